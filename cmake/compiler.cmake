@@ -1,0 +1,24 @@
+# One interface target that carries include paths and flags for all of the project.
+add_library(ambilux_options INTERFACE)
+target_include_directories(ambilux_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(ambilux_options INTERFACE
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wshadow -fno-math-errno>)
+if(AMBILUX_MARCH)
+  target_compile_options(ambilux_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-march=${AMBILUX_MARCH}>)
+endif()
+if(AMBILUX_SANITIZE)
+  target_compile_options(ambilux_options INTERFACE
+    $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${AMBILUX_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all>)
+  target_link_options(ambilux_options INTERFACE -fsanitize=${AMBILUX_SANITIZE})
+endif()
+if(AMBILUX_HAS_CUDA)
+  # Device code calls constexpr host functions; line info costs nothing at run time and serves the profiler.
+  target_compile_options(ambilux_options INTERFACE
+    $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -lineinfo>)
+  target_compile_definitions(ambilux_options INTERFACE AMBILUX_HAS_CUDA=1)
+endif()
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+  set(CMAKE_CUDA_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+endif()

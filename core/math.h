@@ -1,0 +1,113 @@
+// Scalars, frames, affine maps and the ray-origin offset.
+#pragma once
+
+#include <cstring>
+
+#include "core/vec.h"
+
+namespace ambilux {
+
+constexpr float kPi = 3.14159265358979323846f;
+constexpr float kInvPi = 0.31830988618379067154f;
+constexpr float kInv2Pi = 0.15915494309189533577f;
+constexpr float kInv4Pi = 0.07957747154594766788f;
+constexpr float kPiOver2 = 1.57079632679489661923f;
+constexpr float kPiOver4 = 0.78539816339744830961f;
+constexpr float kInfinity = __builtin_huge_valf();
+/// Largest float below 1.
+constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
+
+AMBILUX_HD float sqr(float x) { return x * x; }
+AMBILUX_HD float safe_sqrt(float x) { return sqrtf(fmaxf(x, 0.0f)); }
+AMBILUX_HD float clamp(float x, float lo, float hi) { return fminf(fmaxf(x, lo), hi); }
+AMBILUX_HD float lerp(float a, float b, float t) { return a + (b - a) * t; }
+AMBILUX_HD float degrees_to_radians(float d) { return d * (kPi / 180.0f); }
+
+AMBILUX_HD uint32_t float_bits(float f) {
+    uint32_t u;
+    memcpy(&u, &f, 4);
+    return u;
+}
+AMBILUX_HD float bits_float(uint32_t u) {
+    float f;
+    memcpy(&f, &u, 4);
+    return f;
+}
+
+/// Bound of the relative error after n rounded operations, n·eps/(1-n·eps) (PBRT 4th ed., 6.8.1).
+constexpr float gamma_bound(int n) {
+    const float eps = 0x1p-24f;
+    return n * eps / (1.0f - n * eps);
+}
+
+AMBILUX_HD float next_float_up(float v) {
+    if (v == kInfinity) return v;
+    if (v == 0.0f) v = 0.0f;  // -0 to +0
+    uint32_t u = float_bits(v);
+    u = v >= 0.0f ? u + 1 : u - 1;
+    return bits_float(u);
+}
+AMBILUX_HD float next_float_down(float v) { return -next_float_up(-v); }
+
+/// Orthonormal basis; `n` is its z axis.
+struct Frame {
+    Vec3f s, t, n;
+
+    AMBILUX_HD Vec3f to_local(Vec3f v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
+    AMBILUX_HD Vec3f to_world(Vec3f v) const { return s * v.x + t * v.y + n * v.z; }
+};
+
+/// Frame around a unit vector, without branches (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+AMBILUX_HD Frame frame_from_normal(Vec3f n) {
+    const float sign = copysignf(1.0f, n.z);
+    const float a = -1.0f / (sign + n.z);
+    const float b = n.x * n.y * a;
+    return {{1.0f + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}, n};
+}
+
+/// Frame around unit `n` whose s axis is `dpdu` made orthogonal to it; any frame when they are parallel.
+AMBILUX_HD Frame frame_from_normal_tangent(Vec3f n, Vec3f dpdu) {
+    const Vec3f s = dpdu - n * dot(n, dpdu);
+    const float l2 = length_squared(s);
+    if (!(l2 > 0.0f)) return frame_from_normal(n);
+    const Vec3f unit = s * (1.0f / sqrtf(l2));
+    return {unit, cross(n, unit), n};
+}
+
+/// Affine map, three rows of four. Points are columns.
+struct Affine {
+    float m[3][4];
+
+    AMBILUX_HD Vec3f point(Vec3f p) const {
+        return {m[0][0] * p.x + m[0][1] * p.y + m[0][2] * p.z + m[0][3],
+                m[1][0] * p.x + m[1][1] * p.y + m[1][2] * p.z + m[1][3],
+                m[2][0] * p.x + m[2][1] * p.y + m[2][2] * p.z + m[2][3]};
+    }
+    AMBILUX_HD Vec3f vector(Vec3f v) const {
+        return {m[0][0] * v.x + m[0][1] * v.y + m[0][2] * v.z, m[1][0] * v.x + m[1][1] * v.y + m[1][2] * v.z,
+                m[2][0] * v.x + m[2][1] * v.y + m[2][2] * v.z};
+    }
+    /// Product of the transposed linear part with `n`: call it on the inverse map to transform a normal.
+    AMBILUX_HD Vec3f transposed_vector(Vec3f n) const {
+        return {m[0][0] * n.x + m[1][0] * n.y + m[2][0] * n.z, m[0][1] * n.x + m[1][1] * n.y + m[2][1] * n.z,
+                m[0][2] * n.x + m[1][2] * n.y + m[2][2] * n.z};
+    }
+};
+
+/// Moves `p` off the surface with normal `ng` to the side of `w`, by the absolute error bound `p_error` of `p`
+/// (PBRT 4th ed., 6.8.6). `p_error` bounds each coordinate; `ng` need not point to the side of `w`.
+AMBILUX_HD Vec3f offset_ray_origin(Vec3f p, Vec3f p_error, Vec3f ng, Vec3f w) {
+    const float d = dot(abs(ng), p_error);
+    Vec3f offset = ng * d;
+    if (dot(w, ng) < 0.0f) offset = -offset;
+    Vec3f po = p + offset;
+    for (int i = 0; i < 3; ++i) {
+        if (offset[i] > 0.0f)
+            po[i] = next_float_up(po[i]);
+        else if (offset[i] < 0.0f)
+            po[i] = next_float_down(po[i]);
+    }
+    return po;
+}
+
+}  // namespace ambilux

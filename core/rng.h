@@ -1,0 +1,66 @@
+// Counter-based random numbers: a value is a pure function of (seed, index, sample, stream, block).
+#pragma once
+
+#include "core/math.h"
+
+namespace ambilux {
+
+/// Which walk a number belongs to; light walks of the same index never share numbers with eye walks.
+enum class Stream : uint32_t { eye = 0, light = 1, bench = 2, test = 3 };
+
+/// Names a sequence of random blocks. `index`: pixel or light path; `sample`: sample of that pixel.
+struct RngKey {
+    uint64_t seed;
+    uint32_t index;
+    uint32_t sample;
+    Stream stream;
+};
+
+struct Uint4 {
+    uint32_t x, y, z, w;
+};
+
+AMBILUX_HD uint32_t mul_hi(uint32_t a, uint32_t b) { return uint32_t((uint64_t(a) * b) >> 32); }
+
+/// Philox 4x32 with 7 rounds, the fewest that pass BigCrush (Salmon et al. 2011, "Parallel Random Numbers: As Easy
+/// as 1, 2, 3", table 2).
+AMBILUX_HD Uint4 philox4x32(Uint4 c, uint32_t k0, uint32_t k1) {
+    for (int round = 0; round < 7; ++round) {
+        const uint32_t hi0 = mul_hi(0xD2511F53u, c.x), lo0 = 0xD2511F53u * c.x;
+        const uint32_t hi1 = mul_hi(0xCD9E8D57u, c.z), lo1 = 0xCD9E8D57u * c.z;
+        c = {hi1 ^ c.y ^ k0, lo1, hi0 ^ c.w ^ k1, lo0};
+        k0 += 0x9E3779B9u;
+        k1 += 0xBB67AE85u;
+    }
+    return c;
+}
+
+/// Uniform float in [0,1) from the upper 24 bits.
+AMBILUX_HD float uniform_float(uint32_t bits) { return float(bits >> 8) * 0x1p-24f; }
+
+/// Four uniform 32-bit words for `block` of the sequence.
+AMBILUX_HD Uint4 random_bits(const RngKey& key, uint32_t block) {
+    return philox4x32({key.index, key.sample, block, uint32_t(key.stream)}, uint32_t(key.seed), uint32_t(key.seed >> 32));
+}
+
+/// Four uniform floats in [0,1) for `block` of the sequence.
+AMBILUX_HD Vec4f random_floats(const RngKey& key, uint32_t block) {
+    const Uint4 b = random_bits(key, block);
+    return {uniform_float(b.x), uniform_float(b.y), uniform_float(b.z), uniform_float(b.w)};
+}
+
+/// One uniform float in [0,1) from two words; a cheap hash (Jarzynski and Olano 2020, pcg2d) for decisions that belong to a
+/// (ray, primitive) pair and must not depend on the order in which primitives are visited.
+AMBILUX_HD float hash_float(uint32_t a, uint32_t b) {
+    uint32_t x = a * 1664525u + 1013904223u, y = b * 1664525u + 1013904223u;
+    x += y * 1664525u;
+    y += x * 1664525u;
+    x ^= x >> 16;
+    y ^= y >> 16;
+    x += y * 1664525u;
+    y += x * 1664525u;
+    x ^= x >> 16;
+    return uniform_float(x);
+}
+
+}  // namespace ambilux

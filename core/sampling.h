@@ -1,0 +1,63 @@
+// Warps from the unit square to disks, spheres, hemispheres, cones and triangles (PBRT 4th ed., appendix A.5).
+#pragma once
+
+#include "core/math.h"
+
+namespace ambilux {
+
+/// Uniform point of the unit disk, concentric map (Shirley and Chiu 1997). Density 1/pi per area.
+AMBILUX_HD Vec2f square_to_disk(Vec2f u) {
+    const float a = 2.0f * u.x - 1.0f, b = 2.0f * u.y - 1.0f;
+    if (a == 0.0f && b == 0.0f) return {0.0f, 0.0f};
+    float r, phi;
+    if (fabsf(a) > fabsf(b)) {
+        r = a;
+        phi = kPiOver4 * (b / a);
+    } else {
+        r = b;
+        phi = kPiOver2 - kPiOver4 * (a / b);
+    }
+    return {r * cosf(phi), r * sinf(phi)};
+}
+
+/// Cosine-weighted direction of the upper hemisphere. Density cos(theta)/pi per solid angle.
+AMBILUX_HD Vec3f square_to_cosine_hemisphere(Vec2f u) {
+    const Vec2f d = square_to_disk(u);
+    // Never exactly on the horizon, where the density would be zero.
+    return {d.x, d.y, sqrtf(fmaxf(1.0f - d.x * d.x - d.y * d.y, 1e-14f))};
+}
+
+/// Uniform direction. Density 1/(4 pi) per solid angle.
+AMBILUX_HD Vec3f square_to_sphere(Vec2f u) {
+    const float z = 1.0f - 2.0f * u.x, r = safe_sqrt(1.0f - z * z), phi = 2.0f * kPi * u.y;
+    return {r * cosf(phi), r * sinf(phi), z};
+}
+
+/// Uniform direction in the cone around +z. Density 1/(2 pi (1-cos_max)) per solid angle.
+AMBILUX_HD Vec3f square_to_cone(Vec2f u, float one_minus_cos_max) {
+    const float v = u.x * one_minus_cos_max;  // 1 - cos(theta)
+    const float r = safe_sqrt(v * (2.0f - v)), phi = 2.0f * kPi * u.y;
+    return {r * cosf(phi), r * sinf(phi), 1.0f - v};
+}
+
+/// Uniform barycentrics (b1, b2) of a triangle, square-root map (Turk 1990). Density 1/area per area.
+AMBILUX_HD Vec2f square_to_triangle(Vec2f u) {
+    const float s = sqrtf(u.x);
+    return {s * (1.0f - u.y), s * u.y};
+}
+
+/// Index of the interval that holds `u` in a cumulative table: cdf[0] = 0 ... cdf[n] = 1, non-decreasing.
+/// The result has cdf[i] <= u < cdf[i+1], so an interval of zero width is never returned for u in [0,1).
+AMBILUX_HD uint32_t sample_cdf(const float* cdf, uint32_t n, float u) {
+    uint32_t lo = 0, hi = n;
+    while (hi - lo > 1) {
+        const uint32_t mid = (lo + hi) / 2;
+        if (cdf[mid] <= u)
+            lo = mid;
+        else
+            hi = mid;
+    }
+    return lo;
+}
+
+}  // namespace ambilux

@@ -1,0 +1,69 @@
+// Small float vectors. `Rgb` is linear Rec.709; lengths are in scene units.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "core/hd.h"
+
+namespace ambilux {
+
+struct Vec2f {
+    float x, y;
+};
+
+struct Vec3f {
+    float x, y, z;
+
+    AMBILUX_HD float operator[](int i) const { return i == 0 ? x : (i == 1 ? y : z); }
+    AMBILUX_HD float& operator[](int i) { return i == 0 ? x : (i == 1 ? y : z); }
+    AMBILUX_HD Vec3f& operator+=(Vec3f b) { x += b.x; y += b.y; z += b.z; return *this; }
+    AMBILUX_HD Vec3f& operator*=(Vec3f b) { x *= b.x; y *= b.y; z *= b.z; return *this; }
+    AMBILUX_HD Vec3f& operator*=(float s) { x *= s; y *= s; z *= s; return *this; }
+};
+
+struct Vec4f {
+    float x, y, z, w;
+};
+
+using Rgb = Vec3f;
+
+AMBILUX_HD Vec2f operator+(Vec2f a, Vec2f b) { return {a.x + b.x, a.y + b.y}; }
+AMBILUX_HD Vec2f operator-(Vec2f a, Vec2f b) { return {a.x - b.x, a.y - b.y}; }
+AMBILUX_HD Vec2f operator*(Vec2f a, float s) { return {a.x * s, a.y * s}; }
+AMBILUX_HD Vec2f operator*(float s, Vec2f a) { return a * s; }
+
+AMBILUX_HD Vec3f operator+(Vec3f a, Vec3f b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+AMBILUX_HD Vec3f operator-(Vec3f a, Vec3f b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+AMBILUX_HD Vec3f operator-(Vec3f a) { return {-a.x, -a.y, -a.z}; }
+AMBILUX_HD Vec3f operator*(Vec3f a, Vec3f b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+AMBILUX_HD Vec3f operator*(Vec3f a, float s) { return {a.x * s, a.y * s, a.z * s}; }
+AMBILUX_HD Vec3f operator*(float s, Vec3f a) { return a * s; }
+AMBILUX_HD Vec3f operator/(Vec3f a, Vec3f b) { return {a.x / b.x, a.y / b.y, a.z / b.z}; }
+AMBILUX_HD Vec3f operator/(Vec3f a, float s) { return a * (1.0f / s); }
+AMBILUX_HD bool operator==(Vec3f a, Vec3f b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
+AMBILUX_HD float dot(Vec3f a, Vec3f b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+AMBILUX_HD Vec3f cross(Vec3f a, Vec3f b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+AMBILUX_HD float length_squared(Vec3f a) { return dot(a, a); }
+AMBILUX_HD float length(Vec3f a) { return sqrtf(dot(a, a)); }
+AMBILUX_HD Vec3f normalize(Vec3f a) { return a * (1.0f / length(a)); }
+AMBILUX_HD float max_component(Vec3f a) { return fmaxf(a.x, fmaxf(a.y, a.z)); }
+AMBILUX_HD float min_component(Vec3f a) { return fminf(a.x, fminf(a.y, a.z)); }
+AMBILUX_HD Vec3f min(Vec3f a, Vec3f b) { return {fminf(a.x, b.x), fminf(a.y, b.y), fminf(a.z, b.z)}; }
+AMBILUX_HD Vec3f max(Vec3f a, Vec3f b) { return {fmaxf(a.x, b.x), fmaxf(a.y, b.y), fmaxf(a.z, b.z)}; }
+AMBILUX_HD Vec3f abs(Vec3f a) { return {fabsf(a.x), fabsf(a.y), fabsf(a.z)}; }
+AMBILUX_HD Vec3f splat(float s) { return {s, s, s}; }
+AMBILUX_HD bool is_zero(Vec3f a) { return a.x == 0.0f && a.y == 0.0f && a.z == 0.0f; }
+AMBILUX_HD bool is_finite(Vec3f a) {
+    // A finite float minus itself is zero; NaN and Inf give NaN. Holds without fast-math only.
+    const float s = (a.x - a.x) + (a.y - a.y) + (a.z - a.z);
+    return s == 0.0f;
+}
+
+/// Relative luminance of linear Rec.709 (ITU-R BT.709).
+AMBILUX_HD float luminance(Rgb c) { return 0.212671f * c.x + 0.715160f * c.y + 0.072169f * c.z; }
+
+}  // namespace ambilux

@@ -1,0 +1,95 @@
+// The host's handle on a render in progress: one integrator, one scene, one backend.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "film/moments.h"
+#include "scene/scene.h"
+
+namespace ambilux {
+
+enum class Estimator : uint32_t { naive, nee, mis };
+enum class MisHeuristic : uint32_t { balance, power };
+
+/// All that decides the image, apart from the scene. Every `--set KEY=VALUE` names a field here.
+struct RenderSettings {
+    std::string integrator = "path";
+    std::string variant = "wavefront";
+    std::string backend = "auto";        ///< auto, cpu, cuda
+    Estimator estimator = Estimator::mis;
+    MisHeuristic heuristic = MisHeuristic::balance;
+    int max_depth = -1;                  ///< segments of a path; -1 is unbounded
+    int rr_depth = 5;                    ///< Russian roulette starts at this many segments; a value < 0 turns it off
+    uint64_t seed = 0;
+    std::string accel = "auto";          ///< cpu: embree (auto) or cwbvh (the CUDA traversal built for the host)
+    uint32_t wave_size = 0;              ///< paths in flight; 0 chooses
+    bool specialise = true;              ///< kernels hold only what the scene has
+    bool deterministic = false;
+};
+
+/// Sets one field from text; throws Error(usage) that names the key, the value and what is allowed.
+void apply_setting(RenderSettings& settings, const std::string& key, const std::string& value);
+
+/// What one stage did.
+struct StageStats {
+    std::string name;
+    uint64_t launches = 0, items = 0;
+    double seconds = 0;
+    std::vector<uint64_t> items_by_depth;  ///< index = depth (segments); the last entry gathers all deeper ones
+};
+
+/// Counts of dropped values.
+struct InvalidCounts {
+    uint64_t nan = 0, inf = 0, negative = 0;
+    uint64_t total() const { return nan + inf + negative; }
+};
+
+struct QueueStats {
+    std::string name;
+    uint64_t capacity = 0, peak = 0, overflow = 0;
+};
+
+struct RenderStats {
+    std::string backend, device, accel;
+    double build_seconds = 0;   ///< acceleration structure, upload, allocation
+    double render_seconds = 0;  ///< inside render(), wall clock
+    uint64_t samples = 0;       ///< per pixel
+    uint64_t rays_extend = 0, rays_occlude = 0;
+    std::vector<StageStats> stages;
+    std::vector<QueueStats> queues;
+    InvalidCounts invalid;
+    std::map<std::string, InvalidCounts> invalid_by_stage;
+    uint64_t memory_bytes = 0;            ///< allocated for this render (scene, structure, queues, film)
+    uint64_t memory_bytes_predicted = 0;  ///< computed before the allocation
+    std::vector<std::string> features;    ///< what the kernels contain
+    std::vector<std::string> skipped;     ///< stages and kernel parts that this scene does not need
+};
+
+/// A render in progress. Not thread-safe; `interrupt` may be set from a signal handler.
+class Renderer {
+public:
+    virtual ~Renderer() = default;
+    /// Adds samples [first, first+count) of every pixel to the film. Returns the samples per pixel that were finished: `count`, or
+    /// fewer when *interrupt became true; what was finished is complete for every pixel.
+    virtual uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt = nullptr) = 0;
+    /// Sums over all samples rendered so far, per pixel of the crop.
+    virtual FilmMoments film() = 0;
+    virtual void clear_film() = 0;
+    virtual RenderStats stats() = 0;
+    /// A count for render() after which a caller should look at clocks and signals again: about 0.2 s of work, at least 1.
+    virtual uint32_t preferred_batch() const = 0;
+};
+
+/// Makes the renderer that `settings` names. The scene must outlive it. Throws Error(usage) for unknown names, Error(device) if the backend
+/// is not available.
+std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings& settings);
+
+/// True if this build has the CUDA backend and a device answers.
+bool cuda_available();
+
+}  // namespace ambilux

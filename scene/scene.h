@@ -1,0 +1,71 @@
+// A loaded scene: owns the arrays that a SceneView points to, and what only the host needs to know.
+#pragma once
+
+#include <array>
+#include <utility>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "scene/view.h"
+
+namespace ambilux {
+
+/// How light sampling chooses among emitters.
+enum class LightPicking : uint32_t { power, uniform };
+
+/// Options of the loader.
+struct LoadOptions {
+    bool lenient = false;             ///< replace what is not known, and list each substitution, instead of refusing it
+    uint32_t width = 0, height = 0;   ///< nonzero: replaces the film size (a crop is scaled with it)
+    LightPicking light_picking = LightPicking::power;
+    std::vector<std::pair<std::string, std::string>> parameters;  ///< values of $parameters, over the file's defaults
+};
+
+/// What the file asks of the integrator; the command line has the last word.
+struct IntegratorHint {
+    std::string type = "path";
+    int max_depth = -1;
+    int rr_depth = 5;
+    int spp = 16;
+    bool hide_emitters = false;
+};
+
+struct Scene {
+    std::string path;                        ///< file it came from
+    std::array<uint8_t, 32> content_hash{};  ///< over the XML and every file it names, and the options that change the image
+    std::vector<std::string> warnings;       ///< substitutions made by --lenient, parameters without effect
+    IntegratorHint integrator;
+
+    std::vector<Vec3f> positions, normals;
+    std::vector<Vec2f> uvs;
+    std::vector<Triangle> triangles;
+    std::vector<Quadric> quadrics;
+    std::vector<Shape> shapes;
+    std::vector<Material> materials;
+    std::vector<BsdfRecord> bsdfs;
+    std::vector<Texture> textures;
+    std::vector<uint8_t> texels;
+    std::vector<Emitter> emitters;
+    std::vector<float> emitter_cdf;
+    std::vector<float> tables;
+    uint32_t environment = kNone;
+    Vec3f bounds_center{};
+    float bounds_radius = 0;
+    Sensor sensor{};
+    Features features;  ///< the smallest set that covers the scene
+
+    /// View into this object's arrays; valid while they are not changed.
+    SceneView view() const;
+    /// Bytes of all arrays.
+    uint64_t memory_bytes() const;
+};
+
+/// Fills in what follows from the rest once shapes, materials, textures, emitters and sensor are set: shape areas and their cdfs, pick probabilities,
+/// environment densities, filter table, bounds, features. Call it once after the arrays are complete.
+void finalize_scene(Scene& scene, LightPicking light_picking);
+
+/// Loads a Mitsuba XML scene (formats 0.5, 0.6, 2.x and 3.x). Throws Error(bad_input) with file and line.
+Scene load_mitsuba(const std::string& path, const LoadOptions& options = {});
+
+}  // namespace ambilux

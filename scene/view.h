@@ -1,0 +1,182 @@
+// The scene as kernels see it: plain records in flat arrays, the same on the host and on a device.
+#pragma once
+
+#include "core/features.h"
+#include "core/math.h"
+
+namespace ambilux {
+
+constexpr uint32_t kNone = 0xffffffffu;
+
+/// Colour parameter: `value`, or texture `texture` times `value` when texture >= 0.
+struct ParamRgb {
+    Rgb value = {0, 0, 0};
+    int32_t texture = -1;
+};
+
+/// Scalar parameter: `value`, or the texture's first channel times `value`.
+struct ParamFloat {
+    float value = 0;
+    int32_t texture = -1;
+};
+
+// ---- textures ----
+
+enum class TextureType : uint32_t { bitmap, checkerboard };
+enum class TexelFormat : uint32_t { rgba8, rgba32f };
+enum class WrapMode : uint32_t { repeat, mirror, clamp };
+enum class TextureFilter : uint32_t { nearest, bilinear };
+
+/// 2D texture. (s,t) = to_uv (u,v,1); texel row 0 lies at t = 0 (the loader has flipped images as needed, so that
+/// this holds: the top row of an image file is at t = 1).
+struct Texture {
+    TextureType type;
+    TexelFormat format;
+    WrapMode wrap;
+    TextureFilter filter;
+    uint32_t width, height;
+    uint64_t offset;        ///< first texel, in bytes from SceneView::texels; a multiple of 16
+    uint32_t decode_table;  ///< rgba8: 256 floats in SceneView::tables that turn a byte into a linear value
+    float to_uv[2][3];
+    Rgb color0, color1;  ///< checkerboard: even and odd cells; one period is the unit square, cells are half of it
+};
+
+// ---- surfaces ----
+
+/// Triangle: three vertices and the shape it belongs to.
+struct Triangle {
+    uint32_t v0, v1, v2;
+    uint32_t shape;
+};
+
+/// Analytic shape. Local forms: unit sphere at the origin; unit disk z = 0, normal +z; cylinder x²+y² = 1, 0 <= z <= 1,
+/// normal outwards. `to_world` holds scale (radius, length), rotation and translation; scale is uniform for sphere and disk,
+/// uniform in xy for the cylinder. `flip` reverses the normal.
+struct Quadric {
+    PrimitiveType type;
+    uint32_t shape;
+    uint32_t flip;
+    float radius;  ///< of sphere, disk, cylinder in world units
+    Affine to_world, to_local;
+};
+
+enum ShapeFlags : uint32_t {
+    kShapeHasNormals = 1,  ///< interpolated vertex normals
+    kShapeHasUvs = 2,
+};
+
+/// What all primitives of one shape share. Primitives of a shape are consecutive.
+struct Shape {
+    uint32_t material;
+    uint32_t emitter;  ///< index of its area emitter or kNone
+    uint32_t flags;    ///< ShapeFlags
+    uint32_t first_primitive, primitive_count;
+    float area;  ///< world area
+};
+
+// ---- materials ----
+
+enum class Microfacets : uint32_t { beckmann, ggx };
+
+/// Parameters of one BSDF without its adapters; each type reads what it needs (see transport/bsdf/).
+struct BsdfRecord {
+    BsdfType type = BsdfType::diffuse;
+    Microfacets microfacets = Microfacets::ggx;
+    uint32_t sample_visible = 1;  ///< rough_*: sample visible normals (Heitz and d'Eon 2014)
+    uint32_t nonlinear = 0;       ///< plastic, rough_plastic: colour shifts by internal scattering
+    ParamRgb reflectance;             ///< diffuse, rough_diffuse: reflectance; plastic, rough_plastic: diffuse_reflectance
+    ParamRgb specular_reflectance = {{1, 1, 1}, -1};
+    ParamRgb specular_transmittance = {{1, 1, 1}, -1};
+    Rgb eta = {0, 0, 0};     ///< conductors: real part of the index, relative to the outside
+    float ior = 1.5f;        ///< dielectrics, plastics: interior over exterior index of refraction
+    Rgb k = {0, 0, 0};       ///< conductors: imaginary part, relative to the outside
+    float fdr_internal = 0;  ///< plastics: mean diffuse Fresnel reflectance seen from inside
+    ParamFloat alpha_u, alpha_v;      ///< rough_*: roughness along s and t of the shading frame; rough_diffuse: alpha_u
+    float specular_sampling_weight = 0;  ///< plastics: share of the specular lobe in sampling, before Fresnel
+    uint32_t transmittance_table = kNone;  ///< rough_plastic: kTransmittanceTableSize floats in SceneView::tables
+    int32_t normal_map = -1;  ///< texture of tangent-space normals, or -1
+    int32_t bump_map = -1;    ///< texture of heights, or -1
+    float bump_scale = 1;
+    uint32_t pad = 0;
+};
+
+/// Size of the table of directional transmittance over cos(theta) in [0,1] at equal steps, both ends included.
+constexpr uint32_t kTransmittanceTableSize = 64;
+
+/// A BSDF with its adapters. `front` is used where the ray comes from the side of the shading normal. When `two_sided`, rays from
+/// behind use `back` in a flipped frame; otherwise `back` == `front`, unflipped.
+struct Material {
+    uint32_t front, back;
+    uint32_t two_sided;
+    ParamFloat opacity;  ///< mask: chance that a ray meets the surface
+};
+
+// ---- emitters ----
+
+/// Emitter. `radiance` holds, in this order of types: radiance, intensity (W/sr), intensity, perpendicular irradiance, radiance, radiance scale.
+struct Emitter {
+    EmitterType type;
+    uint32_t shape;           ///< area: its shape
+    uint32_t area_cdf;        ///< area over triangles: primitive_count+1 floats in tables; kNone for a single primitive
+    float pick_probability;   ///< chance that light sampling picks this emitter
+    ParamRgb radiance;        ///< area: textured by surface uv; spot: textured by projection
+    Affine to_world, to_local;///< spot: +z is the axis; envmap: rotation; point, directional: unused
+    Vec3f position;           ///< point, spot
+    Vec3f direction;          ///< directional: direction in which light travels; spot: axis. Unit
+    float cos_cutoff, cos_beam_width;  ///< spot
+    // envmap: latitude-longitude image texels (rgba32f texture `radiance.texture`, row 0 is the top, direction +y) and a piecewise-constant density
+    uint32_t env_marginal;    ///< height+1 floats in tables
+    uint32_t env_conditional; ///< height rows of width+1 floats in tables
+};
+
+// ---- sensor ----
+
+enum class FilterType : uint32_t { box, tent, gaussian };
+/// Entries of the inverse cumulative table of a reconstruction filter minus one.
+constexpr uint32_t kFilterTableSize = 1024;
+
+/// Sensor and film. Film positions are in pixels of the full film, origin at the top left; the image holds the crop.
+struct Sensor {
+    SensorType type;
+    Affine to_world;           ///< camera space: +z is the view direction, +y up, +x LEFT in the image (Mitsuba)
+    Vec2f tan_half_fov;        ///< perspective, thin lens: tangent of half the field of view along x and y of the full film
+                               ///< orthographic: half of the film's extent in camera units
+    Vec2f principal_offset;    ///< shift of the principal point as a fraction of the film size
+    float near_clip, far_clip; ///< along the view axis, scene units
+    float aperture_radius, focus_distance;  ///< thin lens
+    uint32_t film_width, film_height;
+    uint32_t crop_x, crop_y, crop_width, crop_height;
+    FilterType filter;
+    float filter_radius;      ///< pixels
+    uint32_t filter_table;    ///< kFilterTableSize+1 floats in tables: offset in pixels at equal steps of probability
+};
+
+/// Everything a kernel may read. Pointers are host or device memory, as a whole.
+struct SceneView {
+    const Vec3f* positions;  ///< per vertex, world space
+    const Vec3f* normals;    ///< per vertex, unit; arbitrary where the shape lacks them
+    const Vec2f* uvs;        ///< per vertex; arbitrary where the shape lacks them
+    const Triangle* triangles;
+    const Quadric* quadrics;
+    const Shape* shapes;
+    const Material* materials;
+    const BsdfRecord* bsdfs;
+    const Texture* textures;
+    const uint8_t* texels;
+    const Emitter* emitters;
+    const float* emitter_cdf;  ///< emitter_count+1 floats: cumulative pick_probability
+    const float* tables;
+    uint32_t vertex_count, triangle_count, quadric_count, shape_count, material_count, bsdf_count, texture_count, emitter_count;
+    uint32_t environment;      ///< index of the constant or envmap emitter, or kNone
+    Vec3f bounds_center;       ///< bounding sphere of all surfaces (and of the camera position)
+    float bounds_radius;
+    Sensor sensor;
+
+    /// Primitive ids: 0..triangle_count-1 are triangles, then the quadrics.
+    AMBILUX_HD uint32_t primitive_count() const { return triangle_count + quadric_count; }
+    AMBILUX_HD bool is_triangle(uint32_t prim) const { return prim < triangle_count; }
+    AMBILUX_HD const Quadric& quadric(uint32_t prim) const { return quadrics[prim - triangle_count]; }
+    AMBILUX_HD uint32_t shape_of(uint32_t prim) const { return is_triangle(prim) ? triangles[prim].shape : quadric(prim).shape; }
+};
+
+}  // namespace ambilux
