@@ -1,0 +1,142 @@
+// Host-side integrals that plastics need before rendering: mean Fresnel reflectance and transmittance tables. In double.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "scene/view.h"
+
+namespace ambilux {
+namespace precompute {
+
+constexpr double kPiD = 3.14159265358979323846;
+
+/// Gauss-Legendre nodes and weights on [0,1].
+struct Quadrature {
+    std::vector<double> node, weight;
+
+    explicit Quadrature(int n) : node(n), weight(n) {
+        for (int i = 0; i < n; ++i) {
+            double x = std::cos(kPiD * (i + 0.75) / (n + 0.5)), derivative = 1;
+            for (int iteration = 0; iteration < 50; ++iteration) {
+                double p0 = 1, p1 = x;
+                for (int k = 2; k <= n; ++k) {
+                    const double p2 = ((2 * k - 1) * x * p1 - (k - 1) * p0) / k;
+                    p0 = p1;
+                    p1 = p2;
+                }
+                if (n == 1) p0 = 1;
+                derivative = n * (x * p1 - p0) / (x * x - 1);
+                const double step = p1 / derivative;
+                x -= step;
+                if (std::fabs(step) < 1e-15) break;
+            }
+            node[i] = 0.5 * (1 - x);
+            weight[i] = 1 / ((1 - x * x) * derivative * derivative);
+        }
+    }
+};
+
+/// Fresnel reflectance of unpolarised light at cos_i > 0 into relative index eta; `cos_t` is 0 on total reflection.
+inline double fresnel(double cos_i, double eta, double& cos_t) {
+    const double cos2_t = 1 - (1 - cos_i * cos_i) / (eta * eta);
+    cos_t = 0;
+    if (cos2_t <= 0) return 1;
+    cos_t = std::sqrt(cos2_t);
+    const double s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t), p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+    return 0.5 * (s * s + p * p);
+}
+
+/// Smith's masking for one direction, cos > 0 (Walter et al. 2007, equations 34 and exact form of 27).
+inline double smith_g1(Microfacets type, double alpha, double cosine) {
+    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+    if (sine <= 0) return 1;
+    const double a = cosine / (alpha * sine);
+    if (type == Microfacets::ggx) return 2 / (1 + std::sqrt(1 + 1 / (a * a)));
+    const double lambda = a > 6 ? 0.0 : 0.5 * (std::exp(-a * a) / (a * std::sqrt(kPiD)) - std::erfc(a));
+    return 1 / (1 + lambda);
+}
+
+struct Albedo {
+    double reflection, transmission;
+};
+
+/// Directional albedo of a rough dielectric boundary, single scattering, seen at cosine `mu` from the side where the other side has
+/// relative index `eta`. Integral over microfacet normals: slopes are sampled in proportion to D·cos, the azimuth is cut where
+/// normals turn away, so that the integrand is smooth.
+inline Albedo rough_dielectric_albedo(Microfacets type, double alpha, double eta, double mu, const Quadrature& q) {
+    mu = std::max(mu, 1e-6);
+    const double sin_i = std::sqrt(std::max(0.0, 1 - mu * mu));
+    const double g_i = smith_g1(type, alpha, mu) / mu;
+    Albedo sum = {0, 0};
+    for (size_t a = 0; a < q.node.size(); ++a) {
+        // u = 1-(1-v)^2 concentrates nodes at steep normals, where 1/cos of the normal is integrably singular.
+        const double rest = 1 - q.node[a], u1 = rest * rest;
+        const double tan2 = alpha * alpha * (type == Microfacets::ggx ? (1 - u1) / u1 : -std::log(u1));
+        const double cos_m = 1 / std::sqrt(1 + tan2), sin_m = std::sqrt(tan2) * cos_m;
+        const double horizon = sin_i * sin_m > 0 ? -mu * cos_m / (sin_i * sin_m) : -2;
+        const double phi_max = horizon <= -1 ? kPiD : std::acos(std::min(horizon, 1.0));
+        for (size_t b = 0; b < q.node.size(); ++b) {
+            const double cos_phi = std::cos(phi_max * q.node[b]);
+            const double i_dot_m = sin_i * sin_m * cos_phi + mu * cos_m;
+            if (i_dot_m <= 0) continue;
+            double cos_t;
+            const double f = fresnel(i_dot_m, eta, cos_t);
+            const double weight = q.weight[a] * 2 * rest * q.weight[b] * phi_max / kPiD * g_i * i_dot_m / cos_m;
+            const double reflected_z = 2 * i_dot_m * cos_m - mu;
+            if (reflected_z > 0) sum.reflection += weight * f * smith_g1(type, alpha, reflected_z);
+            const double refracted_z = (i_dot_m / eta - cos_t) * cos_m - mu / eta;
+            if (f < 1 && refracted_z < 0) sum.transmission += weight * (1 - f) * smith_g1(type, alpha, -refracted_z);
+        }
+    }
+    return sum;
+}
+
+/// 2·∫ f(mu)·mu dmu over [0,1]; `mu_c` is where f has a square-root kink from above, or 0.
+template <typename Function>
+double cosine_mean(double mu_c, const Quadrature& q, Function f) {
+    double sum = 0;
+    for (size_t i = 0; i < q.node.size(); ++i) {
+        const double t = q.node[i], below = mu_c * t, above = mu_c + (1 - mu_c) * t * t;
+        if (mu_c > 0) sum += q.weight[i] * mu_c * below * f(below);
+        sum += q.weight[i] * (1 - mu_c) * 2 * t * above * f(above);
+    }
+    return 2 * sum;
+}
+
+/// Cosine of the critical angle inside a medium of index `ior` over the outside, 0 where there is none.
+inline double critical_cosine(double ior) { return ior > 1 ? std::sqrt(1 - 1 / (ior * ior)) : 0.0; }
+
+}  // namespace precompute
+
+/// Share of diffuse light arriving from inside that a smooth boundary reflects back inside; `eta` is interior over exterior index
+/// (BsdfRecord::ior). Mitsuba's fdr_int = fresnel_diffuse_reflectance(1/eta), by quadrature instead of a fit.
+inline float fresnel_diffuse_reflectance(float eta) {
+    static const precompute::Quadrature q(64);
+    const double ior = eta;
+    return float(precompute::cosine_mean(precompute::critical_cosine(ior), q, [&](double mu) {
+        double cos_t;
+        return precompute::fresnel(std::max(mu, 1e-12), 1 / ior, cos_t);
+    }));
+}
+
+/// Fills `out` with kTransmittanceTableSize values of the share of light from outside at cosine i/(size-1) that passes a rough
+/// boundary (single scattering; Mitsuba's roughplastic external transmittance). `ior` is interior over exterior index.
+inline void rough_transmittance_table(Microfacets type, float alpha, float ior, float* out) {
+    static const precompute::Quadrature q(80);
+    for (uint32_t i = 0; i < kTransmittanceTableSize; ++i) {
+        const double mu = double(i) / (kTransmittanceTableSize - 1);
+        out[i] = float(precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), ior, mu, q).transmission);
+    }
+}
+
+/// As fresnel_diffuse_reflectance for a rough boundary, single scattering (Mitsuba's roughplastic internal reflectance).
+inline float rough_internal_reflectance(Microfacets type, float alpha, float ior) {
+    static const precompute::Quadrature q(80), mean(32);
+    return float(precompute::cosine_mean(precompute::critical_cosine(ior), mean, [&](double mu) {
+        return precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), 1.0 / ior, mu, q).reflection;
+    }));
+}
+
+}  // namespace ambilux
