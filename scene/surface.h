@@ -17,3 +17,160 @@ struct SurfacePoint {
     uint32_t prim, shape;
 };
 
+/// Octahedral map of a unit vector to [-1,1]² (Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors").
+AMBILUX_HD Vec2f octahedral_encode(Vec3f n) {
+    const float inv = 1.0f / (fabsf(n.x) + fabsf(n.y) + fabsf(n.z));
+    const float x = n.x * inv, y = n.y * inv;
+    if (n.z >= 0.0f) return {x, y};
+    return {copysignf(1.0f - fabsf(y), x), copysignf(1.0f - fabsf(x), y)};
+}
+
+/// Inverse of octahedral_encode; the result is unit within rounding.
+AMBILUX_HD Vec3f octahedral_decode(Vec2f e) {
+    const float z = 1.0f - fabsf(e.x) - fabsf(e.y);
+    const Vec3f n = z >= 0.0f ? Vec3f{e.x, e.y, z} : Vec3f{copysignf(1.0f - fabsf(e.y), e.x), copysignf(1.0f - fabsf(e.x), e.y), z};
+    return normalize(n);
+}
+
+namespace detail {
+
+/// a·b - c·d with one rounding error at most (Kahan; Jeannerod et al. 2013). Its sign is exact, and the same on host and device whatever a compiler fuses.
+AMBILUX_HD float difference_of_products(float a, float b, float c, float d) {
+    const float cd = c * d;
+    const float difference = fmaf(a, b, -cd);
+    const float error = fmaf(-c, d, cd);
+    return difference + error;
+}
+
+AMBILUX_HD Vec3f accurate_cross(Vec3f a, Vec3f b) {
+    return {difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
+            difference_of_products(a.x, b.y, a.y, b.x)};
+}
+
+/// Unit normal of a triangle; any unit vector if it has no area. Scaled first, so that small triangles do not underflow.
+AMBILUX_HD Vec3f triangle_normal(Vec3f e1, Vec3f e2) {
+    const float scale = fmaxf(max_component(abs(e1)), max_component(abs(e2)));
+    if (!(scale > 0.0f)) return {0.0f, 0.0f, 1.0f};
+    const float inv = 1.0f / scale;
+    const Vec3f n = accurate_cross(e1 * inv, e2 * inv);
+    const float l = length(n);
+    if (l > 0.0f) return n * (1.0f / l);
+    // Collinear: orthogonal to the longer edge at least.
+    return frame_from_normal(normalize(length_squared(e1) > length_squared(e2) ? e1 * inv : e2 * inv)).s;
+}
+
+AMBILUX_HD void any_tangents(SurfacePoint& s) {
+    const Frame frame = frame_from_normal(s.ng);
+    s.dpdu = frame.s;
+    s.dpdv = frame.t;
+}
+
+/// Point of triangle `prim` at barycentrics (b1,b2) of its second and third vertex.
+AMBILUX_HD SurfacePoint triangle_surface_at(const SceneView& scene, uint32_t prim, float b1, float b2) {
+    const Triangle tri = scene.triangles[prim];
+    const uint32_t flags = scene.shapes[tri.shape].flags;
+    const Vec3f p0 = scene.positions[tri.v0], p1 = scene.positions[tri.v1], p2 = scene.positions[tri.v2];
+    const float b0 = 1.0f - b1 - b2;
+    SurfacePoint s;
+    s.prim = prim;
+    s.shape = tri.shape;
+    const Vec3f q0 = p0 * b0, q1 = p1 * b1, q2 = p2 * b2;
+    s.p = q0 + q1 + q2;
+    s.p_error = (abs(q0) + abs(q1) + abs(q2)) * gamma_bound(7);  // PBRT 4th ed., 6.8.5
+    const Vec3f e1 = p1 - p0, e2 = p2 - p0;
+    s.ng = triangle_normal(e1, e2);
+    s.ns = s.ng;
+    if (flags & kShapeHasNormals) {
+        const Vec3f n = scene.normals[tri.v0] * b0 + scene.normals[tri.v1] * b1 + scene.normals[tri.v2] * b2;
+        const float l2 = length_squared(n);
+        if (l2 > 1e-20f) s.ns = n * (1.0f / sqrtf(l2));
+    }
+    if (flags & kShapeHasUvs) {
+        const Vec2f t0 = scene.uvs[tri.v0], t1 = scene.uvs[tri.v1], t2 = scene.uvs[tri.v2];
+        s.uv = t0 * b0 + t1 * b1 + t2 * b2;
+        const Vec2f d1 = t1 - t0, d2 = t2 - t0;
+        const float det = difference_of_products(d1.x, d2.y, d1.y, d2.x);
+        if (det == 0.0f) {
+            any_tangents(s);
+        } else {
+            const float inv = 1.0f / det;
+            s.dpdu = (e1 * d2.y - e2 * d1.y) * inv;
+            s.dpdv = (e2 * d1.x - e1 * d2.x) * inv;
+            if (!is_finite(s.dpdu) || !is_finite(s.dpdv)) any_tangents(s);
+        }
+    } else {
+        s.uv = {b1, b2};
+        s.dpdu = e1;
+        s.dpdv = e2;
+    }
+    return s;
+}
+
+/// Bound of |q.to_world.point(local)'s error| when each coordinate of `local` is off by at most `relative` of itself
+/// (PBRT 4th ed., equation 6.30, with the terms of the matrix kept apart from the translation, which is added last).
+AMBILUX_HD Vec3f quadric_error(const Quadric& q, Vec3f local, float relative) {
+    Vec3f e;
+    for (int i = 0; i < 3; ++i) {
+        const float linear = fabsf(q.to_world.m[i][0] * local.x) + fabsf(q.to_world.m[i][1] * local.y) + fabsf(q.to_world.m[i][2] * local.z);
+        e[i] = (gamma_bound(4) + relative) * linear + gamma_bound(2) * fabsf(q.to_world.m[i][3]);
+    }
+    return e;
+}
+
+AMBILUX_HD SurfacePoint quadric_surface_at(const SceneView& scene, uint32_t prim, float u, float v) {
+    const Quadric& q = scene.quadric(prim);
+    SurfacePoint s;
+    s.prim = prim;
+    s.shape = q.shape;
+    Vec3f local, normal;
+    if (q.type == PrimitiveType::sphere) {
+        local = normal = octahedral_decode({u, v});
+        const float r = sqrtf(local.x * local.x + local.y * local.y);
+        float phi = atan2f(local.y, local.x);
+        if (phi < 0.0f) phi += 2.0f * kPi;
+        const float theta = atan2f(r, local.z);
+        s.uv = {phi * kInv2Pi, theta * kInvPi};
+        const float cos_phi = r > 0.0f ? local.x / r : 1.0f, sin_phi = r > 0.0f ? local.y / r : 0.0f;
+        s.dpdu = q.to_world.vector(Vec3f{-local.y, local.x, 0.0f} * (2.0f * kPi));
+        s.dpdv = q.to_world.vector(Vec3f{local.z * cos_phi, local.z * sin_phi, -r} * kPi);
+        // Unit within rounding (5), and to_world's scale stands for `radius`, each rounded on its own.
+        s.p_error = quadric_error(q, local, gamma_bound(9));
+    } else if (q.type == PrimitiveType::disk) {
+        local = {u, v, 0.0f};
+        normal = {0.0f, 0.0f, 1.0f};
+        const float r = sqrtf(u * u + v * v);
+        const float phi = atan2f(v, u) * kInv2Pi;
+        s.uv = {r, phi < 0.0f ? phi + 1.0f : phi};
+        const float cos_phi = r > 0.0f ? u / r : 1.0f, sin_phi = r > 0.0f ? v / r : 0.0f;
+        s.dpdu = q.to_world.vector({cos_phi, sin_phi, 0.0f});
+        s.dpdv = q.to_world.vector(Vec3f{-sin_phi, cos_phi, 0.0f} * (2.0f * kPi * r));
+        s.p_error = quadric_error(q, local, gamma_bound(2));
+    } else {
+        normal = {cosf(u), sinf(u), 0.0f};
+        local = {normal.x, normal.y, v};
+        s.uv = {(u < 0.0f ? u + 2.0f * kPi : u) * kInv2Pi, v};
+        s.dpdu = q.to_world.vector(Vec3f{-normal.y, normal.x, 0.0f} * (2.0f * kPi));
+        s.dpdv = q.to_world.vector({0.0f, 0.0f, 1.0f});
+        // sinf and cosf: 2 ulp on a device (CUDA programming guide, appendix on mathematical functions).
+        s.p_error = quadric_error(q, local, gamma_bound(8));
+    }
+    s.p = q.to_world.point(local);
+    s.ng = normalize(q.to_local.transposed_vector(normal));
+    if (q.flip) s.ng = -s.ng;
+    s.ns = s.ng;
+    return s;
+}
+
+}  // namespace detail
+
+/// The surface point that (prim,u,v) of a Hit names (scene/ray.h); the same for points that emitters sample. World space.
+template <Features F>
+AMBILUX_HD SurfacePoint surface_at(const SceneView& scene, uint32_t prim, float u, float v) {
+    if constexpr (F.has_quadrics()) {
+        if constexpr (!F.has(PrimitiveType::triangle)) return detail::quadric_surface_at(scene, prim, u, v);
+        if (!scene.is_triangle(prim)) return detail::quadric_surface_at(scene, prim, u, v);
+    }
+    return detail::triangle_surface_at(scene, prim, u, v);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,36 @@
+// Surfaces that let a share of the rays pass. One rule for closest and any hit and for every tracer.
+#pragma once
+
+#include "core/rng.h"
+#include "scene/ray.h"
+#include "scene/surface.h"
+#include "transport/texture.h"
+
+namespace ambilux {
+
+/// Texture coordinates at (prim,u,v), without the rest of the surface point.
+template <Features F>
+AMBILUX_HD Vec2f texture_uv(const SceneView& scene, uint32_t prim, float u, float v) {
+    if (scene.is_triangle(prim)) {
+        const Triangle tri = scene.triangles[prim];
+        if (!(scene.shapes[tri.shape].flags & kShapeHasUvs)) return {u, v};
+        return scene.uvs[tri.v0] * (1.0f - u - v) + scene.uvs[tri.v1] * u + scene.uvs[tri.v2] * v;
+    }
+    return surface_at<F>(scene, prim, u, v).uv;
+}
+
+/// True if `ray` meets the surface at (prim,u,v) rather than passing through it: opacity > hash(ray, prim), so the answer does not
+/// depend on the order in which a tracer visits primitives.
+template <Features F>
+AMBILUX_HD bool accept_hit(const SceneView& scene, const Ray& ray, uint32_t prim, float u, float v) {
+    if constexpr (!F.opacity) {
+        return true;
+    } else {
+        const ParamFloat& opacity = scene.materials[scene.shapes[scene.shape_of(prim)].material].opacity;
+        if (opacity.texture < 0 && opacity.value >= 1.0f) return true;
+        const Vec2f uv = F.textures && opacity.texture >= 0 ? texture_uv<F>(scene, prim, u, v) : Vec2f{0.0f, 0.0f};
+        return eval_float<F>(scene, opacity, uv) > hash_float(ray.alpha_seed, prim);
+    }
+}
+
+}  // namespace ambilux
