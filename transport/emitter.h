@@ -1,0 +1,99 @@
+// Emitters: light towards a point (next event estimation), its density, and radiance seen directly. Units and orientation are Mitsuba's.
+#pragma once
+
+#include "transport/emitter/area.h"
+#include "transport/emitter/constant.h"
+#include "transport/emitter/directional.h"
+#include "transport/emitter/envmap.h"
+#include "transport/emitter/point.h"
+#include "transport/emitter/spot.h"
+
+namespace ambilux {
+
+AMBILUX_HD constexpr bool is_delta(EmitterType type) {
+    return type == EmitterType::point || type == EmitterType::spot || type == EmitterType::directional;
+}
+
+/// Picks an emitter by the scene's pick probabilities and samples its light towards `reference_p` (world space). `u` in [0,1)^4: x picks the
+/// emitter, y and z place the sample on it, w picks the primitive of a mesh. False when the sample carries no light (nothing to
+/// add, still one sample); then `s` is not to be read.
+template <Features F>
+AMBILUX_HD bool sample_emitter_direct(const SceneView& view, Vec3f reference_p, Vec4f u, EmitterSample& s) {
+    if (view.emitter_count == 0) return false;
+    const uint32_t index = sample_cdf(view.emitter_cdf, view.emitter_count, u.x);
+    const Emitter& emitter = view.emitters[index];
+    const Vec2f u_position = {u.y, u.z};
+    bool lit = false;
+    s.emitter = index;
+    switch (emitter.type) {
+        case EmitterType::area:
+            if constexpr (F.has(EmitterType::area)) lit = area_sample_direct<F>(view, emitter, reference_p, u.w, u_position, s);
+            break;
+        case EmitterType::point:
+            if constexpr (F.has(EmitterType::point)) lit = point_sample_direct(emitter, reference_p, s);
+            break;
+        case EmitterType::spot:
+            if constexpr (F.has(EmitterType::spot)) lit = spot_sample_direct<F>(view, emitter, reference_p, s);
+            break;
+        case EmitterType::directional:
+            if constexpr (F.has(EmitterType::directional)) lit = directional_sample_direct(view, emitter, reference_p, s);
+            break;
+        case EmitterType::constant:
+            if constexpr (F.has(EmitterType::constant)) lit = constant_sample_direct(view, emitter, reference_p, u_position, s);
+            break;
+        case EmitterType::envmap:
+            if constexpr (F.has(EmitterType::envmap)) lit = envmap_sample_direct(view, emitter, reference_p, u_position, s);
+            break;
+        default: break;
+    }
+    // Written so that NaN fails too.
+    return lit && s.pdf_sa > 0.0f && s.pdf_sa < kInfinity && max_component(s.radiance) > 0.0f;
+}
+
+/// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` at `reference_p` by way of area emitter
+/// `emitter`, which a ray along `wi` meets at `hit`. Zero for every other type: no ray meets those.
+template <Features F>
+AMBILUX_HD float pdf_emitter_direct(const SceneView& view, uint32_t emitter, Vec3f reference_p, Vec3f wi, const SurfacePoint& hit) {
+    if constexpr (F.has(EmitterType::area)) {
+        const Emitter& e = view.emitters[emitter];
+        if (e.type == EmitterType::area) return area_pdf_direct<F>(view, e, reference_p, wi, hit);
+    }
+    return 0.0f;
+}
+
+/// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` by way of the environment; zero without one.
+template <Features F>
+AMBILUX_HD float pdf_environment_direct(const SceneView& view, Vec3f wi) {
+    if constexpr (F.has_environment()) {
+        if (view.environment == kNone) return 0.0f;
+        const Emitter& e = view.emitters[view.environment];
+        if (F.has(EmitterType::envmap) && e.type == EmitterType::envmap) return envmap_pdf_direct(view, e, wi);
+        return e.pick_probability * kInv4Pi;
+    }
+    return 0.0f;
+}
+
+/// Radiance that emitter `emitter` sends from the surface point `point` along unit `wo`; zero if it is no area emitter.
+template <Features F>
+AMBILUX_HD Rgb emitted_radiance(const SceneView& view, uint32_t emitter, const SurfacePoint& point, Vec3f wo) {
+    if constexpr (F.has(EmitterType::area)) {
+        if (emitter == kNone) return {0, 0, 0};
+        const Emitter& e = view.emitters[emitter];
+        if (e.type == EmitterType::area) return area_radiance<F>(view, e, point, wo);
+    }
+    return {0, 0, 0};
+}
+
+/// Radiance that arrives from unit `wi` where nothing is met; zero without an environment.
+template <Features F>
+AMBILUX_HD Rgb environment_radiance(const SceneView& view, Vec3f wi) {
+    if constexpr (F.has_environment()) {
+        if (view.environment == kNone) return {0, 0, 0};
+        const Emitter& e = view.emitters[view.environment];
+        if (F.has(EmitterType::envmap) && e.type == EmitterType::envmap) return envmap_radiance(view, e, wi);
+        return e.radiance.value;
+    }
+    return {0, 0, 0};
+}
+
+}  // namespace ambilux

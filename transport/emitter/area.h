@@ -1,0 +1,157 @@
+// Area emitter: every point of its shape radiates `radiance` into the hemisphere around the geometric normal.
+#pragma once
+
+#include "transport/emitter/sample.h"
+#include "transport/texture.h"
+
+namespace ambilux {
+
+/// Radiance that the area emitter sends from `point` along unit `wo`; zero behind the geometric normal (two-sided light
+/// needs two shapes, as in Mitsuba).
+template <Features F>
+AMBILUX_HD Rgb area_radiance(const SceneView& view, const Emitter& emitter, const SurfacePoint& point, Vec3f wo) {
+    if (!(dot(point.ng, wo) > 0.0f)) return {0, 0, 0};
+    return eval_rgb<F>(view, emitter.radiance, point.uv);
+}
+
+AMBILUX_HD float triangle_area(const SceneView& view, uint32_t prim) {
+    const Triangle& t = view.triangles[prim];
+    const Vec3f p0 = view.positions[t.v0];
+    return 0.5f * length(cross(view.positions[t.v1] - p0, view.positions[t.v2] - p0));
+}
+
+/// Density per area with which area_sample_point picks a point of primitive `prim`. It uses the difference of the rounded
+/// table, not 1/area of the shape: that is what sampling does, and in meshes of many triangles the two differ.
+AMBILUX_HD float area_pdf_position(const SceneView& view, const Emitter& emitter, uint32_t prim) {
+    const Shape& shape = view.shapes[emitter.shape];
+    if (!view.is_triangle(prim)) return 1.0f / shape.area;
+    const float area = triangle_area(view, prim);
+    if (emitter.area_cdf == kNone) return 1.0f / area;
+    const float* cdf = view.tables + emitter.area_cdf + (prim - shape.first_primitive);
+    return (cdf[1] - cdf[0]) / area;
+}
+
+/// Uniform point of the emitter's shape: `u` places it on a primitive that `u_primitive` chose by area.
+template <Features F>
+AMBILUX_HD SurfacePoint area_sample_point(const SceneView& view, const Emitter& emitter, float u_primitive, Vec2f u) {
+    const Shape& shape = view.shapes[emitter.shape];
+    uint32_t prim = shape.first_primitive;
+    if (emitter.area_cdf != kNone)
+        prim += sample_cdf(view.tables + emitter.area_cdf, shape.primitive_count, u_primitive);
+    Vec2f c;
+    if (!F.has_quadrics() || view.is_triangle(prim)) {
+        c = square_to_triangle(u);
+    } else {
+        const PrimitiveType type = view.quadric(prim).type;
+        if (type == PrimitiveType::sphere)
+            c = octahedral_encode(square_to_sphere(u));
+        else if (type == PrimitiveType::disk)
+            c = square_to_disk(u);
+        else
+            c = {kPi * (2.0f * u.x - 1.0f), u.y};
+    }
+    return surface_at<F>(view, prim, c.x, c.y);
+}
+
+/// The cone in which a sphere is seen from outside.
+struct SphereCone {
+    Vec3f axis;                ///< unit, from the reference to the centre
+    float distance;            ///< to the centre
+    float sin2_max;            ///< of the half angle
+    float one_minus_cos_max;   ///< without cancellation for small and far spheres
+    bool outside;              ///< false: the reference is on or inside the sphere, the rest is not set
+};
+
+AMBILUX_HD Vec3f quadric_center(const Quadric& q) { return {q.to_world.m[0][3], q.to_world.m[1][3], q.to_world.m[2][3]}; }
+
+AMBILUX_HD SphereCone sphere_cone(const Quadric& sphere, Vec3f reference_p) {
+    const Vec3f to_center = quadric_center(sphere) - reference_p;
+    const float d2 = length_squared(to_center), r2 = sphere.radius * sphere.radius;
+    SphereCone cone{};
+    cone.outside = d2 > r2;
+    if (!cone.outside) return cone;
+    cone.distance = sqrtf(d2);
+    cone.axis = to_center * (1.0f / cone.distance);
+    cone.sin2_max = r2 / d2;
+    cone.one_minus_cos_max = cone.sin2_max / (1.0f + safe_sqrt(1.0f - cone.sin2_max));
+    return cone;
+}
+
+/// Direct light from a sphere seen from outside: a direction uniform in its cone. The point follows from the angle at the
+/// centre, which stays exact where intersecting a ray would cancel (PBRT 4th ed., 6.2.4).
+template <Features F>
+AMBILUX_HD bool area_sample_sphere(const SceneView& view, const Emitter& emitter, uint32_t prim, const SphereCone& cone,
+                                   Vec3f reference_p, Vec2f u, EmitterSample& s) {
+    const Quadric& sphere = view.quadric(prim);
+    if (sphere.flip) return false;  // radiates inwards
+    const Vec3f local = square_to_cone(u, cone.one_minus_cos_max);
+    const Frame frame = frame_from_normal(cone.axis);
+    const float sin2 = fminf(local.x * local.x + local.y * local.y, cone.sin2_max), cos_theta = local.z;
+    // alpha: angle at the centre between the way back to the reference and the way to the point
+    const float root = safe_sqrt(1.0f - sin2 / cone.sin2_max);
+    const float cos_alpha = sin2 / sqrtf(cone.sin2_max) + cos_theta * root;
+    const float sin_alpha = safe_sqrt(1.0f - cos_alpha * cos_alpha);
+    const float sin_theta = sqrtf(local.x * local.x + local.y * local.y);
+    const Vec3f side = sin_theta > 0.0f ? (frame.s * local.x + frame.t * local.y) * (1.0f / sin_theta) : frame.s;
+    s.ng = normalize(side * sin_alpha - cone.axis * cos_alpha);
+    const Vec3f center = quadric_center(sphere);
+    s.p = center + s.ng * sphere.radius;
+    s.p_error = (abs(center) + splat(sphere.radius)) * gamma_bound(8);
+    s.wi = frame.to_world(local);
+    s.distance = length(s.p - reference_p);
+    s.pdf_sa = emitter.pick_probability * kInv2Pi / cone.one_minus_cos_max;
+    if (F.textures && emitter.radiance.texture >= 0) {
+        const Vec2f c = octahedral_encode(normalize(sphere.to_local.vector(s.ng)));
+        s.radiance = eval_rgb<F>(view, emitter.radiance, surface_at<F>(view, prim, c.x, c.y).uv);
+    } else {
+        s.radiance = emitter.radiance.value;
+    }
+    return s.distance > 0.0f;
+}
+
+/// Direct light from an area emitter at `reference_p`; false when the sample carries none. Sphere from outside: by solid angle;
+/// everything else: by area.
+template <Features F>
+AMBILUX_HD bool area_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, float u_primitive,
+                                   Vec2f u, EmitterSample& s) {
+    s.delta = false;
+    if constexpr (F.has(PrimitiveType::sphere)) {
+        const uint32_t prim = view.shapes[emitter.shape].first_primitive;
+        if (!view.is_triangle(prim) && view.quadric(prim).type == PrimitiveType::sphere) {
+            const SphereCone cone = sphere_cone(view.quadric(prim), reference_p);
+            if (cone.outside) return area_sample_sphere<F>(view, emitter, prim, cone, reference_p, u, s);
+        }
+    }
+    const SurfacePoint point = area_sample_point<F>(view, emitter, u_primitive, u);
+    const Vec3f to_light = point.p - reference_p;
+    const float d2 = length_squared(to_light);
+    if (!(d2 > 0.0f)) return false;
+    s.p = point.p;
+    s.p_error = point.p_error;
+    s.ng = point.ng;
+    s.distance = sqrtf(d2);
+    s.wi = to_light * (1.0f / s.distance);
+    const float cos_light = -dot(point.ng, s.wi);
+    if (!(cos_light > 0.0f)) return false;
+    s.radiance = eval_rgb<F>(view, emitter.radiance, point.uv);
+    s.pdf_sa = emitter.pick_probability * area_pdf_position(view, emitter, point.prim) * d2 / cos_light;
+    return true;
+}
+
+/// Density per solid angle, pick probability included, with which area_sample_direct returns direction `wi` when that meets the
+/// emitter at `hit`; zero at the back, which it never returns.
+template <Features F>
+AMBILUX_HD float area_pdf_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec3f wi, const SurfacePoint& hit) {
+    const float cos_light = -dot(hit.ng, wi);
+    if (!(cos_light > 0.0f)) return 0.0f;
+    if constexpr (F.has(PrimitiveType::sphere)) {
+        if (!view.is_triangle(hit.prim) && view.quadric(hit.prim).type == PrimitiveType::sphere) {
+            const Quadric& sphere = view.quadric(hit.prim);
+            const SphereCone cone = sphere_cone(sphere, reference_p);
+            if (cone.outside) return sphere.flip ? 0.0f : emitter.pick_probability * kInv2Pi / cone.one_minus_cos_max;
+        }
+    }
+    return emitter.pick_probability * area_pdf_position(view, emitter, hit.prim) * length_squared(hit.p - reference_p) / cos_light;
+}
+
+}  // namespace ambilux

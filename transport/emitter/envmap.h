@@ -1,0 +1,105 @@
+// Environment map: radiance by a latitude-longitude image, importance sampled by a piecewise-constant density over the image.
+//
+// Mapping (Mitsuba 3's envmap): u = atan2(x, -z) / 2pi runs to the right, v = theta / pi from the top (+y) down. Columns are
+// periodic with centres at (i+0.5)/width; rows are spread from pole to pole, row j at v = j/(height-1).
+// Density: cells of 1/width by 1/height in (u,v). A cell's probability must be positive wherever the interpolated radiance in it is:
+// envmap_cell_weight gives weights that guarantee it.
+#pragma once
+
+#include "transport/emitter/directional.h"
+#include "transport/texture.h"
+
+namespace ambilux {
+
+/// Image coordinates of a direction in the map's own frame; precise at the poles too.
+AMBILUX_HD Vec2f envmap_uv(Vec3f local) {
+    const float u = atan2f(local.x, -local.z) * kInv2Pi;
+    const float v = atan2f(sqrtf(local.x * local.x + local.z * local.z), local.y) * kInvPi;
+    return {u < 0.0f ? u + 1.0f : u, v};
+}
+
+/// Unit direction in the map's own frame of image coordinates.
+AMBILUX_HD Vec3f envmap_direction(Vec2f uv, float& sin_theta) {
+    const float theta = uv.y * kPi, phi = uv.x * (2.0f * kPi);
+    sin_theta = sinf(theta);
+    return {sinf(phi) * sin_theta, cosf(theta), -cosf(phi) * sin_theta};
+}
+
+/// Radiance at image coordinates, u periodic, v in [0,1].
+AMBILUX_HD Rgb envmap_lookup(const SceneView& view, const Emitter& emitter, Vec2f uv) {
+    const Texture& texture = view.textures[emitter.radiance.texture];
+    const int32_t w = int32_t(texture.width), h = int32_t(texture.height);
+    const float x = reduce_coordinate(uv.x, WrapMode::repeat) * float(w) - 0.5f;
+    const float y = clamp(uv.y, 0.0f, 1.0f) * float(h - 1);
+    const float fx = floorf(x), fy = floorf(y);
+    const float wx = x - fx, wy = y - fy;
+    const uint32_t x0 = wrap_texel(int32_t(fx), w, WrapMode::repeat), x1 = wrap_texel(int32_t(fx) + 1, w, WrapMode::repeat);
+    const uint32_t y0 = wrap_texel(int32_t(fy), h, WrapMode::clamp), y1 = wrap_texel(int32_t(fy) + 1, h, WrapMode::clamp);
+    const Rgb row0 = load_texel(view, texture, x0, y0) * (1.0f - wx) + load_texel(view, texture, x1, y0) * wx;
+    const Rgb row1 = load_texel(view, texture, x0, y1) * (1.0f - wx) + load_texel(view, texture, x1, y1) * wx;
+    return emitter.radiance.value * (row0 * (1.0f - wy) + row1 * wy);
+}
+
+/// Radiance that arrives from unit `wi`, world space.
+AMBILUX_HD Rgb envmap_radiance(const SceneView& view, const Emitter& emitter, Vec3f wi) {
+    return envmap_lookup(view, emitter, envmap_uv(emitter.to_local.vector(wi)));
+}
+
+/// Unnormalised probability of density cell (x,y): mean of luminance times sin(theta) over a 4x4 grid in the cell. The outer
+/// points lie near its border, so that it is positive as soon as a texel that reaches into the cell is not black.
+AMBILUX_HD float envmap_cell_weight(const SceneView& view, const Emitter& emitter, uint32_t x, uint32_t y) {
+    const Texture& texture = view.textures[emitter.radiance.texture];
+    float sum = 0.0f;
+    for (int j = 0; j < 4; ++j) {
+        const float v = (float(y) + (float(j) + 0.5f) * 0.25f) / float(texture.height);
+        for (int i = 0; i < 4; ++i) {
+            const float u = (float(x) + (float(i) + 0.5f) * 0.25f) / float(texture.width);
+            sum += fmaxf(luminance(envmap_lookup(view, emitter, {u, v})), 0.0f) * sinf(v * kPi);
+        }
+    }
+    return sum * (1.0f / 16.0f);
+}
+
+/// Density per unit square of (u,v) that the tables give cell (x,y).
+AMBILUX_HD float envmap_pdf_cell(const SceneView& view, const Emitter& emitter, uint32_t x, uint32_t y) {
+    const Texture& texture = view.textures[emitter.radiance.texture];
+    const float* marginal = view.tables + emitter.env_marginal + y;
+    const float* conditional = view.tables + emitter.env_conditional + uint64_t(y) * (texture.width + 1) + x;
+    return (marginal[1] - marginal[0]) * float(texture.height) * (conditional[1] - conditional[0]) * float(texture.width);
+}
+
+/// Density per unit square of (u,v) to density per solid angle: dw = 2 pi² sin(theta) du dv.
+AMBILUX_HD float envmap_pdf_to_sa(float pdf_uv, float sin_theta) {
+    return sin_theta > 0.0f ? pdf_uv / (2.0f * kPi * kPi * sin_theta) : 0.0f;
+}
+
+AMBILUX_HD bool envmap_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec2f u, EmitterSample& s) {
+    const Texture& texture = view.textures[emitter.radiance.texture];
+    const float* marginal = view.tables + emitter.env_marginal;
+    const uint32_t y = sample_cdf(marginal, texture.height, u.y);
+    const float* conditional = view.tables + emitter.env_conditional + uint64_t(y) * (texture.width + 1);
+    const uint32_t x = sample_cdf(conditional, texture.width, u.x);
+    const float du = clamp((u.x - conditional[x]) / (conditional[x + 1] - conditional[x]), 0.0f, kOneMinusEpsilon);
+    const float dv = clamp((u.y - marginal[y]) / (marginal[y + 1] - marginal[y]), 0.0f, kOneMinusEpsilon);
+    const Vec2f uv = {(float(x) + du) / float(texture.width), (float(y) + dv) / float(texture.height)};
+    float sin_theta;
+    s.wi = normalize(emitter.to_world.vector(envmap_direction(uv, sin_theta)));
+    place_at_infinity(view, reference_p, s);
+    s.radiance = envmap_lookup(view, emitter, uv);
+    s.pdf_sa = emitter.pick_probability * envmap_pdf_to_sa(envmap_pdf_cell(view, emitter, x, y), sin_theta);
+    s.delta = false;
+    return true;
+}
+
+/// Density per solid angle of unit `wi`, pick probability included.
+AMBILUX_HD float envmap_pdf_direct(const SceneView& view, const Emitter& emitter, Vec3f wi) {
+    const Texture& texture = view.textures[emitter.radiance.texture];
+    const Vec3f local = normalize(emitter.to_local.vector(wi));
+    const Vec2f uv = envmap_uv(local);
+    const uint32_t x = uint32_t(wrap_texel(int32_t(uv.x * float(texture.width)), int32_t(texture.width), WrapMode::clamp));
+    const uint32_t y = uint32_t(wrap_texel(int32_t(uv.y * float(texture.height)), int32_t(texture.height), WrapMode::clamp));
+    const float sin_theta = sqrtf(local.x * local.x + local.z * local.z);
+    return emitter.pick_probability * envmap_pdf_to_sa(envmap_pdf_cell(view, emitter, x, y), sin_theta);
+}
+
+}  // namespace ambilux
