@@ -6,25 +6,185 @@
 // - TransportMode::radiance: walk from the camera; importance: walk from a light. They differ by eta² on refraction only; the factor for
 //   shading normals is applied outside, once around all BSDFs (transport/surface_scattering.h).
 // - pdf_sa is the density of wo per solid angle that sample uses; it is the same in both modes up to the swap of roles.
+// - sample takes u.x for the choice of a lobe and (u.y, u.z) for the direction, uniform in [0,1); false means that the walk ends.
+//
+// A new BSDF is one file in transport/bsdf/ with eval, pdf and sample, a BsdfType, and a case in resolve_bsdf and with_bsdf.
 #pragma once
 
 #include "scene/view.h"
+#include "transport/bsdf/conductor.h"
+#include "transport/bsdf/dielectric.h"
+#include "transport/bsdf/diffuse.h"
+#include "transport/bsdf/plastic.h"
+#include "transport/bsdf/rough_conductor.h"
+#include "transport/bsdf/rough_dielectric.h"
+#include "transport/bsdf/rough_diffuse.h"
+#include "transport/bsdf/rough_plastic.h"
+#include "transport/bsdf/sample.h"
+#include "transport/bsdf/thin_dielectric.h"
+#include "transport/texture.h"
 
 namespace ambilux {
 
-enum class TransportMode : uint32_t { radiance, importance };
-
-enum ScatterFlags : uint32_t {
-    kScatterDelta = 1,         ///< sampled from a delta lobe: pdf_sa is a probability (mass), not a density
-    kScatterTransmission = 2,  ///< wi and wo on different sides
+/// Parameters of a BsdfRecord at one surface point, textures looked up. Types share fields; each sets and reads its own only.
+struct Bsdf {
+    BsdfType type;
+    Microfacets microfacets;
+    bool sample_visible, nonlinear;
+    Rgb reflectance_or_eta;       ///< diffuse and plastics: diffuse reflectance; conductors: eta
+    Rgb specular_reflectance;
+    Rgb transmittance_or_k;       ///< dielectrics: specular transmittance; conductors: k
+    float ior;
+    float alpha_u, alpha_v;
+    float fdr_internal, specular_sampling_weight;
+    const float* transmittance_table;
 };
 
-/// Result of sampling a BSDF.
-struct BsdfSample {
-    Vec3f wo;
-    float pdf_sa;    ///< density per solid angle of all smooth lobes together; for a delta lobe its probability
-    Rgb weight;      ///< f·|cos(wo)|/pdf
-    float eta;       ///< relative index passed through (interior/exterior seen along the walk); 1 without refraction
-    uint32_t flags;  ///< ScatterFlags
-};
+/// Looks up the parameters of `record` at texture coordinates `uv`. Microfacet roughness is at least kMinAlpha.
+template <Features F>
+AMBILUX_HD Bsdf resolve_bsdf(const SceneView& scene, const BsdfRecord& record, Vec2f uv) {
+    Bsdf b = {};
+    b.type = record.type;
+    const auto specular_reflectance = [&] { b.specular_reflectance = eval_rgb<F>(scene, record.specular_reflectance, uv); };
+    const auto reflectance = [&] { b.reflectance_or_eta = eval_rgb<F>(scene, record.reflectance, uv); };
+    const auto conductor = [&] {
+        specular_reflectance();
+        b.reflectance_or_eta = record.eta;
+        b.transmittance_or_k = record.k;
+    };
+    const auto dielectric = [&] {
+        specular_reflectance();
+        b.transmittance_or_k = eval_rgb<F>(scene, record.specular_transmittance, uv);
+        b.ior = record.ior;
+    };
+    const auto plastic = [&] {
+        specular_reflectance();
+        reflectance();
+        b.ior = record.ior;
+        b.nonlinear = record.nonlinear != 0;
+        b.fdr_internal = record.fdr_internal;
+        b.specular_sampling_weight = record.specular_sampling_weight;
+    };
+    const auto microfacets = [&] {
+        b.microfacets = record.microfacets;
+        b.sample_visible = record.sample_visible != 0;
+        b.alpha_u = fmaxf(eval_float<F>(scene, record.alpha_u, uv), kMinAlpha);
+        b.alpha_v = fmaxf(eval_float<F>(scene, record.alpha_v, uv), kMinAlpha);
+    };
+    switch (record.type) {
+        case BsdfType::diffuse:
+            if constexpr (F.has(BsdfType::diffuse)) reflectance();
+            break;
+        case BsdfType::rough_diffuse:
+            if constexpr (F.has(BsdfType::rough_diffuse)) {
+                reflectance();
+                b.alpha_u = eval_float<F>(scene, record.alpha_u, uv);
+            }
+            break;
+        case BsdfType::conductor:
+            if constexpr (F.has(BsdfType::conductor)) conductor();
+            break;
+        case BsdfType::rough_conductor:
+            if constexpr (F.has(BsdfType::rough_conductor)) {
+                conductor();
+                microfacets();
+            }
+            break;
+        case BsdfType::dielectric:
+            if constexpr (F.has(BsdfType::dielectric)) dielectric();
+            break;
+        case BsdfType::thin_dielectric:
+            if constexpr (F.has(BsdfType::thin_dielectric)) dielectric();
+            break;
+        case BsdfType::rough_dielectric:
+            if constexpr (F.has(BsdfType::rough_dielectric)) {
+                dielectric();
+                microfacets();
+            }
+            break;
+        case BsdfType::plastic:
+            if constexpr (F.has(BsdfType::plastic)) plastic();
+            break;
+        case BsdfType::rough_plastic:
+            if constexpr (F.has(BsdfType::rough_plastic)) {
+                plastic();
+                microfacets();
+                b.transmittance_table = scene.tables + record.transmittance_table;
+            }
+            break;
+        case BsdfType::count: break;
+    }
+    return b;
+}
+
+/// Calls `op` with the BSDF that `b` stands for; `otherwise` when kernels of features F do not know it.
+template <Features F, typename Result, typename Op>
+AMBILUX_HD Result with_bsdf(const Bsdf& b, Result otherwise, Op op) {
+    const MicrofacetDistribution microfacets = {b.microfacets, b.alpha_u, b.alpha_v};
+    switch (b.type) {
+        case BsdfType::diffuse:
+            if constexpr (F.has(BsdfType::diffuse)) return op(Diffuse{b.reflectance_or_eta});
+            break;
+        case BsdfType::rough_diffuse:
+            if constexpr (F.has(BsdfType::rough_diffuse)) return op(RoughDiffuse{b.reflectance_or_eta, b.alpha_u});
+            break;
+        case BsdfType::conductor:
+            if constexpr (F.has(BsdfType::conductor))
+                return op(Conductor{b.specular_reflectance, b.reflectance_or_eta, b.transmittance_or_k});
+            break;
+        case BsdfType::rough_conductor:
+            if constexpr (F.has(BsdfType::rough_conductor))
+                return op(RoughConductor{b.specular_reflectance, b.reflectance_or_eta, b.transmittance_or_k, microfacets,
+                                         b.sample_visible});
+            break;
+        case BsdfType::dielectric:
+            if constexpr (F.has(BsdfType::dielectric)) return op(Dielectric{b.specular_reflectance, b.transmittance_or_k, b.ior});
+            break;
+        case BsdfType::thin_dielectric:
+            if constexpr (F.has(BsdfType::thin_dielectric))
+                return op(ThinDielectric{b.specular_reflectance, b.transmittance_or_k, b.ior});
+            break;
+        case BsdfType::rough_dielectric:
+            if constexpr (F.has(BsdfType::rough_dielectric))
+                return op(RoughDielectric{b.specular_reflectance, b.transmittance_or_k, b.ior, microfacets, b.sample_visible});
+            break;
+        case BsdfType::plastic:
+            if constexpr (F.has(BsdfType::plastic))
+                return op(Plastic{b.reflectance_or_eta, b.specular_reflectance, b.ior, b.fdr_internal, b.specular_sampling_weight,
+                                  b.nonlinear});
+            break;
+        case BsdfType::rough_plastic:
+            if constexpr (F.has(BsdfType::rough_plastic))
+                return op(RoughPlastic{b.reflectance_or_eta, b.specular_reflectance, b.ior, b.fdr_internal,
+                                       b.specular_sampling_weight, b.nonlinear, microfacets, b.sample_visible,
+                                       b.transmittance_table});
+            break;
+        case BsdfType::count: break;
+    }
+    return otherwise;
+}
+
+/// f(wi,wo)·|cos(wo)| of the smooth lobes; 0 where sides do not fit.
+template <Features F>
+AMBILUX_HD Rgb bsdf_eval(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
+    return with_bsdf<F>(b, Rgb{0.0f, 0.0f, 0.0f}, [&](const auto& bsdf) { return bsdf.eval(wi, wo, mode); });
+}
+
+/// Density of wo per solid angle over the smooth lobes, the chance of choosing them included; 0 where sides do not fit.
+template <Features F>
+AMBILUX_HD float bsdf_pdf(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
+    return with_bsdf<F>(b, 0.0f, [&](const auto& bsdf) { return bsdf.pdf(wi, wo, mode); });
+}
+
+/// Draws wo from uniform u in [0,1)³ (x: lobe). False when nothing is scattered; `out` is then unspecified.
+template <Features F>
+AMBILUX_HD bool bsdf_sample(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) {
+    return with_bsdf<F>(b, false, [&](const auto& bsdf) { return bsdf.sample(wi, u, mode, out); });
+}
+
+/// True if there is a lobe that is not a delta, so that connecting to other vertices can give light.
+AMBILUX_HD bool bsdf_is_smooth(const Bsdf& b) {
+    return b.type != BsdfType::conductor && b.type != BsdfType::dielectric && b.type != BsdfType::thin_dielectric;
+}
+
 }  // namespace ambilux

@@ -131,12 +131,18 @@ inline void rough_transmittance_table(Microfacets type, float alpha, float ior, 
     }
 }
 
-/// As fresnel_diffuse_reflectance for a rough boundary, single scattering (Mitsuba's roughplastic internal reflectance).
+/// As fresnel_diffuse_reflectance for a rough boundary, single scattering (Mitsuba's roughplastic internal reflectance). The mean
+/// over angles is Mitsuba's plain sum over the table's cosines, 1.6 % below the integral: the exact value would make rough
+/// plastics 2 % brighter than in the renders we compare with.
 inline float rough_internal_reflectance(Microfacets type, float alpha, float ior) {
-    static const precompute::Quadrature q(80), mean(32);
-    return float(precompute::cosine_mean(precompute::critical_cosine(ior), mean, [&](double mu) {
-        return precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), 1.0 / ior, mu, q).reflection;
-    }));
+    static const precompute::Quadrature q(64);
+    const uint32_t n = kTransmittanceTableSize;
+    double sum = 0;
+    for (uint32_t i = 1; i < n; ++i) {
+        const double mu = double(i) / (n - 1);
+        sum += mu * precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), 1.0 / ior, mu, q).reflection;
+    }
+    return float(2 * sum / n);
 }
 
 }  // namespace ambilux

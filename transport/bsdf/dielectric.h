@@ -1,0 +1,30 @@
+// Smooth dielectric boundary: Fresnel reflection and refraction (Veach 1997, section 5.2 for the factor eta² of radiance).
+#pragma once
+
+#include "transport/bsdf/fresnel.h"
+#include "transport/bsdf/sample.h"
+
+namespace ambilux {
+
+struct Dielectric {
+    Rgb specular_reflectance, specular_transmittance;
+    float ior;
+
+    AMBILUX_HD Rgb eval(Vec3f, Vec3f, TransportMode) const { return {0.0f, 0.0f, 0.0f}; }
+    AMBILUX_HD float pdf(Vec3f, Vec3f, TransportMode) const { return 0.0f; }
+
+    AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) const {
+        if (wi.z == 0.0f) return false;
+        const FresnelDielectric f = fresnel_dielectric(wi.z, ior);
+        if (u.x < f.reflectance) {
+            out = {reflect(wi), f.reflectance, specular_reflectance, 1.0f, kScatterDelta};
+            return true;
+        }
+        if (f.cos_t == 0.0f) return false;
+        const float scale = mode == TransportMode::radiance ? 1.0f / sqr(f.eta_it) : 1.0f;
+        out = {refract(wi, f), 1.0f - f.reflectance, specular_transmittance * scale, f.eta_it, kScatterDelta | kScatterTransmission};
+        return true;
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,130 @@
+// Microfacet distributions: Beckmann and GGX, anisotropic (Walter et al. 2007; Heitz 2014, "Understanding the Masking-Shadowing
+// Function in Microfacet-Based BRDFs"). Local frame, z = normal of the macrosurface.
+#pragma once
+
+#include "core/sampling.h"
+#include "scene/view.h"
+
+namespace ambilux {
+
+/// Smallest roughness, as in Mitsuba: below it float half vectors do not resolve the lobe.
+constexpr float kMinAlpha = 1e-4f;
+
+/// Inverse error function (Giles 2010, "Approximating the erfinv function", single precision).
+AMBILUX_HD float inverse_erf(float x) {
+    x = clamp(x, -kOneMinusEpsilon, kOneMinusEpsilon);
+    float w = -logf((1.0f - x) * (1.0f + x)), p;
+    if (w < 5.0f) {
+        w -= 2.5f;
+        p = 2.81022636e-08f;
+        p = 3.43273939e-07f + p * w;
+        p = -3.5233877e-06f + p * w;
+        p = -4.39150654e-06f + p * w;
+        p = 0.00021858087f + p * w;
+        p = -0.00125372503f + p * w;
+        p = -0.00417768164f + p * w;
+        p = 0.246640727f + p * w;
+        p = 1.50140941f + p * w;
+    } else {
+        w = sqrtf(w) - 3.0f;
+        p = -0.000200214257f;
+        p = 0.000100950558f + p * w;
+        p = 0.00134934322f + p * w;
+        p = -0.00367342844f + p * w;
+        p = 0.00573950773f + p * w;
+        p = -0.0076224613f + p * w;
+        p = 0.00943887047f + p * w;
+        p = 1.00167406f + p * w;
+        p = 2.83297682f + p * w;
+    }
+    return p * x;
+}
+
+struct MicrofacetDistribution {
+    Microfacets type;
+    float alpha_u, alpha_v;
+
+    /// Density D(m) of microfacet area per macrosurface area and solid angle; 0 below the horizon.
+    AMBILUX_HD float d(Vec3f m) const {
+        if (!(m.z > 0.0f)) return 0.0f;
+        const float norm = 1.0f / (kPi * alpha_u * alpha_v);
+        const float r2 = sqr(m.x / alpha_u) + sqr(m.y / alpha_v), z2 = m.z * m.z;
+        if (type == Microfacets::ggx) return norm / sqr(r2 + z2);
+        const float e = expf(-r2 / z2);
+        return e > 0.0f ? norm * e / (z2 * z2) : 0.0f;
+    }
+
+    /// Projected area of the microfacets that face `v`, per macrosurface area: cos·(1+Λ), v.z >= 0, so that Smith's
+    /// G1 = cos/sigma. Finite and positive down to the horizon (Heitz 2014, section 5.3; Heitz 2018, eq. 2).
+    AMBILUX_HD float sigma(Vec3f v) const {
+        const float t2 = sqr(v.x * alpha_u) + sqr(v.y * alpha_v);
+        if (type == Microfacets::ggx) return 0.5f * (v.z + sqrtf(v.z * v.z + t2));
+        const float t = sqrtf(t2);
+        if (!(t > 0.0f)) return v.z;
+        const float a = v.z / t;
+        return 0.5f * (v.z * (1.0f + erff(a)) + t * expf(-a * a) * 0.56418958354775628f);
+    }
+
+    /// Smith's masking G1 for v.z > 0.
+    AMBILUX_HD float g1(Vec3f v) const { return fminf(v.z / sigma(v), 1.0f); }
+
+    /// Density per solid angle of sample(), wi.z > 0.
+    AMBILUX_HD float pdf(Vec3f wi, Vec3f m, bool visible) const {
+        if (!visible) return d(m) * m.z;
+        return d(m) * fmaxf(dot(wi, m), 0.0f) / sigma(wi);
+    }
+
+    /// Microfacet normal, visible from wi (wi.z > 0) or from the whole distribution in proportion to D·cos.
+    AMBILUX_HD Vec3f sample(Vec3f wi, Vec2f u, bool visible) const {
+        if (!visible) return sample_all(u);
+        return type == Microfacets::ggx ? sample_visible_ggx(wi, u) : sample_visible_beckmann(wi, u);
+    }
+
+    /// Walter et al. 2007, equations 28 and 35, on slopes so that anisotropy is a stretch.
+    AMBILUX_HD Vec3f sample_all(Vec2f u) const {
+        const float tan2 = type == Microfacets::ggx ? u.x / (1.0f - u.x) : -logf(1.0f - u.x);
+        const float r = sqrtf(tan2), phi = 2.0f * kPi * u.y;
+        return normalize({alpha_u * r * cosf(phi), alpha_v * r * sinf(phi), 1.0f});
+    }
+
+    /// Spherical caps (Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps", listing 3).
+    AMBILUX_HD Vec3f sample_visible_ggx(Vec3f wi, Vec2f u) const {
+        const Vec3f v = normalize({wi.x * alpha_u, wi.y * alpha_v, wi.z});
+        const float z = (1.0f - u.y) * (1.0f + v.z) - v.z, r = safe_sqrt(1.0f - z * z), phi = 2.0f * kPi * u.x;
+        const Vec3f h = Vec3f{r * cosf(phi), r * sinf(phi), z} + v;
+        const Vec3f m = {h.x * alpha_u, h.y * alpha_v, fmaxf(h.z, 0.0f)};
+        const float l2 = length_squared(m);
+        return l2 > 0.0f ? m * (1.0f / sqrtf(l2)) : Vec3f{0.0f, 0.0f, 1.0f};
+    }
+
+    /// Visible slopes (Heitz and d'Eon 2014, "Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible
+    /// Normals", supplemental 1): the slope towards v by inverting its cumulative density, the other one is Gaussian.
+    AMBILUX_HD Vec3f sample_visible_beckmann(Vec3f wi, Vec2f u) const {
+        const Vec3f v = normalize({wi.x * alpha_u, wi.y * alpha_v, wi.z});
+        const float sin_v = sqrtf(v.x * v.x + v.y * v.y);
+        const float cos_phi = sin_v > 0.0f ? v.x / sin_v : 1.0f, sin_phi = sin_v > 0.0f ? v.y / sin_v : 0.0f;
+        const float x = visible_beckmann_slope(v.z, sin_v, u.x), y = inverse_erf(2.0f * u.y - 1.0f);
+        return normalize({-alpha_u * (cos_phi * x - sin_phi * y), -alpha_v * (sin_phi * x + cos_phi * y), 1.0f});
+    }
+
+    /// Slope x with density (cos - x·sin)·exp(-x²)/√π, x <= cos/sin, at cumulative share u. Solved for b = erf(x), in which the
+    /// cumulative density [cos·(1+b) + sin·exp(-x²)/√π]/2 is close to linear: Newton steps inside a shrinking bracket.
+    AMBILUX_HD static float visible_beckmann_slope(float cosine, float sine, float u) {
+        const float inv_sqrt_pi = 0.56418958354775628f;
+        float lo = -1.0f, hi = sine > 0.0f ? erff(cosine / sine) : 1.0f;
+        const float top = sine > 0.0f ? expf(-sqr(cosine / sine)) : 0.0f;
+        const float total = cosine * (1.0f + hi) + sine * inv_sqrt_pi * top;
+        float b = lo + (hi - lo) * u, x = 0.0f;
+        for (int i = 0; i < 12; ++i) {
+            x = inverse_erf(b);
+            const float error = cosine * (1.0f + b) + sine * inv_sqrt_pi * expf(-x * x) - u * total;
+            if (fabsf(error) < 1e-7f * total) break;
+            (error > 0.0f ? hi : lo) = b;
+            const float next = b - error / (cosine - sine * x);
+            b = next > lo && next < hi ? next : 0.5f * (lo + hi);
+        }
+        return x;
+    }
+};
+
+}  // namespace ambilux

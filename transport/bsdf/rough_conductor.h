@@ -1,0 +1,37 @@
+// Rough conductor: microfacet reflection with separable Smith masking (Walter et al. 2007, equation 20), front side only.
+#pragma once
+
+#include "transport/bsdf/fresnel.h"
+#include "transport/bsdf/microfacet.h"
+#include "transport/bsdf/sample.h"
+
+namespace ambilux {
+
+struct RoughConductor {
+    Rgb specular_reflectance, eta, k;
+    MicrofacetDistribution microfacets;
+    bool sample_visible;
+
+    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
+        if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
+        const Vec3f m = normalize(wi + wo);
+        const float i_dot_m = dot(wi, m);
+        if (!(i_dot_m > 0.0f)) return no_scattering();
+        const float pdf_sa = microfacets.pdf(wi, m, sample_visible) / (4.0f * i_dot_m);
+        // G1(wi)·G1(wo)/(4·cos(wi)), with G1 = cos/sigma.
+        const float value = microfacets.d(m) * microfacets.g1(wo) / (4.0f * microfacets.sigma(wi));
+        return {specular_reflectance * fresnel_conductor(i_dot_m, eta, k) * value, pdf_sa};
+    }
+    AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
+    AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }
+
+    AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode, BsdfSample& out) const {
+        if (!(wi.z > 0.0f)) return false;
+        const Vec3f m = microfacets.sample(wi, {u.y, u.z}, sample_visible);
+        if (!(dot(wi, m) > 0.0f)) return false;
+        const Vec3f wo = normalize(reflect(wi, m));
+        return smooth_sample(wo, evaluate(wi, wo), 1.0f, 0, out);
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,72 @@
+// Rough dielectric boundary (Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces"), both sides.
+#pragma once
+
+#include "transport/bsdf/fresnel.h"
+#include "transport/bsdf/microfacet.h"
+#include "transport/bsdf/sample.h"
+
+namespace ambilux {
+
+struct RoughDielectric {
+    Rgb specular_reflectance, specular_transmittance;
+    float ior;
+    MicrofacetDistribution microfacets;
+    bool sample_visible;
+
+    /// The distribution that sample() draws from: without visible normals, widened to bound the weights (section 5.3).
+    AMBILUX_HD MicrofacetDistribution sampled_microfacets(Vec3f wi) const {
+        if (sample_visible) return microfacets;
+        const float scale = 1.2f - 0.2f * sqrtf(fabsf(wi.z));
+        return {microfacets.type, microfacets.alpha_u * scale, microfacets.alpha_v * scale};
+    }
+
+    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode mode) const {
+        if (wi.z == 0.0f || wo.z == 0.0f) return no_scattering();
+        // Signs are compared, not the product, which may underflow.
+        const bool reflects = (wi.z > 0.0f) == (wo.z > 0.0f);
+        const float eta = wi.z > 0.0f ? ior : 1.0f / ior;
+        Vec3f m = wi + wo * (reflects ? 1.0f : eta);
+        const float l2 = length_squared(m);
+        if (!(l2 > 0.0f)) return no_scattering();
+        m = m * copysignf(1.0f / sqrtf(l2), m.z);
+        const float i_dot_m = dot(wi, m), o_dot_m = dot(wo, m);
+        // Facets are seen from the side from which the macrosurface is seen (equations 23).
+        if (!(i_dot_m * copysignf(1.0f, wi.z) > 0.0f) || !(o_dot_m * copysignf(1.0f, wo.z) > 0.0f)) return no_scattering();
+
+        const Vec3f i = wi * copysignf(1.0f, wi.z), o = wo * copysignf(1.0f, wo.z);
+        const float f = fresnel_dielectric(i_dot_m, ior).reflectance;
+        const MicrofacetDistribution sampled = sampled_microfacets(wi);
+        // Visible normals: D·|i·m|/sigma(i); the whole distribution: D·cos.
+        const float density = sample_visible ? sampled.d(m) * fabsf(i_dot_m) / sampled.sigma(i) : sampled.d(m) * m.z;
+        // D·G/cos(wi)·|cos(wo)| per |i·m|, with G1 = cos/sigma.
+        const float lobe = microfacets.d(m) * microfacets.g1(o) / microfacets.sigma(i);
+        if (reflects) {
+            const float jacobian = 1.0f / (4.0f * fabsf(o_dot_m));
+            return {specular_reflectance * (f * lobe * 0.25f), f * density * jacobian};
+        }
+        const float denominator = i_dot_m + eta * o_dot_m;
+        const float jacobian = eta * eta * fabsf(o_dot_m) / sqr(denominator);  // equation 17
+        if (!(jacobian < kInfinity)) return no_scattering();
+        const float scale = mode == TransportMode::radiance ? 1.0f / (eta * eta) : 1.0f;
+        return {specular_transmittance * ((1.0f - f) * lobe * fabsf(i_dot_m) * jacobian * scale), (1.0f - f) * density * jacobian};
+    }
+    AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode mode) const { return evaluate(wi, wo, mode).value; }
+    AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode mode) const { return evaluate(wi, wo, mode).pdf_sa; }
+
+    AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) const {
+        if (wi.z == 0.0f) return false;
+        const Vec3f i = wi * copysignf(1.0f, wi.z);
+        const Vec3f m = sampled_microfacets(wi).sample(i, {u.y, u.z}, sample_visible);
+        const float i_dot_m = dot(wi, m);
+        if (!(i_dot_m * copysignf(1.0f, wi.z) > 0.0f)) return false;
+        const FresnelDielectric f = fresnel_dielectric(i_dot_m, ior);
+        const bool reflects = u.x < f.reflectance;
+        if (!reflects && f.cos_t == 0.0f) return false;
+        const Vec3f wo = reflects ? normalize(reflect(wi, m)) : refract(wi, m, f);
+        // A facet may send light below the horizon of the macrosurface: lost, as single scattering has it.
+        if (((wi.z > 0.0f) == (wo.z > 0.0f)) != reflects) return false;
+        return smooth_sample(wo, evaluate(wi, wo, mode), reflects ? 1.0f : f.eta_it, reflects ? 0u : uint32_t(kScatterTransmission), out);
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,46 @@
+// Rough diffuse reflection (Oren and Nayar 1994, "Generalization of Lambert's Reflectance Model", equations 30 and 31: the full
+// qualitative model with interreflection; Mitsuba's roughdiffuse with use_fast_approx = false, its default).
+#pragma once
+
+#include "core/sampling.h"
+#include "transport/bsdf/sample.h"
+
+namespace ambilux {
+
+struct RoughDiffuse {
+    Rgb reflectance;
+    float alpha;  ///< root mean square slope of the microfacets; the paper's sigma is alpha/√2 (Mitsuba's fit)
+
+    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
+        if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
+        const float sigma2 = 0.5f * alpha * alpha;
+        const float sin_i = safe_sqrt(1.0f - wi.z * wi.z), sin_o = safe_sqrt(1.0f - wo.z * wo.z);
+        const float sines = sin_i * sin_o;
+        const float cos_phi = sines > 1e-12f ? clamp((wi.x * wo.x + wi.y * wo.y) / sines, -1.0f, 1.0f) : 0.0f;
+        // The paper's alpha is the larger polar angle, beta the smaller.
+        const float cos_a = fminf(wi.z, wo.z), cos_b = fmaxf(wi.z, wo.z);
+        const float sin_a = fmaxf(sin_i, sin_o), sin_b = fminf(sin_i, sin_o);
+        const float a = acosf(fminf(cos_a, 1.0f)), b = acosf(fminf(cos_b, 1.0f));
+        const float steep = 2.0f * b * kInvPi;
+        const float c = sigma2 / (sigma2 + 0.09f);
+        const float c1 = 1.0f - 0.5f * sigma2 / (sigma2 + 0.33f);
+        const float c2 = 0.45f * c * (cos_phi >= 0.0f ? sin_a : sin_a - steep * steep * steep);
+        const float c3 = 0.125f * c * sqr(4.0f * a * b * kInvPi * kInvPi);
+        const float c4 = 0.17f * sigma2 / (sigma2 + 0.13f);
+        // tan((a+b)/2) = (sin a + sin b)/(cos a + cos b).
+        const float single = c1 + cos_phi * c2 * (sin_b / cos_b) + (1.0f - fabsf(cos_phi)) * c3 * ((sin_a + sin_b) / (cos_a + cos_b));
+        const float twice = c4 * (1.0f - cos_phi * steep * steep);
+        const float pdf_sa = wo.z * kInvPi;
+        return {(reflectance * single + reflectance * reflectance * twice) * pdf_sa, pdf_sa};
+    }
+    AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
+    AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }
+
+    AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode, BsdfSample& out) const {
+        if (!(wi.z > 0.0f)) return false;
+        const Vec3f wo = square_to_cosine_hemisphere({u.y, u.z});
+        return smooth_sample(wo, evaluate(wi, wo), 1.0f, 0, out);
+    }
+};
+
+}  // namespace ambilux

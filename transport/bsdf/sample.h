@@ -1,0 +1,39 @@
+// What every BSDF takes and returns. Conventions: transport/bsdf.h.
+#pragma once
+
+#include "core/math.h"
+
+namespace ambilux {
+
+enum class TransportMode : uint32_t { radiance, importance };
+
+enum ScatterFlags : uint32_t {
+    kScatterDelta = 1,         ///< sampled from a delta lobe: pdf_sa is a probability (mass), not a density
+    kScatterTransmission = 2,  ///< wi and wo on different sides
+};
+
+/// Result of sampling a BSDF.
+struct BsdfSample {
+    Vec3f wo;
+    float pdf_sa;    ///< density per solid angle of all smooth lobes together; for a delta lobe its probability
+    Rgb weight;      ///< f·|cos(wo)|/pdf
+    float eta;       ///< relative index passed through (interior/exterior seen along the walk); 1 without refraction
+    uint32_t flags;  ///< ScatterFlags
+};
+
+/// f·|cos(wo)| and the density of wo together, so that sample, eval and pdf of a BSDF share one formula.
+struct BsdfValue {
+    Rgb value;
+    float pdf_sa;
+};
+
+AMBILUX_HD BsdfValue no_scattering() { return {{0.0f, 0.0f, 0.0f}, 0.0f}; }
+
+/// Fills `out` for a direction drawn from a smooth lobe; false if the density vanishes there (rounding, underflow).
+AMBILUX_HD bool smooth_sample(Vec3f wo, BsdfValue v, float eta, uint32_t flags, BsdfSample& out) {
+    if (!(v.pdf_sa > 0.0f)) return false;
+    out = {wo, v.pdf_sa, v.value / v.pdf_sa, eta, flags};
+    return is_finite(out.weight);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,111 @@
+// Scattering at a surface point in world space: which BSDF, in which frame, and what shading normals cost. The one place where the
+// predicate for light leaks and Veach's factor for shading normals are applied, to sampling and evaluation alike.
+#pragma once
+
+#include "scene/surface.h"
+#include "transport/bsdf.h"
+
+namespace ambilux {
+
+/// A surface point ready to scatter light that arrived along -wi_world.
+struct Scattering {
+    Frame frame;     ///< shading frame of the BSDF, bump or normal map applied; n points to the side of the ray when `flipped`
+    Vec3f ng;        ///< unit geometric normal, flipped with frame.n
+    Vec3f wi_world;  ///< unit, to where the walk came from
+    Vec3f wi;        ///< the same in `frame`
+    Bsdf bsdf;
+    bool flipped;    ///< two-sided material met from behind: frame.n and ng are negated
+};
+
+/// Result of scatter_sample: a BsdfSample whose wo is in world space.
+using ScatterSample = BsdfSample;
+
+/// Shading normal of `record` at `point`: from its normal map or bump map, or the point's own. World space, unit.
+/// Normal map: texel·2-1 in the frame (dpdu, n×dpdu, n). Bump map: normal of the surface displaced along ns by
+/// bump_scale·texture, to first order (Blinn 1978; Mitsuba's bumpmap), on the side of ng.
+template <Features F>
+AMBILUX_HD Vec3f perturbed_normal(const SceneView& scene, const BsdfRecord& record, const SurfacePoint& point) {
+    Vec3f n = point.ns;
+    if (record.normal_map >= 0) {
+        const Rgb texel = eval_texture<F>(scene, scene.textures[record.normal_map], point.uv);
+        n = frame_from_normal_tangent(point.ns, point.dpdu).to_world(texel * 2.0f - splat(1.0f));
+    } else if (record.bump_map >= 0) {
+        const Vec2f g = texture_height_gradient<F>(scene, scene.textures[record.bump_map], point.uv) * record.bump_scale;
+        const Vec3f du = point.dpdu + n * (g.x - dot(n, point.dpdu)), dv = point.dpdv + n * (g.y - dot(n, point.dpdv));
+        n = cross(du, dv);
+        if (dot(n, point.ng) < 0.0f) n = -n;
+    }
+    const float l2 = length_squared(n);
+    // Degenerate maps and parametrisations leave the normal as it is.
+    return l2 > 0.0f && l2 < kInfinity ? n * (1.0f / sqrtf(l2)) : point.ns;
+}
+
+/// Prepares scattering of a walk that arrived from unit direction `wi_world` (pointing away from the surface). The side is that of
+/// the geometric normal: where the shading normal disagrees, nothing is scattered at all.
+template <Features F>
+AMBILUX_HD Scattering make_scattering(const SceneView& scene, const SurfacePoint& point, Vec3f wi_world) {
+    const Material& material = scene.materials[scene.shapes[point.shape].material];
+    const bool flip = material.two_sided != 0 && dot(point.ng, wi_world) < 0.0f;
+    const BsdfRecord& record = scene.bsdfs[flip ? material.back : material.front];
+    Vec3f n = point.ns;
+    if constexpr (F.bumps) n = perturbed_normal<F>(scene, record, point);
+    Scattering s;
+    s.frame = frame_from_normal_tangent(n, point.dpdu);
+    s.ng = point.ng;
+    if (flip) {
+        s.frame.n = -s.frame.n;
+        s.ng = -s.ng;
+    }
+    s.wi_world = wi_world;
+    s.wi = s.frame.to_local(wi_world);
+    s.bsdf = resolve_bsdf<F>(scene, record, point.uv);
+    s.flipped = flip;
+    return s;
+}
+
+/// True if `cos_shading` = dot(frame.n, w) and dot(ng, w) put w on the same side. Directions where they differ carry no light, in either
+/// mode and for either direction of a pair: reflection then leaves on the side it came from, and transmission passes through.
+AMBILUX_HD bool sides_agree(const Scattering& s, Vec3f w, float cos_shading) {
+    const float cos_geometric = dot(s.ng, w);
+    return (cos_geometric > 0.0f && cos_shading > 0.0f) || (cos_geometric < 0.0f && cos_shading < 0.0f);
+}
+
+/// What a BSDF with shading normals is multiplied with in importance mode, |wi·ns|·|wo·ng| / (|wi·ng|·|wo·ns|), so that both modes
+/// describe one surface (Veach 1997, equations 5.19 and 5.20); 1 in radiance mode. Cosines are those with the shading normal.
+AMBILUX_HD float shading_normal_factor(const Scattering& s, Vec3f wo_world, float cos_wo, TransportMode mode) {
+    if (mode == TransportMode::radiance) return 1.0f;
+    return fabsf(s.wi.z / dot(s.ng, s.wi_world)) * fabsf(dot(s.ng, wo_world) / cos_wo);
+}
+
+/// f(wi,wo)·|wo·ns| of the smooth lobes for unit `wo_world`, with the factor for shading normals in importance mode.
+template <Features F>
+AMBILUX_HD Rgb scatter_eval(const Scattering& s, Vec3f wo_world, TransportMode mode) {
+    const Vec3f wo = s.frame.to_local(wo_world);
+    if (!sides_agree(s, s.wi_world, s.wi.z) || !sides_agree(s, wo_world, wo.z)) return {0.0f, 0.0f, 0.0f};
+    return bsdf_eval<F>(s.bsdf, s.wi, wo, mode) * shading_normal_factor(s, wo_world, wo.z, mode);
+}
+
+/// Density per solid angle with which scatter_sample draws `wo_world`; directions that it rejects for their side keep theirs.
+template <Features F>
+AMBILUX_HD float scatter_pdf(const Scattering& s, Vec3f wo_world) {
+    return bsdf_pdf<F>(s.bsdf, s.wi, s.frame.to_local(wo_world), TransportMode::radiance);
+}
+
+/// Density per solid angle of wi_world for a walk that arrives from `wo_world`: the reverse of scatter_pdf.
+template <Features F>
+AMBILUX_HD float scatter_pdf_reverse(const Scattering& s, Vec3f wo_world) {
+    return bsdf_pdf<F>(s.bsdf, s.frame.to_local(wo_world), s.wi, TransportMode::radiance);
+}
+
+/// Draws a direction (u as for bsdf_sample); weight = scatter_eval/scatter_pdf. False when the walk ends here.
+template <Features F>
+AMBILUX_HD bool scatter_sample(const Scattering& s, Vec3f u, TransportMode mode, ScatterSample& out) {
+    if (!sides_agree(s, s.wi_world, s.wi.z) || !bsdf_sample<F>(s.bsdf, s.wi, u, mode, out)) return false;
+    const Vec3f wo = out.wo;
+    out.wo = s.frame.to_world(wo);
+    if (!sides_agree(s, out.wo, wo.z)) return false;
+    out.weight = out.weight * shading_normal_factor(s, out.wo, wo.z, mode);
+    return true;
+}
+
+}  // namespace ambilux
