@@ -1,0 +1,30 @@
+# Sourced by the other scripts: where things are, and how many jobs this machine bears.
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cd "$root"
+build="${AMBILUX_BUILD_DIR:-$root/build}"
+python="$root/.venv/bin/python"
+
+say() { printf '%s\n' "$*" >&2; }
+
+# One job per core, but no more than one per 2 GiB of memory: nvcc and template-heavy C++ need about that.
+jobs() {
+  local cores memory_gib by_memory
+  cores=$(nproc)
+  memory_gib=$(awk '/^MemAvailable:/ {print int($2 / 1048576)}' /proc/meminfo 2>/dev/null || echo 4)
+  by_memory=$((memory_gib / 2))
+  ((by_memory < 1)) && by_memory=1
+  echo $((cores < by_memory ? cores : by_memory))
+}
+
+# configure_and_build [TARGET...]: Release build in $build; AMBILUX_CMAKE_ARGS adds options.
+configure_and_build() {
+  local targets=()
+  (($#)) && targets=(--target "$@")
+  # shellcheck disable=SC2086  # AMBILUX_CMAKE_ARGS is a list of words
+  cmake --preset release -B "$build" ${AMBILUX_CMAKE_ARGS:-}
+  cmake --build "$build" -j "$(jobs)" "${targets[@]}"
+}
+
+# Path of the built program.
+ambilux_program() { echo "$build/cli/ambilux"; }

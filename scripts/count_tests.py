@@ -1,0 +1,55 @@
+"""Adds up JUnit files: names what failed and what was skipped, then prints "N passed, N failed, N skipped".
+
+Usage: count_tests.py FILE...
+Exit status 1 when a test failed, no test ran, or a file is missing (a runner that died writes none, which must not look like success).
+"""
+
+import re
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+# Catch2 2 cannot skip a single test case, so a case that lacks a device or data says so in a line of this form and returns.
+SKIP_LINE = re.compile(r"^\s*(?:\[?skip(?:ped|ping)?\]?)\b[: ].*$", re.IGNORECASE | re.MULTILINE)
+
+
+def tally(path):
+    """Returns (passed, failed, skipped, notes) of one JUnit file; notes are lines for the reader."""
+    passed, failed, skipped, notes = 0, 0, 0, []
+    for case in ET.parse(path).getroot().iter("testcase"):
+        name = ".".join(filter(None, [case.get("classname"), case.get("name")]))
+        if case.get("classname") == case.get("name"):
+            name = case.get("name")
+        if case.find("failure") is not None or case.find("error") is not None or case.get("status") == "fail":
+            failed += 1
+            notes.append(f"failed: {name}")
+        elif case.find("skipped") is not None or case.get("status") in ("notrun", "disabled"):
+            skipped += 1
+            notes.append(f"skipped: {name}")
+        else:
+            passed += 1
+            output = case.findtext("system-out") or ""
+            notes += [f"within {name}: {line.strip()}" for line in dict.fromkeys(SKIP_LINE.findall(output))]
+    return passed, failed, skipped, notes
+
+
+def main(paths):
+    totals, broken, all_notes = [0, 0, 0], False, []
+    for path in map(Path, paths):
+        if not path.exists():
+            all_notes.append(f"failed: {path.name} was not written: its test runner did not finish")
+            broken = True
+            continue
+        *counts, notes = tally(path)
+        totals = [a + b for a, b in zip(totals, counts)]
+        all_notes += notes
+    passed, failed, skipped = totals
+    failed += broken
+    for note in all_notes:
+        print(note)
+    print(f"{passed} passed, {failed} failed, {skipped} skipped")
+    return 1 if failed or passed == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
