@@ -1,6 +1,7 @@
 // Per-pixel sums that every image and every statistic comes from.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 

@@ -1,0 +1,38 @@
+// Error of an image against a reference (design.md, section 5).
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "film/image.h"
+
+namespace ambilux {
+
+/// Means run over all pixels and the channels R, G, B; x is the image, r the reference, se the standard error of r.
+struct Metrics {
+    double rmse = 0;    ///< sqrt(mean((x-r)²)): holds the noise of the reference too
+    double relmse = 0;  ///< mean((x-r)²/(r²+0.01))
+    double mape = 0;    ///< mean(|x-r|/(|r|+0.01))
+    /// The noise of the reference, sqrt(mean(se²)); NaN if the reference states no standard errors.
+    double reference_noise = 0;
+    /// sqrt(max(0, mean((x-r)² - se²))). With x independent of r and r unbiased, E[(x-r)²] = E[(x-truth)²] + se², so this estimates the error against
+    /// the truth. NaN without standard errors. The samples of x and r must not share random numbers.
+    double rmse_corrected = 0;
+    double relmse_corrected = 0;  ///< max(0, mean(((x-r)²-se²)/(r²+0.01))); NaN without standard errors
+    double bias = 0;              ///< mean(x-r)
+    double relative_bias = 0;     ///< mean(x-r)/mean(r); 0 for a black reference without bias
+    /// Sum of the pixels' d over the root of the sum of d², where d is the mean over the channels of x-r. Under "no bias" pixels are independent with mean zero and
+    /// this is close to standard normal, whatever their variances; it needs no variance of the image. Heavy tails make it small, never large. 0 if x equals r.
+    double bias_z = 0;
+    uint64_t non_finite = 0;  ///< values of the image that are NaN or Inf; they make the figures NaN or Inf, never silently better
+};
+
+/// Throws Error(bad_input) if the sizes differ.
+Metrics compare_images(const Image& image, const Reference& reference);
+
+/// The same with exact (double) means.
+Metrics compare_images(const FilmMoments& image, const Reference& reference);
+
+/// All fields under their names; NaN and Inf become null.
+nlohmann::json to_json(const Metrics& metrics);
+
+}  // namespace ambilux
