@@ -1,0 +1,195 @@
+#include "scene/accel/bvh2.h"
+
+#include <string>
+
+#include "core/error.h"
+#include "scene/accel/embree_api.h"
+
+namespace ambilux {
+
+void split_triangle_bounds(const SceneView& scene, uint32_t prim, const Bounds3f& within, int axis, float position, Bounds3f& left, Bounds3f& right) {
+    const Triangle tri = scene.triangles[prim];
+    const Vec3f v[3] = {scene.positions[tri.v0], scene.positions[tri.v1], scene.positions[tri.v2]};
+    left = right = {};
+    for (int i = 0; i < 3; ++i) {
+        const Vec3f a = v[i], b = v[(i + 1) % 3];
+        if (a[axis] <= position) left.extend(a);
+        if (a[axis] >= position) right.extend(a);
+        if ((a[axis] < position && b[axis] > position) || (a[axis] > position && b[axis] < position)) {
+            const Vec3f c = a + (b - a) * ((position - a[axis]) / (b[axis] - a[axis]));
+            const Vec3f pad = max(abs(a), abs(b)) * gamma_bound(6);
+            left.extend(c - pad), left.extend(c + pad);
+            right.extend(c - pad), right.extend(c + pad);
+        }
+    }
+    left.upper[axis] = fminf(left.upper[axis], position);
+    right.lower[axis] = fmaxf(right.lower[axis], position);
+    left.lower = max(left.lower, within.lower), left.upper = min(left.upper, within.upper);
+    right.lower = max(right.lower, within.lower), right.upper = min(right.upper, within.upper);
+}
+
+namespace {
+
+/// Node as Embree's builder makes it.
+struct BuildNode {
+    BuildNode* children[2];  ///< null in leaves
+    Bounds3f bounds;         ///< of leaves
+    uint32_t prim;
+};
+
+struct BuildInput {
+    const SceneView& scene;
+};
+
+Bounds3f bounds_of(const RTCBuildPrimitive& p) { return {{p.lower_x, p.lower_y, p.lower_z}, {p.upper_x, p.upper_y, p.upper_z}}; }
+
+void store(const Bounds3f& b, RTCBounds& out) {
+    out.lower_x = b.lower.x, out.lower_y = b.lower.y, out.lower_z = b.lower.z;
+    out.upper_x = b.upper.x, out.upper_y = b.upper.y, out.upper_z = b.upper.z;
+}
+
+void* create_node(RTCThreadLocalAllocator allocator, unsigned, void*) {
+    return new (rtcThreadLocalAlloc(allocator, sizeof(BuildNode), alignof(BuildNode))) BuildNode{{nullptr, nullptr}, {}, kNone};
+}
+
+void set_children(void* node, void** children, unsigned count, void*) {
+    for (unsigned i = 0; i < count && i < 2; ++i) static_cast<BuildNode*>(node)->children[i] = static_cast<BuildNode*>(children[i]);
+}
+
+void ignore_bounds(void*, const RTCBounds**, unsigned, void*) {}  // recomputed from the leaves
+
+void* create_leaf(RTCThreadLocalAllocator allocator, const RTCBuildPrimitive* primitives, size_t, void*) {
+    return new (rtcThreadLocalAlloc(allocator, sizeof(BuildNode), alignof(BuildNode)))
+        BuildNode{{nullptr, nullptr}, bounds_of(primitives[0]), primitives[0].primID};
+}
+
+void split_primitive(const RTCBuildPrimitive* primitive, unsigned axis, float position, RTCBounds* left_out, RTCBounds* right_out, void* user) {
+    const SceneView& scene = static_cast<BuildInput*>(user)->scene;
+    const Bounds3f within = bounds_of(*primitive);
+    Bounds3f left = within, right = within;
+    if (scene.is_triangle(primitive->primID)) {
+        split_triangle_bounds(scene, primitive->primID, within, int(axis), position, left, right);
+        // A sliver that rounding leaves without a box on one side: cut the box alone.
+        if (left.empty()) left = within, left.upper[int(axis)] = fminf(position, within.upper[int(axis)]);
+        if (right.empty()) right = within, right.lower[int(axis)] = fmaxf(position, within.lower[int(axis)]);
+    } else {
+        left.upper[int(axis)] = fminf(position, within.upper[int(axis)]);
+        right.lower[int(axis)] = fmaxf(position, within.lower[int(axis)]);
+    }
+    store(left, *left_out);
+    store(right, *right_out);
+}
+
+/// Copies Embree's nodes in depth-first order, left before right, so that the result does not depend on which thread made what.
+uint32_t flatten(const BuildNode* root, Bvh2& out) {
+    struct Task {
+        const BuildNode* node;
+        uint32_t index;
+        bool done;
+    };
+    std::vector<Task> tasks;
+    const auto add = [&](const BuildNode* node) {
+        const uint32_t index = uint32_t(out.nodes.size());
+        out.nodes.push_back({node->bounds, kNone, kNone, node->prim});
+        tasks.push_back({node, index, false});
+        return index;
+    };
+    const uint32_t first = add(root);
+    while (!tasks.empty()) {
+        Task& task = tasks.back();
+        const BuildNode* node = task.node;
+        const uint32_t index = task.index;
+        if (!node->children[0]) {
+            tasks.pop_back();
+        } else if (task.done) {
+            Bounds3f b = out.nodes[out.nodes[index].left].bounds;
+            b.extend(out.nodes[out.nodes[index].right].bounds);
+            out.nodes[index].bounds = b;
+            tasks.pop_back();
+        } else {
+            task.done = true;
+            const uint32_t right = add(node->children[1]);
+            const uint32_t left = add(node->children[0]);
+            out.nodes[index].left = left;
+            out.nodes[index].right = right;
+        }
+    }
+    return first;
+}
+
+}  // namespace
+
+Bvh2 build_bvh2(const SceneView& scene) {
+    Bvh2 out;
+    std::vector<RTCBuildPrimitive> primitives;
+    const uint32_t count = scene.primitive_count();
+    primitives.reserve(size_t(count) * 2);
+    for (uint32_t i = 0; i < count; ++i) {
+        const Bounds3f b = scene.is_triangle(i) ? triangle_bounds(scene, i) : quadric_bounds(scene.quadric(i));
+        // fminf and fmaxf skip NaN, so a triangle's vertices are looked at themselves.
+        bool finite = is_finite(b.lower) && is_finite(b.upper);
+        if (scene.is_triangle(i)) {
+            const Triangle t = scene.triangles[i];
+            finite = is_finite(scene.positions[t.v0]) && is_finite(scene.positions[t.v1]) && is_finite(scene.positions[t.v2]);
+        }
+        if (!finite) continue;
+        RTCBuildPrimitive p;
+        p.lower_x = b.lower.x, p.lower_y = b.lower.y, p.lower_z = b.lower.z, p.geomID = 0;
+        p.upper_x = b.upper.x, p.upper_y = b.upper.y, p.upper_z = b.upper.z, p.primID = i;
+        primitives.push_back(p);
+    }
+    if (primitives.empty()) return out;
+
+    const size_t used = primitives.size();
+    primitives.resize(used * 2);  // room for what splits add
+    RTCDevice device = rtcNewDevice(nullptr);
+    if (!device) throw Error(ExitCode::device, "Embree: making a device failed");
+    RTCBVH bvh = rtcNewBVH(device);
+    BuildInput input{scene};
+    RTCBuildArguments args = rtcDefaultBuildArguments();
+    args.buildQuality = RTC_BUILD_QUALITY_HIGH;
+    args.maxBranchingFactor = 2;
+    args.maxDepth = 64;
+    args.sahBlockSize = 1;
+    args.minLeafSize = 1;
+    args.maxLeafSize = 1;
+    args.traversalCost = 1.0f;
+    args.intersectionCost = 1.0f;
+    args.bvh = bvh;
+    args.primitives = primitives.data();
+    args.primitiveCount = used;
+    args.primitiveArrayCapacity = primitives.size();
+    args.createNode = create_node;
+    args.setNodeChildren = set_children;
+    args.setNodeBounds = ignore_bounds;
+    args.createLeaf = create_leaf;
+    args.splitPrimitive = split_primitive;
+    args.userPtr = &input;
+    const auto* root = static_cast<const BuildNode*>(rtcBuildBVH(&args));
+    const RTCError error = rtcGetDeviceError(device);
+    if (root) out.root = flatten(root, out);
+    rtcReleaseBVH(bvh);
+    rtcReleaseDevice(device);
+    if (!root || error != RTC_ERROR_NONE)
+        throw Error(ExitCode::device, "Embree: building a binary tree failed with error code " + std::to_string(int(error)));
+    return out;
+}
+
+double bvh2_cost(const Bvh2& bvh) {
+    if (bvh.root == kNone) return 0.0;
+    double sum = 0.0;
+    // Walk, since optimisation may leave unused nodes.
+    std::vector<uint32_t> stack = {bvh.root};
+    while (!stack.empty()) {
+        const Bvh2Node& n = bvh.nodes[stack.back()];
+        stack.pop_back();
+        if (n.is_leaf()) continue;
+        sum += n.bounds.half_area();
+        stack.push_back(n.left);
+        stack.push_back(n.right);
+    }
+    const double root = bvh.nodes[bvh.root].bounds.half_area();
+    return root > 0.0 ? sum / root : 0.0;
+}
+
+}  // namespace ambilux

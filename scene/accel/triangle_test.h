@@ -1,0 +1,59 @@
+// Watertight ray-triangle test.
+#pragma once
+
+#include "scene/surface.h"
+
+namespace ambilux {
+
+/// Two rows of the shear that maps a ray to the z axis: row·(p - o) are the coordinates of p seen along the ray (Woop, Benthin, Wald 2013,
+/// section 3.1; the permutation of axes is folded into the rows, whose entries are 1, 0 and the shear itself).
+struct RayShear {
+    Vec3f x, y;
+};
+
+AMBILUX_HD RayShear make_ray_shear(Vec3f d) {
+    const Vec3f m = abs(d);
+    if (m.x > m.y && m.x > m.z) return {{-d.y / d.x, 1.0f, 0.0f}, {-d.z / d.x, 0.0f, 1.0f}};
+    if (m.y > m.z) return {{0.0f, -d.z / d.y, 1.0f}, {1.0f, -d.x / d.y, 0.0f}};
+    return {{1.0f, 0.0f, -d.x / d.z}, {0.0f, 1.0f, -d.y / d.z}};
+}
+
+/// Crossing of a ray and a triangle: distance and barycentrics of v1 and v2.
+struct TriangleCrossing {
+    float t, u, v;
+};
+
+namespace detail {
+
+/// Explicit fused operations: the value, and with it the answer on a shared edge, is the same in every triangle and on host and device.
+AMBILUX_HD float fused_dot(Vec3f a, Vec3f b) { return fmaf(a.x, b.x, fmaf(a.y, b.y, a.z * b.z)); }
+
+}  // namespace detail
+
+/// True if the ray o + t d crosses triangle (v0,v1,v2) at 0 < t < tmax. A ray through an edge or a vertex meets at least one of the triangles that
+/// share it: each edge function has the exact sign for its projected end points, and zero counts as inside.
+/// An origin that lies on the triangle's plane within the rounding of the distance does not meet it.
+AMBILUX_HD bool intersect_triangle(Vec3f o, Vec3f d, const RayShear& shear, Vec3f v0, Vec3f v1, Vec3f v2, float tmax, TriangleCrossing& hit) {
+    const Vec3f a = v0 - o, b = v1 - o, c = v2 - o;
+    const float ax = detail::fused_dot(a, shear.x), ay = detail::fused_dot(a, shear.y);
+    const float bx = detail::fused_dot(b, shear.x), by = detail::fused_dot(b, shear.y);
+    const float cx = detail::fused_dot(c, shear.x), cy = detail::fused_dot(c, shear.y);
+    const float u = detail::difference_of_products(cx, by, cy, bx);
+    const float v = detail::difference_of_products(ax, cy, ay, cx);
+    const float w = detail::difference_of_products(bx, ay, by, ax);
+    if (fminf(u, fminf(v, w)) < 0.0f && fmaxf(u, fmaxf(v, w)) > 0.0f) return false;
+    const float det = u + v + w;
+    if (det == 0.0f) return false;
+    // Distance along the ray from the plane. Unlike the interpolated depth it is exactly zero for origins on an axis-aligned triangle.
+    const Vec3f n = detail::accurate_cross(v1 - v0, v2 - v0);
+    const float height = detail::fused_dot(a, n);
+    if (!(fabsf(height) > gamma_bound(6) * detail::fused_dot(abs(a), abs(n)))) return false;
+    const float t = height / detail::fused_dot(d, n);
+    if (!(t > 0.0f && t < tmax)) return false;
+    hit.t = t;
+    hit.u = v / det;
+    hit.v = w / det;
+    return true;
+}
+
+}  // namespace ambilux
