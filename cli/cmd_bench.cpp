@@ -1,0 +1,106 @@
+#include <fmt/format.h>
+
+#include <iostream>
+
+#include "backends/bench_rays.h"
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "experiments/drive.h"
+#include "experiments/statistics.h"
+
+namespace ambilux {
+namespace {
+
+struct Options {
+    SceneOptions scene;
+    RenderOptions render;
+    std::string json;
+    std::string backend = "auto";
+    int repetitions = 25;
+    uint32_t spp = 16;
+};
+
+/// Columns of the rows in `rows`, as far as they are numbers or text.
+void print_rows(const nlohmann::json& rows) {
+    if (!rows.is_array() || rows.empty() || !rows[0].is_object()) {
+        std::cout << rows.dump(2) << "\n";
+        return;
+    }
+    for (const auto& [key, value] : rows[0].items()) std::cout << fmt::format("{:>18}", key);
+    std::cout << "\n";
+    for (const auto& row : rows) {
+        for (const auto& [key, value] : row.items())
+            std::cout << fmt::format("{:>18}", value.is_number_float() ? fmt::format("{:.4g}", value.get<double>())
+                                               : value.is_string()     ? value.get<std::string>()
+                                                                       : value.dump());
+        std::cout << "\n";
+    }
+}
+
+int rays(const Options& o) {
+    if (o.repetitions < 1) throw Error(ExitCode::usage, "--repetitions: at least 1 is needed");
+    const LoadedScene loaded = load_scene(o.scene);
+    const nlohmann::json json = bench_rays(loaded.scene, o.backend, o.repetitions);
+    if (!o.json.empty()) write_json(o.json, json);
+    if (o.json == "-") return int(ExitCode::done);
+    for (const auto& [key, value] : json.items()) {
+        if (value.is_array()) {
+            std::cout << key << ":\n";
+            print_rows(value);
+        } else {
+            std::cout << fmt::format("{}: {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+        }
+    }
+    return int(ExitCode::done);
+}
+
+int stages(const Options& o) {
+    if (o.spp < 1) throw Error(ExitCode::usage, "--spp: at least 1 is needed");
+    const LoadedScene loaded = load_scene(o.scene);
+    const RenderSettings settings = o.render.settings(loaded.scene);
+    const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
+    RenderPosition position;
+    {
+        Progress progress("bench stages");
+        position = drive(*renderer, {}, {o.spp, 0}, interrupt_flag(), [&](const RenderPosition& p) {
+            progress.update(double(p.samples) / o.spp, progress_details(p.samples, p.seconds, renderer->stats()));
+        });
+    }
+    const RenderStats stats = renderer->stats();
+    if (!o.json.empty()) write_json(o.json, stats_json(loaded.scene, settings, stats, loaded.seconds));
+    if (o.json != "-") {
+        const double all = double(stats.rays_extend) + double(stats.rays_occlude);
+        std::cout << fmt::format("{} on {} ({}), {}x{}, {} spp, {}rays/s\n\n", o.scene.path, stats.device, stats.accel, loaded.scene.sensor.crop_width,
+                                 loaded.scene.sensor.crop_height, position.samples, format_count(stats.render_seconds > 0 ? all / stats.render_seconds : 0))
+                  << stage_table(stats);
+    }
+    return int(position.interrupted ? ExitCode::interrupted : ExitCode::done);
+}
+
+}  // namespace
+
+void add_bench(CLI::App& app, Run& run) {
+    CLI::App& command = *app.add_subcommand("bench", "Throughput of one part alone");
+    command.require_subcommand(1);
+
+    auto r = std::make_shared<Options>();
+    CLI::App& rays_command = *command.add_subcommand("rays", "Ray traversal: primary, bounced and shadow rays of a scene");
+    r->scene.add_to(rays_command);
+    rays_command.add_option("--backend", r->backend, "auto, cpu or cuda")->capture_default_str();
+    rays_command.add_option("--repetitions", r->repetitions, "Timed runs of each batch; the median counts")->capture_default_str();
+    rays_command.add_option("--json", r->json, "Write the result to a file, or - for standard output");
+    rays_command.callback([r, &run] { run = [r] { return rays(*r); }; });
+
+    auto s = std::make_shared<Options>();
+    CLI::App& stages_command = *command.add_subcommand("stages", "Time and items of every stage of a render");
+    s->scene.add_to(stages_command);
+    s->render.add_to(stages_command, false);
+    stages_command.add_option("--spp", s->spp, "Samples per pixel")->capture_default_str();
+    stages_command.add_option("--json", s->json, "Write the statistics to a file, or - for standard output");
+    stages_command.callback([s, &run] { run = [s] { return stages(*s); }; });
+}
+
+}  // namespace ambilux

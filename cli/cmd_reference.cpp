@@ -1,0 +1,90 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "experiments/reference.h"
+#include "experiments/statistics.h"
+#include "film/png_io.h"
+
+namespace ambilux {
+namespace {
+
+struct Options {
+    SceneOptions scene;
+    RenderOptions render;
+    std::string output, png, json;
+    uint64_t spp = 0;
+};
+
+int reference(const Options& o) {
+    const LoadedScene loaded = load_scene(o.scene);
+    ReferenceRequest request;
+    request.path = o.output;
+    request.spp = o.spp;
+    request.settings = o.render.settings(loaded.scene);
+    const RenderSettings defaults;
+    if (request.settings.integrator != defaults.integrator || request.settings.estimator != defaults.estimator)
+        throw Error(ExitCode::usage, "a reference is always made by integrator path, estimator mis: leave these settings out");
+    request.interrupt = interrupt_flag();
+
+    ReferenceResult result;
+    {
+        Progress progress("reference");
+        uint64_t first = 0;
+        bool started = false;
+        request.on_batch = [&](const RenderPosition& p) {
+            if (!started) {
+                started = true;
+                first = p.samples;
+            }
+            const double rate = p.seconds > 0 ? double(p.samples - first) / p.seconds : 0;
+            progress.update(double(p.samples) / double(o.spp), fmt::format("{} spp", p.samples),
+                            rate > 0 ? double(o.spp - p.samples) / rate : INFINITY);
+        };
+        result = make_reference(loaded.scene, request, default_hooks());
+    }
+    if (!o.png.empty() && result.reference.samples) write_png(o.png, result.reference.mean);
+    double noise = 0;
+    for (const float se : result.reference.standard_error.rgb) noise += double(se) * double(se);
+    noise = std::sqrt(noise / double(std::max<size_t>(1, result.reference.standard_error.rgb.size())));
+    if (!o.json.empty()) {
+        nlohmann::json json = stats_json(loaded.scene, request.settings, result.stats, loaded.seconds);
+        json["spp"] = result.reference.samples;
+        json["continued_from"] = result.continued_from;
+        json["reference_noise"] = std::isfinite(noise) ? nlohmann::json(noise) : nlohmann::json(nullptr);
+        json["interrupted"] = result.interrupted;
+        write_json(o.json, json);
+    }
+    if (result.interrupted) {
+        log_error(fmt::format("interrupted: {} holds {} of {} samples per pixel; the same command continues it", o.output, result.reference.samples, o.spp));
+        return int(ExitCode::interrupted);
+    }
+    if (result.continued_from >= o.spp)
+        log_info(fmt::format("{}: nothing to do, it holds {} samples per pixel", o.output, result.continued_from));
+    else
+        log_info(fmt::format("{}: {} spp{}, standard error {:.3g} (root mean square)", o.output, result.reference.samples,
+                             result.continued_from ? fmt::format(", {} of them from before", result.continued_from) : "", noise));
+    if (result.stats.invalid.total()) log_warning(fmt::format("{} invalid values were dropped: see the statistics (--json)", result.stats.invalid.total()));
+    return int(ExitCode::done);
+}
+
+}  // namespace
+
+void add_reference(CLI::App& app, Run& run) {
+    auto o = std::make_shared<Options>();
+    CLI::App& command = *app.add_subcommand("reference", "Ground truth with its standard error, by the path tracer; continues an existing file");
+    o->scene.add_to(command);
+    o->render.add_to(command, true);
+    command.add_option("-o,--output", o->output, "Reference to write or to continue (EXR)")->required();
+    command.add_option("--spp", o->spp, "Samples per pixel in total")->required();
+    command.add_option("--png", o->png, "Write an sRGB PNG as well");
+    command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
+    command.callback([o, &run] { run = [o] { return reference(*o); }; });
+}
+
+}  // namespace ambilux

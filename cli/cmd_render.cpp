@@ -1,0 +1,113 @@
+#include <fmt/format.h>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "core/progress.h"
+#include "experiments/drive.h"
+#include "experiments/statistics.h"
+#include "film/exr_io.h"
+#include "film/png_io.h"
+
+namespace ambilux {
+namespace {
+
+struct Options {
+    SceneOptions scene;
+    RenderOptions render;
+    std::string output, png, json;
+    std::optional<uint64_t> spp;
+    std::optional<double> time;
+    std::optional<float> exposure;
+    bool strict = false;
+};
+
+void check(const Options& o) {
+    if (o.spp && o.time) throw Error(ExitCode::usage, "--spp and --time exclude each other: a render ends by one of them");
+    if (o.spp && *o.spp == 0) throw Error(ExitCode::usage, "--spp 0: at least one sample per pixel is needed");
+    if (o.time && !(*o.time > 0)) throw Error(ExitCode::usage, "--time: more than zero seconds are needed");
+    if (o.exposure && o.png.empty()) throw Error(ExitCode::usage, "--exposure changes only the PNG: give --png FILE as well");
+    check_writable(o.output);
+    if (!o.png.empty()) check_writable(o.png);
+    if (!o.json.empty() && o.json != "-") check_writable(o.json);
+}
+
+/// What --strict objects to; empty if nothing.
+std::string objection(const RenderStats& stats) {
+    std::string text;
+    for (const auto& [stage, counts] : stats.invalid_by_stage)
+        if (counts.total()) text += fmt::format("stage {} dropped {} NaN, {} Inf, {} negative values; ", stage, counts.nan, counts.inf, counts.negative);
+    if (text.empty() && stats.invalid.total())
+        text += fmt::format("{} NaN, {} Inf, {} negative values were dropped; ", stats.invalid.nan, stats.invalid.inf, stats.invalid.negative);
+    for (const QueueStats& q : stats.queues)
+        if (q.overflow) text += fmt::format("queue {} of capacity {} lost {} items; ", q.name, q.capacity, q.overflow);
+    if (!text.empty()) text.resize(text.size() - 2);
+    return text;
+}
+
+int render(const Options& o) {
+    check(o);
+    const LoadedScene loaded = load_scene(o.scene);
+    const RenderSettings settings = o.render.settings(loaded.scene);
+    const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
+
+    Budget budget;
+    if (o.time)
+        budget.seconds = *o.time;
+    else
+        budget.samples = o.spp ? *o.spp : uint64_t(std::max(1, loaded.scene.integrator.spp));
+    RenderPosition position;
+    {
+        Progress progress("render");
+        position = drive(*renderer, {}, budget, interrupt_flag(), [&](const RenderPosition& p) {
+            const double fraction = budget.samples ? double(p.samples) / double(budget.samples) : p.seconds / budget.seconds;
+            progress.update(std::min(fraction, 1.0), progress_details(p.samples, p.seconds, renderer->stats()));
+        });
+    }
+
+    RenderStats stats = renderer->stats();
+    if (position.samples > 0) {
+        const Image image = mean_image(renderer->film());
+        write_exr(o.output, image, image_attributes(loaded.scene, settings, stats));
+        if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
+    }
+    if (!o.json.empty()) {
+        nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
+        json["interrupted"] = position.interrupted;
+        write_json(o.json, json);
+    }
+    if (position.interrupted) {
+        log_error(position.samples ? fmt::format("interrupted: {} holds the {} samples per pixel that were finished", o.output, position.samples)
+                                   : "interrupted before the first sample was finished: nothing was saved");
+        return int(ExitCode::interrupted);
+    }
+    log_info(fmt::format("{}: {} spp in {}, {}", o.output, position.samples, format_duration(position.seconds), stats.device));
+    const std::string text = objection(stats);
+    if (text.empty()) return int(ExitCode::done);
+    if (!o.strict) {
+        log_warning(text);
+        return int(ExitCode::done);
+    }
+    throw Error(ExitCode::device, "--strict: " + text + ". The image was saved");
+}
+
+}  // namespace
+
+void add_render(CLI::App& app, Run& run) {
+    auto o = std::make_shared<Options>();
+    CLI::App& command = *app.add_subcommand("render", "Render a scene to an OpenEXR image");
+    o->scene.add_to(command);
+    o->render.add_to(command, false);
+    command.add_option("-o,--output", o->output, "Image to write (EXR)")->required();
+    command.add_option("--png", o->png, "Write an sRGB PNG as well");
+    command.add_option("--exposure", o->exposure, "Stops by which the PNG is brightened");
+    command.add_option("--spp", o->spp, "Samples per pixel. Default: the scene's");
+    command.add_option("--time", o->time, "Seconds of wall clock to render instead of --spp");
+    command.add_flag("--strict", o->strict, "Fail (exit code 4) if invalid values or lost queue items were counted");
+    command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
+    command.callback([o, &run] { run = [o] { return render(*o); }; });
+}
+
+}  // namespace ambilux

@@ -1,0 +1,66 @@
+// The commands of the program, one function each.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "experiments/hooks.h"
+
+namespace ambilux {
+
+/// Adds a command to `app`; the function it registers is what main runs, and returns the exit code.
+using Run = std::function<int()>;
+void add_render(CLI::App& app, Run& run);
+void add_info(CLI::App& app, Run& run);
+void add_reference(CLI::App& app, Run& run);
+void add_compare(CLI::App& app, Run& run);
+void add_experiment(CLI::App& app, Run& run);
+void add_bench(CLI::App& app, Run& run);
+
+/// Options that say which scene is meant.
+struct SceneOptions {
+    std::string path, size;
+    bool lenient = false;
+    std::vector<std::string> parameters;  ///< NAME=VALUE
+    std::string light_picking = "power";
+
+    void add_to(CLI::App& command);
+    LoadOptions load_options() const;
+};
+
+/// Options that say how it is rendered.
+struct RenderOptions {
+    std::string integrator = "path", variant = "wavefront", backend = "auto";
+    uint64_t seed = 0;
+    std::optional<int> max_depth;
+    bool deterministic = false;
+    std::vector<std::string> set;
+
+    /// `fixed_integrator`: the command decides integrator, variant and estimator itself.
+    void add_to(CLI::App& command, bool fixed_integrator);
+    /// Settings in the order of rising priority: the scene's hints, options, --set. Throws Error(usage).
+    RenderSettings settings(const Scene& scene) const;
+};
+
+/// A scene and how long it took to load.
+struct LoadedScene {
+    Scene scene;
+    double seconds = 0;
+};
+/// Loads and reports the substitutions of --lenient as warnings.
+LoadedScene load_scene(const SceneOptions& options);
+
+/// Writes `json` to a file, or to standard output if `path` is "-".
+void write_json(const std::string& path, const nlohmann::json& json);
+
+/// Splits "KEY=VALUE"; throws Error(usage) naming `option`.
+std::pair<std::string, std::string> split_assignment(const std::string& text, const std::string& option);
+
+/// Samples and rays per second, for progress lines.
+std::string progress_details(uint64_t samples, double seconds, const RenderStats& stats);
+
+}  // namespace ambilux

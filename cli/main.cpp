@@ -1,0 +1,50 @@
+// The `ambilux` program: reads the command line, runs one command, turns errors into messages and exit codes (design.md, section 5).
+#include <fmt/format.h>
+
+#include <new>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "core/version.h"
+
+int main(int argc, char** argv) {
+    using namespace ambilux;
+    CLI::App app{"Ambilux: a testbed for bidirectional light transport"};
+    app.set_version_flag("--version", fmt::format("ambilux {} ({})", version(), git_revision()));
+    app.require_subcommand(1);
+    app.fallthrough();
+    bool quiet = false;
+    app.add_flag("--quiet", quiet, "No progress and no messages but errors");
+    Run run;
+    add_render(app, run);
+    add_info(app, run);
+    add_reference(app, run);
+    add_compare(app, run);
+    add_experiment(app, run);
+    add_bench(app, run);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& e) {
+        const int code = app.exit(e);
+        return code == 0 ? int(ExitCode::done) : int(ExitCode::usage);
+    }
+    set_quiet(quiet);
+    install_interrupt_handler();
+    try {
+        return run();
+    } catch (const Error& e) {
+        set_status_line("");
+        log_error(e.what());
+        return int(e.code);
+    } catch (const std::bad_alloc&) {
+        set_status_line("");
+        log_error("out of memory: try a smaller --size");
+        return int(ExitCode::device);
+    } catch (const std::exception& e) {
+        set_status_line("");
+        log_error(fmt::format("unexpected: {}", e.what()));
+        return int(ExitCode::device);
+    }
+}

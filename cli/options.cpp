@@ -1,0 +1,100 @@
+#include <fmt/format.h>
+
+#include <charconv>
+#include <chrono>
+#include <iostream>
+
+#include "cli/commands.h"
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "core/progress.h"
+
+namespace ambilux {
+
+std::pair<std::string, std::string> split_assignment(const std::string& text, const std::string& option) {
+    const size_t at = text.find('=');
+    if (at == 0 || at == std::string::npos) throw Error(ExitCode::usage, fmt::format("{} {}: write it as {} NAME=VALUE", option, text, option));
+    return {text.substr(0, at), text.substr(at + 1)};
+}
+
+void SceneOptions::add_to(CLI::App& command) {
+    command.add_option("SCENE", path, "Mitsuba scene description (XML)")->required();
+    command.add_option("--size", size, "Film size WxH instead of the scene's");
+    command.add_flag("--lenient", lenient, "Replace what is not known and list each substitution, instead of refusing the scene");
+    command.add_option("-D,--define", parameters, "Value NAME=VALUE of a $parameter of the scene")->allow_extra_args(false);
+    command.add_option("--light-picking", light_picking, "How light sampling chooses an emitter: power or uniform")->capture_default_str();
+}
+
+LoadOptions SceneOptions::load_options() const {
+    LoadOptions options;
+    options.lenient = lenient;
+    if (light_picking == "uniform")
+        options.light_picking = LightPicking::uniform;
+    else if (light_picking != "power")
+        throw Error(ExitCode::usage, fmt::format("--light-picking {}: power and uniform are known", light_picking));
+    if (!size.empty()) {
+        const char* end = size.data() + size.size();
+        const auto width = std::from_chars(size.data(), end, options.width);
+        const bool separated = width.ec == std::errc() && width.ptr != end && *width.ptr == 'x';
+        const auto height = separated ? std::from_chars(width.ptr + 1, end, options.height) : width;
+        if (!separated || height.ec != std::errc() || height.ptr != end || options.width == 0 || options.height == 0)
+            throw Error(ExitCode::usage, fmt::format("--size {}: write it as WIDTHxHEIGHT, such as 640x360", size));
+        if (options.width > 65536 || options.height > 65536) throw Error(ExitCode::usage, fmt::format("--size {}: at most 65536 pixels a side", size));
+    }
+    for (const std::string& parameter : parameters) options.parameters.push_back(split_assignment(parameter, "-D"));
+    return options;
+}
+
+void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
+    if (!fixed_integrator) {
+        command.add_option("-i,--integrator", integrator, "path, light or bdpt")->capture_default_str();
+        command.add_option("--variant", variant, "Schedule of the same estimator")->capture_default_str();
+    }
+    command.add_option("--backend", backend, "auto, cpu or cuda; auto takes a CUDA device if there is one")->capture_default_str();
+    command.add_option("--seed", seed, "Seed of all random numbers")->capture_default_str();
+    command.add_option("--max-depth", max_depth, "Longest path in segments (2: direct light); -1: no limit. Default: the scene's");
+    command.add_flag("--deterministic", deterministic, "Same bits in every run on the same backend");
+    command.add_option("--set", set, "KEY=VALUE: any other setting, such as estimator=nee or rr_depth=-1")->allow_extra_args(false);
+}
+
+RenderSettings RenderOptions::settings(const Scene& scene) const {
+    RenderSettings s;
+    s.max_depth = scene.integrator.max_depth;
+    s.rr_depth = scene.integrator.rr_depth;
+    apply_setting(s, "integrator", integrator);
+    apply_setting(s, "variant", variant);
+    apply_setting(s, "backend", backend);
+    s.seed = seed;
+    if (max_depth) apply_setting(s, "max_depth", std::to_string(*max_depth));
+    s.deterministic = deterministic;
+    for (const std::string& assignment : set) {
+        const auto [key, value] = split_assignment(assignment, "--set");
+        apply_setting(s, key, value);
+    }
+    return s;
+}
+
+LoadedScene load_scene(const SceneOptions& options) {
+    const LoadOptions load = options.load_options();
+    const auto start = std::chrono::steady_clock::now();
+    LoadedScene loaded{load_mitsuba(options.path, load), 0};
+    loaded.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    for (const std::string& warning : loaded.scene.warnings) log_warning(warning);
+    return loaded;
+}
+
+void write_json(const std::string& path, const nlohmann::json& json) {
+    // Text from files need not be valid UTF-8; it must not make the result unreadable.
+    const std::string text = json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    if (path != "-") return write_file_atomic(path, text);
+    std::cout << text << std::flush;
+    if (!std::cout) throw Error(ExitCode::device, "cannot write to standard output");
+}
+
+std::string progress_details(uint64_t samples, double seconds, const RenderStats& stats) {
+    const double rays = double(stats.rays_extend) + double(stats.rays_occlude);
+    return fmt::format("{} spp  {}rays/s", samples, format_count(seconds > 0 ? rays / seconds : 0));
+}
+
+}  // namespace ambilux

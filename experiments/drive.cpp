@@ -1,0 +1,56 @@
+#include "experiments/drive.h"
+
+#include <algorithm>
+#include <chrono>
+#include <limits>
+
+#include "core/error.h"
+
+namespace ambilux {
+
+RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& budget, const volatile bool* interrupt,
+                     const std::function<void(const RenderPosition&)>& on_batch) {
+    constexpr uint64_t kMaxSamples = std::numeric_limits<uint32_t>::max();
+    if (budget.samples == 0 && !(budget.seconds > 0)) throw Error(ExitCode::usage, "a render needs a number of samples or a time");
+    if (budget.samples > kMaxSamples) throw Error(ExitCode::usage, "at most 4294967295 samples per pixel are possible");
+    double per_sample = 0;
+    uint64_t last_count = 0;
+    while (!position.interrupted) {
+        if (interrupt && *interrupt) {
+            position.interrupted = true;
+            break;
+        }
+        uint64_t count = std::max<uint32_t>(1, renderer.preferred_batch());
+        if (budget.samples) {
+            if (position.samples >= budget.samples) break;
+            count = std::min(count, budget.samples - position.samples);
+        }
+        if (budget.seconds > 0) {
+            // Begin small, since nothing is known, and grow by at most four, since the first sample may not be typical.
+            count = std::min(count, std::max<uint64_t>(1, 4 * last_count));
+            const double left = budget.seconds - position.seconds;
+            if (left <= 0 && position.samples > 0) break;
+            if (per_sample > 0) {
+                if (left < 0.5 * per_sample) break;
+                count = std::min(count, std::max<uint64_t>(1, uint64_t(left / per_sample)));
+            }
+        }
+        count = std::min(count, kMaxSamples - position.samples);
+        if (count == 0) break;
+        const auto start = std::chrono::steady_clock::now();
+        const uint32_t done = renderer.render(uint32_t(position.samples), uint32_t(count), interrupt);
+        const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        position.samples += done;
+        position.seconds += seconds;
+        if (done < count) {
+            if (!(interrupt && *interrupt)) throw Error(ExitCode::device, "the renderer stopped without a reason");
+            position.interrupted = true;
+        }
+        if (done > 0) per_sample = seconds / done;
+        last_count = count;
+        if (on_batch) on_batch(position);
+    }
+    return position;
+}
+
+}  // namespace ambilux

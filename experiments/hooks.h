@@ -1,0 +1,21 @@
+// What the experiments take from the renderer, as functions, so that tests can put a known process in its place.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "integrators/renderer.h"
+
+namespace ambilux {
+
+struct Hooks {
+    std::function<Scene(const std::string& path, const LoadOptions&)> load_scene;
+    std::function<std::unique_ptr<Renderer>(const Scene&, const RenderSettings&)> make_renderer;
+    std::function<void(RenderSettings&, const std::string& key, const std::string& value)> apply_setting;
+};
+
+/// load_mitsuba, make_renderer and apply_setting.
+Hooks default_hooks();
+
+}  // namespace ambilux

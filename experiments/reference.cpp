@@ -1,0 +1,88 @@
+#include "experiments/reference.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "experiments/statistics.h"
+
+namespace ambilux {
+namespace {
+
+std::string text(const Attributes& attributes, const char* name) {
+    const auto it = attributes.find(name);
+    if (it == attributes.end()) return "(not stated)";
+    return it->is_string() ? it->get<std::string>() : it->dump();
+}
+
+/// Throws if the file at `path` was made from something else than `wanted` describes.
+void check_same(const std::string& path, const Attributes& stored, const Reference& image, const Attributes& wanted, const Scene& scene) {
+    const auto refuse = [&](const std::string& what, const std::string& has, const std::string& asked) {
+        throw input_error(path, 0, fmt::format("cannot be continued: its {} is {}, asked for is {}. Give another file name, or remove the file", what, has, asked));
+    };
+    if (image.mean.width != scene.sensor.crop_width || image.mean.height != scene.sensor.crop_height)
+        refuse("size", fmt::format("{}x{}", image.mean.width, image.mean.height), fmt::format("{}x{}", scene.sensor.crop_width, scene.sensor.crop_height));
+    for (const char* name : {"kind", "scene_hash", "max_depth", "seed"})
+        if (text(stored, name) != text(wanted, name)) refuse(name, text(stored, name), text(wanted, name));
+}
+
+}  // namespace
+
+uint64_t reference_seed(uint64_t seed) {
+    uint64_t z = seed + 0x9E3779B97F4A7C15ull;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
+    return z ^ (z >> 31);
+}
+
+ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& request, const Hooks& hooks) {
+    if (request.spp < 2) throw Error(ExitCode::usage, "a reference needs at least 2 samples per pixel: one has no standard error");
+    RenderSettings settings = request.settings;
+    settings.integrator = "path";
+    settings.estimator = Estimator::mis;
+    settings.seed = reference_seed(request.settings.seed);
+
+    const auto attributes_of = [&](const RenderStats& stats, double seconds) {
+        Attributes a = image_attributes(scene, settings, stats);
+        a["kind"] = "reference";
+        a["seed"] = request.settings.seed;
+        a["seconds"] = seconds;
+        return a;
+    };
+
+    ReferenceResult result;
+    FilmMoments total;
+    double earlier_seconds = 0;
+    if (std::filesystem::exists(request.path)) {
+        result.reference = read_reference_exr(request.path, &result.attributes);
+        // The seed comes back as an integer or, where it does not fit, as text; so does the wanted one after this round.
+        check_same(request.path, result.attributes, result.reference, attributes_of({}, 0), scene);
+        result.continued_from = result.reference.samples;
+        if (result.reference.samples >= request.spp) return result;
+        total = to_moments(result.reference);
+        if (const auto s = result.attributes.find("seconds"); s != result.attributes.end() && s->is_number()) earlier_seconds = s->get<double>();
+    }
+    check_writable(request.path);
+
+    const std::unique_ptr<Renderer> renderer = hooks.make_renderer(scene, settings);
+    RenderPosition position{total.samples, 0, false};
+    while (position.samples < request.spp && !position.interrupted) {
+        const uint64_t before = position.samples;
+        position = drive(*renderer, position, {request.spp, position.seconds + request.checkpoint_seconds}, request.interrupt, request.on_batch);
+        if (position.samples == before) continue;
+        total.add(renderer->film());
+        renderer->clear_film();
+        result.stats = renderer->stats();
+        result.reference = to_reference(total);
+        RenderStats stated = result.stats;
+        stated.samples = total.samples;
+        result.attributes = attributes_of(stated, earlier_seconds + position.seconds);
+        if (total.samples >= 2) write_reference_exr(request.path, result.reference, result.attributes);
+    }
+    result.interrupted = position.interrupted;
+    return result;
+}
+
+}  // namespace ambilux
