@@ -35,6 +35,7 @@ struct Scene {
     std::string path;                        ///< file it came from
     std::array<uint8_t, 32> content_hash{};  ///< over the XML and every file it names, and the options that change the image
     std::vector<std::string> warnings;       ///< substitutions made by --lenient, parameters without effect
+    uint64_t degenerate_triangles = 0;       ///< triangles without area that the loader left out
     IntegratorHint integrator;
 
     std::vector<Vec3f> positions, normals;
