@@ -144,7 +144,7 @@ AMBILUX_HD SurfacePoint quadric_surface_at(const SceneView& scene, uint32_t prim
         const float cos_phi = r > 0.0f ? u / r : 1.0f, sin_phi = r > 0.0f ? v / r : 0.0f;
         s.dpdu = q.to_world.vector({cos_phi, sin_phi, 0.0f});
         s.dpdv = q.to_world.vector(Vec3f{-sin_phi, cos_phi, 0.0f} * (2.0f * kPi * r));
-        s.p_error = quadric_error(q, local, gamma_bound(2));
+        s.p_error = quadric_error(q, local, gamma_bound(5));  // to_local, which decides what is on the plane, is an inverse within rounding
     } else {
         normal = {cosf(u), sinf(u), 0.0f};
         local = {normal.x, normal.y, v};

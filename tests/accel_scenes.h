@@ -57,18 +57,28 @@ inline void add_quadric(Scene& scene, PrimitiveType type, Vec3f center, Frame f,
     q.flip = flip;
     q.radius = radius;
     const Vec3f axes[3] = {f.s, f.t, f.n};
+    double m[3][3];
     for (int c = 0; c < 3; ++c) {
         const double scale = type == PrimitiveType::cylinder && c == 2 ? length : radius;
-        for (int r = 0; r < 3; ++r) {
-            q.to_world.m[r][c] = float(axes[c][r] * scale);
-            q.to_local.m[c][r] = float(axes[c][r] / scale);
-        }
+        for (int r = 0; r < 3; ++r) m[r][c] = axes[c][r] * scale;
     }
-    for (int r = 0; r < 3; ++r) q.to_world.m[r][3] = center[r];
+    // Inverse by cofactors, in double precision, as a loader does it.
+    double inverse[3][3], det = 0;
+    for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) {
+            const int r1 = (c + 1) % 3, r2 = (c + 2) % 3, c1 = (r + 1) % 3, c2 = (r + 2) % 3;
+            inverse[r][c] = m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1];
+        }
+    for (int c = 0; c < 3; ++c) det += m[0][c] * inverse[c][0];
     for (int r = 0; r < 3; ++r) {
-        double sum = 0;
-        for (int c = 0; c < 3; ++c) sum += double(q.to_local.m[r][c]) * center[c];
-        q.to_local.m[r][3] = float(-sum);
+        double offset = 0;
+        for (int c = 0; c < 3; ++c) {
+            q.to_world.m[r][c] = float(m[r][c]);
+            q.to_local.m[r][c] = float(inverse[r][c] / det);
+            offset -= inverse[r][c] / det * center[c];
+        }
+        q.to_world.m[r][3] = center[r];
+        q.to_local.m[r][3] = float(offset);
     }
     scene.shapes.push_back({0, kNone, 0, uint32_t(scene.triangles.size() + scene.quadrics.size()), 1, 0.0f});
     scene.quadrics.push_back(q);
