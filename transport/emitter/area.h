@@ -68,37 +68,34 @@ AMBILUX_HD SphereCone sphere_cone(const Quadric& sphere, Vec3f reference_p) {
     const Vec3f to_center = quadric_center(sphere) - reference_p;
     const float d2 = length_squared(to_center), r2 = sphere.radius * sphere.radius;
     SphereCone cone{};
-    cone.outside = d2 > r2;
-    if (!cone.outside) return cone;
     cone.distance = sqrtf(d2);
+    cone.outside = cone.distance > sphere.radius;
+    if (!cone.outside) return cone;
     cone.axis = to_center * (1.0f / cone.distance);
     cone.sin2_max = r2 / d2;
     cone.one_minus_cos_max = cone.sin2_max / (1.0f + safe_sqrt(1.0f - cone.sin2_max));
     return cone;
 }
 
-/// Direct light from a sphere seen from outside: a direction uniform in its cone. The point follows from the angle at the
-/// centre, which stays exact where intersecting a ray would cancel (PBRT 4th ed., 6.2.4).
+/// Direct light from a sphere seen from outside: a direction uniform in its cone (PBRT 4th ed., 6.2.4). Distance and angle at the
+/// centre come from d - r and not from differences of squares, so that they stay right next to the surface and far away.
 template <Features F>
 AMBILUX_HD bool area_sample_sphere(const SceneView& view, const Emitter& emitter, uint32_t prim, const SphereCone& cone,
-                                   Vec3f reference_p, Vec2f u, EmitterSample& s) {
+                                   Vec2f u, EmitterSample& s) {
     const Quadric& sphere = view.quadric(prim);
     if (sphere.flip) return false;  // radiates inwards
     const Vec3f local = square_to_cone(u, cone.one_minus_cos_max);
     const Frame frame = frame_from_normal(cone.axis);
-    const float sin2 = fminf(local.x * local.x + local.y * local.y, cone.sin2_max), cos_theta = local.z;
-    // alpha: angle at the centre between the way back to the reference and the way to the point
-    const float root = safe_sqrt(1.0f - sin2 / cone.sin2_max);
-    const float cos_alpha = sin2 / sqrtf(cone.sin2_max) + cos_theta * root;
-    const float sin_alpha = safe_sqrt(1.0f - cos_alpha * cos_alpha);
-    const float sin_theta = sqrtf(local.x * local.x + local.y * local.y);
+    const float sin2 = local.x * local.x + local.y * local.y, sin_theta = sqrtf(sin2), cos_theta = local.z;
+    const float r = sphere.radius, d = cone.distance;
+    s.distance = (d - r) * (d + r) / (d * cos_theta + r * safe_sqrt(1.0f - sin2 / cone.sin2_max));
+    const float sin_alpha = s.distance * sin_theta / r, cos_alpha = (d - s.distance * cos_theta) / r;
     const Vec3f side = sin_theta > 0.0f ? (frame.s * local.x + frame.t * local.y) * (1.0f / sin_theta) : frame.s;
     s.ng = normalize(side * sin_alpha - cone.axis * cos_alpha);
     const Vec3f center = quadric_center(sphere);
-    s.p = center + s.ng * sphere.radius;
-    s.p_error = (abs(center) + splat(sphere.radius)) * gamma_bound(8);
+    s.p = center + s.ng * r;
+    s.p_error = (abs(center) + splat(r)) * gamma_bound(8);
     s.wi = frame.to_world(local);
-    s.distance = length(s.p - reference_p);
     s.pdf_sa = emitter.pick_probability * kInv2Pi / cone.one_minus_cos_max;
     if (F.textures && emitter.radiance.texture >= 0) {
         const Vec2f c = octahedral_encode(normalize(sphere.to_local.vector(s.ng)));
@@ -119,7 +116,7 @@ AMBILUX_HD bool area_sample_direct(const SceneView& view, const Emitter& emitter
         const uint32_t prim = view.shapes[emitter.shape].first_primitive;
         if (!view.is_triangle(prim) && view.quadric(prim).type == PrimitiveType::sphere) {
             const SphereCone cone = sphere_cone(view.quadric(prim), reference_p);
-            if (cone.outside) return area_sample_sphere<F>(view, emitter, prim, cone, reference_p, u, s);
+            if (cone.outside) return area_sample_sphere<F>(view, emitter, prim, cone, u, s);
         }
     }
     const SurfacePoint point = area_sample_point<F>(view, emitter, u_primitive, u);

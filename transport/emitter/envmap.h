@@ -45,15 +45,15 @@ AMBILUX_HD Rgb envmap_radiance(const SceneView& view, const Emitter& emitter, Ve
     return envmap_lookup(view, emitter, envmap_uv(emitter.to_local.vector(wi)));
 }
 
-/// Unnormalised probability of density cell (x,y): mean of luminance times sin(theta) over a 4x4 grid in the cell. The outer
-/// points lie near its border, so that it is positive as soon as a texel that reaches into the cell is not black.
+/// Unnormalised probability of density cell (x,y): mean of luminance times sin(theta) over a 4x4 grid in the cell. The grid includes the corners: a texel
+/// reaches a cell from one side, so that the weight is positive wherever the interpolated radiance is.
 AMBILUX_HD float envmap_cell_weight(const SceneView& view, const Emitter& emitter, uint32_t x, uint32_t y) {
     const Texture& texture = view.textures[emitter.radiance.texture];
     float sum = 0.0f;
     for (int j = 0; j < 4; ++j) {
-        const float v = (float(y) + (float(j) + 0.5f) * 0.25f) / float(texture.height);
+        const float v = (float(y) + float(j) * (1.0f / 3.0f)) / float(texture.height);
         for (int i = 0; i < 4; ++i) {
-            const float u = (float(x) + (float(i) + 0.5f) * 0.25f) / float(texture.width);
+            const float u = (float(x) + float(i) * (1.0f / 3.0f)) / float(texture.width);
             sum += fmaxf(luminance(envmap_lookup(view, emitter, {u, v})), 0.0f) * sinf(v * kPi);
         }
     }
