@@ -15,7 +15,9 @@ struct Error : std::runtime_error {
 
 /// Bad input file: "FILE:LINE: message"; line 0 leaves the number out.
 inline Error input_error(const std::string& file, int line, const std::string& message) {
-    return {ExitCode::bad_input, file + (line > 0 ? ":" + std::to_string(line) : "") + ": " + message};
+    std::string text = file;
+    if (line > 0) text.append(":").append(std::to_string(line));
+    return {ExitCode::bad_input, text.append(": ").append(message)};
 }
 
 }  // namespace ambilux

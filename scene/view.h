@@ -27,8 +27,8 @@ enum class TexelFormat : uint32_t { rgba8, rgba32f };
 enum class WrapMode : uint32_t { repeat, mirror, clamp };
 enum class TextureFilter : uint32_t { nearest, bilinear };
 
-/// 2D texture. (s,t) = to_uv (u,v,1); texel row 0 lies at t = 0 (the loader has flipped images as needed, so that
-/// this holds: the top row of an image file is at t = 1).
+/// 2D texture. (s,t) = to_uv (u,v,1); texel row 0, the top row of an image file, lies at t = 0 (as in Mitsuba 3, whose
+/// OBJ loader turns v into 1-v for that; ours does so too).
 struct Texture {
     TextureType type;
     TexelFormat format;

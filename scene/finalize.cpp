@@ -1,0 +1,243 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "core/error.h"
+#include "scene/scene.h"
+
+namespace ambilux {
+
+namespace {
+
+/// Appends the cumulative table of n weights, normalised: 0 ... 1. Returns their sum. All-zero weights count as equal ones.
+template <class Weight>
+double append_cdf(std::vector<float>& tables, size_t n, const Weight& weight) {
+    double total = 0;
+    for (size_t i = 0; i < n; ++i) total += weight(i);
+    double sum = 0;
+    tables.push_back(0.0f);
+    for (size_t i = 0; i < n; ++i) {
+        sum += total > 0 ? weight(i) : 1.0;
+        tables.push_back(i + 1 == n ? 1.0f : std::min(float(sum / (total > 0 ? total : double(n))), 1.0f));
+    }
+    return total;
+}
+
+double triangle_area(const Scene& scene, const Triangle& t) {
+    const Vec3f &a = scene.positions[t.v0], &b = scene.positions[t.v1], &c = scene.positions[t.v2];
+    const double u[3] = {double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z}, v[3] = {double(c.x) - a.x, double(c.y) - a.y, double(c.z) - a.z};
+    const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
+    return 0.5 * std::sqrt(x * x + y * y + z * z);
+}
+
+Vec3f column(const Affine& a, int i) { return {a.m[0][i], a.m[1][i], a.m[2][i]}; }
+
+double quadric_area(const Quadric& q) {
+    const Vec3f x = column(q.to_world, 0), y = column(q.to_world, 1), z = column(q.to_world, 2);
+    switch (q.type) {
+        case PrimitiveType::sphere: return 4 * M_PI * double(q.radius) * q.radius;
+        case PrimitiveType::disk: return M_PI * length(cross(x, y));
+        case PrimitiveType::cylinder: return 2 * M_PI * q.radius * length(z);
+        default: return 0;
+    }
+}
+
+void fill_areas(Scene& scene) {
+    for (Shape& shape : scene.shapes) {
+        double area = 0;
+        for (uint32_t i = 0; i < shape.primitive_count; ++i) {
+            const uint32_t prim = shape.first_primitive + i;
+            area += prim < scene.triangles.size() ? triangle_area(scene, scene.triangles[prim]) : quadric_area(scene.quadrics[prim - scene.triangles.size()]);
+        }
+        shape.area = float(area);
+    }
+    for (Emitter& emitter : scene.emitters) {
+        if (emitter.type != EmitterType::area) continue;
+        const Shape& shape = scene.shapes[emitter.shape];
+        emitter.area_cdf = kNone;
+        if (shape.primitive_count < 2) continue;
+        emitter.area_cdf = uint32_t(scene.tables.size());
+        append_cdf(scene.tables, shape.primitive_count, [&](size_t i) { return triangle_area(scene, scene.triangles[shape.first_primitive + i]); });
+    }
+}
+
+/// Smallest sphere around the centre of the bounding box that holds all surfaces and the camera.
+void fill_bounds(Scene& scene) {
+    Vec3f lo = splat(kInfinity), hi = splat(-kInfinity);
+    const auto grow = [&](Vec3f a, Vec3f b) { lo = min(lo, a), hi = max(hi, b); };
+    const Vec3f camera = column(scene.sensor.to_world, 3);
+    grow(camera, camera);
+    for (const Triangle& t : scene.triangles)
+        for (uint32_t v : {t.v0, t.v1, t.v2}) grow(scene.positions[v], scene.positions[v]);
+    // Centre and half axes of a box around a quadric; a sphere about the origin holds it with radius `reach`.
+    const auto quadric_ball = [](const Quadric& q, Vec3f& center) {
+        center = column(q.to_world, 3);
+        if (q.type == PrimitiveType::sphere) return q.radius;
+        const float flat = length(Vec3f{length(column(q.to_world, 0)), length(column(q.to_world, 1)), 0});
+        if (q.type == PrimitiveType::disk) return std::min(flat, std::max(q.radius, 0.0f));
+        const Vec3f half = column(q.to_world, 2) * 0.5f;
+        center = center + half;
+        return sqrtf(q.radius * q.radius + length_squared(half));
+    };
+    for (const Quadric& q : scene.quadrics) {
+        Vec3f c;
+        const float r = quadric_ball(q, c);
+        grow(c - splat(r), c + splat(r));
+    }
+    const Vec3f center = (lo + hi) * 0.5f;
+    float radius = length(camera - center);
+    for (const Triangle& t : scene.triangles)
+        for (uint32_t v : {t.v0, t.v1, t.v2}) radius = fmaxf(radius, length(scene.positions[v] - center));
+    for (const Quadric& q : scene.quadrics) {
+        Vec3f c;
+        const float r = quadric_ball(q, c);
+        radius = fmaxf(radius, length(c - center) + r);
+    }
+    scene.bounds_center = center;
+    // A little larger against rounding; an empty scene gets a sphere of radius 1, so that distant emitters have something to aim at.
+    scene.bounds_radius = radius > 0 ? radius * (1 + 1e-5f) : 1.0f;
+}
+
+Rgb load_texel(const Scene& scene, const Texture& t, size_t i) {
+    if (t.format == TexelFormat::rgba32f) {
+        float c[4];
+        memcpy(c, scene.texels.data() + t.offset + i * 16, 16);
+        return {c[0], c[1], c[2]};
+    }
+    const uint8_t* c = scene.texels.data() + t.offset + i * 4;
+    const float* decode = scene.tables.data() + t.decode_table;
+    return {decode[c[0]], decode[c[1]], decode[c[2]]};
+}
+
+/// Mean luminance of a colour over its texture.
+double mean_luminance(const Scene& scene, const ParamRgb& parameter) {
+    if (parameter.texture < 0) return luminance(parameter.value);
+    const Texture& t = scene.textures[size_t(parameter.texture)];
+    if (t.type == TextureType::checkerboard) return luminance(parameter.value * (t.color0 + t.color1)) / 2;
+    double sum = 0;
+    const size_t n = size_t(t.width) * t.height;
+    for (size_t i = 0; i < n; ++i) sum += luminance(parameter.value * load_texel(scene, t, i));
+    return sum / double(n);
+}
+
+/// Density of an environment map over the cells of its texel grid: the integral of the bilinear interpolant over the cell (weights 1,6,1 over 8 along
+/// each axis) times the cell's solid angle. Every texel that the interpolant touches inside of a cell has a positive weight, so
+/// the density is zero only where the radiance is. Returns the mean luminance over the sphere.
+double fill_environment(Scene& scene, Emitter& emitter) {
+    const Texture t = scene.textures[size_t(emitter.radiance.texture)];
+    const int64_t w = t.width, h = t.height;
+    std::vector<float> lum(size_t(w * h));
+    for (size_t i = 0; i < lum.size(); ++i) lum[i] = std::max(0.0f, luminance(emitter.radiance.value * load_texel(scene, t, i)));
+
+    std::vector<double> row_sums(size_t(h), 0.0);
+    emitter.env_conditional = uint32_t(scene.tables.size());
+    std::vector<double> weights(static_cast<size_t>(w));
+    for (int64_t y = 0; y < h; ++y) {
+        const float* rows[3] = {&lum[size_t(std::max<int64_t>(y - 1, 0) * w)], &lum[size_t(y * w)], &lum[size_t(std::min(y + 1, h - 1) * w)]};
+        const auto vertical = [&](int64_t x) { return rows[0][x] + 6.0 * rows[1][x] + rows[2][x]; };
+        for (int64_t x = 0; x < w; ++x) weights[size_t(x)] = (vertical((x + w - 1) % w) + 6.0 * vertical(x) + vertical((x + 1) % w)) / 64;
+        const double solid_angle = 2 * M_PI / double(w) * (std::cos(M_PI * double(y) / double(h)) - std::cos(M_PI * double(y + 1) / double(h)));
+        row_sums[size_t(y)] = solid_angle * append_cdf(scene.tables, size_t(w), [&](size_t x) { return weights[x]; });
+    }
+    emitter.env_marginal = uint32_t(scene.tables.size());
+    return append_cdf(scene.tables, size_t(h), [&](size_t y) { return row_sums[y]; }) / (4 * M_PI);
+}
+
+/// Power of an emitter, luminance of watts.
+double emitter_power(Scene& scene, Emitter& e) {
+    const double disk = M_PI * double(scene.bounds_radius) * scene.bounds_radius;
+    switch (e.type) {
+        case EmitterType::area: return M_PI * scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
+        case EmitterType::point: return 4 * M_PI * mean_luminance(scene, e.radiance);
+        // Exact for a constant profile up to the beam width and about right for the falloff.
+        case EmitterType::spot: return 2 * M_PI * (1 - 0.5 * (double(e.cos_cutoff) + e.cos_beam_width)) * mean_luminance(scene, e.radiance);
+        case EmitterType::directional: return disk * mean_luminance(scene, e.radiance);
+        case EmitterType::constant: return disk * 4 * M_PI * mean_luminance(scene, e.radiance);
+        case EmitterType::envmap: return disk * 4 * M_PI * fill_environment(scene, e);
+        default: return 0;
+    }
+}
+
+void fill_emitters(Scene& scene, LightPicking picking) {
+    std::vector<double> power;
+    double total = 0;
+    for (Emitter& e : scene.emitters) {
+        double p = emitter_power(scene, e);
+        if (!(p >= 0) || !std::isfinite(p)) throw input_error(scene.path, 0, "emitter " + std::to_string(power.size()) + " has a power that is not finite");
+        if (picking == LightPicking::uniform && p > 0) p = 1;
+        power.push_back(p);
+        total += p;
+    }
+    // No emitter that shines may vanish in the rounding of the table.
+    for (double& p : power)
+        if (p > 0) p = std::max(p, 1e-6 * total);
+    scene.emitter_cdf.clear();
+    append_cdf(scene.emitter_cdf, power.size(), [&](size_t i) { return power[i]; });
+    // The table's own steps, so that density and sampling agree to the last bit.
+    for (size_t i = 0; i < power.size(); ++i) scene.emitters[i].pick_probability = scene.emitter_cdf[i + 1] - scene.emitter_cdf[i];
+}
+
+/// Cumulative distribution of a reconstruction filter of radius r, at x in [-r, r].
+double filter_cdf(FilterType type, double r, double x) {
+    if (type == FilterType::box) return 0.5 + 0.5 * x / r;
+    if (type == FilterType::tent) {
+        const double s = x / r;
+        return s < 0 ? 0.5 * (1 + s) * (1 + s) : 1 - 0.5 * (1 - s) * (1 - s);
+    }
+    // exp(-x²/2σ²) - exp(-r²/2σ²) with r = 4σ.
+    const double sigma = r / 4, floor = std::exp(-r * r / (2 * sigma * sigma));
+    const auto integral = [&](double a) { return sigma * std::sqrt(M_PI / 2) * std::erf(a / (sigma * std::sqrt(2.0))) - floor * a; };
+    return 0.5 + 0.5 * integral(x) / integral(r);
+}
+
+void fill_filter_table(Scene& scene) {
+    Sensor& sensor = scene.sensor;
+    sensor.filter_table = uint32_t(scene.tables.size());
+    const double r = sensor.filter_radius;
+    for (uint32_t i = 0; i <= kFilterTableSize; ++i) {
+        const double p = double(i) / kFilterTableSize;
+        double lo = -r, hi = r;
+        for (int k = 0; k < 100; ++k) {
+            const double mid = 0.5 * (lo + hi);
+            (filter_cdf(sensor.filter, r, mid) < p ? lo : hi) = mid;
+        }
+        scene.tables.push_back(i == 0 ? float(-r) : (i == kFilterTableSize ? float(r) : (2 * i == kFilterTableSize ? 0.0f : float(0.5 * (lo + hi)))));
+    }
+}
+
+void fill_features(Scene& scene) {
+    Features f;
+    const auto use = [&](int32_t texture) { f.textures |= texture >= 0; };
+    for (const Shape& shape : scene.shapes) {
+        if (shape.primitive_count == 0) continue;
+        const Material& m = scene.materials[shape.material];
+        use(m.opacity.texture);
+        f.opacity |= m.opacity.texture >= 0 || m.opacity.value < 1;
+        for (uint32_t index : {m.front, m.back}) {
+            const BsdfRecord& b = scene.bsdfs[index];
+            f.bsdfs |= bit(b.type);
+            for (int32_t texture : {b.reflectance.texture, b.specular_reflectance.texture, b.specular_transmittance.texture, b.alpha_u.texture, b.alpha_v.texture}) use(texture);
+            f.bumps |= b.normal_map >= 0 || b.bump_map >= 0;
+        }
+        const uint32_t first = shape.first_primitive;
+        f.primitives |= bit(first < scene.triangles.size() ? PrimitiveType::triangle : scene.quadrics[first - scene.triangles.size()].type);
+    }
+    for (const Emitter& e : scene.emitters) {
+        f.emitters |= bit(e.type);
+        if (e.type != EmitterType::envmap) use(e.radiance.texture);  // an environment map has its own lookup
+    }
+    scene.features = f;
+}
+
+}  // namespace
+
+void finalize_scene(Scene& scene, LightPicking light_picking) {
+    fill_areas(scene);
+    fill_bounds(scene);
+    fill_emitters(scene, light_picking);
+    fill_filter_table(scene);
+    fill_features(scene);
+    if (scene.tables.size() >= kNone) throw input_error(scene.path, 0, "the scene's tables are too large");
+}
+
+}  // namespace ambilux

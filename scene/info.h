@@ -1,0 +1,24 @@
+// What is in a scene, for people and for files.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "scene/scene.h"
+
+namespace ambilux {
+
+const char* name_of(BsdfType type);
+const char* name_of(EmitterType type);
+const char* name_of(PrimitiveType type);
+const char* name_of(SensorType type);
+const char* name_of(FilterType type);
+
+/// Names of the features, in a fixed order: bsdf types, emitter types, primitive types, then textures, bumps, opacity.
+std::vector<std::string> feature_names(const Features& features);
+
+/// Counts per type, triangles, memory, sensor, film, integrator hint, features, warnings.
+nlohmann::json scene_info(const Scene& scene);
+
+}  // namespace ambilux

@@ -1,0 +1,41 @@
+#include "scene/scene.h"
+
+namespace ambilux {
+
+SceneView Scene::view() const {
+    SceneView v{};
+    v.positions = positions.data();
+    v.normals = normals.data();
+    v.uvs = uvs.data();
+    v.triangles = triangles.data();
+    v.quadrics = quadrics.data();
+    v.shapes = shapes.data();
+    v.materials = materials.data();
+    v.bsdfs = bsdfs.data();
+    v.textures = textures.data();
+    v.texels = texels.data();
+    v.emitters = emitters.data();
+    v.emitter_cdf = emitter_cdf.data();
+    v.tables = tables.data();
+    v.vertex_count = uint32_t(positions.size());
+    v.triangle_count = uint32_t(triangles.size());
+    v.quadric_count = uint32_t(quadrics.size());
+    v.shape_count = uint32_t(shapes.size());
+    v.material_count = uint32_t(materials.size());
+    v.bsdf_count = uint32_t(bsdfs.size());
+    v.texture_count = uint32_t(textures.size());
+    v.emitter_count = uint32_t(emitters.size());
+    v.environment = environment;
+    v.bounds_center = bounds_center;
+    v.bounds_radius = bounds_radius;
+    v.sensor = sensor;
+    return v;
+}
+
+uint64_t Scene::memory_bytes() const {
+    const auto bytes = [](const auto& array) { return uint64_t(array.size() * sizeof(array[0])); };
+    return bytes(positions) + bytes(normals) + bytes(uvs) + bytes(triangles) + bytes(quadrics) + bytes(shapes) + bytes(materials) + bytes(bsdfs) +
+           bytes(textures) + bytes(texels) + bytes(emitters) + bytes(emitter_cdf) + bytes(tables);
+}
+
+}  // namespace ambilux
