@@ -60,17 +60,20 @@ Hit intersect(const SceneView& view, Vec3f o, Vec3f d) {
     return hit;
 }
 
-/// Below this cosine at the light a sample counts as missed: area sampling has the density d²/(A cos), whose square is not integrable up to the outline, so that no
-/// quadrature would settle.
-constexpr float kGrazing = 0.1f;
+/// Where the density has a pole whose square is not integrable, so that no quadrature would settle: 1/cos at the outline of a shape sampled by area,
+/// 1/sin(theta) at the poles of an environment map. Such samples count as missed.
+bool near_pole(const SceneView& view, Vec3f wi, Vec3f ng) {
+    if (view.environment == kNone) return dot(ng, -wi) < 0.1f;
+    return view.emitters[0].type == EmitterType::envmap && std::fabs(view.emitters[0].to_local.vector(wi).y) > 0.995f;
+}
 
 /// Density that light sampling claims for direction `wi`, of the only emitter.
 double claimed_pdf(const SceneView& view, Vec3f p, Vec3f wi) {
-    if (view.environment != kNone) return pdf_environment_direct<kAll>(view, wi);
+    if (view.environment != kNone) return near_pole(view, wi, wi) ? 0 : pdf_environment_direct<kAll>(view, wi);
     const Hit hit = intersect(view, p, wi);
     if (hit.prim == kNone) return 0;
     const SurfacePoint s = surface_at<kAll>(view, hit.prim, hit.u, hit.v);
-    if (is_zero(emitted_radiance<kAll>(view, view.shapes[s.shape].emitter, s, -wi)) || dot(s.ng, -wi) < kGrazing) return 0;
+    if (is_zero(emitted_radiance<kAll>(view, view.shapes[s.shape].emitter, s, -wi)) || near_pole(view, wi, s.ng)) return 0;
     return pdf_emitter_direct<kAll>(view, view.shapes[s.shape].emitter, p, wi, s);
 }
 
@@ -122,7 +125,7 @@ void check_density(const Scene& scene, Vec3f p, Vec3f axis, double one_minus_cos
             const double claimed = claimed_pdf(view, p, s);
             different += !(std::fabs(claimed - s.pdf_sa) <= 1e-4 * s.pdf_sa);
         }
-        if (dot(s.ng, -s.wi) < kGrazing) continue;
+        if (near_pole(view, s.wi, s.ng)) continue;
         missed -= 1;
         const Vec3f local = frame.to_local(s.wi);
         const double r2 = double(local.x) * local.x + double(local.y) * local.y;
