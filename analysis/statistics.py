@@ -1,0 +1,126 @@
+"""Statistics over seeds and over checkpoints. Pure functions on numbers; each names its formula and source."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value, its standard error (NaN if one sample gives none) and the ends of its 95 % confidence interval."""
+
+    value: float
+    error: float
+    low: float
+    high: float
+
+
+def student_cdf(t, dof):
+    """P(T <= t) of Student's t with `dof` (integer >= 1) degrees of freedom.
+
+    Finite sums for integer degrees of freedom: Abramowitz and Stegun 1964, eqs. 26.7.3 (odd) and 26.7.4 (even).
+    """
+    theta = math.atan2(abs(t), math.sqrt(dof))
+    s, c2 = math.sin(theta), math.cos(theta) ** 2
+    if dof % 2:
+        term, total = math.cos(theta), 0.0
+        for k in range(1, dof - 1, 2):
+            total += term
+            term *= (k + 1) / (k + 2) * c2
+        central = 2 / math.pi * (theta + s * total)
+    else:
+        term, total = 1.0, 0.0
+        for k in range(0, dof - 1, 2):
+            total += term
+            term *= (k + 1) / (k + 2) * c2
+        central = s * total
+    return 0.5 * (1 + math.copysign(central, t))
+
+
+def student_quantile(p, dof):
+    """The t with student_cdf(t, dof) = p, for 0.5 <= p < 1, by bisection."""
+    if not (0.5 <= p < 1 and dof >= 1):
+        raise ValueError(f"student_quantile: p = {p}, dof = {dof}")
+    low, high = 0.0, 1.0
+    while student_cdf(high, dof) < p:
+        high *= 2
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if student_cdf(middle, dof) < p else (low, middle)
+    return 0.5 * (low + high)
+
+
+def mean_estimate(values, confidence=0.95):
+    """Mean of independent values: m, s/sqrt(n), m +- t(n-1) s/sqrt(n) (Student 1908). One value gives an unknown (NaN) error."""
+    values = np.asarray(values, dtype=float)
+    n = len(values)
+    if n == 0:
+        raise ValueError("mean_estimate: no values")
+    mean = float(values.mean())
+    if n == 1:
+        return Estimate(mean, math.nan, math.nan, math.nan)
+    error = float(values.std(ddof=1)) / math.sqrt(n)
+    half = student_quantile(0.5 + confidence / 2, n - 1) * error
+    return Estimate(mean, error, mean - half, mean + half)
+
+
+def geometric_mean(values):
+    """exp(mean(log x)) of positive values: the mean for a logarithmic axis, where one outlying seed does not hide the others."""
+    values = np.asarray(values, dtype=float)
+    if len(values) == 0 or not (values > 0).all():
+        raise ValueError("geometric_mean: needs positive values")
+    return float(np.exp(np.log(values).mean()))
+
+
+def ratio_of_pairs(a, b, confidence=0.95):
+    """Geometric mean of a_i / b_i with its confidence interval, for positive pairs (same seed).
+
+    d_i = log(a_i / b_i); exp(mean d), and exp of Student's interval of mean d (paired t interval, Student 1908). Pairing is
+    right whether or not equal seeds make a and b correlated. `error` is the standard error of the logarithm.
+    """
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    if a.shape != b.shape or not ((a > 0).all() and (b > 0).all()):
+        raise ValueError("ratio_of_pairs: needs positive pairs")
+    d = mean_estimate(np.log(a) - np.log(b), confidence)
+    return Estimate(math.exp(d.value), d.error, math.exp(d.low), math.exp(d.high))
+
+
+def fit_line(x, y):
+    """Least squares y = a + b x. Returns (a, b, standard error of b).
+
+    b = Sxy / Sxx, se(b) = sqrt(RSS / (n-2) / Sxx) (Draper and Smith 1998, eqs. 1.2.9 and 1.4.5); NaN for two points. The
+    standard error holds for independent errors only.
+    """
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    n = len(x)
+    sxx = float(((x - x.mean()) ** 2).sum()) if n else 0.0
+    if n < 2 or sxx == 0:
+        raise ValueError("fit_line: needs two different x")
+    b = float(((x - x.mean()) * (y - y.mean())).sum()) / sxx
+    a = float(y.mean()) - b * float(x.mean())
+    rss = float(((y - a - b * x) ** 2).sum())
+    return a, b, math.sqrt(rss / (n - 2) / sxx) if n > 2 else math.nan
+
+
+def convergence_slope(series):
+    """Slope of log(error) against log(budget); -1/2 is what independent samples give.
+
+    `series`: one (budgets, errors) pair per seed. The checkpoints of one seed share samples, so that their errors are
+    correlated and the standard error of one joint fit would be too small. Therefore each seed is fitted alone and the
+    slopes, which are independent, are averaged (the summary measures of Matthews et al. 1990, BMJ 300:230). With one seed
+    the standard error is that of the fit, which is then too small, and there is no interval.
+    Values that are not positive and finite are left out. Returns None if no seed has two points.
+    """
+    slopes, error = [], math.nan
+    for budgets, errors in series:
+        x, y = np.asarray(budgets, dtype=float), np.asarray(errors, dtype=float)
+        ok = np.isfinite(x) & np.isfinite(y) & (x > 0) & (y > 0)
+        if len(np.unique(x[ok])) >= 2:
+            _, b, error = fit_line(np.log(x[ok]), np.log(y[ok]))
+            slopes.append(b)
+    if not slopes:
+        return None
+    if len(slopes) == 1:
+        return Estimate(slopes[0], error, math.nan, math.nan)
+    return mean_estimate(slopes)
