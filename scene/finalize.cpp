@@ -120,9 +120,16 @@ double mean_luminance(const Scene& scene, const ParamRgb& parameter) {
     return sum / double(n);
 }
 
-/// Density of an environment map over the cells of its texel grid: the integral of the bilinear interpolant over the cell (weights 1,6,1 over 8 along
-/// each axis) times the cell's solid angle. Every texel that the interpolant touches inside of a cell has a positive weight, so
-/// the density is zero only where the radiance is. Returns the mean luminance over the sphere.
+/// Integral of a hat function (1 at 0, 0 at -1 and 1) up to x.
+double hat_integral(double x) {
+    x = std::clamp(x, -1.0, 1.0);
+    return x < 0 ? 0.5 * (1 + x) * (1 + x) : 1 - 0.5 * (1 - x) * (1 - x);
+}
+
+/// Density of an environment map over the cells of 1/width by 1/height in (u,v) (transport/emitter/envmap.h): the integral of the bilinear interpolant
+/// over the cell times the cell's solid angle. Along u, texel centres are cell centres: weights 1, 6, 1 over 8. Along v, texel rows lie at
+/// j/(height-1), so that the weights change from row to row; a row that barely reaches into a cell still gets 1/32, which
+/// bounds the ratio of radiance to density there. The density is zero only where the radiance is. Returns the mean luminance over the sphere.
 double fill_environment(Scene& scene, Emitter& emitter) {
     const Texture t = scene.textures[size_t(emitter.radiance.texture)];
     const int64_t w = t.width, h = t.height;
@@ -131,16 +138,26 @@ double fill_environment(Scene& scene, Emitter& emitter) {
 
     std::vector<double> row_sums(size_t(h), 0.0);
     emitter.env_conditional = uint32_t(scene.tables.size());
-    std::vector<double> weights(static_cast<size_t>(w));
+    std::vector<double> column_weights(static_cast<size_t>(w));
+    double mean = 0;
     for (int64_t y = 0; y < h; ++y) {
-        const float* rows[3] = {&lum[size_t(std::max<int64_t>(y - 1, 0) * w)], &lum[size_t(y * w)], &lum[size_t(std::min(y + 1, h - 1) * w)]};
-        const auto vertical = [&](int64_t x) { return rows[0][x] + 6.0 * rows[1][x] + rows[2][x]; };
-        for (int64_t x = 0; x < w; ++x) weights[size_t(x)] = (vertical((x + w - 1) % w) + 6.0 * vertical(x) + vertical((x + 1) % w)) / 64;
+        // The cell in units of rows.
+        const double a = double(y) * double(h - 1) / double(h), b = double(y + 1) * double(h - 1) / double(h);
+        std::fill(column_weights.begin(), column_weights.end(), 0.0);
+        for (int64_t r = std::max<int64_t>(y - 1, 0); r <= std::min(y + 1, h - 1); ++r) {
+            const double exact = h > 1 ? (hat_integral(b - double(r)) - hat_integral(a - double(r))) / (b - a) : 1.0;
+            if (!(exact > 0)) continue;
+            const double weight = std::max(exact, 1.0 / 32);
+            const float* row = &lum[size_t(r * w)];
+            for (int64_t x = 0; x < w; ++x) column_weights[size_t(x)] += weight * (row[(x + w - 1) % w] + 6.0 * row[x] + row[(x + 1) % w]) / 8;
+        }
         const double solid_angle = 2 * M_PI / double(w) * (std::cos(M_PI * double(y) / double(h)) - std::cos(M_PI * double(y + 1) / double(h)));
-        row_sums[size_t(y)] = solid_angle * append_cdf(scene.tables, size_t(w), [&](size_t x) { return weights[x]; });
+        row_sums[size_t(y)] = solid_angle * append_cdf(scene.tables, size_t(w), [&](size_t x) { return column_weights[x]; });
+        mean += row_sums[size_t(y)] / (4 * M_PI);
     }
     emitter.env_marginal = uint32_t(scene.tables.size());
-    return append_cdf(scene.tables, size_t(h), [&](size_t y) { return row_sums[y]; }) / (4 * M_PI);
+    append_cdf(scene.tables, size_t(h), [&](size_t y) { return row_sums[y]; });
+    return mean;
 }
 
 /// Power of an emitter, luminance of watts.
