@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "core/atomic_file.h"
@@ -70,7 +71,9 @@ ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& reque
     RenderPosition position{total.samples, 0, false};
     while (position.samples < request.spp && !position.interrupted) {
         const uint64_t before = position.samples;
-        position = drive(*renderer, position, {request.spp, position.seconds + request.checkpoint_seconds}, request.interrupt, request.on_batch);
+        // A checkpoint's time ends drive(); it makes at least one sample.
+        const double due = position.seconds + std::max(request.checkpoint_seconds, 1e-3);
+        position = drive(*renderer, position, {request.spp, due}, request.interrupt, request.on_batch);
         if (position.samples == before) continue;
         total.add(renderer->film());
         renderer->clear_film();

@@ -1,0 +1,31 @@
+#include <fmt/format.h>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "experiments/runner.h"
+
+namespace ambilux {
+
+void add_experiment(CLI::App& app, Run& run) {
+    auto request = std::make_shared<ExperimentRequest>();
+    CLI::App& command = *app.add_subcommand("experiment", "Run a convergence experiment and measure it against references");
+    command.add_option("CONFIG", request->config, "Experiment configuration (TOML)")->required();
+    command.add_option("-o,--output", request->output, "Folder for results")->required();
+    command.add_option("--references", request->references, "Folder that keeps references between experiments. Default: OUTPUT/references");
+    command.add_flag("--resume", request->resume, "Go on with the experiment that the folder holds");
+    command.callback([request, &run] {
+        run = [request] {
+            request->interrupt = interrupt_flag();
+            const ExitCode code = run_experiment(*request, default_hooks());
+            if (code == ExitCode::interrupted)
+                log_error("interrupted: all that was finished is saved; the same command with --resume goes on");
+            else
+                log_info(fmt::format("{}/runs.csv is complete", request->output));
+            return int(code);
+        };
+    });
+}
+
+}  // namespace ambilux

@@ -1,0 +1,45 @@
+#include "experiments/results.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "core/atomic_file.h"
+#include "core/error.h"
+
+namespace ambilux {
+
+const char* const kResultHeader =
+    "scene,run,seed,checkpoint,integrator,variant,estimator,backend,spp,time,rmse,rmse_corrected,reference_noise,relmse,relmse_corrected,mape,bias,bias_z,"
+    "rays,invalid";
+
+std::string result_prefix(const std::string& scene, const std::string& run, uint64_t seed) { return fmt::format("{},{},{},", scene, run, seed); }
+
+std::string result_line(const ResultRow& r) {
+    const Metrics& m = r.metrics;
+    return fmt::format("{}{},{},{},{},{},{},{:.6f},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.5g},{},{}", result_prefix(r.scene, r.run, r.seed),
+                       r.checkpoint, r.integrator, r.variant, r.estimator, r.backend, r.spp, r.time, m.rmse, m.rmse_corrected, m.reference_noise, m.relmse,
+                       m.relmse_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid);
+}
+
+std::vector<std::string> read_results(const std::string& path) {
+    std::vector<std::string> lines;
+    if (!std::filesystem::exists(path)) return lines;
+    const std::string content = read_file(path);
+    const auto commas = std::count(kResultHeader, kResultHeader + std::char_traits<char>::length(kResultHeader), ',');
+    std::set<std::string> seen;
+    size_t number = 0;
+    for (size_t begin = 0, end; (end = content.find('\n', begin)) != std::string::npos; begin = end + 1) {
+        std::string line = content.substr(begin, end - begin);
+        if (++number == 1) {
+            if (line != kResultHeader) throw input_error(path, 1, "its columns are not those of this version: choose another output folder");
+            continue;
+        }
+        if (std::count(line.begin(), line.end(), ',') == commas && seen.insert(line).second) lines.push_back(std::move(line));
+    }
+    return lines;
+}
+
+}  // namespace ambilux

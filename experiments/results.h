@@ -1,0 +1,37 @@
+// runs.csv: one row per (scene, run, seed, checkpoint).
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "film/metrics.h"
+
+namespace ambilux {
+
+struct ResultRow {
+    std::string scene, run;
+    uint64_t seed = 0;
+    size_t checkpoint = 0;  ///< counts from 0
+    std::string integrator, variant, estimator, backend;
+    uint64_t spp = 0;
+    double time = 0;  ///< seconds inside the renderer, wall clock
+    Metrics metrics;
+    uint64_t rays = 0, invalid = 0;
+};
+
+/// Column names; the first line of the file.
+extern const char* const kResultHeader;
+
+/// One line without its end. Names hold no commas or quotes (the configuration sees to that).
+std::string result_line(const ResultRow& row);
+
+/// "scene,run,seed,": what the lines of one render begin with.
+std::string result_prefix(const std::string& scene, const std::string& run, uint64_t seed);
+
+/// The lines of a results file, without its header. A last line that a killed process left unfinished is dropped; so are repeated lines. Nothing if the file does
+/// not exist. Throws Error(bad_input) if the header is another.
+std::vector<std::string> read_results(const std::string& path);
+
+}  // namespace ambilux

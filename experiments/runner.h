@@ -1,0 +1,25 @@
+// Runs an experiment: every run on every scene with every seed, measured against the scene's reference at every checkpoint.
+#pragma once
+
+#include <string>
+
+#include "core/error.h"
+#include "experiments/hooks.h"
+
+namespace ambilux {
+
+struct ExperimentRequest {
+    std::string config;      ///< TOML file
+    std::string output;      ///< folder
+    std::string references;  ///< folder of the references; empty: OUTPUT/references. Shared by experiments, it saves making them again
+    bool resume = false;
+    const volatile bool* interrupt = nullptr;
+};
+
+/// Writes into the output folder: config.resolved.toml, manifest.json, runs.csv, images/SCENE/RUN_SEED.{exr,png}, stats/SCENE/RUN_SEED.json, references/. All that can be
+/// wrong with the configuration is refused before anything is rendered. Seeds are the outer loop, so that an experiment that is stopped early has fewer seeds of
+/// every run, not fewer runs. After each checkpoint the state of the render is saved; with `resume` a stopped or killed experiment loses no more than the work since
+/// the last checkpoint. Returns done or interrupted. Throws Error.
+ExitCode run_experiment(const ExperimentRequest& request, const Hooks& hooks);
+
+}  // namespace ambilux
