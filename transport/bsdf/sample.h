@@ -29,9 +29,9 @@ struct BsdfValue {
 
 AMBILUX_HD BsdfValue no_scattering() { return {{0.0f, 0.0f, 0.0f}, 0.0f}; }
 
-/// Fills `out` for a direction drawn from a smooth lobe; false if the density vanishes there (rounding, underflow).
+/// Fills `out` for a direction drawn from a smooth lobe; false if the density is out of range there (rounding, underflow).
 AMBILUX_HD bool smooth_sample(Vec3f wo, BsdfValue v, float eta, uint32_t flags, BsdfSample& out) {
-    if (!(v.pdf_sa > 0.0f)) return false;
+    if (!(v.pdf_sa > 0.0f && v.pdf_sa < kInfinity)) return false;
     out = {wo, v.pdf_sa, v.value / v.pdf_sa, eta, flags};
     return is_finite(out.weight);
 }
