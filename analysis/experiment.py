@@ -4,12 +4,11 @@ import csv
 import json
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 from pathlib import Path
 
-REQUIRED = ("scene", "run", "seed", "checkpoint", "spp", "seconds", "rmse", "rmse_corrected", "relmse", "mape", "rays", "nan", "inf", "negative")
 TEXT = ("scene", "run")
-INTEGERS = ("seed", "checkpoint", "spp", "rays", "nan", "inf", "negative")
+INTEGERS = ("seed", "checkpoint", "spp", "rays", "invalid")
 
 
 class InputError(Exception):
@@ -18,26 +17,24 @@ class InputError(Exception):
 
 @dataclass(frozen=True)
 class Row:
-    """One checkpoint of one seed of one run, as recorded. Seconds are render time; errors are over all pixels and channels."""
+    """One checkpoint of one seed of one run, as recorded. Errors are over all pixels and channels (film/metrics.h); those named
+    `_corrected` have the reference's own noise subtracted and are NaN if that is unknown."""
 
     scene: str
     run: str
     seed: int
     checkpoint: int
     spp: int
-    seconds: float
+    time: float  # seconds inside the renderer, wall clock
     rmse: float
-    rmse_corrected: float  # the reference's own noise subtracted; NaN if unknown
+    rmse_corrected: float
+    reference_noise: float
     relmse: float
+    relmse_corrected: float
     mape: float
+    bias_z: float
     rays: int
-    nan: int
-    inf: int
-    negative: int
-
-    @property
-    def invalid(self):
-        return self.nan + self.inf + self.negative
+    invalid: int  # values dropped: NaN, Inf, negative
 
     @property
     def error(self):
@@ -45,11 +42,12 @@ class Row:
         return self.rmse if math.isnan(self.rmse_corrected) else self.rmse_corrected
 
     @property
-    def reference_noise(self):
-        """The reference's RMS standard error, which the runner subtracted: sqrt(rmse^2 - rmse_corrected^2); NaN if unknown or hidden by max(0, .)."""
-        if math.isnan(self.rmse_corrected) or self.rmse_corrected == 0:
-            return math.nan
-        return math.sqrt(max(0.0, self.rmse**2 - self.rmse_corrected**2))
+    def relative_error(self):
+        """relMSE, chosen like `error`."""
+        return self.relmse if math.isnan(self.relmse_corrected) else self.relmse_corrected
+
+
+REQUIRED = tuple(f.name for f in fields(Row))
 
 
 @dataclass
@@ -57,8 +55,8 @@ class Experiment:
     folder: Path
     manifest: dict
     rows: list
-    scenes: list = field(default_factory=list)  # names in the order of runs.csv
-    runs: list = field(default_factory=list)
+    scenes: list  # names in the order of the configuration
+    runs: list
 
     def select(self, scene, run, checkpoint=None):
         """Rows of one run in one scene, by seed and checkpoint."""
@@ -79,22 +77,21 @@ class Experiment:
 
     def image(self, scene, run):
         """Path of the image of the lowest seed, or None."""
-        pattern = re.compile(re.escape(run) + r"_seed(\d+)\.exr")
+        pattern = re.compile(re.escape(run) + r"_(\d+)\.exr")
         found = [(int(m[1]), p) for p in (self.folder / "images" / scene).glob("*.exr") if (m := pattern.fullmatch(p.name))]
         return min(found)[1] if found else None
 
     def reference(self, scene):
-        """Path of the reference image, or None."""
-        places = (f"references/{scene}.exr", f"images/{scene}/reference.exr")
-        return next((self.folder / p for p in places if (self.folder / p).is_file()), None)
+        """Path of the reference image as the manifest names it, relative to the folder or absolute; None if it is not there."""
+        entry = next(s for s in self.manifest["scenes"] if s["name"] == scene)
+        name = (entry.get("reference") or {}).get("file")
+        return self.folder / name if name and (self.folder / name).is_file() else None
 
 
 def parse_number(text, column, place):
-    """Number of one cell. An empty cell or "null" is NaN where a value may be unknown."""
+    """Number of one cell; "nan" and "inf" are numbers where the column's values are real."""
     try:
-        if column in INTEGERS:
-            return int(text)
-        return math.nan if text in ("", "null") else float(text)
+        return int(text) if column in INTEGERS else float(text)
     except ValueError:
         raise InputError(f"{place}: column '{column}' holds '{text}', which is no number") from None
 
@@ -112,8 +109,8 @@ def read_rows(path):
             if None in record or any(record[c] is None for c in REQUIRED):
                 raise InputError(f"{place}: number of cells differs from the header's")
             row = Row(**{c: record[c] if c in TEXT else parse_number(record[c], c, place) for c in REQUIRED})
-            if row.spp <= 0 or not row.seconds > 0:
-                raise InputError(f"{place}: spp and seconds must be positive")
+            if row.spp <= 0 or not row.time > 0:
+                raise InputError(f"{place}: spp and time must be positive")
             key = (row.scene, row.run, row.seed, row.checkpoint)
             if key in seen:
                 raise InputError(f"{place}: repeats line {seen[key]} (scene {row.scene}, run {row.run}, seed {row.seed}, checkpoint {row.checkpoint})")
@@ -134,6 +131,13 @@ def load(folder):
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     except json.JSONDecodeError as e:
         raise InputError(f"{folder / 'manifest.json'}:{e.lineno}: {e.msg}") from None
+    try:
+        scenes, runs = ([entry["name"] for entry in manifest[key]] for key in ("scenes", "runs"))
+    except (KeyError, TypeError):
+        raise InputError(f"{folder / 'manifest.json'}: lacks the lists 'scenes' and 'runs' of objects with a 'name'") from None
     rows = read_rows(folder / "runs.csv")
-    unique = lambda values: list(dict.fromkeys(values))
-    return Experiment(folder, manifest, rows, unique(r.scene for r in rows), unique(r.run for r in rows))
+    for row in rows:
+        for kind, name, known in (("scene", row.scene, scenes), ("run", row.run, runs)):
+            if name not in known:
+                raise InputError(f"{folder / 'runs.csv'}: {kind} '{name}' is not in manifest.json")
+    return Experiment(folder, manifest, rows, scenes, runs)
