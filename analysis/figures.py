@@ -33,21 +33,20 @@ def plain_number(x, _=None):
 
 
 def label_axis(axis, limits):
-    """Decades alone where there are several; 1, 2 and 5 where the range is short, so that no axis is left without numbers."""
+    """Decades alone where there are several; numbers between them where the range is short, so that no axis has fewer than two."""
     decades = math.log10(limits[1] / limits[0])
-    axis.set_major_locator(LogLocator(10, subs=(1.0,) if decades > 2.5 else (1.0, 2.0, 5.0) if decades > 0.7 else (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)))
+    between = () if decades > 2.7 else (3.0,) if decades > 1.5 else (2.0, 5.0) if decades > 0.8 else (1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
+    axis.set_major_locator(LogLocator(10, subs=(1.0, *between)))
     axis.set_major_formatter(FuncFormatter(plain_number))
     axis.set_minor_formatter(NullFormatter())
 
 
 def draw_guide(axes, curves, x):
-    """Slope -1/2, through the middle of the first curve's first point, drawn under the data."""
-    xs = np.concatenate([getattr(c, x) for c in curves])
-    ys = np.concatenate([c.error for c in curves])
-    start = getattr(curves[0], x)[0], curves[0].error[0]
-    ends = np.array([xs.min(), xs.max()])
-    axes.plot(ends, start[1] * np.sqrt(start[0] / ends), color="0.6", lw=0.8, dashes=(4, 3), zorder=1, label="slope −1/2")
-    return ys
+    """Slope -1/2, below all data so that it hides none."""
+    budgets = np.concatenate([getattr(c, x) for c in curves])
+    level = 0.7 * min((c.low * np.sqrt(getattr(c, x))).min() for c in curves)
+    ends = np.array([budgets.min(), budgets.max()])
+    axes.plot(ends, level / np.sqrt(ends), color="0.5", lw=0.8, dashes=(4, 3), zorder=1, label="slope −1/2")
 
 
 def draw_panel(axes, experiment, scene, x):
@@ -60,7 +59,7 @@ def draw_panel(axes, experiment, scene, x):
         return False
     axes.set_xscale("log")
     axes.set_yscale("log")
-    ys = draw_guide(axes, [c for _, c in curves], x)
+    draw_guide(axes, [c for _, c in curves], x)
     for i, c in curves:
         colour, budget = COLOURS[i % len(COLOURS)], getattr(c, x)
         # Past seven runs colours repeat and dashes tell them apart.
@@ -68,7 +67,7 @@ def draw_panel(axes, experiment, scene, x):
         axes.fill_between(budget, c.low, c.high, color=colour, alpha=0.2, lw=0, zorder=2)
     noise = summary.reference_noise(experiment, scene)
     # Shown where it matters: a reference far below the data would only stretch the axis.
-    if noise > 0.3 * ys.min():
+    if noise > 0.3 * min(c.error.min() for _, c in curves):
         axes.axhline(noise, color="0.4", lw=0.8, ls=":", zorder=1, label="noise of the reference")
     label_axis(axes.xaxis, axes.get_xlim())
     label_axis(axes.yaxis, axes.get_ylim())
@@ -81,7 +80,7 @@ def draw_panel(axes, experiment, scene, x):
 def convergence(experiment, x):
     """Figure with one panel per scene; x is "seconds" or "spp". Lines: geometric mean over seeds; bands: least to greatest seed."""
     count = len(experiment.scenes)
-    columns = min(PANELS_PER_ROW, count)
+    columns = 2 if count == 4 else min(PANELS_PER_ROW, count)
     rows = math.ceil(count / columns)
     with plt.rc_context(STYLE):
         width = 2.4 * columns + 0.3 if columns > 1 else 3.5
