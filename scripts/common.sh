@@ -1,8 +1,10 @@
+# shellcheck shell=bash
 # Sourced by the other scripts: where things are, and how many jobs this machine bears.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 build="${AMBILUX_BUILD_DIR:-$root/build}"
+# shellcheck disable=SC2034  # used by the scripts that source this
 python="$root/.venv/bin/python"
 
 say() { printf '%s\n' "$*" >&2; }
