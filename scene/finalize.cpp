@@ -136,7 +136,8 @@ double fill_environment(Scene& scene, Emitter& emitter) {
     std::vector<float> lum(size_t(w * h));
     for (size_t i = 0; i < lum.size(); ++i) lum[i] = std::max(0.0f, luminance(emitter.radiance.value * load_texel(scene, t, i)));
 
-    std::vector<double> row_sums(size_t(h), 0.0);
+    std::vector<double> row_means(size_t(h), 0.0), row_sums(size_t(h), 0.0);
+    for (size_t i = 0; i < lum.size(); ++i) row_means[i / size_t(w)] += lum[i] / double(w);
     emitter.env_conditional = uint32_t(scene.tables.size());
     std::vector<double> column_weights(static_cast<size_t>(w));
     double mean = 0;
@@ -144,16 +145,18 @@ double fill_environment(Scene& scene, Emitter& emitter) {
         // The cell in units of rows.
         const double a = double(y) * double(h - 1) / double(h), b = double(y + 1) * double(h - 1) / double(h);
         std::fill(column_weights.begin(), column_weights.end(), 0.0);
+        double exact_mean = 0;
         for (int64_t r = std::max<int64_t>(y - 1, 0); r <= std::min(y + 1, h - 1); ++r) {
             const double exact = h > 1 ? (hat_integral(b - double(r)) - hat_integral(a - double(r))) / (b - a) : 1.0;
             if (!(exact > 0)) continue;
             const double weight = std::max(exact, 1.0 / 32);
             const float* row = &lum[size_t(r * w)];
+            exact_mean += exact * row_means[size_t(r)];
             for (int64_t x = 0; x < w; ++x) column_weights[size_t(x)] += weight * (row[(x + w - 1) % w] + 6.0 * row[x] + row[(x + 1) % w]) / 8;
         }
         const double solid_angle = 2 * M_PI / double(w) * (std::cos(M_PI * double(y) / double(h)) - std::cos(M_PI * double(y + 1) / double(h)));
         row_sums[size_t(y)] = solid_angle * append_cdf(scene.tables, size_t(w), [&](size_t x) { return column_weights[x]; });
-        mean += row_sums[size_t(y)] / (4 * M_PI);
+        mean += exact_mean * solid_angle * double(w) / (4 * M_PI);
     }
     emitter.env_marginal = uint32_t(scene.tables.size());
     append_cdf(scene.tables, size_t(h), [&](size_t y) { return row_sums[y]; });
