@@ -67,7 +67,8 @@ AMBILUX_HD float pdf_environment_direct(const SceneView& view, Vec3f wi) {
     if constexpr (F.has_environment()) {
         if (view.environment == kNone) return 0.0f;
         const Emitter& e = view.emitters[view.environment];
-        if (F.has(EmitterType::envmap) && e.type == EmitterType::envmap) return envmap_pdf_direct(view, e, wi);
+        if (F.has(EmitterType::envmap) && e.type == EmitterType::envmap)
+            return e.pick_probability * envmap_pdf_direction(view, e, wi);
         return e.pick_probability * kInv4Pi;
     }
     return 0.0f;

@@ -73,7 +73,8 @@ AMBILUX_HD float envmap_pdf_to_sa(float pdf_uv, float sin_theta) {
     return sin_theta > 0.0f ? pdf_uv / (2.0f * kPi * kPi * sin_theta) : 0.0f;
 }
 
-AMBILUX_HD bool envmap_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec2f u, EmitterSample& s) {
+/// Direction towards the map sampled by its density: `wi` unit, world space, with its radiance and density per solid angle.
+AMBILUX_HD void envmap_sample_direction(const SceneView& view, const Emitter& emitter, Vec2f u, Vec3f& wi, Rgb& radiance, float& pdf_sa) {
     const Texture& texture = view.textures[emitter.radiance.texture];
     const float* marginal = view.tables + emitter.env_marginal;
     const uint32_t y = sample_cdf(marginal, texture.height, u.y);
@@ -83,23 +84,28 @@ AMBILUX_HD bool envmap_sample_direct(const SceneView& view, const Emitter& emitt
     const float dv = clamp((u.y - marginal[y]) / (marginal[y + 1] - marginal[y]), 0.0f, kOneMinusEpsilon);
     const Vec2f uv = {(float(x) + du) / float(texture.width), (float(y) + dv) / float(texture.height)};
     float sin_theta;
-    s.wi = normalize(emitter.to_world.vector(envmap_direction(uv, sin_theta)));
-    place_at_infinity(view, reference_p, s);
-    s.radiance = envmap_lookup(view, emitter, uv);
-    s.pdf_sa = emitter.pick_probability * envmap_pdf_to_sa(envmap_pdf_cell(view, emitter, x, y), sin_theta);
-    s.delta = false;
-    return true;
+    wi = normalize(emitter.to_world.vector(envmap_direction(uv, sin_theta)));
+    radiance = envmap_lookup(view, emitter, uv);
+    pdf_sa = envmap_pdf_to_sa(envmap_pdf_cell(view, emitter, x, y), sin_theta);
 }
 
-/// Density per solid angle of unit `wi`, pick probability included.
-AMBILUX_HD float envmap_pdf_direct(const SceneView& view, const Emitter& emitter, Vec3f wi) {
+/// Density per solid angle with which envmap_sample_direction returns unit `wi`.
+AMBILUX_HD float envmap_pdf_direction(const SceneView& view, const Emitter& emitter, Vec3f wi) {
     const Texture& texture = view.textures[emitter.radiance.texture];
     const Vec3f local = normalize(emitter.to_local.vector(wi));
     const Vec2f uv = envmap_uv(local);
-    const uint32_t x = uint32_t(wrap_texel(int32_t(uv.x * float(texture.width)), int32_t(texture.width), WrapMode::clamp));
-    const uint32_t y = uint32_t(wrap_texel(int32_t(uv.y * float(texture.height)), int32_t(texture.height), WrapMode::clamp));
+    const uint32_t x = wrap_texel(int32_t(uv.x * float(texture.width)), int32_t(texture.width), WrapMode::clamp);
+    const uint32_t y = wrap_texel(int32_t(uv.y * float(texture.height)), int32_t(texture.height), WrapMode::clamp);
     const float sin_theta = sqrtf(local.x * local.x + local.z * local.z);
-    return emitter.pick_probability * envmap_pdf_to_sa(envmap_pdf_cell(view, emitter, x, y), sin_theta);
+    return envmap_pdf_to_sa(envmap_pdf_cell(view, emitter, x, y), sin_theta);
+}
+
+AMBILUX_HD bool envmap_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec2f u, EmitterSample& s) {
+    envmap_sample_direction(view, emitter, u, s.wi, s.radiance, s.pdf_sa);
+    s.pdf_sa *= emitter.pick_probability;
+    place_at_infinity(view, reference_p, s);
+    s.delta = false;
+    return true;
 }
 
 }  // namespace ambilux
