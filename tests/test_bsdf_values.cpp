@@ -115,8 +115,9 @@ TEST_CASE("Reflection is reciprocal: f(wi,wo) = f(wo,wi)") {
         if ((wi.z > 0) != (wo.z > 0)) return;
         for (TransportMode mode : kModes) {
             const Rgb f = eval(c.bsdf, wi, wo, mode) / std::fabs(wo.z), back = eval(c.bsdf, wo, wi, mode) / std::fabs(wi.z);
-            // Near total reflection Fresnel's square root turns a rounding of 1e-7 into 1e-4.
-            const double d = relative_difference(f, back) / (c.bsdf.type == BsdfType::rough_dielectric ? 2e-4 : 1e-5);
+            // Fresnel terms are steep near grazing and total reflection: there a rounding of 1e-7 turns into 1e-4.
+            const bool fresnel = c.bsdf.type != BsdfType::diffuse && c.bsdf.type != BsdfType::rough_diffuse;
+            const double d = relative_difference(f, back) / (fresnel ? 2e-4 : 1e-5);
             if (d > worst) worst = d, where = c.name;
         }
     };
@@ -225,7 +226,7 @@ TEST_CASE("White furnace: lossless BSDFs return exactly what they receive") {
         REQUIRE(sample(make_bsdf(BsdfType::diffuse), direction(mu), {0.5f, 0.3f, 0.6f}, TransportMode::radiance, s));
         CHECK(s.weight == Rgb{1, 1, 1});
         // White plastic with all internal bounces: what enters leaves again, F + (1-F)·(1-fdr_ext)/(n²·(1-fdr_int)) = 1.
-        for (float ior : {1.3f, 1.5f, 1.9f}) {
+        for (float ior : {0.75f, 1.3f, 1.5f, 1.9f}) {
             const Albedo a = sampled_albedo(plastic(ior, true, {1, 1, 1}), direction(mu), 100000, 8, TransportMode::radiance);
             INFO("plastic " << ior << " " << mu << ": " << a.total.mean() << " +- " << a.total.error());
             CHECK(std::fabs(a.total.mean() - 1) < 4 * a.total.error() + 1e-5);
@@ -340,4 +341,74 @@ TEST_CASE("eval and pdf vanish where sides do not fit") {
             CHECK(is_zero(eval(c.bsdf, direction(i), direction(o, 2), TransportMode::radiance)));
             CHECK(pdf(c.bsdf, direction(i), direction(o, 2)) == 0);
         }
+}
+
+TEST_CASE("Values agree with Mitsuba 3.9.1") {
+    // Recorded with scalar_rgb, wi at azimuth 0.7. Tolerances: Mitsuba fits the mean Fresnel reflectance of plastic to 0.1 % and
+    // Beckmann's masking to 0.3 %; its tables for rough plastic come from a coarser quadrature.
+    struct Row {
+        Bsdf bsdf;
+        float mu_i, mu_o, phi_o;
+        TransportMode mode;
+        Rgb value;
+        float pdf;
+        double tolerance;
+    };
+    const auto R = TransportMode::radiance, I = TransportMode::importance;
+    const auto ggx = Microfacets::ggx, beckmann = Microfacets::beckmann;
+    const auto weighted = [](Bsdf b, bool nonlinear) {
+        b.specular_sampling_weight = 0.68181818f;
+        b.nonlinear = nonlinear;
+        return b;
+    };
+    const Bsdf conductor = rough(BsdfType::rough_conductor, ggx, true, 0.2f, 0.5f);
+    const Bsdf conductor_b = rough(BsdfType::rough_conductor, beckmann, false, 0.3f, 0.3f);
+    const Bsdf coated = weighted(plastic(1.5f, true, {0.8f, 0.5f, 0.1f}), true);
+    const Bsdf rough_coated = weighted(rough(BsdfType::rough_plastic, ggx, true, 0.3f, 0.3f), false);
+    const Bsdf rough_coated_b = weighted(rough(BsdfType::rough_plastic, beckmann, true, 0.1f, 0.1f), true);
+    const Bsdf glass = rough(BsdfType::rough_dielectric, ggx, true, 0.4f, 0.4f), glass_all = rough(BsdfType::rough_dielectric, ggx, false, 0.4f, 0.4f);
+    const Bsdf glass_uv = rough(BsdfType::rough_dielectric, ggx, true, 0.4f, 0.2f);
+    const Row rows[] = {
+        {conductor, 0.8f, 0.6f, 2.5f, R, {0.1993089f, 0.1298656f, 0.1071854f}, 0.2197324f, 1e-5},
+        {conductor, 0.3f, 0.5f, 2.5f, R, {0.204156f, 0.1332645f, 0.1107368f}, 0.2321324f, 1e-5},
+        {conductor_b, 0.8f, 0.6f, 2.5f, R, {0.02445605f, 0.01593506f, 0.01315211f}, 0.02100149f, 4e-3},
+        {conductor_b, 0.3f, 0.5f, 2.5f, R, {5.123819e-09f, 3.344616e-09f, 2.779226e-09f}, 1.370802e-09f, 4e-3},
+        {coated, 0.8f, 0.6f, 2.5f, R, {0.1162299f, 0.0541054f, 0.008073868f}, 0.1738799f, 1e-3},
+        {coated, 0.3f, 0.5f, 2.5f, R, {0.07814243f, 0.03637555f, 0.005428134f}, 0.1018958f, 1e-3},
+        {rough_coated, 0.8f, 0.6f, 2.5f, R, {0.1021326f, 0.06494942f, 0.01537187f}, 0.1765467f, 5e-4},
+        {rough_coated, 0.3f, 0.5f, 2.5f, R, {0.07209921f, 0.04581116f, 0.01076042f}, 0.1210296f, 5e-4},
+        {rough_coated_b, 0.8f, 0.6f, 2.5f, R, {0.113266f, 0.05340177f, 0.008045308f}, 0.1737155f, 5e-4},
+        {rough_coated_b, 0.3f, 0.5f, 2.5f, R, {0.07631198f, 0.03597897f, 0.005420455f}, 0.1022879f, 5e-4},
+        {glass, 0.8f, -0.6f, 3.6f, R, splat(0.07861376f), 0.188673f, 1e-5},
+        {glass, 0.8f, -0.6f, 3.6f, I, splat(0.1768809f), 0.188673f, 1e-5},
+        {glass, 0.3f, -0.5f, 3.6f, R, splat(0.5207579f), 1.298573f, 1e-5},
+        {glass, 0.3f, -0.5f, 3.6f, I, splat(1.171705f), 1.298573f, 1e-5},
+        {glass_all, -0.95f, 0.6f, 3.6f, R, splat(0.2124373f), 0.1154198f, 1e-5},
+        {glass_all, -0.95f, 0.6f, 3.6f, I, splat(0.09441655f), 0.1154198f, 1e-5},
+        {glass_all, -0.45f, 0.5f, 3.6f, R, splat(0.5340843f), 0.05089214f, 1e-5},
+        {glass_uv, -0.8f, -0.6f, 3.6f, R, splat(0.8241218f), 0.871406f, 1e-5},
+        {glass_uv, -0.3f, -0.5f, 3.6f, R, splat(0.3015774f), 0.3298088f, 1e-5},
+    };
+    for (const Row& r : rows) {
+        const Vec3f wi = direction(r.mu_i), wo = direction(r.mu_o, r.phi_o);
+        INFO("type " << int(r.bsdf.type) << " cosines " << r.mu_i << " " << r.mu_o);
+        CHECK(relative_difference(eval(r.bsdf, wi, wo, r.mode), r.value) < r.tolerance);
+        CHECK(relative_difference(pdf(r.bsdf, wi, wo, r.mode), r.pdf) < r.tolerance);
+    }
+}
+
+TEST_CASE("Precomputed reflectances of plastics") {
+    // fdr by Mitsuba's fit at 1.5: 0.596811; exact by d'Eon and Irving 2011 within their 0.1 %.
+    CHECK(std::fabs(fresnel_diffuse_reflectance(1.5f) - 0.596811) < 6e-4);
+    CHECK(fresnel_diffuse_reflectance(1.0f) == Approx(0).margin(1e-6));
+    // A nearly smooth coating has the transmittance and reflectance of the smooth one.
+    for (Microfacets m : {Microfacets::beckmann, Microfacets::ggx}) {
+        const float* table = cached_table(m, 1e-4f, 1.5f);
+        for (uint32_t i : {8u, 20u, 40u, 63u}) {
+            const float f = fresnel_dielectric(float(i) / 63, 1.5f).reflectance;
+            CHECK(table[i] == Approx(1 - f).margin(2e-4));
+        }
+        // Mitsuba's sum over the table's cosines lies 1/64 below the integral, up to the end point.
+        CHECK(rough_internal_reflectance(m, 1e-4f, 1.5f) == Approx(fresnel_diffuse_reflectance(1.5f) * 63 / 64).margin(2e-3));
+    }
 }

@@ -20,18 +20,22 @@ struct RoughDiffuse {
         // The paper's alpha is the larger polar angle, beta the smaller.
         const float cos_a = fminf(wi.z, wo.z), cos_b = fmaxf(wi.z, wo.z);
         const float sin_a = fmaxf(sin_i, sin_o), sin_b = fminf(sin_i, sin_o);
-        const float a = acosf(fminf(cos_a, 1.0f)), b = acosf(fminf(cos_b, 1.0f));
-        const float steep = 2.0f * b * kInvPi;
+        const float a = acosf(fminf(cos_a, 1.0f));
+        // 1 - 2b/pi, by the complement: cos b may be tiny and is divided by below.
+        const float flat = 2.0f * kInvPi * asinf(fminf(cos_b, 1.0f)), steep = 1.0f - flat, b = kPiOver2 * steep;
+        // sin a - (2b/pi)³ without cancellation; not negative, because sin a >= sin b >= 2b/pi.
+        const float rest = fmaxf(flat * (3.0f - flat * (3.0f - flat)) - cos_a * cos_a / (1.0f + sin_a), 0.0f);
         const float c = sigma2 / (sigma2 + 0.09f);
         const float c1 = 1.0f - 0.5f * sigma2 / (sigma2 + 0.33f);
-        const float c2 = 0.45f * c * (cos_phi >= 0.0f ? sin_a : sin_a - steep * steep * steep);
+        const float c2 = 0.45f * c * (cos_phi >= 0.0f ? sin_a : rest);
         const float c3 = 0.125f * c * sqr(4.0f * a * b * kInvPi * kInvPi);
         const float c4 = 0.17f * sigma2 / (sigma2 + 0.13f);
         // tan((a+b)/2) = (sin a + sin b)/(cos a + cos b).
         const float single = c1 + cos_phi * c2 * (sin_b / cos_b) + (1.0f - fabsf(cos_phi)) * c3 * ((sin_a + sin_b) / (cos_a + cos_b));
         const float twice = c4 * (1.0f - cos_phi * steep * steep);
         const float pdf_sa = wo.z * kInvPi;
-        return {(reflectance * single + reflectance * reflectance * twice) * pdf_sa, pdf_sa};
+        // The fit may fall below zero at opposite grazing directions.
+        return {max(reflectance * single + reflectance * reflectance * twice, splat(0.0f)) * pdf_sa, pdf_sa};
     }
     AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
     AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }
