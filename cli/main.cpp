@@ -24,11 +24,17 @@ int main(int argc, char** argv) {
     add_compare(app, run);
     add_experiment(app, run);
     add_bench(app, run);
+    const auto named = [&](CLI::App* command) { return argc > 1 && command->check_name(argv[1]); };
+    if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(named).empty()) {
+        log_error(fmt::format("unknown command '{}': render, info, reference, compare, experiment and bench are known", argv[1]));
+        return int(ExitCode::usage);
+    }
     try {
+        if (argc == 1) throw CLI::CallForHelp();
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {
         const int code = app.exit(e);
-        return code == 0 ? int(ExitCode::done) : int(ExitCode::usage);
+        return code == 0 && argc > 1 ? int(ExitCode::done) : int(ExitCode::usage);
     }
     set_quiet(quiet);
     install_interrupt_handler();

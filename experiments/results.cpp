@@ -19,7 +19,7 @@ std::string result_prefix(const std::string& scene, const std::string& run, uint
 
 std::string result_line(const ResultRow& r) {
     const Metrics& m = r.metrics;
-    return fmt::format("{}{},{},{},{},{},{},{:.6f},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.5g},{},{}", result_prefix(r.scene, r.run, r.seed),
+    return fmt::format("{}{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.5g},{},{}", result_prefix(r.scene, r.run, r.seed),
                        r.checkpoint, r.integrator, r.variant, r.estimator, r.backend, r.spp, r.time, m.rmse, m.rmse_corrected, m.reference_noise, m.relmse,
                        m.relmse_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid);
 }
