@@ -311,8 +311,8 @@ TEST_CASE("environment power: mean radiance over the sphere, not over the image"
     s.emitters.push_back(emitter(EmitterType::directional, {1, 1, 1}));
     finalize_scene(s, LightPicking::power);
     const double ratio = s.emitters[0].pick_probability / s.emitters[1].pick_probability;
-    // The solid angle is taken as constant within a cell of 1/65 of the height.
-    CHECK(ratio == Approx(4 * M_PI * expected).epsilon(0.002));
+    // The solid angle is spread evenly within a cell of 1/65 of the height: errors of that order where the radiance jumps.
+    CHECK(ratio == Approx(4 * M_PI * expected).epsilon(0.005));
 }
 
 TEST_CASE("features: the smallest set that covers the scene") {
