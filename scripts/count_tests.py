@@ -9,8 +9,9 @@ import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-# Catch2 2 cannot skip a single test case, so a case that lacks a device or data says so in a line of this form and returns.
-SKIP_LINE = re.compile(r"^\s*(?:\[?skip(?:ped|ping)?\]?)\b[: ].*$", re.IGNORECASE | re.MULTILINE)
+# Catch2 2 cannot skip a single test case, so a case that lacks a device or data says so by WARN (printed as "FILE:LINE: warning:" and the
+# text below) or by a line that begins with "skip", and returns.
+REMARK = re.compile(r"^\S+:\d+: warning:\s*\n\s*(\S.*)$|^\s*(\[?skip(?:ped|ping)?\]?\b[: ].*)$", re.IGNORECASE | re.MULTILINE)
 
 
 def tally(path):
@@ -32,7 +33,8 @@ def tally(path):
         else:
             passed += 1
             output = case.findtext("system-out") or ""
-            notes += [f"within {name}: {line.strip()}" for line in dict.fromkeys(SKIP_LINE.findall(output))]
+            remarks = dict.fromkeys((m[1] or m[2]).strip() for m in REMARK.finditer(output))
+            notes += [f"within {name}: {remark}" for remark in remarks]
     return passed, failed, skipped, notes
 
 

@@ -12,7 +12,11 @@ spec.loader.exec_module(count_tests)
 
 CTEST = """<testsuite>
 <testcase name="ok" classname="ok" status="run"><system-out>skipped: AMBILUX_DATA is not set
-nothing skipped here</system-out></testcase>
+nothing skipped here
+tests/test_x.cpp:70: warning:
+  no CUDA device
+
+All tests passed</system-out></testcase>
 <testcase name="bad" classname="bad" status="fail"><failure message="Failed"/></testcase>
 <testcase name="gone" classname="gone" status="notrun"><skipped message="Unable to find executable"/></testcase>
 <testcase name="device" classname="device" status="notrun"><skipped message="SKIP_RETURN_CODE=4"/></testcase>
@@ -38,6 +42,8 @@ def test_totals_and_names(files, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert lines[-1] == "3 passed, 2 failed, 2 skipped"
     assert "within ok: skipped: AMBILUX_DATA is not set" in lines
+    assert "within ok: no CUDA device" in lines
+    assert sum(line.startswith("within") for line in lines) == 2
     assert "failed: gone (not run: Unable to find executable)" in lines
 
 
