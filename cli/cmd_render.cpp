@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "core/atomic_file.h"
@@ -101,13 +103,16 @@ void add_render(CLI::App& app, Run& run) {
     o->scene.add_to(command);
     o->render.add_to(command, false);
     command.add_option("-o,--output", o->output, "Image to write (EXR)")->required();
-    command.add_option("--png", o->png, "Write an sRGB PNG as well");
+    CLI::Option* png = command.add_option("--png", o->png, "Write an sRGB PNG as well; without a FILE, beside the image")->expected(0, 1)->type_name("[FILE]");
     command.add_option("--exposure", o->exposure, "Stops by which the PNG is brightened");
     command.add_option("--spp", o->spp, "Samples per pixel. Default: the scene's");
     command.add_option("--time", o->time, "Seconds of wall clock to render instead of --spp");
     command.add_flag("--strict", o->strict, "Fail (exit code 4) if invalid values or lost queue items were counted");
     command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
-    command.callback([o, &run] { run = [o] { return render(*o); }; });
+    command.callback([o, png, &run] {
+        if (png->count() > 0 && o->png.empty()) o->png = std::filesystem::path(o->output).replace_extension(".png").string();
+        run = [o] { return render(*o); };
+    });
 }
 
 }  // namespace ambilux

@@ -1,5 +1,6 @@
 #include "film/metrics.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -8,12 +9,16 @@
 namespace ambilux {
 namespace {
 
+void check_sizes(uint32_t width, uint32_t height, const Image& reference) {
+    if (width != reference.width || height != reference.height)
+        throw Error(ExitCode::bad_input, "the image is " + std::to_string(width) + "x" + std::to_string(height) + " but the reference is " +
+                                             std::to_string(reference.width) + "x" + std::to_string(reference.height) + ": render both at the same size");
+}
+
 template <class Value>
 Metrics compare_values(uint32_t width, uint32_t height, const Reference& reference, Value value) {
     const Image& mean = reference.mean;
-    if (width != mean.width || height != mean.height)
-        throw Error(ExitCode::bad_input, "the image is " + std::to_string(width) + "x" + std::to_string(height) + " but the reference is " +
-                                             std::to_string(mean.width) + "x" + std::to_string(mean.height) + ": render both at the same size");
+    check_sizes(width, height, mean);
     const bool errors = reference.standard_error.rgb.size() == mean.rgb.size();
     double squares = 0, relative = 0, absolute = 0, noise = 0, relative_noise = 0, total = 0, reference_total = 0, pixel_squares = 0;
     Metrics m;
@@ -52,6 +57,35 @@ Metrics compare_values(uint32_t width, uint32_t height, const Reference& referen
 }
 
 }  // namespace
+
+BlockAgreement block_agreement(const Image& image, const Image& reference, uint32_t block, double tolerance) {
+    check_sizes(image.width, image.height, reference);
+    BlockAgreement result;
+    double total = 0, reference_total = 0;
+    uint64_t agree = 0, blocks = 0;
+    for (uint32_t by = 0; by < image.height; by += block)
+        for (uint32_t bx = 0; bx < image.width; bx += block) {
+            double x_sum = 0, r_sum = 0;
+            for (uint32_t y = by; y < std::min(by + block, image.height); ++y)
+                for (size_t i = (size_t(y) * image.width + bx) * 3; i < (size_t(y) * image.width + std::min(bx + block, image.width)) * 3; ++i) {
+                    x_sum += image.rgb[i];
+                    r_sum += reference.rgb[i];
+                }
+            total += x_sum;
+            reference_total += r_sum;
+            const double difference = x_sum == r_sum ? 0 : (x_sum - r_sum) / r_sum;
+            ++blocks;
+            agree += std::abs(difference) <= tolerance;  // false for NaN
+            if (!(std::abs(difference) <= std::abs(result.worst))) {
+                result.worst = difference;
+                result.worst_x = bx;
+                result.worst_y = by;
+            }
+        }
+    result.relative_mean = total == reference_total ? 0 : (total - reference_total) / reference_total;
+    result.within = double(agree) / double(blocks);
+    return result;
+}
 
 Metrics compare_images(const Image& image, const Reference& reference) {
     return compare_values(image.width, image.height, reference, [&](size_t i) { return double(image.rgb[i]); });

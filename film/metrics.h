@@ -32,6 +32,18 @@ Metrics compare_images(const Image& image, const Reference& reference);
 /// The same with exact (double) means.
 Metrics compare_images(const FilmMoments& image, const Reference& reference);
 
+/// Agreement with an image that states no errors, such as a published rendering.
+struct BlockAgreement {
+    double relative_mean = 0;  ///< (mean(x)-mean(r))/mean(r), over all pixels and channels
+    double within = 0;         ///< share of blocks whose mean (over pixels and channels) lies within the relative tolerance of the reference's
+    uint32_t worst_x = 0, worst_y = 0;  ///< pixel where the worst block begins
+    double worst = 0;          ///< its relative difference
+};
+
+/// Blocks of `block`x`block` pixels, smaller at the right and bottom edges; black reference blocks agree only with black ones. Throws Error(bad_input) if the
+/// sizes differ.
+BlockAgreement block_agreement(const Image& image, const Image& reference, uint32_t block = 16, double tolerance = 0.03);
+
 /// All fields under their names; NaN and Inf become null.
 nlohmann::json to_json(const Metrics& metrics);
 

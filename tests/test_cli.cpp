@@ -191,6 +191,9 @@ TEST_CASE("a render writes image, PNG and statistics") {
     for (const char* name : {"name", "launches", "items", "seconds"}) CHECK(j["stages"][0].contains(name));
     for (const char* name : {"nan", "inf", "negative"}) CHECK(j["invalid"][name] == 0);
 
+    CHECK(run(folder, render(folder, {"--png", "--spp", "1"}, "beside.exr")).code == 0);
+    CHECK(fs::exists(folder.path / "beside.png"));
+
     const Outcome quiet = run(folder, render(folder, {"--spp", "1", "--quiet"}));
     CHECK(quiet.code == 0);
     CHECK(quiet.err.empty());

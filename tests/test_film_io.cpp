@@ -209,6 +209,22 @@ TEST_CASE("metrics: values by hand") {
     CHECK_THROWS_AS(compare_images(Image{1, 2, x.rgb}, r), Error);
 }
 
+TEST_CASE("block agreement with a published image") {
+    Image r{20, 18, std::vector<float>(20 * 18 * 3, 1.0f)}, x = r;
+    CHECK(block_agreement(x, r).within == 1);
+    for (uint32_t row = 16; row < 18; ++row)
+        for (uint32_t i = 0; i < 16 * 3; ++i) x.rgb[row * 60 + i] = 1.05f;  // lower left block of four
+    const BlockAgreement a = block_agreement(x, r);
+    CHECK(a.within == 0.75);
+    CHECK(a.worst == Approx(0.05).epsilon(1e-5));
+    CHECK(a.worst_x == 0);
+    CHECK(a.worst_y == 16);
+    CHECK(a.relative_mean == Approx(0.05 * 32 / 360).epsilon(1e-5));
+    x.rgb[0] = std::nanf("");
+    CHECK(block_agreement(x, r).within == 0.5);
+    CHECK_THROWS_AS(block_agreement(Image{1, 1, {1, 1, 1}}, r), Error);
+}
+
 TEST_CASE("metrics: the reference's noise is taken out, and the bias z-score is standard normal without bias") {
     // Truth 1, deviation of one sample 1: error against the truth is 1/sqrt(n).
     const uint64_t n = 16, n_ref = 64;
