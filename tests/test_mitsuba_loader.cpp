@@ -554,6 +554,7 @@ TEST_CASE("triangles without area are left out and counted") {
 TEST_CASE("mistakes are named with file and line") {
     const test::TempFolder folder;
     folder.write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.write("line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
     folder.write("range.obj", "v 0 0 0\nf 1 2 3\n");
     folder.write("self.xml", wrap("<include filename='self.xml'/>", "3.0.0"));
     folder.write("notscene.xml", "<bsdf type='diffuse'/>");
@@ -571,6 +572,7 @@ TEST_CASE("mistakes are named with file and line") {
         {"<shape type='obj'><string name='filename' value='nan.obj'/></shape>", "nan.obj: position of vertex 1 is not finite"},
         {"<shape type='obj'><string name='filename' value='range.obj'/></shape>", "range.obj:2: vertex index 2 is out of range"},
         {"<shape type='obj'/>", "scene.xml:2: obj shape has no filename"},
+        {"<shape type='obj'><string name='filename' value='line.obj'/><emitter type='area'/></shape>", "scene.xml:2: the shape emits light but has no area"},
         {"<shape type='rectangle'>\n<float name='colour' value='1'/></shape>", "scene.xml:3: unknown parameter 'colour' of shape 'rectangle'"},
         {"<bsdf type='diffuse' id='unused'>\n<float name='colour' value='1'/></bsdf>", "scene.xml:3: unknown parameter 'colour' of bsdf 'diffuse'"},
         {"<shape type='rectangle'><bsdf type='measured'/></shape>", "scene.xml:2: BSDF type 'measured' is not supported"},

@@ -266,6 +266,7 @@ void build_shapes(Builder& builder, const Object& root) {
         if (job.emitter != kNone) scene.emitters[job.emitter].shape = index;
         if (job.source >= 0) {
             const Mesh& mesh = job.world;
+            if (job.emitter != kNone && mesh.faces.empty()) throw input_error(job.where.file, job.where.line, "the shape emits light but has no area");
             const uint32_t first = uint32_t(scene.positions.size());
             shape.first_primitive = uint32_t(scene.triangles.size());
             shape.primitive_count = uint32_t(mesh.faces.size());
