@@ -14,112 +14,77 @@ namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-/// Sums over the pixels of one block and channel, for one image.
+/// One image in one block and channel.
 struct Side {
-    double mean = 0;           ///< sum of means
-    double variance = 0;       ///< sum of variances of means
-    double dof_terms = 0;      ///< sum of v²/(n-1), for Welch-Satterthwaite
-    double value = 0;          ///< sum of sample values
-    double squares = 0;        ///< sum of squared sample values
-    double max_abs = 0;
-    bool random = false;       ///< has pixels that are not exactly known
-
-    void add(const Side& s) {
-        mean += s.mean;
-        variance += s.variance;
-        dof_terms += s.dof_terms;
-        value += s.value;
-        squares += s.squares;
-        max_abs += s.max_abs;
-        random = random || s.random;
-    }
+    double mean = 0;       ///< sum of the pixels' means
+    double variance = 0;   ///< sum of their variances
+    double dof_terms = 0;  ///< sum of v²/(n-1), for Welch-Satterthwaite
+    double max_abs = 0;    ///< sum of absolute means
+    double events = kInf;  ///< number of random events that made the variance; see measure()
 };
 
-struct Block {
-    Side a, b;
-    uint32_t pixels = 0;
+struct Rectangle {
+    uint32_t x, y, width, height;
 };
 
-/// Adds one pixel: mean m, variance v of that mean, n samples (0: exact).
-void add_pixel(Side& s, double m, double v, uint64_t n) {
-    s.mean += m;
-    s.max_abs += std::abs(m);
-    if (n == 0) return;
-    s.random = true;
-    const double count = double(n);
-    s.variance += v;
-    s.dof_terms += v * v / (count - 1);
-    s.value += count * m;
-    s.squares += v * count * (count - 1) + count * m * m;
+/// Sums over a block, and how many events its variance comes from. A pixel of n samples with mean m and sample variance s² above a base b, which no event made
+/// bright, has e = n(m-b)²/(s²+(m-b)²) effective ones (Kish 1965): rare equal hits count one each. The base is the darkest mean in the block. Pixels add up
+/// weighted by their share of the variance, so that N rare hits anywhere give N.
+Side measure(const Estimate& image, const Rectangle& r, uint32_t channel) {
+    Side side;
+    double base = kInf;
+    const auto index = [&](uint32_t x, uint32_t y) { return (size_t(y) * image.width + x) * 3 + channel; };
+    for (uint32_t y = r.y; y < r.y + r.height; ++y)
+        for (uint32_t x = r.x; x < r.x + r.width; ++x) {
+            const double m = image.mean[index(x, y)];
+            side.mean += m;
+            side.max_abs += std::abs(m);
+            base = std::min(base, m);
+        }
+    if (image.samples == 0) return side;
+    const double n = double(image.samples);
+    double concentration = 0;
+    for (uint32_t y = r.y; y < r.y + r.height; ++y)
+        for (uint32_t x = r.x; x < r.x + r.width; ++x) {
+            const size_t i = index(x, y);
+            const double v = image.variance_of_mean[i], above = image.mean[i] - base;
+            if (v == 0) continue;
+            side.variance += v;
+            side.dof_terms += v * v / (n - 1);
+            const double events = n * above * above / (v * n + above * above);
+            concentration += v * v / std::max(1.0, events);  // no variance without at least one event
+        }
+    if (side.variance > 0) side.events = side.variance * side.variance / concentration;
+    if (side.max_abs == 0) side.events = 0;  // black: it may have met no light yet
+    return side;
 }
 
-/// Effective number of samples: infinite where nothing is random, 0 where a random image is black, which may only mean that it has met no light yet.
-double effective(const Side& s) {
-    if (!s.random) return kInf;
-    if (s.squares == 0) return 0;
-    return s.variance == 0 ? kInf : s.value * s.value / s.squares;
-}
-
-/// Normal equivalent of the difference of the block's means; NaN if there are too few effective samples to say.
-double block_z(const Block& block, const ZTestOptions& options) {
-    const double difference = block.a.mean - block.b.mean;
-    if (!std::isfinite(difference)) return kInf;
-    const double rounding = options.rounding * std::max(block.a.max_abs, block.b.max_abs);
-    const double variance = block.a.variance + block.b.variance;
-    if (!std::isfinite(variance)) return kInf;
+/// Normal equivalent of the difference of a block's means.
+double block_z(const Side& a, const Side& b, const ZTestOptions& options) {
+    const double difference = a.mean - b.mean, variance = a.variance + b.variance;
+    if (!std::isfinite(difference) || !std::isfinite(variance)) return kInf;
+    const double rounding = options.rounding * std::max(a.max_abs, b.max_abs);
     if (std::abs(difference) <= rounding) return 0;
-    const double n_a = effective(block.a), n_b = effective(block.b);
-    if (std::min(n_a, n_b) < options.min_effective) return std::numeric_limits<double>::quiet_NaN();
     if (variance == 0) return std::copysign(kInf, difference);
-
     double t = std::abs(difference) / std::sqrt(variance + rounding * rounding);
     // Hall's transformation, for the skewness of the darker side, weighted by its share of the variance.
-    const Side& dark = difference < 0 ? block.a : block.b;
+    const Side& dark = difference < 0 ? a : b;
     if (dark.variance > 0) {
-        const double g = std::pow(dark.variance / variance, 1.5) / std::sqrt(effective(dark));
+        const double g = std::pow(dark.variance / variance, 1.5) / std::sqrt(dark.events);
         t = std::max(0.0, std::min(t, t - g * t * t / 3 + g * g * t * t * t / 27 - g / 6));
     }
-    const double dof = variance * variance / (block.a.dof_terms + block.b.dof_terms);
-    const double z = std::min(normal_tail_inverse(student_tail(t, dof)), t);
-    return std::copysign(z, difference);
+    const double dof = variance * variance / (a.dof_terms + b.dof_terms);
+    return std::copysign(std::min(normal_tail_inverse(student_tail(t, dof)), t), difference);
 }
 
-std::vector<Block> smallest_blocks(const Estimate& a, const Estimate& b, const ZTestOptions& options, uint32_t columns, uint32_t rows) {
-    std::vector<Block> blocks(size_t(columns) * rows * 3);
-    for (uint32_t y = 0; y < a.height; ++y)
-        for (uint32_t x = 0; x < a.width; ++x) {
-            const size_t block = size_t(y / options.block) * columns + x / options.block;
-            for (size_t c = 0; c < 3; ++c) {
-                const size_t i = (size_t(y) * a.width + x) * 3 + c;
-                double va = a.variance_of_mean[i], vb = b.variance_of_mean[i];
-                if (options.same_estimator && a.samples && b.samples) {
-                    const double na = double(a.samples), nb = double(b.samples);
-                    const double pooled = (va * na * (na - 1) + vb * nb * (nb - 1)) / (na + nb - 2);
-                    va = pooled / na;
-                    vb = pooled / nb;
-                }
-                Block& target = blocks[block * 3 + c];
-                add_pixel(target.a, a.mean[i], va, a.samples);
-                add_pixel(target.b, b.mean[i], vb, b.samples);
-                ++target.pixels;
-            }
-        }
-    return blocks;
-}
-
-std::vector<Block> merge(const std::vector<Block>& blocks, uint32_t columns, uint32_t rows) {
-    const uint32_t new_columns = (columns + 1) / 2, new_rows = (rows + 1) / 2;
-    std::vector<Block> merged(size_t(new_columns) * new_rows * 3);
-    for (uint32_t y = 0; y < rows; ++y)
-        for (uint32_t x = 0; x < columns; ++x)
-            for (size_t c = 0; c < 3; ++c) {
-                const Block& from = blocks[(size_t(y) * columns + x) * 3 + c];
-                Block& to = merged[(size_t(y / 2) * new_columns + x / 2) * 3 + c];
-                to.a.add(from.a);
-                to.b.add(from.b);
-                to.pixels += from.pixels;
-            }
-    return merged;
+/// Pools the variances of two images of one estimator, pixel by pixel.
+void pool(Estimate& a, Estimate& b) {
+    const double na = double(a.samples), nb = double(b.samples);
+    for (size_t i = 0; i < a.mean.size(); ++i) {
+        const double pooled = (a.variance_of_mean[i] * na * (na - 1) + b.variance_of_mean[i] * nb * (nb - 1)) / (na + nb - 2);
+        a.variance_of_mean[i] = pooled / na;
+        b.variance_of_mean[i] = pooled / nb;
+    }
 }
 
 void check(const Estimate& e, const ZTestOptions& options, const char* name) {
@@ -156,65 +121,88 @@ Estimate exact_estimate(const Image& image) {
     return {image.width, image.height, 0, std::vector<double>(image.rgb.begin(), image.rgb.end()), std::vector<double>(image.rgb.size())};
 }
 
-ZTestResult z_test(const Estimate& a, const Estimate& b, const ZTestOptions& options) {
-    check(a, options, "a");
-    check(b, options, "b");
+ZTestResult z_test(const Estimate& image_a, const Estimate& image_b, const ZTestOptions& options) {
+    check(image_a, options, "a");
+    check(image_b, options, "b");
+    Estimate a = image_a, b = image_b;
     if (a.width != b.width || a.height != b.height)
         throw Error(ExitCode::bad_input, fmt::format("images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height));
-    uint32_t size = std::max(1u, options.block), columns = (a.width + size - 1) / size, rows = (a.height + size - 1) / size;
-    std::vector<Block> blocks = smallest_blocks(a, b, options, columns, rows);
+    if (options.same_estimator && a.samples && b.samples) pool(a, b);
+
+    const uint32_t smallest = std::max(1u, options.block);
+    uint64_t size = smallest;
+    while (size < std::max(a.width, a.height)) size *= 2;
 
     ZTestResult r;
-    for (bool first = true;; first = false) {
-        const bool whole = columns == 1 && rows == 1;
+    double total_a = 0, total_b = 0, deviation = 0;
+    struct Events {
+        double per_pixel, expected;  // of the side that has fewer
+    };
+    std::vector<Events> parents;  // by block of the next larger size and channel
+    uint32_t parent_columns = 0;
+    // From the whole image to the smallest blocks.
+    for (bool whole = true; size >= smallest; size /= 2, whole = false) {
+        const auto columns = uint32_t((a.width + size - 1) / size), rows = uint32_t((a.height + size - 1) / size);
+        std::vector<Events> events(size_t(columns) * rows * 3);
         double count[3] = {0, 0, 0};
-        for (uint32_t y = 0; y < rows; ++y)
-            for (uint32_t x = 0; x < columns; ++x)
+        for (uint32_t row = 0; row < rows; ++row)
+            for (uint32_t column = 0; column < columns; ++column)
                 for (uint32_t c = 0; c < 3; ++c) {
-                    const Block& block = blocks[(size_t(y) * columns + x) * 3 + c];
-                    const double z = block_z(block, options);
-                    if (whole) r.mean_z[c] = z;
-                    if (std::isnan(z)) {
-                        r.inconclusive += first;
+                    Rectangle block{uint32_t(column * size), uint32_t(row * size), 0, 0};
+                    block.width = uint32_t(std::min<uint64_t>(size, a.width - block.x));
+                    block.height = uint32_t(std::min<uint64_t>(size, a.height - block.y));
+                    const uint64_t pixels = uint64_t(block.width) * block.height;
+                    const Side side_a = measure(a, block, c), side_b = measure(b, block, c);
+                    const double z = block_z(side_a, side_b, options);
+                    const double fewest = std::min(side_a.events, side_b.events);
+                    // The larger block says how many events to expect here. What it expected itself is a bound, so that a block that happens to have met none
+                    // does not overrule those around it.
+                    double expected = kInf;
+                    if (!whole) {
+                        const Events& parent = parents[(size_t(row / 2) * parent_columns + column / 2) * 3 + c];
+                        expected = std::min(parent.per_pixel * double(pixels), parent.expected);
+                    }
+                    events[(size_t(row) * columns + column) * 3 + c] = {fewest / double(pixels), expected};
+                    if (whole) {
+                        r.mean_z[c] = z;
+                        total_a += side_a.mean;
+                        total_b += side_b.mean;
+                        // Channels of a pixel may be fully correlated: deviations add.
+                        deviation += std::sqrt(side_a.variance + side_b.variance);
+                    }
+                    const bool conclusive = z == 0 || std::isnan(side_a.mean + side_b.mean) ||
+                                            (fewest >= (whole ? 0.25 : 1.0) * options.min_events && expected >= 0.5 * options.min_events);
+                    if (!conclusive) {
                         r.undecided = r.undecided || whole;
+                        r.inconclusive += size == smallest;
                         continue;
                     }
                     ++r.tests;
-                    if (first) {
+                    if (size == smallest) {
                         r.chi_square[c] += z * z;
                         ++count[c];
                     }
-                    if (std::abs(z) > std::abs(r.worst_z) || r.worst_width == 0) {
+                    // Of infinite ones the smallest block is named.
+                    if (std::abs(z) > std::abs(r.worst_z) || r.worst_width == 0 || (std::isinf(z) && std::isinf(r.worst_z) && r.worst_width > block.width)) {
                         r.worst_z = z;
-                        r.worst_x = x * size;
-                        r.worst_y = y * size;
-                        r.worst_width = std::min(size, a.width - r.worst_x);
-                        r.worst_height = std::min(size, a.height - r.worst_y);
+                        r.worst_x = block.x;
+                        r.worst_y = block.y;
+                        r.worst_width = block.width;
+                        r.worst_height = block.height;
                         r.worst_channel = c;
-                        r.worst_a = block.a.mean / block.pixels;
-                        r.worst_b = block.b.mean / block.pixels;
+                        r.worst_a = side_a.mean / double(pixels);
+                        r.worst_b = side_b.mean / double(pixels);
                     }
                 }
-        if (first)
-            for (int c = 0; c < 3; ++c) {
-                r.chi_square_dof = std::max(r.chi_square_dof, count[c]);
-                if (count[c] > 0) r.p_chi_square = std::min(r.p_chi_square, std::min(1.0, 3 * chi_square_tail(r.chi_square[c], count[c])));
-            }
-        if (whole) break;
-        blocks = merge(blocks, columns, rows);
-        size *= 2;
-        columns = (columns + 1) / 2;
-        rows = (rows + 1) / 2;
+        for (int c = 0; c < 3 && size == smallest; ++c) {
+            r.chi_square_dof = std::max(r.chi_square_dof, count[c]);
+            if (count[c] > 0) r.p_chi_square = std::min(r.p_chi_square, std::min(1.0, 3 * chi_square_tail(r.chi_square[c], count[c])));
+        }
+        parents = std::move(events);
+        parent_columns = columns;
     }
 
     r.p_worst = r.tests ? sidak(2 * normal_tail(std::abs(r.worst_z)), double(r.tests)) : 1;
-    double total_a = 0, total_b = 0, deviation = 0;
-    for (const Block& block : blocks) {
-        total_a += block.a.mean;
-        total_b += block.b.mean;
-        // Channels of a pixel may be fully correlated: deviations add.
-        deviation += std::sqrt(block.a.variance + block.b.variance);
-    }
     r.relative_difference = total_a == total_b ? 0 : (total_a - total_b) / total_b;
     const double threshold = normal_tail_inverse(0.5 * sidak_level(0.5 * options.significance, std::max<double>(1, double(r.tests))));
     r.detectable = threshold * deviation / std::abs(total_b);
@@ -230,7 +218,7 @@ std::string ZTestResult::report() const {
         "  chi-square {:.1f} {:.1f} {:.1f} over {} blocks, corrected p = {:.2g}; {} smallest blocks left to larger ones{}",
         pass ? "pass" : "FAIL", worst_z, p_worst, tests, worst_x, worst_y, worst_width, worst_height, "RGB"[worst_channel], worst_a, worst_b, mean_z[0],
         mean_z[1], mean_z[2], relative_difference, detectable, chi_square[0], chi_square[1], chi_square[2], chi_square_dof, p_chi_square, inconclusive,
-        undecided ? "\n  a channel has too few effective samples in the whole image: nothing is shown, use more samples" : "");
+        undecided ? "\n  a channel has met too few bright samples in the whole image: nothing is shown, use more samples" : "");
 }
 
 MitsubaZTest mitsuba_z_test(const Image& mean, uint64_t spp, const Image& ref, const Image& ref_variance) {

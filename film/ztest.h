@@ -25,7 +25,7 @@ struct ZTestOptions {
     uint32_t block = 8;           ///< pixels along the side of the smallest blocks
     double significance = 1e-3;   ///< chance that two equal expectations fail
     uint64_t min_samples = 16;    ///< per pixel; fewer are refused, since variances mean little then
-    double min_effective = 64;    ///< effective samples that a block must have on both sides to be tested
+    double min_events = 32;       ///< random events that a block must have met on both sides to be tested; the whole image needs a quarter
     double rounding = 4e-6;       ///< relative difference that is put down to float rounding
     /// Both images come from the same estimator (say, on two backends): their variances are pooled, which guards against rare bright samples that only one
     /// of them has met.
@@ -35,8 +35,8 @@ struct ZTestOptions {
 struct ZTestResult {
     bool pass = false;
     uint64_t tests = 0;         ///< blocks × channels on all levels that were tested
-    uint64_t inconclusive = 0;  ///< blocks × channels of the smallest size with too few effective samples; larger blocks cover them
-    bool undecided = false;     ///< a channel had too few effective samples even as a whole; then pass is false
+    uint64_t inconclusive = 0;  ///< blocks × channels of the smallest size with too few events; larger blocks cover them
+    bool undecided = false;     ///< a channel had met too few events even as a whole; then pass is false
     double worst_z = 0;         ///< normal equivalent, signed: positive if `a` is brighter
     uint32_t worst_x = 0, worst_y = 0, worst_width = 0, worst_height = 0, worst_channel = 0;  ///< block in pixels
     double worst_a = 0, worst_b = 0;  ///< block means
@@ -56,11 +56,12 @@ struct ZTestResult {
 /// normal equivalent z. The level is shared by the worst z (Sidak over all blocks, channels and scales; scales overlap, which only makes this stricter on
 /// itself) and by the chi-square of z² over the smallest blocks, which sees many small differences.
 ///
-/// Heavy tails: the variance of a block that has met few of its bright samples is estimated too small together with its mean, so that plain z-scores fail for
-/// correct images. Two guards. A block is tested only if its effective sample count (sum of values)²/(sum of squares) reaches `min_effective` on both sides; larger
-/// blocks reach it, and missing light cannot hide on every scale. And the skewness that such a count implies at most for rare equal hits, 1/sqrt(count), is taken
-/// out of t (Hall 1992, "On the removal of skewness by transformation") where that makes |t| smaller. What neither guard can see is a bright sample so rare
-/// that it never occurred: an image of too few samples. The caller chooses enough samples, and `detectable` says what the test could see.
+/// Heavy tails: a block that has met few of its rare bright samples is too dark and its variance is estimated too small together, so that plain z-scores
+/// fail for correct images. Two guards. The number of events that made a block's variance is estimated (see measure() in the source; N rare equal hits give N); a block
+/// is tested only if it has met `min_events` on both sides and its share of the events in the block of twice its size is half as many. Larger blocks reach that, so missing light cannot hide on
+/// every scale. And the skewness 1/sqrt(events) is taken out of t (Hall 1992, "On the removal of skewness by transformation") where that makes |t| smaller.
+/// What neither guard can see is a bright sample so rare that it never occurred anywhere: an image of too few samples. The caller chooses enough, and `detectable`
+/// says what the test could see.
 ///
 /// Pixels of zero variance must agree up to `rounding`. A NaN or Inf fails. Throws Error(bad_input) if sizes differ or samples are too few.
 ZTestResult z_test(const Estimate& a, const Estimate& b, const ZTestOptions& options = {});

@@ -98,6 +98,12 @@ TEST_CASE("equal expectations fail at no more than the nominal rate") {
         INFO(r.failed);
         CHECK(r.failed <= limit);
     }
+    SECTION("rare bright samples on a smooth base, which hides them where there are none") {
+        const Sampler glints = [](std::mt19937_64& rng, size_t) { return 1.0 + (std::uniform_real_distribution<double>()(rng) < 0.001 ? 100.0 : 0.0); };
+        const Rates r = failures(runs, glints, exponential(1.1), 64, 64, options);
+        INFO(r.failed);
+        CHECK(r.failed <= limit);
+    }
     SECTION("very rare hits against a converged image: blocks without hits do not fail") {
         const Rates r = failures(runs, rare(0.5, 0.002), exponential(0.5), 64, 256, options);
         INFO(r.failed);
@@ -130,6 +136,17 @@ TEST_CASE("a bias of 2 % is found") {
             return (inside ? 1.15 : outside ? 0.85 : 1.0) * std::exponential_distribution<double>()(rng);
         };
         const Rates r = failures(10, corner, exponential(1), 256, 256, {});
+        CHECK(r.failed == 10);
+    }
+    SECTION("in one corner, although the edge of a bright light holds nearly all of the variance") {
+        const auto image = [](double corner) {
+            return Sampler([corner](std::mt19937_64& rng, size_t p) {
+                const double u = std::uniform_real_distribution<double>()(rng);
+                if (p / 40 == 30 && p % 40 < 12) return u < 0.5 ? 1000.0 : 0.0;
+                return (p % 40 < 8 && p / 40 < 8 ? corner : 1.0) * -std::log(1 - u);
+            });
+        };
+        const Rates r = failures(10, image(1.15), image(1), 256, 256, {});
         CHECK(r.failed == 10);
     }
     SECTION("small differences of alternating sign in many blocks") {
