@@ -76,8 +76,8 @@ ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& reque
         position = drive(*renderer, position, {request.spp, due}, request.interrupt, request.on_batch);
         if (position.samples == before) continue;
         total.add(renderer->film());
-        renderer->clear_film();
         result.stats = renderer->stats();
+        renderer->clear_film();
         result.reference = to_reference(total);
         RenderStats stated = result.stats;
         stated.samples = total.samples;

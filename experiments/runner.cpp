@@ -354,8 +354,8 @@ private:
         const std::unique_ptr<Renderer> renderer = hooks_.make_renderer(scene.scene, settings);
         RenderPosition position{state.moments.samples, state.notes["seconds"].get<double>(), false};
         work_.skip(work, units(scene, position));
-        const RenderState begin = state;
-        RenderStats stats = renderer->stats();
+        const uint64_t continued_from = state.moments.samples;
+        RenderStats stats = renderer->stats(), counted = stats;
         for (size_t k = state.notes["rows"].size(); k < config_.checkpoints(); ++k) {
             const Budget budget = config_.spp.empty() ? Budget{0, config_.seconds[k]} : Budget{config_.spp[k], 0};
             RenderPosition last = position;
@@ -365,19 +365,20 @@ private:
                 last = p;
                 show(fmt::format("{} {} seed {}: {} spp", scene.entry->name, run.name, seed, p.samples));
             });
+            stats = renderer->stats();
+            const auto count = [&](const char* key, uint64_t now, uint64_t before_batch) { state.notes[key] = state.notes[key].get<uint64_t>() + now - before_batch; };
+            count("rays_extend", stats.rays_extend, counted.rays_extend);
+            count("rays_occlude", stats.rays_occlude, counted.rays_occlude);
+            count("nan", stats.invalid.nan, counted.invalid.nan);
+            count("inf", stats.invalid.inf, counted.invalid.inf);
+            count("negative", stats.invalid.negative, counted.invalid.negative);
+            state.notes["seconds"] = position.seconds;
             // The film restarts at each checkpoint, so that a resumed render adds the same numbers in the same order as an uninterrupted one.
             if (position.samples > before) {
                 state.moments.add(renderer->film());
                 renderer->clear_film();
             }
-            stats = renderer->stats();
-            state.notes["seconds"] = position.seconds;
-            const auto count = [&](const char* key, uint64_t value) { state.notes[key] = begin.notes[key].get<uint64_t>() + value; };
-            count("rays_extend", stats.rays_extend);
-            count("rays_occlude", stats.rays_occlude);
-            count("nan", stats.invalid.nan);
-            count("inf", stats.invalid.inf);
-            count("negative", stats.invalid.negative);
+            counted = renderer->stats();  // a renderer may or may not restart its counters with its film
             if (position.interrupted) {
                 if (state.moments.samples) write_state(state_path, state);
                 return false;
@@ -387,7 +388,7 @@ private:
             write_state(state_path, state);
             add_line(line);
         }
-        finish(scene, name, settings, stats, state, begin.moments.samples);
+        finish(scene, name, settings, stats, state, continued_from);
         std::error_code ignored;
         fs::remove(state_path, ignored);
         return true;

@@ -50,6 +50,7 @@ struct World {
     int kill_at = -1;             ///< the render call that kills the process
     int stop_at = -1;             ///< the render call that raises *flag
     volatile bool flag = false;
+    bool counters_restart = false;  ///< with the film
     int calls = 0, made = 0;
     uint64_t samples = 0;         ///< rendered by all
 };
@@ -87,6 +88,7 @@ public:
     FilmMoments film() override { return film_; }
     void clear_film() override {
         film_.samples = 0;
+        if (world_.counters_restart) rays_ = 0;
         film_.sum.assign(size_t(film_.width) * film_.height * 3, 0.0);
         film_.sum_squares = film_.sum;
     }
@@ -342,6 +344,7 @@ TEST_CASE("an experiment leaves what design.md describes") {
     const Folder folder;
     write_inputs(folder);
     World world;
+    world.counters_restart = GENERATE(false, true);
     CHECK(run_experiment(request(folder, "out"), fake_hooks(world)) == ExitCode::done);
     const auto rows = table(folder / "out/runs.csv");
     REQUIRE(rows.size() == 2 * 2 * 2 * 4);
@@ -363,6 +366,7 @@ TEST_CASE("an experiment leaves what design.md describes") {
     CHECK(fs::exists(folder.path / "out" / manifest["scenes"][0]["reference"]["file"].get<std::string>()));
     const auto stats = nlohmann::json::parse(read_file(folder / "out/stats/a/good_2.json"));
     CHECK(stats["spp"] == 32);
+    CHECK(stats["rays"]["extend"] == 32 * 16 * 12);
     Attributes attributes;
     read_exr(folder / "out/images/a/good_2.exr", &attributes);
     CHECK(attributes["spp"] == 32);
