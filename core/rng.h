@@ -59,8 +59,8 @@ AMBILUX_HD float hash_float(uint32_t a, uint32_t b) {
     y ^= y >> 16;
     x += y * 1664525u;
     y += x * 1664525u;
-    x ^= x >> 16;
-    return uniform_float(x);
+    // The second word: it is mixed once more than the first, which is visibly correlated between neighbouring b.
+    return uniform_float(y ^ y >> 16);
 }
 
 }  // namespace ambilux

@@ -1,4 +1,4 @@
-// libs: ambilux_accel ambilux_scene
+// libs: ambilux_scene
 // labels: accel
 // timeout: 300
 // The host build of the CUDA traversal against Embree: same rays, same hits (pitfall G12), at every scale (B33).

@@ -1,4 +1,4 @@
-// libs: ambilux_accel ambilux_scene
+// libs: ambilux_scene
 // labels: accel
 // Analytic shapes against closed forms in double precision, and surfaces that let rays pass (B34).
 #include <cmath>
@@ -95,7 +95,7 @@ TEMPLATE_TEST_CASE("Opacity: the share of rays that pass, alike for closest and 
     const uint32_t n = 200000;
     double layer[6] = {};
     for (uint32_t i = 0; i < n; ++i) {
-        const Ray ray = {{0, 0, -1}, kInfinity, {0, 0, 1}, i * 2654435761u};
+        const Ray ray = {{0, 0, -1}, kInfinity, {0, 0, 1}, random_bits({42, i, 0, Stream::test}, 0).x};
         Hit hit;
         const bool met = accel.tracer().template closest<kOpacity>(view, ray, hit);
         REQUIRE(accel.tracer().template occluded<kOpacity>(view, ray) == met);
@@ -152,4 +152,20 @@ TEMPLATE_TEST_CASE("Opacity from a texture is looked up where the ray meets the 
         REQUIRE(met == (expected < kInfinity));
         if (met) REQUIRE(hit.t == expected);
     }
+}
+
+TEST_CASE("Decisions of a ray at neighbouring primitives are independent") {
+    // Chance that two primitives both let a ray pass, within 5 standard errors of the product.
+    const uint32_t n = 1000000;
+    for (const uint32_t step : {1u, 2u, 3u, 64u})
+        for (const float p : {0.1f, 0.5f}) {
+            uint32_t both = 0;
+            for (uint32_t i = 0; i < n; ++i) {
+                const uint32_t seed = random_bits({7, i, step, Stream::test}, 0).x;
+                both += hash_float(seed, 100) < p && hash_float(seed, 100 + step) < p;
+            }
+            const double expected = double(p) * p;
+            INFO("step " << step << " p " << p);
+            CHECK(std::fabs(both / double(n) - expected) < 5 * std::sqrt(expected * (1 - expected) / n));
+        }
 }

@@ -1,4 +1,4 @@
-// libs: ambilux_accel ambilux_scene
+// libs: ambilux_scene
 // labels: accel
 // timeout: 300
 // Hit -> surface point -> next ray: the round trip, and that spawned rays do not meet what they leave (B33).
