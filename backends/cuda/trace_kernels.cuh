@@ -140,12 +140,18 @@ __device__ inline void store_hit(Hit* hits, uint32_t i, const Hit& h) {
     __stcs(reinterpret_cast<float4*>(hits) + i, make_float4(h.t, h.u, h.v, __uint_as_float(h.prim)));
 }
 
-/// Nearest hits of an array of rays; launch with persistent_grid() blocks of kTraceBlock threads and *next_ray_counter == 0.
+/// Features as a type. Kernels take this one: the host code that nvcc makes for a kernel cannot name a struct that is a template argument itself.
 template <Features F>
+struct FeatureSet {
+    static constexpr Features value = F;
+};
+
+/// Nearest hits of an array of rays; `Set` is a FeatureSet. Launch with persistent_grid() blocks of kTraceBlock threads and *next_ray_counter == 0.
+template <class Set>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
     trace_closest_kernel(const __grid_constant__ SceneView scene, const CwbvhTracer tracer, const Ray* rays, Hit* hits, const uint32_t* count,
                          uint32_t* next_ray_counter, const TraceTuning tuning) {
-    trace_closest_persistent<F>(
+    trace_closest_persistent<Set::value>(
         scene, tracer,
         [=](uint32_t i, Ray& ray) {
             ray = load_ray(rays, i);
@@ -155,11 +161,11 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
 }
 
 /// Any hit: 1 where a ray is blocked, else 0. Launch as trace_closest_kernel.
-template <Features F>
+template <class Set>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
     trace_any_kernel(const __grid_constant__ SceneView scene, const CwbvhTracer tracer, const Ray* rays, uint8_t* blocked, const uint32_t* count,
                      uint32_t* next_ray_counter, const TraceTuning tuning) {
-    trace_any_persistent<F>(
+    trace_any_persistent<Set::value>(
         scene, tracer,
         [=](uint32_t i, Ray& ray) {
             ray = load_ray(rays, i);
@@ -169,21 +175,21 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
 }
 
 /// The same answers, one thread per ray and the loop of the host: the yardstick for the kernels above.
-template <Features F>
+template <class Set>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
     trace_closest_plain_kernel(const __grid_constant__ SceneView scene, const CwbvhTracer tracer, const Ray* rays, Hit* hits, uint32_t count) {
     const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
     if (i >= count) return;
     Hit hit;
-    tracer.closest<F>(scene, load_ray(rays, i), hit);
+    tracer.closest<Set::value>(scene, load_ray(rays, i), hit);
     store_hit(hits, i, hit);
 }
 
-template <Features F>
+template <class Set>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
     trace_any_plain_kernel(const __grid_constant__ SceneView scene, const CwbvhTracer tracer, const Ray* rays, uint8_t* blocked, uint32_t count) {
     const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
-    if (i < count) blocked[i] = tracer.occluded<F>(scene, load_ray(rays, i));
+    if (i < count) blocked[i] = tracer.occluded<Set::value>(scene, load_ray(rays, i));
 }
 
 /// Blocks that keep every multiprocessor full with a kernel of `threads` threads per block.

@@ -1,0 +1,42 @@
+#include "backends/cuda/device_scene.h"
+
+namespace ambilux {
+
+DeviceScene::DeviceScene(const Scene& scene)
+    : positions_(scene.positions, "vertices on the device"),
+      normals_(scene.normals, "normals on the device"),
+      uvs_(scene.uvs, "texture coordinates on the device"),
+      triangles_(scene.triangles, "triangles on the device"),
+      quadrics_(scene.quadrics, "analytic shapes on the device"),
+      shapes_(scene.shapes, "shapes on the device"),
+      materials_(scene.materials, "materials on the device"),
+      bsdfs_(scene.bsdfs, "BSDFs on the device"),
+      textures_(scene.textures, "texture records on the device"),
+      texels_(scene.texels, "texels on the device"),
+      emitters_(scene.emitters, "emitters on the device"),
+      emitter_cdf_(scene.emitter_cdf, "emitter probabilities on the device"),
+      tables_(scene.tables, "tables on the device"),
+      view_(scene.view()) {
+    view_.positions = positions_.data();
+    view_.normals = normals_.data();
+    view_.uvs = uvs_.data();
+    view_.triangles = triangles_.data();
+    view_.quadrics = quadrics_.data();
+    view_.shapes = shapes_.data();
+    view_.materials = materials_.data();
+    view_.bsdfs = bsdfs_.data();
+    view_.textures = textures_.data();
+    view_.texels = texels_.data();
+    view_.emitters = emitters_.data();
+    view_.emitter_cdf = emitter_cdf_.data();
+    view_.tables = tables_.data();
+}
+
+uint64_t DeviceScene::bytes() const {
+    return positions_.bytes() + normals_.bytes() + uvs_.bytes() + triangles_.bytes() + quadrics_.bytes() + shapes_.bytes() + materials_.bytes() +
+           bsdfs_.bytes() + textures_.bytes() + texels_.bytes() + emitters_.bytes() + emitter_cdf_.bytes() + tables_.bytes();
+}
+
+DeviceCwbvh::DeviceCwbvh(const CwbvhArrays& arrays) : nodes_(arrays.nodes, "acceleration structure on the device"), primitives_(arrays.primitives, "primitives on the device") {}
+
+}  // namespace ambilux

@@ -1,0 +1,54 @@
+// Copies of a scene and of its acceleration structure on a CUDA device.
+#pragma once
+
+#include "backends/cuda/device_memory.h"
+#include "scene/accel/cwbvh.h"
+#include "scene/scene.h"
+
+namespace ambilux {
+
+/// A scene's arrays on the device. The scene may be changed or destroyed afterwards.
+class DeviceScene {
+public:
+    /// Throws Error(device) when memory runs out.
+    explicit DeviceScene(const Scene& scene);
+
+    /// Pointers are to device memory, valid as long as this object.
+    SceneView view() const { return view_; }
+    uint64_t bytes() const;
+    /// What bytes() will be.
+    static uint64_t predicted_bytes(const Scene& scene) { return scene.memory_bytes(); }
+
+private:
+    DeviceBuffer<Vec3f> positions_, normals_;
+    DeviceBuffer<Vec2f> uvs_;
+    DeviceBuffer<Triangle> triangles_;
+    DeviceBuffer<Quadric> quadrics_;
+    DeviceBuffer<Shape> shapes_;
+    DeviceBuffer<Material> materials_;
+    DeviceBuffer<BsdfRecord> bsdfs_;
+    DeviceBuffer<Texture> textures_;
+    DeviceBuffer<uint8_t> texels_;
+    DeviceBuffer<Emitter> emitters_;
+    DeviceBuffer<float> emitter_cdf_, tables_;
+    SceneView view_;
+};
+
+/// An acceleration structure on the device.
+class DeviceCwbvh {
+public:
+    /// Throws Error(device) when memory runs out.
+    explicit DeviceCwbvh(const CwbvhArrays& arrays);
+
+    /// For device code only; valid as long as this object.
+    CwbvhTracer tracer() const { return make_tracer(nodes_.data(), primitives_.data()); }
+    uint64_t bytes() const { return nodes_.bytes() + primitives_.bytes(); }
+    /// What bytes() will be.
+    static uint64_t predicted_bytes(const CwbvhArrays& arrays) { return arrays.bytes(); }
+
+private:
+    DeviceBuffer<CwbvhNode> nodes_;
+    DeviceBuffer<CwbvhPrimitive> primitives_;
+};
+
+}  // namespace ambilux

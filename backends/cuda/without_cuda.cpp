@@ -1,0 +1,19 @@
+// What stands for the CUDA backend in a build without CUDA.
+#include "backends/cuda_device.h"
+#include "backends/trace_on_device.h"
+#include "core/error.h"
+
+namespace ambilux {
+namespace {
+
+Error not_built() { return {ExitCode::device, "this program was built without CUDA"}; }
+
+}  // namespace
+
+bool cuda_device_present() { return false; }
+
+std::string cuda_device_name() { return {}; }
+
+std::vector<Hit> trace_on_device(const Scene&, const std::vector<Ray>&, bool, bool) { throw not_built(); }
+
+}  // namespace ambilux

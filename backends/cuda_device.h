@@ -1,0 +1,15 @@
+// Whether there is a CUDA device to work on. Callable in every build.
+#pragma once
+
+#include <string>
+
+namespace ambilux {
+
+/// True if this build has the CUDA backend and its kernels run on the current device. False without a driver, without a device, or on a
+/// device of another architecture. Never throws, never prints; the answer is kept.
+bool cuda_device_present();
+
+/// Name of the current device; empty if cuda_device_present() is false.
+std::string cuda_device_name();
+
+}  // namespace ambilux

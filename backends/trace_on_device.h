@@ -1,0 +1,16 @@
+// Traces an array of rays on a CUDA device and brings the hits back: for tests, where the cost of copies does not matter.
+#pragma once
+
+#include <vector>
+
+#include "scene/ray.h"
+#include "scene/scene.h"
+
+namespace ambilux {
+
+/// Hits of `rays` on the device, through a structure built for this call. Closest: as CwbvhTracer::closest. With `any_hit` only `prim` counts: kNone where
+/// a ray is free, 0 where it is blocked. `persistent` chooses the kernel with dynamic fetch over the one with a thread per ray.
+/// Throws Error(device) without a device.
+std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& rays, bool any_hit, bool persistent);
+
+}  // namespace ambilux
