@@ -10,11 +10,9 @@
 
 #include "film/moments.h"
 #include "scene/scene.h"
+#include "stages/path_policy.h"
 
 namespace ambilux {
-
-enum class Estimator : uint32_t { naive, nee, mis };
-enum class MisHeuristic : uint32_t { balance, power };
 
 /// All that decides the image, apart from the scene. Every `--set KEY=VALUE` names a field here.
 struct RenderSettings {

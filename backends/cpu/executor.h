@@ -1,0 +1,55 @@
+// Runs the stages of one wave on the calling thread, over queues that belong to it alone.
+#pragma once
+
+#include <chrono>
+
+#include "queues/queue.h"
+#include "stages/stage.h"
+#include "stages/wave.h"
+
+namespace ambilux {
+
+class CpuExecutor {
+public:
+    CpuExecutor(WaveState* state, StageRecord* records) : state_(state), records_(records) {}
+
+    template <class Stage>
+    void run(StageId id, const Stage& stage, uint32_t n) {
+        const auto start = Clock::now();
+        for (uint32_t i = 0; i < n; ++i) stage(i);
+        record(id, n, start);
+    }
+    template <class Stage, class Item>
+    void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
+        const uint32_t n = queue.counter->size();
+        if (n == 0) return;
+        const auto start = Clock::now();
+        for (uint32_t i = 0; i < n; ++i) stage(i);
+        queue.counter->finish();
+        record(id, n, start);
+    }
+    /// Rays are read before any stage pushes new ones, so the queue they came from may be filled again at once.
+    template <class Stage, class Item>
+    void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
+        run(id, stage, queue);
+    }
+    template <class Item, class Body>
+    void repeat_while(const Queue<Item>& queue, Body body) {
+        state_->depth = 1;
+        while (queue.counter->count > 0) body();
+        state_->depth = 0;
+    }
+    void next_depth() { ++state_->depth; }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    void record(StageId id, uint32_t items, Clock::time_point start) {
+        const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start).count();
+        records_[uint32_t(id)].add(items, state_->depth, uint64_t(ns));
+    }
+
+    WaveState* state_;
+    StageRecord* records_;
+};
+
+}  // namespace ambilux

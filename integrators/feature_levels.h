@@ -1,0 +1,28 @@
+// The sets of features that kernels are compiled for. A scene gets the first that covers it.
+#pragma once
+
+#include "core/features.h"
+
+namespace ambilux {
+
+/// Diffuse triangles under area lights.
+constexpr Features kDiffuseFeatures = {bit(BsdfType::diffuse), bit(EmitterType::area), bit(PrimitiveType::triangle), false, false, false};
+
+/// Every BSDF, texture and emitter, on triangles that are neither bumped nor holed.
+constexpr Features kTriangleFeatures = {kAllFeatures.bsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false, false};
+
+/// Carries a set of features as a type.
+template <Features F>
+struct FeatureTag {
+    static constexpr Features value = F;
+};
+
+/// Calls `f` with the FeatureTag of the smallest level that covers `needed`; with the full set if `specialise` is false.
+template <class Function>
+decltype(auto) with_feature_level(const Features& needed, bool specialise, Function&& f) {
+    if (specialise && kDiffuseFeatures.covers(needed)) return f(FeatureTag<kDiffuseFeatures>{});
+    if (specialise && kTriangleFeatures.covers(needed)) return f(FeatureTag<kTriangleFeatures>{});
+    return f(FeatureTag<kAllFeatures>{});
+}
+
+}  // namespace ambilux

@@ -1,0 +1,22 @@
+#include "backends/cuda_device.h"
+#include "core/error.h"
+#include "integrators/path/path.h"
+
+namespace ambilux {
+
+bool cuda_available() { return cuda_device_present(); }
+
+std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings& settings) {
+    // Settings may come from elsewhere than apply_setting.
+    RenderSettings checked;
+    apply_setting(checked, "integrator", settings.integrator);
+    apply_setting(checked, "variant", settings.variant);
+    apply_setting(checked, "backend", settings.backend);
+    apply_setting(checked, "accel", settings.accel);
+    const bool cuda = settings.backend == "cuda" || (settings.backend == "auto" && settings.accel != "embree" && cuda_available());
+    if (cuda && settings.accel == "embree") throw Error(ExitCode::usage, "accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
+    if (cuda) return make_path_cuda(scene, settings);
+    return make_path_cpu(scene, settings);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,148 @@
+// The path tracer on a CUDA device: one graph per wave.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+
+#include "backends/cuda/device_scene.h"
+#include "backends/cuda/executor.cuh"
+#include "backends/cuda_device.h"
+#include "core/error.h"
+#include "integrators/feature_levels.h"
+#include "integrators/path/path_cuda.h"
+#include "integrators/path/schedule.h"
+#include "integrators/path/wave_stats.h"
+#include "scene/info.h"
+
+namespace ambilux {
+
+/// Paths of one wave: enough that the last bounces, which few paths reach, still fill the device.
+constexpr uint32_t kCudaWaveSize = 1u << 22;
+
+template <Features F>
+class PathCuda final : public Renderer {
+public:
+    PathCuda(const Scene& scene, const RenderSettings& settings)
+        : scene_(scene), policy_(make_path_policy(scene, settings)),
+          wave_(shape_wave(scene, settings, settings.wave_size ? settings.wave_size : kCudaWaveSize, ~0u)) {
+        const auto start = Clock::now();
+        const CwbvhAccel accel(scene);
+        lay_out(layout_, wave_.slot_count(), policy_);
+        values_ = uint64_t(wave_.width) * wave_.height * 3;
+        predicted_bytes_ = DeviceScene::predicted_bytes(scene) + accel.arrays().bytes() + layout_.bytes() + 2 * values_ * sizeof(double) + sizeof(uint64_t);
+        size_t free = 0, total = 0;
+        cuda_check(cudaMemGetInfo(&free, &total), "device memory");
+        check_memory(predicted_bytes_, free, wave_.slot_count());
+
+        device_scene_.emplace(scene);
+        device_accel_.emplace(accel.arrays());
+        memory_ = DeviceBuffer<std::byte>(layout_.bytes());
+        memory_.zero();
+        sum_ = DeviceBuffer<double>(values_);
+        sum_squares_ = DeviceBuffer<double>(values_);
+        clock_ = DeviceBuffer<uint64_t>(1);
+        clear_film();
+        Layout layout(memory_.data());
+        queues_ = lay_out(layout, wave_.slot_count(), policy_);
+        std::vector<QueueCounter> counters(PathMemory::kQueues);
+        for (size_t q = 0; q < counters.size(); ++q) counters[q].capacity = layout.queue_capacities()[q];
+        cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
+
+        cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
+        const PathStages<F, CwbvhTracer> stages(device_scene_->view(), device_accel_->tracer(), policy_, wave_, queues_, {sum_.data(), sum_squares_.data()});
+        CudaGraphBuilder builder(stream_, queues_.state, queues_.records, clock_.data());
+        graph_ = builder.build([&](CudaGraphBuilder& exec) { run_path_wave(exec, stages); });
+        cuda_check(cudaDeviceSynchronize(), "preparation");
+        build_seconds_ = seconds_since(start);
+    }
+
+    ~PathCuda() override {
+        if (graph_) cudaGraphExecDestroy(graph_);
+        if (stream_) cudaStreamDestroy(stream_);
+    }
+
+    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+        const auto start = Clock::now();
+        uint32_t done = 0;
+        while (done < count && !(interrupt && *interrupt)) {
+            // All waves of a pass are queued at once; the host waits for the last.
+            const uint32_t pass = std::min(count - done, std::max(preferred_batch(), wave_.samples));
+            const auto pass_start = Clock::now();
+            for (uint32_t s = 0; s < pass; s += wave_.samples) {
+                for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles) {
+                    detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{tile, first + done + s, std::min(wave_.samples, pass - s), 0});
+                    cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
+                }
+            }
+            cuda_check(cudaStreamSynchronize(stream_), "wave");
+            done += pass;
+            measured_seconds_ = seconds_since(pass_start);
+            measured_samples_ = pass;
+        }
+        samples_ += done;
+        film_samples_ += done;
+        render_seconds_ += seconds_since(start);
+        return done;
+    }
+
+    FilmMoments film() override {
+        FilmMoments film;
+        film.width = wave_.width;
+        film.height = wave_.height;
+        film.samples = film_samples_;
+        film.sum = sum_.download();
+        film.sum_squares = sum_squares_.download();
+        return film;
+    }
+
+    void clear_film() override {
+        sum_.zero();
+        sum_squares_.zero();
+        film_samples_ = 0;
+    }
+
+    RenderStats stats() override {
+        RenderStats s;
+        s.backend = "cuda";
+        s.device = cuda_device_name();
+        s.accel = "cwbvh";
+        s.build_seconds = build_seconds_;
+        s.render_seconds = render_seconds_;
+        s.samples = samples_;
+        std::vector<StageRecord> records(kStageCount);
+        std::vector<QueueCounter> counters(PathMemory::kQueues);
+        cuda_check(cudaMemcpy(records.data(), queues_.records, records.size() * sizeof(StageRecord), cudaMemcpyDeviceToHost), "statistics");
+        cuda_check(cudaMemcpy(counters.data(), queues_.counters, counters.size() * sizeof(QueueCounter), cudaMemcpyDeviceToHost), "statistics");
+        fill_stage_stats(records.data(), s);
+        fill_queue_stats(layout_, {counters.data()}, s);
+        s.memory_bytes = device_scene_->bytes() + device_accel_->bytes() + memory_.bytes() + sum_.bytes() + sum_squares_.bytes() + clock_.bytes();
+        s.memory_bytes_predicted = predicted_bytes_;
+        s.features = feature_names(F);
+        s.skipped = skipped_parts(scene_, policy_, F);
+        return s;
+    }
+
+    uint32_t preferred_batch() const override { return batch_of(measured_seconds_, measured_samples_); }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+    const Scene& scene_;
+    PathPolicy policy_;
+    Wave wave_;
+    Layout layout_;
+    uint64_t values_ = 0, predicted_bytes_ = 0, samples_ = 0, film_samples_ = 0, measured_samples_ = 0;
+    double build_seconds_ = 0, render_seconds_ = 0, measured_seconds_ = 0;
+    std::optional<DeviceScene> device_scene_;
+    std::optional<DeviceCwbvh> device_accel_;
+    DeviceBuffer<std::byte> memory_;
+    DeviceBuffer<double> sum_, sum_squares_;
+    DeviceBuffer<uint64_t> clock_;
+    PathMemory queues_{};
+    cudaStream_t stream_ = nullptr;
+    cudaGraphExec_t graph_ = nullptr;
+};
+
+}  // namespace ambilux

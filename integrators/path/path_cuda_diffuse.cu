@@ -1,0 +1,7 @@
+#include "integrators/path/path_cuda.cuh"
+
+namespace ambilux {
+
+std::unique_ptr<Renderer> make_path_cuda_diffuse(const Scene& scene, const RenderSettings& settings) { return std::make_unique<PathCuda<kDiffuseFeatures>>(scene, settings); }
+
+}  // namespace ambilux

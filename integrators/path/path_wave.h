@@ -1,0 +1,103 @@
+// The memory of a wave of eye walks and the stages that work on it.
+#pragma once
+
+#include "integrators/renderer.h"
+#include "queues/layout.h"
+#include "stages/accumulate.h"
+#include "stages/connect.h"
+#include "stages/extend.h"
+#include "stages/generate.h"
+#include "stages/mis_weight.h"
+#include "stages/occlude.h"
+#include "stages/shade.h"
+
+namespace ambilux {
+
+/// What `settings` ask of a scene. Throws Error(usage) when walks might never end.
+PathPolicy make_path_policy(const Scene& scene, const RenderSettings& settings);
+
+/// Which tiles and samples fit into a wave of about `wave_size` paths. Throws Error(usage) if slots would not fit 32 bits.
+Wave shape_wave(const Scene& scene, const RenderSettings& settings, uint32_t wave_size, uint32_t max_tiles);
+
+/// Tiles of the whole film.
+uint32_t tile_count(const Wave& wave);
+
+/// Names of stages and kernel parts that this render does without.
+std::vector<std::string> skipped_parts(const Scene& scene, const PathPolicy& policy, const Features& kernels);
+
+/// Memory of one wave. Every queue holds the most it can ever be given: a slot has at most one ray, hit, connection and contribution at a time.
+struct PathMemory {
+    static constexpr uint32_t kQueues = 8;
+
+    WaveState* state;
+    StageRecord* records;    ///< one per StageId
+    QueueCounter* counters;  ///< one per queue
+    Queue<RayItem> rays;
+    Queue<HitItem> hits;
+    Queue<HitCandidate> hit_candidates;
+    Queue<Contribution> hit_contributions;
+    Queue<ConnectItem> connections;
+    Queue<ConnectCandidate> connect_candidates;
+    Queue<ShadowItem> shadows;
+    Queue<Contribution> shadow_contributions;
+    Lane* samples;
+};
+
+/// Lays out the memory for `slots` paths; queues that `policy` leaves empty have no storage.
+inline PathMemory lay_out(Layout& layout, uint32_t slots, const PathPolicy& policy) {
+    const uint32_t hits = policy.count_hits ? slots : 0, connections = policy.connect ? slots : 0;
+    PathMemory m;
+    m.state = layout.take<WaveState>(1);
+    m.records = layout.take<StageRecord>(kStageCount);
+    m.counters = layout.take<QueueCounter>(PathMemory::kQueues);
+    m.rays = layout.queue<RayItem>("rays", m.counters, slots);
+    m.hits = layout.queue<HitItem>("hits", m.counters, slots);
+    m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, hits);
+    m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, hits);
+    m.connections = layout.queue<ConnectItem>("connections", m.counters, connections);
+    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, connections);
+    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, connections);
+    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, connections);
+    m.samples = layout.take<Lane>(slots);
+    return m;
+}
+
+/// Where the sums of the film lie.
+struct FilmPointers {
+    double *sum, *sum_squares;
+};
+
+/// The stages of a path tracer over one wave, ready to launch.
+template <Features F, class Tracer>
+struct PathStages {
+    PathPolicy policy;
+    Wave wave;
+    PathMemory memory;
+    Generate generate;
+    Extend<F, Tracer> extend;
+    Shade<F> shade;
+    WeightHits weight_hits;
+    Accumulate accumulate_hits;
+    Connect<F> connect;
+    WeightConnections weight_connections;
+    Occlude<F, Tracer> occlude;
+    Accumulate accumulate_shadows;
+    Develop develop;
+
+    PathStages(const SceneView& scene, const Tracer& tracer, const PathPolicy& p, Wave w, const PathMemory& m, FilmPointers film) : policy(p), wave(w), memory(m) {
+        wave.state = m.state;
+        const auto record = [&](StageId id) { return m.records + uint32_t(id); };
+        generate = {scene, wave, policy, m.rays, m.samples, record(StageId::generate)};
+        extend = {scene, tracer, wave, m.rays, m.hits, record(StageId::extend)};
+        shade = {scene, wave, policy, m.hits, m.hit_candidates, m.connections, m.rays, record(StageId::shade)};
+        weight_hits = {policy, m.hit_candidates, m.hit_contributions, record(StageId::mis_weight)};
+        accumulate_hits = {m.hit_contributions, m.samples, record(StageId::accumulate)};
+        connect = {scene, wave, policy, m.connections, m.connect_candidates, record(StageId::connect)};
+        weight_connections = {policy, m.connect_candidates, m.shadows, record(StageId::mis_weight)};
+        occlude = {scene, tracer, m.shadows, m.shadow_contributions, record(StageId::occlude)};
+        accumulate_shadows = {m.shadow_contributions, m.samples, record(StageId::accumulate)};
+        develop = {wave, m.samples, film.sum, film.sum_squares, record(StageId::develop)};
+    }
+};
+
+}  // namespace ambilux

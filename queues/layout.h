@@ -1,0 +1,47 @@
+// One allocation for everything that a wave needs. Run once without memory it tells the bytes; run again with memory it hands out the places.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "queues/queue.h"
+
+namespace ambilux {
+
+class Layout {
+public:
+    explicit Layout(void* memory = nullptr) : memory_(static_cast<std::byte*>(memory)) {}
+
+    /// Place for `count` values; null while there is no memory. Starts are aligned to 256 bytes, the unit of a device's memory transactions and more.
+    template <class T>
+    T* take(uint64_t count) {
+        T* place = memory_ ? reinterpret_cast<T*>(memory_ + bytes_) : nullptr;
+        bytes_ += (count * sizeof(T) + 255) / 256 * 256;
+        return place;
+    }
+
+    /// A queue without items. Its counter is the next of the array `counters`.
+    template <class Item>
+    Queue<Item> queue(const char* name, QueueCounter* counters, uint32_t capacity) {
+        Queue<Item> q;
+        q.counter = counters ? counters + names_.size() : nullptr;
+        q.capacity = capacity;
+        names_.emplace_back(name);
+        capacities_.push_back(capacity);
+        q.base = take<Lane>(uint64_t(capacity) * Queue<Item>::kLanes);
+        return q;
+    }
+
+    uint64_t bytes() const { return bytes_; }
+    const std::vector<std::string>& queue_names() const { return names_; }
+    const std::vector<uint32_t>& queue_capacities() const { return capacities_; }
+
+private:
+    std::byte* memory_;
+    uint64_t bytes_ = 0;
+    std::vector<std::string> names_;
+    std::vector<uint32_t> capacities_;
+};
+
+}  // namespace ambilux

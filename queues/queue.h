@@ -1,0 +1,81 @@
+// Work queues: lanes of 16 bytes, so that neighbouring threads load and store neighbouring 16-byte words, and a counter that lives where the kernels run.
+#pragma once
+
+#include <cstring>
+#include <type_traits>
+
+#include "core/hd.h"
+
+#include <cstdint>
+
+namespace ambilux {
+
+/// The unit of storage: one coalesced access per thread.
+struct alignas(16) Lane {
+    uint32_t word[4];
+};
+
+/// State of one queue. `count` goes on counting when the queue is full, so that what is lost is known.
+struct QueueCounter {
+    uint32_t count;     ///< pushes since the queue was last emptied
+    uint32_t capacity;
+    uint64_t peak;      ///< most pushes of one filling
+    uint64_t overflow;  ///< pushes past the capacity; their items are lost
+    uint32_t next;      ///< first item that no persistent thread has taken yet
+    uint32_t pad[3];
+
+    AMBILUX_HD uint32_t size() const { return count < capacity ? count : capacity; }
+    /// Empties the queue and keeps what its filling tells.
+    AMBILUX_HD void finish() {
+        if (count > peak) peak = count;
+        if (count > capacity) overflow += count - capacity;
+        count = 0;
+        next = 0;
+    }
+};
+
+/// Takes one place for the calling thread. On a device the threads of a warp that push together take theirs with one atomic operation.
+AMBILUX_HD uint32_t take_place(uint32_t* count) {
+#if defined(__CUDA_ARCH__)
+    const uint32_t together = __activemask();
+    uint32_t below;
+    asm("mov.u32 %0, %%lanemask_lt;" : "=r"(below));
+    const uint32_t rank = uint32_t(__popc(together & below));
+    uint32_t first = 0;
+    if (rank == 0) first = atomicAdd(count, uint32_t(__popc(together)));
+    return __shfl_sync(together, first, __ffs(int(together)) - 1) + rank;
+#else
+    return (*count)++;  // a host queue belongs to one thread
+#endif
+}
+
+/// Fixed-capacity queue of trivially copyable items: lane k of item i lies at base[k * capacity + i]. A view: copies share the storage.
+template <class Item>
+struct Queue {
+    static_assert(std::is_trivially_copyable_v<Item> && sizeof(Item) % sizeof(Lane) == 0, "items are whole lanes of plain data");
+    static constexpr uint32_t kLanes = sizeof(Item) / sizeof(Lane);
+
+    Lane* base = nullptr;
+    QueueCounter* counter = nullptr;
+    uint32_t capacity = 0;
+
+    AMBILUX_HD Item load(uint32_t i) const {
+        Lane lanes[kLanes];
+        for (uint32_t k = 0; k < kLanes; ++k) lanes[k] = base[size_t(k) * capacity + i];
+        Item item;
+        memcpy(&item, lanes, sizeof(Item));
+        return item;
+    }
+    AMBILUX_HD void store(uint32_t i, const Item& item) const {
+        Lane lanes[kLanes];
+        memcpy(lanes, &item, sizeof(Item));
+        for (uint32_t k = 0; k < kLanes; ++k) base[size_t(k) * capacity + i] = lanes[k];
+    }
+    /// Appends. Past the capacity the item is lost and counted (QueueCounter::overflow).
+    AMBILUX_HD void push(const Item& item) const {
+        const uint32_t i = take_place(&counter->count);
+        if (i < capacity) store(i, item);
+    }
+};
+
+}  // namespace ambilux

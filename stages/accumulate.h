@@ -1,0 +1,58 @@
+// accumulate: contributions to samples, and samples to the film.
+#pragma once
+
+#include "stages/path_items.h"
+#include "stages/stage.h"
+#include "stages/wave.h"
+
+namespace ambilux {
+
+/// Adds contributions to the samples of their paths. A queue holds at most one contribution per path when this runs, so no two threads meet and
+/// the sum does not depend on the order of the queue.
+struct Accumulate {
+    Queue<Contribution> contributions;
+    Lane* samples;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const Contribution c = contributions.load(i);
+        if (!is_light(c.value, record)) return;
+        Rgb sum;
+        memcpy(&sum, &samples[c.path], sizeof(sum));
+        sum += c.value;
+        memcpy(&samples[c.path], &sum, sizeof(sum));
+    }
+};
+
+/// Adds the samples of the wave's pixels to the sums of the film, sample after sample: the sums do not depend on how samples are dealt to waves.
+struct Develop {
+    Wave wave;
+    const Lane* samples;
+    double* sum;          ///< per pixel and channel (FilmMoments)
+    double* sum_squares;
+    StageRecord* record;
+
+    /// `i` is a slot of the wave's first sample.
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const PathSlot p = wave.locate(i);
+        if (!p.active) return;
+        const uint64_t at = uint64_t(p.pixel) * 3;
+        double s[3] = {sum[at], sum[at + 1], sum[at + 2]}, q[3] = {sum_squares[at], sum_squares[at + 1], sum_squares[at + 2]};
+        const uint32_t stride = wave.tiles * kTilePixels;
+        for (uint32_t k = 0; k < wave.state->samples; ++k) {
+            Rgb value;
+            memcpy(&value, &samples[i + k * stride], sizeof(value));
+            if (!is_light(value, record)) value = {0.0f, 0.0f, 0.0f};
+            for (int c = 0; c < 3; ++c) {
+                s[c] += double(value[c]);
+                q[c] += double(value[c]) * double(value[c]);
+            }
+        }
+        for (int c = 0; c < 3; ++c) {
+            sum[at + c] = s[c];
+            sum_squares[at + c] = q[c];
+        }
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,52 @@
+// connect: a vertex samples an emitter (next event estimation).
+#pragma once
+
+#include "stages/path_items.h"
+#include "stages/path_policy.h"
+#include "stages/stage.h"
+#include "stages/wave.h"
+#include "transport/emitter.h"
+#include "transport/surface_scattering.h"
+
+namespace ambilux {
+
+template <Features F>
+struct Connect {
+    SceneView scene;
+    Wave wave;
+    PathPolicy policy;
+    Queue<ConnectItem> connections;
+    Queue<ConnectCandidate> candidates;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const ConnectItem c = connections.load(i);
+        const RngKey key = wave.key(c.path);
+        const uint32_t depth = c.bits.depth();
+        const SurfacePoint point = surface_at<F>(scene, c.prim, c.u, c.v);
+        EmitterSample light;
+        if (!sample_emitter_direct<F>(scene, point.p, random_floats(key, emitter_block(depth)), light)) return;
+        const Scattering s = make_scattering<F>(scene, point, -c.d);
+        const Rgb f = scatter_eval<F>(s, light.wi, TransportMode::radiance);
+        if (is_zero(f)) return;
+        const Rgb value = c.throughput * f * (light.radiance / light.pdf_sa);
+        if (!is_light(value, record) || is_zero(value)) return;
+        // Only BSDF sampling and a hit could find this light too.
+        const bool other = policy.estimator == Estimator::mis && !light.delta;
+
+        ConnectCandidate out = {value, c.path, light.pdf_sa, other ? scatter_pdf<F>(s, light.wi) : 0.0f, 0, kInfinity, {}, 0, light.wi, 0};
+        out.o = offset_ray_origin(point.p, point.p_error, point.ng, light.wi);
+        if (light.distance < kInfinity) {
+            // Both ends are moved off their surfaces by their error, so the segment between them is open at either end.
+            const Vec3f to = offset_ray_origin(light.p, light.p_error, light.ng, -light.wi) - out.o;
+            const float distance = length(to);
+            if (!(distance > 0.0f)) return;
+            out.d = to / distance;
+            out.tmax = distance * (1.0f - gamma_bound(8));
+        }
+        if constexpr (F.opacity) out.alpha_seed = alpha_seed(key, depth, true);
+        candidates.push(out);
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,79 @@
+// shade: a hit gives light, asks for a connection and goes on.
+#pragma once
+
+#include "stages/path_items.h"
+#include "stages/path_policy.h"
+#include "stages/stage.h"
+#include "stages/wave.h"
+#include "transport/emitter.h"
+#include "transport/surface_scattering.h"
+
+namespace ambilux {
+
+/// Probability with which a walk of `throughput` goes on (Mitsuba's rule: radiance is scaled by the squared index of the medium, which is not loss).
+AMBILUX_HD float survival_probability(Rgb throughput, float eta_scale) { return fminf(max_component(throughput) * sqr(eta_scale), 0.95f); }
+
+template <Features F>
+struct Shade {
+    SceneView scene;
+    Wave wave;
+    PathPolicy policy;
+    Queue<HitItem> hits;
+    Queue<HitCandidate> candidates;
+    Queue<ConnectItem> connections;
+    Queue<RayItem> rays;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const HitItem h = hits.load(i);
+        if (h.prim == kNone) {
+            if (wants_emission(h)) emit(h, environment_radiance<F>(scene, h.d), can_sample(h) ? pdf_environment_direct<F>(scene, h.d) : 0.0f);
+            return;
+        }
+        const SurfacePoint point = surface_at<F>(scene, h.prim, h.u, h.v);
+        const uint32_t emitter = scene.shapes[point.shape].emitter;
+        if (emitter != kNone && wants_emission(h)) {
+            const Rgb radiance = emitted_radiance<F>(scene, emitter, point, -h.d);
+            if (!is_zero(radiance)) emit(h, radiance, can_sample(h) ? pdf_emitter_direct<F>(scene, emitter, h.o, h.d, point) : 0.0f);
+        }
+
+        const uint32_t depth = h.bits.depth();
+        if (depth >= policy.max_depth) return;
+        const Scattering s = make_scattering<F>(scene, point, -h.d);
+        if (policy.connect && bsdf_is_smooth(s.bsdf)) connections.push({h.d, h.path, h.throughput, h.bits, h.u, h.v, h.prim, 0});
+        scatter(h, point, s, depth);
+    }
+
+private:
+    AMBILUX_HD bool wants_emission(const HitItem& h) const { return policy.count_hits && !(policy.hide_emitters && h.bits.depth() == 1); }
+
+    /// True if sampling emitters at the previous vertex could have found this light too.
+    AMBILUX_HD bool can_sample(const HitItem& h) const { return policy.connect && !h.bits.delta(); }
+
+    AMBILUX_HD void emit(const HitItem& h, Rgb radiance, float pdf_other) const {
+        if (policy.estimator == Estimator::nee && pdf_other > 0.0f) return;  // found by the connection
+        const Rgb value = h.throughput * radiance;
+        if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.path, h.pdf_sa, pdf_other, {0, 0}});
+    }
+
+    AMBILUX_HD void scatter(const HitItem& h, const SurfacePoint& point, const Scattering& s, uint32_t depth) const {
+        const Vec4f u = random_floats(wave.key(h.path), scatter_block(depth));
+        ScatterSample sample;
+        if (!scatter_sample<F>(s, {u.x, u.y, u.z}, TransportMode::radiance, sample)) return;
+        const bool delta = sample.flags & kScatterDelta;
+        // The last segment can bring emission only.
+        if (depth + 1 == policy.max_depth && (!policy.count_hits || (policy.estimator == Estimator::nee && !delta))) return;
+        Rgb throughput = h.throughput * sample.weight;
+        if (!is_light(throughput, record) || is_zero(throughput)) return;
+        const float eta_scale = h.bits.eta_scale() * sample.eta;
+        if (depth >= policy.rr_depth) {
+            const float survival = survival_probability(throughput, eta_scale);
+            if (!(u.w < survival)) return;
+            throughput = throughput / survival;
+        }
+        const Vec3f o = offset_ray_origin(point.p, point.p_error, point.ng, sample.wo);
+        rays.push({o, h.path, sample.wo, WalkBits::make(depth + 1, delta, eta_scale), throughput, sample.pdf_sa});
+    }
+};
+
+}  // namespace ambilux

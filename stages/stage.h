@@ -1,0 +1,52 @@
+// What all stages share: their names, their records, and the count of values that are no light.
+#pragma once
+
+#include "core/vec.h"
+
+namespace ambilux {
+
+/// Kernels of a wave, in the order in which they first run.
+enum class StageId : uint32_t { generate = 0, extend, shade, connect, mis_weight, occlude, accumulate, develop, count };
+
+constexpr uint32_t kStageCount = uint32_t(StageId::count);
+constexpr const char* kStageNames[kStageCount] = {"generate", "extend", "shade", "connect", "mis_weight", "occlude", "accumulate", "develop"};
+
+/// Items are counted for depths 0 ... kTrackedDepths-1; the last entry gathers all deeper ones.
+constexpr uint32_t kTrackedDepths = 64;
+
+/// What one stage did; lives where the kernels run.
+struct StageRecord {
+    uint64_t launches, items, nanoseconds;
+    uint64_t nan, inf, negative;  ///< values it dropped
+    uint64_t items_by_depth[kTrackedDepths];
+
+    AMBILUX_HD void add(uint64_t new_items, uint32_t depth, uint64_t ns) {
+        ++launches;
+        items += new_items;
+        nanoseconds += ns;
+        items_by_depth[depth < kTrackedDepths ? depth : kTrackedDepths - 1] += new_items;
+    }
+};
+
+/// Adds 1 to a counter that other threads may add to.
+AMBILUX_HD void count_one(uint64_t* counter) {
+#if defined(__CUDA_ARCH__)
+    atomicAdd(reinterpret_cast<unsigned long long*>(counter), 1ull);
+#else
+    ++*counter;  // a host record belongs to one thread
+#endif
+}
+
+/// True if `v` can be light: finite and not negative. Anything else is counted in the record of the stage that made it; the caller drops it.
+AMBILUX_HD bool is_light(Rgb v, StageRecord* record) {
+    if (is_finite(v)) {
+        if (min_component(v) >= 0.0f) return true;
+        count_one(&record->negative);
+        return false;
+    }
+    const bool nan = v.x != v.x || v.y != v.y || v.z != v.z;
+    count_one(nan ? &record->nan : &record->inf);
+    return false;
+}
+
+}  // namespace ambilux

@@ -1,0 +1,68 @@
+// The set of paths in flight: which pixel and sample each slot stands for, and where its random numbers come from.
+#pragma once
+
+#include "core/rng.h"
+
+namespace ambilux {
+
+/// Side of the square tiles in which pixels are numbered, so that neighbouring threads hold neighbouring pixels.
+constexpr uint32_t kTileSide = 8;
+constexpr uint32_t kTilePixels = kTileSide * kTileSide;
+
+/// Part of a wave that changes from one to the next; lives where the kernels run.
+struct WaveState {
+    uint32_t first_tile;    ///< of this wave
+    uint32_t first_sample;  ///< of this wave
+    uint32_t samples;       ///< of each pixel in this wave, at most Wave::samples
+    uint32_t depth;         ///< segments of the paths in flight
+};
+
+/// What a slot stands for.
+struct PathSlot {
+    uint32_t x, y;    ///< pixel of the crop
+    uint32_t pixel;   ///< y * width + x
+    uint32_t sample;
+    bool active;      ///< false: outside the film, or past the samples of this wave
+};
+
+/// Slots are numbered sample by sample; within one sample tile by tile, within a tile along the Z curve. A film whose size is no multiple of the tile
+/// leaves slots empty.
+struct Wave {
+    const WaveState* state;
+    uint64_t seed;
+    uint32_t width, height;  ///< pixels of the crop
+    uint32_t tiles_x;        ///< tiles in a row of the film
+    uint32_t tiles;          ///< tiles per wave
+    uint32_t samples;        ///< most samples of a pixel per wave
+
+    AMBILUX_HD uint32_t slot_count() const { return tiles * kTilePixels * samples; }
+
+    AMBILUX_HD PathSlot locate(uint32_t slot) const {
+        const uint32_t s = slot / (tiles * kTilePixels), in_wave = slot - s * tiles * kTilePixels;
+        const uint32_t tile = state->first_tile + in_wave / kTilePixels, z = in_wave % kTilePixels;
+        const uint32_t tile_y = tile / tiles_x, tile_x = tile - tile_y * tiles_x;
+        PathSlot p;
+        p.x = tile_x * kTileSide + ((z & 1) | (z >> 1 & 2) | (z >> 2 & 4));
+        p.y = tile_y * kTileSide + ((z >> 1 & 1) | (z >> 2 & 2) | (z >> 3 & 4));
+        p.pixel = p.y * width + p.x;
+        p.sample = state->first_sample + s;
+        p.active = p.x < width && p.y < height && s < state->samples;
+        return p;
+    }
+
+    AMBILUX_HD RngKey key(const PathSlot& p) const { return {seed, p.pixel, p.sample, Stream::eye}; }
+    AMBILUX_HD RngKey key(uint32_t slot) const { return key(locate(slot)); }
+};
+
+/// Blocks of random numbers of an eye walk: 0 is the camera's; a vertex at `depth` >= 1 has one to scatter (and for Russian roulette) and one to sample emitters.
+constexpr uint32_t kCameraBlock = 0;
+AMBILUX_HD uint32_t scatter_block(uint32_t depth) { return 2 * depth - 1; }
+AMBILUX_HD uint32_t emitter_block(uint32_t depth) { return 2 * depth; }
+
+/// Seed of the decisions whether surfaces of partial opacity let a ray pass: another one for every ray. `shadow`: rays towards emitters.
+AMBILUX_HD uint32_t alpha_seed(const RngKey& key, uint32_t depth, bool shadow) {
+    const uint32_t which = 2 * depth + (shadow ? 1 : 0);
+    return philox4x32({key.index, key.sample, which, 0x616c7068u}, uint32_t(key.seed), uint32_t(key.seed >> 32)).x;
+}
+
+}  // namespace ambilux
