@@ -3,7 +3,6 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string>
 
@@ -46,10 +45,8 @@ inline std::optional<Scene> published_scene(const std::string& name, uint32_t wi
 
 /// A scene from its text.
 inline Scene scene_from_text(const std::string& xml) {
-    TempFolder folder;
-    const std::string file = folder.path("scene.xml");
-    std::ofstream(file) << xml;
-    return load_mitsuba(file);
+    const test::TempFolder folder;
+    return load_mitsuba(folder.write("scene.xml", xml));
 }
 
 /// Settings of a render on the CPU, with the scene's own depths.
