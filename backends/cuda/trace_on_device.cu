@@ -3,12 +3,10 @@
 #include "backends/cuda/device_memory.h"
 #include "backends/cuda/device_scene.h"
 #include "backends/cuda/trace_kernels.cuh"
+#include "backends/traversal_features.h"
 
 namespace ambilux {
 namespace {
-
-using TriangleSet = FeatureSet<Features{0, 0, bit(PrimitiveType::triangle), false, false, false}>;
-using FullSet = FeatureSet<kAllFeatures>;
 
 template <class Set>
 std::vector<Hit> trace(const DeviceScene& scene, const DeviceCwbvh& cwbvh, const DeviceBuffer<Ray>& rays, bool any_hit, bool persistent) {
@@ -53,9 +51,8 @@ std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& ray
     const DeviceScene device_scene(scene);
     const DeviceCwbvh cwbvh(accel.arrays());
     const DeviceBuffer<Ray> device_rays(rays, "rays");
-    const bool triangles = !scene.features.has_quadrics() && !scene.features.opacity;
-    return triangles ? trace<TriangleSet>(device_scene, cwbvh, device_rays, any_hit, persistent)
-                     : trace<FullSet>(device_scene, cwbvh, device_rays, any_hit, persistent);
+    return are_opaque_triangles(scene.features) ? trace<FeatureSet<kOpaqueTriangles>>(device_scene, cwbvh, device_rays, any_hit, persistent)
+                                                : trace<FeatureSet<kAllFeatures>>(device_scene, cwbvh, device_rays, any_hit, persistent);
 }
 
 }  // namespace ambilux

@@ -1,4 +1,5 @@
 // What stands for the CUDA backend in a build without CUDA.
+#include "backends/cuda/bench_rays.h"
 #include "backends/cuda_device.h"
 #include "backends/trace_on_device.h"
 #include "core/error.h"
@@ -15,5 +16,7 @@ bool cuda_device_present() { return false; }
 std::string cuda_device_name() { return {}; }
 
 std::vector<Hit> trace_on_device(const Scene&, const std::vector<Ray>&, bool, bool) { throw not_built(); }
+
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const CwbvhArrays&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
 
 }  // namespace ambilux

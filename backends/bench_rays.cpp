@@ -1,0 +1,115 @@
+#include "backends/bench_rays.h"
+
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "backends/cuda/bench_rays.h"
+#include "backends/cuda_device.h"
+#include "backends/ray_batches.h"
+#include "backends/traversal_features.h"
+#include "core/error.h"
+#include "scene/accel/cwbvh.h"
+#include "scene/accel/embree_tracer.h"
+
+namespace ambilux {
+namespace {
+
+constexpr uint32_t kCpuSize = 512, kCudaSize = 2048;
+constexpr int kWarmUps = 3;
+
+nlohmann::json row(const RayBatch& batch, const KernelTiming& timing) {
+    const double count = double(batch.rays.size());
+    return {{"batch", batch.name},
+            {"count", batch.rays.size()},
+            {"hit", count > 0 ? double(timing.hits) / count : 0.0},
+            {"kernel", timing.kernel},
+            {"tuning", timing.tuning},
+            {"mrays_per_s", timing.seconds > 0 ? count / timing.seconds * 1e-6 : 0.0}};
+}
+
+template <Features F, class Tracer>
+KernelTiming time_on_host(const SceneView& scene, const Tracer& tracer, const RayBatch& batch, const std::string& kernel, int repetitions) {
+    const size_t count = batch.rays.size();
+    std::vector<Hit> hits(batch.any_hit ? 0 : count);
+    std::vector<uint8_t> blocked(batch.any_hit ? count : 0);
+    std::vector<double> seconds;
+    for (int i = 0; i < kWarmUps + repetitions; ++i) {
+        const auto start = std::chrono::steady_clock::now();
+        if (batch.any_hit)
+            detail::for_all(count, [&](size_t k) { blocked[k] = tracer.template occluded<F>(scene, batch.rays[k]); });
+        else
+            detail::for_all(count, [&](size_t k) { tracer.template closest<F>(scene, batch.rays[k], hits[k]); });
+        if (i >= kWarmUps) seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    }
+    uint64_t met = 0;
+    for (const Hit& hit : hits) met += hit.prim != kNone;
+    for (const uint8_t b : blocked) met += b;
+    return {kernel, "-", met, count ? median(seconds) : 0.0};
+}
+
+template <Features F, class Tracer>
+nlohmann::json rows_on_host(const Scene& scene, const Tracer& tracer, const std::string& kernel, int repetitions) {
+    const SceneView view = scene.view();
+    nlohmann::json rows = nlohmann::json::array();
+    for (const RayBatch& batch : make_ray_batches<F>(view, tracer, kCpuSize, 0)) rows.push_back(row(batch, time_on_host<F>(view, tracer, batch, kernel, repetitions)));
+    return rows;
+}
+
+template <class Accel>
+nlohmann::json bench_on_host(const Scene& scene, const std::string& accel_name, int repetitions) {
+    const Accel accel(scene);
+    const bool triangles = are_opaque_triangles(scene.features);
+    return {{"device", "cpu, " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads"},
+            {"accel", accel_name},
+            {"build_seconds", accel.build_seconds()},
+            {"accel_bytes", accel.memory_bytes()},
+            {"rows", triangles ? rows_on_host<kOpaqueTriangles>(scene, accel.tracer(), accel_name, repetitions)
+                               : rows_on_host<kAllFeatures>(scene, accel.tracer(), accel_name, repetitions)}};
+}
+
+nlohmann::json bench_on_device(const Scene& scene, int repetitions) {
+    if (!cuda_device_present()) throw Error(ExitCode::device, "--backend cuda: no CUDA device, or this program was built without CUDA");
+    const CwbvhAccel accel(scene);
+    const SceneView view = scene.view();
+    const std::vector<RayBatch> batches = are_opaque_triangles(scene.features)
+                                              ? make_ray_batches<kOpaqueTriangles>(view, accel.tracer(), kCudaSize, 0)
+                                              : make_ray_batches<kAllFeatures>(view, accel.tracer(), kCudaSize, 0);
+    nlohmann::json rows = nlohmann::json::array();
+    const std::vector<std::vector<KernelTiming>> timings = time_rays_on_device(scene, accel.arrays(), batches, kWarmUps, repetitions);
+    for (size_t i = 0; i < batches.size(); ++i)
+        for (const KernelTiming& timing : timings[i]) rows.push_back(row(batches[i], timing));
+    return {{"device", cuda_device_name()},
+            {"accel", "cwbvh"},
+            {"build_seconds", accel.build_seconds()},
+            {"accel_bytes", accel.memory_bytes()},
+            {"rows", rows}};
+}
+
+}  // namespace
+
+double median(std::vector<double> seconds) {
+    std::sort(seconds.begin(), seconds.end());
+    const size_t half = seconds.size() / 2;
+    return seconds.size() % 2 ? seconds[half] : 0.5 * (seconds[half - 1] + seconds[half]);
+}
+
+nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int repetitions) {
+    if (repetitions < 1) throw Error(ExitCode::usage, "bench rays: at least 1 repetition is needed, not " + std::to_string(repetitions));
+    const std::string chosen = backend != "auto" ? backend : cuda_device_present() ? "cuda" : "cpu";
+    nlohmann::json json;
+    if (chosen == "cpu")
+        json = bench_on_host<EmbreeAccel>(scene, "embree", repetitions);
+    else if (chosen == "cpu-cwbvh")
+        json = bench_on_host<CwbvhAccel>(scene, "cwbvh", repetitions);
+    else if (chosen == "cuda")
+        json = bench_on_device(scene, repetitions);
+    else
+        throw Error(ExitCode::usage, "bench rays: backend '" + backend + "' is not one of auto, cpu, cpu-cwbvh, cuda");
+    json["backend"] = chosen;
+    json["repetitions"] = repetitions;
+    return json;
+}
+
+}  // namespace ambilux

@@ -1,0 +1,101 @@
+#include "backends/cuda/bench_rays.h"
+
+#include <algorithm>
+
+#include "backends/bench_rays.h"
+#include "backends/cuda/device_memory.h"
+#include "backends/cuda/device_scene.h"
+#include "backends/cuda/trace_kernels.cuh"
+#include "backends/traversal_features.h"
+
+namespace ambilux {
+namespace {
+
+struct Event {
+    cudaEvent_t event = nullptr;
+    Event() { cuda_check(cudaEventCreate(&event), "event"); }
+    ~Event() { cudaEventDestroy(event); }
+    Event(const Event&) = delete;
+    Event& operator=(const Event&) = delete;
+};
+
+/// Median time of launch(i) for i from warm_ups to warm_ups + repetitions. All are queued before the first is waited for: between an event and a
+/// kernel on an idle device lies the time of the launch.
+template <class Launch>
+double median_seconds(int warm_ups, int repetitions, Launch launch) {
+    const std::vector<Event> starts(size_t(warm_ups + repetitions)), stops(starts.size());
+    for (size_t i = 0; i < starts.size(); ++i) {
+        cuda_check(cudaEventRecord(starts[i].event), "event");
+        launch(i);
+        cuda_check(cudaGetLastError(), "launch of ray traversal");
+        cuda_check(cudaEventRecord(stops[i].event), "event");
+    }
+    cuda_check(cudaDeviceSynchronize(), "ray traversal");
+    std::vector<double> seconds;
+    for (size_t i = size_t(warm_ups); i < starts.size(); ++i) {
+        float milliseconds = 0;
+        cuda_check(cudaEventElapsedTime(&milliseconds, starts[i].event, stops[i].event), "event");
+        seconds.push_back(double(milliseconds) * 1e-3);
+    }
+    return median(std::move(seconds));
+}
+
+template <class Set>
+std::vector<KernelTiming> time_batch(const SceneView& scene, const CwbvhTracer& tracer, const RayBatch& batch, int warm_ups, int repetitions) {
+    struct Variant {
+        const char *kernel, *tuning;
+        TraceTuning values;
+    };
+    std::vector<Variant> variants = {{"persistent", "incoherent", kIncoherentTuning}, {"persistent", "coherent", kCoherentTuning}, {"plain", "-", {}}};
+    if (batch.coherent) std::swap(variants[0], variants[1]);
+
+    const uint32_t count = uint32_t(batch.rays.size()), blocks = (count + kTraceBlock - 1) / kTraceBlock;
+    std::vector<KernelTiming> timings;
+    if (count == 0) {
+        for (const Variant& v : variants) timings.push_back({v.kernel, v.tuning, 0, 0.0});
+        return timings;
+    }
+    const DeviceBuffer<Ray> rays(batch.rays, "rays");
+    const DeviceBuffer<uint32_t> ray_count(std::span<const uint32_t>(&count, 1), "counter");
+    DeviceBuffer<Hit> hits(batch.any_hit ? 0 : count, "hits");
+    DeviceBuffer<uint8_t> blocked(batch.any_hit ? count : 0, "hits");
+    DeviceBuffer<uint32_t> next_rays(size_t(warm_ups + repetitions), "counters");  // one per launch: nothing to clear in between
+    const uint32_t grid = batch.any_hit ? persistent_grid(trace_any_kernel<Set>) : persistent_grid(trace_closest_kernel<Set>);
+    for (const Variant& v : variants) {
+        const bool plain = std::string(v.kernel) == "plain";
+        next_rays.zero();
+        hits.zero();
+        blocked.zero();
+        const double seconds = median_seconds(warm_ups, repetitions, [&](size_t i) {
+            if (plain && batch.any_hit)
+                trace_any_plain_kernel<Set><<<blocks, kTraceBlock>>>(scene, tracer, rays.data(), blocked.data(), count);
+            else if (plain)
+                trace_closest_plain_kernel<Set><<<blocks, kTraceBlock>>>(scene, tracer, rays.data(), hits.data(), count);
+            else if (batch.any_hit)
+                trace_any_kernel<Set><<<grid, kTraceBlock>>>(scene, tracer, rays.data(), blocked.data(), ray_count.data(), next_rays.data() + i, v.values);
+            else
+                trace_closest_kernel<Set><<<grid, kTraceBlock>>>(scene, tracer, rays.data(), hits.data(), ray_count.data(), next_rays.data() + i, v.values);
+        });
+        uint64_t met = 0;
+        for (const Hit& hit : hits.download()) met += hit.prim != kNone;
+        for (const uint8_t b : blocked.download()) met += b;
+        timings.push_back({v.kernel, v.tuning, met, seconds});
+    }
+    return timings;
+}
+
+}  // namespace
+
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const CwbvhArrays& cwbvh, const std::vector<RayBatch>& batches, int warm_ups,
+                                                           int repetitions) {
+    const DeviceScene device_scene(scene);
+    const DeviceCwbvh device_cwbvh(cwbvh);
+    const bool triangles = are_opaque_triangles(scene.features);
+    std::vector<std::vector<KernelTiming>> timings;
+    for (const RayBatch& batch : batches)
+        timings.push_back(triangles ? time_batch<FeatureSet<kOpaqueTriangles>>(device_scene.view(), device_cwbvh.tracer(), batch, warm_ups, repetitions)
+                                    : time_batch<FeatureSet<kAllFeatures>>(device_scene.view(), device_cwbvh.tracer(), batch, warm_ups, repetitions));
+    return timings;
+}
+
+}  // namespace ambilux

@@ -1,0 +1,138 @@
+// The rays that `bench rays` traces: primary, bounced and shadow rays of the paths of one image.
+#pragma once
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <string>
+#include <vector>
+
+#include "core/rng.h"
+#include "core/sampling.h"
+#include "scene/accel/primitive_bounds.h"
+#include "scene/surface.h"
+#include "transport/sensor/camera.h"
+
+namespace ambilux {
+
+struct RayBatch {
+    std::string name;
+    bool any_hit;   ///< asks whether something is in the way, not for the nearest hit
+    bool coherent;  ///< neighbours in the array stay together in the scene
+    std::vector<Ray> rays;
+};
+
+namespace detail {
+
+/// Calls f(i) for 0 <= i < count on all threads.
+template <class Function>
+void for_all(size_t count, Function f) {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, count, 1024), [&](const tbb::blocked_range<size_t>& range) {
+        for (size_t i = range.begin(); i != range.end(); ++i) f(i);
+    });
+}
+
+/// Every second bit of a Morton code, gathered.
+inline uint32_t even_bits(uint32_t code) {
+    uint32_t x = 0;
+    for (uint32_t bit = 0; bit < 16; ++bit) x |= (code >> (2 * bit) & 1u) << bit;
+    return x;
+}
+
+/// Length of the diagonal of the box around all primitives; 0 for an empty scene.
+inline float scene_diagonal(const SceneView& scene) {
+    Bounds3f bounds;
+    for (uint32_t i = 0; i < scene.triangle_count; ++i) bounds.extend(triangle_bounds(scene, i));
+    for (uint32_t i = 0; i < scene.quadric_count; ++i) bounds.extend(quadric_bounds(scene.quadrics[i]));
+    return bounds.empty() ? 0.0f : length(bounds.upper - bounds.lower);
+}
+
+/// Point that a path met, moved off the surface, with the geometric normal on the side that the path came from.
+struct BouncePoint {
+    Vec3f p, n;
+    uint32_t path;
+};
+
+/// Segment between two points of different paths, drawn again up to 16 times until each lies in front of the other. A pair that is still not, stays.
+inline Ray shadow_ray(const std::vector<BouncePoint>& points, RngKey key) {
+    BouncePoint a = {}, b = {};
+    for (uint32_t block = 0; block < 16; ++block) {
+        const Uint4 bits = random_bits(key, block);
+        a = points[mul_hi(bits.x, uint32_t(points.size()))];
+        b = points[mul_hi(bits.y, uint32_t(points.size()))];
+        const Vec3f d = b.p - a.p;
+        if (a.path != b.path && dot(a.n, d) > 0.0f && dot(b.n, d) < 0.0f) break;
+    }
+    const Vec3f d = b.p - a.p;
+    const float distance = length(d);
+    if (!(distance > 0.0f)) return {a.p, 0.0f, a.n, 0};  // hits nothing
+    return {a.p, 0.9999f * distance, d * (1.0f / distance), key.index};
+}
+
+}  // namespace detail
+
+/// Rays of size x size paths (a power of two up to 2^15) through pixels in Morton order, with the scene's camera and its horizontal field of view on both axes:
+/// "primary", jittered; "bounce 1" and "bounce 3": cosine-weighted around the geometric normal, origins moved along it by 1e-5 of the scene's
+/// diagonal, paths that escaped left out; "shadow": segments between random points that different paths met, both ends moved off the
+/// surface likewise and 0.9999 of the length. A function of the scene and of `seed`.
+template <Features F, class Tracer>
+std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tracer, uint32_t size, uint64_t seed) {
+    constexpr uint32_t kBounces = 3, kShadowSample = 1000;
+    const uint32_t paths = size * size;
+    const float offset = 1e-5f * detail::scene_diagonal(scene);
+    const auto key = [&](uint32_t path, uint32_t sample) { return RngKey{seed, path, sample, Stream::bench}; };
+
+    Sensor sensor = scene.sensor;
+    sensor.film_width = sensor.film_height = size;
+    sensor.tan_half_fov.y = sensor.tan_half_fov.x;
+    std::vector<Ray> rays(paths);
+    std::vector<uint32_t> path_of(paths);
+    detail::for_all(paths, [&](size_t i) {
+        const uint32_t path = uint32_t(i);
+        const Vec4f u = random_floats(key(path, 0), 0);
+        const float x = float(detail::even_bits(path)) + u.x, y = float(detail::even_bits(path >> 1)) + u.y;
+        const CameraSample camera = sample_camera_ray(sensor, {x, y}, {u.z, u.w});
+        rays[i] = {camera.o, camera.tmax, camera.d, random_bits(key(path, 0), 1).x};
+        path_of[i] = path;
+    });
+    std::vector<RayBatch> batches;
+    batches.push_back({"primary", false, true, rays});
+
+    std::vector<detail::BouncePoint> points;
+    for (uint32_t bounce = 1; bounce <= kBounces; ++bounce) {
+        std::vector<detail::BouncePoint> met(rays.size());
+        std::vector<uint8_t> is_hit(rays.size());
+        detail::for_all(rays.size(), [&](size_t i) {
+            Hit hit;
+            is_hit[i] = tracer.template closest<F>(scene, rays[i], hit);
+            if (!is_hit[i]) return;
+            const SurfacePoint s = surface_at<F>(scene, hit.prim, hit.u, hit.v);
+            const Vec3f n = dot(s.ng, rays[i].d) > 0.0f ? -s.ng : s.ng;
+            met[i] = {s.p + n * offset, n, path_of[i]};
+        });
+        size_t count = 0;
+        for (size_t i = 0; i < met.size(); ++i)
+            if (is_hit[i]) met[count++] = met[i];
+        met.resize(count);
+        rays.resize(count);
+        path_of.resize(count);
+        detail::for_all(count, [&](size_t i) {
+            const RngKey k = key(met[i].path, bounce);
+            const Vec4f u = random_floats(k, 0);
+            rays[i] = {met[i].p, kInfinity, normalize(frame_from_normal(met[i].n).to_world(square_to_cosine_hemisphere({u.x, u.y}))), random_bits(k, 1).x};
+            path_of[i] = met[i].path;
+        });
+        if (bounce != 2) batches.push_back({"bounce " + std::to_string(bounce), false, false, rays});
+        points.insert(points.end(), met.begin(), met.end());
+    }
+
+    RayBatch shadow = {"shadow", true, false, {}};
+    if (!points.empty()) {
+        shadow.rays.resize(paths);
+        detail::for_all(paths, [&](size_t i) { shadow.rays[i] = detail::shadow_ray(points, key(uint32_t(i), kShadowSample)); });
+    }
+    batches.push_back(std::move(shadow));
+    return batches;
+}
+
+}  // namespace ambilux
