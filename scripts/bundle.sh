@@ -55,6 +55,7 @@ cat >"$top/run.sh" <<'RUN'
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 export LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 [[ -d $here/data && -z ${AMBILUX_DATA:-} ]] && export AMBILUX_DATA="$here/data"
+export AMBILUX_SCENES="$here/scenes"
 if [[ ${1:-} != gpu-tests ]]; then
   [[ -x $here/bin/${1:-} && -n ${1:-} ]] || { echo "run.sh: no program '${1:-}'; there are: $(ls "$here/bin" | tr '\n' ' ')gpu-tests" >&2; exit 2; }
   exec "$here/bin/$1" "${@:2}"

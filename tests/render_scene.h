@@ -17,7 +17,9 @@ inline Scene project_scene(const std::string& name, uint32_t width = 0, uint32_t
     LoadOptions options;
     options.width = width;
     options.height = height;
-    return load_mitsuba(std::string(AMBILUX_SOURCE_DIR) + "/scenes/" + name + ".xml", options);
+    // A bundle for another machine brings its scenes along.
+    const char* folder = std::getenv("AMBILUX_SCENES");
+    return load_mitsuba((folder ? folder : AMBILUX_SOURCE_DIR "/scenes") + ("/" + name + ".xml"), options);
 }
 
 /// A file below AMBILUX_DATA; nothing, with a warning, if that is not set.

@@ -1,0 +1,182 @@
+// libs: ambilux_integrators ambilux_film ambilux_scene ambilux_core
+// labels: gpu
+// timeout: 900
+// The path tracer on a CUDA device against the same stages on the CPU, at equal seeds.
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/error.h"
+#include "film/image.h"
+#include "film/ztest.h"
+#include "tests/render_scene.h"
+
+using namespace ambilux;
+
+namespace {
+
+bool device() {
+    if (cuda_available()) return true;
+    WARN("no CUDA device: skipped");
+    return false;
+}
+
+RenderSettings on(const char* backend, RenderSettings s, const char* accel = "auto") {
+    s.backend = backend;
+    s.accel = accel;
+    return s;
+}
+
+/// Items per stage and depth agree within `share` of a stage's items at that depth, and a handful where those are few.
+void check_counts(const RenderStats& a, const RenderStats& b, double share) {
+    std::map<std::string, const StageStats*> of_b;
+    for (const StageStats& s : b.stages) of_b[s.name] = &s;
+    for (const StageStats& s : a.stages) {
+        REQUIRE(of_b.count(s.name));
+        const StageStats& t = *of_b[s.name];
+        const size_t depths = std::max(s.items_by_depth.size(), t.items_by_depth.size());
+        for (size_t d = 0; d < depths; ++d) {
+            const double x = d < s.items_by_depth.size() ? double(s.items_by_depth[d]) : 0, y = d < t.items_by_depth.size() ? double(t.items_by_depth[d]) : 0;
+            INFO(s.name << " at depth " << d << ": " << x << " and " << y);
+            // A path that takes another way once goes on differently for the rest of its life: the number of such paths adds up over depths.
+            CHECK(std::fabs(x - y) <= share * std::max(x, y) + 3 * std::sqrt(share * std::max(x, y)) + 2);
+        }
+    }
+}
+
+/// Share of pixels whose channels all agree within 1e-3 relative.
+double agreeing_pixels(const FilmMoments& a, const FilmMoments& b) {
+    REQUIRE(a.sum.size() == b.sum.size());
+    uint64_t same = 0;
+    for (size_t p = 0; p < a.sum.size(); p += 3) {
+        bool agree = true;
+        for (size_t c = p; c < p + 3; ++c) agree &= std::fabs(a.sum[c] - b.sum[c]) <= 1e-3 * std::max(std::fabs(a.sum[c]), std::fabs(b.sum[c])) + 1e-12;
+        same += agree;
+    }
+    return double(same) / double(a.sum.size() / 3);
+}
+
+void check_parity(const Scene& scene, RenderSettings settings, uint32_t spp) {
+    const RenderResult cuda = render_scene(scene, on("cuda", settings), spp);
+    const RenderResult embree = render_scene(scene, on("cpu", settings, "embree"), spp);
+    const RenderResult host = render_scene(scene, on("cpu", settings, "cwbvh"), spp);
+    check_counts(cuda.stats, embree.stats, 1e-3);
+    check_counts(cuda.stats, host.stats, 1e-3);
+    CHECK(cuda.stats.invalid.total() == host.stats.invalid.total());
+    WARN(scene.path << ": pixels that agree within 1e-3 at " << spp << " spp: " << agreeing_pixels(cuda.film, embree.film) << " with Embree, "
+                    << agreeing_pixels(cuda.film, host.film) << " with the host's traversal of the same structure");
+}
+
+}  // namespace
+
+TEST_CASE("G5: counts per stage and depth on both backends, every scene of the project") {
+    if (!device()) return;
+    for (const char* name : {"cornell", "furnace", "glass", "lights", "materials", "textured"}) {
+        const Scene scene = project_scene(name, 128, 96);
+        for (const Estimator e : {Estimator::naive, Estimator::nee, Estimator::mis}) {
+            INFO(name << " estimator " << int(e));
+            check_parity(scene, cpu_settings(scene, e), 4);
+        }
+    }
+}
+
+TEST_CASE("G5: counts per stage and depth on both backends, every published scene") {
+    if (!device()) return;
+    for (const char* name : {"cornell-box", "glass-and-ice", "living-room", "staircase", "veach-ajar", "veach-bidir", "veach-mis", "water-caustic"}) {
+        const char* folder = std::getenv("AMBILUX_DATA");
+        if (!folder || !std::filesystem::exists(std::string(folder) + "/scenes/" + name)) {
+            WARN(name << " is not there: skipped");
+            continue;
+        }
+        INFO(name);
+        const auto scene = published_scene(name, 160, 90);
+        check_parity(*scene, cpu_settings(*scene, Estimator::mis), 4);
+    }
+}
+
+TEST_CASE("G5: pixels at 1 spp and depth 4 on both backends: cornell-box and veach-mis") {
+    if (!device()) return;
+    for (const char* name : {"cornell-box", "veach-mis"}) {
+        const auto scene = published_scene(name, 256, 256);
+        if (!scene) return;
+        RenderSettings s = cpu_settings(*scene, Estimator::mis);
+        s.max_depth = 4;
+        const RenderResult cuda = render_scene(*scene, on("cuda", s), 1);
+        const double embree = agreeing_pixels(cuda.film, render_scene(*scene, on("cpu", s, "embree"), 1).film);
+        const double host = agreeing_pixels(cuda.film, render_scene(*scene, on("cpu", s, "cwbvh"), 1).film);
+        WARN(name << ": " << embree << " of the pixels agree with Embree, " << host << " with the host's traversal");
+        CHECK(embree >= 0.995);
+        CHECK(host >= 0.998);
+    }
+}
+
+TEST_CASE("G7: the same seed gives the same bits on a device, whatever the wave; the next seed does not") {
+    if (!device()) return;
+    const Scene scene = project_scene("materials", 160, 90);
+    RenderSettings s = on("cuda", cpu_settings(scene, Estimator::mis));
+    const RenderResult first = render_scene(scene, s, 8);
+    CHECK(first.film.sum == render_scene(scene, s, 8).film.sum);
+    for (const uint32_t wave : {64u, 5000u, 100000u}) {
+        s.wave_size = wave;
+        CHECK(first.film.sum == render_scene(scene, s, 8).film.sum);
+    }
+    s.wave_size = 0;
+    const std::unique_ptr<Renderer> parts = make_renderer(scene, s);
+    parts->render(0, 3);
+    parts->render(3, 5);
+    CHECK(first.film.sum == parts->film().sum);
+    s.seed = 2;
+    CHECK(first.film.sum != render_scene(scene, s, 8).film.sum);
+}
+
+TEST_CASE("images of both backends have the same expectation") {
+    if (!device()) return;
+    for (const char* name : {"cornell", "lights", "materials", "textured", "glass"}) {
+        const Scene scene = project_scene(name, 64, 48);
+        RenderSettings a = cpu_settings(scene, Estimator::mis, 11), b = on("cuda", cpu_settings(scene, Estimator::mis, 12));
+        ZTestOptions options;
+        options.same_estimator = true;
+        const ZTestResult result = z_test(to_estimate(render_scene(scene, a, 256).film), to_estimate(render_scene(scene, b, 4096).film), options);
+        INFO(name << "\n" << result.report());
+        CHECK(result.pass);
+    }
+}
+
+TEST_CASE("G3, G8: a device's queues never overflow and its memory is what was predicted") {
+    if (!device()) return;
+    for (const auto& [width, height] : {std::pair{64u, 64u}, {1u, 1u}, {333u, 77u}}) {
+        const Scene scene = project_scene("lights", width, height);
+        const RenderResult r = render_scene(scene, on("cuda", cpu_settings(scene, Estimator::mis)), 3);
+        CHECK(r.stats.memory_bytes == r.stats.memory_bytes_predicted);
+        CHECK(r.stats.samples == 3);
+        for (const QueueStats& q : r.stats.queues) {
+            CHECK(q.overflow == 0);
+            CHECK(q.peak <= q.capacity);
+        }
+    }
+}
+
+TEST_CASE("G8: more memory than the device has is refused before anything is allocated") {
+    if (!device()) return;
+    Scene scene = project_scene("cornell", 65535, 65536);
+    RenderSettings s = on("cuda", cpu_settings(scene, Estimator::mis));
+    try {
+        make_renderer(scene, s);
+        FAIL("not refused");
+    } catch (const Error& error) {
+        CHECK(error.code == ExitCode::device);
+        CHECK(std::string(error.what()).find("MiB") != std::string::npos);
+    }
+}
+
+TEST_CASE("specialised kernels and full ones give the same image") {
+    if (!device()) return;
+    const Scene scene = project_scene("cornell", 64, 64);
+    RenderSettings s = on("cuda", cpu_settings(scene, Estimator::mis));
+    const RenderResult small = render_scene(scene, s, 16);
+    s.specialise = false;
+    const RenderResult full = render_scene(scene, s, 16);
+    check_counts(small.stats, full.stats, 1e-3);
+    CHECK(small.stats.features != full.stats.features);
+    CHECK(agreeing_pixels(small.film, full.film) >= 0.98);
+}
