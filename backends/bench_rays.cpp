@@ -60,22 +60,21 @@ nlohmann::json rows_on_host(const Scene& scene, const Tracer& tracer, const std:
 template <class Accel>
 nlohmann::json bench_on_host(const Scene& scene, const std::string& accel_name, int repetitions) {
     const Accel accel(scene);
-    const bool triangles = are_opaque_triangles(scene.features);
+    const nlohmann::json rows =
+        with_traversal_features(scene.features, [&](auto set) { return rows_on_host<set.value>(scene, accel.tracer(), accel_name, repetitions); });
     return {{"device", "cpu, " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads"},
             {"accel", accel_name},
             {"build_seconds", accel.build_seconds()},
             {"accel_bytes", accel.memory_bytes()},
-            {"rows", triangles ? rows_on_host<kOpaqueTriangles>(scene, accel.tracer(), accel_name, repetitions)
-                               : rows_on_host<kAllFeatures>(scene, accel.tracer(), accel_name, repetitions)}};
+            {"rows", rows}};
 }
 
 nlohmann::json bench_on_device(const Scene& scene, int repetitions) {
     if (!cuda_device_present()) throw Error(ExitCode::device, "--backend cuda: no CUDA device, or this program was built without CUDA");
     const CwbvhAccel accel(scene);
     const SceneView view = scene.view();
-    const std::vector<RayBatch> batches = are_opaque_triangles(scene.features)
-                                              ? make_ray_batches<kOpaqueTriangles>(view, accel.tracer(), kCudaSize, 0)
-                                              : make_ray_batches<kAllFeatures>(view, accel.tracer(), kCudaSize, 0);
+    const std::vector<RayBatch> batches =
+        with_traversal_features(scene.features, [&](auto set) { return make_ray_batches<set.value>(view, accel.tracer(), kCudaSize, 0); });
     nlohmann::json rows = nlohmann::json::array();
     const std::vector<std::vector<KernelTiming>> timings = time_rays_on_device(scene, accel.arrays(), batches, kWarmUps, repetitions);
     for (size_t i = 0; i < batches.size(); ++i)

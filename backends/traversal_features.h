@@ -1,14 +1,26 @@
-// The two kinds of scene that ray traversal by itself is compiled for.
+// The kinds of scene that ray traversal by itself is compiled for.
 #pragma once
 
 #include "core/features.h"
 
 namespace ambilux {
 
-/// Triangles that stop every ray. All else is traced with kAllFeatures.
-constexpr Features kOpaqueTriangles = {0, 0, bit(PrimitiveType::triangle), false, false, false};
+/// Features as a type. Kernels take this one: the host code that nvcc makes for a kernel cannot name a struct that is a template argument itself.
+template <Features F>
+struct FeatureSet {
+    static constexpr Features value = F;
+};
 
-/// True if kOpaqueTriangles is enough to trace rays through a scene of these features.
-constexpr bool are_opaque_triangles(const Features& features) { return !features.has_quadrics() && !features.opacity; }
+constexpr Features kOpaqueTriangles = {0, 0, bit(PrimitiveType::triangle), false, false, false};
+/// Triangles of partial opacity, textured or not.
+constexpr Features kMaskedTriangles = {0, 0, bit(PrimitiveType::triangle), true, false, true};
+
+/// f(FeatureSet) with the least of kOpaqueTriangles, kMaskedTriangles and kAllFeatures that tracing rays through a scene of `features` needs.
+template <class Function>
+auto with_traversal_features(const Features& features, Function f) {
+    if (features.has_quadrics()) return f(FeatureSet<kAllFeatures>{});
+    if (features.opacity) return f(FeatureSet<kMaskedTriangles>{});
+    return f(FeatureSet<kOpaqueTriangles>{});
+}
 
 }  // namespace ambilux

@@ -6,7 +6,6 @@
 #include "backends/cuda/device_memory.h"
 #include "backends/cuda/device_scene.h"
 #include "backends/cuda/trace_kernels.cuh"
-#include "backends/traversal_features.h"
 
 namespace ambilux {
 namespace {
@@ -90,11 +89,11 @@ std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, c
                                                            int repetitions) {
     const DeviceScene device_scene(scene);
     const DeviceCwbvh device_cwbvh(cwbvh);
-    const bool triangles = are_opaque_triangles(scene.features);
     std::vector<std::vector<KernelTiming>> timings;
     for (const RayBatch& batch : batches)
-        timings.push_back(triangles ? time_batch<FeatureSet<kOpaqueTriangles>>(device_scene.view(), device_cwbvh.tracer(), batch, warm_ups, repetitions)
-                                    : time_batch<FeatureSet<kAllFeatures>>(device_scene.view(), device_cwbvh.tracer(), batch, warm_ups, repetitions));
+        timings.push_back(with_traversal_features(scene.features, [&](auto set) {
+            return time_batch<decltype(set)>(device_scene.view(), device_cwbvh.tracer(), batch, warm_ups, repetitions);
+        }));
     return timings;
 }
 

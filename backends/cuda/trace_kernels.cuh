@@ -5,6 +5,7 @@
 
 #include <cuda_runtime.h>
 
+#include "backends/traversal_features.h"
 #include "scene/accel/cwbvh.h"
 
 namespace ambilux {
@@ -139,12 +140,6 @@ __device__ inline Ray load_ray(const Ray* rays, uint32_t i) {
 __device__ inline void store_hit(Hit* hits, uint32_t i, const Hit& h) {
     __stcs(reinterpret_cast<float4*>(hits) + i, make_float4(h.t, h.u, h.v, __uint_as_float(h.prim)));
 }
-
-/// Features as a type. Kernels take this one: the host code that nvcc makes for a kernel cannot name a struct that is a template argument itself.
-template <Features F>
-struct FeatureSet {
-    static constexpr Features value = F;
-};
 
 /// Nearest hits of an array of rays; `Set` is a FeatureSet. Launch with persistent_grid() blocks of kTraceBlock threads and *next_ray_counter == 0.
 template <class Set>

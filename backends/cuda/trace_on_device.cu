@@ -3,7 +3,6 @@
 #include "backends/cuda/device_memory.h"
 #include "backends/cuda/device_scene.h"
 #include "backends/cuda/trace_kernels.cuh"
-#include "backends/traversal_features.h"
 
 namespace ambilux {
 namespace {
@@ -51,8 +50,7 @@ std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& ray
     const DeviceScene device_scene(scene);
     const DeviceCwbvh cwbvh(accel.arrays());
     const DeviceBuffer<Ray> device_rays(rays, "rays");
-    return are_opaque_triangles(scene.features) ? trace<FeatureSet<kOpaqueTriangles>>(device_scene, cwbvh, device_rays, any_hit, persistent)
-                                                : trace<FeatureSet<kAllFeatures>>(device_scene, cwbvh, device_rays, any_hit, persistent);
+    return with_traversal_features(scene.features, [&](auto set) { return trace<decltype(set)>(device_scene, cwbvh, device_rays, any_hit, persistent); });
 }
 
 }  // namespace ambilux
