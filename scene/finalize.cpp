@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "scene/alias_table.h"
 #include "scene/scene.h"
 
 namespace ambilux {
@@ -126,6 +127,28 @@ double hat_integral(double x) {
     return x < 0 ? 0.5 * (1 + x) * (1 + x) : 1 - 0.5 * (1 - x) * (1 - x);
 }
 
+/// Appends the alias tables of an environment map (scene/view.h, Emitter) whose rows, and cells within each row, get these tickets.
+void append_environment_tables(Scene& scene, Emitter& emitter, size_t width, const std::vector<uint32_t>& row_tickets, const std::vector<uint32_t>& cell_tickets) {
+    std::vector<float>& tables = scene.tables;
+    // Records lie bitwise among the floats.
+    const size_t height = row_tickets.size(), rows_at = (tables.size() + 3) / 4 * 4, cells_at = (rows_at + 2 * height + 3) / 4 * 4;
+    tables.resize(cells_at + 4 * width * height);
+    emitter.env_rows = uint32_t(rows_at);
+    emitter.env_cells = uint32_t(cells_at);
+    const std::vector<AliasBucket> rows = make_alias_table(row_tickets);
+    memcpy(tables.data() + rows_at, rows.data(), rows.size() * sizeof rows[0]);
+    static_assert(sizeof(EnvironmentCell) == 16);
+    for (size_t y = 0; y < height; ++y) {
+        const uint32_t* tickets = cell_tickets.data() + y * width;
+        const double scale = double(row_tickets[y]) / kTickets * double(height) / kTickets * double(width);
+        const std::vector<AliasBucket> buckets = make_alias_table({tickets, tickets + width});
+        std::vector<EnvironmentCell> cells(width);
+        for (size_t x = 0; x < width; ++x)
+            cells[x] = {buckets[x].threshold, buckets[x].alias, float(scale * tickets[x]), float(scale * tickets[buckets[x].alias])};
+        memcpy(tables.data() + cells_at + 4 * y * width, cells.data(), width * sizeof cells[0]);
+    }
+}
+
 /// Density of an environment map over the cells of 1/width by 1/height in (u,v) (transport/emitter/envmap.h): the integral of the bilinear interpolant
 /// over the cell times the cell's solid angle. Along u, texel centres are cell centres: weights 1, 6, 1 over 8. Along v, texel rows lie at
 /// j/(height-1), so that the weights change from row to row; a row that barely reaches into a cell still gets 1/32, which
@@ -133,12 +156,13 @@ double hat_integral(double x) {
 double fill_environment(Scene& scene, Emitter& emitter) {
     const Texture t = scene.textures[size_t(emitter.radiance.texture)];
     const int64_t w = t.width, h = t.height;
+    if (w > (1 << 20) || h > (1 << 20)) throw input_error(scene.path, 0, "environment maps are limited to 2^20 rows and columns");
     std::vector<float> lum(size_t(w * h));
     for (size_t i = 0; i < lum.size(); ++i) lum[i] = std::max(0.0f, luminance(emitter.radiance.value * load_texel(scene, t, i)));
 
     std::vector<double> row_means(size_t(h), 0.0), row_sums(size_t(h), 0.0);
     for (size_t i = 0; i < lum.size(); ++i) row_means[i / size_t(w)] += lum[i] / double(w);
-    emitter.env_conditional = uint32_t(scene.tables.size());
+    std::vector<uint32_t> cell_tickets(size_t(w * h));
     std::vector<double> column_weights(static_cast<size_t>(w));
     double mean = 0;
     for (int64_t y = 0; y < h; ++y) {
@@ -155,11 +179,12 @@ double fill_environment(Scene& scene, Emitter& emitter) {
             for (int64_t x = 0; x < w; ++x) column_weights[size_t(x)] += weight * (row[(x + w - 1) % w] + 6.0 * row[x] + row[(x + 1) % w]) / 8;
         }
         const double solid_angle = 2 * M_PI / double(w) * (std::cos(M_PI * double(y) / double(h)) - std::cos(M_PI * double(y + 1) / double(h)));
-        row_sums[size_t(y)] = solid_angle * append_cdf(scene.tables, size_t(w), [&](size_t x) { return column_weights[x]; });
+        for (double c : column_weights) row_sums[size_t(y)] += solid_angle * c;
+        const std::vector<uint32_t> tickets = deal_tickets(column_weights);
+        std::copy(tickets.begin(), tickets.end(), cell_tickets.begin() + y * w);
         mean += exact_mean * solid_angle * double(w) / (4 * M_PI);
     }
-    emitter.env_marginal = uint32_t(scene.tables.size());
-    append_cdf(scene.tables, size_t(h), [&](size_t y) { return row_sums[y]; });
+    append_environment_tables(scene, emitter, t.width, deal_tickets(row_sums), cell_tickets);
     return mean;
 }
 

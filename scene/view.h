@@ -23,7 +23,7 @@ struct ParamFloat {
 // ---- textures ----
 
 enum class TextureType : uint32_t { bitmap, checkerboard };
-enum class TexelFormat : uint32_t { rgba8, rgba32f };
+enum class TexelFormat : uint32_t { rgba8, rgba32f, rgba16f };
 enum class WrapMode : uint32_t { repeat, mirror, clamp };
 enum class TextureFilter : uint32_t { nearest, bilinear };
 
@@ -113,6 +113,12 @@ struct Material {
 
 // ---- emitters ----
 
+/// Bucket of the alias table of one row of an environment map, with the densities of both its cells, so that a single load serves sampling and density.
+struct EnvironmentCell {
+    uint32_t threshold, alias;       ///< as in AliasBucket; the alias is a column
+    float pdf, alias_pdf;            ///< of the bucket's own cell and of the alias, per unit square of (u,v), the row's probability included
+};
+
 /// Emitter. `radiance` holds, in this order of types: radiance, intensity (W/sr), intensity, perpendicular irradiance, radiance, radiance scale.
 struct Emitter {
     EmitterType type;
@@ -124,9 +130,10 @@ struct Emitter {
     Vec3f position;           ///< point, spot
     Vec3f direction;          ///< directional: direction in which light travels; spot: axis. Unit
     float cos_cutoff, cos_beam_width;  ///< spot
-    // envmap: latitude-longitude image texels (rgba32f texture `radiance.texture`, row 0 is the top, direction +y) and a piecewise-constant density
-    uint32_t env_marginal;    ///< height+1 floats in tables
-    uint32_t env_conditional; ///< height rows of width+1 floats in tables
+    // envmap: latitude-longitude image (texture `radiance.texture` of float texels, row 0 is the top, direction +y) and a piecewise-constant density
+    // over width by height cells (transport/emitter/envmap.h, scene/alias_table.h)
+    uint32_t env_rows;        ///< alias table of the rows: height AliasBuckets in tables, aligned to 8 bytes
+    uint32_t env_cells;       ///< alias table of the cells of each row: height rows of width EnvironmentCells in tables, aligned to 16 bytes
 };
 
 // ---- sensor ----

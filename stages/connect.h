@@ -25,11 +25,11 @@ struct Connect {
         const uint32_t depth = c.bits.depth();
         const SurfacePoint point = surface_at<F>(scene, c.prim, c.u, c.v);
         EmitterSample light;
-        if (!sample_emitter_direct<F>(scene, point.p, random_floats(key, emitter_block(depth)), light)) return;
+        if (!sample_emitter_deferred<F>(scene, point.p, random_floats(key, emitter_block(depth)), light)) return;
         const Scattering s = make_scattering<F>(scene, point, -c.d);
         const Rgb f = scatter_eval<F>(s, light.wi, TransportMode::radiance);
         if (is_zero(f)) return;
-        const Rgb value = c.throughput * f * (light.radiance / light.pdf_sa);
+        const Rgb value = c.throughput * f * (emitter_sample_radiance<F>(scene, light) / light.pdf_sa);
         if (!is_light(value, record) || is_zero(value)) return;
         // Only BSDF sampling and a hit could find this light too.
         const bool other = policy.estimator == Estimator::mis && !light.delta;

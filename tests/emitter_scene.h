@@ -185,6 +185,60 @@ inline uint32_t append_cdf(Scene& s, const std::vector<double>& weights) {
     return offset;
 }
 
+/// Tickets of an alias table (scene/alias_table.h) by rounding down; what is left goes to the largest.
+inline std::vector<uint32_t> tickets_of(const std::vector<double>& weights) {
+    double total = 0;
+    for (double w : weights) total += w;
+    std::vector<uint32_t> tickets;
+    uint32_t sum = 0;
+    for (double w : weights) sum += tickets.emplace_back(w > 0 ? std::max(uint32_t(w / total * 16777216.0), 1u) : 0u);
+    *std::max_element(tickets.begin(), tickets.end()) += 16777216u - sum;
+    return tickets;
+}
+
+/// Alias table of n words {threshold, alias} in quadratic time: again and again the emptiest bucket is filled up from the fullest.
+inline std::vector<std::array<uint32_t, 2>> alias_table_of(std::vector<uint32_t> tickets) {
+    const size_t n = tickets.size();
+    const auto first = [&](size_t i) { return uint32_t(std::ceil(double(i) * 16777216.0 / double(n))); };
+    std::vector<std::array<uint32_t, 2>> table(n);
+    std::vector<int64_t> excess(n);
+    std::vector<bool> done(n, false);
+    for (size_t i = 0; i < n; ++i) excess[i] = int64_t(tickets[i]) - (first(i + 1) - first(i));
+    for (size_t k = 0; k < n; ++k) {
+        size_t lo = n, hi = n;
+        for (size_t i = 0; i < n; ++i) {
+            if (done[i]) continue;
+            if (lo == n || excess[i] < excess[lo]) lo = i;
+            if (hi == n || excess[i] > excess[hi]) hi = i;
+        }
+        table[lo] = {uint32_t(first(lo + 1) + excess[lo]), uint32_t(hi)};
+        if (lo != hi) excess[hi] += excess[lo];
+        done[lo] = true;
+    }
+    return table;
+}
+
+inline void append_environment(Scene& s, Emitter& e, const std::vector<double>& rows, const std::vector<std::vector<double>>& cells) {
+    const auto word = [&](auto w) {
+        float f;
+        memcpy(&f, &w, 4);
+        s.tables.push_back(f);
+    };
+    while (s.tables.size() % 4) s.tables.push_back(0.0f);
+    e.env_rows = uint32_t(s.tables.size());
+    const auto row_tickets = tickets_of(rows);
+    for (auto b : alias_table_of(row_tickets)) word(b[0]), word(b[1]);
+    while (s.tables.size() % 4) s.tables.push_back(0.0f);
+    e.env_cells = uint32_t(s.tables.size());
+    for (size_t y = 0; y < rows.size(); ++y) {
+        const size_t w = cells[y].size();
+        const auto tickets = tickets_of(rows[y] > 0 ? cells[y] : std::vector<double>(w, 1.0));
+        const auto table = alias_table_of(tickets);
+        const auto pdf = [&](size_t x) { return float(row_tickets[y] / 16777216.0 * double(rows.size()) * (tickets[x] / 16777216.0) * double(w)); };
+        for (size_t x = 0; x < w; ++x) word(table[x][0]), word(table[x][1]), word(pdf(x)), word(pdf(table[x][1]));
+    }
+}
+
 /// Fills areas, tables and pick probabilities (uniform, or in proportion to `pick_weights`).
 inline void complete(Scene& s, std::vector<double> pick_weights = {}) {
     s.bounds_radius = 10.0f;
@@ -210,13 +264,7 @@ inline void complete(Scene& s, std::vector<double> pick_weights = {}) {
             const SceneView v = view_of(s);
             for (uint32_t y = 0; y < t.height; ++y)
                 for (uint32_t x = 0; x < t.width; ++x) rows[y] += cells[y][x] = envmap_cell_weight(v, e, x, y);
-            e.env_marginal = append_cdf(s, rows);
-            e.env_conditional = uint32_t(s.tables.size());
-            for (auto& row : cells) {
-                double sum = 0;
-                for (double w : row) sum += w;
-                append_cdf(s, sum > 0 ? row : std::vector<double>(t.width, 1.0));
-            }
+            append_environment(s, e, rows, cells);
         }
     }
     if (pick_weights.empty()) pick_weights.assign(s.emitters.size(), 1.0);

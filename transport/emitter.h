@@ -14,11 +14,10 @@ AMBILUX_HD constexpr bool is_delta(EmitterType type) {
     return type == EmitterType::point || type == EmitterType::spot || type == EmitterType::directional;
 }
 
-/// Picks an emitter by the scene's pick probabilities and samples its light towards `reference_p` (world space). `u` in [0,1)^4: x picks the
-/// emitter, y and z place the sample on it, w picks the primitive of a mesh. False when the sample carries no light (nothing to
-/// add, still one sample); then `s` is not to be read.
+/// sample_emitter_direct without the lookup of an environment map, which costs more than the rest: s.radiance is to be replaced by emitter_sample_radiance once
+/// it is clear that the sample matters. True does not promise light then.
 template <Features F>
-AMBILUX_HD bool sample_emitter_direct(const SceneView& view, Vec3f reference_p, Vec4f u, EmitterSample& s) {
+AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, Vec3f reference_p, Vec4f u, EmitterSample& s) {
     if (view.emitter_count == 0) return false;
     const uint32_t index = sample_cdf(view.emitter_cdf, view.emitter_count, u.x);
     const Emitter& emitter = view.emitters[index];
@@ -42,12 +41,32 @@ AMBILUX_HD bool sample_emitter_direct(const SceneView& view, Vec3f reference_p, 
             if constexpr (F.has(EmitterType::constant)) lit = constant_sample_direct(view, emitter, reference_p, u_position, s);
             break;
         case EmitterType::envmap:
-            if constexpr (F.has(EmitterType::envmap)) lit = envmap_sample_direct(view, emitter, reference_p, u_position, s);
+            if constexpr (F.has(EmitterType::envmap)) lit = envmap_sample_direct(view, emitter, reference_p, {u.y, u.z, u.w}, s);
             break;
         default: break;
     }
     // Written so that NaN fails too.
     return lit && s.pdf_sa > 0.0f && s.pdf_sa < kInfinity && max_component(s.radiance) > 0.0f;
+}
+
+/// Radiance of a sample of sample_emitter_deferred, in the units of EmitterSample::radiance.
+template <Features F>
+AMBILUX_HD Rgb emitter_sample_radiance(const SceneView& view, const EmitterSample& s) {
+    if constexpr (F.has(EmitterType::envmap)) {
+        const Emitter& emitter = view.emitters[s.emitter];
+        if (emitter.type == EmitterType::envmap) return envmap_lookup(view, emitter, s.env_uv);
+    }
+    return s.radiance;
+}
+
+/// Picks an emitter by the scene's pick probabilities and samples its light towards `reference_p` (world space). `u` in [0,1)^4: x picks the
+/// emitter, y and z place the sample on it, w picks the primitive of a mesh or the row of an environment map. False when the sample carries no light
+/// (nothing to add, still one sample); then `s` is not to be read.
+template <Features F>
+AMBILUX_HD bool sample_emitter_direct(const SceneView& view, Vec3f reference_p, Vec4f u, EmitterSample& s) {
+    if (!sample_emitter_deferred<F>(view, reference_p, u, s)) return false;
+    s.radiance = emitter_sample_radiance<F>(view, s);
+    return max_component(s.radiance) > 0.0f;
 }
 
 /// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` at `reference_p` by way of area emitter

@@ -54,8 +54,8 @@ AMBILUX_HD float pdf_emission_direction(const SceneView& view, uint32_t emitter,
     }
 }
 
-/// Samples light leaving an emitter. `u_position` in [0,1)^4: x picks the emitter, y and z place the start, w picks the primitive of a mesh; `u_direction` in
-/// [0,1)². False when the sample carries no light; then `s` is not to be read.
+/// Samples light leaving an emitter. `u_position` in [0,1)^4: x picks the emitter, y and z place the start, w picks the primitive of a mesh or the row of an environment map;
+/// `u_direction` in [0,1)². False when the sample carries no light; then `s` is not to be read.
 template <Features F>
 AMBILUX_HD bool sample_emission(const SceneView& view, Vec4f u_position, Vec2f u_direction, EmissionSample& s) {
     if (view.emitter_count == 0) return false;
@@ -107,7 +107,9 @@ AMBILUX_HD bool sample_emission(const SceneView& view, Vec4f u_position, Vec2f u
             break;
         case EmitterType::envmap:
             if constexpr (F.has(EmitterType::envmap)) {
-                envmap_sample_direction(view, e, u_direction, s.d, s.radiance, s.pdf_dir);
+                Vec2f uv;
+                envmap_sample_direction(view, e, {u_direction.x, u_direction.y, u_position.w}, s.d, uv, s.pdf_dir);
+                s.radiance = envmap_lookup(view, e, uv);
                 s.d = -s.d;
             }
             break;

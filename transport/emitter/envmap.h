@@ -2,10 +2,12 @@
 //
 // Mapping (Mitsuba 3's envmap): u = atan2(x, -z) / 2pi runs to the right, v = theta / pi from the top (+y) down. Columns are
 // periodic with centres at (i+0.5)/width; rows are spread from pole to pole, row j at v = j/(height-1).
-// Density: cells of 1/width by 1/height in (u,v). A cell's probability must be positive wherever the interpolated radiance in it is:
+// Density: cells of 1/width by 1/height in (u,v), drawn from alias tables: a row, then a column in it (one table over all cells would leave no bits
+// of a random number for its threshold). That reads a few bytes that stay in the cache and 16 that do not; the density alone reads those 16. A cell's probability must be positive wherever the interpolated radiance in it is:
 // envmap_cell_weight gives weights that guarantee it.
 #pragma once
 
+#include "scene/alias_table.h"
 #include "transport/emitter/directional.h"
 #include "transport/texture.h"
 
@@ -60,12 +62,17 @@ AMBILUX_HD float envmap_cell_weight(const SceneView& view, const Emitter& emitte
     return sum * (1.0f / 16.0f);
 }
 
-/// Density per unit square of (u,v) that the tables give cell (x,y).
-AMBILUX_HD float envmap_pdf_cell(const SceneView& view, const Emitter& emitter, uint32_t x, uint32_t y) {
-    const Texture& texture = view.textures[emitter.radiance.texture];
-    const float* marginal = view.tables + emitter.env_marginal + y;
-    const float* conditional = view.tables + emitter.env_conditional + uint64_t(y) * (texture.width + 1) + x;
-    return (marginal[1] - marginal[0]) * float(texture.height) * (conditional[1] - conditional[0]) * float(texture.width);
+/// Bucket of cell (x,y) in the alias tables: one aligned load.
+AMBILUX_HD EnvironmentCell load_environment_cell(const SceneView& view, const Emitter& emitter, uint32_t width, uint32_t x, uint32_t y) {
+    EnvironmentCell cell;
+    memcpy(&cell, __builtin_assume_aligned(view.tables + emitter.env_cells + 4 * (uint64_t(y) * width + x), 16), 16);
+    return cell;
+}
+
+AMBILUX_HD AliasBucket load_environment_row(const SceneView& view, const Emitter& emitter, uint32_t y) {
+    AliasBucket row;
+    memcpy(&row, __builtin_assume_aligned(view.tables + emitter.env_rows + 2 * uint64_t(y), 8), 8);
+    return row;
 }
 
 /// Density per unit square of (u,v) to density per solid angle: dw = 2 pi² sin(theta) du dv.
@@ -73,37 +80,43 @@ AMBILUX_HD float envmap_pdf_to_sa(float pdf_uv, float sin_theta) {
     return sin_theta > 0.0f ? pdf_uv / (2.0f * kPi * kPi * sin_theta) : 0.0f;
 }
 
-/// Direction towards the map sampled by its density: `wi` unit, world space, with its radiance and density per solid angle.
-AMBILUX_HD void envmap_sample_direction(const SceneView& view, const Emitter& emitter, Vec2f u, Vec3f& wi, Rgb& radiance, float& pdf_sa) {
+/// Direction towards the map sampled by its density, and where in the image that is; the radiance is envmap_lookup there. `wi` unit, world space. `u` in
+/// [0,1)^3: x picks the column, z the row (each spends all of its 24 bits, so that density and sampling agree exactly), and the
+/// halves of y place the point in the cell, at one of 4096 by 4096 positions.
+AMBILUX_HD void envmap_sample_direction(const SceneView& view, const Emitter& emitter, Vec3f u, Vec3f& wi, Vec2f& uv, float& pdf_sa) {
     const Texture& texture = view.textures[emitter.radiance.texture];
-    const float* marginal = view.tables + emitter.env_marginal;
-    const uint32_t y = sample_cdf(marginal, texture.height, u.y);
-    const float* conditional = view.tables + emitter.env_conditional + uint64_t(y) * (texture.width + 1);
-    const uint32_t x = sample_cdf(conditional, texture.width, u.x);
-    const float du = clamp((u.x - conditional[x]) / (conditional[x + 1] - conditional[x]), 0.0f, kOneMinusEpsilon);
-    const float dv = clamp((u.y - marginal[y]) / (marginal[y + 1] - marginal[y]), 0.0f, kOneMinusEpsilon);
-    const Vec2f uv = {(float(x) + du) / float(texture.width), (float(y) + dv) / float(texture.height)};
+    const uint32_t row_ticket = ticket_of(u.z), ticket = ticket_of(u.x), place = ticket_of(u.y);
+    uint32_t y = bucket_of(row_ticket, texture.height);
+    const AliasBucket row = load_environment_row(view, emitter, y);
+    if (row_ticket >= row.threshold) y = row.alias;
+    uint32_t x = bucket_of(ticket, texture.width);
+    const EnvironmentCell cell = load_environment_cell(view, emitter, texture.width, x, y);
+    const bool own = ticket < cell.threshold;
+    if (!own) x = cell.alias;
+    const float du = (float(place >> 12) + 0.5f) * 0x1p-12f, dv = (float(place & 4095u) + 0.5f) * 0x1p-12f;
+    uv = {(float(x) + du) / float(texture.width), (float(y) + dv) / float(texture.height)};
     float sin_theta;
     wi = normalize(emitter.to_world.vector(envmap_direction(uv, sin_theta)));
-    radiance = envmap_lookup(view, emitter, uv);
-    pdf_sa = envmap_pdf_to_sa(envmap_pdf_cell(view, emitter, x, y), sin_theta);
+    pdf_sa = envmap_pdf_to_sa(own ? cell.pdf : cell.alias_pdf, sin_theta);
 }
 
 /// Density per solid angle with which envmap_sample_direction returns unit `wi`.
 AMBILUX_HD float envmap_pdf_direction(const SceneView& view, const Emitter& emitter, Vec3f wi) {
     const Texture& texture = view.textures[emitter.radiance.texture];
-    const Vec3f local = normalize(emitter.to_local.vector(wi));
+    const Vec3f local = emitter.to_local.vector(wi);
     const Vec2f uv = envmap_uv(local);
     const uint32_t x = wrap_texel(int32_t(uv.x * float(texture.width)), int32_t(texture.width), WrapMode::clamp);
     const uint32_t y = wrap_texel(int32_t(uv.y * float(texture.height)), int32_t(texture.height), WrapMode::clamp);
     const float sin_theta = sqrtf(local.x * local.x + local.z * local.z);
-    return envmap_pdf_to_sa(envmap_pdf_cell(view, emitter, x, y), sin_theta);
+    return envmap_pdf_to_sa(load_environment_cell(view, emitter, texture.width, x, y).pdf, sin_theta);
 }
 
-AMBILUX_HD bool envmap_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec2f u, EmitterSample& s) {
-    envmap_sample_direction(view, emitter, u, s.wi, s.radiance, s.pdf_sa);
+/// Fills in all but the radiance, which is envmap_lookup at `s.env_uv`.
+AMBILUX_HD bool envmap_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec3f u, EmitterSample& s) {
+    envmap_sample_direction(view, emitter, u, s.wi, s.env_uv, s.pdf_sa);
     s.pdf_sa *= emitter.pick_probability;
     place_at_infinity(view, reference_p, s);
+    s.radiance = emitter.radiance.value;
     s.delta = false;
     return true;
 }

@@ -14,6 +14,7 @@ struct EmitterSample {
     Vec3f wi;        ///< unit, from the reference to the light
     float distance;  ///< from the reference to p; kInfinity for environment and directional
     Rgb radiance;    ///< area, constant, envmap: radiance towards the reference; point, spot: intensity / distance²; directional: irradiance
+    Vec2f env_uv;    ///< envmap: where in the image wi points; other types leave it alone
     float pdf_sa;    ///< density of wi per solid angle times the pick probability; for delta lights the pick probability alone
     bool delta;      ///< no other strategy can find this light: point, spot, directional
     uint32_t emitter;
