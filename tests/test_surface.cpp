@@ -228,6 +228,36 @@ TEST_CASE("Spawned rays do not meet the flat primitive they leave, nor the curve
             }
 }
 
+TEST_CASE("Rays leave a plane through zero, where the error bound across it is zero (B33)") {
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto at = [axis](float a, float b) {
+            Vec3f p = {0, 0, 0};
+            p[(axis + 1) % 3] = a;
+            p[(axis + 2) % 3] = b;
+            return p;
+        };
+        Scene scene;
+        add_mesh(scene, {at(-1, -1), at(1, -1), at(1, 1), at(-1, 1)}, {0, 1, 2, 0, 2, 3});
+        const SceneView view = scene.view();
+        const EmbreeAccel embree(scene);
+        const CwbvhAccel cwbvh(scene);
+        Random random(17);
+        int again = 0, again_embree = 0;
+        for (int i = 0; i < 20000; ++i) {
+            Vec2f b = {random.uniform(), random.uniform()};
+            if (b.x + b.y > 1) b = {1 - b.x, 1 - b.y};
+            const SurfacePoint s = surface_at<kTriangles>(view, random.index(2), b.x, b.y);
+            const Vec3f d = random.direction();
+            const Ray ray = {offset_ray_origin(s.p, s.p_error, s.ng, d), kInfinity, d, 0};
+            again += cwbvh.tracer().occluded<kTriangles>(view, ray);
+            again_embree += embree.tracer().occluded<kTriangles>(view, ray);
+        }
+        INFO("axis " << axis);
+        CHECK(again == 0);
+        CHECK(again_embree == 0);
+    }
+}
+
 TEST_CASE("Rays spawned inwards leave a sphere on its far side") {
     for (const float scale : {1e-4f, 1.0f, 1e4f}) {
         const Scene scene = only(PrimitiveType::sphere, scale, {0, 0, 0}, 25);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cfloat>
 #include <cstdint>
 #include <memory>
 
@@ -70,8 +71,8 @@ private:
         RTCRay r;
         r.org_x = ray.o.x, r.org_y = ray.o.y, r.org_z = ray.o.z;
         r.dir_x = ray.d.x, r.dir_y = ray.d.y, r.dir_z = ray.d.z;
-        r.tnear = 0.0f;                        // exclusive in Embree
-        r.tfar = next_float_down(ray.tmax);    // inclusive in Embree
+        r.tnear = FLT_MIN;                   // inclusive for triangles: at 0 a ray would meet the plane through zero that it leaves
+        r.tfar = next_float_down(ray.tmax);  // inclusive in Embree
         r.time = 0.0f;
         r.mask = ~0u;
         r.id = 0;
