@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "core/half.h"
 #include "scene/alias_table.h"
 #include "scene/scene.h"
 
@@ -104,6 +105,10 @@ Rgb load_texel(const Scene& scene, const Texture& t, size_t i) {
         float c[4];
         memcpy(c, scene.texels.data() + t.offset + i * 16, 16);
         return {c[0], c[1], c[2]};
+    }
+    if (t.format == TexelFormat::rgba16f) {
+        const Vec4f c = load_half4(scene.texels.data() + t.offset + i * 8);
+        return {c.x, c.y, c.z};
     }
     const uint8_t* c = scene.texels.data() + t.offset + i * 4;
     const float* decode = scene.tables.data() + t.decode_table;

@@ -13,6 +13,7 @@
 #include "scene/scene.h"
 #include "temp_folder.h"
 #include "transport/bsdf/precompute.h"
+#include "transport/texture.h"
 
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STB_IMAGE_WRITE_STATIC
@@ -460,7 +461,7 @@ TEST_CASE("emitters: values, frames, one environment") {
     const Scene env = load("<emitter type='envmap'><string name='filename' value='e.png'/><float name='scale' value='3'/><transform name='to_world'><rotate y='1' angle='90'/></transform></emitter>", {}, "3.0.0", &folder);
     CHECK(env.environment == 0);
     CHECK(env.emitters[0].radiance.value == splat(3));
-    CHECK(env.textures[0].format == TexelFormat::rgba32f);
+    CHECK(env.textures[0].format == TexelFormat::rgba16f);
     check_rgb(env.emitters[0].to_world.vector({0, 0, 1}), {1, 0, 0});
     CHECK_FALSE(env.features.textures);
     const Scene area = load("<shape type='sphere'><emitter type='area'><rgb name='radiance' value='1,2,3'/></emitter></shape>");
@@ -470,6 +471,23 @@ TEST_CASE("emitters: values, frames, one environment") {
     CHECK(contains(error_of("<emitter type='constant'/>\n<emitter type='constant'/>"), ":3: only one constant or envmap"));
     CHECK(contains(error_of("<emitter type='point'><rgb name='intensity' value='-1'/></emitter>"), "'intensity' is negative"));
     CHECK(contains(error_of("<emitter type='sky'/>"), "emitter type 'sky' is not supported"));
+}
+
+TEST_CASE("environment maps are stored as halves unless that loses something") {
+    const test::TempFolder folder;
+    // Radiance's RGBE: mantissas over 256 times 2^(exponent-128); two texels, neither compressed.
+    const auto texels = [&](std::vector<uint8_t> rgbe) {
+        folder.write("e.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" + std::string(rgbe.begin(), rgbe.end()));
+        return load("<emitter type='envmap'><string name='filename' value='e.hdr'/></emitter>", {}, "3.0.0", &folder);
+    };
+    const auto check = [&](const Scene& s, TexelFormat format, Rgb first, Rgb second) {
+        REQUIRE(s.textures[0].format == format);
+        CHECK(load_texel(s.view(), s.textures[0], 0, 0) == first);
+        CHECK(load_texel(s.view(), s.textures[0], 1, 0) == second);
+    };
+    check(texels({128, 64, 0, 129, 192, 255, 1, 144}), TexelFormat::rgba16f, {1, 0.5f, 0}, {49152, 65280, 256});
+    check(texels({128, 64, 0, 129, 192, 255, 1, 145}), TexelFormat::rgba32f, {1, 0.5f, 0}, {98304, 130560, 512});  // beyond the largest half
+    check(texels({128, 64, 0, 129, 129, 128, 0, 106}), TexelFormat::rgba32f, {1, 0.5f, 0}, {129 * 0x1p-30f, 0x1p-23f, 0});  // a denormal half of few bits
 }
 
 TEST_CASE("analytic shapes and instances") {

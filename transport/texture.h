@@ -1,6 +1,7 @@
 // Texture lookup (conventions: scene/view.h, Texture) and parameters that may come from a texture.
 #pragma once
 
+#include "core/half.h"
 #include "scene/view.h"
 
 namespace ambilux {
@@ -18,6 +19,10 @@ AMBILUX_HD Rgb load_texel(const SceneView& view, const Texture& texture, uint32_
     if (texture.format == TexelFormat::rgba32f) {
         Vec4f texel;
         memcpy(&texel, __builtin_assume_aligned(view.texels + texture.offset + index * 16, 16), 16);
+        return {texel.x, texel.y, texel.z};
+    }
+    if (texture.format == TexelFormat::rgba16f) {
+        const Vec4f texel = load_half4(view.texels + texture.offset + index * 8);
         return {texel.x, texel.y, texel.z};
     }
     uint32_t texel;

@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "core/half.h"
 #include "scene/image_io.h"
 #include "scene/mitsuba/builder.h"
 #include "scene/shapes/mesh.h"
@@ -37,7 +38,18 @@ uint64_t append_texels(Scene& scene, const void* data, size_t size) {
     return offset;
 }
 
-/// Puts the image's texels into the scene, once per file and decoding. `gamma` 0 takes what the file format implies; `as_float` stores floats.
+/// True if all colours keep a precision of 2^-11 as halves: none is too large, and none that is not zero too small.
+bool fits_half(const std::vector<float>& texels) {
+    for (size_t i = 0; i < texels.size(); ++i) {
+        if (i % 4 == 3) continue;
+        const float f = texels[i];
+        if (!(std::fabs(f) <= kMaxHalf) || !(std::fabs(half_to_float(float_to_half(f)) - f) <= 0x1p-11f * std::fabs(f))) return false;
+    }
+    return true;
+}
+
+/// Puts the image's texels into the scene, once per file and decoding. `gamma` 0 takes what the file format implies; `as_float` stores floats
+/// (environment maps), as halves where nothing is lost by that; alpha, which no one reads there, is 1 then.
 LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float) {
     const std::string key = path + "|" + std::to_string(gamma) + (as_float ? "|float" : "");
     const auto known = builder.images.find(key);
@@ -71,7 +83,14 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
                 throw input_error(path, 0, "texel (" + std::to_string(i / 4 % image.width) + ", " + std::to_string(i / 4 / image.width) + ") is not finite");
             if (i % 4 < 3) mean[i % 4] += texels[i];
         }
-        out.offset = append_texels(builder.scene, texels.data(), texels.size() * sizeof(float));
+        if (as_float && fits_half(texels)) {
+            out.format = TexelFormat::rgba16f;
+            std::vector<uint16_t> halves(texels.size());
+            for (size_t i = 0; i < texels.size(); ++i) halves[i] = uint16_t(float_to_half(i % 4 == 3 ? 1.0f : texels[i]));
+            out.offset = append_texels(builder.scene, halves.data(), halves.size() * sizeof halves[0]);
+        } else {
+            out.offset = append_texels(builder.scene, texels.data(), texels.size() * sizeof(float));
+        }
     }
     out.mean = {float(mean[0] / double(count)), float(mean[1] / double(count)), float(mean[2] / double(count))};
     builder.images[key] = out;
