@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "core/half.h"
+#include "core/huge_pages.h"
 #include "scene/alias_table.h"
 #include "scene/scene.h"
 
@@ -288,6 +289,9 @@ void finalize_scene(Scene& scene, LightPicking light_picking) {
     fill_filter_table(scene);
     fill_features(scene);
     if (scene.tables.size() >= kNone) throw input_error(scene.path, 0, "the scene's tables are too large");
+    // What rays read here and there.
+    const auto large_pages = [](const auto& array) { use_huge_pages(array.data(), array.size() * sizeof array[0]); };
+    large_pages(scene.texels), large_pages(scene.tables), large_pages(scene.triangles), large_pages(scene.positions), large_pages(scene.normals), large_pages(scene.uvs);
 }
 
 }  // namespace ambilux
