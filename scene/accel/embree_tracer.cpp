@@ -36,6 +36,19 @@ void filter_triangle(const RTCFilterFunctionNArguments* args) {
     if (!accept_hit<kAllFeatures>(*context.scene, *context.ray, hit->primID, hit->u, hit->v)) args->valid[0] = 0;
 }
 
+/// The same, and the triangle on whose plane the ray starts.
+void filter_occluder(const RTCFilterFunctionNArguments* args) {
+    if (args->valid[0] != -1) return;
+    const auto& context = ray_context(args->context);
+    const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
+    const SceneView& view = *context.scene;
+    const Triangle tri = view.triangles[hit->primID];
+    if (detail::starts_on(context.ray->o, view.positions[tri.v0], view.positions[tri.v1], view.positions[tri.v2]))
+        args->valid[0] = 0;
+    else
+        filter_triangle(args);
+}
+
 void bound_quadric(const RTCBoundsFunctionArguments* args) {
     const auto& view = *static_cast<const SceneView*>(args->geometryUserPtr);
     const Bounds3f b = quadric_bounds(view.quadrics[args->primID]);
@@ -107,10 +120,8 @@ EmbreeAccel::EmbreeAccel(const Scene& scene)
         if (!vertices) throw_embree_error(device_, "allocating vertices");
         std::memcpy(vertices, scene.positions.data(), scene.positions.size() * sizeof(Vec3f));
         rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, scene.triangles.data(), 0, sizeof(Triangle), scene.triangles.size());
-        if (scene.features.opacity) {
-            rtcSetGeometryIntersectFilterFunction(mesh, filter_triangle);
-            rtcSetGeometryOccludedFilterFunction(mesh, filter_triangle);
-        }
+        if (scene.features.opacity) rtcSetGeometryIntersectFilterFunction(mesh, filter_triangle);
+        rtcSetGeometryOccludedFilterFunction(mesh, filter_occluder);
         attach(scene_, mesh, 0);
     }
     if (!scene.quadrics.empty()) {

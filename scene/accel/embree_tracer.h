@@ -9,11 +9,15 @@
 #include "scene/accel/embree_api.h"
 #include "scene/accel/opacity.h"
 #include "scene/accel/traceable.h"
+#include "scene/accel/triangle_test.h"
 #include "scene/scene.h"
 
 namespace ambilux {
 
 namespace detail {
+
+/// True if `o` is on the plane of the triangle within rounding: such a ray does not meet it (intersect_triangle).
+inline bool starts_on(Vec3f o, Vec3f v0, Vec3f v1, Vec3f v2) { return height_over_plane(v0 - o, accurate_cross(v1 - v0, v2 - v0)) == 0.0f; }
 
 /// What Embree's callbacks need to know about the ray in flight. `base` comes first: callbacks get a pointer to it.
 struct EmbreeRayContext {
@@ -38,13 +42,27 @@ struct EmbreeTracer {
         detail::EmbreeRayContext context = make_context<F>(view, ray);
         RTCRayHit query;
         query.ray = make_ray(ray);
-        query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        query.hit.primID = RTC_INVALID_GEOMETRY_ID;
-        query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-        embree_intersect(scene, &context.base, &query);
-        if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-        hit = {query.ray.tfar, query.hit.u, query.hit.v, query.hit.primID + (query.hit.geomID == 0 ? 0 : triangle_count)};
-        return true;
+        for (;;) {
+            query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+            query.hit.primID = RTC_INVALID_GEOMETRY_ID;
+            query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+            embree_intersect(scene, &context.base, &query);
+            if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+            hit = {query.ray.tfar, query.hit.u, query.hit.v, query.hit.primID + (query.hit.geomID == 0 ? 0 : triangle_count)};
+            if (query.hit.geomID != 0) return true;
+            // Embree finds the triangle; our own test tells where, as precisely as on a device, and knows the plane that the ray starts on.
+            const Triangle tri = view.triangles[hit.prim];
+            const Vec3f v0 = view.positions[tri.v0], v1 = view.positions[tri.v1], v2 = view.positions[tri.v2];
+            TriangleCrossing crossing;
+            if (intersect_triangle(ray.o, ray.d, make_ray_shear(ray.d), v0, v1, v2, ray.tmax, crossing)) {
+                hit = {crossing.t, crossing.u, crossing.v, hit.prim};
+                return true;
+            }
+            if (!detail::starts_on(ray.o, v0, v1, v2)) return true;
+            query.ray.tnear = next_float_up(hit.t);
+            query.ray.tfar = next_float_down(ray.tmax);
+            hit = {ray.tmax, 0.0f, 0.0f, kNone};
+        }
     }
 
     /// True if anything lies at 0 < t < ray.tmax.

@@ -30,6 +30,12 @@ AMBILUX_HD float fused_dot(Vec3f a, Vec3f b) { return fmaf(a.x, b.x, fmaf(a.y, b
 
 }  // namespace detail
 
+/// Height of the origin over the plane of triangle (v0,v1,v2) times |n| for a = v0 - o, zero if it is no more than the rounding of its distance; `n` is the normal, not unit.
+AMBILUX_HD float height_over_plane(Vec3f a, Vec3f n) {
+    const float height = detail::fused_dot(a, n);
+    return fabsf(height) > gamma_bound(6) * detail::fused_dot(abs(a), abs(n)) ? height : 0.0f;
+}
+
 /// True if the ray o + t d crosses triangle (v0,v1,v2) at 0 < t < tmax. A ray through an edge or a vertex meets at least one of the triangles that
 /// share it: each edge function has the exact sign for its projected end points, and zero counts as inside.
 /// An origin that lies on the triangle's plane within the rounding of the distance does not meet it.
@@ -46,8 +52,8 @@ AMBILUX_HD bool intersect_triangle(Vec3f o, Vec3f d, const RayShear& shear, Vec3
     if (det == 0.0f) return false;
     // Distance along the ray from the plane. Unlike the interpolated depth it is exactly zero for origins on an axis-aligned triangle.
     const Vec3f n = detail::accurate_cross(v1 - v0, v2 - v0);
-    const float height = detail::fused_dot(a, n);
-    if (!(fabsf(height) > gamma_bound(6) * detail::fused_dot(abs(a), abs(n)))) return false;
+    const float height = height_over_plane(a, n);
+    if (height == 0.0f) return false;
     const float t = height / detail::fused_dot(d, n);
     if (!(t > 0.0f && t < tmax)) return false;
     hit.t = t;
