@@ -83,7 +83,7 @@ TEST_CASE("Spheres, disks and cylinders are met where their closed forms say, ne
 }
 
 TEMPLATE_TEST_CASE("Opacity: the share of rays that pass, alike for closest and any hit and for both tracers (B34)", "", EmbreeAccel, CwbvhAccel) {
-    // Three layers of triangles and two spheres; what is nearest depends on which layers let the ray pass.
+    // Three layers of triangles, a sphere with two sides and a disk; what is nearest depends on which of the six let the ray pass.
     Scene scene;
     for (int i = 0; i < 3; ++i) add_mesh(scene, {{-9, -9, float(i)}, {9, -9, float(i)}, {0, 9, float(i)}}, {0, 1, 2});
     add_quadric(scene, PrimitiveType::sphere, {0, 0, 5}, frame_from_normal({0, 0, 1}), 1);
@@ -93,21 +93,25 @@ TEMPLATE_TEST_CASE("Opacity: the share of rays that pass, alike for closest and 
     const SceneView view = scene.view();
     const TestType accel(scene);
     const uint32_t n = 200000;
-    double layer[6] = {};
+    const uint32_t count = view.primitive_count(), ids[6] = {0, 1, 2, 3, 3 + count, 4};  // where rays leave the sphere they ask once more
+    const float distance[6] = {1, 2, 3, 5, 7, 10};
+    double layer[7] = {};
     for (uint32_t i = 0; i < n; ++i) {
         const Ray ray = {{0, 0, -1}, kInfinity, {0, 0, 1}, random_bits({42, i, 0, Stream::test}, 0).x};
         Hit hit;
         const bool met = accel.tracer().template closest<kOpacity>(view, ray, hit);
         REQUIRE(accel.tracer().template occluded<kOpacity>(view, ray) == met);
-        layer[met ? hit.prim : 5] += 1;
-        // The rule itself, by hand: the first primitive whose hash is below its opacity.
+        // The rule itself, by hand: the first crossing whose hash is below its opacity.
         uint32_t expected = 0;
-        while (expected < 5 && !(0.3f > hash_float(ray.alpha_seed, expected))) ++expected;
-        REQUIRE((met ? hit.prim : 5) == expected);
+        while (expected < 6 && !(0.3f > hash_float(ray.alpha_seed, ids[expected]))) ++expected;
+        REQUIRE(met == (expected < 6));
+        if (met) REQUIRE(hit.prim == ids[expected] % count);
+        if (met) REQUIRE(hit.t == Approx(distance[expected]).epsilon(1e-5));
+        layer[expected] += 1;
     }
     double pass = 1;
-    for (int i = 0; i < 6; ++i) {
-        const double p = i < 5 ? pass * 0.3 : pass;
+    for (int i = 0; i < 7; ++i) {
+        const double p = i < 6 ? pass * 0.3 : pass;
         CHECK(std::fabs(layer[i] / n - p) < 5 * std::sqrt(p * (1 - p) / n));
         pass *= 0.7;
     }

@@ -19,7 +19,22 @@ AMBILUX_HD Vec2f texture_uv(const SceneView& scene, uint32_t prim, float u, floa
     return surface_at<F>(scene, prim, u, v).uv;
 }
 
-/// True if `ray` meets the surface at (prim,u,v) rather than passing through it: opacity > hash(ray, prim), so the answer does not
+/// What decides about a crossing beside the ray: its primitive, but a ray crosses spheres and cylinders twice, and the side where it leaves counts as a primitive of
+/// its own, numbered after all others.
+template <Features F>
+AMBILUX_HD uint32_t opacity_id(const SceneView& scene, const Ray& ray, uint32_t prim, float u, float v) {
+    if constexpr (F.has_quadrics()) {
+        if (!scene.is_triangle(prim)) {
+            const Quadric& q = scene.quadric(prim);
+            if (q.type == PrimitiveType::disk) return prim;
+            const Vec3f outwards = q.type == PrimitiveType::sphere ? octahedral_decode({u, v}) : Vec3f{cosf(u), sinf(u), 0.0f};
+            if (dot(outwards, q.to_local.vector(ray.d)) > 0.0f) return prim + scene.primitive_count();
+        }
+    }
+    return prim;
+}
+
+/// True if `ray` meets the surface at (prim,u,v) rather than passing through it: opacity > hash(ray, opacity_id), so the answer does not
 /// depend on the order in which a tracer visits primitives.
 template <Features F>
 AMBILUX_HD bool accept_hit(const SceneView& scene, const Ray& ray, uint32_t prim, float u, float v) {
@@ -29,7 +44,7 @@ AMBILUX_HD bool accept_hit(const SceneView& scene, const Ray& ray, uint32_t prim
         const ParamFloat& opacity = scene.materials[scene.shapes[scene.shape_of(prim)].material].opacity;
         if (opacity.texture < 0 && opacity.value >= 1.0f) return true;
         const Vec2f uv = F.textures && opacity.texture >= 0 ? texture_uv<F>(scene, prim, u, v) : Vec2f{0.0f, 0.0f};
-        return eval_float<F>(scene, opacity, uv) > hash_float(ray.alpha_seed, prim);
+        return eval_float<F>(scene, opacity, uv) > hash_float(ray.alpha_seed, opacity_id<F>(scene, ray, prim, u, v));
     }
 }
 
