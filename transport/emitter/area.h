@@ -59,7 +59,7 @@ struct SphereCone {
     float distance;            ///< to the centre
     float sin2_max;            ///< of the half angle
     float one_minus_cos_max;   ///< without cancellation for small and far spheres
-    bool outside;              ///< false: the reference is on or inside the sphere, the rest is not set
+    bool outside;              ///< false: the cone is no help: the reference is on or inside the sphere, or that radiates inwards; the rest is not set
 };
 
 AMBILUX_HD Vec3f quadric_center(const Quadric& q) { return {q.to_world.m[0][3], q.to_world.m[1][3], q.to_world.m[2][3]}; }
@@ -69,7 +69,8 @@ AMBILUX_HD SphereCone sphere_cone(const Quadric& sphere, Vec3f reference_p) {
     const float d2 = length_squared(to_center), r2 = sphere.radius * sphere.radius;
     SphereCone cone{};
     cone.distance = sqrtf(d2);
-    cone.outside = cone.distance > sphere.radius;
+    // Points of a sphere that radiates inwards are outside of it as often as rounding will have it; they see its light all the same.
+    cone.outside = !sphere.flip && cone.distance > sphere.radius;
     if (!cone.outside) return cone;
     cone.axis = to_center * (1.0f / cone.distance);
     cone.sin2_max = r2 / d2;
@@ -83,7 +84,6 @@ template <Features F>
 AMBILUX_HD bool area_sample_sphere(const SceneView& view, const Emitter& emitter, uint32_t prim, const SphereCone& cone,
                                    Vec2f u, EmitterSample& s) {
     const Quadric& sphere = view.quadric(prim);
-    if (sphere.flip) return false;  // radiates inwards
     const Vec3f local = square_to_cone(u, cone.one_minus_cos_max);
     const Frame frame = frame_from_normal(cone.axis);
     const float sin2 = local.x * local.x + local.y * local.y, sin_theta = sqrtf(sin2), cos_theta = local.z;
@@ -145,7 +145,7 @@ AMBILUX_HD float area_pdf_direct(const SceneView& view, const Emitter& emitter, 
         if (!view.is_triangle(hit.prim) && view.quadric(hit.prim).type == PrimitiveType::sphere) {
             const Quadric& sphere = view.quadric(hit.prim);
             const SphereCone cone = sphere_cone(sphere, reference_p);
-            if (cone.outside) return sphere.flip ? 0.0f : emitter.pick_probability * kInv2Pi / cone.one_minus_cos_max;
+            if (cone.outside) return emitter.pick_probability * kInv2Pi / cone.one_minus_cos_max;
         }
     }
     return emitter.pick_probability * area_pdf_position(view, emitter, hit.prim) * length_squared(hit.p - reference_p) / cos_light;
