@@ -23,7 +23,7 @@ struct ParamFloat {
 // ---- textures ----
 
 enum class TextureType : uint32_t { bitmap, checkerboard };
-enum class TexelFormat : uint32_t { rgba8, rgba32f, rgba16f };
+enum class TexelFormat : uint32_t { rgba8, rgba32f, rgba16f };  ///< 4, 16 and 8 bytes per texel; rgba16f: finite halves (core/half.h)
 enum class WrapMode : uint32_t { repeat, mirror, clamp };
 enum class TextureFilter : uint32_t { nearest, bilinear };
 
