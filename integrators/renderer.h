@@ -28,6 +28,7 @@ struct RenderSettings {
     uint32_t wave_size = 0;              ///< paths in flight; 0 chooses
     bool specialise = true;              ///< kernels hold only what the scene has
     bool deterministic = false;
+    bool graph = true;                   ///< cuda: one graph per wave; false launches kernel by kernel, for profilers and sanitizers
 };
 
 /// Sets one field from text; throws Error(usage) that names the key, the value and what is allowed.

@@ -60,9 +60,11 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.specialise = boolean(key, value);
     else if (key == "deterministic")
         s.deterministic = boolean(key, value);
+    else if (key == "graph")
+        s.graph = boolean(key, value);
     else
         throw Error(ExitCode::usage,
-                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, max_depth, rr_depth, seed, accel, wave_size, specialise, deterministic", key));
+                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, max_depth, rr_depth, seed, accel, wave_size, specialise, deterministic, graph", key));
 }
 
 }  // namespace ambilux

@@ -32,6 +32,7 @@ void check_counts(const RenderStats& a, const RenderStats& b, double share) {
     std::map<std::string, const StageStats*> of_b;
     for (const StageStats& s : b.stages) of_b[s.name] = &s;
     for (const StageStats& s : a.stages) {
+        if (s.name == "generate" || s.name == "develop") continue;  // run over slots, of which a backend's tiles leave some empty
         REQUIRE(of_b.count(s.name));
         const StageStats& t = *of_b[s.name];
         const size_t depths = std::max(s.items_by_depth.size(), t.items_by_depth.size());
@@ -127,6 +128,17 @@ TEST_CASE("G7: the same seed gives the same bits on a device, whatever the wave;
     CHECK(first.film.sum == parts->film().sum);
     s.seed = 2;
     CHECK(first.film.sum != render_scene(scene, s, 8).film.sum);
+}
+
+TEST_CASE("a graph and single launches give the same bits and counts") {
+    if (!device()) return;
+    const Scene scene = project_scene("lights", 64, 48);
+    RenderSettings s = on("cuda", cpu_settings(scene, Estimator::mis));
+    const RenderResult graph = render_scene(scene, s, 6);
+    s.graph = false;
+    const RenderResult single = render_scene(scene, s, 6);
+    CHECK(graph.film.sum == single.film.sum);
+    check_counts(graph.stats, single.stats, 0);
 }
 
 TEST_CASE("images of both backends have the same expectation") {

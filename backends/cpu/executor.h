@@ -14,7 +14,8 @@ public:
     CpuExecutor(WaveState* state, StageRecord* records) : state_(state), records_(records) {}
 
     template <class Stage>
-    void run(StageId id, const Stage& stage, uint32_t n) {
+    void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
+        const uint32_t n = slots * (samples ? samples : state_->samples);
         const auto start = Clock::now();
         for (uint32_t i = 0; i < n; ++i) stage(i);
         record(id, n, start);
@@ -33,12 +34,15 @@ public:
     void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
         run(id, stage, queue);
     }
+    template <class Stage, class Item>
+    void trace_coherent(StageId id, const Stage& stage, const Queue<Item>& queue) {
+        run(id, stage, queue);
+    }
     template <class Item, class Body>
     void repeat_while(const Queue<Item>& queue, Body body) {
-        state_->depth = 1;
         while (queue.counter->count > 0) body();
-        state_->depth = 0;
     }
+    void set_depth(uint32_t depth) { state_->depth = depth; }
     void next_depth() { ++state_->depth; }
 
 private:

@@ -1,5 +1,5 @@
-// Captures the stages of one wave into a CUDA graph. Loops over depths are conditional nodes, sizes of queues are read on the device: between the launch of a
-// graph and its end the host does nothing.
+// Runs the stages of one wave on a CUDA device. They are captured into a graph whose loop over depths is a conditional node; sizes of queues are read on the
+// device: between the launch of a graph and its end the host does nothing. The same can be launched kernel by kernel, for profilers and sanitizers.
 #pragma once
 
 #include <cuda_runtime.h>
@@ -28,7 +28,8 @@ __device__ inline uint64_t device_nanoseconds() {
 }
 
 template <class Stage>
-__global__ void __launch_bounds__(kStageBlock) launch_fixed(const __grid_constant__ Stage stage, uint32_t n) {
+__global__ void __launch_bounds__(kStageBlock) launch_slots(const __grid_constant__ Stage stage, uint32_t slots, uint32_t samples, const WaveState* state) {
+    const uint32_t n = slots * (samples ? samples : state->samples);
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) stage(i);
 }
 
@@ -38,24 +39,28 @@ __global__ void __launch_bounds__(kStageBlock) launch_queue(const __grid_constan
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) stage(i);
 }
 
-/// Rays by persistent threads. Camera rays stay together; all others are in no order.
+/// Rays in the order of the queue, one after the other: best while neighbours stay together.
 template <class Stage>
-__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(const __grid_constant__ Stage stage, QueueCounter* counter, const WaveState* state) {
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coherent(const __grid_constant__ Stage stage, const QueueCounter* counter) {
     const uint32_t n = counter->size();
-    const bool coherent = state->depth == 1 && !Stage::kAnyHit;
-    const TraceTuning tuning = {coherent ? kCoherentTuning.refill_below : kIncoherentTuning.refill_below,
-                                coherent ? kCoherentTuning.primitives_at : kIncoherentTuning.primitives_at};
+    for (uint32_t i = blockIdx.x * kTraceBlock + threadIdx.x; i < n; i += gridDim.x * kTraceBlock) stage(i);
+}
+
+/// Rays by persistent threads.
+template <class Stage>
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(const __grid_constant__ Stage stage, QueueCounter* counter) {
+    const uint32_t n = counter->size();
     const auto fetch = [&](uint32_t i, Ray& ray) { return stage.fetch(i, ray); };
     if constexpr (Stage::kAnyHit)
-        trace_any_persistent<Stage::kFeatures>(stage.scene, stage.tracer, fetch, [&](uint32_t i, bool blocked) { stage.finish(i, blocked); }, &n, &counter->next, tuning);
+        trace_any_persistent<Stage::kFeatures>(stage.scene, stage.tracer, fetch, [&](uint32_t i, bool blocked) { stage.finish(i, blocked); }, &n, &counter->next);
     else
-        trace_closest_persistent<Stage::kFeatures>(stage.scene, stage.tracer, fetch, [&](uint32_t i, const Hit& hit) { stage.finish(i, hit); }, &n, &counter->next, tuning);
+        trace_closest_persistent<Stage::kFeatures>(stage.scene, stage.tracer, fetch, [&](uint32_t i, const Hit& hit) { stage.finish(i, hit); }, &n, &counter->next);
 }
 
 /// After a stage: its record, and its queue emptied. The time since the last such kernel is the stage's.
-__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, uint32_t n, const WaveState* state, uint64_t* clock) {
+__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, uint32_t slots, uint32_t samples, const WaveState* state, uint64_t* clock) {
     const uint64_t now = device_nanoseconds();
-    record->add(counter ? counter->size() : n, state->depth, now - *clock);
+    record->add(counter ? counter->size() : slots * (samples ? samples : state->samples), state->depth, now - *clock);
     if (counter) counter->finish();
     *clock = now;
 }
@@ -64,20 +69,19 @@ __global__ inline void start_clock(uint64_t* clock) { *clock = device_nanosecond
 
 __global__ inline void set_depth(WaveState* state, uint32_t depth) { state->depth = depth; }
 
-__global__ inline void next_depth(WaveState* state, const QueueCounter* counter, cudaGraphConditionalHandle again) {
-    ++state->depth;
-    cudaGraphSetConditional(again, counter->count > 0);
-}
+__global__ inline void next_depth(WaveState* state) { ++state->depth; }
+
+__global__ inline void repeat_unless_empty(const QueueCounter* counter, cudaGraphConditionalHandle again) { cudaGraphSetConditional(again, counter->count > 0); }
 
 __global__ inline void set_wave(WaveState* state, WaveState value) { *state = value; }
 
 }  // namespace detail
 
-/// Executor of a schedule (integrators/path/schedule.h) whose result is a graph.
-class CudaGraphBuilder {
+/// Executor of a schedule (integrators/path/schedule.h).
+class CudaExecutor {
 public:
     /// `clock`: one value on the device.
-    CudaGraphBuilder(cudaStream_t stream, WaveState* state, StageRecord* records, uint64_t* clock) : stream_(stream), state_(state), records_(records), clock_(clock) {
+    CudaExecutor(cudaStream_t stream, WaveState* state, StageRecord* records, uint64_t* clock) : stream_(stream), state_(state), records_(records), clock_(clock) {
         int device = 0;
         cuda_check(cudaGetDevice(&device), "device");
         cuda_check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "multiprocessors");
@@ -85,10 +89,11 @@ public:
 
     /// Captures what `schedule(*this)` launches.
     template <class Schedule>
-    cudaGraphExec_t build(Schedule schedule) {
+    cudaGraphExec_t capture(Schedule schedule) {
         cuda_check(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), "begin of graph capture");
-        detail::start_clock<<<1, 1, 0, stream_>>>(clock_);
-        schedule(*this);
+        capturing_ = true;
+        launch(schedule);
+        capturing_ = false;
         cudaGraph_t graph = nullptr;
         cuda_check(cudaStreamEndCapture(stream_, &graph), "graph capture");
         cudaGraphExec_t exec = nullptr;
@@ -98,25 +103,47 @@ public:
         return exec;
     }
 
+    /// Launches kernel by kernel; the host reads the size of a queue wherever the schedule loops.
+    template <class Schedule>
+    void launch(Schedule schedule) {
+        detail::start_clock<<<1, 1, 0, stream_>>>(clock_);
+        schedule(*this);
+    }
+
     template <class Stage>
-    void run(StageId id, const Stage& stage, uint32_t n) {
-        detail::launch_fixed<<<blocks(detail::launch_fixed<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, n);
-        finish(id, nullptr, n);
+    void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
+        detail::launch_slots<<<blocks(detail::launch_slots<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, slots, samples, state_);
+        finish(id, nullptr, slots, samples);
     }
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
         detail::launch_queue<<<blocks(detail::launch_queue<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, queue.counter);
-        finish(id, queue.counter, 0);
+        finish(id, queue.counter);
     }
     template <class Stage, class Item>
     void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        detail::launch_trace<<<blocks(detail::launch_trace<Stage>, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, queue.counter, state_);
-        finish(id, queue.counter, 0);
+        detail::launch_trace<<<blocks(detail::launch_trace<Stage>, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, queue.counter);
+        finish(id, queue.counter);
     }
+    template <class Stage, class Item>
+    void trace_coherent(StageId id, const Stage& stage, const Queue<Item>& queue) {
+        detail::launch_coherent<<<blocks(detail::launch_coherent<Stage>, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, queue.counter);
+        finish(id, queue.counter);
+    }
+    void set_depth(uint32_t depth) { detail::set_depth<<<1, 1, 0, stream_>>>(state_, depth); }
+    void next_depth() { detail::next_depth<<<1, 1, 0, stream_>>>(state_); }
 
     template <class Item, class Body>
     void repeat_while(const Queue<Item>& queue, Body body) {
-        detail::set_depth<<<1, 1, 0, stream_>>>(state_, 1);
+        if (capturing_)
+            capture_loop(queue.counter, body);
+        else
+            while (size_of(queue.counter) > 0) body();
+    }
+
+private:
+    template <class Body>
+    void capture_loop(const QueueCounter* counter, Body body) {
         cudaStreamCaptureStatus status;
         cudaGraph_t graph = nullptr;
         const cudaGraphNode_t* dependencies = nullptr;
@@ -126,10 +153,11 @@ public:
 #else
         cuda_check(cudaStreamGetCaptureInfo_v2(stream_, &status, nullptr, &graph, &dependencies, &count), "graph capture");
 #endif
-        cuda_check(cudaGraphConditionalHandleCreate(&again_, graph, 1, cudaGraphCondAssignDefault), "conditional handle");
+        cudaGraphConditionalHandle again{};
+        cuda_check(cudaGraphConditionalHandleCreate(&again, graph, 1, cudaGraphCondAssignDefault), "conditional handle");
         cudaGraphNodeParams params = {};
         params.type = cudaGraphNodeTypeConditional;
-        params.conditional.handle = again_;
+        params.conditional.handle = again;
         params.conditional.type = cudaGraphCondTypeWhile;
         params.conditional.size = 1;
         cudaGraphNode_t node = nullptr;
@@ -144,19 +172,22 @@ public:
         const cudaStream_t outer = stream_;
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
         cuda_check(cudaStreamBeginCaptureToGraph(stream_, params.conditional.phGraph_out[0], nullptr, nullptr, 0, cudaStreamCaptureModeThreadLocal), "begin of loop capture");
-        loop_counter_ = queue.counter;
         body();
+        detail::repeat_unless_empty<<<1, 1, 0, stream_>>>(counter, again);
         cuda_check(cudaStreamEndCapture(stream_, nullptr), "loop capture");
         cuda_check(cudaStreamDestroy(stream_), "stream");
         stream_ = outer;
-        detail::set_depth<<<1, 1, 0, stream_>>>(state_, 0);
     }
-    void next_depth() { detail::next_depth<<<1, 1, 0, stream_>>>(state_, loop_counter_, again_); }
 
-private:
-    void finish(StageId id, QueueCounter* counter, uint32_t n) {
+    uint32_t size_of(const QueueCounter* counter) const {
+        QueueCounter c;
+        cuda_check(cudaMemcpyAsync(&c, counter, sizeof(c), cudaMemcpyDeviceToHost, stream_), "queue size");
+        cuda_check(cudaStreamSynchronize(stream_), "queue size");
+        return c.size();
+    }
+    void finish(StageId id, QueueCounter* counter, uint32_t slots = 0, uint32_t samples = 0) {
         cuda_check(cudaGetLastError(), kStageNames[uint32_t(id)]);
-        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, n, state_, clock_);
+        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, slots, samples, state_, clock_);
     }
     /// As many blocks as can be resident.
     template <class Kernel>
@@ -171,8 +202,7 @@ private:
     StageRecord* records_;
     uint64_t* clock_;
     int multiprocessors_ = 0;
-    cudaGraphConditionalHandle again_{};
-    const QueueCounter* loop_counter_ = nullptr;
+    bool capturing_ = false;
 };
 
 }  // namespace ambilux

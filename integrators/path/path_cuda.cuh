@@ -50,9 +50,9 @@ public:
         cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
 
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        const PathStages<F, CwbvhTracer> stages(device_scene_->view(), device_accel_->tracer(), policy_, wave_, queues_, {sum_.data(), sum_squares_.data()});
-        CudaGraphBuilder builder(stream_, queues_.state, queues_.records, clock_.data());
-        graph_ = builder.build([&](CudaGraphBuilder& exec) { run_path_wave(exec, stages); });
+        stages_.emplace(device_scene_->view(), device_accel_->tracer(), policy_, wave_, queues_, FilmPointers{sum_.data(), sum_squares_.data()});
+        executor_.emplace(stream_, queues_.state, queues_.records, clock_.data());
+        if (settings.graph) graph_ = executor_->capture([&](CudaExecutor& exec) { run_path_wave(exec, *stages_); });
         cuda_check(cudaDeviceSynchronize(), "preparation");
         build_seconds_ = seconds_since(start);
     }
@@ -72,7 +72,10 @@ public:
             for (uint32_t s = 0; s < pass; s += wave_.samples) {
                 for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles) {
                     detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{tile, first + done + s, std::min(wave_.samples, pass - s), 0});
-                    cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
+                    if (graph_)
+                        cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
+                    else
+                        executor_->launch([&](CudaExecutor& exec) { run_path_wave(exec, *stages_); });
                 }
             }
             cuda_check(cudaStreamSynchronize(stream_), "wave");
@@ -142,6 +145,8 @@ private:
     DeviceBuffer<uint64_t> clock_;
     PathMemory queues_{};
     cudaStream_t stream_ = nullptr;
+    std::optional<PathStages<F, CwbvhTracer>> stages_;
+    std::optional<CudaExecutor> executor_;
     cudaGraphExec_t graph_ = nullptr;
 };
 

@@ -5,14 +5,19 @@
 
 namespace ambilux {
 
-/// One wave. An executor has run(id, stage, n): stage(0) ... stage(n-1); run(id, stage, queue): over the queue's size where the queue lives, then empties it;
-/// trace(id, stage, queue): the same for stages that trace rays; next_depth(); and repeat_while(queue, body): body until the queue is found empty.
+/// One wave. An executor has
+/// - run_slots(id, stage, n): stage over n slots for each sample of the wave; with a last argument 1, over n slots once;
+/// - run(id, stage, queue): over the queue's size where the queue lives, then empties it;
+/// - trace(id, stage, queue): the same for rays in no order, trace_coherent for neighbouring rays that stay together;
+/// - set_depth(d), next_depth(), and repeat_while(queue, body): body until the queue is found empty.
 template <class Executor, Features F, class Tracer>
 void run_path_wave(Executor& exec, const PathStages<F, Tracer>& stages) {
     const PathMemory& m = stages.memory;
-    exec.run(StageId::generate, stages.generate, stages.wave.slot_count());
-    exec.repeat_while(m.rays, [&] {
-        exec.trace(StageId::extend, stages.extend, m.rays);
+    const uint32_t slots = stages.wave.tiles * kTilePixels;
+    exec.run_slots(StageId::generate, stages.generate, slots);
+    exec.set_depth(1);
+    exec.trace_coherent(StageId::extend, stages.extend, m.rays);
+    exec.repeat_while(m.hits, [&] {
         exec.run(StageId::shade, stages.shade, m.hits);
         if (stages.policy.count_hits) {
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
@@ -25,8 +30,10 @@ void run_path_wave(Executor& exec, const PathStages<F, Tracer>& stages) {
             exec.run(StageId::accumulate, stages.accumulate_shadows, m.shadow_contributions);
         }
         exec.next_depth();
+        exec.trace(StageId::extend, stages.extend, m.rays);
     });
-    exec.run(StageId::develop, stages.develop, stages.wave.tiles * kTilePixels);
+    exec.set_depth(0);
+    exec.run_slots(StageId::develop, stages.develop, slots, 1);
 }
 
 }  // namespace ambilux
