@@ -26,6 +26,7 @@ struct Connect {
         const SurfacePoint point = surface_at<F>(scene, c.prim, c.u, c.v);
         EmitterSample light;
         if (!sample_emitter_deferred<F>(scene, point.p, random_floats(key, emitter_block(depth)), light)) return;
+        if (!may_scatter(scene, point, -c.d, light.wi)) return;
         const Scattering s = make_scattering<F>(scene, point, -c.d);
         const Rgb f = scatter_eval<F>(s, light.wi, TransportMode::radiance);
         if (is_zero(f)) return;

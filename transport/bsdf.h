@@ -182,6 +182,11 @@ AMBILUX_HD bool bsdf_sample(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode
     return with_bsdf<F>(b, false, [&](const auto& bsdf) { return bsdf.sample(wi, u, mode, out); });
 }
 
+/// True if light can pass to the other side.
+AMBILUX_HD bool bsdf_transmits(BsdfType type) {
+    return type == BsdfType::dielectric || type == BsdfType::thin_dielectric || type == BsdfType::rough_dielectric;
+}
+
 /// True if there is a lobe that is not a delta, so that connecting to other vertices can give light.
 AMBILUX_HD bool bsdf_is_smooth(const Bsdf& b) {
     return b.type != BsdfType::conductor && b.type != BsdfType::dielectric && b.type != BsdfType::thin_dielectric;

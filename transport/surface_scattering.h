@@ -70,6 +70,14 @@ AMBILUX_HD bool sides_agree(const Scattering& s, Vec3f w, float cos_shading) {
     return (cos_geometric > 0.0f && cos_shading > 0.0f) || (cos_geometric < 0.0f && cos_shading < 0.0f);
 }
 
+/// False if no BSDF of the surface can send light from `wi_world` to `wo_world`, told from its type and the geometry alone: what does not transmit scatters to its own side only.
+AMBILUX_HD bool may_scatter(const SceneView& scene, const SurfacePoint& point, Vec3f wi_world, Vec3f wo_world) {
+    const float cos_wi = dot(point.ng, wi_world), cos_wo = dot(point.ng, wo_world);
+    if (cos_wi * cos_wo > 0.0f) return true;
+    const Material& material = scene.materials[scene.shapes[point.shape].material];
+    return bsdf_transmits(scene.bsdfs[material.two_sided != 0 && cos_wi < 0.0f ? material.back : material.front].type);
+}
+
 /// What a BSDF with shading normals is multiplied with in importance mode, |wi·ns|·|wo·ng| / (|wi·ng|·|wo·ns|), so that both modes
 /// describe one surface (Veach 1997, equations 5.19 and 5.20); 1 in radiance mode. Cosines are those with the shading normal.
 AMBILUX_HD float shading_normal_factor(const Scattering& s, Vec3f wo_world, float cos_wo, TransportMode mode) {

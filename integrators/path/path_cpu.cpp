@@ -20,8 +20,8 @@
 namespace ambilux {
 namespace {
 
-/// Paths of one wave: at about 350 bytes each, half of a core's second-level cache.
-constexpr uint32_t kCpuWaveSize = 2048;
+/// Paths of one wave: with the surfaces and texels that they meet, about 1 KiB each, they stay in a core's second-level cache from stage to stage.
+constexpr uint32_t kCpuWaveSize = 512;
 
 struct AlignedDelete {
     void operator()(std::byte* p) const { ::operator delete[](p, std::align_val_t(256)); }
