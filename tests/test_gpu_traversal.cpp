@@ -1,4 +1,4 @@
-// libs: ambilux_backends ambilux_scene ambilux_core
+// libs: ambilux_integrators ambilux_backends ambilux_scene ambilux_core
 // labels: gpu
 // Traversal on a CUDA device against the same traversal on the host: same rays, same hits (pitfall G12).
 #include <cmath>
@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "scene/accel/cwbvh.h"
 #include "tests/accel_scenes.h"
+#include "tests/render_scene.h"
 #include "tests/catch.h"
 
 using namespace ambilux;
@@ -221,7 +222,7 @@ TEST_CASE("On a device nothing is hit in an empty scene (G12)") {
 
 TEST_CASE("All kernels of bench rays give the same answers (G12)") {
     if (no_device()) return;
-    const Scene scene = load_mitsuba(std::string(AMBILUX_SOURCE_DIR) + "/scenes/cornell.xml");
+    const Scene scene = project_scene("cornell");
     const nlohmann::json json = bench_rays(scene, "cuda", 1);
     CHECK(json.at("device") == cuda_device_name());
     std::map<std::string, std::vector<double>> hit;
