@@ -12,7 +12,7 @@ namespace {
 const std::string kTests = "mitsuba-tests/tests/scenes/";
 
 /// The rule of Mitsuba's own render tests. It takes the variance from the reference, so the sampling has to be Mitsuba's as well: emitters are chosen
-/// uniformly and weighted by the power heuristic. With others the image is as right, but its variance is another: test_spot has 3.4 times as much under the
+/// uniformly and weighted by the power heuristic. With others the image is as right, but its variance is another: test_spot has 2.7 times as much under the
 /// balance heuristic.
 void require_mitsuba_test(const std::string& folder, const std::string& name, const std::string& integrator) {
     const auto file = published_file(kTests + folder + "/" + name + "_" + integrator + ".xml");
