@@ -3,6 +3,7 @@
 
 #include "stages/path_items.h"
 #include "stages/stage.h"
+#include "transport/emitter.h"
 
 namespace ambilux {
 
@@ -20,7 +21,7 @@ struct Occlude {
 
     AMBILUX_HD bool fetch(uint32_t i, Ray& ray) const {
         const ShadowItem item = shadows.load(i);
-        ray = {item.o, item.tmax, item.d, item.alpha_seed};
+        ray = {item.o, fabsf(item.tmax), item.d, item.alpha_seed};
         if (is_finite(item.o) && is_finite(item.d)) return true;
         count_one(&record->nan);
         return false;
@@ -29,7 +30,14 @@ struct Occlude {
     AMBILUX_HD void finish(uint32_t i, bool blocked) const {
         if (blocked) return;
         const ShadowItem item = shadows.load(i);
-        contributions.push({item.value, item.path});
+        Rgb value = item.value;
+        if constexpr (F.has_environment()) {
+            if (item.tmax == kTowardsEnvironment) {
+                value *= environment_radiance<F>(scene, item.d);
+                if (!is_light(value, record)) return;
+            }
+        }
+        contributions.push({value, item.path});
     }
 
     AMBILUX_HD void operator()(uint32_t i) const {

@@ -65,13 +65,16 @@ struct HitCandidate {
     uint32_t pad[2];
 };
 
+/// `tmax` of a ray towards the environment: its value lacks the radiance, which is looked up only if the way is free.
+constexpr float kTowardsEnvironment = -kInfinity;
+
 /// Light sampled at an emitter, before it is weighted, and the ray that must be free.
 struct ConnectCandidate {
     Rgb value;
     uint32_t path;
     float pdf_this, pdf_other;  ///< densities of emitter sampling and of BSDF sampling; pdf_other is 0 when only emitter sampling can find this light
     uint32_t alpha_seed;
-    float tmax;
+    float tmax;  ///< or kTowardsEnvironment
     Vec3f o;
     uint32_t pad0;
     Vec3f d;
@@ -83,7 +86,7 @@ struct ShadowItem {
     Rgb value;
     uint32_t path;
     Vec3f o;
-    float tmax;
+    float tmax;  ///< or kTowardsEnvironment
     Vec3f d;
     uint32_t alpha_seed;
 };

@@ -1,12 +1,11 @@
 // What a path tracer does where, decided once by the host.
 #pragma once
 
-#include <cstdint>
+#include "transport/mis.h"
 
 namespace ambilux {
 
 enum class Estimator : uint32_t { naive, nee, mis };
-enum class MisHeuristic : uint32_t { balance, power };
 
 struct PathPolicy {
     Estimator estimator;

@@ -59,6 +59,12 @@ AMBILUX_HD Rgb emitter_sample_radiance(const SceneView& view, const EmitterSampl
     return s.radiance;
 }
 
+/// True for the emitter that surrounds the scene.
+template <Features F>
+AMBILUX_HD bool is_environment(const SceneView& view, uint32_t emitter) {
+    return F.has_environment() && emitter == view.environment;
+}
+
 /// Picks an emitter by the scene's pick probabilities and samples its light towards `reference_p` (world space). `u` in [0,1)^4: x picks the
 /// emitter, y and z place the sample on it, w picks the primitive of a mesh or the row of an environment map. False when the sample carries no light
 /// (nothing to add, still one sample); then `s` is not to be read.

@@ -84,6 +84,7 @@ template <Features F>
 AMBILUX_HD bool area_sample_sphere(const SceneView& view, const Emitter& emitter, uint32_t prim, const SphereCone& cone,
                                    Vec2f u, EmitterSample& s) {
     const Quadric& sphere = view.quadric(prim);
+    s.prim = prim;
     const Vec3f local = square_to_cone(u, cone.one_minus_cos_max);
     const Frame frame = frame_from_normal(cone.axis);
     const float sin2 = local.x * local.x + local.y * local.y, sin_theta = sqrtf(sin2), cos_theta = local.z;
@@ -124,6 +125,7 @@ AMBILUX_HD bool area_sample_direct(const SceneView& view, const Emitter& emitter
     const float d2 = length_squared(to_light);
     if (!(d2 > 0.0f)) return false;
     s.p = point.p;
+    s.prim = point.prim;
     s.p_error = point.p_error;
     s.ng = point.ng;
     s.distance = sqrtf(d2);

@@ -21,6 +21,7 @@ struct EmissionSample {
     float cos_theta;   ///< cosine between ng and d; 1 where there is no surface
     float pick;        ///< probability of this emitter
     uint32_t emitter;
+    uint32_t prim;     ///< area: the primitive that p lies on; otherwise kNone
     bool delta_position, delta_direction, infinite;
 };
 
@@ -67,6 +68,7 @@ AMBILUX_HD bool sample_emission(const SceneView& view, Vec4f u_position, Vec2f u
     s.delta_position = e.type == EmitterType::point || e.type == EmitterType::spot;
     s.delta_direction = e.type == EmitterType::directional;
     s.cos_theta = 1.0f;
+    s.prim = kNone;
     s.p_error = {0, 0, 0};
     s.p = e.position;
     s.pdf_pos = 1.0f;
@@ -77,6 +79,7 @@ AMBILUX_HD bool sample_emission(const SceneView& view, Vec4f u_position, Vec2f u
                 const SurfacePoint point = area_sample_point<F>(view, e, u_position.w, u);
                 const Vec3f local = square_to_cosine_hemisphere(u_direction);
                 s.p = point.p;
+                s.prim = point.prim;
                 s.p_error = point.p_error;
                 s.ng = point.ng;
                 s.d = frame_from_normal(point.ng).to_world(local);

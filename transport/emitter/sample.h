@@ -18,6 +18,7 @@ struct EmitterSample {
     float pdf_sa;    ///< density of wi per solid angle times the pick probability; for delta lights the pick probability alone
     bool delta;      ///< no other strategy can find this light: point, spot, directional
     uint32_t emitter;
+    uint32_t prim;   ///< area: the primitive that p lies on; other types leave it alone
 };
 
 }  // namespace ambilux

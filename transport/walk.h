@@ -1,0 +1,211 @@
+// Random walks from the camera and from emitters, vertex by vertex, with the sums that weight connections between them. Every bidirectional integrator and variant is
+// made of these functions.
+#pragma once
+
+#include "core/rng.h"
+#include "transport/bidirectional.h"
+#include "transport/surface_scattering.h"
+
+namespace ambilux {
+
+/// A ray of a walk and what was gathered before it.
+struct Walk {
+    Vec3f o, d;
+    Rgb throughput;    ///< eye: importance; light: flux. Everything up to and with the scattering into d
+    MisSums sums;      ///< of the ray; unused on the first ray of a light walk
+    LightStart start;  ///< first ray of a light walk
+    float start_distance;  ///< first ray of an eye walk: from the camera to o
+    uint32_t depth;    ///< segments, this one included
+    float eta_scale;
+    bool delta;        ///< the last scattering was a delta (true for first rays)
+};
+
+/// A surface point met by a walk.
+struct WalkVertex {
+    SurfacePoint point;
+    Scattering scattering;
+    MisSums sums;
+    bool first;  ///< met by the first ray of its walk
+};
+
+// ---- starting ----
+
+/// First ray of an eye walk.
+AMBILUX_HD Walk start_eye_walk(const SceneView& scene, const BidirectionalMis& mis, const CameraSample& c) {
+    const Vec3f axis = scene.sensor.to_world.vector({0.0f, 0.0f, 1.0f});
+    const float scale = length(axis), cos_camera = dot(c.d, axis) / scale;
+    Walk w{};
+    w.o = c.o;
+    w.d = c.d;
+    w.throughput = {1.0f, 1.0f, 1.0f};
+    w.sums = camera_sums(mis, scene.sensor, cos_camera);
+    w.start_distance = camera_delta_direction(scene.sensor) ? 0.0f : scene.sensor.near_clip * scale / cos_camera;
+    w.depth = 1;
+    w.eta_scale = 1.0f;
+    w.delta = true;
+    return w;
+}
+
+/// First ray of a light walk.
+AMBILUX_HD Walk start_light_walk(const EmissionSample& e) {
+    Walk w{};
+    w.o = e.prim == kNone ? e.p : offset_ray_origin(e.p, e.p_error, e.ng, e.d);
+    w.d = e.d;
+    const float pdf = e.pick * e.pdf_pos * e.pdf_dir;
+    w.throughput = e.radiance * (e.cos_theta / pdf);
+    w.start = {1.0f / pdf, e.cos_theta, e.prim, e.emitter};
+    w.depth = 1;
+    w.eta_scale = 1.0f;
+    w.delta = true;
+    return w;
+}
+
+// ---- vertices ----
+
+/// The vertex that an eye walk meets at (prim,u,v).
+template <Features F>
+AMBILUX_HD WalkVertex eye_vertex(const SceneView& scene, const BidirectionalMis& mis, const Walk& w, uint32_t prim, float u, float v) {
+    WalkVertex z;
+    z.point = surface_at<F>(scene, prim, u, v);
+    z.scattering = make_scattering<F>(scene, z.point, -w.d);
+    z.first = w.depth == 1;
+    float d2 = length_squared(z.point.p - w.o);
+    if (z.first) d2 = sqr(sqrtf(d2) + w.start_distance);
+    z.sums = sums_at_hit(mis, w.sums, d2, fabsf(dot(z.point.ng, w.d)), z.first && camera_delta_direction(scene.sensor));
+    return z;
+}
+
+/// The vertex that a light walk meets at (prim,u,v).
+template <Features F>
+AMBILUX_HD WalkVertex light_vertex(const SceneView& scene, const BidirectionalMis& mis, const Walk& w, uint32_t prim, float u, float v) {
+    WalkVertex y;
+    y.point = surface_at<F>(scene, prim, u, v);
+    y.scattering = make_scattering<F>(scene, y.point, -w.d);
+    y.first = w.depth == 1;
+    const float cos_in = fabsf(dot(y.point.ng, w.d));
+    y.sums = y.first ? light_sums_at_first_hit<F>(scene, mis, w.start, w.o, w.d, y.point.p, cos_in)
+                     : sums_at_hit(mis, w.sums, length_squared(y.point.p - w.o), cos_in, false);
+    return y;
+}
+
+// ---- going on ----
+
+/// Russian roulette of a walk; u uniform. It enters no density: every strategy's walks are thinned and repaid alike, so that weights, which depend on the path
+/// alone, still sum to one.
+AMBILUX_HD bool survives(Walk& w, float u) {
+    const float survival = fminf(max_component(w.throughput) * sqr(w.eta_scale), 0.95f);
+    if (!(u < survival)) return false;
+    w.throughput = w.throughput / survival;
+    return true;
+}
+
+/// The next ray of the walk `w` that met `vertex`; u.xyz scatter, u.w is for Russian roulette from `rr_depth` segments on. False when the walk ends.
+template <Features F>
+AMBILUX_HD bool scatter_walk(const BidirectionalMis& mis, const WalkVertex& vertex, Vec4f u, TransportMode mode, uint32_t rr_depth, Walk& w) {
+    ScatterSample s;
+    if (!scatter_sample<F>(vertex.scattering, {u.x, u.y, u.z}, mode, s)) return false;
+    const Rgb throughput = w.throughput * s.weight;
+    if (is_zero(throughput)) return false;
+    const bool delta = s.flags & kScatterDelta;
+    const float reverse = delta ? 0.0f : scatter_pdf_reverse<F>(vertex.scattering, s.wo);
+    w.sums = sums_after_scatter(mis, vertex.sums, vertex.first, delta, s.pdf_sa, reverse, fabsf(dot(vertex.point.ng, s.wo)));
+    w.o = offset_ray_origin(vertex.point.p, vertex.point.p_error, vertex.point.ng, s.wo);
+    w.d = s.wo;
+    w.throughput = throughput;
+    w.eta_scale *= mode == TransportMode::radiance ? s.eta : 1.0f;
+    w.delta = delta;
+    const uint32_t met = w.depth++;
+    return met < rr_depth || survives(w, u.w);
+}
+
+// ---- contributions of strategies: value before visibility, and the sum of the other strategies' densities over this one's ----
+
+/// A contribution and the ray that must be free for it.
+struct WalkConnection {
+    Rgb value;
+    float others;  ///< weight = 1 / (1 + others)
+    Vec3f o, d;
+    float tmax;
+};
+
+/// Sets the ray from `from` to the point `to`, both ends moved off their surfaces. False if nothing lies between them.
+AMBILUX_HD bool set_segment(WalkConnection& c, const SurfacePoint& from, Vec3f wi, Vec3f to, Vec3f to_error, Vec3f to_ng) {
+    c.o = offset_ray_origin(from.p, from.p_error, from.ng, wi);
+    const Vec3f segment = offset_ray_origin(to, to_error, to_ng, -wi) - c.o;
+    const float distance = length(segment);
+    if (!(distance > 0.0f)) return false;
+    c.d = segment / distance;
+    c.tmax = distance * (1.0f - gamma_bound(8));
+    return true;
+}
+
+/// s = 1: vertex z of an eye walk with throughput `throughput` samples an emitter with `u`. False when that gives nothing.
+template <Features F>
+AMBILUX_HD bool connect_next_event(const SceneView& scene, const BidirectionalMis& mis, const WalkVertex& z, Rgb throughput, Vec4f u, WalkConnection& c) {
+    EmitterSample light;
+    if (!sample_emitter_deferred<F>(scene, z.point.p, u, light)) return false;
+    const Rgb f = scatter_eval<F>(z.scattering, light.wi, TransportMode::radiance);
+    if (is_zero(f)) return false;
+    c.value = throughput * f * (emitter_sample_radiance<F>(scene, light) / light.pdf_sa);
+    c.others = others_of_next_event<F>(scene, mis, z.sums, z.first, light, scatter_pdf<F>(z.scattering, light.wi), scatter_pdf_reverse<F>(z.scattering, light.wi),
+                                       fabsf(dot(z.point.ng, light.wi)));
+    if (light.distance < kInfinity) return set_segment(c, z.point, light.wi, light.p, light.p_error, light.ng);
+    c.o = offset_ray_origin(z.point.p, z.point.p_error, z.point.ng, light.wi);
+    c.d = light.wi;
+    c.tmax = kInfinity;
+    return true;
+}
+
+/// s >= 2, t >= 2: vertex y of a light walk and vertex z of an eye walk.
+template <Features F>
+AMBILUX_HD bool connect_vertices(const BidirectionalMis& mis, const WalkVertex& y, Rgb y_throughput, const WalkVertex& z, Rgb z_throughput, WalkConnection& c) {
+    const Vec3f to_y = y.point.p - z.point.p;
+    const float d2 = length_squared(to_y);
+    if (!(d2 > 0.0f)) return false;
+    const Vec3f w = to_y * (1.0f / sqrtf(d2));
+    const Rgb f_z = scatter_eval<F>(z.scattering, w, TransportMode::radiance);
+    if (is_zero(f_z)) return false;
+    const Rgb f_y = scatter_eval<F>(y.scattering, -w, TransportMode::importance);
+    if (is_zero(f_y)) return false;
+    c.value = y_throughput * f_y * f_z * z_throughput * (1.0f / d2);
+    const float cos_y = fabsf(dot(y.point.ng, w)), cos_z = fabsf(dot(z.point.ng, w));
+    c.others = others_behind(mis, y.sums, y.first, scatter_pdf<F>(z.scattering, w) * cos_y / d2, scatter_pdf_reverse<F>(y.scattering, -w)) +
+               others_behind(mis, z.sums, z.first, scatter_pdf<F>(y.scattering, -w) * cos_z / d2, scatter_pdf_reverse<F>(z.scattering, w));
+    return set_segment(c, z.point, w, y.point.p, y.point.p_error, y.point.ng);
+}
+
+/// t = 1: vertex y of a light walk and the camera. `value` is what the light walk adds to a pixel where the filter has value 1 at `film_position`, over the number of
+/// light walks per pixel's sample.
+template <Features F>
+AMBILUX_HD bool connect_camera(const SceneView& scene, const BidirectionalMis& mis, const WalkVertex& y, Rgb throughput, Vec2f lens_u, WalkConnection& c, Vec2f& film_position) {
+    CameraConnection camera;
+    if (!connect_to_camera(scene.sensor, y.point.p, lens_u, camera)) return false;
+    const Rgb f = scatter_eval<F>(y.scattering, camera.wi, TransportMode::importance);
+    if (is_zero(f)) return false;
+    c.value = throughput * f * (camera.weight / mis.light_paths);
+    c.others = others_of_camera(scene, mis, y.sums, y.first, camera, fabsf(dot(y.point.ng, camera.wi)), scatter_pdf_reverse<F>(y.scattering, camera.wi));
+    film_position = camera.film_position;
+    c.o = offset_ray_origin(y.point.p, y.point.p_error, y.point.ng, camera.wi);
+    c.d = camera.wi;
+    c.tmax = camera.distance * (1.0f - gamma_bound(8));
+    return c.tmax > 0.0f;
+}
+
+/// (1,1): the start of a light walk on an area emitter, seen by the camera. No other emitter has it: deltas are seen by nobody and the environment is left to eye walks.
+template <Features F>
+AMBILUX_HD bool connect_visible_light(const SceneView& scene, const BidirectionalMis& mis, const EmissionSample& e, Vec2f lens_u, WalkConnection& c, Vec2f& film_position) {
+    if (e.prim == kNone) return false;
+    CameraConnection camera;
+    if (!connect_to_camera(scene.sensor, e.p, lens_u, camera)) return false;
+    const float cos_light = dot(e.ng, camera.wi), pdf_pos = e.pick * e.pdf_pos;
+    if (!(cos_light > 0.0f)) return false;
+    c.value = e.radiance * (cos_light * camera.weight / (pdf_pos * mis.light_paths));
+    c.others = others_of_visible_light(scene, mis, camera, cos_light, pdf_pos);
+    film_position = camera.film_position;
+    c.o = offset_ray_origin(e.p, e.p_error, e.ng, camera.wi);
+    c.d = camera.wi;
+    c.tmax = camera.distance * (1.0f - gamma_bound(8));
+    return c.tmax > 0.0f;
+}
+
+}  // namespace ambilux
