@@ -89,7 +89,7 @@ void add_bench(CLI::App& app, Run& run) {
     auto r = std::make_shared<Options>();
     CLI::App& rays_command = *command.add_subcommand("rays", "Ray traversal: primary, bounced and shadow rays of a scene");
     r->scene.add_to(rays_command);
-    rays_command.add_option("--backend", r->backend, "auto, cpu or cuda")->capture_default_str();
+    rays_command.add_option("--backend", r->backend, "auto, cpu, cpu-cwbvh (the traversal of cuda on the CPU) or cuda")->capture_default_str();
     rays_command.add_option("--repetitions", r->repetitions, "Timed runs of each batch; the median counts")->capture_default_str();
     rays_command.add_option("--json", r->json, "Write the result to a file, or - for standard output");
     rays_command.callback([r, &run] { run = [r] { return rays(*r); }; });

@@ -14,7 +14,7 @@ struct ParamRgb {
     int32_t texture = -1;
 };
 
-/// Scalar parameter: `value`, or the texture's first channel times `value`.
+/// Scalar parameter: `value`, or the luminance of the texture times `value`.
 struct ParamFloat {
     float value = 0;
     int32_t texture = -1;

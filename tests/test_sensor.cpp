@@ -130,7 +130,7 @@ TEST_CASE("B21: projecting a point of a camera ray gives the film position back"
             const Vec2f film = {u.x * 30, u.y * 20}, lens_u = {u.z, u.w};
             const CameraSample ray = sample_camera_ray(s, film, lens_u);
             const Vec3f p = ray.o + ray.d * (w.x * w.x * ray.tmax * 0.99f + 1e-3f);
-            Vec2f back;
+            Vec2f back = {};
             REQUIRE(project_to_film(s, p, lens_point(s, lens_u), back));
             REQUIRE(std::fabs(back.x - film.x) < 1e-3f);
             REQUIRE(std::fabs(back.y - film.y) < 1e-3f);
