@@ -1,12 +1,10 @@
 // The rays that `bench rays` traces: primary, bounced and shadow rays of the paths of one image.
 #pragma once
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <string>
 #include <vector>
 
+#include "core/parallel.h"
 #include "core/rng.h"
 #include "core/sampling.h"
 #include "scene/accel/primitive_bounds.h"
@@ -27,9 +25,7 @@ namespace detail {
 /// Calls f(i) for 0 <= i < count on all threads.
 template <class Function>
 void for_all(size_t count, Function f) {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, count, 1024), [&](const tbb::blocked_range<size_t>& range) {
-        for (size_t i = range.begin(); i != range.end(); ++i) f(i);
-    });
+    parallel_for(count, f, size_t(1024));
 }
 
 /// Every second bit of a Morton code, gathered.

@@ -1,5 +1,6 @@
 #include "backends/cuda_device.h"
 #include "core/error.h"
+#include "integrators/bidirectional/bidirectional.h"
 #include "integrators/path/path.h"
 
 namespace ambilux {
@@ -15,6 +16,7 @@ std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings
     apply_setting(checked, "accel", settings.accel);
     const bool cuda = settings.backend == "cuda" || (settings.backend == "auto" && settings.accel != "embree" && cuda_available());
     if (cuda && settings.accel == "embree") throw Error(ExitCode::usage, "accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
+    if (settings.integrator != "path") return cuda ? make_bidirectional_cuda(scene, settings) : make_bidirectional_cpu(scene, settings);
     if (cuda) return make_path_cuda(scene, settings);
     return make_path_cpu(scene, settings);
 }

@@ -11,6 +11,7 @@
 #include "film/moments.h"
 #include "scene/scene.h"
 #include "stages/path_policy.h"
+#include "transport/bidirectional.h"
 
 namespace ambilux {
 
@@ -21,6 +22,7 @@ struct RenderSettings {
     std::string backend = "auto";        ///< auto, cpu, cuda
     Estimator estimator = Estimator::mis;
     MisHeuristic heuristic = MisHeuristic::balance;
+    uint32_t strategies = kAllStrategies;  ///< bdpt: StrategyBits
     int max_depth = -1;                  ///< segments of a path; -1 is unbounded
     int rr_depth = 5;                    ///< Russian roulette starts at this many segments; a value < 0 turns it off
     uint64_t seed = 0;

@@ -31,13 +31,29 @@ Integer integer(const std::string& key, const std::string& value, Integer lowest
     return result;
 }
 
+/// Names joined by '+', such as "hits+next_event".
+uint32_t strategies(const std::string& key, const std::string& value) {
+    if (value == "all") return kAllStrategies;
+    const std::vector<std::string> names = {"hits", "next_event", "connections", "light"};
+    uint32_t bits = 0;
+    for (size_t start = 0; start <= value.size();) {
+        const size_t end = std::min(value.find('+', start), value.size());
+        const std::string name = value.substr(start, end - start);
+        const auto at = std::find(names.begin(), names.end(), name);
+        if (at == names.end()) refuse(key, value, fmt::format("'{}' is none of {}; join them with '+', or write all", name, fmt::join(names, ", ")));
+        bits |= 1u << (at - names.begin());
+        start = end + 1;
+    }
+    return bits;
+}
+
 bool boolean(const std::string& key, const std::string& value) { return choose(key, value, {"false", "true"}) == 1; }
 
 }  // namespace
 
 void apply_setting(RenderSettings& s, const std::string& key, const std::string& value) {
     if (key == "integrator")
-        s.integrator = (choose(key, value, {"path"}), value);
+        s.integrator = (choose(key, value, {"path", "light", "bdpt"}), value);
     else if (key == "variant")
         s.variant = (choose(key, value, {"wavefront"}), value);
     else if (key == "backend")
@@ -46,6 +62,8 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.estimator = Estimator(choose(key, value, {"naive", "nee", "mis"}));
     else if (key == "heuristic")
         s.heuristic = MisHeuristic(choose(key, value, {"balance", "power"}));
+    else if (key == "strategies")
+        s.strategies = strategies(key, value);
     else if (key == "max_depth")
         s.max_depth = integer(key, value, -1, (1 << 14) - 2);
     else if (key == "rr_depth")
@@ -64,7 +82,7 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.graph = boolean(key, value);
     else
         throw Error(ExitCode::usage,
-                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, max_depth, rr_depth, seed, accel, wave_size, specialise, deterministic, graph", key));
+                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, max_depth, rr_depth, seed, accel, wave_size, specialise, deterministic, graph", key));
 }
 
 }  // namespace ambilux

@@ -71,10 +71,11 @@ struct Queue {
         memcpy(lanes, &item, sizeof(Item));
         for (uint32_t k = 0; k < kLanes; ++k) base[size_t(k) * capacity + i] = lanes[k];
     }
-    /// Appends. Past the capacity the item is lost and counted (QueueCounter::overflow).
-    AMBILUX_HD void push(const Item& item) const {
+    /// Appends and returns the place. Past the capacity the item is lost and counted (QueueCounter::overflow).
+    AMBILUX_HD uint32_t push(const Item& item) const {
         const uint32_t i = take_place(&counter->count);
         if (i < capacity) store(i, item);
+        return i;
     }
 };
 

@@ -6,10 +6,27 @@
 namespace ambilux {
 
 /// Kernels of a wave, in the order in which they first run.
-enum class StageId : uint32_t { generate = 0, extend, shade, connect, mis_weight, occlude, accumulate, develop, count };
+enum class StageId : uint32_t {
+    light_generate = 0,
+    light_extend,
+    light_shade,
+    connect_camera,
+    generate,
+    extend,
+    shade,
+    connect,
+    connect_vertices,
+    mis_weight,
+    occlude,
+    accumulate,
+    splat,
+    develop,
+    count
+};
 
 constexpr uint32_t kStageCount = uint32_t(StageId::count);
-constexpr const char* kStageNames[kStageCount] = {"generate", "extend", "shade", "connect", "mis_weight", "occlude", "accumulate", "develop"};
+constexpr const char* kStageNames[kStageCount] = {"light_generate", "light_extend", "light_shade", "connect_camera", "generate", "extend", "shade",
+                                                   "connect", "connect_vertices", "mis_weight", "occlude", "accumulate", "splat", "develop"};
 
 /// Items are counted for depths 0 ... kTrackedDepths-1; the last entry gathers all deeper ones.
 constexpr uint32_t kTrackedDepths = 64;

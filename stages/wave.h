@@ -15,6 +15,8 @@ struct WaveState {
     uint32_t first_sample;  ///< of this wave
     uint32_t samples;       ///< of each pixel in this wave, at most Wave::samples
     uint32_t depth;         ///< segments of the paths in flight
+    uint32_t failed;        ///< a wave ran out of memory: it and all after it do nothing until the host has made room
+    uint32_t done;          ///< waves that did not fail
 };
 
 /// What a slot stands for.
@@ -50,8 +52,8 @@ struct Wave {
         return p;
     }
 
-    AMBILUX_HD RngKey key(const PathSlot& p) const { return {seed, p.pixel, p.sample, Stream::eye}; }
-    AMBILUX_HD RngKey key(uint32_t slot) const { return key(locate(slot)); }
+    AMBILUX_HD RngKey key(const PathSlot& p, Stream stream = Stream::eye) const { return {seed, p.pixel, p.sample, stream}; }
+    AMBILUX_HD RngKey key(uint32_t slot, Stream stream = Stream::eye) const { return key(locate(slot), stream); }
 };
 
 /// Blocks of random numbers of an eye walk: 0 is the camera's; a vertex at `depth` >= 1 has one to scatter (and for Russian roulette) and one to sample emitters.
@@ -59,10 +61,15 @@ constexpr uint32_t kCameraBlock = 0;
 AMBILUX_HD uint32_t scatter_block(uint32_t depth) { return 2 * depth - 1; }
 AMBILUX_HD uint32_t emitter_block(uint32_t depth) { return 2 * depth; }
 
-/// Seed of the decisions whether surfaces of partial opacity let a ray pass: another one for every ray. `shadow`: rays towards emitters.
+/// Blocks of a light walk: 0 and 1 are the emitter's (place; direction, and the lens that sees it); a vertex has one to scatter and one for the lens.
+constexpr uint32_t kEmissionBlock = 0;
+AMBILUX_HD uint32_t light_scatter_block(uint32_t depth) { return 2 * depth; }
+AMBILUX_HD uint32_t lens_block(uint32_t depth) { return 2 * depth + 1; }
+
+/// Seed of the decisions whether surfaces of partial opacity let a ray pass: another one for every ray. `shadow`: rays of connections.
 AMBILUX_HD uint32_t alpha_seed(const RngKey& key, uint32_t depth, bool shadow) {
     const uint32_t which = 2 * depth + (shadow ? 1 : 0);
-    return philox4x32({key.index, key.sample, which, 0x616c7068u}, uint32_t(key.seed), uint32_t(key.seed >> 32)).x;
+    return philox4x32({key.index, key.sample, which, 0x616c7068u + uint32_t(key.stream)}, uint32_t(key.seed), uint32_t(key.seed >> 32)).x;
 }
 
 }  // namespace ambilux

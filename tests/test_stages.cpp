@@ -50,7 +50,7 @@ struct Bench {
         Layout layout(start);
         memory = lay_out(layout, wave.slot_count(), policy);
         for (size_t q = 0; q < layout.queue_capacities().size(); ++q) memory.counters[q].capacity = layout.queue_capacities()[q];
-        *memory.state = {0, 0, samples, 1};
+        *memory.state = {0, 0, samples, 1, 0, 0};
         sum.resize(size_t(wave.width) * wave.height * 3);
         sum_squares.resize(sum.size());
     }

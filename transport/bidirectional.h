@@ -110,13 +110,15 @@ AMBILUX_HD MisSums light_sums_at_first_hit(const SceneView& scene, const Bidirec
 // ---- sums of the other strategies; the weight is 1 / (1 + sum) ----
 
 /// s = 0: an eye ray of `depth` segments from `o` along unit `d` with sums `ray` (not those at the hit) meets area emitter `emitter` at `light`.
+/// `start_distance`: from the camera to o on a first ray.
 template <Features F>
-AMBILUX_HD float others_of_hit(const SceneView& scene, const BidirectionalMis& mis, MisSums ray, uint32_t depth, uint32_t emitter, Vec3f o, Vec3f d, const SurfacePoint& light) {
-    const float cos_light = -dot(light.ng, d), d2 = length_squared(light.p - o);
+AMBILUX_HD float others_of_hit(const SceneView& scene, const BidirectionalMis& mis, MisSums ray, uint32_t depth, uint32_t emitter, Vec3f o, Vec3f d, float start_distance,
+                                const SurfacePoint& light) {
+    const float cos_light = -dot(light.ng, d);
     const float pdf_pos = scene.emitters[emitter].pick_probability * pdf_emission_position<F>(scene, emitter, light.prim);
     // The other strategy of a path of one segment is (1,1): a light vertex seen by the camera.
     if (depth == 1) {
-        const MisSums s = sums_at_hit(mis, ray, d2, cos_light, camera_delta_direction(scene.sensor));
+        const MisSums s = sums_at_hit(mis, ray, sqr(length(light.p - o) + start_distance), cos_light, camera_delta_direction(scene.sensor));
         return s.dvcm * mis.term(pdf_pos);
     }
     const float next_event = mis.masked(kNextEventStrategies, mis.term(pdf_emitter_direct<F>(scene, emitter, o, d, light)));

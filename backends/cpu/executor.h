@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "queues/queue.h"
+#include "stages/settle.h"
 #include "stages/stage.h"
 #include "stages/wave.h"
 
@@ -41,6 +42,14 @@ public:
     template <class Item, class Body>
     void repeat_while(const Queue<Item>& queue, Body body) {
         while (queue.counter->count > 0) body();
+    }
+    template <class A, class B>
+    void settle(const Queue<A>& a, const Queue<B>& b) {
+        ambilux::settle(*state_, *a.counter, *b.counter);
+    }
+    template <class Item>
+    void clear(const Queue<Item>& queue) {
+        queue.counter->finish();
     }
     void set_depth(uint32_t depth) { state_->depth = depth; }
     void next_depth() { ++state_->depth; }

@@ -4,9 +4,13 @@
 
 #include <cuda_runtime.h>
 
+#include <utility>
+#include <vector>
+
 #include "backends/cuda/device_memory.h"
 #include "backends/cuda/trace_kernels.cuh"
 #include "queues/queue.h"
+#include "stages/settle.h"
 #include "stages/stage.h"
 #include "stages/wave.h"
 
@@ -73,7 +77,21 @@ __global__ inline void next_depth(WaveState* state) { ++state->depth; }
 
 __global__ inline void repeat_unless_empty(const QueueCounter* counter, cudaGraphConditionalHandle again) { cudaGraphSetConditional(again, counter->count > 0); }
 
-__global__ inline void set_wave(WaveState* state, WaveState value) { *state = value; }
+/// A failed wave stays failed, and those after it do nothing.
+__global__ inline void set_wave(WaveState* state, WaveState value) {
+    value.failed = state->failed;
+    value.done = state->done;
+    if (value.failed) value.samples = 0;
+    *state = value;
+}
+
+__global__ inline void settle_queues(WaveState* state, QueueCounter* a, QueueCounter* b) { settle(*state, *a, *b); }
+
+__global__ inline void clear_queue(QueueCounter* counter) { counter->finish(); }
+
+__global__ inline void finish_wave(WaveState* state) {
+    if (!state->failed) ++state->done;
+}
 
 }  // namespace detail
 
@@ -133,6 +151,16 @@ public:
     void set_depth(uint32_t depth) { detail::set_depth<<<1, 1, 0, stream_>>>(state_, depth); }
     void next_depth() { detail::next_depth<<<1, 1, 0, stream_>>>(state_); }
 
+    template <class A, class B>
+    void settle(const Queue<A>& a, const Queue<B>& b) {
+        detail::settle_queues<<<1, 1, 0, stream_>>>(state_, a.counter, b.counter);
+    }
+    template <class Item>
+    void clear(const Queue<Item>& queue) {
+        detail::clear_queue<<<1, 1, 0, stream_>>>(queue.counter);
+    }
+    void finish_wave() { detail::finish_wave<<<1, 1, 0, stream_>>>(state_); }
+
     template <class Item, class Body>
     void repeat_while(const Queue<Item>& queue, Body body) {
         if (capturing_)
@@ -144,17 +172,12 @@ public:
 private:
     template <class Body>
     void capture_loop(const QueueCounter* counter, Body body) {
-        cudaStreamCaptureStatus status;
-        cudaGraph_t graph = nullptr;
-        const cudaGraphNode_t* dependencies = nullptr;
-        size_t count = 0;
-#if CUDART_VERSION >= 13000
-        cuda_check(cudaStreamGetCaptureInfo(stream_, &status, nullptr, &graph, &dependencies, nullptr, &count), "graph capture");
-#else
-        cuda_check(cudaStreamGetCaptureInfo_v2(stream_, &status, nullptr, &graph, &dependencies, &count), "graph capture");
-#endif
+        const auto [graph, unused] = captured();
         cudaGraphConditionalHandle again{};
-        cuda_check(cudaGraphConditionalHandleCreate(&again, graph, 1, cudaGraphCondAssignDefault), "conditional handle");
+        cuda_check(cudaGraphConditionalHandleCreate(&again, graph, 0, cudaGraphCondAssignDefault), "conditional handle");
+        // Set before every entry, since a loop inside of a loop is entered more than once.
+        detail::repeat_unless_empty<<<1, 1, 0, stream_>>>(counter, again);
+        const std::vector<cudaGraphNode_t> dependencies = captured().second;
         cudaGraphNodeParams params = {};
         params.type = cudaGraphNodeTypeConditional;
         params.conditional.handle = again;
@@ -162,10 +185,10 @@ private:
         params.conditional.size = 1;
         cudaGraphNode_t node = nullptr;
 #if CUDART_VERSION >= 13000
-        cuda_check(cudaGraphAddNode(&node, graph, dependencies, nullptr, count, &params), "conditional node");
+        cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), nullptr, dependencies.size(), &params), "conditional node");
         cuda_check(cudaStreamUpdateCaptureDependencies(stream_, &node, nullptr, 1, cudaStreamSetCaptureDependencies), "conditional node");
 #else
-        cuda_check(cudaGraphAddNode(&node, graph, dependencies, count, &params), "conditional node");
+        cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), dependencies.size(), &params), "conditional node");
         cuda_check(cudaStreamUpdateCaptureDependencies(stream_, &node, 1, cudaStreamSetCaptureDependencies), "conditional node");
 #endif
 
@@ -177,6 +200,20 @@ private:
         cuda_check(cudaStreamEndCapture(stream_, nullptr), "loop capture");
         cuda_check(cudaStreamDestroy(stream_), "stream");
         stream_ = outer;
+    }
+
+    /// The graph that the stream is captured into, and the nodes that the next one depends on.
+    std::pair<cudaGraph_t, std::vector<cudaGraphNode_t>> captured() const {
+        cudaStreamCaptureStatus status;
+        cudaGraph_t graph = nullptr;
+        const cudaGraphNode_t* nodes = nullptr;
+        size_t count = 0;
+#if CUDART_VERSION >= 13000
+        cuda_check(cudaStreamGetCaptureInfo(stream_, &status, nullptr, &graph, &nodes, nullptr, &count), "graph capture");
+#else
+        cuda_check(cudaStreamGetCaptureInfo_v2(stream_, &status, nullptr, &graph, &nodes, &count), "graph capture");
+#endif
+        return {graph, {nodes, nodes + count}};
     }
 
     uint32_t size_of(const QueueCounter* counter) const {

@@ -8,11 +8,12 @@
 #include <optional>
 
 #include "backends/cpu/executor.h"
+#include "backends/cpu/wave_bytes.h"
 #include "core/error.h"
 #include "integrators/feature_levels.h"
 #include "integrators/path/path.h"
 #include "integrators/path/schedule.h"
-#include "integrators/path/wave_stats.h"
+#include "integrators/wave_stats.h"
 #include "scene/accel/cwbvh.h"
 #include "scene/accel/embree_tracer.h"
 #include "scene/info.h"
@@ -23,20 +24,15 @@ namespace {
 /// Paths of one wave: with the surfaces and texels that they meet, about 1 KiB each, they stay in a core's second-level cache from stage to stage.
 constexpr uint32_t kCpuWaveSize = 512;
 
-struct AlignedDelete {
-    void operator()(std::byte* p) const { ::operator delete[](p, std::align_val_t(256)); }
-};
-
 /// Queues of one thread.
 struct WaveMemory {
-    std::unique_ptr<std::byte, AlignedDelete> bytes;
+    WaveBytes bytes;
     PathMemory queues;
 
-    WaveMemory(uint64_t size, uint32_t slots, const PathPolicy& policy) : bytes(static_cast<std::byte*>(::operator new[](size, std::align_val_t(256)))) {
-        std::fill_n(bytes.get(), size, std::byte{0});
+    WaveMemory(uint64_t size, uint32_t slots, const PathPolicy& policy) : bytes(make_wave_bytes(size)) {
         Layout layout(bytes.get());
         queues = lay_out(layout, slots, policy);
-        for (size_t q = 0; q < layout.queue_capacities().size(); ++q) queues.counters[q].capacity = layout.queue_capacities()[q];
+        set_capacities(queues.counters, layout);
     }
 };
 
@@ -134,7 +130,7 @@ private:
         const PathStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, memory, {film_.sum.data(), film_.sum_squares.data()});
         CpuExecutor executor(memory.state, memory.records);
         for (uint32_t s = 0; s < count; s += wave_.samples) {
-            *memory.state = {first_tile, first_sample + s, std::min(wave_.samples, count - s), 0};
+            *memory.state = {first_tile, first_sample + s, std::min(wave_.samples, count - s), 0, 0, 0};
             run_path_wave(executor, stages);
         }
     }

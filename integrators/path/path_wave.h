@@ -88,7 +88,7 @@ struct PathStages {
         wave.state = m.state;
         const auto record = [&](StageId id) { return m.records + uint32_t(id); };
         generate = {scene, wave, policy, m.rays, m.samples, record(StageId::generate)};
-        extend = {scene, tracer, wave, m.rays, m.hits, record(StageId::extend)};
+        extend = {scene, tracer, wave, Stream::eye, scene.environment != kNone, m.rays, m.hits, record(StageId::extend)};
         shade = {scene, wave, policy, m.hits, m.hit_candidates, m.connections, m.rays, record(StageId::shade)};
         weight_hits = {policy, m.hit_candidates, m.hit_contributions, record(StageId::mis_weight)};
         accumulate_hits = {m.hit_contributions, m.samples, record(StageId::accumulate)};

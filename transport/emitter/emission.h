@@ -69,6 +69,7 @@ AMBILUX_HD bool sample_emission(const SceneView& view, Vec4f u_position, Vec2f u
     s.delta_direction = e.type == EmitterType::directional;
     s.cos_theta = 1.0f;
     s.prim = kNone;
+    s.pdf_dir = 0.0f;
     s.p_error = {0, 0, 0};
     s.p = e.position;
     s.pdf_pos = 1.0f;

@@ -1,4 +1,4 @@
-#include "integrators/path/wave_stats.h"
+#include "integrators/wave_stats.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,205 @@
+// Light tracing and bidirectional path tracing on a CUDA device: one graph per wave over the whole film.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+
+#include "backends/cuda/device_scene.h"
+#include "backends/cuda/executor.cuh"
+#include "backends/cuda_device.h"
+#include "core/error.h"
+#include "integrators/bidirectional/bidirectional_cuda.h"
+#include "integrators/bidirectional/schedule.h"
+#include "integrators/feature_levels.h"
+#include "integrators/path/path_wave.h"
+#include "integrators/wave_stats.h"
+#include "scene/info.h"
+
+namespace ambilux {
+
+template <Features F>
+class BidirectionalCuda final : public Renderer {
+public:
+    BidirectionalCuda(const Scene& scene, const RenderSettings& settings)
+        : scene_(scene), policy_(make_bidirectional_policy(scene, settings)), use_graph_(settings.graph) {
+        const auto start = Clock::now();
+        wave_ = shape_wave(scene, settings, kTilePixels, 1);
+        wave_.tiles = tile_count(wave_);  // splats may land anywhere on the film
+        const uint32_t slots = wave_.tiles * kTilePixels;
+        wave_.samples = std::max(1u, (settings.wave_size ? settings.wave_size : kWaveSize) / slots);
+        values_ = uint64_t(wave_.width) * wave_.height * 3;
+        const CwbvhAccel accel(scene);
+        device_scene_.emplace(scene);
+        device_accel_.emplace(accel.arrays());
+        sum_ = DeviceBuffer<double>(values_, "film");
+        sum_squares_ = DeviceBuffer<double>(values_, "film");
+        splats_ = DeviceBuffer<int64_t>(values_ * wave_.samples, "splats");
+        samples_of_slots_ = DeviceBuffer<Lane>(wave_.slot_count(), "samples");
+        splats_.zero();
+        clock_ = DeviceBuffer<uint64_t>(1);
+        clear_film();
+        cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
+        allocate(wave_.slot_count() * kKeptPerSlot);
+        build_seconds_ = seconds_since(start);
+    }
+
+    ~BidirectionalCuda() override {
+        if (graph_) cudaGraphExecDestroy(graph_);
+        if (stream_) cudaStreamDestroy(stream_);
+    }
+
+    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+        const auto start = Clock::now();
+        uint32_t done = 0;
+        while (done < count && !(interrupt && *interrupt)) {
+            // All waves of a pass are queued at once; the host waits for the last.
+            const uint32_t pass = std::min(count - done, std::max(preferred_batch(), wave_.samples));
+            const uint32_t waves_before = read_state().done;
+            for (uint32_t s = 0; s < pass; s += wave_.samples) {
+                detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{0, first + done + s, std::min(wave_.samples, pass - s), 0, 0, 0});
+                if (graph_)
+                    cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
+                else
+                    executor_->launch([&](CudaExecutor& exec) { run(exec); });
+            }
+            cuda_check(cudaStreamSynchronize(stream_), "wave");
+            const WaveState state = read_state();
+            done += std::min(pass, (state.done - waves_before) * wave_.samples);
+            if (state.failed) make_room();
+        }
+        samples_ += done;
+        film_samples_ += done;
+        render_seconds_ += seconds_since(start);
+        return done;
+    }
+
+    FilmMoments film() override {
+        FilmMoments film;
+        film.width = wave_.width;
+        film.height = wave_.height;
+        film.samples = film_samples_;
+        film.sum = sum_.download();
+        film.sum_squares = sum_squares_.download();
+        return film;
+    }
+
+    void clear_film() override {
+        sum_.zero();
+        sum_squares_.zero();
+        film_samples_ = 0;
+    }
+
+    RenderStats stats() override {
+        RenderStats s;
+        s.backend = "cuda";
+        s.device = cuda_device_name();
+        s.accel = "cwbvh";
+        s.build_seconds = build_seconds_;
+        s.render_seconds = render_seconds_;
+        s.samples = samples_;
+        const std::vector<StageRecord> records = read_records();
+        const std::vector<QueueCounter> counters = read_counters();
+        fill_stage_stats(records.data(), s);
+        s.rays_extend += records[uint32_t(StageId::light_extend)].items;
+        fill_queue_stats(layout_, {counters.data()}, s);
+        s.memory_bytes = fixed_bytes() + memory_.bytes();
+        s.memory_bytes_predicted = fixed_bytes() + layout_.bytes();
+        s.features = feature_names(F);
+        s.skipped = skipped_strategies(scene_, policy_, F);
+        return s;
+    }
+
+    uint32_t preferred_batch() const override { return batch_of(render_seconds_, samples_); }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    static constexpr uint32_t kWaveSize = 1u << 21;
+    /// Kept light vertices per slot to begin with.
+    static constexpr uint32_t kKeptPerSlot = 4;
+    static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+    uint64_t fixed_bytes() const {
+        return device_scene_->bytes() + device_accel_->bytes() + sum_.bytes() + sum_squares_.bytes() + splats_.bytes() + samples_of_slots_.bytes() + clock_.bytes();
+    }
+
+    /// Queues for `kept` light vertices, and the graph that uses them.
+    void allocate(uint64_t kept) {
+        if (kept > 0xf0000000ull) throw Error(ExitCode::device, "light walks have more vertices than can be numbered: set a max_depth or a smaller wave_size");
+        layout_ = Layout();
+        lay_out(layout_, wave_.slot_count(), uint32_t(kept), policy_);
+        size_t free = 0, total = 0;
+        cuda_check(cudaMemGetInfo(&free, &total), "device memory");
+        check_memory(layout_.bytes(), free, wave_.slot_count());
+        memory_ = DeviceBuffer<std::byte>(layout_.bytes(), "queues");
+        memory_.zero();
+        Layout layout(memory_.data());
+        queues_ = lay_out(layout, wave_.slot_count(), uint32_t(kept), policy_);
+        std::vector<QueueCounter> counters(BidirectionalMemory::kQueues);
+        for (size_t q = 0; q < counters.size(); ++q) counters[q].capacity = layout.queue_capacities()[q];
+        cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
+        stages_.emplace(device_scene_->view(), device_accel_->tracer(), policy_, wave_, queues_,
+                        BidirectionalFilm{samples_of_slots_.data(), splats_.data(), sum_.data(), sum_squares_.data()});
+        executor_.emplace(stream_, queues_.state, queues_.records, clock_.data());
+        if (graph_) cudaGraphExecDestroy(graph_);
+        graph_ = nullptr;
+        if (use_graph_) graph_ = executor_->capture([&](CudaExecutor& exec) { run(exec); });
+        cuda_check(cudaDeviceSynchronize(), "preparation");
+    }
+
+    void run(CudaExecutor& exec) {
+        run_bidirectional_wave(exec, *stages_);
+        exec.run_slots(StageId::develop, stages_->develop, wave_.tiles * kTilePixels, 1);
+        exec.finish_wave();
+    }
+
+    /// A wave had more light vertices than there was room for.
+    void make_room() {
+        const std::vector<StageRecord> records = read_records();
+        uint64_t needed = 0;
+        const std::vector<QueueCounter> counters = read_counters();
+        for (size_t q = 0; q < counters.size(); ++q)
+            if (layout_.queue_names()[q] == "light_vertices" || layout_.queue_names()[q] == "splats") needed = std::max(needed, counters[q].peak);
+        memory_ = DeviceBuffer<std::byte>();
+        allocate(needed + needed / 4);
+        cuda_check(cudaMemcpy(queues_.records, records.data(), records.size() * sizeof(StageRecord), cudaMemcpyHostToDevice), "statistics");
+    }
+
+    WaveState read_state() const {
+        WaveState state;
+        cuda_check(cudaMemcpy(&state, queues_.state, sizeof(state), cudaMemcpyDeviceToHost), "state");
+        return state;
+    }
+    std::vector<StageRecord> read_records() const {
+        std::vector<StageRecord> records(kStageCount);
+        cuda_check(cudaMemcpy(records.data(), queues_.records, records.size() * sizeof(StageRecord), cudaMemcpyDeviceToHost), "statistics");
+        return records;
+    }
+    std::vector<QueueCounter> read_counters() const {
+        std::vector<QueueCounter> counters(BidirectionalMemory::kQueues);
+        cuda_check(cudaMemcpy(counters.data(), queues_.counters, counters.size() * sizeof(QueueCounter), cudaMemcpyDeviceToHost), "statistics");
+        return counters;
+    }
+
+    const Scene& scene_;
+    BidirectionalPolicy policy_;
+    bool use_graph_;
+    Wave wave_{};
+    Layout layout_;
+    uint64_t values_ = 0, samples_ = 0, film_samples_ = 0;
+    double build_seconds_ = 0, render_seconds_ = 0;
+    std::optional<DeviceScene> device_scene_;
+    std::optional<DeviceCwbvh> device_accel_;
+    DeviceBuffer<std::byte> memory_;
+    DeviceBuffer<double> sum_, sum_squares_;
+    DeviceBuffer<int64_t> splats_;
+    DeviceBuffer<Lane> samples_of_slots_;
+    DeviceBuffer<uint64_t> clock_;
+    BidirectionalMemory queues_{};
+    cudaStream_t stream_ = nullptr;
+    std::optional<BidirectionalStages<F, CwbvhTracer>> stages_;
+    std::optional<CudaExecutor> executor_;
+    cudaGraphExec_t graph_ = nullptr;
+};
+
+}  // namespace ambilux

@@ -1,0 +1,9 @@
+#include "integrators/bidirectional/bidirectional_cuda.cuh"
+
+namespace ambilux {
+
+std::unique_ptr<Renderer> make_bidirectional_cuda_all(const Scene& scene, const RenderSettings& settings) {
+    return std::make_unique<BidirectionalCuda<kAllFeatures>>(scene, settings);
+}
+
+}  // namespace ambilux

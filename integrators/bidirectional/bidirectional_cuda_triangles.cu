@@ -1,0 +1,9 @@
+#include "integrators/bidirectional/bidirectional_cuda.cuh"
+
+namespace ambilux {
+
+std::unique_ptr<Renderer> make_bidirectional_cuda_triangles(const Scene& scene, const RenderSettings& settings) {
+    return std::make_unique<BidirectionalCuda<kTriangleFeatures>>(scene, settings);
+}
+
+}  // namespace ambilux

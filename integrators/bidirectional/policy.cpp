@@ -1,0 +1,50 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "integrators/bidirectional/wave.h"
+
+namespace ambilux {
+
+BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSettings& settings) {
+    if (settings.max_depth < 0 && settings.rr_depth < 0)
+        throw Error(ExitCode::usage, "max_depth=-1 with rr_depth=-1: without Russian roulette and without a limit walks may never end; set one of them");
+    BidirectionalPolicy p{};
+    p.mis.heuristic = settings.heuristic;
+    p.mis.strategies = settings.integrator == "light" ? uint32_t(kLightStrategies) : settings.strategies;
+    p.mis.light_paths = float(scene.sensor.crop_width) * float(scene.sensor.crop_height);
+    p.max_depth = settings.max_depth < 0 ? WalkBits::kMaxDepth : uint32_t(settings.max_depth);
+    p.rr_depth = settings.rr_depth < 0 ? ~0u : uint32_t(settings.rr_depth);
+    const bool emitters = !scene.emitters.empty();
+    const bool area = std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return e.type == EmitterType::area; });
+    p.splat = emitters && p.mis.has(kLightStrategies);
+    p.connect_vertices = emitters && p.mis.has(kConnectionStrategies) && p.max_depth >= 3;
+    p.light_walks = p.splat || p.connect_vertices;
+    p.next_event = emitters && p.mis.has(kNextEventStrategies) && p.max_depth >= 2;
+    p.count_hits = area && p.mis.has(kHitStrategies);
+    // No light walk finds the environment that the camera sees: eye walks of one segment count it for the light tracer.
+    p.count_environment = scene.environment != kNone && p.mis.has(kHitStrategies | kLightStrategies);
+    p.background_only = p.mis.strategies == kLightStrategies;
+    p.hide_emitters = scene.integrator.hide_emitters;
+    return p;
+}
+
+std::vector<std::string> skipped_strategies(const Scene& scene, const BidirectionalPolicy& policy, const Features& kernels) {
+    std::vector<std::string> parts;
+    if (scene.emitters.empty()) parts.emplace_back("all strategies: no emitters");
+    if (!policy.light_walks) parts.emplace_back("light walks: no strategy needs them");
+    if (!policy.splat) parts.emplace_back("light tracing (t = 1)");
+    if (!policy.connect_vertices) parts.emplace_back("connections (s, t >= 2)");
+    if (!policy.next_event) parts.emplace_back("next event estimation (s = 1)");
+    if (!policy.count_hits) parts.emplace_back("hits of area emitters (s = 0)");
+    if (policy.background_only) parts.emplace_back("eye walks beyond their first segment");
+    if (!kernels.textures) parts.emplace_back("texture lookup");
+    if (!kernels.bumps) parts.emplace_back("bump and normal maps");
+    if (!kernels.opacity) parts.emplace_back("opacity tests in traversal");
+    if (!kernels.has_quadrics()) parts.emplace_back("spheres, disks and cylinders");
+    if (!kernels.has_environment()) parts.emplace_back("environment: rays that leave the scene end in extend");
+    return parts;
+}
+
+}  // namespace ambilux

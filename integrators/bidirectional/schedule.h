@@ -1,0 +1,81 @@
+// Bidirectional path tracing, and light tracing as its part, as a schedule of stages: light walks of a wave first, then the eye walks of the same slots.
+#pragma once
+
+#include "integrators/bidirectional/wave.h"
+
+namespace ambilux {
+
+/// Splat candidates of one depth: weighted, tested, kept for the end of the wave.
+template <class Executor, Features F, class Tracer>
+void run_splats(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
+    exec.run(StageId::mis_weight, stages.weight_splats, stages.memory.splat_candidates);
+    exec.trace(StageId::occlude, stages.occlude_splats, stages.memory.weighted_splats);
+}
+
+template <class Executor, Features F, class Tracer>
+void run_light_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
+    const BidirectionalMemory& m = stages.memory;
+    exec.run_slots(StageId::light_generate, stages.light_generate, stages.wave.tiles * kTilePixels);
+    if (stages.policy.splat) run_splats(exec, stages);
+    exec.set_depth(1);
+    exec.trace(StageId::light_extend, stages.light_extend, m.rays);
+    exec.repeat_while(m.hits, [&] {
+        exec.run(StageId::light_shade, stages.light_shade, m.hits);
+        if (stages.policy.splat) {
+            exec.run(StageId::connect_camera, stages.connect_camera, m.vertices);
+            run_splats(exec, stages);
+        }
+        exec.next_depth();
+        exec.trace(StageId::light_extend, stages.light_extend, m.rays);
+    });
+    exec.set_depth(0);
+    exec.settle(m.light_vertices, m.splats);
+}
+
+/// Candidates of one launch: weighted, tested, added to their paths.
+template <class Executor, Features F, class Tracer>
+void run_connections(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
+    const BidirectionalMemory& m = stages.memory;
+    exec.run(StageId::mis_weight, stages.weight_connections, m.connect_candidates);
+    exec.trace(StageId::occlude, stages.occlude, m.shadows);
+    exec.run(StageId::accumulate, stages.accumulate_shadows, m.shadow_contributions);
+}
+
+template <class Executor, Features F, class Tracer>
+void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
+    const BidirectionalMemory& m = stages.memory;
+    const BidirectionalPolicy& policy = stages.policy;
+    exec.run_slots(StageId::generate, stages.generate, stages.wave.tiles * kTilePixels);
+    exec.set_depth(1);
+    exec.trace_coherent(StageId::extend, stages.extend, m.rays);
+    exec.repeat_while(m.hits, [&] {
+        exec.run(StageId::shade, stages.shade, m.hits);
+        if (policy.count_hits || policy.count_environment) {
+            exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
+            exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
+        }
+        if (policy.next_event || policy.connect_vertices) exec.run(StageId::connect, stages.connect, m.vertices);
+        if (policy.next_event) run_connections(exec, stages);
+        if (policy.connect_vertices)
+            exec.repeat_while(m.pairs, [&] {
+                exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
+                run_connections(exec, stages);
+                exec.run(StageId::connect_vertices, stages.connect_rest, m.rest);
+                run_connections(exec, stages);
+            });
+        exec.next_depth();
+        exec.trace(StageId::extend, stages.extend, m.rays);
+    });
+    exec.set_depth(0);
+}
+
+/// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h), and settle(queue, queue), clear(queue).
+template <class Executor, Features F, class Tracer>
+void run_bidirectional_wave(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
+    if (stages.policy.light_walks) run_light_walks(exec, stages);
+    run_eye_walks(exec, stages);
+    if (stages.policy.splat) exec.run(StageId::splat, stages.splat, stages.memory.splats);
+    if (stages.policy.connect_vertices) exec.clear(stages.memory.light_vertices);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,133 @@
+// The memory of a wave of paired light and eye walks and the stages that work on it.
+#pragma once
+
+#include "integrators/renderer.h"
+#include "queues/layout.h"
+#include "stages/accumulate.h"
+#include "stages/extend.h"
+#include "stages/eye_walk.h"
+#include "stages/light_walk.h"
+#include "stages/mis_weight.h"
+#include "stages/occlude.h"
+#include "stages/splat.h"
+
+namespace ambilux {
+
+/// What `settings` ask of a scene (integrators light and bdpt). Throws Error(usage) when walks might never end or nothing is left to do.
+BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSettings& settings);
+
+/// Names of strategies and kernel parts that this render does without.
+std::vector<std::string> skipped_strategies(const Scene& scene, const BidirectionalPolicy& policy, const Features& kernels);
+
+/// Memory of one wave. All queues but two hold the most they can ever be given, since a slot has one item at a time. Vertices of light walks and what they splat are kept until
+/// the end of the wave; their number is not known before, and a wave for which they do not suffice is done again with more (settle()).
+struct BidirectionalMemory {
+    static constexpr uint32_t kQueues = 14;
+
+    WaveState* state;
+    StageRecord* records;    ///< one per StageId
+    QueueCounter* counters;  ///< one per queue
+    Queue<WalkItem> rays;
+    Queue<WalkHit> hits;
+    Queue<VertexItem> vertices;  ///< of one depth
+    Queue<VertexItem> light_vertices;
+    Queue<SplatCandidate> splat_candidates, weighted_splats;
+    Queue<SplatItem> splats;
+    Queue<VertexItem> pairs, rest;
+    Queue<HitCandidate> hit_candidates;
+    Queue<Contribution> hit_contributions;
+    Queue<ConnectCandidate> connect_candidates;
+    Queue<ShadowItem> shadows;
+    Queue<Contribution> shadow_contributions;
+    uint32_t* last_vertex;
+};
+
+/// Lays out the memory for `slots` walks of either kind and `kept` vertices of light walks.
+inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept, const BidirectionalPolicy& policy) {
+    const auto when = [&](bool needed, uint32_t n = 0) { return needed ? (n ? n : slots) : 0u; };
+    const bool hits = policy.count_hits || policy.count_environment, connections = policy.next_event || policy.connect_vertices;
+    BidirectionalMemory m;
+    m.state = layout.take<WaveState>(1);
+    m.records = layout.take<StageRecord>(kStageCount);
+    m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
+    m.rays = layout.queue<WalkItem>("rays", m.counters, slots);
+    m.hits = layout.queue<WalkHit>("hits", m.counters, slots);
+    m.vertices = layout.queue<VertexItem>("vertices", m.counters, slots);
+    m.light_vertices = layout.queue<VertexItem>("light_vertices", m.counters, when(policy.connect_vertices, kept));
+    m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat));
+    m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat));
+    m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, kept + slots));
+    m.pairs = layout.queue<VertexItem>("pairs", m.counters, when(policy.connect_vertices));
+    m.rest = layout.queue<VertexItem>("rest", m.counters, when(policy.connect_vertices));
+    m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, when(hits));
+    m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, when(hits));
+    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, when(connections));
+    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, when(connections));
+    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, when(connections));
+    m.last_vertex = layout.take<uint32_t>(slots);
+    return m;
+}
+
+/// Buffers of the film. `samples`: by slot of this wave; `splats`: 3 per pixel of the film and sample of the wave.
+struct BidirectionalFilm {
+    Lane* samples;
+    int64_t* splats;
+    double *sum, *sum_squares;
+};
+
+/// The stages over one wave, ready to launch.
+template <Features F, class Tracer>
+struct BidirectionalStages {
+    BidirectionalPolicy policy;
+    Wave wave;
+    BidirectionalMemory memory;
+    LightGenerate<F> light_generate;
+    Extend<F, Tracer, WalkItem, WalkHit> light_extend;
+    LightShade<F> light_shade;
+    ConnectCamera<F> connect_camera;
+    WeightSplats weight_splats;
+    OccludeSplats<F, Tracer> occlude_splats;
+    Splat splat;
+    EyeGenerate generate;
+    Extend<F, Tracer, WalkItem, WalkHit> extend;
+    EyeShade<F> shade;
+    WeightHits weight_hits;
+    Accumulate accumulate_hits;
+    EyeConnect<F> connect;
+    ConnectVertices<F> connect_vertices, connect_rest;
+    WeightConnections weight_connections;
+    Occlude<F, Tracer> occlude;
+    Accumulate accumulate_shadows;
+    DevelopSplats develop;
+
+    BidirectionalStages(const SceneView& scene, const Tracer& tracer, const BidirectionalPolicy& p, Wave w, const BidirectionalMemory& m, const BidirectionalFilm& film)
+        : policy(p), wave(w), memory(m) {
+        wave.state = m.state;
+        const auto record = [&](StageId id) { return m.records + uint32_t(id); };
+        // Weights are 1/(1 + others): the balance of 1 and `others`, in which the heuristic is applied already.
+        PathPolicy sums{};
+        sums.estimator = Estimator::mis;
+        sums.heuristic = MisHeuristic::balance;
+        light_generate = {scene, wave, policy, m.rays, m.splat_candidates, m.last_vertex, record(StageId::light_generate)};
+        light_extend = {scene, tracer, wave, Stream::light, false, m.rays, m.hits, record(StageId::light_extend)};
+        light_shade = {scene, wave, policy, m.hits, m.rays, m.light_vertices, m.vertices, m.last_vertex, record(StageId::light_shade)};
+        connect_camera = {scene, wave, policy, m.vertices, m.splat_candidates, record(StageId::connect_camera)};
+        weight_splats = {m.splat_candidates, m.weighted_splats, record(StageId::mis_weight)};
+        occlude_splats = {scene, tracer, m.weighted_splats, m.splats, record(StageId::occlude)};
+        splat = {scene, wave, m.splats, film.splats, record(StageId::splat)};
+        generate = {scene, wave, policy, m.rays, film.samples, record(StageId::generate)};
+        extend = {scene, tracer, wave, Stream::eye, policy.count_environment, m.rays, m.hits, record(StageId::extend)};
+        shade = {scene, wave, policy, m.hits, m.rays, m.hit_candidates, m.vertices, m.last_vertex, record(StageId::shade)};
+        weight_hits = {sums, m.hit_candidates, m.hit_contributions, record(StageId::mis_weight)};
+        accumulate_hits = {m.hit_contributions, film.samples, record(StageId::accumulate)};
+        connect = {scene, wave, policy, m.vertices, m.pairs, m.connect_candidates, record(StageId::connect)};
+        connect_vertices = {scene, wave, policy, m.pairs, m.rest, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
+        connect_rest = {scene, wave, policy, m.rest, m.pairs, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
+        weight_connections = {sums, m.connect_candidates, m.shadows, record(StageId::mis_weight)};
+        occlude = {scene, tracer, m.shadows, m.shadow_contributions, record(StageId::occlude)};
+        accumulate_shadows = {m.shadow_contributions, film.samples, record(StageId::accumulate)};
+        develop = {wave, film.samples, film.splats, film.sum, film.sum_squares, record(StageId::develop)};
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,22 @@
+// What a light tracer or bidirectional path tracer does where, decided once by the host.
+#pragma once
+
+#include "transport/bidirectional.h"
+
+namespace ambilux {
+
+struct BidirectionalPolicy {
+    BidirectionalMis mis;
+    uint32_t max_depth;       ///< segments; WalkBits::kMaxDepth stands for no limit
+    uint32_t rr_depth;
+    bool light_walks;         ///< some strategy needs them
+    bool splat;               ///< light vertices are connected with the camera
+    bool connect_vertices;
+    bool next_event;
+    bool count_hits;          ///< eye walks count the area emitters that they meet
+    bool count_environment;   ///< eye walks count the environment
+    bool background_only;     ///< eye walks end at their first vertex: they serve the directly seen environment, which no light walk finds
+    bool hide_emitters;       ///< the camera does not see emitters
+};
+
+}  // namespace ambilux

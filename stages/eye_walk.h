@@ -1,0 +1,131 @@
+// generate, shade, connect and connect_vertices of bidirectional path tracing: walks that start at the camera.
+#pragma once
+
+#include "stages/bidirectional_policy.h"
+#include "stages/generate.h"
+#include "stages/stage.h"
+#include "stages/walk_items.h"
+
+namespace ambilux {
+
+struct EyeGenerate {
+    SceneView scene;
+    Wave wave;
+    BidirectionalPolicy policy;
+    Queue<WalkItem> rays;
+    Lane* samples;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t slot) const {
+        samples[slot] = {};
+        const PathSlot p = wave.locate(slot);
+        if (!p.active || policy.max_depth == 0) return;
+        const CameraSample c = camera_sample(scene, wave, p);
+        rays.push(pack_walk(start_eye_walk(scene, policy.mis, c), slot, false, c.tmax));
+    }
+};
+
+template <Features F>
+struct EyeShade {
+    SceneView scene;
+    Wave wave;
+    BidirectionalPolicy policy;
+    Queue<WalkHit> hits;
+    Queue<WalkItem> rays;
+    Queue<HitCandidate> candidates;
+    Queue<VertexItem> vertices;
+    const uint32_t* last_vertex;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const WalkHit h = hits.load(i);
+        Walk w = unpack_walk(h.ray);
+        const bool visible = !(policy.hide_emitters && w.depth == 1);
+        if (h.prim == kNone) {
+            if (policy.count_environment && visible)
+                emit(h, environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
+            return;
+        }
+        if (policy.background_only) return;
+        const WalkVertex z = eye_vertex<F>(scene, policy.mis, w, h.prim, h.u, h.v);
+        const uint32_t emitter = scene.shapes[z.point.shape].emitter;
+        if (policy.count_hits && visible && emitter != kNone) {
+            const Rgb radiance = emitted_radiance<F>(scene, emitter, z.point, -w.d);
+            if (!is_zero(radiance)) emit(h, radiance, others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, z.point));
+        }
+        if (w.depth >= policy.max_depth) return;
+        if ((policy.next_event || policy.connect_vertices) && bsdf_is_smooth(z.scattering.bsdf))
+            vertices.push(pack_vertex(h, z, policy.connect_vertices ? last_vertex[h.ray.path] : kNone));
+        const uint32_t depth = w.depth;
+        // The last segment can bring emission only.
+        if (depth + 1 == policy.max_depth && !policy.count_hits && !policy.count_environment) return;
+        const Vec4f u = random_floats(wave.key(h.ray.path), scatter_block(depth));
+        if (!scatter_walk<F>(policy.mis, z, u, TransportMode::radiance, policy.rr_depth, w)) return;
+        if (is_light(w.throughput, record)) rays.push(pack_walk(w, h.ray.path, false, kInfinity));
+    }
+
+private:
+    AMBILUX_HD void emit(const WalkHit& h, Rgb radiance, float others) const {
+        const Rgb value = h.ray.throughput * radiance;
+        if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.ray.path, 1.0f, others, {0, 0}});
+    }
+};
+
+/// connect: an eye vertex samples an emitter (s = 1) and goes on to the vertices of its light walk.
+template <Features F>
+struct EyeConnect {
+    SceneView scene;
+    Wave wave;
+    BidirectionalPolicy policy;
+    Queue<VertexItem> vertices;
+    Queue<VertexItem> pairs;
+    Queue<ConnectCandidate> candidates;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const VertexItem item = vertices.load(i);
+        if (item.previous != kNone) pairs.push(item);
+        if (!policy.next_event) return;
+        const uint32_t depth = item.bits.depth();
+        const RngKey key = wave.key(item.path);
+        const WalkVertex z = unpack_vertex<F>(scene, item);
+        WalkConnection c;
+        if (!connect_next_event<F>(scene, policy.mis, z, item.throughput, random_floats(key, emitter_block(depth)), c)) return;
+        if (!is_light(c.value, record) || is_zero(c.value)) return;
+        candidates.push({c.value, item.path, 1.0f, c.others, F.opacity ? alpha_seed(key, depth, true) : 0, c.tmax, c.o, 0, c.d, 0});
+    }
+};
+
+/// connect_vertices: an eye vertex and one vertex of the light walk of its slot (s, t >= 2); what is left of that walk is for the next launch, so that no launch
+/// holds two contributions of one path.
+template <Features F>
+struct ConnectVertices {
+    SceneView scene;
+    Wave wave;
+    BidirectionalPolicy policy;
+    Queue<VertexItem> pairs, rest;
+    Queue<VertexItem> light_vertices;
+    Queue<ConnectCandidate> candidates;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        VertexItem item = pairs.load(i);
+        const uint32_t depth = item.bits.depth();
+        VertexItem light = light_vertices.load(item.previous);
+        while (depth + light.bits.depth() + 1 > policy.max_depth) {
+            if (light.previous == kNone) return;
+            light = light_vertices.load(light.previous);
+        }
+        item.previous = light.previous;
+        if (light.previous != kNone) rest.push(item);
+        const WalkVertex z = unpack_vertex<F>(scene, item), y = unpack_vertex<F>(scene, light);
+        WalkConnection c;
+        if (!connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
+        if (!is_light(c.value, record) || is_zero(c.value)) return;
+        uint32_t seed = 0;
+        if constexpr (F.opacity) seed = alpha_seed(wave.key(item.path), depth + (light.bits.depth() << 16), true);
+        candidates.push({c.value, item.path, 1.0f, c.others, seed, c.tmax, c.o, 0, c.d, 0});
+    }
+};
+
+}  // namespace ambilux

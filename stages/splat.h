@@ -1,0 +1,126 @@
+// Light that arrives anywhere on the film: weighted, tested for occlusion, added up in fixed point, so that the sum does not depend on the order of threads.
+#pragma once
+
+#include "stages/bidirectional_policy.h"
+#include "stages/stage.h"
+#include "stages/walk_items.h"
+#include "stages/wave.h"
+#include "transport/sensor/filter.h"
+
+namespace ambilux {
+
+/// One unit of the fixed-point sums: a pixel holds up to 1.3e8 in steps of 1.5e-11.
+constexpr double kSplatUnit = 0x1p-36;
+
+AMBILUX_HD void add_fixed(int64_t* sum, int64_t value) {
+#if defined(__CUDA_ARCH__)
+    atomicAdd(reinterpret_cast<unsigned long long*>(sum), static_cast<unsigned long long>(value));
+#else
+    __atomic_fetch_add(sum, value, __ATOMIC_RELAXED);
+#endif
+}
+
+struct WeightSplats {
+    Queue<SplatCandidate> candidates, weighted;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        SplatCandidate c = candidates.load(i);
+        c.value *= 1.0f / (1.0f + c.others);
+        if (is_light(c.value, record) && !is_zero(c.value)) weighted.push(c);
+    }
+};
+
+template <Features F, class Tracer>
+struct OccludeSplats {
+    static constexpr Features kFeatures = F;
+    static constexpr bool kAnyHit = true;
+
+    SceneView scene;
+    Tracer tracer;
+    Queue<SplatCandidate> candidates;
+    Queue<SplatItem> splats;
+    StageRecord* record;
+
+    AMBILUX_HD bool fetch(uint32_t i, Ray& ray) const {
+        const SplatCandidate c = candidates.load(i);
+        ray = {c.o, c.tmax, c.d, c.alpha_seed};
+        if (is_finite(c.o) && is_finite(c.d)) return true;
+        count_one(&record->nan);
+        return false;
+    }
+    AMBILUX_HD void finish(uint32_t i, bool blocked) const {
+        if (blocked) return;
+        const SplatCandidate c = candidates.load(i);
+        splats.push({c.value, c.path, c.film, {0, 0}});
+    }
+    AMBILUX_HD void operator()(uint32_t i) const {
+        Ray ray;
+        if (fetch(i, ray)) finish(i, tracer.template occluded<F>(scene, ray));
+    }
+};
+
+/// Adds light to the pixels whose filters reach it.
+struct Splat {
+    SceneView scene;
+    Wave wave;
+    Queue<SplatItem> splats;
+    int64_t* sums;  ///< 3 per pixel and sample of the wave
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const SplatItem item = splats.load(i);
+        const uint32_t sample = item.path / (wave.tiles * kTilePixels);
+        const float x = item.film.x - float(scene.sensor.crop_x), y = item.film.y - float(scene.sensor.crop_y), r = scene.sensor.filter_radius;
+        const int32_t x0 = int32_t(ceilf(x - r - 0.5f)), x1 = int32_t(floorf(x + r - 0.5f));
+        const int32_t y0 = int32_t(ceilf(y - r - 0.5f)), y1 = int32_t(floorf(y + r - 0.5f));
+        for (int32_t py = y0 > 0 ? y0 : 0; py <= y1 && py < int32_t(wave.height); ++py)
+            for (int32_t px = x0 > 0 ? x0 : 0; px <= x1 && px < int32_t(wave.width); ++px) {
+                const float weight = filter_value(scene, {x - (float(px) + 0.5f), y - (float(py) + 0.5f)});
+                if (weight > 0.0f) add(item.value * weight, (uint64_t(sample) * wave.height + uint32_t(py)) * wave.width + uint32_t(px));
+            }
+    }
+
+private:
+    AMBILUX_HD void add(Rgb value, uint64_t pixel) const {
+        // What does not fit is counted as infinite, not wrapped.
+        if (!(max_component(value) < 0x1p26f)) {
+            count_one(&record->inf);
+            return;
+        }
+        for (int c = 0; c < 3; ++c) add_fixed(sums + pixel * 3 + uint32_t(c), llrint(double(value[c]) / kSplatUnit));
+    }
+};
+
+/// Adds the samples of the film's pixels, what eye walks and what light walks brought, to the sums of the film; empties the sums of splats.
+struct DevelopSplats {
+    Wave wave;
+    const Lane* samples;  ///< by slot
+    int64_t* splats;
+    double *sum, *sum_squares;
+    StageRecord* record;
+
+    /// `i` is a slot of the first sample.
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const PathSlot p = wave.locate(i);
+        if (!p.active) return;
+        const uint32_t stride = wave.tiles * kTilePixels;
+        for (uint32_t k = 0; k < wave.state->samples; ++k) {
+            Rgb eye;
+            memcpy(&eye, &samples[i + k * stride], sizeof(eye));
+            int64_t* light = splats + (uint64_t(k) * wave.height * wave.width + p.pixel) * 3;
+            double value[3];
+            for (int c = 0; c < 3; ++c) {
+                value[c] = double(eye[c]) + double(light[c]) * kSplatUnit;
+                light[c] = 0;
+            }
+            if (!is_light({float(value[0]), float(value[1]), float(value[2])}, record)) continue;
+            for (int c = 0; c < 3; ++c) {
+                sum[uint64_t(p.pixel) * 3 + uint32_t(c)] += value[c];
+                sum_squares[uint64_t(p.pixel) * 3 + uint32_t(c)] += value[c] * value[c];
+            }
+        }
+    }
+};
+
+}  // namespace ambilux

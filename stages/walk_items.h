@@ -1,0 +1,110 @@
+// What travels through the queues of light tracing and bidirectional path tracing.
+#pragma once
+
+#include "stages/path_items.h"
+#include "transport/walk.h"
+
+namespace ambilux {
+
+/// A ray of a walk.
+struct WalkItem {
+    Vec3f o;
+    uint32_t path;
+    Vec3f d;
+    WalkBits bits;
+    Rgb throughput;
+    float tmax;        ///< first ray of an eye walk: to the far plane
+    float dvcm, dvc;   ///< sums of the ray; first ray of a light walk: LightStart::inv_pdf and cos_light
+    uint32_t extra[2]; ///< first ray of an eye walk: start_distance; of a light walk: LightStart::prim and emitter
+};
+
+/// Where that ray ended; `prim == kNone`: nowhere.
+struct WalkHit {
+    WalkItem ray;
+    float u, v;
+    uint32_t prim;
+    uint32_t pad;
+};
+
+/// A vertex of a walk to connect. Of a light walk: kept until the eye walk of the same slot is done.
+struct VertexItem {
+    Vec3f d;           ///< of the ray that met it
+    uint32_t path;
+    Rgb throughput;
+    WalkBits bits;
+    float u, v;
+    uint32_t prim;
+    float dvcm;
+    float dvc;
+    uint32_t previous; ///< light: the vertex before it in the same walk or kNone; eye: the light vertex to connect next
+    uint32_t pad[2];
+};
+
+/// Light for a place on the film, before it is weighted, and the ray that must be free.
+struct SplatCandidate {
+    Rgb value;
+    uint32_t path;
+    Vec3f o;
+    float tmax;
+    Vec3f d;
+    uint32_t alpha_seed;
+    Vec2f film;        ///< position in pixels of the full film
+    float others;      ///< weight = 1 / (1 + others)
+    uint32_t pad;
+};
+
+/// Light that arrived on the film.
+struct SplatItem {
+    Rgb value;
+    uint32_t path;
+    Vec2f film;
+    uint32_t pad[2];
+};
+
+AMBILUX_HD Ray ray_of(const WalkItem& r) { return {r.o, r.bits.depth() == 1 ? r.tmax : kInfinity, r.d, 0}; }
+AMBILUX_HD WalkHit hit_of(const WalkItem& r, const Hit& hit) { return {r, hit.u, hit.v, hit.prim, 0}; }
+
+/// `first_tmax`: WalkItem::tmax.
+AMBILUX_HD WalkItem pack_walk(const Walk& w, uint32_t path, bool light, float first_tmax) {
+    WalkItem item = {w.o, path, w.d, WalkBits::make(w.depth, w.delta, w.eta_scale), w.throughput, first_tmax, w.sums.dvcm, w.sums.dvc, {0, 0}};
+    if (w.depth == 1 && light) {
+        item.dvcm = w.start.inv_pdf;
+        item.dvc = w.start.cos_light;
+        item.extra[0] = w.start.prim;
+        item.extra[1] = w.start.emitter;
+    } else if (w.depth == 1) {
+        item.extra[0] = float_bits(w.start_distance);
+    }
+    return item;
+}
+
+AMBILUX_HD Walk unpack_walk(const WalkItem& item) {
+    Walk w{};
+    w.o = item.o;
+    w.d = item.d;
+    w.throughput = item.throughput;
+    w.sums = {item.dvcm, item.dvc};
+    w.start = {item.dvcm, item.dvc, item.extra[0], item.extra[1]};
+    w.start_distance = bits_float(item.extra[0]);
+    w.depth = item.bits.depth();
+    w.eta_scale = item.bits.eta_scale();
+    w.delta = item.bits.delta();
+    return w;
+}
+
+/// The vertex that a VertexItem stands for.
+template <Features F>
+AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& item) {
+    WalkVertex v;
+    v.point = surface_at<F>(scene, item.prim, item.u, item.v);
+    v.scattering = make_scattering<F>(scene, v.point, -item.d);
+    v.sums = {item.dvcm, item.dvc};
+    v.first = item.bits.depth() == 1;
+    return v;
+}
+
+AMBILUX_HD VertexItem pack_vertex(const WalkHit& hit, const WalkVertex& v, uint32_t previous) {
+    return {hit.ray.d, hit.ray.path, hit.ray.throughput, hit.ray.bits, hit.u, hit.v, hit.prim, v.sums.dvcm, v.sums.dvc, previous, {0, 0}};
+}
+
+}  // namespace ambilux
