@@ -1,9 +1,8 @@
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "scene/mitsuba/builder.h"
 #include "scene/shapes/mesh.h"
 
@@ -233,7 +232,7 @@ void build_shapes(Builder& builder, const Object& root) {
         if (child.object->tag == "shape") shapes.add_shape(*child.object, {}, false, false);
     }
 
-    tbb::parallel_for(size_t(0), shapes.sources.size(), [&](size_t i) {
+    parallel_for(shapes.sources.size(), [&](size_t i) {
         MeshSource& s = shapes.sources[i];
         if (s.path.empty()) return;
         const std::string bytes = read_file_bytes(s.path);
@@ -244,7 +243,7 @@ void build_shapes(Builder& builder, const Object& root) {
     });
     for (const MeshSource& s : shapes.sources)
         if (!s.path.empty()) builder.file_digests.push_back({s.path, s.digest});
-    tbb::parallel_for(size_t(0), shapes.jobs.size(), [&](size_t i) {
+    parallel_for(shapes.jobs.size(), [&](size_t i) {
         Job& job = shapes.jobs[i];
         if (job.source >= 0) transform_mesh(job, shapes.sources[size_t(job.source)].mesh);
     });
