@@ -27,6 +27,22 @@ struct Rectangle {
     uint32_t x, y, width, height;
 };
 
+/// The variance of a block whose pixels are not independent, from the sums of its batches. Events that several pixels share are one.
+void correlate(const Estimate& image, const Rectangle& r, uint32_t channel, Side& side) {
+    const double n = double(image.batches.size());
+    double squares = 0;
+    for (const std::vector<double>& batch : image.batches) {
+        double sum = 0;
+        for (uint32_t y = r.y; y < r.y + r.height; ++y)
+            for (uint32_t x = r.x; x < r.x + r.width; ++x) sum += batch[(size_t(y) * image.width + x) * 3 + channel];
+        squares += (sum - side.mean) * (sum - side.mean);
+    }
+    const double variance = squares / (n * (n - 1));
+    if (variance > side.variance) side.events *= side.variance / variance;
+    side.variance = variance;
+    side.dof_terms = variance * variance / (n - 1);
+}
+
 /// Sums over a block, and how many events its variance comes from. A pixel of n samples with mean m and sample variance s² above a base b, which no event made
 /// bright, has e = n(m-b)²/(s²+(m-b)²) effective ones (Kish 1965): rare equal hits count one each. The base is the darkest mean in the block. Pixels add up
 /// weighted by their share of the variance, so that N rare hits anywhere give N.
@@ -56,6 +72,7 @@ Side measure(const Estimate& image, const Rectangle& r, uint32_t channel) {
         }
     if (side.variance > 0) side.events = side.variance * side.variance / concentration;
     if (side.max_abs == 0) side.events = 0;  // black: it may have met no light yet
+    if (!image.batches.empty()) correlate(image, r, channel, side);
     return side;
 }
 
@@ -104,6 +121,22 @@ Estimate to_estimate(const FilmMoments& m) {
     for (size_t i = 0; i < m.sum.size(); ++i) {
         e.mean[i] = m.mean(i);
         e.variance_of_mean[i] = m.variance(i) / double(m.samples);
+    }
+    return e;
+}
+
+Estimate to_estimate(const std::vector<FilmMoments>& batches) {
+    if (batches.size() < 16) throw Error(ExitCode::bad_input, fmt::format("{} independent parts of an image are too few for the variances of its blocks; 16 are needed", batches.size()));
+    FilmMoments all = batches[0];
+    for (size_t i = 1; i < batches.size(); ++i) {
+        if (batches[i].samples != batches[0].samples || batches[i].sum.size() != all.sum.size())
+            throw Error(ExitCode::bad_input, fmt::format("part {} of an image has another size or sample count than the first", i));
+        all.add(batches[i]);
+    }
+    Estimate e = to_estimate(all);
+    for (const FilmMoments& b : batches) {
+        e.batches.emplace_back(b.sum.size());
+        for (size_t i = 0; i < b.sum.size(); ++i) e.batches.back()[i] = b.mean(i);
     }
     return e;
 }
@@ -196,7 +229,7 @@ ZTestResult z_test(const Estimate& image_a, const Estimate& image_b, const ZTest
                 }
         for (int c = 0; c < 3 && size == smallest; ++c) {
             r.chi_square_dof = std::max(r.chi_square_dof, count[c]);
-            if (count[c] > 0) r.p_chi_square = std::min(r.p_chi_square, std::min(1.0, 3 * chi_square_tail(r.chi_square[c], count[c])));
+            if (count[c] > 0 && a.batches.empty() && b.batches.empty()) r.p_chi_square = std::min(r.p_chi_square, std::min(1.0, 3 * chi_square_tail(r.chi_square[c], count[c])));
         }
         parents = std::move(events);
         parent_columns = columns;

@@ -12,10 +12,15 @@ struct Estimate {
     uint32_t width = 0, height = 0;
     uint64_t samples = 0;  ///< 0: exactly known means (all variances zero)
     std::vector<double> mean, variance_of_mean;
+    /// Means of independent parts of equal weight, for images whose pixels are not independent of each other (one light walk splats onto many): the variance of a
+    /// block then comes from the parts. Empty: pixels are independent.
+    std::vector<std::vector<double>> batches = {};
 };
 
 /// Throws Error(bad_input) with fewer than two samples, which have no variance.
 Estimate to_estimate(const FilmMoments& moments);
+/// An image whose pixels depend on each other, from independent parts of equal sample counts. Throws Error(bad_input) for fewer than 16 parts or unequal ones.
+Estimate to_estimate(const std::vector<FilmMoments>& batches);
 /// A reference without standard errors counts as exactly known.
 Estimate to_estimate(const Reference& reference);
 /// Exactly known image, such as a closed form.
@@ -53,7 +58,7 @@ struct ZTestResult {
 /// Compares block means on all scales: blocks of `block` pixels, of twice that size and so on up to the whole image, each channel by itself.
 ///
 /// A block's t = (mean a - mean b)/sqrt(sum of variances of both), with its variances from the moments and Welch-Satterthwaite degrees of freedom; t becomes its
-/// normal equivalent z. The level is shared by the worst z (Sidak over all blocks, channels and scales; scales overlap, which only makes this stricter on
+/// normal equivalent z. Of an image with batches, whose pixels may be correlated, the block's variance is that of its mean over the batches; since blocks then depend on each other too, the chi-square is only reported. The level is shared by the worst z (Sidak over all blocks, channels and scales; scales overlap, which only makes this stricter on
 /// itself) and by the chi-square of z² over the smallest blocks, which sees many small differences.
 ///
 /// Heavy tails: a block that has met few of its rare bright samples is too dark and its variance is estimated too small together, so that plain z-scores

@@ -247,3 +247,49 @@ TEST_CASE("Mitsuba's rule passes its own kind of noise and finds a bias") {
     CHECK_FALSE(mitsuba_z_test(broken, spp, ref, var).pass);
     CHECK_THROWS_AS(mitsuba_z_test(image(0.5, 0), spp, Image{1, 1, {0, 0, 0}}, var), Error);
 }
+
+TEST_CASE("Images whose pixels depend on each other are compared by their batches") {
+    // Every sample sends 64 walks of a geometrically distributed length that light one pixel per step: what walks do is shared by many pixels.
+    const auto walks = [](uint64_t seed, double brightness) {
+        std::mt19937_64 rng(seed);
+        std::vector<FilmMoments> batches;
+        for (int k = 0; k < 32; ++k) {
+            FilmMoments m{16, 16, 2, std::vector<double>(3 * 256), std::vector<double>(3 * 256)};
+            for (int sample = 0; sample < 2; ++sample) {
+                std::vector<double> value(256);
+                for (int w = 0; w < 64; ++w) {
+                    const double throughput = std::exponential_distribution<double>()(rng);
+                    do value[rng() % 256] += brightness * throughput;
+                    while (rng() % 10 != 0);
+                }
+                for (size_t i = 0; i < 3 * 256; ++i) {
+                    m.sum[i] += value[i / 3];
+                    m.sum_squares[i] += value[i / 3] * value[i / 3];
+                }
+            }
+            batches.push_back(std::move(m));
+        }
+        return batches;
+    };
+    ZTestOptions options;
+    options.significance = 0.02;
+    const int runs = 150;
+    int with = 0, without = 0, seen = 0;
+    double detectable = 0;
+    for (int i = 0; i < runs; ++i) {
+        const Estimate a = to_estimate(walks(2 * uint64_t(i), 1)), b = to_estimate(walks(2 * uint64_t(i) + 1, 1));
+        const ZTestResult z = z_test(a, b, options);
+        with += !z.pass;
+        detectable = z.detectable;
+        Estimate plain_a = a, plain_b = b;
+        plain_a.batches.clear();
+        plain_b.batches.clear();
+        without += !z_test(plain_a, plain_b, options).pass;
+        seen += !z_test(a, to_estimate(walks(2 * uint64_t(i) + 1, 1 + 2 * detectable)), options).pass;
+    }
+    INFO("of " << runs << ": " << with << " fail with batches, " << without << " without, " << seen << " are seen at twice " << detectable);
+    CHECK(with <= binomial_limit(runs, options.significance));
+    CHECK(without > runs / 4);
+    CHECK(seen > runs * 9 / 10);
+    CHECK_THROWS_AS(to_estimate(std::vector<FilmMoments>(15, walks(1, 1)[0])), Error);
+}
