@@ -6,7 +6,7 @@
 namespace ambilux {
 
 /// Which walk a number belongs to; light walks of the same index never share numbers with eye walks.
-enum class Stream : uint32_t { eye = 0, light = 1, bench = 2, test = 3 };
+enum class Stream : uint32_t { eye = 0, light = 1, bench = 2, test = 3, pilot = 4 };
 
 /// Names a sequence of random blocks. `index`: pixel or light path; `sample`: sample of that pixel.
 struct RngKey {

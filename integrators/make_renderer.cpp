@@ -14,8 +14,12 @@ std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings
     apply_setting(checked, "variant", settings.variant);
     apply_setting(checked, "backend", settings.backend);
     apply_setting(checked, "accel", settings.accel);
+    if (settings.variant != "wavefront" && settings.integrator != "bdpt")
+        throw Error(ExitCode::usage, "variant=" + settings.variant + ": integrator " + settings.integrator + " has the variant wavefront only; megakernel and lvc belong to bdpt");
     const bool cuda = settings.backend == "cuda" || (settings.backend == "auto" && settings.accel != "embree" && cuda_available());
     if (cuda && settings.accel == "embree") throw Error(ExitCode::usage, "accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
+    if (cuda && settings.deterministic && settings.variant == "lvc")
+        throw Error(ExitCode::usage, "deterministic=true: variant lvc draws from a cache whose order differs between runs on a CUDA device; use wavefront or megakernel");
     if (settings.integrator != "path") return cuda ? make_bidirectional_cuda(scene, settings) : make_bidirectional_cpu(scene, settings);
     if (cuda) return make_path_cuda(scene, settings);
     return make_path_cpu(scene, settings);

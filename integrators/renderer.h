@@ -23,6 +23,7 @@ struct RenderSettings {
     Estimator estimator = Estimator::mis;
     MisHeuristic heuristic = MisHeuristic::balance;
     uint32_t strategies = kAllStrategies;  ///< bdpt: StrategyBits
+    uint32_t connections = 3;            ///< bdpt, variant lvc: light vertices that an eye vertex draws
     int max_depth = -1;                  ///< segments of a path; -1 is unbounded
     int rr_depth = 5;                    ///< Russian roulette starts at this many segments; a value < 0 turns it off
     uint64_t seed = 0;

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "integrators/renderer.h"
+#include "stages/wave.h"
 
 namespace ambilux {
 namespace {
@@ -55,7 +56,7 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
     if (key == "integrator")
         s.integrator = (choose(key, value, {"path", "light", "bdpt"}), value);
     else if (key == "variant")
-        s.variant = (choose(key, value, {"wavefront"}), value);
+        s.variant = (choose(key, value, {"wavefront", "megakernel", "lvc"}), value);
     else if (key == "backend")
         s.backend = (choose(key, value, {"auto", "cpu", "cuda"}), value);
     else if (key == "estimator")
@@ -64,6 +65,8 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.heuristic = MisHeuristic(choose(key, value, {"balance", "power"}));
     else if (key == "strategies")
         s.strategies = strategies(key, value);
+    else if (key == "connections")
+        s.connections = integer<uint32_t>(key, value, 1, kMaxCacheDraws);
     else if (key == "max_depth")
         s.max_depth = integer(key, value, -1, (1 << 14) - 2);
     else if (key == "rr_depth")
@@ -82,7 +85,7 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.graph = boolean(key, value);
     else
         throw Error(ExitCode::usage,
-                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, max_depth, rr_depth, seed, accel, wave_size, specialise, deterministic, graph", key));
+                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, connections, max_depth, rr_depth, seed, accel, wave_size, specialise, deterministic, graph", key));
 }
 
 }  // namespace ambilux

@@ -12,10 +12,12 @@ struct BidirectionalPolicy {
     bool light_walks;         ///< some strategy needs them
     bool splat;               ///< light vertices are connected with the camera
     bool connect_vertices;
+    uint32_t cache_draws;     ///< light vertices that an eye vertex draws from a cache of all; 0: those of the light walk of its slot
     bool next_event;
     bool count_hits;          ///< eye walks count the area emitters that they meet
     bool count_environment;   ///< eye walks count the environment
     bool background_only;     ///< eye walks end at their first vertex: they serve the directly seen environment, which no light walk finds
+    bool megakernel;          ///< variant: one thread per slot instead of stages
     bool hide_emitters;       ///< the camera does not see emitters
 };
 

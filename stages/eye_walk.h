@@ -55,7 +55,7 @@ struct EyeShade {
         }
         if (w.depth >= policy.max_depth) return;
         if ((policy.next_event || policy.connect_vertices) && bsdf_is_smooth(z.scattering.bsdf))
-            vertices.push(pack_vertex(h, z, policy.connect_vertices ? last_vertex[h.ray.path] : kNone));
+            vertices.push(pack_vertex(h, z, !policy.connect_vertices ? kNone : policy.cache_draws > 0 ? policy.cache_draws : last_vertex[h.ray.path]));
         const uint32_t depth = w.depth;
         // The last segment can bring emission only.
         if (depth + 1 == policy.max_depth && !policy.count_hits && !policy.count_environment) return;
@@ -96,6 +96,20 @@ struct EyeConnect {
     }
 };
 
+/// Candidate of eye vertex `item` and light vertex `light`, worth `scale` times their product.
+template <Features F>
+AMBILUX_HD void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const VertexItem& item, const VertexItem& light, float scale,
+                                uint32_t which, const Queue<ConnectCandidate>& candidates, StageRecord* record) {
+    const WalkVertex z = unpack_vertex<F>(scene, item), y = unpack_vertex<F>(scene, light);
+    WalkConnection c;
+    if (!connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
+    c.value *= scale;
+    if (!is_light(c.value, record) || is_zero(c.value)) return;
+    uint32_t seed = 0;
+    if constexpr (F.opacity) seed = alpha_seed(key, item.bits.depth() + (which << WalkBits::kDepthBits), true);
+    candidates.push({c.value, item.path, 1.0f, c.others, seed, c.tmax, c.o, 0, c.d, 0});
+}
+
 /// connect_vertices: an eye vertex and one vertex of the light walk of its slot (s, t >= 2); what is left of that walk is for the next launch, so that no launch
 /// holds two contributions of one path.
 template <Features F>
@@ -118,13 +132,33 @@ struct ConnectVertices {
         }
         item.previous = light.previous;
         if (light.previous != kNone) rest.push(item);
-        const WalkVertex z = unpack_vertex<F>(scene, item), y = unpack_vertex<F>(scene, light);
-        WalkConnection c;
-        if (!connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
-        if (!is_light(c.value, record) || is_zero(c.value)) return;
-        uint32_t seed = 0;
-        if constexpr (F.opacity) seed = alpha_seed(wave.key(item.path), depth + (light.bits.depth() << 16), true);
-        candidates.push({c.value, item.path, 1.0f, c.others, seed, c.tmax, c.o, 0, c.d, 0});
+        push_connection<F>(scene, policy, wave.key(item.path), item, light, 1.0f, light.bits.depth(), candidates, record);
+    }
+};
+
+/// connect_vertices over a cache (Davidovic et al. 2014): an eye vertex and one vertex drawn from those of all light walks of the wave. VertexItem::previous of the eye
+/// vertex counts the draws that are left. M vertices of N walks are in the cache; k draws estimate the sum over a walk's vertices by M / (N k) times theirs.
+template <Features F>
+struct ConnectCache {
+    SceneView scene;
+    Wave wave;
+    BidirectionalPolicy policy;
+    Queue<VertexItem> pairs, rest;
+    Queue<VertexItem> light_vertices;
+    Queue<ConnectCandidate> candidates;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const uint32_t size = light_vertices.counter->size();
+        if (size == 0) return;
+        VertexItem item = pairs.load(i);
+        const uint32_t depth = item.bits.depth(), draw = --item.previous;
+        if (draw > 0) rest.push(item);
+        const RngKey key = wave.key(item.path);
+        const VertexItem light = light_vertices.load(mul_hi(random_bits(key, cache_block(depth, draw)).x, size));
+        if (depth + light.bits.depth() + 1 > policy.max_depth) return;
+        const float scale = float(size) / (float(wave.state->walks) * float(policy.cache_draws));
+        push_connection<F>(scene, policy, key, item, light, scale, WalkBits::kMaxDepth + draw, candidates, record);
     }
 };
 

@@ -20,13 +20,14 @@ enum class StageId : uint32_t {
     occlude,
     accumulate,
     splat,
+    megakernel,
     develop,
     count
 };
 
 constexpr uint32_t kStageCount = uint32_t(StageId::count);
 constexpr const char* kStageNames[kStageCount] = {"light_generate", "light_extend", "light_shade", "connect_camera", "generate", "extend", "shade",
-                                                   "connect", "connect_vertices", "mis_weight", "occlude", "accumulate", "splat", "develop"};
+                                                   "connect", "connect_vertices", "mis_weight", "occlude", "accumulate", "splat", "megakernel", "develop"};
 
 /// Items are counted for depths 0 ... kTrackedDepths-1; the last entry gathers all deeper ones.
 constexpr uint32_t kTrackedDepths = 64;

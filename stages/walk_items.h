@@ -36,7 +36,7 @@ struct VertexItem {
     uint32_t prim;
     float dvcm;
     float dvc;
-    uint32_t previous; ///< light: the vertex before it in the same walk or kNone; eye: the light vertex to connect next
+    uint32_t previous; ///< light: the vertex before it in the same walk or kNone; eye: the light vertex to connect next, or the draws that are left
     uint32_t pad[2];
 };
 

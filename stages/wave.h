@@ -17,6 +17,7 @@ struct WaveState {
     uint32_t depth;         ///< segments of the paths in flight
     uint32_t failed;        ///< a wave ran out of memory: it and all after it do nothing until the host has made room
     uint32_t done;          ///< waves that did not fail
+    uint32_t walks;         ///< active slots
 };
 
 /// What a slot stands for.
@@ -56,6 +57,17 @@ struct Wave {
     AMBILUX_HD RngKey key(uint32_t slot, Stream stream = Stream::eye) const { return key(locate(slot), stream); }
 };
 
+/// Pixels of the film among the `tiles` tiles from `first_tile` on.
+inline uint32_t active_pixels(const Wave& wave, uint32_t first_tile) {
+    uint32_t pixels = 0;
+    for (uint32_t tile = first_tile; tile < first_tile + wave.tiles; ++tile) {
+        const uint32_t x = tile % wave.tiles_x * kTileSide, y = tile / wave.tiles_x * kTileSide;
+        if (y >= wave.height) break;
+        pixels += (wave.width - x < kTileSide ? wave.width - x : kTileSide) * (wave.height - y < kTileSide ? wave.height - y : kTileSide);
+    }
+    return pixels;
+}
+
 /// Blocks of random numbers of an eye walk: 0 is the camera's; a vertex at `depth` >= 1 has one to scatter (and for Russian roulette) and one to sample emitters.
 constexpr uint32_t kCameraBlock = 0;
 AMBILUX_HD uint32_t scatter_block(uint32_t depth) { return 2 * depth - 1; }
@@ -65,6 +77,10 @@ AMBILUX_HD uint32_t emitter_block(uint32_t depth) { return 2 * depth; }
 constexpr uint32_t kEmissionBlock = 0;
 AMBILUX_HD uint32_t light_scatter_block(uint32_t depth) { return 2 * depth; }
 AMBILUX_HD uint32_t lens_block(uint32_t depth) { return 2 * depth + 1; }
+
+/// Blocks of an eye vertex that draws light vertices from a cache.
+constexpr uint32_t kMaxCacheDraws = 256;
+AMBILUX_HD uint32_t cache_block(uint32_t depth, uint32_t draw) { return 0x10000u + depth * kMaxCacheDraws + draw; }
 
 /// Seed of the decisions whether surfaces of partial opacity let a ray pass: another one for every ray. `shadow`: rays of connections.
 AMBILUX_HD uint32_t alpha_seed(const RngKey& key, uint32_t depth, bool shadow) {

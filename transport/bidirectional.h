@@ -28,11 +28,14 @@ struct BidirectionalMis {
     MisHeuristic heuristic;
     uint32_t strategies;  ///< StrategyBits
     float light_paths;    ///< light walks per eye walk of one pixel: of the whole image, over the samples of a pixel
+    float connections;    ///< expected number of times that a vertex of an eye walk meets a given light walk: 1 for paired walks
 
     AMBILUX_HD bool has(uint32_t bits) const { return strategies & bits; }
     /// Ratio of densities to the power that the heuristic asks for.
     AMBILUX_HD float term(float ratio) const { return heuristic == MisHeuristic::power ? ratio * ratio : ratio; }
     AMBILUX_HD float masked(uint32_t bits, float value) const { return has(bits) ? value : 0.0f; }
+    /// Density of connections relative to that of one pair of walks, to the power of the heuristic; 0 if they are off.
+    AMBILUX_HD float connection_term() const { return masked(kConnectionStrategies, term(connections)); }
 };
 
 /// What a walk knows of the strategies that would have sampled its vertices from the other end.
@@ -63,12 +66,12 @@ AMBILUX_HD MisSums sums_at_hit(const BidirectionalMis& mis, MisSums s, float d2,
 /// ray. For a delta the densities of both directions are the same probability (all deltas choose by a Fresnel term that is symmetric).
 AMBILUX_HD MisSums sums_after_scatter(const BidirectionalMis& mis, MisSums s, bool first, bool delta, float pdf_forward_sa, float pdf_reverse_sa, float cos_out) {
     if (delta) return {0.0f, mis.term(cos_out) * s.dvc};
-    const float connection = first ? s.dvcm : mis.masked(kConnectionStrategies, s.dvcm);
+    const float connection = first ? s.dvcm : mis.connection_term() * s.dvcm;
     return {mis.term(1.0f / pdf_forward_sa), mis.term(cos_out / pdf_forward_sa) * (s.dvc * mis.term(pdf_reverse_sa) + connection)};
 }
 
 /// dvcm where it stands for a strategy with s >= 2 and t >= 2, or one of the end strategies whose mask it holds already.
-AMBILUX_HD float connection_dvcm(const BidirectionalMis& mis, MisSums s, bool first) { return first ? s.dvcm : mis.masked(kConnectionStrategies, s.dvcm); }
+AMBILUX_HD float connection_dvcm(const BidirectionalMis& mis, MisSums s, bool first) { return first ? s.dvcm : mis.connection_term() * s.dvcm; }
 
 // ---- light walks ----
 

@@ -112,7 +112,8 @@ AMBILUX_HD bool scatter_walk(const BidirectionalMis& mis, const WalkVertex& vert
     w.o = offset_ray_origin(vertex.point.p, vertex.point.p_error, vertex.point.ng, s.wo);
     w.d = s.wo;
     w.throughput = throughput;
-    w.eta_scale *= mode == TransportMode::radiance ? s.eta : 1.0f;
+    // Sixteen bits, which is what queues keep: every variant then takes the same decisions.
+    if (mode == TransportMode::radiance) w.eta_scale = bits_float(float_bits(w.eta_scale * s.eta) & 0xffff0000u);
     w.delta = delta;
     const uint32_t met = w.depth++;
     return met < rr_depth || survives(w, u.w);
@@ -171,6 +172,7 @@ AMBILUX_HD bool connect_vertices(const BidirectionalMis& mis, const WalkVertex& 
     const float cos_y = fabsf(dot(y.point.ng, w)), cos_z = fabsf(dot(z.point.ng, w));
     c.others = others_behind(mis, y.sums, y.first, scatter_pdf<F>(z.scattering, w) * cos_y / d2, scatter_pdf_reverse<F>(y.scattering, -w)) +
                others_behind(mis, z.sums, z.first, scatter_pdf<F>(y.scattering, -w) * cos_z / d2, scatter_pdf_reverse<F>(z.scattering, w));
+    c.others /= mis.connection_term();
     return set_segment(c, z.point, w, y.point.p, y.point.p_error, y.point.ng);
 }
 

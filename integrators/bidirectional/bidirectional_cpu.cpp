@@ -11,6 +11,7 @@
 #include "backends/cpu/wave_bytes.h"
 #include "core/error.h"
 #include "integrators/bidirectional/bidirectional.h"
+#include "integrators/bidirectional/pilot.h"
 #include "integrators/bidirectional/schedule.h"
 #include "integrators/feature_levels.h"
 #include "integrators/path/path_wave.h"
@@ -23,8 +24,6 @@ namespace ambilux {
 namespace {
 
 constexpr uint32_t kCpuWaveSize = 512;
-/// Kept light vertices per slot to begin with.
-constexpr uint32_t kKeptPerSlot = 4;
 
 /// Queues of one thread. They grow when a wave has more light vertices than any before.
 struct WaveMemory {
@@ -71,8 +70,10 @@ public:
             moments_.sum_squares.resize(values);
             samples_of_slots_.resize(film_wave_.slot_count());
             splats_.resize(values);
+            const double mean = policy_.light_walks ? mean_light_vertices<F>(view_, accel_->tracer(), policy_, settings.seed) : 0.0;
+            plan_cache(policy_, mean);
             waves_.resize(size_t(threads));
-            for (WaveMemory& w : waves_) w.allocate(wave_.slot_count(), wave_.slot_count() * kKeptPerSlot, policy_);
+            for (WaveMemory& w : waves_) w.allocate(wave_.slot_count(), planned_vertices(mean, wave_.slot_count()), policy_);
         } catch (const std::bad_alloc&) {
             throw Error(ExitCode::device, fmt::format("out of memory: a film of {}x{} needs more than there is; a smaller --size needs less", wave_.width, wave_.height));
         }
@@ -148,7 +149,7 @@ private:
             const BidirectionalFilm film = {samples_of_slots_.data() + size_t(first_tile) * kTilePixels, splats_.data(), nullptr, nullptr};
             const BidirectionalStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, m, film);
             CpuExecutor executor(m.state, m.records);
-            *m.state = {first_tile, sample, 1, 0, 0, 0};
+            *m.state = {first_tile, sample, 1, 0, 0, 0, active_pixels(wave_, first_tile)};
             run_bidirectional_wave(executor, stages);
             if (!m.state->failed) return;
             const uint64_t needed = std::max(m.light_vertices.counter->peak, m.splats.counter->peak);
@@ -158,7 +159,7 @@ private:
 
     void develop(uint32_t sample) {
         const auto start = Clock::now();
-        film_state_ = {0, sample, 1, 0, 0, 0};
+        film_state_ = {0, sample, 1, 0, 0, 0, 0};
         tbb::parallel_for(uint32_t(0), film_wave_.tiles, [&](uint32_t tile) {
             StageRecord record{};
             const DevelopSplats stage = {film_wave_, samples_of_slots_.data(), splats_.data(), moments_.sum.data(), moments_.sum_squares.data(), &record};

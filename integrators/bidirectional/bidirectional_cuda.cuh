@@ -10,6 +10,7 @@
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "integrators/bidirectional/bidirectional_cuda.h"
+#include "integrators/bidirectional/pilot.h"
 #include "integrators/bidirectional/schedule.h"
 #include "integrators/feature_levels.h"
 #include "integrators/path/path_wave.h"
@@ -27,7 +28,8 @@ public:
         wave_ = shape_wave(scene, settings, kTilePixels, 1);
         wave_.tiles = tile_count(wave_);  // splats may land anywhere on the film
         const uint32_t slots = wave_.tiles * kTilePixels;
-        wave_.samples = std::max(1u, (settings.wave_size ? settings.wave_size : kWaveSize) / slots);
+        // The samples of a cache are not independent of each other.
+        wave_.samples = policy_.cache_draws > 0 ? 1 : std::max(1u, (settings.wave_size ? settings.wave_size : kWaveSize) / slots);
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         const CwbvhAccel accel(scene);
         device_scene_.emplace(scene);
@@ -40,7 +42,9 @@ public:
         clock_ = DeviceBuffer<uint64_t>(1);
         clear_film();
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        allocate(wave_.slot_count() * kKeptPerSlot);
+        const double mean = policy_.light_walks ? mean_light_vertices<F>(scene.view(), accel.tracer(), policy_, settings.seed) : 0.0;
+        plan_cache(policy_, mean);
+        allocate(planned_vertices(mean, wave_.slot_count()));
         build_seconds_ = seconds_since(start);
     }
 
@@ -57,7 +61,8 @@ public:
             const uint32_t pass = std::min(count - done, std::max(preferred_batch(), wave_.samples));
             const uint32_t waves_before = read_state().done;
             for (uint32_t s = 0; s < pass; s += wave_.samples) {
-                detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{0, first + done + s, std::min(wave_.samples, pass - s), 0, 0, 0});
+                const uint32_t samples = std::min(wave_.samples, pass - s);
+                detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{0, first + done + s, samples, 0, 0, 0, samples * wave_.width * wave_.height});
                 if (graph_)
                     cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
                 else
@@ -115,8 +120,6 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
     static constexpr uint32_t kWaveSize = 1u << 21;
-    /// Kept light vertices per slot to begin with.
-    static constexpr uint32_t kKeptPerSlot = 4;
     static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
     uint64_t fixed_bytes() const {

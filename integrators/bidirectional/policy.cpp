@@ -25,6 +25,9 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     p.count_hits = area && p.mis.has(kHitStrategies);
     // No light walk finds the environment that the camera sees: eye walks of one segment count it for the light tracer.
     p.count_environment = scene.environment != kNone && p.mis.has(kHitStrategies | kLightStrategies);
+    p.mis.connections = 1.0f;
+    p.megakernel = settings.variant == "megakernel";
+    p.cache_draws = settings.variant == "lvc" && p.connect_vertices ? settings.connections : 0;
     p.background_only = p.mis.strategies == kLightStrategies;
     p.hide_emitters = scene.integrator.hide_emitters;
     return p;

@@ -58,9 +58,15 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
         if (policy.next_event) run_connections(exec, stages);
         if (policy.connect_vertices)
             exec.repeat_while(m.pairs, [&] {
-                exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
+                if (policy.cache_draws > 0)
+                    exec.run(StageId::connect_vertices, stages.connect_cache, m.pairs);
+                else
+                    exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
                 run_connections(exec, stages);
-                exec.run(StageId::connect_vertices, stages.connect_rest, m.rest);
+                if (policy.cache_draws > 0)
+                    exec.run(StageId::connect_vertices, stages.connect_cache_rest, m.rest);
+                else
+                    exec.run(StageId::connect_vertices, stages.connect_rest, m.rest);
                 run_connections(exec, stages);
             });
         exec.next_depth();
@@ -72,8 +78,13 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
 /// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h), and settle(queue, queue), clear(queue).
 template <class Executor, Features F, class Tracer>
 void run_bidirectional_wave(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
-    if (stages.policy.light_walks) run_light_walks(exec, stages);
-    run_eye_walks(exec, stages);
+    if (stages.policy.megakernel) {
+        exec.run_slots(StageId::megakernel, stages.megakernel, stages.wave.tiles * kTilePixels);
+        exec.settle(stages.memory.light_vertices, stages.memory.splats);
+    } else {
+        if (stages.policy.light_walks) run_light_walks(exec, stages);
+        run_eye_walks(exec, stages);
+    }
     if (stages.policy.splat) exec.run(StageId::splat, stages.splat, stages.memory.splats);
     if (stages.policy.connect_vertices) exec.clear(stages.memory.light_vertices);
 }

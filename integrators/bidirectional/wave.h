@@ -7,6 +7,7 @@
 #include "stages/extend.h"
 #include "stages/eye_walk.h"
 #include "stages/light_walk.h"
+#include "stages/megakernel.h"
 #include "stages/mis_weight.h"
 #include "stages/occlude.h"
 #include "stages/splat.h"
@@ -42,9 +43,22 @@ struct BidirectionalMemory {
     uint32_t* last_vertex;
 };
 
+/// Memory of the megakernel, whose walks live in registers. Other queues are empty.
+inline BidirectionalMemory lay_out_megakernel(Layout& layout, uint32_t slots, uint32_t kept, const BidirectionalPolicy& policy) {
+    BidirectionalMemory m{};
+    m.state = layout.take<WaveState>(1);
+    m.records = layout.take<StageRecord>(kStageCount);
+    m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
+    m.light_vertices = layout.queue<VertexItem>("light_vertices", m.counters, policy.connect_vertices ? kept : 0);
+    m.splats = layout.queue<SplatItem>("splats", m.counters, policy.splat ? kept + slots : 0);
+    return m;
+}
+
 /// Lays out the memory for `slots` walks of either kind and `kept` vertices of light walks.
 inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept, const BidirectionalPolicy& policy) {
     const auto when = [&](bool needed, uint32_t n = 0) { return needed ? (n ? n : slots) : 0u; };
+    // The megakernel keeps vertices and splats only.
+    if (policy.megakernel) return lay_out_megakernel(layout, slots, kept, policy);
     const bool hits = policy.count_hits || policy.count_environment, connections = policy.next_event || policy.connect_vertices;
     BidirectionalMemory m;
     m.state = layout.take<WaveState>(1);
@@ -95,6 +109,8 @@ struct BidirectionalStages {
     Accumulate accumulate_hits;
     EyeConnect<F> connect;
     ConnectVertices<F> connect_vertices, connect_rest;
+    ConnectCache<F> connect_cache, connect_cache_rest;
+    Megakernel<F, Tracer> megakernel;
     WeightConnections weight_connections;
     Occlude<F, Tracer> occlude;
     Accumulate accumulate_shadows;
@@ -123,6 +139,9 @@ struct BidirectionalStages {
         connect = {scene, wave, policy, m.vertices, m.pairs, m.connect_candidates, record(StageId::connect)};
         connect_vertices = {scene, wave, policy, m.pairs, m.rest, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
         connect_rest = {scene, wave, policy, m.rest, m.pairs, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
+        connect_cache = {scene, wave, policy, m.pairs, m.rest, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
+        connect_cache_rest = {scene, wave, policy, m.rest, m.pairs, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
+        megakernel = {scene, tracer, wave, policy, m.light_vertices, m.splats, film.samples, m.records};
         weight_connections = {sums, m.connect_candidates, m.shadows, record(StageId::mis_weight)};
         occlude = {scene, tracer, m.shadows, m.shadow_contributions, record(StageId::occlude)};
         accumulate_shadows = {m.shadow_contributions, film.samples, record(StageId::accumulate)};

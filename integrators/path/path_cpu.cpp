@@ -130,7 +130,7 @@ private:
         const PathStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, memory, {film_.sum.data(), film_.sum_squares.data()});
         CpuExecutor executor(memory.state, memory.records);
         for (uint32_t s = 0; s < count; s += wave_.samples) {
-            *memory.state = {first_tile, first_sample + s, std::min(wave_.samples, count - s), 0, 0, 0};
+            *memory.state = {first_tile, first_sample + s, std::min(wave_.samples, count - s), 0, 0, 0, 0};
             run_path_wave(executor, stages);
         }
     }

@@ -71,7 +71,7 @@ public:
             const auto pass_start = Clock::now();
             for (uint32_t s = 0; s < pass; s += wave_.samples) {
                 for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles) {
-                    detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{tile, first + done + s, std::min(wave_.samples, pass - s), 0, 0, 0});
+                    detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{tile, first + done + s, std::min(wave_.samples, pass - s), 0, 0, 0, 0});
                     if (graph_)
                         cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
                     else
