@@ -50,7 +50,7 @@ struct Bench {
         Layout layout(start);
         memory = lay_out(layout, wave.slot_count(), policy);
         for (size_t q = 0; q < layout.queue_capacities().size(); ++q) memory.counters[q].capacity = layout.queue_capacities()[q];
-        *memory.state = {0, 0, samples, 1, 0, 0};
+        *memory.state = {0, 0, samples, 1, 0, 0, 0};
         sum.resize(size_t(wave.width) * wave.height * 3);
         sum_squares.resize(sum.size());
     }
@@ -278,7 +278,7 @@ TEST_CASE("G4: slots and pixels are one to one", "[stages]") {
                 const uint32_t total = 5;
                 for (uint32_t tile = 0; tile < tile_count(wave); tile += wave.tiles)
                     for (uint32_t s = 0; s < total; s += samples) {
-                        const WaveState state = {tile, 40 + s, std::min(samples, total - s), 0};
+                        const WaveState state = {tile, 40 + s, std::min(samples, total - s), 0, 0, 0};
                         wave.state = &state;
                         for (uint32_t slot = 0; slot < wave.slot_count(); ++slot) {
                             const PathSlot p = wave.locate(slot);
@@ -296,7 +296,7 @@ TEST_CASE("G4: slots and pixels are one to one", "[stages]") {
     wave.tiles_x = (4097 + kTileSide - 1) / kTileSide;
     wave.tiles = tile_count(wave);
     wave.samples = 1;
-    const WaveState state = {0, 0, 1, 0};
+    const WaveState state = {0, 0, 1, 0, 0, 0};
     wave.state = &state;
     REQUIRE(wave.slot_count() == 513u * 513u * 64u);
     std::vector<bool> seen(4097u * 4097u);
