@@ -1,0 +1,111 @@
+// libs: ambilux_integrators ambilux_film ambilux_scene ambilux_core
+// labels: gpu
+// timeout: 900
+// Light tracing and bidirectional path tracing on a CUDA device against the CPU, at equal seeds.
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "film/image.h"
+#include "tests/render_scene.h"
+
+using namespace ambilux;
+
+namespace {
+
+bool device() {
+    if (cuda_available()) return true;
+    WARN("no CUDA device: skipped");
+    return false;
+}
+
+RenderSettings settings_of(const Scene& scene, const char* integrator, const char* variant, const char* backend) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis);
+    s.integrator = integrator;
+    s.variant = variant;
+    s.backend = backend;
+    return s;
+}
+
+/// Share of pixels whose channels all agree within 1e-3 relative, or within a thousandth of the image's mean.
+double agreeing_pixels(const FilmMoments& a, const FilmMoments& b) {
+    REQUIRE(a.sum.size() == b.sum.size());
+    double mean = 0;
+    for (const double v : b.sum) mean += v / double(b.sum.size());
+    uint64_t same = 0;
+    for (size_t p = 0; p < a.sum.size(); p += 3) {
+        bool agree = true;
+        for (size_t c = p; c < p + 3; ++c) agree &= std::fabs(a.sum[c] - b.sum[c]) <= 1e-3 * std::max({std::fabs(a.sum[c]), std::fabs(b.sum[c]), mean});
+        same += agree;
+    }
+    return double(same) / double(a.sum.size() / 3);
+}
+
+}  // namespace
+
+TEST_CASE("G5: bidirectional renders of both backends at equal seeds: pixels and rays") {
+    if (!device()) return;
+    for (const char* name : {"cornell", "glass", "lights", "materials", "textured", "furnace"}) {
+        const Scene scene = project_scene(name, 96, 64);
+        for (const auto& [integrator, variant] : {std::pair{"light", "wavefront"}, {"bdpt", "wavefront"}, {"bdpt", "megakernel"}}) {
+            INFO(name << " " << integrator << " " << variant);
+            RenderSettings s = settings_of(scene, integrator, variant, "cuda");
+            s.max_depth = 6;
+            const RenderResult cuda = render_scene(scene, s, 1);
+            s.backend = "cpu";
+            s.accel = "cwbvh";
+            const RenderResult cpu = render_scene(scene, s, 1);
+            CHECK(agreeing_pixels(cuda.film, cpu.film) >= 0.995);
+            CHECK(std::fabs(double(cuda.stats.rays_extend) - double(cpu.stats.rays_extend)) <= 1e-3 * double(cpu.stats.rays_extend) + 3);
+            CHECK(std::fabs(double(cuda.stats.rays_occlude) - double(cpu.stats.rays_occlude)) <= 1e-3 * double(cpu.stats.rays_occlude) + 3);
+            CHECK(cuda.stats.invalid.total() == 0);
+            for (const QueueStats& q : cuda.stats.queues) CHECK(q.overflow == 0);
+        }
+    }
+}
+
+TEST_CASE("G1, G7: splats of a device sum up to the same bits, whatever the wave and the launches") {
+    if (!device()) return;
+    const Scene scene = project_scene("glass", 80, 45);
+    for (const char* variant : {"wavefront", "megakernel"}) {
+        INFO(variant);
+        RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
+        const RenderResult first = render_scene(scene, s, 6);
+        CHECK(first.film.sum == render_scene(scene, s, 6).film.sum);
+        s.wave_size = 4000;
+        CHECK(first.film.sum == render_scene(scene, s, 6).film.sum);
+        s.graph = false;
+        CHECK(first.film.sum == render_scene(scene, s, 6).film.sum);
+    }
+}
+
+TEST_CASE("variants of a device give the same image up to rounding") {
+    if (!device()) return;
+    const Scene scene = project_scene("materials", 96, 54);
+    const RenderResult wavefront = render_scene(scene, settings_of(scene, "bdpt", "wavefront", "cuda"), 2);
+    const RenderResult megakernel = render_scene(scene, settings_of(scene, "bdpt", "megakernel", "cuda"), 2);
+    CHECK(agreeing_pixels(wavefront.film, megakernel.film) >= 0.99);
+}
+
+TEST_CASE("long light walks of a device: as on the CPU, in memory that is what was predicted") {
+    if (!device()) return;
+    // Long walks: the number of vertices of one wave scatters widely around the pilot's mean.
+    Scene scene = project_scene("furnace", 16, 16);
+    RenderSettings s = settings_of(scene, "bdpt", "wavefront", "cuda");
+    s.max_depth = 200;
+    s.rr_depth = -1;
+    const RenderResult cuda = render_scene(scene, s, 2);
+    s.backend = "cpu";
+    s.accel = "cwbvh";
+    const RenderResult cpu = render_scene(scene, s, 2);
+    CHECK(agreeing_pixels(cuda.film, cpu.film) >= 0.98);
+    CHECK(cuda.stats.memory_bytes == cuda.stats.memory_bytes_predicted);
+}
+
+TEST_CASE("lvc on a device refuses to be deterministic") {
+    if (!device()) return;
+    const Scene scene = project_scene("cornell", 16, 16);
+    RenderSettings s = settings_of(scene, "bdpt", "lvc", "cuda");
+    s.deterministic = true;
+    CHECK_THROWS_AS(make_renderer(scene, s), Error);
+}
