@@ -28,8 +28,8 @@ public:
         wave_ = shape_wave(scene, settings, kTilePixels, 1);
         wave_.tiles = tile_count(wave_);  // splats may land anywhere on the film
         const uint32_t slots = wave_.tiles * kTilePixels;
-        // The samples of a cache are not independent of each other.
-        wave_.samples = policy_.cache_draws > 0 ? 1 : std::max(1u, (settings.wave_size ? settings.wave_size : kWaveSize) / slots);
+        // Samples that share a cache of light vertices depend on each other, but by one part in the number of light walks only.
+        wave_.samples = std::max(1u, (settings.wave_size ? settings.wave_size : kWaveSize) / slots);
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         const CwbvhAccel accel(scene);
         device_scene_.emplace(scene);
