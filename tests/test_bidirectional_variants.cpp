@@ -1,0 +1,99 @@
+// libs: ambilux_integrators ambilux_film ambilux_scene ambilux_core
+// timeout: 900
+// Variants of bidirectional path tracing give the same image.
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "tests/bidirectional_images.h"
+
+using namespace ambilux;
+
+namespace {
+
+RenderSettings variant_settings(const Scene& scene, const char* variant, uint64_t seed = 1) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
+    s.integrator = "bdpt";
+    s.variant = variant;
+    return s;
+}
+
+double worst_difference(const FilmMoments& a, const FilmMoments& b) {
+    double mean = 0, worst = 0;
+    for (const double v : b.sum) mean += v / double(b.sum.size());
+    for (size_t i = 0; i < a.sum.size(); ++i) worst = std::max(worst, std::fabs(a.sum[i] - b.sum[i]) / std::max(std::fabs(b.sum[i]), mean));
+    return worst;
+}
+
+}  // namespace
+
+TEST_CASE("megakernel and wavefront sample the same paths: images equal up to rounding, rays equal") {
+    for (const char* name : {"cornell", "furnace", "glass", "lights", "materials", "textured"}) {
+        const Scene scene = project_scene(name, 64, 48);
+        for (const char* strategies : {"all", "hits+next_event", "light", "connections+light"}) {
+            INFO(name << " " << strategies);
+            RenderSettings s = variant_settings(scene, "wavefront");
+            apply_setting(s, "strategies", strategies);
+            const RenderResult wavefront = render_scene(scene, s, 3);
+            s.variant = "megakernel";
+            const RenderResult megakernel = render_scene(scene, s, 3);
+            CHECK(worst_difference(megakernel.film, wavefront.film) < 1e-4);
+            CHECK(megakernel.stats.rays_extend == wavefront.stats.rays_extend);
+            CHECK(megakernel.stats.rays_occlude == wavefront.stats.rays_occlude);
+            CHECK(megakernel.stats.invalid.total() == 0);
+        }
+    }
+}
+
+TEST_CASE("lvc has the expectation of paired walks, for few draws and many, and for both heuristics") {
+    for (const char* name : {"cornell", "glass", "lights", "materials"}) {
+        const Scene scene = project_scene(name, 40, 30);
+        const Estimate paired = render_batches(scene, variant_settings(scene, "wavefront", 21), 512);
+        for (const uint32_t draws : {1u, 5u}) {
+            for (const MisHeuristic heuristic : {MisHeuristic::balance, MisHeuristic::power}) {
+                RenderSettings s = variant_settings(scene, "lvc", 22);
+                s.connections = draws;
+                s.heuristic = heuristic;
+                const ZTestResult result = z_test(render_batches(scene, s, 256), paired);
+                INFO(name << " " << draws << " draws, heuristic " << int(heuristic) << "\n" << result.report());
+                CHECK(result.pass);
+                CHECK(result.detectable < 0.06);
+            }
+        }
+    }
+}
+
+TEST_CASE("lvc: connections alone, without weights of other strategies") {
+    // Paths of three segments and more that end on no emitter: the only strategies left are connections, whose weights sum to one among themselves.
+    const Scene scene = project_scene("cornell", 40, 40);
+    RenderSettings s = variant_settings(scene, "wavefront", 31);
+    apply_setting(s, "strategies", "connections");
+    s.max_depth = 4;
+    const Estimate paired = render_batches(scene, s, 1024);
+    s.variant = "lvc";
+    s.seed = 32;
+    s.connections = 4;
+    const ZTestResult result = z_test(render_batches(scene, s, 1024), paired);
+    INFO(result.report());
+    CHECK(result.pass);
+    CHECK(result.detectable < 0.02);
+}
+
+TEST_CASE("G13: variants that an integrator does not have are refused by name") {
+    const Scene scene = project_scene("cornell", 16, 16);
+    for (const auto& [integrator, variant] : {std::pair{"path", "megakernel"}, {"path", "lvc"}, {"light", "lvc"}, {"light", "megakernel"}}) {
+        RenderSettings s = variant_settings(scene, variant);
+        s.integrator = integrator;
+        try {
+            make_renderer(scene, s);
+            FAIL("not refused: " << integrator << " " << variant);
+        } catch (const Error& error) {
+            CHECK(error.code == ExitCode::usage);
+            CHECK(std::string(error.what()).find(variant) != std::string::npos);
+        }
+    }
+    RenderSettings s;
+    CHECK_THROWS_AS(apply_setting(s, "variant", "streaming"), Error);
+    CHECK_THROWS_AS(apply_setting(s, "connections", "0"), Error);
+    CHECK_THROWS_AS(apply_setting(s, "connections", "257"), Error);
+}
