@@ -63,9 +63,9 @@ AMBILUX_HD MisSums sums_at_hit(const BidirectionalMis& mis, MisSums s, float d2,
 }
 
 /// Sums of the ray that leaves a vertex at cosine `cos_out` to the geometric normal. `first`: the vertex is the first of the walk that lies on a surface met by a
-/// ray. For a delta the densities of both directions are the same probability (all deltas choose by a Fresnel term that is symmetric).
+/// ray. For a delta the densities matter by their ratio alone.
 AMBILUX_HD MisSums sums_after_scatter(const BidirectionalMis& mis, MisSums s, bool first, bool delta, float pdf_forward_sa, float pdf_reverse_sa, float cos_out) {
-    if (delta) return {0.0f, mis.term(cos_out) * s.dvc};
+    if (delta) return {0.0f, mis.term(cos_out * pdf_reverse_sa / pdf_forward_sa) * s.dvc};
     const float connection = first ? s.dvcm : mis.connection_term() * s.dvcm;
     return {mis.term(1.0f / pdf_forward_sa), mis.term(cos_out / pdf_forward_sa) * (s.dvc * mis.term(pdf_reverse_sa) + connection)};
 }
@@ -133,6 +133,8 @@ AMBILUX_HD float others_of_hit(const SceneView& scene, const BidirectionalMis& m
 template <Features F>
 AMBILUX_HD float others_of_escape(const SceneView& scene, const BidirectionalMis& mis, MisSums ray, uint32_t depth, Vec3f d) {
     if (depth == 1) return 0.0f;
+    // Eye walks count the environment for two masks, and beyond the first segment for one only.
+    if (!mis.has(kHitStrategies)) return kInfinity;
     const float pick = scene.emitters[scene.environment].pick_probability;
     const float next_event = mis.masked(kNextEventStrategies, mis.term(pdf_environment_direct<F>(scene, d)));
     const float emission = mis.term(pick * pdf_emission_position<F>(scene, scene.environment, kNone) * pdf_emission_direction<F>(scene, scene.environment, d, -d));

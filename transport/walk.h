@@ -99,6 +99,14 @@ AMBILUX_HD bool survives(Walk& w, float u) {
     return true;
 }
 
+/// Density of the way back over a delta, as a multiple of that of the way there. Fresnel terms are symmetric, but a delta function of the direction on one side counts
+/// otherwise as one of the direction on the other: refraction spreads solid angles by n_i² cos_i / (n_o² cos_o). `eta`: of the sample, n_o / n_i.
+AMBILUX_HD float delta_reverse_pdf(const Scattering& s, Vec3f wo, float eta) {
+    if (eta == 1.0f) return 1.0f;
+    // Never 0 by rounding, where a walk leaves along the surface.
+    return fabsf(s.wi.z) / (fmaxf(fabsf(dot(s.frame.n, wo)), 1e-7f) * sqr(eta));
+}
+
 /// The next ray of the walk `w` that met `vertex`; u.xyz scatter, u.w is for Russian roulette from `rr_depth` segments on. False when the walk ends.
 template <Features F>
 AMBILUX_HD bool scatter_walk(const BidirectionalMis& mis, const WalkVertex& vertex, Vec4f u, TransportMode mode, uint32_t rr_depth, Walk& w) {
@@ -107,8 +115,9 @@ AMBILUX_HD bool scatter_walk(const BidirectionalMis& mis, const WalkVertex& vert
     const Rgb throughput = w.throughput * s.weight;
     if (is_zero(throughput)) return false;
     const bool delta = s.flags & kScatterDelta;
-    const float reverse = delta ? 0.0f : scatter_pdf_reverse<F>(vertex.scattering, s.wo);
-    w.sums = sums_after_scatter(mis, vertex.sums, vertex.first, delta, s.pdf_sa, reverse, fabsf(dot(vertex.point.ng, s.wo)));
+    const float forward = delta ? 1.0f : s.pdf_sa;
+    const float reverse = delta ? delta_reverse_pdf(vertex.scattering, s.wo, s.eta) : scatter_pdf_reverse<F>(vertex.scattering, s.wo);
+    w.sums = sums_after_scatter(mis, vertex.sums, vertex.first, delta, forward, reverse, fabsf(dot(vertex.point.ng, s.wo)));
     w.o = offset_ray_origin(vertex.point.p, vertex.point.p_error, vertex.point.ng, s.wo);
     w.d = s.wo;
     w.throughput = throughput;
