@@ -1,5 +1,5 @@
 // Multiple importance sampling over all strategies (s,t) of bidirectional path tracing by sums that walks carry along (van Antwerpen 2011; Georgiev 2012,
-// "Implementing Vertex Connection and Merging", technical report). The derivation with every edge case is in docs/theory.md.
+// "Implementing Vertex Connection and Merging", technical report). The derivation with every edge case is in docs/theory.md, whose equations the comments name.
 //
 // A path x_0 ... x_k starts at the light. Strategy (s,t) samples s vertices from the light and t = k+1-s from the camera with the product density p_s. The
 // weight of a strategy is 1 / (1 + sum of (p_i/p_s)^beta over the other strategies i); the sum splits into one over fewer light vertices and one over more, and
@@ -56,14 +56,14 @@ AMBILUX_HD MisSums camera_sums(const BidirectionalMis& mis, const Sensor& sensor
 }
 
 /// Sums at a vertex that a ray of length² `d2` met at cosine `cos_in` to the geometric normal. `parallel`: the ray came from infinity or from an orthographic
-/// camera, where densities of positions do not fall off with distance.
+/// camera, where densities of positions do not fall off with distance. With sums_after_scatter: equations 10 to 12.
 AMBILUX_HD MisSums sums_at_hit(const BidirectionalMis& mis, MisSums s, float d2, float cos_in, bool parallel) {
     const float inv_cos = mis.term(1.0f / cos_in);
     return {s.dvcm * inv_cos * (parallel ? 1.0f : mis.term(d2)), s.dvc * inv_cos};
 }
 
 /// Sums of the ray that leaves a vertex at cosine `cos_out` to the geometric normal. `first`: the vertex is the first of the walk that lies on a surface met by a
-/// ray. For a delta the densities matter by their ratio alone.
+/// ray. For a delta the densities matter by their ratio alone (equation 6).
 AMBILUX_HD MisSums sums_after_scatter(const BidirectionalMis& mis, MisSums s, bool first, bool delta, float pdf_forward_sa, float pdf_reverse_sa, float cos_out) {
     if (delta) return {0.0f, mis.term(cos_out * pdf_reverse_sa / pdf_forward_sa) * s.dvc};
     const float connection = first ? s.dvcm : mis.connection_term() * s.dvcm;
@@ -83,7 +83,7 @@ struct LightStart {
     uint32_t emitter;
 };
 
-/// Sums at the first vertex of a light walk: at `p`, met by a ray from `o` along `d` at cosine `cos_in`.
+/// Sums at the first vertex of a light walk: at `p`, met by a ray from `o` along `d` at cosine `cos_in` (equation 13).
 template <Features F>
 AMBILUX_HD MisSums light_sums_at_first_hit(const SceneView& scene, const BidirectionalMis& mis, const LightStart& start, Vec3f o, Vec3f d, Vec3f p, float cos_in) {
     const Emitter& e = scene.emitters[start.emitter];
@@ -113,7 +113,7 @@ AMBILUX_HD MisSums light_sums_at_first_hit(const SceneView& scene, const Bidirec
 // ---- sums of the other strategies; the weight is 1 / (1 + sum) ----
 
 /// s = 0: an eye ray of `depth` segments from `o` along unit `d` with sums `ray` (not those at the hit) meets area emitter `emitter` at `light`.
-/// `start_distance`: from the camera to o on a first ray.
+/// `start_distance`: from the camera to o on a first ray. Equation 14.
 template <Features F>
 AMBILUX_HD float others_of_hit(const SceneView& scene, const BidirectionalMis& mis, MisSums ray, uint32_t depth, uint32_t emitter, Vec3f o, Vec3f d, float start_distance,
                                 const SurfacePoint& light) {
@@ -142,7 +142,7 @@ AMBILUX_HD float others_of_escape(const SceneView& scene, const BidirectionalMis
 }
 
 /// s = 1: light sample `light` at an eye vertex with sums `z`. `pdf_sa`: of BSDF sampling towards the light; `pdf_reverse_sa`: of the direction back along the eye walk
-/// for light that arrives from the sample; `cos_z`: between the geometric normal and the direction to the light.
+/// for light that arrives from the sample; `cos_z`: between the geometric normal and the direction to the light. Equation 15.
 template <Features F>
 AMBILUX_HD float others_of_next_event(const SceneView& scene, const BidirectionalMis& mis, MisSums z, bool first, const EmitterSample& light, float pdf_sa, float pdf_reverse_sa,
                                       float cos_z) {
@@ -160,18 +160,18 @@ AMBILUX_HD float others_of_next_event(const SceneView& scene, const Bidirectiona
     return fewer + mis.term(ratio) * (connection_dvcm(mis, z, first) + z.dvc * mis.term(pdf_reverse_sa));
 }
 
-/// One end of a connection, seen from the other: the density of this vertex by sampling there, per area, times what follows behind it.
+/// One end of a connection, seen from the other: the density of this vertex by sampling there, per area, times what follows behind it (equation 7).
 AMBILUX_HD float others_behind(const BidirectionalMis& mis, MisSums s, bool first, float pdf_area, float pdf_reverse_sa) {
     return mis.term(pdf_area) * (connection_dvcm(mis, s, first) + s.dvc * mis.term(pdf_reverse_sa));
 }
 
-/// t = 1: a light vertex with sums `y`, connected with the camera. `cos_y`: between its geometric normal and the direction to the camera.
+/// t = 1: a light vertex with sums `y`, connected with the camera. `cos_y`: between its geometric normal and the direction to the camera. Equation 16.
 AMBILUX_HD float others_of_camera(const SceneView& scene, const BidirectionalMis& mis, MisSums y, bool first, const CameraConnection& c, float cos_y, float pdf_reverse_sa) {
     const float fall_off = camera_delta_direction(scene.sensor) ? 1.0f : 1.0f / sqr(c.camera_distance);
     return others_behind(mis, y, first, camera_walk_pdf(scene.sensor, c.cos_camera) * cos_y * fall_off / mis.light_paths, pdf_reverse_sa);
 }
 
-/// (1,1): a point sampled on an area emitter with density `pdf_pos` (pick included), connected with the camera.
+/// (1,1): a point sampled on an area emitter with density `pdf_pos` (pick included), connected with the camera (equation 17).
 AMBILUX_HD float others_of_visible_light(const SceneView& scene, const BidirectionalMis& mis, const CameraConnection& c, float cos_light, float pdf_pos) {
     const float fall_off = camera_delta_direction(scene.sensor) ? 1.0f : 1.0f / sqr(c.camera_distance);
     return mis.masked(kHitStrategies, mis.term(camera_walk_pdf(scene.sensor, c.cos_camera) * cos_light * fall_off / (mis.light_paths * pdf_pos)));
