@@ -78,8 +78,8 @@ inline std::vector<SceneCase> scene_cases() {
     const std::string walls = "<shape type='cube'><boolean name='flip_normals' value='true'/><transform name='to_world'><scale x='3' y='2' z='5'/><translate y='1.9'/></transform>" + diffuse;
     const std::string lamps = area_light("<shape type='rectangle'><transform name='to_world'><scale x='0.5' y='0.4'/><rotate x='1' angle='90'/><translate y='3.5'/></transform>") +
                               area_light("<shape type='sphere'><point name='center' x='-1' y='1.6' z='0.5'/><float name='radius' value='0.2'/>") +
-                              area_light("<shape type='disk'><transform name='to_world'><scale value='0.3'/><lookat origin='1.8,2.2,0.5' target='0,0,0' up='0,1,0'/></transform>") +
-                              area_light("<shape type='cylinder'><float name='radius' value='0.1'/><point name='p0' x='-0.5' y='2' z='-1'/><point name='p1' x='0.6' y='2.2' z='-1.2'/>") +
+                              area_light("<shape type='disk'><transform name='to_world'><scale value='0.3'/><lookat origin='1.6,1,-1.6' target='0.3,1.7,4.2' up='0,1,0'/></transform>") +
+                              area_light("<shape type='cylinder'><float name='radius' value='0.1'/><point name='p0' x='-0.8' y='1.2' z='-1.3'/><point name='p1' x='0.4' y='1.3' z='-1.5'/>") +
                               area_light("<shape type='cube'><transform name='to_world'><scale x='0.1' y='0.2' z='0.15'/><rotate x='1' y='1' angle='30'/><translate x='1.2' y='1.4' z='-0.4'/></transform>");
     const std::string perspective = "<float name='fov' value='50'/><float name='near_clip' value='0.3'/>";
     const std::string deltas = "<emitter type='point'><point name='position' x='0.3' y='1.4' z='0.4'/>" + rgb("intensity", "2") + "</emitter>" +
