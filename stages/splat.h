@@ -9,7 +9,7 @@
 
 namespace ambilux {
 
-/// One unit of the fixed-point sums: a pixel holds up to 1.3e8 in steps of 1.5e-11.
+/// One unit of the fixed-point sums: a pixel holds up to 6.7e7 per sample in steps of 1.5e-11.
 constexpr double kSplatUnit = 0x1p-36;
 
 AMBILUX_HD void add_fixed(int64_t* sum, int64_t value) {
@@ -18,6 +18,21 @@ AMBILUX_HD void add_fixed(int64_t* sum, int64_t value) {
 #else
     __atomic_fetch_add(sum, value, __ATOMIC_RELAXED);
 #endif
+}
+
+/// Splats of this value and more look at the sum that they are added to: below, a pixel would have to meet 2^20 of them in one sample to wrap around.
+constexpr float kLargeSplat = 64.0f;
+
+/// Adds a large value, unless the sum could wrap around some time: then false.
+AMBILUX_HD bool add_large_fixed(int64_t* sum, int64_t value) {
+#if defined(__CUDA_ARCH__)
+    const auto before = static_cast<int64_t>(atomicAdd(reinterpret_cast<unsigned long long*>(sum), static_cast<unsigned long long>(value)));
+#else
+    const int64_t before = __atomic_fetch_add(sum, value, __ATOMIC_RELAXED);
+#endif
+    if (before >= 0 && before < (int64_t(1) << 62) - value) return true;
+    add_fixed(sum, -value);
+    return false;
 }
 
 struct WeightSplats {
@@ -88,7 +103,16 @@ private:
             count_one(&record->inf);
             return;
         }
-        for (int c = 0; c < 3; ++c) add_fixed(sums + pixel * 3 + uint32_t(c), llrint(double(value[c]) / kSplatUnit));
+        bool fits = true;
+        for (int c = 0; c < 3; ++c) {
+            int64_t* sum = sums + pixel * 3 + uint32_t(c);
+            const int64_t fixed = llrint(double(value[c]) / kSplatUnit);
+            if (value[c] < kLargeSplat)
+                add_fixed(sum, fixed);
+            else
+                fits = add_large_fixed(sum, fixed) && fits;
+        }
+        if (!fits) count_one(&record->inf);
     }
 };
 
