@@ -185,12 +185,18 @@ AMBILUX_HD bool connect_vertices(const BidirectionalMis& mis, const WalkVertex& 
     return set_segment(c, z.point, w, y.point.p, y.point.p_error, y.point.ng);
 }
 
+/// False for places on the film that no filter of a pixel reaches: what lands there needs no shadow ray.
+AMBILUX_HD bool reaches_pixels(const Sensor& sensor, Vec2f film) {
+    const float x = film.x - float(sensor.crop_x), y = film.y - float(sensor.crop_y), beyond = sensor.filter_radius - 0.5f;
+    return x >= -beyond && x <= float(sensor.crop_width) + beyond && y >= -beyond && y <= float(sensor.crop_height) + beyond;
+}
+
 /// t = 1: vertex y of a light walk and the camera. `value` is what the light walk adds to a pixel where the filter has value 1 at `film_position`, over the number of
 /// light walks per pixel's sample.
 template <Features F>
 AMBILUX_HD bool connect_camera(const SceneView& scene, const BidirectionalMis& mis, const WalkVertex& y, Rgb throughput, Vec2f lens_u, WalkConnection& c, Vec2f& film_position) {
     CameraConnection camera;
-    if (!connect_to_camera(scene.sensor, y.point.p, lens_u, camera)) return false;
+    if (!connect_to_camera(scene.sensor, y.point.p, lens_u, camera) || !reaches_pixels(scene.sensor, camera.film_position)) return false;
     const Rgb f = scatter_eval<F>(y.scattering, camera.wi, TransportMode::importance);
     if (is_zero(f)) return false;
     c.value = throughput * f * (camera.weight / mis.light_paths);
@@ -207,7 +213,7 @@ template <Features F>
 AMBILUX_HD bool connect_visible_light(const SceneView& scene, const BidirectionalMis& mis, const EmissionSample& e, Vec2f lens_u, WalkConnection& c, Vec2f& film_position) {
     if (e.prim == kNone) return false;
     CameraConnection camera;
-    if (!connect_to_camera(scene.sensor, e.p, lens_u, camera)) return false;
+    if (!connect_to_camera(scene.sensor, e.p, lens_u, camera) || !reaches_pixels(scene.sensor, camera.film_position)) return false;
     const float cos_light = dot(e.ng, camera.wi), pdf_pos = e.pick * e.pdf_pos;
     if (!(cos_light > 0.0f)) return false;
     c.value = e.radiance * (cos_light * camera.weight / (pdf_pos * mis.light_paths));
