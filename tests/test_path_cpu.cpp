@@ -216,7 +216,7 @@ TEST_CASE("G13: every setting changes something that can be seen, or is refused"
     CHECK(base.stats.backend == "cpu");
 
     RenderSettings s;
-    for (auto [key, value, allowed] : {std::tuple{"integrator", "bdpt", "path"}, {"variant", "mega", "wavefront"}, {"backend", "gpu", "cuda"}, {"estimator", "NEE", "nee"}, {"heuristic", "max", "power"},
+    for (auto [key, value, allowed] : {std::tuple{"integrator", "bidirectional", "bdpt"}, {"variant", "mega", "wavefront"}, {"backend", "gpu", "cuda"}, {"estimator", "NEE", "nee"}, {"heuristic", "max", "power"},
                                        {"max_depth", "-2", "-1"}, {"max_depth", "16383", "16382"}, {"max_depth", "5x", "integer"}, {"max_depth", "", "integer"}, {"rr_depth", "-2", "-1"}, {"seed", "-1", "0"},
                                        {"seed", "18446744073709551616", "18446744073709551615"}, {"accel", "bvh", "cwbvh"}, {"wave_size", "-5", "0"}, {"wave_size", "1e6", "integer"},
                                        {"specialise", "yes", "true"}, {"deterministic", "1", "false"}}) {
