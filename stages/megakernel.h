@@ -49,8 +49,10 @@ private:
 #endif
     }
 
+    // Traversal appears once for either kind of ray, not at every call: the kernel is larger than the instruction caches as it is.
+
     /// The weighted value of a connection if its ray is free, else zero.
-    AMBILUX_HD Rgb visible(WalkConnection c, const RngKey& key, uint32_t which, StageId maker, Counts& counts) const {
+    __attribute__((noinline)) AMBILUX_HD Rgb visible(WalkConnection c, const RngKey& key, uint32_t which, StageId maker, Counts& counts) const {
         const Rgb none = {0.0f, 0.0f, 0.0f};
         if (!is_light(c.value, record(maker))) return none;
         c.value *= 1.0f / (1.0f + c.others);
@@ -67,7 +69,7 @@ private:
     }
 
     /// The nearest hit of the walk's ray; false if there is none.
-    AMBILUX_HD bool extend(const Walk& w, const RngKey& key, float tmax, Hit& hit) const {
+    __attribute__((noinline)) AMBILUX_HD bool extend(const Walk& w, const RngKey& key, float tmax, Hit& hit) const {
         Ray ray = {w.o, tmax, w.d, 0};
         if constexpr (F.opacity) ray.alpha_seed = alpha_seed(key, w.depth, false);
         return tracer.template closest<F>(scene, ray, hit);
@@ -144,7 +146,7 @@ private:
         }
     }
 
-    AMBILUX_HD Rgb connections(const WalkVertex& z, const Walk& w, const RngKey& key, uint32_t last, Counts& counts) const {
+    __attribute__((noinline)) AMBILUX_HD Rgb connections(const WalkVertex& z, const Walk& w, const RngKey& key, uint32_t last, Counts& counts) const {
         Rgb sum = {0.0f, 0.0f, 0.0f};
         WalkConnection c;
         if (policy.next_event && connect_next_event<F>(scene, policy.mis, z, w.throughput, random_floats(key, emitter_block(w.depth)), c))
