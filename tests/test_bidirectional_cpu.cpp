@@ -1,0 +1,677 @@
+// libs: ambilux_integrators ambilux_film ambilux_scene ambilux_core
+// timeout: 300
+// What must not change the image of light tracing and bidirectional path tracing on the CPU and what must; what is counted when values are no light or too
+// large; memory that grows; settings.
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <thread>
+
+#include "backends/cpu/executor.h"
+#include "core/error.h"
+#include "integrators/bidirectional/schedule.h"
+#include "integrators/path/path_wave.h"
+#include "scene/accel/cwbvh.h"
+#include "tests/bidirectional_images.h"
+#include "tests/closed_forms.h"
+
+using namespace ambilux;
+
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+const Method kMethods[] = {{"all"}, {"all", MisHeuristic::power}, {"-i light"}, {"hits"}, {"next_event+connections"}, {"light"}};
+
+RenderSettings settings_of(const Scene& scene, const Method& m = {"all"}) { return method_settings(scene, m, 5); }
+
+bool same_image(const FilmMoments& a, const FilmMoments& b) { return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares; }
+
+uint64_t queue_peak(const RenderStats& stats, const std::string& name) {
+    for (const QueueStats& q : stats.queues)
+        if (q.name == name) return q.peak;
+    return 0;
+}
+
+uint64_t queue_capacity(const RenderStats& stats, const std::string& name) {
+    for (const QueueStats& q : stats.queues)
+        if (q.name == name) return q.capacity;
+    return 0;
+}
+
+void check_queues(const RenderStats& stats) {
+    for (const QueueStats& q : stats.queues) {
+        INFO(q.name);
+        CHECK(q.overflow == 0);
+        CHECK(q.peak <= q.capacity);
+    }
+}
+
+/// Closed sphere that radiates inwards, of albedo 0.95: walks are as long as max_depth lets them.
+Scene long_walks(uint32_t size = 24) {
+    const std::string n = std::to_string(size);
+    return scene_from_text(scene_xml(40, "<sensor type='perspective'><float name='near_clip' value='1e-4'/>" + square_film(size) + "</sensor><shape type='sphere'><boolean name='flip_normals' value='true'/>" +
+                                             diffuse({0.95f, 0.95f, 0.95f}) + area_light({1, 1, 1}) + "</shape>"));
+}
+
+}  // namespace
+
+TEST_CASE("G7: one seed is one image, whatever the waves, the batches and the threads", "[bidirectional]") {
+    for (const char* name : {"cornell", "lights", "materials", "textured"}) {
+        const Scene scene = project_scene(name, 37, 29);
+        for (const Method& m : kMethods) {
+            INFO(name << " " << m.name);
+            const RenderSettings settings = settings_of(scene, m);
+            const FilmMoments film = render_scene(scene, settings, 4).film;
+            CHECK(same_image(film, render_scene(scene, settings, 4).film));
+            for (uint32_t wave_size : {64u, 1000u, 100000u}) {
+                INFO("wave_size " << wave_size);
+                RenderSettings s = settings;
+                s.wave_size = wave_size;
+                CHECK(same_image(film, render_scene(scene, s, 4).film));
+            }
+            const std::unique_ptr<Renderer> parts = make_renderer(scene, settings);
+            CHECK(parts->render(0, 1) == 1);
+            CHECK(parts->render(1, 3) == 3);
+            CHECK(same_image(film, parts->film()));
+            parts->clear_film();
+            CHECK(parts->film().samples == 0);
+            CHECK(parts->render(0, 4) == 4);
+            CHECK(same_image(film, parts->film()));
+            for (size_t threads : {1u, 2u}) {
+                const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+                INFO(threads << " threads");
+                CHECK(same_image(film, render_scene(scene, settings, 4).film));
+            }
+            RenderSettings other = settings;
+            other.seed = 6;
+            CHECK_FALSE(same_image(film, render_scene(scene, other, 4).film));
+        }
+    }
+}
+
+TEST_CASE("G7: eye walks and light walks of one seed share no random numbers", "[bidirectional]") {
+    // With the same numbers at both ends, hits and splats of one sample would be correlated: seen in the variance of all strategies together.
+    const Scene scene = project_scene("cornell", 16, 16);
+    RenderSettings eye = settings_of(scene, {"hits"}), light = settings_of(scene, {"light"});
+    const FilmMoments a = render_scene(scene, eye, 256).film, b = render_scene(scene, light, 256).film;
+    const std::unique_ptr<Renderer> x = make_renderer(scene, eye), y = make_renderer(scene, light);
+    double product = 0, xx = 0, yy = 0;
+    for (uint32_t s = 0; s < 256; ++s) {
+        x->clear_film();
+        y->clear_film();
+        REQUIRE(x->render(s, 1) == 1);
+        REQUIRE(y->render(s, 1) == 1);
+        const FilmMoments p = x->film(), q = y->film();
+        for (size_t i = 0; i < p.sum.size(); i += 3) {
+            const double u = p.sum[i] - a.mean(i), v = q.sum[i] - b.mean(i);
+            product += u * v;
+            xx += u * u;
+            yy += v * v;
+        }
+    }
+    CHECK(std::abs(product / std::sqrt(xx * yy)) < 4 / std::sqrt(256.0 * 256));
+}
+
+TEST_CASE("Specialised kernels render the image of the full ones", "[bidirectional]") {
+    for (const char* name : {"cornell", "furnace", "textured"}) {
+        INFO(name);
+        const Scene scene = project_scene(name, 37, 29);
+        RenderSettings special = settings_of(scene), full = special;
+        full.specialise = false;
+        const FilmMoments a = render_scene(scene, special, 4).film, b = render_scene(scene, full, 4).film;
+        size_t equal = 0;
+        for (size_t i = 0; i < a.sum.size(); ++i) equal += std::abs(a.sum[i] - b.sum[i]) <= 1e-3 * std::abs(b.sum[i]);
+        INFO(double(equal) / double(a.sum.size()) << " of the values are equal");
+        CHECK(double(equal) >= 0.99 * double(a.sum.size()));
+    }
+}
+
+TEST_CASE("G5, G12: Embree and the host build of the CUDA traversal agree in counts and pixels", "[bidirectional]") {
+    for (const char* name : {"cornell", "furnace", "glass", "lights", "materials", "textured"}) {
+        INFO(name);
+        const Scene scene = project_scene(name, 96, 64);
+        RenderSettings embree = settings_of(scene), cwbvh = embree;
+        embree.max_depth = cwbvh.max_depth = 4;
+        embree.accel = "embree";
+        cwbvh.accel = "cwbvh";
+        const RenderResult a = render_scene(scene, embree, 1), b = render_scene(scene, cwbvh, 1);
+        size_t close = 0;
+        const size_t pixels = a.film.sum.size() / 3;
+        for (size_t p = 0; p < pixels; ++p) {
+            bool same = true;
+            for (size_t c = 0; c < 3; ++c) same = same && std::abs(a.film.sum[p * 3 + c] - b.film.sum[p * 3 + c]) <= 2e-3 * std::max(a.film.sum[p * 3 + c], b.film.sum[p * 3 + c]);
+            close += same;
+        }
+        INFO(double(close) / double(pixels) << " of the pixels agree");
+        CHECK(double(close) >= 0.99 * double(pixels));
+        REQUIRE(a.stats.stages.size() == b.stats.stages.size());
+        for (size_t s = 0; s < a.stats.stages.size(); ++s) {
+            const StageStats &x = a.stats.stages[s], &y = b.stats.stages[s];
+            INFO("stage " << x.name);
+            REQUIRE(x.name == y.name);
+            REQUIRE(x.items_by_depth.size() == y.items_by_depth.size());
+            for (size_t d = 0; d < x.items_by_depth.size(); ++d) {
+                INFO("depth " << d << ": " << x.items_by_depth[d] << " and " << y.items_by_depth[d]);
+                CHECK(std::abs(double(x.items_by_depth[d]) - double(y.items_by_depth[d])) <= std::max(1e-3 * double(std::max(x.items_by_depth[d], y.items_by_depth[d])), 4.0));
+            }
+        }
+    }
+}
+
+TEST_CASE("G3, G8: memory is what was predicted, queues never overflow, and counts add up", "[bidirectional]") {
+    for (auto [w, h] : {std::pair{1u, 1u}, {7u, 9u}, {64u, 64u}, {200u, 23u}})
+        for (uint32_t wave_size : {0u, 64u, 5000u, 100000u})
+            for (const char* name : {"all", "-i light"}) {
+                INFO(w << "x" << h << " wave_size " << wave_size << " " << name);
+                const Scene scene = project_scene("lights", w, h);
+                RenderSettings s = settings_of(scene, {name});
+                s.wave_size = wave_size;
+                const RenderStats stats = render_scene(scene, s, 2).stats;
+                CHECK(stats.memory_bytes > 0);
+                CHECK(stats.memory_bytes == stats.memory_bytes_predicted);
+                CHECK(stats.samples == 2);
+                check_queues(stats);
+                std::map<std::string, StageStats> stages;
+                uint64_t traced = 0;
+                for (const StageStats& stage : stats.stages) {
+                    stages[stage.name] = stage;
+                    uint64_t sum = 0;
+                    for (uint64_t n : stage.items_by_depth) sum += n;
+                    CHECK(sum == stage.items);
+                    if (stage.name == "extend" || stage.name == "light_extend") traced += stage.items;
+                }
+                CHECK(stages["extend"].items_by_depth.at(1) == uint64_t(w) * h * 2);
+                CHECK(stages["light_extend"].items_by_depth.at(1) <= uint64_t(w) * h * 2);
+                CHECK(stats.rays_extend == traced);
+                CHECK(stats.rays_occlude == stages["occlude"].items);
+                CHECK(stats.invalid.total() == 0);
+            }
+}
+
+TEST_CASE("G3: a wave with more light vertices than there is room for is done again, and its image is that of any other", "[bidirectional]") {
+    const Scene scene = long_walks();
+    for (const char* name : {"all", "connections", "-i light"}) {
+        INFO(name);
+        RenderSettings s = settings_of(scene, {name});
+        s.rr_depth = -1;
+        const std::unique_ptr<Renderer> renderer = make_renderer(scene, s);
+        REQUIRE(renderer->render(0, 2) == 2);
+        const RenderStats first = renderer->stats();
+        // 38 vertices per walk and more do not fit into what there was to begin with.
+        const std::string kept = std::string(name) == "-i light" ? "splats" : "light_vertices";
+        CHECK(queue_peak(first, kept) > 0);
+        CHECK(queue_capacity(first, kept) >= queue_peak(first, kept));
+        check_queues(first);
+        // Now there is room; nothing is done again.
+        const FilmMoments film = renderer->film();
+        renderer->clear_film();
+        REQUIRE(renderer->render(0, 2) == 2);
+        CHECK(same_image(film, renderer->film()));
+        for (uint32_t wave_size : {64u, 128u, 100000u}) {
+            s.wave_size = wave_size;
+            const RenderResult r = render_scene(scene, s, 2);
+            CHECK(same_image(film, r.film));
+            check_queues(r.stats);
+        }
+        CHECK(first.invalid.total() == 0);
+    }
+    // One segment less room than a walk needs, no walk at all, and every depth between.
+    for (int depth : {1, 2, 3, 4, 5, 6, 7}) {
+        RenderSettings s = settings_of(scene);
+        s.rr_depth = -1;
+        s.max_depth = depth;
+        const RenderResult r = render_scene(scene, s, 1);
+        check_queues(r.stats);
+        CHECK(r.stats.invalid.total() == 0);
+        CHECK(queue_peak(r.stats, "light_vertices") == (depth < 3 ? 0 : queue_peak(r.stats, "light_vertices")));
+    }
+}
+
+TEST_CASE("An interrupted render holds exactly the samples that it says", "[bidirectional]") {
+    const Scene scene = project_scene("cornell", 37, 29);
+    for (const char* name : {"all", "-i light"}) {
+        const RenderSettings settings = settings_of(scene, {name});
+        volatile bool stop = true;
+        const std::unique_ptr<Renderer> never = make_renderer(scene, settings);
+        CHECK(never->render(0, 100, &stop) == 0);
+        CHECK(never->film().samples == 0);
+        const FilmMoments empty = never->film();
+        CHECK(std::all_of(empty.sum.begin(), empty.sum.end(), [](double v) { return v == 0; }));
+
+        const std::unique_ptr<Renderer> some = make_renderer(scene, settings);
+        stop = false;
+        std::thread alarm([&] {
+            std::this_thread::sleep_for(std::chrono::milliseconds(200));
+            stop = true;
+        });
+        const uint32_t done = some->render(0, 1u << 30, &stop);
+        alarm.join();
+        REQUIRE(done > 0);
+        CHECK(some->film().samples == done);
+        CHECK(some->stats().samples == done);
+        CHECK(same_image(some->film(), render_scene(scene, settings, done).film));
+    }
+}
+
+// ---- what is no light, and what is too much ----
+
+namespace {
+
+/// A wave over a whole film whose queues can be changed before a stage runs.
+struct Bench {
+    Scene scene;
+    CwbvhAccel accel;
+    BidirectionalPolicy policy;
+    Wave wave, film_wave;
+    std::vector<Lane> bytes, samples;
+    std::vector<int64_t> splats;
+    std::vector<double> sum, sum_squares;
+    BidirectionalMemory memory;
+    StageId before = StageId::count;
+    std::function<void(Bench&)> change;  ///< called once, before stage `before` runs for the first time
+    bool changed = false;
+
+    explicit Bench(Scene s, const Method& method = {"all"}) : scene(std::move(s)), accel(scene) {
+        const RenderSettings settings = settings_of(scene, method);
+        policy = make_bidirectional_policy(scene, settings);
+        wave = shape_wave(scene, settings, kTilePixels, 1);
+        wave = shape_wave(scene, settings, tile_count(wave) * kTilePixels, tile_count(wave));
+        wave.samples = 1;
+        const uint32_t slots = wave.slot_count();
+        Layout sizes;
+        lay_out(sizes, slots, slots * 64, policy);
+        bytes.resize(sizes.bytes() / sizeof(Lane) + 64);
+        void* start = bytes.data();
+        size_t room = bytes.size() * sizeof(Lane);
+        std::align(256, sizes.bytes(), start, room);
+        Layout layout(start);
+        memory = lay_out(layout, slots, slots * 64, policy);
+        for (size_t q = 0; q < layout.queue_capacities().size(); ++q) memory.counters[q].capacity = layout.queue_capacities()[q];
+        *memory.state = {};
+        memory.state->samples = 1;
+        samples.resize(slots);
+        splats.resize(size_t(wave.width) * wave.height * 3);
+        sum.resize(splats.size());
+        sum_squares.resize(splats.size());
+    }
+
+    /// Runs stages like CpuExecutor, after the change.
+    struct Executor : CpuExecutor {
+        Bench& bench;
+        explicit Executor(Bench& b) : CpuExecutor(b.memory.state, b.memory.records), bench(b) {}
+        void prepare(StageId id, uint32_t items) {
+            if (id != bench.before || bench.changed || items == 0) return;
+            bench.changed = true;
+            bench.change(bench);
+        }
+        template <class Stage>
+        void run_slots(StageId id, const Stage& stage, uint32_t slots) {
+            prepare(id, slots);
+            CpuExecutor::run_slots(id, stage, slots);
+        }
+        template <class Stage, class Item>
+        void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
+            prepare(id, queue.counter->size());
+            CpuExecutor::run(id, stage, queue);
+        }
+        template <class Stage, class Item>
+        void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
+            run(id, stage, queue);
+        }
+        template <class Stage, class Item>
+        void trace_coherent(StageId id, const Stage& stage, const Queue<Item>& queue) {
+            run(id, stage, queue);
+        }
+    };
+
+    using Stages = BidirectionalStages<kAllFeatures, CwbvhTracer>;
+    Stages stages() { return Stages(scene.view(), accel.tracer(), policy, wave, memory, {samples.data(), splats.data(), sum.data(), sum_squares.data()}); }
+
+    void run(StageId id = StageId::count, std::function<void(Bench&)> f = {}) {
+        before = id;
+        change = std::move(f);
+        Executor executor(*this);
+        const Stages s = stages();
+        run_bidirectional_wave(executor, s);
+        executor.prepare(StageId::develop, 1);
+        for (uint32_t i = 0; i < wave.tiles * kTilePixels; ++i) s.develop(i);
+        REQUIRE((change == nullptr || changed));
+        REQUIRE(memory.state->failed == 0);
+        for (double v : sum) {
+            CHECK(std::isfinite(v));
+            CHECK(v >= 0);
+        }
+    }
+    /// Only stage `id` counted anything, and what it counted is this.
+    void check_counts(StageId id, uint64_t nan, uint64_t inf, uint64_t negative) const {
+        for (uint32_t s = 0; s < kStageCount; ++s) {
+            INFO("counts of " << kStageNames[s] << ", injected into " << kStageNames[std::min(uint32_t(id), kStageCount - 1)]);
+            CHECK(memory.records[s].nan == (s == uint32_t(id) ? nan : 0));
+            CHECK(memory.records[s].inf == (s == uint32_t(id) ? inf : 0));
+            CHECK(memory.records[s].negative == (s == uint32_t(id) ? negative : 0));
+        }
+    }
+    uint64_t count(StageId id, int which) const {
+        const StageRecord& r = memory.records[uint32_t(id)];
+        return which == 0 ? r.nan : which == 1 ? r.inf : r.negative;
+    }
+    double total() const {
+        double t = 0;
+        for (double v : sum) t += v;
+        return t;
+    }
+};
+
+template <class Item>
+void edit(const Queue<Item>& queue, uint32_t i, const std::function<void(Item&)>& f) {
+    REQUIRE(i < queue.counter->size());
+    Item item = queue.load(i);
+    f(item);
+    queue.store(i, item);
+}
+
+Scene cornell() { return project_scene("cornell", 16, 16); }
+
+/// A camera in front of a plane that is a lamp.
+Scene lamp_seen() {
+    return scene_from_text(scene_xml(1, "<sensor type='orthographic'><transform name='to_world'><lookat origin='0,0,1' target='0,0,0' up='0,1,0'/></transform>" + square_film(8) + "</sensor><shape type='rectangle'><transform "
+                                        "name='to_world'><scale value='0.999'/></transform>" + area_light({1, 1, 1}) + "</shape>"));
+}
+
+constexpr std::pair<float, int> kBad[] = {{kNan, 0}, {kInf, 1}, {-1.0f, 2}};
+
+}  // namespace
+
+TEST_CASE("G9: nothing is counted in a clean wave, whose film is that of the renderer", "[bidirectional]") {
+    for (const Method& m : kMethods) {
+        INFO(m.name);
+        Bench b(cornell(), m);
+        b.run();
+        b.check_counts(StageId::count, 0, 0, 0);
+        CHECK(b.total() > 0);
+        RenderSettings s = settings_of(b.scene, m);
+        s.accel = "cwbvh";
+        s.specialise = false;
+        const FilmMoments film = render_scene(b.scene, s, 1).film;
+        CHECK(film.sum == b.sum);
+        CHECK(film.sum_squares == b.sum_squares);
+    }
+}
+
+TEST_CASE("G9: light_generate counts emission that is none", "[bidirectional]") {
+    for (auto [value, which] : kBad) {
+        Bench b(cornell(), {"-i light"});
+        b.scene.emitters[0].radiance.value.y = value;
+        b.run();
+        CHECK(b.count(StageId::light_generate, which) > 200);
+        CHECK(b.total() == 0);
+    }
+}
+
+TEST_CASE("G9: light_extend counts rays that are not finite", "[bidirectional]") {
+    Bench b(cornell());
+    b.run(StageId::light_extend, [](Bench& x) {
+        edit<WalkItem>(x.memory.rays, 3, [](WalkItem& r) { r.d.y = kNan; });
+        edit<WalkItem>(x.memory.rays, 5, [](WalkItem& r) { r.o.x = kInf; });
+    });
+    b.check_counts(StageId::light_extend, 2, 0, 0);
+}
+
+TEST_CASE("G9: light_shade counts throughput that is no light, and neither of its vertices reaches the film", "[bidirectional]") {
+    for (auto [value, which] : kBad) {
+        Bench b(cornell(), {"-i light"});
+        b.run(StageId::light_shade, [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.hits.counter->size(); ++i) edit<WalkHit>(x.memory.hits, i, [v](WalkHit& h) { h.ray.throughput.z = v; });
+        });
+        CHECK(b.count(StageId::light_shade, which) > 50);
+        CHECK(b.count(StageId::connect_camera, which) > 50);
+        for (StageId later : {StageId::mis_weight, StageId::occlude, StageId::splat, StageId::develop}) CHECK(b.count(later, which) == 0);
+    }
+}
+
+TEST_CASE("G9: connect_camera counts vertices whose light is none", "[bidirectional]") {
+    for (auto [value, which] : kBad) {
+        Bench b(cornell());
+        b.run(StageId::connect_camera, [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.vertices.counter->size(); i += 2) edit<VertexItem>(x.memory.vertices, i, [v](VertexItem& y) { y.throughput.x = v; });
+        });
+        const uint64_t counted = b.count(StageId::connect_camera, which);
+        CHECK(counted > 20);
+        b.check_counts(StageId::connect_camera, which == 0 ? counted : 0, which == 1 ? counted : 0, which == 2 ? counted : 0);
+        CHECK(b.total() > 0);
+    }
+}
+
+TEST_CASE("G9: connect and connect_vertices count pairs whose light is none", "[bidirectional]") {
+    for (auto [value, which] : kBad) {
+        Bench b(cornell());
+        b.run(StageId::generate, [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.light_vertices.counter->size(); i += 2) edit<VertexItem>(x.memory.light_vertices, i, [v](VertexItem& y) { y.throughput.x = v; });
+        });
+        const uint64_t counted = b.count(StageId::connect_vertices, which);
+        CHECK(counted > 100);
+        b.check_counts(StageId::connect_vertices, which == 0 ? counted : 0, which == 1 ? counted : 0, which == 2 ? counted : 0);
+        CHECK(b.total() > 0);
+
+        Bench e(cornell(), {"next_event"});
+        e.run(StageId::connect, [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.vertices.counter->size(); i += 2) edit<VertexItem>(x.memory.vertices, i, [v](VertexItem& z) { z.throughput.x = v; });
+        });
+        const uint64_t sampled = e.count(StageId::connect, which);
+        CHECK(sampled > 20);
+        e.check_counts(StageId::connect, which == 0 ? sampled : 0, which == 1 ? sampled : 0, which == 2 ? sampled : 0);
+    }
+}
+
+TEST_CASE("G9: shade counts emission and throughput that are no light", "[bidirectional]") {
+    for (auto [value, which] : kBad) {
+        Bench b(lamp_seen(), {"hits"});
+        b.scene.emitters[0].radiance.value.y = value;
+        b.run();
+        CHECK(b.count(StageId::shade, which) > 60);
+        CHECK(b.total() == 0);
+    }
+}
+
+TEST_CASE("G9: mis_weight counts densities and splats that are none", "[bidirectional]") {
+    Bench b(cornell());
+    b.run(StageId::mis_weight, [](Bench& x) {
+        edit<SplatCandidate>(x.memory.splat_candidates, 0, [](SplatCandidate& c) { c.others = kNan; });
+        edit<SplatCandidate>(x.memory.splat_candidates, 1, [](SplatCandidate& c) { c.value.x = kInf; });
+        edit<SplatCandidate>(x.memory.splat_candidates, 2, [](SplatCandidate& c) { c.value.x = -1; });
+    });
+    b.check_counts(StageId::mis_weight, 1, 1, 1);
+}
+
+TEST_CASE("B28: where other strategies are infinitely denser, a splat is nothing, not a NaN", "[bidirectional]") {
+    Bench b(cornell());
+    b.run(StageId::mis_weight, [](Bench& x) {
+        for (uint32_t i = 0; i < x.memory.splat_candidates.counter->size(); ++i) edit<SplatCandidate>(x.memory.splat_candidates, i, [](SplatCandidate& c) { c.others = kInf; });
+    });
+    b.check_counts(StageId::count, 0, 0, 0);
+}
+
+TEST_CASE("G9: occlude counts rays of splats that are not finite", "[bidirectional]") {
+    Bench b(cornell());
+    b.run(StageId::occlude, [](Bench& x) {
+        edit<SplatCandidate>(x.memory.weighted_splats, 0, [](SplatCandidate& c) { c.d.x = kNan; });
+        edit<SplatCandidate>(x.memory.weighted_splats, 1, [](SplatCandidate& c) { c.o.z = kInf; });
+    });
+    b.check_counts(StageId::occlude, 2, 0, 0);
+}
+
+TEST_CASE("G9: develop counts samples that are no light", "[bidirectional]") {
+    Bench b(cornell());
+    b.run(StageId::develop, [](Bench& x) {
+        const float bad[3] = {kNan, kInf, -1e9f};
+        for (uint32_t i = 0; i < 3; ++i) {
+            const Rgb value = {bad[i], 0, 0};
+            memcpy(&x.samples[i], &value, sizeof(value));
+        }
+    });
+    b.check_counts(StageId::develop, 1, 1, 1);
+}
+
+// ---- splats ----
+
+namespace {
+
+/// Film of a Bench without light of its own, with `splats` alone.
+struct SplatFilm {
+    Bench bench;
+    explicit SplatFilm(const std::string& filter = "box", const std::string& crop = "")
+        : bench(scene_from_text(scene_xml(1, "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='16'/><integer name='height' value='16'/>" + crop + "<rfilter type='" + filter +
+                                                 "'/></film></sensor><emitter type='point'/>")),
+                {"light"}) {}
+    void add(std::initializer_list<std::pair<Rgb, Vec2f>> items) {
+        for (const auto& [value, film] : items) {
+            bench.memory.splats.push({value, 0, film, {0, 0}});
+        }
+        const Bench::Stages s = bench.stages();
+        const uint32_t n = bench.memory.splats.counter->size();
+        for (uint32_t i = 0; i < n; ++i) s.splat(i);
+        bench.memory.splats.counter->finish();
+    }
+    double at(uint32_t x, uint32_t y, uint32_t c = 0) const { return double(bench.splats[(size_t(y) * bench.wave.width + x) * 3 + c]) * kSplatUnit; }
+    double total() const {
+        double t = 0;
+        for (size_t i = 0; i < bench.splats.size(); i += 3) t += double(bench.splats[i]) * kSplatUnit;
+        return t;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("B18: splats land in the pixel that they are in, whatever the border; outside nothing lands", "[bidirectional]") {
+    for (auto [x, y, px, py] : {std::tuple{0.0f, 0.0f, 0, 0}, {0.5f, 0.5f, 0, 0}, {0.999f, 3.001f, 0, 3}, {1.0f, 2.0f, 1, 2}, {15.0f, 15.0f, 15, 15}, {15.999f, 15.999f, 15, 15}, {7.25f, 0.0f, 7, 0}}) {
+        INFO(x << "," << y);
+        SplatFilm f;
+        f.add({{{1, 2, 3}, {x, y}}});
+        CHECK(f.at(uint32_t(px), uint32_t(py), 0) == Approx(1));
+        CHECK(f.at(uint32_t(px), uint32_t(py), 1) == Approx(2));
+        CHECK(f.at(uint32_t(px), uint32_t(py), 2) == Approx(3));
+        CHECK(f.total() == Approx(1));
+    }
+    for (auto [x, y] : {std::pair{-0.001f, 5.0f}, {16.0f, 5.0f}, {5.0f, -0.5f}, {5.0f, 16.0f}, {-1e30f, 5.0f}, {1e30f, 1e30f}, {kNan, 5.0f}, {5.0f, -kInf}}) {
+        INFO(x << "," << y);
+        SplatFilm f;
+        f.add({{{1, 1, 1}, {x, y}}});
+        CHECK(f.total() == 0);
+    }
+}
+
+TEST_CASE("B19: a splat is spread by the filter: its energy is 1 on average, and it lands where the filter reaches", "[bidirectional]") {
+    for (const char* filter : {"box", "tent", "gaussian"}) {
+        INFO(filter);
+        // The filter has an integral of 1: averaged over one pixel's positions, its sum over the pixels is 1.
+        SplatFilm f(filter);
+        const int n = 211;  // no multiple of the table's steps
+        for (int i = 0; i < n; ++i)
+            for (int j = 0; j < n; ++j) f.add({{{1, 1, 1}, {8 + (float(i) + 0.5f) / float(n), 8 + (float(j) + 0.5f) / float(n)}}});
+        CHECK(f.total() / (n * n) == Approx(1).epsilon(2e-3));
+        CHECK(f.at(7, 8) == Approx(f.at(9, 8)).epsilon(5e-3).margin(1e-6));
+        CHECK(f.at(8, 7) == Approx(f.at(8, 9)).epsilon(5e-3).margin(1e-6));
+        CHECK(f.at(7, 7) == Approx(f.at(9, 9)).epsilon(5e-3).margin(1e-6));
+        for (uint32_t y = 0; y < 16; ++y)
+            for (uint32_t x = 0; x < 16; ++x)
+                if (std::abs(float(x) - 8.0f) > f.bench.scene.sensor.filter_radius + 0.5f) CHECK(f.at(x, y) == 0);
+    }
+}
+
+TEST_CASE("B16: splats on a crop are those on the whole film there", "[bidirectional]") {
+    SplatFilm whole("gaussian");
+    SplatFilm part("gaussian", "<integer name='crop_offset_x' value='5'/><integer name='crop_offset_y' value='3'/><integer name='crop_width' value='4'/><integer name='crop_height' value='9'/>");
+    for (int i = 0; i < 200; ++i) {
+        const Vec2f at = {float(i * 37 % 160) / 10.0f, float(i * 53 % 160) / 10.0f};
+        whole.add({{{1, 1, 1}, at}});
+        part.add({{{1, 1, 1}, at}});
+    }
+    for (uint32_t y = 0; y < 9; ++y)
+        for (uint32_t x = 0; x < 4; ++x) CHECK(part.at(x, y) == Approx(whole.at(x + 5, y + 3)).epsilon(1e-6).margin(1e-9));
+}
+
+TEST_CASE("G1: splats are summed exactly, in any order, and what is too large is counted, not wrapped", "[bidirectional]") {
+    SplatFilm f;
+    for (int i = 0; i < 10000; ++i) f.add({{{0.1f, 1e-9f, 1e3f}, {3.5f, 4.5f}}});
+    CHECK(f.at(3, 4, 0) == Approx(1e3).epsilon(1e-6));
+    CHECK(f.at(3, 4, 1) == Approx(1e-5).epsilon(1e-2));
+    CHECK(f.bench.memory.records[uint32_t(StageId::splat)].inf == 0);
+
+    SplatFilm large;
+    large.add({{{1, 0x1p26f, 1}, {3.5f, 4.5f}}, {{kInf, 1, 1}, {3.5f, 4.5f}}, {{kNan, kNan, kNan}, {3.5f, 4.5f}}, {{1, 1, 1e30f}, {5.5f, 4.5f}}});
+    CHECK(large.total() == 0);
+    CHECK(large.bench.memory.records[uint32_t(StageId::splat)].inf == 4);
+    large.add({{{0x1.fffffep25f, 1, 1}, {3.5f, 4.5f}}});
+    CHECK(large.at(3, 4) == double(0x1.fffffep25f));
+    CHECK(large.bench.memory.records[uint32_t(StageId::splat)].inf == 4);
+}
+
+TEST_CASE("G1: a pixel that more light reaches than it can hold does not turn dark", "[bidirectional]") {
+    SplatFilm f;
+    for (int i = 0; i < 40; ++i) f.add({{{6e7f, 1, 1}, {3.5f, 4.5f}}});
+    CHECK(f.at(3, 4) >= 0);
+    CHECK((f.bench.memory.records[uint32_t(StageId::splat)].inf > 0 || f.at(3, 4) == Approx(40 * 6e7)));
+}
+
+// ---- settings ----
+
+TEST_CASE("G13: settings of bidirectional methods change something that can be seen, or are refused", "[bidirectional]") {
+    const Scene scene = project_scene("cornell", 37, 29);
+    const auto image = [&](const std::vector<std::pair<const char*, const char*>>& values) {
+        RenderSettings s;
+        for (auto [key, value] : {std::pair{"backend", "cpu"}, {"integrator", "bdpt"}, {"max_depth", "5"}}) apply_setting(s, key, value);
+        for (auto [key, value] : values) apply_setting(s, key, value);
+        return render_scene(scene, s, 4).film;
+    };
+    const FilmMoments base = image({});
+    CHECK(same_image(base, image({{"strategies", "all"}})));
+    CHECK(same_image(base, image({{"strategies", "hits+next_event+connections+light"}})));
+    CHECK(same_image(base, image({{"strategies", "light+connections+next_event+hits"}})));
+    for (auto [key, value] : {std::pair{"strategies", "hits"}, {"strategies", "next_event"}, {"strategies", "connections"}, {"strategies", "light"}, {"strategies", "hits+light"}, {"heuristic", "power"}, {"max_depth", "4"},
+                              {"rr_depth", "1"}, {"seed", "3"}, {"integrator", "light"}, {"integrator", "path"}}) {
+        INFO(key << "=" << value);
+        CHECK_FALSE(same_image(base, image({{key, value}})));
+    }
+    // The light tracer is bdpt with its one family of strategies.
+    CHECK(same_image(image({{"integrator", "light"}}), image({{"strategies", "light"}})));
+
+    RenderSettings s;
+    for (const char* value : {"nonsense", "", "hits+", "+hits", "hits+nonsense", "hits,light", "ALL", "hits + light"}) {
+        INFO("strategies=" << value);
+        try {
+            apply_setting(s, "strategies", value);
+            FAIL("accepted");
+        } catch (const Error& e) {
+            const std::string message = e.what();
+            INFO(message);
+            CHECK(e.code == ExitCode::usage);
+            for (const char* allowed : {"strategies", value, "hits", "next_event", "connections", "light", "all"}) CHECK(message.find(allowed) != std::string::npos);
+        }
+        CHECK(s.strategies == kAllStrategies);
+    }
+}
+
+TEST_CASE("Renders that would not end are refused, and scenes without light are black", "[bidirectional]") {
+    const Scene scene = project_scene("cornell", 16, 16);
+    for (const char* name : {"bdpt", "light"}) {
+        RenderSettings s = settings_of(scene);
+        s.integrator = name;
+        s.max_depth = s.rr_depth = -1;
+        CHECK_THROWS_WITH(make_renderer(scene, s), Catch::Contains("max_depth") && Catch::Contains("rr_depth"));
+    }
+    Scene dark = scene_from_text(scene_xml(4, "<sensor type='perspective'>" + square_film(8) + "</sensor><shape type='sphere'/>"));
+    for (const Method& m : kMethods) check_black(render_scene(dark, settings_of(dark, m), 4));
+    const Scene empty = scene_from_text(scene_xml(4, "<sensor type='perspective'>" + square_film(8) + "</sensor><emitter type='constant'/>"));
+    for (const char* name : {"all", "-i light", "hits"}) {
+        const FilmMoments film = render_scene(empty, settings_of(empty, {name}), 4).film;
+        CHECK(std::all_of(film.sum.begin(), film.sum.end(), [](double v) { return v == 4; }));
+    }
+    check_black(render_scene(empty, settings_of(empty, {"next_event+connections"}), 4));
+}
