@@ -1,0 +1,102 @@
+// libs: ambilux_integrators ambilux_film ambilux_scene ambilux_core
+// labels: long
+// timeout: 3600
+// Every mask of strategies that can sample a scene, both heuristics and the light tracer against the path tracer, on the project's scenes and on published ones.
+#include <algorithm>
+#include <cstdio>
+#include <map>
+
+#include "tests/bidirectional_images.h"
+#include "transport/emitter.h"
+
+using namespace ambilux;
+
+namespace {
+
+struct Comparison {
+    const char* name;
+    bool published;
+    uint32_t width, height;
+    int max_depth;           ///< 0: the scene's own
+    bool deltas;             ///< mirrors, glass or plastic: paths through them to a lamp and to the camera are found by hits alone
+    uint32_t path, sampled;  ///< samples per pixel
+    double all_sees, mask_sees;  ///< bounds of ZTestResult::detectable, for all strategies and for any mask
+    const char* why_not;     ///< why masks other than those with all of hits and next event estimation are not compared
+};
+
+constexpr Comparison kComparisons[] = {
+    {"furnace", false, 48, 32, 0, false, 512, 256, 0.02, 0.06, nullptr},
+    {"textured", false, 48, 32, 0, false, 1024, 256, 0.03, 0.3, nullptr},
+    {"materials", false, 48, 32, 0, true, 1024, 256, 0.05, 0.1, nullptr},
+    {"lights", false, 48, 32, 0, false, 1024, 256, 0.05, 0.2, nullptr},
+    {"cornell", false, 48, 32, 0, false, 1024, 256, 0.02, 0.06, nullptr},
+    {"glass", false, 48, 32, 0, true, 4096, 512, 0.1, 0.2, nullptr},
+    {"cornell-box", true, 48, 32, 5, false, 1024, 256, 0.02, 0.08, nullptr},
+    // Lamps are smaller than a pixel here.
+    {"veach-mis", true, 48, 32, 3, false, 1024, 256, 0.15, 0.5, nullptr},
+    {"veach-bidir", true, 32, 32, 3, true, 2048, 256, 0.1, 0.1, "its lamps are met by so few rays that masks of hits alone stay undecided"},
+    // Two segments: light tracing finds caustics from three on, which no ray of the path tracer meets at these sample counts; its lamp is too small.
+    {"water-caustic", true, 32, 32, 2, true, 1024, 256, 0.1, 0.1, "hits of its lamp are too rare to be tested alone"},
+    {"veach-ajar", true, 48, 32, 4, true, 1024, 128, 0.2, 0.2, "hits of its lamp are too rare to be tested alone"},
+    {"glass-and-ice", true, 48, 32, 5, true, 1024, 128, 0.05, 0.1, nullptr},
+    {"living-room", true, 32, 18, 3, true, 1024, 256, 0.12, 0.12, "hits of its lamps are too rare to be tested alone"},
+    {"staircase", true, 32, 32, 3, true, 1024, 128, 0.1, 0.1, "hits of its lamps are too rare to be tested alone"},
+};
+
+std::string mask_name(uint32_t bits) {
+    constexpr const char* kNames[] = {"hits", "next_event", "connections", "light"};
+    std::string name;
+    for (uint32_t b = 0; b < 4; ++b)
+        if (bits >> b & 1) name += (name.empty() ? "" : "+") + std::string(kNames[b]);
+    return name;
+}
+
+/// Whether some strategy of the mask finds every path that the path tracer finds, emitters seen directly aside. Connections have three segments at least and never
+/// do by themselves.
+bool samples_all(const Scene& scene, const Comparison& c, uint32_t bits) {
+    const bool delta_lights = std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return is_delta(e.type); });
+    if (c.deltas && !(bits & kHitStrategies)) return false;
+    if (c.why_not && !((bits & kHitStrategies) && (bits & kNextEventStrategies))) return false;
+    if (delta_lights && !(bits & (kNextEventStrategies | kLightStrategies))) return false;
+    return bits & (kHitStrategies | kNextEventStrategies | kLightStrategies);
+}
+
+void compare(Scene scene, const Comparison& c) {
+    if (c.max_depth) scene.integrator.max_depth = c.max_depth;
+    // Where no strategy sees emitters directly, they are hidden from both.
+    std::map<bool, Estimate> path;
+    const auto check = [&](const Method& m, bool hidden, double sees) {
+        scene.integrator.hide_emitters = hidden;
+        if (!path.contains(hidden)) path[hidden] = render_path(scene, c.path);
+        const ZTestResult z = z_test(render_batches(scene, method_settings(scene, m, 1), c.sampled), path[hidden]);
+        const std::string what = std::string(c.name) + ", " + m.name + (m.heuristic == MisHeuristic::power ? ", power" : "");
+        std::printf("%-70s z %+5.2f, p %.2g, sees %.3f%s\n", what.c_str(), z.worst_z, z.p_worst, z.detectable, z.undecided ? ", undecided" : "");
+        std::fflush(stdout);
+        INFO(what << ": " << z.report());
+        CHECK(z.pass);
+        CHECK(z.detectable < sees);
+    };
+    for (uint32_t bits = 1; bits <= kAllStrategies; ++bits) {
+        if (!samples_all(scene, c, bits)) continue;
+        const bool hidden = !(bits & (kHitStrategies | kLightStrategies));
+        check({mask_name(bits)}, hidden, bits == kAllStrategies ? c.all_sees : c.mask_sees);
+    }
+    check({"all", MisHeuristic::power}, false, c.all_sees);
+    if (samples_all(scene, c, kLightStrategies)) check({"-i light"}, false, c.mask_sees);
+}
+
+}  // namespace
+
+TEST_CASE("Masks of strategies agree with the path tracer on the project's scenes", "[bidirectional]") {
+    for (const Comparison& c : kComparisons)
+        if (!c.published) compare(project_scene(c.name, c.width, c.height), c);
+}
+
+TEST_CASE("Masks of strategies agree with the path tracer on the published scenes", "[bidirectional]") {
+    for (const Comparison& c : kComparisons) {
+        if (!c.published) continue;
+        const std::optional<Scene> scene = published_scene(c.name, c.width, c.height);
+        if (!scene) return;
+        compare(*scene, c);
+    }
+}
