@@ -35,7 +35,7 @@ constexpr Comparison kComparisons[] = {
     // Lamps are smaller than a pixel here.
     {"veach-mis", true, 48, 32, 3, false, 1024, 256, 0.15, 0.5, nullptr},
     {"veach-bidir", true, 32, 32, 3, true, 2048, 256, 0.1, 0.1, "its lamps are met by so few rays that masks of hits alone stay undecided"},
-    // Two segments: light tracing finds caustics from three on, which no ray of the path tracer meets at these sample counts; its lamp is too small.
+    // Two segments: its lamp is too small for rays of the path tracer, which therefore misses caustics, from three segments on, and the lamp as the camera sees it.
     {"water-caustic", true, 32, 32, 2, true, 1024, 256, 0.1, 0.1, "hits of its lamp are too rare to be tested alone"},
     {"veach-ajar", true, 48, 32, 4, true, 1024, 128, 0.2, 0.2, "hits of its lamp are too rare to be tested alone"},
     {"glass-and-ice", true, 48, 32, 5, true, 1024, 128, 0.05, 0.1, nullptr},
@@ -63,7 +63,7 @@ bool samples_all(const Scene& scene, const Comparison& c, uint32_t bits) {
 
 void compare(Scene scene, const Comparison& c) {
     if (c.max_depth) scene.integrator.max_depth = c.max_depth;
-    // Where no strategy sees emitters directly, they are hidden from both.
+    // Where no strategy sees emitters directly, or only light walks do, they are hidden from both.
     std::map<bool, Estimate> path;
     const auto check = [&](const Method& m, bool hidden, double sees) {
         scene.integrator.hide_emitters = hidden;
@@ -78,10 +78,10 @@ void compare(Scene scene, const Comparison& c) {
     };
     for (uint32_t bits = 1; bits <= kAllStrategies; ++bits) {
         if (!samples_all(scene, c, bits)) continue;
-        const bool hidden = !(bits & (kHitStrategies | kLightStrategies));
+        const bool hidden = c.why_not || !(bits & (kHitStrategies | kLightStrategies));
         check({mask_name(bits)}, hidden, bits == kAllStrategies ? c.all_sees : c.mask_sees);
     }
-    check({"all", MisHeuristic::power}, false, c.all_sees);
+    check({"all", MisHeuristic::power}, c.why_not, c.all_sees);
     if (samples_all(scene, c, kLightStrategies)) check({"-i light"}, false, c.mask_sees);
 }
 
