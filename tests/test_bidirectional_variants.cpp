@@ -48,12 +48,17 @@ TEST_CASE("megakernel and wavefront sample the same paths: images equal up to ro
 TEST_CASE("lvc has the expectation of paired walks, for few draws and many, and for both heuristics") {
     for (const char* name : {"cornell", "glass", "lights", "materials"}) {
         const Scene scene = project_scene(name, 40, 30);
-        const Estimate paired = render_batches(scene, variant_settings(scene, "wavefront", 21), 512);
+        // In glass, hits of the lamp by way of the sphere are so rare that they alone would decide about the number of samples; the same for both variants, they are left out.
+        const char* strategies = name == std::string("glass") ? "next_event+connections+light" : "all";
+        RenderSettings reference = variant_settings(scene, "wavefront", 21);
+        apply_setting(reference, "strategies", strategies);
+        const Estimate paired = render_batches(scene, reference, 512);
         for (const uint32_t draws : {1u, 5u}) {
             for (const MisHeuristic heuristic : {MisHeuristic::balance, MisHeuristic::power}) {
                 RenderSettings s = variant_settings(scene, "lvc", 22);
                 s.connections = draws;
                 s.heuristic = heuristic;
+                apply_setting(s, "strategies", strategies);
                 const ZTestResult result = z_test(render_batches(scene, s, 256), paired);
                 INFO(name << " " << draws << " draws, heuristic " << int(heuristic) << "\n" << result.report());
                 CHECK(result.pass);
@@ -63,17 +68,16 @@ TEST_CASE("lvc has the expectation of paired walks, for few draws and many, and 
     }
 }
 
-TEST_CASE("lvc: connections alone, without weights of other strategies") {
-    // Paths of three segments and more that end on no emitter: the only strategies left are connections, whose weights sum to one among themselves.
+TEST_CASE("lvc: connections and light tracing alone, whose weights sum to one between them") {
     const Scene scene = project_scene("cornell", 40, 40);
     RenderSettings s = variant_settings(scene, "wavefront", 31);
-    apply_setting(s, "strategies", "connections");
+    apply_setting(s, "strategies", "connections+light");
     s.max_depth = 4;
-    const Estimate paired = render_batches(scene, s, 1024);
+    const Estimate paired = render_batches(scene, s, 512);
     s.variant = "lvc";
     s.seed = 32;
     s.connections = 4;
-    const ZTestResult result = z_test(render_batches(scene, s, 1024), paired);
+    const ZTestResult result = z_test(render_batches(scene, s, 512), paired);
     INFO(result.report());
     CHECK(result.pass);
     CHECK(result.detectable < 0.02);
