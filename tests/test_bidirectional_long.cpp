@@ -46,8 +46,11 @@ constexpr Comparison kComparisons[] = {
 std::string mask_name(uint32_t bits) {
     constexpr const char* kNames[] = {"hits", "next_event", "connections", "light"};
     std::string name;
-    for (uint32_t b = 0; b < 4; ++b)
-        if (bits >> b & 1) name += (name.empty() ? "" : "+") + std::string(kNames[b]);
+    for (uint32_t b = 0; b < 4; ++b) {
+        if (!(bits >> b & 1)) continue;
+        if (!name.empty()) name += '+';
+        name += kNames[b];
+    }
     return name;
 }
 

@@ -278,7 +278,10 @@ TEST_CASE("G4: slots and pixels are one to one", "[stages]") {
                 const uint32_t total = 5;
                 for (uint32_t tile = 0; tile < tile_count(wave); tile += wave.tiles)
                     for (uint32_t s = 0; s < total; s += samples) {
-                        const WaveState state = {tile, 40 + s, std::min(samples, total - s), 0, 0, 0};
+                        WaveState state{};
+                        state.first_tile = tile;
+                        state.first_sample = 40 + s;
+                        state.samples = std::min(samples, total - s);
                         wave.state = &state;
                         for (uint32_t slot = 0; slot < wave.slot_count(); ++slot) {
                             const PathSlot p = wave.locate(slot);
@@ -296,7 +299,8 @@ TEST_CASE("G4: slots and pixels are one to one", "[stages]") {
     wave.tiles_x = (4097 + kTileSide - 1) / kTileSide;
     wave.tiles = tile_count(wave);
     wave.samples = 1;
-    const WaveState state = {0, 0, 1, 0, 0, 0};
+    WaveState state{};
+    state.samples = 1;
     wave.state = &state;
     REQUIRE(wave.slot_count() == 513u * 513u * 64u);
     std::vector<bool> seen(4097u * 4097u);
