@@ -19,6 +19,13 @@ struct Connect {
     Queue<ConnectCandidate> candidates;
     StageRecord* record;
 
+    /// What operator() will wait for, so that an executor can ask for it some items ahead.
+    AMBILUX_HD const void* far_memory(uint32_t i) const {
+        if constexpr (!F.has(EmitterType::envmap)) return nullptr;
+        const ConnectItem c = connections.load(i);
+        return emitter_sample_memory<F>(scene, random_floats(wave.key(c.path), emitter_block(c.bits.depth())));
+    }
+
     AMBILUX_HD void operator()(uint32_t i) const {
         const ConnectItem c = connections.load(i);
         const RngKey key = wave.key(c.path);
