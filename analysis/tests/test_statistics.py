@@ -8,17 +8,6 @@ import pytest
 from analysis import statistics as st
 
 
-@pytest.mark.parametrize("dof,expected", [(1, 12.7062047), (2, 4.3026527), (3, 3.1824463), (4, 2.7764451), (9, 2.2621572), (30, 2.0422725)])
-def test_student_quantile_matches_tables(dof, expected):
-    assert st.student_quantile(0.975, dof) == pytest.approx(expected, abs=1e-6)
-
-
-def test_student_cdf_is_symmetric_and_known_for_one_degree():
-    for t in (-3.0, -0.5, 0.0, 0.7, 5.0):
-        assert st.student_cdf(t, 1) == pytest.approx(0.5 + math.atan(t) / math.pi, abs=1e-14)  # Cauchy
-        assert st.student_cdf(t, 7) + st.student_cdf(-t, 7) == pytest.approx(1, abs=1e-14)
-
-
 def test_mean_estimate_by_hand():
     e = st.mean_estimate([1, 2, 3, 4])
     assert e.value == 2.5
@@ -104,3 +93,20 @@ def test_slope_interval_is_honest_for_cumulative_checkpoints():
         e = st.convergence_slope([(checkpoints, r) for r in rmse])
         covered += e.low <= -0.5 <= e.high
     assert abs(covered / trials - 0.95) < 4 * math.sqrt(0.95 * 0.05 / trials)
+
+
+def test_geometric_interval_covers_the_median_of_a_lognormal():
+    rng = np.random.default_rng(17)
+    trials = 3000
+    estimates = [st.geometric_estimate(np.exp(rng.normal(1.0, 0.6, 5))) for _ in range(trials)]
+    covered = sum(e.low <= math.e <= e.high for e in estimates)
+    assert abs(covered - 0.95 * trials) < 4 * math.sqrt(trials * 0.95 * 0.05)
+
+
+def test_two_sided_p_is_uniform_without_an_effect():
+    rng = np.random.default_rng(19)
+    p = np.array([st.two_sided_p(e.value, e.error, -0.5, 4) for e in (st.mean_estimate(rng.normal(-0.5, 0.1, 4)) for _ in range(3000))])
+    for level in (0.01, 0.1, 0.5):
+        assert abs((p < level).mean() - level) < 4 * math.sqrt(level * (1 - level) / 3000)
+    assert math.isnan(st.two_sided_p(1.0, math.nan, 0, 1))
+    assert st.two_sided_p(-0.5, 0.0, -0.5, 4) == 1 and st.two_sided_p(-0.4, 0.0, -0.5, 4) == 0

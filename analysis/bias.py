@@ -1,0 +1,47 @@
+"""Does a run converge to the reference's mean? The reference's own noise is part of the answer."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from analysis.statistics import Estimate
+
+
+def reference_mean_error(noise, pixels):
+    """Upper bound of the standard error of a reference's mean over pixels and channels, from its recorded RMS standard error.
+
+    Pixels are independent, the channels of one are not, so that their errors may add up: the error of a pixel's channel mean is at most the
+    mean over channels of se, and se(mean) = sqrt(sum_pixels (mean_channels se)^2) / pixels <= sqrt(mean se^2) / sqrt(pixels) (Cauchy-Schwarz).
+    """
+    return noise / math.sqrt(pixels)
+
+
+@dataclass(frozen=True)
+class BiasTest:
+    estimate: Estimate      # of mean(image) - mean(truth), in units of radiance
+    degrees: float          # of freedom
+    p: float                # chance of a difference as large if there is none
+
+
+def bias_test(differences, reference_error, confidence=0.95):
+    """Test of "the mean over seeds of mean(x_i) - mean(r) is zero", for one difference per seed. None with less than two seeds.
+
+    All differences hold the same error of r, which averaging over seeds cannot reduce:
+        B = mean d_i,  se^2 = s^2 / n + se_r^2,  t = B / se
+    with s^2 the variance of the d_i. B / se is close to Student's t with the degrees of freedom of Satterthwaite (1946, Biometrics
+    Bulletin 2(6)): nu = se^4 / ((s^2/n)^2 / (n-1)), se_r counting as known. Without the term se_r^2 every run would be found biased in the end.
+    """
+    d = np.asarray(differences, dtype=float)
+    n = len(d)
+    if n < 2 or not np.isfinite(d).all():
+        return None
+    mean, own = float(d.mean()), float(d.var(ddof=1)) / n
+    total = own + (reference_error**2 if math.isfinite(reference_error) else 0.0)
+    error = math.sqrt(total)
+    if error == 0:
+        return BiasTest(Estimate(mean, 0.0, mean, mean), math.inf, 1.0 if mean == 0 else 0.0)
+    degrees = total**2 / (own**2 / (n - 1)) if own > 0 else math.inf
+    half = float(student.ppf(0.5 + confidence / 2, degrees)) * error
+    return BiasTest(Estimate(mean, error, mean - half, mean + half), degrees, float(2 * student.sf(abs(mean) / error, degrees)))

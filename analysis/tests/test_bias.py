@@ -1,0 +1,53 @@
+"""The bias test on normal data: level, power, and the reference's noise."""
+
+import math
+
+import numpy as np
+import pytest
+
+from analysis import bias
+
+
+def trial(rng, shift=0.0, own=1.0, reference=0.7, seeds=4):
+    return bias.bias_test(shift + rng.normal(0, own, seeds) - rng.normal(0, reference), reference)
+
+
+@pytest.mark.parametrize("own,reference", [(1.0, 0.0), (1.0, 0.7), (0.05, 1.0)])
+def test_level_and_coverage_hold_although_seeds_share_the_reference(own, reference):
+    rng = np.random.default_rng(29)
+    tests = [trial(rng, 0.0, own, reference) for _ in range(3000)]
+    false_alarms = np.mean([t.p < 0.05 for t in tests])
+    # Satterthwaite's is an approximation: a point above the binomial error is allowed.
+    assert abs(false_alarms - 0.05) < 4 * math.sqrt(0.05 * 0.95 / 3000) + 0.01
+    assert np.mean([t.estimate.low <= 0 <= t.estimate.high for t in tests]) == pytest.approx(1 - false_alarms, abs=1e-9)
+
+
+def test_ignoring_the_reference_noise_would_cry_wolf():
+    rng = np.random.default_rng(31)
+    wrong = [bias.bias_test(rng.normal(0, 0.05, 4) - rng.normal(0, 1.0), 0.0).p < 0.05 for _ in range(500)]
+    assert np.mean(wrong) > 0.5
+
+
+def test_a_bias_is_found():
+    rng = np.random.default_rng(37)
+    assert np.mean([trial(rng, shift=6.0, own=1.0, reference=0.7).p < 0.01 for _ in range(300)]) > 0.9
+
+
+def test_by_hand():
+    t = bias.bias_test([1.0, 3.0], 0.0)  # mean 2, s^2 = 2, se 1, one degree of freedom: Cauchy
+    assert (t.estimate.value, t.estimate.error, t.degrees) == (2, pytest.approx(1), pytest.approx(1))
+    assert t.p == pytest.approx(1 - 2 / math.pi * math.atan(2))
+    assert bias.bias_test([1.0], 0.1) is None
+    assert bias.bias_test([0.0, 0.0], 0.0).p == 1
+    assert bias.bias_test([1.0, 1.0], 0.5).estimate.error == pytest.approx(0.5)
+
+
+def test_reference_mean_error_bounds_the_simulated_one():
+    rng = np.random.default_rng(41)
+    pixels = 50
+    se = rng.uniform(0.1, 2.0, size=(pixels, 1)) * np.ones((1, 3))
+    noise = math.sqrt((se**2).mean())
+    grey = (rng.normal(size=(4000, pixels, 1)) * se).mean(axis=(1, 2))  # channels move together: the bound is met
+    assert grey.std() == pytest.approx(bias.reference_mean_error(noise, pixels), rel=0.05)
+    colour = (rng.normal(size=(4000, pixels, 3)) * se).mean(axis=(1, 2))
+    assert colour.std() < bias.reference_mean_error(noise, pixels)

@@ -1,0 +1,34 @@
+"""Variance of strategies on noise of known variance."""
+
+import math
+
+import numpy as np
+import pytest
+
+from analysis import strategy_variance as sv
+
+
+def test_variance_of_one_sample_is_unbiased_and_needs_no_reference():
+    rng = np.random.default_rng(43)
+    values = [sv.variance_of_one_sample(5 + rng.normal(0, 3 / math.sqrt(16), size=(3, 20)), 16) for _ in range(2000)]
+    assert np.mean(values) == pytest.approx(9, rel=4 * math.sqrt(2 / (2 * 20) / 2000))
+    with pytest.raises(ValueError):
+        sv.variance_of_one_sample(np.zeros((1, 4)), 1)
+
+
+def test_interval_covers_although_pixels_are_correlated():
+    """Neighbours share their noise, as splats of one light path do: a count over pixels would be too sure of itself."""
+    rng = np.random.default_rng(47)
+    trials, covered = 600, 0
+    for _ in range(trials):
+        shared = np.repeat(rng.normal(0, 2, size=(10, 40)), 5, axis=1)
+        e = sv.strategy_variance(shared, 1)
+        covered += e.low <= 4 <= e.high
+    assert 0.91 < covered / trials < 0.98  # the jackknife of a skewed statistic: close to 95 %, not exactly
+
+
+def test_value_is_the_mean_of_pseudo_values_and_few_seeds_are_told():
+    x = np.array([[1.0, 2.0], [3.0, 5.0], [4.0, 4.0]])
+    assert sv.strategy_variance(x, 2).value == pytest.approx(2 * x.var(axis=0, ddof=1).mean())
+    assert math.isnan(sv.strategy_variance(x[:2], 2).error)
+    assert math.isnan(sv.strategy_variance(x[:1], 2).value)
