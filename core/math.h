@@ -18,8 +18,8 @@ constexpr float kInfinity = __builtin_huge_valf();
 constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
 
 AMBILUX_HD float sqr(float x) { return x * x; }
-AMBILUX_HD float safe_sqrt(float x) { return sqrtf(fmaxf(x, 0.0f)); }
-AMBILUX_HD float clamp(float x, float lo, float hi) { return fminf(fmaxf(x, lo), hi); }
+AMBILUX_HD float safe_sqrt(float x) { return sqrtf(max(x, 0.0f)); }
+AMBILUX_HD float clamp(float x, float lo, float hi) { return min(max(x, lo), hi); }
 AMBILUX_HD float lerp(float a, float b, float t) { return a + (b - a) * t; }
 AMBILUX_HD float degrees_to_radians(float d) { return d * (kPi / 180.0f); }
 

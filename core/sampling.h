@@ -5,26 +5,29 @@
 
 namespace ambilux {
 
+/// Sine and cosine of x in [-pi/4, pi/4] by their series, which are below rounding after these terms. A general sinf has to reduce its argument first.
+AMBILUX_HD void sin_cos_octant(float x, float& sine, float& cosine) {
+    const float x2 = x * x;
+    sine = x + x * x2 * (-1.0f / 6 + x2 * (1.0f / 120 + x2 * (-1.0f / 5040 + x2 * (1.0f / 362880))));
+    cosine = 1.0f + x2 * (-0.5f + x2 * (1.0f / 24 + x2 * (-1.0f / 720 + x2 * (1.0f / 40320))));
+}
+
 /// Uniform point of the unit disk, concentric map (Shirley and Chiu 1997). Density 1/pi per area.
 AMBILUX_HD Vec2f square_to_disk(Vec2f u) {
     const float a = 2.0f * u.x - 1.0f, b = 2.0f * u.y - 1.0f;
     if (a == 0.0f && b == 0.0f) return {0.0f, 0.0f};
-    float r, phi;
-    if (fabsf(a) > fabsf(b)) {
-        r = a;
-        phi = kPiOver4 * (b / a);
-    } else {
-        r = b;
-        phi = kPiOver2 - kPiOver4 * (a / b);
-    }
-    return {r * cosf(phi), r * sinf(phi)};
+    const bool wide = fabsf(a) > fabsf(b);
+    const float r = wide ? a : b;
+    float sine, cosine;
+    sin_cos_octant(kPiOver4 * ((wide ? b : a) / r), sine, cosine);
+    return wide ? Vec2f{r * cosine, r * sine} : Vec2f{r * sine, r * cosine};
 }
 
 /// Cosine-weighted direction of the upper hemisphere. Density cos(theta)/pi per solid angle.
 AMBILUX_HD Vec3f square_to_cosine_hemisphere(Vec2f u) {
     const Vec2f d = square_to_disk(u);
     // Never exactly on the horizon, where the density would be zero.
-    return {d.x, d.y, sqrtf(fmaxf(1.0f - d.x * d.x - d.y * d.y, 1e-14f))};
+    return {d.x, d.y, sqrtf(max(1.0f - d.x * d.x - d.y * d.y, 1e-14f))};
 }
 
 /// Uniform direction. Density 1/(4 pi) per solid angle.

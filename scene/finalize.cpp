@@ -27,7 +27,7 @@ double append_cdf(std::vector<float>& tables, size_t n, const Weight& weight) {
 }
 
 double triangle_area(const Scene& scene, const Triangle& t) {
-    const Vec3f &a = scene.positions[t.v0], &b = scene.positions[t.v1], &c = scene.positions[t.v2];
+    const Vec3f &a = scene.vertices[t.v0].p, &b = scene.vertices[t.v1].p, &c = scene.vertices[t.v2].p;
     const double u[3] = {double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z}, v[3] = {double(c.x) - a.x, double(c.y) - a.y, double(c.z) - a.z};
     const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
     return 0.5 * std::sqrt(x * x + y * y + z * z);
@@ -71,7 +71,7 @@ void fill_bounds(Scene& scene) {
     const Vec3f camera = column(scene.sensor.to_world, 3);
     grow(camera, camera);
     for (const Triangle& t : scene.triangles)
-        for (uint32_t v : {t.v0, t.v1, t.v2}) grow(scene.positions[v], scene.positions[v]);
+        for (uint32_t v : {t.v0, t.v1, t.v2}) grow(scene.vertices[v].p, scene.vertices[v].p);
     // Centre and half axes of a box around a quadric; a sphere about the origin holds it with radius `reach`.
     const auto quadric_ball = [](const Quadric& q, Vec3f& center) {
         center = column(q.to_world, 3);
@@ -90,11 +90,11 @@ void fill_bounds(Scene& scene) {
     const Vec3f center = (lo + hi) * 0.5f;
     float radius = length(camera - center);
     for (const Triangle& t : scene.triangles)
-        for (uint32_t v : {t.v0, t.v1, t.v2}) radius = fmaxf(radius, length(scene.positions[v] - center));
+        for (uint32_t v : {t.v0, t.v1, t.v2}) radius = max(radius, length(scene.vertices[v].p - center));
     for (const Quadric& q : scene.quadrics) {
         Vec3f c;
         const float r = quadric_ball(q, c);
-        radius = fmaxf(radius, length(c - center) + r);
+        radius = max(radius, length(c - center) + r);
     }
     scene.bounds_center = center;
     // A little larger against rounding; an empty scene gets a sphere of radius 1, so that distant emitters have something to aim at.
@@ -291,7 +291,7 @@ void finalize_scene(Scene& scene, LightPicking light_picking) {
     if (scene.tables.size() >= kNone) throw input_error(scene.path, 0, "the scene's tables are too large");
     // What rays read here and there.
     const auto large_pages = [](const auto& array) { use_huge_pages(array.data(), array.size() * sizeof array[0]); };
-    large_pages(scene.texels), large_pages(scene.tables), large_pages(scene.triangles), large_pages(scene.positions), large_pages(scene.normals), large_pages(scene.uvs);
+    large_pages(scene.texels), large_pages(scene.tables), large_pages(scene.triangles), large_pages(scene.vertices);
 }
 
 }  // namespace ambilux

@@ -71,7 +71,7 @@ nlohmann::json scene_info(const Scene& scene) {
         {"shapes", shapes},
         {"triangles", scene.triangles.size()},
         {"degenerate_triangles", scene.degenerate_triangles},
-        {"vertices", scene.positions.size()},
+        {"vertices", scene.vertices.size()},
         {"quadrics", scene.quadrics.size()},
         {"materials", scene.materials.size()},
         {"bsdfs", bsdfs},

@@ -4,9 +4,7 @@ namespace ambilux {
 
 SceneView Scene::view() const {
     SceneView v{};
-    v.positions = positions.data();
-    v.normals = normals.data();
-    v.uvs = uvs.data();
+    v.vertices = vertices.data();
     v.triangles = triangles.data();
     v.quadrics = quadrics.data();
     v.shapes = shapes.data();
@@ -17,7 +15,7 @@ SceneView Scene::view() const {
     v.emitters = emitters.data();
     v.emitter_cdf = emitter_cdf.data();
     v.tables = tables.data();
-    v.vertex_count = uint32_t(positions.size());
+    v.vertex_count = uint32_t(vertices.size());
     v.triangle_count = uint32_t(triangles.size());
     v.quadric_count = uint32_t(quadrics.size());
     v.shape_count = uint32_t(shapes.size());
@@ -34,7 +32,7 @@ SceneView Scene::view() const {
 
 uint64_t Scene::memory_bytes() const {
     const auto bytes = [](const auto& array) { return uint64_t(array.size() * sizeof(array[0])); };
-    return bytes(positions) + bytes(normals) + bytes(uvs) + bytes(triangles) + bytes(quadrics) + bytes(shapes) + bytes(materials) + bytes(bsdfs) +
+    return bytes(vertices) + bytes(triangles) + bytes(quadrics) + bytes(shapes) + bytes(materials) + bytes(bsdfs) +
            bytes(textures) + bytes(texels) + bytes(emitters) + bytes(emitter_cdf) + bytes(tables);
 }
 

@@ -38,8 +38,7 @@ struct Scene {
     uint64_t degenerate_triangles = 0;       ///< triangles without area that the loader left out
     IntegratorHint integrator;
 
-    std::vector<Vec3f> positions, normals;
-    std::vector<Vec2f> uvs;
+    std::vector<Vertex> vertices;
     std::vector<Triangle> triangles;
     std::vector<Quadric> quadrics;
     std::vector<Shape> shapes;

@@ -49,7 +49,7 @@ AMBILUX_HD Vec3f accurate_cross(Vec3f a, Vec3f b) {
 
 /// Unit normal of a triangle; any unit vector if it has no area. Scaled first, so that small triangles do not underflow.
 AMBILUX_HD Vec3f triangle_normal(Vec3f e1, Vec3f e2) {
-    const float scale = fmaxf(max_component(abs(e1)), max_component(abs(e2)));
+    const float scale = max(max_component(abs(e1)), max_component(abs(e2)));
     if (!(scale > 0.0f)) return {0.0f, 0.0f, 1.0f};
     const float inv = 1.0f / scale;
     const Vec3f n = accurate_cross(e1 * inv, e2 * inv);
@@ -69,7 +69,8 @@ AMBILUX_HD void any_tangents(SurfacePoint& s) {
 AMBILUX_HD SurfacePoint triangle_surface_at(const SceneView& scene, uint32_t prim, float b1, float b2) {
     const Triangle tri = scene.triangles[prim];
     const uint32_t flags = scene.shapes[tri.shape].flags;
-    const Vec3f p0 = scene.positions[tri.v0], p1 = scene.positions[tri.v1], p2 = scene.positions[tri.v2];
+    const Vertex &a = scene.vertices[tri.v0], &b = scene.vertices[tri.v1], &c = scene.vertices[tri.v2];
+    const Vec3f p0 = a.p, p1 = b.p, p2 = c.p;
     const float b0 = 1.0f - b1 - b2;
     SurfacePoint s;
     s.prim = prim;
@@ -81,12 +82,12 @@ AMBILUX_HD SurfacePoint triangle_surface_at(const SceneView& scene, uint32_t pri
     s.ng = triangle_normal(e1, e2);
     s.ns = s.ng;
     if (flags & kShapeHasNormals) {
-        const Vec3f n = scene.normals[tri.v0] * b0 + scene.normals[tri.v1] * b1 + scene.normals[tri.v2] * b2;
+        const Vec3f n = a.n * b0 + b.n * b1 + c.n * b2;
         const float l2 = length_squared(n);
         if (l2 > 1e-20f) s.ns = n * (1.0f / sqrtf(l2));
     }
     if (flags & kShapeHasUvs) {
-        const Vec2f t0 = scene.uvs[tri.v0], t1 = scene.uvs[tri.v1], t2 = scene.uvs[tri.v2];
+        const Vec2f t0 = a.uv(), t1 = b.uv(), t2 = c.uv();
         s.uv = t0 * b0 + t1 * b1 + t2 * b2;
         const Vec2f d1 = t1 - t0, d2 = t2 - t0;
         const float det = difference_of_products(d1.x, d2.y, d1.y, d2.x);

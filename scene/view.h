@@ -43,6 +43,16 @@ struct Texture {
 
 // ---- surfaces ----
 
+/// Vertex of a mesh in two loads of 16 bytes, so that a surface point reads one line of memory per vertex. World space.
+struct alignas(32) Vertex {
+    Vec3f p;
+    float u = 0;
+    Vec3f n = {0, 0, 0};  ///< unit; arbitrary where the shape lacks normals
+    float v = 0;          ///< (u,v): texture coordinates, arbitrary where the shape lacks them
+
+    AMBILUX_HD Vec2f uv() const { return {u, v}; }
+};
+
 /// Triangle: three vertices and the shape it belongs to.
 struct Triangle {
     uint32_t v0, v1, v2;
@@ -160,9 +170,7 @@ struct Sensor {
 
 /// Everything a kernel may read. Pointers are host or device memory, as a whole.
 struct SceneView {
-    const Vec3f* positions;  ///< per vertex, world space
-    const Vec3f* normals;    ///< per vertex, unit; arbitrary where the shape lacks them
-    const Vec2f* uvs;        ///< per vertex; arbitrary where the shape lacks them
+    const Vertex* vertices;
     const Triangle* triangles;
     const Quadric* quadrics;
     const Shape* shapes;

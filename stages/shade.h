@@ -11,7 +11,7 @@
 namespace ambilux {
 
 /// Probability with which a walk of `throughput` goes on (Mitsuba's rule: radiance is scaled by the squared index of the medium, which is not loss).
-AMBILUX_HD float survival_probability(Rgb throughput, float eta_scale) { return fminf(max_component(throughput) * sqr(eta_scale), 0.95f); }
+AMBILUX_HD float survival_probability(Rgb throughput, float eta_scale) { return min(max_component(throughput) * sqr(eta_scale), 0.95f); }
 
 template <Features F>
 struct Shade {

@@ -34,15 +34,21 @@ inline uint32_t add_diffuse(Scene& scene) {
     return uint32_t(scene.materials.size() - 1);
 }
 
+inline void set_uvs(Scene& scene, const std::vector<Vec2f>& uvs) {
+    for (size_t i = 0; i < uvs.size(); ++i) scene.vertices[i].u = uvs[i].x, scene.vertices[i].v = uvs[i].y;
+}
+
+inline void set_normals(Scene& scene, const std::vector<Vec3f>& normals) {
+    for (size_t i = 0; i < normals.size(); ++i) scene.vertices[i].n = normals[i];
+}
+
 /// A new shape of triangles; positions and triples of indices into them. Call before any quadric is added.
 inline void add_mesh(Scene& scene, const std::vector<Vec3f>& positions, const std::vector<uint32_t>& indices) {
     if (scene.materials.empty()) add_diffuse(scene);
-    const uint32_t base = uint32_t(scene.positions.size()), shape = uint32_t(scene.shapes.size());
+    const uint32_t base = uint32_t(scene.vertices.size()), shape = uint32_t(scene.shapes.size());
     scene.shapes.push_back({0, kNone, 0, uint32_t(scene.triangles.size()), uint32_t(indices.size() / 3), 0.0f});
     for (const Vec3f p : positions) {
-        scene.positions.push_back(p);
-        scene.normals.push_back({0, 0, 1});
-        scene.uvs.push_back({0, 0});
+        scene.vertices.push_back({p, 0, {0, 0, 1}, 0});
     }
     for (size_t i = 0; i + 2 < indices.size(); i += 3) scene.triangles.push_back({base + indices[i], base + indices[i + 1], base + indices[i + 2], shape});
     scene.features.primitives |= bit(PrimitiveType::triangle);

@@ -50,9 +50,7 @@ inline Affine rotation_to(Vec3f axis, Vec3f origin = {0, 0, 0}) {
 
 inline SceneView view_of(const Scene& s) {
     SceneView v{};
-    v.positions = s.positions.data();
-    v.normals = s.normals.data();
-    v.uvs = s.uvs.data();
+    v.vertices = s.vertices.data();
     v.triangles = s.triangles.data();
     v.quadrics = s.quadrics.data();
     v.shapes = s.shapes.data();
@@ -61,7 +59,7 @@ inline SceneView view_of(const Scene& s) {
     v.emitters = s.emitters.data();
     v.emitter_cdf = s.emitter_cdf.data();
     v.tables = s.tables.data();
-    v.vertex_count = uint32_t(s.positions.size());
+    v.vertex_count = uint32_t(s.vertices.size());
     v.triangle_count = uint32_t(s.triangles.size());
     v.quadric_count = uint32_t(s.quadrics.size());
     v.shape_count = uint32_t(s.shapes.size());
@@ -102,12 +100,11 @@ inline int32_t add_texture(Scene& s, uint32_t width, uint32_t height, const std:
 /// Adds a mesh. All meshes come before the first quadric: primitive ids of quadrics follow those of triangles.
 inline uint32_t add_mesh(Scene& s, const std::vector<Vec3f>& vertices, const std::vector<std::array<uint32_t, 3>>& triangles,
                          const std::vector<Vec2f>& uvs = {}) {
-    const uint32_t base = uint32_t(s.positions.size()), shape = uint32_t(s.shapes.size());
-    s.positions.insert(s.positions.end(), vertices.begin(), vertices.end());
-    s.uvs.resize(base, Vec2f{0, 0});
-    s.uvs.insert(s.uvs.end(), uvs.begin(), uvs.end());
-    s.uvs.resize(s.positions.size(), Vec2f{0, 0});
-    s.normals.resize(s.positions.size(), Vec3f{0, 0, 1});
+    const uint32_t base = uint32_t(s.vertices.size()), shape = uint32_t(s.shapes.size());
+    for (size_t i = 0; i < vertices.size(); ++i) {
+        const Vec2f uv = uvs.empty() ? Vec2f{0, 0} : uvs[i];
+        s.vertices.push_back({vertices[i], uv.x, {0, 0, 1}, uv.y});
+    }
     s.shapes.push_back({0, kNone, uvs.empty() ? 0u : uint32_t(kShapeHasUvs), uint32_t(s.triangles.size()), uint32_t(triangles.size()), 0.0f});
     for (auto t : triangles) s.triangles.push_back({base + t[0], base + t[1], base + t[2], shape});
     return shape;

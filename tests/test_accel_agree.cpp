@@ -79,7 +79,7 @@ bool valid(const SceneView& view, const Ray& ray, bool is_hit, const Hit& hit, f
     for (uint32_t i = 0; i < view.primitive_count(); ++i) {
         if (view.is_triangle(i)) {
             const Triangle tri = view.triangles[i];
-            const Meeting m = meet(ray, view.positions[tri.v0], view.positions[tri.v1], view.positions[tri.v2], slack);
+            const Meeting m = meet(ray, view.vertices[tri.v0].p, view.vertices[tri.v1].p, view.vertices[tri.v2].p, slack);
             if (m.certain && m.t_high < t) return false;
             if (is_hit && hit.prim == i && m.possible && t >= m.t_low && t <= m.t_high) justified = true;
         } else {
@@ -123,7 +123,7 @@ std::vector<Ray> test_rays(const Scene& scene, uint32_t count, float scale, uint
     std::vector<Ray> rays;
     const auto on_triangle = [&](float b1, float b2) {
         const Triangle t = scene.triangles[random.index(uint32_t(scene.triangles.size()))];
-        return scene.positions[t.v0] * (1 - b1 - b2) + scene.positions[t.v1] * b1 + scene.positions[t.v2] * b2;
+        return scene.vertices[t.v0].p * (1 - b1 - b2) + scene.vertices[t.v1].p * b1 + scene.vertices[t.v2].p * b2;
     };
     for (uint32_t i = 0; i < count; ++i) {
         Ray ray = {random.in_box(1.5f * scale), kInfinity, random.direction(), i};
@@ -215,7 +215,7 @@ TEST_CASE("No ray leaves a closed mesh from inside") {
             Ray ray = {random.in_box(inner), kInfinity, random.direction(), i};
             const Triangle t = scene.triangles[random.index(uint32_t(scene.triangles.size()))];
             const float u = random.uniform();
-            const Vec3f a = scene.positions[t.v0], b = scene.positions[t.v1];
+            const Vec3f a = scene.vertices[t.v0].p, b = scene.vertices[t.v1].p;
             if (i % 4 == 1) ray.d = normalize(a - ray.o);                   // at a vertex
             if (i % 4 == 2) ray.d = normalize(a * u + b * (1 - u) - ray.o); // at an edge
             if (i % 4 == 3) {  // at a vertex, origin in one plane with it

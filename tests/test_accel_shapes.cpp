@@ -124,7 +124,7 @@ TEMPLATE_TEST_CASE("Opacity: the share of rays that pass, alike for closest and 
 TEMPLATE_TEST_CASE("Opacity from a texture is looked up where the ray meets the surface", "", EmbreeAccel, CwbvhAccel) {
     Scene scene;
     add_mesh(scene, {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}, {0, 1, 2});
-    scene.uvs = {{0, 0}, {2, 0}, {0, 2}};
+    set_uvs(scene, {{0, 0}, {2, 0}, {0, 2}});
     scene.shapes[0].flags = kShapeHasUvs;
     add_quadric(scene, PrimitiveType::cylinder, {5, 0, 0}, frame_from_normal({0, 0, 1}), 1, 1);
     Texture checker = {};

@@ -22,7 +22,7 @@ Hit intersect(const SceneView& view, Vec3f o, Vec3f d) {
     };
     for (uint32_t i = 0; i < view.triangle_count; ++i) {
         const Triangle& tri = view.triangles[i];
-        const Vec3f p0 = view.positions[tri.v0], a = view.positions[tri.v1] - p0, b = view.positions[tri.v2] - p0, r = o - p0;
+        const Vec3f p0 = view.vertices[tri.v0].p, a = view.vertices[tri.v1].p - p0, b = view.vertices[tri.v2].p - p0, r = o - p0;
         const double e1[3] = {a.x, a.y, a.z}, e2[3] = {b.x, b.y, b.z}, dd[3] = {d.x, d.y, d.z}, rr[3] = {r.x, r.y, r.z};
         const auto det = [](const double* x, const double* y, const double* z) {
             return x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0]) + x[2] * (y[0] * z[1] - y[1] * z[0]);

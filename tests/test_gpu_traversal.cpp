@@ -31,7 +31,7 @@ std::vector<Ray> test_rays(const Scene& scene, uint32_t count, float scale, uint
     std::vector<Ray> rays(count);
     const auto on_triangle = [&](Random& random, float b1, float b2) {
         const Triangle t = scene.triangles[random.index(uint32_t(scene.triangles.size()))];
-        return scene.positions[t.v0] * (1 - b1 - b2) + scene.positions[t.v1] * b1 + scene.positions[t.v2] * b2;
+        return scene.vertices[t.v0].p * (1 - b1 - b2) + scene.vertices[t.v1].p * b1 + scene.vertices[t.v2].p * b2;
     };
     for (uint32_t i = 0; i < count; ++i) {
         Random random(seed);
@@ -79,8 +79,8 @@ std::vector<Hit> trace_on_host(const Scene& scene, const CwbvhTracer& tracer, co
 /// How far rounding may move a hit along its ray: a few units in the last place of the coordinates, as seen at the angle between ray and surface.
 float t_tolerance(const SceneView& view, const Ray& ray, const Hit& hit) {
     const SurfacePoint s = surface_at<kAllFeatures>(view, hit.prim, hit.u, hit.v);
-    const float cosine = fmaxf(fabsf(dot(s.ng, ray.d)), 1e-4f);
-    return fmaxf(1e-5f * hit.t, 32 * 0x1p-24f * (max_component(abs(ray.o)) + hit.t) / cosine);
+    const float cosine = max(fabsf(dot(s.ng, ray.d)), 1e-4f);
+    return max(1e-5f * hit.t, 32 * 0x1p-24f * (max_component(abs(ray.o)) + hit.t) / cosine);
 }
 
 struct Agreement {

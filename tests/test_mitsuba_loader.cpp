@@ -147,7 +147,8 @@ TEST_CASE("both generations of the format give the same scene") {
         "<shape type='obj'><string name='filename' value='m.obj'/><boolean name='faceNormals' value='true'/><transform name='toWorld'><scale value='2'/></transform><ref id='g'/></shape>"
         "<emitter type='spot'><spectrum name='intensity' value='1,2,3'/><float name='cutoffAngle' value='30'/></emitter>",
         {}, "0.6.0", &folder);
-    CHECK(modern.positions == old.positions);
+    REQUIRE(modern.vertices.size() == old.vertices.size());
+    for (size_t i = 0; i < old.vertices.size(); ++i) CHECK(modern.vertices[i].p == old.vertices[i].p);
     CHECK(modern.integrator.max_depth == 9);
     CHECK(old.integrator.max_depth == 9);
     CHECK(old.integrator.rr_depth == 4);
@@ -157,7 +158,7 @@ TEST_CASE("both generations of the format give the same scene") {
     CHECK(memcmp(modern.emitters.data(), old.emitters.data(), sizeof(Emitter)) == 0);
     CHECK(modern.tables == old.tables);
     CHECK(modern.content_hash != old.content_hash);
-    CHECK(modern.positions[1] == Vec3f{2, 0, 0});
+    CHECK(modern.vertices[1].p == Vec3f{2, 0, 0});
     CHECK_FALSE(modern.shapes[0].flags & kShapeHasNormals);
     // Names of the other generation are unknown parameters, not ignored ones.
     CHECK(contains(error_of("<shape type='rectangle'><transform name='toWorld'/></shape>"), "unknown parameter 'toWorld' of shape 'rectangle'"));
@@ -207,7 +208,7 @@ TEST_CASE("content hash: changes with any file, not with its place") {
 TEST_CASE("transforms: later steps apply after earlier ones") {
     const auto moved = [](const std::string& steps) {
         // The rectangle's corner (1,1,0), third vertex.
-        return load("<shape type='rectangle'><transform name='to_world'>" + steps + "</transform></shape>").positions[2];
+        return load("<shape type='rectangle'><transform name='to_world'>" + steps + "</transform></shape>").vertices[2].p;
     };
     check_rgb(moved("<translate x='1' y='2' z='3'/>"), {2, 3, 3});
     check_rgb(moved("<translate value='1 2 3'/><scale value='2'/>"), {4, 6, 6});
@@ -417,8 +418,8 @@ TEST_CASE("textures: top row at t = 0, decoding, pooling, transforms") {
     CHECK(s.textures[2].wrap == WrapMode::clamp);
     CHECK(s.textures[2].filter == TextureFilter::nearest);
     // OBJ puts v = 1 at the top: (0,1) of the file must see the top left texel.
-    CHECK(s.uvs[0].y == 1.0f);
-    CHECK(s.uvs[2].y == 0.0f);
+    CHECK(s.vertices[0].uv().y == 1.0f);
+    CHECK(s.vertices[2].uv().y == 0.0f);
     // The older generation's names, and gamma 1 = raw.
     const Scene old = load("<shape type='rectangle'><bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string name='filename' value='t.png'/><float name='gamma' value='1'/>"
                            "<float name='uscale' value='2'/><float name='voffset' value='0.5'/><string name='filterType' value='trilinear'/><string name='wrapMode' value='mirror'/></texture></bsdf></shape>",
@@ -427,7 +428,7 @@ TEST_CASE("textures: top row at t = 0, decoding, pooling, transforms") {
     CHECK(old.textures[0].to_uv[0][0] == 2.0f);
     CHECK(old.textures[0].to_uv[1][2] == 0.5f);
     CHECK(old.textures[0].wrap == WrapMode::mirror);
-    CHECK(old.uvs[2].y == 1.0f);  // rectangle: as it is
+    CHECK(old.vertices[2].v == 1.0f);  // rectangle: as it is
 
     const Scene checker = load("<shape type='rectangle'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'><rgb name='color0' value='0.7'/>"
                                "<transform name='to_uv'><scale x='20' y='80'/><translate x='0.5'/></transform></texture></bsdf></shape>");
@@ -546,14 +547,14 @@ TEST_CASE("mirrored meshes keep their outside (B12)") {
                     CHECK(bool(s.shapes[0].flags & kShapeHasNormals) == !face_normals);
                     Vec3f middle = {0, 0, 0};
                     for (const Triangle& t : s.triangles)
-                        for (uint32_t v : {t.v0, t.v1, t.v2}) middle += s.positions[v] * (1.0f / 12);
+                        for (uint32_t v : {t.v0, t.v1, t.v2}) middle += s.vertices[v].p * (1.0f / 12);
                     for (const Triangle& t : s.triangles) {
-                        const Vec3f a = s.positions[t.v0], ng = cross(s.positions[t.v1] - a, s.positions[t.v2] - a);
+                        const Vec3f a = s.vertices[t.v0].p, ng = cross(s.vertices[t.v1].p - a, s.vertices[t.v2].p - a);
                         CHECK((dot(ng, a - middle) > 0) == !flip);
                         if (face_normals) continue;
-                        const Vec3f sum = s.normals[t.v0] + s.normals[t.v1] + s.normals[t.v2];
+                        const Vec3f sum = s.vertices[t.v0].n + s.vertices[t.v1].n + s.vertices[t.v2].n;
                         CHECK(dot(ng, sum) > 0);
-                        if (file != "plain") CHECK(length(normalize(ng) - s.normals[t.v0]) < 1e-4f);
+                        if (file != "plain") CHECK(length(normalize(ng) - s.vertices[t.v0].n) < 1e-4f);
                     }
                 }
 }
@@ -566,7 +567,7 @@ TEST_CASE("triangles without area are left out and counted") {
     CHECK(s.degenerate_triangles == 2);
     CHECK(s.shapes[0].primitive_count == 1);
     for (const Triangle& t : s.triangles)
-        for (uint32_t v : {t.v0, t.v1, t.v2}) CHECK(length(s.normals[v]) == Approx(1));
+        for (uint32_t v : {t.v0, t.v1, t.v2}) CHECK(length(s.vertices[v].n) == Approx(1));
 }
 
 TEST_CASE("mistakes are named with file and line") {

@@ -39,8 +39,8 @@ uint32_t add_triangles(Scene& s, const std::vector<std::array<Vec3f, 3>>& triang
     const uint32_t shape = uint32_t(s.shapes.size());
     s.shapes.push_back({0, kNone, 0, uint32_t(s.triangles.size()), uint32_t(triangles.size()), 0});
     for (const auto& t : triangles) {
-        const uint32_t v = uint32_t(s.positions.size());
-        for (Vec3f p : t) s.positions.push_back(p), s.normals.push_back({0, 0, 0}), s.uvs.push_back({0, 0});
+        const uint32_t v = uint32_t(s.vertices.size());
+        for (Vec3f p : t) s.vertices.push_back({p});
         s.triangles.push_back({v, v + 1, v + 2, shape});
     }
     return shape;
@@ -186,7 +186,7 @@ TEST_CASE("bounds hold every surface and the camera; an empty scene has a radius
     finalize_scene(s, LightPicking::power);
     const auto inside = [&](Vec3f p) { return length(p - s.bounds_center) <= s.bounds_radius; };
     CHECK(inside({0, 0, -20}));
-    for (Vec3f p : s.positions) CHECK(inside(p));
+    for (const Vertex& v : s.vertices) CHECK(inside(v.p));
     for (uint32_t i = 0; i < 1000; ++i) {
         const Vec4f u = random_floats({1, i, 0, Stream::test}, 0);
         const Vec3f d = square_to_sphere({u.x, u.y});

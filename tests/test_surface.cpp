@@ -37,7 +37,7 @@ double distance_from(const Scene& scene, uint32_t prim, Vec3f p) {
     const SceneView view = scene.view();
     if (view.is_triangle(prim)) {
         const Triangle t = view.triangles[prim];
-        const Vec3f a = view.positions[t.v0], b = view.positions[t.v1], c = view.positions[t.v2];
+        const Vec3f a = view.vertices[t.v0].p, b = view.vertices[t.v1].p, c = view.vertices[t.v2].p;
         const double e1[3] = {double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z}, e2[3] = {double(c.x) - a.x, double(c.y) - a.y, double(c.z) - a.z};
         const double n[3] = {e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2], e1[0] * e2[1] - e1[1] * e2[0]};
         const double l = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
@@ -92,7 +92,7 @@ TEST_CASE("A surface point lies on its surface within p_error, and where the ray
                     const double bound = std::sqrt(double(length_squared(s.p_error)));
                     worst = std::max(worst, distance_from(scene, hit.prim, s.p) / bound);
                     // Along the ray the error grows with the distance and with the slope.
-                    const float slope = fmaxf(fabsf(dot(s.ng, ray.d)), 1e-3f);
+                    const float slope = max(fabsf(dot(s.ng, ray.d)), 1e-3f);
                     REQUIRE(length(ray.o + ray.d * hit.t - s.p) <= (1e-5f * scale) / slope);
                     REQUIRE(fabsf(length(s.ng) - 1) < 1e-5f);
                     REQUIRE(s.prim == hit.prim);
@@ -115,7 +115,7 @@ TEST_CASE("Partial derivatives are those of the point by uv") {
     // Central differences through surface_at: move (u,v), see how p and uv move.
     Scene scene;
     add_mesh(scene, {{0, 0, 0}, {2, 0, 0.5f}, {0.3f, 1, 0}}, {0, 1, 2});
-    scene.uvs = {{0.1f, 0.2f}, {0.9f, 0.3f}, {0.2f, 0.8f}};
+    set_uvs(scene, {{0.1f, 0.2f}, {0.9f, 0.3f}, {0.2f, 0.8f}});
     scene.shapes[0].flags = kShapeHasUvs;
     add_mesh(scene, {{0, 0, 0}, {2, 0, 0.5f}, {0.3f, 1, 0}}, {0, 1, 2});
     for (const PrimitiveType type : {PrimitiveType::sphere, PrimitiveType::disk, PrimitiveType::cylinder})
@@ -171,11 +171,11 @@ TEST_CASE("Normals: geometric side, interpolation, missing and zero vertex norma
     Scene scene;
     add_mesh(scene, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {0, 1, 2});
     scene.shapes[0].flags = kShapeHasNormals;
-    scene.normals = {normalize(Vec3f{1, 0, 1}), normalize(Vec3f{-1, 0, 1}), normalize(Vec3f{0, 1, 1})};
+    set_normals(scene, {normalize(Vec3f{1, 0, 1}), normalize(Vec3f{-1, 0, 1}), normalize(Vec3f{0, 1, 1})});
     SurfacePoint s = surface_at<kTriangles>(scene.view(), 0, 0.5f, 0.0f);
     CHECK(s.ng == Vec3f{0, 0, 1});
     CHECK(length(s.ns - Vec3f{0, 0, 1}) < 1e-6f);
-    scene.normals = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+    set_normals(scene, {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}});
     CHECK(surface_at<kTriangles>(scene.view(), 0, 0.2f, 0.2f).ns == Vec3f{0, 0, 1});
     Scene flipped;
     add_quadric(flipped, PrimitiveType::sphere, {0, 0, 0}, frame_from_normal({0, 0, 1}), 1, 1, true);

@@ -68,8 +68,8 @@ AMBILUX_HD Bsdf resolve_bsdf(const SceneView& scene, const BsdfRecord& record, V
     const auto microfacets = [&] {
         b.microfacets = record.microfacets;
         b.sample_visible = record.sample_visible != 0;
-        b.alpha_u = fmaxf(eval_float<F>(scene, record.alpha_u, uv), kMinAlpha);
-        b.alpha_v = fmaxf(eval_float<F>(scene, record.alpha_v, uv), kMinAlpha);
+        b.alpha_u = max(eval_float<F>(scene, record.alpha_u, uv), kMinAlpha);
+        b.alpha_v = max(eval_float<F>(scene, record.alpha_v, uv), kMinAlpha);
     };
     switch (record.type) {
         case BsdfType::diffuse:

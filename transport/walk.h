@@ -93,7 +93,7 @@ AMBILUX_HD WalkVertex light_vertex(const SceneView& scene, const BidirectionalMi
 /// Russian roulette of a walk; u uniform. It enters no density: every strategy's walks are thinned and repaid alike, so that weights, which depend on the path
 /// alone, still sum to one.
 AMBILUX_HD bool survives(Walk& w, float u) {
-    const float survival = fminf(max_component(w.throughput) * sqr(w.eta_scale), 0.95f);
+    const float survival = min(max_component(w.throughput) * sqr(w.eta_scale), 0.95f);
     if (!(u < survival)) return false;
     w.throughput = w.throughput / survival;
     return true;
@@ -104,7 +104,7 @@ AMBILUX_HD bool survives(Walk& w, float u) {
 AMBILUX_HD float delta_reverse_pdf(const Scattering& s, Vec3f wo, float eta) {
     if (eta == 1.0f) return 1.0f;
     // Never 0 by rounding, where a walk leaves along the surface.
-    return fabsf(s.wi.z) / (fmaxf(fabsf(dot(s.frame.n, wo)), 1e-7f) * sqr(eta));
+    return fabsf(s.wi.z) / (max(fabsf(dot(s.frame.n, wo)), 1e-7f) * sqr(eta));
 }
 
 /// The next ray of the walk `w` that met `vertex`; u.xyz scatter, u.w is for Russian roulette from `rr_depth` segments on. False when the walk ends.

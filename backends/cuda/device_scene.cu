@@ -3,9 +3,7 @@
 namespace ambilux {
 
 DeviceScene::DeviceScene(const Scene& scene)
-    : positions_(scene.positions, "vertices on the device"),
-      normals_(scene.normals, "normals on the device"),
-      uvs_(scene.uvs, "texture coordinates on the device"),
+    : vertices_(scene.vertices, "vertices on the device"),
       triangles_(scene.triangles, "triangles on the device"),
       quadrics_(scene.quadrics, "analytic shapes on the device"),
       shapes_(scene.shapes, "shapes on the device"),
@@ -17,9 +15,7 @@ DeviceScene::DeviceScene(const Scene& scene)
       emitter_cdf_(scene.emitter_cdf, "emitter probabilities on the device"),
       tables_(scene.tables, "tables on the device"),
       view_(scene.view()) {
-    view_.positions = positions_.data();
-    view_.normals = normals_.data();
-    view_.uvs = uvs_.data();
+    view_.vertices = vertices_.data();
     view_.triangles = triangles_.data();
     view_.quadrics = quadrics_.data();
     view_.shapes = shapes_.data();
@@ -33,7 +29,7 @@ DeviceScene::DeviceScene(const Scene& scene)
 }
 
 uint64_t DeviceScene::bytes() const {
-    return positions_.bytes() + normals_.bytes() + uvs_.bytes() + triangles_.bytes() + quadrics_.bytes() + shapes_.bytes() + materials_.bytes() +
+    return vertices_.bytes() + triangles_.bytes() + quadrics_.bytes() + shapes_.bytes() + materials_.bytes() +
            bsdfs_.bytes() + textures_.bytes() + texels_.bytes() + emitters_.bytes() + emitter_cdf_.bytes() + tables_.bytes();
 }
 

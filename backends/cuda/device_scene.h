@@ -20,8 +20,7 @@ public:
     static uint64_t predicted_bytes(const Scene& scene) { return scene.memory_bytes(); }
 
 private:
-    DeviceBuffer<Vec3f> positions_, normals_;
-    DeviceBuffer<Vec2f> uvs_;
+    DeviceBuffer<Vertex> vertices_;
     DeviceBuffer<Triangle> triangles_;
     DeviceBuffer<Quadric> quadrics_;
     DeviceBuffer<Shape> shapes_;

@@ -9,7 +9,7 @@ namespace ambilux {
 
 void split_triangle_bounds(const SceneView& scene, uint32_t prim, const Bounds3f& within, int axis, float position, Bounds3f& left, Bounds3f& right) {
     const Triangle tri = scene.triangles[prim];
-    const Vec3f v[3] = {scene.positions[tri.v0], scene.positions[tri.v1], scene.positions[tri.v2]};
+    const Vec3f v[3] = {scene.vertices[tri.v0].p, scene.vertices[tri.v1].p, scene.vertices[tri.v2].p};
     left = right = {};
     for (int i = 0; i < 3; ++i) {
         const Vec3f a = v[i], b = v[(i + 1) % 3];
@@ -22,8 +22,8 @@ void split_triangle_bounds(const SceneView& scene, uint32_t prim, const Bounds3f
             right.extend(c - pad), right.extend(c + pad);
         }
     }
-    left.upper[axis] = fminf(left.upper[axis], position);
-    right.lower[axis] = fmaxf(right.lower[axis], position);
+    left.upper[axis] = min(left.upper[axis], position);
+    right.lower[axis] = max(right.lower[axis], position);
     left.lower = max(left.lower, within.lower), left.upper = min(left.upper, within.upper);
     right.lower = max(right.lower, within.lower), right.upper = min(right.upper, within.upper);
 }
@@ -70,11 +70,11 @@ void split_primitive(const RTCBuildPrimitive* primitive, unsigned axis, float po
     if (scene.is_triangle(primitive->primID)) {
         split_triangle_bounds(scene, primitive->primID, within, int(axis), position, left, right);
         // A sliver that rounding leaves without a box on one side: cut the box alone.
-        if (left.empty()) left = within, left.upper[int(axis)] = fminf(position, within.upper[int(axis)]);
-        if (right.empty()) right = within, right.lower[int(axis)] = fmaxf(position, within.lower[int(axis)]);
+        if (left.empty()) left = within, left.upper[int(axis)] = min(position, within.upper[int(axis)]);
+        if (right.empty()) right = within, right.lower[int(axis)] = max(position, within.lower[int(axis)]);
     } else {
-        left.upper[int(axis)] = fminf(position, within.upper[int(axis)]);
-        right.lower[int(axis)] = fmaxf(position, within.lower[int(axis)]);
+        left.upper[int(axis)] = min(position, within.upper[int(axis)]);
+        right.lower[int(axis)] = max(position, within.lower[int(axis)]);
     }
     store(left, *left_out);
     store(right, *right_out);
@@ -126,11 +126,11 @@ Bvh2 build_bvh2(const SceneView& scene) {
     primitives.reserve(size_t(count) * 2);
     for (uint32_t i = 0; i < count; ++i) {
         const Bounds3f b = scene.is_triangle(i) ? triangle_bounds(scene, i) : quadric_bounds(scene.quadric(i));
-        // fminf and fmaxf skip NaN, so a triangle's vertices are looked at themselves.
+        // min and max skip NaN, so a triangle's vertices are looked at themselves.
         bool finite = is_finite(b.lower) && is_finite(b.upper);
         if (scene.is_triangle(i)) {
             const Triangle t = scene.triangles[i];
-            finite = is_finite(scene.positions[t.v0]) && is_finite(scene.positions[t.v1]) && is_finite(scene.positions[t.v2]);
+            finite = is_finite(scene.vertices[t.v0].p) && is_finite(scene.vertices[t.v1].p) && is_finite(scene.vertices[t.v2].p);
         }
         if (!finite) continue;
         RTCBuildPrimitive p;

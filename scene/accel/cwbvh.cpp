@@ -244,7 +244,7 @@ private:
         p.prim = prim;
         if (scene_.is_triangle(prim)) {
             const Triangle t = scene_.triangles[prim];
-            p.v0 = scene_.positions[t.v0], p.v1 = scene_.positions[t.v1], p.v2 = scene_.positions[t.v2];
+            p.v0 = scene_.vertices[t.v0].p, p.v1 = scene_.vertices[t.v1].p, p.v2 = scene_.vertices[t.v2].p;
         }
         return p;
     }

@@ -141,7 +141,7 @@ AMBILUX_HD bool child_hit(const SlabAxis& x, const SlabAxis& y, const SlabAxis& 
     const float nx = fmaf(byte_in_mantissa<Byte>(near_x), x.scale, x.near), fx = fmaf(byte_in_mantissa<Byte>(far_x), x.scale, x.far);
     const float ny = fmaf(byte_in_mantissa<Byte>(near_y), y.scale, y.near), fy = fmaf(byte_in_mantissa<Byte>(far_y), y.scale, y.far);
     const float nz = fmaf(byte_in_mantissa<Byte>(near_z), z.scale, z.near), fz = fmaf(byte_in_mantissa<Byte>(far_z), z.scale, z.far);
-    return fmaxf(fmaxf(nx, ny), fmaxf(nz, 0.0f)) <= fminf(fminf(fx, fy), fminf(fz, tmax));
+    return max(max(nx, ny), max(nz, 0.0f)) <= min(min(fx, fy), min(fz, tmax));
 }
 
 }  // namespace detail

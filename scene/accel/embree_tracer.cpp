@@ -43,7 +43,7 @@ void filter_occluder(const RTCFilterFunctionNArguments* args) {
     const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
     const SceneView& view = *context.scene;
     const Triangle tri = view.triangles[hit->primID];
-    if (detail::starts_on(context.ray->o, view.positions[tri.v0], view.positions[tri.v1], view.positions[tri.v2]))
+    if (detail::starts_on(context.ray->o, view.vertices[tri.v0].p, view.vertices[tri.v1].p, view.vertices[tri.v2].p))
         args->valid[0] = 0;
     else
         filter_triangle(args);
@@ -115,10 +115,7 @@ EmbreeAccel::EmbreeAccel(const Scene& scene)
 
     if (!scene.triangles.empty()) {
         RTCGeometry mesh = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-        // Vertices are copied, since Embree reads 16 bytes at each of them; indices are shared.
-        void* vertices = rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), scene.positions.size());
-        if (!vertices) throw_embree_error(device_, "allocating vertices");
-        std::memcpy(vertices, scene.positions.data(), scene.positions.size() * sizeof(Vec3f));
+        rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, scene.vertices.data(), 0, sizeof(Vertex), scene.vertices.size());
         rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, scene.triangles.data(), 0, sizeof(Triangle), scene.triangles.size());
         if (scene.features.opacity) rtcSetGeometryIntersectFilterFunction(mesh, filter_triangle);
         rtcSetGeometryOccludedFilterFunction(mesh, filter_occluder);

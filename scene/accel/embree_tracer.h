@@ -52,7 +52,7 @@ struct EmbreeTracer {
             if (query.hit.geomID != 0) return true;
             // Embree finds the triangle; our own test tells where, as precisely as on a device, and knows the plane that the ray starts on.
             const Triangle tri = view.triangles[hit.prim];
-            const Vec3f v0 = view.positions[tri.v0], v1 = view.positions[tri.v1], v2 = view.positions[tri.v2];
+            const Vec3f v0 = view.vertices[tri.v0].p, v1 = view.vertices[tri.v1].p, v2 = view.vertices[tri.v2].p;
             TriangleCrossing crossing;
             if (intersect_triangle(ray.o, ray.d, make_ray_shear(ray.d), v0, v1, v2, ray.tmax, crossing)) {
                 hit = {crossing.t, crossing.u, crossing.v, hit.prim};

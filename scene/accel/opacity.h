@@ -14,7 +14,7 @@ AMBILUX_HD Vec2f texture_uv(const SceneView& scene, uint32_t prim, float u, floa
     if (scene.is_triangle(prim)) {
         const Triangle tri = scene.triangles[prim];
         if (!(scene.shapes[tri.shape].flags & kShapeHasUvs)) return {u, v};
-        return scene.uvs[tri.v0] * (1.0f - u - v) + scene.uvs[tri.v1] * u + scene.uvs[tri.v2] * v;
+        return scene.vertices[tri.v0].uv() * (1.0f - u - v) + scene.vertices[tri.v1].uv() * u + scene.vertices[tri.v2].uv() * v;
     }
     return surface_at<F>(scene, prim, u, v).uv;
 }

@@ -38,7 +38,7 @@ AMBILUX_HD Bounds3f quadric_bounds(const Quadric& q) {
         } else {
             const float r = sqrtf(x * x + y * y);
             const float end = q.type == PrimitiveType::cylinder ? z : 0.0f;
-            lo = c + fminf(0.0f, end) - r, hi = c + fmaxf(0.0f, end) + r;
+            lo = c + min(0.0f, end) - r, hi = c + max(0.0f, end) + r;
         }
         const float pad = gamma_bound(8) * (fabsf(c) + fabsf(x) + fabsf(y) + fabsf(z));
         b.lower[i] = lo - pad;
@@ -50,9 +50,9 @@ AMBILUX_HD Bounds3f quadric_bounds(const Quadric& q) {
 AMBILUX_HD Bounds3f triangle_bounds(const SceneView& scene, uint32_t prim) {
     const Triangle tri = scene.triangles[prim];
     Bounds3f b;
-    b.extend(scene.positions[tri.v0]);
-    b.extend(scene.positions[tri.v1]);
-    b.extend(scene.positions[tri.v2]);
+    b.extend(scene.vertices[tri.v0].p);
+    b.extend(scene.vertices[tri.v1].p);
+    b.extend(scene.vertices[tri.v2].p);
     return b;
 }
 

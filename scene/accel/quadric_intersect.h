@@ -21,8 +21,8 @@ AMBILUX_HD Vec3f quadric_origin(const Quadric& q) { return {q.to_world.m[0][3], 
 AMBILUX_HD void ordered_roots(float a, float b, float c, float discriminant, float& t0, float& t1) {
     const float q = b + copysignf(sqrtf(discriminant), b);
     const float r0 = c == 0.0f ? 0.0f : c / q, r1 = q / a;
-    t0 = fminf(r0, r1);
-    t1 = fmaxf(r0, r1);
+    t0 = min(r0, r1);
+    t1 = max(r0, r1);
 }
 
 AMBILUX_HD QuadricCrossings sphere_crossings(const Quadric& q, Vec3f o, Vec3f d, float tmax) {

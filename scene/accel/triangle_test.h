@@ -47,7 +47,7 @@ AMBILUX_HD bool intersect_triangle(Vec3f o, Vec3f d, const RayShear& shear, Vec3
     const float u = detail::difference_of_products(cx, by, cy, bx);
     const float v = detail::difference_of_products(ax, cy, ay, cx);
     const float w = detail::difference_of_products(bx, ay, by, ax);
-    if (fminf(u, fminf(v, w)) < 0.0f && fmaxf(u, fmaxf(v, w)) > 0.0f) return false;
+    if (min(u, min(v, w)) < 0.0f && max(u, max(v, w)) > 0.0f) return false;
     const float det = u + v + w;
     if (det == 0.0f) return false;
     // Distance along the ray from the plane. Unlike the interpolated depth it is exactly zero for origins on an axis-aligned triangle.

@@ -255,9 +255,7 @@ void build_shapes(Builder& builder, const Object& root) {
         triangles += job.world.faces.size();
     }
     if (vertices >= kNone || triangles >= kNone / 2) throw input_error(scene.path, 0, "the scene has too many vertices or triangles");
-    scene.positions.reserve(vertices);
-    scene.normals.reserve(vertices);
-    scene.uvs.reserve(vertices);
+    scene.vertices.reserve(vertices);
     scene.triangles.reserve(triangles);
     for (Job& job : shapes.jobs) {
         const uint32_t index = uint32_t(scene.shapes.size());
@@ -266,16 +264,15 @@ void build_shapes(Builder& builder, const Object& root) {
         if (job.source >= 0) {
             const Mesh& mesh = job.world;
             if (job.emitter != kNone && mesh.faces.empty()) throw input_error(job.where.file, job.where.line, "the shape emits light but has no area");
-            const uint32_t first = uint32_t(scene.positions.size());
+            const uint32_t first = uint32_t(scene.vertices.size());
             shape.first_primitive = uint32_t(scene.triangles.size());
             shape.primitive_count = uint32_t(mesh.faces.size());
             if (!mesh.normals.empty()) shape.flags |= kShapeHasNormals;
             if (!mesh.uvs.empty()) shape.flags |= kShapeHasUvs;
-            scene.positions.insert(scene.positions.end(), mesh.positions.begin(), mesh.positions.end());
-            scene.normals.insert(scene.normals.end(), mesh.normals.begin(), mesh.normals.end());
-            scene.uvs.insert(scene.uvs.end(), mesh.uvs.begin(), mesh.uvs.end());
-            scene.normals.resize(scene.positions.size(), Vec3f{0, 0, 0});
-            scene.uvs.resize(scene.positions.size(), Vec2f{0, 0});
+            for (size_t v = 0; v < mesh.positions.size(); ++v) {
+                const Vec2f uv = mesh.uvs.empty() ? Vec2f{0, 0} : mesh.uvs[v];
+                scene.vertices.push_back({mesh.positions[v], uv.x, mesh.normals.empty() ? Vec3f{0, 0, 0} : mesh.normals[v], uv.y});
+            }
             for (const auto& f : mesh.faces) scene.triangles.push_back({first + f[0], first + f[1], first + f[2], index});
             scene.degenerate_triangles += job.dropped;
             job.world = {};

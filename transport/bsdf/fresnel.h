@@ -23,12 +23,12 @@ AMBILUX_HD FresnelDielectric fresnel_dielectric(float cos_i, float ior) {
     if (eta == 1.0f) return {0.0f, -cos_i, 1.0f};
     if (!(ct > 0.0f) || ci == 0.0f) return {1.0f, cos_i >= 0.0f ? -ct : ct, eta};
     const float s = (ci - eta * ct) / (ci + eta * ct), p = (eta * ci - ct) / (eta * ci + ct);
-    return {fminf(0.5f * (s * s + p * p), 1.0f), cos_i >= 0.0f ? -ct : ct, eta};
+    return {min(0.5f * (s * s + p * p), 1.0f), cos_i >= 0.0f ? -ct : ct, eta};
 }
 
 /// Reflectance of a conductor of relative index eta - i·k at cosine `cos_i` >= 0 (exact; PBRT 3rd ed., 8.2.1).
 AMBILUX_HD float fresnel_conductor(float cos_i, float eta, float k) {
-    const float cos2 = cos_i * cos_i, sin2 = fmaxf(1.0f - cos2, 0.0f);
+    const float cos2 = cos_i * cos_i, sin2 = max(1.0f - cos2, 0.0f);
     const float t = eta * eta - k * k - sin2;
     const float a2b2 = safe_sqrt(t * t + 4.0f * eta * eta * k * k), a = safe_sqrt(0.5f * (a2b2 + t));
     const float s0 = a2b2 + cos2, s1 = 2.0f * cos_i * a;

@@ -66,12 +66,12 @@ struct MicrofacetDistribution {
     }
 
     /// Smith's masking G1 for v.z > 0.
-    AMBILUX_HD float g1(Vec3f v) const { return fminf(v.z / sigma(v), 1.0f); }
+    AMBILUX_HD float g1(Vec3f v) const { return min(v.z / sigma(v), 1.0f); }
 
     /// Density per solid angle of sample(), wi.z > 0.
     AMBILUX_HD float pdf(Vec3f wi, Vec3f m, bool visible) const {
         if (!visible) return d(m) * m.z;
-        return d(m) * fmaxf(dot(wi, m), 0.0f) / sigma(wi);
+        return d(m) * max(dot(wi, m), 0.0f) / sigma(wi);
     }
 
     /// Microfacet normal, visible from wi (wi.z > 0) or from the whole distribution in proportion to D·cos.
@@ -92,7 +92,7 @@ struct MicrofacetDistribution {
         const Vec3f v = normalize({wi.x * alpha_u, wi.y * alpha_v, wi.z});
         const float z = (1.0f - u.y) * (1.0f + v.z) - v.z, r = safe_sqrt(1.0f - z * z), phi = 2.0f * kPi * u.x;
         const Vec3f h = Vec3f{r * cosf(phi), r * sinf(phi), z} + v;
-        const Vec3f m = {h.x * alpha_u, h.y * alpha_v, fmaxf(h.z, 0.0f)};
+        const Vec3f m = {h.x * alpha_u, h.y * alpha_v, max(h.z, 0.0f)};
         const float l2 = length_squared(m);
         return l2 > 0.0f ? m * (1.0f / sqrtf(l2)) : Vec3f{0.0f, 0.0f, 1.0f};
     }

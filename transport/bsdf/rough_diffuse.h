@@ -18,13 +18,13 @@ struct RoughDiffuse {
         const float sines = sin_i * sin_o;
         const float cos_phi = sines > 1e-12f ? clamp((wi.x * wo.x + wi.y * wo.y) / sines, -1.0f, 1.0f) : 0.0f;
         // The paper's alpha is the larger polar angle, beta the smaller.
-        const float cos_a = fminf(wi.z, wo.z), cos_b = fmaxf(wi.z, wo.z);
-        const float sin_a = fmaxf(sin_i, sin_o), sin_b = fminf(sin_i, sin_o);
-        const float a = acosf(fminf(cos_a, 1.0f));
+        const float cos_a = min(wi.z, wo.z), cos_b = max(wi.z, wo.z);
+        const float sin_a = max(sin_i, sin_o), sin_b = min(sin_i, sin_o);
+        const float a = acosf(min(cos_a, 1.0f));
         // 1 - 2b/pi, by the complement: cos b may be tiny and is divided by below.
-        const float flat = 2.0f * kInvPi * asinf(fminf(cos_b, 1.0f)), steep = 1.0f - flat, b = kPiOver2 * steep;
+        const float flat = 2.0f * kInvPi * asinf(min(cos_b, 1.0f)), steep = 1.0f - flat, b = kPiOver2 * steep;
         // sin a - (2b/pi)³ without cancellation; not negative, because sin a >= sin b >= 2b/pi.
-        const float rest = fmaxf(flat * (3.0f - flat * (3.0f - flat)) - cos_a * cos_a / (1.0f + sin_a), 0.0f);
+        const float rest = max(flat * (3.0f - flat * (3.0f - flat)) - cos_a * cos_a / (1.0f + sin_a), 0.0f);
         const float c = sigma2 / (sigma2 + 0.09f);
         const float c1 = 1.0f - 0.5f * sigma2 / (sigma2 + 0.33f);
         const float c2 = 0.45f * c * (cos_phi >= 0.0f ? sin_a : rest);

@@ -16,7 +16,7 @@ struct RoughPlastic {
     const float* table;  ///< kTransmittanceTableSize entries
 
     AMBILUX_HD float transmittance(float cosine) const {
-        const float x = fminf(cosine, 1.0f) * float(kTransmittanceTableSize - 1);
+        const float x = min(cosine, 1.0f) * float(kTransmittanceTableSize - 1);
         const uint32_t i = x < float(kTransmittanceTableSize - 2) ? uint32_t(x) : kTransmittanceTableSize - 2;
         return lerp(table[i], table[i + 1], x - float(i));
     }

@@ -16,8 +16,8 @@ AMBILUX_HD Rgb area_radiance(const SceneView& view, const Emitter& emitter, cons
 
 AMBILUX_HD float triangle_area(const SceneView& view, uint32_t prim) {
     const Triangle& t = view.triangles[prim];
-    const Vec3f p0 = view.positions[t.v0];
-    return 0.5f * length(cross(view.positions[t.v1] - p0, view.positions[t.v2] - p0));
+    const Vec3f p0 = view.vertices[t.v0].p;
+    return 0.5f * length(cross(view.vertices[t.v1].p - p0, view.vertices[t.v2].p - p0));
 }
 
 /// Density per area with which area_sample_point picks a point of primitive `prim`. It uses the difference of the rounded

@@ -7,7 +7,7 @@ namespace ambilux {
 
 /// Puts the sampled point of a light at infinity beyond everything in the scene.
 AMBILUX_HD void place_at_infinity(const SceneView& view, Vec3f reference_p, EmitterSample& s) {
-    const float far_enough = 2.0f * fmaxf(view.bounds_radius, length(reference_p - view.bounds_center));
+    const float far_enough = 2.0f * max(view.bounds_radius, length(reference_p - view.bounds_center));
     s.p = reference_p + s.wi * far_enough;
     s.p_error = {0, 0, 0};
     s.ng = -s.wi;

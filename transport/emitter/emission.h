@@ -45,7 +45,7 @@ template <Features F>
 AMBILUX_HD float pdf_emission_direction(const SceneView& view, uint32_t emitter, Vec3f ng, Vec3f d) {
     const Emitter& e = view.emitters[emitter];
     switch (e.type) {
-        case EmitterType::area: return fmaxf(dot(ng, d), 0.0f) * kInvPi;
+        case EmitterType::area: return max(dot(ng, d), 0.0f) * kInvPi;
         case EmitterType::spot: return dot(e.direction, d) > e.cos_cutoff ? kInv2Pi / (1.0f - e.cos_cutoff) : 0.0f;
         case EmitterType::directional: return 1.0f;
         case EmitterType::envmap:

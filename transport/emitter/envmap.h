@@ -56,7 +56,7 @@ AMBILUX_HD float envmap_cell_weight(const SceneView& view, const Emitter& emitte
         const float v = (float(y) + float(j) * (1.0f / 3.0f)) / float(texture.height);
         for (int i = 0; i < 4; ++i) {
             const float u = (float(x) + float(i) * (1.0f / 3.0f)) / float(texture.width);
-            sum += fmaxf(luminance(envmap_lookup(view, emitter, {u, v})), 0.0f) * sinf(v * kPi);
+            sum += max(luminance(envmap_lookup(view, emitter, {u, v})), 0.0f) * sinf(v * kPi);
         }
     }
     return sum * (1.0f / 16.0f);
