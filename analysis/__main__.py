@@ -1,6 +1,7 @@
-"""python -m analysis RESULTS -o OUT: see README.md.
+"""python -m analysis RESULTS -o OUT: see docs/experiments.md.
 
-Writes OUT/convergence_time and OUT/convergence_spp (.pdf, .png), OUT/table (.csv, .tex) and OUT/report.html. Exit codes: 0 done, 2 usage, 3 bad input.
+Writes figures (.pdf, .png, .caption.txt), tables (.csv, .tex) and report.html into OUT. Exit codes: 0 done, 2 usage, 3 bad input (what does not depend on it
+is made all the same).
 """
 
 import argparse
@@ -9,12 +10,7 @@ import sys
 from pathlib import Path
 
 from analysis import experiment as experiments
-from analysis import figures, report, summary, tables
-
-FIGURES = (
-    ("convergence_time", "seconds", "RMSE against render time. Lines: geometric mean over seeds; bands: least to greatest seed. The noise of the reference is subtracted where it is known."),
-    ("convergence_spp", "spp", "RMSE against samples per pixel, drawn likewise."),
-)
+from analysis import figures, pyramid, report, summary, tables
 
 
 def write(path, text):
@@ -24,35 +20,66 @@ def write(path, text):
     os.replace(temporary, path)
 
 
-def analyse(results, out):
-    """Reads the experiment folder `results` and writes everything into the folder `out`. Returns what a reader must know (summary.remarks)."""
+def strategy_rows(data):
+    """Rows for tables.variances_to_csv."""
+    return [(scene, run, *row) for scene in data.scenes for run in data.runs for row in pyramid.variances(data, scene, run)]
+
+
+def analyse(results, out, insets=None):
+    """Reads the experiment folder `results` and writes everything into the folder `out`. Returns (remarks, figures.Made)."""
     data = experiments.load(results)
     out.mkdir(parents=True, exist_ok=True)
-    shown = []
-    for name, x, title in FIGURES:
-        figures.save(figures.convergence(data, x), out / name)
-        shown.append((title, out / f"{name}.png"))
     lines = summary.lines(data)
     remarks = summary.remarks(data, lines)
     write(out / "table.csv", tables.to_csv(lines))
-    write(out / "table.tex", tables.to_latex(lines, data.runs[0]))
-    write(out / "report.html", report.render(data, lines, remarks, shown))
-    return remarks
+    write(out / "table.tex", tables.to_latex(lines, data.base))
+    write(out / "tests.tex", tables.tests_to_latex(lines))
+    made = figures.make_all(data, out, write, insets or {})
+    try:
+        rows = strategy_rows(data)
+        if rows:
+            write(out / "strategy_variance.csv", tables.variances_to_csv(rows))
+        write(out / "report.html", report.render(data, lines, remarks, made, out))
+    except experiments.InputError as e:
+        made.broken.append(f"report.html: {e}")
+    return remarks, made
+
+
+def parse_inset(text):
+    """("box", (10, 20, 32)) of "box=10,20,32"."""
+    scene, _, numbers = text.rpartition("=")
+    try:
+        x, y, size = (int(n) for n in numbers.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not SCENE=X,Y,SIZE") from None
+    if not scene or x < 0 or y < 0 or size < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not SCENE=X,Y,SIZE with X, Y >= 0 and SIZE >= 1")
+    return scene, (x, y, size)
 
 
 def main(arguments=None):
     parser = argparse.ArgumentParser(prog="python -m analysis", description="Figures, tables and a report of an experiment.")
     parser.add_argument("results", type=Path, help="folder that `ambilux experiment` wrote")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to; may be the same")
+    parser.add_argument("--inset", type=parse_inset, action="append", default=[], metavar="SCENE=X,Y,SIZE",
+                        help="square of the comparison figure in pixels, in place of the chosen ones; up to two per scene")
     options = parser.parse_args(arguments)
+    insets = {}
+    for scene, inset in options.inset:
+        insets.setdefault(scene, []).append(inset)
     try:
-        remarks = analyse(options.results, options.output)
+        remarks, made = analyse(options.results, options.output, insets)
     except experiments.InputError as e:
         print(f"error: {e}", file=sys.stderr)
         return 3
     for remark in remarks:
         print(f"note: {remark}", file=sys.stderr)
-    return 0
+    for name, reason in made.missing:
+        print(f"not made: {name}: {reason}", file=sys.stderr)
+    for message in made.broken:
+        print(f"error: {message}", file=sys.stderr)
+    print(f"{len(made.pictures)} figures, 2 tables and report.html in {options.output}")
+    return 3 if made.broken else 0
 
 
 if __name__ == "__main__":

@@ -1,9 +1,13 @@
-"""Reads the folder of an experiment: manifest.json, runs.csv, images."""
+"""Reads the folder of an experiment: manifest.json, config.resolved.toml, runs.csv, images, statistics, techniques.
+
+What is wrong with a file is an InputError that names file, line and column or key.
+"""
 
 import csv
 import json
 import math
 import re
+import tomllib
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -12,7 +16,7 @@ INTEGERS = ("seed", "checkpoint", "spp", "rays", "invalid")
 
 
 class InputError(Exception):
-    """What is wrong with an experiment folder, with file and line."""
+    """What is wrong with an experiment folder, with file, line and column where there is one."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,7 @@ class Row:
     relmse: float
     relmse_corrected: float
     mape: float
+    bias: float  # mean(x - r)
     bias_z: float
     rays: int
     invalid: int  # values dropped: NaN, Inf, negative
@@ -57,6 +62,23 @@ class Experiment:
     rows: list
     scenes: list  # names in the order of the configuration
     runs: list
+    base: str  # the run that others are compared with: `default` of [ablation] in the configuration, else the first
+
+    @property
+    def name(self):
+        return str(self.manifest.get("name", self.folder.name))
+
+    @property
+    def others(self):
+        return [run for run in self.runs if run != self.base]
+
+    def scene_entry(self, scene):
+        return next(s for s in self.manifest["scenes"] if s["name"] == scene)
+
+    def pixels(self, scene):
+        """Number of pixels of the scene's images as the manifest states it; NaN without."""
+        size = self.scene_entry(scene).get("size")
+        return size[0] * size[1] if size else math.nan
 
     def select(self, scene, run, checkpoint=None):
         """Rows of one run in one scene, by seed and checkpoint."""
@@ -75,17 +97,44 @@ class Experiment:
         common = set.intersection(*sets) if sets else set()
         return max(common) if common else None
 
+    def files(self, folder, scene, run, suffix):
+        """(seed, path) of all folder/SCENE/RUN_SEED.suffix, by seed. One run's name may begin with another's."""
+        pattern = re.compile(re.escape(run) + r"_(\d+)" + re.escape(suffix))
+        place = self.folder / folder / scene
+        return sorted((int(m[1]), p) for p in (place.iterdir() if place.is_dir() else ()) if (m := pattern.fullmatch(p.name)))
+
     def image(self, scene, run):
-        """Path of the image of the lowest seed, or None."""
-        pattern = re.compile(re.escape(run) + r"_(\d+)\.exr")
-        found = [(int(m[1]), p) for p in (self.folder / "images" / scene).glob("*.exr") if (m := pattern.fullmatch(p.name))]
-        return min(found)[1] if found else None
+        """(seed, path) of the image of the lowest seed, or None."""
+        return next(iter(self.files("images", scene, run, ".exr")), None)
 
     def reference(self, scene):
         """Path of the reference image as the manifest names it, relative to the folder or absolute; None if it is not there."""
-        entry = next(s for s in self.manifest["scenes"] if s["name"] == scene)
-        name = (entry.get("reference") or {}).get("file")
+        name = (self.scene_entry(scene).get("reference") or {}).get("file")
         return self.folder / name if name and (self.folder / name).is_file() else None
+
+    def stats(self, scene, run):
+        """Statistics of the renders of all seeds, as the runner wrote them."""
+        return [read_json(path) for _, path in self.files("stats", scene, run, ".json")]
+
+    def techniques(self, scene, run):
+        """(seed, folder) of all folders techniques/SCENE/RUN_SEED that hold a techniques.json."""
+        return [(seed, p) for seed, p in self.files("techniques", scene, run, "") if (p / "techniques.json").is_file()]
+
+
+def settings_of(run):
+    """("lvc", {"connections": "4"}) of the run name "lvc[connections=4]", as the runner names the runs of a sweep; (name, {}) of others."""
+    match = re.fullmatch(r"([^\[\]]+)\[([^\[\]]+)\]", run)
+    pairs = [part.partition("=") for part in re.split(r"[,;]\s*", match[2])] if match else []
+    return (match[1], {key.strip(): value.strip() for key, _, value in pairs}) if pairs and all(equals for _, equals, _ in pairs) else (run, {})
+
+
+def read_json(path):
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except json.JSONDecodeError as e:
+        raise InputError(f"{path}:{e.lineno}: column {e.colno}: {e.msg}; the file may be half-written") from None
+    except (OSError, UnicodeDecodeError) as e:
+        raise InputError(f"{path}: cannot be read: {e}") from None
 
 
 def parse_number(text, column, place):
@@ -96,48 +145,75 @@ def parse_number(text, column, place):
         raise InputError(f"{place}: column '{column}' holds '{text}', which is no number") from None
 
 
-def read_rows(path):
-    """Reads runs.csv. Further columns are ignored; a missing one, a bad number or a repeated row is an InputError."""
+def read_rows(path, scenes, runs):
+    """Reads runs.csv. Further columns are ignored; a missing one, a bad number, a repeated row or an unknown name is an InputError."""
     rows, seen = [], {}
-    with open(path, newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(file)
-        missing = [c for c in REQUIRED if c not in (reader.fieldnames or ())]
-        if missing:
-            raise InputError(f"{path}:1: lacks the column{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
-        for record in reader:
-            place = f"{path}:{reader.line_num}"
-            if None in record or any(record[c] is None for c in REQUIRED):
-                raise InputError(f"{place}: number of cells differs from the header's")
-            row = Row(**{c: record[c] if c in TEXT else parse_number(record[c], c, place) for c in REQUIRED})
-            if row.spp <= 0 or not row.time > 0:
-                raise InputError(f"{place}: spp and time must be positive")
-            key = (row.scene, row.run, row.seed, row.checkpoint)
-            if key in seen:
-                raise InputError(f"{place}: repeats line {seen[key]} (scene {row.scene}, run {row.run}, seed {row.seed}, checkpoint {row.checkpoint})")
-            seen[key] = reader.line_num
-            rows.append(row)
+    try:
+        content = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as e:
+        raise InputError(f"{path}: cannot be read: {e}") from None
+    reader = csv.DictReader(content.splitlines(keepends=True))
+    missing = [c for c in REQUIRED if c not in (reader.fieldnames or ())]
+    if missing:
+        raise InputError(f"{path}:1: lacks the column{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
+    for record in reader:
+        place = f"{path}:{reader.line_num}"
+        cells = sum(v is not None for k, v in record.items() if k is not None) + len(record.get(None) or ())
+        whole = len(reader.fieldnames)
+        if cells > whole:
+            raise InputError(f"{place}: {cells} cells where the header names {whole}; the last one named is column '{reader.fieldnames[-1]}'")
+        if cells < whole:
+            raise InputError(f"{place}: ends in column '{reader.fieldnames[cells - 1]}', {cells} cells where the header names {whole}: a half-written row. "
+                             "`ambilux experiment ... --resume` completes it; without that line the rest can be analysed")
+        row = Row(**{c: record[c] if c in TEXT else parse_number(record[c], c, place) for c in REQUIRED})
+        for column, name, known in (("scene", row.scene, scenes), ("run", row.run, runs)):
+            if name not in known:
+                raise InputError(f"{place}: column '{column}': {column} '{name}' is not in manifest.json")
+        for column in ("spp", "time"):
+            if not getattr(row, column) > 0:
+                raise InputError(f"{place}: column '{column}' holds '{record[column]}', which must be positive")
+        key = (row.scene, row.run, row.seed, row.checkpoint)
+        if key in seen:
+            raise InputError(f"{place}: repeats line {seen[key]} (scene {row.scene}, run {row.run}, seed {row.seed}, checkpoint {row.checkpoint})")
+        seen[key] = reader.line_num
+        rows.append(row)
     if not rows:
         raise InputError(f"{path}: holds no results yet")
+    if not content.endswith("\n"):
+        raise InputError(f"{path}:{reader.line_num}: column '{reader.fieldnames[-1]}': the line does not end: a half-written row. "
+                         "`ambilux experiment ... --resume` completes it")
     return rows
+
+
+def read_base(path, runs):
+    """The run that [ablation] of the resolved configuration names as the default, else the first."""
+    if not path.is_file():
+        return runs[0]
+    try:
+        config = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, OSError, UnicodeDecodeError) as e:
+        raise InputError(f"{path}: {e}") from None
+    base = (config.get("ablation") or {}).get("default", runs[0])
+    if base not in runs:
+        raise InputError(f"{path}: [ablation] default = '{base}' is not a run of manifest.json")
+    return base
 
 
 def load(folder):
     """Reads an experiment folder. Throws InputError."""
     folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is no folder")
     for name in ("manifest.json", "runs.csv"):
         if not (folder / name).is_file():
-            raise InputError(f"{folder}: is no experiment folder: it has no {name}")
-    try:
-        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    except json.JSONDecodeError as e:
-        raise InputError(f"{folder / 'manifest.json'}:{e.lineno}: {e.msg}") from None
+            empty = "is empty: " if not any(folder.iterdir()) else "is no experiment folder: "
+            raise InputError(f"{folder}: {empty}it has no {name}")
+    manifest = read_json(folder / "manifest.json")
     try:
         scenes, runs = ([entry["name"] for entry in manifest[key]] for key in ("scenes", "runs"))
     except (KeyError, TypeError):
         raise InputError(f"{folder / 'manifest.json'}: lacks the lists 'scenes' and 'runs' of objects with a 'name'") from None
-    rows = read_rows(folder / "runs.csv")
-    for row in rows:
-        for kind, name, known in (("scene", row.scene, scenes), ("run", row.run, runs)):
-            if name not in known:
-                raise InputError(f"{folder / 'runs.csv'}: {kind} '{name}' is not in manifest.json")
-    return Experiment(folder, manifest, rows, scenes, runs)
+    if not scenes or not runs:
+        raise InputError(f"{folder / 'manifest.json'}: the list '{'runs' if scenes else 'scenes'}' is empty")
+    rows = read_rows(folder / "runs.csv", scenes, runs)
+    return Experiment(folder, manifest, rows, scenes, runs, read_base(folder / "config.resolved.toml", runs))

@@ -1,4 +1,4 @@
-"""Pictures for people: tone mapping of recorded images and maps of their error. No figure of the table is computed here."""
+"""Images as numbers and as pictures: reading, tone mapping, maps of their error. No figure of the table is computed here."""
 
 import base64
 import io
@@ -8,14 +8,28 @@ import OpenEXR
 from matplotlib import colormaps
 from PIL import Image
 
-ERROR_COLOURS = "magma"
-LARGEST_WIDTH = 800  # of an embedded picture, pixels
+from analysis.experiment import InputError
+from analysis.style import ERROR_COLOURS
 
 
 def read_exr(path):
-    """R, G, B of an OpenEXR file as float32, shape (height, width, 3). Linear Rec.709."""
-    channels = OpenEXR.File(str(path), separate_channels=True).channels()
+    """R, G, B of an OpenEXR file as float32, shape (height, width, 3). Linear Rec.709. Throws InputError."""
+    try:
+        channels = OpenEXR.File(str(path), separate_channels=True).channels()
+    except Exception as e:  # the binding throws plain RuntimeError and others, by version
+        raise InputError(f"{path}: cannot be read as OpenEXR, it may be half-written: {e}") from None
+    missing = [c for c in "RGB" if c not in channels]
+    if missing:
+        raise InputError(f"{path}: lacks the channel{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
     return np.stack([np.asarray(channels[c].pixels, dtype=np.float32) for c in "RGB"], axis=-1)
+
+
+def read_like(path, reference):
+    """read_exr of an image that must have the reference's size."""
+    image = read_exr(path)
+    if image.shape != reference.shape:
+        raise InputError(f"{path}: is {image.shape[1]}x{image.shape[0]}, its reference {reference.shape[1]}x{reference.shape[0]}")
+    return image
 
 
 def exposure(reference):
@@ -37,22 +51,31 @@ def relative_error(image, reference):
     return (np.abs(image - reference) / (np.abs(reference) + 0.01)).mean(axis=2)
 
 
+def signed_error(image, reference):
+    """(x - r) / (|r| + 0.01), averaged over the channels: positive where the image is too bright. Shape (height, width)."""
+    return ((image - reference) / (np.abs(reference) + 0.01)).mean(axis=2)
+
+
+def block_means(values, block):
+    """Means over blocks of block x block of a map, shape (ceil(height / block), ceil(width / block)); those at the edge are of what is there."""
+    rows, columns = (np.arange(0, n, block) for n in values.shape)
+    sums = np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
+    return sums / np.add.reduceat(np.add.reduceat(np.ones_like(values), rows, axis=0), columns, axis=1)
+
+
+def highest_of(maps, percentile=99):
+    """End of a colour scale common to several maps: the brightest part is cut, so that single pixels do not darken all others."""
+    finite = np.concatenate([m[np.isfinite(m)].ravel() for m in maps])
+    return max(1e-6, float(np.percentile(finite, percentile))) if len(finite) else 1.0
+
+
 def colour_map(values, highest):
     """8-bit colours of values in [0, highest]; above it, and NaN, as the last colour."""
     return (colormaps[ERROR_COLOURS](np.nan_to_num(values / highest, nan=1.0, posinf=1.0).clip(0, 1))[..., :3] * 255 + 0.5).astype(np.uint8)
 
 
-def colour_bar_css():
-    """CSS gradient of the error map's colours, from 0 at the left."""
-    stops = [tuple(int(255 * c + 0.5) for c in colormaps[ERROR_COLOURS](t)[:3]) for t in np.linspace(0, 1, 9)]
-    return "linear-gradient(to right, " + ", ".join(f"rgb{s}" for s in stops) + ")"
-
-
 def png_uri(pixels):
-    """data: URI of 8-bit RGB pixels as PNG, made smaller where wider than LARGEST_WIDTH."""
-    picture = Image.fromarray(pixels)
-    if picture.width > LARGEST_WIDTH:
-        picture = picture.resize((LARGEST_WIDTH, max(1, round(picture.height * LARGEST_WIDTH / picture.width))), Image.Resampling.BOX)
+    """data: URI of 8-bit RGB pixels as PNG."""
     buffer = io.BytesIO()
-    picture.save(buffer, "PNG", optimize=True)
+    Image.fromarray(pixels).save(buffer, "PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()

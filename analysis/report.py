@@ -1,64 +1,85 @@
-"""report.html: one file that holds figures, table, pictures and manifest."""
+"""report.html: one file with figures, tables, images at any exposure and the manifest. It loads nothing from anywhere."""
 
 import base64
 import html
 import json
+import math
+import re
 from pathlib import Path
 
-import numpy as np
+from matplotlib import colormaps
+from PIL import Image
 
-from analysis import images, tables
+from analysis import convergence, flip_maps, hdr_data, images, style, summary, tables
 
-STYLE = """
-:root { color-scheme: light; }
-body { font: 15px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 1100px; margin: 2em auto; padding: 0 1em; }
-h1 { font-size: 1.5em; margin-bottom: .2em; } h2 { font-size: 1.2em; margin-top: 2em; border-bottom: 1px solid #ddd; } h3 { font-size: 1em; margin-bottom: .4em; }
-.facts, .note { color: #555; font-size: .9em; }
-.remarks { background: #fff6e0; border-left: 4px solid #e69f00; padding: .5em 1em; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .85em; font-variant-numeric: tabular-nums; border-top: 2px solid #222; border-bottom: 2px solid #222; }
-th, td { padding: .25em .7em; text-align: right; white-space: nowrap; } th:nth-child(-n+2), td:nth-child(-n+2) { text-align: left; }
-thead { border-bottom: 1px solid #222; } tr.first td { border-top: 1px solid #ccc; }
-.figure { max-width: 100%; }
-.pictures { display: flex; flex-wrap: wrap; gap: 12px; } figure { margin: 0; } figcaption { font-size: .85em; }
-.pictures img { display: block; width: 256px; image-rendering: auto; }
-.bar { display: inline-block; width: 160px; height: .8em; vertical-align: middle; margin: 0 .4em; }
-pre { font-size: .8em; background: #f6f6f6; padding: 1em; overflow-x: auto; }
-"""
+PAGE = Path(__file__).parent / "page"
+INTERACTIVE = ("convergence_", "comparison_", "errors_", "flip_")  # figures that the page shows in a way of its own
 
 
-def picture(caption, pixels):
-    name = html.escape(caption)
-    return f'<figure><img src="{images.png_uri(pixels)}" alt="{name}"><figcaption>{name}</figcaption></figure>'
+def page_file(name):
+    return (PAGE / name).read_text(encoding="utf-8")
 
 
-def file_uri(path, kind):
-    return f"data:{kind};base64," + base64.b64encode(Path(path).read_bytes()).decode()
+def as_json(value):
+    """JSON that may stand inside a script element. NaN, which JSON lacks, is null."""
+    def clean(x):
+        if isinstance(x, dict):
+            return {k: clean(v) for k, v in x.items()}
+        if isinstance(x, (list, tuple)):
+            return [clean(v) for v in x]
+        return None if isinstance(x, float) and not math.isfinite(x) else x
+    return json.dumps(clean(value), ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
-def scene_section(experiment, scene):
-    """Reference, renderings and error maps of one scene, as far as there are files."""
+def table_of_colours(name):
+    """256 colours of 8 bits."""
+    return [[int(255 * c + 0.5) for c in colormaps[name](i / 255)[:3]] for i in range(256)]
+
+
+def plot_data(experiment):
+    """Curves for page/plot.js."""
+    scenes = {}
+    for scene in experiment.scenes:
+        curves = {}
+        for measure in convergence.NAMES:
+            found = {run: c for run in experiment.runs if (c := summary.curve(experiment, scene, run, measure))}
+            curves[measure] = {run: {"seconds": c.seconds.tolist(), "spp": c.spp.tolist(), "error": c.error.tolist(), "low": c.low.tolist(), "high": c.high.tolist(),
+                                     "seeds": c.seeds} for run, c in found.items()}
+        scenes[scene] = {"noise": summary.reference_noise(experiment, scene), "curves": curves}
+    return {"runs": experiment.runs, "colours": list(style.COLOURS), "scenes": scenes}
+
+
+def scene_data(experiment, scene):
+    """Images of one scene for page/viewer.js: the reference and the lowest seed of each run; None without any."""
+    path = experiment.reference(scene)
+    files = [(run, p) for run in experiment.runs if (entry := experiment.image(scene, run)) for p in entry[1:]]
+    if path is None and not files:
+        return None
+    reference = images.read_exr(path) if path else None
+    pictures = [(run, images.read_like(p, reference) if reference is not None else images.read_exr(p)) for run, p in files]
+    every = ([("reference", reference)] if reference is not None else []) + pictures
+    factor = hdr_data.factor_for(every[0][1].shape[1])
+    small = [(name, hdr_data.shrink(p, factor)) for name, p in every]
+    height, width = small[0][1].shape[:2]
+    entries = [{"name": name, "data": hdr_data.encode(p)} for name, p in small]
+    scale = 1.0
+    if reference is not None:
+        entries[0]["reference"] = True
+        if pictures:
+            scale = images.highest_of([images.relative_error(p, small[0][1]) for _, p in small[1:]])
+        if flip_maps.flip_evaluator is not None:
+            for entry, (_, picture) in zip(entries[1:], small[1:]):
+                entry["flip"] = hdr_data.encode_bytes(flip_maps.flip(picture, small[0][1])[0])
+    return {"name": scene, "width": width, "height": height, "exposure": images.exposure(small[0][1]), "scale": scale, "shrunk": factor, "images": entries}
+
+
+def scene_section(scene, data):
     out = [f"<h3>{html.escape(scene)}</h3>"]
-    reference_path = experiment.reference(scene)
-    pictures = {run: images.read_exr(path) for run in experiment.runs if (path := experiment.image(scene, run))}
-    if reference_path is None and not pictures:
+    if data is None:
         return "\n".join([*out, '<p class="note">No images yet.</p>'])
-    reference = images.read_exr(reference_path) if reference_path else None
-    factor = images.exposure(reference if reference is not None else next(iter(pictures.values())))
-    shown = [("reference", reference)] if reference is not None else []
-    shown += pictures.items()
-    out.append(f'<p class="note">Shown at {tables.number(factor)} times the recorded radiance, sRGB.</p><div class="pictures">')
-    out += [picture(name, images.tone_map(pixels, factor)) for name, pixels in shown]
-    out.append("</div>")
-    maps = {run: images.relative_error(p, reference) for run, p in pictures.items() if reference is not None and p.shape == reference.shape}
-    if maps:
-        # One scale for all runs of a scene, so that brightness compares; the brightest 1 % are cut.
-        highest = max(1e-6, float(np.nanpercentile(np.stack(list(maps.values())), 99)))
-        bar = f'0<span class="bar" style="background: {images.colour_bar_css()}"></span>{tables.number(highest, 2)} and above'
-        out.append(f'<p class="note">Error |x − r| / (|r| + 0.01), mean of the channels: {bar}</p><div class="pictures">')
-        out += [picture(f"{run}: error", images.colour_map(m, highest)) for run, m in maps.items()]
-        out.append("</div>")
-    return "\n".join(out)
+    if data["shrunk"] > 1:
+        out.append(f'<p class="note">Means of {data["shrunk"]}x{data["shrunk"]} pixels; the files in images/ have all of them.</p>')
+    return "\n".join([*out, f'<div class="viewer" data-scene="{html.escape(scene)}"></div>'])
 
 
 def facts(experiment):
@@ -72,20 +93,59 @@ def facts(experiment):
     return " · ".join(html.escape(str(p)) for p in parts if p)
 
 
-def render(experiment, lines, remarks, figures):
-    """The page as text. `figures`: (title, PNG path) pairs."""
-    name = html.escape(str(experiment.manifest.get("name", experiment.folder.name)))
-    out = [f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-           f"<title>{name}</title><style>{STYLE}</style></head><body>", f"<h1>{name}</h1>", f'<p class="facts">{facts(experiment)}</p>']
+def figure(out, name, title, caption):
+    # 7 inches, the page of a paper, are as wide as the page here.
+    with Image.open(out / f"{name}.png") as picture:
+        width = round(picture.width / style.DPI / style.PAGE * 1100)
+    uri = "data:image/png;base64," + base64.b64encode((out / f"{name}.png").read_bytes()).decode()
+    return (f'<figure id="{html.escape(name)}"><h3>{html.escape(title)}</h3><img src="{uri}" alt="{html.escape(title)}" width="{width}"><figcaption>{html.escape(caption)} '
+            f"<code>{html.escape(name)}.pdf</code></figcaption></figure>")
+
+
+def minus(text):
+    """Hyphens before numbers as minus signs."""
+    return re.sub(r"(?<![\w)])-(?=\d)|(?<=e)-(?=\d)", "−", text)
+
+
+def verdict_table(lines):
+    rows = [f"<tr><td>{html.escape(scene)}</td><td>{html.escape(run)}</td><td>{html.escape(minus(slope))}</td><td>{html.escape(minus(bias))}</td></tr>"
+            for (scene, run), (slope, bias) in summary.verdicts(lines).items()]
+    return ('<table class="said"><thead><tr><th>scene</th><th>run</th><th>convergence</th><th>bias</th></tr></thead><tbody>' + "".join(rows) + "</tbody></table>")
+
+
+def render(experiment, lines, remarks, made, out):
+    """The page as text. `made`: figures.Made, whose PNG files lie in the folder `out`."""
+    name = html.escape(experiment.name)
+    scenes = {scene: scene_data(experiment, scene) for scene in experiment.scenes}
+    data = {"plot": plot_data(experiment), "scenes": {k: v for k, v in scenes.items() if v},
+            "colours": {"error": table_of_colours(style.ERROR_COLOURS), "signed": table_of_colours(style.SIGNED_COLOURS)}}
+    body = [f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+            f"<title>{name}</title><style>{page_file('report.css')}</style></head><body>", f"<h1>{name}</h1>", f'<p class="facts">{facts(experiment)}</p>',
+            '<nav><a href="#images">Images</a><a href="#convergence">Convergence</a><a href="#table">Table</a><a href="#figures">Figures</a>'
+            '<a href="#manifest">Manifest</a></nav>']
     if remarks:
-        out += ['<div class="remarks"><b>Before you believe the figures</b><ul>', *(f"<li>{html.escape(r)}</li>" for r in remarks), "</ul></div>"]
-    out.append("<h2>Convergence</h2>")
-    for title, path in figures:
-        out.append(f'<figure><img class="figure" src="{file_uri(path, "image/png")}" alt="{html.escape(title)}"><figcaption class="note">{html.escape(title)}</figcaption></figure>')
-    out += ["<h2>Table</h2>", f'<div class="wide">{tables.to_html(lines, experiment.runs[0])}</div>', f'<p class="note">{html.escape(tables.CAPTION)} '
-            "Bias |z|: the greatest over seeds of the standardised difference between the image's mean and the reference's.</p>", "<h2>Images</h2>",
-            '<p class="note">Of the first seed, at the end of the run.</p>']
-    out += [scene_section(experiment, scene) for scene in experiment.scenes]
+        body += ['<div class="remarks"><b>Before you believe the figures</b><ul>', *(f"<li>{html.escape(r)}</li>" for r in remarks), "</ul></div>"]
+    body += ['<h2 id="images">Images</h2>', '<p class="note">Of the lowest seed, at the end of the run. Wheel: zoom; drag: pan; double click: twice as large. '
+             "With an image focused: 1–9 or ← → change it, f flips to the one before.</p>"]
+    body += [scene_section(scene, found) for scene, found in scenes.items()]
+    body += ['<h2 id="convergence">Convergence</h2>', '<div class="plot"></div>',
+             '<p class="note">Lines: geometric mean over seeds; bands: its 95 % confidence interval. The noise of the reference is subtracted where it is known.</p>',
+             '<h2 id="table">Table</h2>', f'<div class="wide">{tables.to_html(lines, experiment.base)}</div>',
+             f'<p class="note">{html.escape(tables.CAPTION.format(base=experiment.base))} '
+             "Bias |z|: the greatest over seeds of the standardised difference between the image's mean and the reference's.</p>",
+             f'<div class="wide">{verdict_table(lines)}</div>',
+             '<p class="note">Slope of log RMSE against log samples, over checkpoints above the noise of the reference. Bias: mean over seeds of the difference of means, '
+             "its interval with the noise of the reference. A departure is claimed where chance alone makes one in less than 1 % of such tables.</p>"]
+    body.append('<h2 id="figures">Figures</h2>')
+    body += [figure(out, *entry) for entry in made.pictures if not entry[0].startswith(INTERACTIVE)]
+    others = [n for n, _, _ in made.pictures if n.startswith(INTERACTIVE)]
+    if others:
+        body.append(f'<p class="note">As files only, since the page has them above in another form: {html.escape(", ".join(others))}.</p>')
+    if made.missing or made.broken:
+        body += ['<p class="note">Not made:</p><ul class="note">', *(f"<li>{html.escape(n)}: {html.escape(why)}</li>" for n, why in made.missing),
+                 *(f"<li>{html.escape(message)}</li>" for message in made.broken), "</ul>"]
     manifest = html.escape(json.dumps(experiment.manifest, indent=2, ensure_ascii=False))
-    out += ["<h2>Manifest</h2>", f"<details><summary>manifest.json</summary><pre>{manifest}</pre></details>", "</body></html>\n"]
-    return "\n".join(out)
+    body += ['<h2 id="manifest">Manifest</h2>', f"<details><summary>manifest.json</summary><pre>{manifest}</pre></details>",
+             f'<script type="application/json" id="data">{as_json(data)}</script>',
+             *(f"<script>{page_file(f)}</script>" for f in ("viewer.js", "plot.js", "start.js")), "</body></html>\n"]
+    return "\n".join(body)

@@ -6,19 +6,25 @@ from statistics import NormalDist
 
 import numpy as np
 
-from analysis import statistics
+from analysis import bias, equal_error, statistics
+
+# What a row offers as its error, by the name that the report and the command line use, and what it is called on an axis.
+MEASURES = {"rmse": "error", "relmse": "relative_error"}
+SLOPES = {"rmse": -0.5, "relmse": -1.0}  # of independent samples, against the logarithm of the budget
+FAR = 4.0  # extrapolating a time by more than this is told
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Error of one run over its checkpoints, in rising order. Arrays of equal length; error is the geometric mean over seeds."""
+    """Error of one run over its checkpoints, in rising order. Arrays of equal length; error is the geometric mean over seeds, low and high
+    the ends of its 95 % confidence interval (statistics.geometric_estimate), NaN with one seed."""
 
     run: str
     seconds: np.ndarray
     spp: np.ndarray
     error: np.ndarray
-    low: np.ndarray   # least seed
-    high: np.ndarray  # greatest seed
+    low: np.ndarray
+    high: np.ndarray
     seeds: int
 
 
@@ -31,15 +37,17 @@ class Line:
     seeds: int
     spp: float
     seconds: float           # arithmetic mean
-    rmse: float              # as Row.error
-    relmse: float            # as Row.relative_error
-    relmse_low: float        # least and greatest seed
-    relmse_high: float
+    rmse: statistics.Estimate    # as Row.error
+    relmse: statistics.Estimate  # as Row.relative_error
     mape: float
     rays_per_second: float
-    efficiency: float        # 1 / (relMSE * seconds)
-    speedup: statistics.Estimate | None  # over the first run, from seeds that both have
-    slope: statistics.Estimate | None    # of log RMSE against log seconds, over all checkpoints
+    efficiency: statistics.Estimate  # 1 / (relMSE * seconds)
+    gain: statistics.Estimate | None     # ratio of efficiencies to the base run, from seeds that both have
+    speedup: equal_error.Speedup | None  # over the base run at equal RMSE, over all checkpoints
+    slope: statistics.Estimate | None       # of log RMSE against log spp
+    slope_time: statistics.Estimate | None  # of log RMSE against log seconds
+    slope_seeds: int
+    bias: bias.BiasTest | None
     bias_z: float            # greatest |z| over seeds of "the mean differs from the reference's"
     invalid: int             # dropped values, all seeds
 
@@ -55,14 +63,20 @@ def mean_or_nan(values):
     return statistics.geometric_mean(good) if len(good) else math.nan
 
 
-def curve(experiment, scene, run):
+def estimate_or_nan(values):
+    """Likewise with its interval."""
+    good = positive(values)
+    return statistics.geometric_estimate(good) if len(good) else statistics.Estimate(*[math.nan] * 4)
+
+
+def curve(experiment, scene, run, measure="rmse"):
     """Curve of one run, or None without a point. Checkpoints whose error is zero or unknown for all seeds are left out."""
     points = []
     for checkpoint in experiment.checkpoints(scene, run):
         rows = experiment.select(scene, run, checkpoint)
-        errors = positive([r.error for r in rows])
-        if len(errors):
-            points.append((mean_or_nan([r.time for r in rows]), mean_or_nan([r.spp for r in rows]), mean_or_nan(errors), errors.min(), errors.max()))
+        error = estimate_or_nan([getattr(r, MEASURES[measure]) for r in rows])
+        if not math.isnan(error.value):
+            points.append((mean_or_nan([r.time for r in rows]), mean_or_nan([r.spp for r in rows]), error.value, error.low, error.high))
     return Curve(run, *np.array(points).T, len(experiment.seeds(scene, run))) if points else None
 
 
@@ -77,45 +91,113 @@ def work(row):
     return row.relative_error * row.time
 
 
+def series(experiment, scene, run, budget="time", measure="rmse"):
+    """{seed: (budgets, errors)} over all checkpoints."""
+    out = {}
+    for r in experiment.select(scene, run):
+        pair = out.setdefault(r.seed, ([], []))
+        pair[0].append(getattr(r, budget))
+        pair[1].append(getattr(r, MEASURES[measure]))
+    return out
+
+
+def resolved(experiment, scene, run):
+    """Checkpoints whose mean error is at least the reference's noise (all, if that is unknown). Below, the corrected error is the difference of
+    two nearly equal numbers, and its logarithm is biased. Decided by the mean over seeds, so that no lucky seed is picked."""
+    noise = reference_noise(experiment, scene)
+    checkpoints = experiment.checkpoints(scene, run)
+    if math.isnan(noise):
+        return checkpoints
+    return [c for c in checkpoints if mean_or_nan([r.error for r in experiment.select(scene, run, c)]) >= noise]
+
+
+def slope(experiment, scene, run, budget="spp"):
+    """(statistics.convergence_slope over the resolved checkpoints or None, number of seeds)."""
+    good = set(resolved(experiment, scene, run))
+    rows = [[r for r in experiment.select(scene, run) if r.seed == seed and r.checkpoint in good] for seed in experiment.seeds(scene, run)]
+    fits = [([getattr(r, budget) for r in of_seed], [r.error for r in of_seed]) for of_seed in rows]
+    return statistics.convergence_slope(fits), sum(statistics.convergence_slope([f]) is not None for f in fits)
+
+
+def speedup(experiment, scene, run, base=None):
+    """equal_error.speedup of a run over the base run, by wall-clock time. None if a scene lacks either."""
+    return equal_error.speedup(series(experiment, scene, base or experiment.base), series(experiment, scene, run))
+
+
+def gain(rows, base_rows):
+    """Ratio of efficiencies at one checkpoint, from seeds that both have; None without one."""
+    own, base = ({r.seed: work(r) for r in some} for some in (rows, base_rows))
+    both = [s for s in own if s in base and math.isfinite(own[s] * base[s]) and own[s] * base[s] > 0]
+    return statistics.ratio_of_pairs([base[s] for s in both], [own[s] for s in both]) if both else None
+
+
 def lines(experiment):
-    """One Line per (scene, run), runs in the order of runs.csv. Speed-ups compare with the first run."""
+    """One Line per (scene, run), in the order of the configuration."""
     result = []
     for scene in experiment.scenes:
         last = experiment.last_common_checkpoint(scene)
         if last is None:
             continue
-        first = {r.seed: work(r) for r in experiment.select(scene, experiment.runs[0], last)}
+        base = experiment.select(scene, experiment.base, last)
         for run in experiment.runs:
             rows = experiment.select(scene, run, last)
             if not rows:
                 continue
-            own = {r.seed: work(r) for r in rows}
-            both = [s for s in own if s in first and math.isfinite(own[s] * first[s]) and own[s] * first[s] > 0]
-            history = [[r for r in experiment.select(scene, run) if r.seed == seed] for seed in experiment.seeds(scene, run)]
-            relmse = positive([r.relative_error for r in rows])
-            all_work = mean_or_nan(list(own.values()))
+            slope_spp, slope_seeds = slope(experiment, scene, run)
+            reference_error = bias.reference_mean_error(reference_noise(experiment, scene), experiment.pixels(scene))
             result.append(Line(
                 scene=scene, run=run, seeds=len(rows),
                 spp=mean_or_nan([r.spp for r in rows]),
                 seconds=float(np.mean([r.time for r in rows])),
-                rmse=mean_or_nan([r.error for r in rows]),
-                relmse=mean_or_nan(relmse),
-                relmse_low=float(relmse.min()) if len(relmse) else math.nan,
-                relmse_high=float(relmse.max()) if len(relmse) else math.nan,
+                rmse=estimate_or_nan([r.error for r in rows]),
+                relmse=estimate_or_nan([r.relative_error for r in rows]),
                 mape=mean_or_nan([r.mape for r in rows]),
                 rays_per_second=float(sum(r.rays for r in rows) / sum(r.time for r in rows)),
-                efficiency=1 / all_work,
-                speedup=statistics.ratio_of_pairs([first[s] for s in both], [own[s] for s in both]) if both else None,
-                slope=statistics.convergence_slope([([r.time for r in h], [r.error for r in h]) for h in history]),
+                efficiency=estimate_or_nan([1 / work(r) for r in rows if work(r) > 0]),
+                gain=gain(rows, base),
+                speedup=speedup(experiment, scene, run) if base else None,
+                slope=slope_spp,
+                slope_time=slope(experiment, scene, run, "time")[0],
+                slope_seeds=slope_seeds,
+                bias=bias.bias_test([r.bias for r in rows], reference_error),
                 bias_z=max(abs(r.bias_z) for r in rows),
                 invalid=sum(r.invalid for r in rows)))
     return result
 
 
-def bias_threshold(tests, level=0.01):
+LEVEL = 0.01  # chance of a false statement over all tests of one kind together
+
+
+def bias_threshold(tests, level=LEVEL):
     """|z| that exceeds chance at `level` over all tests together: two-sided normal quantile at level / tests (Bonferroni), which
     holds although tests against one reference are dependent."""
     return NormalDist().inv_cdf(1 - level / tests / 2)
+
+
+def slope_p(line):
+    """Chance of a slope as far from -1/2; NaN with less than two seeds."""
+    return math.nan if line.slope is None else statistics.two_sided_p(line.slope.value, line.slope.error, SLOPES["rmse"], line.slope_seeds)
+
+
+def verdicts(lines):
+    """What the data say on slope and bias, in whole sentences, for (scene, run). Bonferroni over the lines: LEVEL / number of them."""
+    out = {}
+    for line in lines:
+        p = slope_p(line)
+        limit = LEVEL / max(1, len(lines))
+        if math.isnan(p):
+            slope_said = "slope: not tested (needs two seeds and two checkpoints above the noise of the reference)"
+        else:
+            slope_said = (f"slope {line.slope.value:.3f} [{line.slope.low:.3f}, {line.slope.high:.3f}]: "
+                          + ("differs from −1/2 by more than chance" if p < limit else "no departure from −1/2 found"))
+        if line.bias is None:
+            bias_said = "bias over seeds: not tested (needs two seeds)"
+        else:
+            e = line.bias.estimate
+            bias_said = (f"mean off by {e.value:+.2e} [{e.low:+.1e}, {e.high:+.1e}]: "
+                         + ("more than chance and the noise of the reference explain" if line.bias.p < limit else "no bias found"))
+        out[line.scene, line.run] = (slope_said, bias_said)
+    return out
 
 
 def remarks(experiment, summary):
@@ -141,6 +223,15 @@ def remarks(experiment, summary):
             found.append(f"{place}: the error of {broken} checkpoints is NaN or infinite; they are left out of figures and means")
         if line.bias_z > threshold:
             found.append(f"{place}: the mean differs from the reference's by |z| = {line.bias_z:.1f}; chance stays below {threshold:.1f} (1 % over all tests)")
-        if not line.rmse >= noise and not math.isnan(noise):
+        elif line.bias and line.bias.p < LEVEL / len(summary):
+            found.append(f"{place}: the mean over seeds differs from the reference's by {line.bias.estimate.value:+.2e} ± {line.bias.estimate.error:.1e}, "
+                         "noise of the reference included; chance does that in less than 1 % over all tests")
+        if slope_p(line) < LEVEL / len(summary):
+            found.append(f"{place}: the error falls with slope {line.slope.value:.3f} ± {line.slope.error:.3f} of samples, which is not the −1/2 of independent "
+                         "samples without bias: look for bias, rare bright samples, or samples that are not independent")
+        if not line.rmse.value >= noise and not math.isnan(noise):
             found.append(f"{place}: the error is below the noise of the reference ({noise:.2g}) and so uncertain; a longer reference helps")
+        if line.speedup and line.speedup.extrapolated > FAR:
+            found.append(f"{place}: the speed-up compares errors that only one run has measured; the other's time was extrapolated by a factor "
+                         f"of {line.speedup.extrapolated:.3g} along slope −1/2")
     return found

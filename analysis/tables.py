@@ -4,13 +4,17 @@ import csv
 import html
 import io
 import math
+import re
+
+from analysis.summary import FAR
 
 CAPTION = (
     "Each run at the last checkpoint that all runs of the scene have reached. RMSE, relMSE and efficiency are geometric means over "
-    "seeds, with the noise of the reference subtracted where it is known; time is the arithmetic mean, inside the renderer. "
-    "Efficiency is 1 / (relMSE · time). The speed-up is the ratio of efficiencies to the first run, with a 95 % interval from pairs of equal "
-    "seeds. The slope is that of log RMSE against log time, fitted for each seed; ± is the standard error of the mean over seeds "
-    "(with one seed that of the fit, which is then too small)."
+    "seeds, with the noise of the reference subtracted where it is known (RMSE weighs bright pixels, relMSE all alike, and methods may rank differently by "
+    "them); time is the arithmetic mean, inside the renderer. "
+    "Efficiency is 1 / (relMSE · time). The speed-up over {base} is the ratio of times to equal RMSE, with a 95 % interval from pairs of equal "
+    "seeds; a star marks times extrapolated by more than a factor of 4. The slope is that of log RMSE against log samples, fitted for each seed; ± is "
+    "the standard error of the mean over seeds (with one seed that of the fit, which is then too small)."
 )
 
 
@@ -26,13 +30,16 @@ def number(x, digits=3):
     return f"{x:.{digits - 1}e}"
 
 
-def speedup_text(line, is_first):
-    s = line.speedup
-    if is_first:
+def interval(e):
+    return number(e.value) if math.isnan(e.low) else f"{number(e.value)} [{number(e.low, 2)}, {number(e.high, 2)}]"
+
+
+def speedup_text(line, is_base):
+    if is_base:
         return "1"
-    if s is None:
+    if line.speedup is None:
         return "–"
-    return number(s.value) if math.isnan(s.low) else f"{number(s.value)} [{number(s.low, 2)}, {number(s.high, 2)}]"
+    return interval(line.speedup.estimate) + ("*" if line.speedup.extrapolated > FAR else "")
 
 
 def slope_text(line):
@@ -42,52 +49,69 @@ def slope_text(line):
     return f"{s.value:.3f}" if math.isnan(s.error) else f"{s.value:.3f} ± {s.error:.3f}"
 
 
-def cells(line, is_first):
+def cells(line, is_base):
     """What a person reads, in the order of HEADINGS."""
-    return [line.scene, line.run, str(line.seeds), number(line.spp), number(line.seconds), number(line.rmse), number(line.relmse), number(line.efficiency),
-            speedup_text(line, is_first), slope_text(line)]
+    return [line.scene, line.run, str(line.seeds), number(line.spp), number(line.seconds), number(line.rmse.value),
+            number(line.relmse.value), number(line.efficiency.value),
+            speedup_text(line, is_base), slope_text(line)]
 
 
 HEADINGS = ("scene", "run", "seeds", "spp", "time (s)", "RMSE", "relMSE", "efficiency", "speed-up [95 %]", "slope")
 
 
 def to_csv(lines):
-    """All numbers in full precision, for further work."""
-    columns = ("scene", "run", "seeds", "spp", "seconds", "rmse", "relmse", "relmse_low", "relmse_high", "mape", "rays_per_second", "efficiency")
-    estimates = ("speedup", "slope")
+    """All numbers in full precision, for further work. Of each estimate: value, standard error (of the logarithm, but for slope and bias), ends of the interval."""
+    columns = ("scene", "run", "seeds", "spp", "seconds", "mape", "rays_per_second", "bias_z", "invalid")
+    estimates = {
+        "rmse": lambda x: x.rmse, "relmse": lambda x: x.relmse, "efficiency": lambda x: x.efficiency, "efficiency_ratio": lambda x: x.gain,
+        "speedup": lambda x: x.speedup and x.speedup.estimate, "slope": lambda x: x.slope, "slope_time": lambda x: x.slope_time,
+        "bias": lambda x: x.bias and x.bias.estimate,
+    }
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*columns, *(f"{e}{part}" for e in estimates for part in ("", "_error", "_low", "_high")), "bias_z", "invalid"])
+    writer.writerow([*columns, *(f"{e}{part}" for e in estimates for part in ("", "_error", "_low", "_high")), "speedup_at_rmse", "speedup_extrapolated", "bias_p"])
     for line in lines:
         row = [getattr(line, c) for c in columns]
-        for name in estimates:
-            e = getattr(line, name)
+        for get in estimates.values():
+            e = get(line)
             row += [e.value, e.error, e.low, e.high] if e else [math.nan] * 4
-        writer.writerow([f"{v:.9g}" if isinstance(v, float) else v for v in [*row, line.bias_z, line.invalid]])
+        row += [line.speedup.target, line.speedup.extrapolated] if line.speedup else [math.nan] * 2
+        row.append(line.bias.p if line.bias else math.nan)
+        writer.writerow([f"{v:.9g}" if isinstance(v, float) else v for v in row])
+    return out.getvalue()
+
+
+def variances_to_csv(rows):
+    """`rows`: (scene, run, s, t, Estimate, share, seeds)."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["scene", "run", "s", "t", "variance", "variance_error", "variance_low", "variance_high", "share", "seeds"])
+    for scene, run, s, t, e, share, seeds in rows:
+        writer.writerow([scene, run, s, t, *(f"{v:.9g}" for v in (e.value, e.error, e.low, e.high, share)), seeds])
     return out.getvalue()
 
 
 def latex_escape(text):
     special = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"} | {c: "\\" + c for c in "&%$#_{}"}
-    symbols = {"±": r"$\pm$", "–": "--", "−": "$-$", "·": r"$\cdot$"}
+    symbols = {"±": r"$\pm$", "–": "--", "−": "$-$", "·": r"$\cdot$", "≥": r"$\geq$", "×": r"$\times$"}
     return "".join(special.get(c) or symbols.get(c) or c for c in text)
 
 
 def latex_number(text):
     """Typesets minus signs and powers of ten of a cell."""
-    if "e" in text and text.replace("e", "").replace(".", "").replace("-", "").replace("+", "").isdigit():
-        mantissa, exponent = text.split("e")
-        return rf"${mantissa}\cdot 10^{{{int(exponent)}}}$"
+    match = re.fullmatch(r"(-?[\d.]+)e([-+]\d+)", text)
+    if match:
+        return rf"${match[1]}\cdot 10^{{{int(match[2])}}}$"
     return "$-$" + latex_escape(text[1:]) if text.startswith("-") and text != "-" else latex_escape(text)
 
 
-def to_latex(lines, first_run):
+def to_latex(lines, base):
     """A tabular for \\usepackage{booktabs}; scenes are separated by \\midrule, the best efficiency of each scene is bold."""
-    out = [r"% Needs \usepackage{booktabs}. " + latex_escape(CAPTION), r"\begin{tabular}{ll" + "r" * (len(HEADINGS) - 2) + "}", r"\toprule",
+    out = [r"% Needs \usepackage{booktabs}. " + latex_escape(CAPTION.format(base=base)), r"\begin{tabular}{ll" + "r" * (len(HEADINGS) - 2) + "}", r"\toprule",
            " & ".join(latex_escape(h) for h in HEADINGS) + r" \\"]
     scene = None
     for line in lines:
-        row = [latex_escape(c) for c in cells(line, line.run == first_run)[:2]] + [latex_number(c) for c in cells(line, line.run == first_run)[2:]]
+        row = [latex_escape(c) for c in cells(line, line.run == base)[:2]] + [latex_number(c) for c in cells(line, line.run == base)[2:]]
         if line.scene != scene:
             out.append(r"\midrule")
         else:
@@ -101,16 +125,48 @@ def to_latex(lines, first_run):
 
 def best(lines, scene):
     """The most efficient line of a scene; None if it has only one."""
-    rows = [line for line in lines if line.scene == scene and math.isfinite(line.efficiency)]
-    return max(rows, key=lambda line: line.efficiency) if len(rows) > 1 else None
+    rows = [line for line in lines if line.scene == scene and math.isfinite(line.efficiency.value)]
+    return max(rows, key=lambda line: line.efficiency.value) if len(rows) > 1 else None
 
 
-def to_html(lines, first_run):
+TEST_HEADINGS = ("scene", "run", "slope [95 %]", "bias [95 %]", "p of the bias", "greatest |z|")
+
+
+def test_cells(line):
+    """What was found on convergence and bias."""
+    s, b = line.slope, line.bias
+    slope = "–" if s is None else f"{s.value:.3f}" if math.isnan(s.low) else f"{s.value:.3f} [{s.low:.3f}, {s.high:.3f}]"
+    bias = "–" if b is None else f"{b.estimate.value:+.1e} [{b.estimate.low:+.1e}, {b.estimate.high:+.1e}]"
+    return [line.scene, line.run, slope, bias, "–" if b is None else f"{b.p:.2g}", f"{line.bias_z:.1f}"]
+
+
+def tests_to_latex(lines):
+    """A tabular of slopes and bias for \\usepackage{booktabs}."""
+    out = [r"% Needs \usepackage{booktabs}. Slope of log RMSE against log samples, -1/2 without bias; mean difference to the reference over seeds, its noise included.",
+           r"\begin{tabular}{llrrrr}", r"\toprule", " & ".join(latex_escape(h) for h in TEST_HEADINGS) + r" \\"]
+    scene = None
+    for line in lines:
+        row = test_cells(line)
+        if line.scene != scene:
+            out.append(r"\midrule")
+        else:
+            row[0] = ""
+        scene = line.scene
+        out.append(" & ".join([*map(latex_escape, row[:2]), *(latex_text(c) for c in row[2:])]) + r" \\")
+    return "\n".join([*out, r"\bottomrule", r"\end{tabular}", ""])
+
+
+def latex_text(cell):
+    """latex_number of every number of a cell such as "-1.2e-05 [-2.0e-05, 1.0e-06]"."""
+    return re.sub(r"[-+]?\d[\d.]*(?:e[-+]\d+)?", lambda m: latex_number(m[0].lstrip("+")), cell).replace("–", "--")
+
+
+def to_html(lines, base):
     head = "".join(f"<th>{html.escape(h)}</th>" for h in (*HEADINGS, "Mrays/s", "bias |z|"))
     out = [f"<table><thead><tr>{head}</tr></thead><tbody>"]
     scene = None
     for line in lines:
-        row = [html.escape(c).replace("-", "−") if i > 1 else html.escape(c) for i, c in enumerate(cells(line, line.run == first_run))]
+        row = [html.escape(c).replace("-", "−") if i > 1 else html.escape(c) for i, c in enumerate(cells(line, line.run == base))]
         row += [number(line.rays_per_second / 1e6), f"{line.bias_z:.1f}"]
         if line is best(lines, line.scene):
             row[7] = f"<b>{row[7]}</b>"

@@ -1,4 +1,4 @@
-"""From a folder of known content to table, figures and report."""
+"""From a folder of known content to numbers and tables. Figures: test_figures.py; the page: test_page.py."""
 
 import csv
 import math
@@ -8,20 +8,13 @@ import numpy as np
 import pytest
 
 from analysis import __main__ as program
-from analysis import experiment, figures, images, summary, tables
+from analysis import experiment, images, style, summary, tables
 from analysis.tests import synthetic
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return synthetic.make(tmp_path_factory.mktemp("results") / "run")
-
-
-@pytest.fixture(scope="module")
-def output(folder, tmp_path_factory):
-    out = tmp_path_factory.mktemp("out")
-    assert program.main([str(folder), "-o", str(out)]) == 0
-    return out
 
 
 def edit(folder, target, change):
@@ -37,77 +30,113 @@ def test_lines_repeat_what_was_recorded(tmp_path):
     lines = {(line.scene, line.run): line for line in summary.lines(data)}
     mis = lines["box", "mis"]
     assert (mis.seeds, mis.spp) == (3, pytest.approx(64))
-    assert mis.rmse == pytest.approx(0.5 / 8)
-    assert mis.relmse == pytest.approx(4 * 0.25 / 64)
+    assert mis.rmse.value == pytest.approx(0.5 / 8)
+    assert mis.relmse.value == pytest.approx(4 * 0.25 / 64)
     assert mis.seconds == pytest.approx(0.128)
-    assert mis.efficiency == pytest.approx(1 / (0.015625 * 0.128))
+    assert mis.efficiency.value == pytest.approx(1 / (0.015625 * 0.128))
     # naive: relMSE 4*4/64, 0.064 s. Work 0.016 against 0.002.
-    assert mis.speedup.value == pytest.approx(8)
-    assert lines["box", "naive"].speedup.value == 1
+    assert mis.gain.value == pytest.approx(8)
+    # At equal RMSE: (2 / 0.5)^2 fewer samples of twice the time.
+    assert mis.speedup.estimate.value == pytest.approx(8) and mis.speedup.target == pytest.approx(2 / 8)
+    assert lines["box", "naive"].speedup.estimate.value == pytest.approx(1)
+    assert mis.bias.estimate.value == pytest.approx(0.0001) and mis.slope_time.value == pytest.approx(-0.5)
     assert mis.slope.value == pytest.approx(-0.5) and mis.slope.error == pytest.approx(0, abs=1e-9)
     assert mis.rays_per_second == pytest.approx(64 * 10000 / 0.128)
 
 
 def test_speedup_interval_covers_the_truth(tmp_path):
     data = experiment.load(synthetic.make(tmp_path / "r", scenes=[f"s{i}" for i in range(60)], checkpoints=(1, 4), seeds=(1, 2, 3, 4)))
-    intervals = [line.speedup for line in summary.lines(data) if line.run == "mis"]
+    intervals = [line.speedup.estimate for line in summary.lines(data) if line.run == "mis"]
     covered = sum(s.low <= 8 <= s.high for s in intervals)
     assert covered >= 60 * 0.95 - 4 * math.sqrt(60 * 0.95 * 0.05)
     assert not any(s.low <= 1 for s in intervals)
 
 
-def test_curve_is_geometric_mean_with_extremes(folder):
+def test_curve_is_geometric_mean_with_interval(folder):
     data = experiment.load(folder)
     c = summary.curve(data, "box", "nee")
-    first = [r.rmse_corrected for r in data.select("box", "nee", 0)]
-    assert c.error[0] == pytest.approx(np.exp(np.log(first).mean()))
-    assert (c.low[0], c.high[0]) == (min(first), max(first))
+    logs = np.log([r.rmse_corrected for r in data.select("box", "nee", 0)])
+    assert c.error[0] == pytest.approx(np.exp(logs.mean()))
+    half = 4.30265 * logs.std(ddof=1) / math.sqrt(3)  # Student, 2 degrees of freedom
+    assert (c.low[0], c.high[0]) == pytest.approx((np.exp(logs.mean() - half), np.exp(logs.mean() + half)), rel=1e-5)
     assert list(c.spp) == pytest.approx([1, 4, 16, 64])
+    assert summary.curve(data, "box", "nee", "relmse").error[0] == pytest.approx(4 * c.error[0] ** 2)
 
 
-def test_all_files_are_written(output):
-    assert {p.name for p in output.iterdir()} == {"convergence_time.pdf", "convergence_time.png", "convergence_spp.pdf", "convergence_spp.png", "table.csv",
-                                                  "table.tex", "report.html"}
-
-
-def test_report_is_self_contained(output):
-    text = (output / "report.html").read_text()
-    sources = re.findall(r'src="([^"]*)"', text)
-    assert len(sources) == 2 + 2 * (1 + 3 + 3)  # two figures; per scene reference, renderings, error maps
-    assert all(s.startswith("data:image/png;base64,") for s in sources)
-    assert not re.search(r"https?://|<link|<script", text)
-    assert "a processor &lt;&amp;&gt;" in text
-
-
-def test_csv_table_holds_one_line_per_scene_and_run(output):
-    rows = list(csv.DictReader(open(output / "table.csv", newline="")))
+def test_csv_table_holds_one_line_per_scene_and_run(folder):
+    data = experiment.load(folder)
+    rows = list(csv.DictReader(tables.to_csv(summary.lines(data)).splitlines()))
     assert [(r["scene"], r["run"]) for r in rows] == [(s, r) for s in ("box", "glass") for r in ("naive", "nee", "mis")]
     assert all(abs(float(r["slope"]) + 0.5) < 1e-6 for r in rows)
 
 
-def test_latex_table_has_equal_columns_and_no_raw_specials(output):
-    text = (output / "table.tex").read_text()
-    body = [line for line in text.splitlines() if line.endswith(r"\\")]
-    assert {line.count(" & ") for line in body} == {len(tables.HEADINGS) - 1}
-    assert "speed-up [95 \\%]" in text
-    assert not re.search(r"[^\x00-\x7f]", "".join(body))
+def test_verdicts_say_what_the_data_say(tmp_path):
+    """Exact -1/2, a plateau of bias, and a mean that is off: each is named, and nothing else is."""
+    folder = synthetic.make(tmp_path / "r", scenes=("box",), seeds=(1, 2, 3, 4), spread=0.03)
+
+    def change(line, seed_noise=np.random.default_rng(8)):
+        cells = line.split(",")
+        if cells[1] == "nee":  # error^2 = variance / n + bias^2
+            cells[10] = cells[11] = f"{math.hypot(float(cells[11]), 0.2):.9g}"
+        if cells[1] == "mis":
+            cells[16] = f"{0.01 + 0.0002 * seed_noise.normal():.6g}"
+        elif cells[0] == "box":
+            cells[16] = f"{0.0002 * seed_noise.normal():.6g}"
+        return ",".join(cells)
+
+    lines = summary.lines(experiment.load(edit(folder, tmp_path / "odd", lambda rows: [rows[0], *map(change, rows[1:])])))
+    said = {run: text for (_, run), text in summary.verdicts(lines).items()}
+    assert "no departure" in said["naive"][0] and "no bias found" in said["naive"][1]
+    assert "differs from −1/2" in said["nee"][0] and "no bias found" in said["nee"][1]
+    assert "no departure" in said["mis"][0] and "more than chance" in said["mis"][1]
+
+
+def test_slopes_leave_out_what_the_noise_of_the_reference_hides(tmp_path):
+    data = experiment.load(synthetic.make(tmp_path / "r", scenes=("box",), reference_noise=0.3))
+    assert summary.resolved(data, "box", "naive") == [0, 1, 2]  # 2, 1, 0.5, but not 0.25
+    assert summary.resolved(data, "box", "mis") == [0]
+    assert summary.slope(data, "box", "mis") == (None, 0)
+
+
+def test_the_default_of_the_ablation_is_what_others_are_compared_with(tmp_path, capsys):
+    data = experiment.load(synthetic.make(tmp_path / "r", spread=0, base="nee"))
+    assert data.base == "nee" and data.others == ["naive", "mis"]
+    lines = {(line.scene, line.run): line for line in summary.lines(data)}
+    assert lines["box", "naive"].speedup.estimate.value == pytest.approx((0.7 / 2) ** 2 * 1.5)
+    (tmp_path / "r" / "config.resolved.toml").write_text("[ablation]\ndefault = 'none'\n")
+    assert program.main([str(tmp_path / "r"), "-o", str(tmp_path / "out")]) == 3
+    assert "config.resolved.toml: [ablation] default = 'none' is not a run" in capsys.readouterr().err
+    (tmp_path / "r" / "config.resolved.toml").write_text("name = \n")
+    assert program.main([str(tmp_path / "r"), "-o", str(tmp_path / "out")]) == 3
+    assert re.search(r"config.resolved.toml: .*line 1, column", capsys.readouterr().err)
+
+
+def test_run_names_of_sweeps():
+    assert experiment.settings_of("lvc[connections=4]") == ("lvc", {"connections": "4"})
+    assert experiment.settings_of("lvc[connections=4,rr_depth=-1]") == ("lvc", {"connections": "4", "rr_depth": "-1"})
+    assert experiment.settings_of("lvc") == ("lvc", {})
+    assert experiment.settings_of("odd[name]") == ("odd[name]", {})
+
+
+def test_latex_tables_have_equal_columns_and_no_raw_specials(folder):
+    lines = summary.lines(experiment.load(folder))
+    for text, headings in ((tables.to_latex(lines, "naive"), tables.HEADINGS), (tables.tests_to_latex(lines), tables.TEST_HEADINGS)):
+        body = [line for line in text.splitlines() if line.endswith(r"\\")]
+        assert len(body) == 7
+        assert {line.count(" & ") for line in body} == {len(headings) - 1}
+        assert not re.search(r"[^\x00-\x7f]", "".join(body))
+        assert "[95 \\%]" in text
     assert tables.latex_escape("a_b%") == r"a\_b\%"
+    assert tables.latex_number("-1.2e-05") == r"$-1.2\cdot 10^{-5}$"
 
 
-def test_same_input_gives_same_bytes(folder, output, tmp_path):
-    assert program.main([str(folder), "-o", str(tmp_path)]) == 0
-    for path in output.iterdir():
-        assert (tmp_path / path.name).read_bytes() == path.read_bytes(), path.name
-
-
-def test_unfinished_experiment_is_reported_with_a_remark(folder, tmp_path, capsys):
+def test_unfinished_experiment_is_reported_with_a_remark(folder, tmp_path):
     part = edit(folder, tmp_path / "part", lambda lines: [x for x in lines if not x.startswith(("box,mis,3", "box,mis,2,3"))])
     data = experiment.load(part)
     assert data.last_common_checkpoint("box") == 3
     line = next(x for x in summary.lines(data) if (x.scene, x.run) == ("box", "mis"))
-    assert line.seeds == 1 and math.isnan(line.speedup.low)
-    assert program.main([str(part), "-o", str(tmp_path / "out")]) == 0
-    assert "box, mis: 7 of 12 checkpoints recorded" in capsys.readouterr().err
+    assert line.seeds == 1 and math.isnan(line.gain.low)
+    assert any("box, mis: 7 of 12 checkpoints recorded" in r for r in summary.remarks(data, summary.lines(data)))
 
 
 def test_bias_invalid_values_and_noisy_references_are_remarked(folder, tmp_path):
@@ -140,17 +169,14 @@ def test_bias_threshold_holds_its_level():
     assert 40 - 4 * 6.3 < false_alarms < 40 + 4 * 6.3
 
 
-def test_one_seed_and_one_checkpoint_are_enough(tmp_path):
-    folder = synthetic.make(tmp_path / "tiny", scenes=("only",), runs=(("a", 1.0, 1.0),), seeds=(7,), checkpoints=(8,))
-    assert program.main([str(folder), "-o", str(tmp_path / "out")]) == 0
-
-
 @pytest.mark.parametrize("change,message", [
     (lambda lines: [lines[0].replace("relmse,", "other,"), *lines[1:]], r"runs.csv:1: lacks the column relmse"),
     (lambda lines: [*lines, lines[1]], r"repeats line 2"),
     (lambda lines: [lines[0], lines[1].replace(",0.001000,", ",soon,")], r"runs.csv:2: column 'time' holds 'soon'"),
-    (lambda lines: [lines[0], lines[1].replace("box", "cave")], r"scene 'cave' is not in manifest.json"),
-    (lambda lines: [lines[0], lines[1] + ",1"], r"runs.csv:2: number of cells"),
+    (lambda lines: [lines[0], lines[1].replace("box", "cave")], r"runs.csv:2: column 'scene': scene 'cave' is not in manifest.json"),
+    (lambda lines: [lines[0], lines[1] + ",1"], r"runs.csv:2: 21 cells where the header names 20"),
+    (lambda lines: [*lines, lines[1][:40]], r"runs.csv:74: ends in column 'spp', 9 cells .*half-written.*--resume"),
+    (lambda lines: [lines[0], lines[1].replace(",0.001000,", ",-1,")], r"runs.csv:2: column 'time' holds '-1', which must be positive"),
     (lambda lines: lines[:1], r"holds no results yet"),
 ])
 def test_bad_tables_are_refused_with_place_and_name(folder, tmp_path, change, message, capsys):
@@ -159,9 +185,33 @@ def test_bad_tables_are_refused_with_place_and_name(folder, tmp_path, change, me
     assert re.search(message, capsys.readouterr().err)
 
 
+def test_a_line_without_end_is_half_written(folder, tmp_path, capsys):
+    bad = edit(folder, tmp_path / "bad", lambda lines: lines)
+    path = bad / "runs.csv"
+    path.write_text(path.read_text()[:-1])
+    assert program.main([str(bad), "-o", str(tmp_path / "out")]) == 3
+    assert re.search(r"runs.csv:73: column 'invalid'.*half-written", capsys.readouterr().err)
+
+
 def test_other_folders_are_refused(tmp_path, capsys):
-    assert program.main([str(tmp_path), "-o", str(tmp_path / "out")]) == 3
-    assert "no manifest.json" in capsys.readouterr().err
+    for name, message in (("", "is empty: it has no manifest.json"), ("none", "is no folder"), ("other", "is no experiment folder")):
+        if name == "other":
+            (tmp_path / name).mkdir()
+            (tmp_path / name / "x").touch()
+        assert program.main([str(tmp_path / name), "-o", str(tmp_path / "out")]) == 3
+        assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("content,message", [
+    ('{"scenes": [', r"manifest.json:1: column 13: .*half-written"),
+    ('{"scenes": [], "runs": []}', r"manifest.json: the list 'scenes' is empty"),
+    ('{"scenes": []}', r"manifest.json: lacks the lists"),
+])
+def test_bad_manifests_are_refused(folder, tmp_path, content, message, capsys):
+    bad = edit(folder, tmp_path / "bad", lambda lines: lines)
+    (bad / "manifest.json").write_text(content)
+    assert program.main([str(bad), "-o", str(tmp_path / "out")]) == 3
+    assert re.search(message, capsys.readouterr().err)
 
 
 def test_further_columns_do_no_harm(folder, tmp_path):
@@ -172,7 +222,7 @@ def test_further_columns_do_no_harm(folder, tmp_path):
 def test_run_names_that_begin_alike_do_not_mix(tmp_path):
     folder = synthetic.make(tmp_path / "r", scenes=("box",), runs=(("mis", 1.0, 1.0), ("mis_2", 1.0, 1.0)), seeds=(1,))
     data = experiment.load(folder)
-    assert data.image("box", "mis").name == "mis_1.exr" and data.image("box", "mis_2").name == "mis_2_1.exr"
+    assert data.image("box", "mis")[1].name == "mis_1.exr" and data.image("box", "mis_2")[1].name == "mis_2_1.exr"
 
 
 def test_tone_map_and_error_map():
@@ -186,4 +236,4 @@ def test_tone_map_and_error_map():
 
 
 def test_tick_labels():
-    assert [figures.plain_number(x) for x in (0.001, 0.5, 20, 1e-5, 2e6)] == ["0.001", "0.5", "20", "$10^{-5}$", r"$2\cdot10^{6}$"]
+    assert [style.plain_number(x) for x in (0.001, 0.5, 20, 1e-5, 2e6)] == ["0.001", "0.5", "20", "$10^{-5}$", r"$2\cdot10^{6}$"]

@@ -1,0 +1,78 @@
+"""Convergence figures: an error against time and against samples per pixel."""
+
+import math
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from analysis import style, summary
+
+AXES = {"seconds": "time (s)", "spp": "samples per pixel"}
+NAMES = {"rmse": "RMSE", "relmse": "relMSE"}
+
+
+def draw_guide(axes, curves, x, slope):
+    """The slope of independent samples, below all data so that it hides none."""
+    budgets = np.concatenate([getattr(c, x) for c in curves])
+    level = 0.7 * min((c.error * getattr(c, x) ** -slope).min() for c in curves)
+    ends = np.array([budgets.min(), budgets.max()])
+    axes.plot(ends, level * ends**slope, color="0.5", lw=0.8, dashes=(4, 3), zorder=1, label="slope −1/2" if slope == -0.5 else f"slope −{-slope:g}")
+
+
+def draw_panel(axes, experiment, scene, x, measure):
+    """One scene, or a word in place of it."""
+    curves = [(i, c) for i, run in enumerate(experiment.runs) if (c := summary.curve(experiment, scene, run, measure))]
+    axes.set_title(style.wrap(scene, 30))
+    if not curves:
+        axes.text(0.5, 0.5, "no results", ha="center", transform=axes.transAxes)
+        axes.set_axis_off()
+        return
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    draw_guide(axes, [c for _, c in curves], x, summary.SLOPES[measure])
+    for i, c in curves:
+        axes.plot(getattr(c, x), c.error, label=c.run, zorder=3, **style.line_style(i))
+    limits = axes.get_ylim()  # of the lines: a band of two seeds can be decades wide and would flatten everything
+    for i, c in curves:
+        axes.fill_between(getattr(c, x), c.low, c.high, color=style.colour(i), alpha=0.2, lw=0, zorder=2)
+    axes.set_ylim(limits[0] / 1.1, limits[1] * 1.1)
+    noise = summary.reference_noise(experiment, scene)
+    # Shown where it matters: a reference far below the data would only stretch the axis.
+    if measure == "rmse" and noise > 0.3 * min(c.error.min() for _, c in curves):
+        axes.axhline(noise, color="0.4", lw=0.8, ls=":", zorder=1, label="noise of the reference")
+    style.label_log_axis(axes.xaxis, axes.get_xlim())
+    style.label_log_axis(axes.yaxis, axes.get_ylim())
+    axes.set_xlabel(AXES[x])
+    axes.grid(True, which="major", color="0.92", lw=0.5)
+    axes.set_axisbelow(True)
+
+
+def draw(experiment, x, measure):
+    """Figure with one panel per scene; x is "seconds" or "spp"."""
+    with plt.rc_context(style.STYLE):
+        figure, axes, columns = style.panels(len(experiment.scenes), 2.2)
+        corrected = all(not math.isnan(r.rmse_corrected) for r in experiment.rows)
+        entries = {}
+        for i, (one, scene) in enumerate(zip(axes, experiment.scenes)):
+            draw_panel(one, experiment, scene, x, measure)
+            if i % columns == 0:
+                one.set_ylabel(NAMES[measure] + ("" if corrected else " against the reference"))
+            for handle, label in zip(*one.get_legend_handles_labels()):
+                entries.setdefault(label, handle)
+        order = [r for r in experiment.runs if r in entries] + [e for e in entries if e not in experiment.runs]
+        longest = max((len(e) for e in order), default=1)
+        across = max(1, min(len(order), int(figure.get_figwidth() / (0.35 + 0.055 * longest))))
+        figure.legend([entries[e] for e in order], order, loc="outside lower center", ncols=across, frameon=False)
+    return figure
+
+
+def make(experiment):
+    """Yields the four figures."""
+    for measure in NAMES:
+        for x, against in (("seconds", "render time"), ("spp", "samples per pixel")):
+            yield style.Picture(
+                f"convergence_{'time' if x == 'seconds' else 'spp'}" + ("" if measure == "rmse" else "_relmse"), draw(experiment, x, measure),
+                f"{NAMES[measure]} against {against}",
+                "Lines: geometric mean over seeds; bands: its 95 % confidence interval (Student's on the logarithms; none with one seed). The noise of the "
+                "reference is subtracted where it is known. Dashed: the slope of independent samples.",
+                experiment.runs, experiment.scenes)

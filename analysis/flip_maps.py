@@ -1,0 +1,52 @@
+"""FLIP: the difference that a viewer sees when flipping between image and reference.
+
+HDR-FLIP (Andersson, Nilsson, Shirley and Akenine-Möller 2021, "Visualizing errors in rendered high dynamic range images", Eurographics short
+papers) by its authors' program, package flip-evaluator, with its default viewing conditions (67 pixels per degree) and exposures.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from analysis import comparison, style
+
+try:
+    import flip_evaluator
+except ImportError:
+    flip_evaluator = None
+
+PER_FIGURE = 5
+
+
+def flip(image, reference):
+    """(map in [0, 1] of shape (height, width), mean). NaN, Inf and negative values, which FLIP does not know, count as zero."""
+    clean = [np.ascontiguousarray(np.clip(np.nan_to_num(x, posinf=0.0, neginf=0.0), 0, None), dtype=np.float32) for x in (reference, image)]
+    values, mean, _ = flip_evaluator.evaluate(*clean, "HDR", applyMagma=False)
+    return np.asarray(values, dtype=np.float32).reshape(reference.shape[:2]), float(mean)
+
+
+def draw(scene, shape, columns):
+    height, width = shape
+    cell = min(2.2, (style.PAGE - 0.6) / len(columns))
+    with plt.rc_context(style.STYLE):
+        figure, grid = plt.subplots(1, len(columns), figsize=(cell * len(columns) + 0.6, cell * height / width + 0.45), squeeze=False, layout="constrained")
+        for axes, (run, values, mean) in zip(grid[0], columns):
+            drawn = axes.imshow(values, cmap=style.ERROR_COLOURS, vmin=0, vmax=1, interpolation="nearest")
+            axes.set_title(style.wrap(run) + f"\nmean {mean:.3f}")
+            comparison.bare(axes)
+        figure.colorbar(drawn, ax=list(grid[0]), label="HDR-FLIP", fraction=0.05, aspect=14)
+    return figure
+
+
+def make(experiment, scene):
+    """Yields the scene's figures."""
+    if flip_evaluator is None:
+        raise style.NotMade("the package flip-evaluator is not installed (pip install flip-evaluator)")
+    reference, shown = comparison.load(experiment, scene)
+    columns = [(run, *flip(image, reference)) for run, _, image in shown]
+    for part in range(0, len(columns), PER_FIGURE):
+        some = columns[part:part + PER_FIGURE]
+        yield style.Picture(
+            f"flip_{scene}" + (f"_{part // PER_FIGURE + 1}" if part else ""), draw(scene, reference.shape[:2], some), f"FLIP of {scene}",
+            "HDR-FLIP (Andersson et al. 2021) between the image of the lowest seed at the last checkpoint and the reference, 67 pixels per degree; 0: no visible "
+            f"difference. Means: {'; '.join(f'{run} {mean:.4f}' for run, _, mean in some)}.",
+            [c[0] for c in some], [scene])

@@ -1,0 +1,153 @@
+"""Images of the single strategies (s,t) of a bidirectional render, as the pyramid in which Veach 1997, chapter 10, shows them."""
+
+import math
+from dataclasses import dataclass
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from analysis import experiment as experiments, images, strategy_variance, style
+
+KINDS = ("weighted", "raw")
+
+
+@dataclass(frozen=True)
+class Techniques:
+    """A folder techniques/SCENE/RUN_SEED. entries: {(s, t): {"weighted": path, "raw": path}}; either may be missing."""
+
+    folder: object
+    spp: int
+    max_depth: int
+    entries: dict
+
+
+def read(folder):
+    """Reads techniques.json. Throws InputError."""
+    path = folder / "techniques.json"
+    data = experiments.read_json(path)
+    entries = {}
+    for key in ("spp", "max_depth", "entries"):
+        if not isinstance(data, dict) or key not in data:
+            raise experiments.InputError(f"{path}: lacks '{key}'")
+    for i, entry in enumerate(data["entries"]):
+        try:
+            s, t = int(entry["s"]), int(entry["t"])
+        except (KeyError, TypeError, ValueError):
+            raise experiments.InputError(f"{path}: entries[{i}]: lacks the numbers 's' and 't'") from None
+        entries[s, t] = {kind: folder / entry[kind] for kind in KINDS if entry.get(kind)}
+        for file in entries[s, t].values():
+            if not file.is_file():
+                raise experiments.InputError(f"{path}: entries[{i}]: there is no {file.name}; the folder may be half-written")
+    if not entries:
+        raise experiments.InputError(f"{path}: 'entries' is empty")
+    return Techniques(folder, data["spp"], data["max_depth"], entries)
+
+
+def label(s, t):
+    return f"s = {s}, t = {t}"
+
+
+def row_factor(row_images):
+    """Exposure of a row: puts the 95th percentile of the luminance of all its images' lit pixels at 0.8; 1 for black rows.
+
+    Strategies of one path length estimate the same image as far as they can sample it, so that one factor serves the row. Black pixels do not
+    count, because most strategies leave most of their image black.
+    """
+    stacked = np.concatenate([np.nan_to_num(i).reshape(-1, 3) for i in row_images]) @ np.array([0.2126, 0.7152, 0.0722])
+    lit = stacked[stacked > 0]
+    return 0.8 / float(np.percentile(lit, 95)) if len(lit) else 1.0
+
+
+def draw(pictures, kind):
+    """`pictures`: {(s, t): image}. Rows: path length k = s + t - 1, short ones above; columns: s. Returns figure and {k: factor}."""
+    lengths = sorted({s + t - 1 for s, t in pictures})
+    columns = sorted({s for s, _ in pictures})
+    rows = {k: {s: pictures[s, k + 1 - s] for s in columns if (s, k + 1 - s) in pictures} for k in lengths}
+    if kind == "raw":
+        factors = {k: row_factor(row.values()) for k, row in rows.items()}
+    else:
+        brightest = max(lengths, key=lambda k: sum(float(np.nan_to_num(i).mean()) for i in rows[k].values()))
+        base = row_factor([sum(np.nan_to_num(i) for i in rows[brightest].values())])
+        factors = {k: base * 2.0 ** max(0, lengths.index(k) - lengths.index(brightest)) for k in lengths}
+    height, width = next(iter(pictures.values())).shape[:2]
+    cell = min(1.4, (style.PAGE - 0.55) / len(columns))
+    with plt.rc_context(style.STYLE):
+        figure, grid = plt.subplots(len(lengths), len(columns), squeeze=False,
+                                    figsize=(cell * len(columns) + 0.55, (cell * height / width + 0.14) * len(lengths) + 0.3))
+        figure.subplots_adjust(left=0.55 / figure.get_figwidth(), right=1 - 0.02 / figure.get_figwidth(), bottom=0.02, top=1 - 0.3 / figure.get_figheight(),
+                               wspace=0.04, hspace=0.14 / (cell * height / width))
+        for i, k in enumerate(lengths):
+            for j, s in enumerate(columns):
+                axes = grid[i][j]
+                axes.set_axis_off()
+                if s in rows[k]:
+                    axes.imshow(images.tone_map(rows[k][s], factors[k]), interpolation="nearest")
+                    axes.set_title(label(s, k + 1 - s), fontsize=6, pad=1.5)
+            grid[i][0].text(-0.06, 0.5, f"k = {k}\n×{style.short_number(factors[k], 2)}", transform=grid[i][0].transAxes, ha="right", va="center", fontsize=7)
+    return figure, factors
+
+
+def make(experiment, scene, run):
+    """Yields the weighted and the raw pyramid of the lowest seed of a run."""
+    found = experiment.techniques(scene, run)
+    if not found:
+        raise style.NotMade(f"no techniques/{scene}/{run}_SEED/techniques.json (ambilux render --technique-images)")
+    seed, folder = found[0]
+    techniques = read(folder)
+    for kind in KINDS:
+        pictures = {st: images.read_exr(files[kind]) for st, files in techniques.entries.items() if kind in files}
+        if not pictures:
+            continue
+        figure, factors = draw(pictures, kind)
+        how = ("times its MIS weight; the pictures of all rows together add up to the image. Each row below the brightest is exposed one stop more, as in Veach's figure"
+               if kind == "weighted" else "without a weight: each is an estimate of its own of the light of its path length, as far as it can sample it. Each row has an "
+               "exposure of its own")
+        yield style.Picture(
+            f"techniques_{kind}_{scene}_{run}", figure, f"Strategies of {run} on {scene}, {kind}",
+            f"Strategy (s,t), {how} (factors at the left). Rows: path length k = s + t − 1 segments; columns: s vertices from the light. Blank: there is no such strategy, "
+            f"or it was not recorded. {techniques.spp} samples per pixel, max_depth {techniques.max_depth}, seed {seed}. After Veach 1997, chapter 10.",
+            [run], [scene])
+
+
+def variances(experiment, scene, run):
+    """[(s, t, Estimate of the variance of one weighted sample, share of the sum, seeds)] over the seeds that recorded the strategy; [] without two seeds."""
+    folders = [read(folder) for _, folder in experiment.techniques(scene, run)]
+    if len(folders) < 2:
+        return []
+    if len({f.spp for f in folders}) > 1:
+        raise experiments.InputError(f"{folders[0].folder.parent}: the seeds of {run} have different spp: {sorted({f.spp for f in folders})}")
+    out = []
+    for st in sorted({st for f in folders for st in f.entries}, key=lambda st: (sum(st), st[0])):
+        paths = [f.entries[st]["weighted"] for f in folders if "weighted" in f.entries.get(st, {})]
+        if len(paths) > 1:
+            out.append((*st, strategy_variance.strategy_variance([images.read_exr(p) for p in paths], folders[0].spp), len(paths)))
+    total = sum(e.value for _, _, e, _ in out)
+    return [(s, t, e, e.value / total if total > 0 else math.nan, n) for s, t, e, n in out]
+
+
+def make_variance(experiment, scene, run):
+    """Yields the variance of each strategy as shaded cells, rows by k and columns by s, like the pyramid."""
+    found = variances(experiment, scene, run)
+    if not found:
+        raise style.NotMade(f"the variance of strategies needs techniques/{scene}/{run}_SEED of two seeds")
+    cells = {(s, t): share for s, t, _, share, _ in found}
+    lengths, columns = sorted({s + t - 1 for s, t in cells}), sorted({s for s, _ in cells})
+    table = np.array([[cells.get((s, k + 1 - s), math.nan) for s in columns] for k in lengths])
+    with plt.rc_context(style.STYLE):
+        figure, axes = plt.subplots(figsize=(min(style.PAGE, 0.62 * len(columns) + 1.4), 0.3 * len(lengths) + 0.75), layout="constrained")
+        drawn = axes.imshow(100 * table, cmap="cividis", aspect="auto", vmin=0)
+        top = float(np.nanmax(table))
+        for i, k in enumerate(lengths):
+            for j, s in enumerate(columns):
+                if math.isfinite(table[i, j]):
+                    axes.text(j, i, f"{100 * table[i, j]:.1f}", ha="center", va="center", fontsize=6.5, color="black" if table[i, j] > 0.55 * top else "white")
+        axes.set_xticks(range(len(columns)), columns)
+        axes.set_yticks(range(len(lengths)), lengths)
+        axes.set_xlabel("s: vertices from the light")
+        axes.set_ylabel("k: segments")
+        figure.colorbar(drawn, label="% of the sum of variances")
+    yield style.Picture(
+        f"strategy_variance_{scene}_{run}", figure, f"Variance of the strategies of {run} on {scene}",
+        f"Unbiased variance over {max(n for *_, n in found)} seeds of each weighted strategy's image, times spp, mean over pixels and channels, as a share of the sum over "
+        "strategies. Strategies share subpaths, so that the sum is not the variance of the image. Values with jackknife intervals: strategy_variance.csv.",
+        [run], [scene])

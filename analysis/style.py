@@ -1,0 +1,109 @@
+"""One style for all figures: fonts, widths, colours; how numbers are written; how a figure is saved."""
+
+import math
+import textwrap
+from dataclasses import dataclass
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+# Okabe and Ito 2008, "Color universal design": told apart with every common kind of colour vision (tests/test_colour_vision.py simulates
+# them). Yellow is left out: it is too light for lines. Lines differ by markers too, bars by hatching.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+DASHES = ("-", "--", "-.", ":")
+HATCHES = ("", "////", "....", "\\\\\\\\", "xx", "--", "oo")
+ERROR_COLOURS = "magma"  # lightness rises evenly, so that it survives grey print
+SIGNED_COLOURS = "PuOr"  # diverging, without red against green (Brewer)
+
+COLUMN, PAGE = 3.4, 7.0  # widths in inches of one column and of a page, as in ACM's and Eurographics' two-column layouts
+DPI = 200
+
+STYLE = {
+    "font.size": 8, "axes.titlesize": 8.5, "axes.labelsize": 8, "legend.fontsize": 7.5, "xtick.labelsize": 7, "ytick.labelsize": 7,
+    "pdf.fonttype": 42, "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.6, "svg.hashsalt": "ambilux", "hatch.linewidth": 0.5,
+}
+
+
+@dataclass
+class Picture:
+    """A figure to be saved under `name`; `caption` says what is drawn and how, captions.py adds where the data come from."""
+
+    name: str
+    figure: Figure
+    title: str
+    caption: str
+    runs: list
+    scenes: list
+
+
+class NotMade(Exception):
+    """Why the results do not support a figure. No fault of the input."""
+
+
+def colour(i):
+    return COLOURS[i % len(COLOURS)]
+
+
+def line_style(i):
+    """Keywords for run number i. Past seven runs colours repeat and dashes tell them apart."""
+    return {"color": colour(i), "marker": MARKERS[i % len(MARKERS)], "ls": DASHES[i // len(COLOURS) % len(DASHES)], "ms": 3, "lw": 1.2}
+
+
+def wrap(text, width=18):
+    """Long names on several lines, for titles of narrow panels."""
+    head, bracket, rest = text.partition("[")  # lvc[connections=4]
+    if len(text) > width and head and bracket:
+        return wrap(head, width) + "\n" + wrap(bracket + rest, max(width, len(rest) + 1))
+    return "\n".join(textwrap.wrap(text, width, break_long_words=True)) or text
+
+
+def short_number(x, digits=3):
+    """`digits` significant digits, for labels."""
+    if not math.isfinite(x):
+        return "–"
+    if x == 0 or 1e-3 <= abs(x) < 1e5:
+        places = max(0, digits - 1 - math.floor(math.log10(abs(x)))) if x else 0
+        return f"{x:.{places}f}"
+    return f"{x:.{digits - 1}e}"
+
+
+def plain_number(x, _=None):
+    """Label of a logarithmic tick: digits where they are short, else a power of ten."""
+    if 0.001 <= x < 10000:
+        return f"{x:g}"
+    exponent = math.floor(math.log10(x) + 1e-9)
+    factor = round(x / 10**exponent)
+    return (rf"${factor}\cdot" if factor != 1 else "$") + rf"10^{{{exponent}}}$"
+
+
+def label_log_axis(axis, limits):
+    """Decades alone where there are several; numbers between them where the range is short, so that no axis has fewer than two."""
+    decades = math.log10(limits[1] / limits[0])
+    between = () if decades > 2.7 else (3.0,) if decades > 1.5 else (2.0, 5.0) if decades > 0.8 else (1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
+    axis.set_major_locator(LogLocator(10, subs=(1.0, *between)))
+    axis.set_major_formatter(FuncFormatter(plain_number))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def panels(count, height, columns=None, widest=2.35):
+    """Figure and `count` axes in rows of up to three; those left over are hidden. `height`: inches of a row."""
+    columns = columns or (2 if count == 4 else min(3, count))
+    rows = math.ceil(count / columns)
+    width = COLUMN if columns == 1 else min(PAGE, widest * columns + 0.2)
+    figure, grid = plt.subplots(rows, columns, figsize=(width, height * rows + 0.45), squeeze=False, layout="constrained")
+    for axes in grid.flat[count:]:
+        axes.set_axis_off()
+    return figure, list(grid.flat[:count]), columns
+
+
+def save(figure, path_without_suffix):
+    """Writes PDF and PNG and closes the figure. The same data give the same bytes: no dates in the files."""
+    with plt.rc_context(STYLE):
+        figure.savefig(f"{path_without_suffix}.pdf", metadata={"CreationDate": None}, dpi=300)
+        figure.savefig(f"{path_without_suffix}.png", dpi=DPI)
+    plt.close(figure)
