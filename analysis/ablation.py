@@ -137,5 +137,5 @@ def make_sweeps(experiment):
         raise style.NotMade("no runs of a sweep, named like lvc[connections=4], with two values of a key")
     for (name, key), entries in found.items():
         yield style.Picture(
-            f"sweep_{name}_{key}", draw_sweep(experiment, entries, key), f"Speed-up of {name} over its variant {key} = {entries[0][0]}",
+            style.file_name("sweep", name, key), draw_sweep(experiment, entries, key), f"Speed-up of {name} over its variant {key} = {entries[0][0]}",
             "At equal RMSE; lines: geometric mean over pairs of equal seeds; bands: 95 % confidence interval.", [run for _, run in entries], experiment.scenes)

@@ -103,7 +103,7 @@ def make(experiment, scene, run):
                if kind == "weighted" else "without a weight: each is an estimate of its own of the light of its path length, as far as it can sample it. Each row has an "
                "exposure of its own")
         yield style.Picture(
-            f"techniques_{kind}_{scene}_{run}", figure, f"Strategies of {run} on {scene}, {kind}",
+            style.file_name("techniques", kind, scene, run), figure, f"Strategies of {run} on {scene}, {kind}",
             f"Strategy (s,t), {how} (factors at the left). Rows: path length k = s + t − 1 segments; columns: s vertices from the light. Blank: there is no such strategy, "
             f"or it was not recorded. {techniques.spp} samples per pixel, max_depth {techniques.max_depth}, seed {seed}. After Veach 1997, chapter 10.",
             [run], [scene])
@@ -147,7 +147,7 @@ def make_variance(experiment, scene, run):
         axes.set_ylabel("k: segments")
         figure.colorbar(drawn, label="% of the sum of variances")
     yield style.Picture(
-        f"strategy_variance_{scene}_{run}", figure, f"Variance of the strategies of {run} on {scene}",
+        style.file_name("strategy_variance", scene, run), figure, f"Variance of the strategies of {run} on {scene}",
         f"Unbiased variance over {max(n for *_, n in found)} seeds of each weighted strategy's image, times spp, mean over pixels and channels, as a share of the sum over "
         "strategies. Strategies share subpaths, so that the sum is not the variance of the image. Values with jackknife intervals: strategy_variance.csv.",
         [run], [scene])

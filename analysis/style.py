@@ -1,6 +1,7 @@
 """One style for all figures: fonts, widths, colours; how numbers are written; how a figure is saved."""
 
 import math
+import re
 import textwrap
 from dataclasses import dataclass
 
@@ -43,6 +44,11 @@ class Picture:
 
 class NotMade(Exception):
     """Why the results do not support a figure. No fault of the input."""
+
+
+def file_name(*parts):
+    """Name of a figure that LaTeX and shells take as it is: lvc[connections=4] becomes lvc-connections-4."""
+    return "_".join(re.sub(r"[^A-Za-z0-9._]+", "-", part).strip("-") for part in parts)
 
 
 def colour(i):

@@ -30,7 +30,7 @@ def stats(milliseconds, spp, width=48, height=36):
 
 def add_techniques(folder, scene, run, seeds, spp=16, max_depth=3, sigma=0.2):
     """Weighted images of strategy (s,t): picture * 2^-k / (k+1) and noise whose variance of one sample is (sigma * (s+1))^2; raw ones without the share.
-    Strategy (0,2) has no raw image and (3,1) is missing."""
+    Strategy (0,2) has no raw image and (1,3) is missing."""
     rng = np.random.default_rng(5)
     for seed in seeds:
         place = folder / "techniques" / scene / f"{run}_{seed}"
@@ -39,7 +39,7 @@ def add_techniques(folder, scene, run, seeds, spp=16, max_depth=3, sigma=0.2):
         for k in range(1, max_depth + 1):
             for s in range(k + 1):
                 t = k + 1 - s
-                if (s, t) == (3, 1):
+                if (s, t) == (1, 3):
                     continue
                 entry = {"s": s, "t": t, "weighted": f"weighted_s{s:02}_t{t:02}.exr", "raw": f"raw_s{s:02}_t{t:02}.exr"}
                 noise = sigma * (s + 1) / np.sqrt(spp) * rng.normal(size=picture().shape)

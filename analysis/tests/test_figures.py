@@ -1,0 +1,206 @@
+"""Which files are made of which data, and what is drawn."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from analysis import __main__ as program
+from analysis import ablation, captions, comparison, error_maps, experiment, figures, flip_maps, images, pyramid, stage_times, style
+from analysis.tests import synthetic
+
+RUNS = (("nee", 0.7, 1.5), ("lvc[connections=1]", 0.5, 2.0), ("lvc[connections=4]", 0.4, 3.0))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = synthetic.make(tmp_path_factory.mktemp("results") / "run", scenes=("box",), runs=RUNS)
+    synthetic.add_techniques(folder, "box", "lvc[connections=1]", (1, 2, 3))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def output(folder, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out")
+    assert program.main([str(folder), "-o", str(out)]) == 0
+    return out
+
+
+NAMES = {"convergence_time", "convergence_spp", "convergence_time_relmse", "convergence_spp_relmse", "ablation", "sweep_lvc_connections", "stage_times",
+         "comparison_box", "errors_box", "flip_box", "techniques_weighted_box_lvc-connections-1", "techniques_raw_box_lvc-connections-1",
+         "strategy_variance_box_lvc-connections-1"}
+
+
+def test_all_files_are_written(output):
+    if flip_maps.flip_evaluator is None:
+        pytest.skip("flip-evaluator is not installed")
+    expected = {f"{n}.{suffix}" for n in NAMES for suffix in ("pdf", "png", "caption.txt")}
+    assert {p.name for p in output.iterdir()} == expected | {"table.csv", "table.tex", "tests.tex", "strategy_variance.csv", "report.html"}
+
+
+def test_captions_state_the_data(output):
+    for name in NAMES:
+        text = (output / f"{name}.caption.txt").read_text()
+        for part in ("box (48x36, max_depth 5, ", "standard error 0.002", "Seeds: 1–3; samples per pixel 1–64", "a processor <&>", "git 0123456",
+                     "ambilux experiment experiments/synthetic.toml -o run", "python -m analysis run"):
+            assert part in text, (name, part)
+    assert captions.listed([1, 2, 3, 7, 9, 10]) == "1–3, 7, 9, 10"
+
+
+def test_same_input_gives_same_bytes(folder, output, tmp_path):
+    """Of one figure with lines, one with bars and one with images; the page of all."""
+    data = experiment.load(folder)
+    for picture in (next(ablation.make(data)), next(comparison.make(data, "box")), next(pyramid.make_variance(data, "box", "lvc[connections=1]"))):
+        style.save(picture.figure, tmp_path / picture.name)
+        for suffix in ("pdf", "png"):
+            assert (tmp_path / f"{picture.name}.{suffix}").read_bytes() == (output / f"{picture.name}.{suffix}").read_bytes(), picture.name
+
+
+def test_little_data_makes_what_it_supports_and_says_the_rest(tmp_path, capsys):
+    folder = synthetic.make(tmp_path / "tiny", scenes=("only",), runs=(("a", 1.0, 1.0),), seeds=(7,), checkpoints=(8,))
+    for gone in ("images", "references", "stats"):
+        (folder / gone).rename(folder / f"no_{gone}")
+    assert program.main([str(folder), "-o", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().err
+    for name, reason in (("ablation", "needs two runs"), ("sweeps", "no runs of a sweep"), ("stage_times", "no stages"), ("comparison_only", "reference image is not there"),
+                         ("flip_only", "reference image is not there"), ("techniques", "no techniques/SCENE")):
+        assert re.search(f"not made: {name}.*: .*{reason}", said), name
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "No images yet" in page and "an ablation needs two runs" in page
+
+
+@pytest.mark.parametrize("file,content,message", [
+    ("images/box/nee_1.exr", b"not an image", r"nee_1.exr: cannot be read as OpenEXR, it may be half-written"),
+    ("stats/box/nee_2.json", b'{"size": [48, 36], "spp": 64', r"nee_2.json:1: column 29: .*half-written"),
+    ("stats/box/nee_2.json", b'{"size": [48, 36], "spp": 64}', r"nee_2.json: lacks or misuses 'stages'"),
+])
+def test_a_broken_file_stops_only_what_needs_it(folder, tmp_path, file, content, message, capsys, monkeypatch):
+    import shutil
+    bad = shutil.copytree(folder, tmp_path / "bad")
+    shutil.rmtree(bad / "techniques")
+    (bad / file).write_bytes(content)
+    monkeypatch.setattr(style, "save", lambda *_: None)  # what is drawn is of no interest here
+    monkeypatch.setattr("analysis.report.figure", lambda *_: "")
+    assert program.main([str(bad), "-o", str(tmp_path / "out")]) == 3
+    captured = capsys.readouterr()
+    assert re.search(f"error: .*{message}", captured.err)
+    assert "Traceback" not in captured.err
+    assert not re.search(r"error: (convergence|ablation)", captured.err)
+    style.plt.close("all")
+
+
+def test_images_of_another_size_are_refused(folder, tmp_path):
+    reference = images.read_exr(experiment.load(folder).reference("box"))
+    synthetic.write_exr(tmp_path / "small.exr", reference[:10])
+    with pytest.raises(experiment.InputError, match="small.exr: is 48x10, its reference 48x36"):
+        images.read_like(tmp_path / "small.exr", reference)
+
+
+def test_insets_lie_where_methods_differ_and_do_not_overlap():
+    reference = np.ones((60, 90, 3), dtype=np.float32)
+    one, two = reference.copy(), reference.copy()
+    one[5:15, 60:70] = 3  # only the first is wrong here
+    two[40:50, 10:20] = 2
+    insets = comparison.choose_insets(reference, [one, two])
+    (ax, ay, size), (bx, by, _) = insets
+    assert size == 15 and abs(ax - 60) < size and abs(ay - 5) < size and abs(bx - 10) < size and abs(by - 40) < size
+
+
+def test_insets_by_hand():
+    assert program.parse_inset("a=b=1,2,3") == ("a=b", (1, 2, 3))
+    for bad in ("box", "box=1,2", "box=1,2,x", "=1,2,3", "box=-1,2,3"):
+        with pytest.raises(Exception, match="SCENE=X,Y,SIZE"):
+            program.parse_inset(bad)
+
+
+def test_stage_times_are_per_pixel_and_sample(folder, tmp_path):
+    data = experiment.load(folder)
+    times = stage_times.mean_over_seeds(data, "box", "nee")
+    assert times["extend"] == pytest.approx(1e6 * 1.5 * 0.5 / (48 * 36))  # 1.5 ms per sample of 48 x 36 pixels, in ns
+    stats = synthetic.stats(1.5, 64)
+    assert stage_times.per_sample(stats | {"stages_since_spp": 32})["extend"] == pytest.approx(2 * times["extend"])
+    assert stage_times.per_sample(stats | {"stages_since_spp": 64}) == {}
+
+
+def test_ablation_labels_and_ticks():
+    assert ablation.label("lvc[connections=4]", "lvc") == "connections = 4"
+    assert ablation.label("lvc[connections=4]", "path") == "lvc[connections=4]"
+    for low, high in ((0.9, 1.2), (0.5, 4), (0.01, 300), (0.8, 30)):
+        ticks = ablation.ratio_ticks(low, high)
+        assert 1 in ticks and 2 <= len(ticks) <= 9 and min(ticks) >= low and max(ticks) <= high
+
+
+def test_sweeps_are_found(folder):
+    found = ablation.sweeps(experiment.load(folder))
+    assert found == {("lvc", "connections"): [("1", "lvc[connections=1]"), ("4", "lvc[connections=4]")]}
+
+
+def test_pyramid_has_rows_by_length_and_columns_by_light_vertices(folder):
+    data = experiment.load(folder)
+    weighted, raw = pyramid.make(data, "box", "lvc[connections=1]")
+    # Lengths 1 to 3, s = 0 to 3; titled axes are those with an image.
+    titles = [[a.get_title() for a in p.figure.axes] for p in (weighted, raw)]
+    assert len(titles[0]) == 12
+    assert titles[0] == ["s = 0, t = 2", "s = 1, t = 1", "", "", "s = 0, t = 3", "s = 1, t = 2", "s = 2, t = 1", "", "s = 0, t = 4", "", "s = 2, t = 2", "s = 3, t = 1"]
+    assert titles[1][0] == "" and titles[1][1:] == titles[0][1:]
+    style.plt.close("all")
+
+
+def test_exposure_of_raw_rows_undoes_their_scale():
+    rows = {(0, 2): synthetic.picture(), (0, 3): synthetic.picture() / 8}
+    figure, factors = pyramid.draw(rows, "raw")
+    assert factors[2] / factors[1] == pytest.approx(8)
+    _, stops = pyramid.draw(rows, "weighted")
+    assert stops[2] / stops[1] == pytest.approx(2)
+    style.plt.close("all")
+
+
+def test_variance_of_strategies_is_that_of_their_noise(folder):
+    rows = {(s, t): e for s, t, e, _, n in pyramid.variances(experiment.load(folder), "box", "lvc[connections=1]") if n == 3}
+    assert len(rows) == 8
+    for (s, _), e in rows.items():
+        assert e.value == pytest.approx((0.2 * (s + 1)) ** 2, rel=4 * np.sqrt(2 / (2 * 48 * 36 * 3)))
+
+
+@pytest.mark.parametrize("change,message", [
+    (lambda d: d.pop("entries"), "techniques.json: lacks 'entries'"),
+    (lambda d: d["entries"][1].pop("s"), r"entries\[1\]: lacks the numbers 's' and 't'"),
+    (lambda d: d["entries"][0].update(weighted="gone.exr"), r"entries\[0\]: there is no gone.exr"),
+    (lambda d: d["entries"].clear(), "'entries' is empty"),
+])
+def test_bad_techniques_are_refused(tmp_path, change, message):
+    synthetic.add_techniques(tmp_path, "box", "lvc", (1,), max_depth=1)
+    place = tmp_path / "techniques" / "box" / "lvc_1"
+    data = json.loads((place / "techniques.json").read_text())
+    change(data)
+    (place / "techniques.json").write_text(json.dumps(data))
+    with pytest.raises(experiment.InputError, match=message):
+        pyramid.read(place)
+
+
+def test_flip_is_zero_for_equal_images_and_grows_with_the_error():
+    if flip_maps.flip_evaluator is None:
+        pytest.skip("flip-evaluator is not installed")
+    picture = synthetic.picture().astype(np.float32)
+    same, zero = flip_maps.flip(picture, picture)
+    assert same.shape == (36, 48) and zero == pytest.approx(0, abs=1e-6)
+    broken = picture.copy()
+    broken[3, 4] = np.nan
+    means = [flip_maps.flip(picture + d, picture)[1] for d in (0.02, 0.1, 0.4)]
+    assert 0 < means[0] < means[1] < means[2] < 1
+    assert np.isfinite(flip_maps.flip(broken, picture)[1])
+
+
+def test_blocks_and_scales_of_maps():
+    values = np.arange(20, dtype=float).reshape(4, 5)
+    means = images.block_means(values, 2)
+    assert means.shape == (2, 3) and means[0, 0] == pytest.approx(3) and means[1, 2] == pytest.approx(16.5)
+    assert error_maps.images_blocks(np.dstack([values] * 3)).shape == (1, 2, 3)
+    assert images.signed_error(np.full((1, 1, 3), 0.5), np.full((1, 1, 3), 0.99)) == pytest.approx(-0.49)
+    assert images.highest_of([np.array([np.nan, np.inf])]) == 1.0
+
+
+def test_long_names_are_wrapped_at_their_settings():
+    assert style.wrap("lvc[connections=4]", 16) == "lvc\n[connections=4]"
+    assert style.wrap("short", 16) == "short"
