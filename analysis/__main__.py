@@ -25,7 +25,7 @@ def strategy_rows(data):
     return [(scene, run, *row) for scene in data.scenes for run in data.runs for row in pyramid.variances(data, scene, run)]
 
 
-def analyse(results, out, insets=None):
+def analyse(results, out, insets=None, full_size=False):
     """Reads the experiment folder `results` and writes everything into the folder `out`. Returns (remarks, figures.Made)."""
     data = experiments.load(results)
     out.mkdir(parents=True, exist_ok=True)
@@ -39,7 +39,7 @@ def analyse(results, out, insets=None):
         rows = strategy_rows(data)
         if rows:
             write(out / "strategy_variance.csv", tables.variances_to_csv(rows))
-        write(out / "report.html", report.render(data, lines, remarks, made, out))
+        write(out / "report.html", report.render(data, lines, remarks, made, out, full_size))
     except experiments.InputError as e:
         made.broken.append(f"report.html: {e}")
     return remarks, made
@@ -63,12 +63,13 @@ def main(arguments=None):
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to; may be the same")
     parser.add_argument("--inset", type=parse_inset, action="append", default=[], metavar="SCENE=X,Y,SIZE",
                         help="square of the comparison figure in pixels, in place of the chosen ones; up to two per scene")
+    parser.add_argument("--full-size", action="store_true", help="embed large images whole in report.html; it can become hundreds of megabytes")
     options = parser.parse_args(arguments)
     insets = {}
     for scene, inset in options.inset:
         insets.setdefault(scene, []).append(inset)
     try:
-        remarks, made = analyse(options.results, options.output, insets)
+        remarks, made = analyse(options.results, options.output, insets, options.full_size)
     except experiments.InputError as e:
         print(f"error: {e}", file=sys.stderr)
         return 3

@@ -91,7 +91,12 @@ def sweeps(experiment):
         for key, value in settings.items():
             rest = ", ".join(f"{k}={v}" for k, v in settings.items() if k != key)
             out.setdefault((f"{name}[{rest}]" if rest else name, key), []).append((value, run))
-    return {k: v for k, v in out.items() if len(v) > 1}
+    return {k: in_order(v) for k, v in out.items() if len(v) > 1}
+
+
+def in_order(entries):
+    """Values by size where all are numbers, else as configured."""
+    return sorted(entries, key=lambda e: float(e[0])) if all(number_or_none(value) is not None for value, _ in entries) else entries
 
 
 def number_or_none(text):
@@ -102,7 +107,7 @@ def number_or_none(text):
 
 
 def draw_sweep(experiment, entries, key):
-    """Speed-up over the sweep's first value, a line per scene. Values on a logarithmic axis where all are positive numbers, else by name."""
+    """Speed-up over the sweep's first value, which is the least of numbers, a line per scene. Values on a logarithmic axis where all are positive numbers, else by name."""
     numbers = [number_or_none(value) for value, _ in entries]
     numeric = all(n is not None and n > 0 for n in numbers)
     x = numbers if numeric else range(len(entries))
@@ -124,7 +129,7 @@ def draw_sweep(experiment, entries, key):
         axes.set_xticks(list(x), [value for value, _ in entries])
         axes.xaxis.set_minor_locator(NullLocator())
         axes.set_xlabel(key)
-        axes.set_ylabel(f"speed-up over {key} = {entries[0][0]}")
+        axes.set_ylabel("speed-up at equal RMSE")
         axes.grid(True, color="0.92", lw=0.5)
         figure.legend(loc="outside lower center", ncols=min(3, len(experiment.scenes)), frameon=False)
     return figure
@@ -138,4 +143,4 @@ def make_sweeps(experiment):
     for (name, key), entries in found.items():
         yield style.Picture(
             style.file_name("sweep", name, key), draw_sweep(experiment, entries, key), f"Speed-up of {name} over its variant {key} = {entries[0][0]}",
-            "At equal RMSE; lines: geometric mean over pairs of equal seeds; bands: 95 % confidence interval.", [run for _, run in entries], experiment.scenes)
+            f"At equal RMSE, over {key} = {entries[0][0]}. Lines: geometric mean over pairs of equal seeds; bands: 95 % confidence interval.", [run for _, run in entries], experiment.scenes)

@@ -33,8 +33,9 @@ def draw_panel(axes, experiment, scene, x, measure):
     for i, c in curves:
         axes.plot(getattr(c, x), c.error, label=c.run, zorder=3, **style.line_style(i))
     limits = axes.get_ylim()  # of the lines: a band of two seeds can be decades wide and would flatten everything
+    strength = 0.2 if len(curves) <= 3 else 0.11  # many bands on top of each other
     for i, c in curves:
-        axes.fill_between(getattr(c, x), c.low, c.high, color=style.colour(i), alpha=0.2, lw=0, zorder=2)
+        axes.fill_between(getattr(c, x), c.low, c.high, color=style.colour(i), alpha=strength, lw=0, zorder=2)
     axes.set_ylim(limits[0] / 1.1, limits[1] * 1.1)
     noise = summary.reference_noise(experiment, scene)
     # Shown where it matters: a reference far below the data would only stretch the axis.

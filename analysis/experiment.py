@@ -80,10 +80,14 @@ class Experiment:
         size = self.scene_entry(scene).get("size")
         return size[0] * size[1] if size else math.nan
 
+    def __post_init__(self):
+        self._of_run = {}
+        for r in sorted(self.rows, key=lambda r: (r.seed, r.checkpoint)):
+            self._of_run.setdefault((r.scene, r.run), []).append(r)
+
     def select(self, scene, run, checkpoint=None):
         """Rows of one run in one scene, by seed and checkpoint."""
-        rows = [r for r in self.rows if r.scene == scene and r.run == run and checkpoint in (None, r.checkpoint)]
-        return sorted(rows, key=lambda r: (r.seed, r.checkpoint))
+        return [r for r in self._of_run.get((scene, run), ()) if checkpoint in (None, r.checkpoint)]
 
     def seeds(self, scene, run):
         return sorted({r.seed for r in self.select(scene, run)})

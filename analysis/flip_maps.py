@@ -4,10 +4,12 @@ HDR-FLIP (Andersson, Nilsson, Shirley and Akenine-Möller 2021, "Visualizing err
 papers) by its authors' program, package flip-evaluator, with its default viewing conditions (67 pixels per degree) and exposures.
 """
 
+from functools import lru_cache
+
 import matplotlib.pyplot as plt
 import numpy as np
 
-from analysis import comparison, style
+from analysis import comparison, hdr_data, images, style
 
 try:
     import flip_evaluator
@@ -24,13 +26,21 @@ def flip(image, reference):
     return np.asarray(values, dtype=np.float32).reshape(reference.shape[:2]), float(mean)
 
 
+@lru_cache(maxsize=256)
+def of_files(image, reference, factor=1):
+    """flip of two files, shrunk by hdr_data.shrink, the map in 8 bits. Kept, because a figure and the page want the same."""
+    pair = [hdr_data.shrink(p, factor) for p in (images.read_exr(image), images.read_exr(reference))]
+    values, mean = flip(*pair)
+    return (np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8), mean
+
+
 def draw(scene, shape, columns):
     height, width = shape
     cell = min(2.2, (style.PAGE - 0.6) / len(columns))
     with plt.rc_context(style.STYLE):
         figure, grid = plt.subplots(1, len(columns), figsize=(cell * len(columns) + 0.6, cell * height / width + 0.45), squeeze=False, layout="constrained")
         for axes, (run, values, mean) in zip(grid[0], columns):
-            drawn = axes.imshow(values, cmap=style.ERROR_COLOURS, vmin=0, vmax=1, interpolation="nearest")
+            drawn = axes.imshow(values / 255, cmap=style.ERROR_COLOURS, vmin=0, vmax=1, interpolation="nearest")
             axes.set_title(style.wrap(run) + f"\nmean {mean:.3f}")
             comparison.bare(axes)
         figure.colorbar(drawn, ax=list(grid[0]), label="HDR-FLIP", fraction=0.05, aspect=14)
@@ -42,7 +52,7 @@ def make(experiment, scene):
     if flip_evaluator is None:
         raise style.NotMade("the package flip-evaluator is not installed (pip install flip-evaluator)")
     reference, shown = comparison.load(experiment, scene)
-    columns = [(run, *flip(image, reference)) for run, _, image in shown]
+    columns = [(run, *of_files(experiment.image(scene, run)[1], experiment.reference(scene))) for run, _, _ in shown]
     for part in range(0, len(columns), PER_FIGURE):
         some = columns[part:part + PER_FIGURE]
         yield style.Picture(

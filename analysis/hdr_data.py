@@ -6,17 +6,24 @@ import zlib
 import numpy as np
 
 LARGEST_WIDTH = 1280  # pixels of an embedded image; wider ones are averaged over blocks
+LARGEST_PAGE = 10e6   # pixels of all images of a page together: about 60 MB of HTML, which browsers open at once
 
 
 def shrink(image, factor):
     """Means over blocks of factor x factor pixels; what is left at the edges is cut off. Means of radiance are right, of errors they are not:
     maps of a shrunk image are of the shrunk image."""
+    if factor == 1:
+        return image
     height, width = (n // factor * factor for n in image.shape[:2])
     return image[:height, :width].reshape(height // factor, factor, width // factor, factor, -1).mean(axis=(1, 3)).astype(np.float32)
 
 
-def factor_for(width):
-    return max(1, -(-width // LARGEST_WIDTH))
+def factor_for(width, height=1, count=1):
+    """Side of the blocks over which an image is averaged, if the page holds `count` images as large."""
+    factor = max(1, -(-width // LARGEST_WIDTH))
+    while count * (width // factor) * (height // factor) > LARGEST_PAGE and factor < min(width, height):
+        factor += 1
+    return factor
 
 
 def deflate(raw):
@@ -36,8 +43,3 @@ def decode(text, height, width):
     """What the page does, for tests. Shape (height, width, 3), float32."""
     planes = np.frombuffer(zlib.decompress(base64.b64decode(text)), dtype=np.uint8).reshape(2, -1)
     return np.ascontiguousarray(planes.T).view("<f2").reshape(3, height, width).transpose(1, 2, 0).astype(np.float32)
-
-
-def encode_bytes(values):
-    """A map in [0, 1] as 8 bits per pixel."""
-    return deflate((np.clip(np.nan_to_num(values, nan=1.0), 0, 1) * 255 + 0.5).astype(np.uint8).tobytes())

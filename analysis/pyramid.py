@@ -73,8 +73,8 @@ def draw(pictures, kind):
     cell = min(1.4, (style.PAGE - 0.55) / len(columns))
     with plt.rc_context(style.STYLE):
         figure, grid = plt.subplots(len(lengths), len(columns), squeeze=False,
-                                    figsize=(cell * len(columns) + 0.55, (cell * height / width + 0.14) * len(lengths) + 0.3))
-        figure.subplots_adjust(left=0.55 / figure.get_figwidth(), right=1 - 0.02 / figure.get_figwidth(), bottom=0.02, top=1 - 0.3 / figure.get_figheight(),
+                                    figsize=(cell * len(columns) + 0.55, (cell * height / width + 0.14) * len(lengths) + 0.16))
+        figure.subplots_adjust(left=0.55 / figure.get_figwidth(), right=1 - 0.02 / figure.get_figwidth(), bottom=0.02, top=1 - 0.16 / figure.get_figheight(),
                                wspace=0.04, hspace=0.14 / (cell * height / width))
         for i, k in enumerate(lengths):
             for j, s in enumerate(columns):

@@ -49,16 +49,18 @@ def plot_data(experiment):
     return {"runs": experiment.runs, "colours": list(style.COLOURS), "scenes": scenes}
 
 
-def scene_data(experiment, scene):
+def scene_data(experiment, scene, full_size=False):
     """Images of one scene for page/viewer.js: the reference and the lowest seed of each run; None without any."""
     path = experiment.reference(scene)
     files = [(run, p) for run in experiment.runs if (entry := experiment.image(scene, run)) for p in entry[1:]]
     if path is None and not files:
         return None
     reference = images.read_exr(path) if path else None
-    pictures = [(run, images.read_like(p, reference) if reference is not None else images.read_exr(p)) for run, p in files]
+    like = reference if reference is not None else images.read_exr(files[0][1])
+    pictures = [(run, images.read_like(p, like)) for run, p in files]
     every = ([("reference", reference)] if reference is not None else []) + pictures
-    factor = hdr_data.factor_for(every[0][1].shape[1])
+    height, width = like.shape[:2]
+    factor = 1 if full_size else hdr_data.factor_for(width, height, len(every) * len(experiment.scenes))
     small = [(name, hdr_data.shrink(p, factor)) for name, p in every]
     height, width = small[0][1].shape[:2]
     entries = [{"name": name, "data": hdr_data.encode(p)} for name, p in small]
@@ -68,8 +70,8 @@ def scene_data(experiment, scene):
         if pictures:
             scale = images.highest_of([images.relative_error(p, small[0][1]) for _, p in small[1:]])
         if flip_maps.flip_evaluator is not None:
-            for entry, (_, picture) in zip(entries[1:], small[1:]):
-                entry["flip"] = hdr_data.encode_bytes(flip_maps.flip(picture, small[0][1])[0])
+            for entry, (_, file) in zip(entries[1:], files):
+                entry["flip"] = hdr_data.deflate(flip_maps.of_files(file, path, factor)[0].tobytes())
     return {"name": scene, "width": width, "height": height, "exposure": images.exposure(small[0][1]), "scale": scale, "shrunk": factor, "images": entries}
 
 
@@ -78,7 +80,7 @@ def scene_section(scene, data):
     if data is None:
         return "\n".join([*out, '<p class="note">No images yet.</p>'])
     if data["shrunk"] > 1:
-        out.append(f'<p class="note">Means of {data["shrunk"]}x{data["shrunk"]} pixels; the files in images/ have all of them.</p>')
+        out.append(f'<p class="note">Means of {data["shrunk"]}x{data["shrunk"]} pixels; the files in images/ have all of them, and so has a page made with --full-size.</p>')
     return "\n".join([*out, f'<div class="viewer" data-scene="{html.escape(scene)}"></div>'])
 
 
@@ -113,10 +115,10 @@ def verdict_table(lines):
     return ('<table class="said"><thead><tr><th>scene</th><th>run</th><th>convergence</th><th>bias</th></tr></thead><tbody>' + "".join(rows) + "</tbody></table>")
 
 
-def render(experiment, lines, remarks, made, out):
-    """The page as text. `made`: figures.Made, whose PNG files lie in the folder `out`."""
+def render(experiment, lines, remarks, made, out, full_size=False):
+    """The page as text. `made`: figures.Made, whose PNG files lie in the folder `out`. full_size: large images are not averaged over blocks."""
     name = html.escape(experiment.name)
-    scenes = {scene: scene_data(experiment, scene) for scene in experiment.scenes}
+    scenes = {scene: scene_data(experiment, scene, full_size) for scene in experiment.scenes}
     data = {"plot": plot_data(experiment), "scenes": {k: v for k, v in scenes.items() if v},
             "colours": {"error": table_of_colours(style.ERROR_COLOURS), "signed": table_of_colours(style.SIGNED_COLOURS)}}
     body = [f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'

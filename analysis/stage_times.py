@@ -30,7 +30,7 @@ def draw(experiment, table, units):
     stages = list(dict.fromkeys(s for t in table.values() for s in t))
     large = [s for s in stages if any(t.get(s, 0) >= SMALL * sum(t.values()) for t in table.values())]
     # More stages than colours: the largest keep theirs.
-    large = sorted(sorted(large, key=lambda s: -max(t.get(s, 0) / sum(t.values()) for t in table.values()))[:13], key=stages.index)
+    large = sorted(sorted(large, key=lambda s: -max(t.get(s, 0) / sum(t.values()) for t in table.values()))[:28], key=stages.index)
     scenes = [s for s in experiment.scenes if any(scene == s for scene, _ in table)]
     with plt.rc_context(style.STYLE):
         figure, axes, columns = style.panels(len(scenes), 0.5 + 0.26 * len(experiment.runs))
@@ -44,8 +44,8 @@ def draw(experiment, table, units):
                 shown = [(s, times.get(s, 0.0)) for s in large] + [("other", sum(v for s, v in times.items() if s not in large))]
                 left = 0.0
                 for j, (stage, value) in enumerate(shown):
-                    other = stage == "other"
-                    one.barh(y, value, left=left, height=0.66, color="0.75" if other else style.colour(j), hatch="" if other else style.HATCHES[j // 7 * 1],
+                    other = stage == "other"  # seven colours and four hatches: 28 pairs, and neighbours differ in both
+                    one.barh(y, value, left=left, height=0.66, color="0.75" if other else style.colour(j), hatch="" if other else style.HATCHES[j % 4],
                              edgecolor="white", lw=0.4, label=stage)
                     left += value
             one.set_ylim(len(experiment.runs) - 0.45, -0.55)

@@ -48,6 +48,7 @@ class Line:
     slope_time: statistics.Estimate | None  # of log RMSE against log seconds
     slope_seeds: int
     bias: bias.BiasTest | None
+    reference_error: float   # bound of the standard error of the reference's mean; NaN if unknown
     bias_z: float            # greatest |z| over seeds of "the mean differs from the reference's"
     invalid: int             # dropped values, all seeds
 
@@ -160,6 +161,7 @@ def lines(experiment):
                 slope_time=slope(experiment, scene, run, "time")[0],
                 slope_seeds=slope_seeds,
                 bias=bias.bias_test([r.bias for r in rows], reference_error),
+                reference_error=reference_error,
                 bias_z=max(abs(r.bias_z) for r in rows),
                 invalid=sum(r.invalid for r in rows)))
     return result
@@ -194,8 +196,9 @@ def verdicts(lines):
             bias_said = "bias over seeds: not tested (needs two seeds)"
         else:
             e = line.bias.estimate
+            known = "" if math.isfinite(line.reference_error) else " (the noise of the reference is unknown and counts as none)"
             bias_said = (f"mean off by {e.value:+.2e} [{e.low:+.1e}, {e.high:+.1e}]: "
-                         + ("more than chance and the noise of the reference explain" if line.bias.p < limit else "no bias found"))
+                         + ("more than chance and the noise of the reference explain" if line.bias.p < limit else "no bias found") + known)
         out[line.scene, line.run] = (slope_said, bias_said)
     return out
 

@@ -46,6 +46,8 @@ def test_wide_images_are_averaged():
     image = np.arange(24, dtype=np.float32).reshape(2, 4, 3)
     assert hdr_data.shrink(image, 2) == pytest.approx(image.mean(axis=(0, 1)).reshape(1, 1, 3) + np.array([[[-3]], [[3]]]).reshape(1, 2, 1))
     assert [hdr_data.factor_for(w) for w in (100, 1280, 1281, 3840)] == [1, 1, 2, 3]
+    assert hdr_data.factor_for(1280, 720, 5) == 1 and hdr_data.factor_for(1280, 720, 30) == 2
+    assert hdr_data.shrink(image, 1) is image
 
 
 def test_page_is_self_contained_and_escaped(page_file):
