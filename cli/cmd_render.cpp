@@ -10,6 +10,7 @@
 #include "core/progress.h"
 #include "experiments/drive.h"
 #include "experiments/statistics.h"
+#include "experiments/technique_files.h"
 #include "film/exr_io.h"
 #include "film/png_io.h"
 
@@ -19,7 +20,7 @@ namespace {
 struct Options {
     SceneOptions scene;
     RenderOptions render;
-    std::string output, png, json;
+    std::string output, png, json, techniques;
     std::optional<uint64_t> spp;
     std::optional<double> time;
     std::optional<float> exposure;
@@ -34,6 +35,10 @@ void check(const Options& o) {
     check_writable(o.output);
     if (!o.png.empty()) check_writable(o.png);
     if (!o.json.empty() && o.json != "-") check_writable(o.json);
+    if (!o.techniques.empty()) {
+        make_folders(o.techniques);
+        check_writable(o.techniques + "/techniques.json");
+    }
 }
 
 /// What --strict objects to; empty if nothing.
@@ -52,7 +57,8 @@ std::string objection(const RenderStats& stats) {
 int render(const Options& o) {
     check(o);
     const LoadedScene loaded = load_scene(o.scene);
-    const RenderSettings settings = o.render.settings(loaded.scene);
+    RenderSettings settings = o.render.settings(loaded.scene);
+    if (!o.techniques.empty() && settings.technique_depth == 0) settings.technique_depth = kDefaultTechniqueDepth;
     const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
 
     Budget budget;
@@ -75,6 +81,7 @@ int render(const Options& o) {
         write_exr(o.output, image, image_attributes(loaded.scene, settings, stats));
         if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
     }
+    if (position.samples > 0 && !o.techniques.empty()) write_technique_images(o.techniques, loaded.scene, settings, stats, renderer->technique_images());
     if (!o.json.empty()) {
         nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
         json["interrupted"] = position.interrupted;
@@ -107,6 +114,7 @@ void add_render(CLI::App& app, Run& run) {
     command.add_option("--exposure", o->exposure, "Stops by which the PNG is brightened");
     command.add_option("--spp", o->spp, "Samples per pixel. Default: the scene's");
     command.add_option("--time", o->time, "Seconds of wall clock to render instead of --spp");
+    command.add_option("--technique-images", o->techniques, "Folder for raw and weighted images of every strategy (s,t) up to 6 segments, or --set technique_depth=N")->type_name("DIR");
     command.add_flag("--strict", o->strict, "Fail (exit code 4) if invalid values or lost queue items were counted");
     command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
     command.callback([o, png, &run] {

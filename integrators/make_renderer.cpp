@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "integrators/bidirectional/bidirectional.h"
@@ -16,6 +18,9 @@ std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings
     apply_setting(checked, "accel", settings.accel);
     if (settings.variant != "wavefront" && settings.integrator != "bdpt")
         throw Error(ExitCode::usage, "variant=" + settings.variant + ": integrator " + settings.integrator + " has the variant wavefront only; megakernel and lvc belong to bdpt");
+    if (settings.technique_depth > 0 && (settings.integrator == "path" || settings.variant == "megakernel"))
+        throw Error(ExitCode::usage, fmt::format("technique_depth={}: {} gathers no images of single strategies; integrator light and the other variants of bdpt do", settings.technique_depth,
+                                                 settings.integrator == "path" ? "integrator path" : "variant megakernel"));
     const bool cuda = settings.backend == "cuda" || (settings.backend == "auto" && settings.accel != "embree" && cuda_available());
     if (cuda && settings.accel == "embree") throw Error(ExitCode::usage, "accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
     if (cuda && settings.deterministic && settings.variant == "lvc")

@@ -11,6 +11,7 @@
 #include "film/moments.h"
 #include "scene/scene.h"
 #include "stages/path_policy.h"
+#include "stages/techniques.h"
 #include "transport/bidirectional.h"
 
 namespace ambilux {
@@ -23,6 +24,8 @@ struct RenderSettings {
     Estimator estimator = Estimator::mis;
     MisHeuristic heuristic = MisHeuristic::balance;
     uint32_t strategies = kAllStrategies;  ///< bdpt: StrategyBits
+    SingleStrategies singles;            ///< bdpt: if on, these and not the groups
+    uint32_t technique_depth = 0;        ///< light, bdpt: segments up to which images of single strategies are gathered (Renderer::technique_images)
     uint32_t connections = 3;            ///< bdpt, variant lvc: light vertices that an eye vertex draws
     int max_depth = -1;                  ///< segments of a path; -1 is unbounded
     int rr_depth = 5;                    ///< Russian roulette starts at this many segments; a value < 0 turns it off
@@ -72,6 +75,13 @@ struct RenderStats {
     std::vector<std::string> skipped;     ///< stages and kernel parts that this scene does not need
 };
 
+/// What one strategy found, mean over the samples rendered so far: width x height x 3 values, row-major from the top left.
+struct TechniqueImage {
+    uint32_t s, t;
+    std::vector<float> raw, weighted;  ///< without and with the weight of multiple importance sampling
+    uint64_t dropped;                  ///< values left out as no numbers or too large for the sums
+};
+
 /// A render in progress. Not thread-safe; `interrupt` may be set from a signal handler.
 class Renderer {
 public:
@@ -83,6 +93,8 @@ public:
     virtual FilmMoments film() = 0;
     virtual void clear_film() = 0;
     virtual RenderStats stats() = 0;
+    /// With RenderSettings::technique_depth: images of all strategies up to there. Sums of all samples since the start, cleared films included.
+    virtual std::vector<TechniqueImage> technique_images() { return {}; }
     /// A count for render() after which a caller should look at clocks and signals again: about 0.2 s of work, at least 1.
     virtual uint32_t preferred_batch() const = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <optional>
 #include <vector>
 
 #include "core/error.h"
@@ -32,20 +33,64 @@ Integer integer(const std::string& key, const std::string& value, Integer lowest
     return result;
 }
 
-/// Names joined by '+', such as "hits+next_event".
-uint32_t strategies(const std::string& key, const std::string& value) {
-    if (value == "all") return kAllStrategies;
+/// The strategy that "s2t3" names, if that is how `name` is built.
+std::optional<Strategy> single_strategy(const std::string& name) {
+    const char *at = name.data(), *end = at + name.size();
+    const auto number = [&](char letter, uint32_t& n) {
+        if (at == end || *at != letter) return false;
+        const auto parsed = std::from_chars(at + 1, end, n);
+        at = parsed.ptr;
+        return parsed.ec == std::errc() && n <= SingleStrategies::kMaxSegments + 1;
+    };
+    uint32_t s = 0, t = 0;
+    if (!number('s', s) || !number('t', t) || at != end) return {};
+    return Strategy::make(s, t);
+}
+
+/// The group that samples a strategy.
+uint32_t group_of(Strategy strategy) {
+    if (strategy.s() == 0) return kHitStrategies;
+    if (strategy.t() == 1) return kLightStrategies;
+    return strategy.s() == 1 ? kNextEventStrategies : kConnectionStrategies;
+}
+
+/// Names joined by '+': groups, such as "hits+next_event", or single strategies, such as "s1t2+s2t2".
+void set_strategies(RenderSettings& settings, const std::string& key, const std::string& value) {
+    if (value == "all") {
+        settings.strategies = kAllStrategies;
+        settings.singles = {};
+        return;
+    }
     const std::vector<std::string> names = {"hits", "next_event", "connections", "light"};
     uint32_t bits = 0;
+    SingleStrategies singles;
+    std::fill(std::begin(singles.s), std::end(singles.s), SingleStrategies::kNone);
+    bool groups = false;
     for (size_t start = 0; start <= value.size();) {
         const size_t end = std::min(value.find('+', start), value.size());
         const std::string name = value.substr(start, end - start);
-        const auto at = std::find(names.begin(), names.end(), name);
-        if (at == names.end()) refuse(key, value, fmt::format("'{}' is none of {}; join them with '+', or write all", name, fmt::join(names, ", ")));
-        bits |= 1u << (at - names.begin());
         start = end + 1;
+        if (const auto strategy = single_strategy(name)) {
+            const uint32_t s = strategy->s(), t = strategy->t();
+            if (t == 0 || s + t < 2 || strategy->segments() > SingleStrategies::kMaxSegments)
+                refuse(key, value, fmt::format("'{}': t is at least 1, and s + t from 2 to {}", name, SingleStrategies::kMaxSegments + 1));
+            uint8_t& slot = singles.s[strategy->segments()];
+            if (slot != SingleStrategies::kNone && slot != s)
+                refuse(key, value, fmt::format("'{}' and 's{}t{}' sample the same paths; single strategies have weight 1, so only one for each s + t can be on", name, slot, s + t - slot));
+            slot = uint8_t(s);
+            singles.on = true;
+            bits |= group_of(*strategy);
+            continue;
+        }
+        const auto at = std::find(names.begin(), names.end(), name);
+        if (at == names.end())
+            refuse(key, value, fmt::format("'{}' is none of {} and no single strategy such as s2t3; join them with '+', or write all", name, fmt::join(names, ", ")));
+        bits |= 1u << (at - names.begin());
+        groups = true;
     }
-    return bits;
+    if (groups && singles.on) refuse(key, value, "groups and single strategies cannot be mixed");
+    settings.strategies = bits;
+    settings.singles = singles;
 }
 
 bool boolean(const std::string& key, const std::string& value) { return choose(key, value, {"false", "true"}) == 1; }
@@ -64,7 +109,9 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
     else if (key == "heuristic")
         s.heuristic = MisHeuristic(choose(key, value, {"balance", "power"}));
     else if (key == "strategies")
-        s.strategies = strategies(key, value);
+        set_strategies(s, key, value);
+    else if (key == "technique_depth")
+        s.technique_depth = integer<uint32_t>(key, value, 0, kMaxTechniqueDepth);
     else if (key == "connections")
         s.connections = integer<uint32_t>(key, value, 1, kMaxCacheDraws);
     else if (key == "max_depth")
@@ -85,7 +132,7 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.graph = boolean(key, value);
     else
         throw Error(ExitCode::usage,
-                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, connections, max_depth, rr_depth, seed, accel, wave_size, specialise, deterministic, graph", key));
+                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, connections, max_depth, rr_depth, seed, accel, wave_size, specialise, deterministic, graph", key));
 }
 
 }  // namespace ambilux

@@ -13,6 +13,8 @@ struct Accumulate {
     Queue<Contribution> contributions;
     Lane* samples;
     StageRecord* record;
+    Wave wave = {};
+    TechniqueFilm techniques = {};
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const Contribution c = contributions.load(i);
@@ -21,6 +23,7 @@ struct Accumulate {
         memcpy(&sum, &samples[c.path], sizeof(sum));
         sum += c.value;
         memcpy(&samples[c.path], &sum, sizeof(sum));
+        techniques.arrive(wave, c.path, c.value);
     }
 };
 

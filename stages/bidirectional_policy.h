@@ -1,6 +1,7 @@
 // What a light tracer or bidirectional path tracer does where, decided once by the host.
 #pragma once
 
+#include "stages/techniques.h"
 #include "transport/bidirectional.h"
 
 namespace ambilux {
@@ -19,6 +20,13 @@ struct BidirectionalPolicy {
     bool background_only;     ///< eye walks end at their first vertex: they serve the directly seen environment, which no light walk finds
     bool megakernel;          ///< variant: one thread per slot instead of stages
     bool hide_emitters;       ///< the camera does not see emitters
+    SingleStrategies singles;
+    uint32_t technique_depth; ///< segments up to which images of single strategies are gathered; 0: none
+
+    /// True if what strategy (s,t) finds is to be counted.
+    AMBILUX_HD bool wants(uint32_t s, uint32_t t) const { return singles.has(Strategy::make(s, t)); }
+    /// The sum of the other strategies for one that is alone.
+    AMBILUX_HD float others(float sum) const { return singles.on ? 0.0f : sum; }
 };
 
 }  // namespace ambilux

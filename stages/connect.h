@@ -43,7 +43,7 @@ struct Connect {
         // Only BSDF sampling and a hit could find this light too.
         const bool other = policy.estimator == Estimator::mis && !light.delta;
 
-        ConnectCandidate out = {value, c.path, light.pdf_sa, other ? scatter_pdf<F>(s, light.wi) : 0.0f, 0, environment ? kTowardsEnvironment : kInfinity, {}, 0, light.wi, 0};
+        ConnectCandidate out = {value, c.path, light.pdf_sa, other ? scatter_pdf<F>(s, light.wi) : 0.0f, 0, environment ? kTowardsEnvironment : kInfinity, {}, {}, light.wi, 0};
         out.o = offset_ray_origin(point.p, point.p_error, point.ng, light.wi);
         if (light.distance < kInfinity) {
             // Both ends are moved off their surfaces by their error, so the segment between them is open at either end.

@@ -66,8 +66,10 @@ struct EyeShade {
 
 private:
     AMBILUX_HD void emit(const WalkHit& h, Rgb radiance, float others) const {
+        const Strategy strategy = Strategy::make(0, h.ray.bits.depth() + 1);
+        if (!policy.singles.has(strategy)) return;
         const Rgb value = h.ray.throughput * radiance;
-        if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.ray.path, 1.0f, others, {0, 0}});
+        if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.ray.path, 1.0f, policy.others(others), strategy, 0});
     }
 };
 
@@ -85,14 +87,14 @@ struct EyeConnect {
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
         if (item.previous != kNone) pairs.push(item);
-        if (!policy.next_event) return;
         const uint32_t depth = item.bits.depth();
+        if (!policy.next_event || !policy.wants(1, depth + 1)) return;
         const RngKey key = wave.key(item.path);
         const WalkVertex z = unpack_vertex<F>(scene, item);
         WalkConnection c;
         if (!connect_next_event<F>(scene, policy.mis, z, item.throughput, random_floats(key, emitter_block(depth)), c)) return;
         if (!is_light(c.value, record) || is_zero(c.value)) return;
-        candidates.push({c.value, item.path, 1.0f, c.others, F.opacity ? alpha_seed(key, depth, true) : 0, c.tmax, c.o, 0, c.d, 0});
+        candidates.push({c.value, item.path, 1.0f, policy.others(c.others), F.opacity ? alpha_seed(key, depth, true) : 0, c.tmax, c.o, Strategy::make(1, depth + 1), c.d, 0});
     }
 };
 
@@ -100,6 +102,8 @@ struct EyeConnect {
 template <Features F>
 AMBILUX_HD void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const VertexItem& item, const VertexItem& light, float scale,
                                 uint32_t which, const Queue<ConnectCandidate>& candidates, StageRecord* record) {
+    const Strategy strategy = Strategy::make(light.bits.depth() + 1, item.bits.depth() + 1);
+    if (!policy.singles.has(strategy)) return;
     const WalkVertex z = unpack_vertex<F>(scene, item), y = unpack_vertex<F>(scene, light);
     WalkConnection c;
     if (!connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
@@ -107,7 +111,7 @@ AMBILUX_HD void push_connection(const SceneView& scene, const BidirectionalPolic
     if (!is_light(c.value, record) || is_zero(c.value)) return;
     uint32_t seed = 0;
     if constexpr (F.opacity) seed = alpha_seed(key, item.bits.depth() + (which << WalkBits::kDepthBits), true);
-    candidates.push({c.value, item.path, 1.0f, c.others, seed, c.tmax, c.o, 0, c.d, 0});
+    candidates.push({c.value, item.path, 1.0f, policy.others(c.others), seed, c.tmax, c.o, strategy, c.d, 0});
 }
 
 /// connect_vertices: an eye vertex and one vertex of the light walk of its slot (s, t >= 2); what is left of that walk is for the next launch, so that no launch

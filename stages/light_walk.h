@@ -29,11 +29,11 @@ struct LightGenerate {
         if (!sample_emission<F>(scene, random_floats(key, kEmissionBlock), {direction.x, direction.y}, e)) return;
         const Walk w = start_light_walk(e);
         if (!is_light(w.throughput, record)) return;
-        if (policy.splat && !policy.hide_emitters) {
+        if (policy.splat && !policy.hide_emitters && policy.wants(1, 1)) {
             WalkConnection c;
             Vec2f film;
             if (connect_visible_light<F>(scene, policy.mis, e, {direction.z, direction.w}, c, film) && is_light(c.value, record) && !is_zero(c.value))
-                splats.push({c.value, slot, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, 0, true) : 0, film, c.others, 0});
+                splats.push({c.value, slot, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, 0, true) : 0, film, policy.others(c.others), Strategy::make(1, 1)});
         }
         if (policy.max_depth >= 2) rays.push(pack_walk(w, slot, true, kInfinity));
     }
@@ -60,7 +60,7 @@ struct LightShade {
         if (w.depth >= policy.max_depth) return;
         if (bsdf_is_smooth(y.scattering.bsdf)) {
             VertexItem item = pack_vertex(h, y, kNone);
-            if (policy.splat) camera_vertices.push(item);
+            if (policy.splat && policy.wants(w.depth + 1, 1)) camera_vertices.push(item);
             if (policy.connect_vertices && w.depth + 2 <= policy.max_depth) {
                 item.previous = last_vertex[h.ray.path];
                 last_vertex[h.ray.path] = vertices.push(item);
@@ -93,7 +93,8 @@ struct ConnectCamera {
         Vec2f film;
         if (!connect_camera<F>(scene, policy.mis, y, item.throughput, {u.x, u.y}, c, film)) return;
         if (!is_light(c.value, record) || is_zero(c.value)) return;
-        splats.push({c.value, item.path, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, item.bits.depth(), true) : 0, film, c.others, 0});
+        splats.push({c.value, item.path, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, item.bits.depth(), true) : 0, film, policy.others(c.others),
+                     Strategy::make(item.bits.depth() + 1, 1)});
     }
 };
 

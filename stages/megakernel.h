@@ -65,7 +65,7 @@ private:
 
     AMBILUX_HD void push_splat(WalkConnection c, Vec2f film, uint32_t slot, const RngKey& key, uint32_t depth, StageId maker, Counts& counts) const {
         const Rgb value = visible(c, key, depth, maker, counts);
-        if (!is_zero(value)) splats.push({value, slot, film, {0, 0}});
+        if (!is_zero(value)) splats.push({value, slot, film, {}, 0.0f});
     }
 
     /// The nearest hit of the walk's ray; false if there is none.

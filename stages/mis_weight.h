@@ -19,11 +19,14 @@ struct WeightHits {
     Queue<HitCandidate> candidates;
     Queue<Contribution> contributions;
     StageRecord* record;
+    TechniqueFilm techniques = {};
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const HitCandidate c = candidates.load(i);
         const Rgb value = c.value * mis_weight(policy, c.pdf_this, c.pdf_other);
-        if (is_light(value, record) && !is_zero(value)) contributions.push({value, c.path});
+        if (!is_light(value, record) || is_zero(value)) return;
+        techniques.remember(c.path, c.value, c.strategy);
+        contributions.push({value, c.path});
     }
 };
 
@@ -33,11 +36,14 @@ struct WeightConnections {
     Queue<ConnectCandidate> candidates;
     Queue<ShadowItem> shadows;
     StageRecord* record;
+    TechniqueFilm techniques = {};
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const ConnectCandidate c = candidates.load(i);
         const Rgb value = c.value * mis_weight(policy, c.pdf_this, c.pdf_other);
-        if (is_light(value, record) && !is_zero(value)) shadows.push({value, c.path, c.o, c.tmax, c.d, c.alpha_seed});
+        if (!is_light(value, record) || is_zero(value)) return;
+        techniques.remember(c.path, c.value, c.strategy);
+        shadows.push({value, c.path, c.o, c.tmax, c.d, c.alpha_seed});
     }
 };
 

@@ -3,6 +3,7 @@
 
 #include "queues/queue.h"
 #include "scene/ray.h"
+#include "stages/techniques.h"
 
 namespace ambilux {
 
@@ -62,7 +63,8 @@ struct HitCandidate {
     Rgb value;
     uint32_t path;
     float pdf_this, pdf_other;  ///< densities of BSDF sampling and of emitter sampling; pdf_other is 0 when only hits can find this light
-    uint32_t pad[2];
+    Strategy strategy;  ///< bidirectional methods
+    uint32_t pad;
 };
 
 /// `tmax` of a ray towards the environment: its value lacks the radiance, which is looked up only if the way is free.
@@ -76,9 +78,9 @@ struct ConnectCandidate {
     uint32_t alpha_seed;
     float tmax;  ///< or kTowardsEnvironment
     Vec3f o;
-    uint32_t pad0;
+    Strategy strategy;  ///< bidirectional methods
     Vec3f d;
-    uint32_t pad1;
+    uint32_t pad;
 };
 
 /// A ray towards an emitter and what it is worth if it is free.

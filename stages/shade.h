@@ -53,7 +53,7 @@ private:
     AMBILUX_HD void emit(const HitItem& h, Rgb radiance, float pdf_other) const {
         if (policy.estimator == Estimator::nee && pdf_other > 0.0f) return;  // found by the connection
         const Rgb value = h.throughput * radiance;
-        if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.path, h.pdf_sa, pdf_other, {0, 0}});
+        if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.path, h.pdf_sa, pdf_other, {}, 0});
     }
 
     AMBILUX_HD void scatter(const HitItem& h, const SurfacePoint& point, const Scattering& s, uint32_t depth) const {

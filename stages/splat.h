@@ -2,38 +2,13 @@
 #pragma once
 
 #include "stages/bidirectional_policy.h"
+#include "stages/fixed_point.h"
 #include "stages/stage.h"
 #include "stages/walk_items.h"
 #include "stages/wave.h"
 #include "transport/sensor/filter.h"
 
 namespace ambilux {
-
-/// One unit of the fixed-point sums: a pixel holds up to 6.7e7 per sample in steps of 1.5e-11.
-constexpr double kSplatUnit = 0x1p-36;
-
-AMBILUX_HD void add_fixed(int64_t* sum, int64_t value) {
-#if defined(__CUDA_ARCH__)
-    atomicAdd(reinterpret_cast<unsigned long long*>(sum), static_cast<unsigned long long>(value));
-#else
-    __atomic_fetch_add(sum, value, __ATOMIC_RELAXED);
-#endif
-}
-
-/// Splats of this value and more look at the sum that they are added to: below, a pixel would have to meet 2^20 of them in one sample to wrap around.
-constexpr float kLargeSplat = 64.0f;
-
-/// Adds a large value, unless the sum could wrap around some time: then false.
-AMBILUX_HD bool add_large_fixed(int64_t* sum, int64_t value) {
-#if defined(__CUDA_ARCH__)
-    const auto before = static_cast<int64_t>(atomicAdd(reinterpret_cast<unsigned long long*>(sum), static_cast<unsigned long long>(value)));
-#else
-    const int64_t before = __atomic_fetch_add(sum, value, __ATOMIC_RELAXED);
-#endif
-    if (before >= 0 && before < (int64_t(1) << 62) - value) return true;
-    add_fixed(sum, -value);
-    return false;
-}
 
 struct WeightSplats {
     Queue<SplatCandidate> candidates, weighted;
@@ -67,7 +42,7 @@ struct OccludeSplats {
     AMBILUX_HD void finish(uint32_t i, bool blocked) const {
         if (blocked) return;
         const SplatCandidate c = candidates.load(i);
-        splats.push({c.value, c.path, c.film, {0, 0}});
+        splats.push({c.value, c.path, c.film, c.strategy, c.others});
     }
     AMBILUX_HD void operator()(uint32_t i) const {
         Ray ray;
@@ -81,6 +56,7 @@ struct Splat {
     Wave wave;
     Queue<SplatItem> splats;
     int64_t* sums;  ///< 3 per pixel and sample of the wave
+    TechniqueFilm techniques;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
@@ -92,27 +68,12 @@ struct Splat {
         for (int32_t py = y0 > 0 ? y0 : 0; py <= y1 && py < int32_t(wave.height); ++py)
             for (int32_t px = x0 > 0 ? x0 : 0; px <= x1 && px < int32_t(wave.width); ++px) {
                 const float weight = filter_value(scene, {x - (float(px) + 0.5f), y - (float(py) + 0.5f)});
-                if (weight > 0.0f) add(item.value * weight, (uint64_t(sample) * wave.height + uint32_t(py)) * wave.width + uint32_t(px));
+                if (!(weight > 0.0f)) continue;
+                const Rgb value = item.value * weight;
+                const uint32_t pixel = uint32_t(py) * wave.width + uint32_t(px);
+                if (!add_light(sums + (uint64_t(sample) * wave.height * wave.width + pixel) * 3, value)) count_one(&record->inf);
+                techniques.add(wave, item.strategy, pixel, value * (1.0f + item.others), value);
             }
-    }
-
-private:
-    AMBILUX_HD void add(Rgb value, uint64_t pixel) const {
-        // What does not fit is counted as infinite, not wrapped.
-        if (!(max_component(value) < 0x1p26f)) {
-            count_one(&record->inf);
-            return;
-        }
-        bool fits = true;
-        for (int c = 0; c < 3; ++c) {
-            int64_t* sum = sums + pixel * 3 + uint32_t(c);
-            const int64_t fixed = llrint(double(value[c]) / kSplatUnit);
-            if (value[c] < kLargeSplat)
-                add_fixed(sum, fixed);
-            else
-                fits = add_large_fixed(sum, fixed) && fits;
-        }
-        if (!fits) count_one(&record->inf);
     }
 };
 
@@ -135,7 +96,7 @@ struct DevelopSplats {
             int64_t* light = splats + (uint64_t(k) * wave.height * wave.width + p.pixel) * 3;
             double value[3];
             for (int c = 0; c < 3; ++c) {
-                value[c] = double(eye[c]) + double(light[c]) * kSplatUnit;
+                value[c] = double(eye[c]) + double(light[c]) * kLightUnit;
                 light[c] = 0;
             }
             if (!is_light({float(value[0]), float(value[1]), float(value[2])}, record)) continue;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "stages/path_items.h"
+#include "stages/techniques.h"
 #include "transport/walk.h"
 
 namespace ambilux {
@@ -50,7 +51,7 @@ struct SplatCandidate {
     uint32_t alpha_seed;
     Vec2f film;        ///< position in pixels of the full film
     float others;      ///< weight = 1 / (1 + others)
-    uint32_t pad;
+    Strategy strategy;
 };
 
 /// Light that arrived on the film.
@@ -58,7 +59,8 @@ struct SplatItem {
     Rgb value;
     uint32_t path;
     Vec2f film;
-    uint32_t pad[2];
+    Strategy strategy;
+    float others;      ///< what it was weighted by
 };
 
 AMBILUX_HD Ray ray_of(const WalkItem& r) { return {r.o, r.bits.depth() == 1 ? r.tmax : kInfinity, r.d, 0}; }

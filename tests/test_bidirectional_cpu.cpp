@@ -532,17 +532,17 @@ struct SplatFilm {
                 {"light"}) {}
     void add(std::initializer_list<std::pair<Rgb, Vec2f>> items) {
         for (const auto& [value, film] : items) {
-            bench.memory.splats.push({value, 0, film, {0, 0}});
+            bench.memory.splats.push({value, 0, film, {}, 0.0f});
         }
         const Bench::Stages s = bench.stages();
         const uint32_t n = bench.memory.splats.counter->size();
         for (uint32_t i = 0; i < n; ++i) s.splat(i);
         bench.memory.splats.counter->finish();
     }
-    double at(uint32_t x, uint32_t y, uint32_t c = 0) const { return double(bench.splats[(size_t(y) * bench.wave.width + x) * 3 + c]) * kSplatUnit; }
+    double at(uint32_t x, uint32_t y, uint32_t c = 0) const { return double(bench.splats[(size_t(y) * bench.wave.width + x) * 3 + c]) * kLightUnit; }
     double total() const {
         double t = 0;
-        for (size_t i = 0; i < bench.splats.size(); i += 3) t += double(bench.splats[i]) * kSplatUnit;
+        for (size_t i = 0; i < bench.splats.size(); i += 3) t += double(bench.splats[i]) * kLightUnit;
         return t;
     }
 };

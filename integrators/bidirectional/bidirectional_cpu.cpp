@@ -70,6 +70,8 @@ public:
             moments_.sum_squares.resize(values);
             samples_of_slots_.resize(film_wave_.slot_count());
             splats_.resize(values);
+            techniques_.resize(technique_values(policy_, values / 3));
+            technique_dropped_.resize(technique_count(policy_.technique_depth));
             const double mean = policy_.light_walks ? mean_light_vertices<F>(view_, accel_->tracer(), policy_, settings.seed) : 0.0;
             plan_cache(policy_, mean);
             waves_.resize(size_t(threads));
@@ -118,7 +120,7 @@ public:
         add_records(total, film_records_);
         std::vector<const QueueCounter*> counters;
         s.memory_bytes = scene_.memory_bytes() + accel_->memory_bytes() + (moments_.sum.size() + moments_.sum_squares.size()) * sizeof(double) +
-                         splats_.size() * sizeof(int64_t) + samples_of_slots_.size() * sizeof(Lane);
+                         (splats_.size() + techniques_.size()) * sizeof(int64_t) + samples_of_slots_.size() * sizeof(Lane);
         const Layout* largest = &waves_[0].layout;
         for (const WaveMemory& w : waves_) {
             add_records(total, w.queues.records);
@@ -135,6 +137,8 @@ public:
         return s;
     }
 
+    std::vector<TechniqueImage> technique_images() override { return ambilux::technique_images(policy_.technique_depth, samples_, techniques_, technique_dropped_); }
+
     uint32_t preferred_batch() const override { return batch_of(render_seconds_, samples_); }
 
 private:
@@ -146,7 +150,7 @@ private:
         using Tracer = decltype(accel_->tracer());
         for (;;) {
             const BidirectionalMemory& m = memory.queues;
-            const BidirectionalFilm film = {samples_of_slots_.data() + size_t(first_tile) * kTilePixels, splats_.data(), nullptr, nullptr};
+            const BidirectionalFilm film = {samples_of_slots_.data() + size_t(first_tile) * kTilePixels, splats_.data(), nullptr, nullptr, techniques_.empty() ? nullptr : techniques_.data(), technique_dropped_.data()};
             const BidirectionalStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, m, film);
             CpuExecutor executor(m.state, m.records);
             *m.state = {first_tile, sample, 1, 0, 0, 0, active_pixels(wave_, first_tile)};
@@ -185,7 +189,8 @@ private:
     std::optional<Accel> accel_;
     std::vector<WaveMemory> waves_;
     std::vector<Lane> samples_of_slots_;
-    std::vector<int64_t> splats_;
+    std::vector<int64_t> splats_, techniques_;
+    std::vector<uint64_t> technique_dropped_;
     FilmMoments moments_;
     uint64_t samples_ = 0;
     double build_seconds_ = 0, render_seconds_ = 0;

@@ -39,6 +39,12 @@ public:
         splats_ = DeviceBuffer<int64_t>(values_ * wave_.samples, "splats");
         samples_of_slots_ = DeviceBuffer<Lane>(wave_.slot_count(), "samples");
         splats_.zero();
+        if (policy_.technique_depth > 0) {
+            techniques_ = DeviceBuffer<int64_t>(technique_values(policy_, values_ / 3), "images of single strategies");
+            technique_dropped_ = DeviceBuffer<uint64_t>(technique_count(policy_.technique_depth));
+            techniques_.zero();
+            technique_dropped_.zero();
+        }
         clock_ = DeviceBuffer<uint64_t>(1);
         clear_film();
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
@@ -115,6 +121,11 @@ public:
         return s;
     }
 
+    std::vector<TechniqueImage> technique_images() override {
+        if (policy_.technique_depth == 0) return {};
+        return ambilux::technique_images(policy_.technique_depth, samples_, techniques_.download(), technique_dropped_.download());
+    }
+
     uint32_t preferred_batch() const override { return batch_of(render_seconds_, samples_); }
 
 private:
@@ -123,7 +134,7 @@ private:
     static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
     uint64_t fixed_bytes() const {
-        return device_scene_->bytes() + device_accel_->bytes() + sum_.bytes() + sum_squares_.bytes() + splats_.bytes() + samples_of_slots_.bytes() + clock_.bytes();
+        return device_scene_->bytes() + device_accel_->bytes() + sum_.bytes() + sum_squares_.bytes() + splats_.bytes() + techniques_.bytes() + samples_of_slots_.bytes() + clock_.bytes();
     }
 
     /// Queues for `kept` light vertices, and the graph that uses them.
@@ -142,7 +153,7 @@ private:
         for (size_t q = 0; q < counters.size(); ++q) counters[q].capacity = layout.queue_capacities()[q];
         cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
         stages_.emplace(device_scene_->view(), device_accel_->tracer(), policy_, wave_, queues_,
-                        BidirectionalFilm{samples_of_slots_.data(), splats_.data(), sum_.data(), sum_squares_.data()});
+                        BidirectionalFilm{samples_of_slots_.data(), splats_.data(), sum_.data(), sum_squares_.data(), techniques_.data(), technique_dropped_.data()});
         executor_.emplace(stream_, queues_.state, queues_.records, clock_.data());
         if (graph_) cudaGraphExecDestroy(graph_);
         graph_ = nullptr;
@@ -195,7 +206,8 @@ private:
     std::optional<DeviceCwbvh> device_accel_;
     DeviceBuffer<std::byte> memory_;
     DeviceBuffer<double> sum_, sum_squares_;
-    DeviceBuffer<int64_t> splats_;
+    DeviceBuffer<int64_t> splats_, techniques_;
+    DeviceBuffer<uint64_t> technique_dropped_;
     DeviceBuffer<Lane> samples_of_slots_;
     DeviceBuffer<uint64_t> clock_;
     BidirectionalMemory queues_{};

@@ -13,9 +13,16 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     BidirectionalPolicy p{};
     p.mis.heuristic = settings.heuristic;
     p.mis.strategies = settings.integrator == "light" ? uint32_t(kLightStrategies) : settings.strategies;
+    p.singles = settings.integrator == "light" ? SingleStrategies{} : settings.singles;
     p.mis.light_paths = float(scene.sensor.crop_width) * float(scene.sensor.crop_height);
     p.max_depth = settings.max_depth < 0 ? WalkBits::kMaxDepth : uint32_t(settings.max_depth);
     p.rr_depth = settings.rr_depth < 0 ? ~0u : uint32_t(settings.rr_depth);
+    if (p.singles.on) {
+        uint32_t longest = SingleStrategies::kMaxSegments;
+        while (longest > 0 && p.singles.s[longest] == SingleStrategies::kNone) --longest;
+        p.max_depth = std::min(p.max_depth, longest);
+    }
+    p.technique_depth = std::min(settings.technique_depth, p.max_depth);
     const bool emitters = !scene.emitters.empty();
     const bool area = std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return e.type == EmitterType::area; });
     p.splat = emitters && p.mis.has(kLightStrategies);
@@ -31,6 +38,26 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     p.background_only = p.mis.strategies == kLightStrategies;
     p.hide_emitters = scene.integrator.hide_emitters;
     return p;
+}
+
+std::vector<TechniqueImage> technique_images(uint32_t max_depth, uint64_t samples, const std::vector<int64_t>& sums, const std::vector<uint64_t>& dropped) {
+    std::vector<TechniqueImage> images;
+    if (max_depth == 0) return images;
+    const size_t values = sums.size() / 2 / technique_count(max_depth);
+    const double scale = samples ? kLightUnit / double(samples) : 0.0;
+    for (uint32_t k = 1; k <= max_depth; ++k) {
+        for (uint32_t s = 0; s <= k; ++s) {
+            const uint32_t technique = technique_index(Strategy::make(s, k + 1 - s));
+            TechniqueImage image = {s, k + 1 - s, std::vector<float>(values), std::vector<float>(values), dropped[technique]};
+            const int64_t* raw = sums.data() + 2 * technique * values;
+            for (size_t i = 0; i < values; ++i) {
+                image.raw[i] = float(double(raw[i]) * scale);
+                image.weighted[i] = float(double(raw[values + i]) * scale);
+            }
+            images.push_back(std::move(image));
+        }
+    }
+    return images;
 }
 
 std::vector<std::string> skipped_strategies(const Scene& scene, const BidirectionalPolicy& policy, const Features& kernels) {

@@ -41,6 +41,7 @@ struct BidirectionalMemory {
     Queue<ShadowItem> shadows;
     Queue<Contribution> shadow_contributions;
     uint32_t* last_vertex;
+    Lane* raw;  ///< TechniqueFilm::raw
 };
 
 /// Memory of the megakernel, whose walks live in registers. Other queues are empty.
@@ -79,6 +80,7 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     m.shadows = layout.queue<ShadowItem>("shadows", m.counters, when(connections));
     m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, when(connections));
     m.last_vertex = layout.take<uint32_t>(slots);
+    m.raw = layout.take<Lane>(policy.technique_depth ? slots : 0);
     return m;
 }
 
@@ -87,7 +89,15 @@ struct BidirectionalFilm {
     Lane* samples;
     int64_t* splats;
     double *sum, *sum_squares;
+    int64_t* techniques = nullptr;         ///< TechniqueFilm::sums
+    uint64_t* technique_dropped = nullptr;
 };
+
+/// Values of TechniqueFilm::sums for a film of `pixels`.
+inline uint64_t technique_values(const BidirectionalPolicy& policy, uint64_t pixels) { return uint64_t(technique_count(policy.technique_depth)) * 2 * pixels * 3; }
+
+/// Means of what `sums` gathered.
+std::vector<TechniqueImage> technique_images(uint32_t max_depth, uint64_t samples, const std::vector<int64_t>& sums, const std::vector<uint64_t>& dropped);
 
 /// The stages over one wave, ready to launch.
 template <Features F, class Tracer>
@@ -124,27 +134,28 @@ struct BidirectionalStages {
         PathPolicy sums{};
         sums.estimator = Estimator::mis;
         sums.heuristic = MisHeuristic::balance;
+        const TechniqueFilm techniques = {film.techniques, m.raw, film.technique_dropped, policy.technique_depth};
         light_generate = {scene, wave, policy, m.rays, m.splat_candidates, m.last_vertex, record(StageId::light_generate)};
         light_extend = {scene, tracer, wave, Stream::light, false, m.rays, m.hits, record(StageId::light_extend)};
         light_shade = {scene, wave, policy, m.hits, m.rays, m.light_vertices, m.vertices, m.last_vertex, record(StageId::light_shade)};
         connect_camera = {scene, wave, policy, m.vertices, m.splat_candidates, record(StageId::connect_camera)};
         weight_splats = {m.splat_candidates, m.weighted_splats, record(StageId::mis_weight)};
         occlude_splats = {scene, tracer, m.weighted_splats, m.splats, record(StageId::occlude)};
-        splat = {scene, wave, m.splats, film.splats, record(StageId::splat)};
+        splat = {scene, wave, m.splats, film.splats, techniques, record(StageId::splat)};
         generate = {scene, wave, policy, m.rays, film.samples, record(StageId::generate)};
         extend = {scene, tracer, wave, Stream::eye, policy.count_environment, m.rays, m.hits, record(StageId::extend)};
         shade = {scene, wave, policy, m.hits, m.rays, m.hit_candidates, m.vertices, m.last_vertex, record(StageId::shade)};
-        weight_hits = {sums, m.hit_candidates, m.hit_contributions, record(StageId::mis_weight)};
-        accumulate_hits = {m.hit_contributions, film.samples, record(StageId::accumulate)};
+        weight_hits = {sums, m.hit_candidates, m.hit_contributions, record(StageId::mis_weight), techniques};
+        accumulate_hits = {m.hit_contributions, film.samples, record(StageId::accumulate), wave, techniques};
         connect = {scene, wave, policy, m.vertices, m.pairs, m.connect_candidates, record(StageId::connect)};
         connect_vertices = {scene, wave, policy, m.pairs, m.rest, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
         connect_rest = {scene, wave, policy, m.rest, m.pairs, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
         connect_cache = {scene, wave, policy, m.pairs, m.rest, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
         connect_cache_rest = {scene, wave, policy, m.rest, m.pairs, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
         megakernel = {scene, tracer, wave, policy, m.light_vertices, m.splats, film.samples, m.records};
-        weight_connections = {sums, m.connect_candidates, m.shadows, record(StageId::mis_weight)};
+        weight_connections = {sums, m.connect_candidates, m.shadows, record(StageId::mis_weight), techniques};
         occlude = {scene, tracer, m.shadows, m.shadow_contributions, record(StageId::occlude)};
-        accumulate_shadows = {m.shadow_contributions, film.samples, record(StageId::accumulate)};
+        accumulate_shadows = {m.shadow_contributions, film.samples, record(StageId::accumulate), wave, techniques};
         develop = {wave, film.samples, film.splats, film.sum, film.sum_squares, record(StageId::develop)};
     }
 };
