@@ -20,12 +20,12 @@ def label(run, base):
 def ratio_ticks(low, high):
     """Ticks of a logarithmic axis of ratios, few enough to read: 1 is one of them."""
     decades = math.log10(high / low)
-    subs = (1,) if decades > 3 else (1, 3) if decades > 1.6 else (1, 2, 5) if decades > 0.7 else (1, 1.2, 1.5, 2, 3, 5, 7, 8, 9)
+    subs = (1,) if decades > 3 else (1, 3) if decades > 1.6 else (1, 2, 5) if decades > 0.7 else (1, 1.5, 2, 3, 5, 7) if decades > 0.3 else (1, 1.2, 1.5, 2, 3, 5, 7, 8, 9)
     return [s * 10.0**e for e in range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1) for s in subs if low <= s * 10.0**e <= high]
 
 
-def draw_bars(axes, experiment, scene, bars, first):
-    """One scene: bars from 1 to the speed-up. `bars`: (run, Speedup or None)."""
+def draw_bars(axes, experiment, scene, bars, first, biased):
+    """One scene: bars from 1 to the speed-up. `bars`: (run, Speedup or None); `biased`: summary.biased."""
     axes.set_title(style.wrap(scene, 30))
     known = [s.estimate for _, s in bars if s]
     ends = [e for s in known for e in (s.value, s.low, s.high) if math.isfinite(e)] + [1.0]
@@ -45,7 +45,7 @@ def draw_bars(axes, experiment, scene, bars, first):
         if math.isfinite(e.low):
             axes.plot([e.low, e.high], [i, i], color="black", lw=0.9, zorder=3, solid_capstyle="butt")
             axes.plot([e.low, e.high], [i, i], color="black", ls="none", marker="|", ms=5, mew=0.9, zorder=3)
-        far = "*" if s.extrapolated > summary.FAR else ""
+        far = summary.marks(s, (scene, run) in biased or (scene, experiment.base) in biased)
         axes.text(1.02, i, f"{style.short_number(e.value)}{far}", transform=axes.get_yaxis_transform(), va="center", ha="left", fontsize=7)
     axes.axvline(1, color="black", lw=0.8, zorder=4)
     axes.set_ylim(len(bars) - 0.4, -0.6)
@@ -62,11 +62,12 @@ def draw_bars(axes, experiment, scene, bars, first):
 
 
 def draw(experiment):
+    biased = summary.biased(summary.lines(experiment))
     with plt.rc_context(style.STYLE):
         count = len(experiment.scenes)
         figure, axes, columns = style.panels(count, 0.55 + 0.24 * len(experiment.others))
         for i, (one, scene) in enumerate(zip(axes, experiment.scenes)):
-            draw_bars(one, experiment, scene, [(run, summary.speedup(experiment, scene, run)) for run in experiment.others], i % columns == 0)
+            draw_bars(one, experiment, scene, [(run, summary.speedup(experiment, scene, run)) for run in experiment.others], i % columns == 0, biased)
     return figure
 
 
@@ -78,7 +79,8 @@ def make(experiment):
         "ablation", draw(experiment), f"Speed-up over the run {experiment.base} at equal error",
         f"Bars: time that {experiment.base} needs for an RMSE, over the time that the run needs for the same; right of 1 is faster. Geometric mean over pairs of "
         "equal seeds; whiskers: 95 % confidence interval (Student's, on logarithms). The error is the greatest last error of all seeds of both runs; a star "
-        f"marks times extrapolated by more than a factor of {summary.FAR:g} along slope −1/2. "
+        f"marks times extrapolated by more than a factor of {summary.FAR:g} along slope −1/2; a dagger that the mean of the run or of {experiment.base} is off by more than chance allows, so that the ratio depends on the "
+        "error at which it is taken. "
         "The run that others are compared with is that of [ablation] in the configuration, else the first.",
         experiment.runs, experiment.scenes)
 

@@ -18,23 +18,26 @@ INSET_COLOURS = (style.COLOURS[1], style.COLOURS[4])  # vermilion and sky blue: 
 
 
 def choose_insets(reference, renderings, count=INSETS):
-    """(x, y, size) of the square windows in which the renderings' errors differ most from each other; they do not overlap.
+    """(x, y, size) of the square windows in which the renderings' errors differ most from each other and there is something to see; they lie half their size apart or more.
 
-    Score of a window: standard deviation over runs of log(mean relative error + 0.05). Candidates lie on a grid of a third of their size.
+    Score of a window: standard deviation over runs of log(mean relative error + 0.05), times 0.1 + the standard deviation of the reference's grey as shown,
+    so that of two windows that tell the methods apart alike the one with an edge or a highlight wins over the bare wall. Candidates lie on a grid of a third of their size.
     """
     height, width = reference.shape[:2]
     size = max(4, min(height, width) // 4)
     maps = [np.nan_to_num(images.relative_error(p, reference), posinf=1.0) for p in renderings]
     step = max(1, size // 3)
+    grey = images.tone_map(reference, images.exposure(reference)).mean(axis=2) / 255
     scored = []
     for y in range(0, height - size + 1, step):
         for x in range(0, width - size + 1, step):
             errors = [float(m[y:y + size, x:x + size].mean()) for m in maps]
             score = np.std(np.log(np.array(errors) + 0.05)) if len(errors) > 1 else errors[0]
-            scored.append((-float(score), x, y))
+            contrast = float(grey[y:y + size, x:x + size].std())
+            scored.append((-float(score) * (0.1 + contrast), x, y))
     chosen = []
     for _, x, y in sorted(scored):
-        if all(abs(x - a) >= size or abs(y - b) >= size for a, b, _ in chosen):
+        if all(abs(x - a) >= 1.5 * size or abs(y - b) >= 1.5 * size for a, b, _ in chosen):
             chosen.append((x, y, size))
         if len(chosen) == count:
             break
@@ -124,7 +127,7 @@ def make(experiment, scene, insets=None):
     """Yields the scene's figures, RUNS_PER_FIGURE runs in each. `insets`: [(x, y, size)] in pixels, or None to choose them."""
     reference, shown = load(experiment, scene)
     chosen = insets or choose_insets(reference, [image for _, _, image in shown])
-    how = "chosen by hand" if insets else "chosen where the runs' errors differ most from each other"
+    how = "chosen by hand" if insets else "chosen where the runs' errors differ most from each other and the reference has contrast"
     for part in range(0, len(shown), RUNS_PER_FIGURE):
         some = shown[part:part + RUNS_PER_FIGURE]
         yield style.Picture(

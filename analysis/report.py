@@ -126,7 +126,7 @@ def render(experiment, lines, remarks, made, out, full_size=False):
             '<nav><a href="#images">Images</a><a href="#convergence">Convergence</a><a href="#table">Table</a><a href="#figures">Figures</a>'
             '<a href="#manifest">Manifest</a></nav>']
     if remarks:
-        body += ['<div class="remarks"><b>Before you believe the figures</b><ul>', *(f"<li>{html.escape(r)}</li>" for r in remarks), "</ul></div>"]
+        body += ['<div class="remarks"><b>Before you believe the figures</b><ul>', *(f"<li>{html.escape(minus(r))}</li>" for r in remarks), "</ul></div>"]
     body += ['<h2 id="images">Images</h2>', '<p class="note">Of the lowest seed, at the end of the run. Wheel: zoom; drag: pan; double click: twice as large. '
              "With an image focused: 1–9 or ← → change it, f flips to the one before.</p>"]
     body += [scene_section(scene, found) for scene, found in scenes.items()]

@@ -176,6 +176,21 @@ def bias_threshold(tests, level=LEVEL):
     return NormalDist().inv_cdf(1 - level / tests / 2)
 
 
+def is_biased(line, lines):
+    """Whether the means of single seeds or the mean over seeds differ from the reference's by more than chance at LEVEL over all lines."""
+    return line.bias_z > bias_threshold(sum(x.seeds for x in lines)) or (line.bias is not None and line.bias.p < LEVEL / len(lines))
+
+
+def biased(lines):
+    """{(scene, run)} of those."""
+    return {(line.scene, line.run) for line in lines if is_biased(line, lines)}
+
+
+def marks(speedup, biased):
+    """What stands after a speed-up that is not to be taken at its word: * for extrapolated times, † if it compares with an error that bias keeps up."""
+    return ("*" if speedup.extrapolated > FAR else "") + ("†" if biased else "")
+
+
 def slope_p(line):
     """Chance of a slope as far from -1/2; NaN with less than two seeds."""
     return math.nan if line.slope is None else statistics.two_sided_p(line.slope.value, line.slope.error, SLOPES["rmse"], line.slope_seeds)

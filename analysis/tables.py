@@ -6,14 +6,14 @@ import io
 import math
 import re
 
-from analysis.summary import FAR
+from analysis import summary
 
 CAPTION = (
     "Each run at the last checkpoint that all runs of the scene have reached. RMSE, relMSE and efficiency are geometric means over "
     "seeds, with the noise of the reference subtracted where it is known (RMSE weighs bright pixels, relMSE all alike, and methods may rank differently by "
     "them); time is the arithmetic mean, inside the renderer. "
     "Efficiency is 1 / (relMSE · time). The speed-up over {base} is the ratio of times to equal RMSE, with a 95 % interval from pairs of equal "
-    "seeds; a star marks times extrapolated by more than a factor of 4. The slope is that of log RMSE against log samples, fitted for each seed; ± is "
+    "seeds; a star marks times extrapolated by more than a factor of 4, a dagger that the mean of one of both runs is off by more than chance allows. The slope is that of log RMSE against log samples, fitted for each seed; ± is "
     "the standard error of the mean over seeds (with one seed that of the fit, which is then too small)."
 )
 
@@ -34,12 +34,12 @@ def interval(e):
     return number(e.value) if math.isnan(e.low) else f"{number(e.value)} [{number(e.low, 2)}, {number(e.high, 2)}]"
 
 
-def speedup_text(line, is_base):
-    if is_base:
+def speedup_text(line, base, biased):
+    if line.run == base:
         return "1"
     if line.speedup is None:
         return "–"
-    return interval(line.speedup.estimate) + ("*" if line.speedup.extrapolated > FAR else "")
+    return interval(line.speedup.estimate) + summary.marks(line.speedup, (line.scene, line.run) in biased or (line.scene, base) in biased)
 
 
 def slope_text(line):
@@ -49,11 +49,11 @@ def slope_text(line):
     return f"{s.value:.3f}" if math.isnan(s.error) else f"{s.value:.3f} ± {s.error:.3f}"
 
 
-def cells(line, is_base):
+def cells(line, base, biased):
     """What a person reads, in the order of HEADINGS."""
     return [line.scene, line.run, str(line.seeds), number(line.spp), number(line.seconds), number(line.rmse.value),
             number(line.relmse.value), number(line.efficiency.value),
-            speedup_text(line, is_base), slope_text(line)]
+            speedup_text(line, base, biased), slope_text(line)]
 
 
 HEADINGS = ("scene", "run", "seeds", "spp", "time (s)", "RMSE", "relMSE", "efficiency", "speed-up [95 %]", "slope")
@@ -93,7 +93,7 @@ def variances_to_csv(rows):
 
 def latex_escape(text):
     special = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"} | {c: "\\" + c for c in "&%$#_{}"}
-    symbols = {"±": r"$\pm$", "–": "--", "−": "$-$", "·": r"$\cdot$", "≥": r"$\geq$", "×": r"$\times$"}
+    symbols = {"±": r"$\pm$", "–": "--", "−": "$-$", "·": r"$\cdot$", "†": r"$^\dagger$", "≥": r"$\geq$", "×": r"$\times$"}
     return "".join(special.get(c) or symbols.get(c) or c for c in text)
 
 
@@ -109,9 +109,10 @@ def to_latex(lines, base):
     """A tabular for \\usepackage{booktabs}; scenes are separated by \\midrule, the best efficiency of each scene is bold."""
     out = [r"% Needs \usepackage{booktabs}. " + latex_escape(CAPTION.format(base=base)), r"\begin{tabular}{ll" + "r" * (len(HEADINGS) - 2) + "}", r"\toprule",
            " & ".join(latex_escape(h) for h in HEADINGS) + r" \\"]
-    scene = None
+    scene, biased = None, summary.biased(lines)
     for line in lines:
-        row = [latex_escape(c) for c in cells(line, line.run == base)[:2]] + [latex_number(c) for c in cells(line, line.run == base)[2:]]
+        row = cells(line, base, biased)
+        row = [latex_escape(c) for c in row[:2]] + [latex_number(c) for c in row[2:]]
         if line.scene != scene:
             out.append(r"\midrule")
         else:
@@ -164,9 +165,9 @@ def latex_text(cell):
 def to_html(lines, base):
     head = "".join(f"<th>{html.escape(h)}</th>" for h in (*HEADINGS, "Mrays/s", "bias |z|"))
     out = [f"<table><thead><tr>{head}</tr></thead><tbody>"]
-    scene = None
+    scene, biased = None, summary.biased(lines)
     for line in lines:
-        row = [html.escape(c).replace("-", "−") if i > 1 else html.escape(c) for i, c in enumerate(cells(line, line.run == base))]
+        row = [html.escape(c).replace("-", "−") if i > 1 else html.escape(c) for i, c in enumerate(cells(line, base, biased))]
         row += [number(line.rays_per_second / 1e6), f"{line.bias_z:.1f}"]
         if line is best(lines, line.scene):
             row[7] = f"<b>{row[7]}</b>"

@@ -89,6 +89,10 @@ def test_verdicts_say_what_the_data_say(tmp_path):
     assert "no departure" in said["naive"][0] and "no bias found" in said["naive"][1]
     assert "differs from −1/2" in said["nee"][0] and "no bias found" in said["nee"][1]
     assert "no departure" in said["mis"][0] and "more than chance" in said["mis"][1]
+    # Speed-ups that compare with a biased run are marked.
+    assert summary.biased(lines) == {("box", "mis")}
+    marked = [row for row in tables.to_latex(lines, "naive").splitlines() if r"]$^\dagger$" in row]
+    assert len(marked) == 1 and "& mis" in marked[0]
 
 
 def test_slopes_leave_out_what_the_noise_of_the_reference_hides(tmp_path):
