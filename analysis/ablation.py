@@ -79,8 +79,8 @@ def make(experiment):
         "ablation", draw(experiment), f"Speed-up over the run {experiment.base} at equal error",
         f"Bars: time that {experiment.base} needs for an RMSE, over the time that the run needs for the same; right of 1 is faster. Geometric mean over pairs of "
         "equal seeds; whiskers: 95 % confidence interval (Student's, on logarithms). The error is the greatest last error of all seeds of both runs; a star "
-        f"marks times extrapolated by more than a factor of {summary.FAR:g} along slope −1/2; a dagger that the mean of the run or of {experiment.base} is off by more than chance allows, so that the ratio depends on the "
-        "error at which it is taken. "
+        f"marks times extrapolated by more than a factor of {summary.FAR:g} along slope −1/2; a dagger that the mean of the run or of {experiment.base} is off "
+        "by more than chance allows, so that the ratio depends on the error at which it is taken. "
         "The run that others are compared with is that of [ablation] in the configuration, else the first.",
         experiment.runs, experiment.scenes)
 
@@ -117,7 +117,8 @@ def draw_sweep(experiment, entries, key):
         figure, axes = plt.subplots(figsize=(style.COLUMN, 2.3), layout="constrained")
         for i, scene in enumerate(experiment.scenes):
             first = summary.series(experiment, scene, entries[0][1])
-            found = [(at, s.estimate) for at, (_, run) in zip(x, entries) if (s := equal_error.speedup(first, summary.series(experiment, scene, run)))]
+            speedups = [equal_error.speedup(first, summary.series(experiment, scene, run)) for _, run in entries]
+            found = [(at, s.estimate) for at, s in zip(x, speedups) if s]
             if not found:
                 continue
             at, values = zip(*sorted(found, key=lambda pair: pair[0]))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.colors import LogNorm
 
 from analysis import experiment as experiments, images, strategy_variance, style
 
@@ -99,7 +100,7 @@ def make(experiment, scene, run):
         if not pictures:
             continue
         figure, factors = draw(pictures, kind)
-        how = ("times its MIS weight; the pictures of all rows together add up to the image. Each row below the brightest is exposed one stop more, as in Veach's figure"
+        how = ("times its MIS weight; all pictures together add up to the light of these path lengths in the image. Each row below the brightest is exposed one stop more, as in Veach's figure"
                if kind == "weighted" else "without a weight: each is an estimate of its own of the light of its path length, as far as it can sample it. Each row has an "
                "exposure of its own")
         yield style.Picture(
@@ -135,17 +136,20 @@ def make_variance(experiment, scene, run):
     table = np.array([[cells.get((s, k + 1 - s), math.nan) for s in columns] for k in lengths])
     with plt.rc_context(style.STYLE):
         figure, axes = plt.subplots(figsize=(min(style.PAGE, 0.62 * len(columns) + 1.4), 0.3 * len(lengths) + 0.75), layout="constrained")
-        drawn = axes.imshow(100 * table, cmap="cividis", aspect="auto", vmin=0)
-        top = float(np.nanmax(table))
+        top = max(100 * float(np.nanmax(table)), 1e-9)
+        # Logarithmic over four decades: a few strategies often hold nearly all of the variance.
+        drawn = axes.imshow(np.clip(100 * table, 1e-4 * top, None), cmap="cividis", aspect="auto", norm=LogNorm(1e-4 * top, top))
         for i, k in enumerate(lengths):
             for j, s in enumerate(columns):
-                if math.isfinite(table[i, j]):
-                    axes.text(j, i, f"{100 * table[i, j]:.1f}", ha="center", va="center", fontsize=6.5, color="black" if table[i, j] > 0.55 * top else "white")
+                share = 100 * table[i, j]
+                if math.isfinite(share):
+                    text = "0" if share == 0 else "<0.01" if share < 0.01 else style.short_number(share, 2)
+                    axes.text(j, i, text, ha="center", va="center", fontsize=6.5, color="black" if share > 3e-2 * top else "white")
         axes.set_xticks(range(len(columns)), columns)
         axes.set_yticks(range(len(lengths)), lengths)
         axes.set_xlabel("s: vertices from the light")
         axes.set_ylabel("k: segments")
-        figure.colorbar(drawn, label="% of the sum of variances")
+        figure.colorbar(drawn, label="% of the sum of variances", extend="min")
     yield style.Picture(
         style.file_name("strategy_variance", scene, run), figure, f"Variance of the strategies of {run} on {scene}",
         f"Unbiased variance over {max(n for *_, n in found)} seeds of each weighted strategy's image, times spp, mean over pixels and channels, as a share of the sum over "

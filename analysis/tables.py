@@ -9,12 +9,12 @@ import re
 from analysis import summary
 
 CAPTION = (
-    "Each run at the last checkpoint that all runs of the scene have reached. RMSE, relMSE and efficiency are geometric means over "
-    "seeds, with the noise of the reference subtracted where it is known (RMSE weighs bright pixels, relMSE all alike, and methods may rank differently by "
-    "them); time is the arithmetic mean, inside the renderer. "
-    "Efficiency is 1 / (relMSE · time). The speed-up over {base} is the ratio of times to equal RMSE, with a 95 % interval from pairs of equal "
-    "seeds; a star marks times extrapolated by more than a factor of 4, a dagger that the mean of one of both runs is off by more than chance allows. The slope is that of log RMSE against log samples, fitted for each seed; ± is "
-    "the standard error of the mean over seeds (with one seed that of the fit, which is then too small)."
+    "Each run at the last checkpoint that all runs of the scene have reached. RMSE, relMSE and efficiency are geometric means over seeds, with "
+    "the noise of the reference subtracted where it is known (RMSE weighs bright pixels, relMSE all alike, and methods may rank differently by "
+    "them); time is the arithmetic mean, inside the renderer. Efficiency is 1 / (relMSE · time). The speed-up over {base} is the ratio of times"
+    " to equal RMSE, with a 95 % interval from pairs of equal seeds; a star marks times extrapolated by more than a factor of 4, a dagger that "
+    "the mean of one of both runs is off by more than chance allows. The slope is that of log RMSE against log samples, fitted for each seed; ±"
+    " is the standard error of the mean over seeds (with one seed that of the fit, which is then too small)."
 )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis import __main__ as program
-from analysis import ablation, captions, comparison, error_maps, experiment, figures, flip_maps, images, pyramid, stage_times, style
+from analysis import ablation, captions, comparison, error_maps, experiment, flip_maps, images, pyramid, stage_times, style
 from analysis.tests import synthetic
 
 RUNS = (("nee", 0.7, 1.5), ("lvc[connections=1]", 0.5, 2.0), ("lvc[connections=4]", 0.4, 3.0))

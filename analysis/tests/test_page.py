@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis import __main__ as program
-from analysis import experiment, figures, hdr_data, images, report, style, summary
+from analysis import experiment, figures, hdr_data, images, report, summary
 from analysis.tests import synthetic
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
