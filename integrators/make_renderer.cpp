@@ -17,7 +17,7 @@ std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings
     apply_setting(checked, "backend", settings.backend);
     apply_setting(checked, "accel", settings.accel);
     if (settings.variant != "wavefront" && settings.integrator != "bdpt")
-        throw Error(ExitCode::usage, "variant=" + settings.variant + ": integrator " + settings.integrator + " has the variant wavefront only; megakernel and lvc belong to bdpt");
+        throw Error(ExitCode::usage, "variant=" + settings.variant + ": integrator " + settings.integrator + " has the variant wavefront only; megakernel, lvc and streaming belong to bdpt");
     if (settings.technique_depth > 0 && (settings.integrator == "path" || settings.variant == "megakernel"))
         throw Error(ExitCode::usage, fmt::format("technique_depth={}: {} gathers no images of single strategies; integrator light and the other variants of bdpt do", settings.technique_depth,
                                                  settings.integrator == "path" ? "integrator path" : "variant megakernel"));

@@ -101,7 +101,7 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
     if (key == "integrator")
         s.integrator = (choose(key, value, {"path", "light", "bdpt"}), value);
     else if (key == "variant")
-        s.variant = (choose(key, value, {"wavefront", "megakernel", "lvc"}), value);
+        s.variant = (choose(key, value, {"wavefront", "megakernel", "lvc", "streaming"}), value);
     else if (key == "backend")
         s.backend = (choose(key, value, {"auto", "cpu", "cuda"}), value);
     else if (key == "estimator")

@@ -19,6 +19,7 @@ struct BidirectionalPolicy {
     bool count_environment;   ///< eye walks count the environment
     bool background_only;     ///< eye walks end at their first vertex: they serve the directly seen environment, which no light walk finds
     bool megakernel;          ///< variant: one thread per slot instead of stages
+    uint32_t stream_slots;    ///< variant streaming: slots in flight; 0: another variant
     bool hide_emitters;       ///< the camera does not see emitters
     SingleStrategies singles;
     uint32_t technique_depth; ///< segments up to which images of single strategies are gathered; 0: none

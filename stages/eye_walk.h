@@ -25,6 +25,45 @@ struct EyeGenerate {
     }
 };
 
+/// An eye walk at `h`: emission becomes a candidate.
+template <Features F>
+AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, const Queue<HitCandidate>& candidates, StageRecord* record) {
+    const auto emit = [&](Rgb radiance, float others) {
+        const Strategy strategy = Strategy::make(0, h.ray.bits.depth() + 1);
+        if (!policy.singles.has(strategy)) return;
+        const Rgb value = h.ray.throughput * radiance;
+        if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.ray.path, 1.0f, policy.others(others), strategy, 0});
+    };
+    WalkStep step = {};
+    Walk w = unpack_walk(h.ray);
+    const bool visible = !(policy.hide_emitters && w.depth == 1);
+    if (h.prim == kNone) {
+        if constexpr (F.has_environment())
+            if (policy.count_environment && visible) emit(environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
+        return step;
+    }
+    if (policy.background_only) return step;
+    const WalkVertex z = eye_vertex<F>(scene, policy.mis, w, h.prim, h.u, h.v);
+    const uint32_t emitter = scene.shapes[z.point.shape].emitter;
+    if (policy.count_hits && visible && emitter != kNone) {
+        const Rgb radiance = emitted_radiance<F>(scene, emitter, z.point, -w.d);
+        if (!is_zero(radiance)) emit(radiance, others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, z.point));
+    }
+    if (w.depth >= policy.max_depth) return step;
+    if ((policy.next_event || policy.connect_vertices) && bsdf_is_smooth(z.scattering.bsdf)) {
+        step.vertex = pack_vertex(h, z, kNone);
+        step.connectable = true;
+    }
+    const uint32_t depth = w.depth;
+    // The last segment can bring emission only.
+    if (depth + 1 == policy.max_depth && !policy.count_hits && !policy.count_environment) return step;
+    const Vec4f u = random_floats(wave.key(h.ray.path), scatter_block(depth));
+    if (!scatter_walk<F>(policy.mis, z, u, TransportMode::radiance, policy.rr_depth, w) || !is_light(w.throughput, record)) return step;
+    step.ray = pack_walk(w, h.ray.path, false, kInfinity);
+    step.goes_on = true;
+    return step;
+}
+
 template <Features F>
 struct EyeShade {
     SceneView scene;
@@ -39,37 +78,12 @@ struct EyeShade {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const WalkHit h = hits.load(i);
-        Walk w = unpack_walk(h.ray);
-        const bool visible = !(policy.hide_emitters && w.depth == 1);
-        if (h.prim == kNone) {
-            if (policy.count_environment && visible)
-                emit(h, environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
-            return;
+        WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record);
+        if (step.connectable) {
+            if (policy.connect_vertices) step.vertex.previous = policy.cache_draws > 0 ? policy.cache_draws : last_vertex[h.ray.path];
+            vertices.push(step.vertex);
         }
-        if (policy.background_only) return;
-        const WalkVertex z = eye_vertex<F>(scene, policy.mis, w, h.prim, h.u, h.v);
-        const uint32_t emitter = scene.shapes[z.point.shape].emitter;
-        if (policy.count_hits && visible && emitter != kNone) {
-            const Rgb radiance = emitted_radiance<F>(scene, emitter, z.point, -w.d);
-            if (!is_zero(radiance)) emit(h, radiance, others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, z.point));
-        }
-        if (w.depth >= policy.max_depth) return;
-        if ((policy.next_event || policy.connect_vertices) && bsdf_is_smooth(z.scattering.bsdf))
-            vertices.push(pack_vertex(h, z, !policy.connect_vertices ? kNone : policy.cache_draws > 0 ? policy.cache_draws : last_vertex[h.ray.path]));
-        const uint32_t depth = w.depth;
-        // The last segment can bring emission only.
-        if (depth + 1 == policy.max_depth && !policy.count_hits && !policy.count_environment) return;
-        const Vec4f u = random_floats(wave.key(h.ray.path), scatter_block(depth));
-        if (!scatter_walk<F>(policy.mis, z, u, TransportMode::radiance, policy.rr_depth, w)) return;
-        if (is_light(w.throughput, record)) rays.push(pack_walk(w, h.ray.path, false, kInfinity));
-    }
-
-private:
-    AMBILUX_HD void emit(const WalkHit& h, Rgb radiance, float others) const {
-        const Strategy strategy = Strategy::make(0, h.ray.bits.depth() + 1);
-        if (!policy.singles.has(strategy)) return;
-        const Rgb value = h.ray.throughput * radiance;
-        if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.ray.path, 1.0f, policy.others(others), strategy, 0});
+        if (step.goes_on) rays.push(step.ray);
     }
 };
 

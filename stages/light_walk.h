@@ -8,6 +8,52 @@
 
 namespace ambilux {
 
+/// Which of the light walks of a path this is: paired walks have one, numbered 0; streams start one for every eye vertex.
+struct LightWalkNumber {
+    uint32_t n;
+
+    /// Random numbers of walk 0 are those of paired walks.
+    AMBILUX_HD uint32_t block(uint32_t block_of_first) const { return block_of_first + (n << 16); }
+    AMBILUX_HD uint32_t alpha_depth(uint32_t depth) const { return depth + (n << WalkBits::kDepthBits); }
+};
+
+/// Starts light walk `number` of `path`; walk 0 also shows the emitter itself to the camera. False if there is no first ray.
+template <Features F>
+AMBILUX_HD bool start_light(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, uint32_t path, LightWalkNumber number, const Queue<SplatCandidate>& splats,
+                            StageRecord* record, Walk& w) {
+    const RngKey key = wave.key(path, Stream::light);
+    const Vec4f direction = random_floats(key, number.block(kEmissionBlock + 1));
+    EmissionSample e;
+    if (!sample_emission<F>(scene, random_floats(key, number.block(kEmissionBlock)), {direction.x, direction.y}, e)) return false;
+    w = start_light_walk(e);
+    if (!is_light(w.throughput, record)) return false;
+    if (number.n == 0 && policy.splat && !policy.hide_emitters && policy.wants(1, 1)) {
+        WalkConnection c;
+        Vec2f film;
+        if (connect_visible_light<F>(scene, policy.mis, e, {direction.z, direction.w}, c, film) && is_light(c.value, record) && !is_zero(c.value))
+            splats.push({c.value, path, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, 0, true) : 0, film, policy.others(c.others), Strategy::make(1, 1)});
+    }
+    return policy.max_depth >= 2;
+}
+
+/// A light walk at `h`, where it may have `longest` segments in all. Its vertex is connectable wherever the BSDF is.
+template <Features F>
+AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, LightWalkNumber number, uint32_t longest, StageRecord* record) {
+    WalkStep step = {};
+    Walk w = unpack_walk(h.ray);
+    const WalkVertex y = light_vertex<F>(scene, policy.mis, w, h.prim, h.u, h.v);
+    if (bsdf_is_smooth(y.scattering.bsdf)) {
+        step.vertex = pack_vertex(h, y, kNone);
+        step.connectable = true;
+    }
+    if (w.depth >= longest) return step;
+    const Vec4f u = random_floats(wave.key(h.ray.path, Stream::light), number.block(light_scatter_block(w.depth)));
+    if (!scatter_walk<F>(policy.mis, y, u, TransportMode::importance, policy.rr_depth, w) || !is_light(w.throughput, record)) return step;
+    step.ray = pack_walk(w, h.ray.path, true, kInfinity);
+    step.goes_on = true;
+    return step;
+}
+
 /// One light walk per slot, and the emitter itself as the camera sees it.
 template <Features F>
 struct LightGenerate {
@@ -21,21 +67,9 @@ struct LightGenerate {
 
     AMBILUX_HD void operator()(uint32_t slot) const {
         last_vertex[slot] = kNone;
-        const PathSlot p = wave.locate(slot);
-        if (!p.active || policy.max_depth == 0) return;
-        const RngKey key = wave.key(p, Stream::light);
-        const Vec4f direction = random_floats(key, kEmissionBlock + 1);
-        EmissionSample e;
-        if (!sample_emission<F>(scene, random_floats(key, kEmissionBlock), {direction.x, direction.y}, e)) return;
-        const Walk w = start_light_walk(e);
-        if (!is_light(w.throughput, record)) return;
-        if (policy.splat && !policy.hide_emitters && policy.wants(1, 1)) {
-            WalkConnection c;
-            Vec2f film;
-            if (connect_visible_light<F>(scene, policy.mis, e, {direction.z, direction.w}, c, film) && is_light(c.value, record) && !is_zero(c.value))
-                splats.push({c.value, slot, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, 0, true) : 0, film, policy.others(c.others), Strategy::make(1, 1)});
-        }
-        if (policy.max_depth >= 2) rays.push(pack_walk(w, slot, true, kInfinity));
+        if (!wave.locate(slot).active || policy.max_depth == 0) return;
+        Walk w;
+        if (start_light<F>(scene, wave, policy, slot, {0}, splats, record, w)) rays.push(pack_walk(w, slot, true, kInfinity));
     }
 };
 
@@ -54,23 +88,17 @@ struct LightShade {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const WalkHit h = hits.load(i);
-        Walk w = unpack_walk(h.ray);
-        const WalkVertex y = light_vertex<F>(scene, policy.mis, w, h.prim, h.u, h.v);
+        const uint32_t depth = h.ray.bits.depth();
         // A path has at least one segment more than its light walk.
-        if (w.depth >= policy.max_depth) return;
-        if (bsdf_is_smooth(y.scattering.bsdf)) {
-            VertexItem item = pack_vertex(h, y, kNone);
-            if (policy.splat && policy.wants(w.depth + 1, 1)) camera_vertices.push(item);
-            if (policy.connect_vertices && w.depth + 2 <= policy.max_depth) {
-                item.previous = last_vertex[h.ray.path];
-                last_vertex[h.ray.path] = vertices.push(item);
+        WalkStep step = light_step<F>(scene, wave, policy, h, {0}, policy.max_depth - 1, record);
+        if (step.connectable && depth < policy.max_depth) {
+            if (policy.splat && policy.wants(depth + 1, 1)) camera_vertices.push(step.vertex);
+            if (policy.connect_vertices && depth + 2 <= policy.max_depth) {
+                step.vertex.previous = last_vertex[h.ray.path];
+                last_vertex[h.ray.path] = vertices.push(step.vertex);
             }
         }
-        if (w.depth + 1 >= policy.max_depth) return;
-        const uint32_t depth = w.depth;
-        const Vec4f u = random_floats(wave.key(h.ray.path, Stream::light), light_scatter_block(depth));
-        if (!scatter_walk<F>(policy.mis, y, u, TransportMode::importance, policy.rr_depth, w)) return;
-        if (is_light(w.throughput, record)) rays.push(pack_walk(w, h.ray.path, true, kInfinity));
+        if (step.goes_on) rays.push(step.ray);
     }
 };
 

@@ -63,6 +63,13 @@ struct SplatItem {
     float others;      ///< what it was weighted by
 };
 
+/// What became of a walk at a hit: a vertex that connections may use, and the ray with which it goes on.
+struct WalkStep {
+    VertexItem vertex;  ///< VertexItem::previous is the caller's to set
+    WalkItem ray;
+    bool connectable = false, goes_on = false;
+};
+
 AMBILUX_HD Ray ray_of(const WalkItem& r) { return {r.o, r.bits.depth() == 1 ? r.tmax : kInfinity, r.d, 0}; }
 AMBILUX_HD WalkHit hit_of(const WalkItem& r, const Hit& hit) { return {r, hit.u, hit.v, hit.prim, 0}; }
 

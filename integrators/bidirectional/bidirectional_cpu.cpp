@@ -63,6 +63,7 @@ public:
         film_wave_ = wave_;
         film_wave_.tiles = (tile_count(wave_) + wave_.tiles - 1) / wave_.tiles * wave_.tiles;
         film_wave_.state = &film_state_;
+        if (settings.variant == "streaming") policy_.stream_slots = std::max(kTilePixels, wave_.slot_count() / 4);
         const uint64_t values = uint64_t(wave_.width) * wave_.height * 3;
         try {
             accel_.emplace(scene);
@@ -72,7 +73,7 @@ public:
             splats_.resize(values);
             techniques_.resize(technique_values(policy_, values / 3));
             technique_dropped_.resize(technique_count(policy_.technique_depth));
-            const double mean = policy_.light_walks ? mean_light_vertices<F>(view_, accel_->tracer(), policy_, settings.seed) : 0.0;
+            const double mean = policy_.light_walks && !policy_.stream_slots ? mean_light_vertices<F>(view_, accel_->tracer(), policy_, settings.seed) : 0.0;
             plan_cache(policy_, mean);
             waves_.resize(size_t(threads));
             for (WaveMemory& w : waves_) w.allocate(wave_.slot_count(), planned_vertices(mean, wave_.slot_count()), policy_);

@@ -30,6 +30,11 @@ public:
         const uint32_t slots = wave_.tiles * kTilePixels;
         // Samples that share a cache of light vertices depend on each other, but by one part in the number of light walks only.
         wave_.samples = std::max(1u, (settings.wave_size ? settings.wave_size : kWaveSize) / slots);
+        if (settings.variant == "streaming") {
+            // Enough paths for each slot that the last ones, which leave slots idle, matter little.
+            policy_.stream_slots = settings.wave_size ? settings.wave_size : kStreamSlots;
+            wave_.samples = std::max<uint32_t>(1, uint32_t(std::min<uint64_t>(8ull * policy_.stream_slots, kLightRay - 1) / slots));
+        }
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         const CwbvhAccel accel(scene);
         device_scene_.emplace(scene);
@@ -48,7 +53,7 @@ public:
         clock_ = DeviceBuffer<uint64_t>(1);
         clear_film();
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        const double mean = policy_.light_walks ? mean_light_vertices<F>(scene.view(), accel.tracer(), policy_, settings.seed) : 0.0;
+        const double mean = policy_.light_walks && !policy_.stream_slots ? mean_light_vertices<F>(scene.view(), accel.tracer(), policy_, settings.seed) : 0.0;
         plan_cache(policy_, mean);
         allocate(planned_vertices(mean, wave_.slot_count()));
         build_seconds_ = seconds_since(start);
@@ -131,6 +136,7 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
     static constexpr uint32_t kWaveSize = 1u << 21;
+    static constexpr uint32_t kStreamSlots = 1u << 20;
     static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
     uint64_t fixed_bytes() const {

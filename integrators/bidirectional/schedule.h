@@ -75,9 +75,43 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
     exec.set_depth(0);
 }
 
+/// Variant streaming: one ray per slot in every round, of its eye walk or of a light walk for the eye vertex at which that waits.
+template <class Executor, Features F, class Tracer>
+void run_streams(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
+    const BidirectionalMemory& m = stages.memory;
+    const BidirectionalPolicy& policy = stages.policy;
+    exec.run_slots(StageId::generate, stages.stream_begin, policy.stream_slots, 1);
+    exec.repeat_while(m.rays, [&] {
+        exec.trace(StageId::extend, stages.stream_extend, m.rays);
+        exec.run(StageId::shade, stages.stream_eye_shade, m.hits);
+        if (policy.light_walks) exec.run(StageId::light_shade, stages.stream_light_shade, m.light_hits);
+        exec.run(StageId::light_generate, stages.stream_turn, m.turns);
+        if (policy.count_hits || policy.count_environment) {
+            exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
+            exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
+        }
+        if (policy.next_event) {
+            exec.run(StageId::connect, stages.connect, m.vertices);
+            run_connections(exec, stages);
+        } else if (policy.connect_vertices) {
+            exec.clear(m.vertices);
+        }
+        if (policy.connect_vertices) {
+            exec.run(StageId::connect_vertices, stages.stream_connect, m.pairs);
+            run_connections(exec, stages);
+        }
+        if (policy.splat) {
+            exec.run(StageId::connect_camera, stages.stream_connect_camera, m.light_vertices);
+            run_splats(exec, stages);
+            exec.run(StageId::splat, stages.splat, m.splats);
+        }
+    });
+}
+
 /// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h), and settle(queue, queue), clear(queue).
 template <class Executor, Features F, class Tracer>
 void run_bidirectional_wave(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
+    if (stages.policy.stream_slots) return run_streams(exec, stages);
     if (stages.policy.megakernel) {
         exec.run_slots(StageId::megakernel, stages.megakernel, stages.wave.tiles * kTilePixels);
         exec.settle(stages.memory.light_vertices, stages.memory.splats);

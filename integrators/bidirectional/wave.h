@@ -11,6 +11,7 @@
 #include "stages/mis_weight.h"
 #include "stages/occlude.h"
 #include "stages/splat.h"
+#include "stages/stream.h"
 
 namespace ambilux {
 
@@ -23,7 +24,7 @@ std::vector<std::string> skipped_strategies(const Scene& scene, const Bidirectio
 /// Memory of one wave. All queues but two hold the most they can ever be given, since a slot has one item at a time. Vertices of light walks and what they splat are kept until
 /// the end of the wave; their number is not known before, and a wave for which they do not suffice is done again with more (settle()).
 struct BidirectionalMemory {
-    static constexpr uint32_t kQueues = 14;
+    static constexpr uint32_t kQueues = 18;
 
     WaveState* state;
     StageRecord* records;    ///< one per StageId
@@ -42,6 +43,11 @@ struct BidirectionalMemory {
     Queue<Contribution> shadow_contributions;
     uint32_t* last_vertex;
     Lane* raw;  ///< TechniqueFilm::raw
+    // Variant streaming.
+    Queue<WalkHit> light_hits;
+    Queue<TurnItem> turns;
+    Queue<VertexItem> eye;
+    Queue<WalkItem> pending;
 };
 
 /// Memory of the megakernel, whose walks live in registers. Other queues are empty.
@@ -55,13 +61,44 @@ inline BidirectionalMemory lay_out_megakernel(Layout& layout, uint32_t slots, ui
     return m;
 }
 
+/// Memory of the variant streaming: nothing but the film's samples depends on the number of paths or their length.
+inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, const BidirectionalPolicy& policy) {
+    const uint32_t slots = policy.stream_slots;
+    const auto when = [&](bool needed) { return needed ? slots : 0u; };
+    const bool hits = policy.count_hits || policy.count_environment, connections = policy.next_event || policy.connect_vertices;
+    BidirectionalMemory m{};
+    m.state = layout.take<WaveState>(1);
+    m.records = layout.take<StageRecord>(kStageCount);
+    m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
+    m.rays = layout.queue<WalkItem>("rays", m.counters, slots);
+    m.hits = layout.queue<WalkHit>("hits", m.counters, slots);
+    m.light_hits = layout.queue<WalkHit>("light_hits", m.counters, when(policy.light_walks));
+    m.turns = layout.queue<TurnItem>("turns", m.counters, slots);
+    m.eye = layout.queue<VertexItem>("eye_vertices", m.counters, slots);
+    m.pending = layout.queue<WalkItem>("pending", m.counters, slots);
+    m.vertices = layout.queue<VertexItem>("vertices", m.counters, when(connections));
+    m.light_vertices = layout.queue<VertexItem>("camera_vertices", m.counters, when(policy.splat));
+    m.pairs = layout.queue<VertexItem>("pairs", m.counters, when(policy.connect_vertices));
+    m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat));
+    m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat));
+    m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat));
+    m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, when(hits));
+    m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, when(hits));
+    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, when(connections));
+    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, when(connections));
+    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, when(connections));
+    m.raw = layout.take<Lane>(policy.technique_depth ? paths : 0);
+    return m;
+}
+
 /// Lays out the memory for `slots` walks of either kind and `kept` vertices of light walks.
 inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept, const BidirectionalPolicy& policy) {
     const auto when = [&](bool needed, uint32_t n = 0) { return needed ? (n ? n : slots) : 0u; };
     // The megakernel keeps vertices and splats only.
     if (policy.megakernel) return lay_out_megakernel(layout, slots, kept, policy);
+    if (policy.stream_slots) return lay_out_streaming(layout, slots, policy);
     const bool hits = policy.count_hits || policy.count_environment, connections = policy.next_event || policy.connect_vertices;
-    BidirectionalMemory m;
+    BidirectionalMemory m{};
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
@@ -121,6 +158,13 @@ struct BidirectionalStages {
     ConnectVertices<F> connect_vertices, connect_rest;
     ConnectCache<F> connect_cache, connect_cache_rest;
     Megakernel<F, Tracer> megakernel;
+    StreamBegin stream_begin;
+    StreamExtend<F, Tracer> stream_extend;
+    StreamEyeShade<F> stream_eye_shade;
+    StreamTurn<F> stream_turn;
+    StreamLightShade<F> stream_light_shade;
+    StreamConnect<F> stream_connect;
+    ConnectCamera<F> stream_connect_camera;
     WeightConnections weight_connections;
     Occlude<F, Tracer> occlude;
     Accumulate accumulate_shadows;
@@ -153,6 +197,14 @@ struct BidirectionalStages {
         connect_cache = {scene, wave, policy, m.pairs, m.rest, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
         connect_cache_rest = {scene, wave, policy, m.rest, m.pairs, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
         megakernel = {scene, tracer, wave, policy, m.light_vertices, m.splats, film.samples, m.records};
+        const StreamPool pool = {scene, wave, policy, policy.stream_slots, m.eye, m.pending, m.rays, film.samples};
+        stream_begin = {pool};
+        stream_extend = {scene, tracer, pool, m.hits, m.light_hits, record(StageId::extend)};
+        stream_eye_shade = {pool, m.hits, m.hit_candidates, m.vertices, m.turns, record(StageId::shade)};
+        stream_turn = {pool, m.turns, m.splat_candidates, record(StageId::light_generate)};
+        stream_light_shade = {pool, m.light_hits, m.light_vertices, m.pairs, record(StageId::light_shade)};
+        stream_connect_camera = {scene, wave, policy, m.light_vertices, m.splat_candidates, record(StageId::connect_camera)};
+        stream_connect = {pool, m.pairs, m.connect_candidates, record(StageId::connect_vertices)};
         weight_connections = {sums, m.connect_candidates, m.shadows, record(StageId::mis_weight), techniques};
         occlude = {scene, tracer, m.shadows, m.shadow_contributions, record(StageId::occlude)};
         accumulate_shadows = {m.shadow_contributions, film.samples, record(StageId::accumulate), wave, techniques};
