@@ -16,6 +16,7 @@ namespace ambilux {
 struct Method {
     std::string name;  ///< "-i light", or a value of --set strategies
     MisHeuristic heuristic = MisHeuristic::balance;
+    std::string variant = "wavefront";
 };
 
 inline RenderSettings method_settings(const Scene& scene, const Method& method, uint64_t seed) {
@@ -25,6 +26,7 @@ inline RenderSettings method_settings(const Scene& scene, const Method& method, 
         s.integrator = "light";
     } else {
         s.integrator = "bdpt";
+        s.variant = method.variant;
         apply_setting(s, "strategies", method.name);
     }
     return s;

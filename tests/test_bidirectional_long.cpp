@@ -1,7 +1,7 @@
 // libs: ambilux_integrators ambilux_film ambilux_scene ambilux_core
 // labels: long
 // timeout: 3600
-// Every mask of strategies that can sample a scene, both heuristics and the light tracer against the path tracer, on the project's scenes and on published ones.
+// Every mask of strategies that can sample a scene, both heuristics, every variant and the light tracer against the path tracer, on the project's scenes and on published ones.
 #include <algorithm>
 #include <cstdio>
 #include <map>
@@ -64,42 +64,75 @@ bool samples_all(const Scene& scene, const Comparison& c, uint32_t bits) {
     return bits & (kHitStrategies | kNextEventStrategies | kLightStrategies);
 }
 
-void compare(Scene scene, const Comparison& c) {
-    if (c.max_depth) scene.integrator.max_depth = c.max_depth;
-    // Where no strategy sees emitters directly, or only light walks do, they are hidden from both.
-    std::map<bool, Estimate> path;
-    const auto check = [&](const Method& m, bool hidden, double sees) {
-        scene.integrator.hide_emitters = hidden;
-        if (!path.contains(hidden)) path[hidden] = render_path(scene, c.path);
-        const ZTestResult z = z_test(render_batches(scene, method_settings(scene, m, 1), c.sampled), path[hidden]);
-        const std::string what = std::string(c.name) + ", " + m.name + (m.heuristic == MisHeuristic::power ? ", power" : "");
+/// Compares renders of one scene with those of the path tracer. Where no strategy sees emitters directly, or only light walks do, they are hidden from both.
+class Comparator {
+public:
+    Comparator(Scene scene, const Comparison& c) : scene_(std::move(scene)), c_(c) {
+        if (c_.max_depth) scene_.integrator.max_depth = c_.max_depth;
+    }
+    const Scene& scene() const { return scene_; }
+    const Comparison& c() const { return c_; }
+
+    void check(const Method& m, bool hidden, double sees) {
+        scene_.integrator.hide_emitters = hidden;
+        if (!path_.contains(hidden)) path_[hidden] = render_path(scene_, c_.path);
+        const ZTestResult z = z_test(render_batches(scene_, method_settings(scene_, m, 1), c_.sampled), path_[hidden]);
+        const std::string what = std::string(c_.name) + ", " + m.name + (m.heuristic == MisHeuristic::power ? ", power" : "") + (m.variant == "wavefront" ? "" : ", " + m.variant);
         std::printf("%-70s z %+5.2f, p %.2g, sees %.3f%s\n", what.c_str(), z.worst_z, z.p_worst, z.detectable, z.undecided ? ", undecided" : "");
         std::fflush(stdout);
         INFO(what << ": " << z.report());
         CHECK(z.pass);
         CHECK(z.detectable < sees);
-    };
-    for (uint32_t bits = 1; bits <= kAllStrategies; ++bits) {
-        if (!samples_all(scene, c, bits)) continue;
-        const bool hidden = c.why_not || !(bits & (kHitStrategies | kLightStrategies));
-        check({mask_name(bits)}, hidden, bits == kAllStrategies ? c.all_sees : c.mask_sees);
     }
-    check({"all", MisHeuristic::power}, c.why_not, c.all_sees);
-    if (samples_all(scene, c, kLightStrategies)) check({"-i light"}, false, c.mask_sees);
+
+private:
+    Scene scene_;
+    Comparison c_;
+    std::map<bool, Estimate> path_;
+};
+
+void compare_masks(Comparator& comparator) {
+    const Comparison& c = comparator.c();
+    for (uint32_t bits = 1; bits <= kAllStrategies; ++bits) {
+        if (!samples_all(comparator.scene(), c, bits)) continue;
+        const bool hidden = c.why_not || !(bits & (kHitStrategies | kLightStrategies));
+        comparator.check({mask_name(bits)}, hidden, bits == kAllStrategies ? c.all_sees : c.mask_sees);
+    }
+    comparator.check({"all", MisHeuristic::power}, c.why_not, c.all_sees);
+    if (samples_all(comparator.scene(), c, kLightStrategies)) comparator.check({"-i light"}, false, c.mask_sees);
+}
+
+void compare_variants(Comparator& comparator) {
+    for (const char* variant : {"megakernel", "lvc", "streaming"})
+        comparator.check({"all", MisHeuristic::balance, variant}, comparator.c().why_not, comparator.c().all_sees);
+}
+
+template <class Compare>
+void on_project_scenes(Compare compare) {
+    for (const Comparison& c : kComparisons) {
+        if (c.published) continue;
+        Comparator comparator(project_scene(c.name, c.width, c.height), c);
+        compare(comparator);
+    }
+}
+
+template <class Compare>
+void on_published_scenes(Compare compare) {
+    for (const Comparison& c : kComparisons) {
+        if (!c.published) continue;
+        std::optional<Scene> scene = published_scene(c.name, c.width, c.height);
+        if (!scene) return;
+        Comparator comparator(std::move(*scene), c);
+        compare(comparator);
+    }
 }
 
 }  // namespace
 
-TEST_CASE("Masks of strategies agree with the path tracer on the project's scenes", "[bidirectional]") {
-    for (const Comparison& c : kComparisons)
-        if (!c.published) compare(project_scene(c.name, c.width, c.height), c);
-}
+TEST_CASE("Masks of strategies agree with the path tracer on the project's scenes", "[bidirectional]") { on_project_scenes(compare_masks); }
 
-TEST_CASE("Masks of strategies agree with the path tracer on the published scenes", "[bidirectional]") {
-    for (const Comparison& c : kComparisons) {
-        if (!c.published) continue;
-        const std::optional<Scene> scene = published_scene(c.name, c.width, c.height);
-        if (!scene) return;
-        compare(*scene, c);
-    }
-}
+TEST_CASE("Masks of strategies agree with the path tracer on the published scenes", "[bidirectional]") { on_published_scenes(compare_masks); }
+
+TEST_CASE("Variants agree with the path tracer on the project's scenes", "[bidirectional]") { on_project_scenes(compare_variants); }
+
+TEST_CASE("Variants agree with the path tracer on the published scenes", "[bidirectional]") { on_published_scenes(compare_variants); }
