@@ -39,8 +39,8 @@ int compare(const Options& o) {
         std::cout << fmt::format("        {:.6g} without the reference's own noise of {:.3g}\n", m.rmse_corrected, m.reference_noise);
     else
         std::cout << "        holds the reference's own noise, which its file does not state\n";
-    std::cout << fmt::format("relMSE  {:.6g}\nMAPE    {:.6g}\nbias    {:+.6g} ({:+.3f} % of the mean), z = {:+.2f}\n", m.relmse, m.mape, m.bias,
-                             100 * m.relative_bias, m.bias_z);
+    std::cout << fmt::format("relMSE  {:.6g}\n        {:.6g} without the worst {} % of the pixels\nMAPE    {:.6g}\nbias    {:+.6g} ({:+.3f} % of the mean), z = {:+.2f}\n",
+                             m.relmse, m.relmse_trimmed, 100 * kTrimmedShare, m.mape, m.bias, 100 * m.relative_bias, m.bias_z);
     if (m.non_finite) std::cout << fmt::format("{} values of the image are NaN or Inf\n", m.non_finite);
     return int(ExitCode::done);
 }

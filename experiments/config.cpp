@@ -1,132 +1,194 @@
 #include "experiments/config.h"
 
-#include <fmt/format.h>
-#include <toml++/toml.h>
-
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <initializer_list>
-#include <set>
 #include <sstream>
 
 #include "core/atomic_file.h"
-#include "core/error.h"
+#include "experiments/sweep.h"
+#include "experiments/toml_reader.h"
 
 namespace ambilux {
 namespace {
 
-/// Reads nodes of one file and says where a wrong one stands.
-struct Reader {
-    std::string file;
-
-    static int line_of(const toml::node& node) { return int(node.source().begin.line); }
-    Error error(const toml::node& node, const std::string& message) const { return input_error(file, line_of(node), message); }
-
-    void check_keys(const toml::table& table, const std::string& where, std::initializer_list<std::string_view> known) const {
-        for (const auto& [key, node] : table)
-            if (std::find(known.begin(), known.end(), key.str()) == known.end())
-                throw input_error(file, int(key.source().begin.line),
-                                  fmt::format("unknown key '{}' in {}; known are: {}", key.str(), where, fmt::join(known, ", ")));
-    }
-    const toml::node& need(const toml::table& table, std::string_view key, const std::string& where) const {
-        if (const toml::node* node = table.get(key)) return *node;
-        throw error(table, fmt::format("{} lacks the key '{}'", where, key));
-    }
-    std::string text(const toml::node& node, std::string_view key) const {
-        if (!node.is_string()) throw error(node, fmt::format("'{}' must be a string", key));
-        return node.as_string()->get();
-    }
-    bool flag(const toml::node& node, std::string_view key) const {
-        if (!node.is_boolean()) throw error(node, fmt::format("'{}' must be true or false", key));
-        return node.as_boolean()->get();
-    }
-    int64_t integer(const toml::node& node, std::string_view key, int64_t lowest, int64_t highest) const {
-        const auto* value = node.as_integer();
-        if (!value || value->get() < lowest || value->get() > highest)
-            throw error(node, fmt::format("'{}' must be an integer from {} to {}", key, lowest, highest));
-        return value->get();
-    }
-    const toml::table& table(const toml::node& node, std::string_view key) const {
-        if (!node.is_table()) throw error(node, fmt::format("'{}' must be a table", key));
-        return *node.as_table();
-    }
-    const toml::array& array(const toml::node& node, std::string_view key) const {
-        if (!node.is_array() || node.as_array()->empty()) throw error(node, fmt::format("'{}' must be a list that is not empty", key));
-        return *node.as_array();
-    }
-    /// A value of any simple type as the text that --set would take.
-    std::string plain(const toml::node& node, std::string_view key) const {
-        if (const auto* s = node.as_string()) return s->get();
-        if (const auto* i = node.as_integer()) return std::to_string(i->get());
-        if (const auto* b = node.as_boolean()) return b->get() ? "true" : "false";
-        if (const auto* f = node.as_floating_point()) return fmt::format("{}", f->get());
-        throw error(node, fmt::format("'{}' must be a string, a number, true or false", key));
-    }
-    /// Name that is a file name everywhere and needs no quotes in CSV.
-    std::string name(const toml::table& parent, const std::string& where, std::set<std::string>& taken) const {
-        const toml::node& node = need(parent, "name", where);
-        const std::string value = text(node, "name");
-        const bool allowed = !value.empty() && value.size() <= 64 && value[0] != '.' && std::all_of(value.begin(), value.end(), [](unsigned char c) {
-            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-';
-        });
-        if (!allowed) throw error(node, fmt::format("name '{}': use 1 to 64 letters, digits, '.', '_' or '-', not beginning with '.'", value));
-        if (!taken.insert(value).second) throw error(node, fmt::format("name '{}' of {} is used twice", value, where));
-        return value;
-    }
-};
-
 constexpr int64_t kMaxSpp = 4294967295;
 
-SceneEntry read_scene(const Reader& r, const toml::table& t, std::set<std::string>& names) {
-    r.check_keys(t, "[[scene]]", {"name", "path", "size", "max_depth", "reference_spp", "lenient", "parameters"});
+using Reader = TomlReader;
+using Names = std::set<std::string>;
+
+/// Adds a setting of a run, unless it belongs elsewhere.
+void add_setting(const Reader& r, RunEntry& run, const std::string& key, const toml::node& value) {
+    if (key == "seed" || key == "max_depth")
+        throw r.error(value, fmt::format("'{}' belongs to the experiment (seeds) or to a scene (max_depth), not to a run", key));
+    if (key == "technique_depth") throw r.error(value, "'technique_depth' is the key 'techniques' of a run");
+    for (const auto& [taken, text] : run.settings)
+        if (taken == key) throw r.error(value, fmt::format("'{}' of run '{}' is set twice", key, run.name));
+    run.settings.emplace_back(key, r.plain(value, key));
+    run.lines.push_back(Reader::line_of(value));
+}
+
+/// integrator, variant, estimator and set, as runs and references have them.
+void add_settings(const Reader& r, RunEntry& run, const toml::table& t) {
+    for (const char* key : {"integrator", "variant", "estimator"})
+        if (const toml::node* value = t.get(key)) add_setting(r, run, key, *value);
+    if (const toml::node* set = t.get("set"))
+        for (const auto& [key, value] : r.table(*set, "set")) add_setting(r, run, std::string(key.str()), value);
+}
+
+/// The ground truth: `t` over `inherited`.
+ReferenceEntry read_reference(const Reader& r, const toml::table& t, const std::string& where, ReferenceEntry inherited) {
+    if (const toml::node* spp = t.get("spp")) inherited.spp = uint64_t(r.integer(*spp, "spp", 2, kMaxSpp));
+    if (!t.get("integrator") && !t.get("variant") && !t.get("set")) return inherited;
+    ReferenceEntry reference{inherited.spp, {}};
+    reference.how.name = "reference";
+    reference.how.line = Reader::line_of(t);
+    const std::string integrator = r.text(r.need(t, "integrator", where), "integrator");
+    // Light tracing does not see what mirrors show to the camera: it is no ground truth.
+    if (integrator != "path" && integrator != "bdpt")
+        throw r.error(*t.get("integrator"), fmt::format("integrator '{}': a reference is made by path or bdpt, which find all light", integrator));
+    add_settings(r, reference.how, t);
+    for (size_t i = 0; i < reference.how.settings.size(); ++i)
+        for (const char* key : {"estimator", "strategies"})
+            if (reference.how.settings[i].first == key)
+                throw input_error(r.file, reference.how.lines[i], fmt::format("'{}' in {}: a reference uses all that its integrator has", key, where));
+    return reference;
+}
+
+std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const ReferenceEntry& reference, Names& names) {
+    r.check_keys(t, "[[scene]]", {"name", "path", "size", "max_depth", "reference_spp", "reference", "lenient", "parameters", "sweep"});
     SceneEntry scene;
     scene.line = Reader::line_of(t);
-    scene.name = r.name(t, "[[scene]]", names);
+    scene.name = scene.base = r.name(t, "[[scene]]");
     const toml::node& path = r.need(t, "path", "[[scene]]");
     namespace fs = std::filesystem;
     const fs::path folder = fs::absolute(fs::path(r.file)).parent_path();
     scene.path = (folder / r.text(path, "path")).lexically_normal().string();
     if (!fs::is_regular_file(scene.path)) throw r.error(path, fmt::format("scene '{}': there is no file {}", scene.name, scene.path));
-    if (const toml::node* size = t.get("size")) {
-        const toml::array& a = r.array(*size, "size");
-        if (a.size() != 2) throw r.error(*size, "'size' must be [width, height]");
-        scene.width = uint32_t(r.integer(a[0], "size", 1, 65536));
-        scene.height = uint32_t(r.integer(a[1], "size", 1, 65536));
+    const auto set = [&r](SceneEntry& entry, const std::string& key, const toml::node& value) {
+        if (key == "max_depth") {
+            entry.max_depth = int(r.integer(value, key, -1, 1 << 20));
+            return std::to_string(*entry.max_depth);
+        }
+        const toml::array& a = r.array(value, key);
+        if (a.size() != 2) throw r.error(value, "'size' must be [width, height]");
+        entry.width = uint32_t(r.integer(a[0], key, 1, 65536));
+        entry.height = uint32_t(r.integer(a[1], key, 1, 65536));
+        return fmt::format("{}x{}", entry.width, entry.height);
+    };
+    for (const char* key : {"size", "max_depth"})
+        if (const toml::node* value = t.get(key)) set(scene, key, *value);
+    scene.reference = reference;
+    if (const toml::node* own = t.get("reference")) {
+        const toml::table& table = r.table(*own, "reference");
+        r.check_keys(table, "'reference' of [[scene]]", {"spp", "integrator", "variant", "set"});
+        scene.reference = read_reference(r, table, "'reference' of [[scene]]", reference);
     }
-    if (const toml::node* depth = t.get("max_depth")) scene.max_depth = int(r.integer(*depth, "max_depth", -1, 1 << 20));
-    if (const toml::node* spp = t.get("reference_spp")) scene.reference_spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
+    if (const toml::node* spp = t.get("reference_spp")) {
+        if (t.at_path("reference.spp")) throw r.error(*spp, "'reference_spp' and 'reference.spp' say the same: leave one out");
+        scene.reference.spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
+    }
     if (const toml::node* lenient = t.get("lenient")) scene.lenient = r.flag(*lenient, "lenient");
     if (const toml::node* parameters = t.get("parameters"))
         for (const auto& [key, value] : r.table(*parameters, "parameters")) scene.parameters.emplace_back(std::string(key.str()), r.plain(value, key.str()));
-    return scene;
+
+    std::vector<SceneEntry> scenes;
+    const toml::node* sweep = t.get("sweep");
+    if (!sweep) {
+        scenes.push_back(scene);
+    } else {
+        r.check_keys(r.table(*sweep, "sweep"), "'sweep' of [[scene]]", {"size", "max_depth"});
+        for (const char* key : {"size", "max_depth"})
+            if (t.get(key) && sweep->as_table()->get(key)) throw r.error(*sweep, fmt::format("'{}' is set and in 'sweep': leave one out", key));
+        const Sweep lists = read_sweep(r, *sweep, "'sweep' of [[scene]]", [&](const std::string& key, const toml::node& value) {
+            SceneEntry ignored;
+            return set(ignored, key, value);
+        });
+        for (const auto& values : combinations(lists)) {
+            scenes.push_back(scene);
+            scenes.back().name = swept_name(scene.base, values);
+            for (const SweepValue& value : values) set(scenes.back(), value.key, *value.node);
+        }
+    }
+    for (const SceneEntry& entry : scenes) r.claim(*t.get("name"), entry.name, "[[scene]]", names);
+    return scenes;
 }
 
-RunEntry read_run(const Reader& r, const toml::table& t, std::set<std::string>& names) {
-    r.check_keys(t, "[[run]]", {"name", "integrator", "variant", "estimator", "set"});
+/// `run` with `values` in the place of its own; a value keeps the line of its own list.
+RunEntry swept(const Reader& r, RunEntry run, const std::vector<SweepValue>& values) {
+    run.name = swept_name(run.base, values);
+    for (const SweepValue& value : values) {
+        run.swept.emplace_back(value.key, value.text);
+        for (size_t i = 0; i < run.settings.size(); ++i)
+            if (run.settings[i].first == value.key) {
+                run.settings.erase(run.settings.begin() + long(i));
+                run.lines.erase(run.lines.begin() + long(i));
+                break;
+            }
+        add_setting(r, run, value.key, *value.node);
+    }
+    if (run.name.size() > Reader::kMaxName)
+        throw r.error(*values[0].node, fmt::format("the name '{}' is longer than {} characters: sweep fewer keys at once", run.name, Reader::kMaxName));
+    return run;
+}
+
+std::vector<RunEntry> read_run(const Reader& r, const toml::table& t, Names& names) {
+    r.check_keys(t, "[[run]]", {"name", "integrator", "variant", "estimator", "set", "sweep", "techniques"});
     RunEntry run;
     run.line = Reader::line_of(t);
-    run.name = r.name(t, "[[run]]", names);
-    const auto add = [&](std::string_view key, const toml::node& value) {
-        run.settings.emplace_back(std::string(key), r.plain(value, key));
-        run.lines.push_back(Reader::line_of(value));
-    };
-    add("integrator", r.need(t, "integrator", "[[run]]"));
-    for (const char* key : {"variant", "estimator"})
-        if (const toml::node* value = t.get(key)) add(key, *value);
-    if (const toml::node* set = t.get("set"))
-        for (const auto& [key, value] : r.table(*set, "set")) {
-            if (key.str() == "seed" || key.str() == "max_depth")
-                throw r.error(value, fmt::format("'{}' belongs to the experiment (seeds) or to a scene (max_depth), not to a run", key.str()));
-            add(key.str(), value);
+    run.name = run.base = r.name(t, "[[run]]");
+    const toml::node* sweep = t.get("sweep");
+    const bool swept_integrator = sweep && sweep->is_table() && sweep->as_table()->contains("integrator");
+    if (!swept_integrator) r.need(t, "integrator", "[[run]]");
+    add_settings(r, run, t);
+    if (const toml::node* depth = t.get("techniques")) {
+        run.techniques = int(r.integer(*depth, "techniques", 1, 64));
+        run.techniques_line = Reader::line_of(*depth);
+    }
+    std::vector<RunEntry> runs;
+    if (!sweep) {
+        runs.push_back(run);
+    } else {
+        const auto text = [&](const std::string& key, const toml::node& value) { return r.plain(value, key); };
+        for (const auto& values : combinations(read_sweep(r, *sweep, "'sweep'", text))) {
+            for (const SweepValue& value : values)
+                for (const auto& [key, ignored] : run.settings)
+                    if (key == value.key) throw r.error(*value.node, fmt::format("'{}' of run '{}' is set and in 'sweep': leave one out", key, run.name));
+            runs.push_back(swept(r, run, values));
         }
-    return run;
+    }
+    for (const RunEntry& entry : runs) r.claim(*t.get("name"), entry.name, "[[run]]", names);
+    return runs;
+}
+
+/// The default run and, after the runs, those that differ from it by one switch.
+void read_ablation(const Reader& r, const toml::table& t, ExperimentConfig& config, Names& names) {
+    r.check_keys(t, "[ablation]", {"default", "switches"});
+    const toml::node& node = r.need(t, "default", "[ablation]");
+    config.ablation_default = r.text(node, "default");
+    const auto found = std::find_if(config.runs.begin(), config.runs.end(), [&](const RunEntry& run) { return run.name == config.ablation_default; });
+    if (found == config.runs.end()) {
+        std::vector<std::string> known;
+        for (const RunEntry& run : config.runs) known.push_back(run.name);
+        throw r.error(node, fmt::format("[ablation] default '{}' is no run; runs are: {}", config.ablation_default, fmt::join(known, ", ")));
+    }
+    const toml::node* switches = t.get("switches");
+    if (!switches) return;
+    const RunEntry base = *found;
+    if (!base.swept.empty()) throw r.error(*switches, fmt::format("'switches' change a run of its own, and '{}' comes from a sweep", base.name));
+    const auto text = [&](const std::string& key, const toml::node& value) { return r.plain(value, key); };
+    for (const auto& values : one_at_a_time(read_sweep(r, *switches, "'switches'", text))) {
+        for (const auto& [key, value] : base.settings)
+            if (key == values[0].key && value == values[0].text)
+                throw r.error(*values[0].node, fmt::format("{}={} is what the default run has: leave it out", key, value));
+        config.runs.push_back(swept(r, base, values));
+        r.claim(*values[0].node, config.runs.back().name, "[[run]]", names);
+    }
 }
 
 void read_budget(const Reader& r, const toml::table& t, ExperimentConfig& config) {
     r.check_keys(t, "[budget]", {"spp", "seconds"});
     const toml::node *spp = t.get("spp"), *seconds = t.get("seconds");
-    if (!spp == !seconds) throw r.error(t, "[budget] needs either 'spp' or 'seconds'");
+    if (!spp && !seconds) throw r.error(t, "[budget] needs 'spp', 'seconds' or both");
     if (spp)
         for (const toml::node& node : r.array(*spp, "spp")) {
             const auto value = uint64_t(r.integer(node, "spp", 1, kMaxSpp));
@@ -144,6 +206,13 @@ void read_budget(const Reader& r, const toml::table& t, ExperimentConfig& config
 
 }  // namespace
 
+std::vector<Checkpoint> ExperimentConfig::checkpoints() const {
+    std::vector<Checkpoint> all;
+    for (const uint64_t samples : spp) all.push_back({samples, 0});
+    for (const double time : seconds) all.push_back({0, time});
+    return all;
+}
+
 ExperimentConfig read_experiment(const std::string& path) {
     const std::string content = read_file(path);
     toml::table root;
@@ -153,15 +222,15 @@ ExperimentConfig read_experiment(const std::string& path) {
         throw input_error(path, int(e.source().begin.line), std::string(e.description()));
     }
     const Reader r{path};
-    r.check_keys(root, "the configuration", {"name", "backend", "seeds", "reference", "budget", "scene", "run"});
+    r.check_keys(root, "the configuration", {"name", "backend", "seeds", "reference", "budget", "scene", "run", "ablation"});
     const auto need = [&](std::string_view key) -> const toml::node& {
         if (const toml::node* node = root.get(key)) return *node;
         throw input_error(path, 0, fmt::format("lacks the key '{}'", key));
     };
     ExperimentConfig config;
     config.file = path;
-    std::set<std::string> none, scene_names, run_names;
-    config.name = root.contains("name") ? r.name(root, "the configuration", none) : std::filesystem::path(path).stem().string();
+    Names scene_names, run_names;
+    config.name = root.contains("name") ? r.name(root, "the configuration") : std::filesystem::path(path).stem().string();
     if (const toml::node* backend = root.get("backend")) {
         config.backend = r.text(*backend, "backend");
         if (config.backend != "auto" && config.backend != "cpu" && config.backend != "cuda")
@@ -174,33 +243,49 @@ ExperimentConfig read_experiment(const std::string& path) {
         config.seeds.push_back(seed);
     }
     const toml::table& reference = r.table(need("reference"), "reference");
-    r.check_keys(reference, "[reference]", {"spp", "seed"});
-    config.reference_spp = uint64_t(r.integer(r.need(reference, "spp", "[reference]"), "spp", 2, kMaxSpp));
+    r.check_keys(reference, "[reference]", {"spp", "seed", "integrator", "variant", "set"});
+    r.need(reference, "spp", "[reference]");
+    const ReferenceEntry general = read_reference(r, reference, "[reference]", {});
     if (const toml::node* seed = reference.get("seed")) config.reference_seed = uint64_t(r.integer(*seed, "seed", 0, INT64_MAX));
     read_budget(r, r.table(need("budget"), "budget"), config);
-    for (const toml::node& node : r.array(need("scene"), "scene")) config.scenes.push_back(read_scene(r, r.table(node, "scene"), scene_names));
-    for (const toml::node& node : r.array(need("run"), "run")) config.runs.push_back(read_run(r, r.table(node, "run"), run_names));
+    for (const toml::node& node : r.array(need("scene"), "scene"))
+        for (SceneEntry& scene : read_scene(r, r.table(node, "scene"), general, scene_names)) config.scenes.push_back(std::move(scene));
+    for (const toml::node& node : r.array(need("run"), "run"))
+        for (RunEntry& run : read_run(r, r.table(node, "run"), run_names)) config.runs.push_back(std::move(run));
+    if (const toml::node* ablation = root.get("ablation")) read_ablation(r, r.table(*ablation, "ablation"), config, run_names);
     return config;
 }
 
 std::string resolved_toml(const ExperimentConfig& config) {
-    const auto table_of = [](const std::vector<std::pair<std::string, std::string>>& pairs) {
+    const auto table_of = [](const Settings& pairs) {
         toml::table t;
         for (const auto& [key, value] : pairs) t.insert_or_assign(key, value);
         return t;
     };
+    const auto insert_settings = [](toml::table& t, const RunEntry& run) {
+        toml::table set;
+        for (const auto& [key, value] : run.settings) (key == "integrator" || key == "variant" || key == "estimator" ? t : set).insert_or_assign(key, value);
+        if (!set.empty()) t.insert("set", set);
+    };
     toml::table root;
     root.insert("name", config.name);
     root.insert("backend", config.backend);
-    toml::array seeds, scenes, runs, budget;
+    toml::array seeds, scenes, runs, spp, seconds;
     for (const uint64_t seed : config.seeds) seeds.push_back(int64_t(seed));
     root.insert("seeds", seeds);
-    root.insert("reference", toml::table{{"spp", int64_t(config.reference_spp)}, {"seed", int64_t(config.reference_seed)}});
-    for (const uint64_t spp : config.spp) budget.push_back(int64_t(spp));
-    for (const double seconds : config.seconds) budget.push_back(seconds);
-    root.insert("budget", toml::table{{config.spp.empty() ? "seconds" : "spp", budget}});
+    // What a scene replaces of this stands with the scene, so that all scenes state theirs in full.
+    root.insert("reference", toml::table{{"spp", int64_t(config.scenes[0].reference.spp)}, {"seed", int64_t(config.reference_seed)}});
+    for (const uint64_t samples : config.spp) spp.push_back(int64_t(samples));
+    for (const double time : config.seconds) seconds.push_back(time);
+    toml::table budget;
+    if (!spp.empty()) budget.insert("spp", spp);
+    if (!seconds.empty()) budget.insert("seconds", seconds);
+    root.insert("budget", budget);
+    if (!config.ablation_default.empty()) root.insert("ablation", toml::table{{"default", config.ablation_default}});
     for (const SceneEntry& s : config.scenes) {
-        toml::table t{{"name", s.name}, {"path", s.path}, {"reference_spp", int64_t(s.reference_spp.value_or(config.reference_spp))}};
+        toml::table reference{{"spp", int64_t(s.reference.spp)}};
+        insert_settings(reference, s.reference.how);
+        toml::table t{{"name", s.name}, {"path", s.path}, {"reference", reference}};
         if (s.width) t.insert("size", toml::array{int64_t(s.width), int64_t(s.height)});
         if (s.max_depth) t.insert("max_depth", int64_t(*s.max_depth));
         if (s.lenient) t.insert("lenient", true);
@@ -209,13 +294,9 @@ std::string resolved_toml(const ExperimentConfig& config) {
     }
     root.insert("scene", scenes);
     for (const RunEntry& run : config.runs) {
-        toml::table t{{"name", run.name}}, set;
-        for (const auto& [key, value] : run.settings)
-            if (key == "integrator" || key == "variant" || key == "estimator")
-                t.insert_or_assign(key, value);
-            else
-                set.insert_or_assign(key, value);
-        if (!set.empty()) t.insert("set", set);
+        toml::table t{{"name", run.name}};
+        insert_settings(t, run);
+        if (run.techniques) t.insert("techniques", int64_t(run.techniques));
         runs.push_back(t);
     }
     root.insert("run", runs);

@@ -2,8 +2,13 @@
 
 #include <sys/utsname.h>
 
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
 #include <ctime>
+#include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <thread>
 
 namespace ambilux {
@@ -21,6 +26,52 @@ nlohmann::json describe_machine() {
     if (std::string line; std::getline(driver, line)) machine["driver"] = line;
     if (utsname name; ::uname(&name) == 0) machine["system"] = std::string(name.sysname) + " " + name.release + " " + name.machine;
     return machine;
+}
+
+nlohmann::json parse_gpu_clocks(const std::string& lines) {
+    nlohmann::json gpus = nlohmann::json::array();
+    std::istringstream in(lines);
+    for (std::string line; std::getline(in, line);) {
+        nlohmann::json gpu;
+        std::istringstream fields(line);
+        for (const char* name : {"sm_mhz", "memory_mhz", "celsius"}) {
+            std::string field;
+            std::getline(fields, field, ',');
+            field.erase(0, std::min(field.find_first_not_of(' '), field.size()));
+            double value = 0;
+            const auto parsed = std::from_chars(field.data(), field.data() + field.size(), value);
+            gpu[name] = parsed.ec == std::errc() ? nlohmann::json(value) : nlohmann::json(nullptr);
+        }
+        gpus.push_back(gpu);
+    }
+    return gpus;
+}
+
+nlohmann::json describe_clocks(const std::string& when) {
+    nlohmann::json clocks = {{"when", when}, {"date", utc_now()}, {"cpu_mhz", nullptr}, {"gpu", nullptr}};
+    double lowest = 0, highest = 0, sum = 0;
+    int cores = 0;
+    std::ifstream cpu("/proc/cpuinfo");
+    for (std::string line; std::getline(cpu, line);) {
+        if (!line.starts_with("cpu MHz")) continue;
+        const size_t at = line.find(": ");
+        double mhz = 0;
+        if (at == std::string::npos || std::from_chars(line.data() + at + 2, line.data() + line.size(), mhz).ec != std::errc()) continue;
+        lowest = cores ? std::min(lowest, mhz) : mhz;
+        highest = std::max(highest, mhz);
+        sum += mhz;
+        ++cores;
+    }
+    if (cores) clocks["cpu_mhz"] = {{"lowest", lowest}, {"mean", sum / cores}, {"highest", highest}};
+    // Without a driver there is nothing to ask; a driver in trouble may not answer, hence the limit.
+    if (!std::filesystem::exists("/proc/driver/nvidia/version")) return clocks;
+    if (std::FILE* pipe = ::popen("timeout 10 nvidia-smi --query-gpu=clocks.sm,clocks.mem,temperature.gpu --format=csv,noheader,nounits 2>/dev/null", "r")) {
+        std::string lines;
+        char buffer[256];
+        while (std::fgets(buffer, sizeof buffer, pipe)) lines += buffer;
+        if (::pclose(pipe) == 0) clocks["gpu"] = parse_gpu_clocks(lines);
+    }
+    return clocks;
 }
 
 std::string utc_now() {

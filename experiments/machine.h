@@ -9,6 +9,13 @@ namespace ambilux {
 /// cpu (model), cores, system, driver (of NVIDIA devices; null without), read from /proc.
 nlohmann::json describe_machine();
 
+/// What the clocks run at now, as {when, cpu_mhz {lowest, mean, highest}, gpu [{sm_mhz, memory_mhz, celsius}]}: figures of a machine that was throttled or shared can be told.
+/// From /proc/cpuinfo and nvidia-smi; null where those do not say. A GPU without work shows its idle clocks.
+nlohmann::json describe_clocks(const std::string& when);
+
+/// The "gpu" list from nvidia-smi's lines "1980, 2619, 41"; what is no number becomes null.
+nlohmann::json parse_gpu_clocks(const std::string& lines);
+
 /// Now as "2026-01-31T12:34:56Z".
 std::string utc_now();
 

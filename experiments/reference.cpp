@@ -7,10 +7,14 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "experiments/state.h"
 #include "experiments/statistics.h"
 
 namespace ambilux {
 namespace {
+
+/// Attributes that must be equal for samples to be added.
+constexpr const char* kIdentity[] = {"kind", "scene_hash", "max_depth", "seed", "integrator", "reference_settings"};
 
 std::string text(const Attributes& attributes, const char* name) {
     const auto it = attributes.find(name);
@@ -25,7 +29,7 @@ void check_same(const std::string& path, const Attributes& stored, const Referen
     };
     if (image.mean.width != scene.sensor.crop_width || image.mean.height != scene.sensor.crop_height)
         refuse("size", fmt::format("{}x{}", image.mean.width, image.mean.height), fmt::format("{}x{}", scene.sensor.crop_width, scene.sensor.crop_height));
-    for (const char* name : {"kind", "scene_hash", "max_depth", "seed"})
+    for (const char* name : kIdentity)
         if (text(stored, name) != text(wanted, name)) refuse(name, text(stored, name), text(wanted, name));
 }
 
@@ -41,8 +45,8 @@ uint64_t reference_seed(uint64_t seed) {
 ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& request, const Hooks& hooks) {
     if (request.spp < 2) throw Error(ExitCode::usage, "a reference needs at least 2 samples per pixel: one has no standard error");
     RenderSettings settings = request.settings;
-    settings.integrator = "path";
-    settings.estimator = Estimator::mis;
+    if (settings.estimator != Estimator::mis || settings.strategies != kAllStrategies || (settings.integrator != "path" && settings.integrator != "bdpt"))
+        throw Error(ExitCode::usage, "a reference is made by integrator path or bdpt with all that it has (estimator mis, all strategies)");
     settings.seed = reference_seed(request.settings.seed);
 
     const auto attributes_of = [&](const RenderStats& stats, double seconds) {
@@ -50,21 +54,35 @@ ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& reque
         a["kind"] = "reference";
         a["seed"] = request.settings.seed;
         a["seconds"] = seconds;
+        if (!request.settings_text.empty()) a["reference_settings"] = request.settings_text;
         return a;
     };
 
     ReferenceResult result;
     FilmMoments total;
     double earlier_seconds = 0;
+    const std::string sums_path = request.path + ".sums";
+    nlohmann::json identity;
+    for (const char* name : kIdentity) identity[name] = text(attributes_of({}, 0), name);
     if (std::filesystem::exists(request.path)) {
         result.reference = read_reference_exr(request.path, &result.attributes);
         // The seed comes back as an integer or, where it does not fit, as text; so does the wanted one after this round.
         check_same(request.path, result.attributes, result.reference, attributes_of({}, 0), scene);
-        result.continued_from = result.reference.samples;
-        if (result.reference.samples >= request.spp) return result;
+        if (result.reference.samples >= request.spp) {
+            result.continued_from = result.reference.samples;
+            return result;
+        }
         total = to_moments(result.reference);
         if (const auto s = result.attributes.find("seconds"); s != result.attributes.end() && s->is_number()) earlier_seconds = s->get<double>();
     }
+    // Sums that were saved last are as many as those of the image or more; older ones are left over from something else.
+    if (auto sums = read_state(sums_path); sums && sums->notes["identity"] == identity && sums->moments.samples >= total.samples &&
+                                           sums->moments.width == scene.sensor.crop_width && sums->moments.height == scene.sensor.crop_height) {
+        total = std::move(sums->moments);
+        earlier_seconds = sums->notes["seconds"].get<double>();
+        result.reference = to_reference(total);
+    }
+    result.continued_from = total.samples;
     check_writable(request.path);
 
     const std::unique_ptr<Renderer> renderer = hooks.make_renderer(scene, settings);
@@ -82,8 +100,11 @@ ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& reque
         RenderStats stated = result.stats;
         stated.samples = total.samples;
         result.attributes = attributes_of(stated, earlier_seconds + position.seconds);
-        if (total.samples >= 2) write_reference_exr(request.path, result.reference, result.attributes);
+        if (total.samples < 2) continue;
+        if (total.samples < request.spp) write_state(sums_path, {total, {{"identity", identity}, {"seconds", earlier_seconds + position.seconds}}});
+        write_reference_exr(request.path, result.reference, result.attributes);
     }
+    if (std::error_code ignored; total.samples >= request.spp) std::filesystem::remove(sums_path, ignored);
     result.interrupted = position.interrupted;
     return result;
 }

@@ -1,4 +1,4 @@
-// Ground truth: a path-traced image with its standard error, made in parts that may lie days apart.
+// Ground truth: a converged image with its standard error, made in parts that may lie days apart.
 #pragma once
 
 #include <functional>
@@ -17,7 +17,8 @@ uint64_t reference_seed(uint64_t seed);
 struct ReferenceRequest {
     std::string path;         ///< EXR file; continued if it exists
     uint64_t spp = 0;         ///< total; at least 2
-    RenderSettings settings;  ///< seed, depths, backend; integrator and estimator are replaced by path and mis
+    RenderSettings settings;  ///< integrator path or bdpt and all else that decides the image; estimator mis
+    std::string settings_text;  ///< what is not as usual, such as "variant=lvc": names the making, and a file of another is refused. Empty: the path tracer
     double checkpoint_seconds = 30;
     const volatile bool* interrupt = nullptr;
     std::function<void(const RenderPosition&)> on_batch;
@@ -32,7 +33,9 @@ struct ReferenceResult {
 };
 
 /// Brings the file up to `spp` samples and saves it every `checkpoint_seconds` and at the end, also when interrupted. A file that holds as many samples already is
-/// returned as it is. Throws Error(bad_input) that names what differs if the file is of another scene, size, depth or seed.
+/// returned as it is. Until the file is complete its sums lie beside it in full precision (PATH.sums), so that a reference that was killed and continued has the values of
+/// one that was not; one that is extended later starts from the stored floats (6e-8 relative). Throws Error(bad_input) that names what differs if the file is of another scene, size, depth, seed or
+/// integrator.
 ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& request, const Hooks& hooks);
 
 }  // namespace ambilux

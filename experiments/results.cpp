@@ -12,23 +12,40 @@
 namespace ambilux {
 
 const char* const kResultHeader =
-    "scene,run,seed,checkpoint,integrator,variant,estimator,backend,spp,time,rmse,rmse_corrected,reference_noise,relmse,relmse_corrected,mape,bias,bias_z,"
-    "rays,invalid";
+    "scene,run,seed,checkpoint,budget,integrator,variant,estimator,backend,spp,time,rmse,rmse_corrected,reference_noise,relmse,relmse_corrected,relmse_trimmed,"
+    "relmse_trimmed_corrected,mape,bias,bias_z,rays,invalid";
 
-std::string result_prefix(const std::string& scene, const std::string& run, uint64_t seed) { return fmt::format("{},{},{},", scene, run, seed); }
+namespace {
+
+std::string quoted(const std::string& name) { return name.find(',') == name.npos ? name : '"' + name + '"'; }
+
+/// Commas outside quotes; -1 for a quote that does not end.
+long count_commas(std::string_view line) {
+    long commas = 0;
+    bool inside = false;
+    for (const char c : line) {
+        if (c == '"') inside = !inside;
+        commas += c == ',' && !inside;
+    }
+    return inside ? -1 : commas;
+}
+
+}  // namespace
+
+std::string result_prefix(const std::string& scene, const std::string& run, uint64_t seed) { return fmt::format("{},{},{},", quoted(scene), quoted(run), seed); }
 
 std::string result_line(const ResultRow& r) {
     const Metrics& m = r.metrics;
-    return fmt::format("{}{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.5g},{},{}", result_prefix(r.scene, r.run, r.seed),
-                       r.checkpoint, r.integrator, r.variant, r.estimator, r.backend, r.spp, r.time, m.rmse, m.rmse_corrected, m.reference_noise, m.relmse,
-                       m.relmse_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid);
+    return fmt::format("{}{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.5g},{},{}", result_prefix(r.scene, r.run, r.seed),
+                       r.checkpoint, r.budget, r.integrator, r.variant, r.estimator, r.backend, r.spp, r.time, m.rmse, m.rmse_corrected, m.reference_noise,
+                       m.relmse, m.relmse_corrected, m.relmse_trimmed, m.relmse_trimmed_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid);
 }
 
 std::vector<std::string> read_results(const std::string& path) {
     std::vector<std::string> lines;
     if (!std::filesystem::exists(path)) return lines;
     const std::string content = read_file(path);
-    const auto commas = std::count(kResultHeader, kResultHeader + std::char_traits<char>::length(kResultHeader), ',');
+    const long commas = count_commas(kResultHeader);
     std::set<std::string> seen;
     size_t number = 0;
     for (size_t begin = 0, end; (end = content.find('\n', begin)) != std::string::npos; begin = end + 1) {
@@ -37,7 +54,7 @@ std::vector<std::string> read_results(const std::string& path) {
             if (line != kResultHeader) throw input_error(path, 1, "its columns are not those of this version: choose another output folder");
             continue;
         }
-        if (std::count(line.begin(), line.end(), ',') == commas && seen.insert(line).second) lines.push_back(std::move(line));
+        if (count_commas(line) == commas && seen.insert(line).second) lines.push_back(std::move(line));
     }
     return lines;
 }

@@ -13,7 +13,8 @@ namespace ambilux {
 struct ResultRow {
     std::string scene, run;
     uint64_t seed = 0;
-    size_t checkpoint = 0;  ///< counts from 0
+    size_t checkpoint = 0;  ///< place in ExperimentConfig::checkpoints()
+    std::string budget;     ///< "spp" or "seconds": what the checkpoint is given in
     std::string integrator, variant, estimator, backend;
     uint64_t spp = 0;
     double time = 0;  ///< seconds inside the renderer, wall clock
@@ -24,7 +25,7 @@ struct ResultRow {
 /// Column names; the first line of the file.
 extern const char* const kResultHeader;
 
-/// One line without its end. Names hold no commas or quotes (the configuration sees to that).
+/// One line without its end. Names with commas (of sweeps) are quoted; none holds a quote (the configuration sees to that).
 std::string result_line(const ResultRow& row);
 
 /// "scene,run,seed,": what the lines of one render begin with.

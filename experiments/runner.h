@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/error.h"
+#include "experiments/config.h"
 #include "experiments/hooks.h"
 
 namespace ambilux {
@@ -14,12 +15,17 @@ struct ExperimentRequest {
     std::string references;  ///< folder of the references; empty: OUTPUT/references. Shared by experiments, it saves making them again
     bool resume = false;
     const volatile bool* interrupt = nullptr;
+    double reference_checkpoint_seconds = 30;  ///< how often a reference is saved
 };
 
-/// Writes into the output folder: config.resolved.toml, manifest.json, runs.csv, images/SCENE/RUN_SEED.{exr,png}, stats/SCENE/RUN_SEED.json, references/. All that can be
-/// wrong with the configuration is refused before anything is rendered. Seeds are the outer loop, so that an experiment that is stopped early has fewer seeds of
-/// every run, not fewer runs. After each checkpoint the state of the render is saved; with `resume` a stopped or killed experiment loses no more than the work since
-/// the last checkpoint. Returns done or interrupted. Throws Error.
+/// Writes into the output folder: config.resolved.toml, manifest.json, runs.csv, images/SCENE/RUN_SEED.{exr,png}, stats/SCENE/RUN_SEED.json, techniques/SCENE/RUN_SEED/,
+/// references/. All that can be wrong with the configuration is refused before anything is rendered. Seeds are the outer loop, so that an experiment that is stopped early has
+/// fewer seeds of every run, not fewer runs. A render passes through all checkpoints, those in samples and those in seconds, without restarting. After each checkpoint its state
+/// is saved; with `resume` a stopped or killed experiment loses no more than the work since the last checkpoint, or since the start of a render that gathers images of single
+/// strategies. Returns done or interrupted. Throws Error.
 ExitCode run_experiment(const ExperimentRequest& request, const Hooks& hooks);
+
+/// Throws Error(bad_input) that shows the first difference if the folder holds an experiment of another configuration.
+void check_same_experiment(const std::string& folder, const ExperimentConfig& config);
 
 }  // namespace ambilux

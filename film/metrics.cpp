@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "core/error.h"
 
@@ -23,8 +24,14 @@ Metrics compare_values(uint32_t width, uint32_t height, const Reference& referen
     double squares = 0, relative = 0, absolute = 0, noise = 0, relative_noise = 0, total = 0, reference_total = 0, pixel_squares = 0;
     Metrics m;
     const size_t pixels = size_t(width) * height;
+    struct PixelError {
+        double error, noise;
+    };
+    std::vector<PixelError> by_pixel(pixels);
     for (size_t p = 0; p < pixels; ++p) {
         double pixel = 0;
+        PixelError& e = by_pixel[p];
+        e = {0, 0};
         for (size_t c = 0; c < 3; ++c) {
             const size_t i = 3 * p + c;
             const double x = value(i), r = mean.rgb[i], d = x - r;
@@ -35,6 +42,8 @@ Metrics compare_values(uint32_t width, uint32_t height, const Reference& referen
             absolute += std::abs(d) / (std::abs(r) + 0.01);
             noise += se * se;
             relative_noise += se * se / (r * r + 0.01);
+            e.error += d * d / (r * r + 0.01) / 3;
+            e.noise += se * se / (r * r + 0.01) / 3;
             reference_total += r;
             pixel += d / 3;
         }
@@ -50,6 +59,19 @@ Metrics compare_values(uint32_t width, uint32_t height, const Reference& referen
     const auto non_negative = [](double v) { return v < 0 ? 0.0 : v; };
     m.rmse_corrected = std::sqrt(non_negative((squares - noise) / n));
     m.relmse_corrected = non_negative((relative - relative_noise) / n);
+    const size_t kept = pixels - size_t(kTrimmedShare * double(pixels));
+    if (m.non_finite || !std::isfinite(relative)) {
+        m.relmse_trimmed = m.relmse_trimmed_corrected = std::numeric_limits<double>::quiet_NaN();  // outliers of this kind are not forgiven
+    } else if (pixels) {
+        std::nth_element(by_pixel.begin(), by_pixel.begin() + long(kept) - 1, by_pixel.end(), [](const PixelError& a, const PixelError& b) { return a.error < b.error; });
+        PixelError sum{0, 0};
+        for (size_t p = 0; p < kept; ++p) {
+            sum.error += by_pixel[p].error;
+            sum.noise += by_pixel[p].noise;
+        }
+        m.relmse_trimmed = sum.error / double(kept);
+        m.relmse_trimmed_corrected = non_negative((sum.error - sum.noise) / double(kept));
+    }
     m.bias = total / double(pixels);
     m.relative_bias = total == 0 ? 0 : total / (reference_total / 3);
     m.bias_z = pixel_squares == 0 ? 0 : total / std::sqrt(pixel_squares);
@@ -102,6 +124,8 @@ nlohmann::json to_json(const Metrics& m) {
             {"reference_noise", number(m.reference_noise)},
             {"relmse", number(m.relmse)},
             {"relmse_corrected", number(m.relmse_corrected)},
+            {"relmse_trimmed", number(m.relmse_trimmed)},
+            {"relmse_trimmed_corrected", number(m.relmse_trimmed_corrected)},
             {"mape", number(m.mape)},
             {"bias", number(m.bias)},
             {"relative_bias", number(m.relative_bias)},

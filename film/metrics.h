@@ -7,6 +7,9 @@
 
 namespace ambilux {
 
+/// Share of the pixels that relmse_trimmed leaves out.
+constexpr double kTrimmedShare = 0.001;
+
 /// Means run over all pixels and the channels R, G, B; x is the image, r the reference, se the standard error of r.
 struct Metrics {
     double rmse = 0;    ///< sqrt(mean((x-r)²)): holds the noise of the reference too
@@ -18,6 +21,14 @@ struct Metrics {
     /// the truth. NaN without standard errors. The samples of x and r must not share random numbers.
     double rmse_corrected = 0;
     double relmse_corrected = 0;  ///< max(0, mean(((x-r)²-se²)/(r²+0.01))); NaN without standard errors
+    /// relMSE without the worst kTrimmedShare of all pixels: e_p = mean over the channels of (x-r)²/(r²+0.01), and the mean of e_p over all pixels but the
+    /// floor(kTrimmedShare · pixels) largest. On scenes with fireflies a handful of pixels decides relMSE, so that its value says little about the image and changes from
+    /// seed to seed; this figure ranks methods by what the rest of the image looks like (trimmed mean: Tukey 1962; Huber 1981). It is no estimate of relMSE: energy that
+    /// a method finds only in outliers is not in it, so state it beside relMSE, never instead. NaN if any value of the image is NaN or Inf.
+    double relmse_trimmed = 0;
+    /// max(0, mean over the same pixels of ((x-r)²-se²)/(r²+0.01)); NaN without standard errors. Which pixels are kept depends on the noise of the reference as well, so
+    /// where that noise and not the image's decides the worst pixels, this subtracts slightly too much.
+    double relmse_trimmed_corrected = 0;
     double bias = 0;              ///< mean(x-r)
     double relative_bias = 0;     ///< mean(x-r)/mean(r); 0 for a black reference without bias
     /// Sum of the pixels' d over the root of the sum of d², where d is the mean over the channels of x-r. Under "no bias" pixels are independent with mean zero and

@@ -1,0 +1,94 @@
+#include "experiments/reference_store.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <thread>
+#include <vector>
+
+#include "core/error.h"
+#include "core/log.h"
+#include "core/sha256.h"
+#include "experiments/statistics.h"
+
+namespace ambilux {
+
+namespace fs = std::filesystem;
+
+RenderSettings reference_settings(const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene, int max_depth, const Hooks& hooks) {
+    RenderSettings s;
+    s.integrator = "path";
+    s.backend = config.backend;
+    s.max_depth = max_depth;
+    s.rr_depth = scene.integrator.rr_depth;
+    const RunEntry& how = entry.reference.how;
+    for (size_t i = 0; i < how.settings.size(); ++i) try {
+            hooks.apply_setting(s, how.settings[i].first, how.settings[i].second);
+        } catch (const Error& e) {
+            throw input_error(config.file, how.lines[i], fmt::format("reference of '{}': {}", entry.name, e.what()));
+        }
+    s.seed = config.reference_seed;
+    return s;
+}
+
+ReferencePlace find_reference(const std::string& folder, const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene, int max_depth,
+                              const Hooks& hooks) {
+    ReferencePlace place;
+    place.settings = reference_settings(config, entry, scene, max_depth, hooks);
+    const Settings& set = entry.reference.how.settings;
+    std::string making;
+    for (const auto& [key, value] : set) place.settings_text += (place.settings_text.empty() ? "" : " ") + key + "=" + value;
+    if (place.settings_text == "integrator=path") place.settings_text.clear();
+    if (!place.settings_text.empty()) {
+        Sha256 hash;
+        hash.update(place.settings_text);
+        making = "-" + place.settings.integrator + "-";
+        const auto digest = hash.digest();
+        for (size_t i = 0; i < 4; ++i) making += fmt::format("{:02x}", digest[i]);
+    }
+    const std::string depth = max_depth < 0 ? "inf" : std::to_string(max_depth);
+    const std::string seed = config.reference_seed ? fmt::format("-s{}", config.reference_seed) : "";
+    const std::string key = fmt::format("-{}-d{}-{}x{}{}{}.exr", scene_hash(scene).substr(0, 12), depth, scene.sensor.crop_width, scene.sensor.crop_height, making, seed);
+    place.path = folder + "/" + entry.base + key;
+    if (!fs::exists(place.path)) {
+        std::vector<std::string> others;
+        std::error_code missing;
+        for (const auto& file : fs::directory_iterator(folder, missing))
+            if (file.path().filename().string().ends_with(key)) others.push_back(file.path().filename().string());
+        if (!others.empty()) place.path = folder + "/" + *std::min_element(others.begin(), others.end());
+    }
+    if (fs::exists(place.path)) {
+        // A file that cannot be read is named when the reference is made.
+        try {
+            place.cached = read_reference_exr(place.path).samples;
+        } catch (const Error&) {
+        }
+    }
+    return place;
+}
+
+ReferenceLock::ReferenceLock(const std::string& path, const volatile bool* interrupt) {
+    const fs::path file(path);
+    const std::string name = (file.parent_path() / ("." + file.filename().string() + ".lock")).string();
+    fd_ = ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (fd_ < 0) throw Error(ExitCode::device, "cannot write into the folder " + file.parent_path().string());
+    bool said = false;
+    while (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
+        if (interrupt && *interrupt) return;
+        if (!said) log_info(fmt::format("{} is being made by another process: waiting for it", path));
+        said = true;
+        std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    }
+    held_ = true;
+}
+
+ReferenceLock::~ReferenceLock() {
+    if (fd_ >= 0) ::close(fd_);
+}
+
+}  // namespace ambilux

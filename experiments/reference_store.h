@@ -1,0 +1,42 @@
+// A folder of references, found by what they show: content of the scene, depth, size, and how they were made.
+#pragma once
+
+#include <string>
+
+#include "experiments/config.h"
+#include "experiments/hooks.h"
+#include "experiments/reference.h"
+
+namespace ambilux {
+
+/// What a reference is made of: where it lies, how it is rendered, and how a person would say that.
+struct ReferencePlace {
+    std::string path;
+    RenderSettings settings;
+    std::string settings_text;  ///< "" for the path tracer, else such as "integrator=bdpt variant=lvc"
+    uint64_t cached = 0;        ///< samples that the file holds; 0 without a file
+};
+
+/// Settings of a scene's reference. Throws Error(bad_input) with file and line.
+RenderSettings reference_settings(const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene, int max_depth, const Hooks& hooks);
+
+/// Where the reference of a scene lies in `folder`. A file of another name for the same scene content, depth, size, seed and making is taken as well, so that experiments that
+/// share a folder need not agree on names. The folder may be missing.
+ReferencePlace find_reference(const std::string& folder, const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene, int max_depth, const Hooks& hooks);
+
+/// Keeps other processes from making the reference at `path` at the same time; the system releases it when this one ends, however it does.
+class ReferenceLock {
+public:
+    /// Waits for another process. `held()` is false if *interrupt became true meanwhile.
+    ReferenceLock(const std::string& path, const volatile bool* interrupt);
+    ~ReferenceLock();
+    ReferenceLock(const ReferenceLock&) = delete;
+    ReferenceLock& operator=(const ReferenceLock&) = delete;
+    bool held() const { return held_; }
+
+private:
+    int fd_ = -1;
+    bool held_ = false;
+};
+
+}  // namespace ambilux

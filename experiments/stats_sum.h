@@ -1,0 +1,17 @@
+// Statistics of a render that was made in parts, and of which a part may have been made by another process.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "integrators/renderer.h"
+
+namespace ambilux {
+
+/// Adds to `total` what happened between `before` and `now`: counts, times and rays; of queues the highest peak. The rest is taken from `now`.
+void add_part(RenderStats& total, const RenderStats& before, const RenderStats& now);
+
+/// All fields, and back.
+nlohmann::json save_stats(const RenderStats& stats);
+RenderStats restore_stats(const nlohmann::json& json);
+
+}  // namespace ambilux
