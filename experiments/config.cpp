@@ -54,7 +54,13 @@ ReferenceEntry read_reference(const Reader& r, const toml::table& t, const std::
     return reference;
 }
 
-std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const ReferenceEntry& reference, Names& names) {
+/// What --reduced replaces.
+struct Reduction {
+    double scale = 1;            ///< of width and height
+    uint64_t reference_spp = 0;  ///< of all scenes; 0: as it is
+};
+
+std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const ReferenceEntry& reference, const Reduction& reduction, Names& names) {
     r.check_keys(t, "[[scene]]", {"name", "path", "size", "max_depth", "reference_spp", "reference", "lenient", "parameters", "sweep"});
     SceneEntry scene;
     scene.line = Reader::line_of(t);
@@ -64,19 +70,22 @@ std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const 
     const fs::path folder = fs::absolute(fs::path(r.file)).parent_path();
     scene.path = (folder / r.text(path, "path")).lexically_normal().string();
     if (!fs::is_regular_file(scene.path)) throw r.error(path, fmt::format("scene '{}': there is no file {}", scene.name, scene.path));
-    const auto set = [&r](SceneEntry& entry, const std::string& key, const toml::node& value) {
+    const auto set = [&r, &reduction](SceneEntry& entry, const std::string& key, const toml::node& value) {
         if (key == "max_depth") {
             entry.max_depth = int(r.integer(value, key, -1, 1 << 20));
             return std::to_string(*entry.max_depth);
         }
         const toml::array& a = r.array(value, key);
         if (a.size() != 2) throw r.error(value, "'size' must be [width, height]");
-        entry.width = uint32_t(r.integer(a[0], key, 1, 65536));
-        entry.height = uint32_t(r.integer(a[1], key, 1, 65536));
+        const auto pixels = [&](const toml::node& node) { return uint32_t(std::max(1.0, std::round(reduction.scale * double(r.integer(node, key, 1, 65536))))); };
+        entry.width = pixels(a[0]);
+        entry.height = pixels(a[1]);
         return fmt::format("{}x{}", entry.width, entry.height);
     };
     for (const char* key : {"size", "max_depth"})
         if (const toml::node* value = t.get(key)) set(scene, key, *value);
+    const bool sized = t.contains("size") || t.at_path("sweep.size");
+    if (reduction.scale != 1 && !sized) throw r.error(t, fmt::format("scene '{}': 'scale' of [reduced] needs a 'size' here", scene.name));
     scene.reference = reference;
     if (const toml::node* own = t.get("reference")) {
         const toml::table& table = r.table(*own, "reference");
@@ -87,6 +96,7 @@ std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const 
         if (t.at_path("reference.spp")) throw r.error(*spp, "'reference_spp' and 'reference.spp' say the same: leave one out");
         scene.reference.spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
     }
+    if (reduction.reference_spp) scene.reference.spp = reduction.reference_spp;
     if (const toml::node* lenient = t.get("lenient")) scene.lenient = r.flag(*lenient, "lenient");
     if (const toml::node* parameters = t.get("parameters"))
         for (const auto& [key, value] : r.table(*parameters, "parameters")) scene.parameters.emplace_back(std::string(key.str()), r.plain(value, key.str()));
@@ -185,10 +195,23 @@ void read_ablation(const Reader& r, const toml::table& t, ExperimentConfig& conf
     }
 }
 
+void read_seeds(const Reader& r, const toml::node& list, ExperimentConfig& config) {
+    config.seeds.clear();
+    std::set<uint64_t> taken;
+    for (const toml::node& node : r.array(list, "seeds")) {
+        const auto seed = uint64_t(r.integer(node, "seeds", 0, INT64_MAX));
+        if (!taken.insert(seed).second) throw r.error(node, fmt::format("seed {} is listed twice", seed));
+        config.seeds.push_back(seed);
+    }
+}
+
+/// The lists 'spp' and 'seconds' of a table that may hold more; they replace what the configuration has.
 void read_budget(const Reader& r, const toml::table& t, ExperimentConfig& config) {
-    r.check_keys(t, "[budget]", {"spp", "seconds"});
     const toml::node *spp = t.get("spp"), *seconds = t.get("seconds");
-    if (!spp && !seconds) throw r.error(t, "[budget] needs 'spp', 'seconds' or both");
+    if (spp || seconds) {
+        config.spp.clear();
+        config.seconds.clear();
+    }
     if (spp)
         for (const toml::node& node : r.array(*spp, "spp")) {
             const auto value = uint64_t(r.integer(node, "spp", 1, kMaxSpp));
@@ -213,7 +236,7 @@ std::vector<Checkpoint> ExperimentConfig::checkpoints() const {
     return all;
 }
 
-ExperimentConfig read_experiment(const std::string& path) {
+ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     const std::string content = read_file(path);
     toml::table root;
     try {
@@ -222,7 +245,7 @@ ExperimentConfig read_experiment(const std::string& path) {
         throw input_error(path, int(e.source().begin.line), std::string(e.description()));
     }
     const Reader r{path};
-    r.check_keys(root, "the configuration", {"name", "backend", "seeds", "reference", "budget", "scene", "run", "ablation"});
+    r.check_keys(root, "the configuration", {"name", "backend", "seeds", "reference", "budget", "scene", "run", "ablation", "reduced"});
     const auto need = [&](std::string_view key) -> const toml::node& {
         if (const toml::node* node = root.get(key)) return *node;
         throw input_error(path, 0, fmt::format("lacks the key '{}'", key));
@@ -236,20 +259,38 @@ ExperimentConfig read_experiment(const std::string& path) {
         if (config.backend != "auto" && config.backend != "cpu" && config.backend != "cuda")
             throw r.error(*backend, fmt::format("backend '{}': auto, cpu and cuda are known", config.backend));
     }
-    std::set<uint64_t> seeds;
-    for (const toml::node& node : r.array(need("seeds"), "seeds")) {
-        const auto seed = uint64_t(r.integer(node, "seeds", 0, INT64_MAX));
-        if (!seeds.insert(seed).second) throw r.error(node, fmt::format("seed {} is listed twice", seed));
-        config.seeds.push_back(seed);
-    }
+    read_seeds(r, need("seeds"), config);
     const toml::table& reference = r.table(need("reference"), "reference");
     r.check_keys(reference, "[reference]", {"spp", "seed", "integrator", "variant", "set"});
     r.need(reference, "spp", "[reference]");
     const ReferenceEntry general = read_reference(r, reference, "[reference]", {});
     if (const toml::node* seed = reference.get("seed")) config.reference_seed = uint64_t(r.integer(*seed, "seed", 0, INT64_MAX));
-    read_budget(r, r.table(need("budget"), "budget"), config);
+    const toml::table& budget = r.table(need("budget"), "budget");
+    r.check_keys(budget, "[budget]", {"spp", "seconds"});
+    if (!budget.get("spp") && !budget.get("seconds")) throw r.error(budget, "[budget] needs 'spp', 'seconds' or both");
+    read_budget(r, budget, config);
+    // Read in any case, so that its mistakes show before somebody needs it.
+    Reduction reduction;
+    ExperimentConfig small = config;
+    if (const toml::node* node = root.get("reduced")) {
+        const toml::table& t = r.table(*node, "reduced");
+        r.check_keys(t, "[reduced]", {"scale", "reference_spp", "seeds", "spp", "seconds"});
+        if (const toml::node* scale = t.get("scale")) {
+            const auto value = scale->value<double>();
+            if (!scale->is_number() || !value || !(*value > 0) || !(*value <= 1)) throw r.error(*scale, "'scale' must be a number above 0, up to 1");
+            reduction.scale = *value;
+        }
+        if (const toml::node* spp = t.get("reference_spp")) reduction.reference_spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
+        if (const toml::node* seeds = t.get("seeds")) read_seeds(r, *seeds, small);
+        read_budget(r, t, small);
+        if (reduced) config = small;
+        if (reduced) config.name += "-reduced";
+    } else if (reduced) {
+        throw input_error(path, 0, "--reduced: it has no section [reduced] that says what is smaller");
+    }
+    if (!reduced) reduction = {};
     for (const toml::node& node : r.array(need("scene"), "scene"))
-        for (SceneEntry& scene : read_scene(r, r.table(node, "scene"), general, scene_names)) config.scenes.push_back(std::move(scene));
+        for (SceneEntry& scene : read_scene(r, r.table(node, "scene"), general, reduction, scene_names)) config.scenes.push_back(std::move(scene));
     for (const toml::node& node : r.array(need("run"), "run"))
         for (RunEntry& run : read_run(r, r.table(node, "run"), run_names)) config.runs.push_back(std::move(run));
     if (const toml::node* ablation = root.get("ablation")) read_ablation(r, r.table(*ablation, "ablation"), config, run_names);

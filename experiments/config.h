@@ -65,8 +65,8 @@ struct ExperimentConfig {
 };
 
 /// Reads and checks a configuration as far as that needs no scene; sweeps become single runs and scenes. Throws Error(bad_input) with file, line and the offending key
-/// or value.
-ExperimentConfig read_experiment(const std::string& path);
+/// or value. `reduced`: with what the section [reduced] replaces, for small machines; refused where there is no such section.
+ExperimentConfig read_experiment(const std::string& path, bool reduced = false);
 
 /// The configuration with every default filled in and every sweep expanded, as TOML; equal experiments give equal text. It is a configuration itself.
 std::string resolved_toml(const ExperimentConfig& config);

@@ -65,7 +65,7 @@ double technique_bytes(int depth, double pixels) {
 }  // namespace
 
 std::string describe_plan(const ExperimentRequest& request, const Hooks& hooks) {
-    const Prepared prepared = prepare_experiment(request.config, hooks);
+    const Prepared prepared = prepare_experiment(request.config, request.reduced, hooks);
     const ExperimentConfig& config = prepared.config;
     const size_t checkpoints = config.checkpoints().size(), seeds = config.seeds.size();
     namespace fs = std::filesystem;

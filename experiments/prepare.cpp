@@ -74,9 +74,9 @@ RenderSettings settings_for(const ExperimentConfig& config, const LoadedEntry& s
     return s;
 }
 
-Prepared prepare_experiment(const std::string& path, const Hooks& hooks) {
+Prepared prepare_experiment(const std::string& path, bool reduced, const Hooks& hooks) {
     Prepared p;
-    p.config = read_experiment(path);
+    p.config = read_experiment(path, reduced);
     // Settings need no scene: a wrong one is told before minutes of loading.
     for (const RunEntry& run : p.config.runs) settings_for(p.config, {}, run, 0, hooks);
     for (const SceneEntry& entry : p.config.scenes) p.scenes.push_back(load_entry(p.config, entry, hooks));

@@ -45,7 +45,7 @@ uint64_t reference_seed(uint64_t seed) {
 ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& request, const Hooks& hooks) {
     if (request.spp < 2) throw Error(ExitCode::usage, "a reference needs at least 2 samples per pixel: one has no standard error");
     RenderSettings settings = request.settings;
-    if (settings.estimator != Estimator::mis || settings.strategies != kAllStrategies || (settings.integrator != "path" && settings.integrator != "bdpt"))
+    if (settings.estimator != Estimator::mis || settings.strategies != kAllStrategies || settings.singles.on || (settings.integrator != "path" && settings.integrator != "bdpt"))
         throw Error(ExitCode::usage, "a reference is made by integrator path or bdpt with all that it has (estimator mis, all strategies)");
     settings.seed = reference_seed(request.settings.seed);
 

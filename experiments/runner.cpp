@@ -59,7 +59,7 @@ private:
 class Experiment {
 public:
     Experiment(const ExperimentRequest& request, const Hooks& hooks)
-        : request_(request), hooks_(hooks), prepared_(prepare_experiment(request.config, hooks)), config_(prepared_.config), checkpoints_(config_.checkpoints()) {}
+        : request_(request), hooks_(hooks), prepared_(prepare_experiment(request.config, request.reduced, hooks)), config_(prepared_.config), checkpoints_(config_.checkpoints()) {}
 
     ExitCode run() {
         open_folder();

@@ -15,6 +15,7 @@ struct ExperimentRequest {
     std::string references;  ///< folder of the references; empty: OUTPUT/references. Shared by experiments, it saves making them again
     bool resume = false;
     const volatile bool* interrupt = nullptr;
+    bool reduced = false;    ///< as the section [reduced] of the configuration says
     double reference_checkpoint_seconds = 30;  ///< how often a reference is saved
 };
 

@@ -24,9 +24,9 @@ std::vector<std::vector<SweepValue>> one_at_a_time(const Sweep& sweep) {
 }
 
 std::string swept_name(const std::string& base, const std::vector<SweepValue>& values) {
-    std::string inner;
-    for (const SweepValue& value : values) inner += (inner.empty() ? "" : ",") + value.key + "=" + value.text;
-    return inner.empty() ? base : base + "[" + inner + "]";
+    std::vector<std::string> inner;
+    for (const SweepValue& value : values) inner.push_back(fmt::format("{}={}", value.key, value.text));
+    return inner.empty() ? base : fmt::format("{}[{}]", base, fmt::join(inner, ","));
 }
 
 }  // namespace ambilux
