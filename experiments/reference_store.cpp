@@ -74,7 +74,7 @@ ReferencePlace find_reference(const std::string& folder, const ExperimentConfig&
 
 ReferenceLock::ReferenceLock(const std::string& path, const volatile bool* interrupt) {
     const fs::path file(path);
-    const std::string name = (file.parent_path() / ("." + file.filename().string() + ".lock")).string();
+    const std::string name = (file.parent_path() / fmt::format(".{}.lock", file.filename().string())).string();
     fd_ = ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (fd_ < 0) throw Error(ExitCode::device, "cannot write into the folder " + file.parent_path().string());
     bool said = false;
