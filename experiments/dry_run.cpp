@@ -151,8 +151,9 @@ std::string describe_plan(const ExperimentRequest& request, const Hooks& hooks) 
     text += "\n\ncheckpoints of every render\n" + budgets;
     if (!config.ablation_default.empty()) text += "\nablation: every run is compared with " + config.ablation_default + "\n";
     text += fmt::format("\n  {:<28} {:>11} {:>6}  reference\n{}\nruns\n{}", "scene", "size", "depth", scene_rows, run_rows);
-    text += fmt::format("\ntime    {}: references {}, renders {}\n", about(reference_seconds + render_seconds), format_duration(reference_seconds), format_duration(render_seconds));
-    if (memory) text += fmt::format("memory  {} for the largest render ({}) on {}\n", bytes_text(double(memory)), memory_of, fmt::join(prepared.devices, ", "));
+    text += fmt::format("\ndevice  {}\n", fmt::join(prepared.devices, ", "));
+    text += fmt::format("time    {}: references {}, renders {}\n", about(reference_seconds + render_seconds), format_duration(reference_seconds), format_duration(render_seconds));
+    if (memory) text += fmt::format("memory  {} for the largest render ({})\n", bytes_text(double(memory)), memory_of);
     text += fmt::format("disk    up to {}\n", bytes_text(disk));
     text += "These are estimates. ";
     if (!config.spp.empty() || reference_seconds > 0) text += fmt::format("What a sample costs was measured for {} s per scene and run, on this machine as it is now. ", kPilotSeconds);

@@ -1,219 +1,18 @@
 // libs: ambilux_experiments
 // timeout: 120
 // Budgets, references and the experiment runner, on a process of known mean and variance in the renderer's place.
-#include <signal.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
-#include <chrono>
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-#include <thread>
-
-#include "core/atomic_file.h"
-#include "core/error.h"
 #include "core/log.h"
-#include "core/rng.h"
-#include "experiments/results.h"
+#include "experiments/machine.h"
 #include "experiments/reference.h"
-#include "experiments/runner.h"
 #include "experiments/state.h"
+#include "experiments/work_estimate.h"
 #include "film/ztest.h"
-#include "tests/catch.h"
+#include "tests/experiment_fakes.h"
 
 using namespace ambilux;
-namespace fs = std::filesystem;
-
-namespace {
-
-struct Folder {
-    fs::path path;
-    Folder() {
-        std::string name = (fs::temp_directory_path() / "ambilux-run-XXXXXX").string();
-        REQUIRE(::mkdtemp(name.data()));
-        path = name;
-    }
-    ~Folder() {
-        std::error_code ignored;
-        fs::remove_all(path, ignored);
-    }
-    std::string operator/(const std::string& name) const { return (path / name).string(); }
-    void write(const std::string& name, const std::string& text) const { std::ofstream(path / name) << text; }
-};
-
-/// What the fakes of a test share.
-struct World {
-    double sleep_per_sample = 0;  ///< seconds
-    uint32_t batch = 3;
-    int kill_at = -1;             ///< the render call that kills the process
-    int stop_at = -1;             ///< the render call that raises *flag
-    volatile bool flag = false;
-    bool counters_restart = false;  ///< with the film
-    int calls = 0, made = 0;
-    uint64_t samples = 0;         ///< rendered by all
-};
-
-/// Every value is (1 + channel)·exponential; estimator naive has a bias of 10 %.
-class FakeRenderer : public Renderer {
-public:
-    FakeRenderer(const Scene& scene, const RenderSettings& settings, World& world) : settings_(settings), world_(world) {
-        ++world.made;
-        film_.width = scene.sensor.crop_width;
-        film_.height = scene.sensor.crop_height;
-        clear_film();
-    }
-    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
-        if (++world_.calls == world_.kill_at) ::raise(SIGKILL);
-        uint32_t done = 0;
-        for (; done < count; ++done) {
-            if (world_.calls == world_.stop_at && done == 1) world_.flag = true;
-            if (interrupt && *interrupt) break;
-            if (world_.sleep_per_sample > 0) std::this_thread::sleep_for(std::chrono::duration<double>(world_.sleep_per_sample));
-            for (uint32_t p = 0; p < film_.width * film_.height; ++p) {
-                const Vec4f u = random_floats({settings_.seed, p, first + done, Stream::eye}, 0);
-                const double v = -std::log(1.0 - double(u.x)) * (settings_.estimator == Estimator::naive ? 1.1 : 1.0);
-                for (size_t c = 0; c < 3; ++c) {
-                    film_.sum[3 * p + c] += v * double(1 + c);
-                    film_.sum_squares[3 * p + c] += v * v * double(1 + c) * double(1 + c);
-                }
-            }
-        }
-        film_.samples += done;
-        world_.samples += done;
-        rays_ += uint64_t(done) * film_.width * film_.height;
-        return done;
-    }
-    FilmMoments film() override { return film_; }
-    void clear_film() override {
-        film_.samples = 0;
-        if (world_.counters_restart) rays_ = 0;
-        film_.sum.assign(size_t(film_.width) * film_.height * 3, 0.0);
-        film_.sum_squares = film_.sum;
-    }
-    RenderStats stats() override {
-        RenderStats s;
-        s.backend = "fake";
-        s.device = "fake device";
-        s.samples = film_.samples;
-        s.rays_extend = rays_;
-        return s;
-    }
-    uint32_t preferred_batch() const override { return world_.batch; }
-
-private:
-    RenderSettings settings_;
-    World& world_;
-    FilmMoments film_;
-    uint64_t rays_ = 0;
-};
-
-Scene fake_scene(const std::string& path, const LoadOptions& options) {
-    const std::string content = read_file(path);
-    if (content.find("broken") != std::string::npos) throw input_error(path, 7, "unknown bsdf 'broken'");
-    Scene scene;
-    scene.path = path;
-    scene.integrator.max_depth = 5;
-    for (size_t i = 0; i < content.size(); ++i) scene.content_hash[i % 32] ^= uint8_t(content[i] + 31 * i);
-    scene.sensor.crop_width = options.width ? options.width : 16;
-    scene.sensor.crop_height = options.height ? options.height : 12;
-    return scene;
-}
-
-Hooks fake_hooks(World& world) {
-    return {fake_scene,
-            [&world](const Scene& scene, const RenderSettings& settings) {
-                if (settings.integrator != "path") throw Error(ExitCode::usage, "integrator '" + settings.integrator + "' is not known");
-                return std::make_unique<FakeRenderer>(scene, settings, world);
-            },
-            [](RenderSettings& s, const std::string& key, const std::string& value) {
-                if (key == "integrator")
-                    s.integrator = value;
-                else if (key == "max_depth")
-                    s.max_depth = std::stoi(value);
-                else if (key == "rr_depth")
-                    s.rr_depth = std::stoi(value);
-                else if (key == "estimator" && value == "naive")
-                    s.estimator = Estimator::naive;
-                else if (key == "estimator" && value == "mis")
-                    s.estimator = Estimator::mis;
-                else
-                    throw Error(ExitCode::usage, key + "=" + value + " is not known");
-            }};
-}
-
-constexpr const char* kConfig = R"(name = "fake"
-seeds = [1, 2]
-[reference]
-spp = 400
-[budget]
-spp = [1, 2, 8, 32]
-[[scene]]
-name = "a"
-path = "a.xml"
-[[scene]]
-name = "b"
-path = "b.xml"
-size = [9, 5]
-[[run]]
-name = "good"
-integrator = "path"
-[[run]]
-name = "biased"
-integrator = "path"
-estimator = "naive"
-)";
-
-void write_inputs(const Folder& folder, const std::string& config = kConfig) {
-    folder.write("a.xml", "<scene a>");
-    folder.write("b.xml", "<scene b>");
-    folder.write("e.toml", config);
-}
-
-ExperimentRequest request(const Folder& folder, const std::string& output, bool resume = false) {
-    return {folder / "e.toml", folder / output, "", resume, nullptr};
-}
-
-std::vector<std::vector<std::string>> table(const std::string& path) {
-    std::vector<std::vector<std::string>> rows;
-    for (const std::string& line : read_results(path)) {
-        std::istringstream in(line);
-        rows.emplace_back();
-        for (std::string field; std::getline(in, field, ',');) rows.back().push_back(field);
-    }
-    return rows;
-}
-
-size_t column(const std::string& name) {
-    std::istringstream in(kResultHeader);
-    size_t i = 0;
-    for (std::string field; std::getline(in, field, ','); ++i)
-        if (field == name) return i;
-    FAIL("no column " << name);
-    return 0;
-}
-
-/// Rows without the one column that clocks decide.
-std::vector<std::vector<std::string>> timeless(const std::string& path) {
-    auto rows = table(path);
-    for (auto& row : rows) row[column("time")] = "";
-    return rows;
-}
-
-std::string error_of(const std::function<void()>& f, ExitCode code = ExitCode::bad_input) {
-    try {
-        f();
-    } catch (const Error& e) {
-        CHECK(e.code == code);
-        return e.what();
-    }
-    return "no error";
-}
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
-}  // namespace
+using namespace ambilux::test;
 
 TEST_CASE("G14: a time budget is met within 5 % of wall clock, whatever a sample costs") {
     for (const double cost : {0.0005, 0.004, 0.02}) {
@@ -528,42 +327,175 @@ TEST_CASE("two processes do not share a folder; a folder that cannot be made is 
     CHECK(contains(error_of([&] { run_experiment(request(folder, "file/out"), fake_hooks(world)); }, ExitCode::device), "file/out"));
 }
 
-TEST_CASE("configurations are refused with file, line and the offending name, before anything is rendered") {
+TEST_CASE("checkpoints in samples and in seconds lie within one render") {
     const Folder folder;
-    const auto refused = [&](const std::string& from, const std::string& to) {
-        std::string config = kConfig;
-        const size_t at = config.find(from);
-        REQUIRE(at != std::string::npos);
-        write_inputs(folder, config.replace(at, from.size(), to));
-        folder.write("broken.xml", "broken");
-        World world;
-        const std::string message = error_of([&] { run_experiment(request(folder, "out"), fake_hooks(world)); });
-        CHECK(world.calls == 0);
-        CHECK_FALSE(fs::exists(folder.path / "out"));
-        return message;
-    };
-    CHECK(contains(refused("seeds = [1, 2]", "seed = [1, 2]"), "e.toml:2: unknown key 'seed' in the configuration; known are: name"));
-    CHECK(contains(refused("seeds = [1, 2]", "seeds = [1, 1]"), "e.toml:2: seed 1 is listed twice"));
-    CHECK(contains(refused("seeds = [1, 2]", "seeds = 1"), "e.toml:2: 'seeds' must be a list"));
-    CHECK(contains(refused("seeds = [1, 2]", "seeds = [1, 2"), "e.toml:3: "));
-    CHECK(contains(refused("seeds = [1, 2]\n", ""), "e.toml: lacks the key 'seeds'"));
-    CHECK(contains(refused("spp = 400", "spp = 1"), "e.toml:4: 'spp' must be an integer from 2"));
-    CHECK(contains(refused("spp = [1, 2, 8, 32]", "spp = [1, 2, 2]"), "e.toml:6: 'spp' must rise; 2 does not"));
-    CHECK(contains(refused("spp = [1, 2, 8, 32]", "seconds = [-1.0]"), "e.toml:6: 'seconds' must be positive"));
-    CHECK(contains(refused("spp = [1, 2, 8, 32]", ""), "e.toml:5: [budget] needs 'spp', 'seconds' or both"));
-    CHECK(contains(refused("path = \"b.xml\"", "path = \"c.xml\""), "e.toml:12: scene 'b': there is no file "));
-    CHECK(contains(refused("path = \"b.xml\"", "path = \"broken.xml\""), "broken.xml:7: unknown bsdf 'broken'"));
-    CHECK(contains(refused("size = [9, 5]", "size = [9]"), "e.toml:13: 'size' must be [width, height]"));
-    CHECK(contains(refused("size = [9, 5]", "sise = [9, 5]"), "e.toml:13: unknown key 'sise' in [[scene]]"));
-    CHECK(contains(refused("name = \"biased\"", "name = \"good\""), "e.toml:18: name 'good' of [[run]] is used twice"));
-    CHECK(contains(refused("name = \"biased\"", "name = \"a/b\""), "e.toml:18: name 'a/b'"));
-    CHECK(contains(refused("estimator = \"naive\"", "estimator = \"best\""), "e.toml:20: run 'biased': estimator=best is not known"));
-    CHECK(contains(refused("estimator = \"naive\"", "set = { rr_dept = 3 }"), "e.toml:20: run 'biased': rr_dept=3 is not known"));
-    CHECK(contains(refused("estimator = \"naive\"", "set = { seed = 3 }"), "e.toml:20: 'seed' belongs to the experiment"));
-    CHECK(contains(refused("estimator = \"naive\"", "integrator2 = 1"), "e.toml:20: unknown key 'integrator2' in [[run]]"));
-    CHECK(contains(refused("name = \"biased\"\nintegrator = \"path\"", "name = \"biased\"\nintegrator = \"magic\""),
-                   "e.toml:17: run 'biased' on scene 'a': integrator 'magic' is not known"));
+    std::string config = kConfig;
+    config.replace(config.find("spp = [1, 2, 8, 32]"), 19, "spp = [10, 400]\nseconds = [0.05, 0.2]");
+    write_inputs(folder, config);
     World world;
-    ExperimentRequest missing{folder / "none.toml", folder / "out", "", false, nullptr};
-    CHECK(contains(error_of([&] { run_experiment(missing, fake_hooks(world)); }), "none.toml: No such file"));
+    world.sleep_per_sample = 0.0005;
+    world.batch = 20;
+    CHECK(run_experiment(request(folder, "out"), fake_hooks(world)) == ExitCode::done);
+    const auto rows = table(folder / "out/runs.csv");
+    REQUIRE(rows.size() == 8 * 4);
+    const size_t checkpoint = column("checkpoint"), budget = column("budget"), spp = column("spp"), time = column("time");
+    for (size_t i = 0; i < rows.size(); i += 4) {
+        // Written in the order in which they are reached; a place in the list of checkpoints means the same in every render.
+        for (size_t k = 0; k + 1 < 4; ++k) CHECK(std::stod(rows[i + k][time]) <= std::stod(rows[i + k + 1][time]));
+        for (size_t k = 0; k < 4; ++k) {
+            const auto& row = rows[i + k];
+            CHECK(row[budget] == (std::stoi(row[checkpoint]) < 2 ? "spp" : "seconds"));
+            if (row[checkpoint] == "0") CHECK(row[spp] == "10");
+            if (row[checkpoint] == "1") CHECK(row[spp] == "400");
+            if (row[checkpoint] == "2") CHECK(std::stod(row[time]) > 0.95 * 0.05);
+            if (row[checkpoint] == "3") {
+                CHECK(std::stod(row[time]) > 0.95 * 0.2);
+                // The image is that of the last checkpoint of the list, not the latest.
+                Attributes attributes;
+                read_exr(folder / ("out/images/" + row[0] + "/" + row[1] + "_" + row[2] + ".exr"), &attributes);
+                CHECK(std::to_string(attributes["spp"].get<int>()) == row[spp]);
+            }
+        }
+    }
+    // One render each, nothing twice: 400 samples unless time allowed more.
+    const uint64_t references = 2 * 400;
+    uint64_t most = 0;
+    for (size_t i = 3; i < rows.size(); i += 4) most += std::stoull(rows[i][spp]);
+    CHECK(world.samples == references + most);
+}
+
+TEST_CASE("a reference is found by content, extended on demand, and made by the integrator that the configuration names") {
+    const Folder folder;
+    write_inputs(folder);
+    World world;
+    auto r = request(folder, "one");
+    r.references = folder / "refs";
+    run_experiment(r, fake_hooks(world));
+    const auto samples_of = [&](const std::string& config, const std::string& output) {
+        folder.write("e.toml", config);
+        r.output = folder / output;
+        const uint64_t before = world.samples;
+        run_experiment(r, fake_hooks(world));
+        return world.samples - before - 8 * 32;
+    };
+    const auto with = [](std::string config, const std::string& from, const std::string& to) { return config.replace(config.find(from), from.size(), to); };
+    CHECK(samples_of(kConfig, "two") == 0);
+    CHECK(samples_of(with(kConfig, "name = \"b\"", "name = \"another\""), "three") == 0);
+    CHECK(samples_of(with(kConfig, "spp = 400", "spp = 500"), "four") == 2 * 100);
+    CHECK(samples_of(kConfig, "five") == 0);  // 500 serve for 400
+    CHECK(samples_of(with(kConfig, "size = [9, 5]", "size = [9, 5]\nmax_depth = 3"), "six") == 400);
+    CHECK(samples_of(with(kConfig, "spp = 400", "spp = 400\nintegrator = \"bdpt\"\nvariant = \"lvc\""), "seven") == 2 * 400);
+    const auto manifest = nlohmann::json::parse(read_file(folder / "seven/manifest.json"));
+    CHECK(manifest["scenes"][0]["reference"]["integrator"] == "bdpt");
+    CHECK(manifest["scenes"][0]["reference"]["settings"] == "integrator=bdpt variant=lvc");
+    Attributes attributes;
+    read_reference_exr(manifest["scenes"][0]["reference"]["file"].get<std::string>(), &attributes);
+    CHECK(attributes["integrator"] == "bdpt");
+    CHECK(samples_of(with(kConfig, "size = [9, 5]", "size = [9, 5]\nreference = { integrator = \"bdpt\", variant = \"lvc\", spp = 450 }"), "eight") == 50);
+    // A copy of the scene under another name has the same content.
+    folder.write("copy.xml", "<scene b>");
+    CHECK(samples_of(with(kConfig, "path = \"b.xml\"", "path = \"copy.xml\""), "nine") == 0);
+}
+
+TEST_CASE("a reference that is killed and continued has the bits of one that is not") {
+    const Folder folder;
+    write_inputs(folder);
+    World world;
+    const Hooks hooks = fake_hooks(world);
+    const Scene scene = fake_scene(folder / "a.xml", {});
+    ReferenceRequest whole;
+    whole.path = folder / "whole.exr";
+    whole.spp = 64;
+    const auto complete = make_reference(scene, whole, hooks);
+    ReferenceRequest part = whole;
+    part.path = folder / "part.exr";
+    part.checkpoint_seconds = 0;
+    for (const int at : {9, 4, 7}) {
+        const pid_t child = ::fork();
+        REQUIRE(child >= 0);
+        if (child == 0) {
+            World doomed;
+            doomed.kill_at = at;
+            doomed.sleep_per_sample = 0.002;
+            try {
+                make_reference(scene, part, fake_hooks(doomed));
+            } catch (...) {
+            }
+            ::_exit(0);
+        }
+        int status = 0;
+        REQUIRE(::waitpid(child, &status, 0) == child);
+        REQUIRE(WIFSIGNALED(status));
+        CHECK(fs::exists(part.path + ".sums"));
+    }
+    const auto continued = make_reference(scene, part, hooks);
+    CHECK(continued.continued_from >= 4);
+    CHECK(continued.continued_from < 64);
+    CHECK(bool(continued.reference.mean.rgb == complete.reference.mean.rgb));
+    CHECK(bool(continued.reference.standard_error.rgb == complete.reference.standard_error.rgb));
+    CHECK_FALSE(fs::exists(part.path + ".sums"));
+}
+
+TEST_CASE("a render that gathers images of single strategies starts over when it was killed") {
+    const Folder folder;
+    std::string config = kConfig;
+    config.replace(config.find("estimator = \"naive\""), 19, "sweep = { rr_depth = [1, 2], connections = [3] }\ntechniques = 4");
+    write_inputs(folder, config);
+    World world;
+    run_experiment(request(folder, "whole"), fake_hooks(world));
+    const std::string name = "techniques/a/biased[rr_depth=2,connections=3]_1/raw_s00_t02.exr";
+    const Image image = read_exr(folder / ("whole/" + name));
+    CHECK(image.rgb[0] == 32);
+    CHECK_FALSE(fs::exists(folder.path / "whole/techniques/a/good_1"));
+    const pid_t child = ::fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+        World doomed;
+        doomed.kill_at = 2 * 134 + 3 * 13 - 2;  // in the third render, which is of this kind
+        run_experiment(request(folder, "out"), fake_hooks(doomed));
+        ::_exit(0);
+    }
+    int status = 0;
+    REQUIRE(::waitpid(child, &status, 0) == child);
+    REQUIRE(WIFSIGNALED(status));
+    const auto before = read_results(folder / "out/runs.csv").size();
+    CHECK(before % 4 == 0);
+    CHECK(run_experiment(request(folder, "out", true), fake_hooks(world)) == ExitCode::done);
+    CHECK(bool(read_exr(folder / ("out/" + name)).rgb == image.rgb));
+    CHECK(bool(timeless(folder / "out/runs.csv") == timeless(folder / "whole/runs.csv")));
+    const auto manifest = nlohmann::json::parse(read_file(folder / "out/manifest.json"));
+    CHECK(manifest["runs"][2]["sweep"] == nlohmann::json({{"of", "biased"}, {"values", {{"connections", "3"}, {"rr_depth", "2"}}}}));
+    CHECK(manifest["runs"][2]["techniques"] == 4);
+}
+
+TEST_CASE("clocks of graphics cards are read from what nvidia-smi prints") {
+    const auto gpus = parse_gpu_clocks("1980, 2619, 41\n345, [N/A], 30\n");
+    REQUIRE(gpus.size() == 2);
+    CHECK(gpus[0]["sm_mhz"] == 1980);
+    CHECK(gpus[0]["memory_mhz"] == 2619);
+    CHECK(gpus[0]["celsius"] == 41);
+    CHECK(gpus[1]["memory_mhz"].is_null());
+    CHECK(parse_gpu_clocks("").empty());
+    const auto clocks = describe_clocks("start");
+    CHECK(clocks["when"] == "start");
+    CHECK(clocks["date"].is_string());
+}
+
+TEST_CASE("the time that is left: by kind, and for budgets of samples and seconds at once") {
+    WorkEstimate work;
+    work.plan("a", 4, {100, 0});
+    work.plan("b", 2, {0, 3});
+    work.plan("c", 1, {100, 5});
+    CHECK(std::isinf(work.seconds_left()));  // nothing is known of samples
+    CHECK(work.seconds_left("b") == 6);
+    work.begin("a", {100, 0});
+    work.progress("a", 50, 1);
+    CHECK(work.seconds_left("a") == Approx(1 + 3 * 2));
+    CHECK(work.seconds_left("c") == Approx(5));  // 100 samples take 2 s
+    work.measured("c", 10, 1);
+    CHECK(work.seconds_left("c") == Approx(10));
+    CHECK(work.fraction() == Approx(1.0 / (1 + 7 + 6 + 10)));
+    work.end("a");
+    work.skip("a");
+    CHECK(work.seconds_left("a") == Approx(2 * 2));
 }

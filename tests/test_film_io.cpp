@@ -175,6 +175,39 @@ TEST_CASE("PNG: the sRGB curve, clamping and NaN") {
     CHECK(read_file(folder / "a.png").substr(0, 8) == "\x89PNG\r\n\x1a\n");
 }
 
+TEST_CASE("metrics: relMSE without the worst pixels") {
+    // 3000 pixels of error 0.1 in one channel, of which two are fireflies: three are left out, the third an ordinary one.
+    Reference r{{60, 50, std::vector<float>(9000, 1.0f)}, {60, 50, std::vector<float>(9000, 0.02f)}, 16};
+    Image x = r.mean;
+    for (size_t p = 0; p < 3000; ++p) x.rgb[3 * p] += 0.1f;
+    x.rgb[3 * 17 + 1] = 1e4f;
+    x.rgb[3 * 2011 + 2] = 500.0f;
+    const Metrics m = compare_images(x, r);
+    CHECK(m.relmse > 1e4);
+    CHECK(m.relmse_trimmed == Approx(0.01 / 1.01 / 3).epsilon(1e-4));
+    CHECK(m.relmse_trimmed_corrected == Approx((0.01 / 3 - 0.0004) / 1.01).epsilon(1e-4));
+    // What is no number is not forgiven.
+    x.rgb[5] = std::nanf("");
+    CHECK(std::isnan(compare_images(x, r).relmse_trimmed));
+    CHECK(std::isnan(compare_images(x, r).relmse_trimmed_corrected));
+    x.rgb[5] = INFINITY;
+    CHECK(std::isnan(compare_images(x, r).relmse_trimmed));
+    r.standard_error = {};
+    x.rgb[5] = 1;
+    CHECK(std::isnan(compare_images(x, r).relmse_trimmed_corrected));
+    CHECK(compare_images(x, r).relmse_trimmed < 0.01);
+    // With Gaussian noise of known variance, little is lost: the trimmed part holds 0.1 % of pixels and about 0.5 % of their squares.
+    std::mt19937_64 random(3);
+    std::normal_distribution<float> normal(0.0f, 0.1f);
+    Reference zero{{200, 200, std::vector<float>(120000, 0.0f)}, {200, 200, std::vector<float>(120000, 0.0f)}, 16};
+    Image noisy = zero.mean;
+    for (float& v : noisy.rgb) v = normal(random);
+    const Metrics g = compare_images(noisy, zero);
+    CHECK(g.relmse == Approx(1).epsilon(0.02));
+    CHECK(g.relmse_trimmed < g.relmse);
+    CHECK(g.relmse_trimmed == Approx(g.relmse).epsilon(0.01));
+}
+
 TEST_CASE("metrics: values by hand") {
     Reference r{{2, 1, {1, 1, 1, 0, 0, 2}}, {2, 1, {0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f}}, 16};
     const Image x{2, 1, {1.5f, 1, 1, 0, 0.1f, 2}};
@@ -192,6 +225,9 @@ TEST_CASE("metrics: values by hand") {
     CHECK(m.bias == Approx(0.1));
     CHECK(m.relative_bias == Approx(0.6 / 5));
     CHECK(m.bias_z == Approx((0.5 / 3 + 0.1 / 3) / std::sqrt(0.26 / 9)));
+
+    CHECK(m.relmse_trimmed == m.relmse);  // a thousandth of two pixels is none
+    CHECK(compare_images(x, quiet).relmse_trimmed_corrected == Approx(compare_images(x, quiet).relmse_corrected));
 
     const Metrics same = compare_images(r.mean, r);
     CHECK(same.rmse == 0);
