@@ -156,8 +156,9 @@ TEST_CASE("kill -9 at random moments, resumed each time: the same rows, images a
             REQUIRE(a["stages"].size() == b["stages"].size());
             for (size_t i = 0; i < a["stages"].size(); ++i) {
                 CHECK(a["stages"][i]["name"] == b["stages"][i]["name"]);
-                // Film writes are one per batch, and the clock sizes batches.
-                if (a["stages"][i]["name"] != "accumulate") CHECK(a["stages"][i]["items"] == b["stages"][i]["items"]);
+                // The clock sizes batches, and a stage that runs over all slots of a batch counts those that stay empty too.
+                const std::string stage = a["stages"][i]["name"];
+                if (stage == "extend" || stage == "shade" || stage == "occlude") CHECK(a["stages"][i]["items"] == b["stages"][i]["items"]);
             }
             ++statistics;
         }
