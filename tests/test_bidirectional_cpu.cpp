@@ -312,9 +312,9 @@ struct Bench {
             bench.change(bench);
         }
         template <class Stage>
-        void run_slots(StageId id, const Stage& stage, uint32_t slots) {
+        void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
             prepare(id, slots);
-            CpuExecutor::run_slots(id, stage, slots);
+            CpuExecutor::run_slots(id, stage, slots, samples);
         }
         template <class Stage, class Item>
         void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
