@@ -1,6 +1,8 @@
-// megakernel: one thread does a slot's light walk, its eye walk and all connections, with the functions that the stages use.
+// megakernel: one thread does a slot's light walk, its eye walk and all connections, with the functions that the stages use. It is a state machine of at most one ray
+// per round, so that lanes of a warp trace together whatever their rays are for; lanes whose path has ended begin another (Novak et al. 2010, "Path Regeneration for Interactive Path Tracing").
 #pragma once
 
+#include "core/warp.h"
 #include "stages/bidirectional_policy.h"
 #include "stages/generate.h"
 #include "stages/splat.h"
@@ -11,6 +13,9 @@ namespace ambilux {
 
 template <Features F, class Tracer>
 struct Megakernel {
+    static constexpr uint32_t kBlocksPerSm = 4;  ///< on a device: 128 registers per thread
+    static constexpr uint32_t kBeginTogether = 8;  ///< lanes without a path wait for as many before they begin new ones
+
     SceneView scene;
     Tracer tracer;
     Wave wave;
@@ -20,20 +25,73 @@ struct Megakernel {
     Lane* samples;
     StageRecord* records;  ///< one per StageId: rays are counted where the stages would
 
-    AMBILUX_HD void operator()(uint32_t slot) const {
-        samples[slot] = {};
-        const PathSlot p = wave.locate(slot);
-        if (!p.active || policy.max_depth == 0) return;
+    /// Does the slots `slot`, `slot + stride` ... below `end`, one after the other.
+    AMBILUX_HD void run(uint32_t slot, uint32_t end, uint32_t stride) const {
+        const Warp warp;
+        Path path{};
         Counts counts{};
-        const uint32_t last = policy.light_walks ? light_walk(slot, p, counts) : kNone;
-        const Rgb value = eye_walk(p, last, counts);
-        memcpy(&samples[slot], &value, sizeof(value));
+        for (;;) {
+            const bool idle = !path.active && slot < end;
+            const uint32_t waiting = warp.count(idle), working = warp.count(path.active);
+            if (waiting + working == 0) break;
+            if (idle && (working == 0 || waiting >= kBeginTogether)) {
+                begin(path, slot);
+                slot += stride;
+            }
+
+            warp.meet();
+            Hit hit;
+            bool met = false;
+            const bool tested = path.testing, walked = !tested && path.walking && !connecting(path);
+            if (tested || walked) met = trace(path, hit, counts);
+
+            warp.meet();
+            if (tested) {
+                path.testing = false;
+                if (!met) deliver(path);
+            }
+            if (walked) {
+                path.walking = false;
+                if (met)
+                    shade(path, hit);
+                else
+                    escape(path);
+            }
+
+            warp.meet();
+            if (!path.testing && connecting(path)) connect(path);
+
+            warp.meet();
+            if (path.active && !path.testing && !path.walking && !connecting(path)) {
+                if (path.light)
+                    begin_eye_walk(path);
+                else
+                    finish(path);
+            }
+        }
         add(StageId::light_extend, counts.light_rays);
         add(StageId::extend, counts.eye_rays);
         add(StageId::occlude, counts.shadow_rays);
     }
 
 private:
+    /// What a thread works on. Its next ray is the shadow ray if there is one, else, when the vertex has no connections left, that of the walk.
+    struct Path {
+        bool active;
+        bool light;         ///< on the light walk; else on the eye walk
+        bool walking;       ///< `walk` goes on
+        bool testing;       ///< there is a shadow ray
+        uint32_t slot;
+        uint32_t last;      ///< vertex of the light walk
+        Walk walk;
+        float tmax;         ///< of the walk's ray
+        VertexItem vertex;  ///< of the eye walk, with the light vertex to connect next
+        Ray shadow;
+        Rgb value;          ///< arrives if the shadow ray is free:
+        Vec2f film;         ///< there, from a light walk
+        Rgb sum;            ///< of the eye walk
+    };
+
     struct Counts {
         uint32_t light_rays, eye_rays, shadow_rays;
     };
@@ -49,118 +107,143 @@ private:
 #endif
     }
 
-    // Traversal appears once for either kind of ray, not at every call: the kernel is larger than the instruction caches as it is.
+    AMBILUX_HD RngKey key(const Path& path) const { return wave.key(path.slot, path.light ? Stream::light : Stream::eye); }
 
-    /// The weighted value of a connection if its ray is free, else zero.
-    __attribute__((noinline)) AMBILUX_HD Rgb visible(WalkConnection c, const RngKey& key, uint32_t which, StageId maker, Counts& counts) const {
-        const Rgb none = {0.0f, 0.0f, 0.0f};
-        if (!is_light(c.value, record(maker))) return none;
-        c.value *= 1.0f / (1.0f + c.others);
-        if (!is_light(c.value, record(StageId::mis_weight)) || is_zero(c.value)) return none;
-        Ray ray = {c.o, c.tmax, c.d, 0};
-        if constexpr (F.opacity) ray.alpha_seed = alpha_seed(key, which, true);
-        ++counts.shadow_rays;
-        return tracer.template occluded<F>(scene, ray) ? none : c.value;
+    /// A vertex past the capacity was not kept: the wave will be done again.
+    AMBILUX_HD bool connecting(const Path& path) const { return path.vertex.previous < light_vertices.capacity; }
+
+    AMBILUX_HD void begin(Path& path, uint32_t slot) const {
+        samples[slot] = {};
+        path.active = policy.max_depth > 0 && wave.locate(slot).active;
+        if (!path.active) return;
+        path.light = true;
+        path.slot = slot;
+        path.last = kNone;
+        path.vertex.previous = kNone;
+        if (policy.light_walks) begin_light_walk(path);
     }
 
-    AMBILUX_HD void push_splat(WalkConnection c, Vec2f film, uint32_t slot, const RngKey& key, uint32_t depth, StageId maker, Counts& counts) const {
-        const Rgb value = visible(c, key, depth, maker, counts);
-        if (!is_zero(value)) splats.push({value, slot, film, {}, 0.0f});
-    }
-
-    /// The nearest hit of the walk's ray; false if there is none.
-    __attribute__((noinline)) AMBILUX_HD bool extend(const Walk& w, const RngKey& key, float tmax, Hit& hit) const {
-        Ray ray = {w.o, tmax, w.d, 0};
-        if constexpr (F.opacity) ray.alpha_seed = alpha_seed(key, w.depth, false);
-        return tracer.template closest<F>(scene, ray, hit);
-    }
-
-    /// Returns the place of the last vertex kept.
-    AMBILUX_HD uint32_t light_walk(uint32_t slot, const PathSlot& p, Counts& counts) const {
-        const RngKey key = wave.key(p, Stream::light);
-        const Vec4f direction = random_floats(key, kEmissionBlock + 1);
-        uint32_t last = kNone;
+    AMBILUX_HD void begin_light_walk(Path& path) const {
+        const RngKey k = key(path);
+        const Vec4f direction = random_floats(k, kEmissionBlock + 1);
         EmissionSample e;
-        if (!sample_emission<F>(scene, random_floats(key, kEmissionBlock), {direction.x, direction.y}, e)) return last;
-        Walk w = start_light_walk(e);
-        if (!is_light(w.throughput, record(StageId::light_generate))) return last;
+        if (!sample_emission<F>(scene, random_floats(k, kEmissionBlock), {direction.x, direction.y}, e)) return;
+        path.walk = start_light_walk(e);
+        path.tmax = kInfinity;
+        if (!is_light(path.walk.throughput, record(StageId::light_generate))) return;
         WalkConnection c;
-        Vec2f film;
-        if (policy.splat && !policy.hide_emitters && connect_visible_light<F>(scene, policy.mis, e, {direction.z, direction.w}, c, film))
-            push_splat(c, film, slot, key, 0, StageId::light_generate, counts);
-        if (policy.max_depth < 2) return last;
-        for (;;) {
-            Hit hit;
-            ++counts.light_rays;
-            if (!extend(w, key, kInfinity, hit)) return last;
-            const WalkVertex y = light_vertex<F>(scene, policy.mis, w, hit.prim, hit.u, hit.v);
-            if (bsdf_is_smooth(y.scattering.bsdf)) {
-                if (policy.splat) {
-                    const Vec4f u = random_floats(key, lens_block(w.depth));
-                    if (connect_camera<F>(scene, policy.mis, y, w.throughput, {u.x, u.y}, c, film)) push_splat(c, film, slot, key, w.depth, StageId::connect_camera, counts);
-                }
-                if (policy.connect_vertices && w.depth + 2 <= policy.max_depth)
-                    last = light_vertices.push({w.d, slot, w.throughput, WalkBits::make(w.depth, w.delta, w.eta_scale), hit.u, hit.v, hit.prim, y.sums.dvcm, y.sums.dvc, last, {0, 0}});
-            }
-            if (w.depth + 1 >= policy.max_depth) return last;
-            const Vec4f u = random_floats(key, light_scatter_block(w.depth));
-            if (!scatter_walk<F>(policy.mis, y, u, TransportMode::importance, policy.rr_depth, w)) return last;
-            if (!is_light(w.throughput, record(StageId::light_shade))) return last;
+        if (policy.splat && !policy.hide_emitters && policy.wants(1, 1) && connect_visible_light<F>(scene, policy.mis, e, {direction.z, direction.w}, c, path.film))
+            test(path, c, k, 0, StageId::light_generate);
+        path.walking = policy.max_depth >= 2;
+    }
+
+    AMBILUX_HD void begin_eye_walk(Path& path) const {
+        const CameraSample camera = camera_sample(scene, wave, wave.locate(path.slot));
+        path.light = false;
+        path.walk = start_eye_walk(scene, policy.mis, camera);
+        path.tmax = camera.tmax;
+        path.walking = true;
+        path.sum = {0.0f, 0.0f, 0.0f};
+    }
+
+    AMBILUX_HD void finish(Path& path) const {
+        memcpy(&samples[path.slot], &path.sum, sizeof(path.sum));
+        path.active = false;
+    }
+
+    AMBILUX_HD bool trace(const Path& path, Hit& hit, Counts& counts) const {
+        const bool any_hit = path.testing;
+        ++(any_hit ? counts.shadow_rays : path.light ? counts.light_rays : counts.eye_rays);
+        Ray ray = path.shadow;
+        if (!any_hit) {
+            ray = {path.walk.o, path.tmax, path.walk.d, 0};
+            if constexpr (F.opacity) ray.alpha_seed = alpha_seed(key(path), path.walk.depth, false);
         }
+        return tracer.template trace<F>(scene, ray, any_hit, hit);
     }
 
-    AMBILUX_HD Rgb emitted(const Walk& w, Rgb radiance, float others) const {
-        const Rgb value = w.throughput * radiance;
-        if (!is_light(value, record(StageId::shade)) || is_zero(value)) return {0.0f, 0.0f, 0.0f};
-        const Rgb weighted = value * (1.0f / (1.0f + others));
-        return is_light(weighted, record(StageId::mis_weight)) ? weighted : Rgb{0.0f, 0.0f, 0.0f};
+    AMBILUX_HD void deliver(Path& path) const {
+        if (path.light)
+            splats.push({path.value, path.slot, path.film, {}, 0.0f});
+        else
+            path.sum += path.value;
     }
 
-    AMBILUX_HD Rgb eye_walk(const PathSlot& p, uint32_t last, Counts& counts) const {
-        const RngKey key = wave.key(p);
-        const CameraSample camera = camera_sample(scene, wave, p);
-        Walk w = start_eye_walk(scene, policy.mis, camera);
-        Rgb sum = {0.0f, 0.0f, 0.0f};
-        for (;;) {
-            const bool shown = !(policy.hide_emitters && w.depth == 1);
-            Hit hit;
-            ++counts.eye_rays;
-            if (!extend(w, key, w.depth == 1 ? camera.tmax : kInfinity, hit)) {
-                if (F.has_environment() && policy.count_environment && shown)
-                    sum += emitted(w, environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
-                return sum;
-            }
-            if (policy.background_only) return sum;
-            const WalkVertex z = eye_vertex<F>(scene, policy.mis, w, hit.prim, hit.u, hit.v);
-            const uint32_t emitter = scene.shapes[z.point.shape].emitter;
-            if (policy.count_hits && shown && emitter != kNone) {
-                const Rgb radiance = emitted_radiance<F>(scene, emitter, z.point, -w.d);
-                if (!is_zero(radiance)) sum += emitted(w, radiance, others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, z.point));
-            }
-            if (w.depth >= policy.max_depth) return sum;
-            if (bsdf_is_smooth(z.scattering.bsdf)) sum += connections(z, w, key, last, counts);
-            if (w.depth + 1 == policy.max_depth && !policy.count_hits && !policy.count_environment) return sum;
-            const Vec4f u = random_floats(key, scatter_block(w.depth));
-            if (!scatter_walk<F>(policy.mis, z, u, TransportMode::radiance, policy.rr_depth, w)) return sum;
-            if (!is_light(w.throughput, record(StageId::shade))) return sum;
+    /// The connection, weighted, asks for a shadow ray.
+    AMBILUX_HD void test(Path& path, const WalkConnection& c, const RngKey& k, uint32_t which, StageId maker) const {
+        if (!is_light(c.value, record(maker))) return;
+        path.value = c.value * (1.0f / (1.0f + policy.others(c.others)));
+        if (!is_light(path.value, record(StageId::mis_weight)) || is_zero(path.value)) return;
+        path.shadow = {c.o, c.tmax, c.d, F.opacity ? alpha_seed(k, which, true) : 0};
+        path.testing = true;
+    }
+
+    AMBILUX_HD bool emitters_shown(const Walk& w) const { return !(policy.hide_emitters && w.depth == 1); }
+
+    AMBILUX_HD void add_emitted(Path& path, Rgb radiance, float others) const {
+        if (!policy.wants(0, path.walk.depth + 1)) return;
+        const Rgb value = path.walk.throughput * radiance;
+        if (!is_light(value, record(StageId::shade)) || is_zero(value)) return;
+        const Rgb weighted = value * (1.0f / (1.0f + policy.others(others)));
+        if (is_light(weighted, record(StageId::mis_weight))) path.sum += weighted;
+    }
+
+    AMBILUX_HD void escape(Path& path) const {
+        const Walk& w = path.walk;
+        if (F.has_environment() && !path.light && policy.count_environment && emitters_shown(w))
+            add_emitted(path, environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
+    }
+
+    /// The vertex that the walk met: emission, the connection with camera or emitter, and the next ray. Both walks go through the same code as far as they can.
+    AMBILUX_HD void shade(Path& path, const Hit& hit) const {
+        Walk& w = path.walk;
+        const bool light = path.light;
+        if (!light && policy.background_only) return;
+        const RngKey k = key(path);
+        WalkVertex x = walk_vertex<F>(scene, w, hit.prim, hit.u, hit.v);
+        x.sums = light ? light_sums<F>(scene, policy.mis, w, x.point) : eye_sums(scene, policy.mis, w, x.point);
+        const uint32_t emitter = scene.shapes[x.point.shape].emitter;
+        if (!light && policy.count_hits && emitter != kNone && emitters_shown(w)) {
+            const Rgb radiance = emitted_radiance<F>(scene, emitter, x.point, -w.d);
+            if (!is_zero(radiance)) add_emitted(path, radiance, others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, x.point));
         }
+        if (w.depth >= policy.max_depth) return;
+        if (bsdf_is_smooth(x.scattering.bsdf)) {
+            const Vec4f u = random_floats(k, light ? lens_block(w.depth) : emitter_block(w.depth));
+            WalkConnection c;
+            const bool made = light ? policy.splat && policy.wants(w.depth + 1, 1) && connect_camera<F>(scene, policy.mis, x, w.throughput, {u.x, u.y}, c, path.film)
+                                    : policy.next_event && policy.wants(1, w.depth + 1) && connect_next_event<F>(scene, policy.mis, x, w.throughput, u, c);
+            if (made) test(path, c, k, w.depth, light ? StageId::connect_camera : StageId::connect);
+            if (policy.connect_vertices && w.depth + 2 <= policy.max_depth) {
+                const VertexItem item = {w.d, path.slot, w.throughput, WalkBits::make(w.depth, w.delta, w.eta_scale), hit.u, hit.v, hit.prim, x.sums.dvcm, x.sums.dvc, path.last, {0, 0}};
+                if (light)
+                    path.last = light_vertices.push(item);
+                else
+                    path.vertex = item;
+            }
+        }
+        // The last segment of an eye walk can bring emission only, and a path has one more than its light walk.
+        if (w.depth + 1 >= policy.max_depth && (light || !(policy.count_hits || policy.count_environment))) return;
+        const Vec4f u = random_floats(k, light ? light_scatter_block(w.depth) : scatter_block(w.depth));
+        path.tmax = kInfinity;
+        path.walking = scatter_walk<F>(policy.mis, x, u, light ? TransportMode::importance : TransportMode::radiance, policy.rr_depth, w) &&
+                       is_light(w.throughput, record(light ? StageId::light_shade : StageId::shade));
     }
 
-    __attribute__((noinline)) AMBILUX_HD Rgb connections(const WalkVertex& z, const Walk& w, const RngKey& key, uint32_t last, Counts& counts) const {
-        Rgb sum = {0.0f, 0.0f, 0.0f};
+    /// The eye vertex and the next vertex of the light walk that is not too far from the light.
+    AMBILUX_HD void connect(Path& path) const {
+        VertexItem& z = path.vertex;
+        const uint32_t depth = z.bits.depth();
+        VertexItem y;
+        do {
+            if (!connecting(path)) return;
+            y = light_vertices.load(z.previous);
+            z.previous = y.previous;
+        } while (depth + y.bits.depth() + 1 > policy.max_depth);
+        if (!policy.wants(y.bits.depth() + 1, depth + 1)) return;
         WalkConnection c;
-        if (policy.next_event && connect_next_event<F>(scene, policy.mis, z, w.throughput, random_floats(key, emitter_block(w.depth)), c))
-            sum += visible(c, key, w.depth, StageId::connect, counts);
-        // A vertex past the capacity was not kept: the wave will be done again.
-        for (uint32_t i = last; i < light_vertices.capacity;) {
-            const VertexItem light = light_vertices.load(i);
-            i = light.previous;
-            if (w.depth + light.bits.depth() + 1 > policy.max_depth) continue;
-            const WalkVertex y = unpack_vertex<F>(scene, light);
-            if (connect_vertices<F>(policy.mis, y, light.throughput, z, w.throughput, c))
-                sum += visible(c, key, w.depth + (light.bits.depth() << WalkBits::kDepthBits), StageId::connect_vertices, counts);
-        }
-        return sum;
+        if (connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, y), y.throughput, unpack_vertex<F>(scene, z), z.throughput, c))
+            test(path, c, key(path), depth + (y.bits.depth() << WalkBits::kDepthBits), StageId::connect_vertices);
     }
 };
 

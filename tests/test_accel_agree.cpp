@@ -99,6 +99,14 @@ struct Agreement {
     uint64_t wrong_embree = 0, wrong_cwbvh = 0;
 };
 
+/// trace() is closest() and occluded().
+template <Features F, class Tracer>
+void check_trace(const SceneView& view, const Tracer& tracer, const Ray& ray, bool occluded, bool is_hit, const Hit& closest) {
+    Hit hit;
+    const bool any = tracer.template trace<F>(view, ray, true, hit), met = tracer.template trace<F>(view, ray, false, hit);
+    if (any != occluded || met != is_hit || std::memcmp(&hit, &closest, sizeof(hit)) != 0) FAIL("trace disagrees with closest or occluded");
+}
+
 template <Features F>
 void compare(const SceneView& view, const EmbreeTracer& embree, const CwbvhTracer& cwbvh, const Ray& ray, float scale, Agreement& a) {
     Hit e, c;
@@ -115,6 +123,8 @@ void compare(const SceneView& view, const EmbreeTracer& embree, const CwbvhTrace
         ++a.ties;
     }
     if (cwbvh.occluded<F>(view, ray) != c_hit) FAIL("any hit and closest hit disagree for ray " << a.rays);
+    check_trace<F>(view, cwbvh, ray, c_hit, c_hit, c);
+    check_trace<F>(view, embree, ray, embree.occluded<F>(view, ray), e_hit, e);
 }
 
 /// Rays of all kinds that make tracers differ.

@@ -30,7 +30,7 @@ double worst_difference(const FilmMoments& a, const FilmMoments& b) {
 TEST_CASE("megakernel and wavefront sample the same paths: images equal up to rounding, rays equal") {
     for (const char* name : {"cornell", "furnace", "glass", "lights", "materials", "textured"}) {
         const Scene scene = project_scene(name, 64, 48);
-        for (const char* strategies : {"all", "hits+next_event", "light", "connections+light"}) {
+        for (const char* strategies : {"all", "hits+next_event", "light", "connections+light", "s1t2+s2t2+s4t1"}) {
             INFO(name << " " << strategies);
             RenderSettings s = variant_settings(scene, "wavefront");
             apply_setting(s, "strategies", strategies);

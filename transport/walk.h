@@ -62,29 +62,43 @@ AMBILUX_HD Walk start_light_walk(const EmissionSample& e) {
 
 // ---- vertices ----
 
-/// The vertex that an eye walk meets at (prim,u,v).
+/// Sums of an eye walk where its ray meets `point`.
+AMBILUX_HD MisSums eye_sums(const SceneView& scene, const BidirectionalMis& mis, const Walk& w, const SurfacePoint& point) {
+    const bool first = w.depth == 1;
+    float d2 = length_squared(point.p - w.o);
+    if (first) d2 = sqr(sqrtf(d2) + w.start_distance);
+    return sums_at_hit(mis, w.sums, d2, fabsf(dot(point.ng, w.d)), first && camera_delta_direction(scene.sensor));
+}
+
+/// Sums of a light walk where its ray meets `point`.
+template <Features F>
+AMBILUX_HD MisSums light_sums(const SceneView& scene, const BidirectionalMis& mis, const Walk& w, const SurfacePoint& point) {
+    const float cos_in = fabsf(dot(point.ng, w.d));
+    if (w.depth == 1) return light_sums_at_first_hit<F>(scene, mis, w.start, w.o, w.d, point.p, cos_in);
+    return sums_at_hit(mis, w.sums, length_squared(point.p - w.o), cos_in, false);
+}
+
+/// The vertex that a walk meets at (prim,u,v), without its sums.
+template <Features F>
+AMBILUX_HD WalkVertex walk_vertex(const SceneView& scene, const Walk& w, uint32_t prim, float u, float v) {
+    WalkVertex x;
+    x.point = surface_at<F>(scene, prim, u, v);
+    x.scattering = make_scattering<F>(scene, x.point, -w.d);
+    x.first = w.depth == 1;
+    return x;
+}
+
 template <Features F>
 AMBILUX_HD WalkVertex eye_vertex(const SceneView& scene, const BidirectionalMis& mis, const Walk& w, uint32_t prim, float u, float v) {
-    WalkVertex z;
-    z.point = surface_at<F>(scene, prim, u, v);
-    z.scattering = make_scattering<F>(scene, z.point, -w.d);
-    z.first = w.depth == 1;
-    float d2 = length_squared(z.point.p - w.o);
-    if (z.first) d2 = sqr(sqrtf(d2) + w.start_distance);
-    z.sums = sums_at_hit(mis, w.sums, d2, fabsf(dot(z.point.ng, w.d)), z.first && camera_delta_direction(scene.sensor));
+    WalkVertex z = walk_vertex<F>(scene, w, prim, u, v);
+    z.sums = eye_sums(scene, mis, w, z.point);
     return z;
 }
 
-/// The vertex that a light walk meets at (prim,u,v).
 template <Features F>
 AMBILUX_HD WalkVertex light_vertex(const SceneView& scene, const BidirectionalMis& mis, const Walk& w, uint32_t prim, float u, float v) {
-    WalkVertex y;
-    y.point = surface_at<F>(scene, prim, u, v);
-    y.scattering = make_scattering<F>(scene, y.point, -w.d);
-    y.first = w.depth == 1;
-    const float cos_in = fabsf(dot(y.point.ng, w.d));
-    y.sums = y.first ? light_sums_at_first_hit<F>(scene, mis, w.start, w.o, w.d, y.point.p, cos_in)
-                     : sums_at_hit(mis, w.sums, length_squared(y.point.p - w.o), cos_in, false);
+    WalkVertex y = walk_vertex<F>(scene, w, prim, u, v);
+    y.sums = light_sums<F>(scene, mis, w, y.point);
     return y;
 }
 

@@ -21,6 +21,14 @@ public:
         for (uint32_t i = 0; i < n; ++i) stage(i);
         record(id, n, start);
     }
+    /// A stage that takes its slots by itself.
+    template <class Stage>
+    void run_paths(StageId id, const Stage& stage, uint32_t slots) {
+        const uint32_t n = slots * state_->samples;
+        const auto start = Clock::now();
+        stage.run(0, n, 1);
+        record(id, n, start);
+    }
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
         const uint32_t n = queue.counter->size();

@@ -37,6 +37,12 @@ __global__ void __launch_bounds__(kStageBlock) launch_slots(const __grid_constan
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) stage(i);
 }
 
+/// All threads stay until the last slot is done.
+template <class Stage>
+__global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_paths(const __grid_constant__ Stage stage, uint32_t slots, const WaveState* state) {
+    stage.run(blockIdx.x * kStageBlock + threadIdx.x, slots * state->samples, gridDim.x * kStageBlock);
+}
+
 template <class Stage>
 __global__ void __launch_bounds__(kStageBlock) launch_queue(const __grid_constant__ Stage stage, const QueueCounter* counter) {
     const uint32_t n = counter->size();
@@ -132,6 +138,11 @@ public:
     void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
         detail::launch_slots<<<blocks(detail::launch_slots<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, slots, samples, state_);
         finish(id, nullptr, slots, samples);
+    }
+    template <class Stage>
+    void run_paths(StageId id, const Stage& stage, uint32_t slots) {
+        detail::launch_paths<<<blocks(detail::launch_paths<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, slots, state_);
+        finish(id, nullptr, slots);
     }
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {

@@ -113,7 +113,7 @@ template <class Executor, Features F, class Tracer>
 void run_bidirectional_wave(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     if (stages.policy.stream_slots) return run_streams(exec, stages);
     if (stages.policy.megakernel) {
-        exec.run_slots(StageId::megakernel, stages.megakernel, stages.wave.tiles * kTilePixels);
+        exec.run_paths(StageId::megakernel, stages.megakernel, stages.wave.tiles * kTilePixels);
         exec.settle(stages.memory.light_vertices, stages.memory.splats);
     } else {
         if (stages.policy.light_walks) run_light_walks(exec, stages);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "scene/accel/cwbvh_node.h"
@@ -23,14 +24,20 @@ struct CwbvhTracer {
     /// Nearest hit with 0 < t < ray.tmax; without one, hit.prim is kNone and the result is false.
     template <Features F>
     AMBILUX_HD bool closest(const SceneView& scene, const Ray& ray, Hit& hit) const {
-        return traverse<F, false>(scene, ray, hit);
+        return traverse<F>(scene, ray, std::false_type(), hit);
     }
 
     /// True if anything lies at 0 < t < ray.tmax.
     template <Features F>
     AMBILUX_HD bool occluded(const SceneView& scene, const Ray& ray) const {
         Hit hit;
-        return traverse<F, true>(scene, ray, hit);
+        return traverse<F>(scene, ray, std::true_type(), hit);
+    }
+
+    /// Either of them by the same instructions, for lanes of a warp that ask for one and the other. With `any_hit`, `hit` is any of those on the way.
+    template <Features F>
+    AMBILUX_HD bool trace(const SceneView& scene, const Ray& ray, bool any_hit, Hit& hit) const {
+        return traverse<F>(scene, ray, any_hit, hit);
     }
 
     /// Tests one entry of `primitives`; updates `hit` and returns true if the ray meets it at 0 < t < hit.t.
@@ -56,8 +63,9 @@ struct CwbvhTracer {
     }
 
 private:
-    template <Features F, bool AnyHit>
-    AMBILUX_HD bool traverse(const SceneView& scene, const Ray& ray, Hit& hit) const {
+    /// `AnyHit`: a bool, or a constant.
+    template <Features F, class AnyHit>
+    AMBILUX_HD bool traverse(const SceneView& scene, const Ray& ray, AnyHit any_hit, Hit& hit) const {
         hit = {ray.tmax, 0.0f, 0.0f, kNone};
         if (!is_traceable(ray)) return false;
         const CwbvhRay box_ray = make_cwbvh_ray(ray.o, ray.d);
@@ -73,7 +81,7 @@ private:
             group = {node.first_child, (hits & kCwbvhInnerBits) | node.inner_mask};
             for (uint32_t leaves = hits & ~kCwbvhInnerBits; leaves; leaves &= leaves - 1) {
                 const bool met = intersect_primitive<F>(scene, ray, shear, node.first_primitive + uint32_t(detail::lowest_bit(leaves)), hit);
-                if (AnyHit && met) return true;
+                if (any_hit && met) return true;
             }
             if (!(group.hits & kCwbvhInnerBits)) {
                 if (top == 0) break;

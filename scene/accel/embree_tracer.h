@@ -75,6 +75,12 @@ struct EmbreeTracer {
         return query.tfar < 0.0f;
     }
 
+    /// Either of them; with `any_hit`, `hit` is not set.
+    template <Features F>
+    bool trace(const SceneView& view, const Ray& ray, bool any_hit, Hit& hit) const {
+        return any_hit ? occluded<F>(view, ray) : closest<F>(view, ray, hit);
+    }
+
 private:
     template <Features F>
     static detail::EmbreeRayContext make_context(const SceneView& view, const Ray& ray) {
