@@ -163,10 +163,12 @@ private:
     }
 
     AMBILUX_HD void deliver(Path& path) const {
-        if (path.light)
-            splats.push({path.value, path.slot, path.film, {}, 0.0f});
-        else
+        if (!path.light) {
             path.sum += path.value;
+            return;
+        }
+        const SplatItem item = {path.value, path.slot, path.film, Strategy::make(0, 0), 0.0f};
+        splats.push(item);
     }
 
     /// The connection, weighted, asks for a shadow ray.
