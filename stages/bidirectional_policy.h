@@ -24,6 +24,10 @@ struct BidirectionalPolicy {
     SingleStrategies singles;
     uint32_t technique_depth; ///< segments up to which images of single strategies are gathered; 0: none
 
+    /// Eye walks of `depth` segments count the environment that they reach: beyond the first segment as hits only.
+    AMBILUX_HD bool counts_environment(uint32_t depth) const { return count_environment && (depth == 1 || mis.has(kHitStrategies)); }
+    /// The last segment of an eye walk can bring nothing but emission; false if that is not wanted.
+    AMBILUX_HD bool counts_last_segment() const { return count_hits || (count_environment && mis.has(kHitStrategies)); }
     /// True if what strategy (s,t) finds is to be counted.
     AMBILUX_HD bool wants(uint32_t s, uint32_t t) const { return singles.has(Strategy::make(s, t)); }
     /// The sum of the other strategies for one that is alone.

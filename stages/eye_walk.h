@@ -39,7 +39,7 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
     const bool visible = !(policy.hide_emitters && w.depth == 1);
     if (h.prim == kNone) {
         if constexpr (F.has_environment())
-            if (policy.count_environment && visible) emit(environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
+            if (policy.counts_environment(w.depth) && visible) emit(environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
         return step;
     }
     if (policy.background_only) return step;
@@ -55,8 +55,7 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
         step.connectable = true;
     }
     const uint32_t depth = w.depth;
-    // The last segment can bring emission only.
-    if (depth + 1 == policy.max_depth && !policy.count_hits && !policy.count_environment) return step;
+    if (depth + 1 == policy.max_depth && !policy.counts_last_segment()) return step;
     const Vec4f u = random_floats(wave.key(h.ray.path), scatter_block(depth));
     if (!scatter_walk<F>(policy.mis, z, u, TransportMode::radiance, policy.rr_depth, w) || !is_light(w.throughput, record)) return step;
     step.ray = pack_walk(w, h.ray.path, false, kInfinity);

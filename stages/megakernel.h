@@ -192,7 +192,7 @@ private:
 
     AMBILUX_HD void escape(Path& path) const {
         const Walk& w = path.walk;
-        if (F.has_environment() && !path.light && policy.count_environment && emitters_shown(w))
+        if (F.has_environment() && !path.light && policy.counts_environment(w.depth) && emitters_shown(w))
             add_emitted(path, environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
     }
 
@@ -225,7 +225,7 @@ private:
             }
         }
         // The last segment of an eye walk can bring emission only, and a path has one more than its light walk.
-        if (w.depth + 1 >= policy.max_depth && (light || !(policy.count_hits || policy.count_environment))) return;
+        if (w.depth + 1 >= policy.max_depth && (light || !policy.counts_last_segment())) return;
         const Vec4f u = random_floats(k, light ? light_scatter_block(w.depth) : scatter_block(w.depth));
         path.tmax = kInfinity;
         path.walking = scatter_walk<F>(policy.mis, x, u, light ? TransportMode::importance : TransportMode::radiance, policy.rr_depth, w) &&
