@@ -212,6 +212,8 @@ private:
         const LoadedEntry& scene = prepared_.scenes[index];
         SceneReference& made = references_made_[index];
         const std::string work = kind(scene, nullptr);
+        // Looked for again: another scene of this experiment may have been the same.
+        made.place = find_reference(references_, config_, *scene.entry, scene.scene, scene.max_depth, hooks_);
         const ReferenceLock lock(made.place.path, request_.interrupt);
         if (!lock.held()) return false;
         ReferenceRequest request;

@@ -395,6 +395,9 @@ TEST_CASE("a reference is found by content, extended on demand, and made by the 
     // A copy of the scene under another name has the same content.
     folder.write("copy.xml", "<scene b>");
     CHECK(samples_of(with(kConfig, "path = \"b.xml\"", "path = \"copy.xml\""), "nine") == 0);
+    // Twice in one experiment, too.
+    r.references = folder / "fresh";
+    CHECK(samples_of(with(kConfig, "path = \"b.xml\"\nsize = [9, 5]", "path = \"a.xml\""), "ten") == 400);
 }
 
 TEST_CASE("a reference that is killed and continued has the bits of one that is not") {
