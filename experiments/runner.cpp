@@ -65,7 +65,7 @@ public:
         open_folder();
         const FolderLock lock(request_.output);
         read_earlier();
-        manifest_["clocks"].push_back(describe_clocks("start"));
+        manifest_["clocks"].push_back(describe_clocks(manifest_["resumed"].empty() ? "start" : "resumed"));
         write_manifest(false);
         plan();
         Progress progress("experiment " + config_.name);
