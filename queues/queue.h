@@ -34,7 +34,8 @@ struct QueueCounter {
     }
 };
 
-/// Takes one place for the calling thread. On a device the threads of a warp that push together take theirs with one atomic operation.
+/// Takes one place for the calling thread. On a device the threads of a warp that push together take theirs with one atomic operation, so all of them must push to the
+/// same queue: a queue that differs from thread to thread is to be chosen by a branch.
 AMBILUX_HD uint32_t take_place(uint32_t* count) {
 #if defined(__CUDA_ARCH__)
     const uint32_t together = __activemask();

@@ -84,7 +84,11 @@ struct StreamExtend {
         WalkHit h = hit_of(pool.rays.load(i), hit);
         const bool light = h.ray.path & kLightRay;
         h.ray.path &= ~kLightRay;
-        (light ? light_hits : eye_hits).push(h);
+        // Not one push to either of two queues: lanes that push together share a counter (take_place).
+        if (light)
+            light_hits.push(h);
+        else
+            eye_hits.push(h);
     }
 
     AMBILUX_HD void operator()(uint32_t i) const {
