@@ -32,7 +32,7 @@ def analyse(results, out, insets=None, full_size=False):
     lines = summary.lines(data)
     remarks = summary.remarks(data, lines)
     write(out / "table.csv", tables.to_csv(lines))
-    write(out / "table.tex", tables.to_latex(lines, data.base))
+    write(out / "table.tex", tables.to_latex(data, lines))
     write(out / "tests.tex", tables.tests_to_latex(lines))
     made = figures.make_all(data, out, write, insets or {})
     try:

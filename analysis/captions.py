@@ -2,6 +2,8 @@
 
 import textwrap
 
+from analysis import summary
+
 
 def listed(values):
     """"1, 2, 3, 7" as "1–3, 7" for whole numbers."""
@@ -19,13 +21,27 @@ def span(values, unit=""):
     return (f"{low:.4g}" if low == high else f"{low:.4g}–{high:.4g}") + unit
 
 
+def reference_facts(reference):
+    """How a scene's reference was made: "by bdpt (variant wavefront), 2048 spp, RMS standard error 0.00923". `reference`: its entry of the manifest."""
+    settings = dict(part.partition("=")[::2] for part in (reference.get("settings") or "").split())
+    integrator = reference.get("integrator") or settings.get("integrator")
+    settings.pop("integrator", None)
+    if reference.get("variant"):
+        settings.setdefault("variant", reference["variant"])
+    if integrator == "path":
+        settings.setdefault("estimator", "mis")  # how the runner makes references by path tracing (experiments.md)
+    how = ", ".join(f"{key} {value}" for key, value in settings.items())
+    parts = [f"by {integrator}" + (f" ({how})" if how else "") if integrator else None, f"{reference['spp']} spp" if reference.get("spp") else None,
+             f"RMS standard error {reference['noise']:.3g}" if reference.get("noise") is not None else None]
+    return ", ".join(p for p in parts if p)
+
+
 def scene_facts(experiment, scene):
     entry = experiment.scene_entry(scene)
     reference = entry.get("reference") or {}
     parts = [f"{entry['size'][0]}x{entry['size'][1]}" if entry.get("size") else None,
              f"max_depth {entry['max_depth']}" if entry.get("max_depth") is not None else None,
-             f"reference {reference['spp']} spp" if reference.get("spp") else None,
-             f"its RMS standard error {reference['noise']:.3g}" if reference.get("noise") is not None else None,
+             f"reference {facts}" if (facts := reference_facts(reference)) else None,
              f"hash {entry['hash'][:12]}" if entry.get("hash") else None]
     return f"{scene} ({', '.join(p for p in parts if p)})" if any(parts) else scene
 
@@ -37,13 +53,14 @@ def data_behind(experiment, scenes, runs):
     versions, machine = m.get("versions") or {}, m.get("machine") or {}
     devices = ", ".join(d for d in m.get("devices") or [] if d)
     driver = f", driver {machine['driver']}" if machine.get("driver") else ""
-    config = m.get("config")
+    config, clocks = m.get("config"), summary.clock_text(experiment)
     return [line for line in (
         f"Experiment: {experiment.name}, {m.get('date', 'date unknown')}",
         "Scenes: " + "; ".join(scene_facts(experiment, s) for s in scenes),
         "Runs: " + ", ".join(runs),
         f"Seeds: {listed({r.seed for r in rows})}; samples per pixel {span([r.spp for r in rows])}; seconds {span([r.time for r in rows])}" if rows else None,
         f"Device: {devices or 'unknown'} ({machine.get('cpu', 'unknown processor')}{driver})",
+        f"Clocks: {clocks}" if clocks else None,
         f"Revision: ambilux {versions.get('ambilux', '?')}, git {versions.get('git_revision', 'unknown')}",
         f"Command: ambilux experiment {config} -o {experiment.folder.name}" if config else None,
         f"Command: python -m analysis {experiment.folder.name} -o FIGURES",

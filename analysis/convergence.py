@@ -8,7 +8,7 @@ import numpy as np
 from analysis import style, summary
 
 AXES = {"seconds": "time (s)", "spp": "samples per pixel"}
-NAMES = {"rmse": "RMSE", "relmse": "relMSE"}
+NAMES = {"rmse": "RMSE", "relmse": "relMSE", "relmse_trimmed": "trimmed relMSE"}
 
 
 def draw_guide(axes, curves, x, slope):
@@ -21,7 +21,7 @@ def draw_guide(axes, curves, x, slope):
 
 def draw_panel(axes, experiment, scene, x, measure):
     """One scene, or a word in place of it."""
-    curves = [(i, c) for i, run in enumerate(experiment.runs) if (c := summary.curve(experiment, scene, run, measure))]
+    curves = [(i, c) for i, run in enumerate(experiment.runs) if (c := summary.curve(experiment, scene, run, measure, x))]
     axes.set_title(style.wrap(scene, 30))
     if not curves:
         axes.text(0.5, 0.5, "no results", ha="center", transform=axes.transAxes)
@@ -36,11 +36,12 @@ def draw_panel(axes, experiment, scene, x, measure):
     strength = 0.2 if len(curves) <= 3 else 0.11  # many bands on top of each other
     for i, c in curves:
         axes.fill_between(getattr(c, x), c.low, c.high, color=style.colour(i), alpha=strength, lw=0, zorder=2)
-    axes.set_ylim(limits[0] / 1.1, limits[1] * 1.1)
     noise = summary.reference_noise(experiment, scene)
     # Shown where it matters: a reference far below the data would only stretch the axis.
     if measure == "rmse" and noise > 0.3 * min(c.error.min() for _, c in curves):
         axes.axhline(noise, color="0.4", lw=0.8, ls=":", zorder=1, label="noise of the reference")
+        limits = min(limits[0], noise), limits[1]
+    axes.set_ylim(limits[0] / 1.1, limits[1] * 1.1)
     style.label_log_axis(axes.xaxis, axes.get_xlim())
     style.label_log_axis(axes.yaxis, axes.get_ylim())
     axes.set_xlabel(AXES[x])
@@ -68,12 +69,14 @@ def draw(experiment, x, measure):
 
 
 def make(experiment):
-    """Yields the four figures."""
-    for measure in NAMES:
+    """Yields a figure for each error and axis."""
+    for measure in summary.recorded(experiment):
+        trimmed = f"Without the worst {summary.trimmed_share(experiment)} of the pixels of each image, which is no estimate of relMSE. " if measure == "relmse_trimmed" else ""
         for x, against in (("seconds", "render time"), ("spp", "samples per pixel")):
             yield style.Picture(
-                f"convergence_{'time' if x == 'seconds' else 'spp'}" + ("" if measure == "rmse" else "_relmse"), draw(experiment, x, measure),
+                f"convergence_{'time' if x == 'seconds' else 'spp'}" + ("" if measure == "rmse" else f"_{measure}"), draw(experiment, x, measure),
                 f"{NAMES[measure]} against {against}",
                 "Lines: geometric mean over seeds; bands: its 95 % confidence interval (Student's on the logarithms; none with one seed). The noise of the "
-                "reference is subtracted where it is known. Dashed: the slope of independent samples.",
+                f"reference is subtracted where it is known. {trimmed}Dashed: the slope of independent samples. Points: checkpoints in "
+                + (("seconds" if x == "seconds" else "samples") if experiment.budget(x) else "the one unit that the experiment has") + ".",
                 experiment.runs, experiment.scenes)

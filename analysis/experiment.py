@@ -8,10 +8,11 @@ import json
 import math
 import re
 import tomllib
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 
-TEXT = ("scene", "run")
+TEXT = ("scene", "run", "budget")
+KINDS = ("spp", "seconds", "")  # of checkpoints; the last one: not recorded
 INTEGERS = ("seed", "checkpoint", "spp", "rays", "invalid")
 
 
@@ -40,6 +41,10 @@ class Row:
     bias_z: float
     rays: int
     invalid: int  # values dropped: NaN, Inf, negative
+    # Of newer runners. budget: which kind of checkpoint the row is, "spp" or "seconds".
+    budget: str = ""
+    relmse_trimmed: float = math.nan  # relMSE without the worst `trimmed_share` of the pixels
+    relmse_trimmed_corrected: float = math.nan
 
     @property
     def error(self):
@@ -51,8 +56,14 @@ class Row:
         """relMSE, chosen like `error`."""
         return self.relmse if math.isnan(self.relmse_corrected) else self.relmse_corrected
 
+    @property
+    def trimmed_error(self):
+        """relMSE without its worst pixels, chosen like `error`; NaN if it was not recorded."""
+        return self.relmse_trimmed if math.isnan(self.relmse_trimmed_corrected) else self.relmse_trimmed_corrected
 
-REQUIRED = tuple(f.name for f in fields(Row))
+
+REQUIRED = tuple(f.name for f in fields(Row) if f.default is MISSING)
+OPTIONAL = tuple(f.name for f in fields(Row) if f.default is not MISSING)
 
 
 @dataclass
@@ -84,20 +95,28 @@ class Experiment:
         self._of_run = {}
         for r in sorted(self.rows, key=lambda r: (r.seed, r.checkpoint)):
             self._of_run.setdefault((r.scene, r.run), []).append(r)
+        self.budgets = {r.budget for r in self.rows}
 
-    def select(self, scene, run, checkpoint=None):
-        """Rows of one run in one scene, by seed and checkpoint."""
-        return [r for r in self._of_run.get((scene, run), ()) if checkpoint in (None, r.checkpoint)]
+    def budget(self, kind):
+        """The kind of checkpoints that stand for `kind`, "spp" or "seconds": itself if the experiment has both kinds, None (all rows) if it has one.
+
+        Checkpoints of either kind rise within a render, but those of both together do not: a fast run passes its last one in samples
+        before its first one in seconds, a slow one in between."""
+        return kind if {"spp", "seconds"} <= self.budgets else None
+
+    def select(self, scene, run, checkpoint=None, budget=None):
+        """Rows of one run in one scene, by seed and checkpoint; of one kind of checkpoints if `budget` names it."""
+        return [r for r in self._of_run.get((scene, run), ()) if checkpoint in (None, r.checkpoint) and budget in (None, r.budget)]
 
     def seeds(self, scene, run):
         return sorted({r.seed for r in self.select(scene, run)})
 
-    def checkpoints(self, scene, run):
-        return sorted({r.checkpoint for r in self.select(scene, run)})
+    def checkpoints(self, scene, run, budget=None):
+        return sorted({r.checkpoint for r in self.select(scene, run, budget=budget)})
 
     def last_common_checkpoint(self, scene):
-        """The last checkpoint that every run of the scene has reached with at least one seed; None without one."""
-        sets = [set(self.checkpoints(scene, run)) for run in self.runs if self.select(scene, run)]
+        """The last checkpoint (in seconds, if there are any) that every run of the scene has reached with at least one seed; None without one."""
+        sets = [set(self.checkpoints(scene, run, self.budget("seconds"))) for run in self.runs if self.select(scene, run)]
         common = set.intersection(*sets) if sets else set()
         return max(common) if common else None
 
@@ -160,6 +179,7 @@ def read_rows(path, scenes, runs):
     missing = [c for c in REQUIRED if c not in (reader.fieldnames or ())]
     if missing:
         raise InputError(f"{path}:1: lacks the column{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
+    known_columns = [*REQUIRED, *(c for c in OPTIONAL if c in reader.fieldnames)]
     for record in reader:
         place = f"{path}:{reader.line_num}"
         cells = sum(v is not None for k, v in record.items() if k is not None) + len(record.get(None) or ())
@@ -169,7 +189,9 @@ def read_rows(path, scenes, runs):
         if cells < whole:
             raise InputError(f"{place}: ends in column '{reader.fieldnames[cells - 1]}', {cells} cells where the header names {whole}: a half-written row. "
                              "`ambilux experiment ... --resume` completes it; without that line the rest can be analysed")
-        row = Row(**{c: record[c] if c in TEXT else parse_number(record[c], c, place) for c in REQUIRED})
+        row = Row(**{c: record[c] if c in TEXT else parse_number(record[c], c, place) for c in known_columns})
+        if row.budget not in KINDS:
+            raise InputError(f"{place}: column 'budget' holds '{row.budget}', which is neither 'spp' nor 'seconds'")
         for column, name, known in (("scene", row.scene, scenes), ("run", row.run, runs)):
             if name not in known:
                 raise InputError(f"{place}: column '{column}': {column} '{name}' is not in manifest.json")

@@ -10,7 +10,7 @@ from pathlib import Path
 from matplotlib import colormaps
 from PIL import Image
 
-from analysis import convergence, flip_maps, hdr_data, images, style, summary, tables
+from analysis import captions, convergence, flip_maps, hdr_data, images, style, summary, tables
 
 PAGE = Path(__file__).parent / "page"
 INTERACTIVE = ("convergence_", "comparison_", "errors_", "flip_")  # figures that the page shows in a way of its own
@@ -41,12 +41,14 @@ def plot_data(experiment):
     scenes = {}
     for scene in experiment.scenes:
         curves = {}
-        for measure in convergence.NAMES:
-            found = {run: c for run in experiment.runs if (c := summary.curve(experiment, scene, run, measure))}
-            curves[measure] = {run: {"seconds": c.seconds.tolist(), "spp": c.spp.tolist(), "error": c.error.tolist(), "low": c.low.tolist(), "high": c.high.tolist(),
-                                     "seeds": c.seeds} for run, c in found.items()}
+        for measure in summary.recorded(experiment):
+            curves[measure] = {}
+            for x in convergence.AXES:
+                found = {run: c for run in experiment.runs if (c := summary.curve(experiment, scene, run, measure, x))}
+                curves[measure][x] = {run: {"seconds": c.seconds.tolist(), "spp": c.spp.tolist(), "error": c.error.tolist(), "low": c.low.tolist(),
+                                            "high": c.high.tolist(), "seeds": c.seeds} for run, c in found.items()}
         scenes[scene] = {"noise": summary.reference_noise(experiment, scene), "curves": curves}
-    return {"runs": experiment.runs, "colours": list(style.COLOURS), "scenes": scenes}
+    return {"runs": experiment.runs, "colours": list(style.COLOURS), "measures": {m: convergence.NAMES[m] for m in summary.recorded(experiment)}, "scenes": scenes}
 
 
 def scene_data(experiment, scene, full_size=False):
@@ -95,6 +97,15 @@ def facts(experiment):
     return " · ".join(html.escape(str(p)) for p in parts if p)
 
 
+def reference_table(experiment):
+    """How each scene's reference was made, and what is known of the clocks."""
+    rows = "".join(f"<tr><td>{html.escape(scene)}</td><td>{html.escape(captions.reference_facts(experiment.scene_entry(scene).get('reference') or {}) or 'not recorded')}</td></tr>"
+                   for scene in experiment.scenes)
+    clocks = summary.clock_text(experiment)
+    return ('<table class="said"><thead><tr><th>scene</th><th>reference</th></tr></thead><tbody>' + rows + "</tbody></table>"
+            + (f'<p class="note">Clocks: {html.escape(clocks)}.</p>' if clocks else ""))
+
+
 def figure(out, name, title, caption):
     # 7 inches, the page of a paper, are as wide as the page here.
     with Image.open(out / f"{name}.png") as picture:
@@ -123,7 +134,7 @@ def render(experiment, lines, remarks, made, out, full_size=False):
             "colours": {"error": table_of_colours(style.ERROR_COLOURS), "signed": table_of_colours(style.SIGNED_COLOURS)}}
     body = [f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
             f"<title>{name}</title><style>{page_file('report.css')}</style></head><body>", f"<h1>{name}</h1>", f'<p class="facts">{facts(experiment)}</p>',
-            '<nav><a href="#images">Images</a><a href="#convergence">Convergence</a><a href="#table">Table</a><a href="#figures">Figures</a>'
+            '<nav><a href="#images">Images</a><a href="#convergence">Convergence</a><a href="#table">Table</a><a href="#references">References</a><a href="#figures">Figures</a>'
             '<a href="#manifest">Manifest</a></nav>']
     if remarks:
         body += ['<div class="remarks"><b>Before you believe the figures</b><ul>', *(f"<li>{html.escape(minus(r))}</li>" for r in remarks), "</ul></div>"]
@@ -131,13 +142,15 @@ def render(experiment, lines, remarks, made, out, full_size=False):
              "With an image focused: 1–9 or ← → change it, f flips to the one before.</p>"]
     body += [scene_section(scene, found) for scene, found in scenes.items()]
     body += ['<h2 id="convergence">Convergence</h2>', '<div class="plot"></div>',
-             '<p class="note">Lines: geometric mean over seeds; bands: its 95 % confidence interval. The noise of the reference is subtracted where it is known.</p>',
-             '<h2 id="table">Table</h2>', f'<div class="wide">{tables.to_html(lines, experiment.base)}</div>',
-             f'<p class="note">{html.escape(tables.CAPTION.format(base=experiment.base))} '
+             '<p class="note">Lines: geometric mean over seeds; bands: its 95 % confidence interval. The noise of the reference is subtracted where it is known. '
+             f"{html.escape(summary.rows_used(experiment))}</p>",
+             '<h2 id="table">Table</h2>', f'<div class="wide">{tables.to_html(experiment, lines)}</div>',
+             f'<p class="note">{html.escape(tables.caption(experiment, lines))} '
              "Bias |z|: the greatest over seeds of the standardised difference between the image's mean and the reference's.</p>",
              f'<div class="wide">{verdict_table(lines)}</div>',
-             '<p class="note">Slope of log RMSE against log samples, over checkpoints above the noise of the reference. Bias: mean over seeds of the difference of means, '
-             "its interval with the noise of the reference. A departure is claimed where chance alone makes one in less than 1 % of such tables.</p>"]
+             '<p class="note">Slope of log RMSE against log samples, over checkpoints in samples (over all, if the experiment has one kind) above the noise of the '
+             "reference. Bias: mean over seeds of the difference of means at the checkpoint of the table, its interval with the noise of the reference. A departure is claimed where chance alone makes one in less than 1 % of such tables.</p>"]
+    body += ['<h2 id="references">References</h2>', f'<div class="wide">{reference_table(experiment)}</div>']
     body.append('<h2 id="figures">Figures</h2>')
     body += [figure(out, *entry) for entry in made.pictures if not entry[0].startswith(INTERACTIVE)]
     others = [n for n, _, _ in made.pictures if n.startswith(INTERACTIVE)]

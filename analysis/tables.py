@@ -9,13 +9,15 @@ import re
 from analysis import summary
 
 CAPTION = (
-    "Each run at the last checkpoint that all runs of the scene have reached. RMSE, relMSE and efficiency are geometric means over seeds, with "
+    "Each run at the last checkpoint that all runs of the scene have reached, of those in seconds if the experiment has both kinds. RMSE, relMSE and efficiency are geometric means over seeds, with "
     "the noise of the reference subtracted where it is known (RMSE weighs bright pixels, relMSE all alike, and methods may rank differently by "
     "them); time is the arithmetic mean, inside the renderer. Efficiency is 1 / (relMSE · time). The speed-up over {base} is the ratio of times"
     " to equal RMSE, with a 95 % interval from pairs of equal seeds; a star marks times extrapolated by more than a factor of 4, a dagger that "
     "the mean of one of both runs is off by more than chance allows. The slope is that of log RMSE against log samples, fitted for each seed; ±"
     " is the standard error of the mean over seeds (with one seed that of the fit, which is then too small)."
 )
+TRIMMED_CAPTION = (" Trimmed relMSE leaves out the worst {share} of the pixels; ×N is relMSE over it, mean over seeds. It is no estimate of relMSE: a method that finds light only "
+                   "in rare outliers looks better by it than it is.")
 
 
 def number(x, digits=3):
@@ -49,21 +51,43 @@ def slope_text(line):
     return f"{s.value:.3f}" if math.isnan(s.error) else f"{s.value:.3f} ± {s.error:.3f}"
 
 
-def cells(line, base, biased):
-    """What a person reads, in the order of HEADINGS."""
-    return [line.scene, line.run, str(line.seeds), number(line.spp), number(line.seconds), number(line.rmse.value),
-            number(line.relmse.value), number(line.efficiency.value),
-            speedup_text(line, base, biased), slope_text(line)]
+def trimmed_text(line):
+    return number(line.trimmed.value) + (f" (×{number(line.few_pixels.value, 2)})" if line.few_pixels else "")
 
 
-HEADINGS = ("scene", "run", "seeds", "spp", "time (s)", "RMSE", "relMSE", "efficiency", "speed-up [95 %]", "slope")
+# What a person reads: heading and text of a line, which also takes base and summary.biased.
+COLUMNS = {
+    "scene": lambda line, *_: line.scene, "run": lambda line, *_: line.run, "seeds": lambda line, *_: str(line.seeds), "spp": lambda line, *_: number(line.spp),
+    "time (s)": lambda line, *_: number(line.seconds), "RMSE": lambda line, *_: number(line.rmse.value), "relMSE": lambda line, *_: number(line.relmse.value),
+    "trimmed relMSE": lambda line, *_: trimmed_text(line), "efficiency": lambda line, *_: number(line.efficiency.value), "speed-up [95 %]": speedup_text,
+    "slope": lambda line, *_: slope_text(line),
+}
+
+
+def has_trimmed(lines):
+    return any(not math.isnan(line.trimmed.value) for line in lines)
+
+
+def headings(lines):
+    """Those of COLUMNS for which there are numbers."""
+    return [h for h in COLUMNS if h != "trimmed relMSE" or has_trimmed(lines)]
+
+
+def cells(line, base, biased, shown):
+    """Texts of the columns `shown`."""
+    return [COLUMNS[h](line, base, biased) for h in shown]
+
+
+def caption(experiment, lines):
+    return CAPTION.format(base=experiment.base) + (TRIMMED_CAPTION.format(share=summary.trimmed_share(experiment)) if has_trimmed(lines) else "")
 
 
 def to_csv(lines):
     """All numbers in full precision, for further work. Of each estimate: value, standard error (of the logarithm, but for slope and bias), ends of the interval."""
     columns = ("scene", "run", "seeds", "spp", "seconds", "mape", "rays_per_second", "bias_z", "invalid")
     estimates = {
-        "rmse": lambda x: x.rmse, "relmse": lambda x: x.relmse, "efficiency": lambda x: x.efficiency, "efficiency_ratio": lambda x: x.gain,
+        "rmse": lambda x: x.rmse, "relmse": lambda x: x.relmse, "relmse_trimmed": lambda x: x.trimmed, "relmse_over_trimmed": lambda x: x.few_pixels,
+        "efficiency": lambda x: x.efficiency, "efficiency_ratio": lambda x: x.gain,
         "speedup": lambda x: x.speedup and x.speedup.estimate, "slope": lambda x: x.slope, "slope_time": lambda x: x.slope_time,
         "bias": lambda x: x.bias and x.bias.estimate,
     }
@@ -105,13 +129,14 @@ def latex_number(text):
     return "$-$" + latex_escape(text[1:]) if text.startswith("-") and text != "-" else latex_escape(text)
 
 
-def to_latex(lines, base):
+def to_latex(experiment, lines):
     """A tabular for \\usepackage{booktabs}; scenes are separated by \\midrule, the best efficiency of each scene is bold."""
-    out = [r"% Needs \usepackage{booktabs}. " + latex_escape(CAPTION.format(base=base)), r"\begin{tabular}{ll" + "r" * (len(HEADINGS) - 2) + "}", r"\toprule",
-           " & ".join(latex_escape(h) for h in HEADINGS) + r" \\"]
+    shown = headings(lines)
+    out = [r"% Needs \usepackage{booktabs}. " + latex_escape(caption(experiment, lines)), r"\begin{tabular}{ll" + "r" * (len(shown) - 2) + "}", r"\toprule",
+           " & ".join(latex_escape(h) for h in shown) + r" \\"]
     scene, biased = None, summary.biased(lines)
     for line in lines:
-        row = cells(line, base, biased)
+        row = cells(line, experiment.base, biased, shown)
         row = [latex_escape(c) for c in row[:2]] + [latex_number(c) for c in row[2:]]
         if line.scene != scene:
             out.append(r"\midrule")
@@ -119,7 +144,7 @@ def to_latex(lines, base):
             row[0] = ""
         scene = line.scene
         if line is best(lines, scene):
-            row[7] = rf"\textbf{{{row[7]}}}"
+            row[shown.index("efficiency")] = rf"\textbf{{{row[shown.index('efficiency')]}}}"
         out.append(" & ".join(row) + r" \\")
     return "\n".join([*out, r"\bottomrule", r"\end{tabular}", ""])
 
@@ -143,7 +168,7 @@ def test_cells(line):
 
 def tests_to_latex(lines):
     """A tabular of slopes and bias for \\usepackage{booktabs}."""
-    out = [r"% Needs \usepackage{booktabs}. Slope of log RMSE against log samples, -1/2 without bias; mean difference to the reference over seeds, its noise included.",
+    out = [r"% Needs \usepackage{booktabs}. Slope of log RMSE against log samples (over checkpoints in samples if there are both kinds), -1/2 without bias; mean difference to the reference over seeds at the checkpoint of the table, its noise included.",
            r"\begin{tabular}{llrrrr}", r"\toprule", " & ".join(latex_escape(h) for h in TEST_HEADINGS) + r" \\"]
     scene = None
     for line in lines:
@@ -162,15 +187,16 @@ def latex_text(cell):
     return re.sub(r"[-+]?\d[\d.]*(?:e[-+]\d+)?", lambda m: latex_number(m[0].lstrip("+")), cell).replace("–", "--")
 
 
-def to_html(lines, base):
-    head = "".join(f"<th>{html.escape(h)}</th>" for h in (*HEADINGS, "Mrays/s", "bias |z|"))
+def to_html(experiment, lines):
+    shown = headings(lines)
+    head = "".join(f"<th>{html.escape(h)}</th>" for h in (*shown, "Mrays/s", "bias |z|"))
     out = [f"<table><thead><tr>{head}</tr></thead><tbody>"]
     scene, biased = None, summary.biased(lines)
     for line in lines:
-        row = [html.escape(c).replace("-", "−") if i > 1 else html.escape(c) for i, c in enumerate(cells(line, base, biased))]
+        row = [html.escape(c).replace("-", "−") if i > 1 else html.escape(c) for i, c in enumerate(cells(line, experiment.base, biased, shown))]
         row += [number(line.rays_per_second / 1e6), f"{line.bias_z:.1f}"]
         if line is best(lines, line.scene):
-            row[7] = f"<b>{row[7]}</b>"
+            row[shown.index("efficiency")] = f"<b>{row[shown.index('efficiency')]}</b>"
         kind = ' class="first"' if line.scene != scene else ""
         scene = line.scene
         out.append(f"<tr{kind}>" + "".join(f"<td>{c}</td>" for c in row) + "</tr>")

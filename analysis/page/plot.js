@@ -26,12 +26,12 @@ function ticks(low, high) {
   return out;
 }
 
-const AXIS = {seconds: "time (s)", spp: "samples per pixel", rmse: "RMSE", relmse: "relMSE"};
+const AXIS = {seconds: "time (s)", spp: "samples per pixel", rmse: "RMSE", relmse: "relMSE", relmse_trimmed: "trimmed relMSE"};
 
 class Plot {
   constructor(element, data) {
     this.element = element;
-    this.data = data;  // {runs: [names], colours, scenes: {name: {noise, curves: {rmse: {run: {seconds, spp, error, low, high, seeds}}, relmse: ...}}}}
+    this.data = data;  // {runs: [names], colours, measures: {rmse: "RMSE", ...}, scenes: {name: {noise, curves: {rmse: {seconds: {run: {seconds, spp, error, low, high, seeds}}, spp: ...}, ...}}}}
     this.scene = Object.keys(data.scenes)[0];
     this.x = "seconds";
     this.y = "rmse";
@@ -54,7 +54,7 @@ class Plot {
     controls.className = "controls";
     controls.append(
       select("scene", Object.keys(this.data.scenes).map(s => [s, s]), v => { this.scene = v; }),
-      select("y", [["rmse", "RMSE"], ["relmse", "relMSE"]], v => { this.y = v; }), "against",
+      select("y", Object.entries(this.data.measures), v => { this.y = v; }), "against",
       select("x", [["seconds", "time"], ["spp", "samples per pixel"]], v => { this.x = v; }));
     this.legend = document.createElement("div");
     this.legend.className = "legend";
@@ -92,7 +92,7 @@ class Plot {
 
   draw() {
     [...this.legend.children].forEach(b => b.setAttribute("aria-pressed", !this.hidden.has(b.dataset.run)));
-    const scene = this.data.scenes[this.scene], curves = scene.curves[this.y];
+    const scene = this.data.scenes[this.scene], curves = scene.curves[this.y][this.x];
     const shown = this.data.runs.map((run, i) => ({run, i, c: curves[run]})).filter(e => e.c && !this.hidden.has(e.run));
     const W = 860, H = 430, L = 70, R = 16, T = 14, B = 48;
     const root = svg("svg", {viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `${AXIS[this.y]} against ${AXIS[this.x]}, ${this.scene}`});

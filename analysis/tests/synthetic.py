@@ -2,6 +2,7 @@
 split it in known shares."""
 
 import json
+import math
 
 import numpy as np
 import OpenEXR
@@ -50,10 +51,12 @@ def add_techniques(folder, scene, run, seeds, spp=16, max_depth=3, sigma=0.2):
 
 
 def make(folder, scenes=("box", "glass"), runs=(("naive", 2.0, 1.0), ("nee", 0.7, 1.5), ("mis", 0.5, 2.0)), seeds=(1, 2, 3), checkpoints=(1, 4, 16, 64),
-         reference_noise=0.002, spread=0.05, base=None):
-    """`runs`: (name, error at 1 spp, milliseconds per sample). `spread`: relative standard deviation of the error over seeds."""
+         reference_noise=0.002, spread=0.05, base=None, seconds=(), outliers=4.0):
+    """`runs`: (name, error at 1 spp, milliseconds per sample). `spread`: relative standard deviation of the error over seeds. `seconds`: checkpoints in
+    seconds behind those in samples, at the first whole sample past them; with them there are the columns of newer runners, and relMSE is `outliers`
+    times the trimmed one."""
     rng = np.random.default_rng(3)
-    rows = [HEADER]
+    rows = [HEADER + (",budget,relmse_trimmed,relmse_trimmed_corrected" if seconds else "")]
     (folder / "references").mkdir(parents=True)
     for scene in scenes:
         (folder / "images" / scene).mkdir(parents=True)
@@ -62,11 +65,13 @@ def make(folder, scenes=("box", "glass"), runs=(("naive", 2.0, 1.0), ("nee", 0.7
         for run, error, milliseconds in runs:
             for seed in seeds:
                 luck = np.exp(spread * rng.normal())
-                for k, spp in enumerate(checkpoints):
+                of_seconds = [math.ceil(1000 * t / milliseconds - 1e-9) for t in seconds]
+                for k, spp in enumerate([*checkpoints, *of_seconds]):
                     corrected = error * luck / np.sqrt(spp)
                     rmse = np.hypot(corrected, reference_noise)
                     rows.append(f"{scene},{run},{seed},{k},path,wavefront,{run},cpu,{spp},{milliseconds * spp / 1000:.6f},{rmse:.9g},{corrected:.9g},"
-                                f"{reference_noise:.9g},{4 * rmse**2:.9g},{4 * corrected**2:.9g},{rmse:.9g},0.0001,0.5,{spp * 10000},0")
+                                f"{reference_noise:.9g},{4 * rmse**2:.9g},{4 * corrected**2:.9g},{rmse:.9g},0.0001,0.5,{spp * 10000},0"
+                                + (f",{'spp' if k < len(checkpoints) else 'seconds'},{4 * rmse**2 / outliers:.9g},{4 * corrected**2 / outliers:.9g}" if seconds else ""))
                 noise = error / np.sqrt(checkpoints[-1]) * rng.normal(size=picture().shape)
                 write_exr(folder / "images" / scene / f"{run}_{seed}.exr", picture() + noise)
                 (folder / "stats" / scene / f"{run}_{seed}.json").write_text(json.dumps(stats(milliseconds, checkpoints[-1])))

@@ -84,14 +84,15 @@ def test_verdicts_say_what_the_data_say(tmp_path):
             cells[16] = f"{0.0002 * seed_noise.normal():.6g}"
         return ",".join(cells)
 
-    lines = summary.lines(experiment.load(edit(folder, tmp_path / "odd", lambda rows: [rows[0], *map(change, rows[1:])])))
+    data = experiment.load(edit(folder, tmp_path / "odd", lambda rows: [rows[0], *map(change, rows[1:])]))
+    lines = summary.lines(data)
     said = {run: text for (_, run), text in summary.verdicts(lines).items()}
     assert "no departure" in said["naive"][0] and "no bias found" in said["naive"][1]
     assert "differs from −1/2" in said["nee"][0] and "no bias found" in said["nee"][1]
     assert "no departure" in said["mis"][0] and "more than chance" in said["mis"][1]
     # Speed-ups that compare with a biased run are marked.
     assert summary.biased(lines) == {("box", "mis")}
-    marked = [row for row in tables.to_latex(lines, "naive").splitlines() if r"]$^\dagger$" in row]
+    marked = [row for row in tables.to_latex(data, lines).splitlines() if r"]$^\dagger$" in row]
     assert len(marked) == 1 and "& mis" in marked[0]
 
 
@@ -123,8 +124,9 @@ def test_run_names_of_sweeps():
 
 
 def test_latex_tables_have_equal_columns_and_no_raw_specials(folder):
-    lines = summary.lines(experiment.load(folder))
-    for text, headings in ((tables.to_latex(lines, "naive"), tables.HEADINGS), (tables.tests_to_latex(lines), tables.TEST_HEADINGS)):
+    data = experiment.load(folder)
+    lines = summary.lines(data)
+    for text, headings in ((tables.to_latex(data, lines), tables.headings(lines)), (tables.tests_to_latex(lines), tables.TEST_HEADINGS)):
         body = [line for line in text.splitlines() if line.endswith(r"\\")]
         assert len(body) == 7
         assert {line.count(" & ") for line in body} == {len(headings) - 1}
