@@ -1,6 +1,7 @@
 #include "experiments/config.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <sstream>
 
@@ -68,7 +69,14 @@ std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const 
     const toml::node& path = r.need(t, "path", "[[scene]]");
     namespace fs = std::filesystem;
     const fs::path folder = fs::absolute(fs::path(r.file)).parent_path();
-    scene.path = (folder / r.text(path, "path")).lexically_normal().string();
+    std::string file = r.text(path, "path");
+    const std::string data = "$AMBILUX_DATA";
+    if (file.starts_with(data + "/")) {
+        const char* place = std::getenv("AMBILUX_DATA");
+        if (!place || !*place) throw r.error(path, fmt::format("scene '{}': the environment variable AMBILUX_DATA is not set; it names the folder of the published scenes (README)", scene.name));
+        file = fs::absolute(place).string() + file.substr(data.size());
+    }
+    scene.path = (folder / file).lexically_normal().string();
     if (!fs::is_regular_file(scene.path)) throw r.error(path, fmt::format("scene '{}': there is no file {}", scene.name, scene.path));
     const auto set = [&r, &reduction](SceneEntry& entry, const std::string& key, const toml::node& value) {
         if (key == "max_depth") {

@@ -1,6 +1,8 @@
 // libs: ambilux_experiments
 // timeout: 60
 // Configurations: sweeps, ablations, refusals with their lines, reduced sizes, and the plan of a dry run.
+#include <cstdlib>
+
 #include "core/log.h"
 #include "experiments/config.h"
 #include "experiments/dry_run.h"
@@ -108,6 +110,10 @@ TEST_CASE("the project's configurations are right, also reduced") {
     for (const auto& file : fs::directory_iterator(std::string(AMBILUX_SOURCE_DIR) + "/experiments"))
         if (file.path().extension() == ".toml") {
             CAPTURE(file.path().string());
+            if (contains(read_file(file.path().string()), "$AMBILUX_DATA") && !std::getenv("AMBILUX_DATA")) {
+                WARN("skipped: AMBILUX_DATA is not set");
+                continue;
+            }
             const Hooks hooks = default_hooks();
             const ExperimentConfig config = read_experiment(file.path().string());
             for (const RunEntry& run : config.runs) {
@@ -194,6 +200,18 @@ TEST_CASE("configurations are refused with file, line and the offending name, be
     CHECK(contains(refused("spp = [1, 2, 8, 32]", "seconds = [-1.0]"), "e.toml:6: 'seconds' must be positive"));
     CHECK(contains(refused("spp = [1, 2, 8, 32]", ""), "e.toml:5: [budget] needs 'spp', 'seconds' or both"));
     CHECK(contains(refused("path = \"b.xml\"", "path = \"c.xml\""), "e.toml:12: scene 'b': there is no file "));
+    {
+        const char* set = std::getenv("AMBILUX_DATA");
+        const std::string before = set ? set : "";
+        unsetenv("AMBILUX_DATA");
+        CHECK(contains(refused("path = \"b.xml\"", "path = \"$AMBILUX_DATA/b.xml\""), "e.toml:12: scene 'b': the environment variable AMBILUX_DATA is not set"));
+        setenv("AMBILUX_DATA", "/nowhere", 1);
+        CHECK(contains(refused("path = \"b.xml\"", "path = \"$AMBILUX_DATA/b.xml\""), "e.toml:12: scene 'b': there is no file /nowhere/b.xml"));
+        if (set)
+            setenv("AMBILUX_DATA", before.c_str(), 1);
+        else
+            unsetenv("AMBILUX_DATA");
+    }
     CHECK(contains(refused("path = \"b.xml\"", "path = \"broken.xml\""), "broken.xml:7: unknown bsdf 'broken'"));
     CHECK(contains(refused("size = [9, 5]", "size = [9]"), "e.toml:13: 'size' must be [width, height]"));
     CHECK(contains(refused("size = [9, 5]", "sise = [9, 5]"), "e.toml:13: unknown key 'sise' in [[scene]]"));
