@@ -10,6 +10,7 @@ from matplotlib.colors import LogNorm
 from analysis import experiment as experiments, images, strategy_variance, style
 
 KINDS = ("weighted", "raw")
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB (ITU-R BT.709)
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,10 @@ def read(folder):
     return Techniques(folder, data["spp"], data["max_depth"], entries)
 
 
-def label(s, t):
-    return f"s = {s}, t = {t}"
+def label(s, t, share=None):
+    """`share`: of the light of all pictures; told in per cent."""
+    percent = None if share is None else 100 * share
+    return f"s = {s}, t = {t}" + ("" if percent is None else ": 0" if percent == 0 else ": <0.1 %" if percent < 0.1 else f": {percent:.0f} %" if percent >= 9.95 else f": {percent:.1f} %")
 
 
 def row_factor(row_images):
@@ -54,9 +57,22 @@ def row_factor(row_images):
     Strategies of one path length estimate the same image as far as they can sample it, so that one factor serves the row. Black pixels do not
     count, because most strategies leave most of their image black.
     """
-    stacked = np.concatenate([np.nan_to_num(i).reshape(-1, 3) for i in row_images]) @ np.array([0.2126, 0.7152, 0.0722])
+    stacked = np.concatenate([np.nan_to_num(i).reshape(-1, 3) for i in row_images]) @ LUMINANCE
     lit = stacked[stacked > 0]
     return 0.8 / float(np.percentile(lit, 95)) if len(lit) else 1.0
+
+
+def weighted_factors(rows):
+    """{k: factor} of weighted pictures {k: {s: image}}: the brightest row as row_factor of its sum, each row below it one stop more, those above it the same.
+
+    The brightest row is that with the greatest mean of min(1, exposed luminance), exposed by row_factor of all pictures together: a lamp that is seen directly
+    holds much light in few pixels, and an exposure for it would leave the other rows black.
+    """
+    sums = {k: sum(np.nan_to_num(i) for i in row.values()) for k, row in rows.items()}
+    exposed = row_factor([sum(sums.values())])
+    brightest = max(sums, key=lambda k: float(np.minimum(exposed * (sums[k] @ LUMINANCE), 1).mean()))
+    base, lengths = row_factor([sums[brightest]]), sorted(rows)
+    return {k: base * 2.0 ** max(0, lengths.index(k) - lengths.index(brightest)) for k in lengths}
 
 
 def draw(pictures, kind):
@@ -67,9 +83,9 @@ def draw(pictures, kind):
     if kind == "raw":
         factors = {k: row_factor(row.values()) for k, row in rows.items()}
     else:
-        brightest = max(lengths, key=lambda k: sum(float(np.nan_to_num(i).mean()) for i in rows[k].values()))
-        base = row_factor([sum(np.nan_to_num(i) for i in rows[brightest].values())])
-        factors = {k: base * 2.0 ** max(0, lengths.index(k) - lengths.index(brightest)) for k in lengths}
+        factors = weighted_factors(rows)
+    means = {st: float(np.nan_to_num(i).mean()) for st, i in pictures.items()}
+    total = sum(means.values())
     height, width = next(iter(pictures.values())).shape[:2]
     cell = min(1.4, (style.PAGE - 0.55) / len(columns))
     with plt.rc_context(style.STYLE):
@@ -83,7 +99,7 @@ def draw(pictures, kind):
                 axes.set_axis_off()
                 if s in rows[k]:
                     axes.imshow(images.tone_map(rows[k][s], factors[k]), interpolation="nearest")
-                    axes.set_title(label(s, k + 1 - s), fontsize=6, pad=1.5)
+                    axes.set_title(label(s, k + 1 - s, means[s, k + 1 - s] / total if kind == "weighted" and total > 0 else None), fontsize=6, pad=1.5)
             grid[i][0].text(-0.06, 0.5, f"k = {k}\n×{style.short_number(factors[k], 2)}", transform=grid[i][0].transAxes, ha="right", va="center", fontsize=7)
     return figure, factors
 
@@ -100,8 +116,8 @@ def make(experiment, scene, run):
         if not pictures:
             continue
         figure, factors = draw(pictures, kind)
-        how = ("times its MIS weight; all pictures together add up to the light of these path lengths in the image. Each row below the brightest is exposed one stop more, as in Veach's figure"
-               if kind == "weighted" else "without a weight: each is an estimate of its own of the light of its path length, as far as it can sample it. Each row has an "
+        how = ("times its MIS weight; all pictures together add up to the light of these path lengths in the image, per cents are shares of it. Each row below the "
+               "brightest is exposed one stop more, as in Veach's figure" if kind == "weighted" else "without a weight: each is an estimate of its own of the light of its path length, as far as it can sample it. Each row has an "
                "exposure of its own")
         yield style.Picture(
             style.file_name("techniques", kind, scene, run), figure, f"Strategies of {run} on {scene}, {kind}",

@@ -65,7 +65,9 @@ def wrap(text, width=18):
     head, bracket, rest = text.partition("[")  # lvc[connections=4]
     if len(text) > width and head and bracket:
         return wrap(head, width) + "\n" + wrap(bracket + rest, max(width, len(rest) + 1))
-    return "\n".join(textwrap.wrap(text, width, break_long_words=True)) or text
+    # Lists such as hits+next_event break behind a plus: a vertical tab is white space to textwrap, and is taken out again.
+    parts = textwrap.wrap(text.replace("+", "+\v"), width, break_long_words=True, replace_whitespace=False)
+    return "\n".join(parts).replace("\v", "") or text
 
 
 def short_number(x, digits=3):
