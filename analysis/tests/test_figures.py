@@ -220,4 +220,4 @@ def test_blocks_and_scales_of_maps():
 def test_long_names_are_wrapped_at_their_settings():
     assert style.wrap("lvc[connections=4]", 16) == "lvc\n[connections=4]"
     assert style.wrap("short", 16) == "short"
-    assert style.wrap("strategies = hits+next_event+connections", 24) == "strategies =\nhits+next_event+\nconnections"
+    assert style.wrap("strategies = hits+next_event+connections", 24) == "strategies = hits+\nnext_event+connections"
