@@ -39,7 +39,7 @@ def draw_panel(axes, experiment, scene, x, measure):
     noise = summary.reference_noise(experiment, scene)
     # Shown where it matters: a reference far below the data would only stretch the axis.
     if measure == "rmse" and noise > 0.3 * min(c.error.min() for _, c in curves):
-        axes.axhline(noise, color="0.4", lw=0.8, ls=":", zorder=1, label="noise of the reference")
+        axes.axhline(noise, color="0.4", lw=0.8, ls=":", zorder=1, label="reference's noise")
         limits = min(limits[0], noise), limits[1]
     axes.set_ylim(limits[0] / 1.1, limits[1] * 1.1)
     style.label_log_axis(axes.xaxis, axes.get_xlim())
@@ -63,7 +63,7 @@ def draw(experiment, x, measure):
                 entries.setdefault(label, handle)
         order = [r for r in experiment.runs if r in entries] + [e for e in entries if e not in experiment.runs]
         longest = max((len(e) for e in order), default=1)
-        across = max(1, min(len(order), int(figure.get_figwidth() / (0.35 + 0.055 * longest))))
+        across = max(1, min(len(order), int((figure.get_figwidth() - 0.2) / (0.45 + 0.055 * longest))))
         figure.legend([entries[e] for e in order], order, loc="outside lower center", ncols=across, frameon=False)
     return figure
 

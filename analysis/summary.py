@@ -264,8 +264,11 @@ def trimmed_remarks(experiment, summary):
             continue
         whole, trimmed = (min(known, key=lambda line: getattr(line, m).value).run for m in ("relmse", "trimmed"))
         better = f"; without them {trimmed} has the least error, with them {whole}" if whole != trimmed else ""
-        yield (f"{scene}: the worst {trimmed_share(experiment)} of the pixels hold more than half of relMSE, which is so many times the trimmed one: "
-               + ", ".join(f"{line.run} {line.few_pixels.value:.3g}" for line in few) + better + "; state both")
+        few.sort(key=lambda line: -line.few_pixels.value)
+        told = ", ".join(f"{line.run} {line.few_pixels.value:.3g}" for line in few[:4])
+        more = f" and {len(few) - 4} more, down to {few[-1].few_pixels.value:.3g}" if len(few) > 4 else ""
+        yield (f"{scene}: the worst {trimmed_share(experiment)} of the pixels hold more than half of relMSE, which is so many times the trimmed one: {told}{more}"
+               f"{better}; state both")
 
 
 def clock_readings(experiment):
