@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include "backends/cpu/executor.h"
 #include "backends/cpu/wave_bytes.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "integrators/bidirectional/bidirectional.h"
 #include "integrators/bidirectional/pilot.h"
 #include "integrators/bidirectional/schedule.h"
@@ -90,7 +90,7 @@ public:
         uint32_t done = 0;
         arena_.execute([&] {
             while (done < count && !(interrupt && *interrupt)) {
-                tbb::parallel_for(uint32_t(0), film_wave_.tiles / wave_.tiles, [&](uint32_t chunk) { render_tiles(chunk * wave_.tiles, first + done); });
+                parallel_for(film_wave_.tiles / wave_.tiles, [&](uint32_t chunk) { render_tiles(chunk * wave_.tiles, first + done); });
                 develop(first + done);
                 ++done;
             }
@@ -165,7 +165,7 @@ private:
     void develop(uint32_t sample) {
         const auto start = Clock::now();
         film_state_ = {0, sample, 1, 0, 0, 0, 0};
-        tbb::parallel_for(uint32_t(0), film_wave_.tiles, [&](uint32_t tile) {
+        parallel_for(film_wave_.tiles, [&](uint32_t tile) {
             StageRecord record{};
             const DevelopSplats stage = {film_wave_, samples_of_slots_.data(), splats_.data(), moments_.sum.data(), moments_.sum_squares.data(), &record};
             for (uint32_t i = 0; i < kTilePixels; ++i) stage(tile * kTilePixels + i);

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include "backends/cpu/executor.h"
 #include "backends/cpu/wave_bytes.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "integrators/feature_levels.h"
 #include "integrators/path/path.h"
 #include "integrators/path/schedule.h"
@@ -73,7 +73,7 @@ public:
             const auto pass_start = Clock::now();
             arena_.execute([&] {
                 const uint32_t tiles = tile_count(wave_);
-                tbb::parallel_for(uint32_t(0), (tiles + wave_.tiles - 1) / wave_.tiles, [&](uint32_t chunk) { render_tiles(chunk * wave_.tiles, first + done, pass); });
+                parallel_for((tiles + wave_.tiles - 1) / wave_.tiles, [&](uint32_t chunk) { render_tiles(chunk * wave_.tiles, first + done, pass); });
             });
             done += pass;
             measured_seconds_ = seconds_since(pass_start);
