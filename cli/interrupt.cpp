@@ -3,18 +3,20 @@
 #include <csignal>
 #include <unistd.h>
 
+#include "core/flag.h"
+
 namespace ambilux {
 namespace {
 
 volatile bool interrupted = false;
 
 extern "C" void on_signal(int) {
-    if (interrupted) {
+    if (is_set(&interrupted)) {
         constexpr char text[] = "\ninterrupted twice: nothing more is saved\n";
         [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text, sizeof text - 1);
         ::_exit(5);
     }
-    interrupted = true;
+    set_flag(&interrupted);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "core/flag.h"
 
 namespace ambilux {
 
@@ -16,7 +17,7 @@ RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& 
     double per_sample = 0;
     uint64_t last_count = 0;
     while (!position.interrupted) {
-        if (interrupt && *interrupt) {
+        if (is_set(interrupt)) {
             position.interrupted = true;
             break;
         }
@@ -43,7 +44,7 @@ RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& 
         position.samples += done;
         position.seconds += seconds;
         if (done < count) {
-            if (!(interrupt && *interrupt)) throw Error(ExitCode::device, "the renderer stopped without a reason");
+            if (!is_set(interrupt)) throw Error(ExitCode::device, "the renderer stopped without a reason");
             position.interrupted = true;
         }
         if (done > 0) per_sample = seconds / done;

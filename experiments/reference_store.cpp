@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/flag.h"
 #include "core/log.h"
 #include "core/sha256.h"
 #include "experiments/statistics.h"
@@ -79,7 +80,7 @@ ReferenceLock::ReferenceLock(const std::string& path, const volatile bool* inter
     if (fd_ < 0) throw Error(ExitCode::device, "cannot write into the folder " + file.parent_path().string());
     bool said = false;
     while (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
-        if (interrupt && *interrupt) return;
+        if (is_set(interrupt)) return;
         if (!said) log_info(fmt::format("{} is being made by another process: waiting for it", path));
         said = true;
         std::this_thread::sleep_for(std::chrono::milliseconds(200));

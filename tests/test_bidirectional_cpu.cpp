@@ -14,6 +14,7 @@
 
 #include "backends/cpu/executor.h"
 #include "core/error.h"
+#include "core/flag.h"
 #include "integrators/bidirectional/schedule.h"
 #include "integrators/path/path_wave.h"
 #include "scene/accel/cwbvh.h"
@@ -249,7 +250,7 @@ TEST_CASE("An interrupted render holds exactly the samples that it says", "[bidi
         stop = false;
         std::thread alarm([&] {
             std::this_thread::sleep_for(std::chrono::milliseconds(200));
-            stop = true;
+            set_flag(&stop);
         });
         const uint32_t done = some->render(0, 1u << 30, &stop);
         alarm.join();

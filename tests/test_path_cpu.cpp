@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "core/error.h"
+#include "core/flag.h"
 #include "tests/render_scene.h"
 
 using namespace ambilux;
@@ -264,7 +265,7 @@ TEST_CASE("An interrupted render holds exactly the samples that it says", "[path
     stop = false;
     std::thread alarm([&] {
         std::this_thread::sleep_for(std::chrono::milliseconds(300));
-        stop = true;
+        set_flag(&stop);
     });
     const uint32_t done = some->render(0, 1u << 30, &stop);
     alarm.join();

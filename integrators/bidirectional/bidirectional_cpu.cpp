@@ -9,6 +9,7 @@
 #include "backends/cpu/executor.h"
 #include "backends/cpu/wave_bytes.h"
 #include "core/error.h"
+#include "core/flag.h"
 #include "core/parallel.h"
 #include "integrators/bidirectional/bidirectional.h"
 #include "integrators/bidirectional/pilot.h"
@@ -89,7 +90,7 @@ public:
         const auto start = Clock::now();
         uint32_t done = 0;
         arena_.execute([&] {
-            while (done < count && !(interrupt && *interrupt)) {
+            while (done < count && !is_set(interrupt)) {
                 parallel_for(film_wave_.tiles / wave_.tiles, [&](uint32_t chunk) { render_tiles(chunk * wave_.tiles, first + done); });
                 develop(first + done);
                 ++done;

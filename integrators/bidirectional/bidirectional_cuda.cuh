@@ -9,6 +9,7 @@
 #include "backends/cuda/executor.cuh"
 #include "backends/cuda_device.h"
 #include "core/error.h"
+#include "core/flag.h"
 #include "integrators/bidirectional/bidirectional_cuda.h"
 #include "integrators/bidirectional/pilot.h"
 #include "integrators/bidirectional/schedule.h"
@@ -67,7 +68,7 @@ public:
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
         const auto start = Clock::now();
         uint32_t done = 0;
-        while (done < count && !(interrupt && *interrupt)) {
+        while (done < count && !is_set(interrupt)) {
             // All waves of a pass are queued at once; the host waits for the last.
             const uint32_t pass = std::min(count - done, std::max(preferred_batch(), wave_.samples));
             const uint32_t waves_before = read_state().done;

@@ -9,6 +9,7 @@
 #include "backends/cpu/executor.h"
 #include "backends/cpu/wave_bytes.h"
 #include "core/error.h"
+#include "core/flag.h"
 #include "core/parallel.h"
 #include "integrators/feature_levels.h"
 #include "integrators/path/path.h"
@@ -68,7 +69,7 @@ public:
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
         const auto start = Clock::now();
         uint32_t done = 0;
-        while (done < count && !(interrupt && *interrupt)) {
+        while (done < count && !is_set(interrupt)) {
             const uint32_t pass = std::min(count - done, preferred_batch());
             const auto pass_start = Clock::now();
             arena_.execute([&] {

@@ -9,6 +9,7 @@
 #include "backends/cuda/executor.cuh"
 #include "backends/cuda_device.h"
 #include "core/error.h"
+#include "core/flag.h"
 #include "integrators/feature_levels.h"
 #include "integrators/path/path_cuda.h"
 #include "integrators/path/schedule.h"
@@ -65,7 +66,7 @@ public:
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
         const auto start = Clock::now();
         uint32_t done = 0;
-        while (done < count && !(interrupt && *interrupt)) {
+        while (done < count && !is_set(interrupt)) {
             // All waves of a pass are queued at once; the host waits for the last.
             const uint32_t pass = std::min(count - done, std::max(preferred_batch(), wave_.samples));
             const auto pass_start = Clock::now();
