@@ -17,25 +17,11 @@
 #include "experiments/results.h"
 #include "experiments/runner.h"
 #include "tests/catch.h"
+#include "tests/temp_folder.h"
 
 namespace ambilux::test {
 
 namespace fs = std::filesystem;
-
-struct Folder {
-    fs::path path;
-    Folder() {
-        std::string name = (fs::temp_directory_path() / "ambilux-run-XXXXXX").string();
-        REQUIRE(::mkdtemp(name.data()));
-        path = name;
-    }
-    ~Folder() {
-        std::error_code ignored;
-        fs::remove_all(path, ignored);
-    }
-    std::string operator/(const std::string& name) const { return (path / name).string(); }
-    void write(const std::string& name, const std::string& text) const { std::ofstream(path / name) << text; }
-};
 
 /// What the fakes of a test share.
 struct World {
@@ -171,13 +157,13 @@ integrator = "path"
 estimator = "naive"
 )";
 
-inline void write_inputs(const Folder& folder, const std::string& config = kConfig) {
+inline void write_inputs(const TempFolder& folder, const std::string& config = kConfig) {
     folder.write("a.xml", "<scene a>");
     folder.write("b.xml", "<scene b>");
     folder.write("e.toml", config);
 }
 
-inline ExperimentRequest request(const Folder& folder, const std::string& output, bool resume = false) {
+inline ExperimentRequest request(const TempFolder& folder, const std::string& output, bool resume = false) {
     return {folder / "e.toml", folder / output, "", resume, nullptr};
 }
 

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 
 namespace ambilux::test {
@@ -23,6 +24,10 @@ struct TempFolder {
         std::filesystem::remove_all(path, ignored);
     }
     TempFolder(const TempFolder&) = delete;
+
+    std::string operator/(const std::string& name) const { return (path / name).string(); }
+    /// Files and folders directly in it.
+    size_t files() const { return size_t(std::distance(std::filesystem::directory_iterator(path), std::filesystem::directory_iterator())); }
 
     /// Writes a file and returns its full path.
     std::string write(const std::string& name, const std::string& bytes) const {

@@ -14,6 +14,7 @@
 #include "core/atomic_file.h"
 #include "film/exr_io.h"
 #include "tests/catch.h"
+#include "tests/temp_folder.h"
 
 using namespace ambilux;
 namespace fs = std::filesystem;
@@ -24,27 +25,13 @@ namespace {
 const std::string kScenes = std::string(AMBILUX_SOURCE_DIR) + "/scenes/";
 const std::string kCornell = kScenes + "cornell.xml";
 
-struct Folder {
-    fs::path path;
-    Folder() {
-        std::string name = (fs::temp_directory_path() / "ambilux-cli-XXXXXX").string();
-        REQUIRE(::mkdtemp(name.data()));
-        path = name;
-    }
-    ~Folder() {
-        std::error_code ignored;
-        fs::remove_all(path, ignored);
-    }
-    std::string operator/(const std::string& name) const { return (path / name).string(); }
-};
-
 struct Outcome {
     int code = -1;
     std::string out, err;
 };
 
 /// Starts the program with output and messages in files of `folder`.
-pid_t start(const Folder& folder, const std::vector<std::string>& arguments) {
+pid_t start(const test::TempFolder& folder, const std::vector<std::string>& arguments) {
     const pid_t child = ::fork();
     REQUIRE(child >= 0);
     if (child == 0) {
@@ -58,24 +45,24 @@ pid_t start(const Folder& folder, const std::vector<std::string>& arguments) {
     return child;
 }
 
-Outcome finish(const Folder& folder, pid_t child) {
+Outcome finish(const test::TempFolder& folder, pid_t child) {
     int status = 0;
     REQUIRE(::waitpid(child, &status, 0) == child);
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), read_file(folder / ".out"), read_file(folder / ".err")};
 }
 
-Outcome run(const Folder& folder, const std::vector<std::string>& arguments) { return finish(folder, start(folder, arguments)); }
+Outcome run(const test::TempFolder& folder, const std::vector<std::string>& arguments) { return finish(folder, start(folder, arguments)); }
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 /// Arguments of a small render of the Cornell box to a.exr, and further ones.
-std::vector<std::string> render(const Folder& folder, std::vector<std::string> more, const std::string& output = "a.exr") {
+std::vector<std::string> render(const test::TempFolder& folder, std::vector<std::string> more, const std::string& output = "a.exr") {
     std::vector<std::string> all = {"render", kCornell, "--size", "24x16", "-o", folder / output};
     all.insert(all.end(), more.begin(), more.end());
     return all;
 }
 
-json statistics(const Folder& folder, std::vector<std::string> more, const std::string& output = "a.exr") {
+json statistics(const test::TempFolder& folder, std::vector<std::string> more, const std::string& output = "a.exr") {
     more.insert(more.end(), {"--json", "-"});
     const Outcome o = run(folder, render(folder, more, output));
     INFO(o.err);
@@ -86,7 +73,7 @@ json statistics(const Folder& folder, std::vector<std::string> more, const std::
 }  // namespace
 
 TEST_CASE("wrong use ends with code 2 and says what is right") {
-    const Folder folder;
+    const test::TempFolder folder;
     struct Case {
         std::vector<std::string> arguments;
         std::string message;
@@ -134,7 +121,7 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
 }
 
 TEST_CASE("bad input ends with code 3, what cannot be written with code 4, before any work") {
-    const Folder folder;
+    const test::TempFolder folder;
     Outcome o = run(folder, {"render", folder / "none.xml", "-o", folder / "a.exr"});
     CHECK(o.code == 3);
     CHECK(contains(o.err, "none.xml"));
@@ -162,7 +149,7 @@ TEST_CASE("bad input ends with code 3, what cannot be written with code 4, befor
 }
 
 TEST_CASE("a render writes image, PNG and statistics") {
-    const Folder folder;
+    const test::TempFolder folder;
     const Outcome o = run(folder, render(folder, {"--spp", "4", "--png", folder / "a.png", "--json", folder / "a.json", "--strict"}));
     INFO(o.err);
     REQUIRE(o.code == 0);
@@ -201,7 +188,7 @@ TEST_CASE("a render writes image, PNG and statistics") {
 }
 
 TEST_CASE("G13: every accepted option changes something") {
-    const Folder folder;
+    const test::TempFolder folder;
     const json base = statistics(folder, {"--spp", "2"});
     const std::vector<float> pixels = read_exr(folder / "a.exr").rgb;
     const auto changes_image = [&](const std::vector<std::string>& more) {
@@ -246,7 +233,7 @@ TEST_CASE("G13: every accepted option changes something") {
 }
 
 TEST_CASE("G14: --time is wall clock, within 5 %") {
-    const Folder folder;
+    const test::TempFolder folder;
     // Other processes may take the processor at the wrong moment: one of three tries must succeed.
     bool met = false;
     double last = 0;
@@ -261,7 +248,7 @@ TEST_CASE("G14: --time is wall clock, within 5 %") {
 }
 
 TEST_CASE("Ctrl-C saves what is done and ends with code 5") {
-    const Folder folder;
+    const test::TempFolder folder;
     for (const int signal : {SIGINT, SIGTERM}) {
         fs::remove(folder.path / "a.exr");
         const pid_t child = start(folder, render(folder, {"--spp", "100000000", "--json", folder / "a.json"}));
@@ -281,7 +268,7 @@ TEST_CASE("Ctrl-C saves what is done and ends with code 5") {
 }
 
 TEST_CASE("a reference is continued, extended, compared with") {
-    const Folder folder;
+    const test::TempFolder folder;
     const auto reference = [&](const std::string& spp, const std::string& size = "24x16") {
         return run(folder, {"reference", kCornell, "--size", size, "--spp", spp, "-o", folder / "r.exr", "--json", folder / "r.json"});
     };
@@ -312,7 +299,7 @@ TEST_CASE("a reference is continued, extended, compared with") {
 }
 
 TEST_CASE("an experiment, killed and resumed") {
-    const Folder folder;
+    const test::TempFolder folder;
     std::ofstream(folder / "e.toml") << "seeds = [1, 2]\nreference = { spp = 64 }\nbudget = { spp = [1, 4, 16] }\n[[scene]]\nname = \"cornell\"\npath = \"" << kCornell
                                      << "\"\nsize = [24, 16]\nmax_depth = 4\n[[run]]\nname = \"nee\"\nintegrator = \"path\"\nestimator = \"nee\"\n"
                                      << "[[run]]\nname = \"mis\"\nintegrator = \"path\"\n";
@@ -336,7 +323,7 @@ TEST_CASE("an experiment, killed and resumed") {
 }
 
 TEST_CASE("info and bench stages") {
-    const Folder folder;
+    const test::TempFolder folder;
     const Outcome info = run(folder, {"info", kCornell, "--json", "-"});
     REQUIRE(info.code == 0);
     const json j = json::parse(info.out);

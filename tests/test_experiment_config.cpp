@@ -21,7 +21,7 @@ std::string changed(const std::string& from, const std::string& to) {
     return config.replace(at, from.size(), to);
 }
 
-ExperimentConfig read(const Folder& folder, const std::string& config, bool reduced = false) {
+ExperimentConfig read(const TempFolder& folder, const std::string& config, bool reduced = false) {
     write_inputs(folder, config);
     return read_experiment(folder / "e.toml", reduced);
 }
@@ -37,7 +37,7 @@ using Names = std::vector<std::string>;
 }  // namespace
 
 TEST_CASE("a sweep is one line and gives the product of its values, in the order in which they are written") {
-    const Folder folder;
+    const TempFolder folder;
     const ExperimentConfig config =
         read(folder, changed("estimator = \"naive\"", "set = { estimator = \"mis\" }\nsweep = { rr_depth = [2, -1], connections = [1, 4] }"));
     CHECK(names(config.runs) == Names{"good", "biased[rr_depth=2,connections=1]", "biased[rr_depth=2,connections=4]", "biased[rr_depth=-1,connections=1]",
@@ -70,7 +70,7 @@ TEST_CASE("a sweep is one line and gives the product of its values, in the order
 }
 
 TEST_CASE("an ablation changes one switch of its default at a time") {
-    const Folder folder;
+    const TempFolder folder;
     const std::string ablation = "[ablation]\ndefault = \"biased\"\n[ablation.switches]\nestimator = [\"mis\"]\nconnections = [1, 8]\n";
     const ExperimentConfig config = read(folder, kConfig + ablation);
     CHECK(config.ablation_default == "biased");
@@ -85,7 +85,7 @@ TEST_CASE("an ablation changes one switch of its default at a time") {
 }
 
 TEST_CASE("budgets of samples and of seconds stand side by side; --reduced replaces what its section says") {
-    const Folder folder;
+    const TempFolder folder;
     const std::string text = changed("spp = [1, 2, 8, 32]", "spp = [1, 2]\nseconds = [0.5, 1]") + "[reduced]\nscale = 0.5\nseeds = [5]\nreference_spp = 10\nseconds = [0.25]\n";
     std::string sized = text;
     sized.replace(sized.find("path = \"a.xml\""), 14, "path = \"a.xml\"\nsize = [16, 12]");
@@ -129,7 +129,7 @@ TEST_CASE("the project's configurations are right, also reduced") {
 }
 
 TEST_CASE("a dry run tells the plan and writes nothing") {
-    const Folder folder;
+    const TempFolder folder;
     write_inputs(folder);
     World world;
     world.batch = 100;
@@ -181,7 +181,7 @@ TEST_CASE("a dry run tells the plan and writes nothing") {
 }
 
 TEST_CASE("configurations are refused with file, line and the offending name, before anything is rendered") {
-    const Folder folder;
+    const TempFolder folder;
     const auto refused = [&](const std::string& from, const std::string& to) {
         std::string config = kConfig;
         const size_t at = config.find(from);

@@ -58,7 +58,7 @@ TEST_CASE("sample budgets are exact and interruptions keep whole samples") {
 }
 
 TEST_CASE("the reference: a killed and continued one equals the uninterrupted one") {
-    const Folder folder;
+    const TempFolder folder;
     write_inputs(folder);
     World world;
     const Hooks hooks = fake_hooks(world);
@@ -123,7 +123,7 @@ TEST_CASE("the reference: a killed and continued one equals the uninterrupted on
 }
 
 TEST_CASE("a reference shares no random numbers with a render of the same seed") {
-    const Folder folder;
+    const TempFolder folder;
     write_inputs(folder);
     World world;
     const Hooks hooks = fake_hooks(world);
@@ -140,7 +140,7 @@ TEST_CASE("a reference shares no random numbers with a render of the same seed")
 }
 
 TEST_CASE("an experiment leaves what design.md describes") {
-    const Folder folder;
+    const TempFolder folder;
     write_inputs(folder);
     World world;
     world.counters_restart = GENERATE(false, true);
@@ -206,7 +206,7 @@ TEST_CASE("an experiment leaves what design.md describes") {
 }
 
 TEST_CASE("killed at any point and resumed, an experiment equals an uninterrupted one") {
-    const Folder folder;
+    const TempFolder folder;
     write_inputs(folder);
     World world;
     run_experiment(request(folder, "whole"), fake_hooks(world));
@@ -246,7 +246,7 @@ TEST_CASE("killed at any point and resumed, an experiment equals an uninterrupte
 }
 
 TEST_CASE("a signal ends an experiment with what is done saved, and resuming repeats no sample") {
-    const Folder folder;
+    const TempFolder folder;
     write_inputs(folder);
     World world;
     world.stop_at = 300;  // in the renders: the references take 2·134 calls
@@ -262,7 +262,7 @@ TEST_CASE("a signal ends an experiment with what is done saved, and resuming rep
 }
 
 TEST_CASE("a damaged state costs the render, not the experiment") {
-    const Folder folder;
+    const TempFolder folder;
     RenderState state{{1, 1, 2, {1, 2, 3}, {4, 5, 6}}, {{"rows", {"x"}}}};
     write_state(folder / "s", state);
     const auto back = read_state(folder / "s");
@@ -285,7 +285,7 @@ TEST_CASE("a damaged state costs the render, not the experiment") {
 }
 
 TEST_CASE("time checkpoints lie within one render") {
-    const Folder folder;
+    const TempFolder folder;
     std::string config = kConfig;
     config.replace(config.find("spp = [1, 2, 8, 32]"), 19, "seconds = [0.1, 0.3]");
     config.replace(config.find("seeds = [1, 2]"), 14, "seeds = [7]");
@@ -306,7 +306,7 @@ TEST_CASE("time checkpoints lie within one render") {
 }
 
 TEST_CASE("two processes do not share a folder; a folder that cannot be made is a device error") {
-    const Folder folder;
+    const TempFolder folder;
     write_inputs(folder);
     World world;
     World* inner_world = &world;
@@ -328,7 +328,7 @@ TEST_CASE("two processes do not share a folder; a folder that cannot be made is 
 }
 
 TEST_CASE("checkpoints in samples and in seconds lie within one render") {
-    const Folder folder;
+    const TempFolder folder;
     std::string config = kConfig;
     config.replace(config.find("spp = [1, 2, 8, 32]"), 19, "spp = [10, 400]\nseconds = [0.05, 0.2]");
     write_inputs(folder, config);
@@ -365,7 +365,7 @@ TEST_CASE("checkpoints in samples and in seconds lie within one render") {
 }
 
 TEST_CASE("a reference is found by content, extended on demand, and made by the integrator that the configuration names") {
-    const Folder folder;
+    const TempFolder folder;
     write_inputs(folder);
     World world;
     auto r = request(folder, "one");
@@ -401,7 +401,7 @@ TEST_CASE("a reference is found by content, extended on demand, and made by the 
 }
 
 TEST_CASE("a reference that is killed and continued has the bits of one that is not") {
-    const Folder folder;
+    const TempFolder folder;
     write_inputs(folder);
     World world;
     const Hooks hooks = fake_hooks(world);
@@ -440,7 +440,7 @@ TEST_CASE("a reference that is killed and continued has the bits of one that is 
 }
 
 TEST_CASE("a render that gathers images of single strategies starts over when it was killed") {
-    const Folder folder;
+    const TempFolder folder;
     std::string config = kConfig;
     config.replace(config.find("estimator = \"naive\""), 19, "sweep = { rr_depth = [1, 2], connections = [3] }\ntechniques = 4");
     write_inputs(folder, config);

@@ -14,27 +14,12 @@
 #include "film/metrics.h"
 #include "film/png_io.h"
 #include "tests/catch.h"
+#include "tests/temp_folder.h"
 
 using namespace ambilux;
 namespace fs = std::filesystem;
 
 namespace {
-
-/// A fresh folder that goes away again.
-struct Folder {
-    fs::path path;
-    Folder() {
-        std::string name = (fs::temp_directory_path() / "ambilux-film-XXXXXX").string();
-        REQUIRE(::mkdtemp(name.data()));
-        path = name;
-    }
-    ~Folder() {
-        std::error_code ignored;
-        fs::remove_all(path, ignored);
-    }
-    std::string operator/(const std::string& name) const { return (path / name).string(); }
-    size_t files() const { return size_t(std::distance(fs::directory_iterator(path), fs::directory_iterator())); }
-};
 
 Image noise(uint32_t width, uint32_t height, uint64_t seed) {
     std::mt19937_64 rng(seed);
@@ -87,7 +72,7 @@ TEST_CASE("moments: mean, variance and standard error of known samples") {
 }
 
 TEST_CASE("EXR: image and attributes come back unchanged") {
-    const Folder folder;
+    const test::TempFolder folder;
     const Image image = noise(13, 7, 1);
     const Attributes attributes = {{"scene", "a b.xml"}, {"spp", 64}, {"seed", 1ull << 63}, {"seconds", 1.25}, {"negative", -3}};
     write_exr(folder / "a.exr", image, attributes);
@@ -105,7 +90,7 @@ TEST_CASE("EXR: image and attributes come back unchanged") {
 }
 
 TEST_CASE("reference EXR: continued in two parts equals the whole") {
-    const Folder folder;
+    const test::TempFolder folder;
     const FilmMoments first = simulate(9, 5, 40, 1), second = simulate(9, 5, 24, 2);
     write_reference_exr(folder / "r.exr", to_reference(first), {{"scene", "s"}});
     const Reference read = read_reference_exr(folder / "r.exr");
@@ -127,7 +112,7 @@ TEST_CASE("reference EXR: continued in two parts equals the whole") {
 }
 
 TEST_CASE("EXR: bad files are refused by name") {
-    const Folder folder;
+    const test::TempFolder folder;
     std::string message;
     CHECK(code_of([&] { read_exr(folder / "missing.exr"); }, &message) == ExitCode::bad_input);
     CHECK(message.find("missing.exr: No such file") != std::string::npos);
@@ -144,7 +129,7 @@ TEST_CASE("EXR: bad files are refused by name") {
 }
 
 TEST_CASE("a failed write leaves the old file and nothing else") {
-    const Folder folder;
+    const test::TempFolder folder;
     write_exr(folder / "a.exr", noise(4, 4, 1));
     const std::string before = read_file(folder / "a.exr");
     std::string message;
@@ -170,7 +155,7 @@ TEST_CASE("PNG: the sRGB curve, clamping and NaN") {
     CHECK(linear_to_srgb(2.0f) == 1.0f);
     CHECK(linear_to_srgb(0.002f) == Approx(0.02584));
     CHECK(linear_to_srgb(0.5f) == Approx(0.735357).epsilon(1e-5));
-    const Folder folder;
+    const test::TempFolder folder;
     write_png(folder / "a.png", noise(5, 3, 1), 1.0f);
     CHECK(read_file(folder / "a.png").substr(0, 8) == "\x89PNG\r\n\x1a\n");
 }
