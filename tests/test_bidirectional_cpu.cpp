@@ -10,15 +10,14 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <thread>
 
 #include "backends/cpu/executor.h"
 #include "core/error.h"
-#include "core/flag.h"
 #include "integrators/bidirectional/schedule.h"
 #include "integrators/path/path_wave.h"
 #include "scene/accel/cwbvh.h"
 #include "tests/bidirectional_images.h"
+#include "tests/render_checks.h"
 #include "tests/closed_forms.h"
 
 using namespace ambilux;
@@ -31,8 +30,6 @@ constexpr float kInf = std::numeric_limits<float>::infinity();
 const Method kMethods[] = {{"all"}, {"all", MisHeuristic::power}, {"-i light"}, {"hits"}, {"next_event+connections"}, {"light"}};
 
 RenderSettings settings_of(const Scene& scene, const Method& m = {"all"}) { return method_settings(scene, m, 5); }
-
-bool same_image(const FilmMoments& a, const FilmMoments& b) { return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares; }
 
 uint64_t queue_peak(const RenderStats& stats, const std::string& name) {
     for (const QueueStats& q : stats.queues)
@@ -231,34 +228,13 @@ TEST_CASE("G3: a wave with more light vertices than there is room for is done ag
         const RenderResult r = render_scene(scene, s, 1);
         check_queues(r.stats);
         CHECK(r.stats.invalid.total() == 0);
-        CHECK(queue_peak(r.stats, "light_vertices") == (depth < 3 ? 0 : queue_peak(r.stats, "light_vertices")));
+        CHECK((queue_peak(r.stats, "light_vertices") > 0) == (depth >= 3));
     }
 }
 
 TEST_CASE("An interrupted render holds exactly the samples that it says", "[bidirectional]") {
     const Scene scene = project_scene("cornell", 37, 29);
-    for (const char* name : {"all", "-i light"}) {
-        const RenderSettings settings = settings_of(scene, {name});
-        volatile bool stop = true;
-        const std::unique_ptr<Renderer> never = make_renderer(scene, settings);
-        CHECK(never->render(0, 100, &stop) == 0);
-        CHECK(never->film().samples == 0);
-        const FilmMoments empty = never->film();
-        CHECK(std::all_of(empty.sum.begin(), empty.sum.end(), [](double v) { return v == 0; }));
-
-        const std::unique_ptr<Renderer> some = make_renderer(scene, settings);
-        stop = false;
-        std::thread alarm([&] {
-            std::this_thread::sleep_for(std::chrono::milliseconds(200));
-            set_flag(&stop);
-        });
-        const uint32_t done = some->render(0, 1u << 30, &stop);
-        alarm.join();
-        REQUIRE(done > 0);
-        CHECK(some->film().samples == done);
-        CHECK(some->stats().samples == done);
-        CHECK(same_image(some->film(), render_scene(scene, settings, done).film));
-    }
+    for (const char* name : {"all", "-i light"}) check_interrupted(scene, settings_of(scene, {name}));
 }
 
 // ---- what is no light, and what is too much ----

@@ -7,10 +7,9 @@
 #include <cmath>
 #include <chrono>
 #include <map>
-#include <thread>
 
 #include "core/error.h"
-#include "core/flag.h"
+#include "tests/render_checks.h"
 #include "tests/render_scene.h"
 
 using namespace ambilux;
@@ -20,8 +19,6 @@ namespace {
 Scene small_scene(const char* name) { return project_scene(name, 37, 29); }
 
 RenderSettings settings_of(const Scene& scene, uint64_t seed = 5) { return cpu_settings(scene, Estimator::mis, seed); }
-
-bool same_image(const FilmMoments& a, const FilmMoments& b) { return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares; }
 
 std::string refused(RenderSettings& s, const std::string& key, const std::string& value) {
     const RenderSettings before = s;
@@ -252,25 +249,5 @@ TEST_CASE("Renders that would not end or cannot be made are refused", "[path]") 
 
 TEST_CASE("An interrupted render holds exactly the samples that it says", "[path]") {
     const Scene scene = small_scene("cornell");
-    const RenderSettings settings = settings_of(scene);
-    volatile bool stop = true;
-    const std::unique_ptr<Renderer> never = make_renderer(scene, settings);
-    CHECK(never->render(0, 100, &stop) == 0);
-    CHECK(never->film().samples == 0);
-    const FilmMoments empty = never->film();
-    CHECK(std::all_of(empty.sum.begin(), empty.sum.end(), [](double v) { return v == 0; }));
-
-    // Interrupted by another thread somewhere on the way.
-    const std::unique_ptr<Renderer> some = make_renderer(scene, settings);
-    stop = false;
-    std::thread alarm([&] {
-        std::this_thread::sleep_for(std::chrono::milliseconds(300));
-        set_flag(&stop);
-    });
-    const uint32_t done = some->render(0, 1u << 30, &stop);
-    alarm.join();
-    REQUIRE(done > 0);
-    CHECK(some->film().samples == done);
-    CHECK(some->stats().samples == done);
-    CHECK(same_image(some->film(), render_scene(scene, settings, done).film));
+    check_interrupted(scene, settings_of(scene));
 }
