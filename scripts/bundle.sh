@@ -73,8 +73,8 @@ RUN
 chmod +x "$top/run.sh"
 
 mkdir -p "$output"
-# xz: every machine with tar has it, unlike zstd.
+# xz: every machine with tar has it, unlike zstd. The programs hold the same kernels: a dictionary as large as all of them keeps one copy.
 archive="$output/ambilux.tar.xz"
-tar -C "$stage" -cf - ambilux | xz -T0 -3 >"$archive.part"
+tar -C "$stage" -cf - ambilux | xz -T1 --lzma2=preset=3,dict=256MiB >"$archive.part"
 mv "$archive.part" "$archive"
 echo "$archive: $(du -h "$archive" | cut -f1), $(find "$top/bin" -type f | wc -l) programs, $(find "$top/lib" -type f | wc -l) libraries"
