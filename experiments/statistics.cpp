@@ -22,6 +22,11 @@ const char* estimator_name(Estimator estimator) {
     return kNames[uint32_t(estimator)];
 }
 
+const char* fuse_name(Fuse fuse) {
+    const char* names[] = {"auto", "none", "light", "all"};
+    return names[size_t(fuse)];
+}
+
 const char* heuristic_name(MisHeuristic heuristic) { return heuristic == MisHeuristic::balance ? "balance" : "power"; }
 
 nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats, double load_seconds) {
@@ -51,6 +56,8 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, co
             {"rr_depth", settings.rr_depth},
             {"deterministic", settings.deterministic},
             {"specialise", settings.specialise},
+            {"fuse", fuse_name(settings.fuse)},
+            {"cull", settings.cull},
             {"seconds", {{"load", load_seconds}, {"build", stats.build_seconds}, {"render", stats.render_seconds}}},
             {"rays", {{"extend", stats.rays_extend}, {"occlude", stats.rays_occlude}}},
             {"rays_per_second", stats.render_seconds > 0 ? rays / stats.render_seconds : 0.0},

@@ -25,9 +25,11 @@ std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings
     if (cuda && settings.accel == "embree") throw Error(ExitCode::usage, "accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
     if (cuda && settings.deterministic && settings.variant == "lvc")
         throw Error(ExitCode::usage, "deterministic=true: variant lvc draws from a cache whose order differs between runs on a CUDA device; use wavefront or megakernel");
-    if (settings.integrator != "path") return cuda ? make_bidirectional_cuda(scene, settings) : make_bidirectional_cpu(scene, settings);
-    if (cuda) return make_path_cuda(scene, settings);
-    return make_path_cpu(scene, settings);
+    RenderSettings chosen = settings;
+    // On a host connect waits for the tables of environments, which it can ask for ahead only as a stage of its own.
+    if (chosen.fuse == Fuse::automatic) chosen.fuse = cuda ? Fuse::all : Fuse::light;
+    if (chosen.integrator != "path") return cuda ? make_bidirectional_cuda(scene, chosen) : make_bidirectional_cpu(scene, chosen);
+    return cuda ? make_path_cuda(scene, chosen) : make_path_cpu(scene, chosen);
 }
 
 }  // namespace ambilux

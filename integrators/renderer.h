@@ -16,6 +16,14 @@
 
 namespace ambilux {
 
+/// Stages that run as parts of others. Images are the same.
+enum class Fuse : uint32_t {
+    automatic,  ///< what is fastest on the backend
+    none,       ///< every stage is a kernel with a queue
+    light,      ///< mis_weight and accumulate are parts of the stages that find the light
+    all         ///< also connect (integrator path) is a part of shade
+};
+
 /// All that decides the image, apart from the scene. Every `--set KEY=VALUE` names a field here.
 struct RenderSettings {
     std::string integrator = "path";
@@ -33,6 +41,8 @@ struct RenderSettings {
     std::string accel = "auto";          ///< cpu: embree (auto) or cwbvh (the CUDA traversal built for the host)
     uint32_t wave_size = 0;              ///< paths in flight; 0 chooses
     bool specialise = true;              ///< kernels hold only what the scene has
+    Fuse fuse = Fuse::automatic;         ///< which stages pass their items on without a queue
+    float cull = 0.0f;                   ///< Russian roulette before shadow rays (survival_factor); 0: none
     bool deterministic = false;
     bool graph = true;                   ///< cuda: one graph per wave; false launches kernel by kernel, for profilers and sanitizers
 };

@@ -93,6 +93,14 @@ void set_strategies(RenderSettings& settings, const std::string& key, const std:
     settings.singles = singles;
 }
 
+float real(const std::string& key, const std::string& value, float lowest, float highest) {
+    float result{};
+    const char* end = value.data() + value.size();
+    const auto parsed = std::from_chars(value.data(), end, result);
+    if (parsed.ec != std::errc() || parsed.ptr != end || !(result >= lowest && result <= highest)) refuse(key, value, fmt::format("a number from {} to {} is needed", lowest, highest));
+    return result;
+}
+
 bool boolean(const std::string& key, const std::string& value) { return choose(key, value, {"false", "true"}) == 1; }
 
 }  // namespace
@@ -126,13 +134,17 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.wave_size = integer<uint32_t>(key, value, 0, 1u << 28);
     else if (key == "specialise")
         s.specialise = boolean(key, value);
+    else if (key == "fuse")
+        s.fuse = Fuse(choose(key, value, {"auto", "none", "light", "all"}));
+    else if (key == "cull")
+        s.cull = real(key, value, 0.0f, 1.0f);
     else if (key == "deterministic")
         s.deterministic = boolean(key, value);
     else if (key == "graph")
         s.graph = boolean(key, value);
     else
         throw Error(ExitCode::usage,
-                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, connections, max_depth, rr_depth, seed, accel, wave_size, specialise, deterministic, graph", key));
+                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, connections, max_depth, rr_depth, seed, accel, wave_size, specialise, fuse, cull, deterministic, graph", key));
 }
 
 }  // namespace ambilux

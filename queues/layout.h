@@ -22,9 +22,9 @@ public:
     }
 
     /// A queue without items. Its counter is the next of the array `counters`.
-    template <class Item>
-    Queue<Item> queue(const char* name, QueueCounter* counters, uint32_t capacity) {
-        Queue<Item> q;
+    template <class Item, LaneOrder Order = LaneOrder::apart>
+    Queue<Item, Order> queue(const char* name, QueueCounter* counters, uint32_t capacity) {
+        Queue<Item, Order> q;
         q.counter = counters ? counters + names_.size() : nullptr;
         q.capacity = capacity;
         names_.emplace_back(name);

@@ -50,8 +50,14 @@ AMBILUX_HD uint32_t take_place(uint32_t* count) {
 #endif
 }
 
-/// Fixed-capacity queue of trivially copyable items: lane k of item i lies at base[k * capacity + i]. A view: copies share the storage.
-template <class Item>
+/// How the lanes of a queue's items lie in memory.
+enum class LaneOrder {
+    apart,     ///< lane k of item i at base[k * capacity + i]: for items that neighbouring threads take one after the other
+    together,  ///< at base[i * lanes + k]: for items that are taken in no order, since memory moves 32 bytes at least
+};
+
+/// Fixed-capacity queue of trivially copyable items. A view: copies share the storage.
+template <class Item, LaneOrder Order = LaneOrder::apart>
 struct Queue {
     static_assert(std::is_trivially_copyable_v<Item> && sizeof(Item) % sizeof(Lane) == 0, "items are whole lanes of plain data");
     static constexpr uint32_t kLanes = sizeof(Item) / sizeof(Lane);
@@ -60,9 +66,11 @@ struct Queue {
     QueueCounter* counter = nullptr;
     uint32_t capacity = 0;
 
+    AMBILUX_HD size_t place(uint32_t i, uint32_t lane) const { return Order == LaneOrder::apart ? size_t(lane) * capacity + i : size_t(i) * kLanes + lane; }
+
     AMBILUX_HD Item load(uint32_t i) const {
         Lane lanes[kLanes];
-        for (uint32_t k = 0; k < kLanes; ++k) lanes[k] = base[size_t(k) * capacity + i];
+        for (uint32_t k = 0; k < kLanes; ++k) lanes[k] = base[place(i, k)];
         Item item;
         memcpy(&item, lanes, sizeof(Item));
         return item;
@@ -70,7 +78,7 @@ struct Queue {
     AMBILUX_HD void store(uint32_t i, const Item& item) const {
         Lane lanes[kLanes];
         memcpy(lanes, &item, sizeof(Item));
-        for (uint32_t k = 0; k < kLanes; ++k) base[size_t(k) * capacity + i] = lanes[k];
+        for (uint32_t k = 0; k < kLanes; ++k) base[place(i, k)] = lanes[k];
     }
     /// Appends and returns the place. Past the capacity the item is lost and counted (QueueCounter::overflow).
     AMBILUX_HD uint32_t push(const Item& item) const {

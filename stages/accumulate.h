@@ -7,18 +7,27 @@
 
 namespace ambilux {
 
-/// Adds contributions to the samples of their paths. A queue holds at most one contribution per path when this runs, so no two threads meet and
-/// the sum does not depend on the order of the queue.
+/// Adds contributions to the samples of their paths. As a rule one launch holds at most one contribution per path, so no two threads meet and the sum does not depend on the
+/// order of the queue; launches with several say so by `shared`.
 struct Accumulate {
     Queue<Contribution> contributions;
     Lane* samples;
     StageRecord* record;
     Wave wave = {};
     TechniqueFilm techniques = {};
+    bool shared = false;
 
-    AMBILUX_HD void operator()(uint32_t i) const {
-        const Contribution c = contributions.load(i);
+    AMBILUX_HD void operator()(uint32_t i) const { take(contributions.load(i)); }
+
+    AMBILUX_HD void take(const Contribution& c) const {
         if (!is_light(c.value, record)) return;
+#if defined(__CUDA_ARCH__)
+        if (shared) {
+            float* sum = reinterpret_cast<float*>(&samples[c.path]);
+            for (int k = 0; k < 3; ++k) atomicAdd(sum + k, c.value[k]);
+            return;
+        }
+#endif
         Rgb sum;
         memcpy(&sum, &samples[c.path], sizeof(sum));
         sum += c.value;

@@ -6,6 +6,9 @@
 
 namespace ambilux {
 
+/// Most pairs of one eye vertex in a launch of connect_vertices.
+constexpr uint32_t kPairsPerLaunch = 4;
+
 struct BidirectionalPolicy {
     BidirectionalMis mis;
     uint32_t max_depth;       ///< segments; WalkBits::kMaxDepth stands for no limit
@@ -14,6 +17,7 @@ struct BidirectionalPolicy {
     bool splat;               ///< light vertices are connected with the camera
     bool connect_vertices;
     uint32_t cache_draws;     ///< light vertices that an eye vertex draws from a cache of all; 0: those of the light walk of its slot
+    uint32_t pairs_per_launch; ///< pairs of one eye vertex in a launch of connect_vertices; more than 1: sums of a path depend on the order of threads
     bool next_event;
     bool count_hits;          ///< eye walks count the area emitters that they meet
     bool count_environment;   ///< eye walks count the environment
@@ -21,6 +25,8 @@ struct BidirectionalPolicy {
     bool megakernel;          ///< variant: one thread per slot instead of stages
     uint32_t stream_slots;    ///< variant streaming: slots in flight; 0: another variant
     bool hide_emitters;       ///< the camera does not see emitters
+    bool fuse;                ///< light is weighted and added up by the stages that find it, not by stages of their own
+    float cull;               ///< share of a path's light below which what it finds faces Russian roulette before the shadow ray; 0: never
     SingleStrategies singles;
     uint32_t technique_depth; ///< segments up to which images of single strategies are gathered; 0: none
 

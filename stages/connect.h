@@ -1,6 +1,7 @@
 // connect: a vertex samples an emitter (next event estimation).
 #pragma once
 
+#include "stages/mis_weight.h"
 #include "stages/path_items.h"
 #include "stages/path_policy.h"
 #include "stages/stage.h"
@@ -16,7 +17,7 @@ struct Connect {
     Wave wave;
     PathPolicy policy;
     Queue<ConnectItem> connections;
-    Queue<ConnectCandidate> candidates;
+    ConnectOutlet candidates;
     StageRecord* record;
 
     /// What operator() will wait for, so that an executor can ask for it some items ahead.
@@ -28,22 +29,35 @@ struct Connect {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const ConnectItem c = connections.load(i);
-        const RngKey key = wave.key(c.path);
-        const uint32_t depth = c.bits.depth();
         const SurfacePoint point = surface_at<F>(scene, c.prim, c.u, c.v);
+        const RngKey key = wave.key(c.path);
         EmitterSample light;
-        if (!sample_emitter_deferred<F>(scene, point.p, random_floats(key, emitter_block(depth)), light)) return;
-        if (!may_scatter(scene, point, -c.d, light.wi)) return;
-        const Scattering s = make_scattering<F>(scene, point, -c.d);
+        if (!sample(point, -c.d, key, c.bits.depth(), light)) return;
+        finish(point, make_scattering<F>(scene, point, -c.d), light, key, c.path, c.bits.depth(), c.throughput);
+    }
+
+    /// The same for a vertex whose BSDF is known already.
+    AMBILUX_HD void take(const SurfacePoint& point, const Scattering& s, Vec3f wo, uint32_t path, uint32_t depth, Rgb throughput) const {
+        const RngKey key = wave.key(path);
+        EmitterSample light;
+        if (sample(point, wo, key, depth, light)) finish(point, s, light, key, path, depth, throughput);
+    }
+
+private:
+    AMBILUX_HD bool sample(const SurfacePoint& point, Vec3f wo, const RngKey& key, uint32_t depth, EmitterSample& light) const {
+        return sample_emitter_deferred<F>(scene, point.p, random_floats(key, emitter_block(depth)), light) && may_scatter(scene, point, wo, light.wi);
+    }
+
+    AMBILUX_HD void finish(const SurfacePoint& point, const Scattering& s, const EmitterSample& light, const RngKey& key, uint32_t path, uint32_t depth, Rgb throughput) const {
         const Rgb f = scatter_eval<F>(s, light.wi, TransportMode::radiance);
         if (is_zero(f)) return;
         const bool environment = is_environment<F>(scene, light.emitter);
-        const Rgb value = c.throughput * f * ((environment ? splat(1.0f) : emitter_sample_radiance<F>(scene, light)) / light.pdf_sa);
+        const Rgb value = throughput * f * ((environment ? splat(1.0f) : emitter_sample_radiance<F>(scene, light)) / light.pdf_sa);
         if (!is_light(value, record) || is_zero(value)) return;
         // Only BSDF sampling and a hit could find this light too.
         const bool other = policy.estimator == Estimator::mis && !light.delta;
 
-        ConnectCandidate out = {value, c.path, light.pdf_sa, other ? scatter_pdf<F>(s, light.wi) : 0.0f, 0, environment ? kTowardsEnvironment : kInfinity, {}, {}, light.wi, 0};
+        ConnectCandidate out = {value, path, light.pdf_sa, other ? scatter_pdf<F>(s, light.wi) : 0.0f, 0, environment ? kTowardsEnvironment : kInfinity, {}, {}, light.wi, 0};
         out.o = offset_ray_origin(point.p, point.p_error, point.ng, light.wi);
         if (light.distance < kInfinity) {
             // Both ends are moved off their surfaces by their error, so the segment between them is open at either end.
@@ -53,7 +67,7 @@ struct Connect {
             out.d = to / distance;
             out.tmax = distance * (1.0f - gamma_bound(8));
         }
-        if constexpr (F.opacity) out.alpha_seed = alpha_seed(key, depth, true);
+        if (F.opacity || policy.cull > 0.0f) out.alpha_seed = alpha_seed(key, depth, true);
         candidates.push(out);
     }
 };

@@ -3,6 +3,7 @@
 
 #include "stages/bidirectional_policy.h"
 #include "stages/generate.h"
+#include "stages/mis_weight.h"
 #include "stages/stage.h"
 #include "stages/walk_items.h"
 
@@ -27,7 +28,7 @@ struct EyeGenerate {
 
 /// An eye walk at `h`: emission becomes a candidate.
 template <Features F>
-AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, const Queue<HitCandidate>& candidates, StageRecord* record) {
+AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, const HitOutlet& candidates, StageRecord* record) {
     const auto emit = [&](Rgb radiance, float others) {
         const Strategy strategy = Strategy::make(0, h.ray.bits.depth() + 1);
         if (!policy.singles.has(strategy)) return;
@@ -70,7 +71,7 @@ struct EyeShade {
     BidirectionalPolicy policy;
     Queue<WalkHit> hits;
     Queue<WalkItem> rays;
-    Queue<HitCandidate> candidates;
+    HitOutlet candidates;
     Queue<VertexItem> vertices;
     const uint32_t* last_vertex;
     StageRecord* record;
@@ -86,20 +87,41 @@ struct EyeShade {
     }
 };
 
-/// connect: an eye vertex samples an emitter (s = 1) and goes on to the vertices of its light walk.
+/// Pairs of an eye vertex for one launch, from `next` on: a vertex of the light walk of its slot, or, over a cache, the number of draws that are left.
+AMBILUX_HD void push_pairs(const BidirectionalPolicy& policy, const LightVertices& light_vertices, uint32_t vertex, uint32_t path, uint32_t depth, uint32_t next, const Queue<PairItem>& pairs) {
+    for (uint32_t pushed = 0; pushed < policy.pairs_per_launch;) {
+        uint32_t light = next;
+        if (policy.cache_draws > 0) {
+            if (next == 0) return;
+            light = --next;
+        } else {
+            if (next == kNone) return;
+            const VertexItem y = light_vertices.load(light);
+            next = y.previous;
+            if (depth + y.bits.depth() + 1 > policy.max_depth) continue;
+        }
+        ++pushed;
+        const bool last = pushed == policy.pairs_per_launch && next != (policy.cache_draws > 0 ? 0 : kNone);
+        const PairItem pair = {vertex, light, path, last ? next : kNone};
+        pairs.push(pair);
+    }
+}
+
+/// connect: an eye vertex samples an emitter (s = 1) and is paired with the vertices of its light walk.
 template <Features F>
 struct EyeConnect {
     SceneView scene;
     Wave wave;
     BidirectionalPolicy policy;
     Queue<VertexItem> vertices;
-    Queue<VertexItem> pairs;
-    Queue<ConnectCandidate> candidates;
+    LightVertices light_vertices;
+    Queue<PairItem> pairs;
+    ConnectOutlet candidates;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
-        if (item.previous != kNone) pairs.push(item);
+        if (item.previous != kNone) push_pairs(policy, light_vertices, i, item.path, item.bits.depth(), item.previous, pairs);
         const uint32_t depth = item.bits.depth();
         if (!policy.next_event || !policy.wants(1, depth + 1)) return;
         const RngKey key = wave.key(item.path);
@@ -107,14 +129,14 @@ struct EyeConnect {
         WalkConnection c;
         if (!connect_next_event<F>(scene, policy.mis, z, item.throughput, random_floats(key, emitter_block(depth)), c)) return;
         if (!is_light(c.value, record) || is_zero(c.value)) return;
-        candidates.push({c.value, item.path, 1.0f, policy.others(c.others), F.opacity ? alpha_seed(key, depth, true) : 0, c.tmax, c.o, Strategy::make(1, depth + 1), c.d, 0});
+        candidates.push({c.value, item.path, 1.0f, policy.others(c.others), F.opacity || policy.cull > 0.0f ? alpha_seed(key, depth, true) : 0, c.tmax, c.o, Strategy::make(1, depth + 1), c.d, 0});
     }
 };
 
 /// Candidate of eye vertex `item` and light vertex `light`, worth `scale` times their product.
 template <Features F>
 AMBILUX_HD void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const VertexItem& item, const VertexItem& light, float scale,
-                                uint32_t which, const Queue<ConnectCandidate>& candidates, StageRecord* record) {
+                                uint32_t which, const ConnectOutlet& candidates, StageRecord* record) {
     const Strategy strategy = Strategy::make(light.bits.depth() + 1, item.bits.depth() + 1);
     if (!policy.singles.has(strategy)) return;
     const WalkVertex z = unpack_vertex<F>(scene, item), y = unpack_vertex<F>(scene, light);
@@ -123,59 +145,39 @@ AMBILUX_HD void push_connection(const SceneView& scene, const BidirectionalPolic
     c.value *= scale;
     if (!is_light(c.value, record) || is_zero(c.value)) return;
     uint32_t seed = 0;
-    if constexpr (F.opacity) seed = alpha_seed(key, item.bits.depth() + (which << WalkBits::kDepthBits), true);
+    if (F.opacity || policy.cull > 0.0f) seed = alpha_seed(key, item.bits.depth() + (which << WalkBits::kDepthBits), true);
     candidates.push({c.value, item.path, 1.0f, policy.others(c.others), seed, c.tmax, c.o, strategy, c.d, 0});
 }
 
-/// connect_vertices: an eye vertex and one vertex of the light walk of its slot (s, t >= 2); what is left of that walk is for the next launch, so that no launch
-/// holds two contributions of one path.
+/// connect_vertices: an eye vertex and a light vertex (s, t >= 2), of the light walk of its slot, or drawn from a cache of those of all light walks of the wave (Davidovic et al. 2014). M
+/// vertices of N walks are in the cache; k draws estimate the sum over a walk's vertices by M / (N k) times theirs.
 template <Features F>
 struct ConnectVertices {
     SceneView scene;
     Wave wave;
     BidirectionalPolicy policy;
-    Queue<VertexItem> pairs, rest;
-    Queue<VertexItem> light_vertices;
-    Queue<ConnectCandidate> candidates;
+    Queue<PairItem> pairs, rest;
+    Queue<VertexItem> vertices;
+    LightVertices light_vertices;
+    ConnectOutlet candidates;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        VertexItem item = pairs.load(i);
+        const PairItem pair = pairs.load(i);
+        const VertexItem item = vertices.load(pair.vertex);
         const uint32_t depth = item.bits.depth();
-        VertexItem light = light_vertices.load(item.previous);
-        while (depth + light.bits.depth() + 1 > policy.max_depth) {
-            if (light.previous == kNone) return;
-            light = light_vertices.load(light.previous);
-        }
-        item.previous = light.previous;
-        if (light.previous != kNone) rest.push(item);
-        push_connection<F>(scene, policy, wave.key(item.path), item, light, 1.0f, light.bits.depth(), candidates, record);
-    }
-};
-
-/// connect_vertices over a cache (Davidovic et al. 2014): an eye vertex and one vertex drawn from those of all light walks of the wave. VertexItem::previous of the eye
-/// vertex counts the draws that are left. M vertices of N walks are in the cache; k draws estimate the sum over a walk's vertices by M / (N k) times theirs.
-template <Features F>
-struct ConnectCache {
-    SceneView scene;
-    Wave wave;
-    BidirectionalPolicy policy;
-    Queue<VertexItem> pairs, rest;
-    Queue<VertexItem> light_vertices;
-    Queue<ConnectCandidate> candidates;
-    StageRecord* record;
-
-    AMBILUX_HD void operator()(uint32_t i) const {
-        const uint32_t size = light_vertices.counter->size();
-        if (size == 0) return;
-        VertexItem item = pairs.load(i);
-        const uint32_t depth = item.bits.depth(), draw = --item.previous;
-        if (draw > 0) rest.push(item);
+        if (pair.next != kNone) push_pairs(policy, light_vertices, pair.vertex, pair.path, depth, pair.next, rest);
         const RngKey key = wave.key(item.path);
-        const VertexItem light = light_vertices.load(mul_hi(random_bits(key, cache_block(depth, draw)).x, size));
+        uint32_t place = pair.light, size = 0;
+        if (policy.cache_draws > 0) {
+            size = light_vertices.counter->size();
+            if (size == 0) return;
+            place = mul_hi(random_bits(key, cache_block(depth, pair.light)).x, size);
+        }
+        const VertexItem light = light_vertices.load(place);
         if (depth + light.bits.depth() + 1 > policy.max_depth) return;
-        const float scale = float(size) / (float(wave.state->walks) * float(policy.cache_draws));
-        push_connection<F>(scene, policy, key, item, light, scale, WalkBits::kMaxDepth + draw, candidates, record);
+        const float scale = size > 0 ? float(size) / (float(wave.state->walks) * float(policy.cache_draws)) : 1.0f;
+        push_connection<F>(scene, policy, key, item, light, scale, size > 0 ? WalkBits::kMaxDepth + pair.light : light.bits.depth(), candidates, record);
     }
 };
 

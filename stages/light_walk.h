@@ -2,6 +2,7 @@
 #pragma once
 
 #include "stages/bidirectional_policy.h"
+#include "stages/splat.h"
 #include "stages/stage.h"
 #include "stages/walk_items.h"
 #include "stages/wave.h"
@@ -19,7 +20,7 @@ struct LightWalkNumber {
 
 /// Starts light walk `number` of `path`; walk 0 also shows the emitter itself to the camera. False if there is no first ray.
 template <Features F>
-AMBILUX_HD bool start_light(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, uint32_t path, LightWalkNumber number, const Queue<SplatCandidate>& splats,
+AMBILUX_HD bool start_light(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, uint32_t path, LightWalkNumber number, const SplatOutlet& splats,
                             StageRecord* record, Walk& w) {
     const RngKey key = wave.key(path, Stream::light);
     const Vec4f direction = random_floats(key, number.block(kEmissionBlock + 1));
@@ -61,7 +62,7 @@ struct LightGenerate {
     Wave wave;
     BidirectionalPolicy policy;
     Queue<WalkItem> rays;
-    Queue<SplatCandidate> splats;
+    SplatOutlet splats;
     uint32_t* last_vertex;  ///< per slot: the last vertex of its light walk
     StageRecord* record;
 
@@ -81,7 +82,7 @@ struct LightShade {
     BidirectionalPolicy policy;
     Queue<WalkHit> hits;
     Queue<WalkItem> rays;
-    Queue<VertexItem> vertices;       ///< all vertices of all light walks of the wave
+    LightVertices vertices;             ///< all vertices of all light walks of the wave
     Queue<VertexItem> camera_vertices;  ///< those of this depth
     uint32_t* last_vertex;
     StageRecord* record;
@@ -109,7 +110,7 @@ struct ConnectCamera {
     Wave wave;
     BidirectionalPolicy policy;
     Queue<VertexItem> vertices;
-    Queue<SplatCandidate> splats;
+    SplatOutlet splats;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {

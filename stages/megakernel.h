@@ -20,7 +20,7 @@ struct Megakernel {
     Tracer tracer;
     Wave wave;
     BidirectionalPolicy policy;
-    Queue<VertexItem> light_vertices;  ///< memory for the vertices of all light walks; used through chains, never as a queue
+    LightVertices light_vertices;  ///< memory for the vertices of all light walks; used through chains, never as a queue
     Queue<SplatItem> splats;
     Lane* samples;
     StageRecord* records;  ///< one per StageId: rays are counted where the stages would

@@ -1,6 +1,7 @@
 // occlude: light whose way is free becomes a contribution.
 #pragma once
 
+#include "stages/mis_weight.h"
 #include "stages/path_items.h"
 #include "stages/stage.h"
 #include "transport/emitter.h"
@@ -16,7 +17,7 @@ struct Occlude {
     SceneView scene;
     Tracer tracer;
     Queue<ShadowItem> shadows;
-    Queue<Contribution> contributions;
+    ArrivalOutlet contributions;
     StageRecord* record;
 
     AMBILUX_HD bool fetch(uint32_t i, Ray& ray) const {

@@ -15,6 +15,9 @@ struct PathPolicy {
     bool count_hits;      ///< some emitter can be met by a ray
     bool connect;         ///< emitters are sampled
     bool hide_emitters;   ///< the camera does not see emitters
+    bool fuse;            ///< light is weighted and added up by the stages that find it, not by stages of their own
+    bool connect_in_shade;  ///< shade samples emitters too: the surface and its BSDF are looked up once
+    float cull;           ///< share of a path's light below which what it finds faces Russian roulette before the shadow ray; 0: never
 };
 
 }  // namespace ambilux

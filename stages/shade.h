@@ -1,6 +1,7 @@
 // shade: a hit gives light, asks for a connection and goes on.
 #pragma once
 
+#include "stages/connect.h"
 #include "stages/path_items.h"
 #include "stages/path_policy.h"
 #include "stages/stage.h"
@@ -19,10 +20,11 @@ struct Shade {
     Wave wave;
     PathPolicy policy;
     Queue<HitItem> hits;
-    Queue<HitCandidate> candidates;
+    HitOutlet candidates;
     Queue<ConnectItem> connections;
     Queue<RayItem> rays;
     StageRecord* record;
+    Connect<F> connect;
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const HitItem h = hits.load(i);
@@ -40,7 +42,12 @@ struct Shade {
         const uint32_t depth = h.bits.depth();
         if (depth >= policy.max_depth) return;
         const Scattering s = make_scattering<F>(scene, point, -h.d);
-        if (policy.connect && bsdf_is_smooth(s.bsdf)) connections.push({h.d, h.path, h.throughput, h.bits, h.u, h.v, h.prim, 0});
+        if (policy.connect && bsdf_is_smooth(s.bsdf)) {
+            if (policy.connect_in_shade)
+                connect.take(point, s, -h.d, h.path, depth, h.throughput);
+            else
+                connections.push({h.d, h.path, h.throughput, h.bits, h.u, h.v, h.prim, 0});
+        }
         scatter(h, point, s, depth);
     }
 

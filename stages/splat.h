@@ -3,6 +3,7 @@
 
 #include "stages/bidirectional_policy.h"
 #include "stages/fixed_point.h"
+#include "stages/outlet.h"
 #include "stages/stage.h"
 #include "stages/walk_items.h"
 #include "stages/wave.h"
@@ -14,12 +15,15 @@ struct WeightSplats {
     Queue<SplatCandidate> candidates, weighted;
     StageRecord* record;
 
-    AMBILUX_HD void operator()(uint32_t i) const {
-        SplatCandidate c = candidates.load(i);
+    AMBILUX_HD void operator()(uint32_t i) const { take(candidates.load(i)); }
+
+    AMBILUX_HD void take(SplatCandidate c) const {
         c.value *= 1.0f / (1.0f + c.others);
         if (is_light(c.value, record) && !is_zero(c.value)) weighted.push(c);
     }
 };
+
+using SplatOutlet = Outlet<SplatCandidate, WeightSplats>;
 
 template <Features F, class Tracer>
 struct OccludeSplats {

@@ -111,7 +111,7 @@ template <Features F>
 struct StreamEyeShade {
     StreamPool pool;
     Queue<WalkHit> hits;
-    Queue<HitCandidate> candidates;
+    HitOutlet candidates;
     Queue<VertexItem> vertices;
     Queue<TurnItem> turns;
     StageRecord* record;
@@ -139,7 +139,7 @@ template <Features F>
 struct StreamTurn {
     StreamPool pool;
     Queue<TurnItem> turns;
-    Queue<SplatCandidate> splats;
+    SplatOutlet splats;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
@@ -187,7 +187,7 @@ template <Features F>
 struct StreamConnect {
     StreamPool pool;
     Queue<VertexItem> pairs;
-    Queue<ConnectCandidate> candidates;
+    ConnectOutlet candidates;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {

@@ -41,6 +41,17 @@ struct VertexItem {
     uint32_t pad[2];
 };
 
+/// Vertices of light walks, kept over a wave.
+using LightVertices = Queue<VertexItem, LaneOrder::together>;
+
+/// An eye vertex and a vertex of a light walk to be connected.
+struct PairItem {
+    uint32_t vertex;  ///< place of the eye vertex in the queue of its depth
+    uint32_t light;   ///< place of the light vertex; variant lvc: number of the draw
+    uint32_t path;
+    uint32_t next;    ///< what the pairs of the next launch start from (VertexItem::previous); kNone: no pairs are left, or another pair has it
+};
+
 /// Light for a place on the film, before it is weighted, and the ray that must be free.
 struct SplatCandidate {
     Rgb value;

@@ -256,7 +256,8 @@ struct Bench {
     bool changed = false;
 
     explicit Bench(Scene s, const Method& method = {"all"}) : scene(std::move(s)), accel(scene) {
-        const RenderSettings settings = settings_of(scene, method);
+        RenderSettings settings = settings_of(scene, method);
+        settings.fuse = Fuse::none;
         policy = make_bidirectional_policy(scene, settings);
         wave = shape_wave(scene, settings, kTilePixels, 1);
         wave = shape_wave(scene, settings, tile_count(wave) * kTilePixels, tile_count(wave));
@@ -297,6 +298,11 @@ struct Bench {
         void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
             prepare(id, queue.counter->size());
             CpuExecutor::run(id, stage, queue);
+        }
+        template <class Stage, class Item>
+        void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
+            prepare(id, queue.counter->size());
+            CpuExecutor::run_keeping(id, stage, queue);
         }
         template <class Stage, class Item>
         void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
@@ -346,8 +352,8 @@ struct Bench {
     }
 };
 
-template <class Item>
-void edit(const Queue<Item>& queue, uint32_t i, const std::function<void(Item&)>& f) {
+template <class Item, LaneOrder Order>
+void edit(const Queue<Item, Order>& queue, uint32_t i, const std::function<void(Item&)>& f) {
     REQUIRE(i < queue.counter->size());
     Item item = queue.load(i);
     f(item);

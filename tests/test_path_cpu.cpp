@@ -211,6 +211,10 @@ TEST_CASE("G13: every setting changes something that can be seen, or is refused"
     RenderSettings full = settings_of(cornell);
     apply_setting(full, "specialise", "false");
     CHECK(render_scene(cornell, full, 1).stats.features != render_scene(cornell, settings_of(cornell), 1).stats.features);
+    const RenderResult staged = image({{"fuse", "none"}});
+    CHECK(staged.film.sum == base.film.sum);
+    CHECK(image({{"fuse", "all"}}).film.sum == base.film.sum);
+    CHECK(staged.stats.memory_bytes > base.stats.memory_bytes);
     CHECK(base.stats.backend == "cpu");
 
     RenderSettings s;
@@ -225,7 +229,7 @@ TEST_CASE("G13: every setting changes something that can be seen, or is refused"
         CHECK(message.find(allowed) != std::string::npos);
     }
     const std::string unknown = refused(s, "spp", "5");
-    for (const char* name : {"spp", "integrator", "variant", "backend", "estimator", "heuristic", "max_depth", "rr_depth", "seed", "accel", "wave_size", "specialise", "deterministic"})
+    for (const char* name : {"spp", "integrator", "variant", "backend", "estimator", "heuristic", "max_depth", "rr_depth", "seed", "accel", "wave_size", "specialise", "fuse", "deterministic"})
         CHECK(unknown.find(name) != std::string::npos);
 }
 

@@ -38,6 +38,7 @@ struct Bench {
 
     explicit Bench(Scene s, uint32_t samples = 1) : scene(std::move(s)), accel(scene) {
         RenderSettings settings = cpu_settings(scene, Estimator::mis);
+        settings.fuse = Fuse::none;
         policy = make_path_policy(scene, settings);
         const Wave film = shape_wave(scene, settings, kTilePixels, 1);
         wave = shape_wave(scene, settings, tile_count(film) * kTilePixels * samples, tile_count(film));

@@ -31,6 +31,11 @@ public:
     }
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
+        run_keeping(id, stage, queue);
+        queue.counter->finish();
+    }
+    template <class Stage, class Item>
+    void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
         const uint32_t n = queue.counter->size();
         if (n == 0) return;
         const auto start = Clock::now();
@@ -40,7 +45,6 @@ public:
             }
             stage(i);
         }
-        queue.counter->finish();
         record(id, n, start);
     }
     /// Rays are read before any stage pushes new ones, so the queue they came from may be filled again at once.
@@ -57,11 +61,11 @@ public:
         while (queue.counter->count > 0) body();
     }
     template <class A, class B>
-    void settle(const Queue<A>& a, const Queue<B>& b) {
+    void settle(const A& a, const B& b) {
         ambilux::settle(*state_, *a.counter, *b.counter);
     }
-    template <class Item>
-    void clear(const Queue<Item>& queue) {
+    template <class Item, LaneOrder Order>
+    void clear(const Queue<Item, Order>& queue) {
         queue.counter->finish();
     }
     void set_depth(uint32_t depth) { state_->depth = depth; }

@@ -68,10 +68,10 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(c
 }
 
 /// After a stage: its record, and its queue emptied. The time since the last such kernel is the stage's.
-__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, uint32_t slots, uint32_t samples, const WaveState* state, uint64_t* clock) {
+__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, uint32_t slots, uint32_t samples, bool keep, const WaveState* state, uint64_t* clock) {
     const uint64_t now = device_nanoseconds();
     record->add(counter ? counter->size() : slots * (samples ? samples : state->samples), state->depth, now - *clock);
-    if (counter) counter->finish();
+    if (counter && !keep) counter->finish();
     *clock = now;
 }
 
@@ -149,6 +149,12 @@ public:
         detail::launch_queue<<<blocks(detail::launch_queue<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, queue.counter);
         finish(id, queue.counter);
     }
+    /// The queue keeps its items.
+    template <class Stage, class Item>
+    void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
+        detail::launch_queue<<<blocks(detail::launch_queue<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, queue.counter);
+        finish(id, queue.counter, 0, 0, true);
+    }
     template <class Stage, class Item>
     void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
         detail::launch_trace<<<blocks(detail::launch_trace<Stage>, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, queue.counter);
@@ -163,11 +169,11 @@ public:
     void next_depth() { detail::next_depth<<<1, 1, 0, stream_>>>(state_); }
 
     template <class A, class B>
-    void settle(const Queue<A>& a, const Queue<B>& b) {
+    void settle(const A& a, const B& b) {
         detail::settle_queues<<<1, 1, 0, stream_>>>(state_, a.counter, b.counter);
     }
-    template <class Item>
-    void clear(const Queue<Item>& queue) {
+    template <class Item, LaneOrder Order>
+    void clear(const Queue<Item, Order>& queue) {
         detail::clear_queue<<<1, 1, 0, stream_>>>(queue.counter);
     }
     void finish_wave() { detail::finish_wave<<<1, 1, 0, stream_>>>(state_); }
@@ -233,9 +239,9 @@ private:
         cuda_check(cudaStreamSynchronize(stream_), "queue size");
         return c.size();
     }
-    void finish(StageId id, QueueCounter* counter, uint32_t slots = 0, uint32_t samples = 0) {
+    void finish(StageId id, QueueCounter* counter, uint32_t slots = 0, uint32_t samples = 0, bool keep = false) {
         cuda_check(cudaGetLastError(), kStageNames[uint32_t(id)]);
-        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, slots, samples, state_, clock_);
+        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, slots, samples, keep, state_, clock_);
     }
     /// As many blocks as can be resident.
     template <class Kernel>

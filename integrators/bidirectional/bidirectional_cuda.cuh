@@ -29,15 +29,22 @@ public:
         wave_ = shape_wave(scene, settings, kTilePixels, 1);
         wave_.tiles = tile_count(wave_);  // splats may land anywhere on the film
         const uint32_t slots = wave_.tiles * kTilePixels;
+        const CwbvhAccel accel(scene);
+        const double mean = policy_.light_walks && settings.variant != "streaming" ? mean_light_vertices<F>(scene.view(), accel.tracer(), policy_, settings.seed) : 0.0;
+        plan_cache(policy_, mean);
         // Samples that share a cache of light vertices depend on each other, but by one part in the number of light walks only.
-        wave_.samples = std::max(1u, (settings.wave_size ? settings.wave_size : kWaveSize) / slots);
+        size_t free = 0, total = 0;
+        cuda_check(cudaMemGetInfo(&free, &total), "device memory");
+        Layout million;
+        lay_out(million, 1u << 20, planned_vertices(mean, 1u << 20), policy_);
+        const uint64_t bytes_per_path = (million.bytes() >> 20) + 3 * sizeof(int64_t) + sizeof(Lane);
+        wave_.samples = std::max(1u, device_wave_size(settings, kWavePlateau, bytes_per_path, free) / slots);
         if (settings.variant == "streaming") {
             // Enough paths for each slot that the last ones, which leave slots idle, matter little.
             policy_.stream_slots = settings.wave_size ? settings.wave_size : kStreamSlots;
             wave_.samples = std::max<uint32_t>(1, uint32_t(std::min<uint64_t>(8ull * policy_.stream_slots, kLightRay - 1) / slots));
         }
         values_ = uint64_t(wave_.width) * wave_.height * 3;
-        const CwbvhAccel accel(scene);
         device_scene_.emplace(scene);
         device_accel_.emplace(accel.arrays());
         sum_ = DeviceBuffer<double>(values_, "film");
@@ -54,8 +61,6 @@ public:
         clock_ = DeviceBuffer<uint64_t>(1);
         clear_film();
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        const double mean = policy_.light_walks && !policy_.stream_slots ? mean_light_vertices<F>(scene.view(), accel.tracer(), policy_, settings.seed) : 0.0;
-        plan_cache(policy_, mean);
         allocate(planned_vertices(mean, wave_.slot_count()));
         build_seconds_ = seconds_since(start);
     }
@@ -136,7 +141,8 @@ public:
 
 private:
     using Clock = std::chrono::steady_clock;
-    static constexpr uint32_t kWaveSize = 1u << 21;
+    /// Paths of a wave from which on more do not pay (kCudaWavePlateau tells why); their light vertices take half a kilobyte each beside.
+    static constexpr uint32_t kWavePlateau = 1u << 23;
     static constexpr uint32_t kStreamSlots = 1u << 20;
     static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 

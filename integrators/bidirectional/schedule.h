@@ -8,7 +8,7 @@ namespace ambilux {
 /// Splat candidates of one depth: weighted, tested, kept for the end of the wave.
 template <class Executor, Features F, class Tracer>
 void run_splats(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
-    exec.run(StageId::mis_weight, stages.weight_splats, stages.memory.splat_candidates);
+    if (!stages.policy.fuse) exec.run(StageId::mis_weight, stages.weight_splats, stages.memory.splat_candidates);
     exec.trace(StageId::occlude, stages.occlude_splats, stages.memory.weighted_splats);
 }
 
@@ -32,13 +32,16 @@ void run_light_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stage
     exec.settle(m.light_vertices, m.splats);
 }
 
+/// Most pairs of an eye vertex.
+inline uint32_t longest_pairing(const BidirectionalPolicy& policy) { return policy.cache_draws > 0 ? policy.cache_draws : policy.max_depth - 2; }
+
 /// Candidates of one launch: weighted, tested, added to their paths.
 template <class Executor, Features F, class Tracer>
 void run_connections(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     const BidirectionalMemory& m = stages.memory;
-    exec.run(StageId::mis_weight, stages.weight_connections, m.connect_candidates);
+    if (!stages.policy.fuse) exec.run(StageId::mis_weight, stages.weight_connections, m.connect_candidates);
     exec.trace(StageId::occlude, stages.occlude, m.shadows);
-    exec.run(StageId::accumulate, stages.accumulate_shadows, m.shadow_contributions);
+    if (!stages.policy.fuse) exec.run(StageId::accumulate, stages.accumulate_shadows, m.shadow_contributions);
 }
 
 template <class Executor, Features F, class Tracer>
@@ -50,25 +53,24 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
     exec.trace_coherent(StageId::extend, stages.extend, m.rays);
     exec.repeat_while(m.hits, [&] {
         exec.run(StageId::shade, stages.shade, m.hits);
-        if (policy.count_hits || policy.count_environment) {
+        if ((policy.count_hits || policy.count_environment) && !policy.fuse) {
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
             exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
         }
-        if (policy.next_event || policy.connect_vertices) exec.run(StageId::connect, stages.connect, m.vertices);
+        if (policy.next_event || policy.connect_vertices) exec.run_keeping(StageId::connect, stages.connect, m.vertices);
         if (policy.next_event) run_connections(exec, stages);
-        if (policy.connect_vertices)
-            exec.repeat_while(m.pairs, [&] {
-                if (policy.cache_draws > 0)
-                    exec.run(StageId::connect_vertices, stages.connect_cache, m.pairs);
-                else
-                    exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
-                run_connections(exec, stages);
-                if (policy.cache_draws > 0)
-                    exec.run(StageId::connect_vertices, stages.connect_cache_rest, m.rest);
-                else
+        if (policy.connect_vertices) {
+            exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
+            run_connections(exec, stages);
+            if (policy.pairs_per_launch < longest_pairing(policy))
+                exec.repeat_while(m.rest, [&] {
                     exec.run(StageId::connect_vertices, stages.connect_rest, m.rest);
-                run_connections(exec, stages);
-            });
+                    run_connections(exec, stages);
+                    exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
+                    run_connections(exec, stages);
+                });
+        }
+        if (policy.next_event || policy.connect_vertices) exec.clear(m.vertices);
         exec.next_depth();
         exec.trace(StageId::extend, stages.extend, m.rays);
     });
@@ -86,7 +88,7 @@ void run_streams(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
         exec.run(StageId::shade, stages.stream_eye_shade, m.hits);
         if (policy.light_walks) exec.run(StageId::light_shade, stages.stream_light_shade, m.light_hits);
         exec.run(StageId::light_generate, stages.stream_turn, m.turns);
-        if (policy.count_hits || policy.count_environment) {
+        if ((policy.count_hits || policy.count_environment) && !policy.fuse) {
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
             exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
         }
@@ -97,18 +99,18 @@ void run_streams(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
             exec.clear(m.vertices);
         }
         if (policy.connect_vertices) {
-            exec.run(StageId::connect_vertices, stages.stream_connect, m.pairs);
+            exec.run(StageId::connect_vertices, stages.stream_connect, m.waiting);
             run_connections(exec, stages);
         }
         if (policy.splat) {
-            exec.run(StageId::connect_camera, stages.stream_connect_camera, m.light_vertices);
+            exec.run(StageId::connect_camera, stages.stream_connect_camera, m.camera_vertices);
             run_splats(exec, stages);
             exec.run(StageId::splat, stages.splat, m.splats);
         }
     });
 }
 
-/// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h), and settle(queue, queue), clear(queue).
+/// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h), and settle(queue, queue), clear(queue), and run_keeping(id, stage, queue), which leaves the queue as it is.
 template <class Executor, Features F, class Tracer>
 void run_bidirectional_wave(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     if (stages.policy.stream_slots) return run_streams(exec, stages);

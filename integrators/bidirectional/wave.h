@@ -24,7 +24,7 @@ std::vector<std::string> skipped_strategies(const Scene& scene, const Bidirectio
 /// Memory of one wave. All queues but two hold the most they can ever be given, since a slot has one item at a time. Vertices of light walks and what they splat are kept until
 /// the end of the wave; their number is not known before, and a wave for which they do not suffice is done again with more (settle()).
 struct BidirectionalMemory {
-    static constexpr uint32_t kQueues = 18;
+    static constexpr uint32_t kQueues = 20;
 
     WaveState* state;
     StageRecord* records;    ///< one per StageId
@@ -32,10 +32,10 @@ struct BidirectionalMemory {
     Queue<WalkItem> rays;
     Queue<WalkHit> hits;
     Queue<VertexItem> vertices;  ///< of one depth
-    Queue<VertexItem> light_vertices;
+    LightVertices light_vertices;
     Queue<SplatCandidate> splat_candidates, weighted_splats;
     Queue<SplatItem> splats;
-    Queue<VertexItem> pairs, rest;
+    Queue<PairItem> pairs, rest;
     Queue<HitCandidate> hit_candidates;
     Queue<Contribution> hit_contributions;
     Queue<ConnectCandidate> connect_candidates;
@@ -46,7 +46,7 @@ struct BidirectionalMemory {
     // Variant streaming.
     Queue<WalkHit> light_hits;
     Queue<TurnItem> turns;
-    Queue<VertexItem> eye;
+    Queue<VertexItem> eye, camera_vertices, waiting;
     Queue<WalkItem> pending;
 };
 
@@ -56,7 +56,7 @@ inline BidirectionalMemory lay_out_megakernel(Layout& layout, uint32_t slots, ui
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
-    m.light_vertices = layout.queue<VertexItem>("light_vertices", m.counters, policy.connect_vertices ? kept : 0);
+    m.light_vertices = layout.queue<VertexItem, LaneOrder::together>("light_vertices", m.counters, policy.connect_vertices ? kept : 0);
     m.splats = layout.queue<SplatItem>("splats", m.counters, policy.splat ? kept + slots : 0);
     return m;
 }
@@ -65,7 +65,7 @@ inline BidirectionalMemory lay_out_megakernel(Layout& layout, uint32_t slots, ui
 inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, const BidirectionalPolicy& policy) {
     const uint32_t slots = policy.stream_slots;
     const auto when = [&](bool needed) { return needed ? slots : 0u; };
-    const bool hits = policy.count_hits || policy.count_environment, connections = policy.next_event || policy.connect_vertices;
+    const bool connections = policy.next_event || policy.connect_vertices, staged = !policy.fuse, hits = staged && (policy.count_hits || policy.count_environment);
     BidirectionalMemory m{};
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
@@ -77,16 +77,16 @@ inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, con
     m.eye = layout.queue<VertexItem>("eye_vertices", m.counters, slots);
     m.pending = layout.queue<WalkItem>("pending", m.counters, slots);
     m.vertices = layout.queue<VertexItem>("vertices", m.counters, when(connections));
-    m.light_vertices = layout.queue<VertexItem>("camera_vertices", m.counters, when(policy.splat));
-    m.pairs = layout.queue<VertexItem>("pairs", m.counters, when(policy.connect_vertices));
-    m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat));
+    m.camera_vertices = layout.queue<VertexItem>("camera_vertices", m.counters, when(policy.splat));
+    m.waiting = layout.queue<VertexItem>("pairs", m.counters, when(policy.connect_vertices));
+    m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged));
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat));
     m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat));
     m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, when(hits));
     m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, when(hits));
-    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, when(connections));
+    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, when(connections && staged));
     m.shadows = layout.queue<ShadowItem>("shadows", m.counters, when(connections));
-    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, when(connections));
+    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, when(connections && staged));
     m.raw = layout.take<Lane>(policy.technique_depth ? paths : 0);
     return m;
 }
@@ -97,7 +97,8 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     // The megakernel keeps vertices and splats only.
     if (policy.megakernel) return lay_out_megakernel(layout, slots, kept, policy);
     if (policy.stream_slots) return lay_out_streaming(layout, slots, policy);
-    const bool hits = policy.count_hits || policy.count_environment, connections = policy.next_event || policy.connect_vertices;
+    const bool connections = policy.next_event || policy.connect_vertices, staged = !policy.fuse, hits = staged && (policy.count_hits || policy.count_environment);
+    const uint32_t pairs = when(policy.connect_vertices, slots * policy.pairs_per_launch), shadows = connections ? std::max(slots, pairs) : 0;
     BidirectionalMemory m{};
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
@@ -105,17 +106,17 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     m.rays = layout.queue<WalkItem>("rays", m.counters, slots);
     m.hits = layout.queue<WalkHit>("hits", m.counters, slots);
     m.vertices = layout.queue<VertexItem>("vertices", m.counters, slots);
-    m.light_vertices = layout.queue<VertexItem>("light_vertices", m.counters, when(policy.connect_vertices, kept));
-    m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat));
+    m.light_vertices = layout.queue<VertexItem, LaneOrder::together>("light_vertices", m.counters, when(policy.connect_vertices, kept));
+    m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged));
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat));
     m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, kept + slots));
-    m.pairs = layout.queue<VertexItem>("pairs", m.counters, when(policy.connect_vertices));
-    m.rest = layout.queue<VertexItem>("rest", m.counters, when(policy.connect_vertices));
+    m.pairs = layout.queue<PairItem>("pairs", m.counters, pairs);
+    m.rest = layout.queue<PairItem>("rest", m.counters, pairs);
     m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, when(hits));
     m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, when(hits));
-    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, when(connections));
-    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, when(connections));
-    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, when(connections));
+    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, staged ? shadows : 0);
+    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, shadows);
+    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, staged ? shadows : 0);
     m.last_vertex = layout.take<uint32_t>(slots);
     m.raw = layout.take<Lane>(policy.technique_depth ? slots : 0);
     return m;
@@ -156,7 +157,6 @@ struct BidirectionalStages {
     Accumulate accumulate_hits;
     EyeConnect<F> connect;
     ConnectVertices<F> connect_vertices, connect_rest;
-    ConnectCache<F> connect_cache, connect_cache_rest;
     Megakernel<F, Tracer> megakernel;
     StreamBegin stream_begin;
     StreamExtend<F, Tracer> stream_extend;
@@ -178,36 +178,38 @@ struct BidirectionalStages {
         PathPolicy sums{};
         sums.estimator = Estimator::mis;
         sums.heuristic = MisHeuristic::balance;
+        sums.cull = p.cull;
         const TechniqueFilm techniques = {film.techniques, m.raw, film.technique_dropped, policy.technique_depth};
-        light_generate = {scene, wave, policy, m.rays, m.splat_candidates, m.last_vertex, record(StageId::light_generate)};
+        accumulate_hits = {m.hit_contributions, film.samples, record(StageId::accumulate), wave, techniques};
+        weight_hits = {sums, m.hit_candidates, {m.hit_contributions, accumulate_hits, policy.fuse}, record(StageId::mis_weight), techniques};
+        accumulate_shadows = {m.shadow_contributions, film.samples, record(StageId::accumulate), wave, techniques, policy.pairs_per_launch > 1};
+        weight_connections = {sums, m.connect_candidates, m.shadows, record(StageId::mis_weight), techniques, film.samples};
+        weight_splats = {m.splat_candidates, m.weighted_splats, record(StageId::mis_weight)};
+        const HitOutlet hit_outlet = {m.hit_candidates, weight_hits, policy.fuse};
+        const ConnectOutlet connect_outlet = {m.connect_candidates, weight_connections, policy.fuse};
+        const SplatOutlet splat_outlet = {m.splat_candidates, weight_splats, policy.fuse};
+        light_generate = {scene, wave, policy, m.rays, splat_outlet, m.last_vertex, record(StageId::light_generate)};
         light_extend = {scene, tracer, wave, Stream::light, false, m.rays, m.hits, record(StageId::light_extend)};
         light_shade = {scene, wave, policy, m.hits, m.rays, m.light_vertices, m.vertices, m.last_vertex, record(StageId::light_shade)};
-        connect_camera = {scene, wave, policy, m.vertices, m.splat_candidates, record(StageId::connect_camera)};
-        weight_splats = {m.splat_candidates, m.weighted_splats, record(StageId::mis_weight)};
+        connect_camera = {scene, wave, policy, m.vertices, splat_outlet, record(StageId::connect_camera)};
         occlude_splats = {scene, tracer, m.weighted_splats, m.splats, record(StageId::occlude)};
         splat = {scene, wave, m.splats, film.splats, techniques, record(StageId::splat)};
         generate = {scene, wave, policy, m.rays, film.samples, record(StageId::generate)};
         extend = {scene, tracer, wave, Stream::eye, policy.count_environment, m.rays, m.hits, record(StageId::extend)};
-        shade = {scene, wave, policy, m.hits, m.rays, m.hit_candidates, m.vertices, m.last_vertex, record(StageId::shade)};
-        weight_hits = {sums, m.hit_candidates, m.hit_contributions, record(StageId::mis_weight), techniques};
-        accumulate_hits = {m.hit_contributions, film.samples, record(StageId::accumulate), wave, techniques};
-        connect = {scene, wave, policy, m.vertices, m.pairs, m.connect_candidates, record(StageId::connect)};
-        connect_vertices = {scene, wave, policy, m.pairs, m.rest, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
-        connect_rest = {scene, wave, policy, m.rest, m.pairs, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
-        connect_cache = {scene, wave, policy, m.pairs, m.rest, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
-        connect_cache_rest = {scene, wave, policy, m.rest, m.pairs, m.light_vertices, m.connect_candidates, record(StageId::connect_vertices)};
+        shade = {scene, wave, policy, m.hits, m.rays, hit_outlet, m.vertices, m.last_vertex, record(StageId::shade)};
+        connect = {scene, wave, policy, m.vertices, m.light_vertices, m.pairs, connect_outlet, record(StageId::connect)};
+        connect_vertices = {scene, wave, policy, m.pairs, m.rest, m.vertices, m.light_vertices, connect_outlet, record(StageId::connect_vertices)};
+        connect_rest = {scene, wave, policy, m.rest, m.pairs, m.vertices, m.light_vertices, connect_outlet, record(StageId::connect_vertices)};
         megakernel = {scene, tracer, wave, policy, m.light_vertices, m.splats, film.samples, m.records};
         const StreamPool pool = {scene, wave, policy, policy.stream_slots, m.eye, m.pending, m.rays, film.samples};
         stream_begin = {pool};
         stream_extend = {scene, tracer, pool, m.hits, m.light_hits, record(StageId::extend)};
-        stream_eye_shade = {pool, m.hits, m.hit_candidates, m.vertices, m.turns, record(StageId::shade)};
-        stream_turn = {pool, m.turns, m.splat_candidates, record(StageId::light_generate)};
-        stream_light_shade = {pool, m.light_hits, m.light_vertices, m.pairs, record(StageId::light_shade)};
-        stream_connect_camera = {scene, wave, policy, m.light_vertices, m.splat_candidates, record(StageId::connect_camera)};
-        stream_connect = {pool, m.pairs, m.connect_candidates, record(StageId::connect_vertices)};
-        weight_connections = {sums, m.connect_candidates, m.shadows, record(StageId::mis_weight), techniques};
-        occlude = {scene, tracer, m.shadows, m.shadow_contributions, record(StageId::occlude)};
-        accumulate_shadows = {m.shadow_contributions, film.samples, record(StageId::accumulate), wave, techniques};
+        stream_eye_shade = {pool, m.hits, hit_outlet, m.vertices, m.turns, record(StageId::shade)};
+        stream_turn = {pool, m.turns, splat_outlet, record(StageId::light_generate)};
+        stream_light_shade = {pool, m.light_hits, m.camera_vertices, m.waiting, record(StageId::light_shade)};
+        stream_connect_camera = {scene, wave, policy, m.camera_vertices, splat_outlet, record(StageId::connect_camera)};
+        stream_connect = {pool, m.waiting, connect_outlet, record(StageId::connect_vertices)};
+        occlude = {scene, tracer, m.shadows, {m.shadow_contributions, accumulate_shadows, policy.fuse}, record(StageId::occlude)};
         develop = {wave, film.samples, film.splats, film.sum, film.sum_squares, record(StageId::develop)};
     }
 };

@@ -18,22 +18,25 @@
 
 namespace ambilux {
 
-/// Paths of one wave: enough that the last bounces, which few paths reach, still fill the device.
-constexpr uint32_t kCudaWaveSize = 1u << 22;
+/// Paths of one wave from which on more bring less than 5 %, measured on scenes of short paths and long ones (docs/performance.md): the last bounces, which few paths reach, cost as
+/// much for few as for many.
+constexpr uint32_t kCudaWavePlateau = 1u << 24;
 
 template <Features F>
 class PathCuda final : public Renderer {
 public:
     PathCuda(const Scene& scene, const RenderSettings& settings)
-        : scene_(scene), policy_(make_path_policy(scene, settings)),
-          wave_(shape_wave(scene, settings, settings.wave_size ? settings.wave_size : kCudaWaveSize, ~0u)) {
+        : scene_(scene), policy_(make_path_policy(scene, settings)) {
         const auto start = Clock::now();
         const CwbvhAccel accel(scene);
+        size_t free = 0, total = 0;
+        cuda_check(cudaMemGetInfo(&free, &total), "device memory");
+        Layout million;
+        lay_out(million, 1u << 20, policy_);
+        wave_ = shape_wave(scene, settings, device_wave_size(settings, kCudaWavePlateau, million.bytes() >> 20, free), ~0u);
         lay_out(layout_, wave_.slot_count(), policy_);
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         predicted_bytes_ = DeviceScene::predicted_bytes(scene) + accel.arrays().bytes() + layout_.bytes() + 2 * values_ * sizeof(double) + sizeof(uint64_t);
-        size_t free = 0, total = 0;
-        cuda_check(cudaMemGetInfo(&free, &total), "device memory");
         check_memory(predicted_bytes_, free, wave_.slot_count());
 
         device_scene_.emplace(scene);
@@ -135,7 +138,7 @@ private:
 
     const Scene& scene_;
     PathPolicy policy_;
-    Wave wave_;
+    Wave wave_{};
     Layout layout_;
     uint64_t values_ = 0, predicted_bytes_ = 0, samples_ = 0, film_samples_ = 0, measured_samples_ = 0;
     double build_seconds_ = 0, render_seconds_ = 0, measured_seconds_ = 0;

@@ -1,6 +1,8 @@
 // The memory of a wave of eye walks and the stages that work on it.
 #pragma once
 
+#include <algorithm>
+
 #include "integrators/renderer.h"
 #include "queues/layout.h"
 #include "stages/accumulate.h"
@@ -18,6 +20,13 @@ PathPolicy make_path_policy(const Scene& scene, const RenderSettings& settings);
 
 /// Which tiles and samples fit into a wave of about `wave_size` paths. Throws Error(usage) if slots would not fit 32 bits.
 Wave shape_wave(const Scene& scene, const RenderSettings& settings, uint32_t wave_size, uint32_t max_tiles);
+
+/// Paths of a wave on a device where `settings` leave it open: `plateau`, from which on more do not pay, or as many as fit into half of the `free` bytes beside what other
+/// programs hold.
+inline uint32_t device_wave_size(const RenderSettings& settings, uint32_t plateau, uint64_t bytes_per_path, uint64_t free) {
+    if (settings.wave_size > 0) return settings.wave_size;
+    return uint32_t(std::clamp<uint64_t>(free / 2 / bytes_per_path, kTilePixels, plateau));
+}
 
 /// Tiles of the whole film.
 uint32_t tile_count(const Wave& wave);
@@ -45,7 +54,7 @@ struct PathMemory {
 
 /// Lays out the memory for `slots` paths; queues that `policy` leaves empty have no storage.
 inline PathMemory lay_out(Layout& layout, uint32_t slots, const PathPolicy& policy) {
-    const uint32_t hits = policy.count_hits ? slots : 0, connections = policy.connect ? slots : 0;
+    const uint32_t hits = policy.count_hits && !policy.fuse ? slots : 0, connections = policy.connect ? slots : 0, passed_on = policy.fuse ? 0 : connections;
     PathMemory m;
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
@@ -54,10 +63,10 @@ inline PathMemory lay_out(Layout& layout, uint32_t slots, const PathPolicy& poli
     m.hits = layout.queue<HitItem>("hits", m.counters, slots);
     m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, hits);
     m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, hits);
-    m.connections = layout.queue<ConnectItem>("connections", m.counters, connections);
-    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, connections);
+    m.connections = layout.queue<ConnectItem>("connections", m.counters, policy.connect_in_shade ? 0 : connections);
+    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, passed_on);
     m.shadows = layout.queue<ShadowItem>("shadows", m.counters, connections);
-    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, connections);
+    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, passed_on);
     m.samples = layout.take<Lane>(slots);
     return m;
 }
@@ -75,10 +84,10 @@ struct PathStages {
     PathMemory memory;
     Generate generate;
     Extend<F, Tracer> extend;
-    Shade<F> shade;
     WeightHits weight_hits;
     Accumulate accumulate_hits;
     Connect<F> connect;
+    Shade<F> shade;
     WeightConnections weight_connections;
     Occlude<F, Tracer> occlude;
     Accumulate accumulate_shadows;
@@ -89,13 +98,13 @@ struct PathStages {
         const auto record = [&](StageId id) { return m.records + uint32_t(id); };
         generate = {scene, wave, policy, m.rays, m.samples, record(StageId::generate)};
         extend = {scene, tracer, wave, Stream::eye, scene.environment != kNone, m.rays, m.hits, record(StageId::extend)};
-        shade = {scene, wave, policy, m.hits, m.hit_candidates, m.connections, m.rays, record(StageId::shade)};
-        weight_hits = {policy, m.hit_candidates, m.hit_contributions, record(StageId::mis_weight)};
         accumulate_hits = {m.hit_contributions, m.samples, record(StageId::accumulate)};
-        connect = {scene, wave, policy, m.connections, m.connect_candidates, record(StageId::connect)};
-        weight_connections = {policy, m.connect_candidates, m.shadows, record(StageId::mis_weight)};
-        occlude = {scene, tracer, m.shadows, m.shadow_contributions, record(StageId::occlude)};
+        weight_hits = {policy, m.hit_candidates, {m.hit_contributions, accumulate_hits, policy.fuse}, record(StageId::mis_weight)};
+        weight_connections = {policy, m.connect_candidates, m.shadows, record(StageId::mis_weight), {}, m.samples};
+        connect = {scene, wave, policy, m.connections, {m.connect_candidates, weight_connections, policy.fuse}, record(StageId::connect)};
+        shade = {scene, wave, policy, m.hits, {m.hit_candidates, weight_hits, policy.fuse}, m.connections, m.rays, record(StageId::shade), connect};
         accumulate_shadows = {m.shadow_contributions, m.samples, record(StageId::accumulate)};
+        occlude = {scene, tracer, m.shadows, {m.shadow_contributions, accumulate_shadows, policy.fuse}, record(StageId::occlude)};
         develop = {wave, m.samples, film.sum, film.sum_squares, record(StageId::develop)};
     }
 };

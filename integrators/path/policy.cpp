@@ -21,6 +21,9 @@ PathPolicy make_path_policy(const Scene& scene, const RenderSettings& settings) 
     p.count_hits = std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return !is_delta(e.type); });
     p.connect = emitters && p.estimator != Estimator::naive && p.max_depth >= 2;
     p.hide_emitters = scene.integrator.hide_emitters;
+    p.fuse = settings.fuse != Fuse::none;
+    p.connect_in_shade = settings.fuse == Fuse::all;
+    p.cull = settings.cull;
     return p;
 }
 

@@ -19,15 +19,15 @@ void run_path_wave(Executor& exec, const PathStages<F, Tracer>& stages) {
     exec.trace_coherent(StageId::extend, stages.extend, m.rays);
     exec.repeat_while(m.hits, [&] {
         exec.run(StageId::shade, stages.shade, m.hits);
-        if (stages.policy.count_hits) {
+        if (stages.policy.count_hits && !stages.policy.fuse) {
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
             exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
         }
         if (stages.policy.connect) {
-            exec.run(StageId::connect, stages.connect, m.connections);
-            exec.run(StageId::mis_weight, stages.weight_connections, m.connect_candidates);
+            if (!stages.policy.connect_in_shade) exec.run(StageId::connect, stages.connect, m.connections);
+            if (!stages.policy.fuse) exec.run(StageId::mis_weight, stages.weight_connections, m.connect_candidates);
             exec.trace(StageId::occlude, stages.occlude, m.shadows);
-            exec.run(StageId::accumulate, stages.accumulate_shadows, m.shadow_contributions);
+            if (!stages.policy.fuse) exec.run(StageId::accumulate, stages.accumulate_shadows, m.shadow_contributions);
         }
         exec.next_depth();
         exec.trace(StageId::extend, stages.extend, m.rays);
