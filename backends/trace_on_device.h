@@ -8,9 +8,9 @@
 
 namespace ambilux {
 
-/// Hits of `rays` on the device, through a structure built for this call. Closest: as CwbvhTracer::closest. With `any_hit` only `prim` counts: kNone where
+/// Hits of `rays` on the device, through a structure built for this call: a CWBVH, or with `binary` a binary BVH. Closest: as CwbvhTracer::closest. With `any_hit` only `prim` counts: kNone where
 /// a ray is free, 0 where it is blocked. `persistent` chooses the kernel with dynamic fetch over the one with a thread per ray.
 /// Throws Error(device) without a device.
-std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& rays, bool any_hit, bool persistent);
+std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& rays, bool any_hit, bool persistent, bool binary = false);
 
 }  // namespace ambilux

@@ -20,6 +20,7 @@ struct Options {
     std::string json;
     std::string backend = "auto";
     int repetitions = 25;
+    bool opaque = false;
     uint32_t spp = 16;
 };
 
@@ -43,7 +44,7 @@ void print_rows(const nlohmann::json& rows) {
 int rays(const Options& o) {
     if (o.repetitions < 1) throw Error(ExitCode::usage, "--repetitions: at least 1 is needed");
     const LoadedScene loaded = load_scene(o.scene);
-    const nlohmann::json json = bench_rays(loaded.scene, o.backend, o.repetitions);
+    const nlohmann::json json = bench_rays(loaded.scene, o.backend, o.repetitions, o.opaque);
     if (!o.json.empty()) write_json(o.json, json);
     if (o.json == "-") return int(ExitCode::done);
     for (const auto& [key, value] : json.items()) {
@@ -89,8 +90,9 @@ void add_bench(CLI::App& app, Run& run) {
     auto r = std::make_shared<Options>();
     CLI::App& rays_command = *command.add_subcommand("rays", "Ray traversal: primary, bounced and shadow rays of a scene");
     r->scene.add_to(rays_command);
-    rays_command.add_option("--backend", r->backend, "auto, cpu, cpu-cwbvh (the traversal of cuda on the CPU) or cuda")->capture_default_str();
+    rays_command.add_option("--backend", r->backend, "auto, cpu, cuda, cuda-bvh2 (a binary BVH), cpu-cwbvh or cpu-bvh2 (the structures of cuda on the CPU)")->capture_default_str();
     rays_command.add_option("--repetitions", r->repetitions, "Timed runs of each batch; the median counts")->capture_default_str();
+    rays_command.add_flag("--opaque", r->opaque, "Take surfaces of partial opacity as opaque");
     rays_command.add_option("--json", r->json, "Write the result to a file, or - for standard output");
     rays_command.callback([r, &run] { run = [r] { return rays(*r); }; });
 

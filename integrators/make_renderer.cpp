@@ -23,6 +23,9 @@ std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings
                                                  settings.integrator == "path" ? "integrator path" : "variant megakernel"));
     const bool cuda = settings.backend == "cuda" || (settings.backend == "auto" && settings.accel != "embree" && cuda_available());
     if (cuda && settings.accel == "embree") throw Error(ExitCode::usage, "accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
+    if (settings.accel == "bvh2" && !(cuda && settings.integrator == "path"))
+        throw Error(ExitCode::usage, fmt::format("accel=bvh2: a binary BVH to compare with, on the cuda backend for integrator path; {} has {}", cuda ? "integrator " + settings.integrator : "the cpu backend",
+                                                 cuda ? "cwbvh" : "embree and cwbvh"));
     if (cuda && settings.deterministic && settings.variant == "lvc")
         throw Error(ExitCode::usage, "deterministic=true: variant lvc draws from a cache whose order differs between runs on a CUDA device; use wavefront or megakernel");
     RenderSettings chosen = settings;

@@ -38,7 +38,7 @@ struct RenderSettings {
     int max_depth = -1;                  ///< segments of a path; -1 is unbounded
     int rr_depth = 5;                    ///< Russian roulette starts at this many segments; a value < 0 turns it off
     uint64_t seed = 0;
-    std::string accel = "auto";          ///< cpu: embree (auto) or cwbvh (the CUDA traversal built for the host)
+    std::string accel = "auto";          ///< cpu: embree (auto) or cwbvh (the CUDA traversal built for the host). cuda: cwbvh (auto) or, for integrator path, bvh2
     uint32_t wave_size = 0;              ///< paths in flight; 0 chooses
     bool specialise = true;              ///< kernels hold only what the scene has
     Fuse fuse = Fuse::automatic;         ///< which stages pass their items on without a queue

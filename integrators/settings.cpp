@@ -129,7 +129,7 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
     else if (key == "seed")
         s.seed = integer<uint64_t>(key, value, 0, ~0ull);
     else if (key == "accel")
-        s.accel = (choose(key, value, {"auto", "embree", "cwbvh"}), value);
+        s.accel = (choose(key, value, {"auto", "embree", "cwbvh", "bvh2"}), value);
     else if (key == "wave_size")
         s.wave_size = integer<uint32_t>(key, value, 0, 1u << 28);
     else if (key == "specialise")

@@ -1,14 +1,18 @@
 // libs: ambilux_scene
 // labels: accel
 // timeout: 300
-// The host build of the CUDA traversal against Embree: same rays, same hits (pitfall G12), at every scale (B33).
+// The host builds of the CUDA traversals, of the wide BVH and of the binary one, against Embree: same rays, same hits (pitfall G12), at every scale (B33).
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <vector>
 
+#include "scene/accel/bvh2.h"
 #include "scene/accel/cwbvh.h"
 #include "scene/accel/embree_tracer.h"
+#include "scene/accel/pair_bvh.h"
 #include "tests/accel_scenes.h"
 #include "tests/catch.h"
 
@@ -96,7 +100,7 @@ struct Agreement {
     uint64_t rays = 0, hits = 0;
     uint64_t ties = 0;       ///< other primitive at the same distance within rounding
     uint64_t different = 0;  ///< hit or distance differs, and both answers are right within rounding
-    uint64_t wrong_embree = 0, wrong_cwbvh = 0;
+    uint64_t wrong_embree = 0, wrong_own = 0;
 };
 
 /// trace() is closest() and occluded().
@@ -107,23 +111,23 @@ void check_trace(const SceneView& view, const Tracer& tracer, const Ray& ray, bo
     if (any != occluded || met != is_hit || std::memcmp(&hit, &closest, sizeof(hit)) != 0) FAIL("trace disagrees with closest or occluded");
 }
 
-template <Features F>
-void compare(const SceneView& view, const EmbreeTracer& embree, const CwbvhTracer& cwbvh, const Ray& ray, float scale, Agreement& a) {
+template <Features F, class Tracer>
+void compare(const SceneView& view, const EmbreeTracer& embree, const Tracer& own, const Ray& ray, float scale, Agreement& a) {
     Hit e, c;
-    const bool e_hit = embree.closest<F>(view, ray, e), c_hit = cwbvh.closest<F>(view, ray, c);
+    const bool e_hit = embree.closest<F>(view, ray, e), c_hit = own.template closest<F>(view, ray, c);
     ++a.rays;
     a.hits += c_hit;
     const bool same = e_hit == c_hit && (!e_hit || fabsf(e.t - c.t) <= 1e-5f * (e.t + scale));
     const bool other_occlusion = embree.occluded<F>(view, ray) != c_hit;
     if (!same || other_occlusion) {
         ++a.different;
-        if (!valid(view, ray, c_hit, c, scale)) ++a.wrong_cwbvh;
+        if (!valid(view, ray, c_hit, c, scale)) ++a.wrong_own;
         if (!valid(view, ray, e_hit, e, scale)) ++a.wrong_embree;
     } else if (e.prim != c.prim) {
         ++a.ties;
     }
-    if (cwbvh.occluded<F>(view, ray) != c_hit) FAIL("any hit and closest hit disagree for ray " << a.rays);
-    check_trace<F>(view, cwbvh, ray, c_hit, c_hit, c);
+    if (own.template occluded<F>(view, ray) != c_hit) FAIL("any hit and closest hit disagree for ray " << a.rays);
+    check_trace<F>(view, own, ray, c_hit, c_hit, c);
     check_trace<F>(view, embree, ray, embree.occluded<F>(view, ray), e_hit, e);
 }
 
@@ -166,27 +170,36 @@ std::vector<Ray> test_rays(const Scene& scene, uint32_t count, float scale, uint
     return rays;
 }
 
-template <Features F>
-Agreement compare_all(const Scene& scene, uint32_t count, float scale, uint64_t seed) {
+template <Features F, class Accel>
+void compare_with(const Scene& scene, uint32_t count, float scale, uint64_t seed) {
     const SceneView view = scene.view();
     const EmbreeAccel embree(scene);
-    const CwbvhAccel cwbvh(scene);
+    const Accel own(scene);
     Agreement a;
-    for (const Ray& ray : test_rays(scene, count, scale, seed)) compare<F>(view, embree.tracer(), cwbvh.tracer(), ray, scale, a);
+    for (const Ray& ray : test_rays(scene, count, scale, seed)) compare<F>(view, embree.tracer(), own.tracer(), ray, scale, a);
     INFO(a.rays << " rays, " << a.hits << " hits, " << a.ties << " ties, " << a.different << " different within rounding, wrong: Embree " << a.wrong_embree
-                << ", CWBVH " << a.wrong_cwbvh);
+                << ", own " << a.wrong_own);
     CHECK(a.hits > a.rays / 20);
-    CHECK(a.wrong_cwbvh == 0);
+    CHECK(a.wrong_own == 0);
     CHECK(a.wrong_embree <= a.rays / 100);  // its distances to slivers seen along themselves are less exact; more would mean that the oracle is wrong
     // A third of the rays aim at edges, vertices or along surfaces, where both answers may be right.
     CHECK(double(a.different) <= 0.03 * double(a.rays));
     CHECK(double(a.ties) <= 0.05 * double(a.rays));
-    return a;
+}
+
+template <Features F>
+void compare_all(const Scene& scene, uint32_t count, float scale, uint64_t seed) {
+    {
+        INFO("wide");
+        compare_with<F, CwbvhAccel>(scene, count, scale, seed);
+    }
+    INFO("binary");
+    compare_with<F, PairAccel>(scene, count, scale, seed);
 }
 
 }  // namespace
 
-TEST_CASE("CWBVH and Embree agree on triangle soups of every scale (G12, B33)") {
+TEST_CASE("Own structures and Embree agree on triangle soups of every scale (G12, B33)") {
     for (const float scale : {1e-4f, 1e-2f, 1.0f, 1e4f}) {
         DYNAMIC_SECTION("scale " << scale) {
             compare_all<kTriangles>(triangle_soup(3000, 0.3f, scale, 7), 60000, scale, 11);
@@ -195,7 +208,7 @@ TEST_CASE("CWBVH and Embree agree on triangle soups of every scale (G12, B33)") 
     }
 }
 
-TEST_CASE("CWBVH and Embree agree on closed meshes with rays through edges and vertices (G12)") {
+TEST_CASE("Own structures and Embree agree on closed meshes with rays through edges and vertices (G12)") {
     Scene ball;
     add_ball(ball, {0, 0, 0}, 1.0f, 40, 0.1f, 3);
     compare_all<kTriangles>(ball, 100000, 1.0f, 13);
@@ -204,7 +217,7 @@ TEST_CASE("CWBVH and Embree agree on closed meshes with rays through edges and v
     compare_all<kTriangles>(box, 100000, 1.0f, 14);
 }
 
-TEST_CASE("CWBVH and Embree agree on analytic shapes alone and among triangles (G12)") {
+TEST_CASE("Own structures and Embree agree on analytic shapes alone and among triangles (G12)") {
     for (const float scale : {1e-4f, 1.0f, 1e4f}) {
         Scene quadrics;
         add_random_quadrics(quadrics, 60, scale, 5);
@@ -215,10 +228,10 @@ TEST_CASE("CWBVH and Embree agree on analytic shapes alone and among triangles (
     }
 }
 
-TEST_CASE("No ray leaves a closed mesh from inside") {
+TEMPLATE_TEST_CASE("No ray leaves a closed mesh from inside", "", CwbvhAccel, PairAccel) {
     const auto leaks = [](const Scene& scene, float inner, uint32_t count, uint64_t seed) {
         const SceneView view = scene.view();
-        const CwbvhAccel accel(scene);
+        const TestType accel(scene);
         Random random(seed);
         uint64_t escaped = 0;
         for (uint32_t i = 0; i < count; ++i) {
@@ -233,8 +246,8 @@ TEST_CASE("No ray leaves a closed mesh from inside") {
                 ray.d = normalize(a - ray.o);
             }
             Hit hit;
-            if (!accel.tracer().closest<kTriangles>(view, ray, hit)) ++escaped;
-            if (!accel.tracer().occluded<kTriangles>(view, ray)) ++escaped;
+            if (!accel.tracer().template closest<kTriangles>(view, ray, hit)) ++escaped;
+            if (!accel.tracer().template occluded<kTriangles>(view, ray)) ++escaped;
         }
         return escaped;
     };
@@ -253,18 +266,18 @@ TEST_CASE("No ray leaves a closed mesh from inside") {
     Scene far_ball;
     add_ball(far_ball, {1000, 2000, -3000}, 10.0f, 30, 0.1f, 5);
     const SceneView view = far_ball.view();
-    const CwbvhAccel accel(far_ball);
+    const TestType accel(far_ball);
     Random random(25);
     uint64_t escaped = 0;
     for (uint32_t i = 0; i < 200000; ++i) {
         const Ray ray = {Vec3f{1000, 2000, -3000} + random.in_box(3.0f), kInfinity, random.direction(), i};
         Hit hit;
-        escaped += !accel.tracer().closest<kTriangles>(view, ray, hit);
+        escaped += !accel.tracer().template closest<kTriangles>(view, ray, hit);
     }
     CHECK(escaped == 0);
 }
 
-TEMPLATE_TEST_CASE("Rays that are not numbers hit nothing and end", "", EmbreeAccel, CwbvhAccel) {
+TEMPLATE_TEST_CASE("Rays that are not numbers hit nothing and end", "", EmbreeAccel, CwbvhAccel, PairAccel) {
     Scene scene = triangle_soup(100, 0.5f, 1.0f, 1);
     add_random_quadrics(scene, 9, 1.0f, 2);
     const SceneView view = scene.view();
@@ -291,7 +304,7 @@ TEMPLATE_TEST_CASE("Rays that are not numbers hit nothing and end", "", EmbreeAc
     CHECK_FALSE(accel.tracer().template closest<kShapes>(view, {{0, 0, 0}, inf, {0, 0, 0}, 0}, hit));
 }
 
-TEMPLATE_TEST_CASE("Scenes of none, one and many equal primitives", "", EmbreeAccel, CwbvhAccel) {
+TEMPLATE_TEST_CASE("Scenes of none, one and many equal primitives", "", EmbreeAccel, CwbvhAccel, PairAccel) {
     const Ray ray = {{0.25f, 0.25f, -1}, kInfinity, {0, 0, 1}, 0};
     Hit hit;
     Scene empty;
@@ -347,4 +360,34 @@ TEST_CASE("The structure is the same however often it is built, and its boxes ho
     for (const CwbvhPrimitive& p : first.arrays().primitives) seen[p.prim] = true;
     CHECK(std::count(seen.begin(), seen.end(), false) == 0);
     CHECK(first.arrays().depth <= uint32_t(kCwbvhStackSize));
+}
+
+TEST_CASE("Reinsertion lowers the cost of a tree, keeps what it holds, and does the same on one thread as on all") {
+    const Scene scene = triangle_soup(3000, 0.3f, 1.0f, 7);
+    const SceneView view = scene.view();
+    const Bvh2 before = build_bvh2(view);
+    Bvh2 after = before, again = before;
+    tbb::task_arena(1).execute([&] { optimise_bvh2(after, kReinsertionPasses); });
+    optimise_bvh2(again, kReinsertionPasses);
+    CHECK(bvh2_cost(after) < bvh2_cost(before));  // little is to be gained among triangles in no order
+    REQUIRE(after.nodes.size() == again.nodes.size());
+    CHECK(std::memcmp(after.nodes.data(), again.nodes.data(), after.nodes.size() * sizeof(Bvh2Node)) == 0);
+    // Every leaf once, below boxes that hold it.
+    std::vector<uint32_t> stack = {after.root}, seen(after.nodes.size(), 0);
+    bool nested = true;
+    while (!stack.empty()) {
+        const uint32_t at = stack.back();
+        stack.pop_back();
+        ++seen[at];
+        const Bvh2Node& n = after.nodes[at];
+        if (n.is_leaf()) continue;
+        for (const uint32_t child : {n.left, n.right}) {
+            Bounds3f joint = n.bounds;
+            joint.extend(after.nodes[child].bounds);
+            nested = nested && joint.lower == n.bounds.lower && joint.upper == n.bounds.upper;
+            stack.push_back(child);
+        }
+    }
+    CHECK(nested);
+    for (const uint32_t times : seen) REQUIRE(times == 1);
 }

@@ -6,6 +6,7 @@
 
 #include "scene/accel/cwbvh.h"
 #include "scene/accel/embree_tracer.h"
+#include "scene/accel/pair_bvh.h"
 #include "tests/accel_scenes.h"
 #include "tests/catch.h"
 
@@ -82,7 +83,7 @@ TEST_CASE("Spheres, disks and cylinders are met where their closed forms say, ne
         }
 }
 
-TEMPLATE_TEST_CASE("Opacity: the share of rays that pass, alike for closest and any hit and for both tracers (B34)", "", EmbreeAccel, CwbvhAccel) {
+TEMPLATE_TEST_CASE("Opacity: the share of rays that pass, alike for closest and any hit and for all tracers (B34)", "", EmbreeAccel, CwbvhAccel, PairAccel) {
     // Three layers of triangles, a sphere with two sides and a disk; what is nearest depends on which of the six let the ray pass.
     Scene scene;
     for (int i = 0; i < 3; ++i) add_mesh(scene, {{-9, -9, float(i)}, {9, -9, float(i)}, {0, 9, float(i)}}, {0, 1, 2});
@@ -121,7 +122,7 @@ TEMPLATE_TEST_CASE("Opacity: the share of rays that pass, alike for closest and 
     CHECK(accel.tracer().template occluded<kShapes>(view, {{0, 0, -1}, kInfinity, {0, 0, 1}, 3}));
 }
 
-TEMPLATE_TEST_CASE("Opacity from a texture is looked up where the ray meets the surface", "", EmbreeAccel, CwbvhAccel) {
+TEMPLATE_TEST_CASE("Opacity from a texture is looked up where the ray meets the surface", "", EmbreeAccel, CwbvhAccel, PairAccel) {
     Scene scene;
     add_mesh(scene, {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}, {0, 1, 2});
     set_uvs(scene, {{0, 0}, {2, 0}, {0, 2}});

@@ -122,14 +122,14 @@ TEST_CASE("Batches are a function of the seed") {
     }
 }
 
-TEST_CASE("bench rays reports complete rows on the CPU, and both structures find the same") {
+TEST_CASE("bench rays reports complete rows on the CPU, and all structures find the same") {
     const Scene scene = cornell();
     std::map<std::string, double> hit;
-    for (const std::string backend : {"cpu", "cpu-cwbvh"}) {
+    for (const std::string backend : {"cpu", "cpu-cwbvh", "cpu-bvh2"}) {
         INFO(backend);
         const nlohmann::json json = bench_rays(scene, backend, 1);
         CHECK(json.at("backend") == backend);
-        CHECK(json.at("accel") == (backend == "cpu" ? "embree" : "cwbvh"));
+        CHECK(json.at("accel") == (backend == "cpu" ? "embree" : backend.substr(4)));
         CHECK_FALSE(json.at("device").get<std::string>().empty());
         CHECK(json.at("build_seconds") > 0.0);
         CHECK(json.at("accel_bytes") > 1000);
@@ -164,6 +164,16 @@ TEST_CASE("bench rays of a scene without surfaces has rows of nothing") {
     for (const nlohmann::json& row : json.at("rows")) CHECK(row.at("hit") == 0.0);
     CHECK(json.at("rows")[1].at("count") == 0);
     CHECK(json.at("rows")[3].at("count") == 0);
+}
+
+TEST_CASE("bench rays takes surfaces of partial opacity as opaque if asked to") {
+    Scene scene = cornell();
+    for (Material& material : scene.materials) material.opacity = {0.25f, -1};
+    scene.features.opacity = true;
+    const nlohmann::json some = bench_rays(scene, "cpu-cwbvh", 1), all = bench_rays(scene, "cpu-cwbvh", 1, true);
+    CHECK(some.at("opaque") == false);
+    CHECK(all.at("opaque") == true);
+    CHECK(double(all.at("rows")[0].at("hit")) > 1.2 * double(some.at("rows")[0].at("hit")));
 }
 
 TEST_CASE("bench rays refuses what it does not know") {

@@ -95,6 +95,25 @@ TEST_CASE("G5: counts per stage and depth on both backends, every published scen
     }
 }
 
+TEST_CASE("The binary BVH of a device gives the images of the wide one; kernels for all features too") {
+    if (!device()) return;
+    for (const char* name : {"cornell", "materials", "textured"}) {
+        INFO(name);
+        const Scene scene = project_scene(name, 160, 90);
+        const RenderSettings s = on("cuda", cpu_settings(scene, Estimator::mis));
+        const RenderResult wide = render_scene(scene, s, 4);
+        const RenderResult binary = render_scene(scene, on("cuda", s, "bvh2"), 4);
+        CHECK(wide.stats.accel == "cwbvh");
+        CHECK(binary.stats.accel == "bvh2");
+        CHECK(binary.stats.memory_bytes != wide.stats.memory_bytes);
+        check_counts(wide.stats, binary.stats, 1e-3);
+        CHECK(agreeing_pixels(wide.film, binary.film) >= 0.99);
+        RenderSettings general = s;
+        general.specialise = false;
+        CHECK(agreeing_pixels(wide.film, render_scene(scene, general, 4).film) >= 0.99);
+    }
+}
+
 TEST_CASE("G5: pixels at 1 spp and depth 4 on both backends: cornell-box and veach-mis") {
     if (!device()) return;
     for (const char* name : {"cornell-box", "veach-mis"}) {

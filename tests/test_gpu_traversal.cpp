@@ -11,6 +11,7 @@
 #include "backends/trace_on_device.h"
 #include "core/error.h"
 #include "scene/accel/cwbvh.h"
+#include "scene/accel/pair_bvh.h"
 #include "tests/accel_scenes.h"
 #include "tests/render_scene.h"
 #include "tests/catch.h"
@@ -68,11 +69,11 @@ std::vector<Ray> test_rays(const Scene& scene, uint32_t count, float scale, uint
     return rays;
 }
 
-template <Features F>
-std::vector<Hit> trace_on_host(const Scene& scene, const CwbvhTracer& tracer, const std::vector<Ray>& rays) {
+template <Features F, class Tracer>
+std::vector<Hit> trace_on_host(const Scene& scene, const Tracer& tracer, const std::vector<Ray>& rays) {
     const SceneView view = scene.view();
     std::vector<Hit> hits(rays.size());
-    detail::for_all(rays.size(), [&](size_t i) { tracer.closest<F>(view, rays[i], hits[i]); });
+    detail::for_all(rays.size(), [&](size_t i) { tracer.template closest<F>(view, rays[i], hits[i]); });
     return hits;
 }
 
@@ -116,15 +117,14 @@ void compare(const Scene& scene, const std::vector<Ray>& rays, const std::vector
 }
 
 /// Both kernels, nearest and any hit, on the first of `rays` for each count.
-Agreement compare_all(const Scene& scene, const std::vector<Ray>& rays, const std::vector<size_t>& counts) {
-    const CwbvhAccel accel(scene);
-    const std::vector<Hit> host = trace_on_host<kAllFeatures>(scene, accel.tracer(), rays);
+Agreement compare_all(const Scene& scene, const std::vector<Ray>& rays, const std::vector<size_t>& counts, bool binary = false) {
+    const std::vector<Hit> host = binary ? trace_on_host<kAllFeatures>(scene, PairAccel(scene).tracer(), rays) : trace_on_host<kAllFeatures>(scene, CwbvhAccel(scene).tracer(), rays);
     Agreement a;
     for (const size_t count : counts) {
         const std::vector<Ray> some(rays.begin(), rays.begin() + std::ptrdiff_t(count));
         for (const bool persistent : {false, true}) {
-            compare(scene, some, host, trace_on_device(scene, some, false, persistent), a);
-            const std::vector<Hit> blocked = trace_on_device(scene, some, true, persistent);
+            compare(scene, some, host, trace_on_device(scene, some, false, persistent, binary), a);
+            const std::vector<Hit> blocked = trace_on_device(scene, some, true, persistent, binary);
             REQUIRE(blocked.size() == count);
             for (size_t i = 0; i < count; ++i) a.occluded_different += (blocked[i].prim == kNone) != (host[i].prim == kNone);
         }
@@ -157,6 +157,21 @@ TEST_CASE("Device and host agree on triangles, with rays through edges and along
     Scene box;
     add_box(box, 1.0f, 16);
     check(compare_all(box, test_rays(box, 200000, 1.0f, 32), {200000}), true);
+}
+
+TEST_CASE("Device and host agree through a binary BVH (G12)") {
+    if (no_device()) return;
+    for (const float scale : {1e-4f, 1.0f, 1e4f}) {
+        const Scene soup = triangle_soup(3000, 0.3f, scale, 7);
+        check(compare_all(soup, test_rays(soup, 200000, scale, 31), {200000}, true), true);
+    }
+    Scene mixed = triangle_soup(500, 0.3f, 1.0f, 9);
+    add_random_quadrics(mixed, 60, 1.0f, 6);
+    check(compare_all(mixed, test_rays(mixed, kMany, 1.0f, 35), kCounts, true), false);
+    Scene one;
+    add_mesh(one, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {0, 1, 2});
+    const std::vector<Hit> hits = trace_on_device(one, {{{0.25f, 0.25f, -1}, kInfinity, {0, 0, 1}, 0}}, false, true, true);
+    CHECK(hits[0].t == 1.0f);
 }
 
 TEST_CASE("Device and host agree for any number of rays (G12)") {
@@ -223,7 +238,8 @@ TEST_CASE("On a device nothing is hit in an empty scene (G12)") {
 TEST_CASE("All kernels of bench rays give the same answers (G12)") {
     if (no_device()) return;
     const Scene scene = project_scene("cornell");
-    const nlohmann::json json = bench_rays(scene, "cuda", 1);
+    const std::string backend = GENERATE("cuda", "cuda-bvh2");
+    const nlohmann::json json = bench_rays(scene, backend, 1);
     CHECK(json.at("device") == cuda_device_name());
     std::map<std::string, std::vector<double>> hit;
     for (const nlohmann::json& row : json.at("rows")) {

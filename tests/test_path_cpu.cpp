@@ -249,6 +249,12 @@ TEST_CASE("Renders that would not end or cannot be made are refused", "[path]") 
     device.backend = "cuda";
     device.accel = "embree";
     CHECK_THROWS_AS(make_renderer(scene, device), Error);
+    for (const char* backend : {"cpu", "cuda"}) {
+        device.backend = backend;
+        device.accel = "bvh2";
+        device.integrator = backend == std::string("cpu") ? "path" : "bdpt";
+        CHECK_THROWS_WITH(make_renderer(scene, device), Catch::Contains("bvh2") && Catch::Contains("cwbvh"));
+    }
 }
 
 TEST_CASE("An interrupted render holds exactly the samples that it says", "[path]") {

@@ -39,14 +39,14 @@ double median_seconds(int warm_ups, int repetitions, Launch launch) {
     return median(std::move(seconds));
 }
 
-template <class Set>
-std::vector<KernelTiming> time_batch(const SceneView& scene, const CwbvhTracer& tracer, const RayBatch& batch, int warm_ups, int repetitions) {
+template <class Set, class Tracer>
+std::vector<KernelTiming> time_batch(const SceneView& scene, const Tracer& tracer, const RayBatch& batch, int warm_ups, int repetitions) {
     struct Variant {
         const char *kernel, *tuning;
         TraceTuning values;
     };
     std::vector<Variant> variants = {{"persistent", "incoherent", kIncoherentTuning}, {"persistent", "coherent", kCoherentTuning}, {"plain", "-", {}}};
-    if (batch.coherent) std::swap(variants[0], variants[1]);
+    if (batch.coherent) std::swap(variants[0], variants[2]);
 
     const uint32_t count = uint32_t(batch.rays.size()), blocks = (count + kTraceBlock - 1) / kTraceBlock;
     std::vector<KernelTiming> timings;
@@ -59,7 +59,7 @@ std::vector<KernelTiming> time_batch(const SceneView& scene, const CwbvhTracer& 
     DeviceBuffer<Hit> hits(batch.any_hit ? 0 : count, "hits");
     DeviceBuffer<uint8_t> blocked(batch.any_hit ? count : 0, "hits");
     DeviceBuffer<uint32_t> next_rays(size_t(warm_ups + repetitions), "counters");  // one per launch: nothing to clear in between
-    const uint32_t grid = batch.any_hit ? persistent_grid(trace_any_kernel<Set>) : persistent_grid(trace_closest_kernel<Set>);
+    const uint32_t grid = batch.any_hit ? persistent_grid(trace_any_kernel<Set, Tracer>) : persistent_grid(trace_closest_kernel<Set, Tracer>);
     for (const Variant& v : variants) {
         const bool plain = std::string(v.kernel) == "plain";
         next_rays.zero();
@@ -67,13 +67,13 @@ std::vector<KernelTiming> time_batch(const SceneView& scene, const CwbvhTracer& 
         blocked.zero();
         const double seconds = median_seconds(warm_ups, repetitions, [&](size_t i) {
             if (plain && batch.any_hit)
-                trace_any_plain_kernel<Set><<<blocks, kTraceBlock>>>(scene, tracer, rays.data(), blocked.data(), count);
+                trace_any_plain_kernel<Set, Tracer><<<blocks, kTraceBlock>>>(scene, tracer, rays.data(), blocked.data(), count);
             else if (plain)
-                trace_closest_plain_kernel<Set><<<blocks, kTraceBlock>>>(scene, tracer, rays.data(), hits.data(), count);
+                trace_closest_plain_kernel<Set, Tracer><<<blocks, kTraceBlock>>>(scene, tracer, rays.data(), hits.data(), count);
             else if (batch.any_hit)
-                trace_any_kernel<Set><<<grid, kTraceBlock>>>(scene, tracer, rays.data(), blocked.data(), ray_count.data(), next_rays.data() + i, v.values);
+                trace_any_kernel<Set, Tracer><<<grid, kTraceBlock>>>(scene, tracer, rays.data(), blocked.data(), ray_count.data(), next_rays.data() + i, v.values);
             else
-                trace_closest_kernel<Set><<<grid, kTraceBlock>>>(scene, tracer, rays.data(), hits.data(), ray_count.data(), next_rays.data() + i, v.values);
+                trace_closest_kernel<Set, Tracer><<<grid, kTraceBlock>>>(scene, tracer, rays.data(), hits.data(), ray_count.data(), next_rays.data() + i, v.values);
         });
         uint64_t met = 0;
         for (const Hit& hit : hits.download()) met += hit.prim != kNone;
@@ -83,18 +83,29 @@ std::vector<KernelTiming> time_batch(const SceneView& scene, const CwbvhTracer& 
     return timings;
 }
 
-}  // namespace
-
-std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const CwbvhArrays& cwbvh, const std::vector<RayBatch>& batches, int warm_ups,
-                                                           int repetitions) {
+template <class Tracer>
+std::vector<std::vector<KernelTiming>> time_batches(const Scene& scene, const Features& features, const Tracer& tracer, const std::vector<RayBatch>& batches,
+                                                    int warm_ups, int repetitions) {
     const DeviceScene device_scene(scene);
-    const DeviceCwbvh device_cwbvh(cwbvh);
     std::vector<std::vector<KernelTiming>> timings;
     for (const RayBatch& batch : batches)
-        timings.push_back(with_traversal_features(scene.features, [&](auto set) {
-            return time_batch<decltype(set)>(device_scene.view(), device_cwbvh.tracer(), batch, warm_ups, repetitions);
-        }));
+        timings.push_back(with_traversal_features(
+            features, [&](auto set) { return time_batch<decltype(set), Tracer>(device_scene.view(), tracer, batch, warm_ups, repetitions); }));
     return timings;
+}
+
+}  // namespace
+
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const Features& features, const CwbvhArrays& cwbvh,
+                                                           const std::vector<RayBatch>& batches, int warm_ups, int repetitions) {
+    const DeviceCwbvh device_cwbvh(cwbvh);
+    return time_batches(scene, features, device_cwbvh.tracer(), batches, warm_ups, repetitions);
+}
+
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const Features& features, const PairArrays& pairs,
+                                                           const std::vector<RayBatch>& batches, int warm_ups, int repetitions) {
+    const DevicePairs device_pairs(pairs);
+    return time_batches(scene, features, device_pairs.tracer(), batches, warm_ups, repetitions);
 }
 
 }  // namespace ambilux

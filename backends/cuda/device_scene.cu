@@ -35,4 +35,7 @@ uint64_t DeviceScene::bytes() const {
 
 DeviceCwbvh::DeviceCwbvh(const CwbvhArrays& arrays) : nodes_(arrays.nodes, "acceleration structure on the device"), primitives_(arrays.primitives, "primitives on the device") {}
 
+DevicePairs::DevicePairs(const PairArrays& arrays)
+    : nodes_(arrays.nodes, "acceleration structure on the device"), primitives_(arrays.primitives, "primitives on the device"), root_(arrays.root) {}
+
 }  // namespace ambilux

@@ -3,6 +3,7 @@
 
 #include "backends/cuda/device_memory.h"
 #include "scene/accel/cwbvh.h"
+#include "scene/accel/pair_bvh.h"
 #include "scene/scene.h"
 
 namespace ambilux {
@@ -48,6 +49,20 @@ public:
 private:
     DeviceBuffer<CwbvhNode> nodes_;
     DeviceBuffer<CwbvhPrimitive> primitives_;
+};
+
+/// A binary BVH on the device, likewise.
+class DevicePairs {
+public:
+    explicit DevicePairs(const PairArrays& arrays);
+
+    PairTracer tracer() const { return {nodes_.data(), primitives_.data(), root_}; }
+    uint64_t bytes() const { return nodes_.bytes() + primitives_.bytes(); }
+
+private:
+    DeviceBuffer<PairNode> nodes_;
+    DeviceBuffer<CwbvhPrimitive> primitives_;
+    uint32_t root_;
 };
 
 }  // namespace ambilux

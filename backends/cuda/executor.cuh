@@ -4,6 +4,8 @@
 
 #include <cuda_runtime.h>
 
+#include <optional>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -49,22 +51,30 @@ __global__ void __launch_bounds__(kStageBlock) launch_queue(const __grid_constan
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) stage(i);
 }
 
-/// Rays in the order of the queue, one after the other: best while neighbours stay together.
-template <class Stage>
-__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coherent(const __grid_constant__ Stage stage, const QueueCounter* counter) {
+/// Rays in the order of the queue, one after the other: best while neighbours stay together. `Set`: what traversal has to know of; less than the stage does, where
+/// the scene lets it.
+template <class Set, class Stage, class Tracer>
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coherent(const __grid_constant__ Stage stage, const Tracer tracer, const QueueCounter* counter) {
+    static_assert(!Stage::kAnyHit);
     const uint32_t n = counter->size();
-    for (uint32_t i = blockIdx.x * kTraceBlock + threadIdx.x; i < n; i += gridDim.x * kTraceBlock) stage(i);
+    for (uint32_t i = blockIdx.x * kTraceBlock + threadIdx.x; i < n; i += gridDim.x * kTraceBlock) {
+        Ray ray;
+        if (!stage.fetch(i, ray)) continue;
+        Hit hit;
+        tracer.template closest<Set::value>(stage.scene, ray, hit);
+        stage.finish(i, hit);
+    }
 }
 
 /// Rays by persistent threads.
-template <class Stage>
-__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(const __grid_constant__ Stage stage, QueueCounter* counter) {
+template <class Set, class Stage, class Tracer>
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(const __grid_constant__ Stage stage, const Tracer tracer, QueueCounter* counter) {
     const uint32_t n = counter->size();
     const auto fetch = [&](uint32_t i, Ray& ray) { return stage.fetch(i, ray); };
     if constexpr (Stage::kAnyHit)
-        trace_any_persistent<Stage::kFeatures>(stage.scene, stage.tracer, fetch, [&](uint32_t i, bool blocked) { stage.finish(i, blocked); }, &n, &counter->next);
+        trace_any_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, bool blocked) { stage.finish(i, blocked); }, &n, &counter->next);
     else
-        trace_closest_persistent<Stage::kFeatures>(stage.scene, stage.tracer, fetch, [&](uint32_t i, const Hit& hit) { stage.finish(i, hit); }, &n, &counter->next);
+        trace_closest_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, const Hit& hit) { stage.finish(i, hit); }, &n, &counter->next);
 }
 
 /// After a stage: its record, and its queue emptied. The time since the last such kernel is the stage's.
@@ -101,11 +111,13 @@ __global__ inline void finish_wave(WaveState* state) {
 
 }  // namespace detail
 
-/// Executor of a schedule (integrators/path/schedule.h).
-class CudaExecutor {
+/// Executor of a schedule (integrators/path/schedule.h). `kPairs`: kernels are made for binary BVHs too.
+template <bool kPairs>
+class BasicCudaExecutor {
 public:
-    /// `clock`: one value on the device.
-    CudaExecutor(cudaStream_t stream, WaveState* state, StageRecord* records, uint64_t* clock) : stream_(stream), state_(state), records_(records), clock_(clock) {
+    /// `traced`: features that rays have to know of, the scene's or more. `clock`: one value on the device.
+    BasicCudaExecutor(cudaStream_t stream, const Features& traced, WaveState* state, StageRecord* records, uint64_t* clock)
+        : stream_(stream), traced_(traced), state_(state), records_(records), clock_(clock) {
         int device = 0;
         cuda_check(cudaGetDevice(&device), "device");
         cuda_check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "multiprocessors");
@@ -155,14 +167,23 @@ public:
         detail::launch_queue<<<blocks(detail::launch_queue<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, queue.counter);
         finish(id, queue.counter, 0, 0, true);
     }
+    /// Rays go through `pairs` instead of the tracer of their stage.
+    void use(const PairTracer& pairs) requires kPairs { pairs_ = pairs; }
+
     template <class Stage, class Item>
     void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        detail::launch_trace<<<blocks(detail::launch_trace<Stage>, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, queue.counter);
+        with_tracer(stage, [&](auto set, const auto& tracer) {
+            const auto kernel = detail::launch_trace<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
+            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, queue.counter);
+        });
         finish(id, queue.counter);
     }
     template <class Stage, class Item>
     void trace_coherent(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        detail::launch_coherent<<<blocks(detail::launch_coherent<Stage>, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, queue.counter);
+        with_tracer(stage, [&](auto set, const auto& tracer) {
+            const auto kernel = detail::launch_coherent<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
+            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, queue.counter);
+        });
         finish(id, queue.counter);
     }
     void set_depth(uint32_t depth) { detail::set_depth<<<1, 1, 0, stream_>>>(state_, depth); }
@@ -187,6 +208,18 @@ public:
     }
 
 private:
+    /// f(FeatureSet, tracer) with the set that tracing needs. Kernels are made only for sets that the stage's own features cover.
+    template <class Stage, class Function>
+    void with_tracer(const Stage& stage, Function f) const {
+        with_traversal_features(traced_, [&](auto set) {
+            if constexpr (Stage::kFeatures.covers(decltype(set)::value)) {
+                if constexpr (kPairs)
+                    if (pairs_) return f(set, *pairs_);
+                f(set, stage.tracer);
+            }
+        });
+    }
+
     template <class Body>
     void capture_loop(const QueueCounter* counter, Body body) {
         const auto [graph, unused] = captured();
@@ -252,11 +285,15 @@ private:
     }
 
     cudaStream_t stream_;
+    Features traced_;
+    std::optional<PairTracer> pairs_;
     WaveState* state_;
     StageRecord* records_;
     uint64_t* clock_;
     int multiprocessors_ = 0;
     bool capturing_ = false;
 };
+
+using CudaExecutor = BasicCudaExecutor<false>;
 
 }  // namespace ambilux

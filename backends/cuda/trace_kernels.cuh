@@ -1,24 +1,26 @@
 // Ray traversal on a CUDA device: persistent warps that fetch rays as lanes fall idle (Aila and Laine 2009, "Understanding the Efficiency of Ray
-// Traversal on GPUs") over the compressed wide BVH (Ylitie et al. 2017), with primitives postponed until enough lanes hold some. Node and primitive
-// tests are those of scene/accel, so hits agree with the host's.
+// Traversal on GPUs") over the compressed wide BVH (Ylitie et al. 2017), with primitives postponed until enough lanes hold some. A lane that holds some goes on
+// walking until it meets the next (their speculative traversal). Node and primitive tests are those of scene/accel, so hits agree with the host's.
 #pragma once
 
 #include <cuda_runtime.h>
 
 #include "backends/traversal_features.h"
 #include "scene/accel/cwbvh.h"
+#include "scene/accel/pair_bvh.h"
 
 namespace ambilux {
 
 /// When a warp changes what it does. Values are counts of lanes.
 struct TraceTuning {
-    uint32_t refill_below = 20;   ///< fetch rays when fewer lanes than this are busy; 1 waits for the whole warp, best for coherent rays
-    uint32_t primitives_at = 12;  ///< test primitives when this many lanes hold some
+    uint32_t refill_below = 28;   ///< fetch rays when fewer lanes than this are busy; 1 waits for the whole warp, best for coherent rays
+    uint32_t walk_at = 16;        ///< visit nodes again without asking for anything else while this many lanes can
+    uint32_t primitives_at = 8;   ///< likewise for primitives
 };
 
 /// For rays in no order, and for neighbouring rays that stay together.
-constexpr TraceTuning kIncoherentTuning = {20, 12};
-constexpr TraceTuning kCoherentTuning = {1, 1};
+constexpr TraceTuning kIncoherentTuning = {28, 16, 8};
+constexpr TraceTuning kCoherentTuning = {1, 1, 1};
 
 constexpr uint32_t kTraceBlock = 128;
 /// Resident blocks per multiprocessor that kernels are compiled for: 64 registers per thread.
@@ -33,80 +35,183 @@ __device__ inline uint32_t lane_rank(uint32_t mask) {
     return uint32_t(__popc(mask & below));
 }
 
+/// Where a ray is in a CWBVH: nodes to visit, and up to two groups of primitives to test. The stack is an array of its own, so that the rest can be in registers;
+/// its last entry holds the barycentrics of the nearest hit: few are found, and every register counts.
+template <bool AnyHit>
+struct CwbvhWalk {
+    using Entry = CwbvhGroup;
+    static constexpr int kEntries = kCwbvhStackSize + 1;
+    int top = 0;
+    CwbvhGroup group = {0, 0};
+    CwbvhLeaves leaves = {0, 0, 0}, later = {0, 0, 0};
+
+    __device__ void begin(const CwbvhTracer&, Entry*) { group = {0, 0x80000000u}; }
+    __device__ bool has_nodes() const { return (group.hits & kCwbvhInnerBits) || top > 0; }
+    __device__ bool can_step() const { return later.hits == 0 && has_nodes(); }
+    __device__ bool has_primitives() const { return leaves.hits != 0; }
+    __device__ void step(const CwbvhTracer& tracer, Entry* stack, const CwbvhRay& ray, float tmax) {
+        // Any order will do to find any hit.
+        const uint32_t order = AnyHit ? 0u : ray.order;
+        if (!(group.hits & kCwbvhInnerBits)) group = stack[--top];
+        const uint32_t child = take_child(group, order);
+        if (group.hits & kCwbvhInnerBits) stack[top++] = group;
+        const CwbvhNode node = load_record(tracer.nodes + child);
+        const uint32_t hits = child_hits(node, ray, tmax);
+        group = inner_hits(node, hits, order);
+        if (leaves.hits)
+            later = leaf_hits(node, hits);
+        else
+            leaves = leaf_hits(node, hits);
+    }
+    __device__ uint32_t take() { return take_primitive(leaves); }
+    __device__ void after_primitive(Entry*) {
+        if (leaves.hits) return;
+        leaves = later;
+        later.hits = 0;
+    }
+    __device__ void end() {
+        group.hits = leaves.hits = later.hits = 0;
+        top = 0;
+    }
+    static __device__ void keep(Entry* stack, float u, float v) { stack[kCwbvhStackSize] = {float_bits(u), float_bits(v)}; }
+    static __device__ Hit kept(const Entry* stack, float t, uint32_t prim) {
+        return {t, bits_float(stack[kCwbvhStackSize].base), bits_float(stack[kCwbvhStackSize].hits), prim};
+    }
+};
+
+/// The same for a binary BVH: `at` is the reference to look at next, leaves are references too, of which primitives are taken from the front.
+template <bool AnyHit>
+struct PairWalk {
+    using Entry = uint32_t;
+    static constexpr int kEntries = kPairStackSize + 2;
+    int top = 0;
+    uint32_t at = kNone;
+    uint32_t leaf = 0, later = 0;  ///< 0: none
+
+    __device__ void begin(const PairTracer& tracer, Entry* stack) {
+        at = tracer.root;
+        keep_leaves(stack);
+    }
+    __device__ bool has_nodes() const { return at != kNone; }
+    /// What is next is no leaf unless two are kept already.
+    __device__ bool can_step() const { return !(at & kPairLeaf); }
+    __device__ bool has_primitives() const { return leaf != 0; }
+    __device__ void step(const PairTracer& tracer, Entry* stack, const CwbvhRay& ray, float tmax) {
+        uint32_t second;
+        pair_hits(load_record(tracer.nodes + at), ray, tmax, at, second);
+        if (second != kNone) stack[top++] = second;
+        if (at == kNone && top > 0) at = stack[--top];
+        keep_leaves(stack);
+    }
+    __device__ uint32_t take() {
+        const uint32_t index = (leaf & ~kPairLeaf) >> 3;
+        leaf = (leaf & 7u) > 1 ? leaf + 8u - 1u : 0u;
+        return index;
+    }
+    __device__ void after_primitive(Entry* stack) {
+        if (leaf) return;
+        leaf = later;
+        later = 0;
+        keep_leaves(stack);
+    }
+    __device__ void end() {
+        at = kNone;
+        leaf = later = 0;
+        top = 0;
+    }
+    static __device__ void keep(Entry* stack, float u, float v) { stack[kPairStackSize] = float_bits(u), stack[kPairStackSize + 1] = float_bits(v); }
+    static __device__ Hit kept(const Entry* stack, float t, uint32_t prim) { return {t, bits_float(stack[kPairStackSize]), bits_float(stack[kPairStackSize + 1]), prim}; }
+    __device__ void keep_leaves(const Entry* stack) {
+        while (at != kNone && (at & kPairLeaf) && later == 0) {
+            (leaf == 0 ? leaf : later) = at;
+            at = top > 0 ? stack[--top] : kNone;
+        }
+    }
+};
+
+template <class Tracer, bool AnyHit>
+using Walk = std::conditional_t<std::is_same_v<Tracer, PairTracer>, PairWalk<AnyHit>, CwbvhWalk<AnyHit>>;
+
 /// The loop behind trace_closest_persistent and trace_any_persistent. `finish(i, hit)` is called once per fetched ray.
-template <Features F, bool AnyHit, class Fetch, class Finish>
-__device__ void trace_persistent(const SceneView& scene, const CwbvhTracer& tracer, Fetch fetch, Finish finish, const uint32_t* count,
+template <Features F, bool AnyHit, class Tracer, class Fetch, class Finish>
+__device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Finish finish, const uint32_t* count,
                                  uint32_t* next_ray, TraceTuning tuning) {
     constexpr uint32_t kWarp = 0xffffffffu;
     const uint32_t ray_count = *count;
-    CwbvhGroup stack[kCwbvhStackSize];
-    int top = 0;
+    Walk<Tracer, AnyHit> walk;
+    typename Walk<Tracer, AnyHit>::Entry stack[Walk<Tracer, AnyHit>::kEntries];
     Ray ray = {};
     CwbvhRay box_ray = {};
     RayShear shear = {};
-    Hit hit = {};
-    CwbvhGroup group = {0, 0}, primitives = {0, 0};
-    uint32_t index = 0;
-    bool busy = false, drained = false;
+    float t = 0.0f;
+    uint32_t prim = kNone;
+    uint32_t index = kNone;  // of the ray; kNone while idle
+    bool drained = false;
+    uint32_t chunk = 0, chunk_end = 0;  // rays that the warp has taken and not begun
 
     for (;;) {
-        const uint32_t idle = __ballot_sync(kWarp, !busy);
-        if (!drained && 32u - uint32_t(__popc(idle)) < tuning.refill_below) {
-            uint32_t first = 0;
-            const int leader = __ffs(int(idle)) - 1;
-            if (int(threadIdx.x & 31u) == leader) first = atomicAdd(next_ray, uint32_t(__popc(idle)));
-            first = __shfl_sync(kWarp, first, leader);
-            drained = first + uint32_t(__popc(idle)) >= ray_count;
-            if (!busy) {
-                index = first + lane_rank(idle);
-                if (index < ray_count && fetch(index, ray)) {
-                    hit = {ray.tmax, 0.0f, 0.0f, kNone};
+        const uint32_t idle = __ballot_sync(kWarp, index == kNone);
+        if (uint32_t(__popc(idle)) > 32u - tuning.refill_below) {
+            if (!drained) {
+                const uint32_t wanted = uint32_t(__popc(idle)), kept = chunk_end - chunk;
+                uint32_t fresh = chunk;
+                if (wanted > kept) {
+                    if ((threadIdx.x & 31u) == 0) fresh = atomicAdd(next_ray, 32u);
+                    fresh = __shfl_sync(kWarp, fresh, 0);
+                    chunk_end = fresh + 32u;
+                    fresh -= kept;
+                }
+                const uint32_t rank = lane_rank(idle);
+                const uint32_t next = (rank < kept ? chunk : fresh) + rank;
+                chunk = fresh + wanted;
+                drained = chunk >= ray_count;
+                if (index == kNone && next < ray_count && fetch(next, ray)) {
                     if (is_traceable(ray)) {
-                        busy = true;
+                        index = next;
+                        t = ray.tmax;
+                        prim = kNone;
                         box_ray = make_cwbvh_ray(ray.o, ray.d);
                         shear = make_ray_shear(ray.d);
-                        group = {0, 0x80000000u};
-                        primitives = {0, 0};
-                        top = 0;
+                        walk.begin(tracer, stack);
                     } else {
-                        finish(index, hit);
+                        finish(next, Hit{ray.tmax, 0.0f, 0.0f, kNone});
                     }
                 }
+            } else if (idle == kWarp) {
+                return;
             }
         }
-        if (!__any_sync(kWarp, busy)) {
-            if (drained) return;
-            continue;
-        }
 
-        if (busy && primitives.hits == 0) {
-            if (!(group.hits & kCwbvhInnerBits)) group = stack[--top];
-            const uint32_t child = take_child(group, box_ray.octant_inverse);
-            if (group.hits & kCwbvhInnerBits) stack[top++] = group;
-            const CwbvhNode node = load_record(tracer.nodes + child);
-            const uint32_t hits = child_hits(node, box_ray, hit.t);
-            group = {node.first_child, (hits & kCwbvhInnerBits) | node.inner_mask};
-            primitives = {node.first_primitive, hits & ~kCwbvhInnerBits};
-        }
+        uint32_t walking;
+        do {
+            bool walks = walk.can_step();
+            if (walks) {
+                walk.step(tracer, stack, box_ray, t);
+                walks = walk.can_step();
+            }
+            walking = uint32_t(__popc(__ballot_sync(kWarp, walks)));
+        } while (walking >= tuning.walk_at);
 
-        // Lanes with primitives wait until enough others have some too, or until no lane can go on without.
-        const bool dry = !(group.hits & kCwbvhInnerBits) && top == 0;
-        const uint32_t waiting = __ballot_sync(kWarp, busy && primitives.hits != 0);
-        const uint32_t walking = __ballot_sync(kWarp, busy && primitives.hits == 0 && !dry);
-        if (waiting && (walking == 0 || uint32_t(__popc(waiting)) >= tuning.primitives_at)) {
-            while (busy && primitives.hits) {
-                const int bit = lowest_bit(primitives.hits);
-                primitives.hits &= primitives.hits - 1;
-                if (tracer.intersect_primitive<F>(scene, ray, shear, primitives.base + uint32_t(bit), hit) && AnyHit) {
-                    finish(index, hit);
-                    busy = false;
+        // All are asked anew after each round: lanes with many primitives would make the others wait.
+        uint32_t waiting = uint32_t(__popc(__ballot_sync(kWarp, walk.has_primitives())));
+        if (waiting >= tuning.primitives_at || waiting >= walking) {
+            do {
+                if (walk.has_primitives()) {
+                    Hit hit = {t, 0.0f, 0.0f, kNone};
+                    if (tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit)) {
+                        t = hit.t;
+                        prim = hit.prim;
+                        walk.keep(stack, hit.u, hit.v);
+                        if (AnyHit) walk.end();
+                    }
+                    walk.after_primitive(stack);
                 }
-            }
-            __syncwarp();
+                waiting = uint32_t(__popc(__ballot_sync(kWarp, walk.has_primitives())));
+            } while (waiting >= tuning.primitives_at);
         }
-        if (busy && primitives.hits == 0 && dry) {
-            finish(index, hit);
-            busy = false;
+        if (index != kNone && !walk.has_primitives() && !walk.has_nodes()) {
+            finish(index, prim == kNone ? Hit{t, 0.0f, 0.0f, kNone} : walk.kept(stack, t, prim));
+            index = kNone;
         }
     }
 }
@@ -116,15 +221,15 @@ __device__ void trace_persistent(const SceneView& scene, const CwbvhTracer& trac
 /// Nearest hits of *count rays. Call it from all threads of the grid; blocks are of whole warps. fetch(i, ray) loads ray i and returns false to leave it
 /// out; emit(i, hit) is called for every other ray, hit or not (hit.prim == kNone). *next_ray_counter must be 0 when the kernel starts. Both
 /// counts live on the device, so no host round trip is needed between the stage that makes rays and this one.
-template <Features F, class Fetch, class Emit>
-__device__ void trace_closest_persistent(const SceneView& scene, const CwbvhTracer& tracer, Fetch fetch, Emit emit, const uint32_t* count,
+template <Features F, class Tracer, class Fetch, class Emit>
+__device__ void trace_closest_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Emit emit, const uint32_t* count,
                                          uint32_t* next_ray_counter, TraceTuning tuning = kIncoherentTuning) {
     detail::trace_persistent<F, false>(scene, tracer, fetch, emit, count, next_ray_counter, tuning);
 }
 
 /// Whether anything blocks each of *count rays; emit(i, blocked). The rest is as for trace_closest_persistent.
-template <Features F, class Fetch, class Emit>
-__device__ void trace_any_persistent(const SceneView& scene, const CwbvhTracer& tracer, Fetch fetch, Emit emit, const uint32_t* count,
+template <Features F, class Tracer, class Fetch, class Emit>
+__device__ void trace_any_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Emit emit, const uint32_t* count,
                                      uint32_t* next_ray_counter, TraceTuning tuning = kIncoherentTuning) {
     detail::trace_persistent<F, true>(
         scene, tracer, fetch, [&](uint32_t i, const Hit& hit) { emit(i, hit.prim != kNone); }, count, next_ray_counter, tuning);
@@ -142,9 +247,9 @@ __device__ inline void store_hit(Hit* hits, uint32_t i, const Hit& h) {
 }
 
 /// Nearest hits of an array of rays; `Set` is a FeatureSet. Launch with persistent_grid() blocks of kTraceBlock threads and *next_ray_counter == 0.
-template <class Set>
+template <class Set, class Tracer>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
-    trace_closest_kernel(const __grid_constant__ SceneView scene, const CwbvhTracer tracer, const Ray* rays, Hit* hits, const uint32_t* count,
+    trace_closest_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, Hit* hits, const uint32_t* count,
                          uint32_t* next_ray_counter, const TraceTuning tuning) {
     trace_closest_persistent<Set::value>(
         scene, tracer,
@@ -156,9 +261,9 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
 }
 
 /// Any hit: 1 where a ray is blocked, else 0. Launch as trace_closest_kernel.
-template <class Set>
+template <class Set, class Tracer>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
-    trace_any_kernel(const __grid_constant__ SceneView scene, const CwbvhTracer tracer, const Ray* rays, uint8_t* blocked, const uint32_t* count,
+    trace_any_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, uint8_t* blocked, const uint32_t* count,
                      uint32_t* next_ray_counter, const TraceTuning tuning) {
     trace_any_persistent<Set::value>(
         scene, tracer,
@@ -170,21 +275,21 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
 }
 
 /// The same answers, one thread per ray and the loop of the host: the yardstick for the kernels above.
-template <class Set>
+template <class Set, class Tracer>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
-    trace_closest_plain_kernel(const __grid_constant__ SceneView scene, const CwbvhTracer tracer, const Ray* rays, Hit* hits, uint32_t count) {
+    trace_closest_plain_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, Hit* hits, uint32_t count) {
     const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
     if (i >= count) return;
     Hit hit;
-    tracer.closest<Set::value>(scene, load_ray(rays, i), hit);
+    tracer.template closest<Set::value>(scene, load_ray(rays, i), hit);
     store_hit(hits, i, hit);
 }
 
-template <class Set>
+template <class Set, class Tracer>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
-    trace_any_plain_kernel(const __grid_constant__ SceneView scene, const CwbvhTracer tracer, const Ray* rays, uint8_t* blocked, uint32_t count) {
+    trace_any_plain_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, uint8_t* blocked, uint32_t count) {
     const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
-    if (i < count) blocked[i] = tracer.occluded<Set::value>(scene, load_ray(rays, i));
+    if (i < count) blocked[i] = tracer.template occluded<Set::value>(scene, load_ray(rays, i));
 }
 
 /// Blocks that keep every multiprocessor full with a kernel of `threads` threads per block.

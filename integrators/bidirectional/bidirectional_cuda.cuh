@@ -24,7 +24,8 @@ template <Features F>
 class BidirectionalCuda final : public Renderer {
 public:
     BidirectionalCuda(const Scene& scene, const RenderSettings& settings)
-        : scene_(scene), policy_(make_bidirectional_policy(scene, settings)), use_graph_(settings.graph) {
+        : scene_(scene), policy_(make_bidirectional_policy(scene, settings)), use_graph_(settings.graph),
+          traced_(settings.specialise ? scene.features : kAllFeatures) {
         const auto start = Clock::now();
         wave_ = shape_wave(scene, settings, kTilePixels, 1);
         wave_.tiles = tile_count(wave_);  // splats may land anywhere on the film
@@ -167,7 +168,7 @@ private:
         cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
         stages_.emplace(device_scene_->view(), device_accel_->tracer(), policy_, wave_, queues_,
                         BidirectionalFilm{samples_of_slots_.data(), splats_.data(), sum_.data(), sum_squares_.data(), techniques_.data(), technique_dropped_.data()});
-        executor_.emplace(stream_, queues_.state, queues_.records, clock_.data());
+        executor_.emplace(stream_, traced_, queues_.state, queues_.records, clock_.data());
         if (graph_) cudaGraphExecDestroy(graph_);
         graph_ = nullptr;
         if (use_graph_) graph_ = executor_->capture([&](CudaExecutor& exec) { run(exec); });
@@ -211,6 +212,7 @@ private:
     const Scene& scene_;
     BidirectionalPolicy policy_;
     bool use_graph_;
+    Features traced_;  ///< what rays are traced for
     Wave wave_{};
     Layout layout_;
     uint64_t values_ = 0, samples_ = 0, film_samples_ = 0;

@@ -28,7 +28,13 @@ public:
     PathCuda(const Scene& scene, const RenderSettings& settings)
         : scene_(scene), policy_(make_path_policy(scene, settings)) {
         const auto start = Clock::now();
-        const CwbvhAccel accel(scene);
+        std::optional<CwbvhAccel> wide;
+        std::optional<PairAccel> pairs;
+        const bool binary = settings.accel == "bvh2";
+        if (binary)
+            pairs.emplace(scene);
+        else
+            wide.emplace(scene);
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
         Layout million;
@@ -36,11 +42,14 @@ public:
         wave_ = shape_wave(scene, settings, device_wave_size(settings, kCudaWavePlateau, million.bytes() >> 20, free), ~0u);
         lay_out(layout_, wave_.slot_count(), policy_);
         values_ = uint64_t(wave_.width) * wave_.height * 3;
-        predicted_bytes_ = DeviceScene::predicted_bytes(scene) + accel.arrays().bytes() + layout_.bytes() + 2 * values_ * sizeof(double) + sizeof(uint64_t);
+        predicted_bytes_ = DeviceScene::predicted_bytes(scene) + (binary ? pairs->memory_bytes() : wide->memory_bytes()) + layout_.bytes() + 2 * values_ * sizeof(double) + sizeof(uint64_t);
         check_memory(predicted_bytes_, free, wave_.slot_count());
 
         device_scene_.emplace(scene);
-        device_accel_.emplace(accel.arrays());
+        if (binary)
+            device_pairs_.emplace(pairs->arrays());
+        else
+            device_accel_.emplace(wide->arrays());
         memory_ = DeviceBuffer<std::byte>(layout_.bytes());
         memory_.zero();
         sum_ = DeviceBuffer<double>(values_);
@@ -54,9 +63,10 @@ public:
         cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
 
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        stages_.emplace(device_scene_->view(), device_accel_->tracer(), policy_, wave_, queues_, FilmPointers{sum_.data(), sum_squares_.data()});
-        executor_.emplace(stream_, queues_.state, queues_.records, clock_.data());
-        if (settings.graph) graph_ = executor_->capture([&](CudaExecutor& exec) { run_path_wave(exec, *stages_); });
+        stages_.emplace(device_scene_->view(), binary ? CwbvhTracer() : device_accel_->tracer(), policy_, wave_, queues_, FilmPointers{sum_.data(), sum_squares_.data()});
+        executor_.emplace(stream_, settings.specialise ? scene.features : kAllFeatures, queues_.state, queues_.records, clock_.data());
+        if (binary) executor_->use(device_pairs_->tracer());
+        if (settings.graph) graph_ = executor_->capture([&](auto& exec) { run_path_wave(exec, *stages_); });
         cuda_check(cudaDeviceSynchronize(), "preparation");
         build_seconds_ = seconds_since(start);
     }
@@ -79,7 +89,7 @@ public:
                     if (graph_)
                         cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
                     else
-                        executor_->launch([&](CudaExecutor& exec) { run_path_wave(exec, *stages_); });
+                        executor_->launch([&](auto& exec) { run_path_wave(exec, *stages_); });
                 }
             }
             cuda_check(cudaStreamSynchronize(stream_), "wave");
@@ -113,7 +123,7 @@ public:
         RenderStats s;
         s.backend = "cuda";
         s.device = cuda_device_name();
-        s.accel = "cwbvh";
+        s.accel = device_pairs_ ? "bvh2" : "cwbvh";
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;
@@ -123,7 +133,7 @@ public:
         cuda_check(cudaMemcpy(counters.data(), queues_.counters, counters.size() * sizeof(QueueCounter), cudaMemcpyDeviceToHost), "statistics");
         fill_stage_stats(records.data(), s);
         fill_queue_stats(layout_, {counters.data()}, s);
-        s.memory_bytes = device_scene_->bytes() + device_accel_->bytes() + memory_.bytes() + sum_.bytes() + sum_squares_.bytes() + clock_.bytes();
+        s.memory_bytes = device_scene_->bytes() + (device_pairs_ ? device_pairs_->bytes() : device_accel_->bytes()) + memory_.bytes() + sum_.bytes() + sum_squares_.bytes() + clock_.bytes();
         s.memory_bytes_predicted = predicted_bytes_;
         s.features = feature_names(F);
         s.skipped = skipped_parts(scene_, policy_, F);
@@ -143,14 +153,17 @@ private:
     uint64_t values_ = 0, predicted_bytes_ = 0, samples_ = 0, film_samples_ = 0, measured_samples_ = 0;
     double build_seconds_ = 0, render_seconds_ = 0, measured_seconds_ = 0;
     std::optional<DeviceScene> device_scene_;
+    using Executor = BasicCudaExecutor<true>;
+
     std::optional<DeviceCwbvh> device_accel_;
+    std::optional<DevicePairs> device_pairs_;  ///< instead, with accel=bvh2
     DeviceBuffer<std::byte> memory_;
     DeviceBuffer<double> sum_, sum_squares_;
     DeviceBuffer<uint64_t> clock_;
     PathMemory queues_{};
     cudaStream_t stream_ = nullptr;
     std::optional<PathStages<F, CwbvhTracer>> stages_;
-    std::optional<CudaExecutor> executor_;
+    std::optional<Executor> executor_;
     cudaGraphExec_t graph_ = nullptr;
 };
 

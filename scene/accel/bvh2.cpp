@@ -1,8 +1,10 @@
 #include "scene/accel/bvh2.h"
 
+#include <algorithm>
 #include <string>
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "scene/accel/embree_api.h"
 
 namespace ambilux {
@@ -173,6 +175,147 @@ Bvh2 build_bvh2(const SceneView& scene) {
     if (!root || error != RTC_ERROR_NONE)
         throw Error(ExitCode::device, "Embree: building a binary tree failed with error code " + std::to_string(int(error)));
     return out;
+}
+
+namespace {
+
+/// Reinsertion of subtrees (Meister and Bittner 2018, "Parallel Reinsertion for Bounding Volume Hierarchy Optimization").
+class Reinserter {
+public:
+    explicit Reinserter(Bvh2& bvh) : bvh_(bvh), nodes_(bvh.nodes), parent_(nodes_.size(), kNone), area_(nodes_.size()), touched_(nodes_.size(), 0) {
+        for (uint32_t i = 0; i < nodes_.size(); ++i) {
+            area_[i] = nodes_[i].bounds.half_area();
+            if (!nodes_[i].is_leaf()) parent_[nodes_[i].left] = parent_[nodes_[i].right] = i;
+        }
+    }
+
+    /// Moves those of the `share` largest nodes that gain by it; returns by how much the sum of areas of inner nodes falls.
+    double pass(float share) {
+        std::vector<uint32_t> candidates;
+        for (uint32_t i = 0; i < nodes_.size(); ++i)
+            if (i != bvh_.root && parent_[i] != bvh_.root && parent_[i] != kNone) candidates.push_back(i);
+        const size_t count = std::min(candidates.size(), size_t(double(candidates.size()) * share) + 1);
+        const auto larger = [&](uint32_t a, uint32_t b) { return area_[a] > area_[b] || (area_[a] == area_[b] && a < b); };
+        if (count < candidates.size()) std::nth_element(candidates.begin(), candidates.begin() + int64_t(count), candidates.end(), larger);
+        candidates.resize(count);
+        std::vector<Move> moves(count);
+        parallel_for(count, [&](size_t i) { moves[i] = find_move(candidates[i]); }, size_t(64));
+        std::erase_if(moves, [](const Move& m) { return m.gain <= 0.0f; });
+        std::sort(moves.begin(), moves.end(), [](const Move& a, const Move& b) { return a.gain > b.gain || (a.gain == b.gain && a.node < b.node); });
+
+        // Moves were found in the tree as it was: those that touch a node of one already made have to wait for the next pass.
+        std::fill(touched_.begin(), touched_.end(), uint8_t(0));
+        double gain = 0.0;
+        for (const Move& m : moves) {
+            const uint32_t nodes[5] = {m.node, m.target, sibling(m.node), parent_[m.node], parent_[m.target]};
+            bool free = true;
+            for (const uint32_t n : nodes) free = free && !touched_[n];
+            if (!free) continue;
+            for (const uint32_t n : nodes) touched_[n] = 1;
+            make_move(m);
+            gain += m.gain;
+        }
+        return gain;
+    }
+
+private:
+    struct Move {
+        uint32_t node, target;
+        float gain = 0.0f;  ///< by which the sum of areas falls
+    };
+
+    uint32_t sibling(uint32_t node) const {
+        const Bvh2Node& p = nodes_[parent_[node]];
+        return p.left == node ? p.right : p.left;
+    }
+
+    static float joint_area(const Bounds3f& a, const Bounds3f& b) {
+        const Vec3f e = max(a.upper, b.upper) - min(a.lower, b.lower);
+        return e.x * e.y + e.y * e.z + e.z * e.x;
+    }
+
+    /// Best place for the subtree of `node`: branch and bound over the siblings on its way to the root (section 3.1).
+    Move find_move(uint32_t node) const {
+        struct Entry {
+            float saved;  ///< if the subtree goes below here: what removing it saves less what its ancestors grow by
+            uint32_t index;
+        };
+        Entry stack[256];
+        const Bounds3f bounds = nodes_[node].bounds;
+        const float area = area_[node];
+        Move best = {node, kNone, 0.0f};
+        uint32_t pivot = parent_[node], start = sibling(node);
+        float saved = area_[pivot];
+        Bounds3f without = nodes_[start].bounds;  // of the pivot, once the subtree is gone
+        for (;;) {
+            int top = 0;
+            stack[top++] = {saved, start};
+            while (top > 0) {
+                const Entry e = stack[--top];
+                if (e.saved - area <= best.gain) continue;
+                const float joint = joint_area(nodes_[e.index].bounds, bounds);
+                const float gain = e.saved - joint;
+                if (gain > best.gain && e.index != sibling(node)) best.gain = gain, best.target = e.index;
+                const Bvh2Node& n = nodes_[e.index];
+                const float below = gain + area_[e.index];
+                if (n.is_leaf() || below - area <= best.gain || top + 2 > 256) continue;
+                // The child that grows less is looked at first.
+                const float left = joint_area(nodes_[n.left].bounds, bounds) - area_[n.left], right = joint_area(nodes_[n.right].bounds, bounds) - area_[n.right];
+                stack[top++] = {below, left < right ? n.right : n.left};
+                stack[top++] = {below, left < right ? n.left : n.right};
+            }
+            if (pivot == bvh_.root) break;
+            if (pivot != parent_[node]) {
+                without.extend(nodes_[start].bounds);
+                saved += area_[pivot] - without.half_area();
+            }
+            start = sibling(pivot);
+            pivot = parent_[pivot];
+        }
+        return best;
+    }
+
+    void make_move(const Move& m) {
+        const uint32_t parent = parent_[m.node], other = sibling(m.node), grandparent = parent_[parent];
+        replace_child(grandparent, parent, other);
+        const uint32_t above = parent_[m.target];
+        replace_child(above, m.target, parent);
+        nodes_[parent].left = m.node, nodes_[parent].right = m.target;
+        parent_[m.target] = parent;
+        refit(grandparent);
+        refit(parent);
+    }
+
+    void replace_child(uint32_t node, uint32_t before, uint32_t after) {
+        (nodes_[node].left == before ? nodes_[node].left : nodes_[node].right) = after;
+        parent_[after] = node;
+    }
+
+    void refit(uint32_t node) {
+        for (; node != kNone; node = parent_[node]) {
+            Bounds3f b = nodes_[nodes_[node].left].bounds;
+            b.extend(nodes_[nodes_[node].right].bounds);
+            nodes_[node].bounds = b;
+            area_[node] = b.half_area();
+        }
+    }
+
+    Bvh2& bvh_;
+    std::vector<Bvh2Node>& nodes_;
+    std::vector<uint32_t> parent_;
+    std::vector<float> area_;
+    std::vector<uint8_t> touched_;
+};
+
+}  // namespace
+
+void optimise_bvh2(Bvh2& bvh, int passes) {
+    if (bvh.root == kNone) return;
+    // The largest tenth of the nodes gives 0.99 of what all of them do.
+    constexpr float kShare = 0.1f;
+    Reinserter reinserter(bvh);
+    for (int i = 0; i < passes; ++i)
+        if (reinserter.pass(kShare) == 0.0) break;
 }
 
 double bvh2_cost(const Bvh2& bvh) {

@@ -29,9 +29,11 @@ Bvh2 build_bvh2(const SceneView& scene);
 /// Box of the part of triangle `prim` in `within` on either side of the plane x[axis] = position. Rounded outwards.
 void split_triangle_bounds(const SceneView& scene, uint32_t prim, const Bounds3f& within, int axis, float position, Bounds3f& left, Bounds3f& right);
 
-/// Lowers the sum of areas of inner nodes by taking subtrees out and inserting them where they cost least (Bittner, Hapala, Havran 2013, "Fast
-/// Insertion-Based Optimization of Bounding Volume Hierarchies"). Up to `passes` over the nodes, largest first; stops early when little is gained.
+/// Lowers the sum of areas of inner nodes by taking subtrees out and inserting them where they cost least (Meister and Bittner 2018). Up to `passes` over the
+/// largest tenth of the nodes; the result does not depend on the number of threads.
 void optimise_bvh2(Bvh2& bvh, int passes);
+/// Passes for trees that rays are traced through. More find little: the sum falls by 16, 10, 12 % on three published scenes, by 1 % more in 16 passes.
+constexpr int kReinsertionPasses = 6;
 
 /// Sum of half areas of inner nodes over that of the root.
 double bvh2_cost(const Bvh2& bvh);

@@ -71,7 +71,7 @@ public:
 private:
     static CwbvhNode empty_node() {
         CwbvhNode n = {};
-        n.e[0] = n.e[1] = n.e[2] = 1;
+        n.scale_xz = 0x3f803f80u, n.scale_y = 1.0f;
         return n;
     }
 
@@ -182,7 +182,7 @@ private:
     }
 
     /// Exponent of the quantisation step for children in [lower, upper], and the corner they are counted from.
-    static void choose_grid(float lower, float upper, float& corner, uint8_t& exponent) {
+    static int choose_grid(float lower, float upper, float& corner) {
         const double extent = double(upper) - double(lower);
         // Not finer than what floats at these coordinates can tell apart.
         const double least = std::max(std::max(std::fabs(double(lower)), std::fabs(double(upper))) * 0x1p-21, 0x1p-90);
@@ -192,7 +192,7 @@ private:
             corner = next_float_down(float(double(lower) - 0.0625 * step));
             if (std::ceil((double(upper) - double(corner)) / step + kCwbvhMargin) <= 255.0) break;
         }
-        exponent = uint8_t(std::clamp(e + 127, 1, 254));
+        return std::clamp(e, -126 - 15, 127 - 15);
     }
 
     uint32_t write_node(uint32_t wide, const std::array<uint32_t, kWidth>& slots) {
@@ -201,25 +201,27 @@ private:
         for (const uint32_t s : slots)
             if (s != kNone) bounds.extend(bvh_.nodes[s].bounds);
         double step[3];
+        float scale[3];
         for (int axis = 0; axis < 3; ++axis) {
-            choose_grid(bounds.lower[axis], bounds.upper[axis], node.p[axis], node.e[axis]);
-            step[axis] = std::ldexp(1.0, int(node.e[axis]) - 127);
+            const int exponent = choose_grid(bounds.lower[axis], bounds.upper[axis], node.p[axis]);
+            step[axis] = std::ldexp(1.0, exponent);
+            scale[axis] = std::ldexp(1.0f, exponent + 15);
         }
+        node.scale_xz = float_bits(scale[0]) | float_bits(scale[2]) >> 16;
+        node.scale_y = scale[1];
         node.first_primitive = uint32_t(out_.primitives.size());
         node.first_child = uint32_t(out_.nodes.size());
         uint32_t inner_count = 0;
-        uint8_t meta[kWidth] = {}, lower[3][kWidth] = {}, upper[3][kWidth] = {};
+        uint8_t lower[3][kWidth] = {}, upper[3][kWidth] = {};
         for (uint32_t slot = 0; slot < kWidth; ++slot) {
             if (slots[slot] == kNone) continue;
             if (plans_[slots[slot]].leaf) {
                 std::vector<uint32_t> prims;
                 collect(slots[slot], prims);
-                const uint32_t offset = uint32_t(out_.primitives.size()) - node.first_primitive;
-                meta[slot] = uint8_t(((1u << prims.size()) - 1) << 5 | offset);
-                for (const uint32_t prim : prims) out_.primitives.push_back(make_primitive(prim));
+                node.valid |= ((1u << prims.size()) - 1) << (3 * slot);
+                for (const uint32_t prim : prims) out_.primitives.push_back(make_cwbvh_primitive(scene_, prim));
             } else {
-                meta[slot] = uint8_t(1u << 5 | (24 + slot));
-                node.inner_mask = uint8_t(node.inner_mask | 1u << slot);
+                node.valid |= 1u << (24 + slot);
                 ++inner_count;
             }
             const Bounds3f& b = bvh_.nodes[slots[slot]].bounds;
@@ -231,22 +233,11 @@ private:
                 upper[axis][slot] = uint8_t(std::clamp(hi, 0.0, 255.0));
             }
         }
-        std::memcpy(node.meta, meta, kWidth);
         std::memcpy(node.lower_x, lower[0], kWidth), std::memcpy(node.lower_y, lower[1], kWidth), std::memcpy(node.lower_z, lower[2], kWidth);
         std::memcpy(node.upper_x, upper[0], kWidth), std::memcpy(node.upper_y, upper[1], kWidth), std::memcpy(node.upper_z, upper[2], kWidth);
         out_.nodes.resize(out_.nodes.size() + inner_count);
         out_.nodes[wide] = node;
         return node.first_child;
-    }
-
-    CwbvhPrimitive make_primitive(uint32_t prim) const {
-        CwbvhPrimitive p = {};
-        p.prim = prim;
-        if (scene_.is_triangle(prim)) {
-            const Triangle t = scene_.triangles[prim];
-            p.v0 = scene_.vertices[t.v0].p, p.v1 = scene_.vertices[t.v1].p, p.v2 = scene_.vertices[t.v2].p;
-        }
-        return p;
     }
 
     const SceneView& scene_;
@@ -257,12 +248,25 @@ private:
 
 }  // namespace
 
+CwbvhPrimitive make_cwbvh_primitive(const SceneView& scene, uint32_t prim) {
+    CwbvhPrimitive p = {};
+    p.prim = prim;
+    if (scene.is_triangle(prim)) {
+        const Triangle t = scene.triangles[prim];
+        p.v0 = scene.vertices[t.v0].p, p.v1 = scene.vertices[t.v1].p, p.v2 = scene.vertices[t.v2].p;
+        const Vec3f normal = detail::accurate_cross(p.v1 - p.v0, p.v2 - p.v0);
+        p.normal_x = normal.x, p.normal_y = normal.y;
+    }
+    return p;
+}
+
 CwbvhArrays collapse_bvh2(const SceneView& scene, const Bvh2& bvh) { return Collapser(scene, bvh).run(); }
 
 CwbvhAccel::CwbvhAccel(const Scene& scene) {
     const auto start = std::chrono::steady_clock::now();
     const SceneView view = scene.view();
-    const Bvh2 bvh = build_bvh2(view);
+    Bvh2 bvh = build_bvh2(view);
+    optimise_bvh2(bvh, kReinsertionPasses);
     arrays_ = collapse_bvh2(view, bvh);
     build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

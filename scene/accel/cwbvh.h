@@ -56,7 +56,11 @@ struct CwbvhTracer {
             }
         }
         TriangleCrossing crossing;
-        if (!intersect_triangle(ray.o, ray.d, shear, p.v0, p.v1, p.v2, hit.t, crossing)) return false;
+        const auto normal = [&] {
+            const Vec3f a = p.v1 - p.v0, b = p.v2 - p.v0;
+            return Vec3f{p.normal_x, p.normal_y, detail::difference_of_products(a.x, b.y, a.y, b.x)};
+        };
+        if (!intersect_triangle(ray.o, ray.d, shear, p.v0, p.v1, p.v2, hit.t, crossing, normal)) return false;
         if (!accept_hit<F>(scene, ray, p.prim, crossing.u, crossing.v)) return false;
         hit = {crossing.t, crossing.u, crossing.v, p.prim};
         return true;
@@ -74,13 +78,13 @@ private:
         int top = 0;
         CwbvhGroup group = {0, 0x80000000u};  // the root, as the only child of nobody
         for (;;) {
-            const uint32_t index = take_child(group, box_ray.octant_inverse);
+            const uint32_t index = take_child(group, box_ray.order);
             if (group.hits & kCwbvhInnerBits) stack[top++] = group;
             const CwbvhNode node = detail::load_record(nodes + index);
             const uint32_t hits = child_hits(node, box_ray, hit.t);
-            group = {node.first_child, (hits & kCwbvhInnerBits) | node.inner_mask};
-            for (uint32_t leaves = hits & ~kCwbvhInnerBits; leaves; leaves &= leaves - 1) {
-                const bool met = intersect_primitive<F>(scene, ray, shear, node.first_primitive + uint32_t(detail::lowest_bit(leaves)), hit);
+            group = inner_hits(node, hits, box_ray.order);
+            for (CwbvhLeaves leaves = leaf_hits(node, hits); leaves.hits;) {
+                const bool met = intersect_primitive<F>(scene, ray, shear, take_primitive(leaves), hit);
                 if (any_hit && met) return true;
             }
             if (!(group.hits & kCwbvhInnerBits)) {
@@ -101,6 +105,9 @@ struct CwbvhArrays {
 };
 
 inline CwbvhTracer make_tracer(const CwbvhNode* nodes, const CwbvhPrimitive* primitives) { return {nodes, primitives}; }
+
+/// Primitive `prim` as leaves hold it.
+CwbvhPrimitive make_cwbvh_primitive(const SceneView& scene, uint32_t prim);
 
 /// Collapses a binary tree into a wide one of least expected cost (Ylitie et al. 2017, section 5.1), with children in the slots that make octant order
 /// the order along rays (section 3.2). Throws Error(device) if the tree is deeper than the traversal stack.

@@ -4,32 +4,34 @@
 #include <cstring>
 
 #include "core/math.h"
+#include "scene/accel/reciprocal.h"
 #include "scene/ray.h"
 
 namespace ambilux {
 
-/// Eight children in boxes quantised to a grid of 256 steps per axis from `p`, steps 2^(e-127).
-/// meta byte of a child: 0 = none; inner node: 0b001xxxxx with x = 24 + slot; leaf: count of primitives in unary in the upper 3 bits, offset of the first
-/// one from `first_primitive` in the lower 5. Inner children follow each other at `first_child` in the order of slots.
+/// Eight children in boxes quantised to a grid of 256 steps per axis from `p`. Inner children follow each other at `first_child`, primitives of leaves at
+/// `first_primitive`, both in the order of slots.
+/// The paper's byte per child (its figure 2) would have to be decoded for every child that is hit; here hit children set bits that are known at compile time,
+/// and `valid` takes out those that stand for nothing.
 struct alignas(16) CwbvhNode {
     float p[3];
-    uint8_t e[3];
-    uint8_t inner_mask;  ///< bit per slot
+    uint32_t scale_xz;  ///< floats of 2^15 steps, which have no mantissa: x in the upper half, z's upper half in the lower one
     uint32_t first_child, first_primitive;
-    uint32_t meta[2];  ///< four children per word, lowest byte first; likewise below
-    uint32_t lower_x[2], lower_y[2], lower_z[2];
+    uint32_t valid;          ///< bit 24 + slot: an inner child; bits 3 slot to 3 slot + 2: primitives of a leaf, counted in unary
+    float scale_y;           ///< likewise
+    uint32_t lower_x[2], lower_y[2], lower_z[2];  ///< four children per word, lowest byte first
     uint32_t upper_x[2], upper_y[2], upper_z[2];
 };
 static_assert(sizeof(CwbvhNode) == 80);
 
-/// Primitive as leaves hold it: a triangle's vertices, or for an analytic shape its id alone.
+/// Primitive as leaves hold it: a triangle's vertices and as much of its normal as there is room for, or for an analytic shape its id alone.
 struct alignas(16) CwbvhPrimitive {
     Vec3f v0;
     uint32_t prim;
     Vec3f v1;
-    uint32_t pad1;
+    float normal_x;
     Vec3f v2;
-    uint32_t pad2;
+    float normal_y;
 };
 static_assert(sizeof(CwbvhPrimitive) == 48);
 
@@ -42,22 +44,26 @@ constexpr int kCwbvhStackSize = 48;
 struct CwbvhRay {
     Vec3f o;
     Vec3f inverse_d;
-    uint32_t octant_inverse;  ///< 7 - octant; bit k of the octant is set where d[k] < 0
+    uint32_t order;   ///< bits 8 to 10: axes along which the ray ascends; the other bytes are those of 1.0f (detail::byte_in_mantissa)
 };
 
 AMBILUX_HD CwbvhRay make_cwbvh_ray(Vec3f o, Vec3f d) {
     CwbvhRay ray;
     ray.o = o;
     // Directions in a plane get a tiny slope, so that no product is 0·inf.
-    const float tiny = 1e-20f;
-    for (int i = 0; i < 3; ++i) ray.inverse_d[i] = 1.0f / (fabsf(d[i]) > tiny ? d[i] : copysignf(tiny, d[i]));
-    ray.octant_inverse = (ray.inverse_d.x < 0.0f ? 0u : 1u) | (ray.inverse_d.y < 0.0f ? 0u : 2u) | (ray.inverse_d.z < 0.0f ? 0u : 4u);
+    for (int i = 0; i < 3; ++i) ray.inverse_d[i] = fabsf(d[i]) > 1e-20f ? ordinary_reciprocal(d[i]) : copysignf(1e20f, d[i]);
+    ray.order = 0x3f800000u | (ray.inverse_d.x < 0.0f ? 0u : 0x100u) | (ray.inverse_d.y < 0.0f ? 0u : 0x200u) | (ray.inverse_d.z < 0.0f ? 0u : 0x400u);
     return ray;
 }
 
-/// A set of hit children or primitives. Inner nodes: bits 24..31 are hits in order of visit, bits 0..7 the node's inner_mask. Primitives: bits 0..23 by offset.
+/// A set of hit children. Bits 24 to 31: inner nodes in order of visit, the highest first; bits 0 to 7: the node's inner children by slot.
 struct CwbvhGroup {
     uint32_t base, hits;
+};
+
+/// A set of hit primitives, bits as in CwbvhNode::valid.
+struct CwbvhLeaves {
+    uint32_t base, hits, valid;
 };
 
 constexpr uint32_t kCwbvhInnerBits = 0xff000000u;
@@ -72,14 +78,6 @@ AMBILUX_HD int highest_bit(uint32_t x) {
 #endif
 }
 
-AMBILUX_HD int lowest_bit(uint32_t x) {
-#if defined(__CUDA_ARCH__)
-    return __ffs(int(x)) - 1;
-#else
-    return __builtin_ctz(x);
-#endif
-}
-
 AMBILUX_HD int count_bits(uint32_t x) {
 #if defined(__CUDA_ARCH__)
     return __popc(x);
@@ -88,14 +86,15 @@ AMBILUX_HD int count_bits(uint32_t x) {
 #endif
 }
 
-/// 1 + byte·2^-15: one byte permutation on a device, where converting an integer costs four times as much.
+/// 1 + byte·2^-15: one byte permutation on a device, where converting an integer costs four times as much. `one` holds the bytes of 1.0f but the second: from a register that
+/// the compiler cannot see through, since an instruction has room for one constant only, and the choice of bytes is one already.
 template <int Byte>
-AMBILUX_HD float byte_in_mantissa(uint32_t word) {
+AMBILUX_HD float byte_in_mantissa(uint32_t word, uint32_t one) {
 #if defined(__CUDA_ARCH__)
     // Result bytes, lowest first: 0x00, word[Byte], 0x80, 0x3f.
-    return __uint_as_float(__byte_perm(word, 0x3f800000u, 0x7604u | unsigned(Byte) << 4));
+    return __uint_as_float(__byte_perm(word, one, 0x7604u | unsigned(Byte) << 4));
 #else
-    return bits_float(0x3f800000u | (word >> (8 * Byte) & 255u) << 8);
+    return bits_float((one & 0xffff00ffu) | (word >> (8 * Byte) & 255u) << 8);
 #endif
 }
 
@@ -118,65 +117,113 @@ AMBILUX_HD T load_record(const T* address) {
 #endif
 }
 
+/// Largest and least of three: one instruction each on devices since Hopper, for integers only.
+AMBILUX_HD int largest(int a, int b, int c) {
+#if defined(__CUDA_ARCH__)
+    return __vimax3_s32(a, b, c);
+#else
+    return a > b ? (a > c ? a : c) : (b > c ? b : c);
+#endif
+}
+AMBILUX_HD int least(int a, int b, int c) {
+#if defined(__CUDA_ARCH__)
+    return __vimin3_s32(a, b, c);
+#else
+    return a < b ? (a < c ? a : c) : (b < c ? b : c);
+#endif
+}
+
 /// Planes of one axis: t of byte b is fma(1 + b 2^-15, scale, near or far).
 struct SlabAxis {
     float scale, near, far;
 };
 
-AMBILUX_HD SlabAxis slab_axis(float p, uint32_t exponent, float o, float inverse_d) {
+AMBILUX_HD SlabAxis slab_axis(float p, float steps, float o, float inverse_d) {
     // Near and far planes move apart by the rounding of (p-o)/d and of what a triangle test makes of it, so that boxes only grow (Ize 2013, applied to the corner;
     // the part that grows with the quantised offset is in kCwbvhMargin).
-    constexpr float k = gamma_bound(10);
-    const float step = bits_float(exponent << 23) * inverse_d;
+    constexpr float k = gamma_bound(12);
     const float a = (p - o) * inverse_d;
-    const float scale = step * 32768.0f;
+    const float scale = steps * inverse_d;
     const float corner = a - scale;
     // Rounding of `corner` at the magnitude of `a` is one of those steps; at the magnitude of `scale` it is 2^-9 of a quantisation step.
     return {scale, fmaf(-k, fabsf(a), corner), fmaf(k, fabsf(a), corner)};
 }
 
-template <int Byte>
-AMBILUX_HD bool child_hit(const SlabAxis& x, const SlabAxis& y, const SlabAxis& z, uint32_t near_x, uint32_t near_y, uint32_t near_z, uint32_t far_x,
-                          uint32_t far_y, uint32_t far_z, float tmax) {
-    const float nx = fmaf(byte_in_mantissa<Byte>(near_x), x.scale, x.near), fx = fmaf(byte_in_mantissa<Byte>(far_x), x.scale, x.far);
-    const float ny = fmaf(byte_in_mantissa<Byte>(near_y), y.scale, y.near), fy = fmaf(byte_in_mantissa<Byte>(far_y), y.scale, y.far);
-    const float nz = fmaf(byte_in_mantissa<Byte>(near_z), z.scale, z.near), fz = fmaf(byte_in_mantissa<Byte>(far_z), z.scale, z.far);
-    return max(max(nx, ny), max(nz, 0.0f)) <= min(min(fx, fy), min(fz, tmax));
+/// The bits of child `Slot` in CwbvhNode::valid, if the ray meets its box.
+template <int Slot>
+AMBILUX_HD uint32_t child_bits(const SlabAxis& x, const SlabAxis& y, const SlabAxis& z, uint32_t near_x, uint32_t near_y, uint32_t near_z, uint32_t far_x,
+                               uint32_t far_y, uint32_t far_z, uint32_t one, int tmax) {
+    constexpr int b = Slot % 4;
+    const int nx = int(float_bits(fmaf(byte_in_mantissa<b>(near_x, one), x.scale, x.near))), fx = int(float_bits(fmaf(byte_in_mantissa<b>(far_x, one), x.scale, x.far)));
+    const int ny = int(float_bits(fmaf(byte_in_mantissa<b>(near_y, one), y.scale, y.near))), fy = int(float_bits(fmaf(byte_in_mantissa<b>(far_y, one), y.scale, y.far)));
+    const int nz = int(float_bits(fmaf(byte_in_mantissa<b>(near_z, one), z.scale, z.near))), fz = int(float_bits(fmaf(byte_in_mantissa<b>(far_z, one), z.scale, z.far)));
+    // Compared as integers, which order positive floats alike and negative ones the other way round, but below them. A negative far plane therefore makes the
+    // least negative, and the largest of the near ones is no less than that only if the box lies behind the origin.
+    const int near = largest(nx, ny, nz), far = least(fx, fy, fz);
+    return near <= (far < tmax ? far : tmax) ? 1u << (24 + Slot) | 7u << (3 * Slot) : 0u;
+}
+
+/// Moves bit s of the upper byte to 24 + (s ^ axes of `order`): exchanges neighbours, pairs, halves.
+AMBILUX_HD uint32_t sort_slots(uint32_t hits, uint32_t order) {
+    uint32_t t = (hits ^ hits >> 1) & (order & 0x100u) * 0x550000u;
+    hits ^= t ^ t << 1;
+    t = (hits ^ hits >> 2) & (order & 0x200u) * (0x330000u / 2);
+    hits ^= t ^ t << 2;
+    t = (hits ^ hits >> 4) & (order & 0x400u) * (0x0f0000u / 4);
+    return hits ^ t ^ t << 4;
 }
 
 }  // namespace detail
 
-/// Children of `node` whose boxes meet the ray before tmax: bits 24..31 inner nodes, bit 24 + (slot ^ octant_inverse), so that the highest bit is to be
-/// visited first; bits 0..23 primitives by offset.
+/// Children of `node` whose boxes meet the ray before tmax, bits as in CwbvhNode::valid.
 AMBILUX_HD uint32_t child_hits(const CwbvhNode& node, const CwbvhRay& ray, float tmax) {
-    const detail::SlabAxis x = detail::slab_axis(node.p[0], node.e[0], ray.o.x, ray.inverse_d.x);
-    const detail::SlabAxis y = detail::slab_axis(node.p[1], node.e[1], ray.o.y, ray.inverse_d.y);
-    const detail::SlabAxis z = detail::slab_axis(node.p[2], node.e[2], ray.o.z, ray.inverse_d.z);
+    const detail::SlabAxis x = detail::slab_axis(node.p[0], bits_float(node.scale_xz & 0x7f800000u), ray.o.x, ray.inverse_d.x);
+    const detail::SlabAxis y = detail::slab_axis(node.p[1], node.scale_y, ray.o.y, ray.inverse_d.y);
+    const detail::SlabAxis z = detail::slab_axis(node.p[2], bits_float(node.scale_xz << 16), ray.o.z, ray.inverse_d.z);
     const bool px = ray.inverse_d.x >= 0.0f, py = ray.inverse_d.y >= 0.0f, pz = ray.inverse_d.z >= 0.0f;
+    const int end = int(float_bits(tmax));
     uint32_t hits = 0;
-    for (int half = 0; half < 2; ++half) {
-        const uint32_t meta = node.meta[half];
-        // Inner children have bits 3 and 4 of their slot number (24 + slot) set, leaves never both: offsets stop at 23.
-        const uint32_t inner = (meta & meta << 1) >> 4 & 0x01010101u;
-        const uint32_t index = (meta ^ inner * ray.octant_inverse) & 0x1f1f1f1fu;
-        const uint32_t bits = meta >> 5 & 0x07070707u;
-        const uint32_t near_x = px ? node.lower_x[half] : node.upper_x[half], far_x = px ? node.upper_x[half] : node.lower_x[half];
-        const uint32_t near_y = py ? node.lower_y[half] : node.upper_y[half], far_y = py ? node.upper_y[half] : node.lower_y[half];
-        const uint32_t near_z = pz ? node.lower_z[half] : node.upper_z[half], far_z = pz ? node.upper_z[half] : node.lower_z[half];
-        if (detail::child_hit<0>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax)) hits |= (bits & 255u) << (index & 255u);
-        if (detail::child_hit<1>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax)) hits |= (bits >> 8 & 255u) << (index >> 8 & 255u);
-        if (detail::child_hit<2>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax)) hits |= (bits >> 16 & 255u) << (index >> 16 & 255u);
-        if (detail::child_hit<3>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, tmax)) hits |= (bits >> 24) << (index >> 24);
+    {
+        const uint32_t near_x = px ? node.lower_x[0] : node.upper_x[0], far_x = px ? node.upper_x[0] : node.lower_x[0];
+        const uint32_t near_y = py ? node.lower_y[0] : node.upper_y[0], far_y = py ? node.upper_y[0] : node.lower_y[0];
+        const uint32_t near_z = pz ? node.lower_z[0] : node.upper_z[0], far_z = pz ? node.upper_z[0] : node.lower_z[0];
+        hits |= detail::child_bits<0>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, ray.order, end);
+        hits |= detail::child_bits<1>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, ray.order, end);
+        hits |= detail::child_bits<2>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, ray.order, end);
+        hits |= detail::child_bits<3>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, ray.order, end);
     }
-    return hits;
+    {
+        const uint32_t near_x = px ? node.lower_x[1] : node.upper_x[1], far_x = px ? node.upper_x[1] : node.lower_x[1];
+        const uint32_t near_y = py ? node.lower_y[1] : node.upper_y[1], far_y = py ? node.upper_y[1] : node.lower_y[1];
+        const uint32_t near_z = pz ? node.lower_z[1] : node.upper_z[1], far_z = pz ? node.upper_z[1] : node.lower_z[1];
+        hits |= detail::child_bits<4>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, ray.order, end);
+        hits |= detail::child_bits<5>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, ray.order, end);
+        hits |= detail::child_bits<6>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, ray.order, end);
+        hits |= detail::child_bits<7>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, ray.order, end);
+    }
+    return hits & node.valid;
 }
 
+/// Splits what child_hits() says into inner nodes, first along the ray first unless any order will do, and primitives.
+AMBILUX_HD CwbvhGroup inner_hits(const CwbvhNode& node, uint32_t hits, uint32_t order) {
+    return {node.first_child, (detail::sort_slots(hits & kCwbvhInnerBits, order)) | node.valid >> 24};
+}
+AMBILUX_HD CwbvhLeaves leaf_hits(const CwbvhNode& node, uint32_t hits) { return {node.first_primitive, hits & ~kCwbvhInnerBits, node.valid}; }
+
 /// Takes the first inner child out of `group` and returns its node index.
-AMBILUX_HD uint32_t take_child(CwbvhGroup& group, uint32_t octant_inverse) {
+AMBILUX_HD uint32_t take_child(CwbvhGroup& group, uint32_t order) {
     const int bit = detail::highest_bit(group.hits);
     group.hits &= ~(1u << bit);
-    const uint32_t slot = uint32_t(bit - 24) ^ octant_inverse;
+    const uint32_t slot = (uint32_t(bit) ^ order >> 8) & 7u;
     return group.base + uint32_t(detail::count_bits(group.hits & ~(~0u << slot)));
+}
+
+/// Takes a primitive out of `leaves` and returns its index.
+AMBILUX_HD uint32_t take_primitive(CwbvhLeaves& leaves) {
+    const uint32_t rest = leaves.hits & (leaves.hits - 1);
+    const uint32_t below = (leaves.hits ^ rest) - 1;
+    leaves.hits = rest;
+    return leaves.base + uint32_t(detail::count_bits(leaves.valid & below));
 }
 
 }  // namespace ambilux
