@@ -3,19 +3,23 @@
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "integrators/bidirectional/bidirectional.h"
+#include "integrators/bidirectional/choice.h"
 #include "integrators/path/path.h"
 
 namespace ambilux {
 
 bool cuda_available() { return cuda_device_present(); }
 
-std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings& settings) {
+namespace {
+
+std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
     // Settings may come from elsewhere than apply_setting.
     RenderSettings checked;
     apply_setting(checked, "integrator", settings.integrator);
     apply_setting(checked, "variant", settings.variant);
     apply_setting(checked, "backend", settings.backend);
     apply_setting(checked, "accel", settings.accel);
+    if (settings.automatic) check_automatic(settings);
     if (settings.variant != "wavefront" && settings.integrator != "bdpt")
         throw Error(ExitCode::usage, "variant=" + settings.variant + ": integrator " + settings.integrator + " has the variant wavefront only; megakernel, lvc and streaming belong to bdpt");
     if (settings.technique_depth > 0 && (settings.integrator == "path" || settings.variant == "megakernel"))
@@ -25,9 +29,16 @@ std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings
     if (cuda && settings.accel == "embree") throw Error(ExitCode::usage, "accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
     if (cuda && settings.deterministic && settings.variant == "lvc")
         throw Error(ExitCode::usage, "deterministic=true: variant lvc draws from a cache whose order differs between runs on a CUDA device; use wavefront or megakernel");
-    if (settings.integrator != "path") return cuda ? make_bidirectional_cuda(scene, settings) : make_bidirectional_cpu(scene, settings);
-    if (cuda) return make_path_cuda(scene, settings);
-    return make_path_cpu(scene, settings);
+    if (settings.automatic) return make_automatic(scene, settings, cuda, accels, [&](const RenderSettings& chosen) { return make_from(scene, chosen, accels); });
+    if (settings.integrator != "path") return cuda ? make_bidirectional_cuda(scene, settings, accels) : make_bidirectional_cpu(scene, settings, accels);
+    return cuda ? make_path_cuda(scene, settings, accels) : make_path_cpu(scene, settings, accels);
+}
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings& settings) {
+    SharedAccels accels(scene);
+    return make_from(scene, settings, accels);
 }
 
 }  // namespace ambilux

@@ -23,7 +23,7 @@ namespace ambilux {
 template <Features F>
 class BidirectionalCuda final : public Renderer {
 public:
-    BidirectionalCuda(const Scene& scene, const RenderSettings& settings)
+    BidirectionalCuda(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : scene_(scene), policy_(make_bidirectional_policy(scene, settings)), use_graph_(settings.graph) {
         const auto start = Clock::now();
         wave_ = shape_wave(scene, settings, kTilePixels, 1);
@@ -37,9 +37,9 @@ public:
             wave_.samples = std::max<uint32_t>(1, uint32_t(std::min<uint64_t>(8ull * policy_.stream_slots, kLightRay - 1) / slots));
         }
         values_ = uint64_t(wave_.width) * wave_.height * 3;
-        const CwbvhAccel accel(scene);
+        const std::shared_ptr<const CwbvhAccel> accel = accels.get<CwbvhAccel>();
         device_scene_.emplace(scene);
-        device_accel_.emplace(accel.arrays());
+        device_accel_.emplace(accel->arrays());
         sum_ = DeviceBuffer<double>(values_, "film");
         sum_squares_ = DeviceBuffer<double>(values_, "film");
         splats_ = DeviceBuffer<int64_t>(values_ * wave_.samples, "splats");
@@ -54,7 +54,7 @@ public:
         clock_ = DeviceBuffer<uint64_t>(1);
         clear_film();
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        const double mean = policy_.light_walks && !policy_.stream_slots ? mean_light_vertices<F>(scene.view(), accel.tracer(), policy_, settings.seed) : 0.0;
+        const double mean = policy_.light_walks && !policy_.stream_slots ? mean_light_vertices<F>(scene.view(), accel->tracer(), policy_, settings.seed) : 0.0;
         plan_cache(policy_, mean);
         allocate(planned_vertices(mean, wave_.slot_count()));
         build_seconds_ = seconds_since(start);

@@ -24,20 +24,20 @@ constexpr uint32_t kCudaWaveSize = 1u << 22;
 template <Features F>
 class PathCuda final : public Renderer {
 public:
-    PathCuda(const Scene& scene, const RenderSettings& settings)
+    PathCuda(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : scene_(scene), policy_(make_path_policy(scene, settings)),
           wave_(shape_wave(scene, settings, settings.wave_size ? settings.wave_size : kCudaWaveSize, ~0u)) {
         const auto start = Clock::now();
-        const CwbvhAccel accel(scene);
+        const std::shared_ptr<const CwbvhAccel> accel = accels.get<CwbvhAccel>();
         lay_out(layout_, wave_.slot_count(), policy_);
         values_ = uint64_t(wave_.width) * wave_.height * 3;
-        predicted_bytes_ = DeviceScene::predicted_bytes(scene) + accel.arrays().bytes() + layout_.bytes() + 2 * values_ * sizeof(double) + sizeof(uint64_t);
+        predicted_bytes_ = DeviceScene::predicted_bytes(scene) + accel->arrays().bytes() + layout_.bytes() + 2 * values_ * sizeof(double) + sizeof(uint64_t);
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
         check_memory(predicted_bytes_, free, wave_.slot_count());
 
         device_scene_.emplace(scene);
-        device_accel_.emplace(accel.arrays());
+        device_accel_.emplace(accel->arrays());
         memory_ = DeviceBuffer<std::byte>(layout_.bytes());
         memory_.zero();
         sum_ = DeviceBuffer<double>(values_);
