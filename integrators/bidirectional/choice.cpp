@@ -17,7 +17,7 @@ namespace {
 constexpr uint32_t kPilotSamplesCpu = 8192, kPilotSamplesCuda = 32768;
 /// Share of the blocks that the comparison leaves out.
 constexpr double kTrimmedBlocks = 0.01;
-/// Candidates whose predicted costs differ by less than this from that of the best are timed.
+/// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this factor of the best are timed.
 constexpr double kDoubt = 1.5;
 constexpr uint32_t kFirstTimedSample = 0xffff0000u;  ///< far from those of the image
 
@@ -109,7 +109,7 @@ std::vector<ChoiceCandidate> choice_candidates(const RenderSettings& settings, b
 }
 
 double choice_work(const PilotWork& w, const ChoiceCandidate& candidate, bool cuda) {
-    // From renders of nine scenes (docs/performance.md): shading and shadow rays in rays of walks, what longer records and more launches cost.
+    // Fitted to renders (docs/performance.md): shadow rays and connections in rays of walks; what the longer records and further launches of bidirectional methods cost.
     constexpr double kShadow = 0.8;
     const double eye = w.eye_rays + kShadow * w.next_events, light = w.light_rays + kShadow * w.splats;
     const double tried = cuda ? 0.35 : 0.25, ray = cuda ? 0.85 : 0.6, bidirectional = cuda ? 1.6 : 1.3;
@@ -117,7 +117,7 @@ double choice_work(const PilotWork& w, const ChoiceCandidate& candidate, bool cu
     if (!c.light && !c.connect) return eye;
     double work = eye + light;
     if (c.connect && c.draws == 0) work += tried * w.pairs + ray * w.pair_rays;
-    if (c.connect && c.draws > 0) work += c.draws * (0.25 * w.draws + 0.6 * w.draw_rays);
+    if (c.connect && c.draws > 0) work += c.draws * (tried * w.draws + ray * w.draw_rays);
     const bool streaming = std::any_of(candidate.settings.begin(), candidate.settings.end(), [](const auto& s) { return s.second == "streaming"; });
     // A light walk for every vertex of an eye walk.
     if (c.connect && streaming) work += std::max(0.0, w.vertices - 1.0) * w.light_rays;
@@ -171,7 +171,9 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     std::vector<double> seconds(candidates.size(), 0.0);
     const size_t best = ranked[0];
     const auto rival = std::find_if(ranked.begin(), ranked.end(), [&](size_t i) { return family(candidates[i]) != family(candidates[best]); });
-    if (!settings.deterministic && rival != ranked.end() && variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
+    // On the CPU stages cost what their items do (docs/performance.md), but for variants of other schedules.
+    const bool doubtful = cuda || (settings.variant != "wavefront" && settings.variant != "lvc");
+    if (doubtful && !settings.deterministic && rival != ranked.end() && variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
         for (const size_t i : {best, *rival}) seconds[i] = timed(scene, settings_of(settings, candidates[i]), cuda, make);
         for (size_t c = 0; c < candidates.size(); ++c) {
             const size_t like = family(candidates[c]) == family(candidates[*rival]) ? *rival : best;

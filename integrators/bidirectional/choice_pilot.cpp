@@ -55,6 +55,7 @@ struct PilotVertex {
 struct Event {
     Rgb value;  ///< f / (n p) of the strategy that found it, for paired walks
     Shares shares;
+    float coverage = 1.0f;  ///< of a splat: how much of it pixels of the film take
     float total() const { return shares.unidirectional + shares.light + shares.connections; }
 };
 
@@ -152,6 +153,17 @@ private:
         return float(std::min(1.0, sum * 4.0 * double(r) * double(r) / (kSteps * kSteps)));
     }
 
+    /// Sum of the filters of the film's pixels at a place; less than one along the edges.
+    float coverage(Vec2f film) const {
+        const Sensor& s = view_.sensor;
+        const float x = film.x - float(s.crop_x), y = film.y - float(s.crop_y), r = s.filter_radius;
+        if (x >= r && y >= r && x <= float(s.crop_width) - r && y <= float(s.crop_height) - r) return 1.0f;
+        float sum = 0.0f;
+        for (float py = max(0.0f, ceilf(y - r - 0.5f)); py <= y + r - 0.5f && py < float(s.crop_height); py += 1.0f)
+            for (float px = max(0.0f, ceilf(x - r - 0.5f)); px <= x + r - 0.5f && px < float(s.crop_width); px += 1.0f) sum += filter_value(view_, {x - (px + 0.5f), y - (py + 0.5f)});
+        return min(sum, 1.0f);
+    }
+
     uint32_t block_at(Vec2f film) const {
         const Sensor& s = view_.sensor;
         const auto index = [](float at, uint32_t pixels, uint32_t blocks) {
@@ -198,7 +210,7 @@ private:
         const auto splat = [&](const float (&others)[kSets], uint32_t which) {
             if (!counts(c.value)) return;
             task.splat_rays += 1;
-            if (free(c, key, which)) task.splats.push_back({{c.value, shares_of(others, 1)}, block_at(film), which == 0, e.radiance});
+            if (free(c, key, which)) task.splats.push_back({{c.value, shares_of(others, 1), coverage(film)}, block_at(film), which == 0, e.radiance});
         };
         float others[kSets];
         if (policy_.splat && !policy_.hide_emitters && connect_visible_light<F>(view_, mis_[0], e, {direction.z, direction.w}, c, film)) {
@@ -257,9 +269,9 @@ private:
         return c.draws == 0 ? 1.0f : float(double(c.draws) * double(result_.samples) / double(std::max<size_t>(1, vertices_.size())));
     }
 
-    /// Adds a path of the pilot's own estimator to the second moments of all candidates (equation 19).
+    /// Adds a path of the pilot's own estimator to the second moments of all candidates (equation 18).
     void add_event(const Event& e, Sums& sums) const {
-        const float weight = 1.0f / e.total();
+        const float weight = e.coverage / e.total();
         bool rare = false;
         for (int k = 0; k < 3; ++k) sums.mean[k] += double(e.value[k] * weight);
         for (uint32_t c = 0; c < candidates_.size(); ++c) {
@@ -277,7 +289,7 @@ private:
     /// What a path adds to the second moment of a candidate, over its squared value.
     double second_moment(uint32_t c, const Event& e, float sum) const {
         const double by_light = candidates_[c].light ? double(e.shares.light / sum) : 0.0;
-        return (1.0 - (1.0 - double(filter_energy_)) * by_light) / (double(e.total()) * double(sum));
+        return double(e.coverage) * (1.0 - (1.0 - double(filter_energy_)) * by_light) / (double(e.total()) * double(sum));
     }
 
     /// What the eye walk of one sample brings to a candidate. The product of `first` and `second` without `own` is what contributions of one sample have in common.
@@ -304,6 +316,7 @@ private:
         EyeSums sums[kMostCandidates];
     };
 
+    /// The pilot's pixels of a block, with all but (18) of the variance (equation 19).
     void eye_block(uint32_t b, Sums* pixels, PilotWork& work) const {
         const Sensor& sensor = view_.sensor;
         const auto edge = [](uint32_t at, uint32_t size, uint32_t blocks) { return uint32_t(uint64_t(at) * size / blocks); };
@@ -529,11 +542,11 @@ private:
             for (const Outlier& o : outliers) {
                 const Event& e = *o.rare->event;
                 const float sum = sum_of(c, e.shares);
-                share += double(sum) / double(e.total()) / double(result_.samples);
+                share += double(e.coverage) * double(sum) / double(e.total()) / double(result_.samples);
                 if (share > kChoiceTrimmed / kChoiceSamples) break;
                 for (int k = 0; k < 3; ++k) {
                     result_.variance[c][o.rare->block] -= second_moment(c, e, sum) * sqr(double(e.value[k])) / (3.0 * samples * o.rare->scale2[k]);
-                    lost[o.rare->block].of[k] += double(e.value[k]) / double(e.total()) / samples;
+                    lost[o.rare->block].of[k] += double(e.coverage) * double(e.value[k]) / double(e.total()) / samples;
                 }
             }
             std::vector<Mean> smooth(count);
