@@ -67,9 +67,14 @@ int render(const Options& o) {
     else
         budget.samples = o.spp ? *o.spp : uint64_t(std::max(1, loaded.scene.integrator.spp));
     RenderPosition position;
+    // Choosing is part of the method: its time counts.
+    if (const ChoiceStats choice = renderer->stats().choice; !choice.name.empty()) {
+        position.seconds = choice.seconds;
+        log_info(fmt::format("bdpt.auto: {}, after {}. To repeat it: {}", choice.name, format_duration(choice.seconds), choice_line(choice)));
+    }
     {
         Progress progress("render");
-        position = drive(*renderer, {}, budget, interrupt_flag(), [&](const RenderPosition& p) {
+        position = drive(*renderer, position, budget, interrupt_flag(), [&](const RenderPosition& p) {
             const double fraction = budget.samples ? double(p.samples) / double(budget.samples) : p.seconds / budget.seconds;
             progress.update(std::min(fraction, 1.0), progress_details(p.samples, p.seconds, renderer->stats()));
         });

@@ -49,7 +49,7 @@ ReferenceEntry read_reference(const Reader& r, const toml::table& t, const std::
         throw r.error(*t.get("integrator"), fmt::format("integrator '{}': a reference is made by path or bdpt, which find all light", integrator));
     add_settings(r, reference.how, t);
     for (size_t i = 0; i < reference.how.settings.size(); ++i)
-        for (const char* key : {"estimator", "strategies"})
+        for (const char* key : {"estimator", "strategies", "bdpt.auto"})
             if (reference.how.settings[i].first == key)
                 throw input_error(r.file, reference.how.lines[i], fmt::format("'{}' in {}: a reference uses all that its integrator has", key, where));
     return reference;

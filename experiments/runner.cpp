@@ -290,8 +290,16 @@ private:
         if (state.notes["rows"].empty() && std::erase_if(lines_, ours) > 0) rewrite_results();
 
         const RenderSettings settings = settings_for(config_, scene, run, seed, hooks_);
-        const std::unique_ptr<Renderer> renderer = hooks_.make_renderer(scene.scene, settings);
+        RenderSettings made = settings;
+        if (settings.automatic && !total.choice.name.empty()) {
+            // What the first part chose, even if this machine is another or busier.
+            made.automatic = false;
+            for (const auto& [key, value] : total.choice.settings) hooks_.apply_setting(made, key, value);
+        }
+        const std::unique_ptr<Renderer> renderer = hooks_.make_renderer(scene.scene, made);
         RenderPosition position{state.moments.samples, state.notes["seconds"].get<double>(), false};
+        // Choosing is part of the method: its time counts.
+        position.seconds += renderer->stats().choice.seconds;
         work_.begin(work, work_after(scene, position));
         std::vector<size_t> pending;
         for (size_t k = 0; k < checkpoints_.size(); ++k)

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "core/version.h"
 
 namespace ambilux {
@@ -9,7 +11,28 @@ namespace {
 
 nlohmann::json invalid_json(const InvalidCounts& invalid) { return {{"nan", invalid.nan}, {"inf", invalid.inf}, {"negative", invalid.negative}}; }
 
+/// Null where nothing was chosen.
+nlohmann::json choice_json(const ChoiceStats& choice) {
+    if (choice.name.empty()) return nullptr;
+    nlohmann::json candidates = nlohmann::json::array(), settings = nlohmann::json::object();
+    for (const ChoiceStats::Candidate& c : choice.candidates)
+        candidates.push_back({{"name", c.name},
+                              {"settings", c.settings},
+                              {"variance", std::isfinite(c.variance) ? nlohmann::json(c.variance) : nlohmann::json(nullptr)},
+                              {"work", c.work},
+                              {"seconds_per_sample", c.seconds > 0 ? nlohmann::json(c.seconds) : nlohmann::json(nullptr)},
+                              {"efficiency", c.efficiency}});
+    for (const auto& [key, value] : choice.settings) settings[key] = value;
+    return {{"name", choice.name}, {"settings", settings}, {"seconds", choice.seconds}, {"pilot_samples", choice.pilot_samples}, {"candidates", candidates}};
+}
+
 }  // namespace
+
+std::string choice_line(const ChoiceStats& choice) {
+    std::string line;
+    for (const auto& [key, value] : choice.settings) line += " --set " + key + "=" + value;
+    return line.empty() ? line : line.substr(1);
+}
 
 std::string scene_hash(const Scene& scene) {
     std::string hex;
@@ -68,12 +91,13 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, co
             {"memory_bytes_predicted", stats.memory_bytes_predicted},
             {"features", stats.features},
             {"skipped", stats.skipped},
+            {"choice", choice_json(stats.choice)},
             {"version", version()},
             {"git_revision", git_revision()}};
 }
 
 Attributes image_attributes(const Scene& scene, const RenderSettings& settings, const RenderStats& stats) {
-    return {{"scene", scene.path},
+    Attributes attributes = {{"scene", scene.path},
             {"scene_hash", scene_hash(scene)},
             {"integrator", settings.integrator},
             {"variant", settings.variant},
@@ -87,6 +111,8 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& settings, 
             {"seconds", stats.render_seconds},
             {"software", fmt::format("ambilux {}", version())},
             {"git_revision", git_revision()}};
+    if (!stats.choice.name.empty()) attributes["choice"] = choice_line(stats.choice);
+    return attributes;
 }
 
 std::string stage_table(const RenderStats& stats) {

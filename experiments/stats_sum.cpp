@@ -1,6 +1,7 @@
 #include "experiments/stats_sum.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace ambilux {
 namespace {
@@ -28,10 +29,30 @@ void add(InvalidCounts& total, const InvalidCounts& before, const InvalidCounts&
 nlohmann::json save(const InvalidCounts& c) { return {c.nan, c.inf, c.negative}; }
 InvalidCounts restore(const nlohmann::json& j) { return {j.at(0).get<uint64_t>(), j.at(1).get<uint64_t>(), j.at(2).get<uint64_t>()}; }
 
+nlohmann::json save(const ChoiceStats& c) {
+    nlohmann::json candidates = nlohmann::json::array();
+    // Infinite variances become null.
+    for (const ChoiceStats::Candidate& x : c.candidates) candidates.push_back({x.name, x.settings, x.variance, x.work, x.seconds, x.efficiency});
+    return {c.name, c.settings, c.seconds, c.pilot_samples, candidates};
+}
+
+ChoiceStats restore_choice(const nlohmann::json& j) {
+    ChoiceStats c;
+    c.name = j.at(0);
+    c.settings = j.at(1).get<std::vector<std::pair<std::string, std::string>>>();
+    c.seconds = j.at(2);
+    c.pilot_samples = j.at(3);
+    for (const auto& x : j.at(4))
+        c.candidates.push_back({x.at(0), x.at(1), x.at(2).is_null() ? std::numeric_limits<double>::infinity() : x.at(2).get<double>(), x.at(3), x.at(4), x.at(5)});
+    return c;
+}
+
 }  // namespace
 
 void add_part(RenderStats& total, const RenderStats& before, const RenderStats& now) {
     RenderStats sum = now;
+    // A resumed render goes on with what its first part chose.
+    if (sum.choice.name.empty()) sum.choice = total.choice;
     sum.stages = total.stages;
     sum.queues = total.queues;
     sum.invalid = total.invalid;
@@ -82,7 +103,8 @@ nlohmann::json save_stats(const RenderStats& s) {
             {"invalid_by_stage", invalid},
             {"memory", {s.memory_bytes, s.memory_bytes_predicted}},
             {"features", s.features},
-            {"skipped", s.skipped}};
+            {"skipped", s.skipped},
+            {"choice", save(s.choice)}};
 }
 
 RenderStats restore_stats(const nlohmann::json& j) {
@@ -104,6 +126,7 @@ RenderStats restore_stats(const nlohmann::json& j) {
     s.memory_bytes_predicted = j.at("memory").at(1);
     s.features = j.at("features").get<std::vector<std::string>>();
     s.skipped = j.at("skipped").get<std::vector<std::string>>();
+    s.choice = restore_choice(j.at("choice"));
     return s;
 }
 

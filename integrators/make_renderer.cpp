@@ -3,19 +3,23 @@
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "integrators/bidirectional/bidirectional.h"
+#include "integrators/bidirectional/choice.h"
 #include "integrators/path/path.h"
 
 namespace ambilux {
 
 bool cuda_available() { return cuda_device_present(); }
 
-std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings& settings) {
+namespace {
+
+std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
     // Settings may come from elsewhere than apply_setting.
     RenderSettings checked;
     apply_setting(checked, "integrator", settings.integrator);
     apply_setting(checked, "variant", settings.variant);
     apply_setting(checked, "backend", settings.backend);
     apply_setting(checked, "accel", settings.accel);
+    if (settings.automatic) check_automatic(settings);
     if (settings.variant != "wavefront" && settings.integrator != "bdpt")
         throw Error(ExitCode::usage, "variant=" + settings.variant + ": integrator " + settings.integrator + " has the variant wavefront only; megakernel, lvc and streaming belong to bdpt");
     if (settings.technique_depth > 0 && (settings.integrator == "path" || settings.variant == "megakernel"))
@@ -28,11 +32,19 @@ std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings
                                                  cuda ? "cwbvh" : "embree and cwbvh"));
     if (cuda && settings.deterministic && settings.variant == "lvc")
         throw Error(ExitCode::usage, "deterministic=true: variant lvc draws from a cache whose order differs between runs on a CUDA device; use wavefront or megakernel");
+    if (settings.automatic) return make_automatic(scene, settings, cuda, accels, [&](const RenderSettings& chosen) { return make_from(scene, chosen, accels); });
     RenderSettings chosen = settings;
     // On a host connect waits for the tables of environments, which it can ask for ahead only as a stage of its own.
     if (chosen.fuse == Fuse::automatic) chosen.fuse = cuda ? Fuse::all : Fuse::light;
-    if (chosen.integrator != "path") return cuda ? make_bidirectional_cuda(scene, chosen) : make_bidirectional_cpu(scene, chosen);
-    return cuda ? make_path_cuda(scene, chosen) : make_path_cpu(scene, chosen);
+    if (chosen.integrator != "path") return cuda ? make_bidirectional_cuda(scene, chosen, accels) : make_bidirectional_cpu(scene, chosen, accels);
+    return cuda ? make_path_cuda(scene, chosen, accels) : make_path_cpu(scene, chosen, accels);
+}
+
+}  // namespace
+
+std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings& settings) {
+    SharedAccels accels(scene);
+    return make_from(scene, settings, accels);
 }
 
 }  // namespace ambilux

@@ -44,6 +44,7 @@ struct RenderSettings {
     Fuse fuse = Fuse::automatic;         ///< which stages pass their items on without a queue
     float cull = 0.0f;                   ///< Russian roulette before shadow rays (survival_factor); 0: none
     bool deterministic = false;
+    bool automatic = false;              ///< bdpt: a pilot chooses strategies, variant and connections (bdpt.auto)
     bool graph = true;                   ///< cuda: one graph per wave; false launches kernel by kernel, for profilers and sanitizers
 };
 
@@ -69,6 +70,22 @@ struct QueueStats {
     uint64_t capacity = 0, peak = 0, overflow = 0;
 };
 
+/// How bdpt.auto=true chose.
+struct ChoiceStats {
+    struct Candidate {
+        std::string name, settings;
+        double variance;    ///< of one sample of a pixel, relative to its squared mean; infinite if some light cannot be found
+        double work;        ///< of one sample, in rays
+        double seconds;     ///< of one sample of all pixels; 0 where it was not measured
+        double efficiency;  ///< 1 / (variance · cost) over that of the choice
+    };
+    std::string name;  ///< of the choice; empty if there was none
+    std::vector<std::pair<std::string, std::string>> settings;  ///< with them the same estimator runs again
+    double seconds = 0;  ///< that the choice took
+    uint32_t pilot_samples = 0;
+    std::vector<Candidate> candidates;
+};
+
 struct RenderStats {
     std::string backend, device, accel;
     double build_seconds = 0;   ///< acceleration structure, upload, allocation
@@ -82,6 +99,7 @@ struct RenderStats {
     uint64_t memory_bytes = 0;            ///< allocated for this render (scene, structure, queues, film)
     uint64_t memory_bytes_predicted = 0;  ///< computed before the allocation
     std::vector<std::string> features;    ///< what the kernels contain
+    ChoiceStats choice;
     std::vector<std::string> skipped;     ///< stages and kernel parts that this scene does not need
 };
 

@@ -120,6 +120,8 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         set_strategies(s, key, value);
     else if (key == "technique_depth")
         s.technique_depth = integer<uint32_t>(key, value, 0, kMaxTechniqueDepth);
+    else if (key == "bdpt.auto")
+        s.automatic = boolean(key, value);
     else if (key == "connections")
         s.connections = integer<uint32_t>(key, value, 1, kMaxCacheDraws);
     else if (key == "max_depth")
@@ -144,7 +146,7 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.graph = boolean(key, value);
     else
         throw Error(ExitCode::usage,
-                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, connections, max_depth, rr_depth, seed, accel, wave_size, specialise, fuse, cull, deterministic, graph", key));
+                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, bdpt.auto, connections, max_depth, rr_depth, seed, accel, wave_size, specialise, fuse, cull, deterministic, graph", key));
 }
 
 }  // namespace ambilux

@@ -122,6 +122,8 @@ inline Hooks fake_hooks(World& world) {
                     s.rr_depth = std::stoi(value);
                 else if (key == "connections")
                     s.connections = uint32_t(std::stoul(value));
+                else if (key == "bdpt.auto")
+                    s.automatic = value == "true";
                 else if (key == "technique_depth")
                     s.technique_depth = uint32_t(std::stoul(value));
                 else if (key == "variant")

@@ -261,6 +261,53 @@ TEST_CASE("a signal ends an experiment with what is done saved, and resuming rep
     CHECK(table(folder / "out/runs.csv").size() == 32);
 }
 
+TEST_CASE("a resumed render goes on with what its first part chose, and choosing takes of its time") {
+    const TempFolder folder;
+    std::string config = kConfig;
+    config.replace(config.find("name = \"biased\"\nintegrator = \"path\"\nestimator = \"naive\""), std::string::npos, "name = \"chosen\"\nintegrator = \"bdpt\"\nset = { \"bdpt.auto\" = true }\n");
+    config.replace(config.find("seeds = [1, 2]"), 14, "seeds = [1]");
+    write_inputs(folder, config);
+    /// Each choice is another one.
+    struct Choosing : FakeRenderer {
+        Choosing(const Scene& scene, const RenderSettings& settings, World& world, int number) : FakeRenderer(scene, settings, world) {
+            if (settings.automatic) choice = {"choice", {{"connections", std::to_string(number)}}, 1000.0, 1, {}};
+        }
+        RenderStats stats() override {
+            RenderStats s = FakeRenderer::stats();
+            s.choice = choice;
+            return s;
+        }
+        ChoiceStats choice;
+    };
+    World world;
+    Hooks hooks = fake_hooks(world);
+    std::vector<RenderSettings> made;
+    hooks.make_renderer = [&](const Scene& scene, const RenderSettings& settings) {
+        made.push_back(settings);
+        return std::make_unique<Choosing>(scene, settings, world, int(made.size()));
+    };
+    auto r = request(folder, "out");
+    r.interrupt = &world.flag;
+    // The references take 2·134 calls, the run "good" 13, of whose number the first of "chosen" on scene a is one more.
+    world.stop_at = 2 * 134 + 13 + 8;
+    REQUIRE(run_experiment(r, hooks) == ExitCode::interrupted);
+    REQUIRE(made.back().automatic);
+    const uint32_t first = uint32_t(made.size());
+    world.flag = false;
+    r.resume = true;
+    made.clear();
+    REQUIRE(run_experiment(r, hooks) == ExitCode::done);
+    // Tried, rendered: the first render that is made again for "chosen" with that number of connections is the one that was interrupted.
+    const auto resumed = std::find_if(made.begin(), made.end(), [&](const RenderSettings& s) { return s.integrator == "bdpt" && !s.automatic; });
+    REQUIRE(resumed != made.end());
+    CHECK(resumed->connections == first);
+    for (const auto& row : table(folder / "out/runs.csv"))
+        if (row[column("run")] == "chosen") CHECK(std::stod(row[column("time")]) >= 1000.0);
+    const auto stats = nlohmann::json::parse(read_file(folder / "out/stats/a/chosen_1.json"));
+    CHECK(stats["choice"]["settings"]["connections"] == std::to_string(first));
+    CHECK(stats["choice"]["seconds"] == 1000.0);
+}
+
 TEST_CASE("a damaged state costs the render, not the experiment") {
     const TempFolder folder;
     RenderState state{{1, 1, 2, {1, 2, 3}, {4, 5, 6}}, {{"rows", {"x"}}}};

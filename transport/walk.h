@@ -180,9 +180,20 @@ AMBILUX_HD bool connect_next_event(const SceneView& scene, const BidirectionalMi
     return true;
 }
 
-/// s >= 2, t >= 2: vertex y of a light walk and vertex z of an eye walk.
+/// Densities along the segment between a light vertex y and an eye vertex z, and of the directions back along their walks (equation 7).
+struct ConnectionDensities {
+    float y_area, y_reverse_sa;  ///< of y by sampling at z; of the way back from y
+    float z_area, z_reverse_sa;
+};
+
+/// The sum of the strategies that would have sampled both ends otherwise, in multiples of the density of one pair of walks.
+AMBILUX_HD float others_of_connection(const BidirectionalMis& mis, MisSums y, bool y_first, MisSums z, bool z_first, const ConnectionDensities& p) {
+    return others_behind(mis, y, y_first, p.y_area, p.y_reverse_sa) + others_behind(mis, z, z_first, p.z_area, p.z_reverse_sa);
+}
+
+/// s >= 2, t >= 2: vertex y of a light walk and vertex z of an eye walk, but for the weight.
 template <Features F>
-AMBILUX_HD bool connect_vertices(const BidirectionalMis& mis, const WalkVertex& y, Rgb y_throughput, const WalkVertex& z, Rgb z_throughput, WalkConnection& c) {
+AMBILUX_HD bool connect_unweighted(const WalkVertex& y, Rgb y_throughput, const WalkVertex& z, Rgb z_throughput, WalkConnection& c, ConnectionDensities& p) {
     const Vec3f to_y = y.point.p - z.point.p;
     const float d2 = length_squared(to_y);
     if (!(d2 > 0.0f)) return false;
@@ -193,10 +204,17 @@ AMBILUX_HD bool connect_vertices(const BidirectionalMis& mis, const WalkVertex& 
     if (is_zero(f_y)) return false;
     c.value = y_throughput * f_y * f_z * z_throughput * (1.0f / d2);
     const float cos_y = fabsf(dot(y.point.ng, w)), cos_z = fabsf(dot(z.point.ng, w));
-    c.others = others_behind(mis, y.sums, y.first, scatter_pdf<F>(z.scattering, w) * cos_y / d2, scatter_pdf_reverse<F>(y.scattering, -w)) +
-               others_behind(mis, z.sums, z.first, scatter_pdf<F>(y.scattering, -w) * cos_z / d2, scatter_pdf_reverse<F>(z.scattering, w));
-    c.others /= mis.connection_term();
+    p = {scatter_pdf<F>(z.scattering, w) * cos_y / d2, scatter_pdf_reverse<F>(y.scattering, -w), scatter_pdf<F>(y.scattering, -w) * cos_z / d2, scatter_pdf_reverse<F>(z.scattering, w)};
     return set_segment(c, z.point, w, y.point.p, y.point.p_error, y.point.ng);
+}
+
+/// s >= 2, t >= 2: vertex y of a light walk and vertex z of an eye walk.
+template <Features F>
+AMBILUX_HD bool connect_vertices(const BidirectionalMis& mis, const WalkVertex& y, Rgb y_throughput, const WalkVertex& z, Rgb z_throughput, WalkConnection& c) {
+    ConnectionDensities p;
+    if (!connect_unweighted<F>(y, y_throughput, z, z_throughput, c, p)) return false;
+    c.others = others_of_connection(mis, y.sums, y.first, z.sums, z.first, p) / mis.connection_term();
+    return true;
 }
 
 /// False for places on the film that no filter of a pixel reaches: what lands there needs no shadow ray.

@@ -2,13 +2,14 @@
 #pragma once
 
 #include "integrators/renderer.h"
+#include "scene/accel/shared_accels.h"
 
 namespace ambilux {
 
 /// CPU: small waves of paired walks, one per task. All tasks of a sample add their splats to one film in fixed point.
-std::unique_ptr<Renderer> make_bidirectional_cpu(const Scene& scene, const RenderSettings& settings);
+std::unique_ptr<Renderer> make_bidirectional_cpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
 
 /// CUDA: one wave over the whole film. Throws Error(device) without a CUDA build or a device.
-std::unique_ptr<Renderer> make_bidirectional_cuda(const Scene& scene, const RenderSettings& settings);
+std::unique_ptr<Renderer> make_bidirectional_cuda(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
 
 }  // namespace ambilux

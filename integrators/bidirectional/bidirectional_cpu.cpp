@@ -53,7 +53,7 @@ struct WaveMemory {
 template <Features F, class Accel>
 class BidirectionalCpu final : public Renderer {
 public:
-    BidirectionalCpu(const Scene& scene, const RenderSettings& settings)
+    BidirectionalCpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : scene_(scene), view_(scene.view()), policy_(make_bidirectional_policy(scene, settings)), accel_name_(settings.accel == "cwbvh" ? "cwbvh" : "embree") {
         const auto start = Clock::now();
         const int threads = arena_.max_concurrency();
@@ -67,7 +67,7 @@ public:
         if (settings.variant == "streaming") policy_.stream_slots = std::max(kTilePixels, wave_.slot_count() / 4);
         const uint64_t values = uint64_t(wave_.width) * wave_.height * 3;
         try {
-            accel_.emplace(scene);
+            accel_ = accels.get<Accel>();
             moments_.sum.resize(values);
             moments_.sum_squares.resize(values);
             samples_of_slots_.resize(film_wave_.slot_count());
@@ -188,7 +188,7 @@ private:
     Wave wave_{}, film_wave_{};  ///< of one task, and of the whole film
     WaveState film_state_{};
     StageRecord film_records_[kStageCount] = {};
-    std::optional<Accel> accel_;
+    std::shared_ptr<const Accel> accel_;
     std::vector<WaveMemory> waves_;
     std::vector<Lane> samples_of_slots_;
     std::vector<int64_t> splats_, techniques_;
@@ -200,11 +200,11 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_bidirectional_cpu(const Scene& scene, const RenderSettings& settings) {
+std::unique_ptr<Renderer> make_bidirectional_cpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
     return with_feature_level(scene.features, settings.specialise, [&](auto level) -> std::unique_ptr<Renderer> {
         constexpr Features F = decltype(level)::value;
-        if (settings.accel == "cwbvh") return std::make_unique<BidirectionalCpu<F, CwbvhAccel>>(scene, settings);
-        return std::make_unique<BidirectionalCpu<F, EmbreeAccel>>(scene, settings);
+        if (settings.accel == "cwbvh") return std::make_unique<BidirectionalCpu<F, CwbvhAccel>>(scene, settings, accels);
+        return std::make_unique<BidirectionalCpu<F, EmbreeAccel>>(scene, settings, accels);
     });
 }
 

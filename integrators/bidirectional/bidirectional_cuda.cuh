@@ -23,15 +23,15 @@ namespace ambilux {
 template <Features F>
 class BidirectionalCuda final : public Renderer {
 public:
-    BidirectionalCuda(const Scene& scene, const RenderSettings& settings)
+    BidirectionalCuda(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : scene_(scene), policy_(make_bidirectional_policy(scene, settings)), use_graph_(settings.graph),
           traced_(settings.specialise ? scene.features : kAllFeatures) {
         const auto start = Clock::now();
         wave_ = shape_wave(scene, settings, kTilePixels, 1);
         wave_.tiles = tile_count(wave_);  // splats may land anywhere on the film
         const uint32_t slots = wave_.tiles * kTilePixels;
-        const CwbvhAccel accel(scene);
-        const double mean = policy_.light_walks && settings.variant != "streaming" ? mean_light_vertices<F>(scene.view(), accel.tracer(), policy_, settings.seed) : 0.0;
+        const std::shared_ptr<const CwbvhAccel> accel = accels.get<CwbvhAccel>();
+        const double mean = policy_.light_walks && settings.variant != "streaming" ? mean_light_vertices<F>(scene.view(), accel->tracer(), policy_, settings.seed) : 0.0;
         plan_cache(policy_, mean);
         // Samples that share a cache of light vertices depend on each other, but by one part in the number of light walks only.
         size_t free = 0, total = 0;
@@ -47,7 +47,7 @@ public:
         }
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         device_scene_.emplace(scene);
-        device_accel_.emplace(accel.arrays());
+        device_accel_.emplace(accel->arrays());
         sum_ = DeviceBuffer<double>(values_, "film");
         sum_squares_ = DeviceBuffer<double>(values_, "film");
         splats_ = DeviceBuffer<int64_t>(values_ * wave_.samples, "splats");

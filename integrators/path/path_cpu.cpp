@@ -40,7 +40,7 @@ struct WaveMemory {
 template <Features F, class Accel>
 class PathCpu final : public Renderer {
 public:
-    PathCpu(const Scene& scene, const RenderSettings& settings)
+    PathCpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : scene_(scene), view_(scene.view()), policy_(make_path_policy(scene, settings)), accel_name_(settings.accel == "cwbvh" ? "cwbvh" : "embree") {
         const auto start = Clock::now();
         const int threads = arena_.max_concurrency();
@@ -53,7 +53,7 @@ public:
         const uint64_t values = uint64_t(wave_.width) * wave_.height * 3;
         const uint64_t own = layout_.bytes() * uint64_t(threads) + 2 * values * sizeof(double);
         try {
-            accel_.emplace(scene);
+            accel_ = accels.get<Accel>();
             film_.sum.resize(values);
             film_.sum_squares.resize(values);
             for (int t = 0; t < threads; ++t) waves_.emplace_back(layout_.bytes(), wave_.slot_count(), policy_);
@@ -143,7 +143,7 @@ private:
     tbb::task_arena arena_;
     Wave wave_{};
     Layout layout_;
-    std::optional<Accel> accel_;
+    std::shared_ptr<const Accel> accel_;
     std::vector<WaveMemory> waves_;
     FilmMoments film_;
     uint64_t predicted_bytes_ = 0, samples_ = 0, measured_samples_ = 0;
@@ -152,11 +152,11 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_path_cpu(const Scene& scene, const RenderSettings& settings) {
+std::unique_ptr<Renderer> make_path_cpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
     return with_feature_level(scene.features, settings.specialise, [&](auto level) -> std::unique_ptr<Renderer> {
         constexpr Features F = decltype(level)::value;
-        if (settings.accel == "cwbvh") return std::make_unique<PathCpu<F, CwbvhAccel>>(scene, settings);
-        return std::make_unique<PathCpu<F, EmbreeAccel>>(scene, settings);
+        if (settings.accel == "cwbvh") return std::make_unique<PathCpu<F, CwbvhAccel>>(scene, settings, accels);
+        return std::make_unique<PathCpu<F, EmbreeAccel>>(scene, settings, accels);
     });
 }
 

@@ -25,16 +25,16 @@ constexpr uint32_t kCudaWavePlateau = 1u << 24;
 template <Features F>
 class PathCuda final : public Renderer {
 public:
-    PathCuda(const Scene& scene, const RenderSettings& settings)
+    PathCuda(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : scene_(scene), policy_(make_path_policy(scene, settings)) {
         const auto start = Clock::now();
-        std::optional<CwbvhAccel> wide;
+        std::shared_ptr<const CwbvhAccel> wide;
         std::optional<PairAccel> pairs;
         const bool binary = settings.accel == "bvh2";
         if (binary)
             pairs.emplace(scene);
         else
-            wide.emplace(scene);
+            wide = accels.get<CwbvhAccel>();
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
         Layout million;

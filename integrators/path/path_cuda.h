@@ -2,11 +2,12 @@
 #pragma once
 
 #include "integrators/renderer.h"
+#include "scene/accel/shared_accels.h"
 
 namespace ambilux {
 
-std::unique_ptr<Renderer> make_path_cuda_diffuse(const Scene& scene, const RenderSettings& settings);
-std::unique_ptr<Renderer> make_path_cuda_triangles(const Scene& scene, const RenderSettings& settings);
-std::unique_ptr<Renderer> make_path_cuda_all(const Scene& scene, const RenderSettings& settings);
+std::unique_ptr<Renderer> make_path_cuda_diffuse(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
+std::unique_ptr<Renderer> make_path_cuda_triangles(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
+std::unique_ptr<Renderer> make_path_cuda_all(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
 
 }  // namespace ambilux

@@ -1,0 +1,199 @@
+#include "integrators/bidirectional/choice.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/error.h"
+#include "scene/accel/cwbvh.h"
+#include "scene/accel/embree_tracer.h"
+
+namespace ambilux {
+namespace {
+
+/// Pilots: a few hundredths of the shortest renders that are worth a choice, on 2 cores and on the 16 beside a GPU.
+constexpr uint32_t kPilotSamplesCpu = 8192, kPilotSamplesCuda = 32768;
+/// Share of the blocks that the comparison leaves out.
+constexpr double kTrimmedBlocks = 0.01;
+/// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this factor of the best are timed.
+constexpr double kDoubt = 1.5;
+constexpr uint32_t kFirstTimedSample = 0xffff0000u;  ///< far from those of the image
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+std::string joined(const std::vector<std::pair<std::string, std::string>>& settings) {
+    std::string text;
+    for (const auto& [key, value] : settings) text += (text.empty() ? "" : " ") + key + "=" + value;
+    return text;
+}
+
+RenderSettings settings_of(const RenderSettings& settings, const ChoiceCandidate& candidate) {
+    RenderSettings s = settings;
+    s.automatic = false;
+    for (const auto& [key, value] : candidate.settings) apply_setting(s, key, value);
+    return s;
+}
+
+/// Candidates of one family do the same but for the number of draws, so that the time of one tells that of the others.
+uint32_t family(const ChoiceCandidate& c) { return (c.pilot.light ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0); }
+
+/// Seconds per sample of every pixel. On a device: of a wave as full as it gets.
+double timed(const Scene& scene, const RenderSettings& settings, bool cuda, const MakeRenderer& make) {
+    constexpr double kLongEnough = 0.05;
+    constexpr uint32_t kPathsPerWave = 1u << 21;
+    const std::unique_ptr<Renderer> renderer = make(settings);
+    const uint32_t pixels = scene.sensor.crop_width * scene.sensor.crop_height, count = cuda ? std::max(1u, kPathsPerWave / std::max(1u, pixels)) : 1;
+    double seconds = 0;
+    // The second time, unless the first was long enough for what only the first launch costs not to matter.
+    for (uint32_t i = 0; i < 2 && seconds < kLongEnough; ++i) {
+        const auto start = Clock::now();
+        renderer->render(kFirstTimedSample + i * count, count);
+        seconds = seconds_since(start);
+    }
+    return seconds / count;
+}
+
+/// A renderer that also tells how it was chosen.
+class Chosen final : public Renderer {
+public:
+    Chosen(std::unique_ptr<Renderer> renderer, ChoiceStats choice) : renderer_(std::move(renderer)), choice_(std::move(choice)) {}
+
+    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override { return renderer_->render(first, count, interrupt); }
+    FilmMoments film() override { return renderer_->film(); }
+    void clear_film() override { renderer_->clear_film(); }
+    RenderStats stats() override {
+        RenderStats s = renderer_->stats();
+        s.choice = choice_;
+        return s;
+    }
+    std::vector<TechniqueImage> technique_images() override { return renderer_->technique_images(); }
+    uint32_t preferred_batch() const override { return renderer_->preferred_batch(); }
+
+private:
+    std::unique_ptr<Renderer> renderer_;
+    ChoiceStats choice_;
+};
+
+}  // namespace
+
+void check_automatic(const RenderSettings& s) {
+    const auto refuse = [](const std::string& text) { throw Error(ExitCode::usage, text); };
+    if (s.integrator != "bdpt") refuse(fmt::format("bdpt.auto=true: integrator {} leaves nothing to choose; use integrator bdpt", s.integrator));
+    if (s.strategies != kAllStrategies || s.singles.on) refuse("bdpt.auto=true chooses the strategies: leave out the setting strategies, or bdpt.auto");
+    if (s.connections != RenderSettings().connections) refuse(fmt::format("connections={}: bdpt.auto=true chooses the number of connections; leave one of the two out", s.connections));
+    if (s.technique_depth > 0)
+        refuse(fmt::format("technique_depth={}: bdpt.auto=true may choose the path tracer, which gathers no images of single strategies; render once without them and repeat with the settings that "
+                           "were chosen",
+                           s.technique_depth));
+}
+
+std::vector<ChoiceCandidate> choice_candidates(const RenderSettings& settings, bool cuda) {
+    const std::string& variant = settings.variant;
+    std::vector<ChoiceCandidate> all = {{"path", {false, false, 0}, {{"integrator", "path"}, {"variant", "wavefront"}, {"estimator", "mis"}}}};
+    const auto bdpt = [](const std::string& of, const std::string& strategies) {
+        return std::vector<std::pair<std::string, std::string>>{{"integrator", "bdpt"}, {"variant", of}, {"strategies", strategies}};
+    };
+    const std::string plain = variant == "lvc" ? "wavefront" : variant;
+    all.push_back({"bdpt without connections", {true, false, 0}, bdpt(plain, "hits+next_event+light")});
+    if (variant != "lvc") all.push_back({"bdpt, " + variant, {true, true, 0}, bdpt(variant, "all")});
+    // On a device the cache has another order in every run.
+    const bool cache = variant == "lvc" || (variant == "wavefront" && !(cuda && settings.deterministic));
+    for (uint32_t k = 1; cache && k <= 4; ++k) {
+        all.push_back({fmt::format("bdpt, lvc, {} connection{}", k, k > 1 ? "s" : ""), {true, true, k}, bdpt("lvc", "all")});
+        all.back().settings.emplace_back("connections", std::to_string(k));
+    }
+    return all;
+}
+
+double choice_work(const PilotWork& w, const ChoiceCandidate& candidate, bool cuda) {
+    // Fitted to renders (docs/performance.md): shadow rays and connections in rays of walks; what the longer records and further launches of bidirectional methods cost.
+    constexpr double kShadow = 0.8;
+    const double eye = w.eye_rays + kShadow * w.next_events, light = w.light_rays + kShadow * w.splats;
+    const double tried = cuda ? 0.35 : 0.25, ray = cuda ? 0.85 : 0.6, bidirectional = cuda ? 1.6 : 1.3;
+    const PilotCandidate& c = candidate.pilot;
+    if (!c.light && !c.connect) return eye;
+    double work = eye + light;
+    if (c.connect && c.draws == 0) work += tried * w.pairs + ray * w.pair_rays;
+    if (c.connect && c.draws > 0) work += c.draws * (tried * w.draws + ray * w.draw_rays);
+    const bool streaming = std::any_of(candidate.settings.begin(), candidate.settings.end(), [](const auto& s) { return s.second == "streaming"; });
+    // A light walk for every vertex of an eye walk.
+    if (c.connect && streaming) work += std::max(0.0, w.vertices - 1.0) * w.light_rays;
+    return bidirectional * work;
+}
+
+std::vector<double> choice_variances(const ChoicePilot& pilot) {
+    const size_t blocks = pilot.variance[0].size();
+    std::vector<std::pair<double, size_t>> worst(blocks);
+    for (size_t b = 0; b < blocks; ++b) {
+        worst[b] = {kInfinity, b};
+        for (const std::vector<double>& of : pilot.variance) worst[b].first = std::min(worst[b].first, of[b]);
+    }
+    std::sort(worst.begin(), worst.end());
+    const size_t kept = blocks - size_t(kTrimmedBlocks * double(blocks));
+    std::vector<double> variances;
+    for (size_t c = 0; c < pilot.variance.size(); ++c) {
+        double sum = 0;
+        for (size_t i = 0; i < kept; ++i) sum += pilot.variance[c][worst[i].second];
+        variances.push_back(pilot.blind[c] ? double(kInfinity) : std::max(sum / double(kept), 1e-12));
+    }
+    return variances;
+}
+
+std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda, SharedAccels& accels, const MakeRenderer& make) {
+    check_automatic(settings);
+    // Any render builds this: it is no cost of the choice.
+    const bool cwbvh = cuda || settings.accel == "cwbvh";
+    if (cwbvh)
+        accels.get<CwbvhAccel>();
+    else
+        accels.get<EmbreeAccel>();
+    const auto start = Clock::now();
+    const std::vector<ChoiceCandidate> candidates = choice_candidates(settings, cuda);
+    std::vector<PilotCandidate> judged;
+    for (const ChoiceCandidate& c : candidates) judged.push_back(c.pilot);
+    const ChoicePilot pilot = run_choice_pilot(scene, settings, cwbvh, accels, judged, cuda ? kPilotSamplesCuda : kPilotSamplesCpu);
+    const std::vector<double> variance = choice_variances(pilot);
+    std::vector<double> cost;  // of a sample, in any unit; smaller is better in product with the variance
+    for (const ChoiceCandidate& c : candidates) cost.push_back(choice_work(pilot.work, c, cuda));
+    const std::vector<double> work = cost;
+
+    // The best two families, if they cannot be told apart by work.
+    const auto order = [&] {
+        std::vector<size_t> of(candidates.size());
+        for (size_t i = 0; i < of.size(); ++i) of[i] = i;
+        std::stable_sort(of.begin(), of.end(), [&](size_t a, size_t b) { return variance[a] * cost[a] < variance[b] * cost[b]; });
+        return of;
+    };
+    std::vector<size_t> ranked = order();
+    std::vector<double> seconds(candidates.size(), 0.0);
+    const size_t best = ranked[0];
+    const auto rival = std::find_if(ranked.begin(), ranked.end(), [&](size_t i) { return family(candidates[i]) != family(candidates[best]); });
+    // On the CPU stages cost what their items do (docs/performance.md), but for variants of other schedules.
+    const bool doubtful = cuda || (settings.variant != "wavefront" && settings.variant != "lvc");
+    if (doubtful && !settings.deterministic && rival != ranked.end() && variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
+        for (const size_t i : {best, *rival}) seconds[i] = timed(scene, settings_of(settings, candidates[i]), cuda, make);
+        for (size_t c = 0; c < candidates.size(); ++c) {
+            const size_t like = family(candidates[c]) == family(candidates[*rival]) ? *rival : best;
+            cost[c] = seconds[like] * work[c] / work[like];
+            // Families that work has put behind both need not win by the error of its estimate.
+            if (family(candidates[c]) != family(candidates[like])) cost[c] *= kDoubt;
+        }
+        ranked = order();
+    }
+
+    ChoiceStats choice;
+    choice.name = candidates[ranked[0]].name;
+    choice.settings = candidates[ranked[0]].settings;
+    choice.pilot_samples = pilot.samples;
+    for (size_t c = 0; c < candidates.size(); ++c)
+        choice.candidates.push_back({candidates[c].name, joined(candidates[c].settings), variance[c], work[c], seconds[c],
+                                     std::isfinite(variance[c]) ? variance[ranked[0]] * cost[ranked[0]] / (variance[c] * cost[c]) : 0.0});
+    choice.seconds = seconds_since(start);
+    std::unique_ptr<Renderer> renderer = make(settings_of(settings, candidates[ranked[0]]));
+    return std::make_unique<Chosen>(std::move(renderer), std::move(choice));
+}
+
+}  // namespace ambilux

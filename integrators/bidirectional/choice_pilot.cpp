@@ -1,0 +1,586 @@
+#include "integrators/bidirectional/choice_pilot.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/parallel.h"
+#include "integrators/bidirectional/wave.h"
+#include "integrators/feature_levels.h"
+#include "scene/accel/cwbvh.h"
+#include "scene/accel/embree_tracer.h"
+#include "transport/sensor/camera.h"
+
+namespace ambilux {
+namespace {
+
+/// Samples of one pixel: their products estimate its squared mean.
+constexpr uint32_t kPixelSamples = 4;
+constexpr uint32_t kMostBlocks = 32;  ///< a side
+constexpr uint32_t kSmallestBlock = 4;  ///< pixels
+constexpr uint32_t kWalksPerTask = 64;
+constexpr uint32_t kMostCandidates = 8;
+/// A candidate that finds a path this much less often than the pilot does may show it as single bright pixels.
+constexpr float kRareShare = 0.02f;
+
+/// Sets of strategies whose sums walks carry along: hits and next event estimation; light tracing besides; connections besides. The rest follows by differences, since the sums
+/// of the balance heuristic are linear in the densities.
+constexpr uint32_t kSets = 3;
+using SetSums = std::array<MisSums, kSets>;
+
+/// Densities of the groups that could have sampled a path, in multiples of that which did, all with the numbers of samples of paired walks.
+struct Shares {
+    float unidirectional, light, connections;
+};
+
+/// From `others` of each set; `own`: the first set that has the strategy itself.
+Shares shares_of(const float (&others)[kSets], uint32_t own) {
+    float sum[kSets];
+    for (uint32_t m = 0; m < kSets; ++m) sum[m] = others[m] + (m >= own ? 1.0f : 0.0f);
+    return {sum[0], std::max(0.0f, sum[1] - sum[0]), std::max(0.0f, sum[2] - sum[1])};
+}
+
+struct PilotWalk {
+    Walk walk;
+    SetSums sums;
+};
+
+struct PilotVertex {
+    WalkVertex vertex;
+    SetSums sums;
+    Rgb throughput;
+    uint32_t depth;
+};
+
+/// What a path brings without a weight, and who could have found it.
+struct Event {
+    Rgb value;  ///< f / (n p) of the strategy that found it, for paired walks
+    Shares shares;
+    float coverage = 1.0f;  ///< of a splat: how much of it pixels of the film take
+    float total() const { return shares.unidirectional + shares.light + shares.connections; }
+};
+
+struct SplatEvent {
+    Event event;
+    uint32_t block;
+    bool seen;  ///< the emitter itself
+    Rgb radiance;  ///< of it
+};
+
+/// Sums over the samples of one pixel, or of one splat.
+struct Sums {
+    double mean[3] = {};
+    double variance[kMostCandidates][3] = {};
+    double seen[3] = {};  ///< largest radiance of emitters that the camera sees here
+    bool blind[kMostCandidates] = {};   ///< a candidate cannot find some light
+    std::vector<Event> rare;            ///< for some candidate
+};
+
+struct LightTask {
+    std::vector<PilotVertex> vertices;
+    std::vector<uint32_t> ends;  ///< of the walks' vertices
+    std::vector<SplatEvent> splats;
+    double rays = 0, splat_rays = 0;
+};
+
+template <Features F, class Tracer>
+class Pilot {
+public:
+    Pilot(const Scene& scene, const RenderSettings& settings, const Tracer& tracer, const std::vector<PilotCandidate>& candidates, uint32_t samples)
+        : view_(scene.view()), tracer_(tracer), candidates_(candidates), seed_(settings.seed) {
+        RenderSettings all = settings;
+        all.integrator = "bdpt";
+        all.variant = "wavefront";
+        all.heuristic = MisHeuristic::balance;
+        all.strategies = kAllStrategies;
+        all.singles = {};
+        policy_ = make_bidirectional_policy(scene, all);
+        const uint32_t sets[kSets] = {kHitStrategies | kNextEventStrategies, kHitStrategies | kNextEventStrategies | kLightStrategies, kAllStrategies};
+        for (uint32_t m = 0; m < kSets; ++m) {
+            mis_[m] = policy_.mis;
+            mis_[m].strategies = sets[m];
+        }
+        const Sensor& sensor = view_.sensor;
+        const auto blocks = [](uint32_t pixels) { return std::clamp(pixels / kSmallestBlock, 1u, kMostBlocks); };
+        result_.blocks_x = blocks(sensor.crop_width);
+        result_.blocks_y = blocks(sensor.crop_height);
+        const uint32_t count = result_.blocks_x * result_.blocks_y;
+        pixels_ = std::max(1u, (samples / kPixelSamples + count / 2) / count);
+        result_.samples = count * pixels_ * kPixelSamples;
+        filter_energy_ = filter_energy();
+        delta_emitters_ = std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return is_delta(e.type); });
+    }
+
+    ChoicePilot run() {
+        const uint32_t count = result_.blocks_x * result_.blocks_y, n = result_.samples;
+        std::vector<LightTask> tasks((n + kWalksPerTask - 1) / kWalksPerTask);
+        if (policy_.light_walks)
+            parallel_for(uint32_t(tasks.size()), [&](uint32_t t) {
+                for (uint32_t i = t * kWalksPerTask; i < std::min(n, (t + 1) * kWalksPerTask); ++i) {
+                    light_walk(i, tasks[t]);
+                    tasks[t].ends.push_back(uint32_t(tasks[t].vertices.size()));
+                }
+            });
+        std::vector<SplatEvent> splats;
+        gather(tasks, splats);
+        std::vector<Sums> pixels(size_t(count) * pixels_);
+        std::vector<PilotWork> work(count);
+        parallel_for(count, [&](uint32_t b) { eye_block(b, &pixels[size_t(b) * pixels_], work[b]); });
+        for (const PilotWork& w : work) {
+            result_.work.eye_rays += w.eye_rays / n;
+            result_.work.next_events += w.next_events / n;
+            result_.work.vertices += w.vertices / n;
+            result_.work.pairs += w.pairs / n;
+            result_.work.pair_rays += w.pair_rays / n;
+            result_.work.draws += w.draws / n;
+            result_.work.draw_rays += w.draw_rays / n;
+        }
+        result_.light_vertices = double(vertices_.size()) / n;
+        normalise(pixels, splats);
+        return result_;
+    }
+
+private:
+    /// Mean over places on the film of the sum of squares of what a splat counts for its pixels.
+    float filter_energy() const {
+        constexpr int kSteps = 64;
+        const float r = view_.sensor.filter_radius;
+        double sum = 0;
+        for (int y = 0; y < kSteps; ++y)
+            for (int x = 0; x < kSteps; ++x) {
+                const float value = filter_value(view_, {r * (2.0f * (float(x) + 0.5f) / kSteps - 1.0f), r * (2.0f * (float(y) + 0.5f) / kSteps - 1.0f)});
+                sum += double(value) * double(value);
+            }
+        return float(std::min(1.0, sum * 4.0 * double(r) * double(r) / (kSteps * kSteps)));
+    }
+
+    /// Sum of the filters of the film's pixels at a place; less than one along the edges.
+    float coverage(Vec2f film) const {
+        const Sensor& s = view_.sensor;
+        const float x = film.x - float(s.crop_x), y = film.y - float(s.crop_y), r = s.filter_radius;
+        if (x >= r && y >= r && x <= float(s.crop_width) - r && y <= float(s.crop_height) - r) return 1.0f;
+        float sum = 0.0f;
+        for (float py = max(0.0f, ceilf(y - r - 0.5f)); py <= y + r - 0.5f && py < float(s.crop_height); py += 1.0f)
+            for (float px = max(0.0f, ceilf(x - r - 0.5f)); px <= x + r - 0.5f && px < float(s.crop_width); px += 1.0f) sum += filter_value(view_, {x - (px + 0.5f), y - (py + 0.5f)});
+        return min(sum, 1.0f);
+    }
+
+    uint32_t block_at(Vec2f film) const {
+        const Sensor& s = view_.sensor;
+        const auto index = [](float at, uint32_t pixels, uint32_t blocks) {
+            return uint32_t(std::clamp(int64_t(std::floor(double(at) * blocks / pixels)), int64_t(0), int64_t(blocks) - 1));
+        };
+        return index(film.y - float(s.crop_y), s.crop_height, result_.blocks_y) * result_.blocks_x + index(film.x - float(s.crop_x), s.crop_width, result_.blocks_x);
+    }
+
+    /// Scatters with the sums of all sets; the same numbers give the same ray each time.
+    bool scatter(PilotVertex& x, Vec4f u, TransportMode mode, PilotWalk& w) const {
+        const Walk before = w.walk;
+        for (uint32_t m = 0; m < kSets; ++m) {
+            x.vertex.sums = x.sums[m];
+            w.walk = before;
+            if (!scatter_walk<F>(mis_[m], x.vertex, u, mode, policy_.rr_depth, w.walk)) return false;
+            w.sums[m] = w.walk.sums;
+        }
+        return is_finite(w.walk.throughput) && min_component(w.walk.throughput) >= 0.0f;
+    }
+
+    bool closest(const Walk& w, float tmax, const RngKey& key, Hit& hit) const {
+        return tracer_.template closest<F>(view_, Ray{w.o, tmax, w.d, F.opacity ? alpha_seed(key, w.depth, false) : 0}, hit);
+    }
+
+    /// Without its sums.
+    PilotVertex vertex_at(const PilotWalk& w, const Hit& hit) const { return {walk_vertex<F>(view_, w.walk, hit.prim, hit.u, hit.v), {}, w.walk.throughput, w.walk.depth}; }
+
+    bool free(const WalkConnection& c, const RngKey& key, uint32_t which) const {
+        if (!is_finite(c.o) || !is_finite(c.d)) return false;
+        return !tracer_.template occluded<F>(view_, Ray{c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, which, true) : 0});
+    }
+
+    static bool counts(Rgb value) { return is_finite(value) && min_component(value) >= 0.0f && !is_zero(value); }
+
+    void light_walk(uint32_t i, LightTask& task) const {
+        const RngKey key = {seed_, i, 2, Stream::pilot};
+        const Vec4f direction = random_floats(key, kEmissionBlock + 1);
+        EmissionSample e;
+        if (!sample_emission<F>(view_, random_floats(key, kEmissionBlock), {direction.x, direction.y}, e)) return;
+        PilotWalk w{start_light_walk(e), {}};
+        WalkConnection c;
+        Vec2f film;
+        // `which`: 0 is the emitter itself.
+        const auto splat = [&](const float (&others)[kSets], uint32_t which) {
+            if (!counts(c.value)) return;
+            task.splat_rays += 1;
+            if (free(c, key, which)) task.splats.push_back({{c.value, shares_of(others, 1), coverage(film)}, block_at(film), which == 0, e.radiance});
+        };
+        float others[kSets];
+        if (policy_.splat && !policy_.hide_emitters && connect_visible_light<F>(view_, mis_[0], e, {direction.z, direction.w}, c, film)) {
+            std::fill(others, others + kSets, c.others);
+            splat(others, 0);
+        }
+        while (policy_.max_depth >= 2 && is_finite(w.walk.throughput)) {
+            Hit hit;
+            task.rays += 1;
+            if (!closest(w.walk, kInfinity, key, hit)) return;
+            PilotVertex y = vertex_at(w, hit);
+            for (uint32_t m = 0; m < kSets; ++m) {
+                w.walk.sums = w.sums[m];
+                y.sums[m] = light_sums<F>(view_, mis_[m], w.walk, y.vertex.point);
+            }
+            if (bsdf_is_smooth(y.vertex.scattering.bsdf)) {
+                if (policy_.splat && y.depth < policy_.max_depth) {
+                    const Vec4f u = random_floats(key, lens_block(y.depth));
+                    bool made = true;
+                    for (uint32_t m = 0; m < kSets && made; ++m) {
+                        y.vertex.sums = y.sums[m];
+                        made = connect_camera<F>(view_, mis_[m], y.vertex, y.throughput, {u.x, u.y}, c, film);
+                        others[m] = c.others;
+                    }
+                    if (made) splat(others, y.depth);
+                }
+                if (policy_.connect_vertices && y.depth + 2 <= policy_.max_depth) task.vertices.push_back(y);
+            }
+            if (y.depth + 1 >= policy_.max_depth) return;
+            if (!scatter(y, random_floats(key, light_scatter_block(y.depth)), TransportMode::importance, w)) return;
+        }
+    }
+
+    void gather(std::vector<LightTask>& tasks, std::vector<SplatEvent>& splats) {
+        first_.push_back(0);
+        for (LightTask& t : tasks) {
+            for (const uint32_t end : t.ends) first_.push_back(uint32_t(vertices_.size()) + end);
+            vertices_.insert(vertices_.end(), t.vertices.begin(), t.vertices.end());
+            splats.insert(splats.end(), t.splats.begin(), t.splats.end());
+            result_.work.light_rays += t.rays / result_.samples;
+            result_.work.splats += t.splat_rays / result_.samples;
+            t = {};
+        }
+        first_.resize(result_.samples + 1, uint32_t(vertices_.size()));
+    }
+
+    /// Sum of the candidate's densities over that of the strategy that found the path.
+    float sum_of(uint32_t c, const Shares& s) const {
+        const PilotCandidate& candidate = candidates_[c];
+        float sum = s.unidirectional;
+        if (candidate.light) sum += s.light;
+        if (candidate.connect) sum += s.connections * connections(candidate);
+        return sum;
+    }
+    float connections(const PilotCandidate& c) const {
+        return c.draws == 0 ? 1.0f : float(double(c.draws) * double(result_.samples) / double(std::max<size_t>(1, vertices_.size())));
+    }
+
+    /// Adds a path of the pilot's own estimator to the second moments of all candidates (equation 18).
+    void add_event(const Event& e, Sums& sums) const {
+        const float weight = e.coverage / e.total();
+        bool rare = false;
+        for (int k = 0; k < 3; ++k) sums.mean[k] += double(e.value[k] * weight);
+        for (uint32_t c = 0; c < candidates_.size(); ++c) {
+            const float sum = sum_of(c, e.shares);
+            if (!(sum > 0.0f)) {
+                sums.blind[c] = true;
+                continue;
+            }
+            rare |= sum < kRareShare * e.total();
+            for (int k = 0; k < 3; ++k) sums.variance[c][k] += second_moment(c, e, sum) * sqr(double(e.value[k]));
+        }
+        if (rare) sums.rare.push_back(e);
+    }
+
+    /// What a path adds to the second moment of a candidate, over its squared value.
+    double second_moment(uint32_t c, const Event& e, float sum) const {
+        const double by_light = candidates_[c].light ? double(e.shares.light / sum) : 0.0;
+        return double(e.coverage) * (1.0 - (1.0 - double(filter_energy_)) * by_light) / (double(e.total()) * double(sum));
+    }
+
+    /// What the eye walk of one sample brings to a candidate. The product of `first` and `second` without `own` is what contributions of one sample have in common.
+    struct EyeSums {
+        double first[3] = {}, second[3] = {};  ///< with the first and the second draw of every vertex; the same for paired walks
+        double own[3] = {};                    ///< products of contributions with themselves
+
+        /// `share`: of the product that belongs to single contributions.
+        void add(Rgb a, Rgb b, double share) {
+            for (int k = 0; k < 3; ++k) {
+                first[k] += double(a[k]);
+                second[k] += double(b[k]);
+                own[k] += double(a[k]) * double(b[k]) * share;
+            }
+        }
+    };
+
+    /// An eye walk and where its results go.
+    struct Eye {
+        uint32_t number;
+        RngKey key;
+        Sums& pixel;
+        PilotWork& work;
+        EyeSums sums[kMostCandidates];
+    };
+
+    /// The pilot's pixels of a block, with all but (18) of the variance (equation 19).
+    void eye_block(uint32_t b, Sums* pixels, PilotWork& work) const {
+        const Sensor& sensor = view_.sensor;
+        const auto edge = [](uint32_t at, uint32_t size, uint32_t blocks) { return uint32_t(uint64_t(at) * size / blocks); };
+        const uint32_t bx = b % result_.blocks_x, by = b / result_.blocks_x;
+        const uint32_t x0 = edge(bx, sensor.crop_width, result_.blocks_x), x1 = edge(bx + 1, sensor.crop_width, result_.blocks_x);
+        const uint32_t y0 = edge(by, sensor.crop_height, result_.blocks_y), y1 = edge(by + 1, sensor.crop_height, result_.blocks_y);
+        for (uint32_t p = 0; p < pixels_; ++p) {
+            const uint32_t first = (b * pixels_ + p) * kPixelSamples;
+            const Uint4 place = random_bits({seed_, first, 3, Stream::pilot}, 0);
+            const uint32_t x = x0 + mul_hi(place.x, x1 - x0), y = y0 + mul_hi(place.y, y1 - y0);
+            double sum[kMostCandidates][3] = {}, squares[kMostCandidates][3] = {};
+            for (uint32_t s = 0; s < kPixelSamples; ++s) {
+                Eye eye{first + s, {seed_, first + s, 1, Stream::pilot}, pixels[p], work, {}};
+                eye_walk(eye, x, y);
+                for (uint32_t c = 0; c < candidates_.size(); ++c)
+                    for (int k = 0; k < 3; ++k) {
+                        const EyeSums& e = eye.sums[c];
+                        pixels[p].variance[c][k] += e.first[k] * e.second[k] - e.own[k];
+                        const double value = 0.5 * (e.first[k] + e.second[k]);
+                        sum[c][k] += value;
+                        squares[c][k] += value * value;
+                    }
+            }
+            // Products of different samples: the squared mean, without bias.
+            for (uint32_t c = 0; c < candidates_.size(); ++c)
+                for (int k = 0; k < 3; ++k) pixels[p].variance[c][k] -= (sum[c][k] * sum[c][k] - squares[c][k]) / (kPixelSamples - 1);
+        }
+    }
+
+    /// A hit or a sample of next event estimation.
+    void found(Eye& eye, const Event& e) const {
+        add_event(e, eye.pixel);
+        for (uint32_t c = 0; c < candidates_.size(); ++c) {
+            const Rgb value = e.value * (1.0f / sum_of(c, e.shares));
+            eye.sums[c].add(value, value, 1.0);
+        }
+    }
+
+    void found_by_hit(Eye& eye, Rgb value, uint32_t depth, const float (&others)[kSets]) const {
+        if (depth == 1)
+            for (int k = 0; k < 3; ++k) eye.pixel.seen[k] = std::max(eye.pixel.seen[k], double(value[k]));
+        found(eye, {value, shares_of(others, 0)});
+    }
+
+    void eye_walk(Eye& eye, uint32_t x, uint32_t y) const {
+        if (policy_.max_depth == 0) return;
+        const Vec4f u = random_floats(eye.key, kCameraBlock);
+        const CameraSample camera = sample_camera_ray(view_.sensor, sample_film_position(view_, x, y, {u.x, u.y}), {u.z, u.w});
+        PilotWalk w{start_eye_walk(view_, mis_[0], camera), {}};
+        for (uint32_t m = 0; m < kSets; ++m) w.sums[m] = start_eye_walk(view_, mis_[m], camera).sums;
+        float others[kSets];
+        for (float tmax = camera.tmax;; tmax = kInfinity) {
+            const uint32_t depth = w.walk.depth;
+            const bool visible = !(policy_.hide_emitters && depth == 1);
+            Hit hit;
+            eye.work.eye_rays += 1;
+            if (!closest(w.walk, tmax, eye.key, hit)) {
+                if constexpr (F.has_environment()) {
+                    if (!policy_.counts_environment(depth) || !visible) return;
+                    const Rgb value = w.walk.throughput * environment_radiance<F>(view_, w.walk.d);
+                    for (uint32_t m = 0; m < kSets; ++m) others[m] = others_of_escape<F>(view_, mis_[m], w.sums[m], depth, w.walk.d);
+                    if (counts(value)) found_by_hit(eye, value, depth, others);
+                }
+                return;
+            }
+            PilotVertex z = vertex_at(w, hit);
+            for (uint32_t m = 0; m < kSets; ++m) {
+                w.walk.sums = w.sums[m];
+                z.sums[m] = eye_sums(view_, mis_[m], w.walk, z.vertex.point);
+            }
+            const uint32_t emitter = view_.shapes[z.vertex.point.shape].emitter;
+            if (policy_.count_hits && visible && emitter != kNone) {
+                const Rgb value = z.throughput * emitted_radiance<F>(view_, emitter, z.vertex.point, -w.walk.d);
+                if (counts(value)) {
+                    for (uint32_t m = 0; m < kSets; ++m)
+                        others[m] = others_of_hit<F>(view_, mis_[m], w.sums[m], depth, emitter, w.walk.o, w.walk.d, w.walk.start_distance, z.vertex.point);
+                    found_by_hit(eye, value, depth, others);
+                }
+            }
+            if (depth >= policy_.max_depth) return;
+            if (bsdf_is_smooth(z.vertex.scattering.bsdf)) {
+                if (policy_.next_event) next_event(eye, z);
+                if (policy_.connect_vertices && !vertices_.empty()) connect(eye, z);
+            }
+            if (depth + 1 == policy_.max_depth && !policy_.counts_last_segment()) return;
+            if (!scatter(z, random_floats(eye.key, scatter_block(depth)), TransportMode::radiance, w)) return;
+        }
+    }
+
+    void next_event(Eye& eye, PilotVertex& z) const {
+        const Vec4f u = random_floats(eye.key, emitter_block(z.depth));
+        float others[kSets];
+        WalkConnection c;
+        for (uint32_t m = 0; m < kSets; ++m) {
+            z.vertex.sums = z.sums[m];
+            if (!connect_next_event<F>(view_, mis_[m], z.vertex, z.throughput, u, c)) return;
+            others[m] = c.others;
+        }
+        if (!counts(c.value)) return;
+        eye.work.next_events += 1;
+        if (free(c, eye.key, z.depth)) found(eye, {c.value, shares_of(others, 0)});
+    }
+
+    /// The connection of two vertices; false if it brings nothing.
+    bool connection(const Eye& eye, const PilotVertex& y, const PilotVertex& z, uint32_t which, Event& e, double& tried, double& rays) const {
+        if (z.depth + y.depth + 1 > policy_.max_depth) return false;
+        WalkConnection c;
+        ConnectionDensities p;
+        tried += 1;
+        if (!connect_unweighted<F>(y.vertex, y.throughput, z.vertex, z.throughput, c, p) || !counts(c.value)) return false;
+        rays += 1;
+        if (!free(c, eye.key, z.depth + (which << WalkBits::kDepthBits))) return false;
+        float others[kSets];
+        for (uint32_t m = 0; m < kSets; ++m) others[m] = others_of_connection(mis_[m], y.sums[m], y.vertex.first, z.sums[m], z.vertex.first, p);
+        e = {c.value, shares_of(others, 2)};
+        return true;
+    }
+
+    void connect(Eye& eye, const PilotVertex& z) const {
+        PilotWork& work = eye.work;
+        work.vertices += 1;
+        Event e;
+        for (uint32_t v = first_[eye.number]; v < first_[eye.number + 1]; ++v) {
+            if (!connection(eye, vertices_[v], z, vertices_[v].depth, e, work.pairs, work.pair_rays)) continue;
+            add_event(e, eye.pixel);
+            for (uint32_t c = 0; c < candidates_.size(); ++c) {
+                if (!candidates_[c].connect || candidates_[c].draws > 0) continue;
+                const Rgb value = e.value * (1.0f / sum_of(c, e.shares));
+                eye.sums[c].add(value, value, 1.0);
+            }
+        }
+        const Uint4 bits = random_bits(eye.key, cache_block(z.depth, 0));
+        const uint32_t which[2] = {mul_hi(bits.x, uint32_t(vertices_.size())), mul_hi(bits.y, uint32_t(vertices_.size()))};
+        Event drawn[2];
+        bool made[2];
+        double tried = 0, rays = 0;
+        for (uint32_t d = 0; d < 2; ++d) made[d] = connection(eye, vertices_[which[d]], z, WalkBits::kMaxDepth + d, drawn[d], tried, rays);
+        work.draws += tried / 2;
+        work.draw_rays += rays / 2;
+        if (!made[0] && !made[1]) return;
+        for (uint32_t c = 0; c < candidates_.size(); ++c) {
+            if (candidates_[c].draws == 0) continue;
+            // Each draw stands for all k of its vertex.
+            Rgb value[2];
+            for (uint32_t d = 0; d < 2; ++d) value[d] = made[d] ? drawn[d].value * (float(candidates_[c].draws) / sum_of(c, drawn[d].shares)) : Rgb{0.0f, 0.0f, 0.0f};
+            eye.sums[c].add(value[0], value[1], 1.0 / double(candidates_[c].draws));
+        }
+    }
+
+    struct Mean {
+        double of[3] = {};
+    };
+
+    /// Means over a block and its neighbours: a few samples are no scale.
+    void blur(const std::vector<Mean>& of, std::vector<Mean>& to) const {
+        const uint32_t width = result_.blocks_x, height = result_.blocks_y;
+        for (uint32_t b = 0; b < width * height; ++b) {
+            const uint32_t x = b % width, y = b / width;
+            double n = 0;
+            for (uint32_t ny = y ? y - 1 : 0; ny < std::min(height, y + 2); ++ny)
+                for (uint32_t nx = x ? x - 1 : 0; nx < std::min(width, x + 2); ++nx, n += 1)
+                    for (int k = 0; k < 3; ++k) to[b].of[k] += of[ny * width + nx].of[k];
+            for (double& m : to[b].of) m /= n;
+        }
+    }
+
+    /// Sums of pixels and splats to variances of blocks, relative to their squared means.
+    void normalise(const std::vector<Sums>& pixels, const std::vector<SplatEvent>& splats) {
+        const uint32_t count = result_.blocks_x * result_.blocks_y;
+        const double samples = double(pixels_) * kPixelSamples;
+        std::vector<Mean> block(count), scale(count);
+        for (size_t p = 0; p < pixels.size(); ++p)
+            for (int k = 0; k < 3; ++k) block[p / pixels_].of[k] += pixels[p].mean[k] / samples;
+        std::vector<Sums> sums(splats.size());
+        for (size_t i = 0; i < splats.size(); ++i) {
+            add_event(splats[i].event, sums[i]);
+            for (int k = 0; k < 3; ++k) {
+                block[splats[i].block].of[k] += sums[i].mean[k] / samples;
+                if (splats[i].seen) sums[i].seen[k] = double(splats[i].radiance[k]);
+            }
+        }
+        blur(block, scale);
+        result_.variance.assign(candidates_.size(), std::vector<double>(count));
+        result_.blind.assign(candidates_.size(), false);
+        struct Rare {
+            const Event* event;
+            uint32_t block;
+            double scale2[3];
+        };
+        std::vector<Rare> rare;
+        const auto add = [&](const Sums& s, uint32_t b) {
+            double scale2[3];
+            for (int k = 0; k < 3; ++k) scale2[k] = sqr(std::max(scale[b].of[k], s.seen[k])) + 0.01;
+            for (const Event& e : s.rare) rare.push_back({&e, b, {scale2[0], scale2[1], scale2[2]}});
+            for (size_t c = 0; c < candidates_.size(); ++c) {
+                // Without emitters of no extent, eye walks can meet whatever there is: zeros are rounding.
+                if (delta_emitters_ && s.blind[c]) result_.blind[c] = true;
+                for (int k = 0; k < 3; ++k) result_.variance[c][b] += s.variance[c][k] / (3.0 * samples * scale2[k]);
+            }
+        };
+        for (size_t p = 0; p < pixels.size(); ++p) add(pixels[p], uint32_t(p / pixels_));
+        for (size_t i = 0; i < splats.size(); ++i) add(sums[i], splats[i].block);
+
+        // Outliers: the brightest contributions that after kChoiceSamples samples are in kChoiceTrimmed of the pixels. There they are left out, and elsewhere their light is missing.
+        struct Outlier {
+            double size;
+            const Rare* rare;
+        };
+        std::vector<Outlier> outliers;
+        std::vector<Mean> lost(count);
+        for (uint32_t c = 0; c < candidates_.size(); ++c) {
+            outliers.clear();
+            for (const Rare& r : rare) {
+                const float sum = sum_of(c, r.event->shares);
+                if (!(sum > 0.0f && sum < kRareShare * r.event->total())) continue;
+                double size = 0;
+                for (int k = 0; k < 3; ++k) size = std::max(size, double(r.event->value[k]) / (double(sum) * std::sqrt(r.scale2[k])));
+                outliers.push_back({size, &r});
+            }
+            std::sort(outliers.begin(), outliers.end(), [](const Outlier& a, const Outlier& b) { return a.size > b.size; });
+            std::fill(lost.begin(), lost.end(), Mean{});
+            double share = 0;
+            for (const Outlier& o : outliers) {
+                const Event& e = *o.rare->event;
+                const float sum = sum_of(c, e.shares);
+                share += double(e.coverage) * double(sum) / double(e.total()) / double(result_.samples);
+                if (share > kChoiceTrimmed / kChoiceSamples) break;
+                for (int k = 0; k < 3; ++k) {
+                    result_.variance[c][o.rare->block] -= second_moment(c, e, sum) * sqr(double(e.value[k])) / (3.0 * samples * o.rare->scale2[k]);
+                    lost[o.rare->block].of[k] += double(e.coverage) * double(e.value[k]) / double(e.total()) / samples;
+                }
+            }
+            std::vector<Mean> smooth(count);
+            blur(lost, smooth);
+            for (uint32_t b = 0; b < count; ++b)
+                for (int k = 0; k < 3; ++k) result_.variance[c][b] += kChoiceSamples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale[b].of[k]) + 0.01));
+        }
+    }
+
+    ChoicePilot result_;
+    SceneView view_;
+    const Tracer tracer_;
+    std::vector<PilotCandidate> candidates_;
+    uint64_t seed_;
+    BidirectionalPolicy policy_{};
+    BidirectionalMis mis_[kSets] = {};
+    uint32_t pixels_ = 0;  ///< of a block
+    float filter_energy_ = 1;
+    bool delta_emitters_ = false;
+    std::vector<PilotVertex> vertices_;
+    std::vector<uint32_t> first_;  ///< vertex of each light walk
+};
+
+}  // namespace
+
+ChoicePilot run_choice_pilot(const Scene& scene, const RenderSettings& settings, bool cwbvh, SharedAccels& accels, const std::vector<PilotCandidate>& candidates, uint32_t samples) {
+    return with_feature_level(scene.features, settings.specialise, [&](auto level) {
+        constexpr Features F = decltype(level)::value;
+        const auto run = [&](auto accel) {
+            const auto tracer = accel->tracer();
+            return Pilot<F, std::remove_cv_t<decltype(tracer)>>(scene, settings, tracer, candidates, samples).run();
+        };
+        return cwbvh ? run(accels.get<CwbvhAccel>()) : run(accels.get<EmbreeAccel>());
+    });
+}
+
+}  // namespace ambilux

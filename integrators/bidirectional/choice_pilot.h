@@ -1,0 +1,43 @@
+// Second moments of several estimators from one set of paths, before the render (docs/theory.md, section 6).
+#pragma once
+
+#include "integrators/renderer.h"
+#include "scene/accel/shared_accels.h"
+
+namespace ambilux {
+
+/// What is predicted is the error after so many samples of every pixel, without this share of the pixels.
+constexpr double kChoiceSamples = 1000, kChoiceTrimmed = 0.001;
+
+/// An estimator that the pilot judges. All have hits and next event estimation.
+struct PilotCandidate {
+    bool light;       ///< light tracing
+    bool connect;     ///< connections
+    uint32_t draws;   ///< of each eye vertex from a cache of light vertices; 0: paired walks
+};
+
+/// Mean numbers per eye walk, or per pair of walks.
+struct PilotWork {
+    double eye_rays = 0, light_rays = 0;
+    double next_events = 0, splats = 0;              ///< shadow rays of them
+    double vertices = 0;                             ///< of an eye walk that can be connected
+    double pairs = 0, pair_rays = 0;                 ///< of paired walks: connections tried, shadow rays
+    double draws = 0, draw_rays = 0;                 ///< of one draw at each eye vertex
+};
+
+struct ChoicePilot {
+    uint32_t blocks_x = 0, blocks_y = 0;
+    uint32_t samples = 0;  ///< eye walks, and as many light walks
+    /// Of each candidate and block of the film: variance of one sample of a pixel over the block's squared mean plus 0.01, mean over pixels and channels;
+    /// without rare outliers, for which the light that they bring counts as missing.
+    std::vector<std::vector<double>> variance;
+    std::vector<bool> blind;     ///< the candidate cannot find some of the light
+    double light_vertices = 0;   ///< mean of a light walk
+    PilotWork work;
+};
+
+/// About `samples` eye walks, and as many light walks, over the whole film. The numbers are those of Stream::pilot and depend on the seed alone. Weights are those of the balance
+/// heuristic, whatever the render uses. `cwbvh`: over this structure instead of Embree's.
+ChoicePilot run_choice_pilot(const Scene& scene, const RenderSettings& settings, bool cwbvh, SharedAccels& accels, const std::vector<PilotCandidate>& candidates, uint32_t samples);
+
+}  // namespace ambilux

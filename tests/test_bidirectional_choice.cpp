@@ -1,0 +1,233 @@
+// libs: ambilux_experiments ambilux_integrators ambilux_film ambilux_scene ambilux_core
+// timeout: 900
+// bdpt.auto=true: what the pilot predicts is what renders show, and what follows from it.
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "experiments/stats_sum.h"
+#include "integrators/bidirectional/choice.h"
+#include "tests/bidirectional_images.h"
+
+using namespace ambilux;
+
+namespace {
+
+RenderSettings automatic_settings(const Scene& scene, uint64_t seed = 1) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
+    s.integrator = "bdpt";
+    s.automatic = true;
+    return s;
+}
+
+RenderSettings fixed(RenderSettings s, const std::vector<std::pair<std::string, std::string>>& settings) {
+    s.automatic = false;
+    for (const auto& [key, value] : settings) apply_setting(s, key, value);
+    return s;
+}
+
+std::vector<PilotCandidate> pilots(const std::vector<ChoiceCandidate>& candidates) {
+    std::vector<PilotCandidate> p;
+    for (const ChoiceCandidate& c : candidates) p.push_back(c.pilot);
+    return p;
+}
+
+struct Mean {
+    double mean, error;  ///< standard error
+};
+Mean mean_of(const std::vector<double>& values) {
+    double sum = 0, squares = 0;
+    for (const double v : values) sum += v;
+    const double n = double(values.size()), mean = sum / n;
+    for (const double v : values) squares += (v - mean) * (v - mean);
+    return {mean, std::sqrt(squares / (n - 1) / n)};
+}
+
+/// Variance of one sample of a pixel, relative to the squared mean of its block and the neighbours, as the pilot scales it; mean over the film.
+double relative_variance(const FilmMoments& film, const FilmMoments& truth, uint32_t blocks_x, uint32_t blocks_y) {
+    const uint32_t w = film.width / blocks_x, h = film.height / blocks_y;
+    double sum = 0;
+    for (uint32_t y = 0; y < film.height; ++y)
+        for (uint32_t x = 0; x < film.width; ++x)
+            for (uint32_t c = 0; c < 3; ++c) {
+                const uint32_t x0 = (x / w ? x / w - 1 : 0) * w, x1 = std::min(film.width, (x / w + 2) * w), y0 = (y / h ? y / h - 1 : 0) * h, y1 = std::min(film.height, (y / h + 2) * h);
+                double mean = 0;
+                for (uint32_t j = y0; j < y1; ++j)
+                    for (uint32_t i = x0; i < x1; ++i) mean += truth.mean((size_t(j) * film.width + i) * 3 + c) / ((x1 - x0) * (y1 - y0));
+                sum += film.variance((size_t(y) * film.width + x) * 3 + c) / (mean * mean + 0.01);
+            }
+    return sum / double(film.sum.size());
+}
+
+const std::string kGround = "<shape type='rectangle'><transform name='to_world'><scale value='4'/></transform>" + diffuse({0.5f, 0.5f, 0.5f}) + "</shape>";
+const std::string kGlassBall = "<shape type='sphere'><point name='center' x='0' y='0' z='0.7'/><float name='radius' value='0.5'/><bsdf type='dielectric'/></shape>";
+const std::string kView = "<sensor type='perspective'><float name='fov' value='45'/>" + lookat("origin='0,-3,2.5' target='0,0,0.3' up='0,0,1'") + film(32) + "</sensor>";
+
+}  // namespace
+
+TEST_CASE("second moments that the pilot predicts are those of renders, for every candidate") {
+    // Splats of light tracing are spread by the filter, eye walks are not.
+    for (const char* filter : {"box", "gaussian"}) {
+        const std::string text = "<sensor type='perspective'><float name='fov' value='45'/>" + lookat("origin='0,-3,2.5' target='0,0,0.3' up='0,0,1'") + film(32, filter) + "</sensor>" + kGround +
+                                 "<shape type='cube'><transform name='to_world'><scale value='0.3'/><translate x='-0.4' z='0.5'/></transform>" + diffuse({0.8f, 0.5f, 0.3f}) + "</shape>" +
+                                 "<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' angle='180'/><translate z='2.4'/></transform>" + diffuse({0, 0, 0}) +
+                                 area_light({4, 5, 3}) + "</shape>";
+        const Scene scene = scene_from_text(scene_xml(5, text));
+        RenderSettings s = automatic_settings(scene);
+        const auto candidates = choice_candidates(s, false);
+        SharedAccels accels(scene);
+        std::vector<std::vector<double>> predicted(candidates.size());
+        uint32_t bx = 0, by = 0;
+        for (uint64_t seed = 1; seed <= 12; ++seed) {
+            s.seed = seed;
+            const ChoicePilot pilot = run_choice_pilot(scene, s, false, accels, pilots(candidates), 16384);
+            bx = pilot.blocks_x;
+            by = pilot.blocks_y;
+            for (size_t c = 0; c < candidates.size(); ++c) {
+                CHECK_FALSE(pilot.blind[c]);
+                double sum = 0;
+                for (const double v : pilot.variance[c]) sum += v;
+                predicted[c].push_back(sum / double(pilot.variance[c].size()));
+            }
+        }
+        s.seed = 77;
+        const FilmMoments truth = render_scene(scene, fixed(s, candidates[3].settings), 1024).film;
+        for (size_t c = 0; c < candidates.size(); ++c) {
+            std::vector<double> measured;
+            const auto renderer = make_renderer(scene, fixed(s, candidates[c].settings));
+            for (uint32_t k = 0; k < 12; ++k) {
+                renderer->clear_film();
+                renderer->render(k * 64, 64);
+                measured.push_back(relative_variance(renderer->film(), truth, bx, by));
+            }
+            const Mean p = mean_of(predicted[c]), m = mean_of(measured);
+            INFO(filter << " " << candidates[c].name << ": predicted " << p.mean << " +- " << p.error << ", measured " << m.mean << " +- " << m.error);
+            // One in 100 beside the errors: block means of a pilot are noisy, and light walks of a wave are shared.
+            CHECK(std::abs(p.mean - m.mean) < 4.5 * std::hypot(p.error, m.error) + 0.015 * m.mean);
+            CHECK(std::hypot(p.error, m.error) < 0.04 * m.mean);
+        }
+    }
+}
+
+TEST_CASE("what is chosen renders as if its settings had been given: the pilot leaves nothing in the image") {
+    for (const char* name : {"cornell", "glass", "lights", "materials"}) {
+        const Scene scene = project_scene(name, 40, 30);
+        const RenderSettings s = automatic_settings(scene, 5);
+        const RenderResult chosen = render_scene(scene, s, 4);
+        const ChoiceStats& choice = chosen.stats.choice;
+        INFO(name << ": " << choice.name);
+        REQUIRE_FALSE(choice.name.empty());
+        CHECK(choice.seconds > 0);
+        CHECK(choice.candidates.size() == 7);
+        const RenderResult again = render_scene(scene, fixed(s, choice.settings), 4);
+        CHECK(again.stats.choice.name.empty());
+        CHECK(worst_difference(again.film, mean_image(chosen.film)) < 1e-5);
+        CHECK(again.stats.rays_extend == chosen.stats.rays_extend);
+        CHECK(again.stats.samples == chosen.stats.samples);
+        // Every candidate has the same expectation (other tests); these once more, but for glass, whose rare hits of the lamp would need too many samples.
+        if (name == std::string("glass")) continue;
+        RenderSettings reference = cpu_settings(scene, Estimator::mis, 99);
+        reference.integrator = "bdpt";
+        const ZTestResult z = z_test(render_batches(scene, s, 256), render_batches(scene, reference, 256));
+        INFO(z.report());
+        CHECK(z.pass);
+    }
+}
+
+TEST_CASE("light walks run where they find what eye walks do not, and only there") {
+    const auto name_of = [](const Scene& scene, uint64_t seed) {
+        RenderSettings s = automatic_settings(scene, seed);
+        s.deterministic = true;
+        return make_renderer(scene, s)->stats().choice.name;
+    };
+    for (uint64_t seed = 1; seed <= 4; ++seed) {
+        INFO("seed " << seed);
+        CHECK(name_of(project_scene("glass", 64, 48), seed) != "path");
+        // A sky over diffuse ground: most light walks miss what the camera sees, and next event estimation is all that is needed.
+        const Scene sky = scene_from_text(scene_xml(4, kView + kGround + "<emitter type='constant'><rgb name='radiance' value='1,1,1'/></emitter>"));
+        CHECK(name_of(sky, seed) == "path");
+    }
+}
+
+TEST_CASE("a candidate that cannot find some of the light is never chosen") {
+    const Scene scene = scene_from_text(scene_xml(6, kView + kGround + kGlassBall + "<emitter type='point'><point name='position' x='0.5' y='0.2' z='3'/><rgb name='intensity' value='5,5,5'/></emitter>"));
+    RenderSettings s = automatic_settings(scene);
+    const ChoiceStats choice = make_renderer(scene, s)->stats().choice;
+    REQUIRE(choice.candidates[0].name == "path");
+    CHECK(std::isinf(choice.candidates[0].variance));
+    CHECK(choice.candidates[0].efficiency == 0);
+    CHECK(choice.name != "path");
+}
+
+TEST_CASE("the choice repeats: it depends on the seed, and on clocks only where it says so") {
+    const Scene scene = project_scene("materials", 40, 30);
+    RenderSettings s = automatic_settings(scene, 3);
+    s.deterministic = true;
+    const ChoiceStats a = make_renderer(scene, s)->stats().choice, b = make_renderer(scene, s)->stats().choice;
+    s.accel = "cwbvh";
+    const ChoiceStats other_rays = make_renderer(scene, s)->stats().choice;
+    s.seed = 4;
+    const ChoiceStats other_seed = make_renderer(scene, s)->stats().choice;
+    CHECK(a.name == b.name);
+    for (size_t c = 0; c < a.candidates.size(); ++c) {
+        CHECK(a.candidates[c].variance == b.candidates[c].variance);
+        CHECK(a.candidates[c].work == b.candidates[c].work);
+        CHECK(a.candidates[c].seconds == 0);
+        CHECK(other_rays.candidates[c].variance == Approx(a.candidates[c].variance).epsilon(0.05));
+        CHECK(other_seed.candidates[c].variance != a.candidates[c].variance);
+    }
+}
+
+TEST_CASE("variants restrict the choice; other settings that it would make are refused by name") {
+    const Scene scene = project_scene("cornell", 24, 24);
+    RenderSettings s = automatic_settings(scene);
+    s.variant = "lvc";
+    CHECK(choice_candidates(s, false).size() == 6);
+    s.variant = "streaming";
+    REQUIRE(choice_candidates(s, false).size() == 3);
+    CHECK(make_renderer(scene, s)->stats().choice.candidates[2].name == "bdpt, streaming");
+    s.variant = "wavefront";
+    s.deterministic = true;
+    CHECK(choice_candidates(s, false).size() == 7);
+    CHECK(choice_candidates(s, true).size() == 3);  // a cache on a device has another order in every run
+    const auto refused = [&](const std::string& key, const std::string& value, const std::string& part) {
+        RenderSettings other = automatic_settings(scene);
+        apply_setting(other, key, value);
+        try {
+            make_renderer(scene, other);
+            FAIL("not refused: " << key << "=" << value);
+        } catch (const Error& error) {
+            CHECK(error.code == ExitCode::usage);
+            INFO(error.what());
+            CHECK(std::string(error.what()).find(part) != std::string::npos);
+        }
+    };
+    refused("integrator", "path", "integrator path");
+    refused("integrator", "light", "integrator light");
+    refused("strategies", "hits+next_event", "strategies");
+    refused("strategies", "s1t2", "strategies");
+    refused("connections", "2", "connections=2");
+    refused("technique_depth", "4", "technique_depth=4");
+    CHECK_THROWS_AS(apply_setting(s, "bdpt.auto", "yes"), Error);
+}
+
+TEST_CASE("nothing to see: scenes without emitters and films of one pixel") {
+    const Scene dark = scene_from_text(scene_xml(4, kView + kGround));
+    CHECK(render_scene(dark, automatic_settings(dark), 2).stats.choice.name == "path");
+    const Scene pixel = project_scene("cornell", 1, 1);
+    CHECK(render_scene(pixel, automatic_settings(pixel), 2).stats.choice.candidates.size() == 7);
+}
+
+TEST_CASE("saved statistics keep the choice, and a later part does not lose it") {
+    RenderStats first;
+    first.choice = {"bdpt, lvc, 2 connections", {{"integrator", "bdpt"}, {"connections", "2"}}, 0.25, 8192, {{"path", "integrator=path", std::numeric_limits<double>::infinity(), 3, 0, 0}}};
+    RenderStats total;
+    add_part(total, {}, first);
+    total = restore_stats(nlohmann::json::parse(save_stats(total).dump()));
+    add_part(total, {}, {});
+    CHECK(total.choice.name == first.choice.name);
+    CHECK(total.choice.settings == first.choice.settings);
+    CHECK(total.choice.seconds == 0.25);
+    REQUIRE(total.choice.candidates.size() == 1);
+    CHECK(std::isinf(total.choice.candidates[0].variance));
+}
