@@ -40,10 +40,11 @@ RenderSettings settings_of(const RenderSettings& settings, const ChoiceCandidate
 /// Candidates of one family do the same but for the number of draws, so that the time of one tells that of the others.
 uint32_t family(const ChoiceCandidate& c) { return (c.pilot.light ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0); }
 
-/// Seconds per sample of every pixel. On a device: of a wave as full as it gets.
-double timed(const Scene& scene, const RenderSettings& settings, bool cuda, const MakeRenderer& make) {
+/// Seconds per sample of every pixel. On a device: of one full wave, smaller than a render's for the sake of time.
+double timed(const Scene& scene, RenderSettings settings, bool cuda, const MakeRenderer& make) {
     constexpr double kLongEnough = 0.05;
     constexpr uint32_t kPathsPerWave = 1u << 21;
+    if (cuda && settings.wave_size == 0 && settings.variant != "streaming") settings.wave_size = kPathsPerWave;
     const std::unique_ptr<Renderer> renderer = make(settings);
     const uint32_t pixels = scene.sensor.crop_width * scene.sensor.crop_height, count = cuda ? std::max(1u, kPathsPerWave / std::max(1u, pixels)) : 1;
     double seconds = 0;
