@@ -81,6 +81,8 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, co
             {"specialise", settings.specialise},
             {"fuse", fuse_name(settings.fuse)},
             {"cull", settings.cull},
+            {"compaction", compaction_name(stats.queue_policy.compaction)},
+            {"ordering", ordering_name(stats.queue_policy.ordering)},
             {"seconds", {{"load", load_seconds}, {"build", stats.build_seconds}, {"render", stats.render_seconds}}},
             {"rays", {{"extend", stats.rays_extend}, {"occlude", stats.rays_occlude}}},
             {"rays_per_second", stats.render_seconds > 0 ? rays / stats.render_seconds : 0.0},

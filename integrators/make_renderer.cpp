@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <bit>
+
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "integrators/bidirectional/bidirectional.h"
@@ -7,6 +9,15 @@
 #include "integrators/path/path.h"
 
 namespace ambilux {
+namespace {
+
+/// What `ordering=auto` stands for (docs/performance.md, "Compaction and ordering").
+Ordering best_ordering(const Scene& scene, const RenderSettings& settings, bool cuda) {
+    const bool sortable = settings.variant == "wavefront" || settings.variant == "lvc";
+    return cuda && sortable && std::popcount(scene.features.bsdfs) > 1 ? Ordering::material : Ordering::none;
+}
+
+}  // namespace
 
 bool cuda_available() { return cuda_device_present(); }
 
@@ -25,6 +36,11 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     if (settings.technique_depth > 0 && (settings.integrator == "path" || settings.variant == "megakernel"))
         throw Error(ExitCode::usage, fmt::format("technique_depth={}: {} gathers no images of single strategies; integrator light and the other variants of bdpt do", settings.technique_depth,
                                                  settings.integrator == "path" ? "integrator path" : "variant megakernel"));
+    const bool switched = settings.queues.compaction != Compaction::atomic || (settings.queues.ordering != Ordering::none && settings.queues.ordering != Ordering::automatic);
+    if (switched && (settings.variant == "megakernel" || settings.variant == "streaming"))
+        throw Error(ExitCode::usage, fmt::format("compaction={}, ordering={}: variant {} {}; the variants wavefront and lvc have these switches", compaction_name(settings.queues.compaction),
+                                                 ordering_name(settings.queues.ordering), settings.variant,
+                                                 settings.variant == "megakernel" ? "has no queues to compact or to sort" : "appends what its slots do in no fixed order"));
     const bool cuda = settings.backend == "cuda" || (settings.backend == "auto" && settings.accel != "embree" && cuda_available());
     if (cuda && settings.accel == "embree") throw Error(ExitCode::usage, "accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
     if (settings.accel == "bvh2" && !(cuda && settings.integrator == "path"))
@@ -36,6 +52,7 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     RenderSettings chosen = settings;
     // On a host connect waits for the tables of environments, which it can ask for ahead only as a stage of its own.
     if (chosen.fuse == Fuse::automatic) chosen.fuse = cuda ? Fuse::all : Fuse::light;
+    if (chosen.queues.ordering == Ordering::automatic) chosen.queues.ordering = best_ordering(scene, settings, cuda);
     if (chosen.integrator != "path") return cuda ? make_bidirectional_cuda(scene, chosen, accels) : make_bidirectional_cpu(scene, chosen, accels);
     return cuda ? make_path_cuda(scene, chosen, accels) : make_path_cpu(scene, chosen, accels);
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "film/moments.h"
+#include "queues/order.h"
 #include "scene/scene.h"
 #include "stages/path_policy.h"
 #include "stages/techniques.h"
@@ -40,6 +41,7 @@ struct RenderSettings {
     uint64_t seed = 0;
     std::string accel = "auto";          ///< cpu: embree (auto) or cwbvh (the CUDA traversal built for the host). cuda: cwbvh (auto) or, for integrator path, bvh2
     uint32_t wave_size = 0;              ///< paths in flight; 0 chooses
+    QueuePolicy queues = {Compaction::atomic, Ordering::automatic};  ///< keys compaction and ordering: where items lie and in which order stages go through them
     bool specialise = true;              ///< kernels hold only what the scene has
     Fuse fuse = Fuse::automatic;         ///< which stages pass their items on without a queue
     float cull = 0.0f;                   ///< Russian roulette before shadow rays (survival_factor); 0: none
@@ -88,6 +90,7 @@ struct ChoiceStats {
 
 struct RenderStats {
     std::string backend, device, accel;
+    QueuePolicy queue_policy;   ///< as used
     double build_seconds = 0;   ///< acceleration structure, upload, allocation
     double render_seconds = 0;  ///< inside render(), wall clock
     uint64_t samples = 0;       ///< per pixel

@@ -134,6 +134,10 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.accel = (choose(key, value, {"auto", "embree", "cwbvh", "bvh2"}), value);
     else if (key == "wave_size")
         s.wave_size = integer<uint32_t>(key, value, 0, 1u << 28);
+    else if (key == "compaction")
+        s.queues.compaction = Compaction(choose(key, value, {"atomic", "select", "none"}));
+    else if (key == "ordering")
+        s.queues.ordering = Ordering(choose(key, value, {"none", "material", "morton", "auto"}));
     else if (key == "specialise")
         s.specialise = boolean(key, value);
     else if (key == "fuse")
@@ -146,7 +150,7 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.graph = boolean(key, value);
     else
         throw Error(ExitCode::usage,
-                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, bdpt.auto, connections, max_depth, rr_depth, seed, accel, wave_size, specialise, fuse, cull, deterministic, graph", key));
+                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, bdpt.auto, connections, max_depth, rr_depth, seed, accel, wave_size, compaction, ordering, specialise, fuse, cull, deterministic, graph", key));
 }
 
 }  // namespace ambilux

@@ -1,4 +1,5 @@
 // Work queues: lanes of 16 bytes, so that neighbouring threads load and store neighbouring 16-byte words, and a counter that lives where the kernels run.
+// Items are appended, or lie at the places of their paths (queues/order.h says what for).
 #pragma once
 
 #include <cstring>
@@ -17,10 +18,10 @@ struct alignas(16) Lane {
 
 /// State of one queue. `count` goes on counting when the queue is full, so that what is lost is known.
 struct QueueCounter {
-    uint32_t count;     ///< pushes since the queue was last emptied
+    uint32_t count;     ///< items since the queue was last emptied; of a queue of fixed places known on a device only when it has been counted
     uint32_t capacity;
     uint64_t peak;      ///< most pushes of one filling
-    uint64_t overflow;  ///< pushes past the capacity; their items are lost
+    uint64_t overflow;  ///< items lost: pushes past the capacity, or to a fixed place that was taken (which only the host looks for)
     uint32_t next;      ///< first item that no persistent thread has taken yet
     uint32_t pad[3];
 
@@ -50,6 +51,17 @@ AMBILUX_HD uint32_t take_place(uint32_t* count) {
 #endif
 }
 
+/// The path that an item belongs to.
+template <class Item>
+AMBILUX_HD uint32_t path_of(const Item& item) {
+    if constexpr (requires { item.ray.path; })
+        return item.ray.path;
+    else if constexpr (requires { item.path; })
+        return item.path;
+    else
+        return 0;
+}
+
 /// How the lanes of a queue's items lie in memory.
 enum class LaneOrder {
     apart,     ///< lane k of item i at base[k * capacity + i]: for items that neighbouring threads take one after the other
@@ -65,6 +77,7 @@ struct Queue {
     Lane* base = nullptr;
     QueueCounter* counter = nullptr;
     uint32_t capacity = 0;
+    uint8_t* flags = nullptr;  ///< fixed places: 1 where there is an item. Null: items are appended
 
     AMBILUX_HD size_t place(uint32_t i, uint32_t lane) const { return Order == LaneOrder::apart ? size_t(lane) * capacity + i : size_t(i) * kLanes + lane; }
 
@@ -80,10 +93,21 @@ struct Queue {
         memcpy(lanes, &item, sizeof(Item));
         for (uint32_t k = 0; k < kLanes; ++k) base[place(i, k)] = lanes[k];
     }
-    /// Appends and returns the place. Past the capacity the item is lost and counted (QueueCounter::overflow).
+    /// Appends the item, or stores it at the place of its path, and returns the place. Past the capacity the item is lost and counted (QueueCounter::overflow).
     AMBILUX_HD uint32_t push(const Item& item) const {
-        const uint32_t i = take_place(&counter->count);
+        const uint32_t i = flags ? fixed_place(item) : take_place(&counter->count);
         if (i < capacity) store(i, item);
+        return i;
+    }
+
+private:
+    AMBILUX_HD uint32_t fixed_place(const Item& item) const {
+        const uint32_t i = path_of(item);
+#if !defined(__CUDA_ARCH__)
+        ++counter->count;  // a device counts before it goes through the queue
+        if (i >= capacity || flags[i]) ++counter->overflow;
+#endif
+        if (i < capacity) flags[i] = 1;
         return i;
     }
 };

@@ -1,6 +1,7 @@
 // What a light tracer or bidirectional path tracer does where, decided once by the host.
 #pragma once
 
+#include "queues/order.h"
 #include "stages/techniques.h"
 #include "transport/bidirectional.h"
 
@@ -29,6 +30,7 @@ struct BidirectionalPolicy {
     float cull;               ///< share of a path's light below which what it finds faces Russian roulette before the shadow ray; 0: never
     SingleStrategies singles;
     uint32_t technique_depth; ///< segments up to which images of single strategies are gathered; 0: none
+    QueuePolicy queues;
 
     /// Eye walks of `depth` segments count the environment that they reach: beyond the first segment as hits only.
     AMBILUX_HD bool counts_environment(uint32_t depth) const { return count_environment && (depth == 1 || mis.has(kHitStrategies)); }

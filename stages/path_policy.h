@@ -1,6 +1,7 @@
 // What a path tracer does where, decided once by the host.
 #pragma once
 
+#include "queues/order.h"
 #include "transport/mis.h"
 
 namespace ambilux {
@@ -18,6 +19,7 @@ struct PathPolicy {
     bool fuse;            ///< light is weighted and added up by the stages that find it, not by stages of their own
     bool connect_in_shade;  ///< shade samples emitters too: the surface and its BSDF are looked up once
     float cull;           ///< share of a path's light below which what it finds faces Russian roulette before the shadow ray; 0: never
+    QueuePolicy queues;
 };
 
 }  // namespace ambilux

@@ -118,6 +118,58 @@ TEST_CASE("lvc: connections and light tracing alone, whose weights sum to one be
     CHECK(result.detectable < 0.02);
 }
 
+TEST_CASE("where items lie and in which order stages go through them changes no bit of bidirectional images and no count") {
+    for (const char* name : {"glass", "lights", "materials"}) {
+        const Scene scene = project_scene(name, 61, 43);
+        for (const char* variant : {"wavefront", "lvc"}) {
+            RenderSettings one_pair = variant_settings(scene, variant);
+            one_pair.deterministic = true;  // contributions of one path are then added one launch after the other
+            const RenderResult first = render_scene(scene, one_pair, 2);
+            for (const char* compaction : {"atomic", "select", "none"}) {
+                for (const char* ordering : {"none", "material", "morton"}) {
+                    INFO(name << " " << variant << " compaction=" << compaction << " ordering=" << ordering);
+                    RenderSettings s = one_pair;
+                    apply_setting(s, "compaction", compaction);
+                    apply_setting(s, "ordering", ordering);
+                    const RenderResult result = render_scene(scene, s, 2);
+                    s.deterministic = false;
+                    for (const QueueStats& q : render_scene(scene, s, 2).stats.queues) CHECK(q.overflow == 0);
+                    for (const QueueStats& q : result.stats.queues) CHECK(q.overflow == 0);  // no path pushed twice
+                    CHECK(result.stats.invalid.total() == 0);
+                    // The places in the cache, and with them what is drawn, are those of another order.
+                    if (s.variant == "lvc" && s.queues.ordering != Ordering::none) continue;
+                    CHECK(result.film.sum == first.film.sum);
+                    REQUIRE(result.stats.stages.size() == first.stats.stages.size());
+                    for (size_t k = 0; k < first.stats.stages.size(); ++k) CHECK(result.stats.stages[k].items_by_depth == first.stats.stages[k].items_by_depth);
+                }
+            }
+        }
+    }
+}
+
+TEST_CASE("lvc over sorted queues has the expectation of paired walks") {
+    const Scene scene = project_scene("materials", 40, 30);
+    const Estimate paired = render_batches(scene, variant_settings(scene, "wavefront", 51), 256);
+    RenderSettings s = variant_settings(scene, "lvc", 52);
+    for (const char* ordering : {"material", "morton"}) {
+        apply_setting(s, "ordering", ordering);
+        const ZTestResult result = z_test(render_batches(scene, s, 128), paired);
+        INFO(ordering << "\n" << result.report());
+        CHECK(result.pass);
+    }
+}
+
+TEST_CASE("compaction and ordering are refused where there are no such queues") {
+    const Scene scene = project_scene("cornell", 16, 16);
+    for (const char* variant : {"megakernel", "streaming"}) {
+        for (const auto& [key, value] : {std::pair{"compaction", "select"}, {"compaction", "none"}, {"ordering", "material"}, {"ordering", "morton"}}) {
+            RenderSettings s = variant_settings(scene, variant);
+            apply_setting(s, key, value);
+            CHECK_THROWS_WITH(make_renderer(scene, s), Catch::Contains(std::string(key) + "=" + value) && Catch::Contains(variant) && Catch::Contains("wavefront"));
+        }
+    }
+}
+
 TEST_CASE("streaming samples the paths of paired walks but for connections beyond the first eye vertex") {
     for (const char* name : {"cornell", "furnace", "glass", "lights", "materials", "textured"}) {
         for (const auto& [strategies, max_depth] : {std::pair{"hits+next_event", 6}, {"light", 6}, {"hits+next_event+light", 6}, {"connections", 3}, {"all", 3}}) {

@@ -164,6 +164,42 @@ TEST_CASE("a graph and single launches give the same bits and counts") {
     check_counts(graph.stats, single.stats, 0);
 }
 
+TEST_CASE("where items lie and in which order stages go through them changes no bit of a device's image and no count") {
+    if (!device()) return;
+    for (const char* name : {"lights", "materials", "textured"}) {
+        const Scene scene = project_scene(name, 97, 61);
+        RenderSettings s = on("cuda", cpu_settings(scene, Estimator::mis));
+        const RenderResult first = render_scene(scene, s, 6);
+        for (const char* compaction : {"atomic", "select", "none"}) {
+            for (const char* ordering : {"none", "material", "morton"}) {
+                apply_setting(s, "compaction", compaction);
+                apply_setting(s, "ordering", ordering);
+                for (const auto& [graph, wave_size] : {std::pair{true, 0u}, {true, 4000u}, {false, 4000u}}) {
+                    INFO(name << " compaction=" << compaction << " ordering=" << ordering << " graph=" << graph << " wave_size=" << wave_size);
+                    s.graph = graph;
+                    s.wave_size = wave_size;
+                    const RenderResult result = render_scene(scene, s, 6);
+                    CHECK(first.film.sum == result.film.sum);
+                    check_counts(first.stats, result.stats, 0);
+                    CHECK(result.stats.invalid.total() == 0);
+                    CHECK(result.stats.memory_bytes == result.stats.memory_bytes_predicted);
+                    for (const QueueStats& q : result.stats.queues) CHECK(q.overflow == 0);
+                }
+            }
+        }
+    }
+}
+
+TEST_CASE("by default a device sorts hits by material where there are several types of BSDFs") {
+    if (!device()) return;
+    for (const auto& [name, ordering] : {std::pair{"cornell", Ordering::none}, {"materials", Ordering::material}}) {
+        const Scene scene = project_scene(name, 32, 32);
+        const QueuePolicy used = render_scene(scene, on("cuda", cpu_settings(scene, Estimator::mis)), 1).stats.queue_policy;
+        CHECK(used.compaction == Compaction::atomic);
+        CHECK(used.ordering == ordering);
+    }
+}
+
 TEST_CASE("images of both backends have the same expectation") {
     if (!device()) return;
     for (const char* name : {"cornell", "lights", "materials", "textured", "glass"}) {

@@ -1,10 +1,13 @@
 // libs: ambilux_backends ambilux_queues ambilux_core
 // labels: gpu
-// Queues on a device: pushes of divergent threads, warp by warp.
+// Queues on a device: pushes of divergent threads, warp by warp; lists of places.
 #include <algorithm>
+#include <numeric>
 #include <vector>
 
 #include "backends/cuda/device_memory.h"
+#include "backends/cuda/executor.cuh"
+#include "backends/cuda/order.h"
 #include "backends/cuda_device.h"
 #include "queues/queue.h"
 #include "tests/catch.h"
@@ -79,4 +82,84 @@ TEST_CASE("G3: a full queue on a device loses items by count, not in silence") {
     CHECK(c.size() == 100);
     c.finish();
     CHECK(c.overflow == 900);
+}
+
+namespace {
+
+/// Numbers that depend on nothing but `i`.
+uint32_t scrambled(uint32_t i) {
+    i = (i ^ i >> 16) * 0x7feb352du;
+    i = (i ^ i >> 15) * 0x846ca68bu;
+    return i ^ i >> 16;
+}
+
+/// Memory of lists over `n` places.
+struct OwnedOrder {
+    DeviceBuffer<std::byte> memory;
+    OrderMemory order;
+
+    OwnedOrder(QueuePolicy policy, uint32_t n) {
+        const uint64_t temporary = order_temporary_bytes(policy, n);
+        Layout sizes;
+        lay_out_order(sizes, policy, n, temporary);
+        memory = DeviceBuffer<std::byte>(sizes.bytes());
+        Layout layout(memory.data());
+        order = lay_out_order(layout, policy, n, temporary);
+    }
+    std::vector<uint32_t> read(const uint32_t* list, uint32_t n) const {
+        std::vector<uint32_t> values(n);
+        cuda_check(cudaMemcpy(values.data(), list, n * sizeof(uint32_t), cudaMemcpyDeviceToHost), "list");
+        return values;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("compaction of flags on a device: the places that hold an item, in order, and their number") {
+    if (!cuda_device_present()) {
+        WARN("no CUDA device: skipped");
+        return;
+    }
+    for (const uint32_t n : {1u, 31u, 32u, 33u, 1000u, (1u << 20) + 1}) {
+        const OwnedOrder owned({Compaction::select, Ordering::none}, n);
+        for (const uint32_t in_256 : {0u, 1u, 128u, 255u, 256u}) {
+            INFO(n << " places, " << in_256 << " of 256 with an item");
+            std::vector<uint8_t> flags((n + 255) / 256 * 256);
+            std::vector<uint32_t> expected;
+            for (uint32_t i = 0; i < n; ++i) {
+                flags[i] = scrambled(i) % 256 < in_256;
+                if (flags[i]) expected.push_back(i);
+            }
+            const DeviceBuffer<uint8_t> device_flags{std::span<const uint8_t>(flags)};
+            DeviceBuffer<uint32_t> count(2);
+            count.zero();
+            select_places(owned.order, device_flags.data(), n, count.data(), nullptr);
+            detail::count_items<<<7, kStageBlock>>>(device_flags.data(), n, count.data() + 1);
+            cuda_check(cudaDeviceSynchronize(), "select_places");
+            CHECK(count.download() == std::vector<uint32_t>{uint32_t(expected.size()), uint32_t(expected.size())});
+            CHECK(owned.read(owned.order.list[0], uint32_t(expected.size())) == expected);
+        }
+    }
+}
+
+TEST_CASE("sorting places on a device: as a stable sort on the host, for any number of bits") {
+    if (!cuda_device_present()) {
+        WARN("no CUDA device: skipped");
+        return;
+    }
+    for (const uint32_t n : {1u, 31u, 32u, 33u, 1000u, (1u << 20) + 1}) {
+        for (const uint32_t bits : {1u, 3u, 8u, 9u, 24u}) {
+            INFO(n << " places, " << bits << " bits");
+            const OwnedOrder owned({Compaction::atomic, Ordering::material}, n);
+            std::vector<uint32_t> keys(n), places(n);
+            for (uint32_t i = 0; i < n; ++i) keys[i] = scrambled(i) & ((1u << bits) - 1);
+            std::iota(places.begin(), places.end(), 0u);
+            cuda_check(cudaMemcpy(owned.order.keys[0], keys.data(), n * sizeof(uint32_t), cudaMemcpyHostToDevice), "keys");
+            cuda_check(cudaMemcpy(owned.order.list[0], places.data(), n * sizeof(uint32_t), cudaMemcpyHostToDevice), "places");
+            sort_places(owned.order, n, bits, nullptr);
+            cuda_check(cudaDeviceSynchronize(), "sort_places");
+            std::stable_sort(places.begin(), places.end(), [&](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
+            CHECK(owned.read(owned.order.list[1], n) == places);
+        }
+    }
 }

@@ -221,7 +221,7 @@ TEST_CASE("G13: every setting changes something that can be seen, or is refused"
     for (auto [key, value, allowed] : {std::tuple{"integrator", "bidirectional", "bdpt"}, {"variant", "mega", "wavefront"}, {"backend", "gpu", "cuda"}, {"estimator", "NEE", "nee"}, {"heuristic", "max", "power"},
                                        {"max_depth", "-2", "-1"}, {"max_depth", "16383", "16382"}, {"max_depth", "5x", "integer"}, {"max_depth", "", "integer"}, {"rr_depth", "-2", "-1"}, {"seed", "-1", "0"},
                                        {"seed", "18446744073709551616", "18446744073709551615"}, {"accel", "bvh", "cwbvh"}, {"wave_size", "-5", "0"}, {"wave_size", "1e6", "integer"},
-                                       {"specialise", "yes", "true"}, {"deterministic", "1", "false"}}) {
+                                       {"specialise", "yes", "true"}, {"compaction", "sort", "atomic, select, none"}, {"ordering", "type", "none, material, morton"}, {"deterministic", "1", "false"}}) {
         const std::string message = refused(s, key, value);
         INFO(message);
         CHECK(message.find(key) != std::string::npos);
@@ -229,8 +229,36 @@ TEST_CASE("G13: every setting changes something that can be seen, or is refused"
         CHECK(message.find(allowed) != std::string::npos);
     }
     const std::string unknown = refused(s, "spp", "5");
-    for (const char* name : {"spp", "integrator", "variant", "backend", "estimator", "heuristic", "max_depth", "rr_depth", "seed", "accel", "wave_size", "specialise", "fuse", "deterministic"})
+    for (const char* name : {"spp", "integrator", "variant", "backend", "estimator", "heuristic", "max_depth", "rr_depth", "seed", "accel", "wave_size", "compaction", "ordering", "specialise", "fuse", "deterministic"})
         CHECK(unknown.find(name) != std::string::npos);
+}
+
+TEST_CASE("Where items lie and in which order stages go through them changes no bit of the image and no count", "[path]") {
+    for (const char* name : {"lights", "materials", "textured"}) {
+        const Scene scene = small_scene(name);
+        const RenderResult first = render_scene(scene, settings_of(scene), 4);
+        for (const char* compaction : {"atomic", "select", "none"}) {
+            for (const char* ordering : {"none", "material", "morton"}) {
+                INFO(name << " compaction=" << compaction << " ordering=" << ordering);
+                RenderSettings s = settings_of(scene);
+                apply_setting(s, "compaction", compaction);
+                apply_setting(s, "ordering", ordering);
+                const RenderResult result = render_scene(scene, s, 4);
+                CHECK(same_image(first.film, result.film));
+                REQUIRE(result.stats.stages.size() == first.stats.stages.size());
+                for (size_t k = 0; k < first.stats.stages.size(); ++k) CHECK(result.stats.stages[k].items_by_depth == first.stats.stages[k].items_by_depth);
+                for (const QueueStats& q : result.stats.queues) CHECK(q.overflow == 0);  // no path pushed twice
+                CHECK(result.stats.memory_bytes == result.stats.memory_bytes_predicted);
+            }
+        }
+    }
+}
+
+TEST_CASE("By default queues of the CPU are appended to and gone through as they are", "[path]") {
+    const Scene scene = small_scene("materials");
+    const QueuePolicy used = render_scene(scene, settings_of(scene), 1).stats.queue_policy;
+    CHECK(used.compaction == Compaction::atomic);
+    CHECK(used.ordering == Ordering::none);
 }
 
 TEST_CASE("Renders that would not end or cannot be made are refused", "[path]") {

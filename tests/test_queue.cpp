@@ -1,10 +1,13 @@
-// libs: ambilux_queues
-// Queues on the host: storage, counting, layout.
+// libs: ambilux_stages ambilux_queues
+// Queues on the host: storage, counting, layout, fixed places, the order in which stages go through them.
+#include <algorithm>
+#include <limits>
 #include <memory>
 #include <set>
 #include <vector>
 
-#include "queues/layout.h"
+#include "backends/cpu/executor.h"
+#include "queues/order.h"
 #include "tests/catch.h"
 
 using namespace ambilux;
@@ -96,4 +99,141 @@ TEST_CASE("G8: a layout without memory tells the bytes that one with memory uses
     for (const void* p : places) CHECK(reinterpret_cast<uintptr_t>(p) % 256 == 0);
     // Only the empty queue may share its place.
     CHECK(std::set<const void*>(places.begin(), places.end()).size() == places.size() - 1);
+}
+
+TEST_CASE("queue of fixed places: an item lies where its path says; a second one for the same path is counted as lost") {
+    std::vector<Lane> memory(5);
+    std::vector<uint8_t> flags(5);
+    QueueCounter counter{};
+    counter.capacity = 5;
+    const Queue<Contribution> queue = {memory.data(), &counter, 5, flags.data()};
+    for (const uint32_t path : {3u, 0u, 4u}) CHECK(queue.push({{float(path), 0.0f, 0.0f}, path}) == path);
+    CHECK(flags == std::vector<uint8_t>{1, 0, 0, 1, 1});
+    for (const uint32_t path : {0u, 3u, 4u}) CHECK(queue.load(path).value.x == float(path));
+    CHECK(counter.size() == 3);
+    CHECK(counter.overflow == 0);
+    queue.push({{}, 3});
+    CHECK(counter.overflow == 1);
+    queue.push({{}, 5});
+    CHECK(counter.overflow == 2);
+    CHECK(flags == std::vector<uint8_t>{1, 0, 0, 1, 1});
+    // The path of a hit of a walk is that of its ray.
+    WalkHit hit{};
+    hit.ray.path = 7;
+    CHECK(path_of(hit) == 7);
+}
+
+namespace {
+
+/// Notes what it is called with, and puts an item of every second path into another queue.
+struct Note {
+    Queue<HitItem> in, out;
+    std::vector<uint32_t>* paths;
+
+    void operator()(uint32_t i) const {
+        const HitItem item = in.load(i);
+        paths->push_back(item.path);
+        if (item.path % 2 == 0) out.push(item);
+    }
+};
+
+}  // namespace
+
+TEST_CASE("an executor goes through all items once, in the order that is asked for, for any size") {
+    for (const uint32_t n : {0u, 1u, 31u, 32u, 33u, 1000u}) {
+        for (const Compaction compaction : {Compaction::atomic, Compaction::select, Compaction::none}) {
+            for (const Ordering ordering : {Ordering::none, Ordering::material, Ordering::morton}) {
+                INFO(n << " slots, compaction " << compaction_name(compaction) << ", ordering " << ordering_name(ordering));
+                const QueuePolicy policy = {compaction, ordering};
+                const auto lay = [&](Layout& layout, Queue<HitItem>* queues, QueueCounter* counters, OrderMemory& order) {
+                    for (int q = 0; q < 2; ++q) queues[q] = layout.queue<HitItem>("hits", counters, n, policy.fixed_places());
+                    order = lay_out_order(layout, policy, n);
+                };
+                Queue<HitItem> queues[2];
+                OrderMemory order;
+                Layout sizes;
+                lay(sizes, queues, nullptr, order);
+                std::vector<Lane> memory(sizes.bytes() / sizeof(Lane) + 1);
+                QueueCounter counters[2] = {};
+                for (QueueCounter& c : counters) c.capacity = n;
+                Layout layout(memory.data());
+                lay(layout, queues, counters, order);
+                CHECK(layout.bytes() == sizes.bytes());
+
+                // Three materials in turn, and one hit in seven of nothing.
+                const Shape shapes[3] = {{2, kNone, 0, 0, 1, 1.0f}, {0, kNone, 0, 1, 1, 1.0f}, {1, kNone, 0, 2, 1, 1.0f}};
+                const Triangle triangles[3] = {{0, 0, 0, 0}, {0, 0, 0, 1}, {0, 0, 0, 2}};
+                SceneView scene{};
+                scene.shapes = shapes;
+                scene.triangles = triangles;
+                scene.triangle_count = 3;
+                scene.material_count = 3;
+                const auto material = [&](uint32_t path) { return path % 7 == 0 ? 3 : shapes[path % 3].material; };
+
+                WaveState state{};
+                StageRecord records[kStageCount] = {};
+                CpuExecutor executor(&state, records, scene, order);
+                std::vector<uint32_t> expected, paths;
+                for (uint32_t path = 0; path < n; ++path) {
+                    if (path % 5 == 1) continue;
+                    HitItem item{};
+                    item.path = path;
+                    item.prim = path % 7 == 0 ? kNone : path % 3;
+                    queues[0].push(item);
+                    expected.push_back(path);
+                }
+                const auto by_material = [&](std::vector<uint32_t> list) {
+                    if (ordering == Ordering::material) std::stable_sort(list.begin(), list.end(), [&](uint32_t a, uint32_t b) { return material(a) < material(b); });
+                    return list;
+                };
+                executor.run(StageId::shade, Note{queues[0], queues[1], &paths}, queues[0]);
+                CHECK(paths == by_material(expected));
+                CHECK(counters[0].count == 0);
+                CHECK(counters[0].peak == expected.size());
+                // What was pushed while the first queue was gone through.
+                std::erase_if(expected, [](uint32_t path) { return path % 2 == 1; });
+                paths.clear();
+                executor.run(StageId::shade, Note{queues[1], queues[0], &paths}, queues[1]);
+                std::vector<uint32_t> sorted = paths;
+                std::sort(sorted.begin(), sorted.end());
+                CHECK(sorted == expected);
+                if (compaction != Compaction::atomic || ordering != Ordering::material) CHECK(paths == by_material(expected));
+                CHECK(records[uint32_t(StageId::shade)].items == counters[0].count + counters[0].peak);
+                for (const QueueCounter& c : counters) CHECK(c.overflow == 0);
+            }
+        }
+    }
+}
+
+TEST_CASE("keys of rays: octant first, then the Z curve of a grid over the scene; never the key of an empty place") {
+    SceneView scene{};
+    scene.bounds_center = {1.0f, 2.0f, 3.0f};
+    scene.bounds_radius = 4.0f;
+    const auto key = [&](Vec3f o, Vec3f d) {
+        RayItem ray{};
+        ray.o = o;
+        ray.d = d;
+        return MortonOrder::key(scene, ray);
+    };
+    const Vec3f up = {1.0f, 1.0f, 1.0f};
+    CHECK(key({-3.0f, -2.0f, -1.0f}, up) == 0);
+    CHECK(key({5.0f, 6.0f, 7.0f}, -up) == 0xfffffe);
+    CHECK(key({4.99f, 5.99f, 6.99f}, up) == 0x1fffff);
+    const float cell = 8.0f / 128.0f;
+    // One cell along x, y, z is bit 0, 1, 2; two cells are bit 3 and so on up to 64 cells.
+    for (uint32_t bit = 0; bit < 7; ++bit) {
+        const float far = cell * (float(1u << bit) + 0.5f), near = 0.5f * cell;
+        CHECK(key(Vec3f{-3.0f, -2.0f, -1.0f} + Vec3f{far, near, near}, up) == 1u << 3 * bit);
+        CHECK(key(Vec3f{-3.0f, -2.0f, -1.0f} + Vec3f{near, far, near}, up) == 2u << 3 * bit);
+        CHECK(key(Vec3f{-3.0f, -2.0f, -1.0f} + Vec3f{near, near, far}, up) == 4u << 3 * bit);
+    }
+    CHECK(key({-3.0f, -2.0f, -1.0f}, {-1.0f, 1.0f, -1.0f}) == 5u << 21);
+    const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+    for (const float x : {nan, inf, -inf}) CHECK(key({x, x, x}, {x, x, x}) < 0xffffffu);
+    scene.bounds_radius = 0.0f;
+    CHECK(key({1.0f, 2.0f, 3.0f}, up) < 0xffffffu);
+    for (const uint32_t materials : {0u, 1u, 2u, 3u, 254u, 255u, 256u}) {
+        scene.material_count = materials;
+        CHECK(materials < (1u << MaterialOrder::bits(scene)) - 1);
+    }
 }

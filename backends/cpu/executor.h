@@ -1,9 +1,12 @@
 // Runs the stages of one wave on the calling thread, over queues that belong to it alone.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 
+#include "queues/order.h"
 #include "queues/queue.h"
+#include "stages/order_keys.h"
 #include "stages/settle.h"
 #include "stages/stage.h"
 #include "stages/wave.h"
@@ -13,6 +16,7 @@ namespace ambilux {
 class CpuExecutor {
 public:
     CpuExecutor(WaveState* state, StageRecord* records) : state_(state), records_(records) {}
+    CpuExecutor(WaveState* state, StageRecord* records, const SceneView& scene, const OrderMemory& order) : state_(state), records_(records), scene_(&scene), order_(order) {}
 
     template <class Stage>
     void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
@@ -31,30 +35,21 @@ public:
     }
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        run_keeping(id, stage, queue);
-        queue.counter->finish();
+        run_in_order<MaterialOrder>(id, stage, queue);
     }
+    /// Items stay where they are until clear().
     template <class Stage, class Item>
     void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        const uint32_t n = queue.counter->size();
-        if (n == 0) return;
-        const auto start = Clock::now();
-        for (uint32_t i = 0; i < n; ++i) {
-            if constexpr (requires { stage.far_memory(i); }) {
-                if (i + kPrefetchDistance < n) __builtin_prefetch(stage.far_memory(i + kPrefetchDistance));
-            }
-            stage(i);
-        }
-        record(id, n, start);
+        run_in_order<void>(id, stage, queue, true);
     }
     /// Rays are read before any stage pushes new ones, so the queue they came from may be filled again at once.
     template <class Stage, class Item>
     void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        run(id, stage, queue);
+        run_in_order<MortonOrder>(id, stage, queue);
     }
     template <class Stage, class Item>
     void trace_coherent(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        run(id, stage, queue);
+        run_in_order<void>(id, stage, queue);
     }
     template <class Item, class Body>
     void repeat_while(const Queue<Item>& queue, Body body) {
@@ -74,6 +69,49 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
     static constexpr uint32_t kPrefetchDistance = 8;  ///< items; further or nearer makes no difference between 4 and 16
+
+    /// One place where the stage is called: compilers contract sums of products differently in every copy of a stage, and images should not depend on the order of queues.
+    template <class Order, class Stage, class Item>
+    void run_in_order(StageId id, const Stage& stage, const Queue<Item>& queue, bool keep = false) {
+        const uint32_t items = queue.counter->size();
+        if (items == 0) return;
+        const auto start = Clock::now();
+        const uint32_t* list = make_list<Order>(queue);
+        const bool gaps = queue.flags && !list;
+        const uint32_t n = gaps ? queue.capacity : items;
+        for (uint32_t i = 0; i < n; ++i) {
+            if constexpr (requires { stage.far_memory(i); }) {
+                if (!queue.flags && !list && i + kPrefetchDistance < n) __builtin_prefetch(stage.far_memory(i + kPrefetchDistance));
+            }
+            if (!gaps || take(queue, i)) stage(list ? list[i] : i);
+        }
+        if (!keep) queue.counter->finish();
+        record(id, items, start);
+    }
+    /// The places of all items, if they do not lie one after the other or not in the order in which they are wanted; null: as they lie.
+    template <class Order, class Item>
+    const uint32_t* make_list(const Queue<Item>& queue) const {
+        bool sorted = false;
+        if constexpr (Ordered<Order, Item>) sorted = order_.policy.ordering == Order::kOrdering;
+        if (!sorted && !(queue.flags && order_.policy.compaction == Compaction::select)) return nullptr;
+        uint32_t n = 0;
+        uint32_t *list = order_.list[0], *keys = order_.keys[0];
+        for (uint32_t i = 0, end = queue.flags ? queue.capacity : queue.counter->size(); i < end; ++i)
+            if (!queue.flags || take(queue, i)) list[n++] = i;
+        if constexpr (Ordered<Order, Item>) {
+            if (sorted) {
+                for (uint32_t i = 0; i < n; ++i) keys[list[i]] = Order::key(*scene_, queue.load(list[i]));
+                std::sort(list, list + n, [&](uint32_t a, uint32_t b) { return keys[a] != keys[b] ? keys[a] < keys[b] : a < b; });
+            }
+        }
+        return list;
+    }
+    template <class Item>
+    static bool take(const Queue<Item>& queue, uint32_t place) {
+        const bool taken = queue.flags[place];
+        queue.flags[place] = 0;
+        return taken;
+    }
     void record(StageId id, uint32_t items, Clock::time_point start) {
         const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start).count();
         records_[uint32_t(id)].add(items, state_->depth, uint64_t(ns));
@@ -81,6 +119,8 @@ private:
 
     WaveState* state_;
     StageRecord* records_;
+    const SceneView* scene_ = nullptr;
+    OrderMemory order_{};
 };
 
 }  // namespace ambilux

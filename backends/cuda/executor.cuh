@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "backends/cuda/device_memory.h"
+#include "backends/cuda/order.h"
 #include "backends/cuda/trace_kernels.cuh"
 #include "queues/queue.h"
+#include "stages/order_keys.h"
 #include "stages/settle.h"
 #include "stages/stage.h"
 #include "stages/wave.h"
@@ -33,6 +35,25 @@ __device__ inline uint64_t device_nanoseconds() {
     return ns;
 }
 
+/// The items that a launch goes through.
+struct Items {
+    QueueCounter* counter;
+    const uint32_t* list;  ///< their places; null: places 0, 1, 2 ...
+    uint8_t* flags;        ///< Queue::flags
+    uint32_t capacity;
+
+    /// Places to look at.
+    __device__ uint32_t size() const { return flags && !list ? capacity : counter->size(); }
+    __device__ uint32_t place(uint32_t i) const { return list ? list[i] : i; }
+    /// False if there is no item. What is taken must be used: its place is empty from now on.
+    __device__ bool take(uint32_t place) const {
+        if (!flags) return true;
+        if (!list && !flags[place]) return false;
+        flags[place] = 0;
+        return true;
+    }
+};
+
 template <class Stage>
 __global__ void __launch_bounds__(kStageBlock) launch_slots(const __grid_constant__ Stage stage, uint32_t slots, uint32_t samples, const WaveState* state) {
     const uint32_t n = slots * (samples ? samples : state->samples);
@@ -51,30 +72,90 @@ __global__ void __launch_bounds__(kStageBlock) launch_queue(const __grid_constan
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) stage(i);
 }
 
+/// The same where items do not lie one after the other. A kernel of its own: together they take other registers, which costs stages 1 to 3 % of their time.
+template <class Stage>
+__global__ void __launch_bounds__(kStageBlock) launch_places(const __grid_constant__ Stage stage, const Items items) {
+    const uint32_t n = items.size();
+    for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) {
+        const uint32_t place = items.place(i);
+        if (items.take(place)) stage(place);
+    }
+}
+
 /// Rays in the order of the queue, one after the other: best while neighbours stay together. `Set`: what traversal has to know of; less than the stage does, where
 /// the scene lets it.
 template <class Set, class Stage, class Tracer>
-__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coherent(const __grid_constant__ Stage stage, const Tracer tracer, const QueueCounter* counter) {
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coherent(const __grid_constant__ Stage stage, const Tracer tracer, const Items items) {
     static_assert(!Stage::kAnyHit);
-    const uint32_t n = counter->size();
+    const uint32_t n = items.size();
     for (uint32_t i = blockIdx.x * kTraceBlock + threadIdx.x; i < n; i += gridDim.x * kTraceBlock) {
+        const uint32_t place = items.place(i);
         Ray ray;
-        if (!stage.fetch(i, ray)) continue;
+        if (!items.take(place) || !stage.fetch(place, ray)) continue;
         Hit hit;
         tracer.template closest<Set::value>(stage.scene, ray, hit);
-        stage.finish(i, hit);
+        stage.finish(place, hit);
     }
 }
 
 /// Rays by persistent threads.
 template <class Set, class Stage, class Tracer>
-__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(const __grid_constant__ Stage stage, const Tracer tracer, QueueCounter* counter) {
-    const uint32_t n = counter->size();
-    const auto fetch = [&](uint32_t i, Ray& ray) { return stage.fetch(i, ray); };
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(const __grid_constant__ Stage stage, const Tracer tracer, const Items items) {
+    const uint32_t n = items.size();
+    const auto fetch = [&](uint32_t i, Ray& ray) {
+        const uint32_t place = items.place(i);
+        return items.take(place) && stage.fetch(place, ray);
+    };
     if constexpr (Stage::kAnyHit)
-        trace_any_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, bool blocked) { stage.finish(i, blocked); }, &n, &counter->next);
+        trace_any_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, bool blocked) { stage.finish(items.place(i), blocked); }, &n, &items.counter->next);
     else
-        trace_closest_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, const Hit& hit) { stage.finish(i, hit); }, &n, &counter->next);
+        trace_closest_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, const Hit& hit) { stage.finish(items.place(i), hit); }, &n, &items.counter->next);
+}
+
+/// Counts the items of a queue of fixed places, 16 flags at a time: memory of flags is a multiple of that, and those past the capacity are 0.
+__global__ inline void count_items(const uint8_t* flags, uint32_t capacity, uint32_t* count) {
+    uint32_t mine = 0;
+    for (uint32_t i = (blockIdx.x * kStageBlock + threadIdx.x) * 16; i < capacity; i += gridDim.x * kStageBlock * 16) {
+        const uint4 word = *reinterpret_cast<const uint4*>(flags + i);
+        mine += uint32_t(__popc(word.x) + __popc(word.y) + __popc(word.z) + __popc(word.w));
+    }
+    const uint32_t warp = __reduce_add_sync(0xffffffffu, mine);
+    if (threadIdx.x % 32 == 0 && warp) atomicAdd(count, warp);
+}
+
+/// Sorts run over all places of a queue, or a quarter, a sixteenth ... of them.
+constexpr uint32_t kSortSizes = 6;
+
+/// The smallest of these sizes that holds `items`; none if there are no items.
+__host__ __device__ inline uint32_t sort_size(uint32_t capacity, uint32_t items) {
+    uint32_t k = 0;
+    while (k + 1 < kSortSizes && capacity >> 2 * (k + 1) >= items) ++k;
+    return items > 0 ? capacity >> 2 * k : 0;
+}
+
+struct SortConditions {
+    cudaGraphConditionalHandle handles[kSortSizes];
+};
+
+__global__ inline void choose_sort(const QueueCounter* counter, uint32_t capacity, SortConditions conditions) {
+    const uint32_t size = sort_size(capacity, counter->size());
+    for (uint32_t k = 0; k < kSortSizes && capacity >> 2 * k > 0; ++k)
+        cudaGraphSetConditional(conditions.handles[k], capacity >> 2 * k == size);
+}
+
+/// Keys of the items that a launch will go through, and their places as they lie. The last key is that of places without an item.
+template <class Order, class Item>
+__global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__ SceneView scene, const Queue<Item> queue, const Items items, uint32_t last, uint32_t* places, uint32_t* keys) {
+    const uint32_t n = items.size(), end = items.flags && !items.list ? n : sort_size(items.capacity, n);
+    for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < end; i += gridDim.x * kStageBlock) {
+        uint32_t place = i, key = last;
+        if (i < n) {
+            place = items.place(i);
+            if (items.list || !items.flags || items.flags[place]) key = Order::key(scene, queue.load(place));
+        }
+        places[i] = place;
+        keys[i] = key;
+    }
 }
 
 /// After a stage: its record, and its queue emptied. The time since the last such kernel is the stage's.
@@ -116,8 +197,8 @@ template <bool kPairs>
 class BasicCudaExecutor {
 public:
     /// `traced`: features that rays have to know of, the scene's or more. `clock`: one value on the device.
-    BasicCudaExecutor(cudaStream_t stream, const Features& traced, WaveState* state, StageRecord* records, uint64_t* clock)
-        : stream_(stream), traced_(traced), state_(state), records_(records), clock_(clock) {
+    BasicCudaExecutor(cudaStream_t stream, const Features& traced, WaveState* state, StageRecord* records, uint64_t* clock, const SceneView& scene, const OrderMemory& order)
+        : stream_(stream), traced_(traced), state_(state), records_(records), clock_(clock), scene_(scene), order_(order) {
         int device = 0;
         cuda_check(cudaGetDevice(&device), "device");
         cuda_check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "multiprocessors");
@@ -158,13 +239,13 @@ public:
     }
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        detail::launch_queue<<<blocks(detail::launch_queue<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, queue.counter);
+        launch_items(stage, prepare<MaterialOrder>(queue));
         finish(id, queue.counter);
     }
-    /// The queue keeps its items.
+    /// Items stay where they are until clear().
     template <class Stage, class Item>
     void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        detail::launch_queue<<<blocks(detail::launch_queue<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, queue.counter);
+        launch_items(stage, prepare<void>(queue));
         finish(id, queue.counter, 0, 0, true);
     }
     /// Rays go through `pairs` instead of the tracer of their stage.
@@ -172,17 +253,19 @@ public:
 
     template <class Stage, class Item>
     void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
+        const detail::Items items = prepare<MortonOrder>(queue);
         with_tracer(stage, [&](auto set, const auto& tracer) {
             const auto kernel = detail::launch_trace<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
-            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, queue.counter);
+            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
         });
         finish(id, queue.counter);
     }
     template <class Stage, class Item>
     void trace_coherent(StageId id, const Stage& stage, const Queue<Item>& queue) {
+        const detail::Items items = prepare<void>(queue);  // in order as they are
         with_tracer(stage, [&](auto set, const auto& tracer) {
             const auto kernel = detail::launch_coherent<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
-            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, queue.counter);
+            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
         });
         finish(id, queue.counter);
     }
@@ -201,10 +284,13 @@ public:
 
     template <class Item, class Body>
     void repeat_while(const Queue<Item>& queue, Body body) {
-        if (capturing_)
-            capture_loop(queue.counter, body);
-        else
-            while (size_of(queue.counter) > 0) body();
+        const auto counted_body = [&] {
+            counted_ = queue.counter;
+            body();
+        };
+        const auto count = [&] { this->count(queue); };
+        if (capturing_) return capture_loop(queue.counter, count, counted_body);
+        for (count(); size_of(queue.counter) > 0; count()) counted_body();
     }
 
 private:
@@ -220,18 +306,77 @@ private:
         });
     }
 
-    template <class Body>
-    void capture_loop(const QueueCounter* counter, Body body) {
-        const auto [graph, unused] = captured();
-        cudaGraphConditionalHandle again{};
-        cuda_check(cudaGraphConditionalHandleCreate(&again, graph, 0, cudaGraphCondAssignDefault), "conditional handle");
+    template <class Stage>
+    void launch_items(const Stage& stage, const detail::Items& items) {
+        if (items.list || items.flags)
+            detail::launch_places<<<blocks(detail::launch_places<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
+        else
+            detail::launch_queue<<<blocks(detail::launch_queue<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items.counter);
+    }
+    /// What a launch over `queue` goes through, sorted if it is to be. A loop has counted its queue already when its body begins with that queue.
+    template <class Order, class Item>
+    detail::Items prepare(const Queue<Item>& queue) {
+        const bool counted = counted_ == queue.counter;
+        counted_ = nullptr;
+        if (!counted) count(queue);
+        const bool selected = queue.flags && order_.policy.compaction == Compaction::select;
+        detail::Items items = {queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity};
+        if constexpr (Ordered<Order, Item>) {
+            if (order_.policy.ordering == Order::kOrdering && queue.capacity > 0) {
+                const uint32_t bits = Order::bits(scene_);
+                detail::make_keys<Order, Item><<<blocks(detail::make_keys<Order, Item>, kStageBlock), kStageBlock, 0, stream_>>>(scene_, queue, items, (1u << bits) - 1, order_.list[0], order_.keys[0]);
+                if (queue.flags && !items.list)
+                    sort_places(order_, queue.capacity, bits, stream_);
+                else
+                    sort_as_many(queue.counter, queue.capacity, bits);
+                items.list = order_.list[1];
+            }
+        }
+        return items;
+    }
+    /// Sorts no more places than hold the items. A graph has a sort for each of several sizes, since its launches are laid down before it is known.
+    void sort_as_many(const QueueCounter* counter, uint32_t capacity, uint32_t bits) {
+        if (!capturing_) return sort_places(order_, detail::sort_size(capacity, size_of(counter)), bits, stream_);
+        detail::SortConditions conditions{};
+        for (uint32_t k = 0; k < detail::kSortSizes && capacity >> 2 * k > 0; ++k) conditions.handles[k] = make_condition();
+        detail::choose_sort<<<1, 1, 0, stream_>>>(counter, capacity, conditions);
+        for (uint32_t k = 0; k < detail::kSortSizes && capacity >> 2 * k > 0; ++k)
+            capture_conditional(cudaGraphCondTypeIf, conditions.handles[k], [&] { sort_places(order_, capacity >> 2 * k, bits, stream_); });
+    }
+    /// Has the counter of a queue of fixed places tell its size; compaction select makes the list too.
+    template <class Item>
+    void count(const Queue<Item>& queue) {
+        if (!queue.flags || queue.capacity == 0) return;
+        if (order_.policy.compaction == Compaction::select)
+            select_places(order_, queue.flags, queue.capacity, &queue.counter->count, stream_);
+        else
+            detail::count_items<<<blocks(detail::count_items, kStageBlock), kStageBlock, 0, stream_>>>(queue.flags, queue.capacity, &queue.counter->count);
+    }
+
+    template <class Count, class Body>
+    void capture_loop(const QueueCounter* counter, Count count, Body body) {
+        const cudaGraphConditionalHandle again = make_condition();
         // Set before every entry, since a loop inside of a loop is entered more than once.
+        count();
         detail::repeat_unless_empty<<<1, 1, 0, stream_>>>(counter, again);
-        const std::vector<cudaGraphNode_t> dependencies = captured().second;
+        capture_conditional(cudaGraphCondTypeWhile, again, [&] {
+            body();
+            count();
+            detail::repeat_unless_empty<<<1, 1, 0, stream_>>>(counter, again);
+        });
+    }
+    cudaGraphConditionalHandle make_condition() const {
+        cudaGraphConditionalHandle handle{};
+        cuda_check(cudaGraphConditionalHandleCreate(&handle, captured().first, 0, cudaGraphCondAssignDefault), "conditional handle");
+        return handle;
+    }
+    template <class Body>
+    void capture_conditional(cudaGraphConditionalNodeType type, cudaGraphConditionalHandle handle, Body body) {
+        const auto [graph, dependencies] = captured();
         cudaGraphNodeParams params = {};
         params.type = cudaGraphNodeTypeConditional;
-        params.conditional.handle = again;
-        params.conditional.type = cudaGraphCondTypeWhile;
+        params.conditional.handle = handle;
+        params.conditional.type = type;
         params.conditional.size = 1;
         cudaGraphNode_t node = nullptr;
 #if CUDART_VERSION >= 13000
@@ -244,10 +389,9 @@ private:
 
         const cudaStream_t outer = stream_;
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        cuda_check(cudaStreamBeginCaptureToGraph(stream_, params.conditional.phGraph_out[0], nullptr, nullptr, 0, cudaStreamCaptureModeThreadLocal), "begin of loop capture");
+        cuda_check(cudaStreamBeginCaptureToGraph(stream_, params.conditional.phGraph_out[0], nullptr, nullptr, 0, cudaStreamCaptureModeThreadLocal), "begin of conditional capture");
         body();
-        detail::repeat_unless_empty<<<1, 1, 0, stream_>>>(counter, again);
-        cuda_check(cudaStreamEndCapture(stream_, nullptr), "loop capture");
+        cuda_check(cudaStreamEndCapture(stream_, nullptr), "conditional capture");
         cuda_check(cudaStreamDestroy(stream_), "stream");
         stream_ = outer;
     }
@@ -290,6 +434,9 @@ private:
     WaveState* state_;
     StageRecord* records_;
     uint64_t* clock_;
+    SceneView scene_;
+    OrderMemory order_;
+    const QueueCounter* counted_ = nullptr;  ///< of the queue whose count and list are known before the next launch
     int multiprocessors_ = 0;
     bool capturing_ = false;
 };

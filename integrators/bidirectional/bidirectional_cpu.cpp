@@ -31,6 +31,7 @@ struct WaveMemory {
     Layout layout;
     WaveBytes bytes;
     BidirectionalMemory queues;
+    OrderMemory order;
     uint32_t kept = 0;
 
     void allocate(uint32_t slots, uint32_t new_kept, const BidirectionalPolicy& policy) {
@@ -39,9 +40,11 @@ struct WaveMemory {
         kept = new_kept;
         layout = Layout();
         lay_out(layout, slots, kept, policy);
+        lay_out_order(layout, policy.queues, order_slots(policy, slots));
         bytes = make_wave_bytes(layout.bytes());
         Layout real(bytes.get());
         queues = lay_out(real, slots, kept, policy);
+        order = lay_out_order(real, policy.queues, order_slots(policy, slots));
         if (old) {
             std::copy_n(before.records, kStageCount, queues.records);
             std::copy_n(before.counters, BidirectionalMemory::kQueues, queues.counters);
@@ -115,6 +118,7 @@ public:
         s.backend = "cpu";
         s.device = fmt::format("CPU, {} threads", arena_.max_concurrency());
         s.accel = accel_name_;
+        s.queue_policy = policy_.queues;
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;
@@ -154,7 +158,7 @@ private:
             const BidirectionalMemory& m = memory.queues;
             const BidirectionalFilm film = {samples_of_slots_.data() + size_t(first_tile) * kTilePixels, splats_.data(), nullptr, nullptr, techniques_.empty() ? nullptr : techniques_.data(), technique_dropped_.data()};
             const BidirectionalStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, m, film);
-            CpuExecutor executor(m.state, m.records);
+            CpuExecutor executor(m.state, m.records, view_, memory.order);
             *m.state = {first_tile, sample, 1, 0, 0, 0, active_pixels(wave_, first_tile)};
             run_bidirectional_wave(executor, stages);
             if (!m.state->failed) return;

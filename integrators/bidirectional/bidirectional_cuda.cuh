@@ -118,6 +118,7 @@ public:
         s.backend = "cuda";
         s.device = cuda_device_name();
         s.accel = "cwbvh";
+        s.queue_policy = policy_.queues;
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;
@@ -156,6 +157,8 @@ private:
         if (kept > 0xf0000000ull) throw Error(ExitCode::device, "light walks have more vertices than can be numbered: set a max_depth or a smaller wave_size");
         layout_ = Layout();
         lay_out(layout_, wave_.slot_count(), uint32_t(kept), policy_);
+        const uint64_t temporary = order_temporary_bytes(policy_.queues, order_slots(policy_, wave_.slot_count()));
+        lay_out_order(layout_, policy_.queues, order_slots(policy_, wave_.slot_count()), temporary);
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
         check_memory(layout_.bytes(), free, wave_.slot_count());
@@ -163,12 +166,13 @@ private:
         memory_.zero();
         Layout layout(memory_.data());
         queues_ = lay_out(layout, wave_.slot_count(), uint32_t(kept), policy_);
+        const OrderMemory order = lay_out_order(layout, policy_.queues, order_slots(policy_, wave_.slot_count()), temporary);
         std::vector<QueueCounter> counters(BidirectionalMemory::kQueues);
         for (size_t q = 0; q < counters.size(); ++q) counters[q].capacity = layout.queue_capacities()[q];
         cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
         stages_.emplace(device_scene_->view(), device_accel_->tracer(), policy_, wave_, queues_,
                         BidirectionalFilm{samples_of_slots_.data(), splats_.data(), sum_.data(), sum_squares_.data(), techniques_.data(), technique_dropped_.data()});
-        executor_.emplace(stream_, traced_, queues_.state, queues_.records, clock_.data());
+        executor_.emplace(stream_, traced_, queues_.state, queues_.records, clock_.data(), device_scene_->view(), order);
         if (graph_) cudaGraphExecDestroy(graph_);
         graph_ = nullptr;
         if (use_graph_) graph_ = executor_->capture([&](CudaExecutor& exec) { run(exec); });

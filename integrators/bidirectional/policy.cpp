@@ -41,6 +41,7 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     p.hide_emitters = scene.integrator.hide_emitters;
     p.fuse = settings.fuse != Fuse::none;
     p.cull = settings.cull;
+    p.queues = settings.queues;
     return p;
 }
 

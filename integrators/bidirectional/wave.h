@@ -91,32 +91,36 @@ inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, con
     return m;
 }
 
+/// The most items that a stage goes through in order (OrderMemory::slots).
+inline uint32_t order_slots(const BidirectionalPolicy& policy, uint32_t slots) { return policy.connect_vertices ? slots * policy.pairs_per_launch : slots; }
+
 /// Lays out the memory for `slots` walks of either kind and `kept` vertices of light walks.
 inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept, const BidirectionalPolicy& policy) {
     const auto when = [&](bool needed, uint32_t n = 0) { return needed ? (n ? n : slots) : 0u; };
     // The megakernel keeps vertices and splats only.
     if (policy.megakernel) return lay_out_megakernel(layout, slots, kept, policy);
     if (policy.stream_slots) return lay_out_streaming(layout, slots, policy);
+    const bool fixed = policy.queues.fixed_places(), single = fixed && order_slots(policy, slots) == slots;  // several pairs of a path need several places
     const bool connections = policy.next_event || policy.connect_vertices, staged = !policy.fuse, hits = staged && (policy.count_hits || policy.count_environment);
     const uint32_t pairs = when(policy.connect_vertices, slots * policy.pairs_per_launch), shadows = connections ? std::max(slots, pairs) : 0;
     BidirectionalMemory m{};
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
-    m.rays = layout.queue<WalkItem>("rays", m.counters, slots);
-    m.hits = layout.queue<WalkHit>("hits", m.counters, slots);
-    m.vertices = layout.queue<VertexItem>("vertices", m.counters, slots);
+    m.rays = layout.queue<WalkItem>("rays", m.counters, slots, fixed);
+    m.hits = layout.queue<WalkHit>("hits", m.counters, slots, fixed);
+    m.vertices = layout.queue<VertexItem>("vertices", m.counters, slots, fixed);
     m.light_vertices = layout.queue<VertexItem, LaneOrder::together>("light_vertices", m.counters, when(policy.connect_vertices, kept));
-    m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged));
-    m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat));
+    m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged), fixed);
+    m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat), fixed);
     m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, kept + slots));
-    m.pairs = layout.queue<PairItem>("pairs", m.counters, pairs);
-    m.rest = layout.queue<PairItem>("rest", m.counters, pairs);
-    m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, when(hits));
-    m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, when(hits));
-    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, staged ? shadows : 0);
-    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, shadows);
-    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, staged ? shadows : 0);
+    m.pairs = layout.queue<PairItem>("pairs", m.counters, pairs, single);
+    m.rest = layout.queue<PairItem>("rest", m.counters, pairs, single);
+    m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, when(hits), fixed);
+    m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, when(hits), fixed);
+    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, staged ? shadows : 0, single);
+    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, shadows, single);
+    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, staged ? shadows : 0, single);
     m.last_vertex = layout.take<uint32_t>(slots);
     m.raw = layout.take<Lane>(policy.technique_depth ? slots : 0);
     return m;

@@ -29,10 +29,12 @@ constexpr uint32_t kCpuWaveSize = 512;
 struct WaveMemory {
     WaveBytes bytes;
     PathMemory queues;
+    OrderMemory order;
 
     WaveMemory(uint64_t size, uint32_t slots, const PathPolicy& policy) : bytes(make_wave_bytes(size)) {
         Layout layout(bytes.get());
         queues = lay_out(layout, slots, policy);
+        order = lay_out_order(layout, policy.queues, slots);
         set_capacities(queues.counters, layout);
     }
 };
@@ -50,6 +52,7 @@ public:
         wave_ = shape_wave(scene, settings, settings.wave_size ? settings.wave_size : kCpuWaveSize, max_tiles);
 
         lay_out(layout_, wave_.slot_count(), policy_);
+        lay_out_order(layout_, policy_.queues, wave_.slot_count());
         const uint64_t values = uint64_t(wave_.width) * wave_.height * 3;
         const uint64_t own = layout_.bytes() * uint64_t(threads) + 2 * values * sizeof(double);
         try {
@@ -99,6 +102,7 @@ public:
         s.backend = "cpu";
         s.device = fmt::format("CPU, {} threads", arena_.max_concurrency());
         s.accel = accel_name_;
+        s.queue_policy = policy_.queues;
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;
@@ -126,10 +130,11 @@ private:
     static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
     void render_tiles(uint32_t first_tile, uint32_t first_sample, uint32_t count) {
-        const PathMemory& memory = waves_[size_t(tbb::this_task_arena::current_thread_index())].queues;
+        const WaveMemory& wave = waves_[size_t(tbb::this_task_arena::current_thread_index())];
+        const PathMemory& memory = wave.queues;
         using Tracer = decltype(accel_->tracer());
         const PathStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, memory, {film_.sum.data(), film_.sum_squares.data()});
-        CpuExecutor executor(memory.state, memory.records);
+        CpuExecutor executor(memory.state, memory.records, view_, wave.order);
         for (uint32_t s = 0; s < count; s += wave_.samples) {
             *memory.state = {first_tile, first_sample + s, std::min(wave_.samples, count - s), 0, 0, 0, 0};
             run_path_wave(executor, stages);

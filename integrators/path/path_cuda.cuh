@@ -41,6 +41,8 @@ public:
         lay_out(million, 1u << 20, policy_);
         wave_ = shape_wave(scene, settings, device_wave_size(settings, kCudaWavePlateau, million.bytes() >> 20, free), ~0u);
         lay_out(layout_, wave_.slot_count(), policy_);
+        const uint64_t temporary = order_temporary_bytes(policy_.queues, wave_.slot_count());
+        lay_out_order(layout_, policy_.queues, wave_.slot_count(), temporary);
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         predicted_bytes_ = DeviceScene::predicted_bytes(scene) + (binary ? pairs->memory_bytes() : wide->memory_bytes()) + layout_.bytes() + 2 * values_ * sizeof(double) + sizeof(uint64_t);
         check_memory(predicted_bytes_, free, wave_.slot_count());
@@ -58,13 +60,14 @@ public:
         clear_film();
         Layout layout(memory_.data());
         queues_ = lay_out(layout, wave_.slot_count(), policy_);
+        const OrderMemory order = lay_out_order(layout, policy_.queues, wave_.slot_count(), temporary);
         std::vector<QueueCounter> counters(PathMemory::kQueues);
         for (size_t q = 0; q < counters.size(); ++q) counters[q].capacity = layout.queue_capacities()[q];
         cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
 
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
         stages_.emplace(device_scene_->view(), binary ? CwbvhTracer() : device_accel_->tracer(), policy_, wave_, queues_, FilmPointers{sum_.data(), sum_squares_.data()});
-        executor_.emplace(stream_, settings.specialise ? scene.features : kAllFeatures, queues_.state, queues_.records, clock_.data());
+        executor_.emplace(stream_, settings.specialise ? scene.features : kAllFeatures, queues_.state, queues_.records, clock_.data(), device_scene_->view(), order);
         if (binary) executor_->use(device_pairs_->tracer());
         if (settings.graph) graph_ = executor_->capture([&](auto& exec) { run_path_wave(exec, *stages_); });
         cuda_check(cudaDeviceSynchronize(), "preparation");
@@ -124,6 +127,7 @@ public:
         s.backend = "cuda";
         s.device = cuda_device_name();
         s.accel = device_pairs_ ? "bvh2" : "cwbvh";
+        s.queue_policy = policy_.queues;
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;

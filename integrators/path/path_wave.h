@@ -55,18 +55,19 @@ struct PathMemory {
 /// Lays out the memory for `slots` paths; queues that `policy` leaves empty have no storage.
 inline PathMemory lay_out(Layout& layout, uint32_t slots, const PathPolicy& policy) {
     const uint32_t hits = policy.count_hits && !policy.fuse ? slots : 0, connections = policy.connect ? slots : 0, passed_on = policy.fuse ? 0 : connections;
+    const bool fixed = policy.queues.fixed_places();
     PathMemory m;
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(PathMemory::kQueues);
-    m.rays = layout.queue<RayItem>("rays", m.counters, slots);
-    m.hits = layout.queue<HitItem>("hits", m.counters, slots);
-    m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, hits);
-    m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, hits);
-    m.connections = layout.queue<ConnectItem>("connections", m.counters, policy.connect_in_shade ? 0 : connections);
-    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, passed_on);
-    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, connections);
-    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, passed_on);
+    m.rays = layout.queue<RayItem>("rays", m.counters, slots, fixed);
+    m.hits = layout.queue<HitItem>("hits", m.counters, slots, fixed);
+    m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, hits, fixed);
+    m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, hits, fixed);
+    m.connections = layout.queue<ConnectItem>("connections", m.counters, policy.connect_in_shade ? 0 : connections, fixed);
+    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, passed_on, fixed);
+    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, connections, fixed);
+    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, passed_on, fixed);
     m.samples = layout.take<Lane>(slots);
     return m;
 }

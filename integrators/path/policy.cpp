@@ -24,6 +24,7 @@ PathPolicy make_path_policy(const Scene& scene, const RenderSettings& settings) 
     p.fuse = settings.fuse != Fuse::none;
     p.connect_in_shade = settings.fuse == Fuse::all;
     p.cull = settings.cull;
+    p.queues = settings.queues;
     return p;
 }
 

@@ -1,0 +1,55 @@
+// What items are sorted by (queues/order.h). Keys are small, since a sort takes time for every 8 bits.
+#pragma once
+
+#include <bit>
+
+#include "core/math.h"
+#include "queues/order.h"
+#include "scene/view.h"
+#include "stages/walk_items.h"
+
+namespace ambilux {
+
+/// Materials, not types of BSDFs: equal materials read the same textures too, and there are far fewer of them than warps, so that warps of mixed types are rare either way.
+/// Rays that met nothing come last.
+struct MaterialOrder {
+    static constexpr Ordering kOrdering = Ordering::material;
+
+    static uint32_t bits(const SceneView& scene) { return uint32_t(std::bit_width(scene.material_count + 1u)); }
+
+    AMBILUX_HD static uint32_t key(const SceneView& scene, const HitItem& hit) { return of(scene, hit.prim); }
+    AMBILUX_HD static uint32_t key(const SceneView& scene, const WalkHit& hit) { return of(scene, hit.prim); }
+
+private:
+    AMBILUX_HD static uint32_t of(const SceneView& scene, uint32_t prim) { return prim == kNone ? scene.material_count : scene.shapes[scene.shape_of(prim)].material; }
+};
+
+/// Rays by octant of direction, then by cell of a grid of 128 cells along each axis of the scene's bounds.
+struct MortonOrder {
+    static constexpr Ordering kOrdering = Ordering::morton;
+
+    static uint32_t bits(const SceneView&) { return 24; }
+
+    template <class Item>
+    AMBILUX_HD static uint32_t key(const SceneView& scene, const Item& ray) {
+        const Vec3f at = (ray.o - scene.bounds_center) * (64.0f / scene.bounds_radius) + Vec3f{64.0f, 64.0f, 64.0f};
+        const uint32_t octant = (ray.d.x < 0.0f ? 1u : 0u) | (ray.d.y < 0.0f ? 2u : 0u) | (ray.d.z < 0.0f ? 4u : 0u);
+        const uint32_t key = octant << 21 | spread(at.x) | spread(at.y) << 1 | spread(at.z) << 2;
+        return key < 0xffffffu ? key : 0xfffffeu;  // the last key is that of places without a ray
+    }
+
+private:
+    /// The 7 bits of a coordinate's cell, two apart. What is no number lands in cell 0.
+    AMBILUX_HD static uint32_t spread(float x) {
+        uint32_t cell = x > 0.0f ? uint32_t(min(x, 127.0f)) : 0u;
+        cell = (cell | cell << 8) & 0x0000f00fu;
+        cell = (cell | cell << 4) & 0x000c30c3u;
+        return (cell | cell << 2) & 0x00249249u;
+    }
+};
+
+/// True for items that `Order` has keys for.
+template <class Order, class Item>
+concept Ordered = requires(const SceneView& scene, const Item& item) { Order::key(scene, item); };
+
+}  // namespace ambilux
