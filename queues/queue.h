@@ -16,6 +16,24 @@ struct alignas(16) Lane {
     uint32_t word[4];
 };
 
+/// The start of a lane as a value. The lane is loaded whole: copying a part of it is compiled to loads of single bytes.
+template <class Value>
+AMBILUX_HD Value start_of(const Lane& place) {
+    static_assert(sizeof(Value) <= sizeof(Lane));
+    const Lane lane = place;
+    Value value;
+    memcpy(&value, &lane, sizeof(value));
+    return value;
+}
+
+/// Replaces a lane by `value` and zeros.
+template <class Value>
+AMBILUX_HD void set_start(Lane& place, const Value& value) {
+    Lane lane = {};
+    memcpy(&lane, &value, sizeof(value));
+    place = lane;
+}
+
 /// State of one queue. `count` goes on counting when the queue is full, so that what is lost is known.
 struct QueueCounter {
     uint32_t count;     ///< items since the queue was last emptied; of a queue of fixed places known on a device only when it has been counted

@@ -28,10 +28,7 @@ struct Accumulate {
             return;
         }
 #endif
-        Rgb sum;
-        memcpy(&sum, &samples[c.path], sizeof(sum));
-        sum += c.value;
-        memcpy(&samples[c.path], &sum, sizeof(sum));
+        set_start(samples[c.path], start_of<Rgb>(samples[c.path]) + c.value);
         techniques.arrive(wave, c.path, c.value);
     }
 };
@@ -52,8 +49,7 @@ struct Develop {
         double s[3] = {sum[at], sum[at + 1], sum[at + 2]}, q[3] = {sum_squares[at], sum_squares[at + 1], sum_squares[at + 2]};
         const uint32_t stride = wave.tiles * kTilePixels;
         for (uint32_t k = 0; k < wave.state->samples; ++k) {
-            Rgb value;
-            memcpy(&value, &samples[i + k * stride], sizeof(value));
+            Rgb value = start_of<Rgb>(samples[i + k * stride]);
             if (!is_light(value, record)) value = {0.0f, 0.0f, 0.0f};
             for (int c = 0; c < 3; ++c) {
                 s[c] += double(value[c]);

@@ -7,8 +7,10 @@
 
 namespace ambilux {
 
-/// Most pairs of one eye vertex in a launch of connect_vertices.
-constexpr uint32_t kPairsPerLaunch = 4;
+/// Most pairs of one eye vertex in a launch of connect_vertices, and from how many vertices on a launch has enough to do with one of each: then neighbouring threads hold neighbouring
+/// vertices of as many light walks. The last depths, which few paths reach, need fewer launches with several.
+constexpr uint32_t kPairsPerLaunch = 8;
+constexpr uint32_t kVerticesForOnePair = 1u << 16;
 
 struct BidirectionalPolicy {
     BidirectionalMis mis;

@@ -49,15 +49,15 @@ private:
     }
 
     AMBILUX_HD void finish(const SurfacePoint& point, const Scattering& s, const EmitterSample& light, const RngKey& key, uint32_t path, uint32_t depth, Rgb throughput) const {
-        const Rgb f = scatter_eval<F>(s, light.wi, TransportMode::radiance);
-        if (is_zero(f)) return;
+        const BsdfValue f = scatter_evaluate<F>(s, light.wi, TransportMode::radiance);
+        if (is_zero(f.value)) return;
         const bool environment = is_environment<F>(scene, light.emitter);
-        const Rgb value = throughput * f * ((environment ? splat(1.0f) : emitter_sample_radiance<F>(scene, light)) / light.pdf_sa);
+        const Rgb value = throughput * f.value * ((environment ? splat(1.0f) : emitter_sample_radiance<F>(scene, light)) / light.pdf_sa);
         if (!is_light(value, record) || is_zero(value)) return;
         // Only BSDF sampling and a hit could find this light too.
         const bool other = policy.estimator == Estimator::mis && !light.delta;
 
-        ConnectCandidate out = {value, path, light.pdf_sa, other ? scatter_pdf<F>(s, light.wi) : 0.0f, 0, environment ? kTowardsEnvironment : kInfinity, {}, {}, light.wi, 0};
+        ConnectCandidate out = {value, path, light.pdf_sa, other ? f.pdf_sa : 0.0f, 0, environment ? kTowardsEnvironment : kInfinity, {}, {}, light.wi, 0};
         out.o = offset_ray_origin(point.p, point.p_error, point.ng, light.wi);
         if (light.distance < kInfinity) {
             // Both ends are moved off their surfaces by their error, so the segment between them is open at either end.

@@ -87,9 +87,10 @@ struct EyeShade {
     }
 };
 
-/// Pairs of an eye vertex for one launch, from `next` on: a vertex of the light walk of its slot, or, over a cache, the number of draws that are left.
-AMBILUX_HD void push_pairs(const BidirectionalPolicy& policy, const LightVertices& light_vertices, uint32_t vertex, uint32_t path, uint32_t depth, uint32_t next, const Queue<PairItem>& pairs) {
-    for (uint32_t pushed = 0; pushed < policy.pairs_per_launch;) {
+/// Pairs of an eye vertex for one launch over `vertices` of them, from `next` on: a vertex of the light walk of its slot, or, over a cache, the number of draws that are left.
+AMBILUX_HD void push_pairs(const BidirectionalPolicy& policy, const LightVertices& light_vertices, uint32_t vertices, uint32_t vertex, uint32_t path, uint32_t depth, uint32_t next, const Queue<PairItem>& pairs) {
+    const uint32_t most = vertices < kVerticesForOnePair ? policy.pairs_per_launch : 1;
+    for (uint32_t pushed = 0; pushed < most;) {
         uint32_t light = next;
         if (policy.cache_draws > 0) {
             if (next == 0) return;
@@ -101,7 +102,7 @@ AMBILUX_HD void push_pairs(const BidirectionalPolicy& policy, const LightVertice
             if (depth + y.bits.depth() + 1 > policy.max_depth) continue;
         }
         ++pushed;
-        const bool last = pushed == policy.pairs_per_launch && next != (policy.cache_draws > 0 ? 0 : kNone);
+        const bool last = pushed == most && next != (policy.cache_draws > 0 ? 0 : kNone);
         const PairItem pair = {vertex, light, path, last ? next : kNone};
         pairs.push(pair);
     }
@@ -121,7 +122,7 @@ struct EyeConnect {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
-        if (item.previous != kNone) push_pairs(policy, light_vertices, i, item.path, item.bits.depth(), item.previous, pairs);
+        if (item.previous != kNone) push_pairs(policy, light_vertices, vertices.counter->size(), i, item.path, item.bits.depth(), item.previous, pairs);
         const uint32_t depth = item.bits.depth();
         if (!policy.next_event || !policy.wants(1, depth + 1)) return;
         const RngKey key = wave.key(item.path);
@@ -166,7 +167,7 @@ struct ConnectVertices {
         const PairItem pair = pairs.load(i);
         const VertexItem item = vertices.load(pair.vertex);
         const uint32_t depth = item.bits.depth();
-        if (pair.next != kNone) push_pairs(policy, light_vertices, pair.vertex, pair.path, depth, pair.next, rest);
+        if (pair.next != kNone) push_pairs(policy, light_vertices, pairs.counter->size(), pair.vertex, pair.path, depth, pair.next, rest);
         const RngKey key = wave.key(item.path);
         uint32_t place = pair.light, size = 0;
         if (policy.cache_draws > 0) {

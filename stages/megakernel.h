@@ -147,7 +147,7 @@ private:
     }
 
     AMBILUX_HD void finish(Path& path) const {
-        memcpy(&samples[path.slot], &path.sum, sizeof(path.sum));
+        set_start(samples[path.slot], path.sum);
         path.active = false;
     }
 

@@ -58,9 +58,7 @@ struct WeightConnections {
         Rgb value = c.value * mis_weight(policy, c.pdf_this, c.pdf_other);
         if (!is_light(value, record) || is_zero(value)) return;
         if (policy.cull > 0.0f && c.tmax != kTowardsEnvironment) {
-            Rgb so_far;
-            memcpy(&so_far, &samples[c.path], sizeof(so_far));
-            const float factor = survival_factor(policy.cull, value, so_far, c.alpha_seed);
+            const float factor = survival_factor(policy.cull, value, start_of<Rgb>(samples[c.path]), c.alpha_seed);
             if (factor == 0.0f) return;
             value *= factor;
         }

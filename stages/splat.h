@@ -95,8 +95,7 @@ struct DevelopSplats {
         if (!p.active) return;
         const uint32_t stride = wave.tiles * kTilePixels;
         for (uint32_t k = 0; k < wave.state->samples; ++k) {
-            Rgb eye;
-            memcpy(&eye, &samples[i + k * stride], sizeof(eye));
+            const Rgb eye = start_of<Rgb>(samples[i + k * stride]);
             int64_t* light = splats + (uint64_t(k) * wave.height * wave.width + p.pixel) * 3;
             double value[3];
             for (int c = 0; c < 3; ++c) {

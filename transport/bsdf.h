@@ -164,22 +164,50 @@ AMBILUX_HD Result with_bsdf(const Bsdf& b, Result otherwise, Op op) {
     return otherwise;
 }
 
-/// f(wi,wo)·|cos(wo)| of the smooth lobes; 0 where sides do not fit.
+namespace detail {
+
 template <Features F>
-AMBILUX_HD Rgb bsdf_eval(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
-    return with_bsdf<F>(b, Rgb{0.0f, 0.0f, 0.0f}, [&](const auto& bsdf) { return bsdf.eval(wi, wo, mode); });
+AMBILUX_HD_APART BsdfValue bsdf_evaluate_apart(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
+    return with_bsdf<F>(b, no_scattering(), [&](const auto& bsdf) -> BsdfValue {
+        if constexpr (requires { bsdf.evaluate(wi, wo, mode); }) return bsdf.evaluate(wi, wo, mode);
+        else if constexpr (requires { bsdf.evaluate(wi, wo); }) return bsdf.evaluate(wi, wo);
+        else return {bsdf.eval(wi, wo, mode), bsdf.pdf(wi, wo, mode)};
+    });
 }
 
-/// Density of wo per solid angle over the smooth lobes, the chance of choosing them included; 0 where sides do not fit.
+template <Features F>
+AMBILUX_HD_APART bool bsdf_sample_apart(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) {
+    return with_bsdf<F>(b, false, [&](const auto& bsdf) { return bsdf.sample(wi, u, mode, out); });
+}
+
+}  // namespace detail
+
+/// f(wi,wo)·|cos(wo)| of the smooth lobes, and the density of wo per solid angle over them, the chance of choosing them included; 0 where sides do not fit.
+template <Features F>
+AMBILUX_HD BsdfValue bsdf_evaluate(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
+    if constexpr (F.bsdfs == bit(BsdfType::diffuse)) {
+        const Diffuse bsdf = {b.reflectance_or_eta};
+        return {bsdf.eval(wi, wo, mode), bsdf.pdf(wi, wo, mode)};
+    } else {
+        return detail::bsdf_evaluate_apart<F>(b, wi, wo, mode);
+    }
+}
+
+template <Features F>
+AMBILUX_HD Rgb bsdf_eval(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
+    return bsdf_evaluate<F>(b, wi, wo, mode).value;
+}
+
 template <Features F>
 AMBILUX_HD float bsdf_pdf(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
-    return with_bsdf<F>(b, 0.0f, [&](const auto& bsdf) { return bsdf.pdf(wi, wo, mode); });
+    return bsdf_evaluate<F>(b, wi, wo, mode).pdf_sa;
 }
 
 /// Draws wo from uniform u in [0,1)³ (x: lobe). False when nothing is scattered; `out` is then unspecified.
 template <Features F>
 AMBILUX_HD bool bsdf_sample(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) {
-    return with_bsdf<F>(b, false, [&](const auto& bsdf) { return bsdf.sample(wi, u, mode, out); });
+    if constexpr (F.bsdfs == bit(BsdfType::diffuse)) return Diffuse{b.reflectance_or_eta}.sample(wi, u, mode, out);
+    else return detail::bsdf_sample_apart<F>(b, wi, u, mode, out);
 }
 
 /// True if light can pass to the other side.

@@ -85,12 +85,19 @@ AMBILUX_HD float shading_normal_factor(const Scattering& s, Vec3f wo_world, floa
     return fabsf(s.wi.z / dot(s.ng, s.wi_world)) * fabsf(dot(s.ng, wo_world) / cos_wo);
 }
 
-/// f(wi,wo)·|wo·ns| of the smooth lobes for unit `wo_world`, with the factor for shading normals in importance mode.
+/// f(wi,wo)·|wo·ns| of the smooth lobes for unit `wo_world`, with the factor for shading normals in importance mode, and what scatter_pdf gives wherever that is not 0.
+template <Features F>
+AMBILUX_HD BsdfValue scatter_evaluate(const Scattering& s, Vec3f wo_world, TransportMode mode) {
+    const Vec3f wo = s.frame.to_local(wo_world);
+    if (!sides_agree(s, s.wi_world, s.wi.z) || !sides_agree(s, wo_world, wo.z)) return no_scattering();
+    BsdfValue v = bsdf_evaluate<F>(s.bsdf, s.wi, wo, mode);
+    v.value *= shading_normal_factor(s, wo_world, wo.z, mode);
+    return v;
+}
+
 template <Features F>
 AMBILUX_HD Rgb scatter_eval(const Scattering& s, Vec3f wo_world, TransportMode mode) {
-    const Vec3f wo = s.frame.to_local(wo_world);
-    if (!sides_agree(s, s.wi_world, s.wi.z) || !sides_agree(s, wo_world, wo.z)) return {0.0f, 0.0f, 0.0f};
-    return bsdf_eval<F>(s.bsdf, s.wi, wo, mode) * shading_normal_factor(s, wo_world, wo.z, mode);
+    return scatter_evaluate<F>(s, wo_world, mode).value;
 }
 
 /// Density per solid angle with which scatter_sample draws `wo_world`; directions that it rejects for their side keep theirs.

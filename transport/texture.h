@@ -70,7 +70,7 @@ AMBILUX_HD BilinearTexels load_bilinear(const SceneView& view, const Texture& te
 
 /// Linear colour of a texture at surface coordinates `uv`; finite for any uv if the texels are.
 template <Features F>
-AMBILUX_HD Rgb eval_texture(const SceneView& view, const Texture& texture, Vec2f uv) {
+AMBILUX_HD_APART Rgb eval_texture(const SceneView& view, const Texture& texture, Vec2f uv) {
     const Vec2f st = texture_coordinates(texture, uv);
     if (texture.type == TextureType::checkerboard) {
         const bool right = st.x - floorf(st.x) > 0.5f, upper = st.y - floorf(st.y) > 0.5f;

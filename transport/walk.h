@@ -168,10 +168,10 @@ template <Features F>
 AMBILUX_HD bool connect_next_event(const SceneView& scene, const BidirectionalMis& mis, const WalkVertex& z, Rgb throughput, Vec4f u, WalkConnection& c) {
     EmitterSample light;
     if (!sample_emitter_deferred<F>(scene, z.point.p, u, light)) return false;
-    const Rgb f = scatter_eval<F>(z.scattering, light.wi, TransportMode::radiance);
-    if (is_zero(f)) return false;
-    c.value = throughput * f * (emitter_sample_radiance<F>(scene, light) / light.pdf_sa);
-    c.others = others_of_next_event<F>(scene, mis, z.sums, z.first, light, scatter_pdf<F>(z.scattering, light.wi), scatter_pdf_reverse<F>(z.scattering, light.wi),
+    const BsdfValue f = scatter_evaluate<F>(z.scattering, light.wi, TransportMode::radiance);
+    if (is_zero(f.value)) return false;
+    c.value = throughput * f.value * (emitter_sample_radiance<F>(scene, light) / light.pdf_sa);
+    c.others = others_of_next_event<F>(scene, mis, z.sums, z.first, light, f.pdf_sa, scatter_pdf_reverse<F>(z.scattering, light.wi),
                                        fabsf(dot(z.point.ng, light.wi)));
     if (light.distance < kInfinity) return set_segment(c, z.point, light.wi, light.p, light.p_error, light.ng);
     c.o = offset_ray_origin(z.point.p, z.point.p_error, z.point.ng, light.wi);
@@ -198,13 +198,13 @@ AMBILUX_HD bool connect_unweighted(const WalkVertex& y, Rgb y_throughput, const 
     const float d2 = length_squared(to_y);
     if (!(d2 > 0.0f)) return false;
     const Vec3f w = to_y * (1.0f / sqrtf(d2));
-    const Rgb f_z = scatter_eval<F>(z.scattering, w, TransportMode::radiance);
-    if (is_zero(f_z)) return false;
-    const Rgb f_y = scatter_eval<F>(y.scattering, -w, TransportMode::importance);
-    if (is_zero(f_y)) return false;
-    c.value = y_throughput * f_y * f_z * z_throughput * (1.0f / d2);
+    const BsdfValue f_z = scatter_evaluate<F>(z.scattering, w, TransportMode::radiance);
+    if (is_zero(f_z.value)) return false;
+    const BsdfValue f_y = scatter_evaluate<F>(y.scattering, -w, TransportMode::importance);
+    if (is_zero(f_y.value)) return false;
+    c.value = y_throughput * f_y.value * f_z.value * z_throughput * (1.0f / d2);
     const float cos_y = fabsf(dot(y.point.ng, w)), cos_z = fabsf(dot(z.point.ng, w));
-    p = {scatter_pdf<F>(z.scattering, w) * cos_y / d2, scatter_pdf_reverse<F>(y.scattering, -w), scatter_pdf<F>(y.scattering, -w) * cos_z / d2, scatter_pdf_reverse<F>(z.scattering, w)};
+    p = {f_z.pdf_sa * cos_y / d2, scatter_pdf_reverse<F>(y.scattering, -w), f_y.pdf_sa * cos_z / d2, scatter_pdf_reverse<F>(z.scattering, w)};
     return set_segment(c, z.point, w, y.point.p, y.point.p_error, y.point.ng);
 }
 

@@ -91,8 +91,11 @@ inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, con
     return m;
 }
 
+/// Pairs of one launch for `slots` paths (push_pairs).
+inline uint32_t most_pairs(const BidirectionalPolicy& policy, uint32_t slots) { return std::max(slots, std::min(slots, kVerticesForOnePair) * policy.pairs_per_launch); }
+
 /// The most items that a stage goes through in order (OrderMemory::slots).
-inline uint32_t order_slots(const BidirectionalPolicy& policy, uint32_t slots) { return policy.connect_vertices ? slots * policy.pairs_per_launch : slots; }
+inline uint32_t order_slots(const BidirectionalPolicy& policy, uint32_t slots) { return policy.connect_vertices ? most_pairs(policy, slots) : slots; }
 
 /// Lays out the memory for `slots` walks of either kind and `kept` vertices of light walks.
 inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept, const BidirectionalPolicy& policy) {
@@ -100,9 +103,9 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     // The megakernel keeps vertices and splats only.
     if (policy.megakernel) return lay_out_megakernel(layout, slots, kept, policy);
     if (policy.stream_slots) return lay_out_streaming(layout, slots, policy);
-    const bool fixed = policy.queues.fixed_places(), single = fixed && order_slots(policy, slots) == slots;  // several pairs of a path need several places
+    const bool fixed = policy.queues.fixed_places(), single = fixed && policy.pairs_per_launch == 1;  // several pairs of a path need several places
     const bool connections = policy.next_event || policy.connect_vertices, staged = !policy.fuse, hits = staged && (policy.count_hits || policy.count_environment);
-    const uint32_t pairs = when(policy.connect_vertices, slots * policy.pairs_per_launch), shadows = connections ? std::max(slots, pairs) : 0;
+    const uint32_t pairs = when(policy.connect_vertices, most_pairs(policy, slots)), shadows = connections ? std::max(slots, pairs) : 0;
     BidirectionalMemory m{};
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);

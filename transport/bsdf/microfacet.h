@@ -75,7 +75,7 @@ struct MicrofacetDistribution {
     }
 
     /// Microfacet normal, visible from wi (wi.z > 0) or from the whole distribution in proportion to D·cos.
-    AMBILUX_HD Vec3f sample(Vec3f wi, Vec2f u, bool visible) const {
+    AMBILUX_HD_APART Vec3f sample(Vec3f wi, Vec2f u, bool visible) const {
         if (!visible) return sample_all(u);
         return type == Microfacets::ggx ? sample_visible_ggx(wi, u) : sample_visible_beckmann(wi, u);
     }

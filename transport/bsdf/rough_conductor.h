@@ -12,7 +12,7 @@ struct RoughConductor {
     MicrofacetDistribution microfacets;
     bool sample_visible;
 
-    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
+    AMBILUX_HD_APART BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
         const Vec3f m = normalize(wi + wo);
         const float i_dot_m = dot(wi, m);

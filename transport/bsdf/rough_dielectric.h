@@ -20,7 +20,7 @@ struct RoughDielectric {
         return {microfacets.type, microfacets.alpha_u * scale, microfacets.alpha_v * scale};
     }
 
-    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode mode) const {
+    AMBILUX_HD_APART BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode mode) const {
         if (wi.z == 0.0f || wo.z == 0.0f) return no_scattering();
         // Signs are compared, not the product, which may underflow.
         const bool reflects = (wi.z > 0.0f) == (wo.z > 0.0f);

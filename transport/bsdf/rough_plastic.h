@@ -25,7 +25,7 @@ struct RoughPlastic {
         return specular_probability(1.0f - passed, passed, specular_sampling_weight);
     }
 
-    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
+    AMBILUX_HD_APART BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
         const Vec3f m = normalize(wi + wo);
         const float i_dot_m = dot(wi, m);
