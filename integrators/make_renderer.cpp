@@ -5,7 +5,6 @@
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "integrators/bidirectional/bidirectional.h"
-#include "integrators/feature_levels.h"
 #include "integrators/bidirectional/choice.h"
 #include "integrators/path/path.h"
 
@@ -52,8 +51,7 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     if (settings.automatic) return make_automatic(scene, settings, cuda, accels, [&](const RenderSettings& chosen) { return make_from(scene, chosen, accels); });
     RenderSettings chosen = settings;
     // On a host connect waits for the tables of environments, which it can ask for ahead only as a stage of its own.
-    // On a device shade and connect in one kernel outgrow the instruction caches, but where all that scatters is diffuse.
-    if (chosen.fuse == Fuse::automatic) chosen.fuse = cuda && chosen.specialise && kDiffuseFeatures.covers(scene.features) ? Fuse::all : Fuse::light;
+    if (chosen.fuse == Fuse::automatic) chosen.fuse = cuda ? Fuse::all : Fuse::light;
     if (chosen.queues.ordering == Ordering::automatic) chosen.queues.ordering = best_ordering(scene, settings, cuda);
     if (chosen.integrator != "path") return cuda ? make_bidirectional_cuda(scene, chosen, accels) : make_bidirectional_cpu(scene, chosen, accels);
     return cuda ? make_path_cuda(scene, chosen, accels) : make_path_cpu(scene, chosen, accels);

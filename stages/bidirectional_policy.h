@@ -20,6 +20,7 @@ struct BidirectionalPolicy {
     bool splat;               ///< light vertices are connected with the camera
     bool connect_vertices;
     uint32_t cache_draws;     ///< light vertices that an eye vertex draws from a cache of all; 0: those of the light walk of its slot
+    uint32_t one_pair_from;    ///< launches over as many vertices hold one pair of each (kVerticesForOnePair)
     uint32_t pairs_per_launch; ///< pairs of one eye vertex in a launch of connect_vertices; more than 1: sums of a path depend on the order of threads
     bool next_event;
     bool count_hits;          ///< eye walks count the area emitters that they meet

@@ -89,7 +89,7 @@ struct EyeShade {
 
 /// Pairs of an eye vertex for one launch over `vertices` of them, from `next` on: a vertex of the light walk of its slot, or, over a cache, the number of draws that are left.
 AMBILUX_HD void push_pairs(const BidirectionalPolicy& policy, const LightVertices& light_vertices, uint32_t vertices, uint32_t vertex, uint32_t path, uint32_t depth, uint32_t next, const Queue<PairItem>& pairs) {
-    const uint32_t most = vertices < kVerticesForOnePair ? policy.pairs_per_launch : 1;
+    const uint32_t most = vertices < policy.one_pair_from ? policy.pairs_per_launch : 1;
     for (uint32_t pushed = 0; pushed < most;) {
         uint32_t light = next;
         if (policy.cache_draws > 0) {

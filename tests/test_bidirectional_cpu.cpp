@@ -255,10 +255,11 @@ struct Bench {
     std::function<void(Bench&)> change;  ///< called once, before stage `before` runs for the first time
     bool changed = false;
 
-    explicit Bench(Scene s, const Method& method = {"all"}) : scene(std::move(s)), accel(scene) {
+    explicit Bench(Scene s, const Method& method = {"all"}, uint32_t one_pair_from = kVerticesForOnePair) : scene(std::move(s)), accel(scene) {
         RenderSettings settings = settings_of(scene, method);
         settings.fuse = Fuse::none;
         policy = make_bidirectional_policy(scene, settings);
+        policy.one_pair_from = one_pair_from;
         wave = shape_wave(scene, settings, kTilePixels, 1);
         wave = shape_wave(scene, settings, tile_count(wave) * kTilePixels, tile_count(wave));
         wave.samples = 1;
@@ -385,6 +386,21 @@ TEST_CASE("G9: nothing is counted in a clean wave, whose film is that of the ren
         const FilmMoments film = render_scene(b.scene, s, 1).film;
         CHECK(film.sum == b.sum);
         CHECK(film.sum_squares == b.sum_squares);
+    }
+}
+
+TEST_CASE("Launches with one pair of a path, while there are many vertices, and with several after that connect the same pairs") {
+    Bench several(cornell());
+    several.run();
+    const uint64_t pairs = several.memory.records[uint32_t(StageId::connect_vertices)].items;
+    CHECK(pairs > 256);
+    for (const uint32_t one_pair_from : {0u, 1u, 40u, 200u}) {
+        INFO(one_pair_from);
+        Bench b(cornell(), {"all"}, one_pair_from);
+        b.run();
+        CHECK(b.memory.records[uint32_t(StageId::connect_vertices)].items == pairs);
+        CHECK(std::fabs(b.total() - several.total()) < 1e-6 * several.total());
+        for (uint32_t q = 0; q < BidirectionalMemory::kQueues; ++q) CHECK(b.memory.counters[q].overflow == 0);
     }
 }
 

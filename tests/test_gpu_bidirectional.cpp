@@ -64,6 +64,36 @@ TEST_CASE("G5: bidirectional renders of both backends at equal seeds: pixels and
     }
 }
 
+TEST_CASE("Launches of a device that hold one pair of a path and those that hold several connect the same pairs") {
+    if (!device()) return;
+    // More eye vertices than kVerticesForOnePair at first, fewer in the end.
+    const Scene scene = project_scene("glass", 640, 360);
+    for (const char* variant : {"wavefront", "lvc"}) {
+        INFO(variant);
+        RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
+        s.max_depth = 12;
+        s.connections = 5;
+        const RenderResult several = render_scene(scene, s, 1);
+        s.wave_size = 64;  // paths of one sample all the same: the film is one wave
+        if (s.variant == "wavefront") s.deterministic = true;
+        const RenderResult other = render_scene(scene, s, 1);
+        const auto pairs = [](const RenderResult& r) {
+            for (const StageStats& t : r.stats.stages)
+                if (t.name == "connect_vertices") return t.items;
+            return uint64_t(0);
+        };
+        CHECK(pairs(several) > 640u * 360u);
+        CHECK(pairs(several) == pairs(other));
+        for (const QueueStats& q : several.stats.queues) CHECK(q.overflow == 0);
+        // The CPU has launches of several pairs only.
+        s.backend = "cpu";
+        s.deterministic = false;
+        s.wave_size = 0;
+        const double on_host = double(pairs(render_scene(scene, s, 1)));
+        CHECK(std::fabs(double(pairs(several)) - on_host) <= 2e-3 * on_host);
+    }
+}
+
 TEST_CASE("G1, G7: splats of a device sum up to the same bits, whatever the wave and the launches") {
     if (!device()) return;
     const Scene scene = project_scene("glass", 80, 45);

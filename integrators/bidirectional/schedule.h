@@ -62,7 +62,7 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
         if (policy.connect_vertices) {
             exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
             run_connections(exec, stages);
-            if (policy.pairs_per_launch < longest_pairing(policy))
+            if (longest_pairing(policy) > 1)
                 exec.repeat_while(m.rest, [&] {
                     exec.run(StageId::connect_vertices, stages.connect_rest, m.rest);
                     run_connections(exec, stages);

@@ -92,7 +92,7 @@ inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, con
 }
 
 /// Pairs of one launch for `slots` paths (push_pairs).
-inline uint32_t most_pairs(const BidirectionalPolicy& policy, uint32_t slots) { return std::max(slots, std::min(slots, kVerticesForOnePair) * policy.pairs_per_launch); }
+inline uint32_t most_pairs(const BidirectionalPolicy& policy, uint32_t slots) { return std::max(slots, std::min(slots, policy.one_pair_from) * policy.pairs_per_launch); }
 
 /// The most items that a stage goes through in order (OrderMemory::slots).
 inline uint32_t order_slots(const BidirectionalPolicy& policy, uint32_t slots) { return policy.connect_vertices ? most_pairs(policy, slots) : slots; }
