@@ -112,6 +112,24 @@ TEST_CASE("lvc has the expectation of paired walks, for few draws and many, and 
     }
 }
 
+TEST_CASE("Light that is culled before its shadow ray keeps its expectation and saves rays") {
+    for (const char* integrator : {"bdpt", "path"}) {
+        INFO(integrator);
+        const Scene scene = project_scene("cornell", 40, 30);
+        RenderSettings s = variant_settings(scene, "wavefront", 41);
+        s.integrator = integrator;
+        const Estimate without = render_batches(scene, s, 1024);
+        const uint64_t rays = render_scene(scene, s, 4).stats.rays_occlude;
+        s.seed = 42;
+        s.cull = 0.5f;
+        CHECK(render_scene(scene, s, 4).stats.rays_occlude < rays * 9 / 10);
+        const ZTestResult result = z_test(render_batches(scene, s, 1024), without);
+        INFO(result.report());
+        CHECK(result.pass);
+        CHECK(result.detectable < 0.02);
+    }
+}
+
 TEST_CASE("lvc: connections and light tracing alone, whose weights sum to one between them") {
     const Scene scene = project_scene("cornell", 40, 40);
     RenderSettings s = variant_settings(scene, "wavefront", 31);
