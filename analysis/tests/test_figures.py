@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -221,3 +223,12 @@ def test_long_names_are_wrapped_at_their_settings():
     assert style.wrap("lvc[connections=4]", 16) == "lvc\n[connections=4]"
     assert style.wrap("short", 16) == "short"
     assert style.wrap("strategies = hits+next_event+connections", 24) == "strategies = hits+\nnext_event+connections"
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
+def test_tables_are_latex(output, tmp_path):
+    document = tmp_path / "tables.tex"
+    inputs = "\n".join(rf"\input{{{output / name}}}" for name in ("table.tex", "tests.tex"))
+    document.write_text(r"\documentclass{article}\usepackage{booktabs}\begin{document}" + "\n" + inputs + "\n" + r"\end{document}")
+    made = subprocess.run(["pdflatex", "-interaction=nonstopmode", "-halt-on-error", document.name], cwd=tmp_path, capture_output=True, text=True)
+    assert made.returncode == 0, made.stdout[-2000:]
