@@ -24,4 +24,7 @@ void check_memory(uint64_t needed, uint64_t free, uint32_t paths);
 /// Samples of every pixel that take about 0.2 s, from what was measured so far; 1 when nothing was.
 uint32_t batch_of(double seconds, uint64_t samples);
 
+/// The same in whole waves of `wave_samples` samples, at least one: the last depths of a wave cost as much for few paths as for many.
+inline uint32_t whole_waves(uint32_t batch, uint32_t wave_samples) { return (batch + wave_samples - 1) / wave_samples * wave_samples; }
+
 }  // namespace ambilux

@@ -33,6 +33,22 @@ public:
         if (fixed_places) q.flags = take<uint8_t>(capacity);
         return q;
     }
+    /// The same queue with other storage: never both hold items.
+    template <class Item>
+    Queue<Item> alternate(Queue<Item> q) {
+        q.base = take<Lane>(uint64_t(q.capacity) * Queue<Item>::kLanes);
+        return q;
+    }
+    /// A queue of items that are the first lanes of those of `whole` and lie where these do.
+    template <class Front, class Item>
+    Queue<Front> front(const char* name, QueueCounter* counters, const Queue<Item>& whole, bool fixed_places) {
+        static_assert(sizeof(Front) < sizeof(Item));
+        Queue<Front> q = queue<Front>(name, counters, 0);
+        q.base = whole.base;
+        q.capacity = capacities_.back() = whole.capacity;
+        if (fixed_places) q.flags = take<uint8_t>(q.capacity);
+        return q;
+    }
 
     uint64_t bytes() const { return bytes_; }
     const std::vector<std::string>& queue_names() const { return names_; }

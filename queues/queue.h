@@ -117,6 +117,17 @@ struct Queue {
         if (i < capacity) store(i, item);
         return i;
     }
+    /// Writes the last lane of an item whose others are there already (Layout::front). Whoever does so for items that are appended sets the counter.
+    template <class Last>
+    AMBILUX_HD void complete(uint32_t i, const Last& last) const {
+        static_assert(sizeof(Last) == sizeof(Lane));
+        set_start(base[place(i, kLanes - 1)], last);
+        if (!flags) return;
+        flags[i] = 1;
+#if !defined(__CUDA_ARCH__)
+        ++counter->count;
+#endif
+    }
 
 private:
     AMBILUX_HD uint32_t fixed_place(const Item& item) const {

@@ -26,9 +26,9 @@ struct EyeGenerate {
     }
 };
 
-/// An eye walk at `h`: emission becomes a candidate.
-template <Features F>
-AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, const HitOutlet& candidates, StageRecord* record) {
+/// An eye walk at `h`: emission becomes a candidate, and visit(vertex) is called where connections may start.
+template <Features F, class Visit>
+AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, const HitOutlet& candidates, StageRecord* record, Visit visit) {
     const auto emit = [&](Rgb radiance, float others) {
         const Strategy strategy = Strategy::make(0, h.ray.bits.depth() + 1);
         if (!policy.singles.has(strategy)) return;
@@ -54,6 +54,7 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
     if ((policy.next_event || policy.connect_vertices) && bsdf_is_smooth(z.scattering.bsdf)) {
         step.vertex = pack_vertex(h, z, kNone);
         step.connectable = true;
+        visit(z);
     }
     const uint32_t depth = w.depth;
     if (depth + 1 == policy.max_depth && !policy.counts_last_segment()) return step;
@@ -63,29 +64,6 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
     step.goes_on = true;
     return step;
 }
-
-template <Features F>
-struct EyeShade {
-    SceneView scene;
-    Wave wave;
-    BidirectionalPolicy policy;
-    Queue<WalkHit> hits;
-    Queue<WalkItem> rays;
-    HitOutlet candidates;
-    Queue<VertexItem> vertices;
-    const uint32_t* last_vertex;
-    StageRecord* record;
-
-    AMBILUX_HD void operator()(uint32_t i) const {
-        const WalkHit h = hits.load(i);
-        WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record);
-        if (step.connectable) {
-            if (policy.connect_vertices) step.vertex.previous = policy.cache_draws > 0 ? policy.cache_draws : last_vertex[h.ray.path];
-            vertices.push(step.vertex);
-        }
-        if (step.goes_on) rays.push(step.ray);
-    }
-};
 
 /// Pairs of an eye vertex for one launch over `vertices` of them, from `next` on: a vertex of the light walk of its slot, or, over a cache, the number of draws that are left.
 AMBILUX_HD void push_pairs(const BidirectionalPolicy& policy, const LightVertices& light_vertices, uint32_t vertices, uint32_t vertex, uint32_t path, uint32_t depth, uint32_t next, const Queue<PairItem>& pairs) {
@@ -122,15 +100,51 @@ struct EyeConnect {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
-        if (item.previous != kNone) push_pairs(policy, light_vertices, vertices.counter->size(), i, item.path, item.bits.depth(), item.previous, pairs);
-        const uint32_t depth = item.bits.depth();
+        pair(item, i, vertices.counter->size());
+        if (policy.next_event) take(unpack_vertex<F>(scene, item), item.throughput, item.path, item.bits.depth());
+    }
+
+    /// `count`: of vertices in this launch, or more.
+    AMBILUX_HD void pair(const VertexItem& item, uint32_t place, uint32_t count) const {
+        if (item.previous != kNone) push_pairs(policy, light_vertices, count, place, item.path, item.bits.depth(), item.previous, pairs);
+    }
+
+    AMBILUX_HD void take(const WalkVertex& z, Rgb throughput, uint32_t path, uint32_t depth) const {
         if (!policy.next_event || !policy.wants(1, depth + 1)) return;
-        const RngKey key = wave.key(item.path);
-        const WalkVertex z = unpack_vertex<F>(scene, item);
+        const RngKey key = wave.key(path);
         WalkConnection c;
-        if (!connect_next_event<F>(scene, policy.mis, z, item.throughput, random_floats(key, emitter_block(depth)), c)) return;
+        if (!connect_next_event<F>(scene, policy.mis, z, throughput, random_floats(key, emitter_block(depth)), c)) return;
         if (!is_light(c.value, record) || is_zero(c.value)) return;
-        candidates.push({c.value, item.path, 1.0f, policy.others(c.others), F.opacity || policy.cull > 0.0f ? alpha_seed(key, depth, true) : 0, c.tmax, c.o, Strategy::make(1, depth + 1), c.d, 0});
+        candidates.push({c.value, path, 1.0f, policy.others(c.others), F.opacity || policy.cull > 0.0f ? alpha_seed(key, depth, true) : 0, c.tmax, c.o, Strategy::make(1, depth + 1), c.d, 0});
+    }
+};
+
+template <Features F>
+struct EyeShade {
+    static constexpr uint32_t kBlocksPerSm = 3;  ///< 168 registers instead of 232: more warps hide more latency (docs/performance.md)
+
+    SceneView scene;
+    Wave wave;
+    BidirectionalPolicy policy;
+    Queue<WalkHit> hits;
+    Queue<WalkItem> rays;
+    HitOutlet candidates;
+    Queue<VertexItem> vertices;
+    const uint32_t* last_vertex;
+    StageRecord* record;
+    EyeConnect<F> connect;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const WalkHit h = hits.load(i);
+        WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z) {
+            if (policy.connect_in_shade) connect.take(z, h.ray.throughput, h.ray.path, h.ray.bits.depth());
+        });
+        if (step.connectable && (policy.connect_vertices || !policy.connect_in_shade)) {
+            if (policy.connect_vertices) step.vertex.previous = policy.cache_draws > 0 ? policy.cache_draws : last_vertex[h.ray.path];
+            const uint32_t place = vertices.push(step.vertex);
+            if (policy.connect_in_shade) connect.pair(step.vertex, place, hits.counter->size());
+        }
+        if (step.goes_on) rays.push(step.ray);
     }
 };
 

@@ -31,17 +31,38 @@ AMBILUX_HD bool add_large_fixed(int64_t* sum, int64_t value) {
     return false;
 }
 
+/// Adds values of less than 2^42 to three sums.
+AMBILUX_HD void add_small_fixed(int64_t* sums, const int64_t (&values)[3]) {
+#if defined(__CUDA_ARCH__)
+    // A lamp that covers a few pixels gets a splat from every light walk: the threads of a warp that mean the same pixel add theirs up first.
+    const uint32_t same = __match_any_sync(__activemask(), reinterpret_cast<unsigned long long>(sums));
+    if (same & (same - 1)) {
+        constexpr uint32_t kHalf = (1u << 21) - 1;
+        int64_t total[3];
+        for (int c = 0; c < 3; ++c) {
+            const uint32_t low = __reduce_add_sync(same, uint32_t(values[c]) & kHalf), high = __reduce_add_sync(same, uint32_t(values[c] >> 21));
+            total[c] = (int64_t(high) << 21) + low;
+        }
+        if ((threadIdx.x & 31u) == uint32_t(__ffs(int(same)) - 1))
+            for (int c = 0; c < 3; ++c) add_fixed(sums + c, total[c]);
+        return;
+    }
+#endif
+    for (int c = 0; c < 3; ++c) add_fixed(sums + c, values[c]);
+}
+
 /// Adds light to three sums. False if it does not fit: such light is to be counted as infinite, not wrapped.
 AMBILUX_HD bool add_light(int64_t* sums, Rgb value) {
-    if (!(max_component(value) < 0x1p26f)) return false;
-    bool fits = true;
-    for (int c = 0; c < 3; ++c) {
-        const int64_t fixed = llrint(double(value[c]) / kLightUnit);
-        if (value[c] < kLargeLight)
-            add_fixed(sums + c, fixed);
-        else
-            fits = add_large_fixed(sums + c, fixed) && fits;
+    const float most = max_component(value);
+    if (!(most < 0x1p26f)) return false;
+    int64_t fixed[3];
+    for (int c = 0; c < 3; ++c) fixed[c] = llrint(double(value[c]) / kLightUnit);
+    if (most < kLargeLight) {
+        add_small_fixed(sums, fixed);
+        return true;
     }
+    bool fits = true;
+    for (int c = 0; c < 3; ++c) fits = add_large_fixed(sums + c, fixed[c]) && fits;
     return fits;
 }
 

@@ -37,15 +37,17 @@ AMBILUX_HD bool start_light(const SceneView& scene, const Wave& wave, const Bidi
     return policy.max_depth >= 2;
 }
 
-/// A light walk at `h`, where it may have `longest` segments in all. Its vertex is connectable wherever the BSDF is.
-template <Features F>
-AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, LightWalkNumber number, uint32_t longest, StageRecord* record) {
+/// A light walk at `h`, where it may have `longest` segments in all. Its vertex is connectable wherever the BSDF is; visit(vertex) is called there.
+template <Features F, class Visit>
+AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, LightWalkNumber number, uint32_t longest, StageRecord* record,
+                               Visit visit) {
     WalkStep step = {};
     Walk w = unpack_walk(h.ray);
     const WalkVertex y = light_vertex<F>(scene, policy.mis, w, h.prim, h.u, h.v);
     if (bsdf_is_smooth(y.scattering.bsdf)) {
         step.vertex = pack_vertex(h, y, kNone);
         step.connectable = true;
+        visit(y);
     }
     if (w.depth >= longest) return step;
     const Vec4f u = random_floats(wave.key(h.ray.path, Stream::light), number.block(light_scatter_block(w.depth)));
@@ -74,35 +76,6 @@ struct LightGenerate {
     }
 };
 
-/// A light vertex: kept for connections, asked for by the camera, and left again.
-template <Features F>
-struct LightShade {
-    SceneView scene;
-    Wave wave;
-    BidirectionalPolicy policy;
-    Queue<WalkHit> hits;
-    Queue<WalkItem> rays;
-    LightVertices vertices;             ///< all vertices of all light walks of the wave
-    Queue<VertexItem> camera_vertices;  ///< those of this depth
-    uint32_t* last_vertex;
-    StageRecord* record;
-
-    AMBILUX_HD void operator()(uint32_t i) const {
-        const WalkHit h = hits.load(i);
-        const uint32_t depth = h.ray.bits.depth();
-        // A path has at least one segment more than its light walk.
-        WalkStep step = light_step<F>(scene, wave, policy, h, {0}, policy.max_depth - 1, record);
-        if (step.connectable && depth < policy.max_depth) {
-            if (policy.splat && policy.wants(depth + 1, 1)) camera_vertices.push(step.vertex);
-            if (policy.connect_vertices && depth + 2 <= policy.max_depth) {
-                step.vertex.previous = last_vertex[h.ray.path];
-                last_vertex[h.ray.path] = vertices.push(step.vertex);
-            }
-        }
-        if (step.goes_on) rays.push(step.ray);
-    }
-};
-
 /// connect_camera: light vertices of one depth and the camera (t = 1).
 template <Features F>
 struct ConnectCamera {
@@ -115,15 +88,53 @@ struct ConnectCamera {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
-        const WalkVertex y = unpack_vertex<F>(scene, item);
-        const RngKey key = wave.key(item.path, Stream::light);
-        const Vec4f u = random_floats(key, lens_block(item.bits.depth()));
+        take(unpack_vertex<F>(scene, item), item.throughput, item.path, item.bits.depth());
+    }
+
+    AMBILUX_HD void take(const WalkVertex& y, Rgb throughput, uint32_t path, uint32_t depth) const {
+        const RngKey key = wave.key(path, Stream::light);
+        const Vec4f u = random_floats(key, lens_block(depth));
         WalkConnection c;
         Vec2f film;
-        if (!connect_camera<F>(scene, policy.mis, y, item.throughput, {u.x, u.y}, c, film)) return;
+        if (!connect_camera<F>(scene, policy.mis, y, throughput, {u.x, u.y}, c, film)) return;
         if (!is_light(c.value, record) || is_zero(c.value)) return;
-        splats.push({c.value, item.path, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, item.bits.depth(), true) : 0, film, policy.others(c.others),
-                     Strategy::make(item.bits.depth() + 1, 1)});
+        splats.push({c.value, path, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, depth, true) : 0, film, policy.others(c.others), Strategy::make(depth + 1, 1)});
+    }
+};
+
+/// A light vertex: kept for connections, connected with the camera, and left again.
+template <Features F>
+struct LightShade {
+    static constexpr uint32_t kBlocksPerSm = 3;  ///< as EyeShade
+
+    SceneView scene;
+    Wave wave;
+    BidirectionalPolicy policy;
+    Queue<WalkHit> hits;
+    Queue<WalkItem> rays;
+    LightVertices vertices;             ///< all vertices of all light walks of the wave
+    Queue<VertexItem> camera_vertices;  ///< those of this depth
+    uint32_t* last_vertex;
+    StageRecord* record;
+    ConnectCamera<F> connect;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const WalkHit h = hits.load(i);
+        if (h.prim == kNone) return;
+        const uint32_t depth = h.ray.bits.depth();
+        const bool to_camera = policy.splat && depth < policy.max_depth && policy.wants(depth + 1, 1);
+        // A path has at least one segment more than its light walk.
+        WalkStep step = light_step<F>(scene, wave, policy, h, {0}, policy.max_depth - 1, record, [&](const WalkVertex& y) {
+            if (to_camera && policy.connect_in_shade) connect.take(y, h.ray.throughput, h.ray.path, depth);
+        });
+        if (step.connectable && depth < policy.max_depth) {
+            if (to_camera && !policy.connect_in_shade) camera_vertices.push(step.vertex);
+            if (policy.connect_vertices && depth + 2 <= policy.max_depth) {
+                step.vertex.previous = last_vertex[h.ray.path];
+                last_vertex[h.ray.path] = vertices.push(step.vertex);
+            }
+        }
+        if (step.goes_on) rays.push(step.ray);
     }
 };
 

@@ -34,7 +34,14 @@ struct RayItem {
     float pdf_sa;      ///< of d, by BSDF sampling; after a delta a probability. Camera rays: distance of the far plane
 };
 
-/// Where that ray ended; `prim == kNone`: nowhere, only the environment remains.
+/// Where a ray of a walk ended: the last lane of HitItem and WalkHit.
+struct HitEnd {
+    float u, v;
+    uint32_t prim;
+    uint32_t pad;
+};
+
+/// Where that ray ended; `prim == kNone`: nowhere, only the environment remains. Its first lanes are the RayItem.
 struct HitItem {
     Vec3f o;
     uint32_t path;

@@ -16,6 +16,8 @@ AMBILUX_HD float survival_probability(Rgb throughput, float eta_scale) { return 
 
 template <Features F>
 struct Shade {
+    static constexpr uint32_t kBlocksPerSm = 4;  ///< 128 registers; fewer spill too much (docs/performance.md)
+
     SceneView scene;
     Wave wave;
     PathPolicy policy;

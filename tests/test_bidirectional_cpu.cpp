@@ -309,9 +309,14 @@ struct Bench {
         void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
             run(id, stage, queue);
         }
-        template <class Stage, class Item>
-        void trace_coherent(StageId id, const Stage& stage, const Queue<Item>& queue) {
-            run(id, stage, queue);
+        template <class Stage, class Item, class Out>
+        void extend(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
+            prepare(id, rays.counter->size());
+            CpuExecutor::extend(id, stage, rays, hits);
+        }
+        template <class Stage, class Item, class Out>
+        void extend_coherent(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
+            extend(id, stage, rays, hits);
         }
     };
 
@@ -417,8 +422,8 @@ TEST_CASE("G9: light_generate counts emission that is none", "[bidirectional]") 
 TEST_CASE("G9: light_extend counts rays that are not finite", "[bidirectional]") {
     Bench b(cornell());
     b.run(StageId::light_extend, [](Bench& x) {
-        edit<WalkItem>(x.memory.rays, 3, [](WalkItem& r) { r.d.y = kNan; });
-        edit<WalkItem>(x.memory.rays, 5, [](WalkItem& r) { r.o.x = kInf; });
+        edit<WalkItem>(x.memory.rays[0], 3, [](WalkItem& r) { r.d.y = kNan; });
+        edit<WalkItem>(x.memory.rays[0], 5, [](WalkItem& r) { r.o.x = kInf; });
     });
     b.check_counts(StageId::light_extend, 2, 0, 0);
 }
@@ -427,7 +432,7 @@ TEST_CASE("G9: light_shade counts throughput that is no light, and neither of it
     for (auto [value, which] : kBad) {
         Bench b(cornell(), {"-i light"});
         b.run(StageId::light_shade, [v = value](Bench& x) {
-            for (uint32_t i = 0; i < x.memory.hits.counter->size(); ++i) edit<WalkHit>(x.memory.hits, i, [v](WalkHit& h) { h.ray.throughput.z = v; });
+            for (uint32_t i = 0; i < x.memory.hits[0].counter->size(); ++i) edit<WalkHit>(x.memory.hits[0], i, [v](WalkHit& h) { h.ray.throughput.z = v; });
         });
         CHECK(b.count(StageId::light_shade, which) > 50);
         CHECK(b.count(StageId::connect_camera, which) > 50);

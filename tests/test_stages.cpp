@@ -35,6 +35,7 @@ struct Bench {
     std::vector<std::byte> bytes;
     std::vector<double> sum, sum_squares;
     PathMemory memory;
+    int place = 0;  ///< of the walks of this depth
 
     explicit Bench(Scene s, uint32_t samples = 1) : scene(std::move(s)), accel(scene) {
         RenderSettings settings = cpu_settings(scene, Estimator::mis);
@@ -70,16 +71,23 @@ struct Bench {
     }
     /// From a wave of rays to the film.
     void finish() {
-        const Stages s = stages();
-        while (memory.rays.counter->count > 0) {
-            run(s.extend, memory.rays);
+        while (memory.rays[0].counter->count > 0) {
+            extend();
             finish_depth();
         }
         develop();
     }
+    void extend() {
+        memory.hits[place].counter->count = memory.rays[place].counter->size();
+        run(stages().extend[place], memory.rays[place]);
+    }
+    void shade() {
+        run(stages().shade[place], memory.hits[place]);
+        place = 1 - place;
+    }
     /// From hits to the samples.
     void finish_depth() {
-        run(stages().shade, memory.hits);
+        shade();
         finish_contributions();
     }
     void finish_contributions() {
@@ -145,8 +153,8 @@ TEST_CASE("G9: a sensor without a place is counted by extend, ray by ray", "[sta
 TEST_CASE("G9: extend counts rays that are not finite", "[stages]") {
     Bench b = cornell();
     b.generate();
-    change<RayItem>(b.memory.rays, 3, [](RayItem& r) { r.d.y = kNan; });
-    change<RayItem>(b.memory.rays, 5, [](RayItem& r) { r.o.x = kInf; });
+    change<RayItem>(b.memory.rays[0], 3, [](RayItem& r) { r.d.y = kNan; });
+    change<RayItem>(b.memory.rays[0], 5, [](RayItem& r) { r.o.x = kInf; });
     b.finish();
     b.check_counts(StageId::extend, 2, 0, 0);
 }
@@ -155,13 +163,15 @@ TEST_CASE("G9: shade counts emission and throughput that are no light", "[stages
     for (auto [value, which] : {std::pair{kNan, 0}, {kInf, 1}, {-1.0f, 2}}) {
         Bench b = cornell();
         b.generate();
-        b.run(b.stages().extend, b.memory.rays);
+        b.extend();
         uint32_t wall = kNone;
-        for (uint32_t i = 0; i < b.memory.hits.counter->size(); ++i)
-            if (b.scene.shapes[b.scene.view().shape_of(b.memory.hits.load(i).prim)].emitter == kNone) wall = i;
+        for (uint32_t i = 0; i < b.memory.hits[0].counter->size(); ++i) {
+            const uint32_t prim = b.memory.hits[0].load(i).prim;
+            if (prim != kNone && b.scene.shapes[b.scene.view().shape_of(prim)].emitter == kNone) wall = i;
+        }
         REQUIRE(wall != kNone);
-        change<HitItem>(b.memory.hits, wall, [v = value](HitItem& h) { h.throughput = {1, v, 1}; });
-        b.run(b.stages().shade, b.memory.hits);
+        change<HitItem>(b.memory.hits[0], wall, [v = value](HitItem& h) { h.throughput = {1, v, 1}; });
+        b.shade();
         const StageRecord& r = b.record(StageId::shade);
         CHECK(r.nan == (which == 0 ? 1 : 0));
         CHECK(r.inf == (which == 1 ? 1 : 0));
@@ -186,8 +196,8 @@ TEST_CASE("G9: connect counts light that is none", "[stages]") {
     for (auto [value, which] : {std::pair{kNan, 0}, {kInf, 1}, {-1.0f, 2}}) {
         Bench b = cornell();
         b.generate();
-        b.run(b.stages().extend, b.memory.rays);
-        b.run(b.stages().shade, b.memory.hits);
+        b.extend();
+        b.shade();
         const uint32_t n = b.memory.connections.counter->size();
         REQUIRE(n > 100);
         for (uint32_t i = 0; i < n; i += 2) change<ConnectItem>(b.memory.connections, i, [v = value](ConnectItem& c) { c.throughput.z = v; });
@@ -204,8 +214,8 @@ TEST_CASE("G9: connect counts light that is none", "[stages]") {
 TEST_CASE("G9: mis_weight counts densities and light that are none", "[stages]") {
     Bench b = cornell();
     b.generate();
-    b.run(b.stages().extend, b.memory.rays);
-    b.run(b.stages().shade, b.memory.hits);
+    b.extend();
+    b.shade();
     b.run(b.stages().connect, b.memory.connections);
     change<ConnectCandidate>(b.memory.connect_candidates, 0, [](ConnectCandidate& c) { c.pdf_this = kNan; });
     change<ConnectCandidate>(b.memory.connect_candidates, 1, [](ConnectCandidate& c) { c.value.x = kInf; });
@@ -218,8 +228,8 @@ TEST_CASE("G9: mis_weight counts densities and light that are none", "[stages]")
 TEST_CASE("G9: occlude counts shadow rays that are not finite", "[stages]") {
     Bench b = cornell();
     b.generate();
-    b.run(b.stages().extend, b.memory.rays);
-    b.run(b.stages().shade, b.memory.hits);
+    b.extend();
+    b.shade();
     b.run(b.stages().connect, b.memory.connections);
     b.run(b.stages().weight_connections, b.memory.connect_candidates);
     change<ShadowItem>(b.memory.shadows, 0, [](ShadowItem& s) { s.d.x = kNan; });

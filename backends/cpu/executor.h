@@ -42,14 +42,18 @@ public:
     void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
         run_in_order<void>(id, stage, queue, true);
     }
-    /// Rays are read before any stage pushes new ones, so the queue they came from may be filled again at once.
     template <class Stage, class Item>
     void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
         run_in_order<MortonOrder>(id, stage, queue);
     }
-    template <class Stage, class Item>
-    void trace_coherent(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        run_in_order<void>(id, stage, queue);
+    template <class Stage, class Item, class Out>
+    void extend(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
+        if (!rays.flags) hits.counter->count = rays.counter->size();
+        trace(id, stage, rays);
+    }
+    template <class Stage, class Item, class Out>
+    void extend_coherent(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
+        extend(id, stage, rays, hits);
     }
     template <class Item, class Body>
     void repeat_while(const Queue<Item>& queue, Body body) {

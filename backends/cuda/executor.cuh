@@ -18,8 +18,8 @@
 #include "stages/stage.h"
 #include "stages/wave.h"
 
-#if CUDART_VERSION < 12040
-#error "Conditional graph nodes need CUDA 12.4 or newer"
+#if CUDART_VERSION < 12080
+#error "Graphs that choose one of several bodies need CUDA 12.8 or newer"
 #endif
 
 namespace ambilux {
@@ -35,15 +35,21 @@ __device__ inline uint64_t device_nanoseconds() {
     return ns;
 }
 
+/// From so many items on a sort pays; fewer are shaded in the time that its launches take.
+constexpr uint32_t kSortFrom = 1u << 15;
+
 /// The items that a launch goes through.
 struct Items {
     QueueCounter* counter;
     const uint32_t* list;  ///< their places; null: places 0, 1, 2 ...
     uint8_t* flags;        ///< Queue::flags
     uint32_t capacity;
+    const uint32_t* sorted;  ///< instead of `list` if there are at least kSortFrom items; null: never
 
     /// Places to look at.
     __device__ uint32_t size() const { return flags && !list ? capacity : counter->size(); }
+    /// What to go through when size() is `n`.
+    __device__ Items of(uint32_t n) const { return {counter, sorted && n >= kSortFrom ? sorted : list, flags, capacity, nullptr}; }
     __device__ uint32_t place(uint32_t i) const { return list ? list[i] : i; }
     /// False if there is no item. What is taken must be used: its place is empty from now on.
     __device__ bool take(uint32_t place) const {
@@ -66,16 +72,18 @@ __global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_paths
     stage.run(blockIdx.x * kStageBlock + threadIdx.x, slots * state->samples, gridDim.x * kStageBlock);
 }
 
+/// Blocks of a stage that are to be resident on a multiprocessor: 1 leaves registers to the compiler.
 template <class Stage>
-__global__ void __launch_bounds__(kStageBlock) launch_queue(const __grid_constant__ Stage stage, const QueueCounter* counter) {
-    const uint32_t n = counter->size();
-    for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) stage(i);
+constexpr uint32_t blocks_per_multiprocessor() {
+    if constexpr (requires { Stage::kBlocksPerSm; }) return Stage::kBlocksPerSm;
+    return 1;
 }
 
-/// The same where items do not lie one after the other. A kernel of its own: together they take other registers, which costs stages 1 to 3 % of their time.
+/// One kernel, however items lie and are ordered: two of them would round differently.
 template <class Stage>
-__global__ void __launch_bounds__(kStageBlock) launch_places(const __grid_constant__ Stage stage, const Items items) {
-    const uint32_t n = items.size();
+__global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>()) launch_items(const __grid_constant__ Stage stage, const Items all) {
+    const uint32_t n = all.size();
+    const Items items = all.of(n);
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) {
         const uint32_t place = items.place(i);
         if (items.take(place)) stage(place);
@@ -85,9 +93,10 @@ __global__ void __launch_bounds__(kStageBlock) launch_places(const __grid_consta
 /// Rays in the order of the queue, one after the other: best while neighbours stay together. `Set`: what traversal has to know of; less than the stage does, where
 /// the scene lets it.
 template <class Set, class Stage, class Tracer>
-__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coherent(const __grid_constant__ Stage stage, const Tracer tracer, const Items items) {
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coherent(const __grid_constant__ Stage stage, const Tracer tracer, const Items all) {
     static_assert(!Stage::kAnyHit);
-    const uint32_t n = items.size();
+    const uint32_t n = all.size();
+    const Items items = all.of(n);
     for (uint32_t i = blockIdx.x * kTraceBlock + threadIdx.x; i < n; i += gridDim.x * kTraceBlock) {
         const uint32_t place = items.place(i);
         Ray ray;
@@ -100,8 +109,9 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coheren
 
 /// Rays by persistent threads.
 template <class Set, class Stage, class Tracer>
-__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(const __grid_constant__ Stage stage, const Tracer tracer, const Items items) {
-    const uint32_t n = items.size();
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(const __grid_constant__ Stage stage, const Tracer tracer, const Items all) {
+    const uint32_t n = all.size();
+    const Items items = all.of(n);
     const auto fetch = [&](uint32_t i, Ray& ray) {
         const uint32_t place = items.place(i);
         return items.take(place) && stage.fetch(place, ray);
@@ -126,27 +136,26 @@ __global__ inline void count_items(const uint8_t* flags, uint32_t capacity, uint
 /// Sorts run over all places of a queue, or a quarter, a sixteenth ... of them.
 constexpr uint32_t kSortSizes = 6;
 
-/// The smallest of these sizes that holds `items`; none if there are no items.
-__host__ __device__ inline uint32_t sort_size(uint32_t capacity, uint32_t items) {
+/// Which of these sizes is the smallest that holds `items`; kSortSizes: too few to sort.
+__host__ __device__ inline uint32_t sort_choice(uint32_t capacity, uint32_t items) {
+    if (items < kSortFrom) return kSortSizes;
     uint32_t k = 0;
     while (k + 1 < kSortSizes && capacity >> 2 * (k + 1) >= items) ++k;
-    return items > 0 ? capacity >> 2 * k : 0;
+    return k;
 }
 
-struct SortConditions {
-    cudaGraphConditionalHandle handles[kSortSizes];
+/// Where a graph has a sort for each size: the conditional node that runs one of them.
+struct SortSwitch {
+    cudaGraphConditionalHandle handle;
+    bool on;
 };
 
-__global__ inline void choose_sort(const QueueCounter* counter, uint32_t capacity, SortConditions conditions) {
-    const uint32_t size = sort_size(capacity, counter->size());
-    for (uint32_t k = 0; k < kSortSizes && capacity >> 2 * k > 0; ++k)
-        cudaGraphSetConditional(conditions.handles[k], capacity >> 2 * k == size);
-}
-
-/// Keys of the items that a launch will go through, and their places as they lie. The last key is that of places without an item.
+/// Keys of the items that a launch will go through, and their places as they lie. The last key is that of places without an item. Tells `sorts` which size to sort.
 template <class Order, class Item>
-__global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__ SceneView scene, const Queue<Item> queue, const Items items, uint32_t last, uint32_t* places, uint32_t* keys) {
-    const uint32_t n = items.size(), end = items.flags && !items.list ? n : sort_size(items.capacity, n);
+__global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__ SceneView scene, const Queue<Item> queue, const Items items, uint32_t last, uint32_t* places, uint32_t* keys, SortSwitch sorts) {
+    const uint32_t n = items.size(), choice = sort_choice(items.capacity, n);
+    if (sorts.on && blockIdx.x == 0 && threadIdx.x == 0) cudaGraphSetConditional(sorts.handle, choice);
+    const uint32_t end = items.flags && !items.list ? n : choice < kSortSizes ? items.capacity >> 2 * choice : 0;
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < end; i += gridDim.x * kStageBlock) {
         uint32_t place = i, key = last;
         if (i < n) {
@@ -158,19 +167,23 @@ __global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__
     }
 }
 
-/// After a stage: its record, and its queue emptied. The time since the last such kernel is the stage's.
-__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, uint32_t slots, uint32_t samples, bool keep, const WaveState* state, uint64_t* clock) {
+/// A change of WaveState::depth.
+struct DepthChange {
+    bool set;           ///< to `value`; otherwise `value` is added
+    uint32_t value;
+};
+
+/// After a stage: its record, and its queue emptied; `out`, if it is not null, holds as many items as that did. The time since the last such kernel is the stage's.
+__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, QueueCounter* out, uint32_t slots, uint32_t samples, bool keep, DepthChange depth, WaveState* state, uint64_t* clock) {
     const uint64_t now = device_nanoseconds();
+    state->depth = depth.set ? depth.value : state->depth + depth.value;
+    if (out) out->count = counter->size();
     record->add(counter ? counter->size() : slots * (samples ? samples : state->samples), state->depth, now - *clock);
     if (counter && !keep) counter->finish();
     *clock = now;
 }
 
 __global__ inline void start_clock(uint64_t* clock) { *clock = device_nanoseconds(); }
-
-__global__ inline void set_depth(WaveState* state, uint32_t depth) { state->depth = depth; }
-
-__global__ inline void next_depth(WaveState* state) { ++state->depth; }
 
 __global__ inline void repeat_unless_empty(const QueueCounter* counter, cudaGraphConditionalHandle again) { cudaGraphSetConditional(again, counter->count > 0); }
 
@@ -230,47 +243,51 @@ public:
     template <class Stage>
     void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
         detail::launch_slots<<<blocks(detail::launch_slots<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, slots, samples, state_);
-        finish(id, nullptr, slots, samples);
+        finish(id, nullptr, nullptr, slots, samples);
     }
     template <class Stage>
     void run_paths(StageId id, const Stage& stage, uint32_t slots) {
         detail::launch_paths<<<blocks(detail::launch_paths<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, slots, state_);
-        finish(id, nullptr, slots);
+        finish(id, nullptr, nullptr, slots);
     }
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        launch_items(stage, prepare<MaterialOrder>(queue));
+        const detail::Items items = prepare<MaterialOrder>(queue);
+        detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
         finish(id, queue.counter);
     }
     /// Items stay where they are until clear().
     template <class Stage, class Item>
     void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        launch_items(stage, prepare<void>(queue));
-        finish(id, queue.counter, 0, 0, true);
+        const detail::Items items = prepare<void>(queue);
+        detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
+        finish(id, queue.counter, nullptr, 0, 0, true);
     }
     /// Rays go through `pairs` instead of the tracer of their stage.
     void use(const PairTracer& pairs) requires kPairs { pairs_ = pairs; }
 
     template <class Stage, class Item>
     void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        const detail::Items items = prepare<MortonOrder>(queue);
-        with_tracer(stage, [&](auto set, const auto& tracer) {
-            const auto kernel = detail::launch_trace<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
-            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
-        });
+        launch_traces(stage, queue);
         finish(id, queue.counter);
     }
-    template <class Stage, class Item>
-    void trace_coherent(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        const detail::Items items = prepare<void>(queue);  // in order as they are
+    template <class Stage, class Item, class Out>
+    void extend(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
+        launch_traces(stage, rays);
+        finish(id, rays.counter, hits.flags ? nullptr : hits.counter);
+    }
+    template <class Stage, class Item, class Out>
+    void extend_coherent(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
+        const detail::Items items = prepare<void>(rays);  // in order as they are
         with_tracer(stage, [&](auto set, const auto& tracer) {
             const auto kernel = detail::launch_coherent<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
             kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
         });
-        finish(id, queue.counter);
+        finish(id, rays.counter, hits.flags ? nullptr : hits.counter);
     }
-    void set_depth(uint32_t depth) { detail::set_depth<<<1, 1, 0, stream_>>>(state_, depth); }
-    void next_depth() { detail::next_depth<<<1, 1, 0, stream_>>>(state_); }
+    /// From the next record on; no kernel but those that keep records asks.
+    void set_depth(uint32_t depth) { depth_ = {true, depth}; }
+    void next_depth() { ++depth_.value; }
 
     template <class A, class B>
     void settle(const A& a, const B& b) {
@@ -294,6 +311,14 @@ public:
     }
 
 private:
+    template <class Stage, class Item>
+    void launch_traces(const Stage& stage, const Queue<Item>& rays) {
+        const detail::Items items = prepare<MortonOrder>(rays);
+        with_tracer(stage, [&](auto set, const auto& tracer) {
+            const auto kernel = detail::launch_trace<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
+            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
+        });
+    }
     /// f(FeatureSet, tracer) with the set that tracing needs. Kernels are made only for sets that the stage's own features cover.
     template <class Stage, class Function>
     void with_tracer(const Stage& stage, Function f) const {
@@ -306,13 +331,6 @@ private:
         });
     }
 
-    template <class Stage>
-    void launch_items(const Stage& stage, const detail::Items& items) {
-        if (items.list || items.flags)
-            detail::launch_places<<<blocks(detail::launch_places<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
-        else
-            detail::launch_queue<<<blocks(detail::launch_queue<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items.counter);
-    }
     /// What a launch over `queue` goes through, sorted if it is to be. A loop has counted its queue already when its body begins with that queue.
     template <class Order, class Item>
     detail::Items prepare(const Queue<Item>& queue) {
@@ -320,28 +338,31 @@ private:
         counted_ = nullptr;
         if (!counted) count(queue);
         const bool selected = queue.flags && order_.policy.compaction == Compaction::select;
-        detail::Items items = {queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity};
+        detail::Items items = {queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity, nullptr};
         if constexpr (Ordered<Order, Item>) {
             if (order_.policy.ordering == Order::kOrdering && queue.capacity > 0) {
                 const uint32_t bits = Order::bits(scene_);
-                detail::make_keys<Order, Item><<<blocks(detail::make_keys<Order, Item>, kStageBlock), kStageBlock, 0, stream_>>>(scene_, queue, items, (1u << bits) - 1, order_.list[0], order_.keys[0]);
-                if (queue.flags && !items.list)
+                const bool whole = queue.flags && !items.list;
+                const detail::SortSwitch sorts = {capturing_ && !whole ? make_condition() : cudaGraphConditionalHandle{}, capturing_ && !whole};
+                detail::make_keys<Order, Item><<<blocks(detail::make_keys<Order, Item>, kStageBlock), kStageBlock, 0, stream_>>>(scene_, queue, items, (1u << bits) - 1, order_.list[0], order_.keys[0], sorts);
+                if (whole)
                     sort_places(order_, queue.capacity, bits, stream_);
                 else
-                    sort_as_many(queue.counter, queue.capacity, bits);
-                items.list = order_.list[1];
+                    sort_as_many(queue.counter, queue.capacity, bits, sorts);
+                (whole ? items.list : items.sorted) = order_.list[1];
             }
         }
         return items;
     }
     /// Sorts no more places than hold the items. A graph has a sort for each of several sizes, since its launches are laid down before it is known.
-    void sort_as_many(const QueueCounter* counter, uint32_t capacity, uint32_t bits) {
-        if (!capturing_) return sort_places(order_, detail::sort_size(capacity, size_of(counter)), bits, stream_);
-        detail::SortConditions conditions{};
-        for (uint32_t k = 0; k < detail::kSortSizes && capacity >> 2 * k > 0; ++k) conditions.handles[k] = make_condition();
-        detail::choose_sort<<<1, 1, 0, stream_>>>(counter, capacity, conditions);
-        for (uint32_t k = 0; k < detail::kSortSizes && capacity >> 2 * k > 0; ++k)
-            capture_conditional(cudaGraphCondTypeIf, conditions.handles[k], [&] { sort_places(order_, capacity >> 2 * k, bits, stream_); });
+    void sort_as_many(const QueueCounter* counter, uint32_t capacity, uint32_t bits, const detail::SortSwitch& sorts) {
+        const auto sort = [&](uint32_t k) {
+            if (k < detail::kSortSizes) sort_places(order_, capacity >> 2 * k, bits, stream_);
+        };
+        if (capturing_)
+            capture_conditional(cudaGraphCondTypeSwitch, sorts.handle, detail::kSortSizes, sort);
+        else
+            sort(detail::sort_choice(capacity, size_of(counter)));
     }
     /// Has the counter of a queue of fixed places tell its size; compaction select makes the list too.
     template <class Item>
@@ -359,7 +380,7 @@ private:
         // Set before every entry, since a loop inside of a loop is entered more than once.
         count();
         detail::repeat_unless_empty<<<1, 1, 0, stream_>>>(counter, again);
-        capture_conditional(cudaGraphCondTypeWhile, again, [&] {
+        capture_conditional(cudaGraphCondTypeWhile, again, 1, [&](uint32_t) {
             body();
             count();
             detail::repeat_unless_empty<<<1, 1, 0, stream_>>>(counter, again);
@@ -370,14 +391,15 @@ private:
         cuda_check(cudaGraphConditionalHandleCreate(&handle, captured().first, 0, cudaGraphCondAssignDefault), "conditional handle");
         return handle;
     }
+    /// `bodies` graphs, of which body(k) captures the k-th.
     template <class Body>
-    void capture_conditional(cudaGraphConditionalNodeType type, cudaGraphConditionalHandle handle, Body body) {
+    void capture_conditional(cudaGraphConditionalNodeType type, cudaGraphConditionalHandle handle, uint32_t bodies, Body body) {
         const auto [graph, dependencies] = captured();
         cudaGraphNodeParams params = {};
         params.type = cudaGraphNodeTypeConditional;
         params.conditional.handle = handle;
         params.conditional.type = type;
-        params.conditional.size = 1;
+        params.conditional.size = bodies;
         cudaGraphNode_t node = nullptr;
 #if CUDART_VERSION >= 13000
         cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), nullptr, dependencies.size(), &params), "conditional node");
@@ -389,9 +411,11 @@ private:
 
         const cudaStream_t outer = stream_;
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        cuda_check(cudaStreamBeginCaptureToGraph(stream_, params.conditional.phGraph_out[0], nullptr, nullptr, 0, cudaStreamCaptureModeThreadLocal), "begin of conditional capture");
-        body();
-        cuda_check(cudaStreamEndCapture(stream_, nullptr), "conditional capture");
+        for (uint32_t k = 0; k < bodies; ++k) {
+            cuda_check(cudaStreamBeginCaptureToGraph(stream_, params.conditional.phGraph_out[k], nullptr, nullptr, 0, cudaStreamCaptureModeThreadLocal), "begin of conditional capture");
+            body(k);
+            cuda_check(cudaStreamEndCapture(stream_, nullptr), "conditional capture");
+        }
         cuda_check(cudaStreamDestroy(stream_), "stream");
         stream_ = outer;
     }
@@ -416,9 +440,10 @@ private:
         cuda_check(cudaStreamSynchronize(stream_), "queue size");
         return c.size();
     }
-    void finish(StageId id, QueueCounter* counter, uint32_t slots = 0, uint32_t samples = 0, bool keep = false) {
+    void finish(StageId id, QueueCounter* counter, QueueCounter* out = nullptr, uint32_t slots = 0, uint32_t samples = 0, bool keep = false) {
         cuda_check(cudaGetLastError(), kStageNames[uint32_t(id)]);
-        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, slots, samples, keep, state_, clock_);
+        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, out, slots, samples, keep, depth_, state_, clock_);
+        depth_ = {};
     }
     /// As many blocks as can be resident.
     template <class Kernel>
@@ -439,6 +464,7 @@ private:
     const QueueCounter* counted_ = nullptr;  ///< of the queue whose count and list are known before the next launch
     int multiprocessors_ = 0;
     bool capturing_ = false;
+    detail::DepthChange depth_{};
 };
 
 using CudaExecutor = BasicCudaExecutor<false>;

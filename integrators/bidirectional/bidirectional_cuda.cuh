@@ -76,7 +76,7 @@ public:
         uint32_t done = 0;
         while (done < count && !is_set(interrupt)) {
             // All waves of a pass are queued at once; the host waits for the last.
-            const uint32_t pass = std::min(count - done, std::max(preferred_batch(), wave_.samples));
+            const uint32_t pass = std::min(count - done, preferred_batch());
             const uint32_t waves_before = read_state().done;
             for (uint32_t s = 0; s < pass; s += wave_.samples) {
                 const uint32_t samples = std::min(wave_.samples, pass - s);
@@ -139,7 +139,7 @@ public:
         return ambilux::technique_images(policy_.technique_depth, samples_, techniques_.download(), technique_dropped_.download());
     }
 
-    uint32_t preferred_batch() const override { return batch_of(render_seconds_, samples_); }
+    uint32_t preferred_batch() const override { return whole_waves(batch_of(render_seconds_, samples_), wave_.samples); }
 
 private:
     using Clock = std::chrono::steady_clock;

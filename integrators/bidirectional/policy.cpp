@@ -41,6 +41,7 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     p.background_only = p.mis.strategies == kLightStrategies;
     p.hide_emitters = scene.integrator.hide_emitters;
     p.fuse = settings.fuse != Fuse::none;
+    p.connect_in_shade = settings.fuse == Fuse::all && settings.variant != "streaming";
     p.cull = settings.cull;
     p.queues = settings.queues;
     return p;

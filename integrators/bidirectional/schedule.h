@@ -18,15 +18,13 @@ void run_light_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stage
     exec.run_slots(StageId::light_generate, stages.light_generate, stages.wave.tiles * kTilePixels);
     if (stages.policy.splat) run_splats(exec, stages);
     exec.set_depth(1);
-    exec.trace(StageId::light_extend, stages.light_extend, m.rays);
-    exec.repeat_while(m.hits, [&] {
-        exec.run(StageId::light_shade, stages.light_shade, m.hits);
+    exec.extend(StageId::light_extend, stages.light_extend[0], m.rays[0], m.hits[0]);
+    repeat_depths(exec, StageId::light_extend, stages.light_extend, m, [&](int k) {
+        exec.run(StageId::light_shade, stages.light_shade[k], m.hits[k]);
         if (stages.policy.splat) {
-            exec.run(StageId::connect_camera, stages.connect_camera, m.vertices);
+            if (!stages.policy.connect_in_shade) exec.run(StageId::connect_camera, stages.connect_camera, m.vertices);
             run_splats(exec, stages);
         }
-        exec.next_depth();
-        exec.trace(StageId::light_extend, stages.light_extend, m.rays);
     });
     exec.set_depth(0);
     exec.settle(m.light_vertices, m.splats);
@@ -50,14 +48,14 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
     const BidirectionalPolicy& policy = stages.policy;
     exec.run_slots(StageId::generate, stages.generate, stages.wave.tiles * kTilePixels);
     exec.set_depth(1);
-    exec.trace_coherent(StageId::extend, stages.extend, m.rays);
-    exec.repeat_while(m.hits, [&] {
-        exec.run(StageId::shade, stages.shade, m.hits);
+    exec.extend_coherent(StageId::extend, stages.extend[0], m.rays[0], m.hits[0]);
+    repeat_depths(exec, StageId::extend, stages.extend, m, [&](int k) {
+        exec.run(StageId::shade, stages.shade[k], m.hits[k]);
         if ((policy.count_hits || policy.count_environment) && !policy.fuse) {
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
             exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
         }
-        if (policy.next_event || policy.connect_vertices) exec.run_keeping(StageId::connect, stages.connect, m.vertices);
+        if ((policy.next_event || policy.connect_vertices) && !policy.connect_in_shade) exec.run_keeping(StageId::connect, stages.connect, m.vertices);
         if (policy.next_event) run_connections(exec, stages);
         if (policy.connect_vertices) {
             exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
@@ -71,8 +69,6 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
                 });
         }
         if (policy.next_event || policy.connect_vertices) exec.clear(m.vertices);
-        exec.next_depth();
-        exec.trace(StageId::extend, stages.extend, m.rays);
     });
     exec.set_depth(0);
 }
@@ -83,9 +79,9 @@ void run_streams(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     const BidirectionalMemory& m = stages.memory;
     const BidirectionalPolicy& policy = stages.policy;
     exec.run_slots(StageId::generate, stages.stream_begin, policy.stream_slots, 1);
-    exec.repeat_while(m.rays, [&] {
-        exec.trace(StageId::extend, stages.stream_extend, m.rays);
-        exec.run(StageId::shade, stages.stream_eye_shade, m.hits);
+    exec.repeat_while(m.rays[0], [&] {
+        exec.trace(StageId::extend, stages.stream_extend, m.rays[0]);
+        exec.run(StageId::shade, stages.stream_eye_shade, m.hits[0]);
         if (policy.light_walks) exec.run(StageId::light_shade, stages.stream_light_shade, m.light_hits);
         exec.run(StageId::light_generate, stages.stream_turn, m.turns);
         if ((policy.count_hits || policy.count_environment) && !policy.fuse) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "integrators/renderer.h"
+#include "integrators/walk_queues.h"
 #include "queues/layout.h"
 #include "stages/accumulate.h"
 #include "stages/extend.h"
@@ -23,14 +24,12 @@ std::vector<std::string> skipped_strategies(const Scene& scene, const Bidirectio
 
 /// Memory of one wave. All queues but two hold the most they can ever be given, since a slot has one item at a time. Vertices of light walks and what they splat are kept until
 /// the end of the wave; their number is not known before, and a wave for which they do not suffice is done again with more (settle()).
-struct BidirectionalMemory {
+struct BidirectionalMemory : WalkQueues<WalkItem, WalkHit> {
     static constexpr uint32_t kQueues = 20;
 
     WaveState* state;
     StageRecord* records;    ///< one per StageId
     QueueCounter* counters;  ///< one per queue
-    Queue<WalkItem> rays;
-    Queue<WalkHit> hits;
     Queue<VertexItem> vertices;  ///< of one depth
     LightVertices light_vertices;
     Queue<SplatCandidate> splat_candidates, weighted_splats;
@@ -70,8 +69,8 @@ inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, con
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
-    m.rays = layout.queue<WalkItem>("rays", m.counters, slots);
-    m.hits = layout.queue<WalkHit>("hits", m.counters, slots);
+    m.rays[0] = layout.queue<WalkItem>("rays", m.counters, slots);
+    m.hits[0] = layout.queue<WalkHit>("hits", m.counters, slots);
     m.light_hits = layout.queue<WalkHit>("light_hits", m.counters, when(policy.light_walks));
     m.turns = layout.queue<TurnItem>("turns", m.counters, slots);
     m.eye = layout.queue<VertexItem>("eye_vertices", m.counters, slots);
@@ -110,9 +109,8 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
-    m.rays = layout.queue<WalkItem>("rays", m.counters, slots, fixed);
-    m.hits = layout.queue<WalkHit>("hits", m.counters, slots, fixed);
-    m.vertices = layout.queue<VertexItem>("vertices", m.counters, slots, fixed);
+    lay_out_walks(layout, m, m.counters, slots, fixed);
+    m.vertices = layout.queue<VertexItem>("vertices", m.counters, when(policy.connect_vertices || !policy.connect_in_shade), fixed && !policy.connect_in_shade);
     m.light_vertices = layout.queue<VertexItem, LaneOrder::together>("light_vertices", m.counters, when(policy.connect_vertices, kept));
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged), fixed);
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat), fixed);
@@ -151,15 +149,15 @@ struct BidirectionalStages {
     Wave wave;
     BidirectionalMemory memory;
     LightGenerate<F> light_generate;
-    Extend<F, Tracer, WalkItem, WalkHit> light_extend;
-    LightShade<F> light_shade;
+    Extend<F, Tracer, WalkItem, WalkHit> light_extend[2];
+    LightShade<F> light_shade[2];
     ConnectCamera<F> connect_camera;
     WeightSplats weight_splats;
     OccludeSplats<F, Tracer> occlude_splats;
     Splat splat;
     EyeGenerate generate;
-    Extend<F, Tracer, WalkItem, WalkHit> extend;
-    EyeShade<F> shade;
+    Extend<F, Tracer, WalkItem, WalkHit> extend[2];
+    EyeShade<F> shade[2];
     WeightHits weight_hits;
     Accumulate accumulate_hits;
     EyeConnect<F> connect;
@@ -195,23 +193,25 @@ struct BidirectionalStages {
         const HitOutlet hit_outlet = {m.hit_candidates, weight_hits, policy.fuse};
         const ConnectOutlet connect_outlet = {m.connect_candidates, weight_connections, policy.fuse};
         const SplatOutlet splat_outlet = {m.splat_candidates, weight_splats, policy.fuse};
-        light_generate = {scene, wave, policy, m.rays, splat_outlet, m.last_vertex, record(StageId::light_generate)};
-        light_extend = {scene, tracer, wave, Stream::light, false, m.rays, m.hits, record(StageId::light_extend)};
-        light_shade = {scene, wave, policy, m.hits, m.rays, m.light_vertices, m.vertices, m.last_vertex, record(StageId::light_shade)};
         connect_camera = {scene, wave, policy, m.vertices, splat_outlet, record(StageId::connect_camera)};
+        connect = {scene, wave, policy, m.vertices, m.light_vertices, m.pairs, connect_outlet, record(StageId::connect)};
+        for (int k = 0; k < 2; ++k) {
+            light_extend[k] = {scene, tracer, wave, Stream::light, m.rays[k], m.hits[k], record(StageId::light_extend)};
+            light_shade[k] = {scene, wave, policy, m.hits[k], m.rays[1 - k], m.light_vertices, m.vertices, m.last_vertex, record(StageId::light_shade), connect_camera};
+            extend[k] = {scene, tracer, wave, Stream::eye, m.rays[k], m.hits[k], record(StageId::extend)};
+            shade[k] = {scene, wave, policy, m.hits[k], m.rays[1 - k], hit_outlet, m.vertices, m.last_vertex, record(StageId::shade), connect};
+        }
+        light_generate = {scene, wave, policy, m.rays[0], splat_outlet, m.last_vertex, record(StageId::light_generate)};
         occlude_splats = {scene, tracer, m.weighted_splats, m.splats, record(StageId::occlude)};
         splat = {scene, wave, m.splats, film.splats, techniques, record(StageId::splat)};
-        generate = {scene, wave, policy, m.rays, film.samples, record(StageId::generate)};
-        extend = {scene, tracer, wave, Stream::eye, policy.count_environment, m.rays, m.hits, record(StageId::extend)};
-        shade = {scene, wave, policy, m.hits, m.rays, hit_outlet, m.vertices, m.last_vertex, record(StageId::shade)};
-        connect = {scene, wave, policy, m.vertices, m.light_vertices, m.pairs, connect_outlet, record(StageId::connect)};
+        generate = {scene, wave, policy, m.rays[0], film.samples, record(StageId::generate)};
         connect_vertices = {scene, wave, policy, m.pairs, m.rest, m.vertices, m.light_vertices, connect_outlet, record(StageId::connect_vertices)};
         connect_rest = {scene, wave, policy, m.rest, m.pairs, m.vertices, m.light_vertices, connect_outlet, record(StageId::connect_vertices)};
         megakernel = {scene, tracer, wave, policy, m.light_vertices, m.splats, film.samples, m.records};
-        const StreamPool pool = {scene, wave, policy, policy.stream_slots, m.eye, m.pending, m.rays, film.samples};
+        const StreamPool pool = {scene, wave, policy, policy.stream_slots, m.eye, m.pending, m.rays[0], film.samples};
         stream_begin = {pool};
-        stream_extend = {scene, tracer, pool, m.hits, m.light_hits, record(StageId::extend)};
-        stream_eye_shade = {pool, m.hits, hit_outlet, m.vertices, m.turns, record(StageId::shade)};
+        stream_extend = {scene, tracer, pool, m.hits[0], m.light_hits, record(StageId::extend)};
+        stream_eye_shade = {pool, m.hits[0], hit_outlet, m.vertices, m.turns, record(StageId::shade)};
         stream_turn = {pool, m.turns, splat_outlet, record(StageId::light_generate)};
         stream_light_shade = {pool, m.light_hits, m.camera_vertices, m.waiting, record(StageId::light_shade)};
         stream_connect_camera = {scene, wave, policy, m.camera_vertices, splat_outlet, record(StageId::connect_camera)};

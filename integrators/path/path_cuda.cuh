@@ -84,7 +84,7 @@ public:
         uint32_t done = 0;
         while (done < count && !is_set(interrupt)) {
             // All waves of a pass are queued at once; the host waits for the last.
-            const uint32_t pass = std::min(count - done, std::max(preferred_batch(), wave_.samples));
+            const uint32_t pass = std::min(count - done, preferred_batch());
             const auto pass_start = Clock::now();
             for (uint32_t s = 0; s < pass; s += wave_.samples) {
                 for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles) {
@@ -144,7 +144,7 @@ public:
         return s;
     }
 
-    uint32_t preferred_batch() const override { return batch_of(measured_seconds_, measured_samples_); }
+    uint32_t preferred_batch() const override { return whole_waves(batch_of(measured_seconds_, measured_samples_), wave_.samples); }
 
 private:
     using Clock = std::chrono::steady_clock;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "integrators/renderer.h"
+#include "integrators/walk_queues.h"
 #include "queues/layout.h"
 #include "stages/accumulate.h"
 #include "stages/connect.h"
@@ -35,14 +36,12 @@ uint32_t tile_count(const Wave& wave);
 std::vector<std::string> skipped_parts(const Scene& scene, const PathPolicy& policy, const Features& kernels);
 
 /// Memory of one wave. Every queue holds the most it can ever be given: a slot has at most one ray, hit, connection and contribution at a time.
-struct PathMemory {
+struct PathMemory : WalkQueues<RayItem, HitItem> {
     static constexpr uint32_t kQueues = 8;
 
     WaveState* state;
     StageRecord* records;    ///< one per StageId
     QueueCounter* counters;  ///< one per queue
-    Queue<RayItem> rays;
-    Queue<HitItem> hits;
     Queue<HitCandidate> hit_candidates;
     Queue<Contribution> hit_contributions;
     Queue<ConnectItem> connections;
@@ -60,8 +59,7 @@ inline PathMemory lay_out(Layout& layout, uint32_t slots, const PathPolicy& poli
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(PathMemory::kQueues);
-    m.rays = layout.queue<RayItem>("rays", m.counters, slots, fixed);
-    m.hits = layout.queue<HitItem>("hits", m.counters, slots, fixed);
+    lay_out_walks(layout, m, m.counters, slots, fixed);
     m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, hits, fixed);
     m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, hits, fixed);
     m.connections = layout.queue<ConnectItem>("connections", m.counters, policy.connect_in_shade ? 0 : connections, fixed);
@@ -84,11 +82,11 @@ struct PathStages {
     Wave wave;
     PathMemory memory;
     Generate generate;
-    Extend<F, Tracer> extend;
+    Extend<F, Tracer> extend[2];
     WeightHits weight_hits;
     Accumulate accumulate_hits;
     Connect<F> connect;
-    Shade<F> shade;
+    Shade<F> shade[2];
     WeightConnections weight_connections;
     Occlude<F, Tracer> occlude;
     Accumulate accumulate_shadows;
@@ -97,13 +95,15 @@ struct PathStages {
     PathStages(const SceneView& scene, const Tracer& tracer, const PathPolicy& p, Wave w, const PathMemory& m, FilmPointers film) : policy(p), wave(w), memory(m) {
         wave.state = m.state;
         const auto record = [&](StageId id) { return m.records + uint32_t(id); };
-        generate = {scene, wave, policy, m.rays, m.samples, record(StageId::generate)};
-        extend = {scene, tracer, wave, Stream::eye, scene.environment != kNone, m.rays, m.hits, record(StageId::extend)};
+        generate = {scene, wave, policy, m.rays[0], m.samples, record(StageId::generate)};
         accumulate_hits = {m.hit_contributions, m.samples, record(StageId::accumulate)};
         weight_hits = {policy, m.hit_candidates, {m.hit_contributions, accumulate_hits, policy.fuse}, record(StageId::mis_weight)};
         weight_connections = {policy, m.connect_candidates, m.shadows, record(StageId::mis_weight), {}, m.samples};
         connect = {scene, wave, policy, m.connections, {m.connect_candidates, weight_connections, policy.fuse}, record(StageId::connect)};
-        shade = {scene, wave, policy, m.hits, {m.hit_candidates, weight_hits, policy.fuse}, m.connections, m.rays, record(StageId::shade), connect};
+        for (int k = 0; k < 2; ++k) {
+            extend[k] = {scene, tracer, wave, Stream::eye, m.rays[k], m.hits[k], record(StageId::extend)};
+            shade[k] = {scene, wave, policy, m.hits[k], {m.hit_candidates, weight_hits, policy.fuse}, m.connections, m.rays[1 - k], record(StageId::shade), connect};
+        }
         accumulate_shadows = {m.shadow_contributions, m.samples, record(StageId::accumulate)};
         occlude = {scene, tracer, m.shadows, {m.shadow_contributions, accumulate_shadows, policy.fuse}, record(StageId::occlude)};
         develop = {wave, m.samples, film.sum, film.sum_squares, record(StageId::develop)};

@@ -8,7 +8,8 @@ namespace ambilux {
 /// One wave. An executor has
 /// - run_slots(id, stage, n): stage over n slots for each sample of the wave; with a last argument 1, over n slots once;
 /// - run(id, stage, queue): over the queue's size where the queue lives, then empties it;
-/// - trace(id, stage, queue): the same for rays in no order, trace_coherent for neighbouring rays that stay together;
+/// - trace(id, stage, queue): the same for rays in no order;
+/// - extend(id, stage, rays, hits): rays become hits where they lie; extend_coherent for neighbouring rays that stay together;
 /// - set_depth(d), next_depth(), and repeat_while(queue, body): body until the queue is found empty.
 template <class Executor, Features F, class Tracer>
 void run_path_wave(Executor& exec, const PathStages<F, Tracer>& stages) {
@@ -16,9 +17,9 @@ void run_path_wave(Executor& exec, const PathStages<F, Tracer>& stages) {
     const uint32_t slots = stages.wave.tiles * kTilePixels;
     exec.run_slots(StageId::generate, stages.generate, slots);
     exec.set_depth(1);
-    exec.trace_coherent(StageId::extend, stages.extend, m.rays);
-    exec.repeat_while(m.hits, [&] {
-        exec.run(StageId::shade, stages.shade, m.hits);
+    exec.extend_coherent(StageId::extend, stages.extend[0], m.rays[0], m.hits[0]);
+    repeat_depths(exec, StageId::extend, stages.extend, m, [&](int k) {
+        exec.run(StageId::shade, stages.shade[k], m.hits[k]);
         if (stages.policy.count_hits && !stages.policy.fuse) {
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
             exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
@@ -29,8 +30,6 @@ void run_path_wave(Executor& exec, const PathStages<F, Tracer>& stages) {
             exec.trace(StageId::occlude, stages.occlude, m.shadows);
             if (!stages.policy.fuse) exec.run(StageId::accumulate, stages.accumulate_shadows, m.shadow_contributions);
         }
-        exec.next_depth();
-        exec.trace(StageId::extend, stages.extend, m.rays);
     });
     exec.set_depth(0);
     exec.run_slots(StageId::develop, stages.develop, slots, 1);
