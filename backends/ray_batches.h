@@ -1,4 +1,4 @@
-// The rays that `bench rays` traces: primary, bounced and shadow rays of the paths of one image.
+// The rays that `bench rays` traces: primary, bounced and shadow rays of the paths of one image, rays to its emitters and from them.
 #pragma once
 
 #include <string>
@@ -9,6 +9,8 @@
 #include "core/sampling.h"
 #include "scene/accel/primitive_bounds.h"
 #include "scene/surface.h"
+#include "transport/emitter.h"
+#include "transport/emitter/emission.h"
 #include "transport/sensor/camera.h"
 
 namespace ambilux {
@@ -65,15 +67,51 @@ inline Ray shadow_ray(const std::vector<BouncePoint>& points, RngKey key) {
     return {a.p, 0.9999f * distance, d * (1.0f / distance), key.index};
 }
 
+/// Next event estimation at `point`: a segment to a sampled point of an emitter, or without end towards the environment. False if no light comes that way.
+inline bool ray_to_emitter(const SceneView& scene, const BouncePoint& point, RngKey key, float offset, Ray& ray) {
+    EmitterSample light;
+    if (!sample_emitter_deferred<kAllFeatures>(scene, point.p, random_floats(key, 0), light) || !(dot(point.n, light.wi) > 0.0f)) return false;
+    ray = {point.p, kInfinity, light.wi, random_bits(key, 1).x};
+    if (light.distance < kInfinity) ray.tmax = light.distance - offset;
+    return ray.tmax > 0.0f;
+}
+
+/// Points that rays meet; is_hit[i] tells whether ray i did. Points lie `offset` off the surface.
+template <Features F, class Tracer>
+std::vector<BouncePoint> trace_points(const SceneView& scene, const Tracer& tracer, const std::vector<Ray>& rays, const std::vector<uint32_t>& path_of, float offset) {
+    std::vector<BouncePoint> met(rays.size());
+    std::vector<uint8_t> is_hit(rays.size());
+    for_all(rays.size(), [&](size_t i) {
+        Hit hit;
+        is_hit[i] = tracer.template closest<F>(scene, rays[i], hit);
+        if (!is_hit[i]) return;
+        const SurfacePoint s = surface_at<F>(scene, hit.prim, hit.u, hit.v);
+        const Vec3f n = dot(s.ng, rays[i].d) > 0.0f ? -s.ng : s.ng;
+        met[i] = {s.p + n * offset, n, path_of[i]};
+    });
+    size_t count = 0;
+    for (size_t i = 0; i < met.size(); ++i)
+        if (is_hit[i]) met[count++] = met[i];
+    met.resize(count);
+    return met;
+}
+
+/// Cosine-weighted around the normal.
+inline Ray bounced_ray(const BouncePoint& point, RngKey key) {
+    const Vec4f u = random_floats(key, 0);
+    return {point.p, kInfinity, normalize(frame_from_normal(point.n).to_world(square_to_cosine_hemisphere({u.x, u.y}))), random_bits(key, 1).x};
+}
+
 }  // namespace detail
 
 /// Rays of size x size paths (a power of two up to 2^15) through pixels in Morton order, with the scene's camera and its horizontal field of view on both axes:
 /// "primary", jittered; "bounce 1" and "bounce 3": cosine-weighted around the geometric normal, origins moved along it by 1e-5 of the scene's
 /// diagonal, paths that escaped left out; "shadow": segments between random points that different paths met, both ends moved off the
-/// surface likewise and 0.9999 of the length. A function of the scene and of `seed`.
+/// surface likewise and 0.9999 of the length; "to emitters": next event estimation where primary rays end, as far as light comes that way; "from emitters": first rays of
+/// light walks; "light bounce": cosine-weighted where these end. A function of the scene and of `seed`.
 template <Features F, class Tracer>
 std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tracer, uint32_t size, uint64_t seed) {
-    constexpr uint32_t kBounces = 3, kShadowSample = 1000;
+    constexpr uint32_t kBounces = 3, kShadowSample = 1000, kEmitterSample = 1001, kEmissionSample = 1002, kLightBounceSample = 1003;
     const uint32_t paths = size * size;
     const float offset = 1e-5f * detail::scene_diagonal(scene);
     const auto key = [&](uint32_t path, uint32_t sample) { return RngKey{seed, path, sample, Stream::bench}; };
@@ -95,29 +133,21 @@ std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tra
     batches.push_back({"primary", false, true, rays});
 
     std::vector<detail::BouncePoint> points;
+    std::vector<Ray> to_emitters;
     for (uint32_t bounce = 1; bounce <= kBounces; ++bounce) {
-        std::vector<detail::BouncePoint> met(rays.size());
-        std::vector<uint8_t> is_hit(rays.size());
-        detail::for_all(rays.size(), [&](size_t i) {
-            Hit hit;
-            is_hit[i] = tracer.template closest<F>(scene, rays[i], hit);
-            if (!is_hit[i]) return;
-            const SurfacePoint s = surface_at<F>(scene, hit.prim, hit.u, hit.v);
-            const Vec3f n = dot(s.ng, rays[i].d) > 0.0f ? -s.ng : s.ng;
-            met[i] = {s.p + n * offset, n, path_of[i]};
-        });
-        size_t count = 0;
-        for (size_t i = 0; i < met.size(); ++i)
-            if (is_hit[i]) met[count++] = met[i];
-        met.resize(count);
-        rays.resize(count);
-        path_of.resize(count);
-        detail::for_all(count, [&](size_t i) {
-            const RngKey k = key(met[i].path, bounce);
-            const Vec4f u = random_floats(k, 0);
-            rays[i] = {met[i].p, kInfinity, normalize(frame_from_normal(met[i].n).to_world(square_to_cosine_hemisphere({u.x, u.y}))), random_bits(k, 1).x};
+        const std::vector<detail::BouncePoint> met = detail::trace_points<F>(scene, tracer, rays, path_of, offset);
+        rays.resize(met.size());
+        path_of.resize(met.size());
+        detail::for_all(met.size(), [&](size_t i) {
+            rays[i] = detail::bounced_ray(met[i], key(met[i].path, bounce));
             path_of[i] = met[i].path;
         });
+        if (bounce == 1) {
+            for (const detail::BouncePoint& point : met) {
+                Ray ray;
+                if (detail::ray_to_emitter(scene, point, key(point.path, kEmitterSample), offset, ray)) to_emitters.push_back(ray);
+            }
+        }
         if (bounce != 2) batches.push_back({"bounce " + std::to_string(bounce), false, false, rays});
         points.insert(points.end(), met.begin(), met.end());
     }
@@ -128,6 +158,23 @@ std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tra
         detail::for_all(paths, [&](size_t i) { shadow.rays[i] = detail::shadow_ray(points, key(uint32_t(i), kShadowSample)); });
     }
     batches.push_back(std::move(shadow));
+    batches.push_back({"to emitters", true, false, std::move(to_emitters)});
+
+    rays.clear();
+    path_of.clear();
+    for (uint32_t path = 0; path < paths; ++path) {
+        const RngKey k = key(path, kEmissionSample);
+        const Vec4f direction = random_floats(k, 1);
+        EmissionSample e;
+        if (!sample_emission<kAllFeatures>(scene, random_floats(k, 0), {direction.x, direction.y}, e)) continue;
+        rays.push_back({e.prim == kNone ? e.p : e.p + e.ng * offset, kInfinity, e.d, random_bits(k, 2).x});
+        path_of.push_back(path);
+    }
+    batches.push_back({"from emitters", false, false, rays});
+    const std::vector<detail::BouncePoint> lit = detail::trace_points<F>(scene, tracer, rays, path_of, offset);
+    rays.resize(lit.size());
+    detail::for_all(lit.size(), [&](size_t i) { rays[i] = detail::bounced_ray(lit[i], key(lit[i].path, kLightBounceSample)); });
+    batches.push_back({"light bounce", false, false, std::move(rays)});
     return batches;
 }
 

@@ -50,9 +50,13 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
         throw Error(ExitCode::usage, "deterministic=true: variant lvc draws from a cache whose order differs between runs on a CUDA device; use wavefront or megakernel");
     if (settings.automatic) return make_automatic(scene, settings, cuda, accels, [&](const RenderSettings& chosen) { return make_from(scene, chosen, accels); });
     RenderSettings chosen = settings;
-    // On a host connect waits for the tables of environments, which it can ask for ahead only as a stage of its own.
-    if (chosen.fuse == Fuse::automatic) chosen.fuse = cuda ? Fuse::all : Fuse::light;
-    if (chosen.queues.ordering == Ordering::automatic) chosen.queues.ordering = best_ordering(scene, settings, cuda);
+    // On a host connect of the path tracer waits for the tables of environments, which it can ask for ahead only as a stage of its own.
+    if (chosen.fuse == Fuse::automatic) chosen.fuse = cuda || chosen.integrator != "path" ? Fuse::all : Fuse::light;
+    if (chosen.queues.ordering == Ordering::automatic) {
+        constexpr uint32_t kDelta = bit(BsdfType::conductor) | bit(BsdfType::dielectric) | bit(BsdfType::thin_dielectric);  // are never connected
+        chosen.queues.ordering = best_ordering(scene, settings, cuda);
+        chosen.queues.order_pairs = std::popcount(scene.features.bsdfs & ~kDelta) > 1;
+    }
     if (chosen.integrator != "path") return cuda ? make_bidirectional_cuda(scene, chosen, accels) : make_bidirectional_cpu(scene, chosen, accels);
     return cuda ? make_path_cuda(scene, chosen, accels) : make_path_cpu(scene, chosen, accels);
 }

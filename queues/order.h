@@ -26,6 +26,7 @@ inline const char* ordering_name(Ordering o) { return o == Ordering::none ? "non
 struct QueuePolicy {
     Compaction compaction = Compaction::atomic;
     Ordering ordering = Ordering::none;
+    bool order_pairs = true;  ///< ordering by material sorts pairs of vertices too, not hits alone
 
     /// For queues of which a path has one item at a time; others are always appended to.
     bool fixed_places() const { return compaction != Compaction::atomic; }

@@ -66,23 +66,26 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
 }
 
 /// Pairs of an eye vertex for one launch over `vertices` of them, from `next` on: a vertex of the light walk of its slot, or, over a cache, the number of draws that are left.
-AMBILUX_HD void push_pairs(const BidirectionalPolicy& policy, const LightVertices& light_vertices, uint32_t vertices, uint32_t vertex, uint32_t path, uint32_t depth, uint32_t next, const Queue<PairItem>& pairs) {
+AMBILUX_HD void push_pairs(const Wave& wave, const BidirectionalPolicy& policy, const LightVertices& light_vertices, uint32_t vertices, uint32_t vertex, uint32_t path, uint32_t depth, uint32_t next,
+                           const Queue<PairItem>& pairs) {
     const uint32_t most = vertices < policy.one_pair_from ? policy.pairs_per_launch : 1;
-    for (uint32_t pushed = 0; pushed < most;) {
-        uint32_t light = next;
-        if (policy.cache_draws > 0) {
-            if (next == 0) return;
-            light = --next;
-        } else {
-            if (next == kNone) return;
-            const VertexItem y = light_vertices.load(light);
-            next = y.previous;
-            if (depth + y.bits.depth() + 1 > policy.max_depth) continue;
+    if (policy.cache_draws > 0) {
+        const uint32_t size = light_vertices.counter->size();
+        if (size == 0) return;
+        for (uint32_t pushed = 1; next > 0 && pushed <= most; ++pushed) {
+            --next;
+            const uint32_t light = mul_hi(random_bits(wave.key(path), cache_block(depth, next)).x, size);
+            pairs.push({vertex, light, path, pushed == most && next > 0 ? next : kNone});
         }
+        return;
+    }
+    for (uint32_t pushed = 0; next != kNone && pushed < most;) {
+        const uint32_t light = next;
+        const VertexItem y = light_vertices.load(light);
+        next = y.previous;
+        if (depth + y.bits.depth() + 1 > policy.max_depth) continue;
         ++pushed;
-        const bool last = pushed == most && next != (policy.cache_draws > 0 ? 0 : kNone);
-        const PairItem pair = {vertex, light, path, last ? next : kNone};
-        pairs.push(pair);
+        pairs.push({vertex, light, path, pushed == most ? next : kNone});
     }
 }
 
@@ -106,7 +109,7 @@ struct EyeConnect {
 
     /// `count`: of vertices in this launch, or more.
     AMBILUX_HD void pair(const VertexItem& item, uint32_t place, uint32_t count) const {
-        if (item.previous != kNone) push_pairs(policy, light_vertices, count, place, item.path, item.bits.depth(), item.previous, pairs);
+        if (item.previous != kNone) push_pairs(wave, policy, light_vertices, count, place, item.path, item.bits.depth(), item.previous, pairs);
     }
 
     AMBILUX_HD void take(const WalkVertex& z, Rgb throughput, uint32_t path, uint32_t depth) const {
@@ -148,13 +151,25 @@ struct EyeShade {
     }
 };
 
-/// Candidate of eye vertex `item` and light vertex `light`, worth `scale` times their product.
+/// An eye vertex that pairs one after the other may have in common.
+struct PairedVertex {
+    uint32_t place = kNone;  ///< in the queue of its depth
+    bool unpacked = false;
+    VertexItem item;
+    WalkVertex vertex;
+};
+
+/// Candidate of the eye vertex `eye`, which is unpacked if it is not yet, and light vertex `light`, worth `scale` times their product.
 template <Features F>
-AMBILUX_HD void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const VertexItem& item, const VertexItem& light, float scale,
+AMBILUX_HD void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, PairedVertex& eye, const VertexItem& light, float scale,
                                 uint32_t which, const ConnectOutlet& candidates, StageRecord* record) {
+    const VertexItem& item = eye.item;
     const Strategy strategy = Strategy::make(light.bits.depth() + 1, item.bits.depth() + 1);
     if (!policy.singles.has(strategy)) return;
-    const WalkVertex z = unpack_vertex<F>(scene, item), y = unpack_vertex<F>(scene, light);
+    if (!eye.unpacked) eye.vertex = unpack_vertex<F>(scene, item);
+    eye.unpacked = true;
+    const WalkVertex& z = eye.vertex;
+    const WalkVertex y = unpack_vertex<F>(scene, light);
     WalkConnection c;
     if (!connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
     c.value *= scale;
@@ -177,22 +192,32 @@ struct ConnectVertices {
     ConnectOutlet candidates;
     StageRecord* record;
 
+    /// What a pair is sorted by: the surface of its light vertex.
+    AMBILUX_HD uint32_t prim_of(uint32_t i) const { return light_vertices.load(pairs.load(i).light).prim; }
+
+    /// What an executor that goes through items one after the other may keep from one to the next.
+    using Memory = PairedVertex;
+
     AMBILUX_HD void operator()(uint32_t i) const {
+        Memory eye;
+        (*this)(i, eye);
+    }
+
+    AMBILUX_HD void operator()(uint32_t i, Memory& eye) const {
         const PairItem pair = pairs.load(i);
-        const VertexItem item = vertices.load(pair.vertex);
-        const uint32_t depth = item.bits.depth();
-        if (pair.next != kNone) push_pairs(policy, light_vertices, pairs.counter->size(), pair.vertex, pair.path, depth, pair.next, rest);
-        const RngKey key = wave.key(item.path);
-        uint32_t place = pair.light, size = 0;
-        if (policy.cache_draws > 0) {
-            size = light_vertices.counter->size();
-            if (size == 0) return;
-            place = mul_hi(random_bits(key, cache_block(depth, pair.light)).x, size);
+        if (eye.place != pair.vertex) {
+            eye.place = pair.vertex;
+            eye.unpacked = false;
+            eye.item = vertices.load(pair.vertex);
         }
-        const VertexItem light = light_vertices.load(place);
+        const VertexItem& item = eye.item;
+        const uint32_t depth = item.bits.depth();
+        if (pair.next != kNone) push_pairs(wave, policy, light_vertices, pairs.counter->size(), pair.vertex, pair.path, depth, pair.next, rest);
+        const VertexItem light = light_vertices.load(pair.light);
         if (depth + light.bits.depth() + 1 > policy.max_depth) return;
-        const float scale = size > 0 ? float(size) / (float(wave.state->walks) * float(policy.cache_draws)) : 1.0f;
-        push_connection<F>(scene, policy, key, item, light, scale, size > 0 ? WalkBits::kMaxDepth + pair.light : light.bits.depth(), candidates, record);
+        const bool drawn = policy.cache_draws > 0;
+        const float scale = drawn ? float(light_vertices.counter->size()) / (float(wave.state->walks) * float(policy.cache_draws)) : 1.0f;
+        push_connection<F>(scene, policy, wave.key(item.path), eye, light, scale, drawn ? WalkBits::kMaxDepth + pair.light : light.bits.depth(), candidates, record);
     }
 };
 

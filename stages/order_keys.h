@@ -10,7 +10,7 @@
 
 namespace ambilux {
 
-/// Materials, not types of BSDFs: equal materials read the same textures too, and there are far fewer of them than warps, so that warps of mixed types are rare either way.
+/// Of hits, and of the light vertices of pairs, whose eye vertices are in order already. Materials, not types of BSDFs: equal materials read the same textures too, and there are far fewer of them than warps, so that warps of mixed types are rare either way.
 /// Rays that met nothing come last.
 struct MaterialOrder {
     static constexpr Ordering kOrdering = Ordering::material;
@@ -20,7 +20,6 @@ struct MaterialOrder {
     AMBILUX_HD static uint32_t key(const SceneView& scene, const HitItem& hit) { return of(scene, hit.prim); }
     AMBILUX_HD static uint32_t key(const SceneView& scene, const WalkHit& hit) { return of(scene, hit.prim); }
 
-private:
     AMBILUX_HD static uint32_t of(const SceneView& scene, uint32_t prim) { return prim == kNone ? scene.material_count : scene.shapes[scene.shape_of(prim)].material; }
 };
 
@@ -48,8 +47,26 @@ private:
     }
 };
 
-/// True for items that `Order` has keys for.
-template <class Order, class Item>
-concept Ordered = requires(const SceneView& scene, const Item& item) { Order::key(scene, item); };
+/// A stage whose items do not tell by themselves what they will be shaded with.
+template <class Stage>
+concept TellsSurface = requires(const Stage& stage) { stage.prim_of(0u); };
+
+/// True for items that `Order` has keys for when `Stage` goes through them.
+template <class Order, class Stage, class Item>
+concept Ordered = requires(const SceneView& scene, const Item& item) { Order::key(scene, item); } || (std::is_same_v<Order, MaterialOrder> && TellsSurface<Stage>);
+
+/// True if `policy` asks for the items of `Stage` to be sorted by `Order`.
+template <class Order, class Stage>
+bool sorts(const QueuePolicy& policy) {
+    return policy.ordering == Order::kOrdering && (policy.order_pairs || !(TellsSurface<Stage> && std::is_same_v<Order, MaterialOrder>));
+}
+
+template <class Order, class Stage, class Item>
+AMBILUX_HD uint32_t order_key(const SceneView& scene, const Stage& stage, const Queue<Item>& queue, uint32_t place) {
+    if constexpr (TellsSurface<Stage> && std::is_same_v<Order, MaterialOrder>)
+        return MaterialOrder::of(scene, stage.prim_of(place));
+    else
+        return Order::key(scene, queue.load(place));
+}
 
 }  // namespace ambilux

@@ -93,6 +93,8 @@ struct DevelopSplats {
     AMBILUX_HD void operator()(uint32_t i) const {
         const PathSlot p = wave.locate(i);
         if (!p.active) return;
+        const uint64_t at = uint64_t(p.pixel) * 3;
+        double s[3] = {sum[at], sum[at + 1], sum[at + 2]}, q[3] = {sum_squares[at], sum_squares[at + 1], sum_squares[at + 2]};
         const uint32_t stride = wave.tiles * kTilePixels;
         for (uint32_t k = 0; k < wave.state->samples; ++k) {
             const Rgb eye = start_of<Rgb>(samples[i + k * stride]);
@@ -104,9 +106,13 @@ struct DevelopSplats {
             }
             if (!is_light({float(value[0]), float(value[1]), float(value[2])}, record)) continue;
             for (int c = 0; c < 3; ++c) {
-                sum[uint64_t(p.pixel) * 3 + uint32_t(c)] += value[c];
-                sum_squares[uint64_t(p.pixel) * 3 + uint32_t(c)] += value[c] * value[c];
+                s[c] += value[c];
+                q[c] += value[c] * value[c];
             }
+        }
+        for (uint32_t c = 0; c < 3; ++c) {
+            sum[at + c] = s[c];
+            sum_squares[at + c] = q[c];
         }
     }
 };

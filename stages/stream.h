@@ -191,7 +191,9 @@ struct StreamConnect {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const VertexItem light = pairs.load(i), eye = pool.eye.load(pool.slot_of(light.path));
+        const VertexItem light = pairs.load(i);
+        PairedVertex eye;
+        eye.item = pool.eye.load(pool.slot_of(light.path));
         push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path), eye, light, 1.0f, light.bits.depth(), candidates, record);
     }
 };

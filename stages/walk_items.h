@@ -47,7 +47,7 @@ using LightVertices = Queue<VertexItem, LaneOrder::together>;
 /// An eye vertex and a vertex of a light walk to be connected.
 struct PairItem {
     uint32_t vertex;  ///< place of the eye vertex in the queue of its depth
-    uint32_t light;   ///< place of the light vertex; variant lvc: number of the draw
+    uint32_t light;   ///< place of the light vertex
     uint32_t path;
     uint32_t next;    ///< what the pairs of the next launch start from (VertexItem::previous); kNone: no pairs are left, or another pair has it
 };

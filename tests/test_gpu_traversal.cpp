@@ -139,8 +139,12 @@ void check(const Agreement& a, bool exact) {
     CHECK(double(a.different) <= 1e-5 * double(a.rays));
     CHECK(double(a.occluded_different) <= 1e-5 * double(a.rays));
     CHECK(double(a.ties) <= 1e-4 * double(a.rays));
-    // The triangle test is made of operations that no compiler fuses, and both traversals visit primitives in one order.
-    if (exact) CHECK(a.inexact + a.ties == 0);
+    // The triangle test is made of operations that no compiler fuses, and both traversals visit primitives in one order. But a lane that walks on before it has tested what it holds
+    // enters boxes that the host's shortened ray misses by a rounding error: where two surfaces meet, either may then be the nearest.
+    if (exact) {
+        CHECK(a.inexact == 0);
+        CHECK(double(a.ties) <= 1.0 + 2e-6 * double(a.rays));
+    }
 }
 
 constexpr uint32_t kMany = (1u << 20) + 1;
@@ -246,7 +250,7 @@ TEST_CASE("All kernels of bench rays give the same answers (G12)") {
         CHECK(row.at("mrays_per_s") > 0.0);
         hit[row.at("batch")].push_back(row.at("hit"));
     }
-    REQUIRE(hit.size() == 4);
+    REQUIRE(hit.size() == 7);
     for (const auto& [batch, fractions] : hit) {
         INFO(batch);
         CHECK(fractions.size() == 3);

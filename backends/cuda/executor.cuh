@@ -151,8 +151,8 @@ struct SortSwitch {
 };
 
 /// Keys of the items that a launch will go through, and their places as they lie. The last key is that of places without an item. Tells `sorts` which size to sort.
-template <class Order, class Item>
-__global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__ SceneView scene, const Queue<Item> queue, const Items items, uint32_t last, uint32_t* places, uint32_t* keys, SortSwitch sorts) {
+template <class Order, class Stage, class Item>
+__global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__ SceneView scene, const __grid_constant__ Stage stage, const Queue<Item> queue, const Items items, uint32_t last, uint32_t* places, uint32_t* keys, SortSwitch sorts) {
     const uint32_t n = items.size(), choice = sort_choice(items.capacity, n);
     if (sorts.on && blockIdx.x == 0 && threadIdx.x == 0) cudaGraphSetConditional(sorts.handle, choice);
     const uint32_t end = items.flags && !items.list ? n : choice < kSortSizes ? items.capacity >> 2 * choice : 0;
@@ -160,7 +160,7 @@ __global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__
         uint32_t place = i, key = last;
         if (i < n) {
             place = items.place(i);
-            if (items.list || !items.flags || items.flags[place]) key = Order::key(scene, queue.load(place));
+            if (items.list || !items.flags || items.flags[place]) key = order_key<Order>(scene, stage, queue, place);
         }
         places[i] = place;
         keys[i] = key;
@@ -252,14 +252,14 @@ public:
     }
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        const detail::Items items = prepare<MaterialOrder>(queue);
+        const detail::Items items = prepare<MaterialOrder>(stage, queue);
         detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
         finish(id, queue.counter);
     }
     /// Items stay where they are until clear().
     template <class Stage, class Item>
     void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        const detail::Items items = prepare<void>(queue);
+        const detail::Items items = prepare<void>(stage, queue);
         detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
         finish(id, queue.counter, nullptr, 0, 0, true);
     }
@@ -278,7 +278,7 @@ public:
     }
     template <class Stage, class Item, class Out>
     void extend_coherent(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
-        const detail::Items items = prepare<void>(rays);  // in order as they are
+        const detail::Items items = prepare<void>(stage, rays);  // in order as they are
         with_tracer(stage, [&](auto set, const auto& tracer) {
             const auto kernel = detail::launch_coherent<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
             kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
@@ -313,7 +313,7 @@ public:
 private:
     template <class Stage, class Item>
     void launch_traces(const Stage& stage, const Queue<Item>& rays) {
-        const detail::Items items = prepare<MortonOrder>(rays);
+        const detail::Items items = prepare<MortonOrder>(stage, rays);
         with_tracer(stage, [&](auto set, const auto& tracer) {
             const auto kernel = detail::launch_trace<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
             kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
@@ -332,23 +332,23 @@ private:
     }
 
     /// What a launch over `queue` goes through, sorted if it is to be. A loop has counted its queue already when its body begins with that queue.
-    template <class Order, class Item>
-    detail::Items prepare(const Queue<Item>& queue) {
+    template <class Order, class Stage, class Item>
+    detail::Items prepare(const Stage& stage, const Queue<Item>& queue) {
         const bool counted = counted_ == queue.counter;
         counted_ = nullptr;
         if (!counted) count(queue);
         const bool selected = queue.flags && order_.policy.compaction == Compaction::select;
         detail::Items items = {queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity, nullptr};
-        if constexpr (Ordered<Order, Item>) {
-            if (order_.policy.ordering == Order::kOrdering && queue.capacity > 0) {
+        if constexpr (Ordered<Order, Stage, Item>) {
+            if (sorts<Order, Stage>(order_.policy) && queue.capacity > 0) {
                 const uint32_t bits = Order::bits(scene_);
                 const bool whole = queue.flags && !items.list;
-                const detail::SortSwitch sorts = {capturing_ && !whole ? make_condition() : cudaGraphConditionalHandle{}, capturing_ && !whole};
-                detail::make_keys<Order, Item><<<blocks(detail::make_keys<Order, Item>, kStageBlock), kStageBlock, 0, stream_>>>(scene_, queue, items, (1u << bits) - 1, order_.list[0], order_.keys[0], sorts);
+                const detail::SortSwitch choice = {capturing_ && !whole ? make_condition() : cudaGraphConditionalHandle{}, capturing_ && !whole};
+                detail::make_keys<Order, Stage, Item><<<blocks(detail::make_keys<Order, Stage, Item>, kStageBlock), kStageBlock, 0, stream_>>>(scene_, stage, queue, items, (1u << bits) - 1, order_.list[0], order_.keys[0], choice);
                 if (whole)
                     sort_places(order_, queue.capacity, bits, stream_);
                 else
-                    sort_as_many(queue.counter, queue.capacity, bits, sorts);
+                    sort_as_many(queue.counter, queue.capacity, bits, choice);
                 (whole ? items.list : items.sorted) = order_.list[1];
             }
         }

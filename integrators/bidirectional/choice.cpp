@@ -18,7 +18,7 @@ constexpr uint32_t kPilotSamplesCpu = 8192, kPilotSamplesCuda = 32768;
 /// Share of the blocks that the comparison leaves out.
 constexpr double kTrimmedBlocks = 0.01;
 /// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this factor of the best are timed.
-constexpr double kDoubt = 1.5;
+constexpr double kDoubt = 1.3;
 constexpr uint32_t kFirstTimedSample = 0xffff0000u;  ///< far from those of the image
 
 using Clock = std::chrono::steady_clock;
@@ -113,12 +113,12 @@ double choice_work(const PilotWork& w, const ChoiceCandidate& candidate, bool cu
     // Fitted to renders (docs/performance.md): shadow rays and connections in rays of walks; what the longer records and further launches of bidirectional methods cost.
     constexpr double kShadow = 0.8;
     const double eye = w.eye_rays + kShadow * w.next_events, light = w.light_rays + kShadow * w.splats;
-    const double tried = cuda ? 0.35 : 0.25, ray = cuda ? 0.85 : 0.6, bidirectional = cuda ? 1.6 : 1.3;
+    const double pair = cuda ? 1.3 : 0.25, draw = cuda ? 0.85 : 0.25, ray = cuda ? 0.85 : 0.6, bidirectional = cuda ? 1.5 : 1.3;
     const PilotCandidate& c = candidate.pilot;
     if (!c.light && !c.connect) return eye;
     double work = eye + light;
-    if (c.connect && c.draws == 0) work += tried * w.pairs + ray * w.pair_rays;
-    if (c.connect && c.draws > 0) work += c.draws * (tried * w.draws + ray * w.draw_rays);
+    if (c.connect && c.draws == 0) work += pair * w.pairs + ray * w.pair_rays;
+    if (c.connect && c.draws > 0) work += c.draws * (draw * w.draws + ray * w.draw_rays);
     const bool streaming = std::any_of(candidate.settings.begin(), candidate.settings.end(), [](const auto& s) { return s.second == "streaming"; });
     // A light walk for every vertex of an eye walk.
     if (c.connect && streaming) work += std::max(0.0, w.vertices - 1.0) * w.light_rays;

@@ -20,7 +20,7 @@ namespace ambilux {
 
 /// Paths of one wave from which on more bring less than 5 %, measured on scenes of short paths and long ones (docs/performance.md): the last bounces, which few paths reach, cost as
 /// much for few as for many.
-constexpr uint32_t kCudaWavePlateau = 1u << 24;
+constexpr uint32_t kCudaWavePlateau = 1u << 26;
 
 template <Features F>
 class PathCuda final : public Renderer {
