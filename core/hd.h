@@ -6,7 +6,10 @@
 /// Not copied into its callers on a device. For what is long and called in several places: threads of a warp that run through different code wait for instructions more than for anything
 /// else once kernels exceed the instruction caches (docs/performance.md).
 #define AMBILUX_HD_APART __host__ __device__ __noinline__ inline
+/// One copy on the host. For what several stages of one name do: compilers contract sums of products differently in every copy, and images should not depend on which of them ran.
+#define AMBILUX_HD_ONCE __host__ __device__ inline
 #else
 #define AMBILUX_HD inline
 #define AMBILUX_HD_APART inline
+#define AMBILUX_HD_ONCE inline __attribute__((noinline))
 #endif

@@ -161,7 +161,7 @@ struct PairedVertex {
 
 /// Candidate of the eye vertex `eye`, which is unpacked if it is not yet, and light vertex `light`, worth `scale` times their product.
 template <Features F>
-AMBILUX_HD void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, PairedVertex& eye, const VertexItem& light, float scale,
+AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, PairedVertex& eye, const VertexItem& light, float scale,
                                 uint32_t which, const ConnectOutlet& candidates, StageRecord* record) {
     const VertexItem& item = eye.item;
     const Strategy strategy = Strategy::make(light.bits.depth() + 1, item.bits.depth() + 1);

@@ -117,7 +117,7 @@ TEST_CASE("where items lie and in which order stages go through them changes no 
         for (const auto& [integrator, variant] : {std::pair{"light", "wavefront"}, {"bdpt", "wavefront"}, {"bdpt", "lvc"}}) {
             RenderSettings s = settings_of(scene, integrator, variant, "cuda");
             s.deterministic = s.variant != "lvc";  // contributions of one path are then added one launch after the other
-            const RenderResult first = render_scene(scene, s, 4);
+            const RenderResult first = render_scene(scene, s, 8);  // first depths hold enough items to be sorted
             for (const char* compaction : {"atomic", "select", "none"}) {
                 for (const char* ordering : {"none", "material", "morton"}) {
                     apply_setting(s, "compaction", compaction);
@@ -125,7 +125,7 @@ TEST_CASE("where items lie and in which order stages go through them changes no 
                     for (const bool graph : {true, false}) {
                         INFO(name << " " << integrator << " " << variant << " compaction=" << compaction << " ordering=" << ordering << " graph=" << graph);
                         s.graph = graph;
-                        const RenderResult result = render_scene(scene, s, 4);
+                        const RenderResult result = render_scene(scene, s, 8);
                         CHECK(first.stats.rays_extend == result.stats.rays_extend);
                         CHECK(result.stats.invalid.total() == 0);
                         CHECK(result.stats.memory_bytes == result.stats.memory_bytes_predicted);
