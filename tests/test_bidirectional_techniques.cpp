@@ -53,7 +53,6 @@ TEST_CASE("Technique images change no bit of the image, and their weighted ones 
             const Gathered with = gather(scene, settings, uint32_t(depth), 16);
             // The cache of lvc holds the walks of one task, whose order is that of threads: its images are compared within the same render only.
             if (settings.variant == "wavefront") {
-                settings.deterministic = true;  // one pair of a path per launch, as images of single strategies have it
                 const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
                 REQUIRE(renderer->render(0, 16) == 16);
                 const FilmMoments without = renderer->film();

@@ -87,7 +87,7 @@ float t_tolerance(const SceneView& view, const Ray& ray, const Hit& hit) {
 struct Agreement {
     uint64_t rays = 0, hits = 0;
     uint64_t ties = 0;       ///< other primitive at the same distance
-    uint64_t inexact = 0;    ///< same primitive, other bits
+    uint64_t inexact = 0;    ///< other bits, or ties at distances that are equal only up to rounding
     uint64_t different = 0;  ///< hit, primitive or distance differs beyond rounding
     uint64_t occluded_different = 0;
 };
@@ -110,6 +110,7 @@ void compare(const Scene& scene, const std::vector<Ray>& rays, const std::vector
             ++a.different;
         } else if (h.prim != d.prim) {
             ++a.ties;
+            a.inexact += h.t != d.t;
         } else {
             a.inexact += h.t != d.t || h.u != d.u || h.v != d.v;
         }
@@ -140,10 +141,11 @@ void check(const Agreement& a, bool exact) {
     CHECK(double(a.occluded_different) <= 1e-5 * double(a.rays));
     CHECK(double(a.ties) <= 1e-4 * double(a.rays));
     // The triangle test is made of operations that no compiler fuses, and both traversals visit primitives in one order. But a lane that walks on before it has tested what it holds
-    // enters boxes that the host's shortened ray misses by a rounding error: where two surfaces meet, either may then be the nearest.
+    // enters boxes that the host's shortened ray misses by a rounding error: at an edge or a vertex another triangle may then be the first of those at the very same distance. On the host,
+    // with rays that are never shortened, 5 of 12.6 million rays end so.
     if (exact) {
         CHECK(a.inexact == 0);
-        CHECK(double(a.ties) <= 1.0 + 2e-6 * double(a.rays));
+        CHECK(double(a.ties) <= 1.0 + 5e-7 * double(a.rays));
     }
 }
 

@@ -48,12 +48,14 @@ public:
     }
     template <class Stage, class Item, class Out>
     void extend(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
-        if (!rays.flags) hits.counter->count = rays.counter->size();
+        if (!hits.flags) hits.counter->count = rays.counter->size();
         trace(id, stage, rays);
     }
+    /// Rays that are in order as they are.
     template <class Stage, class Item, class Out>
     void extend_coherent(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
-        extend(id, stage, rays, hits);
+        if (!hits.flags) hits.counter->count = rays.counter->size();
+        run_in_order<void>(id, stage, rays);
     }
     template <class Item, class Body>
     void repeat_while(const Queue<Item>& queue, Body body) {
