@@ -12,9 +12,10 @@ if(AMBILUX_SANITIZE)
   target_link_options(ambilux_options INTERFACE -fsanitize=${AMBILUX_SANITIZE})
 endif()
 if(AMBILUX_HAS_CUDA)
-  # Device code calls constexpr host functions; line info costs nothing at run time and serves the profiler.
+  # Device code calls constexpr host functions; line info costs nothing at run time and serves the profiler. Quotients and roots without the branch for rare
+  # operands make shading a tenth faster (docs/performance.md); what must be correctly rounded says so (core/math.h, rounded_divide).
   target_compile_options(ambilux_options INTERFACE
-    $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -lineinfo>)
+    $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -lineinfo -prec-div=false -prec-sqrt=false>)
   target_compile_definitions(ambilux_options INTERFACE AMBILUX_HAS_CUDA=1)
 endif()
 find_program(CCACHE_PROGRAM ccache)

@@ -17,6 +17,22 @@ constexpr float kInfinity = __builtin_huge_valf();
 /// Largest float below 1.
 constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
 
+/// Correctly rounded on every backend. Elsewhere devices divide within 2 and take roots within 1 unit in the last place (cmake/compiler.cmake).
+AMBILUX_HD float rounded_divide(float a, float b) {
+#if defined(__CUDA_ARCH__)
+    return __fdiv_rn(a, b);
+#else
+    return a / b;
+#endif
+}
+AMBILUX_HD float rounded_sqrt(float x) {
+#if defined(__CUDA_ARCH__)
+    return __fsqrt_rn(x);
+#else
+    return sqrtf(x);
+#endif
+}
+
 AMBILUX_HD float sqr(float x) { return x * x; }
 AMBILUX_HD float safe_sqrt(float x) { return sqrtf(max(x, 0.0f)); }
 AMBILUX_HD float clamp(float x, float lo, float hi) { return min(max(x, lo), hi); }

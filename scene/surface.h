@@ -134,8 +134,8 @@ AMBILUX_HD SurfacePoint quadric_surface_at(const SceneView& scene, uint32_t prim
         const float cos_phi = r > 0.0f ? local.x / r : 1.0f, sin_phi = r > 0.0f ? local.y / r : 0.0f;
         s.dpdu = q.to_world.vector(Vec3f{-local.y, local.x, 0.0f} * (2.0f * kPi));
         s.dpdv = q.to_world.vector(Vec3f{local.z * cos_phi, local.z * sin_phi, -r} * kPi);
-        // Unit within rounding (5), and to_world's scale stands for `radius`, each rounded on its own.
-        s.p_error = quadric_error(q, local, gamma_bound(9));
+        // Unit within rounding (7, where roots and quotients are not correctly rounded), and to_world's scale stands for `radius`, each rounded on its own.
+        s.p_error = quadric_error(q, local, gamma_bound(11));
     } else if (q.type == PrimitiveType::disk) {
         local = {u, v, 0.0f};
         normal = {0.0f, 0.0f, 1.0f};

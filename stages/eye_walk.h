@@ -210,10 +210,10 @@ struct ConnectVertices {
             eye.unpacked = false;
             eye.item = vertices.load(pair.vertex);
         }
+        const VertexItem light = light_vertices.load(pair.light);  // before anything waits for the eye vertex
         const VertexItem& item = eye.item;
         const uint32_t depth = item.bits.depth();
         if (pair.next != kNone) push_pairs(wave, policy, light_vertices, pairs.counter->size(), pair.vertex, pair.path, depth, pair.next, rest);
-        const VertexItem light = light_vertices.load(pair.light);
         if (depth + light.bits.depth() + 1 > policy.max_depth) return;
         const bool drawn = policy.cache_draws > 0;
         const float scale = drawn ? float(light_vertices.counter->size()) / (float(wave.state->walks) * float(policy.cache_draws)) : 1.0f;

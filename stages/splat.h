@@ -65,7 +65,7 @@ struct Splat {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const SplatItem item = splats.load(i);
-        const uint32_t sample = item.path / (wave.tiles * kTilePixels);
+        const uint32_t sample = wave.sample_of(item.path);
         const float x = item.film.x - float(scene.sensor.crop_x), y = item.film.y - float(scene.sensor.crop_y), r = scene.sensor.filter_radius;
         const int32_t x0 = int32_t(ceilf(x - r - 0.5f)), x1 = int32_t(floorf(x + r - 0.5f));
         const int32_t y0 = int32_t(ceilf(y - r - 0.5f)), y1 = int32_t(floorf(y + r - 0.5f));

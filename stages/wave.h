@@ -1,6 +1,7 @@
 // The set of paths in flight: which pixel and sample each slot stands for, and where its random numbers come from.
 #pragma once
 
+#include "core/divisor.h"
 #include "core/rng.h"
 
 namespace ambilux {
@@ -34,16 +35,19 @@ struct Wave {
     const WaveState* state;
     uint64_t seed;
     uint32_t width, height;  ///< pixels of the crop
-    uint32_t tiles_x;        ///< tiles in a row of the film
-    uint32_t tiles;          ///< tiles per wave
+    Divisor tiles_x;         ///< tiles in a row of the film
+    Divisor tiles;           ///< tiles per wave
     uint32_t samples;        ///< most samples of a pixel per wave
 
     AMBILUX_HD uint32_t slot_count() const { return tiles * kTilePixels * samples; }
 
+    /// Of the samples of this wave.
+    AMBILUX_HD uint32_t sample_of(uint32_t slot) const { return tiles.quotient(slot / kTilePixels); }
+
     AMBILUX_HD PathSlot locate(uint32_t slot) const {
-        const uint32_t s = slot / (tiles * kTilePixels), in_wave = slot - s * tiles * kTilePixels;
-        const uint32_t tile = state->first_tile + in_wave / kTilePixels, z = in_wave % kTilePixels;
-        const uint32_t tile_y = tile / tiles_x, tile_x = tile - tile_y * tiles_x;
+        const uint32_t s = sample_of(slot), z = slot % kTilePixels;
+        const uint32_t tile = state->first_tile + slot / kTilePixels - s * tiles;
+        const uint32_t tile_y = tiles_x.quotient(tile), tile_x = tile - tile_y * tiles_x;
         PathSlot p;
         p.x = tile_x * kTileSide + ((z & 1) | (z >> 1 & 2) | (z >> 2 & 4));
         p.y = tile_y * kTileSide + ((z >> 1 & 1) | (z >> 2 & 2) | (z >> 3 & 4));

@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <random>
 #include <set>
 #include <tuple>
 #include <vector>
@@ -273,6 +274,21 @@ TEST_CASE("G4: walk bits hold every depth, flag and scale", "[stages]") {
                 CHECK(std::abs(b.eta_scale() - eta) <= eta * 0.0079f);  // 7 bits of mantissa
             }
     CHECK(WalkBits::kMaxDepth == 16383);
+}
+
+TEST_CASE("Quotients by multiplication are exact", "[stages]") {
+    const auto same = [](uint32_t n, uint32_t d) { return Divisor(d).quotient(n) == n / d; };
+    bool exact = true;
+    std::mt19937 random(1);
+    for (uint32_t d = 1; d < 3000; ++d)
+        for (uint32_t n : {0u, 1u, d - 1, d, d + 1, 0x7fffffffu, 0x80000000u, 0xffffffffu / d * d - 1, 0xffffffffu / d * d, 0xfffffffeu, 0xffffffffu}) exact = exact && same(n, d);
+    for (int i = 0; i < 1000000; ++i) {
+        const uint32_t d = std::max(1u, uint32_t(random()) >> (random() & 31u)), n = uint32_t(random());
+        exact = exact && same(n, d) && same(n / d * d, d) && same(n / d * d - 1, d);
+    }
+    for (uint32_t d : {0x7fffffffu, 0x80000000u, 0x80000001u, 0xffffffffu})
+        for (uint32_t n : {0u, d - 1, d, d + 1, 0xffffffffu}) exact = exact && same(n, d);
+    CHECK(exact);
 }
 
 TEST_CASE("G4: slots and pixels are one to one", "[stages]") {

@@ -170,7 +170,7 @@ private:
     void develop(uint32_t sample) {
         const auto start = Clock::now();
         film_state_ = {0, sample, 1, 0, 0, 0, 0};
-        parallel_for(film_wave_.tiles, [&](uint32_t tile) {
+        parallel_for(uint32_t(film_wave_.tiles), [&](uint32_t tile) {
             StageRecord record{};
             const DevelopSplats stage = {film_wave_, samples_of_slots_.data(), splats_.data(), moments_.sum.data(), moments_.sum_squares.data(), &record};
             for (uint32_t i = 0; i < kTilePixels; ++i) stage(tile * kTilePixels + i);

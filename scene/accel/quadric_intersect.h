@@ -19,8 +19,8 @@ AMBILUX_HD Vec3f quadric_origin(const Quadric& q) { return {q.to_world.m[0][3], 
 
 /// Roots of a t² - 2 b t + c = 0 in ascending order, where `discriminant` = b² - a c >= 0 (Press et al., Numerical Recipes, 5.6).
 AMBILUX_HD void ordered_roots(float a, float b, float c, float discriminant, float& t0, float& t1) {
-    const float q = b + copysignf(sqrtf(discriminant), b);
-    const float r0 = c == 0.0f ? 0.0f : c / q, r1 = q / a;
+    const float q = b + copysignf(rounded_sqrt(discriminant), b);
+    const float r0 = c == 0.0f ? 0.0f : rounded_divide(c, q), r1 = rounded_divide(q, a);
     t0 = min(r0, r1);
     t1 = max(r0, r1);
 }
@@ -37,7 +37,7 @@ AMBILUX_HD QuadricCrossings sphere_crossings(const Quadric& q, Vec3f o, Vec3f d,
         discriminant = b * b;
     } else {
         // Haines et al. 2019, Ray Tracing Gems ch. 7, equation 5: from the point of the ray that is closest to the centre.
-        discriminant = a * (r2 - length_squared(f + d * (b / a)));
+        discriminant = a * (r2 - length_squared(f + d * rounded_divide(b, a)));
     }
     if (!(discriminant >= 0.0f)) return hits;
     float t[2];
@@ -61,7 +61,7 @@ AMBILUX_HD QuadricCrossings disk_crossings(const Quadric& q, Vec3f o, Vec3f d, f
     const Vec3f row = {q.to_local.m[2][0], q.to_local.m[2][1], q.to_local.m[2][2]};
     const float z = dot(row, f);
     if (fabsf(z) <= gamma_bound(6) * dot(abs(row), abs(f))) return hits;  // the origin is on the disk
-    const float t = -z / dot(row, d);
+    const float t = rounded_divide(-z, dot(row, d));
     if (!(t > 0.0f && t < tmax)) return hits;
     const Vec3f p = q.to_local.vector(f + d * t);
     if (!(p.x * p.x + p.y * p.y <= 1.0f)) return hits;
@@ -87,7 +87,7 @@ AMBILUX_HD QuadricCrossings cylinder_crossings(const Quadric& q, Vec3f world_o, 
         c = 0.0f;
         discriminant = b * b;
     } else {
-        const float s = b / a, x = o.x + s * d.x, y = o.y + s * d.y;
+        const float s = rounded_divide(b, a), x = o.x + s * d.x, y = o.y + s * d.y;
         discriminant = a * (1.0f - (x * x + y * y));
     }
     if (!(discriminant >= 0.0f)) return hits;

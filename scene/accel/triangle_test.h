@@ -57,9 +57,9 @@ AMBILUX_HD bool intersect_triangle(Vec3f o, Vec3f d, const RayShear& shear, Vec3
     // Distance along the ray from the plane. Unlike the interpolated depth it is exactly zero for origins on an axis-aligned triangle.
     const Vec3f n = normal();
     const float height = height_over_plane(a, n);
-    const float t = height / detail::fused_dot(d, n);  // not a number for two zeros
+    const float t = rounded_divide(height, detail::fused_dot(d, n));  // not a number for two zeros
     if (!(t > 0.0f && t < tmax)) return false;
-    const float r = 1.0f / det;
+    const float r = rounded_divide(1.0f, det);
     hit.t = t;
     hit.u = v * r;
     hit.v = w * r;
