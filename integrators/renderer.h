@@ -45,6 +45,7 @@ struct RenderSettings {
     bool specialise = true;              ///< kernels hold only what the scene has
     Fuse fuse = Fuse::automatic;         ///< which stages pass their items on without a queue
     float cull = 0.0f;                   ///< Russian roulette before shadow rays (survival_factor); 0: none
+    bool tail = true;                    ///< cuda: the last walks of a wave go on for several depths in one launch (stages/tail.h)
     bool deterministic = false;
     bool automatic = false;              ///< bdpt: a pilot chooses strategies, variant and connections (bdpt.auto)
     bool graph = true;                   ///< cuda: one graph per wave; false launches kernel by kernel, for profilers and sanitizers
@@ -91,6 +92,7 @@ struct ChoiceStats {
 struct RenderStats {
     std::string backend, device, accel;
     QueuePolicy queue_policy;   ///< as used
+    Fuse fuse = Fuse::none;     ///< as used
     double build_seconds = 0;   ///< acceleration structure, upload, allocation
     double render_seconds = 0;  ///< inside render(), wall clock
     uint64_t samples = 0;       ///< per pixel

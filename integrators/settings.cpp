@@ -144,13 +144,15 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.fuse = Fuse(choose(key, value, {"auto", "none", "light", "all"}));
     else if (key == "cull")
         s.cull = real(key, value, 0.0f, 1.0f);
+    else if (key == "tail")
+        s.tail = boolean(key, value);
     else if (key == "deterministic")
         s.deterministic = boolean(key, value);
     else if (key == "graph")
         s.graph = boolean(key, value);
     else
         throw Error(ExitCode::usage,
-                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, bdpt.auto, connections, max_depth, rr_depth, seed, accel, wave_size, compaction, ordering, specialise, fuse, cull, deterministic, graph", key));
+                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, bdpt.auto, connections, max_depth, rr_depth, seed, accel, wave_size, compaction, ordering, specialise, fuse, cull, tail, deterministic, graph", key));
 }
 
 }  // namespace ambilux

@@ -6,6 +6,7 @@
 
 #include "queues/layout.h"
 #include "stages/stage.h"
+#include "stages/tail.h"
 
 namespace ambilux {
 
@@ -25,16 +26,30 @@ void lay_out_walks(Layout& layout, WalkQueues<RayItem, HitItem>& m, QueueCounter
     m.rays[1].base = m.hits[1].base;
 }
 
-/// From the hits of depth 1 in place 0 on: body(k) goes through the hits of a depth in place k and pushes rays to place 1 - k, which then become the next hits.
-template <class Executor, class RayItem, class HitItem, class Extend, class Body>
-void repeat_depths(Executor& exec, StageId id, const Extend (&extend)[2], const WalkQueues<RayItem, HitItem>& m, Body body) {
-    exec.repeat_while(m.hits[0], [&] {
+/// From the hits of depth 1 in place 0 on: shade[k] goes through the hits of a depth in place k and pushes rays to place 1 - k, which after rest(tail) become the next hits. Executors that
+/// can do so take fewer than `tail_below` walks through several depths at once (stages/tail.h); `tail` is true then, and what is pushed may belong to one path more than once.
+template <class Executor, class RayItem, class HitItem, class Shade, class Extend, class Rest>
+void repeat_depths(Executor& exec, StageId shade_id, const Shade (&shade)[2], StageId extend_id, const Extend (&extend)[2], const WalkQueues<RayItem, HitItem>& m, uint32_t tail_below,
+                   Rest rest) {
+    const auto two_rounds = [&](auto tail) {
         for (const int k : {0, 1}) {
-            body(k);
-            exec.next_depth();
-            exec.extend(id, extend[1 - k], m.rays[1 - k], m.hits[1 - k]);
+            if constexpr (tail)
+                exec.run_tail(shade_id, shade[k], extend[1 - k], m.hits[k]);
+            else
+                exec.run(shade_id, shade[k], m.hits[k]);
+            rest(tail.value);
+            exec.next_depth(tail ? kTailDepths : 1);
+            exec.extend(extend_id, extend[1 - k], m.rays[1 - k], m.hits[1 - k]);
         }
-    });
+    };
+    if constexpr (requires { Executor::kTails; }) {
+        if (tail_below > 0) {
+            exec.repeat_while(m.hits[0], [&] { two_rounds(std::false_type()); }, tail_below);
+            exec.repeat_while(m.hits[0], [&] { two_rounds(std::true_type()); });
+            return;
+        }
+    }
+    exec.repeat_while(m.hits[0], [&] { two_rounds(std::false_type()); });
 }
 
 }  // namespace ambilux

@@ -12,6 +12,12 @@ namespace ambilux {
 /// Adds one set of kStageCount records to another.
 void add_records(StageRecord* to, const StageRecord* from);
 
+/// What a PathPolicy or BidirectionalPolicy fuses.
+template <class Policy>
+Fuse fuse_of(const Policy& policy) {
+    return !policy.fuse ? Fuse::none : policy.connect_in_shade ? Fuse::all : Fuse::light;
+}
+
 /// Fills stages, rays and invalid counts. Stages that were never launched are left out.
 void fill_stage_stats(const StageRecord* records, RenderStats& stats);
 

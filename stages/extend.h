@@ -28,13 +28,26 @@ struct Extend {
     StageRecord* record;
 
     AMBILUX_HD bool fetch(uint32_t i, Ray& ray) const {
-        const Item item = rays.load(i);
+        if (fetch(rays.load(i), ray)) return true;
+        finish(i, {ray.tmax, 0.0f, 0.0f, kNone});
+        return false;
+    }
+
+    /// False for a ray that is none.
+    AMBILUX_HD bool fetch(const Item& item, Ray& ray) const {
         ray = ray_of(item);
         if constexpr (F.opacity) ray.alpha_seed = alpha_seed(wave.key(item.path, stream), item.bits.depth(), false);
         if (is_finite(item.o) && is_finite(item.d)) return true;
         count_one(&record->nan);
-        finish(i, {ray.tmax, 0.0f, 0.0f, kNone});
         return false;
+    }
+
+    /// Where the ray of an item ends.
+    AMBILUX_HD Out hit_of(const Item& item) const {
+        Ray ray;
+        Hit hit = {0.0f, 0.0f, 0.0f, kNone};
+        if (fetch(item, ray)) tracer.template closest<F>(scene, ray, hit);
+        return ambilux::hit_of(item, hit);
     }
 
     AMBILUX_HD void finish(uint32_t i, const Hit& hit) const { hits.complete(i, HitEnd{hit.u, hit.v, hit.prim, 0}); }

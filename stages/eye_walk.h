@@ -138,16 +138,22 @@ struct EyeShade {
     EyeConnect<F> connect;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const WalkHit h = hits.load(i);
+        WalkItem next;
+        if (take(hits.load(i), hits.counter->size(), next)) rays.push(next);
+    }
+
+    /// True if the walk goes on with the ray `next`. `count`: of hits in this launch, or more.
+    AMBILUX_HD bool take(const WalkHit& h, uint32_t count, WalkItem& next) const {
         WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z) {
             if (policy.connect_in_shade) connect.take(z, h.ray.throughput, h.ray.path, h.ray.bits.depth());
         });
         if (step.connectable && (policy.connect_vertices || !policy.connect_in_shade)) {
             if (policy.connect_vertices) step.vertex.previous = policy.cache_draws > 0 ? policy.cache_draws : last_vertex[h.ray.path];
             const uint32_t place = vertices.push(step.vertex);
-            if (policy.connect_in_shade) connect.pair(step.vertex, place, hits.counter->size());
+            if (policy.connect_in_shade) connect.pair(step.vertex, place, count);
         }
-        if (step.goes_on) rays.push(step.ray);
+        next = step.ray;
+        return step.goes_on;
     }
 };
 

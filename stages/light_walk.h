@@ -119,8 +119,13 @@ struct LightShade {
     ConnectCamera<F> connect;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const WalkHit h = hits.load(i);
-        if (h.prim == kNone) return;
+        WalkItem next;
+        if (take(hits.load(i), 0, next)) rays.push(next);
+    }
+
+    /// True if the walk goes on with the ray `next`.
+    AMBILUX_HD bool take(const WalkHit& h, uint32_t, WalkItem& next) const {
+        if (h.prim == kNone) return false;
         const uint32_t depth = h.ray.bits.depth();
         const bool to_camera = policy.splat && depth < policy.max_depth && policy.wants(depth + 1, 1);
         // A path has at least one segment more than its light walk.
@@ -134,7 +139,8 @@ struct LightShade {
                 last_vertex[h.ray.path] = vertices.push(step.vertex);
             }
         }
-        if (step.goes_on) rays.push(step.ray);
+        next = step.ray;
+        return step.goes_on;
     }
 };
 

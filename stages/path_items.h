@@ -54,6 +54,8 @@ struct HitItem {
     uint32_t pad;
 };
 
+AMBILUX_HD HitItem hit_of(const RayItem& r, const Hit& hit) { return {r.o, r.path, r.d, r.bits, r.throughput, r.pdf_sa, hit.u, hit.v, hit.prim, 0}; }
+
 /// A vertex to be connected to an emitter.
 struct ConnectItem {
     Vec3f d;           ///< of the ray that found it

@@ -18,6 +18,7 @@ struct PathPolicy {
     bool hide_emitters;   ///< the camera does not see emitters
     bool fuse;            ///< light is weighted and added up by the stages that find it, not by stages of their own
     bool connect_in_shade;  ///< shade samples emitters too: the surface and its BSDF are looked up once
+    uint32_t tail_below;    ///< on a device: fewer walks than this go on for several depths in one launch (stages/tail.h); 0: never
     float cull;           ///< share of a path's light below which what it finds faces Russian roulette before the shadow ray; 0: never
     QueuePolicy queues;
 };

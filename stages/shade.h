@@ -29,10 +29,15 @@ struct Shade {
     Connect<F> connect;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const HitItem h = hits.load(i);
+        RayItem next;
+        if (take(hits.load(i), 0, next)) rays.push(next);
+    }
+
+    /// True if the walk goes on with the ray `next`.
+    AMBILUX_HD bool take(const HitItem& h, uint32_t, RayItem& next) const {
         if (h.prim == kNone) {
             if (wants_emission(h)) emit(h, environment_radiance<F>(scene, h.d), can_sample(h) ? pdf_environment_direct<F>(scene, h.d) : 0.0f);
-            return;
+            return false;
         }
         const SurfacePoint point = surface_at<F>(scene, h.prim, h.u, h.v);
         const uint32_t emitter = scene.shapes[point.shape].emitter;
@@ -42,7 +47,7 @@ struct Shade {
         }
 
         const uint32_t depth = h.bits.depth();
-        if (depth >= policy.max_depth) return;
+        if (depth >= policy.max_depth) return false;
         const Scattering s = make_scattering<F>(scene, point, -h.d);
         if (policy.connect && bsdf_is_smooth(s.bsdf)) {
             if (policy.connect_in_shade)
@@ -50,7 +55,7 @@ struct Shade {
             else
                 connections.push({h.d, h.path, h.throughput, h.bits, h.u, h.v, h.prim, 0});
         }
-        scatter(h, point, s, depth);
+        return scatter(h, point, s, depth, next);
     }
 
 private:
@@ -65,23 +70,24 @@ private:
         if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.path, h.pdf_sa, pdf_other, {}, 0});
     }
 
-    AMBILUX_HD void scatter(const HitItem& h, const SurfacePoint& point, const Scattering& s, uint32_t depth) const {
+    AMBILUX_HD bool scatter(const HitItem& h, const SurfacePoint& point, const Scattering& s, uint32_t depth, RayItem& next) const {
         const Vec4f u = random_floats(wave.key(h.path), scatter_block(depth));
         ScatterSample sample;
-        if (!scatter_sample<F>(s, {u.x, u.y, u.z}, TransportMode::radiance, sample)) return;
+        if (!scatter_sample<F>(s, {u.x, u.y, u.z}, TransportMode::radiance, sample)) return false;
         const bool delta = sample.flags & kScatterDelta;
         // The last segment can bring emission only.
-        if (depth + 1 == policy.max_depth && (!policy.count_hits || (policy.estimator == Estimator::nee && !delta))) return;
+        if (depth + 1 == policy.max_depth && (!policy.count_hits || (policy.estimator == Estimator::nee && !delta))) return false;
         Rgb throughput = h.throughput * sample.weight;
-        if (!is_light(throughput, record) || is_zero(throughput)) return;
+        if (!is_light(throughput, record) || is_zero(throughput)) return false;
         const float eta_scale = h.bits.eta_scale() * sample.eta;
         if (depth >= policy.rr_depth) {
             const float survival = survival_probability(throughput, eta_scale);
-            if (!(u.w < survival)) return;
+            if (!(u.w < survival)) return false;
             throughput = throughput / survival;
         }
         const Vec3f o = offset_ray_origin(point.p, point.p_error, point.ng, sample.wo);
-        rays.push({o, h.path, sample.wo, WalkBits::make(depth + 1, delta, eta_scale), throughput, sample.pdf_sa});
+        next = {o, h.path, sample.wo, WalkBits::make(depth + 1, delta, eta_scale), throughput, sample.pdf_sa};
+        return true;
     }
 };
 

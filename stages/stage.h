@@ -32,6 +32,25 @@ constexpr const char* kStageNames[kStageCount] = {"light_generate", "light_exten
 /// Items are counted for depths 0 ... kTrackedDepths-1; the last entry gathers all deeper ones.
 constexpr uint32_t kTrackedDepths = 64;
 
+/// Adds 1 to a counter that other threads may add to.
+AMBILUX_HD void count_one(uint64_t* counter) {
+#if defined(__CUDA_ARCH__)
+    atomicAdd(reinterpret_cast<unsigned long long*>(counter), 1ull);
+#else
+    ++*counter;  // a host record belongs to one thread
+#endif
+}
+
+/// Adds 1 to counters[which]; the threads of a warp that mean the same one add once for all of them.
+AMBILUX_HD void count_together(uint64_t* counters, uint32_t which) {
+#if defined(__CUDA_ARCH__)
+    const uint32_t same = __match_any_sync(__activemask(), which);
+    if ((threadIdx.x & 31u) == uint32_t(__ffs(int(same)) - 1)) atomicAdd(reinterpret_cast<unsigned long long*>(counters + which), static_cast<unsigned long long>(__popc(same)));
+#else
+    ++counters[which];
+#endif
+}
+
 /// What one stage did; lives where the kernels run.
 struct StageRecord {
     uint64_t launches, items, nanoseconds;
@@ -42,18 +61,17 @@ struct StageRecord {
         ++launches;
         items += new_items;
         nanoseconds += ns;
-        items_by_depth[depth < kTrackedDepths ? depth : kTrackedDepths - 1] += new_items;
+        items_by_depth[tracked(depth)] += new_items;
     }
-};
+    /// An item that no launch was made for. Threads of a warp that call together are expected to mean the same depth more often than not.
+    AMBILUX_HD void count_item(uint32_t depth) {
+        count_together(&items, 0);
+        count_together(items_by_depth, tracked(depth));
+    }
 
-/// Adds 1 to a counter that other threads may add to.
-AMBILUX_HD void count_one(uint64_t* counter) {
-#if defined(__CUDA_ARCH__)
-    atomicAdd(reinterpret_cast<unsigned long long*>(counter), 1ull);
-#else
-    ++*counter;  // a host record belongs to one thread
-#endif
-}
+private:
+    AMBILUX_HD static uint32_t tracked(uint32_t depth) { return depth < kTrackedDepths ? depth : kTrackedDepths - 1; }
+};
 
 /// True if `v` can be light: finite and not negative. Anything else is counted in the record of the stage that made it; the caller drops it.
 AMBILUX_HD bool is_light(Rgb v, StageRecord* record) {

@@ -64,6 +64,32 @@ TEST_CASE("G5: bidirectional renders of both backends at equal seeds: pixels and
     }
 }
 
+TEST_CASE("The last walks of light and eye find the same light, several depths in a launch") {
+    if (!device()) return;
+    for (const char* name : {"cornell", "glass", "materials"}) {
+        const Scene scene = project_scene(name, 160, 90);
+        for (const char* variant : {"wavefront", "lvc"}) {
+            INFO(name << " " << variant);
+            RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
+            s.connections = 2;
+            const RenderResult tail = render_scene(scene, s, 8);
+            s.tail = false;
+            const RenderResult none = render_scene(scene, s, 8);
+            for (const StageStats& t : tail.stats.stages)
+                for (const StageStats& n : none.stats.stages) {
+                    if (t.name != n.name) continue;
+                    INFO(t.name);
+                    // Connections of a cache are those of other vertices in every run.
+                    const double share = s.variant == "lvc" && (t.name == "occlude" || t.name == "connect_vertices") ? 5e-3 : 1e-3;
+                    CHECK(std::fabs(double(t.items) - double(n.items)) <= share * double(n.items));
+                    if (t.name == "shade" || t.name == "light_shade") CHECK(t.launches < n.launches);
+                }
+            if (s.variant == "wavefront") CHECK(agreeing_pixels(tail.film, none.film) >= 0.99);
+            for (const QueueStats& q : tail.stats.queues) CHECK(q.overflow == 0);
+        }
+    }
+}
+
 TEST_CASE("Launches of a device that hold one pair of a path and those that hold several connect the same pairs") {
     if (!device()) return;
     // More eye vertices than kVerticesForOnePair at first, fewer in the end.

@@ -221,7 +221,7 @@ TEST_CASE("G13: every setting changes something that can be seen, or is refused"
     for (auto [key, value, allowed] : {std::tuple{"integrator", "bidirectional", "bdpt"}, {"variant", "mega", "wavefront"}, {"backend", "gpu", "cuda"}, {"estimator", "NEE", "nee"}, {"heuristic", "max", "power"},
                                        {"max_depth", "-2", "-1"}, {"max_depth", "16383", "16382"}, {"max_depth", "5x", "integer"}, {"max_depth", "", "integer"}, {"rr_depth", "-2", "-1"}, {"seed", "-1", "0"},
                                        {"seed", "18446744073709551616", "18446744073709551615"}, {"accel", "bvh", "cwbvh"}, {"wave_size", "-5", "0"}, {"wave_size", "1e6", "integer"},
-                                       {"specialise", "yes", "true"}, {"fuse", "some", "light"}, {"cull", "2", "from 0 to 1"}, {"cull", "half", "number"}, {"compaction", "sort", "atomic, select, none"}, {"ordering", "type", "none, material, morton"}, {"deterministic", "1", "false"}}) {
+                                       {"specialise", "yes", "true"}, {"fuse", "some", "light"}, {"cull", "2", "from 0 to 1"}, {"cull", "half", "number"}, {"compaction", "sort", "atomic, select, none"}, {"ordering", "type", "none, material, morton"}, {"tail", "16", "false"}, {"deterministic", "1", "false"}}) {
         const std::string message = refused(s, key, value);
         INFO(message);
         CHECK(message.find(key) != std::string::npos);
@@ -229,7 +229,7 @@ TEST_CASE("G13: every setting changes something that can be seen, or is refused"
         CHECK(message.find(allowed) != std::string::npos);
     }
     const std::string unknown = refused(s, "spp", "5");
-    for (const char* name : {"spp", "integrator", "variant", "backend", "estimator", "heuristic", "max_depth", "rr_depth", "seed", "accel", "wave_size", "compaction", "ordering", "specialise", "fuse", "cull", "deterministic"})
+    for (const char* name : {"spp", "integrator", "variant", "backend", "estimator", "heuristic", "max_depth", "rr_depth", "seed", "accel", "wave_size", "compaction", "ordering", "specialise", "fuse", "cull", "tail", "deterministic"})
         CHECK(unknown.find(name) != std::string::npos);
 }
 

@@ -70,7 +70,7 @@ public:
         queue.counter->finish();
     }
     void set_depth(uint32_t depth) { state_->depth = depth; }
-    void next_depth() { ++state_->depth; }
+    void next_depth(uint32_t depths = 1) { state_->depth += depths; }
 
 private:
     using Clock = std::chrono::steady_clock;

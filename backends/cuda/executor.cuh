@@ -16,6 +16,7 @@
 #include "stages/order_keys.h"
 #include "stages/settle.h"
 #include "stages/stage.h"
+#include "stages/tail.h"
 #include "stages/wave.h"
 
 #if CUDART_VERSION < 12080
@@ -70,6 +71,12 @@ __global__ void __launch_bounds__(kStageBlock) launch_slots(const __grid_constan
 template <class Stage>
 __global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_paths(const __grid_constant__ Stage stage, uint32_t slots, const WaveState* state) {
     stage.run(blockIdx.x * kStageBlock + threadIdx.x, slots * state->samples, gridDim.x * kStageBlock);
+}
+
+/// The last walks of a wave (stages/tail.h).
+template <class Tail>
+__global__ void __launch_bounds__(kStageBlock, 3) launch_tail(const __grid_constant__ Tail tail, const QueueCounter* counter) {
+    tail.run(blockIdx.x * kStageBlock + threadIdx.x, counter->size(), gridDim.x * kStageBlock);
 }
 
 /// Blocks of a stage that are to be resident on a multiprocessor: 1 leaves registers to the compiler.
@@ -185,7 +192,7 @@ __global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, 
 
 __global__ inline void start_clock(uint64_t* clock) { *clock = device_nanoseconds(); }
 
-__global__ inline void repeat_unless_empty(const QueueCounter* counter, cudaGraphConditionalHandle again) { cudaGraphSetConditional(again, counter->count > 0); }
+__global__ inline void repeat_while_any(const QueueCounter* counter, uint32_t least, cudaGraphConditionalHandle again) { cudaGraphSetConditional(again, counter->count >= least); }
 
 /// A failed wave stays failed, and those after it do nothing.
 __global__ inline void set_wave(WaveState* state, WaveState value) {
@@ -209,6 +216,8 @@ __global__ inline void finish_wave(WaveState* state) {
 template <bool kPairs>
 class BasicCudaExecutor {
 public:
+    static constexpr bool kTails = true;  ///< has run_tail
+
     /// `traced`: features that rays have to know of, the scene's or more. `clock`: one value on the device.
     BasicCudaExecutor(cudaStream_t stream, const Features& traced, WaveState* state, StageRecord* records, uint64_t* clock, const SceneView& scene, const OrderMemory& order)
         : stream_(stream), traced_(traced), state_(state), records_(records), clock_(clock), scene_(scene), order_(order) {
@@ -256,6 +265,13 @@ public:
         detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
         finish(id, queue.counter);
     }
+    /// Several depths of the walks of `hits`, which must be appended.
+    template <class Shade, class Extend, class Item>
+    void run_tail(StageId id, const Shade& shade, const Extend& extend, const Queue<Item>& hits) {
+        using Kernel = Tail<Shade, Extend>;
+        detail::launch_tail<<<blocks(detail::launch_tail<Kernel>, kStageBlock), kStageBlock, 0, stream_>>>(Kernel{shade, extend}, hits.counter);
+        finish(id, hits.counter);
+    }
     /// Items stay where they are until clear().
     template <class Stage, class Item>
     void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
@@ -287,7 +303,7 @@ public:
     }
     /// From the next record on; no kernel but those that keep records asks.
     void set_depth(uint32_t depth) { depth_ = {true, depth}; }
-    void next_depth() { ++depth_.value; }
+    void next_depth(uint32_t depths = 1) { depth_.value += depths; }
 
     template <class A, class B>
     void settle(const A& a, const B& b) {
@@ -299,15 +315,16 @@ public:
     }
     void finish_wave() { detail::finish_wave<<<1, 1, 0, stream_>>>(state_); }
 
+    /// While there are `least` items.
     template <class Item, class Body>
-    void repeat_while(const Queue<Item>& queue, Body body) {
+    void repeat_while(const Queue<Item>& queue, Body body, uint32_t least = 1) {
         const auto counted_body = [&] {
             counted_ = queue.counter;
             body();
         };
         const auto count = [&] { this->count(queue); };
-        if (capturing_) return capture_loop(queue.counter, count, counted_body);
-        for (count(); size_of(queue.counter) > 0; count()) counted_body();
+        if (capturing_) return capture_loop(queue.counter, least, count, counted_body);
+        for (count(); size_of(queue.counter) >= least; count()) counted_body();
     }
 
 private:
@@ -375,15 +392,15 @@ private:
     }
 
     template <class Count, class Body>
-    void capture_loop(const QueueCounter* counter, Count count, Body body) {
+    void capture_loop(const QueueCounter* counter, uint32_t least, Count count, Body body) {
         const cudaGraphConditionalHandle again = make_condition();
         // Set before every entry, since a loop inside of a loop is entered more than once.
         count();
-        detail::repeat_unless_empty<<<1, 1, 0, stream_>>>(counter, again);
+        detail::repeat_while_any<<<1, 1, 0, stream_>>>(counter, least, again);
         capture_conditional(cudaGraphCondTypeWhile, again, 1, [&](uint32_t) {
             body();
             count();
-            detail::repeat_unless_empty<<<1, 1, 0, stream_>>>(counter, again);
+            detail::repeat_while_any<<<1, 1, 0, stream_>>>(counter, least, again);
         });
     }
     cudaGraphConditionalHandle make_condition() const {

@@ -119,6 +119,7 @@ public:
         s.device = fmt::format("CPU, {} threads", arena_.max_concurrency());
         s.accel = accel_name_;
         s.queue_policy = policy_.queues;
+        s.fuse = fuse_of(policy_);
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;

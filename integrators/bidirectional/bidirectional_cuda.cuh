@@ -45,6 +45,7 @@ public:
             policy_.stream_slots = settings.wave_size ? settings.wave_size : kStreamSlots;
             wave_.samples = std::max<uint32_t>(1, uint32_t(std::min<uint64_t>(8ull * policy_.stream_slots, kLightRay - 1) / slots));
         }
+        policy_.tail_below = tail_walks(settings, wave_.slot_count());
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         device_scene_.emplace(scene);
         device_accel_.emplace(accel->arrays());
@@ -119,6 +120,7 @@ public:
         s.device = cuda_device_name();
         s.accel = "cwbvh";
         s.queue_policy = policy_.queues;
+        s.fuse = fuse_of(policy_);
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;

@@ -19,8 +19,7 @@ void run_light_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stage
     if (stages.policy.splat) run_splats(exec, stages);
     exec.set_depth(1);
     exec.extend(StageId::light_extend, stages.light_extend[0], m.rays[0], m.hits[0]);
-    repeat_depths(exec, StageId::light_extend, stages.light_extend, m, [&](int k) {
-        exec.run(StageId::light_shade, stages.light_shade[k], m.hits[k]);
+    repeat_depths(exec, StageId::light_shade, stages.light_shade, StageId::light_extend, stages.light_extend, m, stages.policy.tail_below, [&](bool) {
         if (stages.policy.splat) {
             if (!stages.policy.connect_in_shade) exec.run(StageId::connect_camera, stages.connect_camera, m.vertices);
             run_splats(exec, stages);
@@ -33,12 +32,12 @@ void run_light_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stage
 /// Most pairs of an eye vertex.
 inline uint32_t longest_pairing(const BidirectionalPolicy& policy) { return policy.cache_draws > 0 ? policy.cache_draws : policy.max_depth - 2; }
 
-/// Candidates of one launch: weighted, tested, added to their paths.
+/// Candidates of one launch: weighted, tested, added to their paths. `tail`: there may be several of a path.
 template <class Executor, Features F, class Tracer>
-void run_connections(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
+void run_connections(Executor& exec, const BidirectionalStages<F, Tracer>& stages, bool tail = false) {
     const BidirectionalMemory& m = stages.memory;
     if (!stages.policy.fuse) exec.run(StageId::mis_weight, stages.weight_connections, m.connect_candidates);
-    exec.trace(StageId::occlude, stages.occlude, m.shadows);
+    exec.trace(StageId::occlude, tail ? stages.occlude_tail : stages.occlude, m.shadows);
     if (!stages.policy.fuse) exec.run(StageId::accumulate, stages.accumulate_shadows, m.shadow_contributions);
 }
 
@@ -49,23 +48,22 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
     exec.run_slots(StageId::generate, stages.generate, stages.wave.tiles * kTilePixels);
     exec.set_depth(1);
     exec.extend_coherent(StageId::extend, stages.extend[0], m.rays[0], m.hits[0]);
-    repeat_depths(exec, StageId::extend, stages.extend, m, [&](int k) {
-        exec.run(StageId::shade, stages.shade[k], m.hits[k]);
+    repeat_depths(exec, StageId::shade, stages.shade, StageId::extend, stages.extend, m, policy.tail_below, [&](bool tail) {
         if ((policy.count_hits || policy.count_environment) && !policy.fuse) {
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
             exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
         }
         if ((policy.next_event || policy.connect_vertices) && !policy.connect_in_shade) exec.run_keeping(StageId::connect, stages.connect, m.vertices);
-        if (policy.next_event) run_connections(exec, stages);
+        if (policy.next_event) run_connections(exec, stages, tail);
         if (policy.connect_vertices) {
             exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
-            run_connections(exec, stages);
+            run_connections(exec, stages, tail);
             if (longest_pairing(policy) > 1)
                 exec.repeat_while(m.rest, [&] {
                     exec.run(StageId::connect_vertices, stages.connect_rest, m.rest);
-                    run_connections(exec, stages);
+                    run_connections(exec, stages, tail);
                     exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
-                    run_connections(exec, stages);
+                    run_connections(exec, stages, tail);
                 });
         }
         if (policy.next_event || policy.connect_vertices) exec.clear(m.vertices);

@@ -171,7 +171,7 @@ struct BidirectionalStages {
     StreamConnect<F> stream_connect;
     ConnectCamera<F> stream_connect_camera;
     WeightConnections weight_connections;
-    Occlude<F, Tracer> occlude;
+    Occlude<F, Tracer> occlude, occlude_tail;
     Accumulate accumulate_shadows;
     DevelopSplats develop;
 
@@ -217,6 +217,8 @@ struct BidirectionalStages {
         stream_connect_camera = {scene, wave, policy, m.camera_vertices, splat_outlet, record(StageId::connect_camera)};
         stream_connect = {pool, m.waiting, connect_outlet, record(StageId::connect_vertices)};
         occlude = {scene, tracer, m.shadows, {m.shadow_contributions, accumulate_shadows, policy.fuse}, record(StageId::occlude)};
+        occlude_tail = occlude;
+        occlude_tail.contributions.next.shared = true;
         develop = {wave, film.samples, film.splats, film.sum, film.sum_squares, record(StageId::develop)};
     }
 };

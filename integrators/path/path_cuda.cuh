@@ -40,6 +40,7 @@ public:
         Layout million;
         lay_out(million, 1u << 20, policy_);
         wave_ = shape_wave(scene, settings, device_wave_size(settings, kCudaWavePlateau, million.bytes() >> 20, free), ~0u);
+        policy_.tail_below = tail_walks(settings, wave_.slot_count());
         lay_out(layout_, wave_.slot_count(), policy_);
         const uint64_t temporary = order_temporary_bytes(policy_.queues, wave_.slot_count());
         lay_out_order(layout_, policy_.queues, wave_.slot_count(), temporary);
@@ -128,6 +129,7 @@ public:
         s.device = cuda_device_name();
         s.accel = device_pairs_ ? "bvh2" : "cwbvh";
         s.queue_policy = policy_.queues;
+        s.fuse = fuse_of(policy_);
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;

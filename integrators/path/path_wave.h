@@ -29,6 +29,13 @@ inline uint32_t device_wave_size(const RenderSettings& settings, uint32_t platea
     return uint32_t(std::clamp<uint64_t>(free / 2 / bytes_per_path, kTilePixels, plateau));
 }
 
+/// PathPolicy::tail_below, for waves of `slots`. Walks of a tail may bring several contributions in one launch: their sums depend on the order of threads, and queues have room for that
+/// many only where items are appended. Stages that pass light on without queues do not need that room.
+inline uint32_t tail_walks(const RenderSettings& settings, uint32_t slots) {
+    const bool suits = !settings.deterministic && settings.technique_depth == 0 && settings.fuse != Fuse::none && !settings.queues.fixed_places() && settings.accel != "bvh2";
+    return settings.tail && suits ? std::min(kTailWalks, slots / kTailDepths) : 0;
+}
+
 /// Tiles of the whole film.
 uint32_t tile_count(const Wave& wave);
 
@@ -88,7 +95,7 @@ struct PathStages {
     Connect<F> connect;
     Shade<F> shade[2];
     WeightConnections weight_connections;
-    Occlude<F, Tracer> occlude;
+    Occlude<F, Tracer> occlude, occlude_tail;
     Accumulate accumulate_shadows;
     Develop develop;
 
@@ -106,6 +113,8 @@ struct PathStages {
         }
         accumulate_shadows = {m.shadow_contributions, m.samples, record(StageId::accumulate)};
         occlude = {scene, tracer, m.shadows, {m.shadow_contributions, accumulate_shadows, policy.fuse}, record(StageId::occlude)};
+        occlude_tail = occlude;
+        occlude_tail.contributions.next.shared = true;
         develop = {wave, m.samples, film.sum, film.sum_squares, record(StageId::develop)};
     }
 };

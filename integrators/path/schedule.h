@@ -10,7 +10,7 @@ namespace ambilux {
 /// - run(id, stage, queue): over the queue's size where the queue lives, then empties it;
 /// - trace(id, stage, queue): the same for rays in no order;
 /// - extend(id, stage, rays, hits): rays become hits where they lie; extend_coherent for neighbouring rays that stay together;
-/// - set_depth(d), next_depth(), and repeat_while(queue, body): body until the queue is found empty.
+/// - set_depth(d), next_depth(n), and repeat_while(queue, body): body until the queue is found empty.
 template <class Executor, Features F, class Tracer>
 void run_path_wave(Executor& exec, const PathStages<F, Tracer>& stages) {
     const PathMemory& m = stages.memory;
@@ -18,8 +18,7 @@ void run_path_wave(Executor& exec, const PathStages<F, Tracer>& stages) {
     exec.run_slots(StageId::generate, stages.generate, slots);
     exec.set_depth(1);
     exec.extend_coherent(StageId::extend, stages.extend[0], m.rays[0], m.hits[0]);
-    repeat_depths(exec, StageId::extend, stages.extend, m, [&](int k) {
-        exec.run(StageId::shade, stages.shade[k], m.hits[k]);
+    repeat_depths(exec, StageId::shade, stages.shade, StageId::extend, stages.extend, m, stages.policy.tail_below, [&](bool tail) {
         if (stages.policy.count_hits && !stages.policy.fuse) {
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
             exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
@@ -27,7 +26,7 @@ void run_path_wave(Executor& exec, const PathStages<F, Tracer>& stages) {
         if (stages.policy.connect) {
             if (!stages.policy.connect_in_shade) exec.run(StageId::connect, stages.connect, m.connections);
             if (!stages.policy.fuse) exec.run(StageId::mis_weight, stages.weight_connections, m.connect_candidates);
-            exec.trace(StageId::occlude, stages.occlude, m.shadows);
+            exec.trace(StageId::occlude, tail ? stages.occlude_tail : stages.occlude, m.shadows);
             if (!stages.policy.fuse) exec.run(StageId::accumulate, stages.accumulate_shadows, m.shadow_contributions);
         }
     });
