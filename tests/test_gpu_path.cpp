@@ -260,7 +260,7 @@ TEST_CASE("G3, G8: a device's queues never overflow and its memory is what was p
     }
 }
 
-TEST_CASE("G8: more memory than the device has is refused before anything is allocated") {
+TEST_CASE("G8: more memory than the device has is refused before queues are allocated") {
     if (!device()) return;
     Scene scene = project_scene("cornell", 65535, 65536);
     RenderSettings s = on("cuda", cpu_settings(scene, Estimator::mis));

@@ -38,4 +38,16 @@ DeviceCwbvh::DeviceCwbvh(const CwbvhArrays& arrays) : nodes_(arrays.nodes, "acce
 DevicePairs::DevicePairs(const PairArrays& arrays)
     : nodes_(arrays.nodes, "acceleration structure on the device"), primitives_(arrays.primitives, "primitives on the device"), root_(arrays.root) {}
 
+template <>
+std::shared_ptr<const DeviceScene> SharedAccels::get() {
+    if (!device_scene_) device_scene_ = std::make_shared<const DeviceScene>(scene_);
+    return device_scene_;
+}
+
+template <>
+std::shared_ptr<const DeviceCwbvh> SharedAccels::get() {
+    if (!device_cwbvh_) device_cwbvh_ = std::make_shared<const DeviceCwbvh>(get<CwbvhAccel>()->arrays());
+    return device_cwbvh_;
+}
+
 }  // namespace ambilux

@@ -4,6 +4,7 @@
 #include "backends/cuda/device_memory.h"
 #include "scene/accel/cwbvh.h"
 #include "scene/accel/pair_bvh.h"
+#include "scene/accel/shared_accels.h"
 #include "scene/scene.h"
 
 namespace ambilux {
@@ -64,5 +65,10 @@ private:
     DeviceBuffer<CwbvhPrimitive> primitives_;
     uint32_t root_;
 };
+
+template <>
+std::shared_ptr<const DeviceScene> SharedAccels::get<DeviceScene>();
+template <>
+std::shared_ptr<const DeviceCwbvh> SharedAccels::get<DeviceCwbvh>();
 
 }  // namespace ambilux

@@ -33,6 +33,8 @@ public:
         const std::shared_ptr<const CwbvhAccel> accel = accels.get<CwbvhAccel>();
         const double mean = policy_.light_walks && settings.variant != "streaming" ? mean_light_vertices<F>(scene.view(), accel->tracer(), policy_, settings.seed) : 0.0;
         plan_cache(policy_, mean);
+        device_scene_ = accels.get<DeviceScene>();
+        device_accel_ = accels.get<DeviceCwbvh>();
         // Samples that share a cache of light vertices depend on each other, but by one part in the number of light walks only.
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
@@ -47,8 +49,6 @@ public:
         }
         policy_.tail_below = tail_walks(settings, wave_.slot_count());
         values_ = uint64_t(wave_.width) * wave_.height * 3;
-        device_scene_.emplace(scene);
-        device_accel_.emplace(accel->arrays());
         sum_ = DeviceBuffer<double>(values_, "film");
         sum_squares_ = DeviceBuffer<double>(values_, "film");
         splats_ = DeviceBuffer<int64_t>(values_ * wave_.samples, "splats");
@@ -223,8 +223,8 @@ private:
     Layout layout_;
     uint64_t values_ = 0, samples_ = 0, film_samples_ = 0;
     double build_seconds_ = 0, render_seconds_ = 0;
-    std::optional<DeviceScene> device_scene_;
-    std::optional<DeviceCwbvh> device_accel_;
+    std::shared_ptr<const DeviceScene> device_scene_;
+    std::shared_ptr<const DeviceCwbvh> device_accel_;
     DeviceBuffer<std::byte> memory_;
     DeviceBuffer<double> sum_, sum_squares_;
     DeviceBuffer<int64_t> splats_, techniques_;

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "backends/cuda_device.h"
 #include "core/error.h"
 #include "scene/accel/cwbvh.h"
 #include "scene/accel/embree_tracer.h"
@@ -40,21 +41,23 @@ RenderSettings settings_of(const RenderSettings& settings, const ChoiceCandidate
 /// Candidates of one family do the same but for the number of draws, so that the time of one tells that of the others.
 uint32_t family(const ChoiceCandidate& c) { return (c.pilot.light ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0); }
 
-/// Seconds per sample of every pixel. On a device: of one full wave, smaller than a render's for the sake of time.
+/// Seconds per sample of every pixel. On a device: of about one full wave, smaller than a render's for the sake of time.
 double timed(const Scene& scene, RenderSettings settings, bool cuda, const MakeRenderer& make) {
     constexpr double kLongEnough = 0.05;
     constexpr uint32_t kPathsPerWave = 1u << 21;
     if (cuda && settings.wave_size == 0 && settings.variant != "streaming") settings.wave_size = kPathsPerWave;
     const std::unique_ptr<Renderer> renderer = make(settings);
-    const uint32_t pixels = scene.sensor.crop_width * scene.sensor.crop_height, count = cuda ? std::max(1u, kPathsPerWave / std::max(1u, pixels)) : 1;
-    double seconds = 0;
-    // The second time, unless the first was long enough for what only the first launch costs not to matter.
-    for (uint32_t i = 0; i < 2 && seconds < kLongEnough; ++i) {
+    const uint32_t pixels = scene.sensor.crop_width * scene.sensor.crop_height;
+    const uint32_t count = cuda ? std::clamp(kPathsPerWave / std::max(1u, pixels), 1u, renderer->preferred_batch()) : 1;
+    const auto seconds_of = [&](uint32_t first, uint32_t samples) {
         const auto start = Clock::now();
-        renderer->render(kFirstTimedSample + i * count, count);
-        seconds = seconds_since(start);
-    }
-    return seconds / count;
+        renderer->render(first, samples);
+        return seconds_since(start);
+    };
+    // The first launch bears what later ones do not. It is short, and counts only where it was long enough for that not to matter.
+    const double once = seconds_of(kFirstTimedSample, 1);
+    if (count == 1 && once >= kLongEnough) return once;
+    return seconds_of(kFirstTimedSample + 1, count) / count;
 }
 
 /// A renderer that also tells how it was chosen.
@@ -145,7 +148,8 @@ std::vector<double> choice_variances(const ChoicePilot& pilot) {
 
 std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda, SharedAccels& accels, const MakeRenderer& make) {
     check_automatic(settings);
-    // Any render builds this: it is no cost of the choice.
+    // Any render builds this, and wakes the device: it is no cost of the choice.
+    if (cuda) cuda_device_present();
     const bool cwbvh = cuda || settings.accel == "cwbvh";
     if (cwbvh)
         accels.get<CwbvhAccel>();

@@ -17,7 +17,7 @@ namespace {
 constexpr uint32_t kPixelSamples = 4;
 constexpr uint32_t kMostBlocks = 32;  ///< a side
 constexpr uint32_t kSmallestBlock = 4;  ///< pixels
-constexpr uint32_t kWalksPerTask = 64;
+constexpr uint32_t kWalksPerTask = 32;
 constexpr uint32_t kMostCandidates = 8;
 /// A candidate that finds a path this much less often than the pilot does may show it as single bright pixels.
 constexpr float kRareShare = 0.02f;
@@ -112,16 +112,15 @@ public:
 
     ChoicePilot run() {
         const uint32_t count = result_.blocks_x * result_.blocks_y, n = result_.samples;
-        std::vector<LightTask> tasks((n + kWalksPerTask - 1) / kWalksPerTask);
+        tasks_.resize((n + kWalksPerTask - 1) / kWalksPerTask);
         if (policy_.light_walks)
-            parallel_for(uint32_t(tasks.size()), [&](uint32_t t) {
+            parallel_for(uint32_t(tasks_.size()), [&](uint32_t t) {
                 for (uint32_t i = t * kWalksPerTask; i < std::min(n, (t + 1) * kWalksPerTask); ++i) {
-                    light_walk(i, tasks[t]);
-                    tasks[t].ends.push_back(uint32_t(tasks[t].vertices.size()));
+                    light_walk(i, tasks_[t]);
+                    tasks_[t].ends.push_back(uint32_t(tasks_[t].vertices.size()));
                 }
             });
-        std::vector<SplatEvent> splats;
-        gather(tasks, splats);
+        gather();
         std::vector<Sums> pixels(size_t(count) * pixels_);
         std::vector<PilotWork> work(count);
         parallel_for(count, [&](uint32_t b) { eye_block(b, &pixels[size_t(b) * pixels_], work[b]); });
@@ -135,7 +134,7 @@ public:
             result_.work.draw_rays += w.draw_rays / n;
         }
         result_.light_vertices = double(vertices_.size()) / n;
-        normalise(pixels, splats);
+        normalise(pixels);
         return result_;
     }
 
@@ -244,15 +243,16 @@ private:
         }
     }
 
-    void gather(std::vector<LightTask>& tasks, std::vector<SplatEvent>& splats) {
+    /// Vertices and splats stay where they are: they are large.
+    void gather() {
+        first_.reserve(result_.samples + 1);
         first_.push_back(0);
-        for (LightTask& t : tasks) {
+        for (const LightTask& t : tasks_) {
             for (const uint32_t end : t.ends) first_.push_back(uint32_t(vertices_.size()) + end);
-            vertices_.insert(vertices_.end(), t.vertices.begin(), t.vertices.end());
-            splats.insert(splats.end(), t.splats.begin(), t.splats.end());
+            for (const PilotVertex& v : t.vertices) vertices_.push_back(&v);
+            for (const SplatEvent& e : t.splats) splats_.push_back(&e);
             result_.work.light_rays += t.rays / result_.samples;
             result_.work.splats += t.splat_rays / result_.samples;
-            t = {};
         }
         first_.resize(result_.samples + 1, uint32_t(vertices_.size()));
     }
@@ -440,7 +440,7 @@ private:
         work.vertices += 1;
         Event e;
         for (uint32_t v = first_[eye.number]; v < first_[eye.number + 1]; ++v) {
-            if (!connection(eye, vertices_[v], z, vertices_[v].depth, e, work.pairs, work.pair_rays)) continue;
+            if (!connection(eye, *vertices_[v], z, vertices_[v]->depth, e, work.pairs, work.pair_rays)) continue;
             add_event(e, eye.pixel);
             for (uint32_t c = 0; c < candidates_.size(); ++c) {
                 if (!candidates_[c].connect || candidates_[c].draws > 0) continue;
@@ -453,7 +453,7 @@ private:
         Event drawn[2];
         bool made[2];
         double tried = 0, rays = 0;
-        for (uint32_t d = 0; d < 2; ++d) made[d] = connection(eye, vertices_[which[d]], z, WalkBits::kMaxDepth + d, drawn[d], tried, rays);
+        for (uint32_t d = 0; d < 2; ++d) made[d] = connection(eye, *vertices_[which[d]], z, WalkBits::kMaxDepth + d, drawn[d], tried, rays);
         work.draws += tried / 2;
         work.draw_rays += rays / 2;
         if (!made[0] && !made[1]) return;
@@ -484,76 +484,94 @@ private:
     }
 
     /// Sums of pixels and splats to variances of blocks, relative to their squared means.
-    void normalise(const std::vector<Sums>& pixels, const std::vector<SplatEvent>& splats) {
+    void normalise(const std::vector<Sums>& pixels) {
         const uint32_t count = result_.blocks_x * result_.blocks_y;
         const double samples = double(pixels_) * kPixelSamples;
         std::vector<Mean> block(count), scale(count);
         for (size_t p = 0; p < pixels.size(); ++p)
             for (int k = 0; k < 3; ++k) block[p / pixels_].of[k] += pixels[p].mean[k] / samples;
-        std::vector<Sums> sums(splats.size());
-        for (size_t i = 0; i < splats.size(); ++i) {
-            add_event(splats[i].event, sums[i]);
-            for (int k = 0; k < 3; ++k) {
-                block[splats[i].block].of[k] += sums[i].mean[k] / samples;
-                if (splats[i].seen) sums[i].seen[k] = double(splats[i].radiance[k]);
-            }
-        }
+        for (const SplatEvent* s : splats_)
+            for (int k = 0; k < 3; ++k) block[s->block].of[k] += double(s->event.value[k] * (s->event.coverage / s->event.total())) / samples;
         blur(block, scale);
         result_.variance.assign(candidates_.size(), std::vector<double>(count));
-        result_.blind.assign(candidates_.size(), false);
+        std::array<bool, kMostCandidates> blind{};
+        parallel_for(uint32_t(candidates_.size()), [&](uint32_t c) { blind[c] = !judge(c, pixels, scale, result_.variance[c]); });
+        result_.blind.assign(blind.begin(), blind.begin() + ptrdiff_t(candidates_.size()));
+    }
+
+    /// The variance of one candidate in every block. False if it cannot find some of the light.
+    bool judge(uint32_t c, const std::vector<Sums>& pixels, const std::vector<Mean>& scale, std::vector<double>& variance) const {
+        const double samples = double(pixels_) * kPixelSamples;
+        // Outliers: the brightest contributions that after kChoiceSamples samples are in kChoiceTrimmed of the pixels. There they are left out, and elsewhere their light is missing.
         struct Rare {
+            double size;
             const Event* event;
             uint32_t block;
-            double scale2[3];
+            float sum;
+            std::array<double, 3> scale2;
         };
         std::vector<Rare> rare;
-        const auto add = [&](const Sums& s, uint32_t b) {
-            double scale2[3];
-            for (int k = 0; k < 3; ++k) scale2[k] = sqr(std::max(scale[b].of[k], s.seen[k])) + 0.01;
-            for (const Event& e : s.rare) rare.push_back({&e, b, {scale2[0], scale2[1], scale2[2]}});
-            for (size_t c = 0; c < candidates_.size(); ++c) {
-                // Without emitters of no extent, eye walks can meet whatever there is: zeros are rounding.
-                if (delta_emitters_ && s.blind[c]) result_.blind[c] = true;
-                for (int k = 0; k < 3; ++k) result_.variance[c][b] += s.variance[c][k] / (3.0 * samples * scale2[k]);
-            }
+        bool blind = false;
+        const auto scale2_of = [&](uint32_t b, const auto& seen) {
+            std::array<double, 3> scale2;
+            for (int k = 0; k < 3; ++k) scale2[k] = sqr(std::max(scale[b].of[k], double(seen[k]))) + 0.01;
+            return scale2;
         };
-        for (size_t p = 0; p < pixels.size(); ++p) add(pixels[p], uint32_t(p / pixels_));
-        for (size_t i = 0; i < splats.size(); ++i) add(sums[i], splats[i].block);
-
-        // Outliers: the brightest contributions that after kChoiceSamples samples are in kChoiceTrimmed of the pixels. There they are left out, and elsewhere their light is missing.
-        struct Outlier {
-            double size;
-            const Rare* rare;
+        const auto add_rare = [&](const Event& e, uint32_t b, const std::array<double, 3>& scale2, float sum) {
+            if (!(sum > 0.0f && sum < kRareShare * e.total())) return;
+            double size = 0;
+            for (int k = 0; k < 3; ++k) size = std::max(size, double(e.value[k]) / (double(sum) * std::sqrt(scale2[k])));
+            rare.push_back({size, &e, b, sum, scale2});
         };
-        std::vector<Outlier> outliers;
-        std::vector<Mean> lost(count);
-        for (uint32_t c = 0; c < candidates_.size(); ++c) {
-            outliers.clear();
-            for (const Rare& r : rare) {
-                const float sum = sum_of(c, r.event->shares);
-                if (!(sum > 0.0f && sum < kRareShare * r.event->total())) continue;
-                double size = 0;
-                for (int k = 0; k < 3; ++k) size = std::max(size, double(r.event->value[k]) / (double(sum) * std::sqrt(r.scale2[k])));
-                outliers.push_back({size, &r});
-            }
-            std::sort(outliers.begin(), outliers.end(), [](const Outlier& a, const Outlier& b) { return a.size > b.size; });
-            std::fill(lost.begin(), lost.end(), Mean{});
-            double share = 0;
-            for (const Outlier& o : outliers) {
-                const Event& e = *o.rare->event;
-                const float sum = sum_of(c, e.shares);
-                share += double(e.coverage) * double(sum) / double(e.total()) / double(result_.samples);
-                if (share > kChoiceTrimmed / kChoiceSamples) break;
-                for (int k = 0; k < 3; ++k) {
-                    result_.variance[c][o.rare->block] -= second_moment(c, e, sum) * sqr(double(e.value[k])) / (3.0 * samples * o.rare->scale2[k]);
-                    lost[o.rare->block].of[k] += double(e.coverage) * double(e.value[k]) / double(e.total()) / samples;
-                }
-            }
-            std::vector<Mean> smooth(count);
-            blur(lost, smooth);
-            for (uint32_t b = 0; b < count; ++b)
-                for (int k = 0; k < 3; ++k) result_.variance[c][b] += kChoiceSamples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale[b].of[k]) + 0.01));
+        for (size_t p = 0; p < pixels.size(); ++p) {
+            const Sums& s = pixels[p];
+            const uint32_t b = uint32_t(p / pixels_);
+            const std::array<double, 3> scale2 = scale2_of(b, s.seen);
+            blind |= s.blind[c];
+            for (int k = 0; k < 3; ++k) variance[b] += s.variance[c][k] / (3.0 * samples * scale2[k]);
+            for (const Event& e : s.rare) add_rare(e, b, scale2, sum_of(c, e.shares));
         }
+        for (const SplatEvent* s : splats_) {
+            const Event& e = s->event;
+            const float sum = sum_of(c, e.shares);
+            if (!(sum > 0.0f)) {
+                blind = true;
+                continue;
+            }
+            const std::array<double, 3> scale2 = scale2_of(s->block, s->seen ? s->radiance : Rgb{0.0f, 0.0f, 0.0f});
+            const double moment = second_moment(c, e, sum);
+            for (int k = 0; k < 3; ++k) variance[s->block] += moment * sqr(double(e.value[k])) / (3.0 * samples * scale2[k]);
+            add_rare(e, s->block, scale2, sum);
+        }
+
+        std::vector<Mean> lost(scale.size()), smooth(scale.size());
+        // Which are the largest matters, not their order: of what is in question the larger half is taken, or the other half is left.
+        double share = 0;
+        auto taken = rare.begin();
+        for (auto end = rare.end(); taken != end;) {
+            const auto middle = taken + (end - taken) / 2 + 1;
+            std::nth_element(taken, middle - 1, end, [](const Rare& a, const Rare& b) { return a.size > b.size; });
+            double more = 0;
+            for (auto r = taken; r != middle; ++r) more += double(r->event->coverage) * double(r->sum) / double(r->event->total()) / double(result_.samples);
+            if (share + more <= kChoiceTrimmed / kChoiceSamples) {
+                share += more;
+                taken = middle;
+            } else {
+                end = middle - 1;
+            }
+        }
+        for (auto r = rare.begin(); r != taken; ++r) {
+            const Event& e = *r->event;
+            for (int k = 0; k < 3; ++k) {
+                variance[r->block] -= second_moment(c, e, r->sum) * sqr(double(e.value[k])) / (3.0 * samples * r->scale2[k]);
+                lost[r->block].of[k] += double(e.coverage) * double(e.value[k]) / double(e.total()) / samples;
+            }
+        }
+        blur(lost, smooth);
+        for (uint32_t b = 0; b < scale.size(); ++b)
+            for (int k = 0; k < 3; ++k) variance[b] += kChoiceSamples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale[b].of[k]) + 0.01));
+        // Without emitters of no extent, eye walks can meet whatever there is: zeros are rounding.
+        return !(delta_emitters_ && blind);
     }
 
     ChoicePilot result_;
@@ -566,7 +584,9 @@ private:
     uint32_t pixels_ = 0;  ///< of a block
     float filter_energy_ = 1;
     bool delta_emitters_ = false;
-    std::vector<PilotVertex> vertices_;
+    std::vector<LightTask> tasks_;
+    std::vector<const PilotVertex*> vertices_;  ///< of all tasks
+    std::vector<const SplatEvent*> splats_;
     std::vector<uint32_t> first_;  ///< vertex of each light walk
 };
 

@@ -28,13 +28,17 @@ public:
     PathCuda(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : scene_(scene), policy_(make_path_policy(scene, settings)) {
         const auto start = Clock::now();
-        std::shared_ptr<const CwbvhAccel> wide;
-        std::optional<PairAccel> pairs;
         const bool binary = settings.accel == "bvh2";
-        if (binary)
-            pairs.emplace(scene);
-        else
-            wide = accels.get<CwbvhAccel>();
+        device_scene_ = accels.get<DeviceScene>();
+        uint64_t structure_bytes;
+        if (binary) {
+            const PairAccel pairs(scene);
+            structure_bytes = pairs.memory_bytes();
+            device_pairs_.emplace(pairs.arrays());
+        } else {
+            structure_bytes = accels.get<CwbvhAccel>()->memory_bytes();
+            device_accel_ = accels.get<DeviceCwbvh>();
+        }
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
         Layout million;
@@ -45,14 +49,10 @@ public:
         const uint64_t temporary = order_temporary_bytes(policy_.queues, wave_.slot_count());
         lay_out_order(layout_, policy_.queues, wave_.slot_count(), temporary);
         values_ = uint64_t(wave_.width) * wave_.height * 3;
-        predicted_bytes_ = DeviceScene::predicted_bytes(scene) + (binary ? pairs->memory_bytes() : wide->memory_bytes()) + layout_.bytes() + 2 * values_ * sizeof(double) + sizeof(uint64_t);
-        check_memory(predicted_bytes_, free, wave_.slot_count());
+        const uint64_t own = layout_.bytes() + 2 * values_ * sizeof(double) + sizeof(uint64_t);
+        predicted_bytes_ = DeviceScene::predicted_bytes(scene) + structure_bytes + own;
+        check_memory(own, free, wave_.slot_count());
 
-        device_scene_.emplace(scene);
-        if (binary)
-            device_pairs_.emplace(pairs->arrays());
-        else
-            device_accel_.emplace(wide->arrays());
         memory_ = DeviceBuffer<std::byte>(layout_.bytes());
         memory_.zero();
         sum_ = DeviceBuffer<double>(values_);
@@ -158,10 +158,10 @@ private:
     Layout layout_;
     uint64_t values_ = 0, predicted_bytes_ = 0, samples_ = 0, film_samples_ = 0, measured_samples_ = 0;
     double build_seconds_ = 0, render_seconds_ = 0, measured_seconds_ = 0;
-    std::optional<DeviceScene> device_scene_;
+    std::shared_ptr<const DeviceScene> device_scene_;
     using Executor = BasicCudaExecutor<true>;
 
-    std::optional<DeviceCwbvh> device_accel_;
+    std::shared_ptr<const DeviceCwbvh> device_accel_;
     std::optional<DevicePairs> device_pairs_;  ///< instead, with accel=bvh2
     DeviceBuffer<std::byte> memory_;
     DeviceBuffer<double> sum_, sum_squares_;

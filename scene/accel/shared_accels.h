@@ -1,4 +1,4 @@
-// Acceleration structures of one scene for several renderers.
+// What several renderers of one scene have in common: acceleration structures, and copies on a device.
 #pragma once
 
 #include <memory>
@@ -9,20 +9,24 @@ namespace ambilux {
 
 class CwbvhAccel;
 class EmbreeAccel;
+class DeviceScene;
+class DeviceCwbvh;
 
-/// Each is built when it is first asked for. The scene must outlive them.
+/// Each is made when it is first asked for, and lives as long as this object or a renderer that holds it. The scene must not change meanwhile and must outlive them.
 class SharedAccels {
 public:
     explicit SharedAccels(const Scene& scene) : scene_(scene) {}
 
-    /// `Accel`: CwbvhAccel or EmbreeAccel.
-    template <class Accel>
-    std::shared_ptr<const Accel> get();
+    /// `T`: CwbvhAccel, EmbreeAccel; in builds with CUDA also DeviceScene, DeviceCwbvh (backends/cuda/device_scene.h).
+    template <class T>
+    std::shared_ptr<const T> get();
 
 private:
     const Scene& scene_;
     std::shared_ptr<const CwbvhAccel> cwbvh_;
     std::shared_ptr<const EmbreeAccel> embree_;
+    std::shared_ptr<const DeviceScene> device_scene_;
+    std::shared_ptr<const DeviceCwbvh> device_cwbvh_;
 };
 
 template <>

@@ -1,0 +1,89 @@
+// libs: ambilux_integrators ambilux_film ambilux_scene ambilux_core
+// labels: gpu
+// What renderers of one scene share on a device, and choices that are made there.
+#include "backends/cuda/device_scene.h"
+#include "integrators/bidirectional/bidirectional.h"
+#include "integrators/path/path.h"
+#include "tests/bidirectional_images.h"
+
+using namespace ambilux;
+
+namespace {
+
+bool device() {
+    if (cuda_available()) return true;
+    WARN("no CUDA device: skipped");
+    return false;
+}
+
+RenderSettings fixed_settings(const Scene& scene, const char* integrator) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis);
+    s.backend = "cuda";
+    s.integrator = integrator;
+    s.fuse = Fuse::all;
+    s.queues.ordering = Ordering::none;
+    return s;
+}
+
+}  // namespace
+
+TEST_CASE("renderers of one scene share its copy on the device, which lives as long as any of them") {
+    if (!device()) return;
+    const Scene scene = project_scene("textured", 64, 48);
+    const RenderSettings path = fixed_settings(scene, "path"), light = fixed_settings(scene, "light");
+    std::unique_ptr<Renderer> a, b;
+    std::weak_ptr<const DeviceScene> copy;
+    std::weak_ptr<const DeviceCwbvh> structure;
+    {
+        SharedAccels accels(scene);
+        a = make_path_cuda(scene, path, accels);
+        b = make_bidirectional_cuda(scene, light, accels);
+        copy = accels.get<DeviceScene>();
+        structure = accels.get<DeviceCwbvh>();
+        CHECK(accels.get<DeviceScene>() == copy.lock());
+        CHECK(copy.use_count() == 3);
+        CHECK(structure.use_count() == 3);
+    }
+    CHECK(copy.use_count() == 2);
+    const auto check = [&](Renderer& shared, const RenderSettings& settings) {
+        REQUIRE(shared.render(0, 4) == 4);
+        const RenderResult own = render_scene(scene, settings, 4);
+        CHECK(shared.film().sum == own.film.sum);
+        CHECK(shared.stats().memory_bytes == own.stats.memory_bytes);
+        CHECK(shared.stats().memory_bytes == shared.stats().memory_bytes_predicted);
+    };
+    check(*b, light);
+    b.reset();
+    check(*a, path);
+    CHECK(copy.use_count() == 1);
+    CHECK(structure.use_count() == 1);
+    a.reset();
+    CHECK(copy.expired());
+    CHECK(structure.expired());
+}
+
+TEST_CASE("what is chosen on a device renders as if its settings had been given, in as much memory") {
+    if (!device()) return;
+    bool timed = false;
+    for (const char* name : {"cornell", "glass", "lights", "materials"}) {
+        const Scene scene = project_scene(name, 96, 64);
+        RenderSettings s = cpu_settings(scene, Estimator::mis, 5);
+        s.backend = "cuda";
+        s.integrator = "bdpt";
+        s.automatic = true;
+        const RenderResult chosen = render_scene(scene, s, 4);
+        const ChoiceStats& choice = chosen.stats.choice;
+        INFO(name << ": " << choice.name);
+        REQUIRE_FALSE(choice.name.empty());
+        for (const ChoiceStats::Candidate& c : choice.candidates) timed |= c.seconds > 0;
+        s.automatic = false;
+        for (const auto& [key, value] : choice.settings) apply_setting(s, key, value);
+        const RenderResult again = render_scene(scene, s, 4);
+        CHECK(again.stats.rays_extend == chosen.stats.rays_extend);
+        CHECK(again.stats.memory_bytes == chosen.stats.memory_bytes);
+        CHECK(chosen.stats.memory_bytes == chosen.stats.memory_bytes_predicted);
+        // A cache of light vertices has another order in every run.
+        if (s.variant != "lvc") CHECK(worst_difference(again.film, mean_image(chosen.film)) < 1e-5);
+    }
+    CHECK(timed);
+}
