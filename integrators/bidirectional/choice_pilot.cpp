@@ -438,6 +438,10 @@ private:
     void connect(Eye& eye, const PilotVertex& z) const {
         PilotWork& work = eye.work;
         work.vertices += 1;
+        const Uint4 bits = random_bits(eye.key, cache_block(z.depth, 0));
+        const PilotVertex* drawn_vertices[2] = {vertices_[mul_hi(bits.x, uint32_t(vertices_.size()))], vertices_[mul_hi(bits.y, uint32_t(vertices_.size()))]};
+        for (const PilotVertex* v : drawn_vertices)
+            for (uint32_t at = 0; at < sizeof(PilotVertex); at += 64) __builtin_prefetch(reinterpret_cast<const char*>(v) + at);
         Event e;
         for (uint32_t v = first_[eye.number]; v < first_[eye.number + 1]; ++v) {
             if (!connection(eye, *vertices_[v], z, vertices_[v]->depth, e, work.pairs, work.pair_rays)) continue;
@@ -448,12 +452,10 @@ private:
                 eye.sums[c].add(value, value, 1.0);
             }
         }
-        const Uint4 bits = random_bits(eye.key, cache_block(z.depth, 0));
-        const uint32_t which[2] = {mul_hi(bits.x, uint32_t(vertices_.size())), mul_hi(bits.y, uint32_t(vertices_.size()))};
         Event drawn[2];
         bool made[2];
         double tried = 0, rays = 0;
-        for (uint32_t d = 0; d < 2; ++d) made[d] = connection(eye, *vertices_[which[d]], z, WalkBits::kMaxDepth + d, drawn[d], tried, rays);
+        for (uint32_t d = 0; d < 2; ++d) made[d] = connection(eye, *drawn_vertices[d], z, WalkBits::kMaxDepth + d, drawn[d], tried, rays);
         work.draws += tried / 2;
         work.draw_rays += rays / 2;
         if (!made[0] && !made[1]) return;
