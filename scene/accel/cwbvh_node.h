@@ -7,6 +7,12 @@
 #include "scene/accel/reciprocal.h"
 #include "scene/ray.h"
 
+// All eight children of a node at once, on hosts that have the instructions.
+#if defined(__AVX2__) && defined(__FMA__) && defined(__BMI2__) && !defined(__CUDACC__)
+#define AMBILUX_WIDE_BOXES
+#include <immintrin.h>
+#endif
+
 namespace ambilux {
 
 /// Eight children in boxes quantised to a grid of 256 steps per axis from `p`. Inner children follow each other at `first_child`, primitives of leaves at
@@ -163,6 +169,15 @@ AMBILUX_HD uint32_t child_bits(const SlabAxis& x, const SlabAxis& y, const SlabA
     return near <= (far < tmax ? far : tmax) ? 1u << (24 + Slot) | 7u << (3 * Slot) : 0u;
 }
 
+#if defined(AMBILUX_WIDE_BOXES)
+/// t of one plane of each child, bits as child_bits() has them.
+inline __m256i planes_of_children(const uint32_t (&bytes)[2], float scale, float corner) {
+    const __m256i mantissa = _mm256_slli_epi32(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(bytes))), 8);
+    const __m256 in_steps = _mm256_castsi256_ps(_mm256_or_si256(mantissa, _mm256_set1_epi32(0x3f800000)));
+    return _mm256_castps_si256(_mm256_fmadd_ps(in_steps, _mm256_set1_ps(scale), _mm256_set1_ps(corner)));
+}
+#endif
+
 /// Moves bit s of the upper byte to 24 + (s ^ axes of `order`): exchanges neighbours, pairs, halves.
 AMBILUX_HD uint32_t sort_slots(uint32_t hits, uint32_t order) {
     uint32_t t = (hits ^ hits >> 1) & (order & 0x100u) * 0x550000u;
@@ -182,6 +197,15 @@ AMBILUX_HD uint32_t child_hits(const CwbvhNode& node, const CwbvhRay& ray, float
     const detail::SlabAxis z = detail::slab_axis(node.p[2], bits_float(node.scale_xz << 16), ray.o.z, ray.inverse_d.z);
     const bool px = ray.inverse_d.x >= 0.0f, py = ray.inverse_d.y >= 0.0f, pz = ray.inverse_d.z >= 0.0f;
     const int end = int(float_bits(tmax));
+#if defined(AMBILUX_WIDE_BOXES)
+    const auto planes = detail::planes_of_children;
+    const __m256i near = _mm256_max_epi32(_mm256_max_epi32(planes(px ? node.lower_x : node.upper_x, x.scale, x.near), planes(py ? node.lower_y : node.upper_y, y.scale, y.near)),
+                                          planes(pz ? node.lower_z : node.upper_z, z.scale, z.near));
+    const __m256i far = _mm256_min_epi32(_mm256_min_epi32(planes(px ? node.upper_x : node.lower_x, x.scale, x.far), planes(py ? node.upper_y : node.lower_y, y.scale, y.far)),
+                                         _mm256_min_epi32(planes(pz ? node.upper_z : node.lower_z, z.scale, z.far), _mm256_set1_epi32(end)));
+    const uint32_t met = ~uint32_t(_mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(near, far)))) & 0xffu;
+    return (met << 24 | 7u * _pdep_u32(met, 0x249249u)) & node.valid;
+#else
     uint32_t hits = 0;
     {
         const uint32_t near_x = px ? node.lower_x[0] : node.upper_x[0], far_x = px ? node.upper_x[0] : node.lower_x[0];
@@ -202,6 +226,7 @@ AMBILUX_HD uint32_t child_hits(const CwbvhNode& node, const CwbvhRay& ray, float
         hits |= detail::child_bits<7>(x, y, z, near_x, near_y, near_z, far_x, far_y, far_z, ray.order, end);
     }
     return hits & node.valid;
+#endif
 }
 
 /// Splits what child_hits() says into inner nodes, first along the ray first unless any order will do, and primitives.
