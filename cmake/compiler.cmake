@@ -1,8 +1,9 @@
 # One interface target that carries include paths and flags for all of the project.
 add_library(ambilux_options INTERFACE)
 target_include_directories(ambilux_options INTERFACE ${PROJECT_SOURCE_DIR})
+# Compilers contract a*b+c differently in every copy of an inlined function; without that, images do not depend on which stages are inlined where.
 target_compile_options(ambilux_options INTERFACE
-  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wshadow -fno-math-errno>)
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wshadow -fno-math-errno -ffp-contract=off>)
 if(AMBILUX_MARCH)
   target_compile_options(ambilux_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-march=${AMBILUX_MARCH}>)
 endif()
