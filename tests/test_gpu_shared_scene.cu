@@ -22,6 +22,7 @@ RenderSettings fixed_settings(const Scene& scene, const char* integrator) {
     s.integrator = integrator;
     s.fuse = Fuse::all;
     s.queues.ordering = Ordering::none;
+    s.deterministic = true;  // bits are compared
     return s;
 }
 
