@@ -63,7 +63,7 @@ struct StageRecord {
         nanoseconds += ns;
         items_by_depth[tracked(depth)] += new_items;
     }
-    /// An item that no launch was made for. Threads of a warp that call together are expected to mean the same depth more often than not.
+    /// An item that no launch was made for.
     AMBILUX_HD void count_item(uint32_t depth) {
         count_together(&items, 0);
         count_together(items_by_depth, tracked(depth));
