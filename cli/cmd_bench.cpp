@@ -61,7 +61,8 @@ int rays(const Options& o) {
 int stages(const Options& o) {
     if (o.spp < 1) throw Error(ExitCode::usage, "--spp: at least 1 is needed");
     const LoadedScene loaded = load_scene(o.scene);
-    const RenderSettings settings = o.render.settings(loaded.scene);
+    RenderSettings settings = o.render.settings(loaded.scene);
+    settings.expected_samples = o.spp;
     const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
     RenderPosition position;
     {

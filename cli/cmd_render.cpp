@@ -59,13 +59,14 @@ int render(const Options& o) {
     const LoadedScene loaded = load_scene(o.scene);
     RenderSettings settings = o.render.settings(loaded.scene);
     if (!o.techniques.empty() && settings.technique_depth == 0) settings.technique_depth = kDefaultTechniqueDepth;
-    const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
-
     Budget budget;
     if (o.time)
         budget.seconds = *o.time;
     else
         budget.samples = o.spp ? *o.spp : uint64_t(std::max(1, loaded.scene.integrator.spp));
+    settings.expected_samples = budget.samples;
+    const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
+
     RenderPosition position;
     // Choosing is part of the method: its time counts.
     if (const ChoiceStats choice = renderer->stats().choice; !choice.name.empty()) {

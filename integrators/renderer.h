@@ -41,6 +41,7 @@ struct RenderSettings {
     uint64_t seed = 0;
     std::string accel = "auto";          ///< cpu: embree (auto) or cwbvh (the CUDA traversal built for the host). cuda: cwbvh (auto) or, for integrator path, bvh2
     uint32_t wave_size = 0;              ///< paths in flight; 0 chooses
+    uint64_t expected_samples = 0;       ///< that will be asked for, of every pixel; 0: not known. Waves that are chosen for a device are no larger
     QueuePolicy queues = {Compaction::atomic, Ordering::automatic};  ///< keys compaction and ordering: where items lie and in which order stages go through them
     bool specialise = true;              ///< kernels hold only what the scene has
     Fuse fuse = Fuse::automatic;         ///< which stages pass their items on without a queue

@@ -260,6 +260,24 @@ TEST_CASE("G3, G8: a device's queues never overflow and its memory is what was p
     }
 }
 
+TEST_CASE("G8: waves of a device are no larger than the render") {
+    if (!device()) return;
+    const Scene scene = project_scene("lights", 97, 61);
+    RenderSettings s = on("cuda", cpu_settings(scene, Estimator::mis));
+    s.deterministic = true;
+    const RenderResult any = render_scene(scene, s, 3);
+    s.expected_samples = 3;
+    const RenderResult small = render_scene(scene, s, 3);
+    CHECK(small.film.sum == any.film.sum);
+    CHECK(small.stats.memory_bytes == small.stats.memory_bytes_predicted);
+    CHECK(small.stats.memory_bytes < 64u << 20);
+    CHECK(any.stats.memory_bytes > small.stats.memory_bytes);
+    s.expected_samples = 2;  // more come than were expected
+    CHECK(render_scene(scene, s, 3).film.sum == any.film.sum);
+    s.expected_samples = ~uint64_t(0);
+    CHECK(render_scene(scene, s, 1).stats.memory_bytes == any.stats.memory_bytes);
+}
+
 TEST_CASE("G8: more memory than the device has is refused before queues are allocated") {
     if (!device()) return;
     Scene scene = project_scene("cornell", 65535, 65536);

@@ -41,7 +41,7 @@ public:
         Layout million;
         lay_out(million, 1u << 20, planned_vertices(mean, 1u << 20), policy_);
         const uint64_t bytes_per_path = (million.bytes() >> 20) + 3 * sizeof(int64_t) + sizeof(Lane);
-        wave_.samples = std::max(1u, device_wave_size(settings, kWavePlateau, bytes_per_path, free) / slots);
+        wave_.samples = std::max(1u, device_wave_size(scene, settings, kWavePlateau, bytes_per_path, free) / slots);
         if (settings.variant == "streaming") {
             // Enough paths for each slot that the last ones, which leave slots idle, matter little.
             policy_.stream_slots = settings.wave_size ? settings.wave_size : kStreamSlots;

@@ -43,7 +43,7 @@ public:
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
         Layout million;
         lay_out(million, 1u << 20, policy_);
-        wave_ = shape_wave(scene, settings, device_wave_size(settings, kCudaWavePlateau, million.bytes() >> 20, free), ~0u);
+        wave_ = shape_wave(scene, settings, device_wave_size(scene, settings, kCudaWavePlateau, million.bytes() >> 20, free), ~0u);
         policy_.tail_below = tail_walks(settings, wave_.slot_count());
         lay_out(layout_, wave_.slot_count(), policy_);
         const uint64_t temporary = order_temporary_bytes(policy_.queues, wave_.slot_count());

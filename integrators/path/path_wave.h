@@ -22,11 +22,14 @@ PathPolicy make_path_policy(const Scene& scene, const RenderSettings& settings);
 /// Which tiles and samples fit into a wave of about `wave_size` paths. Throws Error(usage) if slots would not fit 32 bits.
 Wave shape_wave(const Scene& scene, const RenderSettings& settings, uint32_t wave_size, uint32_t max_tiles);
 
-/// Paths of a wave on a device where `settings` leave it open: `plateau`, from which on more do not pay, or as many as fit into half of the `free` bytes beside what other
-/// programs hold.
-inline uint32_t device_wave_size(const RenderSettings& settings, uint32_t plateau, uint64_t bytes_per_path, uint64_t free) {
+/// Paths of a wave on a device where `settings` leave it open: `plateau`, from which on more do not pay, or as many as the render has, or as fit into half of the `free` bytes beside
+/// what other programs hold.
+inline uint32_t device_wave_size(const Scene& scene, const RenderSettings& settings, uint32_t plateau, uint64_t bytes_per_path, uint64_t free) {
     if (settings.wave_size > 0) return settings.wave_size;
-    return uint32_t(std::clamp<uint64_t>(free / 2 / bytes_per_path, kTilePixels, plateau));
+    const auto tiles = [](uint32_t pixels) { return uint64_t(pixels + kTileSide - 1) / kTileSide; };
+    const uint64_t slots = tiles(scene.sensor.crop_width) * tiles(scene.sensor.crop_height) * kTilePixels;
+    const bool fewer = settings.expected_samples > 0 && settings.expected_samples <= plateau / slots;
+    return uint32_t(std::clamp<uint64_t>(free / 2 / bytes_per_path, kTilePixels, fewer ? slots * settings.expected_samples : plateau));
 }
 
 /// PathPolicy::tail_below, for waves of `slots`. Walks of a tail may bring several contributions in one launch: their sums depend on the order of threads, and queues have room for that
