@@ -296,6 +296,7 @@ private:
             made.automatic = false;
             for (const auto& [key, value] : total.choice.settings) hooks_.apply_setting(made, key, value);
         }
+        for (const Checkpoint& c : checkpoints_) made.expected_samples = std::max(made.expected_samples, c.samples);
         const std::unique_ptr<Renderer> renderer = hooks_.make_renderer(scene.scene, made);
         RenderPosition position{state.moments.samples, state.notes["seconds"].get<double>(), false};
         // Choosing is part of the method: its time counts.

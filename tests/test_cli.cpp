@@ -254,6 +254,9 @@ TEST_CASE("Ctrl-C saves what is done and ends with code 5") {
         const pid_t child = start(folder, render(folder, {"--spp", "100000000", "--json", folder / "a.json"}));
         std::this_thread::sleep_for(std::chrono::milliseconds(1500));
         ::kill(child, signal);
+        // As `timeout` does: once to the process, at once again to its group.
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        ::kill(child, signal);
         const Outcome o = finish(folder, child);
         CAPTURE(signal, o.err);
         CHECK(o.code == 5);

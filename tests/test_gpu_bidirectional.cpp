@@ -8,16 +8,11 @@
 #include "core/error.h"
 #include "film/image.h"
 #include "tests/bidirectional_images.h"
+#include "tests/gpu_device.h"
 
 using namespace ambilux;
 
 namespace {
-
-bool device() {
-    if (cuda_available()) return true;
-    WARN("no CUDA device: skipped");
-    return false;
-}
 
 RenderSettings settings_of(const Scene& scene, const char* integrator, const char* variant, const char* backend) {
     RenderSettings s = cpu_settings(scene, Estimator::mis);
@@ -79,12 +74,12 @@ TEST_CASE("The last walks of light and eye find the same light, several depths i
                 for (const StageStats& n : none.stats.stages) {
                     if (t.name != n.name) continue;
                     INFO(t.name);
-                    // Connections of a cache are those of other vertices in every run.
-                    const double share = s.variant == "lvc" && (t.name == "occlude" || t.name == "connect_vertices") ? 5e-3 : 1e-3;
-                    CHECK(std::fabs(double(t.items) - double(n.items)) <= share * double(n.items));
+                    // Connections of a cache are those of other vertices in every run; else walks differ where kernels round differently.
+                    const double share = s.variant == "lvc" && t.name == "occlude" ? 5e-3 : 1e-5;
+                    CHECK(std::fabs(double(t.items) - double(n.items)) <= share * double(n.items) + 3);
                     if (t.name == "shade" || t.name == "light_shade") CHECK(t.launches < n.launches);
                 }
-            if (s.variant == "wavefront") CHECK(agreeing_pixels(tail.film, none.film) >= 0.99);
+            if (s.variant == "wavefront") CHECK(agreeing_pixels(tail.film, none.film) >= 0.999);
             for (const QueueStats& q : tail.stats.queues) CHECK(q.overflow == 0);
         }
     }

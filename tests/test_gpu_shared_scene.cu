@@ -5,16 +5,11 @@
 #include "integrators/bidirectional/bidirectional.h"
 #include "integrators/path/path.h"
 #include "tests/bidirectional_images.h"
+#include "tests/gpu_device.h"
 
 using namespace ambilux;
 
 namespace {
-
-bool device() {
-    if (cuda_available()) return true;
-    WARN("no CUDA device: skipped");
-    return false;
-}
 
 RenderSettings fixed_settings(const Scene& scene, const char* integrator) {
     RenderSettings s = cpu_settings(scene, Estimator::mis);
