@@ -65,6 +65,7 @@ int render(const Options& o) {
     else
         budget.samples = o.spp ? *o.spp : uint64_t(std::max(1, loaded.scene.integrator.spp));
     settings.expected_samples = budget.samples;
+    settings.expected_seconds = budget.seconds;
     const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
 
     RenderPosition position;

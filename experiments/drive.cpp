@@ -21,14 +21,15 @@ RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& 
             position.interrupted = true;
             break;
         }
-        uint64_t count = std::max<uint32_t>(1, renderer.preferred_batch());
+        const uint64_t ready = position.samples == 0 ? renderer.ready() : 0;
+        uint64_t count = std::max<uint64_t>({1, renderer.preferred_batch(), ready});
         if (budget.samples) {
             if (position.samples >= budget.samples) break;
             count = std::min(count, budget.samples - position.samples);
         }
         if (budget.seconds > 0) {
             // Begin small, since nothing is known, and grow by at most four, since the first sample may not be typical.
-            count = std::min(count, std::max<uint64_t>(1, 4 * last_count));
+            count = std::min(count, ready ? ready : std::max<uint64_t>(1, 4 * last_count));
             const double left = budget.seconds - position.seconds;
             if (left <= 0 && position.samples > 0) break;
             if (per_sample > 0) {
@@ -47,8 +48,8 @@ RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& 
             if (!is_set(interrupt)) throw Error(ExitCode::device, "the renderer stopped without a reason");
             position.interrupted = true;
         }
-        if (done > 0) per_sample = seconds / done;
-        last_count = count;
+        if (done > 0 && !ready) per_sample = seconds / done;
+        last_count = ready ? std::max<uint64_t>(1, count / 4) : count;
         if (on_batch) on_batch(position);
     }
     return position;

@@ -296,7 +296,11 @@ private:
             made.automatic = false;
             for (const auto& [key, value] : total.choice.settings) hooks_.apply_setting(made, key, value);
         }
-        for (const Checkpoint& c : checkpoints_) made.expected_samples = std::max(made.expected_samples, c.samples);
+        for (const Checkpoint& c : checkpoints_) {
+            made.expected_samples = std::max(made.expected_samples, c.samples);
+            made.expected_seconds = std::max(made.expected_seconds, c.seconds);
+        }
+        if (made.expected_samples > 0) made.expected_seconds = 0;
         const std::unique_ptr<Renderer> renderer = hooks_.make_renderer(scene.scene, made);
         RenderPosition position{state.moments.samples, state.notes["seconds"].get<double>(), false};
         // Choosing is part of the method: its time counts.

@@ -42,6 +42,7 @@ struct RenderSettings {
     std::string accel = "auto";          ///< cpu: embree (auto) or cwbvh (the CUDA traversal built for the host). cuda: cwbvh (auto) or, for integrator path, bvh2
     uint32_t wave_size = 0;              ///< paths in flight; 0 chooses
     uint64_t expected_samples = 0;       ///< that will be asked for, of every pixel; 0: not known. Waves that are chosen for a device are no larger
+    double expected_seconds = 0;         ///< that the render is to take, where a time sets its end and nothing else does; 0: not known
     QueuePolicy queues = {Compaction::atomic, Ordering::automatic};  ///< keys compaction and ordering: where items lie and in which order stages go through them
     bool specialise = true;              ///< kernels hold only what the scene has
     Fuse fuse = Fuse::automatic;         ///< which stages pass their items on without a queue
@@ -126,6 +127,8 @@ public:
     /// Sums over all samples rendered so far, per pixel of the crop.
     virtual FilmMoments film() = 0;
     virtual void clear_film() = 0;
+    /// Samples that were rendered while the renderer was made: a first call of render(0, count) with at least so many adds them at no cost.
+    virtual uint32_t ready() const { return 0; }
     virtual RenderStats stats() = 0;
     /// With RenderSettings::technique_depth: images of all strategies up to there. Sums of all samples since the start, cleared films included.
     virtual std::vector<TechniqueImage> technique_images() { return {}; }

@@ -26,6 +26,17 @@ void lay_out_walks(Layout& layout, WalkQueues<RayItem, HitItem>& m, QueueCounter
     m.rays[1].base = m.hits[1].base;
 }
 
+/// Hits of camera rays, in place 0. Executors that can do so make and trace the rays in one launch if `fuse` says so.
+template <class Executor, class Generate, class Extend, class RayItem, class HitItem>
+void start_eye_walks(Executor& exec, const Generate& generate, const Extend& extend, const WalkQueues<RayItem, HitItem>& m, uint32_t slots, [[maybe_unused]] bool fuse) {
+    if constexpr (requires { exec.generate_and_extend(generate, extend, slots); }) {
+        if (fuse && !m.hits[0].flags) return exec.generate_and_extend(generate, extend, slots);
+    }
+    exec.run_slots(StageId::generate, generate, slots);
+    exec.set_depth(1);
+    exec.extend_coherent(StageId::extend, extend, m.rays[0], m.hits[0]);
+}
+
 /// From the hits of depth 1 in place 0 on: shade[k] goes through the hits of a depth in place k and pushes rays to place 1 - k, which after rest(tail) become the next hits. Executors that
 /// can do so take fewer than `tail_below` walks through several depths at once (stages/tail.h); `tail` is true then, and what is pushed may belong to one path more than once.
 template <class Executor, class RayItem, class HitItem, class Shade, class Extend, class Rest>

@@ -23,7 +23,7 @@ void add_records(StageRecord* to, const StageRecord* from) {
 void fill_stage_stats(const StageRecord* records, RenderStats& stats) {
     for (uint32_t s = 0; s < kStageCount; ++s) {
         const StageRecord& r = records[s];
-        if (r.launches == 0) continue;
+        if (r.launches == 0 && r.items == 0) continue;
         StageStats stage;
         stage.name = kStageNames[s];
         stage.launches = r.launches;

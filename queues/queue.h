@@ -35,7 +35,7 @@ AMBILUX_HD void set_start(Lane& place, const Value& value) {
 }
 
 /// State of one queue. `count` goes on counting when the queue is full, so that what is lost is known.
-struct QueueCounter {
+struct alignas(1024) QueueCounter {
     uint32_t count;     ///< items since the queue was last emptied; of a queue of fixed places known on a device only when it has been counted
     uint32_t capacity;
     uint64_t peak;      ///< most pushes of one filling
@@ -62,7 +62,8 @@ AMBILUX_HD uint32_t take_place(uint32_t* count) {
     asm("mov.u32 %0, %%lanemask_lt;" : "=r"(below));
     const uint32_t rank = uint32_t(__popc(together & below));
     uint32_t first = 0;
-    if (rank == 0) first = atomicAdd(count, uint32_t(__popc(together)));
+    // By hand, since compilers look once more for threads that add to one place.
+    if (rank == 0) asm volatile("atom.global.add.u32 %0, [%1], %2;" : "=r"(first) : "l"(__cvta_generic_to_global(count)), "r"(__popc(together)) : "memory");
     return __shfl_sync(together, first, __ffs(int(together)) - 1) + rank;
 #else
     return (*count)++;  // a host queue belongs to one thread

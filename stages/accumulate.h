@@ -7,6 +7,17 @@
 
 namespace ambilux {
 
+/// Adds light to a sample that other threads may add to.
+AMBILUX_HD void add_shared(Lane& sample, Rgb value) {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+    atomicAdd(reinterpret_cast<float4*>(&sample), make_float4(value.x, value.y, value.z, 0.0f));
+#elif defined(__CUDA_ARCH__)
+    for (int k = 0; k < 3; ++k) atomicAdd(reinterpret_cast<float*>(&sample) + k, value[k]);
+#else
+    set_start(sample, start_of<Rgb>(sample) + value);  // a host's samples belong to one thread
+#endif
+}
+
 /// Adds contributions to the samples of their paths. As a rule one launch holds at most one contribution per path, so no two threads meet and the sum does not depend on the
 /// order of the queue; launches with several say so by `shared`.
 struct Accumulate {
@@ -21,14 +32,10 @@ struct Accumulate {
 
     AMBILUX_HD void take(const Contribution& c) const {
         if (!is_light(c.value, record)) return;
-#if defined(__CUDA_ARCH__)
-        if (shared) {
-            float* sum = reinterpret_cast<float*>(&samples[c.path]);
-            for (int k = 0; k < 3; ++k) atomicAdd(sum + k, c.value[k]);
-            return;
-        }
-#endif
-        set_start(samples[c.path], start_of<Rgb>(samples[c.path]) + c.value);
+        if (shared)
+            add_shared(samples[c.path], c.value);
+        else
+            set_start(samples[c.path], start_of<Rgb>(samples[c.path]) + c.value);
         techniques.arrive(wave, c.path, c.value);
     }
 };

@@ -31,6 +31,7 @@ struct BidirectionalPolicy {
     bool hide_emitters;       ///< the camera does not see emitters
     bool fuse;                ///< light is weighted and added up by the stages that find it, not by stages of their own
     bool connect_in_shade;    ///< vertices are connected with camera and emitters by the stages that make them
+    bool at_once;             ///< on a host: shade also connects with the vertices of light walks, and rays that test connections are traced by the stages that make them
     uint32_t tail_below;      ///< on a device: fewer walks than this go on for several depths in one launch (stages/tail.h); 0: never
     float cull;               ///< share of a path's light below which what it finds faces Russian roulette before the shadow ray; 0: never
     SingleStrategies singles;

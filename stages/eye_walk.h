@@ -18,15 +18,21 @@ struct EyeGenerate {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t slot) const {
+        WalkItem ray;
+        if (make(slot, ray)) rays.push(ray);
+    }
+    /// False if the slot has none.
+    AMBILUX_HD bool make(uint32_t slot, WalkItem& ray) const {
         samples[slot] = {};
         const PathSlot p = wave.locate(slot);
-        if (!p.active || policy.max_depth == 0) return;
+        if (!p.active || policy.max_depth == 0) return false;
         const CameraSample c = camera_sample(scene, wave, p);
-        rays.push(pack_walk(start_eye_walk(scene, policy.mis, c), slot, false, c.tmax));
+        ray = pack_walk(start_eye_walk(scene, policy.mis, c), slot, false, c.tmax);
+        return true;
     }
 };
 
-/// An eye walk at `h`: emission becomes a candidate, and visit(vertex) is called where connections may start.
+/// An eye walk at `h`: emission becomes a candidate, and visit(vertex, its item) is called where connections may start.
 template <Features F, class Visit>
 AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, const HitOutlet& candidates, StageRecord* record, Visit visit) {
     const auto emit = [&](Rgb radiance, float others) {
@@ -54,7 +60,7 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
     if ((policy.next_event || policy.connect_vertices) && bsdf_is_smooth(z.scattering.bsdf)) {
         step.vertex = pack_vertex(h, z, kNone);
         step.connectable = true;
-        visit(z);
+        visit(z, step.vertex);
     }
     const uint32_t depth = w.depth;
     if (depth + 1 == policy.max_depth && !policy.counts_last_segment()) return step;
@@ -89,6 +95,27 @@ AMBILUX_HD void push_pairs(const Wave& wave, const BidirectionalPolicy& policy, 
     }
 }
 
+/// Candidate of the eye vertex `z`, which `item` stands for, and light vertex `light`, worth `scale` times their product.
+template <Features F>
+AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const VertexItem& item, const WalkVertex& z, const VertexItem& light, float scale,
+                                uint32_t which, const ConnectOutlet& candidates, StageRecord* record) {
+    const Strategy strategy = Strategy::make(light.bits.depth() + 1, item.bits.depth() + 1);
+    if (!policy.singles.has(strategy)) return;
+    const WalkVertex y = unpack_vertex<F>(scene, light);
+    WalkConnection c;
+    if (!connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
+    c.value *= scale;
+    if (!is_light(c.value, record) || is_zero(c.value)) return;
+    uint32_t seed = 0;
+    if (F.opacity || policy.cull > 0.0f) seed = alpha_seed(key, item.bits.depth() + (which << WalkBits::kDepthBits), true);
+    candidates.push({c.value, item.path, 1.0f, policy.others(c.others), seed, c.tmax, c.o, strategy, c.d, 0});
+}
+
+/// What a draw from a cache is worth: M vertices of N walks are in it, and k draws estimate the sum over a walk's vertices by M / (N k) times theirs.
+AMBILUX_HD float draw_scale(const Wave& wave, const BidirectionalPolicy& policy, const LightVertices& light_vertices) {
+    return float(light_vertices.counter->size()) / (float(wave.state->walks) * float(policy.cache_draws));
+}
+
 /// connect: an eye vertex samples an emitter (s = 1) and is paired with the vertices of its light walk.
 template <Features F>
 struct EyeConnect {
@@ -100,6 +127,7 @@ struct EyeConnect {
     Queue<PairItem> pairs;
     ConnectOutlet candidates;
     StageRecord* record;
+    StageRecord* pairs_record;  ///< of connect_vertices
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
@@ -110,6 +138,29 @@ struct EyeConnect {
     /// `count`: of vertices in this launch, or more.
     AMBILUX_HD void pair(const VertexItem& item, uint32_t place, uint32_t count) const {
         if (item.previous != kNone) push_pairs(wave, policy, light_vertices, count, place, item.path, item.bits.depth(), item.previous, pairs);
+    }
+
+    /// connect_vertices for all that pair() would push, in the same order.
+    AMBILUX_HD void connect_all(const VertexItem& item, const WalkVertex& z) const {
+        const RngKey key = wave.key(item.path);
+        const uint32_t depth = item.bits.depth();
+        const auto connect = [&](const VertexItem& light, float scale, uint32_t which) {
+            pairs_record->count_item(depth);
+            if (depth + light.bits.depth() + 1 <= policy.max_depth) push_connection<F>(scene, policy, key, item, z, light, scale, which, candidates, pairs_record);
+        };
+        if (policy.cache_draws > 0) {
+            const uint32_t size = light_vertices.counter->size();
+            for (uint32_t draw = size > 0 ? policy.cache_draws : 0; draw-- > 0;) {
+                const uint32_t light = mul_hi(random_bits(key, cache_block(depth, draw)).x, size);
+                connect(light_vertices.load(light), draw_scale(wave, policy, light_vertices), WalkBits::kMaxDepth + light);
+            }
+            return;
+        }
+        for (uint32_t next = item.previous; next != kNone;) {
+            const VertexItem light = light_vertices.load(next);
+            next = light.previous;
+            if (depth + light.bits.depth() + 1 <= policy.max_depth) connect(light, 1.0f, light.bits.depth());
+        }
     }
 
     AMBILUX_HD void take(const WalkVertex& z, Rgb throughput, uint32_t path, uint32_t depth) const {
@@ -144,10 +195,16 @@ struct EyeShade {
 
     /// True if the walk goes on with the ray `next`. `count`: of hits in this launch, or more.
     AMBILUX_HD bool take(const WalkHit& h, uint32_t count, WalkItem& next) const {
-        WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z) {
-            if (policy.connect_in_shade) connect.take(z, h.ray.throughput, h.ray.path, h.ray.bits.depth());
+        WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z, [[maybe_unused]] VertexItem& item) {
+            if (!policy.connect_in_shade) return;
+            connect.take(z, h.ray.throughput, h.ray.path, h.ray.bits.depth());
+#if !defined(__CUDA_ARCH__)
+            if (!policy.at_once || !policy.connect_vertices) return;
+            item.previous = last_vertex[h.ray.path];
+            connect.connect_all(item, z);
+#endif
         });
-        if (step.connectable && (policy.connect_vertices || !policy.connect_in_shade)) {
+        if (step.connectable && !policy.at_once && (policy.connect_vertices || !policy.connect_in_shade)) {
             if (policy.connect_vertices) step.vertex.previous = policy.cache_draws > 0 ? policy.cache_draws : last_vertex[h.ray.path];
             const uint32_t place = vertices.push(step.vertex);
             if (policy.connect_in_shade) connect.pair(step.vertex, place, count);
@@ -165,28 +222,7 @@ struct PairedVertex {
     WalkVertex vertex;
 };
 
-/// Candidate of the eye vertex `eye`, which is unpacked if it is not yet, and light vertex `light`, worth `scale` times their product.
-template <Features F>
-AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, PairedVertex& eye, const VertexItem& light, float scale,
-                                uint32_t which, const ConnectOutlet& candidates, StageRecord* record) {
-    const VertexItem& item = eye.item;
-    const Strategy strategy = Strategy::make(light.bits.depth() + 1, item.bits.depth() + 1);
-    if (!policy.singles.has(strategy)) return;
-    if (!eye.unpacked) eye.vertex = unpack_vertex<F>(scene, item);
-    eye.unpacked = true;
-    const WalkVertex& z = eye.vertex;
-    const WalkVertex y = unpack_vertex<F>(scene, light);
-    WalkConnection c;
-    if (!connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
-    c.value *= scale;
-    if (!is_light(c.value, record) || is_zero(c.value)) return;
-    uint32_t seed = 0;
-    if (F.opacity || policy.cull > 0.0f) seed = alpha_seed(key, item.bits.depth() + (which << WalkBits::kDepthBits), true);
-    candidates.push({c.value, item.path, 1.0f, policy.others(c.others), seed, c.tmax, c.o, strategy, c.d, 0});
-}
-
-/// connect_vertices: an eye vertex and a light vertex (s, t >= 2), of the light walk of its slot, or drawn from a cache of those of all light walks of the wave (Davidovic et al. 2014). M
-/// vertices of N walks are in the cache; k draws estimate the sum over a walk's vertices by M / (N k) times theirs.
+/// connect_vertices: an eye vertex and a light vertex (s, t >= 2), of the light walk of its slot, or drawn from a cache of those of all light walks of the wave (Davidovic et al. 2014).
 template <Features F>
 struct ConnectVertices {
     SceneView scene;
@@ -222,8 +258,10 @@ struct ConnectVertices {
         if (pair.next != kNone) push_pairs(wave, policy, light_vertices, pairs.counter->size(), pair.vertex, pair.path, depth, pair.next, rest);
         if (depth + light.bits.depth() + 1 > policy.max_depth) return;
         const bool drawn = policy.cache_draws > 0;
-        const float scale = drawn ? float(light_vertices.counter->size()) / (float(wave.state->walks) * float(policy.cache_draws)) : 1.0f;
-        push_connection<F>(scene, policy, wave.key(item.path), eye, light, scale, drawn ? WalkBits::kMaxDepth + pair.light : light.bits.depth(), candidates, record);
+        if (!eye.unpacked) eye.vertex = unpack_vertex<F>(scene, item);
+        eye.unpacked = true;
+        push_connection<F>(scene, policy, wave.key(item.path), item, eye.vertex, light, drawn ? draw_scale(wave, policy, light_vertices) : 1.0f,
+                           drawn ? WalkBits::kMaxDepth + pair.light : light.bits.depth(), candidates, record);
     }
 };
 

@@ -31,38 +31,44 @@ AMBILUX_HD bool add_large_fixed(int64_t* sum, int64_t value) {
     return false;
 }
 
-/// Adds values of less than 2^42 to three sums.
-AMBILUX_HD void add_small_fixed(int64_t* sums, const int64_t (&values)[3]) {
+/// Light from here on is too much to be added.
+constexpr float kTooMuchLight = 0x1p26f;
+
+struct FixedLight {
+    int64_t value[3];
+};
+
+AMBILUX_HD FixedLight to_fixed(Rgb value) { return {{llrint(double(value.x) / kLightUnit), llrint(double(value.y) / kLightUnit), llrint(double(value.z) / kLightUnit)}}; }
+
+/// The threads of a warp that mean the same place add up what they have for it, values of less than 2^42: true for the one that is left with the sum. A lamp that covers a few pixels
+/// gets a splat from every light walk.
+AMBILUX_HD bool gather_light([[maybe_unused]] const void* place, [[maybe_unused]] FixedLight& light) {
 #if defined(__CUDA_ARCH__)
-    // A lamp that covers a few pixels gets a splat from every light walk: the threads of a warp that mean the same pixel add theirs up first.
-    const uint32_t same = __match_any_sync(__activemask(), reinterpret_cast<unsigned long long>(sums));
+    const uint32_t same = __match_any_sync(__activemask(), reinterpret_cast<unsigned long long>(place));
     if (same & (same - 1)) {
         constexpr uint32_t kHalf = (1u << 21) - 1;
-        int64_t total[3];
         for (int c = 0; c < 3; ++c) {
-            const uint32_t low = __reduce_add_sync(same, uint32_t(values[c]) & kHalf), high = __reduce_add_sync(same, uint32_t(values[c] >> 21));
-            total[c] = (int64_t(high) << 21) + low;
+            const uint32_t low = __reduce_add_sync(same, uint32_t(light.value[c]) & kHalf), high = __reduce_add_sync(same, uint32_t(light.value[c] >> 21));
+            light.value[c] = (int64_t(high) << 21) + low;
         }
-        if ((threadIdx.x & 31u) == uint32_t(__ffs(int(same)) - 1))
-            for (int c = 0; c < 3; ++c) add_fixed(sums + c, total[c]);
-        return;
+        return (threadIdx.x & 31u) == uint32_t(__ffs(int(same)) - 1);
     }
 #endif
-    for (int c = 0; c < 3; ++c) add_fixed(sums + c, values[c]);
+    return true;
 }
 
 /// Adds light to three sums. False if it does not fit: such light is to be counted as infinite, not wrapped.
 AMBILUX_HD bool add_light(int64_t* sums, Rgb value) {
     const float most = max_component(value);
-    if (!(most < 0x1p26f)) return false;
-    int64_t fixed[3];
-    for (int c = 0; c < 3; ++c) fixed[c] = llrint(double(value[c]) / kLightUnit);
+    if (!(most < kTooMuchLight)) return false;
+    FixedLight fixed = to_fixed(value);
     if (most < kLargeLight) {
-        add_small_fixed(sums, fixed);
+        if (gather_light(sums, fixed))
+            for (int c = 0; c < 3; ++c) add_fixed(sums + c, fixed.value[c]);
         return true;
     }
     bool fits = true;
-    for (int c = 0; c < 3; ++c) fits = add_large_fixed(sums + c, fixed[c]) && fits;
+    for (int c = 0; c < 3; ++c) fits = add_large_fixed(sums + c, fixed.value[c]) && fits;
     return fits;
 }
 

@@ -25,11 +25,17 @@ struct Generate {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t slot) const {
+        RayItem ray;
+        if (make(slot, ray)) rays.push(ray);
+    }
+    /// False if the slot has none.
+    AMBILUX_HD bool make(uint32_t slot, RayItem& ray) const {
         samples[slot] = {};
         const PathSlot p = wave.locate(slot);
-        if (!p.active || policy.max_depth == 0) return;
+        if (!p.active || policy.max_depth == 0) return false;
         const CameraSample c = camera_sample(scene, wave, p);
-        rays.push({c.o, slot, c.d, WalkBits::make(1, true, 1.0f), {1.0f, 1.0f, 1.0f}, c.tmax});
+        ray = {c.o, slot, c.d, WalkBits::make(1, true, 1.0f), {1.0f, 1.0f, 1.0f}, c.tmax};
+        return true;
     }
 };
 

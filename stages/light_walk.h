@@ -69,7 +69,7 @@ struct LightGenerate {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t slot) const {
-        last_vertex[slot] = kNone;
+        if (policy.cache_draws == 0) last_vertex[slot] = kNone;
         if (!wave.locate(slot).active || policy.max_depth == 0) return;
         Walk w;
         if (start_light<F>(scene, wave, policy, slot, {0}, splats, record, w)) rays.push(pack_walk(w, slot, true, kInfinity));
@@ -135,8 +135,10 @@ struct LightShade {
         if (step.connectable && depth < policy.max_depth) {
             if (to_camera && !policy.connect_in_shade) camera_vertices.push(step.vertex);
             if (policy.connect_vertices && depth + 2 <= policy.max_depth) {
-                step.vertex.previous = last_vertex[h.ray.path];
-                last_vertex[h.ray.path] = vertices.push(step.vertex);
+                const bool chained = policy.cache_draws == 0;
+                if (chained) step.vertex.previous = last_vertex[h.ray.path];
+                const uint32_t place = vertices.push(step.vertex);
+                if (chained) last_vertex[h.ray.path] = place;
             }
         }
         next = step.ray;

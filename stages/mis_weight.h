@@ -47,7 +47,7 @@ AMBILUX_HD float survival_factor(float cull, Rgb value, Rgb so_far, uint32_t see
 struct WeightConnections {
     PathPolicy policy;
     Queue<ConnectCandidate> candidates;
-    Queue<ShadowItem> shadows;
+    HostOutlet<ShadowItem> shadows;
     StageRecord* record;
     TechniqueFilm techniques = {};
     const Lane* samples = nullptr;  ///< what the paths have brought so far

@@ -8,11 +8,13 @@
 
 namespace ambilux {
 
-/// `Tracer` has occluded<F>(scene, ray) or is followed by a kernel of its own that calls fetch and finish.
+/// `Tracer` has occluded<F>(scene, ray) or is followed by a kernel of its own that calls fetch and finish, and keeps in between what fetch leaves for finish: lanes of a warp end one by
+/// one, and all would wait for what each of them loads.
 template <Features F, class Tracer>
 struct Occlude {
     static constexpr Features kFeatures = F;
     static constexpr bool kAnyHit = true;
+    using Kept = Contribution;
 
     SceneView scene;
     Tracer tracer;
@@ -20,30 +22,47 @@ struct Occlude {
     ArrivalOutlet contributions;
     StageRecord* record;
 
-    AMBILUX_HD bool fetch(uint32_t i, Ray& ray) const {
+    AMBILUX_HD bool fetch(uint32_t i, Ray& ray, Kept& kept) const {
         const ShadowItem item = shadows.load(i);
+        kept = {item.value, item.path};
+        return fetch(item, ray);
+    }
+    /// False for a ray that is none.
+    AMBILUX_HD bool fetch(const ShadowItem& item, Ray& ray) const {
         ray = {item.o, fabsf(item.tmax), item.d, item.alpha_seed};
         if (is_finite(item.o) && is_finite(item.d)) return true;
         count_one(&record->nan);
         return false;
     }
 
-    AMBILUX_HD void finish(uint32_t i, bool blocked) const {
+    AMBILUX_HD void finish([[maybe_unused]] uint32_t i, Kept kept, bool blocked) const {
         if (blocked) return;
-        const ShadowItem item = shadows.load(i);
-        Rgb value = item.value;
-        if constexpr (F.has_environment()) {
-            if (item.tmax == kTowardsEnvironment) {
-                value *= environment_radiance<F>(scene, item.d);
-                if (!is_light(value, record)) return;
-            }
-        }
-        contributions.push({value, item.path});
+        if constexpr (F.has_environment())
+            arrive(kept, shadows.load(i));
+        else
+            contributions.push(kept);
+    }
+    /// All of it for an item that is in no queue.
+    AMBILUX_HD void take(const ShadowItem& item) const {
+        Ray ray;
+        if (fetch(item, ray) && !tracer.template occluded<F>(scene, ray)) arrive({item.value, item.path}, item);
     }
 
     AMBILUX_HD void operator()(uint32_t i) const {
         Ray ray;
-        if (fetch(i, ray)) finish(i, tracer.template occluded<F>(scene, ray));
+        Kept kept;
+        if (fetch(i, ray, kept)) finish(i, kept, tracer.template occluded<F>(scene, ray));
+    }
+
+private:
+    AMBILUX_HD void arrive(Kept kept, const ShadowItem& item) const {
+        if constexpr (F.has_environment()) {
+            if (item.tmax == kTowardsEnvironment) {
+                kept.value *= environment_radiance<F>(scene, item.d);
+                if (!is_light(kept.value, record)) return;
+            }
+        }
+        contributions.push(kept);
     }
 };
 

@@ -21,4 +21,19 @@ struct Outlet {
     }
 };
 
+/// A queue, or on a host, if `take` is set, a stage of any kind that has each item at once: nothing waits there for many items to come together.
+template <class Item>
+struct HostOutlet {
+    Queue<Item> queue;
+    const void* stage = nullptr;
+    void (*take)(const void* stage, const Item& item) = nullptr;
+
+    AMBILUX_HD void push(const Item& item) const {
+#if !defined(__CUDA_ARCH__)
+        if (take) return take(stage, item);
+#endif
+        queue.push(item);
+    }
+};
+
 }  // namespace ambilux

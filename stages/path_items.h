@@ -103,7 +103,7 @@ struct ShadowItem {
 };
 
 /// Light to be added to a path's sample.
-struct Contribution {
+struct alignas(16) Contribution {
     Rgb value;
     uint32_t path;
 };

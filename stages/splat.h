@@ -2,7 +2,7 @@
 #pragma once
 
 #include "stages/bidirectional_policy.h"
-#include "stages/fixed_point.h"
+#include "stages/splat_sums.h"
 #include "stages/outlet.h"
 #include "stages/stage.h"
 #include "stages/walk_items.h"
@@ -12,7 +12,8 @@
 namespace ambilux {
 
 struct WeightSplats {
-    Queue<SplatCandidate> candidates, weighted;
+    Queue<SplatCandidate> candidates;
+    HostOutlet<SplatCandidate> weighted;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const { take(candidates.load(i)); }
@@ -29,6 +30,7 @@ template <Features F, class Tracer>
 struct OccludeSplats {
     static constexpr Features kFeatures = F;
     static constexpr bool kAnyHit = true;
+    using Kept = Contribution;
 
     SceneView scene;
     Tracer tracer;
@@ -36,21 +38,32 @@ struct OccludeSplats {
     Queue<SplatItem> splats;
     StageRecord* record;
 
-    AMBILUX_HD bool fetch(uint32_t i, Ray& ray) const {
+    AMBILUX_HD bool fetch(uint32_t i, Ray& ray, Kept& kept) const {
         const SplatCandidate c = candidates.load(i);
+        kept = {c.value, c.path};
+        return fetch(c, ray);
+    }
+    /// False for a ray that is none.
+    AMBILUX_HD bool fetch(const SplatCandidate& c, Ray& ray) const {
         ray = {c.o, c.tmax, c.d, c.alpha_seed};
         if (is_finite(c.o) && is_finite(c.d)) return true;
         count_one(&record->nan);
         return false;
     }
-    AMBILUX_HD void finish(uint32_t i, bool blocked) const {
+    AMBILUX_HD void finish(uint32_t i, const Kept& kept, bool blocked) const {
         if (blocked) return;
         const SplatCandidate c = candidates.load(i);
-        splats.push({c.value, c.path, c.film, c.strategy, c.others});
+        splats.push({kept.value, kept.path, c.film, c.strategy, c.others});
+    }
+    /// All of it for a candidate that is in no queue.
+    AMBILUX_HD void take(const SplatCandidate& c) const {
+        Ray ray;
+        if (fetch(c, ray) && !tracer.template occluded<F>(scene, ray)) splats.push({c.value, c.path, c.film, c.strategy, c.others});
     }
     AMBILUX_HD void operator()(uint32_t i) const {
         Ray ray;
-        if (fetch(i, ray)) finish(i, tracer.template occluded<F>(scene, ray));
+        Kept kept;
+        if (fetch(i, ray, kept)) finish(i, kept, tracer.template occluded<F>(scene, ray));
     }
 };
 
@@ -59,7 +72,7 @@ struct Splat {
     SceneView scene;
     Wave wave;
     Queue<SplatItem> splats;
-    int64_t* sums;  ///< 3 per pixel and sample of the wave
+    SplatSums sums;
     TechniqueFilm techniques;
     StageRecord* record;
 
@@ -75,7 +88,7 @@ struct Splat {
                 if (!(weight > 0.0f)) continue;
                 const Rgb value = item.value * weight;
                 const uint32_t pixel = uint32_t(py) * wave.width + uint32_t(px);
-                if (!add_light(sums + (uint64_t(sample) * wave.height * wave.width + pixel) * 3, value)) count_one(&record->inf);
+                if (!sums.add(uint64_t(sample) * wave.height * wave.width + pixel, value)) count_one(&record->inf);
                 techniques.add(wave, item.strategy, pixel, value * (1.0f + item.others), value);
             }
     }
@@ -85,7 +98,7 @@ struct Splat {
 struct DevelopSplats {
     Wave wave;
     const Lane* samples;  ///< by slot
-    int64_t* splats;
+    SplatSums splats;
     double *sum, *sum_squares;
     StageRecord* record;
 
@@ -98,12 +111,9 @@ struct DevelopSplats {
         const uint32_t stride = wave.tiles * kTilePixels;
         for (uint32_t k = 0; k < wave.state->samples; ++k) {
             const Rgb eye = start_of<Rgb>(samples[i + k * stride]);
-            int64_t* light = splats + (uint64_t(k) * wave.height * wave.width + p.pixel) * 3;
             double value[3];
-            for (int c = 0; c < 3; ++c) {
-                value[c] = double(eye[c]) + double(light[c]) * kLightUnit;
-                light[c] = 0;
-            }
+            splats.take(uint64_t(k) * wave.height * wave.width + p.pixel, value);
+            for (int c = 0; c < 3; ++c) value[c] += double(eye[c]);
             if (!is_light({float(value[0]), float(value[1]), float(value[2])}, record)) continue;
             for (int c = 0; c < 3; ++c) {
                 s[c] += value[c];

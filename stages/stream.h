@@ -120,7 +120,7 @@ struct StreamEyeShade {
         const WalkHit h = hits.load(i);
         const BidirectionalPolicy& policy = pool.policy;
         const uint32_t depth = h.ray.bits.depth(), slot = pool.slot_of(h.ray.path);
-        WalkStep step = eye_step<F>(pool.scene, pool.wave, policy, h, candidates, record, [](const WalkVertex&) {});
+        WalkStep step = eye_step<F>(pool.scene, pool.wave, policy, h, candidates, record, [](const WalkVertex&, const VertexItem&) {});
         if (step.connectable) vertices.push(step.vertex);
         if (!step.goes_on) step.ray.bits = {0};
         pool.pending.store(slot, step.ray);
@@ -192,9 +192,8 @@ struct StreamConnect {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem light = pairs.load(i);
-        PairedVertex eye;
-        eye.item = pool.eye.load(pool.slot_of(light.path));
-        push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path), eye, light, 1.0f, light.bits.depth(), candidates, record);
+        const VertexItem eye = pool.eye.load(pool.slot_of(light.path));
+        push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path), eye, unpack_vertex<F>(pool.scene, eye), light, 1.0f, light.bits.depth(), candidates, record);
     }
 };
 

@@ -57,6 +57,22 @@ struct Wave {
         return p;
     }
 
+    /// Active slots before a slot, or all if there is none of this number.
+    AMBILUX_HD uint32_t active_before(uint32_t slot) const {
+        const uint32_t s = sample_of(slot), tile = slot / kTilePixels - s * tiles, first = pixels_before(state->first_tile);
+        uint32_t before = s * (pixels_before(state->first_tile + tiles) - first) + pixels_before(state->first_tile + tile) - first;
+        const uint32_t tile_y = tiles_x.quotient(state->first_tile + tile), tile_x = state->first_tile + tile - tile_y * tiles_x;
+        if ((tile_x + 1) * kTileSide <= width && (tile_y + 1) * kTileSide <= height) return before + slot % kTilePixels;
+        for (uint32_t k = slot / kTilePixels * kTilePixels; k < slot; ++k) before += locate(k).active;
+        return before;
+    }
+    /// Pixels of the tiles before a tile of the film.
+    AMBILUX_HD uint32_t pixels_before(uint32_t tile) const {
+        const uint32_t y = tiles_x.quotient(tile), x = tile - y * tiles_x, above = y * kTileSide;
+        if (above >= height) return width * height;
+        return above * width + x * kTileSide * (height - above < kTileSide ? height - above : kTileSide);
+    }
+
     AMBILUX_HD RngKey key(const PathSlot& p, Stream stream = Stream::eye) const { return {seed, p.pixel, p.sample, stream}; }
     AMBILUX_HD RngKey key(uint32_t slot, Stream stream = Stream::eye) const { return key(locate(slot), stream); }
 };

@@ -321,7 +321,7 @@ struct Bench {
     };
 
     using Stages = BidirectionalStages<kAllFeatures, CwbvhTracer>;
-    Stages stages() { return Stages(scene.view(), accel.tracer(), policy, wave, memory, {samples.data(), splats.data(), sum.data(), sum_squares.data()}); }
+    Stages stages() { return Stages(scene.view(), accel.tracer(), policy, wave, memory, {samples.data(), {splats.data(), nullptr}, sum.data(), sum_squares.data()}); }
 
     void run(StageId id = StageId::count, std::function<void(Bench&)> f = {}) {
         before = id;

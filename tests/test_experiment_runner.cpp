@@ -57,6 +57,31 @@ TEST_CASE("sample budgets are exact and interruptions keep whole samples") {
     error_of([&] { drive(renderer, {}, {0, 0}); }, ExitCode::usage);
 }
 
+TEST_CASE("samples that a renderer brings along are the first of a render with a time, and are not counted twice") {
+    World world;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 2;
+    struct Prepared : FakeRenderer {
+        using FakeRenderer::FakeRenderer;
+        uint32_t left = 7, first_count = 0;
+        uint32_t ready() const override { return left; }
+        uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+            const uint32_t had = count < left ? 0 : left;
+            if (had) first_count = count;
+            left = 0;
+            return had + FakeRenderer::render(first + had, count - had, interrupt);
+        }
+    };
+    world.sleep_per_sample = 0.01;
+    Prepared timed(scene, {}, world);
+    const RenderPosition p = drive(timed, {}, {0, 0.2});
+    CHECK(timed.first_count == 7);
+    CHECK(p.samples == world.samples + 7);
+    CHECK(p.seconds == Approx(0.2).margin(0.1));
+    Prepared counted(scene, {}, world);
+    CHECK(drive(counted, {}, {5, 0}).samples == 5);  // fewer than there are: the renderer sees that
+}
+
 TEST_CASE("the reference: a killed and continued one equals the uninterrupted one") {
     const TempFolder folder;
     write_inputs(folder);

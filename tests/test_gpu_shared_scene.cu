@@ -83,3 +83,35 @@ TEST_CASE("what is chosen on a device renders as if its settings had been given,
     }
     CHECK(timed);
 }
+
+TEST_CASE("a path tracer that renders while the pilot runs is the render that was asked for") {
+    if (!device()) return;
+    // A sky over diffuse ground is the path tracer's.
+    const Scene scene = scene_from_text(scene_xml(4, "<sensor type='perspective'><float name='fov' value='45'/>" + lookat("origin='0,-3,2.5' target='0,0,0.3' up='0,0,1'") + film(64) + "</sensor>" +
+                                                         "<shape type='rectangle'>" + diffuse({0.5f, 0.5f, 0.5f}) + "</shape><emitter type='constant'/>"));
+    RenderSettings s = cpu_settings(scene, Estimator::mis, 5);
+    s.backend = "cuda";
+    s.integrator = "bdpt";
+    s.automatic = true;
+    s.expected_seconds = 1;
+    const auto renderer = make_renderer(scene, s);
+    REQUIRE(renderer->stats().choice.name == "path");
+    const uint32_t ready = renderer->ready();
+    REQUIRE(ready > 0);
+    RenderSettings path = s;
+    path.automatic = false;
+    for (const auto& [key, value] : renderer->stats().choice.settings) apply_setting(path, key, value);
+    REQUIRE(renderer->render(0, ready + 3) == ready + 3);
+    CHECK(renderer->film().samples == ready + 3);
+    CHECK(renderer->ready() == 0);
+    CHECK(worst_difference(render_scene(scene, path, ready + 3).film, mean_image(renderer->film())) < 1e-5);
+    // Fewer, or others, are rendered as if nothing had been.
+    const auto fewer = make_renderer(scene, s);
+    REQUIRE(fewer->ready() > 1);
+    REQUIRE(fewer->render(0, 1) == 1);
+    CHECK(fewer->film().samples == 1);
+    CHECK(worst_difference(render_scene(scene, path, 1).film, mean_image(fewer->film())) < 1e-5);
+    const auto later = make_renderer(scene, s);
+    REQUIRE(later->render(5, 2) == 2);
+    CHECK(later->film().samples == 2);
+}

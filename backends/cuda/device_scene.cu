@@ -40,14 +40,12 @@ DevicePairs::DevicePairs(const PairArrays& arrays)
 
 template <>
 std::shared_ptr<const DeviceScene> SharedAccels::get() {
-    if (!device_scene_) device_scene_ = std::make_shared<const DeviceScene>(scene_);
-    return device_scene_;
+    return once(device_scene_, [&] { return std::make_shared<const DeviceScene>(scene_); });
 }
 
 template <>
 std::shared_ptr<const DeviceCwbvh> SharedAccels::get() {
-    if (!device_cwbvh_) device_cwbvh_ = std::make_shared<const DeviceCwbvh>(get<CwbvhAccel>()->arrays());
-    return device_cwbvh_;
+    return once(device_cwbvh_, [&] { return std::make_shared<const DeviceCwbvh>(get<CwbvhAccel>()->arrays()); });
 }
 
 }  // namespace ambilux

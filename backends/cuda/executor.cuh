@@ -114,19 +114,43 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coheren
     }
 }
 
+/// Camera rays, traced as soon as they are made. They are in memory for the stages that follow; each knows its place, since adding to a counter takes longer than tracing it.
+template <class Set, class Generate, class Stage, class Tracer>
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
+    launch_camera_rays(const __grid_constant__ Generate generate, const __grid_constant__ Stage stage, const Tracer tracer, uint32_t slots, const WaveState* state) {
+    const uint32_t n = slots * state->samples;
+    if (blockIdx.x == 0 && threadIdx.x == 0) stage.rays.counter->count = generate.wave.active_before(n);
+    for (uint32_t i = blockIdx.x * kTraceBlock + threadIdx.x; i < n; i += gridDim.x * kTraceBlock) {
+        auto item = decltype(stage.rays.load(0)){};
+        if (!generate.make(i, item)) continue;
+        const uint32_t place = generate.wave.active_before(i);
+        stage.rays.store(place, item);
+        Ray ray;
+        Hit hit = {0.0f, 0.0f, 0.0f, kNone};
+        if (stage.fetch(item, ray)) tracer.template closest<Set::value>(stage.scene, ray, hit);
+        stage.finish(place, hit);
+    }
+}
+
 /// Rays by persistent threads.
 template <class Set, class Stage, class Tracer>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(const __grid_constant__ Stage stage, const Tracer tracer, const Items all) {
     const uint32_t n = all.size();
     const Items items = all.of(n);
-    const auto fetch = [&](uint32_t i, Ray& ray) {
-        const uint32_t place = items.place(i);
-        return items.take(place) && stage.fetch(place, ray);
-    };
-    if constexpr (Stage::kAnyHit)
-        trace_any_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, bool blocked) { stage.finish(items.place(i), blocked); }, &n, &items.counter->next);
-    else
+    if constexpr (Stage::kAnyHit) {
+        __shared__ typename Stage::Kept kept[kTraceBlock];
+        const auto fetch = [&](uint32_t i, Ray& ray) {
+            const uint32_t place = items.place(i);
+            return items.take(place) && stage.fetch(place, ray, kept[threadIdx.x]);
+        };
+        trace_any_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, bool blocked) { stage.finish(items.place(i), kept[threadIdx.x], blocked); }, &n, &items.counter->next);
+    } else {
+        const auto fetch = [&](uint32_t i, Ray& ray) {
+            const uint32_t place = items.place(i);
+            return items.take(place) && stage.fetch(place, ray);
+        };
         trace_closest_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, const Hit& hit) { stage.finish(items.place(i), hit); }, &n, &items.counter->next);
+    }
 }
 
 /// Counts the items of a queue of fixed places, 16 flags at a time: memory of flags is a multiple of that, and those past the capacity are 0.
@@ -300,6 +324,17 @@ public:
             kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
         });
         finish(id, rays.counter, hits.flags ? nullptr : hits.counter);
+    }
+    /// generate and the extend that follows, of depth 1; the time is extend's. Items must be appended.
+    template <class Generate, class Extend>
+    void generate_and_extend(const Generate& generate, const Extend& extend, uint32_t slots) {
+        finish(StageId::generate, nullptr, nullptr, slots);
+        set_depth(1);
+        with_tracer(extend, [&](auto set, const auto& tracer) {
+            const auto kernel = detail::launch_camera_rays<decltype(set), Generate, Extend, std::remove_cvref_t<decltype(tracer)>>;
+            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(generate, extend, tracer, slots, state_);
+        });
+        finish(StageId::extend, extend.rays.counter, extend.hits.counter);
     }
     /// From the next record on; no kernel but those that keep records asks.
     void set_depth(uint32_t depth) { depth_ = {true, depth}; }

@@ -59,6 +59,7 @@ public:
     BidirectionalCpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : scene_(scene), view_(scene.view()), policy_(make_bidirectional_policy(scene, settings)), accel_name_(settings.accel == "cwbvh" ? "cwbvh" : "embree") {
         const auto start = Clock::now();
+        policy_.at_once = policy_.connect_in_shade && !policy_.megakernel;
         const int threads = arena_.max_concurrency();
         const Wave film = shape_wave(scene, settings, kTilePixels, 1);
         const uint32_t max_tiles = std::max(1u, tile_count(film) / uint32_t(8 * threads));
@@ -157,7 +158,7 @@ private:
         using Tracer = decltype(accel_->tracer());
         for (;;) {
             const BidirectionalMemory& m = memory.queues;
-            const BidirectionalFilm film = {samples_of_slots_.data() + size_t(first_tile) * kTilePixels, splats_.data(), nullptr, nullptr, techniques_.empty() ? nullptr : techniques_.data(), technique_dropped_.data()};
+            const BidirectionalFilm film = {samples_of_slots_.data() + size_t(first_tile) * kTilePixels, {splats_.data(), nullptr}, nullptr, nullptr, techniques_.empty() ? nullptr : techniques_.data(), technique_dropped_.data()};
             const BidirectionalStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, m, film);
             CpuExecutor executor(m.state, m.records, view_, memory.order);
             *m.state = {first_tile, sample, 1, 0, 0, 0, active_pixels(wave_, first_tile)};
@@ -173,7 +174,7 @@ private:
         film_state_ = {0, sample, 1, 0, 0, 0, 0};
         parallel_for(uint32_t(film_wave_.tiles), [&](uint32_t tile) {
             StageRecord record{};
-            const DevelopSplats stage = {film_wave_, samples_of_slots_.data(), splats_.data(), moments_.sum.data(), moments_.sum_squares.data(), &record};
+            const DevelopSplats stage = {film_wave_, samples_of_slots_.data(), {splats_.data(), nullptr}, moments_.sum.data(), moments_.sum_squares.data(), &record};
             for (uint32_t i = 0; i < kTilePixels; ++i) stage(tile * kTilePixels + i);
             if (record.nan + record.inf + record.negative) {
                 StageRecord& total = film_records_[uint32_t(StageId::develop)];

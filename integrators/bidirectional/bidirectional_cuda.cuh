@@ -51,8 +51,11 @@ public:
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         sum_ = DeviceBuffer<double>(values_, "film");
         sum_squares_ = DeviceBuffer<double>(values_, "film");
-        splats_ = DeviceBuffer<int64_t>(values_ * wave_.samples, "splats");
+        const uint64_t cells = values_ / 3 * wave_.samples;
+        fixed_splats_ = DeviceBuffer<int64_t>(settings.deterministic ? cells * 3 : 0, "splats");
+        splats_ = DeviceBuffer<Lane>(settings.deterministic ? 0 : cells, "splats");
         samples_of_slots_ = DeviceBuffer<Lane>(wave_.slot_count(), "samples");
+        fixed_splats_.zero();
         splats_.zero();
         if (policy_.technique_depth > 0) {
             techniques_ = DeviceBuffer<int64_t>(technique_values(policy_, values_ / 3), "images of single strategies");
@@ -151,7 +154,7 @@ private:
     static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
     uint64_t fixed_bytes() const {
-        return device_scene_->bytes() + device_accel_->bytes() + sum_.bytes() + sum_squares_.bytes() + splats_.bytes() + techniques_.bytes() + samples_of_slots_.bytes() + clock_.bytes();
+        return device_scene_->bytes() + device_accel_->bytes() + sum_.bytes() + sum_squares_.bytes() + fixed_splats_.bytes() + splats_.bytes() + techniques_.bytes() + samples_of_slots_.bytes() + clock_.bytes();
     }
 
     /// Queues for `kept` light vertices, and the graph that uses them.
@@ -173,7 +176,7 @@ private:
         for (size_t q = 0; q < counters.size(); ++q) counters[q].capacity = layout.queue_capacities()[q];
         cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
         stages_.emplace(device_scene_->view(), device_accel_->tracer(), policy_, wave_, queues_,
-                        BidirectionalFilm{samples_of_slots_.data(), splats_.data(), sum_.data(), sum_squares_.data(), techniques_.data(), technique_dropped_.data()});
+                        BidirectionalFilm{samples_of_slots_.data(), {fixed_splats_.data(), splats_.data()}, sum_.data(), sum_squares_.data(), techniques_.data(), technique_dropped_.data()});
         executor_.emplace(stream_, traced_, queues_.state, queues_.records, clock_.data(), device_scene_->view(), order);
         if (graph_) cudaGraphExecDestroy(graph_);
         graph_ = nullptr;
@@ -227,7 +230,8 @@ private:
     std::shared_ptr<const DeviceCwbvh> device_accel_;
     DeviceBuffer<std::byte> memory_;
     DeviceBuffer<double> sum_, sum_squares_;
-    DeviceBuffer<int64_t> splats_, techniques_;
+    DeviceBuffer<int64_t> fixed_splats_, techniques_;
+    DeviceBuffer<Lane> splats_;
     DeviceBuffer<uint64_t> technique_dropped_;
     DeviceBuffer<Lane> samples_of_slots_;
     DeviceBuffer<uint64_t> clock_;

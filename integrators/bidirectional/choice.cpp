@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
+#include <thread>
 
 #include "backends/cuda_device.h"
 #include "core/error.h"
+#include "core/flag.h"
 #include "scene/accel/cwbvh.h"
 #include "scene/accel/embree_tracer.h"
 
@@ -61,14 +64,65 @@ double timed(const Scene& scene, RenderSettings settings, bool cuda, const MakeR
     return seconds_of(kFirstTimedSample + 1, count) / count;
 }
 
-/// A renderer that also tells how it was chosen.
+/// The path tracer of a device, which has nothing else to do while the host runs the pilot. Its samples are those that the render begins with if it is chosen: the pilot, on which that depends,
+/// has random numbers of its own. Otherwise they are dropped. For renders that end by the clock: others gain nothing.
+class HeadStart {
+public:
+    HeadStart(const RenderSettings& settings, const MakeRenderer& make)
+        : thread_([this, settings, &make] {
+              try {
+                  renderer_ = make(settings);
+                  run();
+              } catch (const std::exception&) {
+                  samples_ = 0;
+                  renderer_.reset();  // it is tried again, and complains, if it is chosen
+              }
+          }) {}
+    ~HeadStart() { stop(); }
+
+    void stop() {
+        set_flag(&stop_);
+        if (thread_.joinable()) thread_.join();
+    }
+    uint32_t samples() const { return samples_; }
+    std::unique_ptr<Renderer> take() { return std::move(renderer_); }
+
+private:
+    void run() {
+        constexpr double kBatchSeconds = 0.008;  // which the host may have to wait for
+        for (uint32_t batch = 1; !is_set(&stop_);) {
+            const auto start = Clock::now();
+            samples_ += renderer_->render(samples_, batch);
+            batch = std::clamp(uint32_t(kBatchSeconds / seconds_since(start) * batch), 1u, 4 * batch);
+        }
+    }
+
+    volatile bool stop_ = false;
+    uint32_t samples_ = 0;
+    std::unique_ptr<Renderer> renderer_;
+    std::thread thread_;
+};
+
+/// A renderer that also tells how it was chosen. `ready`: samples that are in its film.
 class Chosen final : public Renderer {
 public:
-    Chosen(std::unique_ptr<Renderer> renderer, ChoiceStats choice) : renderer_(std::move(renderer)), choice_(std::move(choice)) {}
+    Chosen(std::unique_ptr<Renderer> renderer, uint32_t ready, ChoiceStats choice) : renderer_(std::move(renderer)), ready_(ready), choice_(std::move(choice)) {}
 
-    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override { return renderer_->render(first, count, interrupt); }
-    FilmMoments film() override { return renderer_->film(); }
-    void clear_film() override { renderer_->clear_film(); }
+    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+        if (first != 0 || count < ready_) drop();
+        const uint32_t done = ready_;
+        ready_ = 0;
+        return done == count ? done : done + renderer_->render(first + done, count - done, interrupt);
+    }
+    FilmMoments film() override {
+        drop();
+        return renderer_->film();
+    }
+    void clear_film() override {
+        ready_ = 0;
+        renderer_->clear_film();
+    }
+    uint32_t ready() const override { return ready_; }
     RenderStats stats() override {
         RenderStats s = renderer_->stats();
         s.choice = choice_;
@@ -78,7 +132,12 @@ public:
     uint32_t preferred_batch() const override { return renderer_->preferred_batch(); }
 
 private:
+    void drop() {
+        if (ready_ > 0) clear_film();
+    }
+
     std::unique_ptr<Renderer> renderer_;
+    uint32_t ready_;
     ChoiceStats choice_;
 };
 
@@ -160,7 +219,10 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     const std::vector<ChoiceCandidate> candidates = choice_candidates(settings, cuda);
     std::vector<PilotCandidate> judged;
     for (const ChoiceCandidate& c : candidates) judged.push_back(c.pilot);
+    std::optional<HeadStart> head_start;
+    if (cuda && settings.expected_seconds > 0) head_start.emplace(settings_of(settings, candidates[0]), make);
     const ChoicePilot pilot = run_choice_pilot(scene, settings, cwbvh, accels, judged, cuda ? kPilotSamplesCuda : kPilotSamplesCpu);
+    if (head_start) head_start->stop();
     const std::vector<double> variance = choice_variances(pilot);
     std::vector<double> cost;  // of a sample, in any unit; smaller is better in product with the variance
     for (const ChoiceCandidate& c : candidates) cost.push_back(choice_work(pilot.work, c, cuda));
@@ -198,8 +260,15 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
         choice.candidates.push_back({candidates[c].name, joined(candidates[c].settings), variance[c], work[c], seconds[c],
                                      std::isfinite(variance[c]) ? variance[ranked[0]] * cost[ranked[0]] / (variance[c] * cost[c]) : 0.0});
     choice.seconds = seconds_since(start);
-    std::unique_ptr<Renderer> renderer = make(settings_of(settings, candidates[ranked[0]]));
-    return std::make_unique<Chosen>(std::move(renderer), std::move(choice));
+    std::unique_ptr<Renderer> renderer;
+    uint32_t ready = 0;
+    if (head_start && ranked[0] == 0) {
+        ready = head_start->samples();
+        renderer = head_start->take();
+    }
+    head_start.reset();  // and with it the memory of a path tracer that is not wanted
+    if (!renderer) renderer = make(settings_of(settings, candidates[ranked[0]]));
+    return std::make_unique<Chosen>(std::move(renderer), ready, std::move(choice));
 }
 
 }  // namespace ambilux

@@ -45,9 +45,7 @@ template <class Executor, Features F, class Tracer>
 void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     const BidirectionalMemory& m = stages.memory;
     const BidirectionalPolicy& policy = stages.policy;
-    exec.run_slots(StageId::generate, stages.generate, stages.wave.tiles * kTilePixels);
-    exec.set_depth(1);
-    exec.extend_coherent(StageId::extend, stages.extend[0], m.rays[0], m.hits[0]);
+    start_eye_walks(exec, stages.generate, stages.extend[0], m, stages.wave.tiles * kTilePixels, policy.connect_in_shade && policy.max_depth > 0);
     repeat_depths(exec, StageId::shade, stages.shade, StageId::extend, stages.extend, m, policy.tail_below, [&](bool tail) {
         if ((policy.count_hits || policy.count_environment) && !policy.fuse) {
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);

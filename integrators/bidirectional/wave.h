@@ -127,10 +127,10 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     return m;
 }
 
-/// Buffers of the film. `samples`: by slot of this wave; `splats`: 3 per pixel of the film and sample of the wave.
+/// Buffers of the film. `samples`: by slot of this wave.
 struct BidirectionalFilm {
     Lane* samples;
-    int64_t* splats;
+    SplatSums splats;
     double *sum, *sum_squares;
     int64_t* techniques = nullptr;         ///< TechniqueFilm::sums
     uint64_t* technique_dropped = nullptr;
@@ -188,13 +188,18 @@ struct BidirectionalStages {
         accumulate_hits = {m.hit_contributions, film.samples, record(StageId::accumulate), wave, techniques};
         weight_hits = {sums, m.hit_candidates, {m.hit_contributions, accumulate_hits, policy.fuse}, record(StageId::mis_weight), techniques};
         accumulate_shadows = {m.shadow_contributions, film.samples, record(StageId::accumulate), wave, techniques, policy.pairs_per_launch > 1};
-        weight_connections = {sums, m.connect_candidates, m.shadows, record(StageId::mis_weight), techniques, film.samples};
-        weight_splats = {m.splat_candidates, m.weighted_splats, record(StageId::mis_weight)};
+        weight_connections = {sums, m.connect_candidates, {m.shadows}, record(StageId::mis_weight), techniques, film.samples};
+        weight_splats = {m.splat_candidates, {m.weighted_splats}, record(StageId::mis_weight)};
+        if (policy.at_once) {
+            weight_connections.shadows.stage = weight_splats.weighted.stage = this;
+            weight_connections.shadows.take = [](const void* self, const ShadowItem& item) { static_cast<const BidirectionalStages*>(self)->take_at_once(&BidirectionalStages::occlude, item); };
+            weight_splats.weighted.take = [](const void* self, const SplatCandidate& item) { static_cast<const BidirectionalStages*>(self)->take_at_once(&BidirectionalStages::occlude_splats, item); };
+        }
         const HitOutlet hit_outlet = {m.hit_candidates, weight_hits, policy.fuse};
         const ConnectOutlet connect_outlet = {m.connect_candidates, weight_connections, policy.fuse};
         const SplatOutlet splat_outlet = {m.splat_candidates, weight_splats, policy.fuse};
         connect_camera = {scene, wave, policy, m.vertices, splat_outlet, record(StageId::connect_camera)};
-        connect = {scene, wave, policy, m.vertices, m.light_vertices, m.pairs, connect_outlet, record(StageId::connect)};
+        connect = {scene, wave, policy, m.vertices, m.light_vertices, m.pairs, connect_outlet, record(StageId::connect), record(StageId::connect_vertices)};
         for (int k = 0; k < 2; ++k) {
             light_extend[k] = {scene, tracer, wave, Stream::light, m.rays[k], m.hits[k], record(StageId::light_extend)};
             light_shade[k] = {scene, wave, policy, m.hits[k], m.rays[1 - k], m.light_vertices, m.vertices, m.last_vertex, record(StageId::light_shade), connect_camera};
@@ -220,6 +225,14 @@ struct BidirectionalStages {
         occlude_tail = occlude;
         occlude_tail.contributions.next.shared = true;
         develop = {wave, film.samples, film.splats, film.sum, film.sum_squares, record(StageId::develop)};
+    }
+    BidirectionalStages(const BidirectionalStages&) = delete;  // some stages point to others
+
+private:
+    template <class Stage, class Item>
+    void take_at_once(Stage BidirectionalStages::*stage, const Item& item) const {
+        (this->*stage).record->count_item(memory.state->depth);
+        (this->*stage).take(item);
     }
 };
 

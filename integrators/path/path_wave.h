@@ -108,7 +108,7 @@ struct PathStages {
         generate = {scene, wave, policy, m.rays[0], m.samples, record(StageId::generate)};
         accumulate_hits = {m.hit_contributions, m.samples, record(StageId::accumulate)};
         weight_hits = {policy, m.hit_candidates, {m.hit_contributions, accumulate_hits, policy.fuse}, record(StageId::mis_weight)};
-        weight_connections = {policy, m.connect_candidates, m.shadows, record(StageId::mis_weight), {}, m.samples};
+        weight_connections = {policy, m.connect_candidates, {m.shadows}, record(StageId::mis_weight), {}, m.samples};
         connect = {scene, wave, policy, m.connections, {m.connect_candidates, weight_connections, policy.fuse}, record(StageId::connect)};
         for (int k = 0; k < 2; ++k) {
             extend[k] = {scene, tracer, wave, Stream::eye, m.rays[k], m.hits[k], record(StageId::extend)};

@@ -15,9 +15,7 @@ template <class Executor, Features F, class Tracer>
 void run_path_wave(Executor& exec, const PathStages<F, Tracer>& stages) {
     const PathMemory& m = stages.memory;
     const uint32_t slots = stages.wave.tiles * kTilePixels;
-    exec.run_slots(StageId::generate, stages.generate, slots);
-    exec.set_depth(1);
-    exec.extend_coherent(StageId::extend, stages.extend[0], m.rays[0], m.hits[0]);
+    start_eye_walks(exec, stages.generate, stages.extend[0], m, slots, stages.policy.connect_in_shade && stages.policy.max_depth > 0);
     repeat_depths(exec, StageId::shade, stages.shade, StageId::extend, stages.extend, m, stages.policy.tail_below, [&](bool tail) {
         if (stages.policy.count_hits && !stages.policy.fuse) {
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);

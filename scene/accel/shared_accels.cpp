@@ -7,14 +7,12 @@ namespace ambilux {
 
 template <>
 std::shared_ptr<const CwbvhAccel> SharedAccels::get() {
-    if (!cwbvh_) cwbvh_ = std::make_shared<const CwbvhAccel>(scene_);
-    return cwbvh_;
+    return once(cwbvh_, [&] { return std::make_shared<const CwbvhAccel>(scene_); });
 }
 
 template <>
 std::shared_ptr<const EmbreeAccel> SharedAccels::get() {
-    if (!embree_) embree_ = std::make_shared<const EmbreeAccel>(scene_);
-    return embree_;
+    return once(embree_, [&] { return std::make_shared<const EmbreeAccel>(scene_); });
 }
 
 }  // namespace ambilux

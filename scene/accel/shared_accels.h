@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 
 #include "scene/scene.h"
 
@@ -12,7 +13,7 @@ class EmbreeAccel;
 class DeviceScene;
 class DeviceCwbvh;
 
-/// Each is made when it is first asked for, and lives as long as this object or a renderer that holds it. The scene must not change meanwhile and must outlive them.
+/// Each is made when it is first asked for, by whichever thread, and lives as long as this object or a renderer that holds it. The scene must not change meanwhile and must outlive them.
 class SharedAccels {
 public:
     explicit SharedAccels(const Scene& scene) : scene_(scene) {}
@@ -22,7 +23,16 @@ public:
     std::shared_ptr<const T> get();
 
 private:
+    /// Returns `made`, after make() if it is not yet.
+    template <class T>
+    std::shared_ptr<const T> once(std::shared_ptr<const T>& made, auto make) {
+        const std::lock_guard<std::recursive_mutex> lock(mutex_);
+        if (!made) made = make();
+        return made;
+    }
+
     const Scene& scene_;
+    std::recursive_mutex mutex_;  ///< some are made from others
     std::shared_ptr<const CwbvhAccel> cwbvh_;
     std::shared_ptr<const EmbreeAccel> embree_;
     std::shared_ptr<const DeviceScene> device_scene_;

@@ -1,0 +1,42 @@
+// What light walks bring to the pixels.
+#pragma once
+
+#include "stages/accumulate.h"
+#include "stages/fixed_point.h"
+
+namespace ambilux {
+
+/// A cell per pixel and sample of a wave, of one of two kinds. Fixed point does not depend on the order in which threads add. A cell of floats takes one operation of memory instead of
+/// three: n values are added up with an error of at most n 2^-24 of their sum.
+struct SplatSums {
+    int64_t* fixed;  ///< three per cell in units of kLightUnit, or null
+    Lane* floats;    ///< or a lane per cell
+
+    /// False if the light does not fit.
+    AMBILUX_HD bool add(uint64_t cell, Rgb value) const {
+        if (fixed) return add_light(fixed + cell * 3, value);
+        if (!(max_component(value) < kTooMuchLight)) return false;
+        if (max_component(value) < kLargeLight) {
+            FixedLight light = to_fixed(value);
+            if (!gather_light(floats + cell, light)) return true;
+            value = {float(double(light.value[0]) * kLightUnit), float(double(light.value[1]) * kLightUnit), float(double(light.value[2]) * kLightUnit)};
+        }
+        add_shared(floats[cell], value);
+        return true;
+    }
+    /// Empties a cell.
+    AMBILUX_HD void take(uint64_t cell, double (&value)[3]) const {
+        if (!fixed) {
+            const Rgb sum = start_of<Rgb>(floats[cell]);
+            for (int c = 0; c < 3; ++c) value[c] = double(sum[c]);
+            floats[cell] = {};
+            return;
+        }
+        for (int c = 0; c < 3; ++c) {
+            value[c] = double(fixed[cell * 3 + c]) * kLightUnit;
+            fixed[cell * 3 + c] = 0;
+        }
+    }
+};
+
+}  // namespace ambilux
