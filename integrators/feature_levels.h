@@ -8,6 +8,10 @@ namespace ambilux {
 /// Diffuse triangles under area lights.
 constexpr Features kDiffuseFeatures = {bit(BsdfType::diffuse), bit(EmitterType::area), bit(PrimitiveType::triangle), false, false, false};
 
+/// What most scenes of light transport papers are made of: any shapes under area lights, no textures.
+constexpr Features kUntexturedFeatures = {bit(BsdfType::diffuse) | bit(BsdfType::conductor) | bit(BsdfType::rough_conductor) | bit(BsdfType::dielectric), bit(EmitterType::area),
+                                          kAllFeatures.primitives, false, false, false};
+
 /// Every BSDF, texture and emitter, on triangles that are neither bumped nor holed.
 constexpr Features kTriangleFeatures = {kAllFeatures.bsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false, false};
 
@@ -23,6 +27,13 @@ decltype(auto) with_feature_level(const Features& needed, bool specialise, Funct
     if (specialise && kDiffuseFeatures.covers(needed)) return f(FeatureTag<kDiffuseFeatures>{});
     if (specialise && kTriangleFeatures.covers(needed)) return f(FeatureTag<kTriangleFeatures>{});
     return f(FeatureTag<kAllFeatures>{});
+}
+
+/// The same with one level more, for kernels of a device, where what is never called costs registers and room in instruction caches.
+template <class Function>
+decltype(auto) with_kernel_level(const Features& needed, bool specialise, Function&& f) {
+    if (specialise && !kDiffuseFeatures.covers(needed) && kUntexturedFeatures.covers(needed)) return f(FeatureTag<kUntexturedFeatures>{});
+    return with_feature_level(needed, specialise, f);
 }
 
 }  // namespace ambilux

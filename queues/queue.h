@@ -34,14 +34,14 @@ AMBILUX_HD void set_start(Lane& place, const Value& value) {
     place = lane;
 }
 
-/// State of one queue. `count` goes on counting when the queue is full, so that what is lost is known.
-struct alignas(1024) QueueCounter {
+/// State of one queue. Counters lie a kilobyte apart: those that share a part of a device's cache are added to one after the other; one cache line more, lest all fall into few sets of a host's. `count` goes on counting when the queue is full, so that what is lost is known.
+struct QueueCounter {
     uint32_t count;     ///< items since the queue was last emptied; of a queue of fixed places known on a device only when it has been counted
     uint32_t capacity;
     uint64_t peak;      ///< most pushes of one filling
     uint64_t overflow;  ///< items lost: pushes past the capacity, or to a fixed place that was taken (which only the host looks for)
     uint32_t next;      ///< first item that no persistent thread has taken yet
-    uint32_t pad[3];
+    uint32_t pad[265];
 
     AMBILUX_HD uint32_t size() const { return count < capacity ? count : capacity; }
     /// Empties the queue and keeps what its filling tells.
@@ -52,6 +52,8 @@ struct alignas(1024) QueueCounter {
         next = 0;
     }
 };
+
+static_assert(sizeof(QueueCounter) == 1024 + 64);
 
 /// Takes one place for the calling thread. On a device the threads of a warp that push together take theirs with one atomic operation, so all of them must push to the
 /// same queue: a queue that differs from thread to thread is to be chosen by a branch.

@@ -101,7 +101,9 @@ AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Bidirectional
                                 uint32_t which, const ConnectOutlet& candidates, StageRecord* record) {
     const Strategy strategy = Strategy::make(light.bits.depth() + 1, item.bits.depth() + 1);
     if (!policy.singles.has(strategy)) return;
-    const WalkVertex y = unpack_vertex<F>(scene, light);
+    const SurfacePoint at = surface_of<F>(scene, light);
+    if (!may_connect(scene, at, -light.d, z.point, -item.d)) return;
+    const WalkVertex y = unpack_vertex<F>(scene, light, at);
     WalkConnection c;
     if (!connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
     c.value *= scale;
@@ -175,7 +177,8 @@ struct EyeConnect {
 
 template <Features F>
 struct EyeShade {
-    static constexpr uint32_t kBlocksPerSm = 3;  ///< 168 registers instead of 232: more warps hide more latency (docs/performance.md)
+    /// 168 registers instead of 232, 128 for diffuse surfaces: more warps hide more latency (docs/performance.md).
+    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 4 : 3;
 
     SceneView scene;
     Wave wave;
@@ -240,12 +243,28 @@ struct ConnectVertices {
     /// What an executor that goes through items one after the other may keep from one to the next.
     using Memory = PairedVertex;
 
-    AMBILUX_HD void operator()(uint32_t i) const {
+    AMBILUX_HD void operator()(uint32_t i, Memory& eye) const {
+        push_next(pairs.load(i));
+        connect(i, eye);
+    }
+    /// False if the pair brings nothing, told with less than a connection takes. Executors that can do so gather the others first, which then connect().
+    /// Among diffuse surfaces a connection takes little more than that.
+    AMBILUX_HD bool relevant(uint32_t i) const requires(F.bsdfs != bit(BsdfType::diffuse)) {
+        const PairItem pair = pairs.load(i);
+        const VertexItem light = light_vertices.load(pair.light), item = vertices.load(pair.vertex);
+        push_next(pair);
+        return item.bits.depth() + light.bits.depth() + 1 <= policy.max_depth && may_connect(scene, surface_of<F>(scene, light), -light.d, surface_of<F>(scene, item), -item.d);
+    }
+    AMBILUX_HD void connect(uint32_t i) const {
         Memory eye;
-        (*this)(i, eye);
+        connect(i, eye);
     }
 
-    AMBILUX_HD void operator()(uint32_t i, Memory& eye) const {
+private:
+    AMBILUX_HD void push_next(const PairItem& pair) const {
+        if (pair.next != kNone) push_pairs(wave, policy, light_vertices, pairs.counter->size(), pair.vertex, pair.path, vertices.load(pair.vertex).bits.depth(), pair.next, rest);
+    }
+    AMBILUX_HD void connect(uint32_t i, Memory& eye) const {
         const PairItem pair = pairs.load(i);
         if (eye.place != pair.vertex) {
             eye.place = pair.vertex;
@@ -255,7 +274,6 @@ struct ConnectVertices {
         const VertexItem light = light_vertices.load(pair.light);  // before anything waits for the eye vertex
         const VertexItem& item = eye.item;
         const uint32_t depth = item.bits.depth();
-        if (pair.next != kNone) push_pairs(wave, policy, light_vertices, pairs.counter->size(), pair.vertex, pair.path, depth, pair.next, rest);
         if (depth + light.bits.depth() + 1 > policy.max_depth) return;
         const bool drawn = policy.cache_draws > 0;
         if (!eye.unpacked) eye.vertex = unpack_vertex<F>(scene, item);

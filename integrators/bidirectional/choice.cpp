@@ -71,7 +71,9 @@ public:
     HeadStart(const RenderSettings& settings, const MakeRenderer& make)
         : thread_([this, settings, &make] {
               try {
+                  const auto start = Clock::now();
                   renderer_ = make(settings);
+                  build_seconds_ = seconds_since(start);
                   run();
               } catch (const std::exception&) {
                   samples_ = 0;
@@ -85,12 +87,13 @@ public:
         if (thread_.joinable()) thread_.join();
     }
     uint32_t samples() const { return samples_; }
+    double build_seconds() const { return build_seconds_; }
     std::unique_ptr<Renderer> take() { return std::move(renderer_); }
 
 private:
     void run() {
         constexpr double kBatchSeconds = 0.008;  // which the host may have to wait for
-        for (uint32_t batch = 1; !is_set(&stop_);) {
+        for (uint32_t batch = 1; samples_ == 0 || !is_set(&stop_);) {
             const auto start = Clock::now();
             samples_ += renderer_->render(samples_, batch);
             batch = std::clamp(uint32_t(kBatchSeconds / seconds_since(start) * batch), 1u, 4 * batch);
@@ -99,6 +102,7 @@ private:
 
     volatile bool stop_ = false;
     uint32_t samples_ = 0;
+    double build_seconds_ = 0;
     std::unique_ptr<Renderer> renderer_;
     std::thread thread_;
 };
@@ -265,6 +269,8 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     if (head_start && ranked[0] == 0) {
         ready = head_start->samples();
         renderer = head_start->take();
+        // Building it is no cost of the choice either: any render does.
+        if (renderer) choice.seconds = std::max(0.0, choice.seconds - head_start->build_seconds());
     }
     head_start.reset();  // and with it the memory of a path tracer that is not wanted
     if (!renderer) renderer = make(settings_of(settings, candidates[ranked[0]]));

@@ -11,8 +11,9 @@ namespace ambilux {
 std::unique_ptr<Renderer> make_path_cuda([[maybe_unused]] const Scene& scene, [[maybe_unused]] const RenderSettings& settings, [[maybe_unused]] SharedAccels& accels) {
 #if defined(AMBILUX_HAS_CUDA)
     if (!cuda_device_present()) throw Error(ExitCode::device, "no CUDA device answers: check the driver with nvidia-smi, or use --backend cpu");
-    return with_feature_level(scene.features, settings.specialise, [&](auto level) {
+    return with_kernel_level(scene.features, settings.specialise, [&](auto level) {
         if constexpr (decltype(level)::value == kDiffuseFeatures) return make_path_cuda_diffuse(scene, settings, accels);
+        else if constexpr (decltype(level)::value == kUntexturedFeatures) return make_path_cuda_untextured(scene, settings, accels);
         else if constexpr (decltype(level)::value == kTriangleFeatures) return make_path_cuda_triangles(scene, settings, accels);
         else return make_path_cuda_all(scene, settings, accels);
     });

@@ -1,0 +1,9 @@
+#include "integrators/bidirectional/bidirectional_cuda.cuh"
+
+namespace ambilux {
+
+std::unique_ptr<Renderer> make_bidirectional_cuda_untextured(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
+    return std::make_unique<BidirectionalCuda<kUntexturedFeatures>>(scene, settings, accels);
+}
+
+}  // namespace ambilux
