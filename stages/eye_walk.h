@@ -243,6 +243,10 @@ struct ConnectVertices {
     /// What an executor that goes through items one after the other may keep from one to the next.
     using Memory = PairedVertex;
 
+    AMBILUX_HD void operator()(uint32_t i) const {
+        Memory eye;
+        (*this)(i, eye);
+    }
     AMBILUX_HD void operator()(uint32_t i, Memory& eye) const {
         push_next(pairs.load(i));
         connect(i, eye);
