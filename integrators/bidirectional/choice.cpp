@@ -45,14 +45,15 @@ RenderSettings settings_of(const RenderSettings& settings, const ChoiceCandidate
 /// Candidates of one family do the same but for the number of draws, so that the time of one tells that of the others.
 uint32_t family(const ChoiceCandidate& c) { return (c.pilot.light ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0); }
 
-/// Seconds per sample of every pixel. On a device: of about one full wave, smaller than a render's for the sake of time.
+/// Seconds per sample of every pixel. On a device: of about one full wave, smaller than a render's for the sake of time. What launches cost beside their items is then more than it will be, and for
+/// cheap samples most: so the path tracer's wave holds more of them, and takes about as long as others.
 double timed(const Scene& scene, RenderSettings settings, bool cuda, const MakeRenderer& make) {
     constexpr double kLongEnough = 0.05;
-    constexpr uint32_t kPathsPerWave = 1u << 21;
-    if (cuda && settings.wave_size == 0 && settings.variant != "streaming") settings.wave_size = kPathsPerWave;
+    const uint32_t paths_per_wave = settings.integrator == "path" ? 1u << 22 : 1u << 21;
+    if (cuda && settings.wave_size == 0 && settings.variant != "streaming") settings.wave_size = paths_per_wave;
     const std::unique_ptr<Renderer> renderer = make(settings);
     const uint32_t pixels = scene.sensor.crop_width * scene.sensor.crop_height;
-    const uint32_t count = cuda ? std::clamp(kPathsPerWave / std::max(1u, pixels), 1u, renderer->preferred_batch()) : 1;
+    const uint32_t count = cuda ? std::clamp(paths_per_wave / std::max(1u, pixels), 1u, renderer->preferred_batch()) : 1;
     const auto seconds_of = [&](uint32_t first, uint32_t samples) {
         const auto start = Clock::now();
         renderer->render(first, samples);
