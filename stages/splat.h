@@ -2,8 +2,8 @@
 #pragma once
 
 #include "stages/bidirectional_policy.h"
-#include "stages/splat_sums.h"
 #include "stages/outlet.h"
+#include "stages/splat_sums.h"
 #include "stages/stage.h"
 #include "stages/walk_items.h"
 #include "stages/wave.h"

@@ -178,6 +178,53 @@ TEST_CASE("the choice repeats: it depends on the seed, and on clocks only where 
     }
 }
 
+TEST_CASE("a path tracer that renders while the pilot runs makes room for a candidate that has none beside it") {
+    // What a device does, by renderers of the host.
+    struct Counted : Renderer {
+        Counted(std::unique_ptr<Renderer> r, int& l) : renderer(std::move(r)), living(l) { ++living; }
+        ~Counted() override { --living; }
+        uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override { return renderer->render(first, count, interrupt); }
+        FilmMoments film() override { return renderer->film(); }
+        void clear_film() override { renderer->clear_film(); }
+        RenderStats stats() override { return renderer->stats(); }
+        uint32_t preferred_batch() const override { return 4; }
+        std::unique_ptr<Renderer> renderer;
+        int& living;
+    };
+    bool some_timed = false;
+    for (const char* name : {"cornell", "glass", "lights", "materials"}) {
+        const Scene scene = project_scene(name, 48, 32);
+        RenderSettings s = automatic_settings(scene, 5);
+        s.expected_seconds = 1;
+        for (const bool small : {false, true}) {
+            int living = 0, refused = 0;
+            SharedAccels accels(scene);
+            const auto make = [&](const RenderSettings& chosen) -> std::unique_ptr<Renderer> {
+                if (small && living > 0) {
+                    ++refused;
+                    throw Error(ExitCode::device, "no room");
+                }
+                return std::make_unique<Counted>(make_renderer(scene, chosen), living);
+            };
+            const auto renderer = make_automatic(scene, s, true, accels, make);
+            const ChoiceStats choice = renderer->stats().choice;
+            INFO(name << (small ? ", small: " : ", large: ") << choice.name << ", ready " << renderer->ready());
+            const bool timed = std::any_of(choice.candidates.begin(), choice.candidates.end(), [](const ChoiceStats::Candidate& c) { return c.seconds > 0; });
+            some_timed |= timed;
+            CHECK(living == 1);
+            CHECK(refused == (small && timed ? 1 : 0));
+            CHECK((renderer->ready() > 0) == (choice.name == "path" && !(small && timed)));
+            CHECK(choice.seconds >= 0);
+            const uint32_t samples = renderer->ready() + 2;
+            REQUIRE(renderer->render(0, samples) == samples);
+            const FilmMoments film = renderer->film();
+            CHECK(film.samples == samples);
+            CHECK(worst_difference(render_scene(scene, fixed(s, choice.settings), samples).film, mean_image(film)) < 1e-5);
+        }
+    }
+    CHECK(some_timed);
+}
+
 TEST_CASE("variants restrict the choice; other settings that it would make are refused by name") {
     const Scene scene = project_scene("cornell", 24, 24);
     RenderSettings s = automatic_settings(scene);

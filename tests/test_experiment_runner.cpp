@@ -77,7 +77,8 @@ TEST_CASE("samples that a renderer brings along are the first of a render with a
     const RenderPosition p = drive(timed, {}, {0, 0.2});
     CHECK(timed.first_count == 7);
     CHECK(p.samples == world.samples + 7);
-    CHECK(p.seconds == Approx(0.2).margin(0.1));
+    CHECK(world.samples > 0);
+    CHECK(world.samples <= 21);  // what the time suffices for, and one by rounding
     Prepared counted(scene, {}, world);
     CHECK(drive(counted, {}, {5, 0}).samples == 5);  // fewer than there are: the renderer sees that
 }

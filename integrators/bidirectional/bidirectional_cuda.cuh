@@ -40,7 +40,7 @@ public:
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
         Layout million;
         lay_out(million, 1u << 20, planned_vertices(mean, 1u << 20), policy_);
-        const uint64_t bytes_per_path = (million.bytes() >> 20) + 3 * sizeof(int64_t) + sizeof(Lane);
+        const uint64_t bytes_per_path = (million.bytes() >> 20) + (settings.deterministic ? 3 * sizeof(int64_t) : sizeof(Lane)) + sizeof(Lane);
         wave_.samples = std::max(1u, device_wave_size(scene, settings, kWavePlateau, bytes_per_path, free) / slots);
         if (settings.variant == "streaming") {
             // Enough paths for each slot that the last ones, which leave slots idle, matter little.

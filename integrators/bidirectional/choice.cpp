@@ -247,7 +247,17 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     // On the CPU stages cost what their items do (docs/performance.md), but for variants of other schedules.
     const bool doubtful = cuda || (settings.variant != "wavefront" && settings.variant != "lvc");
     if (doubtful && !settings.deterministic && rival != ranked.end() && variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
-        for (const size_t i : {best, *rival}) seconds[i] = timed(scene, settings_of(settings, candidates[i]), cuda, make);
+        for (const size_t i : {best, *rival}) {
+            const RenderSettings candidate = settings_of(settings, candidates[i]);
+            try {
+                seconds[i] = timed(scene, candidate, cuda, make);
+            } catch (const Error&) {
+                // A small device has no room for two.
+                if (!head_start) throw;
+                head_start.reset();
+                seconds[i] = timed(scene, candidate, cuda, make);
+            }
+        }
         for (size_t c = 0; c < candidates.size(); ++c) {
             const size_t like = family(candidates[c]) == family(candidates[*rival]) ? *rival : best;
             cost[c] = seconds[like] * work[c] / work[like];

@@ -104,16 +104,17 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     if (policy.stream_slots) return lay_out_streaming(layout, slots, policy);
     const bool fixed = policy.queues.fixed_places(), single = fixed && policy.pairs_per_launch == 1;  // several pairs of a path need several places
     const bool connections = policy.next_event || policy.connect_vertices, staged = !policy.fuse, hits = staged && (policy.count_hits || policy.count_environment);
-    const uint32_t pairs = when(policy.connect_vertices, most_pairs(policy, slots)), shadows = connections ? std::max(slots, pairs) : 0;
+    const bool gathered = !policy.at_once;
+    const uint32_t pairs = when(policy.connect_vertices && gathered, most_pairs(policy, slots)), shadows = connections && gathered ? std::max(slots, pairs) : 0;
     BidirectionalMemory m{};
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
     lay_out_walks(layout, m, m.counters, slots, fixed);
-    m.vertices = layout.queue<VertexItem>("vertices", m.counters, when(policy.connect_vertices || !policy.connect_in_shade), fixed && !policy.connect_in_shade);
+    m.vertices = layout.queue<VertexItem>("vertices", m.counters, when((policy.connect_vertices && gathered) || !policy.connect_in_shade), fixed && !policy.connect_in_shade);
     m.light_vertices = layout.queue<VertexItem, LaneOrder::together>("light_vertices", m.counters, when(policy.connect_vertices, kept));
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged), fixed);
-    m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat), fixed);
+    m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat && gathered), fixed);
     m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, kept + slots));
     m.pairs = layout.queue<PairItem>("pairs", m.counters, pairs, single);
     m.rest = layout.queue<PairItem>("rest", m.counters, pairs, single);
