@@ -86,7 +86,7 @@ AMBILUX_HD Frame frame_from_normal_tangent(Vec3f n, Vec3f dpdu) {
     const Vec3f s = dpdu - n * dot(n, dpdu);
     const float l2 = length_squared(s);
     if (!(l2 > 0.0f)) return frame_from_normal(n);
-    const Vec3f unit = s * (1.0f / sqrtf(l2));
+    const Vec3f unit = s * inverse_sqrt(l2);
     return {unit, cross(n, unit), n};
 }
 
@@ -110,20 +110,11 @@ struct Affine {
     }
 };
 
-/// Moves `p` off the surface with normal `ng` to the side of `w`, by the absolute error bound `p_error` of `p`
-/// (PBRT 4th ed., 6.8.6). `p_error` bounds each coordinate; `ng` need not point to the side of `w`.
+/// Moves `p` off the surface with normal `ng` to the side of `w`, by the absolute error bound `p_error` of `p` (PBRT 4th ed., 6.8.6) and by what the sum may be rounded, instead of
+/// stepping to the next float afterwards. `p_error` bounds each coordinate; `ng` need not point to the side of `w`.
 AMBILUX_HD Vec3f offset_ray_origin(Vec3f p, Vec3f p_error, Vec3f ng, Vec3f w) {
-    const float d = dot(abs(ng), p_error);
-    Vec3f offset = ng * d;
-    if (dot(w, ng) < 0.0f) offset = -offset;
-    Vec3f po = p + offset;
-    for (int i = 0; i < 3; ++i) {
-        if (offset[i] > 0.0f)
-            po[i] = next_float_up(po[i]);
-        else if (offset[i] < 0.0f)
-            po[i] = next_float_down(po[i]);
-    }
-    return po;
+    const float d = dot(abs(ng), p_error + abs(p) * 0x1p-23f);
+    return p + ng * (dot(w, ng) < 0.0f ? -d : d);
 }
 
 }  // namespace ambilux

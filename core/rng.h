@@ -26,9 +26,8 @@ AMBILUX_HD uint32_t mul_hi(uint32_t a, uint32_t b) { return uint32_t((uint64_t(a
 /// as 1, 2, 3", table 2).
 AMBILUX_HD Uint4 philox4x32(Uint4 c, uint32_t k0, uint32_t k1) {
     for (int round = 0; round < 7; ++round) {
-        const uint32_t hi0 = mul_hi(0xD2511F53u, c.x), lo0 = 0xD2511F53u * c.x;
-        const uint32_t hi1 = mul_hi(0xCD9E8D57u, c.z), lo1 = 0xCD9E8D57u * c.z;
-        c = {hi1 ^ c.y ^ k0, lo1, hi0 ^ c.w ^ k1, lo0};
+        const uint64_t product0 = uint64_t(0xD2511F53u) * c.x, product1 = uint64_t(0xCD9E8D57u) * c.z;
+        c = {uint32_t(product1 >> 32) ^ c.y ^ k0, uint32_t(product1), uint32_t(product0 >> 32) ^ c.w ^ k1, uint32_t(product0)};
         k0 += 0x9E3779B9u;
         k1 += 0xBB67AE85u;
     }

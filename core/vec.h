@@ -49,7 +49,15 @@ AMBILUX_HD Vec3f cross(Vec3f a, Vec3f b) {
 }
 AMBILUX_HD float length_squared(Vec3f a) { return dot(a, a); }
 AMBILUX_HD float length(Vec3f a) { return sqrtf(dot(a, a)); }
-AMBILUX_HD Vec3f normalize(Vec3f a) { return a * (1.0f / length(a)); }
+/// 1 / sqrt(x), within 2 units in the last place for x > 0.
+AMBILUX_HD float inverse_sqrt(float x) {
+#if defined(__CUDA_ARCH__)
+    return rsqrtf(x);
+#else
+    return 1.0f / sqrtf(x);
+#endif
+}
+AMBILUX_HD Vec3f normalize(Vec3f a) { return a * inverse_sqrt(length_squared(a)); }
 /// The smaller and the larger of two; of a number and a NaN the number. As fminf and fmaxf, which are one instruction on a device but calls of a library on the host.
 #if defined(__CUDA_ARCH__)
 AMBILUX_HD float min(float a, float b) { return fminf(a, b); }
@@ -66,9 +74,8 @@ AMBILUX_HD Vec3f abs(Vec3f a) { return {fabsf(a.x), fabsf(a.y), fabsf(a.z)}; }
 AMBILUX_HD Vec3f splat(float s) { return {s, s, s}; }
 AMBILUX_HD bool is_zero(Vec3f a) { return a.x == 0.0f && a.y == 0.0f && a.z == 0.0f; }
 AMBILUX_HD bool is_finite(Vec3f a) {
-    // A finite float minus itself is zero; NaN and Inf give NaN. Holds without fast-math only.
-    const float s = (a.x - a.x) + (a.y - a.y) + (a.z - a.z);
-    return s == 0.0f;
+    constexpr float kInf = __builtin_huge_valf();
+    return (fabsf(a.x) < kInf) & (fabsf(a.y) < kInf) & (fabsf(a.z) < kInf);
 }
 
 /// Relative luminance of linear Rec.709 (ITU-R BT.709).

@@ -5,16 +5,10 @@
 #include <cstring>
 #include <type_traits>
 
-#include "core/hd.h"
-
-#include <cstdint>
+#include "queues/counter.h"
+#include "queues/stretch.h"
 
 namespace ambilux {
-
-/// The unit of storage: one coalesced access per thread.
-struct alignas(16) Lane {
-    uint32_t word[4];
-};
 
 /// The start of a lane as a value. The lane is loaded whole: copying a part of it is compiled to loads of single bytes.
 template <class Value>
@@ -32,44 +26,6 @@ AMBILUX_HD void set_start(Lane& place, const Value& value) {
     Lane lane = {};
     memcpy(&lane, &value, sizeof(value));
     place = lane;
-}
-
-/// State of one queue. Counters lie a kilobyte apart: those that share a part of a device's cache are added to one after the other; one cache line more, lest all fall into few sets of a host's. `count` goes on counting when the queue is full, so that what is lost is known.
-struct QueueCounter {
-    uint32_t count;     ///< items since the queue was last emptied; of a queue of fixed places known on a device only when it has been counted
-    uint32_t capacity;
-    uint64_t peak;      ///< most pushes of one filling
-    uint64_t overflow;  ///< items lost: pushes past the capacity, or to a fixed place that was taken (which only the host looks for)
-    uint32_t next;      ///< first item that no persistent thread has taken yet
-    uint32_t pad[265];
-
-    AMBILUX_HD uint32_t size() const { return count < capacity ? count : capacity; }
-    /// Empties the queue and keeps what its filling tells.
-    AMBILUX_HD void finish() {
-        if (count > peak) peak = count;
-        if (count > capacity) overflow += count - capacity;
-        count = 0;
-        next = 0;
-    }
-};
-
-static_assert(sizeof(QueueCounter) == 1024 + 64);
-
-/// Takes one place for the calling thread. On a device the threads of a warp that push together take theirs with one atomic operation, so all of them must push to the
-/// same queue: a queue that differs from thread to thread is to be chosen by a branch.
-AMBILUX_HD uint32_t take_place(uint32_t* count) {
-#if defined(__CUDA_ARCH__)
-    const uint32_t together = __activemask();
-    uint32_t below;
-    asm("mov.u32 %0, %%lanemask_lt;" : "=r"(below));
-    const uint32_t rank = uint32_t(__popc(together & below));
-    uint32_t first = 0;
-    // By hand, since compilers look once more for threads that add to one place.
-    if (rank == 0) asm volatile("atom.global.add.u32 %0, [%1], %2;" : "=r"(first) : "l"(__cvta_generic_to_global(count)), "r"(__popc(together)) : "memory");
-    return __shfl_sync(together, first, __ffs(int(together)) - 1) + rank;
-#else
-    return (*count)++;  // a host queue belongs to one thread
-#endif
 }
 
 /// The path that an item belongs to.
@@ -119,6 +75,17 @@ struct Queue {
         const uint32_t i = flags ? fixed_place(item) : take_place(&counter->count);
         if (i < capacity) store(i, item);
         return i;
+    }
+    /// The same, and places may stay empty: whoever goes through the queue skips items whose path is kNoPath. Kernels that call it open and close the stretches of their blocks.
+    AMBILUX_HD uint32_t push_loosely(const Item& item) const {
+#if defined(__CUDA_ARCH__)
+        if (!flags) {
+            const uint32_t i = WarpStretches::mine().take({counter, base, place(0, 1), place(1, 0), kLanes, capacity});
+            if (i < capacity) store(i, item);
+            return i;
+        }
+#endif
+        return push(item);
     }
     /// Writes the last lane of an item whose others are there already (Layout::front). Whoever does so for items that are appended sets the counter.
     template <class Last>

@@ -60,7 +60,14 @@ void fill_areas(Scene& scene) {
         emitter.area_cdf = kNone;
         if (shape.primitive_count < 2) continue;
         emitter.area_cdf = uint32_t(scene.tables.size());
-        append_cdf(scene.tables, shape.primitive_count, [&](size_t i) { return triangle_area(scene, scene.triangles[shape.first_primitive + i]); });
+        const auto triangle_area_of = [&](size_t i) { return triangle_area(scene, scene.triangles[shape.first_primitive + i]); };
+        append_cdf(scene.tables, shape.primitive_count, triangle_area_of);
+        // From the rounded table, not 1/area of the shape: that is what sampling does, and in meshes of many triangles the two differ.
+        for (size_t i = 0; i < shape.primitive_count; ++i) {
+            const float* cdf = scene.tables.data() + emitter.area_cdf + i;
+            const double share = double(cdf[1]) - cdf[0];
+            scene.tables.push_back(share > 0 ? float(share / triangle_area_of(i)) : 0.0f);
+        }
     }
 }
 

@@ -51,10 +51,12 @@ AMBILUX_HD Vec3f accurate_cross(Vec3f a, Vec3f b) {
 AMBILUX_HD Vec3f triangle_normal(Vec3f e1, Vec3f e2) {
     const float scale = max(max_component(abs(e1)), max_component(abs(e2)));
     if (!(scale > 0.0f)) return {0.0f, 0.0f, 1.0f};
-    const float inv = 1.0f / scale;
+    // A power of two near 1/scale, so that nothing is rounded.
+    const uint32_t exponent = float_bits(scale) >> 23;
+    const float inv = bits_float((253u - (exponent < 252u ? exponent : 252u)) << 23);
     const Vec3f n = accurate_cross(e1 * inv, e2 * inv);
-    const float l = length(n);
-    if (l > 0.0f) return n * (1.0f / l);
+    const float l2 = length_squared(n);
+    if (l2 > 0.0f) return n * inverse_sqrt(l2);
     // Collinear: orthogonal to the longer edge at least.
     return frame_from_normal(normalize(length_squared(e1) > length_squared(e2) ? e1 * inv : e2 * inv)).s;
 }
@@ -84,7 +86,7 @@ AMBILUX_HD SurfacePoint triangle_surface_at(const SceneView& scene, uint32_t pri
     if (flags & kShapeHasNormals) {
         const Vec3f n = a.n * b0 + b.n * b1 + c.n * b2;
         const float l2 = length_squared(n);
-        if (l2 > 1e-20f) s.ns = n * (1.0f / sqrtf(l2));
+        if (l2 > 1e-20f) s.ns = n * inverse_sqrt(l2);
     }
     if (flags & kShapeHasUvs) {
         const Vec2f t0 = a.uv(), t1 = b.uv(), t2 = c.uv();

@@ -133,7 +133,7 @@ struct EnvironmentCell {
 struct Emitter {
     EmitterType type;
     uint32_t shape;           ///< area: its shape
-    uint32_t area_cdf;        ///< area over triangles: primitive_count+1 floats in tables; kNone for a single primitive
+    uint32_t area_cdf;        ///< area over triangles: primitive_count+1 floats in tables, and then the density per area on each; kNone for a single primitive
     float pick_probability;   ///< chance that light sampling picks this emitter
     ParamRgb radiance;        ///< area: textured by surface uv; spot: textured by projection
     Affine to_world, to_local;///< spot: +z is the axis; envmap: rotation; point, directional: unused

@@ -36,9 +36,8 @@ struct Connect {
         finish(point, make_scattering<F>(scene, point, -c.d), light, key, c.path, c.bits.depth(), c.throughput);
     }
 
-    /// The same for a vertex whose BSDF is known already.
-    AMBILUX_HD void take(const SurfacePoint& point, const Scattering& s, Vec3f wo, uint32_t path, uint32_t depth, Rgb throughput) const {
-        const RngKey key = wave.key(path);
+    /// The same for a vertex whose BSDF and random numbers are known already.
+    AMBILUX_HD void take(const SurfacePoint& point, const Scattering& s, Vec3f wo, const RngKey& key, uint32_t path, uint32_t depth, Rgb throughput) const {
         EmitterSample light;
         if (sample(point, wo, key, depth, light)) finish(point, s, light, key, path, depth, throughput);
     }

@@ -32,7 +32,7 @@ struct EyeGenerate {
     }
 };
 
-/// An eye walk at `h`: emission becomes a candidate, and visit(vertex, its item) is called where connections may start.
+/// An eye walk at `h`: emission becomes a candidate, and visit(vertex, its item, random numbers of the walk) is called where connections may start.
 template <Features F, class Visit>
 AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, const HitOutlet& candidates, StageRecord* record, Visit visit) {
     const auto emit = [&](Rgb radiance, float others) {
@@ -57,14 +57,15 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
         if (!is_zero(radiance)) emit(radiance, others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, z.point));
     }
     if (w.depth >= policy.max_depth) return step;
+    const RngKey key = wave.key(h.ray.path);
     if ((policy.next_event || policy.connect_vertices) && bsdf_is_smooth(z.scattering.bsdf)) {
         step.vertex = pack_vertex(h, z, kNone);
         step.connectable = true;
-        visit(z, step.vertex);
+        visit(z, step.vertex, key);
     }
     const uint32_t depth = w.depth;
     if (depth + 1 == policy.max_depth && !policy.counts_last_segment()) return step;
-    const Vec4f u = random_floats(wave.key(h.ray.path), scatter_block(depth));
+    const Vec4f u = random_floats(key, scatter_block(depth));
     if (!scatter_walk<F>(policy.mis, z, u, TransportMode::radiance, policy.rr_depth, w) || !is_light(w.throughput, record)) return step;
     step.ray = pack_walk(w, h.ray.path, false, kInfinity);
     step.goes_on = true;
@@ -134,7 +135,7 @@ struct EyeConnect {
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
         pair(item, i, vertices.counter->size());
-        if (policy.next_event) take(unpack_vertex<F>(scene, item), item.throughput, item.path, item.bits.depth());
+        if (policy.next_event) take(unpack_vertex<F>(scene, item), item.throughput, wave.key(item.path), item.path, item.bits.depth());
     }
 
     /// `count`: of vertices in this launch, or more.
@@ -165,9 +166,8 @@ struct EyeConnect {
         }
     }
 
-    AMBILUX_HD void take(const WalkVertex& z, Rgb throughput, uint32_t path, uint32_t depth) const {
+    AMBILUX_HD void take(const WalkVertex& z, Rgb throughput, const RngKey& key, uint32_t path, uint32_t depth) const {
         if (!policy.next_event || !policy.wants(1, depth + 1)) return;
-        const RngKey key = wave.key(path);
         WalkConnection c;
         if (!connect_next_event<F>(scene, policy.mis, z, throughput, random_floats(key, emitter_block(depth)), c)) return;
         if (!is_light(c.value, record) || is_zero(c.value)) return;
@@ -198,9 +198,9 @@ struct EyeShade {
 
     /// True if the walk goes on with the ray `next`. `count`: of hits in this launch, or more.
     AMBILUX_HD bool take(const WalkHit& h, uint32_t count, WalkItem& next) const {
-        WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z, [[maybe_unused]] VertexItem& item) {
+        WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z, [[maybe_unused]] VertexItem& item, const RngKey& key) {
             if (!policy.connect_in_shade) return;
-            connect.take(z, h.ray.throughput, h.ray.path, h.ray.bits.depth());
+            connect.take(z, h.ray.throughput, key, h.ray.path, h.ray.bits.depth());
 #if !defined(__CUDA_ARCH__)
             if (!policy.at_once || !policy.connect_vertices) return;
             item.previous = last_vertex[h.ray.path];

@@ -37,20 +37,21 @@ AMBILUX_HD bool start_light(const SceneView& scene, const Wave& wave, const Bidi
     return policy.max_depth >= 2;
 }
 
-/// A light walk at `h`, where it may have `longest` segments in all. Its vertex is connectable wherever the BSDF is; visit(vertex) is called there.
+/// A light walk at `h`, where it may have `longest` segments in all. Its vertex is connectable wherever the BSDF is; visit(vertex, random numbers of the walk) is called there.
 template <Features F, class Visit>
 AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, LightWalkNumber number, uint32_t longest, StageRecord* record,
                                Visit visit) {
     WalkStep step = {};
     Walk w = unpack_walk(h.ray);
     const WalkVertex y = light_vertex<F>(scene, policy.mis, w, h.prim, h.u, h.v);
+    const RngKey key = wave.key(h.ray.path, Stream::light);
     if (bsdf_is_smooth(y.scattering.bsdf)) {
         step.vertex = pack_vertex(h, y, kNone);
         step.connectable = true;
-        visit(y);
+        visit(y, key);
     }
     if (w.depth >= longest) return step;
-    const Vec4f u = random_floats(wave.key(h.ray.path, Stream::light), number.block(light_scatter_block(w.depth)));
+    const Vec4f u = random_floats(key, number.block(light_scatter_block(w.depth)));
     if (!scatter_walk<F>(policy.mis, y, u, TransportMode::importance, policy.rr_depth, w) || !is_light(w.throughput, record)) return step;
     step.ray = pack_walk(w, h.ray.path, true, kInfinity);
     step.goes_on = true;
@@ -88,11 +89,10 @@ struct ConnectCamera {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
-        take(unpack_vertex<F>(scene, item), item.throughput, item.path, item.bits.depth());
+        take(unpack_vertex<F>(scene, item), item.throughput, wave.key(item.path, Stream::light), item.path, item.bits.depth());
     }
 
-    AMBILUX_HD void take(const WalkVertex& y, Rgb throughput, uint32_t path, uint32_t depth) const {
-        const RngKey key = wave.key(path, Stream::light);
+    AMBILUX_HD void take(const WalkVertex& y, Rgb throughput, const RngKey& key, uint32_t path, uint32_t depth) const {
         const Vec4f u = random_floats(key, lens_block(depth));
         WalkConnection c;
         Vec2f film;
@@ -129,8 +129,8 @@ struct LightShade {
         const uint32_t depth = h.ray.bits.depth();
         const bool to_camera = policy.splat && depth < policy.max_depth && policy.wants(depth + 1, 1);
         // A path has at least one segment more than its light walk.
-        WalkStep step = light_step<F>(scene, wave, policy, h, {0}, policy.max_depth - 1, record, [&](const WalkVertex& y) {
-            if (to_camera && policy.connect_in_shade) connect.take(y, h.ray.throughput, h.ray.path, depth);
+        WalkStep step = light_step<F>(scene, wave, policy, h, {0}, policy.max_depth - 1, record, [&](const WalkVertex& y, const RngKey& key) {
+            if (to_camera && policy.connect_in_shade) connect.take(y, h.ray.throughput, key, h.ray.path, depth);
         });
         if (step.connectable && depth < policy.max_depth) {
             if (to_camera && !policy.connect_in_shade) camera_vertices.push(step.vertex);

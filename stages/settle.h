@@ -13,7 +13,7 @@ AMBILUX_HD void settle(WaveState& state, QueueCounter& a, QueueCounter& b) {
     QueueCounter* queues[2] = {&a, &b};
     for (QueueCounter* q : queues) {
         if (q->count > q->peak) q->peak = q->count;
-        q->count = 0;
+        q->count = q->holes = 0;
     }
     state.failed = 1;
     state.samples = 0;

@@ -49,13 +49,14 @@ struct Shade {
         const uint32_t depth = h.bits.depth();
         if (depth >= policy.max_depth) return false;
         const Scattering s = make_scattering<F>(scene, point, -h.d);
+        const RngKey key = wave.key(h.path);
         if (policy.connect && bsdf_is_smooth(s.bsdf)) {
             if (policy.connect_in_shade)
-                connect.take(point, s, -h.d, h.path, depth, h.throughput);
+                connect.take(point, s, -h.d, key, h.path, depth, h.throughput);
             else
                 connections.push({h.d, h.path, h.throughput, h.bits, h.u, h.v, h.prim, 0});
         }
-        return scatter(h, point, s, depth, next);
+        return scatter(h, point, s, key, depth, next);
     }
 
 private:
@@ -70,8 +71,8 @@ private:
         if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.path, h.pdf_sa, pdf_other, {}, 0});
     }
 
-    AMBILUX_HD bool scatter(const HitItem& h, const SurfacePoint& point, const Scattering& s, uint32_t depth, RayItem& next) const {
-        const Vec4f u = random_floats(wave.key(h.path), scatter_block(depth));
+    AMBILUX_HD bool scatter(const HitItem& h, const SurfacePoint& point, const Scattering& s, const RngKey& key, uint32_t depth, RayItem& next) const {
+        const Vec4f u = random_floats(key, scatter_block(depth));
         ScatterSample sample;
         if (!scatter_sample<F>(s, {u.x, u.y, u.z}, TransportMode::radiance, sample)) return false;
         const bool delta = sample.flags & kScatterDelta;

@@ -30,6 +30,7 @@ template <Features F, class Tracer>
 struct OccludeSplats {
     static constexpr Features kFeatures = F;
     static constexpr bool kAnyHit = true;
+    static constexpr bool kPushesLoosely = true;
     using Kept = Contribution;
 
     SceneView scene;
@@ -53,12 +54,12 @@ struct OccludeSplats {
     AMBILUX_HD void finish(uint32_t i, const Kept& kept, bool blocked) const {
         if (blocked) return;
         const SplatCandidate c = candidates.load(i);
-        splats.push({kept.value, kept.path, c.film, c.strategy, c.others});
+        splats.push_loosely({kept.value, kept.path, c.film, c.strategy, c.others});
     }
     /// All of it for a candidate that is in no queue.
     AMBILUX_HD void take(const SplatCandidate& c) const {
         Ray ray;
-        if (fetch(c, ray) && !tracer.template occluded<F>(scene, ray)) splats.push({c.value, c.path, c.film, c.strategy, c.others});
+        if (fetch(c, ray) && !tracer.template occluded<F>(scene, ray)) splats.push_loosely({c.value, c.path, c.film, c.strategy, c.others});
     }
     AMBILUX_HD void operator()(uint32_t i) const {
         Ray ray;
@@ -78,6 +79,7 @@ struct Splat {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const SplatItem item = splats.load(i);
+        if ((item.path == kNoPath) | (item.film.x != item.film.x)) return;  // either would do for a hole; asking for both loads both lanes at once
         const uint32_t sample = wave.sample_of(item.path);
         const float x = item.film.x - float(scene.sensor.crop_x), y = item.film.y - float(scene.sensor.crop_y), r = scene.sensor.filter_radius;
         const int32_t x0 = int32_t(ceilf(x - r - 0.5f)), x1 = int32_t(floorf(x + r - 0.5f));
@@ -108,17 +110,28 @@ struct DevelopSplats {
         if (!p.active) return;
         const uint64_t at = uint64_t(p.pixel) * 3;
         double s[3] = {sum[at], sum[at + 1], sum[at + 2]}, q[3] = {sum_squares[at], sum_squares[at + 1], sum_squares[at + 2]};
-        const uint32_t stride = wave.tiles * kTilePixels;
-        for (uint32_t k = 0; k < wave.state->samples; ++k) {
-            const Rgb eye = start_of<Rgb>(samples[i + k * stride]);
-            double value[3];
-            splats.take(uint64_t(k) * wave.height * wave.width + p.pixel, value);
-            for (int c = 0; c < 3; ++c) value[c] += double(eye[c]);
-            if (!is_light({float(value[0]), float(value[1]), float(value[2])}, record)) continue;
-            for (int c = 0; c < 3; ++c) {
-                s[c] += value[c];
-                q[c] += value[c] * value[c];
-            }
+        const uint32_t stride = wave.tiles * kTilePixels, count = wave.state->samples;
+        constexpr uint32_t kTogether = 4;  // loads that do not wait for each other
+        for (uint32_t first = 0; first < count; first += kTogether) {
+            Rgb eye[kTogether];
+            double value[kTogether][3];
+            const auto each = [&](auto f) {
+                for (uint32_t k = 0; k < kTogether; ++k)
+                    if (first + k < count) f(k, uint64_t(first + k) * wave.height * wave.width + p.pixel);
+            };
+            each([&](uint32_t k, uint64_t cell) {
+                eye[k] = start_of<Rgb>(samples[i + (first + k) * stride]);
+                splats.read(cell, value[k]);
+            });
+            each([&](uint32_t k, uint64_t cell) {
+                splats.clear(cell);
+                for (int c = 0; c < 3; ++c) value[k][c] += double(eye[k][c]);
+                if (!is_light({float(value[k][0]), float(value[k][1]), float(value[k][2])}, record)) return;
+                for (int c = 0; c < 3; ++c) {
+                    s[c] += value[k][c];
+                    q[c] += value[k][c] * value[k][c];
+                }
+            });
         }
         for (uint32_t c = 0; c < 3; ++c) {
             sum[at + c] = s[c];

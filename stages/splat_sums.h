@@ -24,18 +24,15 @@ struct SplatSums {
         add_shared(floats[cell], value);
         return true;
     }
-    /// Empties a cell.
-    AMBILUX_HD void take(uint64_t cell, double (&value)[3]) const {
-        if (!fixed) {
-            const Rgb sum = start_of<Rgb>(floats[cell]);
-            for (int c = 0; c < 3; ++c) value[c] = double(sum[c]);
+    AMBILUX_HD void read(uint64_t cell, double (&value)[3]) const {
+        const Rgb sum = fixed ? Rgb{} : start_of<Rgb>(floats[cell]);
+        for (int c = 0; c < 3; ++c) value[c] = fixed ? double(fixed[cell * 3 + c]) * kLightUnit : double(sum[c]);
+    }
+    AMBILUX_HD void clear(uint64_t cell) const {
+        if (!fixed)
             floats[cell] = {};
-            return;
-        }
-        for (int c = 0; c < 3; ++c) {
-            value[c] = double(fixed[cell * 3 + c]) * kLightUnit;
-            fixed[cell * 3 + c] = 0;
-        }
+        else
+            for (int c = 0; c < 3; ++c) fixed[cell * 3 + c] = 0;
     }
 };
 

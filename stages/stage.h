@@ -1,7 +1,7 @@
 // What all stages share: their names, their records, and the count of values that are no light.
 #pragma once
 
-#include "core/vec.h"
+#include "core/math.h"
 
 namespace ambilux {
 
@@ -75,6 +75,9 @@ private:
 
 /// True if `v` can be light: finite and not negative. Anything else is counted in the record of the stage that made it; the caller drops it.
 AMBILUX_HD bool is_light(Rgb v, StageRecord* record) {
+    // Finite and neither negative nor -0: the bits of such floats are below those of infinity.
+    constexpr uint32_t kInfinityBits = 0x7f800000u;
+    if ((float_bits(v.x) < kInfinityBits) & (float_bits(v.y) < kInfinityBits) & (float_bits(v.z) < kInfinityBits)) return true;
     if (is_finite(v)) {
         if (min_component(v) >= 0.0f) return true;
         count_one(&record->negative);

@@ -120,7 +120,7 @@ struct StreamEyeShade {
         const WalkHit h = hits.load(i);
         const BidirectionalPolicy& policy = pool.policy;
         const uint32_t depth = h.ray.bits.depth(), slot = pool.slot_of(h.ray.path);
-        WalkStep step = eye_step<F>(pool.scene, pool.wave, policy, h, candidates, record, [](const WalkVertex&, const VertexItem&) {});
+        WalkStep step = eye_step<F>(pool.scene, pool.wave, policy, h, candidates, record, [](const WalkVertex&, const VertexItem&, const RngKey&) {});
         if (step.connectable) vertices.push(step.vertex);
         if (!step.goes_on) step.ray.bits = {0};
         pool.pending.store(slot, step.ray);
@@ -171,7 +171,7 @@ struct StreamLightShade {
         const bool splat = policy.splat && number.n == 0;
         // A path has one segment more than its light walk, and those of the eye walk if there is one.
         const uint32_t longest = splat ? policy.max_depth - 1 : policy.max_depth - 1 - eye.bits.depth();
-        WalkStep step = light_step<F>(pool.scene, pool.wave, policy, h, number, longest, record, [](const WalkVertex&) {});
+        WalkStep step = light_step<F>(pool.scene, pool.wave, policy, h, number, longest, record, [](const WalkVertex&, const RngKey&) {});
         if (step.connectable) {
             if (splat && depth < policy.max_depth && policy.wants(depth + 1, 1)) camera_vertices.push(step.vertex);
             if (eye.prim != kNone && depth + eye.bits.depth() + 1 <= policy.max_depth) pairs.push(step.vertex);

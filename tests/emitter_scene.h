@@ -236,6 +236,12 @@ inline void append_environment(Scene& s, Emitter& e, const std::vector<double>& 
     }
 }
 
+inline float triangle_area(const SceneView& view, uint32_t prim) {
+    const Triangle& t = view.triangles[prim];
+    const Vec3f p0 = view.vertices[t.v0].p;
+    return 0.5f * length(cross(view.vertices[t.v1].p - p0, view.vertices[t.v2].p - p0));
+}
+
 /// Fills areas, tables and pick probabilities (uniform, or in proportion to `pick_weights`).
 inline void complete(Scene& s, std::vector<double> pick_weights = {}) {
     s.bounds_radius = 10.0f;
@@ -254,6 +260,7 @@ inline void complete(Scene& s, std::vector<double> pick_weights = {}) {
             const SceneView v = view_of(s);
             for (uint32_t k = 0; k < shape.primitive_count; ++k) areas.push_back(triangle_area(v, shape.first_primitive + k));
             e.area_cdf = append_cdf(s, areas);
+            for (uint32_t k = 0; k < shape.primitive_count; ++k) s.tables.push_back(float((s.tables[e.area_cdf + k + 1] - s.tables[e.area_cdf + k]) / areas[k]));
         } else if (e.type == EmitterType::envmap) {
             const Texture t = s.textures[size_t(e.radiance.texture)];
             std::vector<double> rows(t.height, 0.0);

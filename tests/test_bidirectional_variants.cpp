@@ -297,7 +297,7 @@ TEST_CASE("G13: variants that an integrator does not have are refused by name") 
     CHECK_THROWS_AS(apply_setting(s, "connections", "257"), Error);
 }
 
-TEST_CASE("Sums of splats: cells of floats hold what fixed point holds, and both are empty after they are taken") {
+TEST_CASE("Sums of splats: cells of floats hold what fixed point holds, and both can be emptied") {
     std::vector<int64_t> fixed(6, 0);
     std::vector<Lane> floats(2, Lane{});
     const SplatSums kinds[2] = {{fixed.data(), nullptr}, {nullptr, floats.data()}};
@@ -310,11 +310,12 @@ TEST_CASE("Sums of splats: cells of floats hold what fixed point holds, and both
         }
         CHECK_FALSE(sums.add(1, {1, 2, 0x1p26f}));
         double value[3];
-        sums.take(1, value);
+        sums.read(1, value);
         for (int c = 0; c < 3; ++c) CHECK(value[c] == Approx(expected[c]).epsilon(sums.fixed ? 1e-9 : 100 * 0x1p-24));
-        sums.take(1, value);
+        sums.clear(1);
+        sums.read(1, value);
         for (int c = 0; c < 3; ++c) CHECK(value[c] == 0);
-        sums.take(0, value);
+        sums.read(0, value);
         for (int c = 0; c < 3; ++c) CHECK(value[c] == 0);
     }
 }

@@ -86,6 +86,105 @@ TEST_CASE("G3: a full queue on a device loses items by count, not in silence") {
 
 namespace {
 
+/// An item of two lanes, as those that are pushed loosely are.
+struct Loose {
+    uint32_t number, pad[2], path;
+    uint32_t again[4];
+};
+
+/// Threads that `keep` selects push their number, from one of two places.
+template <LaneOrder Order>
+__global__ void __launch_bounds__(128) push_loosely(Queue<Loose, Order> queue, uint32_t n, uint32_t keep) {
+    WarpStretches& stretches = WarpStretches::mine();
+    stretches.open(n);
+    for (uint32_t i = blockIdx.x * 128 + threadIdx.x; i < n; i += gridDim.x * 128) {
+        const Loose item = {i, {0, 0}, i / 2, {0, 0, 0, i}};
+        if (i % keep == 0)
+            queue.push_loosely(item);
+        else if (keep == 3 && i % keep == 1)
+            queue.push_loosely(item);
+    }
+    stretches.close();
+}
+
+/// Numbers of items, their order given up, of a queue that 132 * `blocks` blocks have pushed to.
+template <LaneOrder Order>
+void check_loose(uint32_t n, uint32_t keep, uint32_t blocks) {
+    INFO(n << " threads, 1 of " << keep << ", " << 132 * blocks << " blocks");
+    const uint32_t expected = keep == 3 ? (n + 2) / 3 + (n + 1) / 3 : (n + keep - 1) / keep, capacity = with_holes(n);
+    DeviceBuffer<Lane> memory(size_t(capacity) * 2);
+    memory.zero();
+    std::vector<QueueCounter> counters(1);
+    counters[0].capacity = capacity;
+    DeviceBuffer<QueueCounter> counter{std::span<const QueueCounter>(counters)};
+    const Queue<Loose, Order> queue{memory.data(), counter.data(), capacity};
+    push_loosely<Order><<<132 * blocks, 128>>>(queue, n, keep);
+    cuda_check(cudaDeviceSynchronize(), "push_loosely");
+    const QueueCounter c = counter.download()[0];
+    REQUIRE(c.count <= capacity);
+    REQUIRE(c.items() == expected);
+    std::vector<Lane> lanes = memory.download();
+    const Queue<Loose, Order> here{lanes.data(), nullptr, capacity};
+    std::vector<uint32_t> seen;
+    uint64_t holes = 0, wrong = 0;
+    for (uint32_t i = 0; i < c.count; ++i) {
+        const Loose item = here.load(i);
+        if (item.path == kNoPath) {
+            ++holes;
+            continue;
+        }
+        seen.push_back(item.number);
+        wrong += item.path != item.number / 2 || item.again[3] != item.number;
+    }
+    CHECK(holes == c.holes);
+    CHECK(wrong == 0);
+    REQUIRE(seen.size() == expected);
+    std::sort(seen.begin(), seen.end());
+    for (uint32_t i = 0, k = 0; i < n; ++i)
+        if (i % keep == 0 || (keep == 3 && i % keep == 1)) wrong += seen[k++] != i;
+    CHECK(wrong == 0);
+    const bool ahead = std::min(n / 16, kMostHoles) / (132 * blocks * 4) >= 64;
+    if (!ahead) CHECK(c.holes == 0);
+    if (ahead && expected % 64 != 0) CHECK(c.holes > 0);
+}
+
+}  // namespace
+
+TEST_CASE("places taken ahead: every loose push arrives once, what is left over is marked and counted") {
+    if (!cuda_device_present()) {
+        WARN("no CUDA device: skipped");
+        return;
+    }
+    for (const uint32_t n : {1u, 33u, 1000u, (1u << 20) + 1, (1u << 23) + 7, (1u << 25) + 5}) {
+        for (const uint32_t keep : {1u, 2u, 3u, 33u}) {
+            for (const uint32_t blocks : {1u, 7u}) check_loose<LaneOrder::apart>(n, keep, blocks);
+        }
+        check_loose<LaneOrder::together>(n, 3, 2);
+    }
+}
+
+TEST_CASE("places taken ahead: a queue that is too small loses items by count") {
+    if (!cuda_device_present()) {
+        WARN("no CUDA device: skipped");
+        return;
+    }
+    constexpr uint32_t n = 1u << 22, capacity = 1u << 21;
+    DeviceBuffer<Lane> memory(size_t(capacity) * 2);
+    memory.zero();
+    std::vector<QueueCounter> counters(1);
+    counters[0].capacity = capacity;
+    DeviceBuffer<QueueCounter> counter{std::span<const QueueCounter>(counters)};
+    push_loosely<LaneOrder::apart><<<132, 128>>>(Queue<Loose>{memory.data(), counter.data(), capacity}, n, 1);
+    cuda_check(cudaDeviceSynchronize(), "push_loosely");
+    QueueCounter c = counter.download()[0];
+    CHECK(c.count >= n);
+    CHECK(c.items() <= capacity);
+    c.finish();
+    CHECK(c.overflow >= n - capacity);
+}
+
+namespace {
+
 /// Numbers that depend on nothing but `i`.
 uint32_t scrambled(uint32_t i) {
     i = (i ^ i >> 16) * 0x7feb352du;

@@ -116,6 +116,7 @@ TEST_CASE("areas of all shapes, and the density over a mesh light's triangles (B
     CHECK(cdf[1] == Approx(0.75));
     CHECK(cdf[2] == Approx(0.875));
     CHECK(cdf[3] == 1.0f);
+    for (int i = 4; i < 7; ++i) CHECK(cdf[i] == Approx(0.25));  // density per area
     CHECK(s.emitters[1].area_cdf == kNone);
     // Power: pi·area·radiance.
     CHECK(s.emitters[0].pick_probability == Approx(4 / (4 + 16 * M_PI)).epsilon(1e-6));

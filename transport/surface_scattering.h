@@ -37,7 +37,7 @@ AMBILUX_HD Vec3f perturbed_normal(const SceneView& scene, const BsdfRecord& reco
     }
     const float l2 = length_squared(n);
     // Degenerate maps and parametrisations leave the normal as it is.
-    return l2 > 0.0f && l2 < kInfinity ? n * (1.0f / sqrtf(l2)) : point.ns;
+    return l2 > 0.0f && l2 < kInfinity ? n * inverse_sqrt(l2) : point.ns;
 }
 
 /// Prepares scattering of a walk that arrived from unit direction `wi_world` (pointing away from the surface). The side is that of

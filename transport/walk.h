@@ -197,7 +197,7 @@ AMBILUX_HD bool connect_unweighted(const WalkVertex& y, Rgb y_throughput, const 
     const Vec3f to_y = y.point.p - z.point.p;
     const float d2 = length_squared(to_y);
     if (!(d2 > 0.0f)) return false;
-    const Vec3f w = to_y * (1.0f / sqrtf(d2));
+    const Vec3f w = to_y * inverse_sqrt(d2);
     const BsdfValue f_z = scatter_evaluate<F>(z.scattering, w, TransportMode::radiance);
     if (is_zero(f_z.value)) return false;
     const BsdfValue f_y = scatter_evaluate<F>(y.scattering, -w, TransportMode::importance);

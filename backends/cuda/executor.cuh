@@ -164,11 +164,14 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(c
     const Items items = all.of(n);
     if constexpr (Stage::kAnyHit) {
         __shared__ typename Stage::Kept kept[kTraceBlock];
+        constexpr bool loose = requires { requires Stage::kPushesLoosely; };
+        if constexpr (loose) WarpStretches::mine().open(n);
         const auto fetch = [&](uint32_t i, Ray& ray) {
             const uint32_t place = items.place(i);
             return items.take(place) && stage.fetch(place, ray, kept[threadIdx.x]);
         };
         trace_any_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, bool blocked) { stage.finish(items.place(i), kept[threadIdx.x], blocked); }, &n, &items.counter->next);
+        if constexpr (loose) WarpStretches::mine().close();
     } else {
         const auto fetch = [&](uint32_t i, Ray& ray) {
             const uint32_t place = items.place(i);
@@ -234,7 +237,7 @@ __global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, 
     const uint64_t now = device_nanoseconds();
     state->depth = depth.set ? depth.value : state->depth + depth.value;
     if (out) out->count = counter->size();
-    record->add(counter ? counter->size() : slots * (samples ? samples : state->samples), state->depth, now - *clock);
+    record->add(counter ? counter->items() : slots * (samples ? samples : state->samples), state->depth, now - *clock);
     if (counter && !keep) counter->finish();
     *clock = now;
 }

@@ -80,7 +80,7 @@ inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, con
     m.waiting = layout.queue<VertexItem>("pairs", m.counters, when(policy.connect_vertices));
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged));
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat));
-    m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat));
+    m.splats = layout.queue<SplatItem>("splats", m.counters, with_holes(when(policy.splat)));
     m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, when(hits));
     m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, when(hits));
     m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, when(connections && staged));

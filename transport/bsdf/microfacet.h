@@ -94,7 +94,7 @@ struct MicrofacetDistribution {
         const Vec3f h = Vec3f{r * cosf(phi), r * sinf(phi), z} + v;
         const Vec3f m = {h.x * alpha_u, h.y * alpha_v, max(h.z, 0.0f)};
         const float l2 = length_squared(m);
-        return l2 > 0.0f ? m * (1.0f / sqrtf(l2)) : Vec3f{0.0f, 0.0f, 1.0f};
+        return l2 > 0.0f ? m * inverse_sqrt(l2) : Vec3f{0.0f, 0.0f, 1.0f};
     }
 
     /// Visible slopes (Heitz and d'Eon 2014, "Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible

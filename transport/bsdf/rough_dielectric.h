@@ -28,7 +28,7 @@ struct RoughDielectric {
         Vec3f m = wi + wo * (reflects ? 1.0f : eta);
         const float l2 = length_squared(m);
         if (!(l2 > 0.0f)) return no_scattering();
-        m = m * copysignf(1.0f / sqrtf(l2), m.z);
+        m = m * copysignf(inverse_sqrt(l2), m.z);
         const float i_dot_m = dot(wi, m), o_dot_m = dot(wo, m);
         // Facets are seen from the side from which the macrosurface is seen (equations 23).
         if (!(i_dot_m * copysignf(1.0f, wi.z) > 0.0f) || !(o_dot_m * copysignf(1.0f, wo.z) > 0.0f)) return no_scattering();

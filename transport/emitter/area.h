@@ -14,21 +14,11 @@ AMBILUX_HD Rgb area_radiance(const SceneView& view, const Emitter& emitter, cons
     return eval_rgb<F>(view, emitter.radiance, point.uv);
 }
 
-AMBILUX_HD float triangle_area(const SceneView& view, uint32_t prim) {
-    const Triangle& t = view.triangles[prim];
-    const Vec3f p0 = view.vertices[t.v0].p;
-    return 0.5f * length(cross(view.vertices[t.v1].p - p0, view.vertices[t.v2].p - p0));
-}
-
-/// Density per area with which area_sample_point picks a point of primitive `prim`. It uses the difference of the rounded
-/// table, not 1/area of the shape: that is what sampling does, and in meshes of many triangles the two differ.
+/// Density per area with which area_sample_point picks a point of primitive `prim`.
 AMBILUX_HD float area_pdf_position(const SceneView& view, const Emitter& emitter, uint32_t prim) {
     const Shape& shape = view.shapes[emitter.shape];
-    if (!view.is_triangle(prim)) return 1.0f / shape.area;
-    const float area = triangle_area(view, prim);
-    if (emitter.area_cdf == kNone) return 1.0f / area;
-    const float* cdf = view.tables + emitter.area_cdf + (prim - shape.first_primitive);
-    return (cdf[1] - cdf[0]) / area;
+    if (emitter.area_cdf == kNone) return 1.0f / shape.area;
+    return view.tables[emitter.area_cdf + shape.primitive_count + 1 + (prim - shape.first_primitive)];
 }
 
 /// Uniform point of the emitter's shape: `u` places it on a primitive that `u_primitive` chose by area.
