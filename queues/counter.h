@@ -19,8 +19,8 @@ constexpr uint32_t kNoPath = 0xffffffffu;
 struct QueueCounter {
     uint32_t count;     ///< places given out since the queue was last emptied; of a queue of fixed places known on a device only when it has been counted
     uint32_t capacity;
-    uint64_t peak;      ///< most pushes of one filling
-    uint64_t overflow;  ///< items lost: pushes past the capacity, or to a fixed place that was taken (which only the host looks for)
+    uint64_t peak;      ///< most places given out in one filling
+    uint64_t overflow;  ///< items lost: places past the capacity, or to a fixed place that was taken (which only the host looks for)
     uint32_t next;      ///< first item that no persistent thread has taken yet
     uint32_t holes;     ///< places below `count` that hold no item (queues/stretch.h)
     uint32_t pad[264];

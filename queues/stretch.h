@@ -22,6 +22,8 @@ constexpr uint32_t with_holes(uint32_t items) {
 /// Stretches of a block's warps, in shared memory, of one queue that the kernel pushes to.
 class WarpStretches {
 public:
+    static constexpr uint32_t kMostWarps = 4;
+
     /// Those of the calling block.
     __device__ static WarpStretches& mine() {
         __shared__ WarpStretches stretches;
@@ -96,7 +98,6 @@ public:
     }
 
 private:
-    static constexpr uint32_t kMostWarps = 4;
     static constexpr unsigned long long kRefilled = ~0ull;  ///< by other lanes of the warp just now
 
     unsigned long long places_[kMostWarps];  ///< next | end << 32

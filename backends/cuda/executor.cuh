@@ -165,6 +165,7 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(c
     if constexpr (Stage::kAnyHit) {
         __shared__ typename Stage::Kept kept[kTraceBlock];
         constexpr bool loose = requires { requires Stage::kPushesLoosely; };
+        static_assert(kTraceBlock / 32 <= WarpStretches::kMostWarps);
         if constexpr (loose) WarpStretches::mine().open(n);
         const auto fetch = [&](uint32_t i, Ray& ray) {
             const uint32_t place = items.place(i);
