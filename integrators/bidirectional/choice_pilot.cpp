@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/parallel.h"
+#include "integrators/bidirectional/choice_judge.h"
 #include "integrators/bidirectional/wave.h"
 #include "integrators/feature_levels.h"
 #include "scene/accel/cwbvh.h"
@@ -18,22 +19,14 @@ constexpr uint32_t kPixelSamples = 4;
 constexpr uint32_t kMostBlocks = 32;  ///< a side
 constexpr uint32_t kSmallestBlock = 4;  ///< pixels
 constexpr uint32_t kWalksPerTask = 32;
-constexpr uint32_t kMostCandidates = 8;
-/// A candidate that finds a path this much less often than the pilot does may show it as single bright pixels.
-constexpr float kRareShare = 0.02f;
 
 /// Sets of strategies whose sums walks carry along: hits and next event estimation; light tracing besides; connections besides. The rest follows by differences, since the sums
 /// of the balance heuristic are linear in the densities.
 constexpr uint32_t kSets = 3;
 using SetSums = std::array<MisSums, kSets>;
 
-/// Densities of the groups that could have sampled a path, in multiples of that which did, all with the numbers of samples of paired walks.
-struct Shares {
-    float unidirectional, light, connections;
-};
-
 /// From `others` of each set; `own`: the first set that has the strategy itself.
-Shares shares_of(const float (&others)[kSets], uint32_t own) {
+PilotShares shares_of(const float (&others)[kSets], uint32_t own) {
     float sum[kSets];
     for (uint32_t m = 0; m < kSets; ++m) sum[m] = others[m] + (m >= own ? 1.0f : 0.0f);
     return {sum[0], std::max(0.0f, sum[1] - sum[0]), std::max(0.0f, sum[2] - sum[1])};
@@ -51,34 +44,10 @@ struct PilotVertex {
     uint32_t depth;
 };
 
-/// What a path brings without a weight, and who could have found it.
-struct Event {
-    Rgb value;  ///< f / (n p) of the strategy that found it, for paired walks
-    Shares shares;
-    float coverage = 1.0f;  ///< of a splat: how much of it pixels of the film take
-    float total() const { return shares.unidirectional + shares.light + shares.connections; }
-};
-
-struct SplatEvent {
-    Event event;
-    uint32_t block;
-    bool seen;  ///< the emitter itself
-    Rgb radiance;  ///< of it
-};
-
-/// Sums over the samples of one pixel, or of one splat.
-struct Sums {
-    double mean[3] = {};
-    double variance[kMostCandidates][3] = {};
-    double seen[3] = {};  ///< largest radiance of emitters that the camera sees here
-    bool blind[kMostCandidates] = {};   ///< a candidate cannot find some light
-    std::vector<Event> rare;            ///< for some candidate
-};
-
 struct LightTask {
     std::vector<PilotVertex> vertices;
     std::vector<uint32_t> ends;  ///< of the walks' vertices
-    std::vector<SplatEvent> splats;
+    std::vector<PilotSplat> splats;
     double rays = 0, splat_rays = 0;
 };
 
@@ -86,7 +55,7 @@ template <Features F, class Tracer>
 class Pilot {
 public:
     Pilot(const Scene& scene, const RenderSettings& settings, const Tracer& tracer, const std::vector<PilotCandidate>& candidates, uint32_t samples)
-        : view_(scene.view()), tracer_(tracer), candidates_(candidates), seed_(settings.seed) {
+        : view_(scene.view()), tracer_(tracer), moments_{candidates}, seed_(settings.seed) {
         RenderSettings all = settings;
         all.integrator = "bdpt";
         all.variant = "wavefront";
@@ -105,8 +74,8 @@ public:
         result_.blocks_y = blocks(sensor.crop_height);
         const uint32_t count = result_.blocks_x * result_.blocks_y;
         pixels_ = std::max(1u, (samples / kPixelSamples + count / 2) / count);
-        result_.samples = count * pixels_ * kPixelSamples;
-        filter_energy_ = filter_energy();
+        result_.samples = moments_.samples = count * pixels_ * kPixelSamples;
+        moments_.filter_energy = filter_energy();
         delta_emitters_ = std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return is_delta(e.type); });
     }
 
@@ -121,7 +90,7 @@ public:
                 }
             });
         gather();
-        std::vector<Sums> pixels(size_t(count) * pixels_);
+        std::vector<PilotSums> pixels(size_t(count) * pixels_);
         std::vector<PilotWork> work(count);
         parallel_for(count, [&](uint32_t b) { eye_block(b, &pixels[size_t(b) * pixels_], work[b]); });
         for (const PilotWork& w : work) {
@@ -134,7 +103,7 @@ public:
             result_.work.draw_rays += w.draw_rays / n;
         }
         result_.light_vertices = double(vertices_.size()) / n;
-        normalise(pixels);
+        judge_candidates(moments_, {pixels, splats_, pixels_, kPixelSamples, delta_emitters_}, result_);
         return result_;
     }
 
@@ -250,46 +219,12 @@ private:
         for (const LightTask& t : tasks_) {
             for (const uint32_t end : t.ends) first_.push_back(uint32_t(vertices_.size()) + end);
             for (const PilotVertex& v : t.vertices) vertices_.push_back(&v);
-            for (const SplatEvent& e : t.splats) splats_.push_back(&e);
+            for (const PilotSplat& e : t.splats) splats_.push_back(&e);
             result_.work.light_rays += t.rays / result_.samples;
             result_.work.splats += t.splat_rays / result_.samples;
         }
         first_.resize(result_.samples + 1, uint32_t(vertices_.size()));
-    }
-
-    /// Sum of the candidate's densities over that of the strategy that found the path.
-    float sum_of(uint32_t c, const Shares& s) const {
-        const PilotCandidate& candidate = candidates_[c];
-        float sum = s.unidirectional;
-        if (candidate.light) sum += s.light;
-        if (candidate.connect) sum += s.connections * connections(candidate);
-        return sum;
-    }
-    float connections(const PilotCandidate& c) const {
-        return c.draws == 0 ? 1.0f : float(double(c.draws) * double(result_.samples) / double(std::max<size_t>(1, vertices_.size())));
-    }
-
-    /// Adds a path of the pilot's own estimator to the second moments of all candidates (equation 18).
-    void add_event(const Event& e, Sums& sums) const {
-        const float weight = e.coverage / e.total();
-        bool rare = false;
-        for (int k = 0; k < 3; ++k) sums.mean[k] += double(e.value[k] * weight);
-        for (uint32_t c = 0; c < candidates_.size(); ++c) {
-            const float sum = sum_of(c, e.shares);
-            if (!(sum > 0.0f)) {
-                sums.blind[c] = true;
-                continue;
-            }
-            rare |= sum < kRareShare * e.total();
-            for (int k = 0; k < 3; ++k) sums.variance[c][k] += second_moment(c, e, sum) * sqr(double(e.value[k]));
-        }
-        if (rare) sums.rare.push_back(e);
-    }
-
-    /// What a path adds to the second moment of a candidate, over its squared value.
-    double second_moment(uint32_t c, const Event& e, float sum) const {
-        const double by_light = candidates_[c].light ? double(e.shares.light / sum) : 0.0;
-        return double(e.coverage) * (1.0 - (1.0 - double(filter_energy_)) * by_light) / (double(e.total()) * double(sum));
+        moments_.light_vertices = vertices_.size();
     }
 
     /// What the eye walk of one sample brings to a candidate. The product of `first` and `second` without `own` is what contributions of one sample have in common.
@@ -311,13 +246,13 @@ private:
     struct Eye {
         uint32_t number;
         RngKey key;
-        Sums& pixel;
+        PilotSums& pixel;
         PilotWork& work;
         EyeSums sums[kMostCandidates];
     };
 
     /// The pilot's pixels of a block, with all but (18) of the variance (equation 19).
-    void eye_block(uint32_t b, Sums* pixels, PilotWork& work) const {
+    void eye_block(uint32_t b, PilotSums* pixels, PilotWork& work) const {
         const Sensor& sensor = view_.sensor;
         const auto edge = [](uint32_t at, uint32_t size, uint32_t blocks) { return uint32_t(uint64_t(at) * size / blocks); };
         const uint32_t bx = b % result_.blocks_x, by = b / result_.blocks_x;
@@ -331,7 +266,7 @@ private:
             for (uint32_t s = 0; s < kPixelSamples; ++s) {
                 Eye eye{first + s, {seed_, first + s, 1, Stream::pilot}, pixels[p], work, {}};
                 eye_walk(eye, x, y);
-                for (uint32_t c = 0; c < candidates_.size(); ++c)
+                for (uint32_t c = 0; c < moments_.candidates.size(); ++c)
                     for (int k = 0; k < 3; ++k) {
                         const EyeSums& e = eye.sums[c];
                         pixels[p].variance[c][k] += e.first[k] * e.second[k] - e.own[k];
@@ -341,16 +276,16 @@ private:
                     }
             }
             // Products of different samples: the squared mean, without bias.
-            for (uint32_t c = 0; c < candidates_.size(); ++c)
+            for (uint32_t c = 0; c < moments_.candidates.size(); ++c)
                 for (int k = 0; k < 3; ++k) pixels[p].variance[c][k] -= (sum[c][k] * sum[c][k] - squares[c][k]) / (kPixelSamples - 1);
         }
     }
 
     /// A hit or a sample of next event estimation.
-    void found(Eye& eye, const Event& e) const {
-        add_event(e, eye.pixel);
-        for (uint32_t c = 0; c < candidates_.size(); ++c) {
-            const Rgb value = e.value * (1.0f / sum_of(c, e.shares));
+    void found(Eye& eye, const PilotEvent& e) const {
+        moments_.add(e, eye.pixel);
+        for (uint32_t c = 0; c < moments_.candidates.size(); ++c) {
+            const Rgb value = e.value * (1.0f / moments_.sum_of(c, e.shares));
             eye.sums[c].add(value, value, 1.0);
         }
     }
@@ -421,7 +356,7 @@ private:
     }
 
     /// The connection of two vertices; false if it brings nothing.
-    bool connection(const Eye& eye, const PilotVertex& y, const PilotVertex& z, uint32_t which, Event& e, double& tried, double& rays) const {
+    bool connection(const Eye& eye, const PilotVertex& y, const PilotVertex& z, uint32_t which, PilotEvent& e, double& tried, double& rays) const {
         if (z.depth + y.depth + 1 > policy_.max_depth) return false;
         WalkConnection c;
         ConnectionDensities p;
@@ -442,153 +377,44 @@ private:
         const PilotVertex* drawn_vertices[2] = {vertices_[mul_hi(bits.x, uint32_t(vertices_.size()))], vertices_[mul_hi(bits.y, uint32_t(vertices_.size()))]};
         for (const PilotVertex* v : drawn_vertices)
             for (uint32_t at = 0; at < sizeof(PilotVertex); at += 64) __builtin_prefetch(reinterpret_cast<const char*>(v) + at);
-        Event e;
+        PilotEvent e;
         for (uint32_t v = first_[eye.number]; v < first_[eye.number + 1]; ++v) {
             if (!connection(eye, *vertices_[v], z, vertices_[v]->depth, e, work.pairs, work.pair_rays)) continue;
-            add_event(e, eye.pixel);
-            for (uint32_t c = 0; c < candidates_.size(); ++c) {
-                if (!candidates_[c].connect || candidates_[c].draws > 0) continue;
-                const Rgb value = e.value * (1.0f / sum_of(c, e.shares));
+            moments_.add(e, eye.pixel);
+            for (uint32_t c = 0; c < moments_.candidates.size(); ++c) {
+                if (!moments_.candidates[c].connect || moments_.candidates[c].draws > 0) continue;
+                const Rgb value = e.value * (1.0f / moments_.sum_of(c, e.shares));
                 eye.sums[c].add(value, value, 1.0);
             }
         }
-        Event drawn[2];
+        PilotEvent drawn[2];
         bool made[2];
         double tried = 0, rays = 0;
         for (uint32_t d = 0; d < 2; ++d) made[d] = connection(eye, *drawn_vertices[d], z, WalkBits::kMaxDepth + d, drawn[d], tried, rays);
         work.draws += tried / 2;
         work.draw_rays += rays / 2;
         if (!made[0] && !made[1]) return;
-        for (uint32_t c = 0; c < candidates_.size(); ++c) {
-            if (candidates_[c].draws == 0) continue;
+        for (uint32_t c = 0; c < moments_.candidates.size(); ++c) {
+            if (moments_.candidates[c].draws == 0) continue;
             // Each draw stands for all k of its vertex.
             Rgb value[2];
-            for (uint32_t d = 0; d < 2; ++d) value[d] = made[d] ? drawn[d].value * (float(candidates_[c].draws) / sum_of(c, drawn[d].shares)) : Rgb{0.0f, 0.0f, 0.0f};
-            eye.sums[c].add(value[0], value[1], 1.0 / double(candidates_[c].draws));
+            for (uint32_t d = 0; d < 2; ++d) value[d] = made[d] ? drawn[d].value * (float(moments_.candidates[c].draws) / moments_.sum_of(c, drawn[d].shares)) : Rgb{0.0f, 0.0f, 0.0f};
+            eye.sums[c].add(value[0], value[1], 1.0 / double(moments_.candidates[c].draws));
         }
-    }
-
-    struct Mean {
-        double of[3] = {};
-    };
-
-    /// Means over a block and its neighbours: a few samples are no scale.
-    void blur(const std::vector<Mean>& of, std::vector<Mean>& to) const {
-        const uint32_t width = result_.blocks_x, height = result_.blocks_y;
-        for (uint32_t b = 0; b < width * height; ++b) {
-            const uint32_t x = b % width, y = b / width;
-            double n = 0;
-            for (uint32_t ny = y ? y - 1 : 0; ny < std::min(height, y + 2); ++ny)
-                for (uint32_t nx = x ? x - 1 : 0; nx < std::min(width, x + 2); ++nx, n += 1)
-                    for (int k = 0; k < 3; ++k) to[b].of[k] += of[ny * width + nx].of[k];
-            for (double& m : to[b].of) m /= n;
-        }
-    }
-
-    /// Sums of pixels and splats to variances of blocks, relative to their squared means.
-    void normalise(const std::vector<Sums>& pixels) {
-        const uint32_t count = result_.blocks_x * result_.blocks_y;
-        const double samples = double(pixels_) * kPixelSamples;
-        std::vector<Mean> block(count), scale(count);
-        for (size_t p = 0; p < pixels.size(); ++p)
-            for (int k = 0; k < 3; ++k) block[p / pixels_].of[k] += pixels[p].mean[k] / samples;
-        for (const SplatEvent* s : splats_)
-            for (int k = 0; k < 3; ++k) block[s->block].of[k] += double(s->event.value[k] * (s->event.coverage / s->event.total())) / samples;
-        blur(block, scale);
-        result_.variance.assign(candidates_.size(), std::vector<double>(count));
-        std::array<bool, kMostCandidates> blind{};
-        parallel_for(uint32_t(candidates_.size()), [&](uint32_t c) { blind[c] = !judge(c, pixels, scale, result_.variance[c]); });
-        result_.blind.assign(blind.begin(), blind.begin() + ptrdiff_t(candidates_.size()));
-    }
-
-    /// The variance of one candidate in every block. False if it cannot find some of the light.
-    bool judge(uint32_t c, const std::vector<Sums>& pixels, const std::vector<Mean>& scale, std::vector<double>& variance) const {
-        const double samples = double(pixels_) * kPixelSamples;
-        // Outliers: the brightest contributions that after kChoiceSamples samples are in kChoiceTrimmed of the pixels. There they are left out, and elsewhere their light is missing.
-        struct Rare {
-            double size;
-            const Event* event;
-            uint32_t block;
-            float sum;
-            std::array<double, 3> scale2;
-        };
-        std::vector<Rare> rare;
-        bool blind = false;
-        const auto scale2_of = [&](uint32_t b, const auto& seen) {
-            std::array<double, 3> scale2;
-            for (int k = 0; k < 3; ++k) scale2[k] = sqr(std::max(scale[b].of[k], double(seen[k]))) + 0.01;
-            return scale2;
-        };
-        const auto add_rare = [&](const Event& e, uint32_t b, const std::array<double, 3>& scale2, float sum) {
-            if (!(sum > 0.0f && sum < kRareShare * e.total())) return;
-            double size = 0;
-            for (int k = 0; k < 3; ++k) size = std::max(size, double(e.value[k]) / (double(sum) * std::sqrt(scale2[k])));
-            rare.push_back({size, &e, b, sum, scale2});
-        };
-        for (size_t p = 0; p < pixels.size(); ++p) {
-            const Sums& s = pixels[p];
-            const uint32_t b = uint32_t(p / pixels_);
-            const std::array<double, 3> scale2 = scale2_of(b, s.seen);
-            blind |= s.blind[c];
-            for (int k = 0; k < 3; ++k) variance[b] += s.variance[c][k] / (3.0 * samples * scale2[k]);
-            for (const Event& e : s.rare) add_rare(e, b, scale2, sum_of(c, e.shares));
-        }
-        for (const SplatEvent* s : splats_) {
-            const Event& e = s->event;
-            const float sum = sum_of(c, e.shares);
-            if (!(sum > 0.0f)) {
-                blind = true;
-                continue;
-            }
-            const std::array<double, 3> scale2 = scale2_of(s->block, s->seen ? s->radiance : Rgb{0.0f, 0.0f, 0.0f});
-            const double moment = second_moment(c, e, sum);
-            for (int k = 0; k < 3; ++k) variance[s->block] += moment * sqr(double(e.value[k])) / (3.0 * samples * scale2[k]);
-            add_rare(e, s->block, scale2, sum);
-        }
-
-        std::vector<Mean> lost(scale.size()), smooth(scale.size());
-        // Which are the largest matters, not their order: of what is in question the larger half is taken, or the other half is left.
-        double share = 0;
-        auto taken = rare.begin();
-        for (auto end = rare.end(); taken != end;) {
-            const auto middle = taken + (end - taken) / 2 + 1;
-            std::nth_element(taken, middle - 1, end, [](const Rare& a, const Rare& b) { return a.size > b.size; });
-            double more = 0;
-            for (auto r = taken; r != middle; ++r) more += double(r->event->coverage) * double(r->sum) / double(r->event->total()) / double(result_.samples);
-            if (share + more <= kChoiceTrimmed / kChoiceSamples) {
-                share += more;
-                taken = middle;
-            } else {
-                end = middle - 1;
-            }
-        }
-        for (auto r = rare.begin(); r != taken; ++r) {
-            const Event& e = *r->event;
-            for (int k = 0; k < 3; ++k) {
-                variance[r->block] -= second_moment(c, e, r->sum) * sqr(double(e.value[k])) / (3.0 * samples * r->scale2[k]);
-                lost[r->block].of[k] += double(e.coverage) * double(e.value[k]) / double(e.total()) / samples;
-            }
-        }
-        blur(lost, smooth);
-        for (uint32_t b = 0; b < scale.size(); ++b)
-            for (int k = 0; k < 3; ++k) variance[b] += kChoiceSamples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale[b].of[k]) + 0.01));
-        // Without emitters of no extent, eye walks can meet whatever there is: zeros are rounding.
-        return !(delta_emitters_ && blind);
     }
 
     ChoicePilot result_;
     SceneView view_;
     const Tracer tracer_;
-    std::vector<PilotCandidate> candidates_;
+    SecondMoments moments_;
     uint64_t seed_;
     BidirectionalPolicy policy_{};
     BidirectionalMis mis_[kSets] = {};
     uint32_t pixels_ = 0;  ///< of a block
-    float filter_energy_ = 1;
     bool delta_emitters_ = false;
     std::vector<LightTask> tasks_;
     std::vector<const PilotVertex*> vertices_;  ///< of all tasks
-    std::vector<const SplatEvent*> splats_;
+    std::vector<const PilotSplat*> splats_;
     std::vector<uint32_t> first_;  ///< vertex of each light walk
 };
 
