@@ -41,6 +41,13 @@ struct QueueCounter {
 static_assert(sizeof(QueueCounter) == 1024 + 64);
 
 #if defined(__CUDACC__)
+/// Rank of the calling lane among the lanes of `mask`.
+__device__ inline uint32_t lane_rank(uint32_t mask) {
+    uint32_t below;
+    asm("mov.u32 %0, %%lanemask_lt;" : "=r"(below));
+    return uint32_t(__popc(mask & below));
+}
+
 /// Adds to a counter that other threads add to, and returns what it was. By hand, since compilers look once more for threads that add to one place.
 __device__ inline uint32_t add_to(uint32_t* counter, uint32_t n) {
     uint32_t before;
@@ -53,10 +60,7 @@ __device__ inline uint32_t add_to(uint32_t* counter, uint32_t n) {
 /// same queue: a queue that differs from thread to thread is to be chosen by a branch.
 AMBILUX_HD uint32_t take_place(uint32_t* count) {
 #if defined(__CUDA_ARCH__)
-    const uint32_t together = __activemask();
-    uint32_t below;
-    asm("mov.u32 %0, %%lanemask_lt;" : "=r"(below));
-    const uint32_t rank = uint32_t(__popc(together & below));
+    const uint32_t together = __activemask(), rank = lane_rank(together);
     uint32_t first = 0;
     if (rank == 0) first = add_to(count, uint32_t(__popc(together)));
     return __shfl_sync(together, first, __ffs(int(together)) - 1) + rank;

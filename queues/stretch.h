@@ -62,10 +62,7 @@ public:
 
     /// A place for the calling thread. Threads of a warp that come together take theirs together; others may come in between.
     __device__ uint32_t take(const Target& queue) {
-        const uint32_t together = __activemask(), wanted = uint32_t(__popc(together));
-        uint32_t below;
-        asm("mov.u32 %0, %%lanemask_lt;" : "=r"(below));
-        const uint32_t rank = uint32_t(__popc(together & below)), leader = uint32_t(__ffs(int(together)) - 1);
+        const uint32_t together = __activemask(), wanted = uint32_t(__popc(together)), rank = lane_rank(together), leader = uint32_t(__ffs(int(together)) - 1);
         uint32_t first = 0, from_first = 0, second = 0;
         if (rank == 0) {
             unsigned long long& mine = places_[threadIdx.x / 32];

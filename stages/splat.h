@@ -59,7 +59,7 @@ struct OccludeSplats {
     /// All of it for a candidate that is in no queue.
     AMBILUX_HD void take(const SplatCandidate& c) const {
         Ray ray;
-        if (fetch(c, ray) && !tracer.template occluded<F>(scene, ray)) splats.push_loosely({c.value, c.path, c.film, c.strategy, c.others});
+        if (fetch(c, ray) && !tracer.template occluded<F>(scene, ray)) splats.push({c.value, c.path, c.film, c.strategy, c.others});
     }
     AMBILUX_HD void operator()(uint32_t i) const {
         Ray ray;

@@ -19,6 +19,9 @@ struct Method {
     std::string variant = "wavefront";
 };
 
+/// One of each kind: all strategies by either heuristic, one walk alone, one group alone.
+inline const Method kMethods[] = {{"all"}, {"all", MisHeuristic::power}, {"-i light"}, {"hits"}, {"next_event+connections"}, {"light"}};
+
 inline RenderSettings method_settings(const Scene& scene, const Method& method, uint64_t seed) {
     RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
     s.heuristic = method.heuristic;

@@ -6,6 +6,7 @@
 #include <cuda_runtime.h>
 
 #include "backends/traversal_features.h"
+#include "queues/counter.h"
 #include "scene/accel/cwbvh.h"
 #include "scene/accel/pair_bvh.h"
 
@@ -27,13 +28,6 @@ constexpr uint32_t kTraceBlock = 128;
 constexpr uint32_t kTraceBlocksPerSm = 8;
 
 namespace detail {
-
-/// Rank of this lane among the lanes of `mask`.
-__device__ inline uint32_t lane_rank(uint32_t mask) {
-    uint32_t below;
-    asm("mov.u32 %0, %%lanemask_lt;" : "=r"(below));
-    return uint32_t(__popc(mask & below));
-}
 
 /// Where a ray is in a CWBVH: nodes to visit, and up to two groups of primitives to test. The stack is an array of its own, so that the rest can be in registers;
 /// its last entry holds the barycentrics of the nearest hit: few are found, and every register counts.
