@@ -217,7 +217,7 @@ private:
                                     : policy.next_event && policy.wants(1, w.depth + 1) && connect_next_event<F>(scene, policy.mis, x, w.throughput, u, c);
             if (made) test(path, c, k, w.depth, light ? StageId::connect_camera : StageId::connect);
             if (policy.connect_vertices && w.depth + 2 <= policy.max_depth) {
-                const VertexItem item = {w.d, path.slot, w.throughput, WalkBits::make(w.depth, w.delta, w.eta_scale), hit.u, hit.v, hit.prim, x.sums.dvcm, x.sums.dvc, path.last, {0, 0}};
+                const VertexItem item = {w.d, WalkBits::make(w.depth, w.delta, w.eta_scale), hit.u, hit.v, hit.prim, path.last, w.throughput, path.slot, x.sums.dvcm, x.sums.dvc, {0, 0}};
                 if (light)
                     path.last = light_vertices.push(item);
                 else

@@ -9,35 +9,41 @@ namespace ambilux {
 
 /// A ray of a walk.
 struct WalkItem {
+    static constexpr uint32_t kPairedLanes = 4;
+
     Vec3f o;
     uint32_t path;
     Vec3f d;
     WalkBits bits;
     Rgb throughput;
     float tmax;        ///< first ray of an eye walk: to the far plane
-    float dvcm, dvc;   ///< sums of the ray; first ray of a light walk: LightStart::inv_pdf and cos_light
+    float dvcm, dvc;   ///< sums of the ray; first ray of a light walk: LightStart::inv_pdf and direction
     uint32_t extra[2]; ///< first ray of an eye walk: start_distance; of a light walk: LightStart::prim and emitter
 };
 
 /// Where that ray ended; `prim == kNone`: nowhere.
 struct WalkHit {
+    static constexpr uint32_t kPairedLanes = 4;
+
     WalkItem ray;
     float u, v;
     uint32_t prim;
     uint32_t pad;
 };
 
-/// A vertex of a walk to connect. Of a light walk: kept until the eye walk of the same slot is done.
+/// A vertex of a walk to connect. Of a light walk: kept until the eye walk of the same slot is done. In the first half is what tells whether a connection can give light, and which vertex is
+/// next: memory moves 32 bytes at a time, and most pairs need no more.
 struct VertexItem {
+    static constexpr uint32_t kPairedLanes = 4;
+
     Vec3f d;           ///< of the ray that met it
-    uint32_t path;
-    Rgb throughput;
     WalkBits bits;
     float u, v;
     uint32_t prim;
-    float dvcm;
-    float dvc;
     uint32_t previous; ///< light: the vertex before it in the same walk or kNone; eye: the light vertex to connect next, or the draws that are left
+    Rgb throughput;
+    uint32_t path;
+    float dvcm, dvc;
     uint32_t pad[2];
 };
 
@@ -89,7 +95,7 @@ AMBILUX_HD WalkItem pack_walk(const Walk& w, uint32_t path, bool light, float fi
     WalkItem item = {w.o, path, w.d, WalkBits::make(w.depth, w.delta, w.eta_scale), w.throughput, first_tmax, w.sums.dvcm, w.sums.dvc, {0, 0}};
     if (w.depth == 1 && light) {
         item.dvcm = w.start.inv_pdf;
-        item.dvc = w.start.cos_light;
+        item.dvc = w.start.direction;
         item.extra[0] = w.start.prim;
         item.extra[1] = w.start.emitter;
     } else if (w.depth == 1) {
@@ -133,7 +139,7 @@ AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& it
 }
 
 AMBILUX_HD VertexItem pack_vertex(const WalkHit& hit, const WalkVertex& v, uint32_t previous) {
-    return {hit.ray.d, hit.ray.path, hit.ray.throughput, hit.ray.bits, hit.u, hit.v, hit.prim, v.sums.dvcm, v.sums.dvc, previous, {0, 0}};
+    return {hit.ray.d, hit.ray.bits, hit.u, hit.v, hit.prim, previous, hit.ray.throughput, hit.ray.path, v.sums.dvcm, v.sums.dvc, {0, 0}};
 }
 
 }  // namespace ambilux

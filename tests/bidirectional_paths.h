@@ -123,6 +123,9 @@ struct Tally {
     double worst = 0, worst_of_bound = 0, worst_sum = 0;
 };
 
+/// Density of s.wi_world for a walk that arrives from `wo_world`: directions exchanged.
+inline float reverse_pdf(const Scattering& s, Vec3f wo_world) { return bsdf_pdf<F>(s.bsdf, s.frame.to_local(wo_world), s.wi, TransportMode::radiance); }
+
 class Bench {
 public:
     Bench(const Scene& scene, Tally& tally) : scene_(scene.view()), accel_(scene), tracer_(accel_.tracer()), tally_(tally) {}
@@ -388,7 +391,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
             reverse = delta_reverse_pdf(s, wo, sample.eta);
         } else {
             forward = scatter_pdf<F>(vertex.scattering, wo);
-            reverse = scatter_pdf_reverse<F>(vertex.scattering, wo);
+            reverse = reverse_pdf(vertex.scattering, wo);
             if (!(forward > 0.0f)) return false;
         }
         w.sums = sums_after_scatter(mis_, vertex.sums, vertex.first, x.delta, forward, reverse, fabsf(dot(vertex.point.ng, wo)));
@@ -410,6 +413,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
     start.cos_theta = area ? dot(start.ng, start.d) : 1.0f;
     start.pick = e.pick_probability;
     start.emitter = path.emitter;
+    start.infinite = infinite;
     start.prim = area ? path.light.prim : kNone;
     if (!(start.pdf_dir > 0.0f)) return;
     Walk w = start_light_walk(start);
@@ -458,7 +462,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
             light.distance = infinite ? kInfinity : sqrtf(length_squared(position(0) - position(1)));
             light.pdf_sa = area ? pdf_emitter_direct<F>(scene_, path.emitter, position(1), light.wi, path.light)
                                 : (light.delta ? e.pick_probability : pdf_environment_direct<F>(scene_, light.wi));
-            others = others_of_next_event<F>(scene_, mis_, z[1].sums, z[1].first, light, scatter_pdf<F>(z[1].scattering, light.wi), scatter_pdf_reverse<F>(z[1].scattering, light.wi),
+            others = others_of_next_event<F>(scene_, mis_, z[1].sums, z[1].first, light, scatter_pdf<F>(z[1].scattering, light.wi), reverse_pdf(z[1].scattering, light.wi),
                                              fabsf(dot(z[1].point.ng, light.wi)));
         } else {
             if (!connect_vertices<F>(mis_, y[s - 1], {1, 1, 1}, z[s], {1, 1, 1}, connection)) return;

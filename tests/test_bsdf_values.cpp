@@ -92,6 +92,32 @@ TEST_CASE("B24: sample states the pdf and the weight that pdf and eval give, in 
     std::printf("B24: pdf %.2g, weight %.2g\n", worst_pdf, worst_weight);
 }
 
+TEST_CASE("The density of the way back is that of the way there with its directions exchanged") {
+    double worst = 0;
+    std::string where;
+    int compared = 0;
+    const auto check = [&](const BsdfCase& c, Vec3f wi, Vec3f wo, float reverse) {
+        const double d = relative_difference(reverse, pdf(c.bsdf, wo, wi)) / 1e-6;
+        if (d > worst) worst = d, where = c.name;
+        ++compared;
+    };
+    for_samples({1.0f, 0.9f, 0.3f, 0.05f}, 200, [&](const BsdfCase& c, Vec3f wi, const BsdfSample& s, TransportMode mode) {
+        if (s.flags & kScatterDelta) return;
+        check(c, wi, s.wo, s.pdf_reverse_sa);
+        check(c, wi, s.wo, bsdf_evaluate<kAllFeatures>(c.bsdf, wi, s.wo, mode).pdf_reverse_sa);
+    });
+    for (const auto& c : bsdf_cases())
+        for (int i = 0; i < 200; ++i) {
+            const Vec4f u = uniform(74, i), v = uniform(75, i);
+            const Vec3f wi = square_to_sphere({u.x, u.y}), wo = square_to_sphere({v.x, v.y});
+            check(c, wi, wo, bsdf_evaluate<kAllFeatures>(c.bsdf, wi, wo, TransportMode::radiance).pdf_reverse_sa);
+        }
+    INFO(where);
+    CHECK(compared > 10000);
+    CHECK(worst < 1);
+    std::printf("reverse densities: %d, %.2g of the rounding bound\n", compared, worst);
+}
+
 TEST_CASE("B24: sampled directions and their densities do not depend on the mode") {
     int differences = 0;
     uint32_t sequence = 50;

@@ -78,7 +78,7 @@ AMBILUX_HD float connection_dvcm(const BidirectionalMis& mis, MisSums s, bool fi
 /// What a light walk carries to its first vertex, where the density of next event estimation becomes known.
 struct LightStart {
     float inv_pdf;    ///< 1 / (pick · pdf_pos · pdf_dir)
-    float cos_light;  ///< at the emitter; 1 without a surface
+    float direction;  ///< area: cosine at the emitter; environment: density of the direction per solid angle, pick included; otherwise unused
     uint32_t prim;    ///< of an area emitter
     uint32_t emitter;
 };
@@ -94,17 +94,17 @@ AMBILUX_HD MisSums light_sums_at_first_hit(const SceneView& scene, const Bidirec
             // Only the cosine at the emitter counts: a normal of that length along the ray has it.
             SurfacePoint light{};
             light.p = o;
-            light.ng = d * start.cos_light;
+            light.ng = d * start.direction;
             light.prim = start.prim;
-            next_event = pdf_emitter_direct<F>(scene, start.emitter, p, -d, light) * start.cos_light * scale;
-            hit = start.cos_light * scale;
+            next_event = pdf_emitter_direct<F>(scene, start.emitter, p, -d, light) * start.direction * scale;
+            hit = start.direction * scale;
             break;
         }
         case EmitterType::point:
         case EmitterType::spot: next_event = e.pick_probability * length_squared(p - o) * scale; break;
         case EmitterType::directional: next_event = e.pick_probability * scale; break;
         default:
-            next_event = pdf_environment_direct<F>(scene, -d) * scale;
+            next_event = start.direction * scale;  // samples its direction likewise
             hit = scale;
     }
     return {mis.masked(kNextEventStrategies, mis.term(next_event)), mis.masked(kHitStrategies, mis.term(hit))};
@@ -135,10 +135,9 @@ AMBILUX_HD float others_of_escape(const SceneView& scene, const BidirectionalMis
     if (depth == 1) return 0.0f;
     // Eye walks count the environment for two masks, and beyond the first segment for one only.
     if (!mis.has(kHitStrategies)) return kInfinity;
-    const float pick = scene.emitters[scene.environment].pick_probability;
-    const float next_event = mis.masked(kNextEventStrategies, mis.term(pdf_environment_direct<F>(scene, d)));
-    const float emission = mis.term(pick * pdf_emission_position<F>(scene, scene.environment, kNone) * pdf_emission_direction<F>(scene, scene.environment, d, -d));
-    return next_event * ray.dvcm + emission * ray.dvc;
+    // Light walks draw their directions as next event estimation does.
+    const float pdf_sa = pdf_environment_direct<F>(scene, d), emission = pdf_sa * pdf_emission_position<F>(scene, scene.environment, kNone);
+    return mis.masked(kNextEventStrategies, mis.term(pdf_sa)) * ray.dvcm + mis.term(emission) * ray.dvc;
 }
 
 /// s = 1: light sample `light` at an eye vertex with sums `z`. `pdf_sa`: of BSDF sampling towards the light; `pdf_reverse_sa`: of the direction back along the eye walk
@@ -148,14 +147,14 @@ AMBILUX_HD float others_of_next_event(const SceneView& scene, const Bidirectiona
                                       float cos_z) {
     const Emitter& e = scene.emitters[light.emitter];
     const float fewer = light.delta ? 0.0f : mis.masked(kHitStrategies, mis.term(pdf_sa / light.pdf_sa));
-    float ratio = pdf_emission_direction<F>(scene, light.emitter, light.ng, -light.wi) * cos_z;  // of a light walk to here over that of this sample
+    float ratio = cos_z;  // density of a light walk to here over that of this sample
     switch (e.type) {
         case EmitterType::area:
-            ratio *= e.pick_probability * pdf_emission_position<F>(scene, light.emitter, light.prim) / (light.pdf_sa * -dot(light.ng, light.wi));
+            ratio *= e.pick_probability * pdf_emission_position<F>(scene, light.emitter, light.prim) * kInvPi / light.pdf_sa;  // the cosine at the light is in both
             break;
         case EmitterType::point:
-        case EmitterType::spot: ratio *= 1.0f / sqr(light.distance); break;
-        default: ratio *= e.pick_probability * pdf_emission_position<F>(scene, light.emitter, kNone) / light.pdf_sa;
+        case EmitterType::spot: ratio *= pdf_emission_direction<F>(scene, light.emitter, light.ng, -light.wi) / sqr(light.distance); break;
+        default: ratio *= pdf_emission_position<F>(scene, light.emitter, kNone);  // light walks draw the direction as this sample was
     }
     return fewer + mis.term(ratio) * (connection_dvcm(mis, z, first) + z.dvc * mis.term(pdf_reverse_sa));
 }

@@ -171,7 +171,7 @@ AMBILUX_HD_APART BsdfValue bsdf_evaluate_apart(const Bsdf& b, Vec3f wi, Vec3f wo
     return with_bsdf<F>(b, no_scattering(), [&](const auto& bsdf) -> BsdfValue {
         if constexpr (requires { bsdf.evaluate(wi, wo, mode); }) return bsdf.evaluate(wi, wo, mode);
         else if constexpr (requires { bsdf.evaluate(wi, wo); }) return bsdf.evaluate(wi, wo);
-        else return {bsdf.eval(wi, wo, mode), bsdf.pdf(wi, wo, mode)};
+        else return no_scattering();  // delta lobes only
     });
 }
 
@@ -182,12 +182,11 @@ AMBILUX_HD_APART bool bsdf_sample_apart(const Bsdf& b, Vec3f wi, Vec3f u, Transp
 
 }  // namespace detail
 
-/// f(wi,wo)·|cos(wo)| of the smooth lobes, and the density of wo per solid angle over them, the chance of choosing them included; 0 where sides do not fit.
+/// f(wi,wo)·|cos(wo)| of the smooth lobes, and the densities of both directions per solid angle over them, the chance of choosing them included; 0 where sides do not fit.
 template <Features F>
 AMBILUX_HD BsdfValue bsdf_evaluate(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
     if constexpr (F.bsdfs == bit(BsdfType::diffuse)) {
-        const Diffuse bsdf = {b.reflectance_or_eta};
-        return {bsdf.eval(wi, wo, mode), bsdf.pdf(wi, wo, mode)};
+        return Diffuse{b.reflectance_or_eta}.evaluate(wi, wo);
     } else {
         return detail::bsdf_evaluate_apart<F>(b, wi, wo, mode);
     }

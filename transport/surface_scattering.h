@@ -85,7 +85,7 @@ AMBILUX_HD float shading_normal_factor(const Scattering& s, Vec3f wo_world, floa
     return fabsf(s.wi.z / dot(s.ng, s.wi_world)) * fabsf(dot(s.ng, wo_world) / cos_wo);
 }
 
-/// f(wi,wo)·|wo·ns| of the smooth lobes for unit `wo_world`, with the factor for shading normals in importance mode, and what scatter_pdf gives wherever that is not 0.
+/// f(wi,wo)·|wo·ns| of the smooth lobes for unit `wo_world`, with the factor for shading normals in importance mode, and, wherever that is not 0, the densities of scatter_sample.
 template <Features F>
 AMBILUX_HD BsdfValue scatter_evaluate(const Scattering& s, Vec3f wo_world, TransportMode mode) {
     const Vec3f wo = s.frame.to_local(wo_world);
@@ -104,12 +104,6 @@ AMBILUX_HD Rgb scatter_eval(const Scattering& s, Vec3f wo_world, TransportMode m
 template <Features F>
 AMBILUX_HD float scatter_pdf(const Scattering& s, Vec3f wo_world) {
     return bsdf_pdf<F>(s.bsdf, s.wi, s.frame.to_local(wo_world), TransportMode::radiance);
-}
-
-/// Density per solid angle of wi_world for a walk that arrives from `wo_world`: the reverse of scatter_pdf.
-template <Features F>
-AMBILUX_HD float scatter_pdf_reverse(const Scattering& s, Vec3f wo_world) {
-    return bsdf_pdf<F>(s.bsdf, s.frame.to_local(wo_world), s.wi, TransportMode::radiance);
 }
 
 /// Draws a direction (u as for bsdf_sample); weight = scatter_eval/scatter_pdf. False when the walk ends here.

@@ -53,7 +53,7 @@ AMBILUX_HD Walk start_light_walk(const EmissionSample& e) {
     w.d = e.d;
     const float pdf = e.pick * e.pdf_pos * e.pdf_dir;
     w.throughput = e.radiance * (e.cos_theta / pdf);
-    w.start = {1.0f / pdf, e.cos_theta, e.prim, e.emitter};
+    w.start = {1.0f / pdf, e.infinite ? e.pick * e.pdf_dir : e.cos_theta, e.prim, e.emitter};
     w.depth = 1;
     w.eta_scale = 1.0f;
     w.delta = true;
@@ -130,7 +130,7 @@ AMBILUX_HD bool scatter_walk(const BidirectionalMis& mis, const WalkVertex& vert
     if (is_zero(throughput)) return false;
     const bool delta = s.flags & kScatterDelta;
     const float forward = delta ? 1.0f : s.pdf_sa;
-    const float reverse = delta ? delta_reverse_pdf(vertex.scattering, s.wo, s.eta) : scatter_pdf_reverse<F>(vertex.scattering, s.wo);
+    const float reverse = delta ? delta_reverse_pdf(vertex.scattering, s.wo, s.eta) : s.pdf_reverse_sa;
     w.sums = sums_after_scatter(mis, vertex.sums, vertex.first, delta, forward, reverse, fabsf(dot(vertex.point.ng, s.wo)));
     w.o = offset_ray_origin(vertex.point.p, vertex.point.p_error, vertex.point.ng, s.wo);
     w.d = s.wo;
@@ -163,20 +163,29 @@ AMBILUX_HD bool set_segment(WalkConnection& c, const SurfacePoint& from, Vec3f w
     return true;
 }
 
-/// s = 1: vertex z of an eye walk with throughput `throughput` samples an emitter with `u`. False when that gives nothing.
+/// s = 1: vertex z of an eye walk with throughput `throughput` samples an emitter with `u`. False when that gives nothing. `environment`: the value is to be multiplied by
+/// environment_radiance from c.d, which is worth a look only if the ray turns out to be free.
 template <Features F>
-AMBILUX_HD bool connect_next_event(const SceneView& scene, const BidirectionalMis& mis, const WalkVertex& z, Rgb throughput, Vec4f u, WalkConnection& c) {
+AMBILUX_HD bool connect_next_event_deferred(const SceneView& scene, const BidirectionalMis& mis, const WalkVertex& z, Rgb throughput, Vec4f u, WalkConnection& c, bool& environment) {
     EmitterSample light;
-    if (!sample_emitter_deferred<F>(scene, z.point.p, u, light)) return false;
+    if (!sample_emitter_deferred<F>(scene, z.point.p, u, light) || !may_scatter(scene, z.point, z.scattering.wi_world, light.wi)) return false;
     const BsdfValue f = scatter_evaluate<F>(z.scattering, light.wi, TransportMode::radiance);
     if (is_zero(f.value)) return false;
-    c.value = throughput * f.value * (emitter_sample_radiance<F>(scene, light) / light.pdf_sa);
-    c.others = others_of_next_event<F>(scene, mis, z.sums, z.first, light, f.pdf_sa, scatter_pdf_reverse<F>(z.scattering, light.wi),
-                                       fabsf(dot(z.point.ng, light.wi)));
+    environment = is_environment<F>(scene, light.emitter);
+    c.value = throughput * f.value * ((environment ? splat(1.0f) : light.radiance) / light.pdf_sa);
+    c.others = others_of_next_event<F>(scene, mis, z.sums, z.first, light, f.pdf_sa, f.pdf_reverse_sa, fabsf(dot(z.point.ng, light.wi)));
     if (light.distance < kInfinity) return set_segment(c, z.point, light.wi, light.p, light.p_error, light.ng);
     c.o = offset_ray_origin(z.point.p, z.point.p_error, z.point.ng, light.wi);
     c.d = light.wi;
     c.tmax = kInfinity;
+    return true;
+}
+/// The same with the environment's radiance.
+template <Features F>
+AMBILUX_HD bool connect_next_event(const SceneView& scene, const BidirectionalMis& mis, const WalkVertex& z, Rgb throughput, Vec4f u, WalkConnection& c) {
+    bool environment = false;
+    if (!connect_next_event_deferred<F>(scene, mis, z, throughput, u, c, environment)) return false;
+    if (environment) c.value *= environment_radiance<F>(scene, c.d);
     return true;
 }
 
@@ -204,7 +213,7 @@ AMBILUX_HD bool connect_unweighted(const WalkVertex& y, Rgb y_throughput, const 
     if (is_zero(f_y.value)) return false;
     c.value = y_throughput * f_y.value * f_z.value * z_throughput * (1.0f / d2);
     const float cos_y = fabsf(dot(y.point.ng, w)), cos_z = fabsf(dot(z.point.ng, w));
-    p = {f_z.pdf_sa * cos_y / d2, scatter_pdf_reverse<F>(y.scattering, -w), f_y.pdf_sa * cos_z / d2, scatter_pdf_reverse<F>(z.scattering, w)};
+    p = {f_z.pdf_sa * cos_y / d2, f_y.pdf_reverse_sa, f_y.pdf_sa * cos_z / d2, f_z.pdf_reverse_sa};
     return set_segment(c, z.point, w, y.point.p, y.point.p_error, y.point.ng);
 }
 
@@ -235,10 +244,10 @@ template <Features F>
 AMBILUX_HD bool connect_camera(const SceneView& scene, const BidirectionalMis& mis, const WalkVertex& y, Rgb throughput, Vec2f lens_u, WalkConnection& c, Vec2f& film_position) {
     CameraConnection camera;
     if (!connect_to_camera(scene.sensor, y.point.p, lens_u, camera) || !reaches_pixels(scene.sensor, camera.film_position)) return false;
-    const Rgb f = scatter_eval<F>(y.scattering, camera.wi, TransportMode::importance);
-    if (is_zero(f)) return false;
-    c.value = throughput * f * (camera.weight / mis.light_paths);
-    c.others = others_of_camera(scene, mis, y.sums, y.first, camera, fabsf(dot(y.point.ng, camera.wi)), scatter_pdf_reverse<F>(y.scattering, camera.wi));
+    const BsdfValue f = scatter_evaluate<F>(y.scattering, camera.wi, TransportMode::importance);
+    if (is_zero(f.value)) return false;
+    c.value = throughput * f.value * (camera.weight / mis.light_paths);
+    c.others = others_of_camera(scene, mis, y.sums, y.first, camera, fabsf(dot(y.point.ng, camera.wi)), f.pdf_reverse_sa);
     film_position = camera.film_position;
     c.o = offset_ray_origin(y.point.p, y.point.p_error, y.point.ng, camera.wi);
     c.d = camera.wi;

@@ -14,7 +14,7 @@ struct Conductor {
 
     AMBILUX_HD bool sample(Vec3f wi, Vec3f, TransportMode, BsdfSample& out) const {
         if (!(wi.z > 0.0f)) return false;
-        out = {reflect(wi), 1.0f, specular_reflectance * fresnel_conductor(wi.z, eta, k), 1.0f, kScatterDelta};
+        out = {reflect(wi), 1.0f, 1.0f, specular_reflectance * fresnel_conductor(wi.z, eta, k), 1.0f, kScatterDelta};
         return true;
     }
 };

@@ -17,12 +17,12 @@ struct Dielectric {
         if (wi.z == 0.0f) return false;
         const FresnelDielectric f = fresnel_dielectric(wi.z, ior);
         if (u.x < f.reflectance) {
-            out = {reflect(wi), f.reflectance, specular_reflectance, 1.0f, kScatterDelta};
+            out = {reflect(wi), f.reflectance, f.reflectance, specular_reflectance, 1.0f, kScatterDelta};
             return true;
         }
         if (f.cos_t == 0.0f) return false;
         const float scale = mode == TransportMode::radiance ? 1.0f / sqr(f.eta_it) : 1.0f;
-        out = {refract(wi, f), 1.0f - f.reflectance, specular_transmittance * scale, f.eta_it, kScatterDelta | kScatterTransmission};
+        out = {refract(wi, f), 1.0f - f.reflectance, 1.0f - f.reflectance, specular_transmittance * scale, f.eta_it, kScatterDelta | kScatterTransmission};
         return true;
     }
 };

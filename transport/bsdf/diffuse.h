@@ -12,7 +12,7 @@ struct Diffuse {
     AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
         const float pdf_sa = wo.z * kInvPi;
-        return {reflectance * pdf_sa, pdf_sa};
+        return {reflectance * pdf_sa, pdf_sa, wi.z * kInvPi};
     }
     AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
     AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }
@@ -20,7 +20,7 @@ struct Diffuse {
     AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode, BsdfSample& out) const {
         if (!(wi.z > 0.0f)) return false;
         const Vec3f wo = square_to_cosine_hemisphere({u.y, u.z});
-        out = {wo, wo.z * kInvPi, reflectance, 1.0f, 0};
+        out = {wo, wo.z * kInvPi, wi.z * kInvPi, reflectance, 1.0f, 0};
         return true;
     }
 };

@@ -40,6 +40,19 @@ AMBILUX_HD float inverse_erf(float x) {
     return p * x;
 }
 
+/// Microfacet normal that reflects unit wi to unit wo, both above the horizon, and its cosine with either, the same however they are exchanged; not above 0 if they are opposite.
+AMBILUX_HD Vec3f half_vector(Vec3f wi, Vec3f wo, float& cosine) {
+    const Vec3f h = wi + wo;
+    const float l2 = length_squared(h), inv = inverse_sqrt(l2);
+    cosine = 0.5f * l2 * inv;
+    return h * inv;
+}
+
+/// MicrofacetDistribution::reflection.
+struct MicrofacetReflection {
+    float value, pdf_sa, pdf_reverse_sa;
+};
+
 struct MicrofacetDistribution {
     Microfacets type;
     float alpha_u, alpha_v;
@@ -65,13 +78,16 @@ struct MicrofacetDistribution {
         return 0.5f * (v.z * (1.0f + erff(a)) + t * expf(-a * a) * 0.56418958354775628f);
     }
 
-    /// Smith's masking G1 for v.z > 0.
-    AMBILUX_HD float g1(Vec3f v) const { return min(v.z / sigma(v), 1.0f); }
-
-    /// Density per solid angle of sample(), wi.z > 0.
-    AMBILUX_HD float pdf(Vec3f wi, Vec3f m, bool visible) const {
-        if (!visible) return d(m) * m.z;
-        return d(m) * max(dot(wi, m), 0.0f) / sigma(wi);
+    /// Reflection at m = half_vector(wi, wo, cosine): D·G1(wi)·G1(wo)/(4·cos(wi)), which is f·cos(wo) without
+    /// Fresnel (Walter et al. 2007, equation 20), and the densities of wo and of wi by sample() at the other: that of m, visible D·(w·m)/sigma(w) or all of them D·cos(m), over
+    /// 4·(w·m).
+    AMBILUX_HD MicrofacetReflection reflection(Vec3f wi, Vec3f wo, Vec3f m, float cosine, bool visible) const {
+        const float density = d(m) * 0.25f, sigma_i = sigma(wi), sigma_o = sigma(wo);
+        const float per_i = density / sigma_i;  // G1 = cos/sigma
+        const float value = per_i * min(wo.z / sigma_o, 1.0f);
+        if (visible) return {value, per_i, density / sigma_o};
+        const float all = density * m.z / cosine;
+        return {value, all, all};
     }
 
     /// Microfacet normal, visible from wi (wi.z > 0) or from the whole distribution in proportion to D·cos.

@@ -35,7 +35,7 @@ struct Plastic {
         const float fi = fresnel_dielectric(wi.z, ior).reflectance, fo = fresnel_dielectric(wo.z, ior).reflectance;
         const float cosine = wo.z * kInvPi;
         const float passed = (1.0f - fi) * (1.0f - fo) / (ior * ior);
-        return {internal_scattering(reflectance, fdr_internal, nonlinear) * (passed * cosine), (1.0f - probability(fi)) * cosine};
+        return {internal_scattering(reflectance, fdr_internal, nonlinear) * (passed * cosine), (1.0f - probability(fi)) * cosine, (1.0f - probability(fo)) * (wi.z * kInvPi)};
     }
     AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
     AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }
@@ -44,7 +44,7 @@ struct Plastic {
         if (!(wi.z > 0.0f)) return false;
         const float f = fresnel_dielectric(wi.z, ior).reflectance, p = probability(f);
         if (u.x < p) {
-            out = {reflect(wi), p, specular_reflectance * (f / p), 1.0f, kScatterDelta};
+            out = {reflect(wi), p, p, specular_reflectance * (f / p), 1.0f, kScatterDelta};
             return true;
         }
         const Vec3f wo = square_to_cosine_hemisphere({u.y, u.z});

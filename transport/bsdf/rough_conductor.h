@@ -14,13 +14,11 @@ struct RoughConductor {
 
     AMBILUX_HD_APART BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
-        const Vec3f m = normalize(wi + wo);
-        const float i_dot_m = dot(wi, m);
-        if (!(i_dot_m > 0.0f)) return no_scattering();
-        const float pdf_sa = microfacets.pdf(wi, m, sample_visible) / (4.0f * i_dot_m);
-        // G1(wi)·G1(wo)/(4·cos(wi)), with G1 = cos/sigma.
-        const float value = microfacets.d(m) * microfacets.g1(wo) / (4.0f * microfacets.sigma(wi));
-        return {specular_reflectance * fresnel_conductor(i_dot_m, eta, k) * value, pdf_sa};
+        float cosine;
+        const Vec3f m = half_vector(wi, wo, cosine);
+        if (!(cosine > 0.0f)) return no_scattering();
+        const MicrofacetReflection f = microfacets.reflection(wi, wo, m, cosine, sample_visible);
+        return {specular_reflectance * fresnel_conductor(cosine, eta, k) * f.value, f.pdf_sa, f.pdf_reverse_sa};
     }
     AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
     AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }

@@ -35,7 +35,7 @@ struct RoughDiffuse {
         const float twice = c4 * (1.0f - cos_phi * steep * steep);
         const float pdf_sa = wo.z * kInvPi;
         // The fit may fall below zero at opposite grazing directions.
-        return {max(reflectance * single + reflectance * reflectance * twice, splat(0.0f)) * pdf_sa, pdf_sa};
+        return {max(reflectance * single + reflectance * reflectance * twice, splat(0.0f)) * pdf_sa, pdf_sa, wi.z * kInvPi};
     }
     AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
     AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }

@@ -27,17 +27,15 @@ struct RoughPlastic {
 
     AMBILUX_HD_APART BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
-        const Vec3f m = normalize(wi + wo);
-        const float i_dot_m = dot(wi, m);
-        if (!(i_dot_m > 0.0f)) return no_scattering();
-        const float ti = transmittance(wi.z), to = transmittance(wo.z), p = probability(ti);
+        float cos_m;
+        const Vec3f m = half_vector(wi, wo, cos_m);
+        if (!(cos_m > 0.0f)) return no_scattering();
+        const float ti = transmittance(wi.z), to = transmittance(wo.z), pi = probability(ti), po = probability(to);
         const float cosine = wo.z * kInvPi;
-        const float coating = fresnel_dielectric(i_dot_m, ior).reflectance * microfacets.d(m) * microfacets.g1(wo) /
-                              (4.0f * microfacets.sigma(wi));
+        const MicrofacetReflection coating = microfacets.reflection(wi, wo, m, cos_m, sample_visible);
         const float passed = ti * to / (ior * ior) * cosine;
-        const float coating_pdf = microfacets.pdf(wi, m, sample_visible) / (4.0f * i_dot_m);
-        return {specular_reflectance * coating + internal_scattering(reflectance, fdr_internal, nonlinear) * passed,
-                p * coating_pdf + (1.0f - p) * cosine};
+        return {specular_reflectance * (fresnel_dielectric(cos_m, ior).reflectance * coating.value) + internal_scattering(reflectance, fdr_internal, nonlinear) * passed,
+                pi * coating.pdf_sa + (1.0f - pi) * cosine, po * coating.pdf_reverse_sa + (1.0f - po) * (wi.z * kInvPi)};
     }
     AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
     AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }

@@ -18,9 +18,9 @@ struct ThinDielectric {
         // R + T·R·T + T·R³·T + ... with T = 1-R sums to 2R/(1+R) (Stokes 1860).
         const float r = fresnel_dielectric(fabsf(wi.z), ior).reflectance, reflectance = 2.0f * r / (1.0f + r);
         if (u.x < reflectance)
-            out = {reflect(wi), reflectance, specular_reflectance, 1.0f, kScatterDelta};
+            out = {reflect(wi), reflectance, reflectance, specular_reflectance, 1.0f, kScatterDelta};
         else
-            out = {-wi, 1.0f - reflectance, specular_transmittance, 1.0f, kScatterDelta | kScatterTransmission};
+            out = {-wi, 1.0f - reflectance, 1.0f - reflectance, specular_transmittance, 1.0f, kScatterDelta | kScatterTransmission};
         return true;
     }
 };
