@@ -45,6 +45,16 @@ enum class LaneOrder {
     together,  ///< at base[i * lanes + k]: for items that are taken in no order, since memory moves 32 bytes at least
 };
 
+/// Lanes of an item, the first ones, that lie two by two where the others are apart: items say so (kPairedLanes) that are written in order and read in another, sorted by their materials.
+template <class Item>
+constexpr uint32_t paired_lanes() {
+    if constexpr (requires { Item::kPairedLanes; }) {
+        static_assert(Item::kPairedLanes % 2 == 0 && Item::kPairedLanes <= sizeof(Item) / sizeof(Lane));
+        return Item::kPairedLanes;
+    }
+    return 0;
+}
+
 /// Fixed-capacity queue of trivially copyable items. A view: copies share the storage.
 template <class Item, LaneOrder Order = LaneOrder::apart>
 struct Queue {
@@ -56,7 +66,10 @@ struct Queue {
     uint32_t capacity = 0;
     uint8_t* flags = nullptr;  ///< fixed places: 1 where there is an item. Null: items are appended
 
-    AMBILUX_HD size_t place(uint32_t i, uint32_t lane) const { return Order == LaneOrder::apart ? size_t(lane) * capacity + i : size_t(i) * kLanes + lane; }
+    AMBILUX_HD size_t place(uint32_t i, uint32_t lane) const {
+        if constexpr (Order == LaneOrder::together) return size_t(i) * kLanes + lane;
+        return lane < paired_lanes<Item>() ? size_t(lane & ~1u) * capacity + 2 * size_t(i) + (lane & 1u) : size_t(lane) * capacity + i;
+    }
 
     AMBILUX_HD Item load(uint32_t i) const {
         Lane lanes[kLanes];
@@ -80,6 +93,7 @@ struct Queue {
     AMBILUX_HD uint32_t push_loosely(const Item& item) const {
 #if defined(__CUDA_ARCH__)
         if (!flags) {
+            static_assert(paired_lanes<Item>() == 0, "holes are filled lane by lane");
             const uint32_t i = WarpStretches::mine().take({counter, base, place(0, 1), place(1, 0), kLanes, capacity});
             if (i < capacity) store(i, item);
             return i;

@@ -26,6 +26,8 @@ static_assert(WalkBits::kDepthBits + 1 <= 16, "depth and flag share the lower ha
 
 /// A ray of an eye walk, to be extended to the next surface.
 struct RayItem {
+    static constexpr uint32_t kPairedLanes = 2;
+
     Vec3f o;
     uint32_t path;     ///< slot
     Vec3f d;
@@ -43,6 +45,8 @@ struct HitEnd {
 
 /// Where that ray ended; `prim == kNone`: nowhere, only the environment remains. Its first lanes are the RayItem.
 struct HitItem {
+    static constexpr uint32_t kPairedLanes = 2;
+
     Vec3f o;
     uint32_t path;
     Vec3f d;

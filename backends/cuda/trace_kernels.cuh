@@ -126,7 +126,8 @@ struct PairWalk {
 template <class Tracer, bool AnyHit>
 using Walk = std::conditional_t<std::is_same_v<Tracer, PairTracer>, PairWalk<AnyHit>, CwbvhWalk<AnyHit>>;
 
-/// The loop behind trace_closest_persistent and trace_any_persistent. `finish(i, hit)` is called once per fetched ray.
+/// The loop behind trace_closest_persistent and trace_any_persistent. `finish(i, hit)` is called once per fetched ray: for all that have ended when the warp fetches others, since the
+/// whole warp waits for what it loads.
 template <Features F, bool AnyHit, class Tracer, class Fetch, class Finish>
 __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Finish finish, const uint32_t* count,
                                  uint32_t* next_ray, TraceTuning tuning) {
@@ -144,35 +145,37 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
     uint32_t chunk = 0, chunk_end = 0;  // rays that the warp has taken and not begun
 
     for (;;) {
-        const uint32_t idle = __ballot_sync(kWarp, index == kNone);
-        if (uint32_t(__popc(idle)) > 32u - tuning.refill_below) {
-            if (!drained) {
-                const uint32_t wanted = uint32_t(__popc(idle)), kept = chunk_end - chunk;
-                uint32_t fresh = chunk;
-                if (wanted > kept) {
-                    if ((threadIdx.x & 31u) == 0) fresh = atomicAdd(next_ray, 32u);
-                    fresh = __shfl_sync(kWarp, fresh, 0);
-                    chunk_end = fresh + 32u;
-                    fresh -= kept;
+        const bool done = !walk.has_primitives() && !walk.has_nodes();  // or never begun
+        const uint32_t idle = __ballot_sync(kWarp, done);
+        if (uint32_t(__popc(idle)) > 32u - tuning.refill_below && (!drained || idle == kWarp)) {
+            if (done && index != kNone) {
+                finish(index, prim == kNone ? Hit{t, 0.0f, 0.0f, kNone} : walk.kept(stack, t, prim));
+                index = kNone;
+            }
+            if (drained) return;
+            const uint32_t wanted = uint32_t(__popc(idle)), kept = chunk_end - chunk;
+            uint32_t fresh = chunk;
+            if (wanted > kept) {
+                if ((threadIdx.x & 31u) == 0) fresh = atomicAdd(next_ray, 32u);
+                fresh = __shfl_sync(kWarp, fresh, 0);
+                chunk_end = fresh + 32u;
+                fresh -= kept;
+            }
+            const uint32_t rank = lane_rank(idle);
+            const uint32_t next = (rank < kept ? chunk : fresh) + rank;
+            chunk = fresh + wanted;
+            drained = chunk >= ray_count;
+            if (done && next < ray_count && fetch(next, ray)) {
+                if (is_traceable(ray)) {
+                    index = next;
+                    t = ray.tmax;
+                    prim = kNone;
+                    box_ray = make_cwbvh_ray(ray.o, ray.d);
+                    shear = make_ray_shear(ray.d);
+                    walk.begin(tracer, stack);
+                } else {
+                    finish(next, Hit{ray.tmax, 0.0f, 0.0f, kNone});
                 }
-                const uint32_t rank = lane_rank(idle);
-                const uint32_t next = (rank < kept ? chunk : fresh) + rank;
-                chunk = fresh + wanted;
-                drained = chunk >= ray_count;
-                if (index == kNone && next < ray_count && fetch(next, ray)) {
-                    if (is_traceable(ray)) {
-                        index = next;
-                        t = ray.tmax;
-                        prim = kNone;
-                        box_ray = make_cwbvh_ray(ray.o, ray.d);
-                        shear = make_ray_shear(ray.d);
-                        walk.begin(tracer, stack);
-                    } else {
-                        finish(next, Hit{ray.tmax, 0.0f, 0.0f, kNone});
-                    }
-                }
-            } else if (idle == kWarp) {
-                return;
             }
         }
 
@@ -202,10 +205,6 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
                 }
                 waiting = uint32_t(__popc(__ballot_sync(kWarp, walk.has_primitives())));
             } while (waiting >= tuning.primitives_at);
-        }
-        if (index != kNone && !walk.has_primitives() && !walk.has_nodes()) {
-            finish(index, prim == kNone ? Hit{t, 0.0f, 0.0f, kNone} : walk.kept(stack, t, prim));
-            index = kNone;
         }
     }
 }
