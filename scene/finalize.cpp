@@ -7,6 +7,7 @@
 #include "core/huge_pages.h"
 #include "scene/alias_table.h"
 #include "scene/scene.h"
+#include "transport/sensor/filter.h"
 
 namespace ambilux {
 
@@ -235,14 +236,8 @@ void fill_emitters(Scene& scene, LightPicking picking) {
     for (size_t i = 0; i < power.size(); ++i) scene.emitters[i].pick_probability = scene.emitter_cdf[i + 1] - scene.emitter_cdf[i];
 }
 
-/// Cumulative distribution of a reconstruction filter of radius r, at x in [-r, r].
-double filter_cdf(FilterType type, double r, double x) {
-    if (type == FilterType::box) return 0.5 + 0.5 * x / r;
-    if (type == FilterType::tent) {
-        const double s = x / r;
-        return s < 0 ? 0.5 * (1 + s) * (1 + s) : 1 - 0.5 * (1 - s) * (1 - s);
-    }
-    // exp(-x²/2σ²) - exp(-r²/2σ²) with r = 4σ.
+/// Cumulative distribution of the Gaussian reconstruction filter of radius r, exp(-x²/2σ²) - exp(-r²/2σ²) with r = 4σ, at x in [-r, r].
+double filter_cdf(double r, double x) {
     const double sigma = r / 4, floor = std::exp(-r * r / (2 * sigma * sigma));
     const auto integral = [&](double a) { return sigma * std::sqrt(M_PI / 2) * std::erf(a / (sigma * std::sqrt(2.0))) - floor * a; };
     return 0.5 + 0.5 * integral(x) / integral(r);
@@ -250,6 +245,7 @@ double filter_cdf(FilterType type, double r, double x) {
 
 void fill_filter_table(Scene& scene) {
     Sensor& sensor = scene.sensor;
+    if (sensor.filter != FilterType::gaussian) return;
     sensor.filter_table = uint32_t(scene.tables.size());
     const double r = sensor.filter_radius;
     for (uint32_t i = 0; i <= kFilterTableSize; ++i) {
@@ -257,10 +253,11 @@ void fill_filter_table(Scene& scene) {
         double lo = -r, hi = r;
         for (int k = 0; k < 100; ++k) {
             const double mid = 0.5 * (lo + hi);
-            (filter_cdf(sensor.filter, r, mid) < p ? lo : hi) = mid;
+            (filter_cdf(r, mid) < p ? lo : hi) = mid;
         }
         scene.tables.push_back(i == 0 ? float(-r) : (i == kFilterTableSize ? float(r) : (2 * i == kFilterTableSize ? 0.0f : float(0.5 * (lo + hi)))));
     }
+    append_filter_guide(scene.tables);
 }
 
 void fill_features(Scene& scene) {

@@ -149,7 +149,7 @@ struct Emitter {
 // ---- sensor ----
 
 enum class FilterType : uint32_t { box, tent, gaussian };
-/// Entries of the inverse cumulative table of a reconstruction filter minus one.
+/// Entries of the inverse cumulative table of a Gaussian reconstruction filter minus one, and of its guide.
 constexpr uint32_t kFilterTableSize = 1024;
 
 /// Sensor and film. Film positions are in pixels of the full film, origin at the top left; the image holds the crop.
@@ -165,7 +165,7 @@ struct Sensor {
     uint32_t crop_x, crop_y, crop_width, crop_height;
     FilterType filter;
     float filter_radius;      ///< pixels
-    uint32_t filter_table;    ///< kFilterTableSize+1 floats in tables: offset in pixels at equal steps of probability
+    uint32_t filter_table;    ///< gaussian, in tables: kFilterTableSize+1 offsets in pixels at equal steps of probability, and what finds one of them (transport/sensor/filter.h)
 };
 
 /// Everything a kernel may read. Pointers are host or device memory, as a whole.

@@ -40,18 +40,26 @@ struct FixedLight {
 
 AMBILUX_HD FixedLight to_fixed(Rgb value) { return {{llrint(double(value.x) / kLightUnit), llrint(double(value.y) / kLightUnit), llrint(double(value.z) / kLightUnit)}}; }
 
-/// The threads of a warp that mean the same place add up what they have for it, values of less than 2^42: true for the one that is left with the sum. A lamp that covers a few pixels
-/// gets a splat from every light walk.
-AMBILUX_HD bool gather_light([[maybe_unused]] const void* place, [[maybe_unused]] FixedLight& light) {
+/// The threads of a warp that come with the same `place`, as bits. A lamp that covers a few pixels gets a splat from every light walk.
+AMBILUX_HD uint32_t threads_with([[maybe_unused]] const void* place) {
 #if defined(__CUDA_ARCH__)
-    const uint32_t same = __match_any_sync(__activemask(), reinterpret_cast<unsigned long long>(place));
-    if (same & (same - 1)) {
+    return __match_any_sync(__activemask(), reinterpret_cast<unsigned long long>(place));
+#else
+    return 1;
+#endif
+}
+AMBILUX_HD bool several(uint32_t threads) { return threads & (threads - 1); }
+
+/// These threads add up what they have, values of less than 2^42: true for the one that is left with the sum.
+AMBILUX_HD bool gather_light([[maybe_unused]] uint32_t threads, [[maybe_unused]] FixedLight& light) {
+#if defined(__CUDA_ARCH__)
+    if (several(threads)) {
         constexpr uint32_t kHalf = (1u << 21) - 1;
         for (int c = 0; c < 3; ++c) {
-            const uint32_t low = __reduce_add_sync(same, uint32_t(light.value[c]) & kHalf), high = __reduce_add_sync(same, uint32_t(light.value[c] >> 21));
+            const uint32_t low = __reduce_add_sync(threads, uint32_t(light.value[c]) & kHalf), high = __reduce_add_sync(threads, uint32_t(light.value[c] >> 21));
             light.value[c] = (int64_t(high) << 21) + low;
         }
-        return (threadIdx.x & 31u) == uint32_t(__ffs(int(same)) - 1);
+        return (threadIdx.x & 31u) == uint32_t(__ffs(int(threads)) - 1);
     }
 #endif
     return true;
@@ -63,7 +71,7 @@ AMBILUX_HD bool add_light(int64_t* sums, Rgb value) {
     if (!(most < kTooMuchLight)) return false;
     FixedLight fixed = to_fixed(value);
     if (most < kLargeLight) {
-        if (gather_light(sums, fixed))
+        if (gather_light(threads_with(sums), fixed))
             for (int c = 0; c < 3; ++c) add_fixed(sums + c, fixed.value[c]);
         return true;
     }

@@ -84,15 +84,17 @@ struct Splat {
         const float x = item.film.x - float(scene.sensor.crop_x), y = item.film.y - float(scene.sensor.crop_y), r = scene.sensor.filter_radius;
         const int32_t x0 = int32_t(ceilf(x - r - 0.5f)), x1 = int32_t(floorf(x + r - 0.5f));
         const int32_t y0 = int32_t(ceilf(y - r - 0.5f)), y1 = int32_t(floorf(y + r - 0.5f));
-        for (int32_t py = y0 > 0 ? y0 : 0; py <= y1 && py < int32_t(wave.height); ++py)
+        for (int32_t py = y0 > 0 ? y0 : 0; py <= y1 && py < int32_t(wave.height); ++py) {
+            const float row = filter_value_1d(scene, y - (float(py) + 0.5f));
             for (int32_t px = x0 > 0 ? x0 : 0; px <= x1 && px < int32_t(wave.width); ++px) {
-                const float weight = filter_value(scene, {x - (float(px) + 0.5f), y - (float(py) + 0.5f)});
+                const float weight = row * filter_value_1d(scene, x - (float(px) + 0.5f));
                 if (!(weight > 0.0f)) continue;
                 const Rgb value = item.value * weight;
                 const uint32_t pixel = uint32_t(py) * wave.width + uint32_t(px);
                 if (!sums.add(uint64_t(sample) * wave.height * wave.width + pixel, value)) count_one(&record->inf);
                 techniques.add(wave, item.strategy, pixel, value * (1.0f + item.others), value);
             }
+        }
     }
 };
 

@@ -17,9 +17,12 @@ struct SplatSums {
         if (fixed) return add_light(fixed + cell * 3, value);
         if (!(max_component(value) < kTooMuchLight)) return false;
         if (max_component(value) < kLargeLight) {
-            FixedLight light = to_fixed(value);
-            if (!gather_light(floats + cell, light)) return true;
-            value = {float(double(light.value[0]) * kLightUnit), float(double(light.value[1]) * kLightUnit), float(double(light.value[2]) * kLightUnit)};
+            const uint32_t threads = threads_with(floats + cell);
+            if (several(threads)) {
+                FixedLight light = to_fixed(value);
+                if (!gather_light(threads, light)) return true;
+                value = {float(double(light.value[0]) * kLightUnit), float(double(light.value[1]) * kLightUnit), float(double(light.value[2]) * kLightUnit)};
+            }
         }
         add_shared(floats[cell], value);
         return true;

@@ -199,26 +199,24 @@ TEST_CASE("bounds hold every surface and the camera; an empty scene has a radius
     CHECK(s.bounds_radius < 30.0f);
 }
 
-TEST_CASE("filter tables invert the filters' cumulative distributions (B19)") {
-    const auto table = [](FilterType type, float radius) {
+TEST_CASE("The Gaussian's table inverts its cumulative distribution (B19)") {
+    const auto table = [](float radius) {
         Scene s = base();
-        s.sensor.filter = type;
+        s.sensor.filter = FilterType::gaussian;
         s.sensor.filter_radius = radius;
         finalize_scene(s, LightPicking::power);
         return std::vector<float>(s.tables.begin() + s.sensor.filter_table, s.tables.begin() + s.sensor.filter_table + kFilterTableSize + 1);
     };
     const uint32_t n = kFilterTableSize;
-    for (const auto& [type, radius] : {std::pair{FilterType::box, 0.5f}, {FilterType::tent, 1.0f}, {FilterType::gaussian, 2.0f}, {FilterType::tent, 2.5f}}) {
-        const std::vector<float> t = table(type, radius);
+    for (const float radius : {2.0f, 0.7f}) {
+        const std::vector<float> t = table(radius);
         CHECK(t[0] == -radius);
         CHECK(t[n] == radius);
         CHECK(t[n / 2] == 0.0f);
         for (uint32_t i = 0; i < n; ++i) REQUIRE(t[i] < t[i + 1]);
         for (uint32_t i = 0; i <= n; ++i) REQUIRE(t[i] == Approx(-t[n - i]).margin(1e-6));
         // Midpoint sums of the filter itself against the table, independent of the closed forms.
-        const auto filter = [&, type_ = type, r = double(radius)](double x) {
-            if (type_ == FilterType::box) return 1.0;
-            if (type_ == FilterType::tent) return 1 - std::fabs(x) / r;
+        const auto filter = [r = double(radius)](double x) {
             const double a = 8 / (r * r);  // 1/(2 stddev²), stddev = r/4
             return std::exp(-a * x * x) - std::exp(-a * r * r);
         };

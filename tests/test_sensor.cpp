@@ -53,6 +53,7 @@ uint32_t append_filter(Scene& s, double radius, const std::function<double(doubl
         const double step = cdf[k + 1] - cdf[k];
         s.tables.push_back(float(-radius + 2 * radius * (double(k) + (step > 0 ? (target - cdf[k]) / step : 0)) / n));
     }
+    append_filter_guide(s.tables);
     return offset;
 }
 
@@ -230,18 +231,25 @@ TEST_CASE("Filters: samples have the filter's moments, its value is their densit
     scene.sensor = make_sensor(SensorType::perspective);
     scene.tables.resize(3, 0.0f);
     const double sigma = 0.5, radius = 4 * sigma, lowest = std::exp(-radius * radius / (2 * sigma * sigma));
-    const std::pair<double, std::function<double(double)>> filters[] = {
-        {0.5, [](double) { return 1.0; }},
-        {1.0, [](double x) { return 1 - std::fabs(x); }},
-        {radius, [&](double x) { return std::exp(-x * x / (2 * sigma * sigma)) - lowest; }},
+    const struct {
+        FilterType type;
+        double r;
+        std::function<double(double)> density;
+    } filters[] = {
+        {FilterType::box, 0.5, [](double) { return 1.0; }},
+        {FilterType::tent, 1.0, [](double x) { return 1 - std::fabs(x); }},
+        {FilterType::tent, 2.5, [](double x) { return 1 - std::fabs(x) / 2.5; }},
+        {FilterType::gaussian, radius, [&](double x) { return std::exp(-x * x / (2 * sigma * sigma)) - lowest; }},
     };
-    for (const auto& [r, density] : filters) {
+    for (const auto& [type, r, density] : filters) {
+        scene.sensor.filter = type;
+        scene.sensor.filter_radius = float(r);
         scene.sensor.filter_table = append_filter(scene, r, density);
         const SceneView view = view_of(scene);
         double total = 0;
         const int n = 100000;
         for (int i = 0; i < n; ++i) total += density(-r + 2 * r * (i + 0.5) / n);
-        // Moments of the table, uniform between its entries, which stretches the last thousandth of a tail.
+        // Moments of a table, uniform between its entries, which stretches the last thousandth of a tail; those of box and tent are right for their closed forms to 1e-5.
         const float* table = view.tables + view.sensor.filter_table;
         double second = 0, fourth = 0;
         for (uint32_t i = 0; i < kFilterTableSize; ++i) {
@@ -272,18 +280,37 @@ TEST_CASE("Filters: samples have the filter's moments, its value is their densit
         const double norm = total * 2 * r / n;
         for (double x : {0.013, -0.21, 0.37}) CHECK(filter_value(view, {float(x), 0.11f}) == Approx(density(x) * density(0.11) / (norm * norm)).epsilon(0.01));
         double integral = 0;
-        for (int i = 0; i < n; ++i) integral += filter_pdf_1d(view.tables + view.sensor.filter_table, float(-r + 2 * r * (i + 0.5) / n));
+        for (int i = 0; i < n; ++i) integral += filter_value_1d(view, float(-r + 2 * r * (i + 0.5) / n));
         CHECK(integral * 2 * r / n == Approx(1).epsilon(2e-3));
         CHECK(filter_value(view, {float(r) * 1.01f, 0}) == 0);
-        CHECK(sample_filter_1d(view.tables + view.sensor.filter_table, 0.0f) == Approx(-r).margin(1e-3));
-        CHECK(sample_filter_1d(view.tables + view.sensor.filter_table, 1.0f) == Approx(r).margin(1e-3));
+        if (type != FilterType::gaussian) {
+            // Closed forms: the distribution of sample_filter_1d has the density filter_value_1d, to the rounding of a difference.
+            for (double u = 0.0005; u < 0.999; u += 0.001) {
+                const double a = sample_filter_1d(view, float(u)), b = sample_filter_1d(view, float(u + 0.0005));
+                REQUIRE(filter_value_1d(view, float(0.5 * (a + b))) * (b - a) == Approx(0.0005).epsilon(a * b < 0 || std::fabs(a) > 0.95 * r ? 0.02 : 2e-3));
+            }
+            continue;
+        }
+        // The entry that a search finds, wherever the offset lies, on entries too.
+        const auto searched = [&](float x) {
+            const float* above = std::upper_bound(table, table + kFilterTableSize + 1, x);
+            return above == table || above == table + kFilterTableSize + 1 ? 0.0f : 1.0f / (float(kFilterTableSize) * (above[0] - above[-1]));
+        };
+        for (uint32_t i = 0; i <= kFilterTableSize; ++i)
+            for (const float x : {table[i], std::nextafter(table[i], -9.0f), std::nextafter(table[i], 9.0f)}) REQUIRE(filter_value_1d(view, x) == searched(x));
+        for (uint32_t i = 0; i < 100000; ++i) {
+            const float x = float(r) * (2.2f * random(43, i).x - 1.1f);
+            REQUIRE(filter_value_1d(view, x) == searched(x));
+        }
+        CHECK(sample_filter_1d(view, 0.0f) == Approx(-r).margin(1e-3));
+        CHECK(sample_filter_1d(view, 1.0f) == Approx(r).margin(1e-3));
     }
 }
 
 TEST_CASE("B16: film positions of a crop are those of the full film", "[sensor]") {
     Scene scene;
     scene.sensor = make_sensor(SensorType::perspective);
-    scene.sensor.filter_table = append_filter(scene, 0.5, [](double) { return 1.0; });
+    scene.sensor.filter_radius = 0.5f;
     const Vec2f full = sample_film_position(view_of(scene), 12, 9, {0.25f, 0.75f});
     CHECK(full.x == Approx(12.25));
     CHECK(full.y == Approx(9.75));
