@@ -15,6 +15,9 @@ constexpr Features kUntexturedFeatures = {bit(BsdfType::diffuse) | bit(BsdfType:
 /// Every BSDF, texture and emitter, on triangles that are neither bumped nor holed.
 constexpr Features kTriangleFeatures = {kAllFeatures.bsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false, false};
 
+/// The same with holes.
+constexpr Features kMaskedFeatures = {kAllFeatures.bsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false, true};
+
 /// Carries a set of features as a type.
 template <Features F>
 struct FeatureTag {
@@ -29,10 +32,11 @@ decltype(auto) with_feature_level(const Features& needed, bool specialise, Funct
     return f(FeatureTag<kAllFeatures>{});
 }
 
-/// The same with one level more, for kernels of a device, where what is never called costs registers and room in instruction caches.
+/// The same with two levels more, for kernels of a device, where what is never called costs registers and room in instruction caches.
 template <class Function>
 decltype(auto) with_kernel_level(const Features& needed, bool specialise, Function&& f) {
     if (specialise && !kDiffuseFeatures.covers(needed) && kUntexturedFeatures.covers(needed)) return f(FeatureTag<kUntexturedFeatures>{});
+    if (specialise && !kTriangleFeatures.covers(needed) && kMaskedFeatures.covers(needed)) return f(FeatureTag<kMaskedFeatures>{});
     return with_feature_level(needed, specialise, f);
 }
 

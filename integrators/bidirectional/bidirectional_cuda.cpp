@@ -15,6 +15,7 @@ std::unique_ptr<Renderer> make_bidirectional_cuda([[maybe_unused]] const Scene& 
         if constexpr (decltype(level)::value == kDiffuseFeatures) return make_bidirectional_cuda_diffuse(scene, settings, accels);
         else if constexpr (decltype(level)::value == kUntexturedFeatures) return make_bidirectional_cuda_untextured(scene, settings, accels);
         else if constexpr (decltype(level)::value == kTriangleFeatures) return make_bidirectional_cuda_triangles(scene, settings, accels);
+        else if constexpr (decltype(level)::value == kMaskedFeatures) return make_bidirectional_cuda_masked(scene, settings, accels);
         else return make_bidirectional_cuda_all(scene, settings, accels);
     });
 #else

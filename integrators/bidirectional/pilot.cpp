@@ -38,6 +38,7 @@ double mean_light_vertices(const SceneView& scene, const Tracer& tracer, const B
 template double mean_light_vertices<kDiffuseFeatures>(const SceneView&, const CwbvhTracer&, const BidirectionalPolicy&, uint64_t);
 template double mean_light_vertices<kUntexturedFeatures>(const SceneView&, const CwbvhTracer&, const BidirectionalPolicy&, uint64_t);
 template double mean_light_vertices<kTriangleFeatures>(const SceneView&, const CwbvhTracer&, const BidirectionalPolicy&, uint64_t);
+template double mean_light_vertices<kMaskedFeatures>(const SceneView&, const CwbvhTracer&, const BidirectionalPolicy&, uint64_t);
 template double mean_light_vertices<kAllFeatures>(const SceneView&, const CwbvhTracer&, const BidirectionalPolicy&, uint64_t);
 template double mean_light_vertices<kDiffuseFeatures>(const SceneView&, const EmbreeTracer&, const BidirectionalPolicy&, uint64_t);
 template double mean_light_vertices<kTriangleFeatures>(const SceneView&, const EmbreeTracer&, const BidirectionalPolicy&, uint64_t);

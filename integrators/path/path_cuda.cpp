@@ -15,6 +15,7 @@ std::unique_ptr<Renderer> make_path_cuda([[maybe_unused]] const Scene& scene, [[
         if constexpr (decltype(level)::value == kDiffuseFeatures) return make_path_cuda_diffuse(scene, settings, accels);
         else if constexpr (decltype(level)::value == kUntexturedFeatures) return make_path_cuda_untextured(scene, settings, accels);
         else if constexpr (decltype(level)::value == kTriangleFeatures) return make_path_cuda_triangles(scene, settings, accels);
+        else if constexpr (decltype(level)::value == kMaskedFeatures) return make_path_cuda_masked(scene, settings, accels);
         else return make_path_cuda_all(scene, settings, accels);
     });
 #else

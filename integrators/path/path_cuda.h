@@ -9,6 +9,7 @@ namespace ambilux {
 std::unique_ptr<Renderer> make_path_cuda_diffuse(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
 std::unique_ptr<Renderer> make_path_cuda_untextured(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
 std::unique_ptr<Renderer> make_path_cuda_triangles(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
+std::unique_ptr<Renderer> make_path_cuda_masked(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
 std::unique_ptr<Renderer> make_path_cuda_all(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
 
 }  // namespace ambilux
