@@ -171,13 +171,7 @@ struct EyeConnect {
         WalkConnection c;
         bool environment = false;
         if (!connect_next_event_deferred<F>(scene, policy.mis, z, throughput, random_floats(key, emitter_block(depth)), c, environment)) return;
-        if (environment) {
-            // Images of single strategies have their values noted before the ray is traced.
-            if (policy.technique_depth > 0)
-                c.value *= environment_radiance<F>(scene, c.d);
-            else
-                c.tmax = kTowardsEnvironment;
-        }
+        if (environment) c.tmax = kTowardsEnvironment;
         if (!is_light(c.value, record) || is_zero(c.value)) return;
         candidates.push({c.value, path, 1.0f, policy.others(c.others), F.opacity || policy.cull > 0.0f ? alpha_seed(key, depth, true) : 0, c.tmax, c.o, Strategy::make(1, depth + 1), c.d, 0});
     }

@@ -58,7 +58,9 @@ private:
     AMBILUX_HD void arrive(Kept kept, const ShadowItem& item) const {
         if constexpr (F.has_environment()) {
             if (item.tmax == kTowardsEnvironment) {
-                kept.value *= environment_radiance<F>(scene, item.d);
+                const Rgb radiance = environment_radiance<F>(scene, item.d);
+                contributions.next.techniques.scale(kept.path, radiance);
+                kept.value *= radiance;
                 if (!is_light(kept.value, record)) return;
             }
         }

@@ -39,6 +39,12 @@ struct TechniqueFilm {
         const uint32_t words[4] = {float_bits(value.x), float_bits(value.y), float_bits(value.z), strategy.code};
         memcpy(&raw[slot], words, sizeof(words));
     }
+    /// What the slot's candidate is worth lacked this factor.
+    AMBILUX_HD void scale(uint32_t slot, Rgb factor) const {
+        if (!sums) return;
+        const Lane lane = raw[slot];
+        remember(slot, Rgb{bits_float(lane.word[0]), bits_float(lane.word[1]), bits_float(lane.word[2])} * factor, {lane.word[3]});
+    }
     /// The slot's candidate arrived, worth `weighted` with its weight.
     AMBILUX_HD void arrive(const Wave& wave, uint32_t slot, Rgb weighted) const {
         if (!sums) return;
