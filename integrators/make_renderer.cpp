@@ -57,6 +57,7 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
         chosen.queues.ordering = best_ordering(scene, settings, cuda);
         chosen.queues.order_pairs = std::popcount(scene.features.bsdfs & ~kDelta) > 1;
     }
+    chosen.queues.keyed_hits = chosen.queues.ordering == Ordering::material && chosen.queues.compaction == Compaction::atomic && std::popcount(scene.features.bsdfs) > 1;
     if (chosen.integrator != "path") return cuda ? make_bidirectional_cuda(scene, chosen, accels) : make_bidirectional_cpu(scene, chosen, accels);
     return cuda ? make_path_cuda(scene, chosen, accels) : make_path_cpu(scene, chosen, accels);
 }

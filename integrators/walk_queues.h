@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "queues/layout.h"
+#include "queues/order.h"
 #include "stages/stage.h"
 #include "stages/tail.h"
 
@@ -18,9 +19,11 @@ struct WalkQueues {
 };
 
 template <class RayItem, class HitItem>
-void lay_out_walks(Layout& layout, WalkQueues<RayItem, HitItem>& m, QueueCounter* counters, uint32_t slots, bool fixed) {
+void lay_out_walks(Layout& layout, WalkQueues<RayItem, HitItem>& m, QueueCounter* counters, uint32_t slots, const QueuePolicy& policy) {
+    const bool fixed = policy.fixed_places();
     m.hits[0] = layout.queue<HitItem>("hits", counters, slots, fixed);
     m.rays[0] = layout.front<RayItem>("rays", counters, m.hits[0], fixed);
+    if (policy.keyed_hits) m.hits[0].keys = layout.take<uint16_t>(slots);
     m.hits[1] = layout.alternate(m.hits[0]);
     m.rays[1] = m.rays[0];
     m.rays[1].base = m.hits[1].base;

@@ -27,6 +27,7 @@ struct QueuePolicy {
     Compaction compaction = Compaction::atomic;
     Ordering ordering = Ordering::none;
     bool order_pairs = true;  ///< ordering by material sorts pairs of vertices too, not hits alone
+    bool keyed_hits = false;  ///< ordering by material: hits are kept with their keys (Queue::keys)
 
     /// For queues of which a path has one item at a time; others are always appended to.
     bool fixed_places() const { return compaction != Compaction::atomic; }
@@ -36,7 +37,7 @@ struct QueuePolicy {
 struct OrderMemory {
     QueuePolicy policy;
     uint32_t slots;
-    uint32_t* list[2];         ///< the second, and keys, for sorting only
+    uint32_t* list[2];         ///< what there is, where nothing is selected all places, and what is sorted; the second, and keys, for sorting only
     uint32_t* keys[2];
     std::byte* temporary;      ///< what a backend's scans and sorts need
     uint64_t temporary_bytes;

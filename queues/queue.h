@@ -65,6 +65,7 @@ struct Queue {
     QueueCounter* counter = nullptr;
     uint32_t capacity = 0;
     uint8_t* flags = nullptr;  ///< fixed places: 1 where there is an item. Null: items are appended
+    uint16_t* keys = nullptr;  ///< by place: what items are sorted by (queues/order.h), written by those who complete them. Null: looked up when they are sorted
 
     AMBILUX_HD size_t place(uint32_t i, uint32_t lane) const {
         if constexpr (Order == LaneOrder::together) return size_t(i) * kLanes + lane;

@@ -260,6 +260,12 @@ void fill_filter_table(Scene& scene) {
     append_filter_guide(scene.tables);
 }
 
+void fill_sort_keys(Scene& scene) {
+    const SceneView view = scene.view();
+    scene.sort_keys.resize(view.primitive_count());
+    for (uint32_t prim = 0; prim < view.primitive_count(); ++prim) scene.sort_keys[prim] = uint16_t(std::min(scene.shapes[view.shape_of(prim)].material, kMostSortKeys - 1));
+}
+
 void fill_features(Scene& scene) {
     Features f;
     const auto use = [&](int32_t texture) { f.textures |= texture >= 0; };
@@ -292,6 +298,7 @@ void finalize_scene(Scene& scene, LightPicking light_picking) {
     fill_emitters(scene, light_picking);
     fill_filter_table(scene);
     fill_features(scene);
+    fill_sort_keys(scene);
     if (scene.tables.size() >= kNone) throw input_error(scene.path, 0, "the scene's tables are too large");
     // What rays read here and there.
     const auto large_pages = [](const auto& array) { use_huge_pages(array.data(), array.size() * sizeof array[0]); };

@@ -12,6 +12,7 @@ SceneView Scene::view() const {
     v.bsdfs = bsdfs.data();
     v.textures = textures.data();
     v.texels = texels.data();
+    v.sort_keys = sort_keys.data();
     v.emitters = emitters.data();
     v.emitter_cdf = emitter_cdf.data();
     v.tables = tables.data();
@@ -33,7 +34,7 @@ SceneView Scene::view() const {
 uint64_t Scene::memory_bytes() const {
     const auto bytes = [](const auto& array) { return uint64_t(array.size() * sizeof(array[0])); };
     return bytes(vertices) + bytes(triangles) + bytes(quadrics) + bytes(shapes) + bytes(materials) + bytes(bsdfs) +
-           bytes(textures) + bytes(texels) + bytes(emitters) + bytes(emitter_cdf) + bytes(tables);
+           bytes(textures) + bytes(texels) + bytes(sort_keys) + bytes(emitters) + bytes(emitter_cdf) + bytes(tables);
 }
 
 }  // namespace ambilux

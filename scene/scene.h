@@ -46,6 +46,7 @@ struct Scene {
     std::vector<BsdfRecord> bsdfs;
     std::vector<Texture> textures;
     std::vector<uint8_t> texels;
+    std::vector<uint16_t> sort_keys;         ///< per primitive (SceneView::sort_keys)
     std::vector<Emitter> emitters;
     std::vector<float> emitter_cdf;
     std::vector<float> tables;

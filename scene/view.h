@@ -168,6 +168,9 @@ struct Sensor {
     uint32_t filter_table;    ///< gaussian, in tables: kFilterTableSize+1 offsets in pixels at equal steps of probability, and what finds one of them (transport/sensor/filter.h)
 };
 
+/// Materials that hits are told apart by when they are sorted.
+constexpr uint32_t kMostSortKeys = 0xfffe;
+
 /// Everything a kernel may read. Pointers are host or device memory, as a whole.
 struct SceneView {
     const Vertex* vertices;
@@ -178,6 +181,7 @@ struct SceneView {
     const BsdfRecord* bsdfs;
     const Texture* textures;
     const uint8_t* texels;
+    const uint16_t* sort_keys; ///< per primitive: its material, kMostSortKeys - 1 at most
     const Emitter* emitters;
     const float* emitter_cdf;  ///< emitter_count+1 floats: cumulative pick_probability
     const float* tables;

@@ -1,7 +1,10 @@
 // extend: rays to the next surface.
 #pragma once
 
+#include <bit>
+
 #include "scene/accel/traceable.h"
+#include "stages/order_keys.h"
 #include "stages/path_items.h"
 #include "stages/stage.h"
 #include "stages/wave.h"
@@ -17,6 +20,7 @@ template <Features F, class Tracer, class Item = RayItem, class Out = HitItem>
 struct Extend {
     static constexpr Features kFeatures = F;
     static constexpr bool kAnyHit = false;
+    static constexpr bool kSeveralBsdfs = std::popcount(F.bsdfs) > 1;  ///< otherwise nothing is sorted by material, or without keys that are kept
     static_assert(sizeof(Out) == sizeof(Item) + sizeof(HitEnd));
 
     SceneView scene;
@@ -50,7 +54,11 @@ struct Extend {
         return ambilux::hit_of(item, hit);
     }
 
-    AMBILUX_HD void finish(uint32_t i, const Hit& hit) const { hits.complete(i, HitEnd{hit.u, hit.v, hit.prim, 0}); }
+    AMBILUX_HD void finish(uint32_t i, const Hit& hit) const {
+        hits.complete(i, HitEnd{hit.u, hit.v, hit.prim, 0});
+        if constexpr (kSeveralBsdfs)
+            if (hits.keys) hits.keys[i] = uint16_t(MaterialOrder::of(scene, hit.prim));
+    }
 
     AMBILUX_HD void operator()(uint32_t i) const {
         Ray ray;

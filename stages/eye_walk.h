@@ -180,7 +180,7 @@ struct EyeConnect {
 template <Features F>
 struct EyeShade {
     /// 168 registers instead of 232, 128 for diffuse surfaces: more warps hide more latency (docs/performance.md).
-    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 4 : 3;
+    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : 3;
 
     SceneView scene;
     Wave wave;
@@ -230,6 +230,8 @@ struct PairedVertex {
 /// connect_vertices: an eye vertex and a light vertex (s, t >= 2), of the light walk of its slot, or drawn from a cache of those of all light walks of the wave (Davidovic et al. 2014).
 template <Features F>
 struct ConnectVertices {
+    static constexpr uint32_t kBlocksPerSm = 4;
+
     SceneView scene;
     Wave wave;
     BidirectionalPolicy policy;

@@ -105,7 +105,7 @@ struct ConnectCamera {
 /// A light vertex: kept for connections, connected with the camera, and left again.
 template <Features F>
 struct LightShade {
-    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 4 : 3;  ///< as EyeShade
+    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : 4;
 
     SceneView scene;
     Wave wave;

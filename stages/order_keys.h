@@ -15,12 +15,12 @@ namespace ambilux {
 struct MaterialOrder {
     static constexpr Ordering kOrdering = Ordering::material;
 
-    static uint32_t bits(const SceneView& scene) { return uint32_t(std::bit_width(scene.material_count + 1u)); }
+    static uint32_t bits(const SceneView& scene) { return uint32_t(std::bit_width(of(scene, kNone) + 1u)); }
 
     AMBILUX_HD static uint32_t key(const SceneView& scene, const HitItem& hit) { return of(scene, hit.prim); }
     AMBILUX_HD static uint32_t key(const SceneView& scene, const WalkHit& hit) { return of(scene, hit.prim); }
 
-    AMBILUX_HD static uint32_t of(const SceneView& scene, uint32_t prim) { return prim == kNone ? scene.material_count : scene.shapes[scene.shape_of(prim)].material; }
+    AMBILUX_HD static uint32_t of(const SceneView& scene, uint32_t prim) { return prim == kNone ? min(scene.material_count, kMostSortKeys) : scene.sort_keys[prim]; }
 };
 
 /// Rays by octant of direction, then by cell of a grid of 128 cells along each axis of the scene's bounds.
@@ -65,6 +65,8 @@ template <class Order, class Stage, class Item>
 AMBILUX_HD uint32_t order_key(const SceneView& scene, const Stage& stage, const Queue<Item>& queue, uint32_t place) {
     if constexpr (TellsSurface<Stage> && std::is_same_v<Order, MaterialOrder>)
         return MaterialOrder::of(scene, stage.prim_of(place));
+    else if (std::is_same_v<Order, MaterialOrder> && queue.keys)
+        return queue.keys[place];
     else
         return Order::key(scene, queue.load(place));
 }

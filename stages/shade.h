@@ -16,7 +16,7 @@ AMBILUX_HD float survival_probability(Rgb throughput, float eta_scale) { return 
 
 template <Features F>
 struct Shade {
-    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 6 : 4;  ///< 80 or 128 registers; fewer spill too much (docs/performance.md)
+    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 6 : F.textures ? 4 : 5;  ///< 80, 128 or 102 registers; fewer spill too much (docs/performance.md)
 
     SceneView scene;
     Wave wave;

@@ -9,7 +9,7 @@ namespace ambilux {
 constexpr uint32_t kTailDepths = 16;
 
 /// Fewer walks than this do not fill a device (docs/performance.md).
-constexpr uint32_t kTailWalks = 1u << 17;
+constexpr uint32_t kTailWalks = 1u << 15;
 
 /// shade and extend in turns, from hits to the rays that are left after kTailDepths. Rays and hits between them count as items of their stages, the time as shade's.
 template <class Shade, class Extend>

@@ -253,11 +253,19 @@ TEST_CASE("sorting places on a device: as a stable sort on the host, for any num
             std::vector<uint32_t> keys(n), places(n);
             for (uint32_t i = 0; i < n; ++i) keys[i] = scrambled(i) & ((1u << bits) - 1);
             std::iota(places.begin(), places.end(), 0u);
+            list_places(owned.order, nullptr);
+            CHECK(owned.read(owned.order.list[0], n) == places);
             cuda_check(cudaMemcpy(owned.order.keys[0], keys.data(), n * sizeof(uint32_t), cudaMemcpyHostToDevice), "keys");
-            cuda_check(cudaMemcpy(owned.order.list[0], places.data(), n * sizeof(uint32_t), cudaMemcpyHostToDevice), "places");
-            sort_places(owned.order, n, bits, nullptr);
+            sort_places(owned.order, nullptr, n, bits, nullptr);
             cuda_check(cudaDeviceSynchronize(), "sort_places");
             std::stable_sort(places.begin(), places.end(), [&](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
+            CHECK(owned.read(owned.order.list[1], n) == places);
+            if (bits > 16) continue;
+            const std::vector<uint16_t> short_keys(keys.begin(), keys.end());
+            const DeviceBuffer<uint16_t> kept{std::span<const uint16_t>(short_keys)};
+            cuda_check(cudaMemset(owned.order.list[1], 0xff, n * sizeof(uint32_t)), "places");
+            sort_places(owned.order, kept.data(), n, bits, nullptr);
+            cuda_check(cudaDeviceSynchronize(), "sort_places");
             CHECK(owned.read(owned.order.list[1], n) == places);
         }
     }

@@ -36,6 +36,17 @@ struct OwnedQueue {
     }
 };
 
+/// Items of which the first ones are the front of the second.
+struct Front {
+    static constexpr uint32_t kPairedLanes = 2;
+    Lane lane[3];
+};
+
+struct Whole {
+    static constexpr uint32_t kPairedLanes = 2;
+    Lane lane[4];
+};
+
 }  // namespace
 
 TEST_CASE("queue: what is pushed is loaded, for any size") {
@@ -57,6 +68,32 @@ TEST_CASE("queue: lanes of an item lie a capacity apart, so that neighbours are 
     for (uint32_t i = 0; i < 7; ++i) q.queue.push(numbered(i));
     for (uint32_t i = 0; i < 7; ++i)
         for (uint32_t lane = 0; lane < 3; ++lane) CHECK(q.memory[lane * 7 + i].word[0] == i * 12 + lane * 4);
+}
+
+TEST_CASE("queue: the first lanes of items that ask for it lie two by two, and fronts lie where their items do") {
+    Lane memory[64] = {};
+    QueueCounter counters[2] = {};
+    Layout layout(memory);
+    const Queue<Whole> whole = layout.queue<Whole>("whole", counters, 5);
+    const Queue<Front> front = layout.front<Front>("front", counters, whole, false);
+    std::set<const Lane*> places;
+    for (uint32_t i = 0; i < 5; ++i) {
+        Front item{};
+        for (uint32_t k = 0; k < 3; ++k) item.lane[k].word[0] = 10 * i + k;
+        CHECK(front.push(item) == i);
+        Lane last{};
+        last.word[0] = 10 * i + 3;
+        whole.complete(i, last);
+    }
+    for (uint32_t i = 0; i < 5; ++i) {
+        const Whole item = whole.load(i);
+        for (uint32_t k = 0; k < 4; ++k) CHECK(item.lane[k].word[0] == 10 * i + k);
+        for (uint32_t k = 0; k < 4; ++k) places.insert(&whole.base[whole.place(i, k)]);
+        CHECK(whole.place(i, 1) == 2 * i + 1);
+        CHECK(whole.place(i, 2) == 10 + i);
+    }
+    CHECK(places.size() == 20);
+    CHECK(*places.rbegin() - *places.begin() == 19);
 }
 
 TEST_CASE("G3: a push past the capacity is counted, and touches nothing") {
@@ -161,14 +198,15 @@ TEST_CASE("an executor goes through all items once, in the order that is asked f
                 CHECK(layout.bytes() == sizes.bytes());
 
                 // Three materials in turn, and one hit in seven of nothing.
-                const Shape shapes[3] = {{2, kNone, 0, 0, 1, 1.0f}, {0, kNone, 0, 1, 1, 1.0f}, {1, kNone, 0, 2, 1, 1.0f}};
-                const Triangle triangles[3] = {{0, 0, 0, 0}, {0, 0, 0, 1}, {0, 0, 0, 2}};
+                const uint16_t materials[3] = {2, 0, 1};
                 SceneView scene{};
-                scene.shapes = shapes;
-                scene.triangles = triangles;
+                scene.sort_keys = materials;
                 scene.triangle_count = 3;
                 scene.material_count = 3;
-                const auto material = [&](uint32_t path) { return path % 7 == 0 ? 3 : shapes[path % 3].material; };
+                const auto material = [&](uint32_t path) { return path % 7 == 0 ? uint16_t(3) : materials[path % 3]; };
+                // Half of the sizes with keys that are kept.
+                std::vector<uint16_t> keys(n);
+                if (n % 2 == 0) queues[0].keys = keys.data();
 
                 WaveState state{};
                 StageRecord records[kStageCount] = {};
@@ -179,7 +217,7 @@ TEST_CASE("an executor goes through all items once, in the order that is asked f
                     HitItem item{};
                     item.path = path;
                     item.prim = path % 7 == 0 ? kNone : path % 3;
-                    queues[0].push(item);
+                    keys[queues[0].push(item)] = material(path);
                     expected.push_back(path);
                 }
                 const auto by_material = [&](std::vector<uint32_t> list) {
@@ -232,8 +270,11 @@ TEST_CASE("keys of rays: octant first, then the Z curve of a grid over the scene
     for (const float x : {nan, inf, -inf}) CHECK(key({x, x, x}, {x, x, x}) < 0xffffffu);
     scene.bounds_radius = 0.0f;
     CHECK(key({1.0f, 2.0f, 3.0f}, up) < 0xffffffu);
-    for (const uint32_t materials : {0u, 1u, 2u, 3u, 254u, 255u, 256u}) {
+    for (const uint32_t materials : {0u, 1u, 2u, 3u, 254u, 255u, 256u, 0xfffdu, 0xfffeu, 0xffffu, 0x10000u, 1u << 20}) {
         scene.material_count = materials;
-        CHECK(materials < (1u << MaterialOrder::bits(scene)) - 1);
+        const uint32_t nothing = MaterialOrder::of(scene, kNone);
+        CHECK(nothing == std::min(materials, 0xfffeu));
+        CHECK(nothing < (1u << MaterialOrder::bits(scene)) - 1);
+        CHECK(MaterialOrder::bits(scene) <= 16);
     }
 }

@@ -98,6 +98,16 @@ void add_envmap(Scene& s, uint32_t w, uint32_t h, const std::vector<float>& grey
 
 }  // namespace
 
+TEST_CASE("hits are sorted by the material of their primitive, as far as 16 bits tell them apart") {
+    Scene s = base();
+    s.materials.resize(kMostSortKeys + 2, s.materials[0]);
+    const std::vector<std::array<Vec3f, 3>> one = {{Vec3f{0, 0, 0}, Vec3f{1, 0, 0}, Vec3f{0, 1, 0}}};
+    const uint32_t materials[] = {3, 0, kMostSortKeys - 1, kMostSortKeys, kMostSortKeys + 1};
+    for (const uint32_t material : materials) s.shapes[add_triangles(s, one)].material = material;
+    finalize_scene(s, LightPicking::power);
+    CHECK(s.sort_keys == std::vector<uint16_t>{3, 0, 0xfffd, 0xfffd, 0xfffd});
+}
+
 TEST_CASE("areas of all shapes, and the density over a mesh light's triangles (B13)") {
     Scene s = base();
     const uint32_t mesh = add_triangles(s, {{Vec3f{0, 0, 0}, {2, 0, 0}, {0, 3, 0}}, {Vec3f{0, 0, 1}, {1, 0, 1}, {0, 0, 2}}, {Vec3f{5, 5, 5}, {5, 5, 6}, {5, 6, 5}}});

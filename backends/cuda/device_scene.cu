@@ -11,6 +11,7 @@ DeviceScene::DeviceScene(const Scene& scene)
       bsdfs_(scene.bsdfs, "BSDFs on the device"),
       textures_(scene.textures, "texture records on the device"),
       texels_(scene.texels, "texels on the device"),
+      sort_keys_(scene.sort_keys, "sort keys on the device"),
       emitters_(scene.emitters, "emitters on the device"),
       emitter_cdf_(scene.emitter_cdf, "emitter probabilities on the device"),
       tables_(scene.tables, "tables on the device"),
@@ -23,6 +24,7 @@ DeviceScene::DeviceScene(const Scene& scene)
     view_.bsdfs = bsdfs_.data();
     view_.textures = textures_.data();
     view_.texels = texels_.data();
+    view_.sort_keys = sort_keys_.data();
     view_.emitters = emitters_.data();
     view_.emitter_cdf = emitter_cdf_.data();
     view_.tables = tables_.data();
@@ -30,7 +32,7 @@ DeviceScene::DeviceScene(const Scene& scene)
 
 uint64_t DeviceScene::bytes() const {
     return vertices_.bytes() + triangles_.bytes() + quadrics_.bytes() + shapes_.bytes() + materials_.bytes() +
-           bsdfs_.bytes() + textures_.bytes() + texels_.bytes() + emitters_.bytes() + emitter_cdf_.bytes() + tables_.bytes();
+           bsdfs_.bytes() + textures_.bytes() + texels_.bytes() + sort_keys_.bytes() + emitters_.bytes() + emitter_cdf_.bytes() + tables_.bytes();
 }
 
 DeviceCwbvh::DeviceCwbvh(const CwbvhArrays& arrays) : nodes_(arrays.nodes, "acceleration structure on the device"), primitives_(arrays.primitives, "primitives on the device") {}

@@ -30,6 +30,7 @@ private:
     DeviceBuffer<BsdfRecord> bsdfs_;
     DeviceBuffer<Texture> textures_;
     DeviceBuffer<uint8_t> texels_;
+    DeviceBuffer<uint16_t> sort_keys_;
     DeviceBuffer<Emitter> emitters_;
     DeviceBuffer<float> emitter_cdf_, tables_;
     SceneView view_;

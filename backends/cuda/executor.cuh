@@ -73,10 +73,13 @@ __global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_paths
     stage.run(blockIdx.x * kStageBlock + threadIdx.x, slots * state->samples, gridDim.x * kStageBlock);
 }
 
-/// The last walks of a wave (stages/tail.h).
+/// The last walks of a wave (stages/tail.h), as far apart as there are threads for: lanes of a warp wait for each other.
 template <class Tail>
 __global__ void __launch_bounds__(kStageBlock, 3) launch_tail(const __grid_constant__ Tail tail, const QueueCounter* counter) {
-    tail.run(blockIdx.x * kStageBlock + threadIdx.x, counter->size(), gridDim.x * kStageBlock);
+    const uint32_t walks = counter->size(), threads = gridDim.x * kStageBlock, thread = blockIdx.x * kStageBlock + threadIdx.x;
+    uint32_t apart = 1;
+    while (apart < 32 && walks * apart * 2 <= threads) apart *= 2;
+    if (thread % apart == 0) tail.run(thread / apart, walks, threads / apart);
 }
 
 /// Blocks of a stage that are to be resident on a multiprocessor: 1 leaves registers to the compiler.
@@ -193,14 +196,14 @@ __global__ inline void count_items(const uint8_t* flags, uint32_t capacity, uint
     if (threadIdx.x % 32 == 0 && warp) atomicAdd(count, warp);
 }
 
-/// Sorts run over all places of a queue, or a quarter, a sixteenth ... of them.
-constexpr uint32_t kSortSizes = 6;
+/// Sorts run over all places of a queue, or a half, a quarter ... of them.
+constexpr uint32_t kSortSizes = 11;
 
 /// Which of these sizes is the smallest that holds `items`; kSortSizes: too few to sort.
 __host__ __device__ inline uint32_t sort_choice(uint32_t capacity, uint32_t items) {
     if (items < kSortFrom) return kSortSizes;
     uint32_t k = 0;
-    while (k + 1 < kSortSizes && capacity >> 2 * (k + 1) >= items) ++k;
+    while (k + 1 < kSortSizes && capacity >> (k + 1) >= items) ++k;
     return k;
 }
 
@@ -210,21 +213,31 @@ struct SortSwitch {
     bool on;
 };
 
-/// Keys of the items that a launch will go through, and their places as they lie. The last key is that of places without an item. Tells `sorts` which size to sort.
-template <class Order, class Stage, class Item>
-__global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__ SceneView scene, const __grid_constant__ Stage stage, const Queue<Item> queue, const Items items, uint32_t last, uint32_t* places, uint32_t* keys, SortSwitch sorts) {
-    const uint32_t n = items.size(), choice = sort_choice(items.capacity, n);
+/// Places that will be sorted for a launch over `n` items. Tells `sorts` which size that is.
+__device__ inline uint32_t places_to_sort(const Items& items, uint32_t n, SortSwitch sorts) {
+    const uint32_t choice = sort_choice(items.capacity, n);
     if (sorts.on && blockIdx.x == 0 && threadIdx.x == 0) cudaGraphSetConditional(sorts.handle, choice);
-    const uint32_t end = items.flags && !items.list ? n : choice < kSortSizes ? items.capacity >> 2 * choice : 0;
+    return items.flags && !items.list ? n : choice < kSortSizes ? items.capacity >> choice : 0;
+}
+
+/// Keys of the items that a launch will go through. The last key is that of places without an item.
+template <class Order, class Stage, class Item>
+__global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__ SceneView scene, const __grid_constant__ Stage stage, const Queue<Item> queue, const Items items, uint32_t last, uint32_t* keys, SortSwitch sorts) {
+    const uint32_t n = items.size(), end = places_to_sort(items, n, sorts);
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < end; i += gridDim.x * kStageBlock) {
-        uint32_t place = i, key = last;
+        uint32_t key = last;
         if (i < n) {
-            place = items.place(i);
+            const uint32_t place = items.place(i);
             if (items.list || !items.flags || items.flags[place]) key = order_key<Order>(scene, stage, queue, place);
         }
-        places[i] = place;
         keys[i] = key;
     }
+}
+
+/// The same for items that have their keys.
+__global__ inline void __launch_bounds__(kStageBlock) fill_keys(uint16_t* keys, const Items items, uint16_t last, SortSwitch sorts) {
+    const uint32_t n = items.size(), end = places_to_sort(items, n, sorts);
+    for (uint32_t i = n + blockIdx.x * kStageBlock + threadIdx.x; i < end; i += gridDim.x * kStageBlock) keys[i] = last;
 }
 
 /// A change of WaveState::depth.
@@ -277,6 +290,7 @@ public:
         int device = 0;
         cuda_check(cudaGetDevice(&device), "device");
         cuda_check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "multiprocessors");
+        if (order.policy.ordering != Ordering::none) list_places(order, stream);
     }
 
     /// Captures what `schedule(*this)` launches.
@@ -428,25 +442,30 @@ private:
                 const uint32_t bits = Order::bits(scene_);
                 const bool whole = queue.flags && !items.list;
                 const detail::SortSwitch choice = {capturing_ && !whole ? make_condition() : cudaGraphConditionalHandle{}, capturing_ && !whole};
-                detail::make_keys<Order, Stage, Item><<<blocks(detail::make_keys<Order, Stage, Item>, kStageBlock), kStageBlock, 0, stream_>>>(scene_, stage, queue, items, (1u << bits) - 1, order_.list[0], order_.keys[0], choice);
-                if (whole)
-                    sort_places(order_, queue.capacity, bits, stream_);
+                const uint32_t last = (1u << bits) - 1;
+                if (queue.keys)
+                    detail::fill_keys<<<blocks(detail::fill_keys, kStageBlock), kStageBlock, 0, stream_>>>(queue.keys, items, uint16_t(last), choice);
                 else
-                    sort_as_many(queue.counter, queue.capacity, bits, choice);
+                    detail::make_keys<Order, Stage, Item><<<blocks(detail::make_keys<Order, Stage, Item>, kStageBlock), kStageBlock, 0, stream_>>>(scene_, stage, queue, items, last, order_.keys[0], choice);
+                if (whole)
+                    sort_places(order_, queue.keys, queue.capacity, bits, stream_);
+                else
+                    sort_as_many(queue, bits, choice);
                 (whole ? items.list : items.sorted) = order_.list[1];
             }
         }
         return items;
     }
     /// Sorts no more places than hold the items. A graph has a sort for each of several sizes, since its launches are laid down before it is known.
-    void sort_as_many(const QueueCounter* counter, uint32_t capacity, uint32_t bits, const detail::SortSwitch& sorts) {
+    template <class Item>
+    void sort_as_many(const Queue<Item>& queue, uint32_t bits, const detail::SortSwitch& sorts) {
         const auto sort = [&](uint32_t k) {
-            if (k < detail::kSortSizes) sort_places(order_, capacity >> 2 * k, bits, stream_);
+            if (k < detail::kSortSizes) sort_places(order_, queue.keys, queue.capacity >> k, bits, stream_);
         };
         if (capturing_)
             capture_conditional(cudaGraphCondTypeSwitch, sorts.handle, detail::kSortSizes, sort);
         else
-            sort(detail::sort_choice(capacity, size_of(counter)));
+            sort(detail::sort_choice(queue.capacity, size_of(queue.counter)));
     }
     /// Has the counter of a queue of fixed places tell its size; compaction select makes the list too.
     template <class Item>

@@ -110,7 +110,7 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
-    lay_out_walks(layout, m, m.counters, slots, fixed);
+    lay_out_walks(layout, m, m.counters, slots, policy.queues);
     m.vertices = layout.queue<VertexItem>("vertices", m.counters, when((policy.connect_vertices && gathered) || !policy.connect_in_shade), fixed && !policy.connect_in_shade);
     m.light_vertices = layout.queue<VertexItem, LaneOrder::together>("light_vertices", m.counters, when(policy.connect_vertices, kept));
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged), fixed);

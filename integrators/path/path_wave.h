@@ -69,7 +69,7 @@ inline PathMemory lay_out(Layout& layout, uint32_t slots, const PathPolicy& poli
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(PathMemory::kQueues);
-    lay_out_walks(layout, m, m.counters, slots, fixed);
+    lay_out_walks(layout, m, m.counters, slots, policy.queues);
     m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, hits, fixed);
     m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, hits, fixed);
     m.connections = layout.queue<ConnectItem>("connections", m.counters, policy.connect_in_shade ? 0 : connections, fixed);
