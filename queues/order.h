@@ -37,7 +37,7 @@ struct QueuePolicy {
 struct OrderMemory {
     QueuePolicy policy;
     uint32_t slots;
-    uint32_t* list[2];         ///< what there is, where nothing is selected all places, and what is sorted; the second, and keys, for sorting only
+    uint32_t* list[2];         ///< places: those selected, or all one after the other; and the same sorted. The second, and keys, for sorting only
     uint32_t* keys[2];
     std::byte* temporary;      ///< what a backend's scans and sorts need
     uint64_t temporary_bytes;
