@@ -59,10 +59,10 @@ nlohmann::json rows_on_host(const Scene& scene, const Tracer& tracer, const std:
 }
 
 template <class Accel>
-nlohmann::json bench_on_host(const Scene& scene, const Features& features, const std::string& accel_name, int repetitions) {
+nlohmann::json bench_on_host(const Scene& scene, const std::string& accel_name, int repetitions) {
     const Accel accel(scene);
     const nlohmann::json rows =
-        with_traversal_features(features, [&](auto set) { return rows_on_host<set.value>(scene, accel.tracer(), accel_name, repetitions); });
+        with_traversal_features(scene.features, [&](auto set) { return rows_on_host<set.value>(scene, accel.tracer(), accel_name, repetitions); });
     return {{"device", "cpu, " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads"},
             {"accel", accel_name},
             {"build_seconds", accel.build_seconds()},
@@ -71,14 +71,14 @@ nlohmann::json bench_on_host(const Scene& scene, const Features& features, const
 }
 
 template <class Accel>
-nlohmann::json bench_on_device(const Scene& scene, const Features& features, const std::string& accel_name, int repetitions) {
+nlohmann::json bench_on_device(const Scene& scene, const std::string& accel_name, int repetitions) {
     if (!cuda_device_present()) throw Error(ExitCode::device, "--backend cuda: no CUDA device, or this program was built without CUDA");
     const Accel accel(scene);
     const SceneView view = scene.view();
     const std::vector<RayBatch> batches =
-        with_traversal_features(features, [&](auto set) { return make_ray_batches<set.value>(view, accel.tracer(), kCudaSize, 0); });
+        with_traversal_features(scene.features, [&](auto set) { return make_ray_batches<set.value>(view, accel.tracer(), kCudaSize, 0); });
     nlohmann::json rows = nlohmann::json::array();
-    const std::vector<std::vector<KernelTiming>> timings = time_rays_on_device(scene, features, accel.arrays(), batches, kWarmUps, repetitions);
+    const std::vector<std::vector<KernelTiming>> timings = time_rays_on_device(scene, accel.arrays(), batches, kWarmUps, repetitions);
     for (size_t i = 0; i < batches.size(); ++i)
         for (const KernelTiming& timing : timings[i]) rows.push_back(row(batches[i], timing));
     return {{"device", cuda_device_name()},
@@ -98,20 +98,24 @@ double median(std::vector<double> seconds) {
 
 nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int repetitions, bool opaque) {
     if (repetitions < 1) throw Error(ExitCode::usage, "bench rays: at least 1 repetition is needed, not " + std::to_string(repetitions));
+    if (opaque && scene.features.opacity) {
+        Scene solid = scene;
+        for (Material& material : solid.materials) material.opacity = {1.0f, -1};
+        solid.features.opacity = false;
+        return bench_rays(solid, backend, repetitions, opaque);
+    }
     const std::string chosen = backend != "auto" ? backend : cuda_device_present() ? "cuda" : "cpu";
-    Features features = scene.features;
-    if (opaque) features.opacity = false;
     nlohmann::json json;
     if (chosen == "cpu")
-        json = bench_on_host<EmbreeAccel>(scene, features, "embree", repetitions);
+        json = bench_on_host<EmbreeAccel>(scene, "embree", repetitions);
     else if (chosen == "cpu-cwbvh")
-        json = bench_on_host<CwbvhAccel>(scene, features, "cwbvh", repetitions);
+        json = bench_on_host<CwbvhAccel>(scene, "cwbvh", repetitions);
     else if (chosen == "cuda")
-        json = bench_on_device<CwbvhAccel>(scene, features, "cwbvh", repetitions);
+        json = bench_on_device<CwbvhAccel>(scene, "cwbvh", repetitions);
     else if (chosen == "cpu-bvh2")
-        json = bench_on_host<PairAccel>(scene, features, "bvh2", repetitions);
+        json = bench_on_host<PairAccel>(scene, "bvh2", repetitions);
     else if (chosen == "cuda-bvh2")
-        json = bench_on_device<PairAccel>(scene, features, "bvh2", repetitions);
+        json = bench_on_device<PairAccel>(scene, "bvh2", repetitions);
     else
         throw Error(ExitCode::usage, "bench rays: backend '" + backend + "' is not one of auto, cpu, cpu-cwbvh, cpu-bvh2, cuda, cuda-bvh2");
     json["backend"] = chosen;

@@ -36,6 +36,7 @@ struct Features {
     constexpr bool has(BsdfType t) const { return bsdfs >> uint32_t(t) & 1u; }
     constexpr bool has(EmitterType t) const { return emitters >> uint32_t(t) & 1u; }
     constexpr bool has(PrimitiveType t) const { return primitives >> uint32_t(t) & 1u; }
+    constexpr bool several_bsdfs() const { return bsdfs & (bsdfs - 1); }
     constexpr bool has_quadrics() const { return primitives & ~1u; }
     constexpr bool has_environment() const { return has(EmitterType::constant) || has(EmitterType::envmap); }
 

@@ -72,17 +72,25 @@ struct Queue {
         return lane < paired_lanes<Item>() ? size_t(lane & ~1u) * capacity + 2 * size_t(i) + (lane & 1u) : size_t(lane) * capacity + i;
     }
 
-    AMBILUX_HD Item load(uint32_t i) const {
+    AMBILUX_HD Item load(uint32_t i) const { return load_but(i, kLanes, {}); }
+    /// Lane `known` is `value`, and what is in memory is not looked at.
+    AMBILUX_HD Item load_but(uint32_t i, uint32_t known, const Lane& value) const {
         Lane lanes[kLanes];
-        for (uint32_t k = 0; k < kLanes; ++k) lanes[k] = base[place(i, k)];
+        for (uint32_t k = 0; k < kLanes; ++k) {
+            lanes[k] = value;
+            if (k != known) lanes[k] = base[place(i, k)];
+        }
         Item item;
         memcpy(&item, lanes, sizeof(Item));
         return item;
     }
-    AMBILUX_HD void store(uint32_t i, const Item& item) const {
+    AMBILUX_HD void store(uint32_t i, const Item& item) const { store_but(i, kLanes, item); }
+    /// The same without lane `known`.
+    AMBILUX_HD void store_but(uint32_t i, uint32_t known, const Item& item) const {
         Lane lanes[kLanes];
         memcpy(lanes, &item, sizeof(Item));
-        for (uint32_t k = 0; k < kLanes; ++k) base[place(i, k)] = lanes[k];
+        for (uint32_t k = 0; k < kLanes; ++k)
+            if (k != known) base[place(i, k)] = lanes[k];
     }
     /// Appends the item, or stores it at the place of its path, and returns the place. Past the capacity the item is lost and counted (QueueCounter::overflow).
     AMBILUX_HD uint32_t push(const Item& item) const {
@@ -112,6 +120,12 @@ struct Queue {
 #if !defined(__CUDA_ARCH__)
         ++counter->count;
 #endif
+    }
+
+    /// What complete() wrote.
+    template <class Last>
+    AMBILUX_HD Last last(uint32_t i) const {
+        return start_of<Last>(base[place(i, kLanes - 1)]);
     }
 
 private:

@@ -1,8 +1,6 @@
 // extend: rays to the next surface.
 #pragma once
 
-#include <bit>
-
 #include "scene/accel/traceable.h"
 #include "stages/order_keys.h"
 #include "stages/path_items.h"
@@ -20,7 +18,6 @@ template <Features F, class Tracer, class Item = RayItem, class Out = HitItem>
 struct Extend {
     static constexpr Features kFeatures = F;
     static constexpr bool kAnyHit = false;
-    static constexpr bool kSeveralBsdfs = std::popcount(F.bsdfs) > 1;  ///< otherwise nothing is sorted by material, or without keys that are kept
     static_assert(sizeof(Out) == sizeof(Item) + sizeof(HitEnd));
 
     SceneView scene;
@@ -56,7 +53,7 @@ struct Extend {
 
     AMBILUX_HD void finish(uint32_t i, const Hit& hit) const {
         hits.complete(i, HitEnd{hit.u, hit.v, hit.prim, 0});
-        if constexpr (kSeveralBsdfs)
+        if constexpr (F.several_bsdfs())  // otherwise nothing is sorted by material, or without keys that are kept
             if (hits.keys) hits.keys[i] = uint16_t(MaterialOrder::of(scene, hit.prim));
     }
 

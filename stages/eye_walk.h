@@ -181,6 +181,7 @@ template <Features F>
 struct EyeShade {
     /// 168 registers instead of 232, 128 for diffuse surfaces: more warps hide more latency (docs/performance.md).
     static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : 3;
+    static constexpr bool kGathers = !F.several_bsdfs() && !F.has_environment();  ///< hits are in no order, and misses of no use
 
     SceneView scene;
     Wave wave;
@@ -193,10 +194,14 @@ struct EyeShade {
     StageRecord* record;
     EyeConnect<F> connect;
 
+    /// True if nothing comes of rays that meet nothing.
+    AMBILUX_HD bool skips_misses() const { return !F.has_environment() || !policy.count_environment; }
+
     AMBILUX_HD void operator()(uint32_t i) const {
         WalkItem next;
-        if (take(hits.load(i), hits.counter->size(), next)) rays.push(next);
+        if (take(hit(i), hits.counter->size(), next)) rays.push(next);
     }
+    AMBILUX_HD WalkHit hit(uint32_t i) const { return hits.load(i); }
 
     /// True if the walk goes on with the ray `next`. `count`: of hits in this launch, or more.
     AMBILUX_HD bool take(const WalkHit& h, uint32_t count, WalkItem& next) const {

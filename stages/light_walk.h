@@ -118,10 +118,14 @@ struct LightShade {
     StageRecord* record;
     ConnectCamera<F> connect;
 
+    /// Nothing comes of rays that meet nothing.
+    AMBILUX_HD bool skips_misses() const { return true; }
+
     AMBILUX_HD void operator()(uint32_t i) const {
         WalkItem next;
-        if (take(hits.load(i), 0, next)) rays.push(next);
+        if (take(hit(i), 0, next)) rays.push(next);
     }
+    AMBILUX_HD WalkHit hit(uint32_t i) const { return hits.load(i); }
 
     /// True if the walk goes on with the ray `next`.
     AMBILUX_HD bool take(const WalkHit& h, uint32_t, WalkItem& next) const {

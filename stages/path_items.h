@@ -27,6 +27,8 @@ static_assert(WalkBits::kDepthBits + 1 <= 16, "depth and flag share the lower ha
 /// A ray of an eye walk, to be extended to the next surface.
 struct RayItem {
     static constexpr uint32_t kPairedLanes = 2;
+    static constexpr uint32_t kKnownLane = 2;  ///< of camera rays whose distances have been looked at: throughput 1, and a density that nobody asks for
+
 
     Vec3f o;
     uint32_t path;     ///< slot

@@ -16,6 +16,7 @@ AMBILUX_HD float survival_probability(Rgb throughput, float eta_scale) { return 
 
 template <Features F>
 struct Shade {
+    static constexpr bool kGathers = !F.several_bsdfs() && !F.has_environment();  ///< hits are in no order, and misses of no use
     static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 6 : F.textures ? 4 : 5;  ///< 80, 128 or 102 registers; fewer spill too much (docs/performance.md)
 
     SceneView scene;
@@ -28,9 +29,22 @@ struct Shade {
     StageRecord* record;
     Connect<F> connect;
 
+    /// True if nothing comes of rays that meet nothing.
+    AMBILUX_HD bool skips_misses() const { return !F.has_environment() || scene.environment == kNone || !policy.count_hits; }
+
     AMBILUX_HD void operator()(uint32_t i) const {
         RayItem next;
-        if (take(hits.load(i), 0, next)) rays.push(next);
+        if (take(hit(i), 0, next)) rays.push(next);
+    }
+
+    /// Hits of camera rays, the only ones while depth is 1, are not kept whole on a device.
+    AMBILUX_HD HitItem hit(uint32_t i) const {
+#if defined(__CUDA_ARCH__)
+        constexpr uint32_t kOne = 0x3f800000u;
+        return hits.load_but(i, wave.state->depth == 1 ? RayItem::kKnownLane : hits.kLanes, {{kOne, kOne, kOne, kOne}});
+#else
+        return hits.load(i);
+#endif
     }
 
     /// True if the walk goes on with the ray `next`.

@@ -19,12 +19,12 @@ struct Tail {
 
     /// Walks `first`, first + stride, ... of `count` in this launch.
     AMBILUX_HD void run(uint32_t first, uint32_t count, uint32_t stride) const {
-        auto hit = decltype(shade.hits.load(0)){};
+        auto hit = decltype(shade.hit(0)){};
         uint32_t left = 0;  // depths that the walk in hand may go on for
         for (uint32_t i = first;;) {
             if (left == 0) {
                 if (i >= count) return;
-                hit = shade.hits.load(i);
+                hit = shade.hit(i);
                 i += stride;
                 left = kTailDepths;
             }

@@ -105,7 +105,7 @@ AMBILUX_HD uint32_t cache_block(uint32_t depth, uint32_t draw) { return 0x10000u
 /// Seed of the decisions whether surfaces of partial opacity let a ray pass: another one for every ray. `shadow`: rays of connections.
 AMBILUX_HD uint32_t alpha_seed(const RngKey& key, uint32_t depth, bool shadow) {
     const uint32_t which = 2 * depth + (shadow ? 1 : 0);
-    return philox4x32({key.index, key.sample, which, 0x616c7068u + uint32_t(key.stream)}, uint32_t(key.seed), uint32_t(key.seed >> 32)).x;
+    return hash_word({key.index, key.sample, which, uint32_t(key.seed) ^ uint32_t(key.seed >> 32) * 0x9e3779b9u ^ uint32_t(key.stream) << 29});
 }
 
 }  // namespace ambilux

@@ -359,7 +359,7 @@ TEST_CASE("The structure is the same however often it is built, and its boxes ho
         CHECK(std::memcmp(again.arrays().primitives.data(), first.arrays().primitives.data(), first.arrays().primitives.size() * sizeof(CwbvhPrimitive)) == 0);
     }
     std::vector<bool> seen(scene.triangles.size() + scene.quadrics.size());
-    for (const CwbvhPrimitive& p : first.arrays().primitives) seen[p.prim] = true;
+    for (const CwbvhPrimitive& p : first.arrays().primitives) seen[p.prim<kAllFeatures>()] = true;
     CHECK(std::count(seen.begin(), seen.end(), false) == 0);
     CHECK(first.arrays().depth <= uint32_t(kCwbvhStackSize));
 }

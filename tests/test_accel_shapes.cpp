@@ -116,10 +116,17 @@ TEMPLATE_TEST_CASE("Opacity: the share of rays that pass, alike for closest and 
         CHECK(std::fabs(layer[i] / n - p) < 5 * std::sqrt(p * (1 - p) / n));
         pass *= 0.7;
     }
-    // Kernels without the feature, and materials of opacity 0 and 1.
+    // Materials of opacity 0 and 1, and kernels without the feature.
+    const Ray ray = {{0, 0, -1}, kInfinity, {0, 0, 1}, 3};
+    Hit hit;
     scene.materials[0].opacity = {0.0f, -1};
-    CHECK_FALSE(accel.tracer().template occluded<kOpacity>(view, {{0, 0, -1}, kInfinity, {0, 0, 1}, 3}));
-    CHECK(accel.tracer().template occluded<kShapes>(view, {{0, 0, -1}, kInfinity, {0, 0, 1}, 3}));
+    CHECK_FALSE(accel.tracer().template occluded<kOpacity>(view, ray));
+    scene.materials[0].opacity = {1.0f, -1};
+    const TestType solid(scene);
+    for (const bool met : {solid.tracer().template closest<kOpacity>(view, ray, hit), solid.tracer().template closest<kShapes>(view, ray, hit)}) {
+        CHECK(met);
+        CHECK(hit.prim == 0);
+    }
 }
 
 TEMPLATE_TEST_CASE("Opacity from a texture is looked up where the ray meets the surface", "", EmbreeAccel, CwbvhAccel, PairAccel) {

@@ -84,28 +84,28 @@ std::vector<KernelTiming> time_batch(const SceneView& scene, const Tracer& trace
 }
 
 template <class Tracer>
-std::vector<std::vector<KernelTiming>> time_batches(const Scene& scene, const Features& features, const Tracer& tracer, const std::vector<RayBatch>& batches,
+std::vector<std::vector<KernelTiming>> time_batches(const Scene& scene, const Tracer& tracer, const std::vector<RayBatch>& batches,
                                                     int warm_ups, int repetitions) {
     const DeviceScene device_scene(scene);
     std::vector<std::vector<KernelTiming>> timings;
     for (const RayBatch& batch : batches)
         timings.push_back(with_traversal_features(
-            features, [&](auto set) { return time_batch<decltype(set), Tracer>(device_scene.view(), tracer, batch, warm_ups, repetitions); }));
+            scene.features, [&](auto set) { return time_batch<decltype(set), Tracer>(device_scene.view(), tracer, batch, warm_ups, repetitions); }));
     return timings;
 }
 
 }  // namespace
 
-std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const Features& features, const CwbvhArrays& cwbvh,
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const CwbvhArrays& cwbvh,
                                                            const std::vector<RayBatch>& batches, int warm_ups, int repetitions) {
     const DeviceCwbvh device_cwbvh(cwbvh);
-    return time_batches(scene, features, device_cwbvh.tracer(), batches, warm_ups, repetitions);
+    return time_batches(scene, device_cwbvh.tracer(), batches, warm_ups, repetitions);
 }
 
-std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const Features& features, const PairArrays& pairs,
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const PairArrays& pairs,
                                                            const std::vector<RayBatch>& batches, int warm_ups, int repetitions) {
     const DevicePairs device_pairs(pairs);
-    return time_batches(scene, features, device_pairs.tracer(), batches, warm_ups, repetitions);
+    return time_batches(scene, device_pairs.tracer(), batches, warm_ups, repetitions);
 }
 
 }  // namespace ambilux

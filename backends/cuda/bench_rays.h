@@ -19,10 +19,10 @@ struct KernelTiming {
 };
 
 /// For each batch, every kernel that can trace it: the persistent one with the tuning that suits the batch, with the other, and the plain one.
-/// `features`: what tracing takes notice of. Throws Error(device).
-std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const Features& features, const CwbvhArrays& cwbvh,
+/// Throws Error(device).
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const CwbvhArrays& cwbvh,
                                                            const std::vector<RayBatch>& batches, int warm_ups, int repetitions);
-std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const Features& features, const PairArrays& pairs,
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const PairArrays& pairs,
                                                            const std::vector<RayBatch>& batches, int warm_ups, int repetitions);
 
 }  // namespace ambilux

@@ -46,11 +46,29 @@ struct Items {
     uint8_t* flags;        ///< Queue::flags
     uint32_t capacity;
     const uint32_t* sorted;  ///< instead of `list` if there are at least kSortFrom items; null: never
+    const uint16_t* keys;    ///< that `sorted` is in the order of; null: every item is to be looked at
+    uint16_t end;            ///< key from which on nothing comes of items
 
     /// Places to look at.
     __device__ uint32_t size() const { return flags && !list ? capacity : counter->size(); }
     /// What to go through when size() is `n`.
-    __device__ Items of(uint32_t n) const { return {counter, sorted && n >= kSortFrom ? sorted : list, flags, capacity, nullptr}; }
+    __device__ Items of(uint32_t n) const {
+        const bool in_order = sorted && n >= kSortFrom;
+        return {counter, in_order ? sorted : list, flags, capacity, nullptr, in_order ? keys : nullptr, end};
+    }
+    /// How many of the first n items something may come of, which all threads of a block ask together.
+    __device__ uint32_t worth(uint32_t n) const {
+        if (!keys) return n;
+        uint32_t first = 0, last = n;  // what is asked for lies between them
+        while (first < last) {
+            const uint32_t step = (last - first + kStageBlock - 1) / kStageBlock, probe = first + threadIdx.x * step;
+            const uint32_t below = uint32_t(__syncthreads_count(probe < last && keys[probe] < end));
+            if (below == 0) return first;
+            last = min(last, first + below * step);
+            first += (below - 1) * step + 1;
+        }
+        return first;
+    }
     __device__ uint32_t place(uint32_t i) const { return list ? list[i] : i; }
     /// False if there is no item. What is taken must be used: its place is empty from now on.
     __device__ bool take(uint32_t place) const {
@@ -89,15 +107,50 @@ constexpr uint32_t blocks_per_multiprocessor() {
     return 1;
 }
 
+/// Stages of hits that may have no use for rays that met nothing.
+template <class Stage>
+concept SkipsMisses = requires(const Stage& stage) { stage.skips_misses(); };
+
+/// Stages of hits that never have that use, and whose hits are never sorted.
+template <class Stage>
+concept Gathered = requires { requires Stage::kGathers; };
+
 /// One kernel, however items lie and are ordered: two of them would round differently.
 template <class Stage>
 __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>()) launch_items(const __grid_constant__ Stage stage, const Items all) {
-    const uint32_t n = all.size();
-    const Items items = all.of(n);
+    const uint32_t size = all.size();
+    const Items items = all.of(size);
+    const uint32_t n = SkipsMisses<Stage> ? items.worth(size) : size;
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) {
         const uint32_t place = items.place(i);
         if (items.take(place)) stage(place);
     }
+}
+
+/// A warp gathers 32 hits that are some before it goes on with them.
+template <class Stage>
+__global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>()) launch_gathered(const __grid_constant__ Stage stage, const Items all) {
+    __shared__ uint32_t gathered[kStageBlock / 32][64];
+    const uint32_t n = all.size(), lane = threadIdx.x % 32;
+    const Items items = all.of(n);
+    uint32_t* const mine = gathered[threadIdx.x / 32];
+    uint32_t held = 0;
+    for (uint32_t first = blockIdx.x * kStageBlock + threadIdx.x - lane; first < n; first += gridDim.x * kStageBlock) {
+        const uint32_t i = first + lane, place = i < n ? items.place(i) : 0;
+        const bool some = i < n && items.take(place) && stage.hits.template last<HitEnd>(place).prim != kNone;
+        const uint32_t found = __ballot_sync(0xffffffffu, some);
+        if (some) mine[held + lane_rank(found)] = place;
+        held += uint32_t(__popc(found));
+        __syncwarp();
+        if (const uint32_t ahead = i + gridDim.x * kStageBlock; ahead < n && !items.list) asm volatile("prefetch.global.L2 [%0];" ::"l"(stage.hits.base + stage.hits.place(ahead, stage.hits.kLanes - 1)));
+        if (held < 32) continue;
+        held -= 32;
+        const uint32_t next = mine[held + lane];
+        __syncwarp();
+        stage(next);
+    }
+    __syncwarp();
+    if (lane < held) stage(mine[lane]);
 }
 
 /// Stages that can tell of an item, with less than it takes, that nothing will come of it.
@@ -152,7 +205,10 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
         auto item = decltype(stage.rays.load(0)){};
         if (!generate.make(i, item)) continue;
         const uint32_t place = generate.wave.active_before(i);
-        stage.rays.store(place, item);
+        if constexpr (requires { item.kKnownLane; })
+            stage.rays.store_but(place, item.kKnownLane, item);
+        else
+            stage.rays.store(place, item);
         Ray ray;
         Hit hit = {0.0f, 0.0f, 0.0f, kNone};
         if (stage.fetch(item, ray)) tracer.template closest<Set::value>(stage.scene, ray, hit);
@@ -329,7 +385,9 @@ public:
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
         const detail::Items items = prepare<MaterialOrder>(stage, queue);
-        if constexpr (detail::Filtered<Stage>)
+        if constexpr (detail::Gathered<Stage>)
+            detail::launch_gathered<<<blocks(detail::launch_gathered<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
+        else if constexpr (detail::Filtered<Stage>)
             detail::launch_filtered<<<blocks(detail::launch_filtered<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
         else
             detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
@@ -436,7 +494,7 @@ private:
         counted_ = nullptr;
         if (!counted) count(queue);
         const bool selected = queue.flags && order_.policy.compaction == Compaction::select;
-        detail::Items items = {queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity, nullptr};
+        detail::Items items = {queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity, nullptr, nullptr, 0};
         if constexpr (Ordered<Order, Stage, Item>) {
             if (sorts<Order, Stage>(order_.policy) && queue.capacity > 0) {
                 const uint32_t bits = Order::bits(scene_);
@@ -452,6 +510,9 @@ private:
                 else
                     sort_as_many(queue, bits, choice);
                 (whole ? items.list : items.sorted) = order_.list[1];
+                if constexpr (detail::SkipsMisses<Stage>) {
+                    if (queue.keys && !whole && stage.skips_misses()) items.keys = reinterpret_cast<const uint16_t*>(order_.keys[1]), items.end = uint16_t(MaterialOrder::of(scene_, kNone));
+                }
             }
         }
         return items;

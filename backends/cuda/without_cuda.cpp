@@ -17,7 +17,7 @@ std::string cuda_device_name() { return {}; }
 
 std::vector<Hit> trace_on_device(const Scene&, const std::vector<Ray>&, bool, bool, bool) { throw not_built(); }
 
-std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const Features&, const CwbvhArrays&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
-std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const Features&, const PairArrays&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const CwbvhArrays&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const PairArrays&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
 
 }  // namespace ambilux

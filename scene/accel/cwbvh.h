@@ -16,7 +16,7 @@ namespace ambilux {
 struct Scene;
 struct Bvh2;
 
-/// Traces rays through a CWBVH. Pointers are host or device memory.
+/// Traces rays through a CWBVH, of a scene whose surfaces are all opaque unless F.opacity. Pointers are host or device memory.
 struct CwbvhTracer {
     const CwbvhNode* nodes = nullptr;            ///< the root is nodes[0]; it has no children in an empty scene
     const CwbvhPrimitive* primitives = nullptr;  ///< in the order of leaves
@@ -45,11 +45,11 @@ struct CwbvhTracer {
     AMBILUX_HD bool intersect_primitive(const SceneView& scene, const Ray& ray, const RayShear& shear, uint32_t index, Hit& hit) const {
         const CwbvhPrimitive p = detail::load_record(primitives + index);
         if constexpr (F.has_quadrics()) {
-            if (!scene.is_triangle(p.prim)) {
-                const QuadricCrossings hits = quadric_crossings<F>(scene.quadric(p.prim), ray.o, ray.d, hit.t);
+            if (!scene.is_triangle(p.template prim<F>())) {
+                const QuadricCrossings hits = quadric_crossings<F>(scene.quadric(p.template prim<F>()), ray.o, ray.d, hit.t);
                 for (int i = 0; i < hits.count; ++i) {
-                    if (!accept_hit<F>(scene, ray, p.prim, hits.u[i], hits.v[i])) continue;
-                    hit = {hits.t[i], hits.u[i], hits.v[i], p.prim};
+                    if (!accepts<F>(scene, ray, p, hits.u[i], hits.v[i])) continue;
+                    hit = {hits.t[i], hits.u[i], hits.v[i], p.template prim<F>()};
                     return true;
                 }
                 return false;
@@ -61,12 +61,17 @@ struct CwbvhTracer {
             return Vec3f{p.normal_x, p.normal_y, detail::difference_of_products(a.x, b.y, a.y, b.x)};
         };
         if (!intersect_triangle(ray.o, ray.d, shear, p.v0, p.v1, p.v2, hit.t, crossing, normal)) return false;
-        if (!accept_hit<F>(scene, ray, p.prim, crossing.u, crossing.v)) return false;
-        hit = {crossing.t, crossing.u, crossing.v, p.prim};
+        if (!accepts<F>(scene, ray, p, crossing.u, crossing.v)) return false;
+        hit = {crossing.t, crossing.u, crossing.v, p.template prim<F>()};
         return true;
     }
 
 private:
+    template <Features F>
+    AMBILUX_HD static bool accepts(const SceneView& scene, const Ray& ray, const CwbvhPrimitive& p, float u, float v) {
+        if constexpr (F.opacity) return !p.lets_pass() || accept_hit<F>(scene, ray, p.template prim<F>(), u, v);
+        return true;
+    }
     /// `AnyHit`: a bool, or a constant.
     template <Features F, class AnyHit>
     AMBILUX_HD bool traverse(const SceneView& scene, const Ray& ray, AnyHit any_hit, Hit& hit) const {

@@ -32,12 +32,20 @@ static_assert(sizeof(CwbvhNode) == 80);
 
 /// Primitive as leaves hold it: a triangle's vertices and as much of its normal as there is room for, or for an analytic shape its id alone.
 struct alignas(16) CwbvhPrimitive {
+    static constexpr uint32_t kLetsPass = 0x80000000u;
+
     Vec3f v0;
-    uint32_t prim;
+    uint32_t word;  ///< its number, and kLetsPass if rays may pass through it, as in scenes with Features::opacity only: no other primitive needs to be asked for its opacity
     Vec3f v1;
     float normal_x;
     Vec3f v2;
     float normal_y;
+
+    template <Features F>
+    AMBILUX_HD uint32_t prim() const {
+        return F.opacity ? word & ~kLetsPass : word;
+    }
+    AMBILUX_HD bool lets_pass() const { return word & kLetsPass; }
 };
 static_assert(sizeof(CwbvhPrimitive) == 48);
 
