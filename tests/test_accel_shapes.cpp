@@ -7,6 +7,7 @@
 #include "scene/accel/cwbvh.h"
 #include "scene/accel/embree_tracer.h"
 #include "scene/accel/pair_bvh.h"
+#include "stages/wave.h"
 #include "tests/accel_scenes.h"
 #include "tests/catch.h"
 
@@ -180,4 +181,65 @@ TEST_CASE("Decisions of a ray at neighbouring primitives are independent") {
             INFO("step " << step << " p " << p);
             CHECK(std::fabs(both / double(n) - expected) < 5 * std::sqrt(expected * (1 - expected) / n));
         }
+}
+
+TEST_CASE("Seeds of rays: neighbouring pixels, samples, depths, walks and random seeds decide independently") {
+    // Chance that a ray passes, and that it and its neighbour both do, within 5 standard errors.
+    const uint32_t n = 1000000;
+    const RngKey base = {7, 0, 0, Stream::eye};
+    const auto neighbour = [](RngKey key, uint32_t& depth, bool& shadow, int which) {
+        switch (which) {
+            case 0: ++key.index; break;
+            case 1: ++key.sample; break;
+            case 2: ++depth; break;
+            case 3: shadow = !shadow; break;
+            case 4: key.stream = Stream::light; break;
+            case 5: ++key.seed; break;
+            case 6: key.seed += 1ull << 32; break;
+            case 7: depth += 1u << 14; break;
+            default: key.index += 1024;
+        }
+        return key;
+    };
+    for (const bool along_samples : {false, true})
+        for (int which = 0; which < 9; ++which)
+            for (const float p : {0.1f, 0.5f}) {
+                uint32_t passed = 0, both = 0;
+                for (uint32_t i = 0; i < n; ++i) {
+                    RngKey key = base;
+                    (along_samples ? key.sample : key.index) = i;
+                    uint32_t depth = 1 + i % 7;
+                    bool shadow = false;
+                    const bool one = hash_float(alpha_seed(key, depth, shadow), 100) < p;
+                    const RngKey other = neighbour(key, depth, shadow, which);
+                    passed += one;
+                    both += one && hash_float(alpha_seed(other, depth, shadow), 100) < p;
+                }
+                INFO("neighbour " << which << " along samples " << along_samples << " p " << p);
+                const auto within = [&](uint32_t count, double expected) { return std::fabs(count / double(n) - expected) < 5 * std::sqrt(expected * (1 - expected) / n); };
+                CHECK(within(passed, p));
+                CHECK(within(both, double(p) * p));
+            }
+}
+
+TEST_CASE("Primitives of a structure say whether rays may pass through them") {
+    Scene scene;
+    add_mesh(scene, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {0, 1, 2});
+    add_mesh(scene, {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}}, {0, 1, 2});
+    add_mesh(scene, {{0, 0, 2}, {1, 0, 2}, {0, 1, 2}}, {0, 1, 2});
+    add_quadric(scene, PrimitiveType::sphere, {0, 0, 5}, frame_from_normal({0, 0, 1}), 1);
+    add_diffuse(scene);
+    add_diffuse(scene);
+    scene.materials[1].opacity = {0.99f, -1};
+    scene.materials[2].opacity = {1.0f, 0};  // from a texture
+    scene.shapes[1].material = 1;
+    scene.shapes[2].material = 2;
+    scene.shapes[3].material = 1;
+    scene.features.opacity = true;
+    const CwbvhAccel accel(scene);
+    REQUIRE(accel.arrays().primitives.size() == 4);
+    for (const CwbvhPrimitive& p : accel.arrays().primitives) {
+        REQUIRE(p.prim<kOpacity>() < 4);
+        CHECK(p.lets_pass() == (p.prim<kOpacity>() > 0));
+    }
 }

@@ -10,6 +10,7 @@
 #include "backends/cuda/order.h"
 #include "backends/cuda_device.h"
 #include "queues/queue.h"
+#include "stages/path_items.h"
 #include "tests/catch.h"
 
 using namespace ambilux;
@@ -267,6 +268,92 @@ TEST_CASE("sorting places on a device: as a stable sort on the host, for any num
             sort_places(owned.order, kept.data(), n, bits, nullptr);
             cuda_check(cudaDeviceSynchronize(), "sort_places");
             CHECK(owned.read(owned.order.list[1], n) == places);
+        }
+    }
+}
+
+namespace {
+
+/// Counts how often it is called for each hit. `Gathers`: as stages of one BSDF are.
+template <bool Gathers>
+struct Visit {
+    static constexpr bool kGathers = Gathers;
+
+    Queue<HitItem> hits;
+    uint32_t* visits;
+    bool skips;
+
+    bool skips_misses() const { return skips; }
+    AMBILUX_HD void operator()(uint32_t i) const {
+#if defined(__CUDA_ARCH__)
+        atomicAdd(visits + hits.load(i).path, 1u);
+#endif
+    }
+};
+
+/// Runs Visit over the hits of `n` paths of which some have ended and some have met nothing: one in `misses`, all for 1, none for 0.
+template <bool Gathers>
+void check_visits(const QueuePolicy& policy, uint32_t n, uint32_t misses, bool skips) {
+    INFO(n << " paths, 1 of " << misses << " meets nothing, compaction " << compaction_name(policy.compaction) << ", ordering " << ordering_name(policy.ordering) << ", gathers " << Gathers
+           << ", skips " << skips);
+    constexpr uint32_t kMaterials = 5;
+    const OwnedOrder owned(policy, n);
+    std::vector<Lane> lanes(size_t(n) * Queue<HitItem>::kLanes + 1);
+    std::vector<QueueCounter> counters(1);
+    counters[0].capacity = n;
+    std::vector<uint8_t> flags((n + 255) / 256 * 256 + 256);
+    std::vector<uint16_t> keys(n + 1);
+    Queue<HitItem> queue = {lanes.data(), counters.data(), n, policy.fixed_places() ? flags.data() : nullptr};
+    std::vector<uint32_t> expected(n + 1), met(n + 1);
+    for (uint32_t path = 0; path < n; ++path) {
+        if (scrambled(path) % 4 == 0) continue;
+        const bool miss = misses > 0 && scrambled(path + n) % misses == 0;
+        HitItem item{};
+        item.path = path;
+        item.prim = miss ? kNone : path;
+        keys[queue.push(item)] = uint16_t(miss ? kMaterials : scrambled(path) % kMaterials);
+        expected[path] = 1;
+        met[path] = !miss;
+    }
+    const uint32_t items = counters[0].count;
+    if (policy.fixed_places()) counters[0].count = 0;  // a device counts for itself
+    const DeviceBuffer<Lane> device_lanes{std::span<const Lane>(lanes)};
+    const DeviceBuffer<uint8_t> device_flags{std::span<const uint8_t>(flags)};
+    const DeviceBuffer<uint16_t> device_keys{std::span<const uint16_t>(keys)};
+    const DeviceBuffer<QueueCounter> device_counters{std::span<const QueueCounter>(counters)};
+    DeviceBuffer<WaveState> state(1);
+    DeviceBuffer<StageRecord> records(kStageCount);
+    DeviceBuffer<uint64_t> clock(1);
+    DeviceBuffer<uint32_t> visits(n + 1);
+    state.zero();
+    records.zero();
+    clock.zero();
+    visits.zero();
+    const auto writable = [](const auto& buffer) { return const_cast<std::remove_const_t<std::remove_pointer_t<decltype(buffer.data())>>*>(buffer.data()); };
+    queue = {writable(device_lanes), writable(device_counters), n, policy.fixed_places() ? writable(device_flags) : nullptr, policy.keyed_hits ? writable(device_keys) : nullptr};
+    SceneView scene{};
+    scene.material_count = kMaterials;
+    CudaExecutor executor(nullptr, {}, state.data(), records.data(), clock.data(), scene, owned.order);
+    executor.run(StageId::shade, Visit<Gathers>{queue, visits.data(), skips}, queue);
+    cuda_check(cudaDeviceSynchronize(), "visits");
+    const bool without_misses = Gathers || (skips && policy.keyed_hits && items >= detail::kSortFrom);
+    CHECK(visits.download() == (without_misses ? met : expected));
+    CHECK(records.download()[uint32_t(StageId::shade)].items == items);
+    CHECK(device_counters.download()[0].count == 0);
+}
+
+}  // namespace
+
+TEST_CASE("stages of hits on a device: every hit once, and rays that met nothing where they are of use only") {
+    if (!cuda_device_present()) {
+        WARN("no CUDA device: skipped");
+        return;
+    }
+    const QueuePolicy sorted = {Compaction::atomic, Ordering::material, true, true};
+    for (const uint32_t n : {1u, 33u, 1000u, 50000u, (1u << 20) + 1}) {
+        for (const uint32_t misses : {0u, 1u, 2u, 9u, 1000u}) {
+            for (const Compaction compaction : {Compaction::atomic, Compaction::select, Compaction::none}) check_visits<true>({compaction, Ordering::none}, n, misses, true);
+            for (const bool skips : {false, true}) check_visits<false>(sorted, n, misses, skips);
         }
     }
 }

@@ -49,6 +49,27 @@ struct Whole {
 
 }  // namespace
 
+TEST_CASE("queue: a lane that is known is neither stored nor loaded, and the last lane is read alone") {
+    std::vector<Lane> memory(2 * Queue<Whole>::kLanes + 1, Lane{{9, 9, 9, 9}});
+    QueueCounter counter{};
+    const Queue<Whole> queue = {memory.data(), &counter, 2};
+    const Whole item = {{{{1, 2, 3, 4}}, {{5, 6, 7, 8}}, {{10, 11, 12, 13}}, {{14, 15, 16, 17}}}};
+    const auto same = [](const Lane& a, const Lane& b) { return std::equal(a.word, a.word + 4, b.word); };
+    for (uint32_t known = 0; known <= Queue<Whole>::kLanes; ++known) {
+        std::fill(memory.begin(), memory.end(), Lane{{9, 9, 9, 9}});
+        queue.store_but(1, known, item);
+        const Whole stored = queue.load(1), untouched = queue.load(0);
+        queue.store(1, item);
+        const Whole loaded = queue.load_but(1, known, {{20, 21, 22, 23}});
+        for (uint32_t k = 0; k < Queue<Whole>::kLanes; ++k) {
+            CHECK(same(stored.lane[k], k == known ? Lane{{9, 9, 9, 9}} : item.lane[k]));
+            CHECK(same(untouched.lane[k], {{9, 9, 9, 9}}));
+            CHECK(same(loaded.lane[k], k == known ? Lane{{20, 21, 22, 23}} : item.lane[k]));
+        }
+        CHECK(same(queue.last<Lane>(1), item.lane[3]));
+    }
+}
+
 TEST_CASE("queue: what is pushed is loaded, for any size") {
     for (const uint32_t n : {0u, 1u, 31u, 32u, 33u, 1000u, (1u << 20) + 1}) {
         OwnedQueue q(n);
