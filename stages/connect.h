@@ -51,7 +51,7 @@ private:
         const BsdfValue f = scatter_evaluate<F>(s, light.wi, TransportMode::radiance);
         if (is_zero(f.value)) return;
         const bool environment = is_environment<F>(scene, light.emitter);
-        const Rgb value = throughput * f.value * ((environment ? splat(1.0f) : emitter_sample_radiance<F>(scene, light)) / light.pdf_sa);
+        const Rgb value = throughput * f.value * ((environment ? splat(1.0f) : light.radiance) / light.pdf_sa);
         if (!is_light(value, record) || is_zero(value)) return;
         // Only BSDF sampling and a hit could find this light too.
         const bool other = policy.estimator == Estimator::mis && !light.delta;
