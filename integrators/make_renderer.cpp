@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <bit>
-
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "integrators/bidirectional/bidirectional.h"
@@ -14,7 +12,7 @@ namespace {
 /// What `ordering=auto` stands for (docs/performance.md, "Compaction and ordering").
 Ordering best_ordering(const Scene& scene, const RenderSettings& settings, bool cuda) {
     const bool sortable = settings.variant == "wavefront" || settings.variant == "lvc";
-    return cuda && sortable && std::popcount(scene.features.bsdfs) > 1 ? Ordering::material : Ordering::none;
+    return cuda && sortable && scene.features.several_bsdfs() ? Ordering::material : Ordering::none;
 }
 
 }  // namespace
@@ -52,12 +50,8 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     RenderSettings chosen = settings;
     // On a host connect of the path tracer waits for the tables of environments, which it can ask for ahead only as a stage of its own.
     if (chosen.fuse == Fuse::automatic) chosen.fuse = cuda || chosen.integrator != "path" ? Fuse::all : Fuse::light;
-    if (chosen.queues.ordering == Ordering::automatic) {
-        constexpr uint32_t kDelta = bit(BsdfType::conductor) | bit(BsdfType::dielectric) | bit(BsdfType::thin_dielectric);  // are never connected
-        chosen.queues.ordering = best_ordering(scene, settings, cuda);
-        chosen.queues.order_pairs = std::popcount(scene.features.bsdfs & ~kDelta) > 1;
-    }
-    chosen.queues.keyed_hits = chosen.queues.ordering == Ordering::material && chosen.queues.compaction == Compaction::atomic && std::popcount(scene.features.bsdfs) > 1;
+    if (chosen.queues.ordering == Ordering::automatic) chosen.queues.ordering = best_ordering(scene, settings, cuda);
+    chosen.queues.keyed_hits = chosen.queues.ordering == Ordering::material && chosen.queues.compaction == Compaction::atomic && scene.features.several_bsdfs();
     if (chosen.integrator != "path") return cuda ? make_bidirectional_cuda(scene, chosen, accels) : make_bidirectional_cpu(scene, chosen, accels);
     return cuda ? make_path_cuda(scene, chosen, accels) : make_path_cpu(scene, chosen, accels);
 }

@@ -26,7 +26,6 @@ inline const char* ordering_name(Ordering o) { return o == Ordering::none ? "non
 struct QueuePolicy {
     Compaction compaction = Compaction::atomic;
     Ordering ordering = Ordering::none;
-    bool order_pairs = true;  ///< ordering by material sorts pairs of vertices too, not hits alone
     bool keyed_hits = false;  ///< ordering by material: hits are kept with their keys (Queue::keys)
 
     /// For queues of which a path has one item at a time; others are always appended to.

@@ -72,6 +72,18 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
     return step;
 }
 
+/// Which of `size` light vertices the draw of an eye vertex finds: each with the same probability. On a device vertices that lie together in their queue draw together, from a random place of
+/// the cache on: what they load lies together too, and mostly was left by walks on one material.
+AMBILUX_HD uint32_t drawn_vertex(const Wave& wave, [[maybe_unused]] uint32_t vertex, [[maybe_unused]] uint32_t path, uint32_t depth, uint32_t draw, uint32_t size) {
+#if defined(__CUDA_ARCH__)
+    const RngKey key = {wave.seed, vertex / kDrawsTogether, wave.state->first_sample, Stream::eye};
+    const uint32_t at = mul_hi(random_bits(key, cache_block(depth, draw)).x, size) + vertex % kDrawsTogether;
+    return at < size ? at : at % size;
+#else
+    return mul_hi(random_bits(wave.key(path), cache_block(depth, draw)).x, size);
+#endif
+}
+
 /// Pairs of an eye vertex for one launch over `vertices` of them, from `next` on: a vertex of the light walk of its slot, or, over a cache, the number of draws that are left.
 AMBILUX_HD void push_pairs(const Wave& wave, const BidirectionalPolicy& policy, const LightVertices& light_vertices, uint32_t vertices, uint32_t vertex, uint32_t path, uint32_t depth, uint32_t next,
                            const Queue<PairItem>& pairs) {
@@ -81,7 +93,7 @@ AMBILUX_HD void push_pairs(const Wave& wave, const BidirectionalPolicy& policy, 
         if (size == 0) return;
         for (uint32_t pushed = 1; next > 0 && pushed <= most; ++pushed) {
             --next;
-            const uint32_t light = mul_hi(random_bits(wave.key(path), cache_block(depth, next)).x, size);
+            const uint32_t light = drawn_vertex(wave, vertex, path, depth, next, size);
             pairs.push({vertex, light, path, pushed == most && next > 0 ? next : kNone});
         }
         return;
@@ -245,9 +257,6 @@ struct ConnectVertices {
     LightVertices light_vertices;
     ConnectOutlet candidates;
     StageRecord* record;
-
-    /// What a pair is sorted by: the surface of its light vertex.
-    AMBILUX_HD uint32_t prim_of(uint32_t i) const { return light_vertices.load(pairs.load(i).light).prim; }
 
     /// What an executor that goes through items one after the other may keep from one to the next.
     using Memory = PairedVertex;

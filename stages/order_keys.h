@@ -10,7 +10,7 @@
 
 namespace ambilux {
 
-/// Of hits, and of the light vertices of pairs, whose eye vertices are in order already. Materials, not types of BSDFs: equal materials read the same textures too, and there are far fewer of them than warps, so that warps of mixed types are rare either way.
+/// Of hits. Materials, not types of BSDFs: equal materials read the same textures too, and there are far fewer of them than warps, so that warps of mixed types are rare either way.
 /// Rays that met nothing come last.
 struct MaterialOrder {
     static constexpr Ordering kOrdering = Ordering::material;
@@ -47,28 +47,14 @@ private:
     }
 };
 
-/// A stage whose items do not tell by themselves what they will be shaded with.
-template <class Stage>
-concept TellsSurface = requires(const Stage& stage) { stage.prim_of(0u); };
+/// True for items that `Order` has keys for.
+template <class Order, class Item>
+concept Ordered = requires(const SceneView& scene, const Item& item) { Order::key(scene, item); };
 
-/// True for items that `Order` has keys for when `Stage` goes through them.
-template <class Order, class Stage, class Item>
-concept Ordered = requires(const SceneView& scene, const Item& item) { Order::key(scene, item); } || (std::is_same_v<Order, MaterialOrder> && TellsSurface<Stage>);
-
-/// True if `policy` asks for the items of `Stage` to be sorted by `Order`.
-template <class Order, class Stage>
-bool sorts(const QueuePolicy& policy) {
-    return policy.ordering == Order::kOrdering && (policy.order_pairs || !(TellsSurface<Stage> && std::is_same_v<Order, MaterialOrder>));
-}
-
-template <class Order, class Stage, class Item>
-AMBILUX_HD uint32_t order_key(const SceneView& scene, const Stage& stage, const Queue<Item>& queue, uint32_t place) {
-    if constexpr (TellsSurface<Stage> && std::is_same_v<Order, MaterialOrder>)
-        return MaterialOrder::of(scene, stage.prim_of(place));
-    else if (std::is_same_v<Order, MaterialOrder> && queue.keys)
-        return queue.keys[place];
-    else
-        return Order::key(scene, queue.load(place));
+template <class Order, class Item>
+AMBILUX_HD uint32_t order_key(const SceneView& scene, const Queue<Item>& queue, uint32_t place) {
+    if (std::is_same_v<Order, MaterialOrder> && queue.keys) return queue.keys[place];
+    return Order::key(scene, queue.load(place));
 }
 
 }  // namespace ambilux

@@ -349,7 +349,7 @@ TEST_CASE("stages of hits on a device: every hit once, and rays that met nothing
         WARN("no CUDA device: skipped");
         return;
     }
-    const QueuePolicy sorted = {Compaction::atomic, Ordering::material, true, true};
+    const QueuePolicy sorted = {Compaction::atomic, Ordering::material, true};
     for (const uint32_t n : {1u, 33u, 1000u, 50000u, (1u << 20) + 1}) {
         for (const uint32_t misses : {0u, 1u, 2u, 9u, 1000u}) {
             for (const Compaction compaction : {Compaction::atomic, Compaction::select, Compaction::none}) check_visits<true>({compaction, Ordering::none}, n, misses, true);

@@ -82,7 +82,7 @@ private:
         const uint32_t items = queue.counter->size();
         if (items == 0) return;
         const auto start = Clock::now();
-        const uint32_t* list = make_list<Order>(stage, queue);
+        const uint32_t* list = make_list<Order>(queue);
         const bool gaps = queue.flags && !list;
         const uint32_t n = gaps ? queue.capacity : items;
         [[maybe_unused]] auto memory = memory_of(stage);
@@ -108,18 +108,18 @@ private:
             return 0;
     }
     /// The places of all items, if they do not lie one after the other or not in the order in which they are wanted; null: as they lie.
-    template <class Order, class Stage, class Item>
-    const uint32_t* make_list(const Stage& stage, const Queue<Item>& queue) const {
+    template <class Order, class Item>
+    const uint32_t* make_list(const Queue<Item>& queue) const {
         bool sorted = false;
-        if constexpr (Ordered<Order, Stage, Item>) sorted = sorts<Order, Stage>(order_.policy);
+        if constexpr (Ordered<Order, Item>) sorted = order_.policy.ordering == Order::kOrdering;
         if (!sorted && !(queue.flags && order_.policy.compaction == Compaction::select)) return nullptr;
         uint32_t n = 0;
         uint32_t *list = order_.list[0], *keys = order_.keys[0];
         for (uint32_t i = 0, end = queue.flags ? queue.capacity : queue.counter->size(); i < end; ++i)
             if (!queue.flags || take(queue, i)) list[n++] = i;
-        if constexpr (Ordered<Order, Stage, Item>) {
+        if constexpr (Ordered<Order, Item>) {
             if (sorted) {
-                for (uint32_t i = 0; i < n; ++i) keys[list[i]] = order_key<Order>(*scene_, stage, queue, list[i]);
+                for (uint32_t i = 0; i < n; ++i) keys[list[i]] = order_key<Order>(*scene_, queue, list[i]);
                 std::sort(list, list + n, [&](uint32_t a, uint32_t b) { return keys[a] != keys[b] ? keys[a] < keys[b] : a < b; });
             }
         }

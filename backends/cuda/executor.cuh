@@ -277,14 +277,14 @@ __device__ inline uint32_t places_to_sort(const Items& items, uint32_t n, SortSw
 }
 
 /// Keys of the items that a launch will go through. The last key is that of places without an item.
-template <class Order, class Stage, class Item>
-__global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__ SceneView scene, const __grid_constant__ Stage stage, const Queue<Item> queue, const Items items, uint32_t last, uint32_t* keys, SortSwitch sorts) {
+template <class Order, class Item>
+__global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__ SceneView scene, const Queue<Item> queue, const Items items, uint32_t last, uint32_t* keys, SortSwitch sorts) {
     const uint32_t n = items.size(), end = places_to_sort(items, n, sorts);
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < end; i += gridDim.x * kStageBlock) {
         uint32_t key = last;
         if (i < n) {
             const uint32_t place = items.place(i);
-            if (items.list || !items.flags || items.flags[place]) key = order_key<Order>(scene, stage, queue, place);
+            if (items.list || !items.flags || items.flags[place]) key = order_key<Order>(scene, queue, place);
         }
         keys[i] = key;
     }
@@ -495,8 +495,8 @@ private:
         if (!counted) count(queue);
         const bool selected = queue.flags && order_.policy.compaction == Compaction::select;
         detail::Items items = {queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity, nullptr, nullptr, 0};
-        if constexpr (Ordered<Order, Stage, Item>) {
-            if (sorts<Order, Stage>(order_.policy) && queue.capacity > 0) {
+        if constexpr (Ordered<Order, Item>) {
+            if (order_.policy.ordering == Order::kOrdering && queue.capacity > 0) {
                 const uint32_t bits = Order::bits(scene_);
                 const bool whole = queue.flags && !items.list;
                 const detail::SortSwitch choice = {capturing_ && !whole ? make_condition() : cudaGraphConditionalHandle{}, capturing_ && !whole};
@@ -504,7 +504,7 @@ private:
                 if (queue.keys)
                     detail::fill_keys<<<blocks(detail::fill_keys, kStageBlock), kStageBlock, 0, stream_>>>(queue.keys, items, uint16_t(last), choice);
                 else
-                    detail::make_keys<Order, Stage, Item><<<blocks(detail::make_keys<Order, Stage, Item>, kStageBlock), kStageBlock, 0, stream_>>>(scene_, stage, queue, items, last, order_.keys[0], choice);
+                    detail::make_keys<Order, Item><<<blocks(detail::make_keys<Order, Item>, kStageBlock), kStageBlock, 0, stream_>>>(scene_, queue, items, last, order_.keys[0], choice);
                 if (whole)
                     sort_places(order_, queue.keys, queue.capacity, bits, stream_);
                 else
