@@ -181,7 +181,7 @@ double choice_work(const PilotWork& w, const ChoiceCandidate& candidate, bool cu
     // Fitted to renders (docs/performance.md): shadow rays and connections in rays of walks; what the longer records and further launches of bidirectional methods cost.
     constexpr double kShadow = 0.8;
     const double eye = w.eye_rays + kShadow * w.next_events, light = w.light_rays + kShadow * w.splats;
-    const double pair = cuda ? 1.3 : 0.25, draw = cuda ? 0.85 : 0.25, ray = cuda ? 0.85 : 0.6, bidirectional = cuda ? 1.5 : 1.3;
+    const double pair = cuda ? 1.1 : 0.25, draw = cuda ? 0.55 : 0.25, ray = cuda ? 0.85 : 0.6, bidirectional = cuda ? 1.5 : 1.3;
     const PilotCandidate& c = candidate.pilot;
     if (!c.light && !c.connect) return eye;
     double work = eye + light;
