@@ -223,7 +223,10 @@ TEST_CASE("Device and host let the same rays pass surfaces of partial opacity (G
 
     const std::vector<Ray> rays = test_rays(scene, 400000, 1.0f, 36);
     const CwbvhAccel accel(scene);
-    const std::vector<Hit> opaque = trace_on_host<Features{0, 0, kAllFeatures.primitives, false, false, false}>(scene, accel.tracer(), rays);
+    Scene solid = scene;
+    for (Material& material : solid.materials) material.opacity = {1.0f, -1};
+    const CwbvhAccel solid_accel(solid);
+    const std::vector<Hit> opaque = trace_on_host<Features{0, 0, kAllFeatures.primitives, false, false, false}>(solid, solid_accel.tracer(), rays);
     const std::vector<Hit> partial = trace_on_host<kAllFeatures>(scene, accel.tracer(), rays);
     uint64_t passed = 0;
     for (size_t i = 0; i < rays.size(); ++i) passed += opaque[i].prim != partial[i].prim;
