@@ -89,6 +89,8 @@ public:
     }
     uint32_t samples() const { return samples_; }
     double build_seconds() const { return build_seconds_; }
+    /// Of every pixel, while there was nothing else to do; 0: unknown.
+    double seconds_per_sample() const { return seconds_per_sample_; }
     std::unique_ptr<Renderer> take() { return std::move(renderer_); }
 
 private:
@@ -97,13 +99,15 @@ private:
         for (uint32_t batch = 1; samples_ == 0 || !is_set(&stop_);) {
             const auto start = Clock::now();
             samples_ += renderer_->render(samples_, batch);
-            batch = std::clamp(uint32_t(kBatchSeconds / seconds_since(start) * batch), 1u, 4 * batch);
+            const double seconds = seconds_since(start);
+            if (seconds > 0.5 * kBatchSeconds && samples_ > batch) seconds_per_sample_ = seconds / batch;  // the first bears what later ones do not
+            batch = std::clamp(uint32_t(kBatchSeconds / seconds * batch), 1u, 4 * batch);
         }
     }
 
     volatile bool stop_ = false;
     uint32_t samples_ = 0;
-    double build_seconds_ = 0;
+    double build_seconds_ = 0, seconds_per_sample_ = 0;
     std::unique_ptr<Renderer> renderer_;
     std::thread thread_;
 };
@@ -248,6 +252,10 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     const bool doubtful = cuda || (settings.variant != "wavefront" && settings.variant != "lvc");
     if (doubtful && !settings.deterministic && rival != ranked.end() && variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
         for (const size_t i : {best, *rival}) {
+            if (i == 0 && head_start && head_start->seconds_per_sample() > 0) {
+                seconds[i] = head_start->seconds_per_sample();
+                continue;
+            }
             const RenderSettings candidate = settings_of(settings, candidates[i]);
             try {
                 seconds[i] = timed(scene, candidate, cuda, make);
