@@ -273,7 +273,7 @@ void fill_features(Scene& scene) {
         if (shape.primitive_count == 0) continue;
         const Material& m = scene.materials[shape.material];
         use(m.opacity.texture);
-        f.opacity |= m.opacity.texture >= 0 || m.opacity.value < 1;
+        f.opacity |= m.lets_pass();
         for (uint32_t index : {m.front, m.back}) {
             const BsdfRecord& b = scene.bsdfs[index];
             f.bsdfs |= bit(b.type);

@@ -119,6 +119,9 @@ struct Material {
     uint32_t front, back;
     uint32_t two_sided;
     ParamFloat opacity;  ///< mask: chance that a ray meets the surface
+
+    /// False if every ray meets it.
+    AMBILUX_HD bool lets_pass() const { return opacity.texture >= 0 || !(opacity.value >= 1.0f); }
 };
 
 // ---- emitters ----

@@ -317,10 +317,10 @@ void check_visits(const QueuePolicy& policy, uint32_t n, uint32_t misses, bool s
     }
     const uint32_t items = counters[0].count;
     if (policy.fixed_places()) counters[0].count = 0;  // a device counts for itself
-    const DeviceBuffer<Lane> device_lanes{std::span<const Lane>(lanes)};
-    const DeviceBuffer<uint8_t> device_flags{std::span<const uint8_t>(flags)};
-    const DeviceBuffer<uint16_t> device_keys{std::span<const uint16_t>(keys)};
-    const DeviceBuffer<QueueCounter> device_counters{std::span<const QueueCounter>(counters)};
+    DeviceBuffer<Lane> device_lanes{std::span<const Lane>(lanes)};
+    DeviceBuffer<uint8_t> device_flags{std::span<const uint8_t>(flags)};
+    DeviceBuffer<uint16_t> device_keys{std::span<const uint16_t>(keys)};
+    DeviceBuffer<QueueCounter> device_counters{std::span<const QueueCounter>(counters)};
     DeviceBuffer<WaveState> state(1);
     DeviceBuffer<StageRecord> records(kStageCount);
     DeviceBuffer<uint64_t> clock(1);
@@ -329,8 +329,7 @@ void check_visits(const QueuePolicy& policy, uint32_t n, uint32_t misses, bool s
     records.zero();
     clock.zero();
     visits.zero();
-    const auto writable = [](const auto& buffer) { return const_cast<std::remove_const_t<std::remove_pointer_t<decltype(buffer.data())>>*>(buffer.data()); };
-    queue = {writable(device_lanes), writable(device_counters), n, policy.fixed_places() ? writable(device_flags) : nullptr, policy.keyed_hits ? writable(device_keys) : nullptr};
+    queue = {device_lanes.data(), device_counters.data(), n, policy.fixed_places() ? device_flags.data() : nullptr, policy.keyed_hits ? device_keys.data() : nullptr};
     SceneView scene{};
     scene.material_count = kMaterials;
     CudaExecutor executor(nullptr, {}, state.data(), records.data(), clock.data(), scene, owned.order);

@@ -250,7 +250,7 @@ private:
 
 CwbvhPrimitive make_cwbvh_primitive(const SceneView& scene, uint32_t prim) {
     CwbvhPrimitive p = {};
-    p.word = prim | (may_let_pass(opacity_of(scene, prim)) ? CwbvhPrimitive::kLetsPass : 0);
+    p.word = prim | (material_of(scene, prim).lets_pass() ? CwbvhPrimitive::kLetsPass : 0);
     if (scene.is_triangle(prim)) {
         const Triangle t = scene.triangles[prim];
         p.v0 = scene.vertices[t.v0].p, p.v1 = scene.vertices[t.v1].p, p.v2 = scene.vertices[t.v2].p;

@@ -34,11 +34,7 @@ AMBILUX_HD uint32_t opacity_id(const SceneView& scene, const Ray& ray, uint32_t 
     return prim;
 }
 
-/// Opacity of a primitive's surface.
-AMBILUX_HD const ParamFloat& opacity_of(const SceneView& scene, uint32_t prim) { return scene.materials[scene.shapes[scene.shape_of(prim)].material].opacity; }
-
-/// False if every ray meets a surface of this opacity.
-AMBILUX_HD bool may_let_pass(const ParamFloat& opacity) { return opacity.texture >= 0 || !(opacity.value >= 1.0f); }
+AMBILUX_HD const Material& material_of(const SceneView& scene, uint32_t prim) { return scene.materials[scene.shapes[scene.shape_of(prim)].material]; }
 
 /// True if `ray` meets the surface at (prim,u,v) rather than passing through it: opacity > hash(ray, opacity_id), so the answer does not
 /// depend on the order in which a tracer visits primitives.
@@ -47,8 +43,9 @@ AMBILUX_HD bool accept_hit(const SceneView& scene, const Ray& ray, uint32_t prim
     if constexpr (!F.opacity) {
         return true;
     } else {
-        const ParamFloat& opacity = opacity_of(scene, prim);
-        if (!may_let_pass(opacity)) return true;
+        const Material& material = material_of(scene, prim);
+        if (!material.lets_pass()) return true;
+        const ParamFloat& opacity = material.opacity;
         const Vec2f uv = F.textures && opacity.texture >= 0 ? texture_uv<F>(scene, prim, u, v) : Vec2f{0.0f, 0.0f};
         return eval_float<F>(scene, opacity, uv) > hash_float(ray.alpha_seed, opacity_id<F>(scene, ray, prim, u, v));
     }
