@@ -21,7 +21,7 @@ struct QueueCounter {
     uint32_t capacity;
     uint64_t peak;      ///< most places given out in one filling
     uint64_t overflow;  ///< items lost: places past the capacity, or to a fixed place that was taken (which only the host looks for)
-    uint32_t next;      ///< first item that no persistent thread has taken yet
+    uint32_t next;      ///< items that threads of a launch have taken in turns
     uint32_t holes;     ///< places below `count` that hold no item (queues/stretch.h)
     uint32_t pad[264];
 

@@ -191,8 +191,7 @@ struct EyeConnect {
 
 template <Features F>
 struct EyeShade {
-    /// 168 registers instead of 232, 128 for diffuse surfaces: more warps hide more latency (docs/performance.md).
-    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : 3;
+    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : F.textures ? 3 : 4;  ///< 102, 168 or 128 registers instead of up to 232: more warps hide more latency (docs/performance.md)
     static constexpr bool kGathers = !F.several_bsdfs() && !F.has_environment();  ///< hits are in no order, and misses of no use
 
     SceneView scene;
@@ -247,7 +246,8 @@ struct PairedVertex {
 /// connect_vertices: an eye vertex and a light vertex (s, t >= 2), of the light walk of its slot, or drawn from a cache of those of all light walks of the wave (Davidovic et al. 2014).
 template <Features F>
 struct ConnectVertices {
-    static constexpr uint32_t kBlocksPerSm = 4;
+    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : 4;
+    static constexpr bool kStrides = true;  ///< on a device threads do not take pairs in turns: 1.17 of the time (docs/performance.md)
 
     SceneView scene;
     Wave wave;

@@ -356,3 +356,98 @@ TEST_CASE("stages of hits on a device: every hit once, and rays that met nothing
         }
     }
 }
+
+namespace {
+
+__global__ void visit_in_turns(uint32_t n, uint32_t* next, uint32_t* visits, uint32_t* past) {
+    detail::in_turns(n, next, [&](uint32_t i) { atomicAdd(i < n ? visits + i : past, 1u); });
+}
+
+struct Word {
+    uint32_t word[4];
+};
+
+struct Mark {
+    uint32_t* visits;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+#if defined(__CUDA_ARCH__)
+        atomicAdd(visits + i, 1u);
+#endif
+    }
+};
+
+/// Takes every third item.
+struct MarkSome : Mark {
+    __device__ bool relevant(uint32_t i) const { return i % 3 == 0; }
+    __device__ void connect(uint32_t i) const { (*this)(i); }
+};
+
+struct MarkWithStrides : Mark {
+    static constexpr bool kStrides = true;
+};
+
+}  // namespace
+
+TEST_CASE("turns: every item once, whatever the lengths of stretches") {
+    if (!cuda_device_present()) {
+        WARN("no CUDA device: skipped");
+        return;
+    }
+    for (const uint32_t blocks : {1u, 2u, 33u}) {
+        const uint32_t threads = blocks * 128;
+        for (const uint32_t n : {0u, 1u, 31u, 32u, 33u, threads - 1, threads, threads + 1, 16 * threads - 1, 16 * threads, 16 * threads + 5, 64 * threads - 1, 64 * threads, 64 * threads + 77, 1000 * threads + 255}) {
+            INFO(n << " items, " << threads << " threads");
+            DeviceBuffer<uint32_t> next(1), past(1), visits(n + 1);
+            next.zero(), past.zero(), visits.zero();
+            visit_in_turns<<<blocks, 128>>>(n, next.data(), visits.data(), past.data());
+            cuda_check(cudaDeviceSynchronize(), "visit_in_turns");
+            std::vector<uint32_t> expected(n + 1, 1);
+            expected[n] = 0;
+            CHECK(visits.download() == expected);
+            CHECK(past.download()[0] == (n + 31) / 32 * 32 - n);
+        }
+    }
+}
+
+TEST_CASE("turns: launches begin at the first item, also over a queue that is kept and over slots") {
+    if (!cuda_device_present()) {
+        WARN("no CUDA device: skipped");
+        return;
+    }
+    int device = 0, multiprocessors = 0;
+    cuda_check(cudaGetDevice(&device), "device");
+    cuda_check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device), "multiprocessors");
+    const uint32_t most_threads = uint32_t(multiprocessors) * 2048;  // resident, so that stretches are of all lengths
+    for (const uint32_t n : {1000u, 16 * most_threads + 5, 64 * most_threads + 77}) {
+        INFO(n << " items");
+        DeviceBuffer<Lane> unused(1);
+        std::vector<QueueCounter> counters(1);
+        counters[0].capacity = counters[0].count = n;
+        DeviceBuffer<QueueCounter> counter{std::span<const QueueCounter>(counters)};
+        DeviceBuffer<WaveState> state(1);
+        DeviceBuffer<StageRecord> records(kStageCount);
+        DeviceBuffer<uint64_t> clock(1);
+        DeviceBuffer<uint32_t> visits(n);
+        state.zero(), records.zero(), clock.zero(), visits.zero();
+        const Queue<Word> queue = {unused.data(), counter.data(), n};  // of which only the counter is used
+        const OwnedOrder owned({}, 0);
+        CudaExecutor executor(nullptr, {}, state.data(), records.data(), clock.data(), SceneView{}, owned.order);
+        const auto refill = [&] { cuda_check(cudaMemcpy(&counter.data()->count, &n, sizeof n, cudaMemcpyHostToDevice), "count"); };
+        executor.run_keeping(StageId::shade, Mark{visits.data()}, queue);
+        executor.run_keeping(StageId::shade, Mark{visits.data()}, queue);
+        executor.run(StageId::shade, Mark{visits.data()}, queue);
+        CHECK(counter.download()[0].count == 0);
+        refill();
+        executor.run(StageId::shade, MarkWithStrides{{visits.data()}}, queue);
+        for (int launch = 0; launch < 2; ++launch) {
+            refill();
+            executor.run(StageId::connect_vertices, MarkSome{{visits.data()}}, queue);
+            executor.run_slots(StageId::develop, Mark{visits.data()}, n, 1);
+        }
+        const std::vector<uint32_t> seen = visits.download();
+        uint64_t wrong = 0;
+        for (uint32_t i = 0; i < n; ++i) wrong += seen[i] != (i % 3 == 0 ? 8u : 6u);
+        CHECK(wrong == 0);
+    }
+}

@@ -187,6 +187,24 @@ TEST_CASE("Device and host agree for any number of rays (G12)") {
     check(compare_all(ball, test_rays(ball, kMany, 1.0f, 33), kCounts), true);
 }
 
+TEST_CASE("Of many rays, which warps take in longer stretches, each is traced once (G12)") {
+    if (no_device()) return;
+    Scene ball;
+    add_ball(ball, {0, 0, 0}, 1.0f, 40, 0.1f, 3);
+    const std::vector<Ray> all = test_rays(ball, 6000077, 1.0f, 38);
+    for (const size_t count : {size_t(3000001), all.size()}) {
+        const std::vector<Ray> rays(all.begin(), all.begin() + ptrdiff_t(count));
+        for (const bool any_hit : {false, true}) {
+            const std::vector<Hit> persistent = trace_on_device(ball, rays, any_hit, true, false), plain = trace_on_device(ball, rays, any_hit, false, false);
+            REQUIRE(persistent.size() == count);
+            uint64_t different = 0;
+            for (size_t i = 0; i < count; ++i)
+                different += any_hit ? (persistent[i].prim == kNone) != (plain[i].prim == kNone) : persistent[i].t != plain[i].t || persistent[i].prim != plain[i].prim;
+            CHECK(different == 0);
+        }
+    }
+}
+
 TEST_CASE("Device and host agree on analytic shapes alone and among triangles (G12)") {
     if (no_device()) return;
     for (const float scale : {1e-4f, 1.0f, 1e4f}) {

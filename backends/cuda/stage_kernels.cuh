@@ -67,10 +67,34 @@ struct Items {
     }
 };
 
+/// body(i), by whole warps, for all i below n and for as many more as fill a warp. Warps take their next stretch of items when they are done with the last: what is in work lies together, so that
+/// all run the same material, and none has more to do than others. Stretches are long, since taking one waits, but not so long that warps would end far apart; where items are few, each warp has
+/// its own. *next must be 0 when the kernel starts.
+template <class Body>
+__device__ void in_turns(uint32_t n, uint32_t* next, Body body) {
+    const uint32_t lane = threadIdx.x % 32, threads = gridDim.x * blockDim.x, stretch = n / threads >= 64 ? 256 : n / threads >= 16 ? 64 : 32;
+    uint32_t i = (blockIdx.x * blockDim.x + threadIdx.x) / 32 * stretch + lane;
+    while (i - lane < n) {
+        body(i);
+        i += 32;
+        if ((i & (stretch - 1)) >= 32) continue;
+        if (stretch == 32) {
+            i += threads - 32;
+            continue;
+        }
+        __syncwarp();
+        uint32_t taken = 0;
+        if (lane == 0) taken = add_to(next, stretch);
+        i = threads / 32 * stretch + __shfl_sync(0xffffffffu, taken, 0) + lane;
+    }
+}
+
 template <class Stage>
-__global__ void __launch_bounds__(kStageBlock) launch_slots(const __grid_constant__ Stage stage, uint32_t slots, uint32_t samples, const WaveState* state) {
+__global__ void __launch_bounds__(kStageBlock) launch_slots(const __grid_constant__ Stage stage, uint32_t slots, uint32_t samples, WaveState* state) {
     const uint32_t n = slots * (samples ? samples : state->samples);
-    for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) stage(i);
+    in_turns(n, &state->next, [&](uint32_t i) {
+        if (i < n) stage(i);
+    });
 }
 
 /// All threads stay until the last slot is done.
@@ -109,9 +133,18 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
     const uint32_t size = all.size();
     const Items items = all.of(size);
     const uint32_t n = SkipsMisses<Stage> ? items.worth(size) : size;
-    for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) {
+    const auto each = [&](uint32_t i) {
+        if (i >= n) return;
         const uint32_t place = items.place(i);
         if (items.take(place)) stage(place);
+    };
+    if constexpr (requires { requires Stage::kStrides; }) {
+        for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) each(i);
+    } else {
+        in_turns(n, &items.counter->next, [&](uint32_t i) {
+            each(i);
+            __syncwarp();  // lanes that part while they push would stay apart
+        });
     }
 }
 
@@ -123,20 +156,20 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
     const Items items = all.of(n);
     uint32_t* const mine = gathered[threadIdx.x / 32];
     uint32_t held = 0;
-    for (uint32_t first = blockIdx.x * kStageBlock + threadIdx.x - lane; first < n; first += gridDim.x * kStageBlock) {
-        const uint32_t i = first + lane, place = i < n ? items.place(i) : 0;
+    in_turns(n, &items.counter->next, [&](uint32_t i) {
+        const uint32_t place = i < n ? items.place(i) : 0;
         const bool some = i < n && items.take(place) && stage.hits.template last<HitEnd>(place).prim != kNone;
         const uint32_t found = __ballot_sync(0xffffffffu, some);
         if (some) mine[held + lane_rank(found)] = place;
         held += uint32_t(__popc(found));
         __syncwarp();
-        if (const uint32_t ahead = i + gridDim.x * kStageBlock; ahead < n && !items.list) asm volatile("prefetch.global.L2 [%0];" ::"l"(stage.hits.base + stage.hits.place(ahead, stage.hits.kLanes - 1)));
-        if (held < 32) continue;
+        if (const uint32_t ahead = i + 32; ahead < n && !items.list) asm volatile("prefetch.global.L2 [%0];" ::"l"(stage.hits.base + stage.hits.place(ahead, stage.hits.kLanes - 1)));
+        if (held < 32) return;
         held -= 32;
         const uint32_t next = mine[held + lane];
         __syncwarp();
         stage(next);
-    }
+    });
     __syncwarp();
     if (lane < held) stage(mine[lane]);
 }
@@ -149,12 +182,16 @@ concept Filtered = requires(const Stage& stage) { stage.relevant(0u); };
 template <class Stage>
 __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>()) launch_filtered(const __grid_constant__ Stage stage, const Items all) {
     constexpr uint32_t kMost = 8 * kStageBlock;
-    __shared__ uint32_t relevant[kMost], count;
+    __shared__ uint32_t relevant[kMost], count, taken;
     const uint32_t n = all.size();
     const Items items = all.of(n);
     const uint32_t stretch = min(kMost, (n / gridDim.x / kStageBlock + 1) * kStageBlock);
-    for (uint32_t first = blockIdx.x * stretch; first < n; first += gridDim.x * stretch) {
-        if (threadIdx.x == 0) count = 0;
+    for (uint32_t first = blockIdx.x * stretch; first < n; first = gridDim.x * stretch + taken) {
+        uint32_t next = n;
+        if (threadIdx.x == 0) {
+            count = 0;
+            if (stretch == kMost) next = add_to(&items.counter->next, stretch);
+        }
         __syncthreads();
         for (uint32_t i = first + threadIdx.x; i < min(n, first + stretch); i += kStageBlock) {
             const uint32_t place = items.place(i);
@@ -162,6 +199,7 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
         }
         __syncthreads();
         for (uint32_t i = threadIdx.x; i < count; i += kStageBlock) stage.connect(relevant[i]);
+        if (threadIdx.x == 0) taken = next;
         __syncthreads();
     }
 }
@@ -173,14 +211,15 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coheren
     static_assert(!Stage::kAnyHit);
     const uint32_t n = all.size();
     const Items items = all.of(n);
-    for (uint32_t i = blockIdx.x * kTraceBlock + threadIdx.x; i < n; i += gridDim.x * kTraceBlock) {
+    in_turns(n, &items.counter->next, [&](uint32_t i) {
+        if (i >= n) return;
         const uint32_t place = items.place(i);
         Ray ray;
-        if (!items.take(place) || !stage.fetch(place, ray)) continue;
+        if (!items.take(place) || !stage.fetch(place, ray)) return;
         Hit hit;
         tracer.template closest<Set::value>(stage.scene, ray, hit);
         stage.finish(place, hit);
-    }
+    });
 }
 
 /// Camera rays, traced as soon as they are made. They are in memory for the stages that follow; each knows its place, since adding to a counter takes longer than tracing it.
@@ -189,9 +228,9 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
     launch_camera_rays(const __grid_constant__ Generate generate, const __grid_constant__ Stage stage, const Tracer tracer, uint32_t slots, const WaveState* state) {
     const uint32_t n = slots * state->samples;
     if (blockIdx.x == 0 && threadIdx.x == 0) stage.rays.counter->count = generate.wave.active_before(n);
-    for (uint32_t i = blockIdx.x * kTraceBlock + threadIdx.x; i < n; i += gridDim.x * kTraceBlock) {
+    in_turns(n, &stage.rays.counter->next, [&](uint32_t i) {
         auto item = decltype(stage.rays.load(0)){};
-        if (!generate.make(i, item)) continue;
+        if (i >= n || !generate.make(i, item)) return;
         const uint32_t place = generate.wave.active_before(i);
         if constexpr (requires { item.kKnownLane; })
             stage.rays.store_but(place, item.kKnownLane, item);
@@ -201,7 +240,7 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
         Hit hit = {0.0f, 0.0f, 0.0f, kNone};
         if (stage.fetch(item, ray)) tracer.template closest<Set::value>(stage.scene, ray, hit);
         stage.finish(place, hit);
-    }
+    });
 }
 
 /// Rays by persistent threads.
@@ -297,6 +336,7 @@ __global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, 
     if (out) out->count = counter->size();
     record->add(counter ? counter->items() : slots * (samples ? samples : state->samples), state->depth, now - *clock);
     if (counter && !keep) counter->finish();
+    (counter ? counter->next : state->next) = 0;
     *clock = now;
 }
 

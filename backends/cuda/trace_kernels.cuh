@@ -132,7 +132,8 @@ template <Features F, bool AnyHit, class Tracer, class Fetch, class Finish>
 __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Finish finish, const uint32_t* count,
                                  uint32_t* next_ray, TraceTuning tuning) {
     constexpr uint32_t kWarp = 0xffffffffu;
-    const uint32_t ray_count = *count;
+    // Of many rays a warp takes more at a time, since all warps add to the counter, one after the other. What is visible or not is known so fast that waiting for it shows earlier.
+    const uint32_t ray_count = *count, per_thread = ray_count / (gridDim.x * blockDim.x), stretch = per_thread >= 32 ? 128 : AnyHit && per_thread >= 16 ? 64 : 32;
     Walk<Tracer, AnyHit> walk;
     typename Walk<Tracer, AnyHit>::Entry stack[Walk<Tracer, AnyHit>::kEntries];
     Ray ray = {};
@@ -156,9 +157,9 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
             const uint32_t wanted = uint32_t(__popc(idle)), kept = chunk_end - chunk;
             uint32_t fresh = chunk;
             if (wanted > kept) {
-                if ((threadIdx.x & 31u) == 0) fresh = atomicAdd(next_ray, 32u);
+                if ((threadIdx.x & 31u) == 0) fresh = atomicAdd(next_ray, stretch);
                 fresh = __shfl_sync(kWarp, fresh, 0);
-                chunk_end = fresh + 32u;
+                chunk_end = fresh + stretch;
                 fresh -= kept;
             }
             const uint32_t rank = lane_rank(idle);
