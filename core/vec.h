@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <type_traits>
 
 #include "core/hd.h"
 
@@ -66,6 +67,19 @@ AMBILUX_HD float max(float a, float b) { return fmaxf(a, b); }
 AMBILUX_HD float min(float a, float b) { return a < b || b != b ? a : b; }
 AMBILUX_HD float max(float a, float b) { return a > b || b != b ? a : b; }
 #endif
+/// Of other types exactly: without these, numbers of 32 bits would be converted to floats, which tell 24 of them apart.
+template <class T>
+    requires std::is_arithmetic_v<T>
+AMBILUX_HD T min(T a, T b) { return b < a ? b : a; }
+template <class T>
+    requires std::is_arithmetic_v<T>
+AMBILUX_HD T max(T a, T b) { return a < b ? b : a; }
+template <class A, class B>
+    requires(std::is_arithmetic_v<A> && std::is_arithmetic_v<B> && !std::is_same_v<A, B>)
+void min(A, B) = delete;
+template <class A, class B>
+    requires(std::is_arithmetic_v<A> && std::is_arithmetic_v<B> && !std::is_same_v<A, B>)
+void max(A, B) = delete;
 AMBILUX_HD float max_component(Vec3f a) { return max(a.x, max(a.y, a.z)); }
 AMBILUX_HD float min_component(Vec3f a) { return min(a.x, min(a.y, a.z)); }
 AMBILUX_HD Vec3f min(Vec3f a, Vec3f b) { return {min(a.x, b.x), min(a.y, b.y), min(a.z, b.z)}; }

@@ -428,26 +428,28 @@ TEST_CASE("turns: launches begin at the first item, also over a queue that is ke
         DeviceBuffer<WaveState> state(1);
         DeviceBuffer<StageRecord> records(kStageCount);
         DeviceBuffer<uint64_t> clock(1);
-        DeviceBuffer<uint32_t> visits(n);
-        state.zero(), records.zero(), clock.zero(), visits.zero();
+        state.zero(), records.zero(), clock.zero();
         const Queue<Word> queue = {unused.data(), counter.data(), n};  // of which only the counter is used
         const OwnedOrder owned({}, 0);
         CudaExecutor executor(nullptr, {}, state.data(), records.data(), clock.data(), SceneView{}, owned.order);
-        const auto refill = [&] { cuda_check(cudaMemcpy(&counter.data()->count, &n, sizeof n, cudaMemcpyHostToDevice), "count"); };
-        executor.run_keeping(StageId::shade, Mark{visits.data()}, queue);
-        executor.run_keeping(StageId::shade, Mark{visits.data()}, queue);
-        executor.run(StageId::shade, Mark{visits.data()}, queue);
-        CHECK(counter.download()[0].count == 0);
-        refill();
-        executor.run(StageId::shade, MarkWithStrides{{visits.data()}}, queue);
-        for (int launch = 0; launch < 2; ++launch) {
-            refill();
-            executor.run(StageId::connect_vertices, MarkSome{{visits.data()}}, queue);
-            executor.run_slots(StageId::develop, Mark{visits.data()}, n, 1);
+        DeviceBuffer<uint32_t> visits(n);
+        const auto check = [&](const char* what, uint32_t times, uint32_t every, auto launch) {
+            INFO(what);
+            visits.zero();
+            cuda_check(cudaMemcpy(&counter.data()->count, &n, sizeof n, cudaMemcpyHostToDevice), "count");
+            for (uint32_t k = 0; k < times; ++k) launch();
+            const std::vector<uint32_t> seen = visits.download();
+            uint64_t wrong = 0;
+            for (uint32_t i = 0; i < n; ++i) wrong += seen[i] != (i % every == 0 ? times : 0);
+            CHECK(wrong == 0);
+        };
+        for (int repeat = 0; repeat < 5; ++repeat) {
+            check("items", 3, 1, [&] { executor.run_keeping(StageId::shade, Mark{visits.data()}, queue); });
+            check("items, for the last time", 1, 1, [&] { executor.run(StageId::shade, Mark{visits.data()}, queue); });
+            CHECK(counter.download()[0].count == 0);
+            check("strides", 1, 1, [&] { executor.run(StageId::shade, MarkWithStrides{{visits.data()}}, queue); });
+            check("filtered", 1, 3, [&] { executor.run(StageId::connect_vertices, MarkSome{{visits.data()}}, queue); });
+            check("slots", 3, 1, [&] { executor.run_slots(StageId::develop, Mark{visits.data()}, n, 1); });
         }
-        const std::vector<uint32_t> seen = visits.download();
-        uint64_t wrong = 0;
-        for (uint32_t i = 0; i < n; ++i) wrong += seen[i] != (i % 3 == 0 ? 8u : 6u);
-        CHECK(wrong == 0);
     }
 }
