@@ -178,7 +178,7 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
 template <class Stage>
 concept Filtered = requires(const Stage& stage) { stage.relevant(0u); };
 
-/// A block looks through a stretch of items first, so that its warps are full of those that matter.
+/// A block looks through a stretch of items first, so that its warps are full of those that matter. Blocks take stretches in turns, too.
 template <class Stage>
 __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>()) launch_filtered(const __grid_constant__ Stage stage, const Items all) {
     constexpr uint32_t kMost = 8 * kStageBlock;
