@@ -67,7 +67,7 @@ AMBILUX_HD float max(float a, float b) { return fmaxf(a, b); }
 AMBILUX_HD float min(float a, float b) { return a < b || b != b ? a : b; }
 AMBILUX_HD float max(float a, float b) { return a > b || b != b ? a : b; }
 #endif
-/// Of other types exactly: without these, numbers of 32 bits would be converted to floats, which tell 24 of them apart.
+/// Of other types, exactly: without these, numbers of 32 bits would be converted to floats, which keep 24.
 template <class T>
     requires std::is_arithmetic_v<T>
 AMBILUX_HD T min(T a, T b) { return b < a ? b : a; }

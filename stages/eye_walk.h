@@ -247,7 +247,7 @@ struct PairedVertex {
 template <Features F>
 struct ConnectVertices {
     static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : 4;
-    static constexpr bool kStrides = true;  ///< on a device threads do not take pairs in turns: 1.17 of the time (docs/performance.md)
+    static constexpr bool kStrides = true;  ///< pairs that are not filtered are not taken in turns on a device: 1.17 of the time (docs/performance.md)
 
     SceneView scene;
     Wave wave;
