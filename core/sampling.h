@@ -12,6 +12,18 @@ AMBILUX_HD void sin_cos_octant(float x, float& sine, float& cosine) {
     cosine = 1.0f + x2 * (-0.5f + x2 * (1.0f / 24 + x2 * (-1.0f / 720 + x2 * (1.0f / 40320))));
 }
 
+/// Sine and cosine of 2 pi t, t in [0,1].
+AMBILUX_HD void sin_cos_turns(float t, float& sine, float& cosine) {
+    const float quarter = floorf(4.0f * t + 0.5f);
+    float s, c;
+    sin_cos_octant(2.0f * kPi * (t - 0.25f * quarter), s, c);
+    const uint32_t k = uint32_t(quarter);
+    sine = k & 1u ? c : s;
+    cosine = k & 1u ? s : c;
+    if (k & 2u) sine = -sine;
+    if ((k + 1u) & 2u) cosine = -cosine;
+}
+
 /// Uniform point of the unit disk, concentric map (Shirley and Chiu 1997). Density 1/pi per area.
 AMBILUX_HD Vec2f square_to_disk(Vec2f u) {
     const float a = 2.0f * u.x - 1.0f, b = 2.0f * u.y - 1.0f;
@@ -32,15 +44,19 @@ AMBILUX_HD Vec3f square_to_cosine_hemisphere(Vec2f u) {
 
 /// Uniform direction. Density 1/(4 pi) per solid angle.
 AMBILUX_HD Vec3f square_to_sphere(Vec2f u) {
-    const float z = 1.0f - 2.0f * u.x, r = safe_sqrt(1.0f - z * z), phi = 2.0f * kPi * u.y;
-    return {r * cosf(phi), r * sinf(phi), z};
+    const float z = 1.0f - 2.0f * u.x, r = safe_sqrt(1.0f - z * z);
+    float sine, cosine;
+    sin_cos_turns(u.y, sine, cosine);
+    return {r * cosine, r * sine, z};
 }
 
 /// Uniform direction in the cone around +z. Density 1/(2 pi (1-cos_max)) per solid angle.
 AMBILUX_HD Vec3f square_to_cone(Vec2f u, float one_minus_cos_max) {
     const float v = u.x * one_minus_cos_max;  // 1 - cos(theta)
-    const float r = safe_sqrt(v * (2.0f - v)), phi = 2.0f * kPi * u.y;
-    return {r * cosf(phi), r * sinf(phi), 1.0f - v};
+    const float r = safe_sqrt(v * (2.0f - v));
+    float sine, cosine;
+    sin_cos_turns(u.y, sine, cosine);
+    return {r * cosine, r * sine, 1.0f - v};
 }
 
 /// Uniform barycentrics (b1, b2) of a triangle, square-root map (Turk 1990). Density 1/area per area.

@@ -2,6 +2,7 @@
 // Items are appended, or lie at the places of their paths (queues/order.h says what for).
 #pragma once
 
+#include <cstddef>
 #include <cstring>
 #include <type_traits>
 
@@ -83,6 +84,16 @@ struct Queue {
         Item item;
         memcpy(&item, lanes, sizeof(Item));
         return item;
+    }
+    /// The first member of an item, which is some lanes long.
+    AMBILUX_HD auto load_front(uint32_t i) const {
+        using Front = decltype(Item::front);
+        static_assert(offsetof(Item, front) == 0 && sizeof(Front) % sizeof(Lane) == 0);
+        Lane lanes[sizeof(Front) / sizeof(Lane)];
+        for (uint32_t k = 0; k < sizeof(Front) / sizeof(Lane); ++k) lanes[k] = base[place(i, k)];
+        Front front;
+        memcpy(&front, lanes, sizeof(Front));
+        return front;
     }
     AMBILUX_HD void store(uint32_t i, const Item& item) const { store_but(i, kLanes, item); }
     /// The same without lane `known`.

@@ -12,9 +12,6 @@ namespace ambilux {
 constexpr uint32_t kPairsPerLaunch = 8;
 constexpr uint32_t kVerticesForOnePair = 1u << 16;
 
-/// Eye vertices that draw neighbouring light vertices from a cache: the lanes of a warp.
-constexpr uint32_t kDrawsTogether = 32;
-
 struct BidirectionalPolicy {
     BidirectionalMis mis;
     uint32_t max_depth;       ///< segments; WalkBits::kMaxDepth stands for no limit

@@ -1,6 +1,7 @@
 // generate, shade, connect and connect_vertices of bidirectional path tracing: walks that start at the camera.
 #pragma once
 
+#include "core/warp.h"
 #include "stages/bidirectional_policy.h"
 #include "stages/generate.h"
 #include "stages/mis_weight.h"
@@ -59,7 +60,7 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
     if (w.depth >= policy.max_depth) return step;
     const RngKey key = wave.key(h.ray.path);
     if ((policy.next_event || policy.connect_vertices) && bsdf_is_smooth(z.scattering.bsdf)) {
-        step.vertex = pack_vertex(h, z, kNone);
+        step.vertex = pack_vertex(h, z);
         step.connectable = true;
         visit(z, step.vertex, key);
     }
@@ -72,47 +73,69 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
     return step;
 }
 
-/// Which of `size` light vertices the draw of an eye vertex finds: each with the same probability. On a device vertices that lie together in their queue draw together, from a random place of
-/// the cache on: what they load lies together too, and mostly was left by walks on one material.
-AMBILUX_HD uint32_t drawn_vertex(const Wave& wave, [[maybe_unused]] uint32_t vertex, [[maybe_unused]] uint32_t path, uint32_t depth, uint32_t draw, uint32_t size) {
+/// Which of `size` light vertices the draw of an eye vertex finds, whose walk has the random numbers `key`: each with the same probability. On a device threads of a warp that draw together find
+/// vertices that lie together, from a random place of the cache on: so does what they load, and mostly it was left by walks on one material.
+AMBILUX_HD uint32_t drawn_vertex(const RngKey& key, uint32_t depth, uint32_t draw, uint32_t size) {
+    const uint32_t block = cache_block(depth, draw);
 #if defined(__CUDA_ARCH__)
-    const RngKey key = {wave.seed, vertex / kDrawsTogether, wave.state->first_sample, Stream::eye};
-    const uint32_t at = mul_hi(random_bits(key, cache_block(depth, draw)).x, size) + vertex % kDrawsTogether;
+    const uint32_t together = __activemask(), rank = lane_rank(together);
+    const int first = __ffs(int(together)) - 1;
+    const RngKey shared = {key.seed, __shfl_sync(together, key.index, first), __shfl_sync(together, key.sample, first), key.stream};
+    const uint32_t at = mul_hi(random_bits(shared, __shfl_sync(together, block, first)).x, size) + rank;
     return at < size ? at : at % size;
 #else
-    return mul_hi(random_bits(wave.key(path), cache_block(depth, draw)).x, size);
+    return mul_hi(random_bits(key, block).x, size);
 #endif
 }
 
-/// Pairs of an eye vertex for one launch over `vertices` of them, from `next` on: a vertex of the light walk of its slot, or, over a cache, the number of draws that are left.
-AMBILUX_HD void push_pairs(const Wave& wave, const BidirectionalPolicy& policy, const LightVertices& light_vertices, uint32_t vertices, uint32_t vertex, uint32_t path, uint32_t depth, uint32_t next,
-                           const Queue<PairItem>& pairs) {
-    const uint32_t most = vertices < policy.one_pair_from ? policy.pairs_per_launch : 1;
-    if (policy.cache_draws > 0) {
+/// Goes through the light vertices that an eye vertex may be connected with.
+struct LightVertexSearch {
+    const SceneView& scene;
+    const BidirectionalPolicy& policy;
+    const LightVertices& light_vertices;
+    const RngKey& key;      ///< of the eye walk
+    uint32_t depth;         ///< of the eye vertex `z`
+    const SurfacePoint& z;
+    Vec3f z_wi;             ///< unit, to where its walk came from
+
+    /// The next one, kNone if there is none, from `next` on, which goes on: a vertex of the light walk of the same slot, or, over a cache, the number of draws that are left; kNone or 0: the end.
+    AMBILUX_HD uint32_t find(uint32_t& next) const {
+        const bool drawn = policy.cache_draws > 0;
         const uint32_t size = light_vertices.counter->size();
-        if (size == 0) return;
-        for (uint32_t pushed = 1; next > 0 && pushed <= most; ++pushed) {
-            --next;
-            const uint32_t light = drawn_vertex(wave, vertex, path, depth, next, size);
-            pairs.push({vertex, light, path, pushed == most && next > 0 ? next : kNone});
+        if (size == 0 || depth + 2 > policy.max_depth) next = kNone;
+        while (next != kNone) {
+            uint32_t light = next;
+            if (drawn) light = drawn_vertex(key, depth, --next, size);
+            const LightVertexFront y = light_vertices.load_front(light);
+            if (!drawn)
+                next = y.previous;
+            else if (next == 0)
+                next = kNone;
+            if (depth + y.side.depth() + 1 <= policy.max_depth && may_connect(scene, y, z, z_wi)) return light;
         }
-        return;
+        return kNone;
     }
-    for (uint32_t pushed = 0; next != kNone && pushed < most;) {
-        const uint32_t light = next;
-        const VertexItem y = light_vertices.load(light);
-        next = y.previous;
-        if (depth + y.bits.depth() + 1 > policy.max_depth) continue;
-        ++pushed;
-        pairs.push({vertex, light, path, pushed == most ? next : kNone});
+};
+
+/// Pairs of the vertex that `search` is for, for one launch over `vertices` of them, from `next` on. place(): of the vertex in its queue, asked once and only if there is a pair.
+template <class Place>
+AMBILUX_HD void push_pairs(const LightVertexSearch& search, uint32_t vertices, uint32_t path, uint32_t next, const Queue<PairItem>& pairs, Place place) {
+    uint32_t light = search.find(next);
+    if (light == kNone) return;
+    const uint32_t vertex = place();
+    for (uint32_t left = vertices < search.policy.one_pair_from ? search.policy.pairs_per_launch : 1; light != kNone;) {
+        const bool last = --left == 0;
+        const uint32_t following = last ? kNone : search.find(next);
+        pairs.push({vertex, light, path, last ? next : kNone});
+        light = following;
     }
 }
 
-/// Candidate of the eye vertex `z`, which `item` stands for, and light vertex `light`, worth `scale` times their product.
-template <Features F>
-AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const VertexItem& item, const WalkVertex& z, const VertexItem& light, float scale,
-                                uint32_t which, const ConnectOutlet& candidates, StageRecord* record) {
-    const Strategy strategy = Strategy::make(light.bits.depth() + 1, item.bits.depth() + 1);
+/// Candidate of the eye vertex `z`, which `item` stands for, and light vertex `light`, worth `scale` times their product. `place`: of the light vertex in its cache.
+template <Features F, class Light>
+AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const VertexItem& item, const WalkVertex& z, const Light& light, float scale,
+                                uint32_t place, const ConnectOutlet& candidates, StageRecord* record) {
+    const Strategy strategy = Strategy::make(depth_of(light) + 1, item.bits.depth() + 1);
     if (!policy.singles.has(strategy)) return;
     const SurfacePoint at = surface_of<F>(scene, light);
     if (!may_connect(scene, at, -light.d, z.point, -item.d)) return;
@@ -122,7 +145,10 @@ AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Bidirectional
     c.value *= scale;
     if (!is_light(c.value, record) || is_zero(c.value)) return;
     uint32_t seed = 0;
-    if (F.opacity || policy.cull > 0.0f) seed = alpha_seed(key, item.bits.depth() + (which << WalkBits::kDepthBits), true);
+    if (F.opacity || policy.cull > 0.0f) {
+        const uint32_t which = policy.cache_draws > 0 ? WalkBits::kMaxDepth + place : depth_of(light);
+        seed = alpha_seed(key, item.bits.depth() + (which << WalkBits::kDepthBits), true);
+    }
     candidates.push({c.value, item.path, 1.0f, policy.others(c.others), seed, c.tmax, c.o, strategy, c.d, 0});
 }
 
@@ -131,7 +157,7 @@ AMBILUX_HD float draw_scale(const Wave& wave, const BidirectionalPolicy& policy,
     return float(light_vertices.counter->size()) / (float(wave.state->walks) * float(policy.cache_draws));
 }
 
-/// connect: an eye vertex samples an emitter (s = 1) and is paired with the vertices of its light walk.
+/// connect: an eye vertex samples an emitter (s = 1) and is paired with light vertices.
 template <Features F>
 struct EyeConnect {
     SceneView scene;
@@ -146,35 +172,26 @@ struct EyeConnect {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
-        pair(item, i, vertices.counter->size());
-        if (policy.next_event) take(unpack_vertex<F>(scene, item), item.throughput, wave.key(item.path), item.path, item.bits.depth());
+        const WalkVertex z = unpack_vertex<F>(scene, item);
+        const RngKey key = wave.key(item.path);
+        pair(item, z, key, vertices.counter->size(), [&] { return i; });
+        take(z, item.throughput, key, item.path, item.bits.depth());
     }
 
-    /// `count`: of vertices in this launch, or more.
-    AMBILUX_HD void pair(const VertexItem& item, uint32_t place, uint32_t count) const {
-        if (item.previous != kNone) push_pairs(wave, policy, light_vertices, count, place, item.path, item.bits.depth(), item.previous, pairs);
+    /// The first pairs of the vertex `z`, which `item` stands for. `count`: of vertices in this launch, or more; place(): in `vertices`.
+    template <class Place>
+    AMBILUX_HD void pair(const VertexItem& item, const WalkVertex& z, const RngKey& key, uint32_t count, Place place) const {
+        if (item.next != kNone) push_pairs(search(item, z, key), count, item.path, item.next, pairs, place);
     }
 
     /// connect_vertices for all that pair() would push, in the same order.
-    AMBILUX_HD void connect_all(const VertexItem& item, const WalkVertex& z) const {
-        const RngKey key = wave.key(item.path);
-        const uint32_t depth = item.bits.depth();
-        const auto connect = [&](const VertexItem& light, float scale, uint32_t which) {
-            pairs_record->count_item(depth);
-            if (depth + light.bits.depth() + 1 <= policy.max_depth) push_connection<F>(scene, policy, key, item, z, light, scale, which, candidates, pairs_record);
-        };
-        if (policy.cache_draws > 0) {
-            const uint32_t size = light_vertices.counter->size();
-            for (uint32_t draw = size > 0 ? policy.cache_draws : 0; draw-- > 0;) {
-                const uint32_t light = mul_hi(random_bits(key, cache_block(depth, draw)).x, size);
-                connect(light_vertices.load(light), draw_scale(wave, policy, light_vertices), WalkBits::kMaxDepth + light);
-            }
-            return;
-        }
-        for (uint32_t next = item.previous; next != kNone;) {
-            const VertexItem light = light_vertices.load(next);
-            next = light.previous;
-            if (depth + light.bits.depth() + 1 <= policy.max_depth) connect(light, 1.0f, light.bits.depth());
+    AMBILUX_HD void connect_all(const VertexItem& item, const WalkVertex& z, const RngKey& key) const {
+        const LightVertexSearch lights = search(item, z, key);
+        const float scale = policy.cache_draws > 0 ? draw_scale(wave, policy, light_vertices) : 1.0f;
+        uint32_t next = item.next;
+        for (uint32_t found = lights.find(next); found != kNone; found = lights.find(next)) {
+            pairs_record->count_item(lights.depth);
+            push_connection<F>(scene, policy, key, item, z, light_vertices.load(found), scale, found, candidates, pairs_record);
         }
     }
 
@@ -187,11 +204,16 @@ struct EyeConnect {
         if (!is_light(c.value, record) || is_zero(c.value)) return;
         candidates.push({c.value, path, 1.0f, policy.others(c.others), F.opacity || policy.cull > 0.0f ? alpha_seed(key, depth, true) : 0, c.tmax, c.o, Strategy::make(1, depth + 1), c.d, 0});
     }
+
+private:
+    AMBILUX_HD LightVertexSearch search(const VertexItem& item, const WalkVertex& z, const RngKey& key) const {
+        return {scene, policy, light_vertices, key, item.bits.depth(), z.point, -item.d};
+    }
 };
 
 template <Features F>
 struct EyeShade {
-    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : F.textures ? 3 : 4;  ///< 102, 168 or 128 registers instead of up to 232: more warps hide more latency (docs/performance.md)
+    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : 4;  ///< 102 or 128 registers instead of up to 232: more warps hide more latency (docs/performance.md)
     static constexpr bool kGathers = !F.several_bsdfs() && !F.has_environment();  ///< hits are in no order, and misses of no use
 
     SceneView scene;
@@ -216,20 +238,24 @@ struct EyeShade {
 
     /// True if the walk goes on with the ray `next`. `count`: of hits in this launch, or more.
     AMBILUX_HD bool take(const WalkHit& h, uint32_t count, WalkItem& next) const {
-        WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z, [[maybe_unused]] VertexItem& item, const RngKey& key) {
-            if (!policy.connect_in_shade) return;
+        const WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z, VertexItem& item, const RngKey& key) {
+            if (policy.connect_vertices) item.next = policy.cache_draws > 0 ? policy.cache_draws : last_vertex[h.ray.path];
+            const auto push = [&] { return vertices.push(item); };
+            if (!policy.connect_in_shade) {
+                push();
+                return;
+            }
             connect.take(z, h.ray.throughput, key, h.ray.path, h.ray.bits.depth());
 #if !defined(__CUDA_ARCH__)
-            if (!policy.at_once || !policy.connect_vertices) return;
-            item.previous = last_vertex[h.ray.path];
-            connect.connect_all(item, z);
+            if (policy.at_once) {
+                if (policy.connect_vertices) connect.connect_all(item, z, key);
+                return;
+            }
 #endif
+            const Warp warp;
+            connect.pair(item, z, key, count, push);
+            warp.meet();  // else lanes that search longer than others stay apart
         });
-        if (step.connectable && !policy.at_once && (policy.connect_vertices || !policy.connect_in_shade)) {
-            if (policy.connect_vertices) step.vertex.previous = policy.cache_draws > 0 ? policy.cache_draws : last_vertex[h.ray.path];
-            const uint32_t place = vertices.push(step.vertex);
-            if (policy.connect_in_shade) connect.pair(step.vertex, place, count);
-        }
         next = step.ray;
         return step.goes_on;
     }
@@ -238,7 +264,6 @@ struct EyeShade {
 /// An eye vertex that pairs one after the other may have in common.
 struct PairedVertex {
     uint32_t place = kNone;  ///< in the queue of its depth
-    bool unpacked = false;
     VertexItem item;
     WalkVertex vertex;
 };
@@ -247,7 +272,6 @@ struct PairedVertex {
 template <Features F>
 struct ConnectVertices {
     static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : 4;
-    static constexpr bool kStrides = true;  ///< pairs that are not filtered are not taken in turns on a device: 1.17 of the time (docs/performance.md)
 
     SceneView scene;
     Wave wave;
@@ -266,42 +290,19 @@ struct ConnectVertices {
         (*this)(i, eye);
     }
     AMBILUX_HD void operator()(uint32_t i, Memory& eye) const {
-        push_next(pairs.load(i));
-        connect(i, eye);
-    }
-    /// False if the pair brings nothing, told with less than a connection takes. Executors that can do so gather the others first, which then connect().
-    /// Among diffuse surfaces a connection takes little more than that.
-    AMBILUX_HD bool relevant(uint32_t i) const requires(F.bsdfs != bit(BsdfType::diffuse)) {
         const PairItem pair = pairs.load(i);
-        const VertexItem light = light_vertices.load(pair.light), item = vertices.load(pair.vertex);
-        push_next(pair);
-        return item.bits.depth() + light.bits.depth() + 1 <= policy.max_depth && may_connect(scene, surface_of<F>(scene, light), -light.d, surface_of<F>(scene, item), -item.d);
-    }
-    AMBILUX_HD void connect(uint32_t i) const {
-        Memory eye;
-        connect(i, eye);
-    }
-
-private:
-    AMBILUX_HD void push_next(const PairItem& pair) const {
-        if (pair.next != kNone) push_pairs(wave, policy, light_vertices, pairs.counter->size(), pair.vertex, pair.path, vertices.load(pair.vertex).bits.depth(), pair.next, rest);
-    }
-    AMBILUX_HD void connect(uint32_t i, Memory& eye) const {
-        const PairItem pair = pairs.load(i);
+        const LightVertexItem light = light_vertices.load(pair.light);  // before anything waits for the eye vertex
         if (eye.place != pair.vertex) {
             eye.place = pair.vertex;
-            eye.unpacked = false;
             eye.item = vertices.load(pair.vertex);
+            eye.vertex = unpack_vertex<F>(scene, eye.item);
         }
-        const VertexItem light = light_vertices.load(pair.light);  // before anything waits for the eye vertex
-        const VertexItem& item = eye.item;
-        const uint32_t depth = item.bits.depth();
-        if (depth + light.bits.depth() + 1 > policy.max_depth) return;
-        const bool drawn = policy.cache_draws > 0;
-        if (!eye.unpacked) eye.vertex = unpack_vertex<F>(scene, item);
-        eye.unpacked = true;
-        push_connection<F>(scene, policy, wave.key(item.path), item, eye.vertex, light, drawn ? draw_scale(wave, policy, light_vertices) : 1.0f,
-                           drawn ? WalkBits::kMaxDepth + pair.light : light.bits.depth(), candidates, record);
+        const RngKey key = wave.key(pair.path);
+        const Warp warp;
+        if (pair.next != kNone)
+            push_pairs({scene, policy, light_vertices, key, eye.item.bits.depth(), eye.vertex.point, -eye.item.d}, pairs.counter->size(), pair.path, pair.next, rest, [&] { return pair.vertex; });
+        warp.meet();
+        push_connection<F>(scene, policy, key, eye.item, eye.vertex, light, policy.cache_draws > 0 ? draw_scale(wave, policy, light_vertices) : 1.0f, pair.light, candidates, record);
     }
 };
 

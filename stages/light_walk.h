@@ -46,7 +46,7 @@ AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const B
     const WalkVertex y = light_vertex<F>(scene, policy.mis, w, h.prim, h.u, h.v);
     const RngKey key = wave.key(h.ray.path, Stream::light);
     if (bsdf_is_smooth(y.scattering.bsdf)) {
-        step.vertex = pack_vertex(h, y, kNone);
+        step.vertex = pack_vertex(h, y);
         step.connectable = true;
         visit(y, key);
     }
@@ -135,16 +135,13 @@ struct LightShade {
         // A path has at least one segment more than its light walk.
         WalkStep step = light_step<F>(scene, wave, policy, h, {0}, policy.max_depth - 1, record, [&](const WalkVertex& y, const RngKey& key) {
             if (to_camera && policy.connect_in_shade) connect.take(y, h.ray.throughput, key, h.ray.path, depth);
-        });
-        if (step.connectable && depth < policy.max_depth) {
-            if (to_camera && !policy.connect_in_shade) camera_vertices.push(step.vertex);
+            if (to_camera && !policy.connect_in_shade) camera_vertices.push(pack_vertex(h, y));
             if (policy.connect_vertices && depth + 2 <= policy.max_depth) {
                 const bool chained = policy.cache_draws == 0;
-                if (chained) step.vertex.previous = last_vertex[h.ray.path];
-                const uint32_t place = vertices.push(step.vertex);
+                const uint32_t place = vertices.push(pack_light_vertex(y, h.prim, h.u, h.v, h.ray.d, h.ray.throughput, depth, chained ? last_vertex[h.ray.path] : kNone));
                 if (chained) last_vertex[h.ray.path] = place;
             }
-        }
+        });
         next = step.ray;
         return step.goes_on;
     }

@@ -110,7 +110,7 @@ private:
     AMBILUX_HD RngKey key(const Path& path) const { return wave.key(path.slot, path.light ? Stream::light : Stream::eye); }
 
     /// A vertex past the capacity was not kept: the wave will be done again.
-    AMBILUX_HD bool connecting(const Path& path) const { return path.vertex.previous < light_vertices.capacity; }
+    AMBILUX_HD bool connecting(const Path& path) const { return path.vertex.next < light_vertices.capacity; }
 
     AMBILUX_HD void begin(Path& path, uint32_t slot) const {
         samples[slot] = {};
@@ -119,7 +119,7 @@ private:
         path.light = true;
         path.slot = slot;
         path.last = kNone;
-        path.vertex.previous = kNone;
+        path.vertex.next = kNone;
         if (policy.light_walks) begin_light_walk(path);
     }
 
@@ -217,11 +217,10 @@ private:
                                     : policy.next_event && policy.wants(1, w.depth + 1) && connect_next_event<F>(scene, policy.mis, x, w.throughput, u, c);
             if (made) test(path, c, k, w.depth, light ? StageId::connect_camera : StageId::connect);
             if (policy.connect_vertices && w.depth + 2 <= policy.max_depth) {
-                const VertexItem item = {w.d, WalkBits::make(w.depth, w.delta, w.eta_scale), hit.u, hit.v, hit.prim, path.last, w.throughput, path.slot, x.sums.dvcm, x.sums.dvc, {0, 0}};
                 if (light)
-                    path.last = light_vertices.push(item);
+                    path.last = light_vertices.push(pack_light_vertex(x, hit.prim, hit.u, hit.v, w.d, w.throughput, w.depth, path.last));
                 else
-                    path.vertex = item;
+                    path.vertex = {w.d, WalkBits::make(w.depth, w.delta, w.eta_scale), hit.u, hit.v, hit.prim, path.last, w.throughput, path.slot, x.sums.dvcm, x.sums.dvc, {0, 0}};
             }
         }
         // The last segment of an eye walk can bring emission only, and a path has one more than its light walk.
@@ -236,16 +235,17 @@ private:
     AMBILUX_HD void connect(Path& path) const {
         VertexItem& z = path.vertex;
         const uint32_t depth = z.bits.depth();
-        VertexItem y;
+        LightVertexItem y;
         do {
             if (!connecting(path)) return;
-            y = light_vertices.load(z.previous);
-            z.previous = y.previous;
-        } while (depth + y.bits.depth() + 1 > policy.max_depth);
-        if (!policy.wants(y.bits.depth() + 1, depth + 1)) return;
+            y = light_vertices.load(z.next);
+            z.next = y.front.previous;
+        } while (depth + y.front.side.depth() + 1 > policy.max_depth);
+        const uint32_t light_depth = y.front.side.depth();
+        if (!policy.wants(light_depth + 1, depth + 1)) return;
         WalkConnection c;
         if (connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, y), y.throughput, unpack_vertex<F>(scene, z), z.throughput, c))
-            test(path, c, key(path), depth + (y.bits.depth() << WalkBits::kDepthBits), StageId::connect_vertices);
+            test(path, c, key(path), depth + (light_depth << WalkBits::kDepthBits), StageId::connect_vertices);
     }
 };
 

@@ -193,7 +193,7 @@ struct StreamConnect {
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem light = pairs.load(i);
         const VertexItem eye = pool.eye.load(pool.slot_of(light.path));
-        push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path), eye, unpack_vertex<F>(pool.scene, eye), light, 1.0f, light.bits.depth(), candidates, record);
+        push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path), eye, unpack_vertex<F>(pool.scene, eye), light, 1.0f, kNone, candidates, record);
     }
 };
 

@@ -31,8 +31,7 @@ struct WalkHit {
     uint32_t pad;
 };
 
-/// A vertex of a walk to connect. Of a light walk: kept until the eye walk of the same slot is done. In the first half is what tells whether a connection can give light, and which vertex is
-/// next: memory moves 32 bytes at a time, and most pairs need no more.
+/// A vertex of a walk to connect.
 struct VertexItem {
     static constexpr uint32_t kPairedLanes = 4;
 
@@ -40,22 +39,71 @@ struct VertexItem {
     WalkBits bits;
     float u, v;
     uint32_t prim;
-    uint32_t previous; ///< light: the vertex before it in the same walk or kNone; eye: the light vertex to connect next, or the draws that are left
+    uint32_t next;     ///< of an eye walk: the light vertex to connect next, or the draws from a cache that are left; kNone: nothing
     Rgb throughput;
     uint32_t path;
     float dvcm, dvc;
     uint32_t pad[2];
 };
 
-/// Vertices of light walks, kept over a wave.
-using LightVertices = Queue<VertexItem, LaneOrder::together>;
+/// To which sides a vertex scatters, and its depth. Of the normal 8 bits of either coordinate of its octahedron are kept (Cigolle et al. 2014, "A Survey of Efficient Representations for
+/// Independent Unit Vectors").
+struct VertexSide {
+    uint32_t bits;
+
+    /// `n`: unit geometric normal on the side that the walk came from; `through`: the BSDF passes light to the other side too.
+    AMBILUX_HD static VertexSide make(uint32_t depth, Vec3f n, bool through) {
+        const float scale = 1.0f / (fabsf(n.x) + fabsf(n.y) + fabsf(n.z));
+        float x = n.x * scale, y = n.y * scale;
+        if (n.z < 0.0f) {
+            const float folded = copysignf(1.0f - fabsf(y), x);
+            y = copysignf(1.0f - fabsf(x), y);
+            x = folded;
+        }
+        return {depth | (through ? kThrough : 0u) | quantised(x) << 16 | quantised(y) << 24};
+    }
+    AMBILUX_HD uint32_t depth() const { return bits & WalkBits::kMaxDepth; }
+    /// False if nothing is scattered towards `w`, of any length. True for a few directions more: up to two degrees behind the surface.
+    AMBILUX_HD bool reaches(Vec3f w) const {
+        if (bits & kThrough) return true;
+        const float x = (float(bits >> 16 & 255u) - 127.0f) * (1.0f / 127.0f), y = (float(bits >> 24) - 127.0f) * (1.0f / 127.0f);
+        const float z = 1.0f - fabsf(x) - fabsf(y), fold = max(-z, 0.0f);
+        const float along = dot(Vec3f{x - copysignf(fold, x), y - copysignf(fold, y), z}, w);
+        return !(along <= 0.0f && sqr(along) >= sqr(kError) * length_squared(w));
+    }
+
+private:
+    static constexpr uint32_t kThrough = 1u << WalkBits::kDepthBits;
+    static constexpr float kError = 0.01f;  ///< of the vector whose coordinates have the sum 1: half a step, 1/254, in x and y, as much as both in z
+
+    AMBILUX_HD static uint32_t quantised(float x) { return uint32_t(clamp(x * 127.0f + 127.5f, 0.0f, 254.0f)); }
+};
+
+/// What tells whether a vertex of a light walk can be connected with a point, and which vertex is next: memory moves 32 bytes at a time, and most pairs need no more.
+struct LightVertexFront {
+    Vec3f p;
+    VertexSide side;
+    uint32_t prim;
+    uint32_t previous; ///< the vertex before it in the same walk or kNone
+    float u, v;
+};
+
+/// A vertex of a light walk, kept over a wave for connections.
+struct LightVertexItem {
+    LightVertexFront front;
+    Vec3f d;           ///< of the ray that met it
+    Rgb throughput;
+    float dvcm, dvc;
+};
+
+using LightVertices = Queue<LightVertexItem, LaneOrder::together>;
 
 /// An eye vertex and a vertex of a light walk to be connected.
 struct PairItem {
     uint32_t vertex;  ///< place of the eye vertex in the queue of its depth
     uint32_t light;   ///< place of the light vertex
     uint32_t path;
-    uint32_t next;    ///< what the pairs of the next launch start from (VertexItem::previous); kNone: no pairs are left, or another pair has it
+    uint32_t next;    ///< what the pairs of the next launch start from (VertexItem::next); kNone: no pairs are left, or another pair has it
 };
 
 /// Light for a place on the film, before it is weighted, and the ray that must be free.
@@ -82,7 +130,7 @@ struct SplatItem {
 
 /// What became of a walk at a hit: a vertex that connections may use, and the ray with which it goes on.
 struct WalkStep {
-    VertexItem vertex;  ///< VertexItem::previous is the caller's to set
+    VertexItem vertex;
     WalkItem ray;
     bool connectable = false, goes_on = false;
 };
@@ -118,28 +166,41 @@ AMBILUX_HD Walk unpack_walk(const WalkItem& item) {
     return w;
 }
 
-/// The vertex that a VertexItem stands for, which lies at `point`.
-template <Features F>
-AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& item, const SurfacePoint& point) {
-    WalkVertex v;
-    v.point = point;
-    v.scattering = make_scattering<F>(scene, v.point, -item.d);
-    v.sums = {item.dvcm, item.dvc};
-    v.first = item.bits.depth() == 1;
-    return v;
-}
+AMBILUX_HD uint32_t depth_of(const VertexItem& item) { return item.bits.depth(); }
+AMBILUX_HD uint32_t depth_of(const LightVertexItem& item) { return item.front.side.depth(); }
 
 template <Features F>
 AMBILUX_HD SurfacePoint surface_of(const SceneView& scene, const VertexItem& item) {
     return surface_at<F>(scene, item.prim, item.u, item.v);
 }
 template <Features F>
-AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& item) {
+AMBILUX_HD SurfacePoint surface_of(const SceneView& scene, const LightVertexItem& item) {
+    return surface_at<F>(scene, item.front.prim, item.front.u, item.front.v);
+}
+/// The vertex that an item of a walk stands for, which lies at `point`.
+template <Features F, class Item>
+AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const Item& item, const SurfacePoint& point) {
+    return {point, make_scattering<F>(scene, point, -item.d), {item.dvcm, item.dvc}, depth_of(item) == 1};
+}
+template <Features F, class Item>
+AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const Item& item) {
     return unpack_vertex<F>(scene, item, surface_of<F>(scene, item));
 }
 
-AMBILUX_HD VertexItem pack_vertex(const WalkHit& hit, const WalkVertex& v, uint32_t previous) {
-    return {hit.ray.d, hit.ray.bits, hit.u, hit.v, hit.prim, previous, hit.ray.throughput, hit.ray.path, v.sums.dvcm, v.sums.dvc, {0, 0}};
+AMBILUX_HD VertexItem pack_vertex(const WalkHit& hit, const WalkVertex& v) {
+    return {hit.ray.d, hit.ray.bits, hit.u, hit.v, hit.prim, kNone, hit.ray.throughput, hit.ray.path, v.sums.dvcm, v.sums.dvc, {0, 0}};
+}
+
+/// The vertex `y` of a light walk, met at (prim,u,v) by a ray along `d`, after `previous`.
+AMBILUX_HD LightVertexItem pack_light_vertex(const WalkVertex& y, uint32_t prim, float u, float v, Vec3f d, Rgb throughput, uint32_t depth, uint32_t previous) {
+    const bool in_front = dot(y.point.ng, d) < 0.0f;
+    return {{y.point.p, VertexSide::make(depth, in_front ? y.point.ng : -y.point.ng, bsdf_transmits(y.scattering.bsdf.type)), prim, previous, u, v}, d, throughput, y.sums.dvcm, y.sums.dvc};
+}
+
+/// False if no light can pass between the vertex `y` of a light walk and `z`, which a walk came to from `z_wi`: may_connect, in doubt true.
+AMBILUX_HD bool may_connect(const SceneView& scene, const LightVertexFront& y, const SurfacePoint& z, Vec3f z_wi) {
+    const Vec3f w = z.p - y.p;
+    return y.side.reaches(w) && may_scatter(scene, z, z_wi, -w);
 }
 
 }  // namespace ambilux

@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "scene/accel/cwbvh.h"
 #include "stages/splat_sums.h"
+#include "stages/walk_items.h"
 #include "tests/bidirectional_images.h"
 #include "transport/walk.h"
 
@@ -350,7 +351,11 @@ TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no li
             WalkConnection c;
             const bool brings = connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c) && !is_zero(c.value);
             lit += brings;
-            if (may_connect(view, y.point, y.scattering.wi_world, z.point, z.scattering.wi_world)) continue;
+            const LightVertexItem packed = pack_light_vertex(y, 0, 0.0f, 0.0f, -y.scattering.wi_world, {1, 1, 1}, 2, kNone);
+            if (may_connect(view, y.point, y.scattering.wi_world, z.point, z.scattering.wi_world)) {
+                REQUIRE(may_connect(view, packed.front, z.point, z.scattering.wi_world));
+                continue;
+            }
             ++turned_down;
             REQUIRE_FALSE(brings);
         }
@@ -358,5 +363,27 @@ TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no li
         CHECK(pairs > 1000);
         CHECK(lit > 100);
         CHECK(turned_down > pairs / 4);
+    }
+}
+
+TEST_CASE("The coarse normal of a light vertex turns down nothing in front of it, and what is more than two degrees behind") {
+    for (uint32_t i = 0; i < 400000; ++i) {
+        const RngKey key = {9, i, 0, Stream::eye};
+        const Vec4f u = random_floats(key, 0), v = random_floats(key, 1);
+        Vec3f n = square_to_sphere({u.x, u.y});
+        // Along edges of the octahedron and at its corners too.
+        if (i % 3 == 0) n = normalize(Vec3f{i % 2 ? n.x : 0.0f, i % 4 < 2 ? n.y : 1e-4f * n.y, i % 5 ? n.z : 0.0f});
+        if (!is_finite(n)) continue;
+        const uint32_t depth = 1 + i % WalkBits::kMaxDepth;
+        const VertexSide side = VertexSide::make(depth, n, false);
+        REQUIRE(side.depth() == depth);
+        // A direction at `angle` above the surface, of any length.
+        const Vec3f across = normalize(cross(n, square_to_sphere({v.x, v.y})));
+        const float angle = 0.1f * (2.0f * u.z - 1.0f), distance = std::exp2(60.0f * (u.w - 0.5f));
+        const Vec3f w = (across * std::cos(angle) + n * std::sin(angle)) * distance;
+        INFO("normal " << n.x << " " << n.y << " " << n.z << ", angle " << angle << ", distance " << distance);
+        if (dot(n, w) > 0.0f) REQUIRE(side.reaches(w));
+        if (angle < -0.035f) REQUIRE_FALSE(side.reaches(w));
+        REQUIRE(VertexSide::make(depth, n, true).reaches(w));
     }
 }

@@ -103,15 +103,17 @@ TEST_CASE("Launches of a device that hold one pair of a path and those that hold
                 if (t.name == "connect_vertices") return t.items;
             return uint64_t(0);
         };
-        CHECK(pairs(several) > 640u * 360u);
-        CHECK(pairs(several) == pairs(other));
+        CHECK(pairs(several) > 640u * 360u / 2);
+        // Which draws from a cache may be connected is left to chance; at worst the threads of a warp agree.
+        const double chance = s.variant == "lvc" ? 4 * std::sqrt(2.0 * 32 / double(pairs(several))) : 0.0;
+        CHECK(std::fabs(double(pairs(several)) - double(pairs(other))) <= chance * double(pairs(several)));
         for (const QueueStats& q : several.stats.queues) CHECK(q.overflow == 0);
         // The CPU has launches of several pairs only.
         s.backend = "cpu";
         s.deterministic = false;
         s.wave_size = 0;
         const double on_host = double(pairs(render_scene(scene, s, 1)));
-        CHECK(std::fabs(double(pairs(several)) - on_host) <= 2e-3 * on_host);
+        CHECK(std::fabs(double(pairs(several)) - on_host) <= (2e-3 + chance) * on_host);
     }
 }
 

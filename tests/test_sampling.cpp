@@ -19,6 +19,25 @@ TEST_CASE("sine and cosine of an octant are right to rounding") {
     CHECK(worst < 1e-7);
 }
 
+TEST_CASE("sine and cosine of turns are right to rounding, and exact at quarters") {
+    double worst = 0;
+    for (int i = 0; i <= 1 << 20; ++i) {
+        const float t = float(i) / (1 << 20);
+        float s, c;
+        sin_cos_turns(t, s, c);
+        const double angle = 2 * std::acos(-1.0) * double(t);
+        worst = std::max({worst, std::abs(s - std::sin(angle)), std::abs(c - std::cos(angle))});
+    }
+    CHECK(worst < 1.5e-7);
+    const float exact[5][2] = {{0, 1}, {1, 0}, {0, -1}, {-1, 0}, {0, 1}};
+    for (int k = 0; k < 5; ++k) {
+        float s, c;
+        sin_cos_turns(0.25f * float(k), s, c);
+        CHECK(s == exact[k][0]);
+        CHECK(c == exact[k][1]);
+    }
+}
+
 TEST_CASE("the concentric map is that of Shirley and Chiu") {
     double worst = 0;
     for (int i = 0; i <= 512; ++i) {

@@ -167,7 +167,7 @@ AMBILUX_HD Result with_bsdf(const Bsdf& b, Result otherwise, Op op) {
 namespace detail {
 
 template <Features F>
-AMBILUX_HD_APART BsdfValue bsdf_evaluate_apart(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
+AMBILUX_HD_APART BsdfValue bsdf_evaluate_apart(Bsdf b, Vec3f wi, Vec3f wo, TransportMode mode) {
     return with_bsdf<F>(b, no_scattering(), [&](const auto& bsdf) -> BsdfValue {
         if constexpr (requires { bsdf.evaluate(wi, wo, mode); }) return bsdf.evaluate(wi, wo, mode);
         else if constexpr (requires { bsdf.evaluate(wi, wo); }) return bsdf.evaluate(wi, wo);
@@ -175,9 +175,16 @@ AMBILUX_HD_APART BsdfValue bsdf_evaluate_apart(const Bsdf& b, Vec3f wi, Vec3f wo
     });
 }
 
+struct SampleOrNone {
+    BsdfSample sample;
+    bool some;
+};
+
 template <Features F>
-AMBILUX_HD_APART bool bsdf_sample_apart(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) {
-    return with_bsdf<F>(b, false, [&](const auto& bsdf) { return bsdf.sample(wi, u, mode, out); });
+AMBILUX_HD_APART SampleOrNone bsdf_sample_apart(Bsdf b, Vec3f wi, Vec3f u, TransportMode mode) {
+    SampleOrNone s;
+    s.some = with_bsdf<F>(b, false, [&](const auto& bsdf) { return bsdf.sample(wi, u, mode, s.sample); });
+    return s;
 }
 
 }  // namespace detail
@@ -205,8 +212,13 @@ AMBILUX_HD float bsdf_pdf(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode)
 /// Draws wo from uniform u in [0,1)³ (x: lobe). False when nothing is scattered; `out` is then unspecified.
 template <Features F>
 AMBILUX_HD bool bsdf_sample(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) {
-    if constexpr (F.bsdfs == bit(BsdfType::diffuse)) return Diffuse{b.reflectance_or_eta}.sample(wi, u, mode, out);
-    else return detail::bsdf_sample_apart<F>(b, wi, u, mode, out);
+    if constexpr (F.bsdfs == bit(BsdfType::diffuse)) {
+        return Diffuse{b.reflectance_or_eta}.sample(wi, u, mode, out);
+    } else {
+        const detail::SampleOrNone s = detail::bsdf_sample_apart<F>(b, wi, u, mode);
+        if (s.some) out = s.sample;
+        return s.some;
+    }
 }
 
 /// True if light can pass to the other side.

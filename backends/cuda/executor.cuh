@@ -76,8 +76,6 @@ public:
         const detail::Items items = prepare<MaterialOrder>(stage, queue);
         if constexpr (detail::Gathered<Stage>)
             detail::launch_gathered<<<blocks(detail::launch_gathered<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
-        else if constexpr (detail::Filtered<Stage>)
-            detail::launch_filtered<<<blocks(detail::launch_filtered<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
         else
             detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
         finish(id, queue.counter);

@@ -138,14 +138,10 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
         const uint32_t place = items.place(i);
         if (items.take(place)) stage(place);
     };
-    if constexpr (requires { requires Stage::kStrides; }) {
-        for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < n; i += gridDim.x * kStageBlock) each(i);
-    } else {
-        in_turns(n, &items.counter->next, [&](uint32_t i) {
-            each(i);
-            __syncwarp();  // lanes that part while they push would stay apart
-        });
-    }
+    in_turns(n, &items.counter->next, [&](uint32_t i) {
+        each(i);
+        __syncwarp();  // lanes that part while they push would stay apart
+    });
 }
 
 /// A warp gathers 32 hits that are some before it goes on with them.
@@ -172,36 +168,6 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
     });
     __syncwarp();
     if (lane < held) stage(mine[lane]);
-}
-
-/// Stages that can tell of an item, with less than it takes, that nothing will come of it.
-template <class Stage>
-concept Filtered = requires(const Stage& stage) { stage.relevant(0u); };
-
-/// A block looks through a stretch of items first, so that its warps are full of those that matter. Blocks take stretches in turns, too.
-template <class Stage>
-__global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>()) launch_filtered(const __grid_constant__ Stage stage, const Items all) {
-    constexpr uint32_t kMost = 8 * kStageBlock;
-    __shared__ uint32_t relevant[kMost], count, taken;
-    const uint32_t n = all.size();
-    const Items items = all.of(n);
-    const uint32_t stretch = min(kMost, (n / gridDim.x / kStageBlock + 1) * kStageBlock);
-    for (uint32_t first = blockIdx.x * stretch; first < n; first = gridDim.x * stretch + taken) {
-        uint32_t next = n;
-        if (threadIdx.x == 0) {
-            count = 0;
-            if (stretch == kMost) next = add_to(&items.counter->next, stretch);
-        }
-        __syncthreads();
-        for (uint32_t i = first + threadIdx.x; i < min(n, first + stretch); i += kStageBlock) {
-            const uint32_t place = items.place(i);
-            if (items.take(place) && stage.relevant(place)) relevant[atomicAdd(&count, 1u)] = place;
-        }
-        __syncthreads();
-        for (uint32_t i = threadIdx.x; i < count; i += kStageBlock) stage.connect(relevant[i]);
-        if (threadIdx.x == 0) taken = next;
-        __syncthreads();
-    }
 }
 
 /// Rays in the order of the queue, one after the other: best while neighbours stay together. `Set`: what traversal has to know of; less than the stage does, where

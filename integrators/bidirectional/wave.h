@@ -55,7 +55,7 @@ inline BidirectionalMemory lay_out_megakernel(Layout& layout, uint32_t slots, ui
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
-    m.light_vertices = layout.queue<VertexItem, LaneOrder::together>("light_vertices", m.counters, policy.connect_vertices ? kept : 0);
+    m.light_vertices = layout.queue<LightVertexItem, LaneOrder::together>("light_vertices", m.counters, policy.connect_vertices ? kept : 0);
     m.splats = layout.queue<SplatItem>("splats", m.counters, policy.splat ? kept + slots : 0);
     return m;
 }
@@ -112,7 +112,7 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
     lay_out_walks(layout, m, m.counters, slots, policy.queues);
     m.vertices = layout.queue<VertexItem>("vertices", m.counters, when((policy.connect_vertices && gathered) || !policy.connect_in_shade), fixed && !policy.connect_in_shade);
-    m.light_vertices = layout.queue<VertexItem, LaneOrder::together>("light_vertices", m.counters, when(policy.connect_vertices, kept));
+    m.light_vertices = layout.queue<LightVertexItem, LaneOrder::together>("light_vertices", m.counters, when(policy.connect_vertices, kept));
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged), fixed);
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat && gathered), fixed);
     m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, kept + slots));

@@ -91,23 +91,28 @@ struct MicrofacetDistribution {
     }
 
     /// Microfacet normal, visible from wi (wi.z > 0) or from the whole distribution in proportion to D·cos.
-    AMBILUX_HD_APART Vec3f sample(Vec3f wi, Vec2f u, bool visible) const {
-        if (!visible) return sample_all(u);
-        return type == Microfacets::ggx ? sample_visible_ggx(wi, u) : sample_visible_beckmann(wi, u);
+    AMBILUX_HD Vec3f sample(Vec3f wi, Vec2f u, bool visible) const { return sample_apart(*this, wi, u, visible); }
+    AMBILUX_HD_APART static Vec3f sample_apart(MicrofacetDistribution of, Vec3f wi, Vec2f u, bool visible) {
+        if (!visible) return of.sample_all(u);
+        return of.type == Microfacets::ggx ? of.sample_visible_ggx(wi, u) : of.sample_visible_beckmann(wi, u);
     }
 
     /// Walter et al. 2007, equations 28 and 35, on slopes so that anisotropy is a stretch.
     AMBILUX_HD Vec3f sample_all(Vec2f u) const {
         const float tan2 = type == Microfacets::ggx ? u.x / (1.0f - u.x) : -logf(1.0f - u.x);
-        const float r = sqrtf(tan2), phi = 2.0f * kPi * u.y;
-        return normalize({alpha_u * r * cosf(phi), alpha_v * r * sinf(phi), 1.0f});
+        const float r = sqrtf(tan2);
+        float sine, cosine;
+        sin_cos_turns(u.y, sine, cosine);
+        return normalize({alpha_u * r * cosine, alpha_v * r * sine, 1.0f});
     }
 
     /// Spherical caps (Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps", listing 3).
     AMBILUX_HD Vec3f sample_visible_ggx(Vec3f wi, Vec2f u) const {
         const Vec3f v = normalize({wi.x * alpha_u, wi.y * alpha_v, wi.z});
-        const float z = (1.0f - u.y) * (1.0f + v.z) - v.z, r = safe_sqrt(1.0f - z * z), phi = 2.0f * kPi * u.x;
-        const Vec3f h = Vec3f{r * cosf(phi), r * sinf(phi), z} + v;
+        const float z = (1.0f - u.y) * (1.0f + v.z) - v.z, r = safe_sqrt(1.0f - z * z);
+        float sine, cosine;
+        sin_cos_turns(u.x, sine, cosine);
+        const Vec3f h = Vec3f{r * cosine, r * sine, z} + v;
         const Vec3f m = {h.x * alpha_u, h.y * alpha_v, max(h.z, 0.0f)};
         const float l2 = length_squared(m);
         return l2 > 0.0f ? m * inverse_sqrt(l2) : Vec3f{0.0f, 0.0f, 1.0f};

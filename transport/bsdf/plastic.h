@@ -30,7 +30,8 @@ struct Plastic {
         return specular_probability(reflected, 1.0f - reflected, specular_sampling_weight);
     }
 
-    AMBILUX_HD_APART BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
+    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const { return formula_apart(*this, wi, wo); }
+    AMBILUX_HD BsdfValue formula(Vec3f wi, Vec3f wo) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
         const float fi = fresnel_dielectric(wi.z, ior).reflectance, fo = fresnel_dielectric(wo.z, ior).reflectance;
         const float cosine = wo.z * kInvPi;

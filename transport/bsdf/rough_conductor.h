@@ -12,7 +12,8 @@ struct RoughConductor {
     MicrofacetDistribution microfacets;
     bool sample_visible;
 
-    AMBILUX_HD_APART BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
+    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const { return formula_apart(*this, wi, wo); }
+    AMBILUX_HD BsdfValue formula(Vec3f wi, Vec3f wo) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
         float cosine;
         const Vec3f m = half_vector(wi, wo, cosine);

@@ -20,7 +20,8 @@ struct RoughDielectric {
         return {microfacets.type, microfacets.alpha_u * scale, microfacets.alpha_v * scale};
     }
 
-    AMBILUX_HD_APART BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode mode) const {
+    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode mode) const { return formula_apart(*this, wi, wo, mode); }
+    AMBILUX_HD BsdfValue formula(Vec3f wi, Vec3f wo, TransportMode mode) const {
         if (wi.z == 0.0f || wo.z == 0.0f) return no_scattering();
         // Signs are compared, not the product, which may underflow.
         const bool above = wi.z > 0.0f, reflects = above == (wo.z > 0.0f);

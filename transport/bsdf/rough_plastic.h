@@ -25,7 +25,8 @@ struct RoughPlastic {
         return specular_probability(1.0f - passed, passed, specular_sampling_weight);
     }
 
-    AMBILUX_HD_APART BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
+    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const { return formula_apart(*this, wi, wo); }
+    AMBILUX_HD BsdfValue formula(Vec3f wi, Vec3f wo) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
         float cos_m;
         const Vec3f m = half_vector(wi, wo, cos_m);

@@ -38,4 +38,10 @@ AMBILUX_HD bool smooth_sample(Vec3f wo, BsdfValue v, float eta, uint32_t flags, 
     return is_finite(out.weight);
 }
 
+/// bsdf.formula(...) for BSDFs whose evaluate() is long.
+template <class Bsdf, class... Rest>
+AMBILUX_HD_APART BsdfValue formula_apart(Bsdf bsdf, Rest... rest) {
+    return bsdf.formula(rest...);
+}
+
 }  // namespace ambilux

@@ -7,6 +7,7 @@
 // envmap_cell_weight gives weights that guarantee it.
 #pragma once
 
+#include "core/sampling.h"
 #include "scene/alias_table.h"
 #include "transport/emitter/directional.h"
 #include "transport/texture.h"
@@ -22,9 +23,10 @@ AMBILUX_HD Vec2f envmap_uv(Vec3f local) {
 
 /// Unit direction in the map's own frame of image coordinates.
 AMBILUX_HD Vec3f envmap_direction(Vec2f uv, float& sin_theta) {
-    const float theta = uv.y * kPi, phi = uv.x * (2.0f * kPi);
-    sin_theta = sinf(theta);
-    return {sinf(phi) * sin_theta, cosf(theta), -cosf(phi) * sin_theta};
+    float cos_theta, sin_phi, cos_phi;
+    sin_cos_turns(0.5f * uv.y, sin_theta, cos_theta);
+    sin_cos_turns(uv.x, sin_phi, cos_phi);
+    return {sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta};
 }
 
 /// Radiance at image coordinates, u periodic, v in [0,1].
