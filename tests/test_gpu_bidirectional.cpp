@@ -59,9 +59,9 @@ TEST_CASE("G5: bidirectional renders of both backends at equal seeds: pixels and
     }
 }
 
-/// Most by which the pairs of two runs differ that draw from a cache, `pairs` in one of them: which draws may be connected is left to chance, four standard deviations of it; at worst all
-/// threads of a warp agree.
-double drawn_difference(uint64_t pairs) { return 4 * std::sqrt(2.0 * 32 * double(pairs)); }
+/// Most by which pairs, or the shadow rays of such a render, differ between two runs that draw from a cache, `items` in one of them: four standard deviations. Which draws may be connected is
+/// left to chance, and threads of a warp draw together: over 16 seeds of glass the difference was 2.1 (pairs) and 2.4 (rays) times the root of their number, its mean 0 within that of the mean.
+double drawn_difference(uint64_t items) { return 4 * 2.5 * std::sqrt(double(items)); }
 
 TEST_CASE("The last walks of light and eye find the same light, several depths in a launch") {
     if (!device()) return;
@@ -80,8 +80,7 @@ TEST_CASE("The last walks of light and eye find the same light, several depths i
                     INFO(t.name);
                     // Connections of a cache are those of other vertices in every run; else walks differ where kernels round differently.
                     double most = 1e-5 * double(n.items) + 3;
-                    if (s.variant == "lvc" && t.name == "occlude") most = 5e-3 * double(n.items);
-                    if (s.variant == "lvc" && t.name == "connect_vertices") most = drawn_difference(n.items);
+                    if (s.variant == "lvc" && (t.name == "occlude" || t.name == "connect_vertices")) most = drawn_difference(n.items);
                     CHECK(std::fabs(double(t.items) - double(n.items)) <= most);
                     if (t.name == "shade" || t.name == "light_shade") CHECK(t.launches < n.launches);
                 }
