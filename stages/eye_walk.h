@@ -98,7 +98,7 @@ struct LightVertexSearch {
     const SurfacePoint& z;
     Vec3f z_wi;             ///< unit, to where its walk came from
 
-    /// The next one, kNone if there is none, from `next` on, which goes on: a vertex of the light walk of the same slot, or, over a cache, the number of draws that are left; kNone or 0: the end.
+    /// The next one, kNone if there is none, from `next` on, which goes on: a vertex of the light walk of the same slot, or, over a cache, the number of draws that are left.
     AMBILUX_HD uint32_t find(uint32_t& next) const {
         const bool drawn = policy.cache_draws > 0;
         const uint32_t size = light_vertices.counter->size();
