@@ -46,35 +46,27 @@ struct VertexItem {
     uint32_t pad[2];
 };
 
-/// To which sides a vertex scatters, and its depth. Of the normal 8 bits of either coordinate of its octahedron are kept (Cigolle et al. 2014, "A Survey of Efficient Representations for
-/// Independent Unit Vectors").
+/// To which sides a vertex scatters, and its depth. Of the normal 8 bits of either coordinate of its octahedral map are kept.
 struct VertexSide {
     uint32_t bits;
 
     /// `n`: unit geometric normal on the side that the walk came from; `through`: the BSDF passes light to the other side too.
     AMBILUX_HD static VertexSide make(uint32_t depth, Vec3f n, bool through) {
-        const float scale = 1.0f / (fabsf(n.x) + fabsf(n.y) + fabsf(n.z));
-        float x = n.x * scale, y = n.y * scale;
-        if (n.z < 0.0f) {
-            const float folded = copysignf(1.0f - fabsf(y), x);
-            y = copysignf(1.0f - fabsf(x), y);
-            x = folded;
-        }
-        return {depth | (through ? kThrough : 0u) | quantised(x) << 16 | quantised(y) << 24};
+        const Vec2f e = octahedral_encode(n);
+        return {depth | (through ? kThrough : 0u) | quantised(e.x) << 16 | quantised(e.y) << 24};
     }
     AMBILUX_HD uint32_t depth() const { return bits & WalkBits::kMaxDepth; }
     /// False if nothing is scattered towards `w`, of any length. True for a few directions more: up to two degrees behind the surface.
     AMBILUX_HD bool reaches(Vec3f w) const {
         if (bits & kThrough) return true;
-        const float x = (float(bits >> 16 & 255u) - 127.0f) * (1.0f / 127.0f), y = (float(bits >> 24) - 127.0f) * (1.0f / 127.0f);
-        const float z = 1.0f - fabsf(x) - fabsf(y), fold = max(-z, 0.0f);
-        const float along = dot(Vec3f{x - copysignf(fold, x), y - copysignf(fold, y), z}, w);
+        const Vec3f n = octahedral_decode({(float(bits >> 16 & 255u) - 127.0f) * (1.0f / 127.0f), (float(bits >> 24) - 127.0f) * (1.0f / 127.0f)});
+        const float along = dot(n, w);
         return !(along <= 0.0f && sqr(along) >= sqr(kError) * length_squared(w));
     }
 
 private:
     static constexpr uint32_t kThrough = 1u << WalkBits::kDepthBits;
-    static constexpr float kError = 0.01f;  ///< of the vector whose coordinates have the sum 1: half a step, 1/254, in x and y, as much as both in z
+    static constexpr float kError = 0.017f;  ///< half a step, 1/254, in x and y, as much as both in z, over the least length, 1/sqrt(3), of a vector whose coordinates have the sum 1
 
     AMBILUX_HD static uint32_t quantised(float x) { return uint32_t(clamp(x * 127.0f + 127.5f, 0.0f, 254.0f)); }
 };
