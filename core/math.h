@@ -110,11 +110,12 @@ struct Affine {
     }
 };
 
-/// Moves `p` off the surface with normal `ng` to the side of `w`, by the absolute error bound `p_error` of `p` (PBRT 4th ed., 6.8.6) and by what the sum may be rounded, instead of
-/// stepping to the next float afterwards. `p_error` bounds each coordinate; `ng` need not point to the side of `w`.
-AMBILUX_HD Vec3f offset_ray_origin(Vec3f p, Vec3f p_error, Vec3f ng, Vec3f w) {
-    const float d = dot(abs(ng), p_error + abs(p) * 0x1p-23f);
-    return p + ng * (dot(w, ng) < 0.0f ? -d : d);
-}
+/// How far from `p` rays must begin along the normal `ng` of its surface: the absolute error bound `p_error` of each coordinate of `p` (PBRT 4th ed., 6.8.6) and what the sum may be rounded,
+/// instead of stepping to the next float afterwards.
+AMBILUX_HD float ray_offset(Vec3f p, Vec3f p_error, Vec3f ng) { return dot(abs(ng), p_error + abs(p) * 0x1p-23f); }
+
+/// Moves `p` off the surface with normal `ng` to the side of `w`, by `offset` (ray_offset). `ng` need not point to that side.
+AMBILUX_HD Vec3f offset_ray_origin(Vec3f p, float offset, Vec3f ng, Vec3f w) { return p + ng * (dot(w, ng) < 0.0f ? -offset : offset); }
+AMBILUX_HD Vec3f offset_ray_origin(Vec3f p, Vec3f p_error, Vec3f ng, Vec3f w) { return offset_ray_origin(p, ray_offset(p, p_error, ng), ng, w); }
 
 }  // namespace ambilux

@@ -36,17 +36,14 @@ AMBILUX_HD uint32_t path_of(const Item& item) {
         return item.ray.path;
     else if constexpr (requires { item.path; })
         return item.path;
+    else if constexpr (requires { item.path(); })
+        return item.path();
     else
         return 0;
 }
 
-/// How the lanes of a queue's items lie in memory.
-enum class LaneOrder {
-    apart,     ///< lane k of item i at base[k * capacity + i]: for items that neighbouring threads take one after the other
-    together,  ///< at base[i * lanes + k]: for items that are taken in no order, since memory moves 32 bytes at least
-};
-
-/// Lanes of an item, the first ones, that lie two by two where the others are apart: items say so (kPairedLanes) that are written in order and read in another, sorted by their materials.
+/// Lanes of an item, the first ones, that lie two by two where the others are apart, since memory moves 32 bytes at least: items say so (kPairedLanes) that are written in order and read in another,
+/// sorted by their materials or drawn.
 template <class Item>
 constexpr uint32_t paired_lanes() {
     if constexpr (requires { Item::kPairedLanes; }) {
@@ -56,8 +53,8 @@ constexpr uint32_t paired_lanes() {
     return 0;
 }
 
-/// Fixed-capacity queue of trivially copyable items. A view: copies share the storage.
-template <class Item, LaneOrder Order = LaneOrder::apart>
+/// Fixed-capacity queue of trivially copyable items: lane k of item i is at base[k * capacity + i] but for paired ones. A view: copies share the storage.
+template <class Item>
 struct Queue {
     static_assert(std::is_trivially_copyable_v<Item> && sizeof(Item) % sizeof(Lane) == 0, "items are whole lanes of plain data");
     static constexpr uint32_t kLanes = sizeof(Item) / sizeof(Lane);
@@ -69,7 +66,6 @@ struct Queue {
     uint16_t* keys = nullptr;  ///< by place: what items are sorted by (queues/order.h), written by those who complete them. Null: looked up when they are sorted
 
     AMBILUX_HD size_t place(uint32_t i, uint32_t lane) const {
-        if constexpr (Order == LaneOrder::together) return size_t(i) * kLanes + lane;
         return lane < paired_lanes<Item>() ? size_t(lane & ~1u) * capacity + 2 * size_t(i) + (lane & 1u) : size_t(lane) * capacity + i;
     }
 
@@ -95,18 +91,19 @@ struct Queue {
         memcpy(&front, lanes, sizeof(Front));
         return front;
     }
-    AMBILUX_HD void store(uint32_t i, const Item& item) const { store_but(i, kLanes, item); }
+    /// `lanes`: of the item, the first ones, which are all that its readers look at.
+    AMBILUX_HD void store(uint32_t i, const Item& item, uint32_t lanes = kLanes) const { store_but(i, kLanes, item, lanes); }
     /// The same without lane `known`.
-    AMBILUX_HD void store_but(uint32_t i, uint32_t known, const Item& item) const {
-        Lane lanes[kLanes];
-        memcpy(lanes, &item, sizeof(Item));
+    AMBILUX_HD void store_but(uint32_t i, uint32_t known, const Item& item, uint32_t lanes = kLanes) const {
+        Lane all[kLanes];
+        memcpy(all, &item, sizeof(Item));
         for (uint32_t k = 0; k < kLanes; ++k)
-            if (k != known) base[place(i, k)] = lanes[k];
+            if (k != known && k < lanes) base[place(i, k)] = all[k];
     }
     /// Appends the item, or stores it at the place of its path, and returns the place. Past the capacity the item is lost and counted (QueueCounter::overflow).
-    AMBILUX_HD uint32_t push(const Item& item) const {
+    AMBILUX_HD uint32_t push(const Item& item, uint32_t lanes = kLanes) const {
         const uint32_t i = flags ? fixed_place(item) : take_place(&counter->count);
-        if (i < capacity) store(i, item);
+        if (i < capacity) store(i, item, lanes);
         return i;
     }
     /// The same, and places may stay empty: whoever goes through the queue skips items whose path is kNoPath. Kernels that call it open and close the stretches of their blocks.

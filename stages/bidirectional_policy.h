@@ -7,8 +7,8 @@
 
 namespace ambilux {
 
-/// Most pairs of one eye vertex in a launch of connect_vertices, and from how many vertices on a launch has enough to do with one of each: then neighbouring threads hold neighbouring
-/// vertices of as many light walks. The last depths, which few paths reach, need fewer launches with several.
+/// Most pairs of one eye vertex in a launch of connect_vertices, and from how many vertices on a launch holds one of each, unless there is room for several all the same: the fewer launches,
+/// the better.
 constexpr uint32_t kPairsPerLaunch = 8;
 constexpr uint32_t kVerticesForOnePair = 1u << 16;
 
@@ -20,8 +20,9 @@ struct BidirectionalPolicy {
     bool splat;               ///< light vertices are connected with the camera
     bool connect_vertices;
     uint32_t cache_draws;     ///< light vertices that an eye vertex draws from a cache of all; 0: those of the light walk of its slot
-    uint32_t one_pair_from;    ///< launches over as many vertices hold one pair of each (kVerticesForOnePair)
+    uint32_t one_pair_from;    ///< launches over as many vertices hold one pair of each: kVerticesForOnePair, or what the queue of pairs has room for
     uint32_t pairs_per_launch; ///< pairs of one eye vertex in a launch of connect_vertices; more than 1: sums of a path depend on the order of threads
+    uint32_t vertex_lanes;     ///< of a VertexItem that kernels use (vertex_lanes)
     bool next_event;
     bool count_hits;          ///< eye walks count the area emitters that they meet
     bool count_environment;   ///< eye walks count the environment

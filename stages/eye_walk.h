@@ -33,7 +33,7 @@ struct EyeGenerate {
     }
 };
 
-/// An eye walk at `h`: emission becomes a candidate, and visit(vertex, its item, random numbers of the walk) is called where connections may start.
+/// An eye walk at `h`: emission becomes a candidate, and visit(vertex, random numbers of the walk) is called where connections may start.
 template <Features F, class Visit>
 AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, const HitOutlet& candidates, StageRecord* record, Visit visit) {
     const auto emit = [&](Rgb radiance, float others) {
@@ -60,9 +60,7 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
     if (w.depth >= policy.max_depth) return step;
     const RngKey key = wave.key(h.ray.path);
     if ((policy.next_event || policy.connect_vertices) && bsdf_is_smooth(z.scattering.bsdf)) {
-        step.vertex = pack_vertex(h, z);
-        step.connectable = true;
-        visit(z, step.vertex, key);
+        visit(z, key);
     }
     const uint32_t depth = w.depth;
     if (depth + 1 == policy.max_depth && !policy.counts_last_segment()) return step;
@@ -95,8 +93,7 @@ struct LightVertexSearch {
     const LightVertices& light_vertices;
     const RngKey& key;      ///< of the eye walk
     uint32_t depth;         ///< of the eye vertex `z`
-    const SurfacePoint& z;
-    Vec3f z_wi;             ///< unit, to where its walk came from
+    const WalkVertex& z;
 
     /// The next one, kNone if there is none, from `next` on, which goes on: a vertex of the light walk of the same slot, or, over a cache, the number of draws that are left.
     AMBILUX_HD uint32_t find(uint32_t& next) const {
@@ -106,12 +103,12 @@ struct LightVertexSearch {
         while (next != kNone) {
             uint32_t light = next;
             if (drawn) light = drawn_vertex(key, depth, --next, size);
-            const LightVertexFront y = light_vertices.load_front(light);
+            const VertexFront y = light_vertices.load_front(light);
             if (!drawn)
-                next = y.previous;
+                next = y.link;
             else if (next == 0)
                 next = kNone;
-            if (depth + y.side.depth() + 1 <= policy.max_depth && may_connect(scene, y, z, z_wi)) return light;
+            if (depth + y.side.depth() + 1 <= policy.max_depth && may_connect(y, z)) return light;
         }
         return kNone;
     }
@@ -132,24 +129,23 @@ AMBILUX_HD void push_pairs(const LightVertexSearch& search, uint32_t vertices, u
 }
 
 /// Candidate of the eye vertex `z`, which `item` stands for, and light vertex `light`, worth `scale` times their product. `place`: of the light vertex in its cache.
-template <Features F, class Light>
-AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const VertexItem& item, const WalkVertex& z, const Light& light, float scale,
+template <Features F>
+AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const VertexItem& item, const WalkVertex& z, const VertexItem& light, float scale,
                                 uint32_t place, const ConnectOutlet& candidates, StageRecord* record) {
-    const Strategy strategy = Strategy::make(depth_of(light) + 1, item.bits.depth() + 1);
+    const uint32_t eye_depth = item.front.side.depth(), light_depth = light.front.side.depth();
+    const Strategy strategy = Strategy::make(light_depth + 1, eye_depth + 1);
     if (!policy.singles.has(strategy)) return;
-    const SurfacePoint at = surface_of<F>(scene, light);
-    if (!may_connect(scene, at, -light.d, z.point, -item.d)) return;
-    const WalkVertex y = unpack_vertex<F>(scene, light, at);
+    const WalkVertex y = unpack_vertex<F>(scene, light);
     WalkConnection c;
-    if (!connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
+    if (!may_connect(y, z) || !connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
     c.value *= scale;
     if (!is_light(c.value, record) || is_zero(c.value)) return;
     uint32_t seed = 0;
     if (F.opacity || policy.cull > 0.0f) {
-        const uint32_t which = policy.cache_draws > 0 ? WalkBits::kMaxDepth + place : depth_of(light);
-        seed = alpha_seed(key, item.bits.depth() + (which << WalkBits::kDepthBits), true);
+        const uint32_t which = policy.cache_draws > 0 ? WalkBits::kMaxDepth + place : light_depth;
+        seed = alpha_seed(key, eye_depth + (which << WalkBits::kDepthBits), true);
     }
-    candidates.push({c.value, item.path, 1.0f, policy.others(c.others), seed, c.tmax, c.o, strategy, c.d, 0});
+    candidates.push({c.value, item.path(), 1.0f, policy.others(c.others), seed, c.tmax, c.o, strategy, c.d, 0});
 }
 
 /// What a draw from a cache is worth: M vertices of N walks are in it, and k draws estimate the sum over a walk's vertices by M / (N k) times theirs.
@@ -165,6 +161,7 @@ struct EyeConnect {
     BidirectionalPolicy policy;
     Queue<VertexItem> vertices;
     LightVertices light_vertices;
+    const uint32_t* last_vertex;  ///< per slot: of its light walk; null: pairs are made elsewhere
     Queue<PairItem> pairs;
     ConnectOutlet candidates;
     StageRecord* record;
@@ -173,22 +170,24 @@ struct EyeConnect {
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
         const WalkVertex z = unpack_vertex<F>(scene, item);
-        const RngKey key = wave.key(item.path);
-        pair(item, z, key, vertices.counter->size(), [&] { return i; });
-        take(z, item.throughput, key, item.path, item.bits.depth());
+        const uint32_t path = item.path(), depth = item.front.side.depth();
+        const RngKey key = wave.key(path);
+        pair(z, key, path, depth, vertices.counter->size(), [&] { return i; });
+        take(z, item.throughput, key, path, depth);
     }
 
-    /// The first pairs of the vertex `z`, which `item` stands for. `count`: of vertices in this launch, or more; place(): in `vertices`.
+    /// The first pairs of the vertex `z`. `count`: of vertices in this launch, or more; place(): in `vertices`.
     template <class Place>
-    AMBILUX_HD void pair(const VertexItem& item, const WalkVertex& z, const RngKey& key, uint32_t count, Place place) const {
-        if (item.next != kNone) push_pairs(search(item, z, key), count, item.path, item.next, pairs, place);
+    AMBILUX_HD void pair(const WalkVertex& z, const RngKey& key, uint32_t path, uint32_t depth, uint32_t count, Place place) const {
+        const uint32_t first = first_pair(path);
+        if (first != kNone) push_pairs({scene, policy, light_vertices, key, depth, z}, count, path, first, pairs, place);
     }
 
     /// connect_vertices for all that pair() would push, in the same order.
     AMBILUX_HD void connect_all(const VertexItem& item, const WalkVertex& z, const RngKey& key) const {
-        const LightVertexSearch lights = search(item, z, key);
+        const LightVertexSearch lights = {scene, policy, light_vertices, key, item.front.side.depth(), z};
         const float scale = policy.cache_draws > 0 ? draw_scale(wave, policy, light_vertices) : 1.0f;
-        uint32_t next = item.next;
+        uint32_t next = first_pair(item.path());
         for (uint32_t found = lights.find(next); found != kNone; found = lights.find(next)) {
             pairs_record->count_item(lights.depth);
             push_connection<F>(scene, policy, key, item, z, light_vertices.load(found), scale, found, candidates, pairs_record);
@@ -206,8 +205,10 @@ struct EyeConnect {
     }
 
 private:
-    AMBILUX_HD LightVertexSearch search(const VertexItem& item, const WalkVertex& z, const RngKey& key) const {
-        return {scene, policy, light_vertices, key, item.bits.depth(), z.point, -item.d};
+    /// Where LightVertexSearch::find starts; kNone: there is nothing to connect with.
+    AMBILUX_HD uint32_t first_pair(uint32_t path) const {
+        if (!policy.connect_vertices || !last_vertex) return kNone;
+        return policy.cache_draws > 0 ? policy.cache_draws : last_vertex[path];
     }
 };
 
@@ -223,7 +224,6 @@ struct EyeShade {
     Queue<WalkItem> rays;
     HitOutlet candidates;
     Queue<VertexItem> vertices;
-    const uint32_t* last_vertex;
     StageRecord* record;
     EyeConnect<F> connect;
 
@@ -238,22 +238,22 @@ struct EyeShade {
 
     /// True if the walk goes on with the ray `next`. `count`: of hits in this launch, or more.
     AMBILUX_HD bool take(const WalkHit& h, uint32_t count, WalkItem& next) const {
-        const WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z, VertexItem& item, const RngKey& key) {
-            if (policy.connect_vertices) item.next = policy.cache_draws > 0 ? policy.cache_draws : last_vertex[h.ray.path];
-            const auto push = [&] { return vertices.push(item); };
+        const WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z, const RngKey& key) {
+            const auto push = [&] { return vertices.push(pack_vertex<F>(z, h), vertex_lanes<F>()); };
             if (!policy.connect_in_shade) {
                 push();
                 return;
             }
-            connect.take(z, h.ray.throughput, key, h.ray.path, h.ray.bits.depth());
+            const uint32_t depth = h.ray.bits.depth();
+            connect.take(z, h.ray.throughput, key, h.ray.path, depth);
 #if !defined(__CUDA_ARCH__)
             if (policy.at_once) {
-                if (policy.connect_vertices) connect.connect_all(item, z, key);
+                if (policy.connect_vertices) connect.connect_all(pack_vertex<F>(z, h), z, key);
                 return;
             }
 #endif
             const Warp warp;
-            connect.pair(item, z, key, count, push);
+            connect.pair(z, key, h.ray.path, depth, count, push);
             warp.meet();  // else lanes that search longer than others stay apart
         });
         next = step.ray;
@@ -291,7 +291,7 @@ struct ConnectVertices {
     }
     AMBILUX_HD void operator()(uint32_t i, Memory& eye) const {
         const PairItem pair = pairs.load(i);
-        const LightVertexItem light = light_vertices.load(pair.light);  // before anything waits for the eye vertex
+        const VertexItem light = light_vertices.load(pair.light);  // before anything waits for the eye vertex
         if (eye.place != pair.vertex) {
             eye.place = pair.vertex;
             eye.item = vertices.load(pair.vertex);
@@ -300,7 +300,7 @@ struct ConnectVertices {
         const RngKey key = wave.key(pair.path);
         const Warp warp;
         if (pair.next != kNone)
-            push_pairs({scene, policy, light_vertices, key, eye.item.bits.depth(), eye.vertex.point, -eye.item.d}, pairs.counter->size(), pair.path, pair.next, rest, [&] { return pair.vertex; });
+            push_pairs({scene, policy, light_vertices, key, eye.item.front.side.depth(), eye.vertex}, pairs.counter->size(), pair.path, pair.next, rest, [&] { return pair.vertex; });
         warp.meet();
         push_connection<F>(scene, policy, key, eye.item, eye.vertex, light, policy.cache_draws > 0 ? draw_scale(wave, policy, light_vertices) : 1.0f, pair.light, candidates, record);
     }

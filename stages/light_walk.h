@@ -37,7 +37,7 @@ AMBILUX_HD bool start_light(const SceneView& scene, const Wave& wave, const Bidi
     return policy.max_depth >= 2;
 }
 
-/// A light walk at `h`, where it may have `longest` segments in all. Its vertex is connectable wherever the BSDF is; visit(vertex, random numbers of the walk) is called there.
+/// A light walk at `h`, where it may have `longest` segments in all. visit(vertex, random numbers of the walk) is called where connections may start.
 template <Features F, class Visit>
 AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, LightWalkNumber number, uint32_t longest, StageRecord* record,
                                Visit visit) {
@@ -46,8 +46,6 @@ AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const B
     const WalkVertex y = light_vertex<F>(scene, policy.mis, w, h.prim, h.u, h.v);
     const RngKey key = wave.key(h.ray.path, Stream::light);
     if (bsdf_is_smooth(y.scattering.bsdf)) {
-        step.vertex = pack_vertex(h, y);
-        step.connectable = true;
         visit(y, key);
     }
     if (w.depth >= longest) return step;
@@ -89,7 +87,7 @@ struct ConnectCamera {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = vertices.load(i);
-        take(unpack_vertex<F>(scene, item), item.throughput, wave.key(item.path, Stream::light), item.path, item.bits.depth());
+        take(unpack_vertex<F>(scene, item), item.throughput, wave.key(item.path(), Stream::light), item.path(), item.front.side.depth());
     }
 
     AMBILUX_HD void take(const WalkVertex& y, Rgb throughput, const RngKey& key, uint32_t path, uint32_t depth) const {
@@ -135,10 +133,10 @@ struct LightShade {
         // A path has at least one segment more than its light walk.
         WalkStep step = light_step<F>(scene, wave, policy, h, {0}, policy.max_depth - 1, record, [&](const WalkVertex& y, const RngKey& key) {
             if (to_camera && policy.connect_in_shade) connect.take(y, h.ray.throughput, key, h.ray.path, depth);
-            if (to_camera && !policy.connect_in_shade) camera_vertices.push(pack_vertex(h, y));
+            if (to_camera && !policy.connect_in_shade) camera_vertices.push(pack_vertex<F>(y, h), vertex_lanes<F>());
             if (policy.connect_vertices && depth + 2 <= policy.max_depth) {
                 const bool chained = policy.cache_draws == 0;
-                const uint32_t place = vertices.push(pack_light_vertex(y, h.prim, h.u, h.v, h.ray.d, h.ray.throughput, depth, chained ? last_vertex[h.ray.path] : kNone));
+                const uint32_t place = vertices.push(pack_light_vertex<F>(y, {h.u, h.v, h.prim}, h.ray.d, h.ray.throughput, depth, chained ? last_vertex[h.ray.path] : kNone), vertex_lanes<F>());
                 if (chained) last_vertex[h.ray.path] = place;
             }
         });

@@ -75,6 +75,16 @@ struct Megakernel {
     }
 
 private:
+    /// The vertex of the eye walk that is being connected. Its surface is looked up for every pair: a thread has no registers for it.
+    struct EyeVertex {
+        Vec3f d;        ///< of the ray that met it
+        uint32_t depth;
+        SurfacePlace place;
+        uint32_t next;  ///< the light vertex to connect next
+        Rgb throughput;
+        MisSums sums;
+    };
+
     /// What a thread works on. Its next ray is the shadow ray if there is one, else, when the vertex has no connections left, that of the walk.
     struct Path {
         bool active;
@@ -85,7 +95,7 @@ private:
         uint32_t last;      ///< vertex of the light walk
         Walk walk;
         float tmax;         ///< of the walk's ray
-        VertexItem vertex;  ///< of the eye walk, with the light vertex to connect next
+        EyeVertex vertex;
         Ray shadow;
         Rgb value;          ///< arrives if the shadow ray is free:
         Vec2f film;         ///< there, from a light walk
@@ -202,7 +212,7 @@ private:
         const bool light = path.light;
         if (!light && policy.background_only) return;
         const RngKey k = key(path);
-        WalkVertex x = walk_vertex<F>(scene, w, hit.prim, hit.u, hit.v);
+        WalkVertex x = walk_vertex<F>(scene, w.d, w.depth, hit.prim, hit.u, hit.v);
         x.sums = light ? light_sums<F>(scene, policy.mis, w, x.point) : eye_sums(scene, policy.mis, w, x.point);
         const uint32_t emitter = scene.shapes[x.point.shape].emitter;
         if (!light && policy.count_hits && emitter != kNone && emitters_shown(w)) {
@@ -218,9 +228,9 @@ private:
             if (made) test(path, c, k, w.depth, light ? StageId::connect_camera : StageId::connect);
             if (policy.connect_vertices && w.depth + 2 <= policy.max_depth) {
                 if (light)
-                    path.last = light_vertices.push(pack_light_vertex(x, hit.prim, hit.u, hit.v, w.d, w.throughput, w.depth, path.last));
+                    path.last = light_vertices.push(pack_light_vertex<F>(x, {hit.u, hit.v, hit.prim}, w.d, w.throughput, w.depth, path.last), vertex_lanes<F>());
                 else
-                    path.vertex = {w.d, WalkBits::make(w.depth, w.delta, w.eta_scale), hit.u, hit.v, hit.prim, path.last, w.throughput, path.slot, x.sums.dvcm, x.sums.dvc, {0, 0}};
+                    path.vertex = {w.d, w.depth, {hit.u, hit.v, hit.prim}, path.last, w.throughput, x.sums};
             }
         }
         // The last segment of an eye walk can bring emission only, and a path has one more than its light walk.
@@ -233,19 +243,22 @@ private:
 
     /// The eye vertex and the next vertex of the light walk that is not too far from the light.
     AMBILUX_HD void connect(Path& path) const {
-        VertexItem& z = path.vertex;
-        const uint32_t depth = z.bits.depth();
-        LightVertexItem y;
+        EyeVertex& z = path.vertex;
+        uint32_t place, light_depth;
         do {
             if (!connecting(path)) return;
-            y = light_vertices.load(z.next);
-            z.next = y.front.previous;
-        } while (depth + y.front.side.depth() + 1 > policy.max_depth);
-        const uint32_t light_depth = y.front.side.depth();
-        if (!policy.wants(light_depth + 1, depth + 1)) return;
+            place = z.next;
+            const VertexFront front = light_vertices.load_front(place);
+            light_depth = front.side.depth();
+            z.next = front.link;
+        } while (z.depth + light_depth + 1 > policy.max_depth);
+        if (!policy.wants(light_depth + 1, z.depth + 1)) return;
+        WalkVertex eye = walk_vertex<F>(scene, z.d, z.depth, z.place.prim, z.place.u, z.place.v);
+        eye.sums = z.sums;
+        const VertexItem light = light_vertices.load(place);
         WalkConnection c;
-        if (connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, y), y.throughput, unpack_vertex<F>(scene, z), z.throughput, c))
-            test(path, c, key(path), depth + (light_depth << WalkBits::kDepthBits), StageId::connect_vertices);
+        if (connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, light), light.throughput, eye, z.throughput, c))
+            test(path, c, key(path), z.depth + (light_depth << WalkBits::kDepthBits), StageId::connect_vertices);
     }
 };
 

@@ -17,13 +17,13 @@ struct StreamPool {
     Wave wave;
     BidirectionalPolicy policy;
     uint32_t slots;
-    Queue<VertexItem> eye;      ///< by slot, not a queue: the vertex that the light walk is for; prim is kNone if it is for the camera only
+    Queue<VertexItem> eye;      ///< by slot, not a queue: the vertex that the light walk is for; its path is kNoPath if it is for the camera only
     Queue<WalkItem> pending;    ///< by slot: the ray with which the eye walk goes on; depth 0: it has ended
     Queue<WalkItem> rays;
     Lane* samples;              ///< per path
 
     AMBILUX_HD uint32_t slot_of(uint32_t path) const { return path % slots; }
-    AMBILUX_HD LightWalkNumber number_of(const VertexItem& vertex) const { return {vertex.bits.depth() - 1}; }
+    AMBILUX_HD LightWalkNumber number_of(const VertexItem& vertex) const { return {vertex.front.side.depth() - 1}; }
 
     /// Starts the first of the paths `path`, path + slots ... that has a pixel.
     AMBILUX_HD void begin(uint32_t path) const {
@@ -120,16 +120,18 @@ struct StreamEyeShade {
         const WalkHit h = hits.load(i);
         const BidirectionalPolicy& policy = pool.policy;
         const uint32_t depth = h.ray.bits.depth(), slot = pool.slot_of(h.ray.path);
-        WalkStep step = eye_step<F>(pool.scene, pool.wave, policy, h, candidates, record, [](const WalkVertex&, const VertexItem&, const RngKey&) {});
-        if (step.connectable) vertices.push(step.vertex);
+        VertexItem vertex = {};
+        vertex.front = {{}, VertexSide::of_depth(depth), {}, kNoPath};
+        bool connect = false;
+        WalkStep step = eye_step<F>(pool.scene, pool.wave, policy, h, candidates, record, [&](const WalkVertex& z, const RngKey&) {
+            const VertexItem item = pack_vertex<F>(z, h);
+            vertices.push(item, vertex_lanes<F>());
+            connect = policy.connect_vertices && depth + 2 <= policy.max_depth;
+            if (connect) vertex = item;
+        });
         if (!step.goes_on) step.ray.bits = {0};
         pool.pending.store(slot, step.ray);
-        const bool connect = policy.connect_vertices && step.connectable && depth + 2 <= policy.max_depth;
-        if (!connect) {
-            step.vertex.prim = kNone;
-            step.vertex.bits = h.ray.bits;
-        }
-        pool.eye.store(slot, step.vertex);
+        pool.eye.store(slot, vertex, vertex_lanes<F>());
         turns.push({h.ray.path, connect || (policy.splat && depth == 1) ? 1u : 0u, {0, 0}});
     }
 };
@@ -170,12 +172,12 @@ struct StreamLightShade {
         const uint32_t depth = h.ray.bits.depth();
         const bool splat = policy.splat && number.n == 0;
         // A path has one segment more than its light walk, and those of the eye walk if there is one.
-        const uint32_t longest = splat ? policy.max_depth - 1 : policy.max_depth - 1 - eye.bits.depth();
-        WalkStep step = light_step<F>(pool.scene, pool.wave, policy, h, number, longest, record, [](const WalkVertex&, const RngKey&) {});
-        if (step.connectable) {
-            if (splat && depth < policy.max_depth && policy.wants(depth + 1, 1)) camera_vertices.push(step.vertex);
-            if (eye.prim != kNone && depth + eye.bits.depth() + 1 <= policy.max_depth) pairs.push(step.vertex);
-        }
+        const uint32_t longest = splat ? policy.max_depth - 1 : policy.max_depth - 1 - eye.front.side.depth();
+        WalkStep step = light_step<F>(pool.scene, pool.wave, policy, h, number, longest, record, [&](const WalkVertex& y, const RngKey&) {
+            const VertexItem item = pack_vertex<F>(y, h);
+            if (splat && depth < policy.max_depth && policy.wants(depth + 1, 1)) camera_vertices.push(item, vertex_lanes<F>());
+            if (eye.path() != kNoPath && depth + eye.front.side.depth() + 1 <= policy.max_depth) pairs.push(item, vertex_lanes<F>());
+        });
         if (!step.goes_on) return pool.advance(path);
         step.ray.path |= kLightRay;
         pool.rays.push(step.ray);
@@ -192,8 +194,8 @@ struct StreamConnect {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem light = pairs.load(i);
-        const VertexItem eye = pool.eye.load(pool.slot_of(light.path));
-        push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path), eye, unpack_vertex<F>(pool.scene, eye), light, 1.0f, kNone, candidates, record);
+        const VertexItem eye = pool.eye.load(pool.slot_of(light.path()));
+        push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path()), eye, unpack_vertex<F>(pool.scene, eye), light, 1.0f, kNone, candidates, record);
     }
 };
 

@@ -31,25 +31,12 @@ struct WalkHit {
     uint32_t pad;
 };
 
-/// A vertex of a walk to connect.
-struct VertexItem {
-    static constexpr uint32_t kPairedLanes = 4;
-
-    Vec3f d;           ///< of the ray that met it
-    WalkBits bits;
-    float u, v;
-    uint32_t prim;
-    uint32_t next;     ///< of an eye walk: the light vertex to connect next, or the draws from a cache that are left; kNone: nothing
-    Rgb throughput;
-    uint32_t path;
-    float dvcm, dvc;
-    uint32_t pad[2];
-};
-
 /// To which sides a vertex scatters, and its depth. Of the normal 8 bits of either coordinate of its octahedral map are kept.
 struct VertexSide {
     uint32_t bits;
 
+    /// For whoever asks for the depth only.
+    AMBILUX_HD static VertexSide of_depth(uint32_t depth) { return {depth | kThrough}; }
     /// `n`: unit geometric normal on the side that the walk came from; `through`: the BSDF passes light to the other side too.
     AMBILUX_HD static VertexSide make(uint32_t depth, Vec3f n, bool through) {
         const Vec2f e = octahedral_encode(n);
@@ -71,31 +58,65 @@ private:
     AMBILUX_HD static uint32_t quantised(float x) { return uint32_t(clamp(x * 127.0f + 127.5f, 0.0f, 254.0f)); }
 };
 
-/// What tells whether a vertex of a light walk can be connected with a point, and which vertex is next: memory moves 32 bytes at a time, and most pairs need no more.
-struct LightVertexFront {
+/// What tells whether a vertex can be connected with a point, and which vertex is next: memory moves 32 bytes at a time, and most pairs need no more.
+struct VertexFront {
     Vec3f p;
     VertexSide side;
-    uint32_t prim;
-    uint32_t previous; ///< the vertex before it in the same walk or kNone
-    float u, v;
-};
-
-/// A vertex of a light walk, kept over a wave for connections.
-struct LightVertexItem {
-    LightVertexFront front;
     Vec3f d;           ///< of the ray that met it
-    Rgb throughput;
-    float dvcm, dvc;
+    uint32_t link;     ///< the path; of a vertex that is kept over a wave, the one before it in the same walk or kNone
 };
 
-using LightVertices = Queue<LightVertexItem, LaneOrder::together>;
+/// A point on a surface as hits name it.
+struct SurfacePlace {
+    float u, v;
+    uint32_t prim;
+};
+
+/// True if vertices hold all that a connection asks for; else their surfaces are looked up again, which takes less than twice the bytes where there are no textures (docs/performance.md).
+template <Features F>
+constexpr bool vertices_are_whole() {
+    return F.textures;
+}
+
+/// A vertex of a walk.
+struct VertexItem {
+    static constexpr uint32_t kPairedLanes = 8;
+
+    VertexFront front;
+    Rgb throughput;
+    float dvcm;
+    union {
+        SurfacePlace place;        ///< of a vertex that is not whole
+        Rgb specular_reflectance;  ///< of one that is (ScatteringParts), which has what follows `dvc` too
+    };
+    float dvc;
+    Vec3f ng;
+    float offset;                  ///< WalkVertex::offset
+    Vec3f n;
+    uint32_t record;
+    Vec3f tangent;
+    float alpha_u;
+    Rgb color;
+    float alpha_v;
+
+    AMBILUX_HD uint32_t path() const { return front.link; }
+};
+
+/// Lanes of a VertexItem that kernels of these features use.
+template <Features F>
+constexpr uint32_t vertex_lanes() {
+    return vertices_are_whole<F>() ? sizeof(VertexItem) / sizeof(Lane) : 4;
+}
+
+/// Vertices of light walks, kept over a wave.
+using LightVertices = Queue<VertexItem>;
 
 /// An eye vertex and a vertex of a light walk to be connected.
 struct PairItem {
     uint32_t vertex;  ///< place of the eye vertex in the queue of its depth
     uint32_t light;   ///< place of the light vertex
     uint32_t path;
-    uint32_t next;    ///< what the pairs of the next launch start from (VertexItem::next); kNone: no pairs are left, or another pair has it
+    uint32_t next;    ///< what the pairs of the next launch start from (first_pair); kNone: no pairs are left, or another pair has it
 };
 
 /// Light for a place on the film, before it is weighted, and the ray that must be free.
@@ -120,11 +141,10 @@ struct SplatItem {
     float others;      ///< what it was weighted by
 };
 
-/// What became of a walk at a hit: a vertex that connections may use, and the ray with which it goes on.
+/// What became of a walk at a hit: the ray with which it goes on.
 struct WalkStep {
-    VertexItem vertex;
     WalkItem ray;
-    bool connectable = false, goes_on = false;
+    bool goes_on = false;
 };
 
 AMBILUX_HD Ray ray_of(const WalkItem& r) { return {r.o, r.bits.depth() == 1 ? r.tmax : kInfinity, r.d, 0}; }
@@ -158,41 +178,62 @@ AMBILUX_HD Walk unpack_walk(const WalkItem& item) {
     return w;
 }
 
-AMBILUX_HD uint32_t depth_of(const VertexItem& item) { return item.bits.depth(); }
-AMBILUX_HD uint32_t depth_of(const LightVertexItem& item) { return item.front.side.depth(); }
-
+/// The vertex `v` at `place` that a ray along `d` met.
 template <Features F>
-AMBILUX_HD SurfacePoint surface_of(const SceneView& scene, const VertexItem& item) {
-    return surface_at<F>(scene, item.prim, item.u, item.v);
+AMBILUX_HD VertexItem pack_vertex(const WalkVertex& v, SurfacePlace place, Vec3f d, Rgb throughput, VertexSide side, uint32_t link) {
+    VertexItem item = {};
+    item.front = {v.point.p, side, d, link};
+    item.throughput = throughput;
+    item.dvcm = v.sums.dvcm;
+    item.dvc = v.sums.dvc;
+    if constexpr (vertices_are_whole<F>()) {
+        const ScatteringParts s = parts_of(v.scattering);
+        item.specular_reflectance = s.parameters.specular_reflectance;
+        item.ng = s.ng;
+        item.offset = v.offset;
+        item.n = s.n;
+        item.record = s.record;
+        item.tangent = s.tangent;
+        item.alpha_u = s.parameters.alpha_u;
+        item.color = s.parameters.color;
+        item.alpha_v = s.parameters.alpha_v;
+    } else {
+        item.place = place;
+    }
+    return item;
 }
+/// For connections of the path of `hit`.
 template <Features F>
-AMBILUX_HD SurfacePoint surface_of(const SceneView& scene, const LightVertexItem& item) {
-    return surface_at<F>(scene, item.front.prim, item.front.u, item.front.v);
+AMBILUX_HD VertexItem pack_vertex(const WalkVertex& v, const WalkHit& hit) {
+    return pack_vertex<F>(v, {hit.u, hit.v, hit.prim}, hit.ray.d, hit.ray.throughput, VertexSide::of_depth(hit.ray.bits.depth()), hit.ray.path);
 }
-/// The vertex that an item of a walk stands for, which lies at `point`.
-template <Features F, class Item>
-AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const Item& item, const SurfacePoint& point) {
-    return {point, make_scattering<F>(scene, point, -item.d), {item.dvcm, item.dvc}, depth_of(item) == 1};
-}
-template <Features F, class Item>
-AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const Item& item) {
-    return unpack_vertex<F>(scene, item, surface_of<F>(scene, item));
-}
-
-AMBILUX_HD VertexItem pack_vertex(const WalkHit& hit, const WalkVertex& v) {
-    return {hit.ray.d, hit.ray.bits, hit.u, hit.v, hit.prim, kNone, hit.ray.throughput, hit.ray.path, v.sums.dvcm, v.sums.dvc, {0, 0}};
-}
-
-/// The vertex `y` of a light walk, met at (prim,u,v) by a ray along `d`, after `previous`.
-AMBILUX_HD LightVertexItem pack_light_vertex(const WalkVertex& y, uint32_t prim, float u, float v, Vec3f d, Rgb throughput, uint32_t depth, uint32_t previous) {
+/// Of a light walk, after the vertex `previous`.
+template <Features F>
+AMBILUX_HD VertexItem pack_light_vertex(const WalkVertex& y, SurfacePlace place, Vec3f d, Rgb throughput, uint32_t depth, uint32_t previous) {
     const bool in_front = dot(y.point.ng, d) < 0.0f;
-    return {{y.point.p, VertexSide::make(depth, in_front ? y.point.ng : -y.point.ng, bsdf_transmits(y.scattering.bsdf.type)), prim, previous, u, v}, d, throughput, y.sums.dvcm, y.sums.dvc};
+    return pack_vertex<F>(y, place, d, throughput, VertexSide::make(depth, in_front ? y.point.ng : -y.point.ng, bsdf_transmits(y.scattering.bsdf.type)), previous);
 }
 
-/// False if no light can pass between the vertex `y` of a light walk and `z`, which a walk came to from `z_wi`: may_connect, in doubt true.
-AMBILUX_HD bool may_connect(const SceneView& scene, const LightVertexFront& y, const SurfacePoint& z, Vec3f z_wi) {
-    const Vec3f w = z.p - y.p;
-    return y.side.reaches(w) && may_scatter(scene, z, z_wi, -w);
+template <Features F>
+AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& item) {
+    WalkVertex v = {};
+    if constexpr (vertices_are_whole<F>()) {
+        v.point.p = item.front.p;
+        v.point.ng = item.ng;
+        v.offset = item.offset;
+        v.scattering = scattering_of<F>(scene, {item.ng, item.n, item.tangent, item.record, {item.color, item.alpha_u, item.specular_reflectance, item.alpha_v}}, -item.front.d);
+        v.first = item.front.side.depth() == 1;
+    } else {
+        v = walk_vertex<F>(scene, item.front.d, item.front.side.depth(), item.place.prim, item.place.u, item.place.v);
+    }
+    v.sums = {item.dvcm, item.dvc};
+    return v;
+}
+
+/// False if no light can pass between the vertex `y` of a light walk and `z`: may_connect of their vertices, in doubt true.
+AMBILUX_HD bool may_connect(const VertexFront& y, const WalkVertex& z) {
+    const Vec3f w = z.point.p - y.p;
+    return y.side.reaches(w) && may_scatter(z.scattering, -w);
 }
 
 }  // namespace ambilux

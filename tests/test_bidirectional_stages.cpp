@@ -139,8 +139,8 @@ struct Bench {
     }
 };
 
-template <class Item, LaneOrder Order>
-void edit(const Queue<Item, Order>& queue, uint32_t i, const std::function<void(Item&)>& f) {
+template <class Item>
+void edit(const Queue<Item>& queue, uint32_t i, const std::function<void(Item&)>& f) {
     REQUIRE(i < queue.counter->size());
     Item item = queue.load(i);
     f(item);
@@ -238,7 +238,7 @@ TEST_CASE("G9: connect and connect_vertices count pairs whose light is none", "[
     for (auto [value, which] : kBad) {
         Bench b(cornell());
         b.run(StageId::generate, [v = value](Bench& x) {
-            for (uint32_t i = 0; i < x.memory.light_vertices.counter->size(); i += 2) edit<LightVertexItem>(x.memory.light_vertices, i, [v](LightVertexItem& y) { y.throughput.x = v; });
+            for (uint32_t i = 0; i < x.memory.light_vertices.counter->size(); i += 2) edit<VertexItem>(x.memory.light_vertices, i, [v](VertexItem& y) { y.throughput.x = v; });
         });
         const uint64_t counted = b.count(StageId::connect_vertices, which);
         CHECK(counted > 100);

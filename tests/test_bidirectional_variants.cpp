@@ -2,6 +2,7 @@
 // timeout: 900
 // Variants of bidirectional path tracing give the same image.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/error.h"
@@ -335,6 +336,7 @@ TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no li
             Hit hit;
             if (!accel.tracer().closest<kAllFeatures>(view, {from, kInfinity, d, 0}, hit)) return false;
             v.point = surface_at<kAllFeatures>(view, hit.prim, hit.u, hit.v);
+            v.offset = ray_offset(v.point.p, v.point.p_error, v.point.ng);
             v.scattering = make_scattering<kAllFeatures>(view, v.point, -d);
             v.sums = {1, 1};
             v.first = false;
@@ -351,9 +353,9 @@ TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no li
             WalkConnection c;
             const bool brings = connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c) && !is_zero(c.value);
             lit += brings;
-            const LightVertexItem packed = pack_light_vertex(y, 0, 0.0f, 0.0f, -y.scattering.wi_world, {1, 1, 1}, 2, kNone);
-            if (may_connect(view, y.point, y.scattering.wi_world, z.point, z.scattering.wi_world)) {
-                REQUIRE(may_connect(view, packed.front, z.point, z.scattering.wi_world));
+            const VertexItem packed = pack_light_vertex<kAllFeatures>(y, {}, -y.scattering.wi_world, {1, 1, 1}, 2, kNone);
+            if (may_connect(y, z)) {
+                REQUIRE(may_connect(packed.front, z));
                 continue;
             }
             ++turned_down;
@@ -364,6 +366,57 @@ TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no li
         CHECK(lit > 100);
         CHECK(turned_down > pairs / 4);
     }
+}
+
+TEST_CASE("A vertex that comes from a queue is the one that went in, surface, frame and BSDF") {
+    constexpr Features kLookedUp = {kAllFeatures.bsdfs, kAllFeatures.emitters, kAllFeatures.primitives, false, false, false};
+    static_assert(vertices_are_whole<kAllFeatures>() && !vertices_are_whole<kLookedUp>());
+    const auto same = [](Vec3f a, Vec3f b) { return a.x == b.x && a.y == b.y && a.z == b.z; };
+    const auto close = [](Vec3f a, Vec3f b) { return length(a - b) < 1e-6f; };  // copies of one function round their sums of products differently
+    uint32_t types = 0, behind = 0;
+    for (const char* name : {"cornell", "glass", "materials", "textured"}) {
+        INFO(name);
+        const Scene scene = project_scene(name, 32, 32);
+        const CwbvhAccel accel(scene);
+        const SceneView view = scene.view();
+        uint32_t vertices = 0;
+        for (uint32_t i = 0; i < 20000; ++i) {
+            const RngKey key = {11, i, 0, Stream::eye};
+            const Vec4f u = random_floats(key, 0), t = random_floats(key, 1);
+            const Vec3f from = scene.bounds_center + square_to_sphere({u.x, u.y}) * scene.bounds_radius, to = scene.bounds_center + square_to_sphere({u.z, u.w}) * (0.4f * scene.bounds_radius);
+            const Vec3f d = normalize(to - from);
+            Hit hit;
+            if (!accel.tracer().closest<kAllFeatures>(view, {from, kInfinity, d, 0}, hit)) continue;
+            const uint32_t depth = 1 + i % 2;
+            WalkVertex v = walk_vertex<kAllFeatures>(view, d, depth, hit.prim, hit.u, hit.v);
+            v.sums = {t.z, t.w};
+            ++vertices;
+            behind += v.scattering.flipped;
+            types |= bit(v.scattering.bsdf.type);
+            const auto check = [&](const VertexItem& item, const WalkVertex& back) {
+                const Scattering &a = v.scattering, &b = back.scattering;
+                const Bsdf &f = a.bsdf, &g = b.bsdf;
+                REQUIRE((item.front.side.depth() == depth && item.path() == 7 && same(item.throughput, {1, 2, 3})));
+                REQUIRE((back.first == v.first && back.sums.dvcm == v.sums.dvcm && back.sums.dvc == v.sums.dvc));
+                REQUIRE((close(back.point.p, v.point.p) && std::fabs(back.offset - v.offset) <= 1e-6f * v.offset));
+                REQUIRE((close(back.point.ng, v.point.ng) || close(-back.point.ng, v.point.ng)));  // its side does not matter
+                REQUIRE((close(a.ng, b.ng) && close(a.frame.n, b.frame.n) && close(a.frame.s, b.frame.s) && close(a.frame.t, b.frame.t) && close(a.wi, b.wi) && same(a.wi_world, b.wi_world)));
+                REQUIRE((a.record == b.record && a.flipped == b.flipped && f.type == g.type && f.microfacets == g.microfacets && f.sample_visible == g.sample_visible && f.nonlinear == g.nonlinear));
+                REQUIRE((same(f.reflectance_or_eta, g.reflectance_or_eta) && same(f.specular_reflectance, g.specular_reflectance) && same(f.transmittance_or_k, g.transmittance_or_k)));
+                REQUIRE((f.ior == g.ior && f.alpha_u == g.alpha_u && f.alpha_v == g.alpha_v && f.fdr_internal == g.fdr_internal && f.specular_sampling_weight == g.specular_sampling_weight &&
+                         f.transmittance_table == g.transmittance_table));
+            };
+            const SurfacePlace place = {hit.u, hit.v, hit.prim};
+            const VertexItem whole = pack_vertex<kAllFeatures>(v, place, d, {1, 2, 3}, VertexSide::of_depth(depth), 7);
+            check(whole, unpack_vertex<kAllFeatures>(view, whole));
+            if (scene.features.textures || scene.features.bumps) continue;
+            const VertexItem looked_up = pack_vertex<kLookedUp>(v, place, d, {1, 2, 3}, VertexSide::of_depth(depth), 7);
+            check(looked_up, unpack_vertex<kLookedUp>(view, looked_up));
+        }
+        CHECK(vertices > 1000);
+    }
+    CHECK(std::popcount(types) >= 5);
+    CHECK(behind > 0);
 }
 
 TEST_CASE("The coarse normal of a light vertex turns down nothing in front of it, and what is more than two degrees behind") {

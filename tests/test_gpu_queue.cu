@@ -94,8 +94,7 @@ struct Loose {
 };
 
 /// Threads that `keep` selects push their number, from one of two places.
-template <LaneOrder Order>
-__global__ void __launch_bounds__(128) push_loosely(Queue<Loose, Order> queue, uint32_t n, uint32_t keep) {
+__global__ void __launch_bounds__(128) push_loosely(Queue<Loose> queue, uint32_t n, uint32_t keep) {
     WarpStretches& stretches = WarpStretches::mine();
     stretches.open(n);
     for (uint32_t i = blockIdx.x * 128 + threadIdx.x; i < n; i += gridDim.x * 128) {
@@ -109,7 +108,6 @@ __global__ void __launch_bounds__(128) push_loosely(Queue<Loose, Order> queue, u
 }
 
 /// Numbers of items, their order given up, of a queue that 132 * `blocks` blocks have pushed to.
-template <LaneOrder Order>
 void check_loose(uint32_t n, uint32_t keep, uint32_t blocks) {
     INFO(n << " threads, 1 of " << keep << ", " << 132 * blocks << " blocks");
     const uint32_t expected = keep == 3 ? (n + 2) / 3 + (n + 1) / 3 : (n + keep - 1) / keep, capacity = with_holes(n);
@@ -118,14 +116,14 @@ void check_loose(uint32_t n, uint32_t keep, uint32_t blocks) {
     std::vector<QueueCounter> counters(1);
     counters[0].capacity = capacity;
     DeviceBuffer<QueueCounter> counter{std::span<const QueueCounter>(counters)};
-    const Queue<Loose, Order> queue{memory.data(), counter.data(), capacity};
-    push_loosely<Order><<<132 * blocks, 128>>>(queue, n, keep);
+    const Queue<Loose> queue{memory.data(), counter.data(), capacity};
+    push_loosely<<<132 * blocks, 128>>>(queue, n, keep);
     cuda_check(cudaDeviceSynchronize(), "push_loosely");
     const QueueCounter c = counter.download()[0];
     REQUIRE(c.count <= capacity);
     REQUIRE(c.items() == expected);
     std::vector<Lane> lanes = memory.download();
-    const Queue<Loose, Order> here{lanes.data(), nullptr, capacity};
+    const Queue<Loose> here{lanes.data(), nullptr, capacity};
     std::vector<uint32_t> seen;
     uint64_t holes = 0, wrong = 0;
     for (uint32_t i = 0; i < c.count; ++i) {
@@ -158,9 +156,8 @@ TEST_CASE("places taken ahead: every loose push arrives once, what is left over 
     }
     for (const uint32_t n : {1u, 33u, 1000u, (1u << 20) + 1, (1u << 23) + 7, (1u << 25) + 5}) {
         for (const uint32_t keep : {1u, 2u, 3u, 33u}) {
-            for (const uint32_t blocks : {1u, 7u}) check_loose<LaneOrder::apart>(n, keep, blocks);
+            for (const uint32_t blocks : {1u, 7u}) check_loose(n, keep, blocks);
         }
-        check_loose<LaneOrder::together>(n, 3, 2);
     }
 }
 
@@ -175,7 +172,7 @@ TEST_CASE("places taken ahead: a queue that is too small loses items by count") 
     std::vector<QueueCounter> counters(1);
     counters[0].capacity = capacity;
     DeviceBuffer<QueueCounter> counter{std::span<const QueueCounter>(counters)};
-    push_loosely<LaneOrder::apart><<<132, 128>>>(Queue<Loose>{memory.data(), counter.data(), capacity}, n, 1);
+    push_loosely<<<132, 128>>>(Queue<Loose>{memory.data(), counter.data(), capacity}, n, 1);
     cuda_check(cudaDeviceSynchronize(), "push_loosely");
     QueueCounter c = counter.download()[0];
     CHECK(c.count >= n);

@@ -8,8 +8,10 @@
 // - pdf_sa is the density of wo per solid angle that sample uses; it is the same in both modes up to the swap of roles.
 // - sample takes u.x for the choice of a lobe and (u.y, u.z) for the direction, uniform in [0,1); false means that the walk ends.
 //
-// A new BSDF is one file in transport/bsdf/ with eval, pdf and sample, a BsdfType, and a case in resolve_bsdf and with_bsdf.
+// A new BSDF is one file in transport/bsdf/ with eval, pdf and sample, a BsdfType, a case in look_up_parameters and with_bsdf, and in make_bsdf the constants that it has.
 #pragma once
+
+#include <bit>
 
 #include "scene/view.h"
 #include "transport/bsdf/conductor.h"
@@ -40,36 +42,36 @@ struct Bsdf {
     const float* transmittance_table;
 };
 
+/// True if light can pass to the other side.
+AMBILUX_HD bool bsdf_transmits(BsdfType type) {
+    return type == BsdfType::dielectric || type == BsdfType::thin_dielectric || type == BsdfType::rough_dielectric;
+}
+
+/// Parameters that textures may set. What else a Bsdf has is the same at all points of its record.
+struct BsdfParameters {
+    Rgb color;  ///< reflectance; of dielectrics specular transmittance
+    float alpha_u;
+    Rgb specular_reflectance;
+    float alpha_v;
+};
+
 /// Looks up the parameters of `record` at texture coordinates `uv`. Microfacet roughness is at least kMinAlpha.
 template <Features F>
-AMBILUX_HD Bsdf resolve_bsdf(const SceneView& scene, const BsdfRecord& record, Vec2f uv) {
-    Bsdf b = {};
-    b.type = record.type;
-    const auto specular_reflectance = [&] { b.specular_reflectance = eval_rgb<F>(scene, record.specular_reflectance, uv); };
-    const auto reflectance = [&] { b.reflectance_or_eta = eval_rgb<F>(scene, record.reflectance, uv); };
-    const auto conductor = [&] {
-        specular_reflectance();
-        b.reflectance_or_eta = record.eta;
-        b.transmittance_or_k = record.k;
-    };
+AMBILUX_HD BsdfParameters look_up_parameters(const SceneView& scene, const BsdfRecord& record, Vec2f uv) {
+    BsdfParameters p = {};
+    const auto specular_reflectance = [&] { p.specular_reflectance = eval_rgb<F>(scene, record.specular_reflectance, uv); };
+    const auto reflectance = [&] { p.color = eval_rgb<F>(scene, record.reflectance, uv); };
     const auto dielectric = [&] {
         specular_reflectance();
-        b.transmittance_or_k = eval_rgb<F>(scene, record.specular_transmittance, uv);
-        b.ior = record.ior;
+        p.color = eval_rgb<F>(scene, record.specular_transmittance, uv);
     };
     const auto plastic = [&] {
         specular_reflectance();
         reflectance();
-        b.ior = record.ior;
-        b.nonlinear = record.nonlinear != 0;
-        b.fdr_internal = record.fdr_internal;
-        b.specular_sampling_weight = record.specular_sampling_weight;
     };
-    const auto microfacets = [&] {
-        b.microfacets = record.microfacets;
-        b.sample_visible = record.sample_visible != 0;
-        b.alpha_u = max(eval_float<F>(scene, record.alpha_u, uv), kMinAlpha);
-        b.alpha_v = max(eval_float<F>(scene, record.alpha_v, uv), kMinAlpha);
+    const auto roughness = [&] {
+        p.alpha_u = max(eval_float<F>(scene, record.alpha_u, uv), kMinAlpha);
+        p.alpha_v = max(eval_float<F>(scene, record.alpha_v, uv), kMinAlpha);
     };
     switch (record.type) {
         case BsdfType::diffuse:
@@ -78,16 +80,16 @@ AMBILUX_HD Bsdf resolve_bsdf(const SceneView& scene, const BsdfRecord& record, V
         case BsdfType::rough_diffuse:
             if constexpr (F.has(BsdfType::rough_diffuse)) {
                 reflectance();
-                b.alpha_u = eval_float<F>(scene, record.alpha_u, uv);
+                p.alpha_u = eval_float<F>(scene, record.alpha_u, uv);
             }
             break;
         case BsdfType::conductor:
-            if constexpr (F.has(BsdfType::conductor)) conductor();
+            if constexpr (F.has(BsdfType::conductor)) specular_reflectance();
             break;
         case BsdfType::rough_conductor:
             if constexpr (F.has(BsdfType::rough_conductor)) {
-                conductor();
-                microfacets();
+                specular_reflectance();
+                roughness();
             }
             break;
         case BsdfType::dielectric:
@@ -99,7 +101,7 @@ AMBILUX_HD Bsdf resolve_bsdf(const SceneView& scene, const BsdfRecord& record, V
         case BsdfType::rough_dielectric:
             if constexpr (F.has(BsdfType::rough_dielectric)) {
                 dielectric();
-                microfacets();
+                roughness();
             }
             break;
         case BsdfType::plastic:
@@ -108,13 +110,51 @@ AMBILUX_HD Bsdf resolve_bsdf(const SceneView& scene, const BsdfRecord& record, V
         case BsdfType::rough_plastic:
             if constexpr (F.has(BsdfType::rough_plastic)) {
                 plastic();
-                microfacets();
-                b.transmittance_table = scene.tables + record.transmittance_table;
+                roughness();
             }
             break;
         case BsdfType::count: break;
     }
+    return p;
+}
+
+/// The BSDF of `record` where its parameters are `p`.
+template <Features F>
+AMBILUX_HD Bsdf make_bsdf(const SceneView& scene, const BsdfRecord& record, const BsdfParameters& p) {
+    constexpr auto some = [](auto... types) { return ((F.bsdfs & bit(types)) | ...) != 0; };
+    Bsdf b = {};
+    b.type = F.several_bsdfs() ? record.type : BsdfType(std::countr_zero(F.bsdfs));
+    b.reflectance_or_eta = b.transmittance_or_k = p.color;
+    b.specular_reflectance = p.specular_reflectance;
+    b.alpha_u = p.alpha_u;
+    b.alpha_v = p.alpha_v;
+    if (some(BsdfType::conductor, BsdfType::rough_conductor) && (b.type == BsdfType::conductor || b.type == BsdfType::rough_conductor)) {
+        b.reflectance_or_eta = record.eta;
+        b.transmittance_or_k = record.k;
+    }
+    if constexpr (some(BsdfType::rough_conductor, BsdfType::rough_dielectric, BsdfType::rough_plastic)) {
+        b.microfacets = record.microfacets;
+        b.sample_visible = record.sample_visible != 0;
+    }
+    if constexpr (some(BsdfType::dielectric, BsdfType::thin_dielectric, BsdfType::rough_dielectric, BsdfType::plastic, BsdfType::rough_plastic)) b.ior = record.ior;
+    if constexpr (some(BsdfType::plastic, BsdfType::rough_plastic)) {
+        b.nonlinear = record.nonlinear != 0;
+        b.fdr_internal = record.fdr_internal;
+        b.specular_sampling_weight = record.specular_sampling_weight;
+    }
+    if constexpr (some(BsdfType::rough_plastic)) b.transmittance_table = scene.tables + record.transmittance_table;
     return b;
+}
+
+/// Those with which `b` was made.
+AMBILUX_HD BsdfParameters parameters_of(const Bsdf& b) {
+    return {bsdf_transmits(b.type) ? b.transmittance_or_k : b.reflectance_or_eta, b.alpha_u, b.specular_reflectance, b.alpha_v};
+}
+
+/// The BSDF of `record` at texture coordinates `uv`.
+template <Features F>
+AMBILUX_HD Bsdf resolve_bsdf(const SceneView& scene, const BsdfRecord& record, Vec2f uv) {
+    return make_bsdf<F>(scene, record, look_up_parameters<F>(scene, record, uv));
 }
 
 /// Calls `op` with the BSDF that `b` stands for; `otherwise` when kernels of features F do not know it.
@@ -219,11 +259,6 @@ AMBILUX_HD bool bsdf_sample(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode
         if (s.some) out = s.sample;
         return s.some;
     }
-}
-
-/// True if light can pass to the other side.
-AMBILUX_HD bool bsdf_transmits(BsdfType type) {
-    return type == BsdfType::dielectric || type == BsdfType::thin_dielectric || type == BsdfType::rough_dielectric;
 }
 
 /// True if there is a lobe that is not a delta, so that connecting to other vertices can give light.

@@ -14,6 +14,7 @@ struct Scattering {
     Vec3f wi_world;  ///< unit, to where the walk came from
     Vec3f wi;        ///< the same in `frame`
     Bsdf bsdf;
+    uint32_t record; ///< place of its BsdfRecord in SceneView::bsdfs
     bool flipped;    ///< two-sided material met from behind: frame.n and ng are negated
 };
 
@@ -46,7 +47,8 @@ template <Features F>
 AMBILUX_HD Scattering make_scattering(const SceneView& scene, const SurfacePoint& point, Vec3f wi_world) {
     const Material& material = scene.materials[scene.shapes[point.shape].material];
     const bool flip = material.two_sided != 0 && dot(point.ng, wi_world) < 0.0f;
-    const BsdfRecord& record = scene.bsdfs[flip ? material.back : material.front];
+    const uint32_t index = flip ? material.back : material.front;
+    const BsdfRecord& record = scene.bsdfs[index];
     Vec3f n = point.ns;
     if constexpr (F.bumps) n = perturbed_normal<F>(scene, record, point);
     Scattering s;
@@ -59,7 +61,31 @@ AMBILUX_HD Scattering make_scattering(const SceneView& scene, const SurfacePoint
     s.wi_world = wi_world;
     s.wi = s.frame.to_local(wi_world);
     s.bsdf = resolve_bsdf<F>(scene, record, point.uv);
+    s.record = index;
     s.flipped = flip;
+    return s;
+}
+
+/// What is left of a Scattering when its point is forgotten: scattering_of() makes it again.
+struct ScatteringParts {
+    Vec3f ng, n;     ///< of Scattering::ng and frame.n
+    Vec3f tangent;   ///< frame.s
+    uint32_t record; ///< and, in the highest bit, whether it was flipped
+    BsdfParameters parameters;
+};
+
+AMBILUX_HD ScatteringParts parts_of(const Scattering& s) { return {s.ng, s.frame.n, s.frame.s, s.record | uint32_t(s.flipped) << 31, parameters_of(s.bsdf)}; }
+
+template <Features F>
+AMBILUX_HD Scattering scattering_of(const SceneView& scene, const ScatteringParts& parts, Vec3f wi_world) {
+    Scattering s;
+    s.record = parts.record & 0x7fffffffu;
+    s.flipped = parts.record >> 31;
+    s.frame = {parts.tangent, cross(s.flipped ? -parts.n : parts.n, parts.tangent), parts.n};
+    s.ng = parts.ng;
+    s.wi_world = wi_world;
+    s.wi = s.frame.to_local(wi_world);
+    s.bsdf = make_bsdf<F>(scene, scene.bsdfs[s.record], parts.parameters);
     return s;
 }
 
@@ -77,6 +103,9 @@ AMBILUX_HD bool may_scatter(const SceneView& scene, const SurfacePoint& point, V
     const Material& material = scene.materials[scene.shapes[point.shape].material];
     return bsdf_transmits(scene.bsdfs[material.two_sided != 0 && cos_wi < 0.0f ? material.back : material.front].type);
 }
+
+/// The same where the BSDF is known.
+AMBILUX_HD bool may_scatter(const Scattering& s, Vec3f wo_world) { return dot(s.ng, s.wi_world) * dot(s.ng, wo_world) > 0.0f || bsdf_transmits(s.bsdf.type); }
 
 /// What a BSDF with shading normals is multiplied with in importance mode, |wi·ns|·|wo·ng| / (|wi·ng|·|wo·ns|), so that both modes
 /// describe one surface (Veach 1997, equations 5.19 and 5.20); 1 in radiance mode. Cosines are those with the shading normal.

@@ -22,7 +22,8 @@ struct Walk {
 
 /// A surface point met by a walk.
 struct WalkVertex {
-    SurfacePoint point;
+    SurfacePoint point;  ///< of a vertex that comes from a queue: p and ng only
+    float offset;        ///< ray_offset
     Scattering scattering;
     MisSums sums;
     bool first;  ///< met by the first ray of its walk
@@ -78,26 +79,27 @@ AMBILUX_HD MisSums light_sums(const SceneView& scene, const BidirectionalMis& mi
     return sums_at_hit(mis, w.sums, length_squared(point.p - w.o), cos_in, false);
 }
 
-/// The vertex that a walk meets at (prim,u,v), without its sums.
+/// The vertex that a ray along `d`, the one numbered `depth` of a walk, meets at (prim,u,v), without its sums.
 template <Features F>
-AMBILUX_HD WalkVertex walk_vertex(const SceneView& scene, const Walk& w, uint32_t prim, float u, float v) {
+AMBILUX_HD WalkVertex walk_vertex(const SceneView& scene, Vec3f d, uint32_t depth, uint32_t prim, float u, float v) {
     WalkVertex x;
     x.point = surface_at<F>(scene, prim, u, v);
-    x.scattering = make_scattering<F>(scene, x.point, -w.d);
-    x.first = w.depth == 1;
+    x.offset = ray_offset(x.point.p, x.point.p_error, x.point.ng);
+    x.scattering = make_scattering<F>(scene, x.point, -d);
+    x.first = depth == 1;
     return x;
 }
 
 template <Features F>
 AMBILUX_HD WalkVertex eye_vertex(const SceneView& scene, const BidirectionalMis& mis, const Walk& w, uint32_t prim, float u, float v) {
-    WalkVertex z = walk_vertex<F>(scene, w, prim, u, v);
+    WalkVertex z = walk_vertex<F>(scene, w.d, w.depth, prim, u, v);
     z.sums = eye_sums(scene, mis, w, z.point);
     return z;
 }
 
 template <Features F>
 AMBILUX_HD WalkVertex light_vertex(const SceneView& scene, const BidirectionalMis& mis, const Walk& w, uint32_t prim, float u, float v) {
-    WalkVertex y = walk_vertex<F>(scene, w, prim, u, v);
+    WalkVertex y = walk_vertex<F>(scene, w.d, w.depth, prim, u, v);
     y.sums = light_sums<F>(scene, mis, w, y.point);
     return y;
 }
@@ -132,7 +134,7 @@ AMBILUX_HD bool scatter_walk(const BidirectionalMis& mis, const WalkVertex& vert
     const float forward = delta ? 1.0f : s.pdf_sa;
     const float reverse = delta ? delta_reverse_pdf(vertex.scattering, s.wo, s.eta) : s.pdf_reverse_sa;
     w.sums = sums_after_scatter(mis, vertex.sums, vertex.first, delta, forward, reverse, fabsf(dot(vertex.point.ng, s.wo)));
-    w.o = offset_ray_origin(vertex.point.p, vertex.point.p_error, vertex.point.ng, s.wo);
+    w.o = offset_ray_origin(vertex.point.p, vertex.offset, vertex.point.ng, s.wo);
     w.d = s.wo;
     w.throughput = throughput;
     // Sixteen bits, which is what queues keep: every variant then takes the same decisions.
@@ -153,9 +155,9 @@ struct WalkConnection {
 };
 
 /// Sets the ray from `from` to the point `to`, both ends moved off their surfaces. False if nothing lies between them.
-AMBILUX_HD bool set_segment(WalkConnection& c, const SurfacePoint& from, Vec3f wi, Vec3f to, Vec3f to_error, Vec3f to_ng) {
-    c.o = offset_ray_origin(from.p, from.p_error, from.ng, wi);
-    const Vec3f segment = offset_ray_origin(to, to_error, to_ng, -wi) - c.o;
+AMBILUX_HD bool set_segment(WalkConnection& c, const WalkVertex& from, Vec3f wi, Vec3f to, float to_offset, Vec3f to_ng) {
+    c.o = offset_ray_origin(from.point.p, from.offset, from.point.ng, wi);
+    const Vec3f segment = offset_ray_origin(to, to_offset, to_ng, -wi) - c.o;
     const float distance = length(segment);
     if (!(distance > 0.0f)) return false;
     c.d = segment / distance;
@@ -168,14 +170,14 @@ AMBILUX_HD bool set_segment(WalkConnection& c, const SurfacePoint& from, Vec3f w
 template <Features F>
 AMBILUX_HD bool connect_next_event_deferred(const SceneView& scene, const BidirectionalMis& mis, const WalkVertex& z, Rgb throughput, Vec4f u, WalkConnection& c, bool& environment) {
     EmitterSample light;
-    if (!sample_emitter_deferred<F>(scene, z.point.p, u, light) || !may_scatter(scene, z.point, z.scattering.wi_world, light.wi)) return false;
+    if (!sample_emitter_deferred<F>(scene, z.point.p, u, light) || !may_scatter(z.scattering, light.wi)) return false;
     const BsdfValue f = scatter_evaluate<F>(z.scattering, light.wi, TransportMode::radiance);
     if (is_zero(f.value)) return false;
     environment = is_environment<F>(scene, light.emitter);
     c.value = throughput * f.value * ((environment ? splat(1.0f) : light.radiance) / light.pdf_sa);
     c.others = others_of_next_event<F>(scene, mis, z.sums, z.first, light, f.pdf_sa, f.pdf_reverse_sa, fabsf(dot(z.point.ng, light.wi)));
-    if (light.distance < kInfinity) return set_segment(c, z.point, light.wi, light.p, light.p_error, light.ng);
-    c.o = offset_ray_origin(z.point.p, z.point.p_error, z.point.ng, light.wi);
+    if (light.distance < kInfinity) return set_segment(c, z, light.wi, light.p, ray_offset(light.p, light.p_error, light.ng), light.ng);
+    c.o = offset_ray_origin(z.point.p, z.offset, z.point.ng, light.wi);
     c.d = light.wi;
     c.tmax = kInfinity;
     return true;
@@ -214,7 +216,7 @@ AMBILUX_HD bool connect_unweighted(const WalkVertex& y, Rgb y_throughput, const 
     c.value = y_throughput * f_y.value * f_z.value * z_throughput * (1.0f / d2);
     const float cos_y = fabsf(dot(y.point.ng, w)), cos_z = fabsf(dot(z.point.ng, w));
     p = {f_z.pdf_sa * cos_y / d2, f_y.pdf_reverse_sa, f_y.pdf_sa * cos_z / d2, f_z.pdf_reverse_sa};
-    return set_segment(c, z.point, w, y.point.p, y.point.p_error, y.point.ng);
+    return set_segment(c, z, w, y.point.p, y.offset, y.point.ng);
 }
 
 /// s >= 2, t >= 2: vertex y of a light walk and vertex z of an eye walk.
@@ -226,10 +228,10 @@ AMBILUX_HD bool connect_vertices(const BidirectionalMis& mis, const WalkVertex& 
     return true;
 }
 
-/// False if no light can pass between two points from where walks came (`y_wi`, `z_wi`, away from the surfaces), told from places and types of BSDFs: most pairs in a room face away from each other.
-AMBILUX_HD bool may_connect(const SceneView& scene, const SurfacePoint& y, Vec3f y_wi, const SurfacePoint& z, Vec3f z_wi) {
-    const Vec3f w = z.p - y.p;
-    return may_scatter(scene, y, y_wi, w) && may_scatter(scene, z, z_wi, -w);
+/// False if no light can pass between two vertices, told from places and types of BSDFs: most pairs in a room face away from each other.
+AMBILUX_HD bool may_connect(const WalkVertex& y, const WalkVertex& z) {
+    const Vec3f w = z.point.p - y.point.p;
+    return may_scatter(y.scattering, w) && may_scatter(z.scattering, -w);
 }
 
 /// False for places on the film that no filter of a pixel reaches: what lands there needs no shadow ray.
@@ -249,7 +251,7 @@ AMBILUX_HD bool connect_camera(const SceneView& scene, const BidirectionalMis& m
     c.value = throughput * f.value * (camera.weight / mis.light_paths);
     c.others = others_of_camera(scene, mis, y.sums, y.first, camera, fabsf(dot(y.point.ng, camera.wi)), f.pdf_reverse_sa);
     film_position = camera.film_position;
-    c.o = offset_ray_origin(y.point.p, y.point.p_error, y.point.ng, camera.wi);
+    c.o = offset_ray_origin(y.point.p, y.offset, y.point.ng, camera.wi);
     c.d = camera.wi;
     c.tmax = camera.distance * (1.0f - gamma_bound(8));
     return c.tmax > 0.0f;

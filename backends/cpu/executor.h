@@ -65,8 +65,8 @@ public:
     void settle(const A& a, const B& b) {
         ambilux::settle(*state_, *a.counter, *b.counter);
     }
-    template <class Item, LaneOrder Order>
-    void clear(const Queue<Item, Order>& queue) {
+    template <class Item>
+    void clear(const Queue<Item>& queue) {
         queue.counter->finish();
     }
     void set_depth(uint32_t depth) { state_->depth = depth; }

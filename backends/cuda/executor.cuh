@@ -135,8 +135,8 @@ public:
     void settle(const A& a, const B& b) {
         detail::settle_queues<<<1, 1, 0, stream_>>>(state_, a.counter, b.counter);
     }
-    template <class Item, LaneOrder Order>
-    void clear(const Queue<Item, Order>& queue) {
+    template <class Item>
+    void clear(const Queue<Item>& queue) {
         detail::clear_queue<<<1, 1, 0, stream_>>>(queue.counter);
     }
     void finish_wave() { detail::finish_wave<<<1, 1, 0, stream_>>>(state_); }

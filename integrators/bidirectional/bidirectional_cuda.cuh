@@ -27,6 +27,7 @@ public:
         : scene_(scene), policy_(make_bidirectional_policy(scene, settings)), use_graph_(settings.graph),
           traced_(settings.specialise ? scene.features : kAllFeatures) {
         const auto start = Clock::now();
+        policy_.vertex_lanes = vertex_lanes<F>();
         wave_ = shape_wave(scene, settings, kTilePixels, 1);
         wave_.tiles = tile_count(wave_);  // splats may land anywhere on the film
         const uint32_t slots = wave_.tiles * kTilePixels;
@@ -47,6 +48,8 @@ public:
             policy_.stream_slots = settings.wave_size ? settings.wave_size : kStreamSlots;
             wave_.samples = std::max<uint32_t>(1, uint32_t(std::min<uint64_t>(8ull * policy_.stream_slots, kLightRay - 1) / slots));
         }
+        // Several pairs of a vertex wherever they fit: every launch lasts as long as its slowest ray.
+        policy_.one_pair_from = std::max(policy_.one_pair_from, wave_.slot_count() / policy_.pairs_per_launch);
         policy_.tail_below = tail_walks(settings, wave_.slot_count());
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         sum_ = DeviceBuffer<double>(values_, "film");

@@ -157,7 +157,7 @@ private:
     }
 
     /// Without its sums.
-    PilotVertex vertex_at(const PilotWalk& w, const Hit& hit) const { return {walk_vertex<F>(view_, w.walk, hit.prim, hit.u, hit.v), {}, w.walk.throughput, w.walk.depth}; }
+    PilotVertex vertex_at(const PilotWalk& w, const Hit& hit) const { return {walk_vertex<F>(view_, w.walk.d, w.walk.depth, hit.prim, hit.u, hit.v), {}, w.walk.throughput, w.walk.depth}; }
 
     bool free(const WalkConnection& c, const RngKey& key, uint32_t which) const {
         if (!is_finite(c.o) || !is_finite(c.d)) return false;

@@ -38,6 +38,7 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     // A launch with several pairs of one vertex adds to sums in the order in which threads come, and images of single strategies tell contributions of one path apart by launches.
     p.one_pair_from = kVerticesForOnePair;
     p.pairs_per_launch = settings.deterministic || p.technique_depth > 0 ? 1 : p.cache_draws > 0 ? std::min(p.cache_draws, kPairsPerLaunch) : kPairsPerLaunch;
+    p.vertex_lanes = Queue<VertexItem>::kLanes;
     p.background_only = p.mis.strategies == kLightStrategies;
     p.hide_emitters = scene.integrator.hide_emitters;
     p.fuse = settings.fuse != Fuse::none;

@@ -55,7 +55,7 @@ inline BidirectionalMemory lay_out_megakernel(Layout& layout, uint32_t slots, ui
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
-    m.light_vertices = layout.queue<LightVertexItem, LaneOrder::together>("light_vertices", m.counters, policy.connect_vertices ? kept : 0);
+    m.light_vertices = layout.queue<VertexItem>("light_vertices", m.counters, policy.connect_vertices ? kept : 0, false, policy.vertex_lanes);
     m.splats = layout.queue<SplatItem>("splats", m.counters, policy.splat ? kept + slots : 0);
     return m;
 }
@@ -111,8 +111,8 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
     lay_out_walks(layout, m, m.counters, slots, policy.queues);
-    m.vertices = layout.queue<VertexItem>("vertices", m.counters, when((policy.connect_vertices && gathered) || !policy.connect_in_shade), fixed && !policy.connect_in_shade);
-    m.light_vertices = layout.queue<LightVertexItem, LaneOrder::together>("light_vertices", m.counters, when(policy.connect_vertices, kept));
+    m.vertices = layout.queue<VertexItem>("vertices", m.counters, when((policy.connect_vertices && gathered) || !policy.connect_in_shade), fixed && !policy.connect_in_shade, policy.vertex_lanes);
+    m.light_vertices = layout.queue<VertexItem>("light_vertices", m.counters, when(policy.connect_vertices, kept), false, policy.vertex_lanes);
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged), fixed);
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat && gathered), fixed);
     m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, kept + slots));
@@ -200,12 +200,12 @@ struct BidirectionalStages {
         const ConnectOutlet connect_outlet = {m.connect_candidates, weight_connections, policy.fuse};
         const SplatOutlet splat_outlet = {m.splat_candidates, weight_splats, policy.fuse};
         connect_camera = {scene, wave, policy, m.vertices, splat_outlet, record(StageId::connect_camera)};
-        connect = {scene, wave, policy, m.vertices, m.light_vertices, m.pairs, connect_outlet, record(StageId::connect), record(StageId::connect_vertices)};
+        connect = {scene, wave, policy, m.vertices, m.light_vertices, m.last_vertex, m.pairs, connect_outlet, record(StageId::connect), record(StageId::connect_vertices)};
         for (int k = 0; k < 2; ++k) {
             light_extend[k] = {scene, tracer, wave, Stream::light, m.rays[k], m.hits[k], record(StageId::light_extend)};
             light_shade[k] = {scene, wave, policy, m.hits[k], m.rays[1 - k], m.light_vertices, m.vertices, m.last_vertex, record(StageId::light_shade), connect_camera};
             extend[k] = {scene, tracer, wave, Stream::eye, m.rays[k], m.hits[k], record(StageId::extend)};
-            shade[k] = {scene, wave, policy, m.hits[k], m.rays[1 - k], hit_outlet, m.vertices, m.last_vertex, record(StageId::shade), connect};
+            shade[k] = {scene, wave, policy, m.hits[k], m.rays[1 - k], hit_outlet, m.vertices, record(StageId::shade), connect};
         }
         light_generate = {scene, wave, policy, m.rays[0], splat_outlet, m.last_vertex, record(StageId::light_generate)};
         occlude_splats = {scene, tracer, m.weighted_splats, m.splats, record(StageId::occlude)};
