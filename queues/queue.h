@@ -69,16 +69,17 @@ struct Queue {
         return lane < paired_lanes<Item>() ? size_t(lane & ~1u) * capacity + 2 * size_t(i) + (lane & 1u) : size_t(lane) * capacity + i;
     }
 
-    AMBILUX_HD Item load(uint32_t i) const { return load_but(i, kLanes, {}); }
+    /// `lanes`: of the item, the first ones; the others are zero.
+    AMBILUX_HD Item load(uint32_t i, uint32_t lanes = kLanes) const { return load_but(i, kLanes, {}, lanes); }
     /// Lane `known` is `value`, and what is in memory is not looked at.
-    AMBILUX_HD Item load_but(uint32_t i, uint32_t known, const Lane& value) const {
-        Lane lanes[kLanes];
+    AMBILUX_HD Item load_but(uint32_t i, uint32_t known, const Lane& value, uint32_t lanes = kLanes) const {
+        Lane all[kLanes];
         for (uint32_t k = 0; k < kLanes; ++k) {
-            lanes[k] = value;
-            if (k != known) lanes[k] = base[place(i, k)];
+            all[k] = value;
+            if (k != known && k < lanes) all[k] = base[place(i, k)];
         }
         Item item;
-        memcpy(&item, lanes, sizeof(Item));
+        memcpy(&item, all, sizeof(Item));
         return item;
     }
     /// The first member of an item, which is some lanes long.
@@ -91,7 +92,7 @@ struct Queue {
         memcpy(&front, lanes, sizeof(Front));
         return front;
     }
-    /// `lanes`: of the item, the first ones, which are all that its readers look at.
+    /// `lanes`: of the item, the first ones; the others stay as they are.
     AMBILUX_HD void store(uint32_t i, const Item& item, uint32_t lanes = kLanes) const { store_but(i, kLanes, item, lanes); }
     /// The same without lane `known`.
     AMBILUX_HD void store_but(uint32_t i, uint32_t known, const Item& item, uint32_t lanes = kLanes) const {

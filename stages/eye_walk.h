@@ -168,7 +168,7 @@ struct EyeConnect {
     StageRecord* pairs_record;  ///< of connect_vertices
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const VertexItem item = vertices.load(i);
+        const VertexItem item = vertices.load(i, vertex_lanes<F>());
         const WalkVertex z = unpack_vertex<F>(scene, item);
         const uint32_t path = item.path(), depth = item.front.side.depth();
         const RngKey key = wave.key(path);
@@ -190,7 +190,7 @@ struct EyeConnect {
         uint32_t next = first_pair(item.path());
         for (uint32_t found = lights.find(next); found != kNone; found = lights.find(next)) {
             pairs_record->count_item(lights.depth);
-            push_connection<F>(scene, policy, key, item, z, light_vertices.load(found), scale, found, candidates, pairs_record);
+            push_connection<F>(scene, policy, key, item, z, light_vertices.load(found, vertex_lanes<F>()), scale, found, candidates, pairs_record);
         }
     }
 
@@ -291,10 +291,10 @@ struct ConnectVertices {
     }
     AMBILUX_HD void operator()(uint32_t i, Memory& eye) const {
         const PairItem pair = pairs.load(i);
-        const VertexItem light = light_vertices.load(pair.light);  // before anything waits for the eye vertex
+        const VertexItem light = light_vertices.load(pair.light, vertex_lanes<F>());  // before anything waits for the eye vertex
         if (eye.place != pair.vertex) {
             eye.place = pair.vertex;
-            eye.item = vertices.load(pair.vertex);
+            eye.item = vertices.load(pair.vertex, vertex_lanes<F>());
             eye.vertex = unpack_vertex<F>(scene, eye.item);
         }
         const RngKey key = wave.key(pair.path);

@@ -86,7 +86,7 @@ struct ConnectCamera {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const VertexItem item = vertices.load(i);
+        const VertexItem item = vertices.load(i, vertex_lanes<F>());
         take(unpack_vertex<F>(scene, item), item.throughput, wave.key(item.path(), Stream::light), item.path(), item.front.side.depth());
     }
 

@@ -255,7 +255,7 @@ private:
         if (!policy.wants(light_depth + 1, z.depth + 1)) return;
         WalkVertex eye = walk_vertex<F>(scene, z.d, z.depth, z.place.prim, z.place.u, z.place.v);
         eye.sums = z.sums;
-        const VertexItem light = light_vertices.load(place);
+        const VertexItem light = light_vertices.load(place, vertex_lanes<F>());
         WalkConnection c;
         if (connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, light), light.throughput, eye, z.throughput, c))
             test(path, c, key(path), z.depth + (light_depth << WalkBits::kDepthBits), StageId::connect_vertices);

@@ -23,7 +23,7 @@ struct StreamPool {
     Lane* samples;              ///< per path
 
     AMBILUX_HD uint32_t slot_of(uint32_t path) const { return path % slots; }
-    AMBILUX_HD LightWalkNumber number_of(const VertexItem& vertex) const { return {vertex.front.side.depth() - 1}; }
+    AMBILUX_HD LightWalkNumber number_of(const VertexFront& vertex) const { return {vertex.side.depth() - 1}; }
 
     /// Starts the first of the paths `path`, path + slots ... that has a pixel.
     AMBILUX_HD void begin(uint32_t path) const {
@@ -71,7 +71,7 @@ struct StreamExtend {
         if constexpr (F.opacity) {
             const bool light = item.path & kLightRay;
             const uint32_t path = item.path & ~kLightRay, depth = item.bits.depth();
-            ray.alpha_seed = light ? alpha_seed(pool.wave.key(path, Stream::light), pool.number_of(pool.eye.load(pool.slot_of(path))).alpha_depth(depth), false)
+            ray.alpha_seed = light ? alpha_seed(pool.wave.key(path, Stream::light), pool.number_of(pool.eye.load_front(pool.slot_of(path))).alpha_depth(depth), false)
                                    : alpha_seed(pool.wave.key(path), depth, false);
         }
         if (is_finite(item.o) && is_finite(item.d)) return true;
@@ -147,7 +147,7 @@ struct StreamTurn {
     AMBILUX_HD void operator()(uint32_t i) const {
         const TurnItem turn = turns.load(i);
         Walk w;
-        if (turn.light_walk && start_light<F>(pool.scene, pool.wave, pool.policy, turn.path, pool.number_of(pool.eye.load(pool.slot_of(turn.path))), splats, record, w))
+        if (turn.light_walk && start_light<F>(pool.scene, pool.wave, pool.policy, turn.path, pool.number_of(pool.eye.load_front(pool.slot_of(turn.path))), splats, record, w))
             pool.rays.push(pack_walk(w, turn.path | kLightRay, true, kInfinity));
         else
             pool.advance(turn.path);
@@ -167,8 +167,8 @@ struct StreamLightShade {
         const uint32_t path = h.ray.path;
         if (h.prim == kNone) return pool.advance(path);
         const BidirectionalPolicy& policy = pool.policy;
-        const VertexItem eye = pool.eye.load(pool.slot_of(path));
-        const LightWalkNumber number = pool.number_of(eye);
+        const VertexItem eye = pool.eye.load(pool.slot_of(path), vertex_lanes<F>());
+        const LightWalkNumber number = pool.number_of(eye.front);
         const uint32_t depth = h.ray.bits.depth();
         const bool splat = policy.splat && number.n == 0;
         // A path has one segment more than its light walk, and those of the eye walk if there is one.
@@ -193,8 +193,8 @@ struct StreamConnect {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const VertexItem light = pairs.load(i);
-        const VertexItem eye = pool.eye.load(pool.slot_of(light.path()));
+        const VertexItem light = pairs.load(i, vertex_lanes<F>());
+        const VertexItem eye = pool.eye.load(pool.slot_of(light.path()), vertex_lanes<F>());
         push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path()), eye, unpack_vertex<F>(pool.scene, eye), light, 1.0f, kNone, candidates, record);
     }
 };
