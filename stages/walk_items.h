@@ -72,7 +72,7 @@ struct SurfacePlace {
     uint32_t prim;
 };
 
-/// True if vertices hold all that a connection asks for; else their surfaces are looked up again, which takes less than twice the bytes where there are no textures (docs/performance.md).
+/// True if vertices hold all that a connection asks for. Else their surfaces are looked up again: without textures that costs less than 64 bytes more of every vertex (docs/performance.md).
 template <Features F>
 constexpr bool vertices_are_whole() {
     return F.textures;
