@@ -22,7 +22,7 @@ public:
     }
 
     /// A queue without items. Its counter is the next of the array `counters`. With `fixed_places` an item lies at the place of its path; the memory must then be zero at first. `lanes`: of each
-    /// item, the first ones, which are all that is used of it; an even number of those that are paired.
+    /// item, the first ones, which are all that is used of it.
     template <class Item>
     Queue<Item> queue(const char* name, QueueCounter* counters, uint32_t capacity, bool fixed_places = false, uint32_t lanes = Queue<Item>::kLanes) {
         Queue<Item> q;
@@ -30,7 +30,7 @@ public:
         q.capacity = capacity;
         names_.emplace_back(name);
         capacities_.push_back(capacity);
-        q.base = take<Lane>(uint64_t(capacity) * lanes);
+        q.base = take<Lane>(uint64_t(capacity) * (lanes < paired_lanes<Item>() ? (lanes + 1) / 2 * 2 : lanes));
         if (fixed_places) q.flags = take<uint8_t>(capacity);
         return q;
     }

@@ -82,6 +82,14 @@ struct Queue {
         memcpy(&item, all, sizeof(Item));
         return item;
     }
+    /// Lanes of an item from `first` to before `end`; what else `item` has stays as it is.
+    AMBILUX_HD void load_more(uint32_t i, Item& item, uint32_t first, uint32_t end) const {
+        Lane all[kLanes];
+        memcpy(all, &item, sizeof(Item));
+        for (uint32_t k = 0; k < kLanes; ++k)
+            if (k >= first && k < end) all[k] = base[place(i, k)];
+        memcpy(&item, all, sizeof(Item));
+    }
     /// The first member of an item, which is some lanes long.
     AMBILUX_HD auto load_front(uint32_t i) const {
         using Front = decltype(Item::front);

@@ -25,12 +25,14 @@ AMBILUX_HD Vec2f octahedral_encode(Vec3f n) {
     return {copysignf(1.0f - fabsf(y), x), copysignf(1.0f - fabsf(x), y)};
 }
 
-/// Inverse of octahedral_encode; the result is unit within rounding.
-AMBILUX_HD Vec3f octahedral_decode(Vec2f e) {
+/// The point of the octahedron that octahedral_encode maps to `e`: a vector of that direction, between 1/sqrt(3) and 1 long.
+AMBILUX_HD Vec3f octahedral_direction(Vec2f e) {
     const float z = 1.0f - fabsf(e.x) - fabsf(e.y);
-    const Vec3f n = z >= 0.0f ? Vec3f{e.x, e.y, z} : Vec3f{copysignf(1.0f - fabsf(e.y), e.x), copysignf(1.0f - fabsf(e.x), e.y), z};
-    return normalize(n);
+    return z >= 0.0f ? Vec3f{e.x, e.y, z} : Vec3f{copysignf(1.0f - fabsf(e.y), e.x), copysignf(1.0f - fabsf(e.x), e.y), z};
 }
+
+/// Inverse of octahedral_encode; the result is unit within rounding.
+AMBILUX_HD Vec3f octahedral_decode(Vec2f e) { return normalize(octahedral_direction(e)); }
 
 namespace detail {
 

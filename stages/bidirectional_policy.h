@@ -22,7 +22,7 @@ struct BidirectionalPolicy {
     uint32_t cache_draws;     ///< light vertices that an eye vertex draws from a cache of all; 0: those of the light walk of its slot
     uint32_t one_pair_from;    ///< launches over as many vertices hold one pair of each: kVerticesForOnePair, or what the queue of pairs has room for
     uint32_t pairs_per_launch; ///< pairs of one eye vertex in a launch of connect_vertices; more than 1: sums of a path depend on the order of threads
-    uint32_t vertex_lanes;     ///< of a VertexItem that kernels use (vertex_lanes)
+    uint32_t vertex_lanes, connection_lanes; ///< of a VertexItem and a ConnectionVertex that kernels use
     bool next_event;
     bool count_hits;          ///< eye walks count the area emitters that they meet
     bool count_environment;   ///< eye walks count the environment

@@ -6,7 +6,7 @@
 #include "stages/generate.h"
 #include "stages/mis_weight.h"
 #include "stages/stage.h"
-#include "stages/walk_items.h"
+#include "stages/vertex_items.h"
 
 namespace ambilux {
 
@@ -88,7 +88,6 @@ AMBILUX_HD uint32_t drawn_vertex(const RngKey& key, uint32_t depth, uint32_t dra
 
 /// Goes through the light vertices that an eye vertex may be connected with.
 struct LightVertexSearch {
-    const SceneView& scene;
     const BidirectionalPolicy& policy;
     const LightVertices& light_vertices;
     const RngKey& key;      ///< of the eye walk
@@ -103,12 +102,12 @@ struct LightVertexSearch {
         while (next != kNone) {
             uint32_t light = next;
             if (drawn) light = drawn_vertex(key, depth, --next, size);
-            const VertexFront y = light_vertices.load_front(light);
+            const ConnectionVertexFront y = light_vertices.load_front(light);
             if (!drawn)
                 next = y.link;
             else if (next == 0)
                 next = kNone;
-            if (depth + y.side.depth() + 1 <= policy.max_depth && may_connect(y, z)) return light;
+            if (depth + y.bits.depth() + 1 <= policy.max_depth && may_connect(y, z)) return light;
         }
         return kNone;
     }
@@ -128,24 +127,34 @@ AMBILUX_HD void push_pairs(const LightVertexSearch& search, uint32_t vertices, u
     }
 }
 
-/// Candidate of the eye vertex `z`, which `item` stands for, and light vertex `light`, worth `scale` times their product. `place`: of the light vertex in its cache.
+/// A vertex of the eye walk of `path`.
+struct EyeVertex {
+    WalkVertex vertex;
+    Rgb throughput;
+    uint32_t path, depth;
+};
+
 template <Features F>
-AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const VertexItem& item, const WalkVertex& z, const VertexItem& light, float scale,
-                                uint32_t place, const ConnectOutlet& candidates, StageRecord* record) {
-    const uint32_t eye_depth = item.front.side.depth(), light_depth = light.front.side.depth();
-    const Strategy strategy = Strategy::make(light_depth + 1, eye_depth + 1);
+AMBILUX_HD EyeVertex eye_vertex_of(const SceneView& scene, const ConnectionVertex& item) { return {unpack_vertex<F>(scene, item), item.throughput, item.path(), item.bits().depth()}; }
+
+/// Candidate of the eye vertex `z` and light vertex `light`, worth `scale` times their product. `place`: of the light vertex in its cache.
+template <Features F>
+AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const BidirectionalPolicy& policy, const RngKey& key, const EyeVertex& z, const ConnectionVertex& light, float scale, uint32_t place,
+                                     const ConnectOutlet& candidates, StageRecord* record) {
+    const uint32_t light_depth = light.front.bits.depth();
+    const Strategy strategy = Strategy::make(light_depth + 1, z.depth + 1);
     if (!policy.singles.has(strategy)) return;
     const WalkVertex y = unpack_vertex<F>(scene, light);
     WalkConnection c;
-    if (!may_connect(y, z) || !connect_vertices<F>(policy.mis, y, light.throughput, z, item.throughput, c)) return;
+    if (!may_connect(y, z.vertex) || !connect_vertices<F>(policy.mis, y, light.throughput, z.vertex, z.throughput, c)) return;
     c.value *= scale;
     if (!is_light(c.value, record) || is_zero(c.value)) return;
     uint32_t seed = 0;
     if (F.opacity || policy.cull > 0.0f) {
         const uint32_t which = policy.cache_draws > 0 ? WalkBits::kMaxDepth + place : light_depth;
-        seed = alpha_seed(key, eye_depth + (which << WalkBits::kDepthBits), true);
+        seed = alpha_seed(key, z.depth + (which << WalkBits::kDepthBits), true);
     }
-    candidates.push({c.value, item.path(), 1.0f, policy.others(c.others), seed, c.tmax, c.o, strategy, c.d, 0});
+    candidates.push({c.value, z.path, 1.0f, policy.others(c.others), seed, c.tmax, c.o, strategy, c.d, 0});
 }
 
 /// What a draw from a cache is worth: M vertices of N walks are in it, and k draws estimate the sum over a walk's vertices by M / (N k) times theirs.
@@ -160,6 +169,7 @@ struct EyeConnect {
     Wave wave;
     BidirectionalPolicy policy;
     Queue<VertexItem> vertices;
+    Queue<ConnectionVertex> eye_vertices;
     LightVertices light_vertices;
     const uint32_t* last_vertex;  ///< per slot: of its light walk; null: pairs are made elsewhere
     Queue<PairItem> pairs;
@@ -168,29 +178,30 @@ struct EyeConnect {
     StageRecord* pairs_record;  ///< of connect_vertices
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const VertexItem item = vertices.load(i, vertex_lanes<F>());
-        const WalkVertex z = unpack_vertex<F>(scene, item);
-        const uint32_t path = item.path(), depth = item.front.side.depth();
-        const RngKey key = wave.key(path);
-        pair(z, key, path, depth, vertices.counter->size(), [&] { return i; });
-        take(z, item.throughput, key, path, depth);
+        const VertexItem item = load_vertex<F>(vertices, i);
+        const EyeVertex z = {unpack_vertex<F>(scene, item), item.throughput, item.path, item.bits().depth()};
+        const RngKey key = wave.key(z.path);
+        pair(z, item.d, key, vertices.counter->size());
+        take(z.vertex, z.throughput, key, z.path, z.depth);
     }
 
-    /// The first pairs of the vertex `z`. `count`: of vertices in this launch, or more; place(): in `vertices`.
-    template <class Place>
-    AMBILUX_HD void pair(const WalkVertex& z, const RngKey& key, uint32_t path, uint32_t depth, uint32_t count, Place place) const {
-        const uint32_t first = first_pair(path);
-        if (first != kNone) push_pairs({scene, policy, light_vertices, key, depth, z}, count, path, first, pairs, place);
+    /// The first pairs of the vertex `z`, which a ray along `d` met. `count`: of vertices in this launch, or more.
+    AMBILUX_HD void pair(const EyeVertex& z, Vec3f d, const RngKey& key, uint32_t count) const {
+        const uint32_t first = first_pair(z.path);
+        if (first != kNone)
+            push_pairs({policy, light_vertices, key, z.depth, z.vertex}, count, z.path, first, pairs,
+                       [&] { return push_vertex<F>(eye_vertices, pack_connection_vertex(z.vertex, z.depth, d, z.throughput, z.path)); });
     }
 
-    /// connect_vertices for all that pair() would push, in the same order.
-    AMBILUX_HD void connect_all(const VertexItem& item, const WalkVertex& z, const RngKey& key) const {
-        const LightVertexSearch lights = {scene, policy, light_vertices, key, item.front.side.depth(), z};
+    /// connect_vertices for all that pair() would push, in the same order and of the same vertices.
+    AMBILUX_HD void connect_all(const EyeVertex& z, Vec3f d, const RngKey& key) const {
+        const LightVertexSearch lights = {policy, light_vertices, key, z.depth, z.vertex};
         const float scale = policy.cache_draws > 0 ? draw_scale(wave, policy, light_vertices) : 1.0f;
-        uint32_t next = first_pair(item.path());
+        const EyeVertex packed = eye_vertex_of<F>(scene, pack_connection_vertex(z.vertex, z.depth, d, z.throughput, z.path));
+        uint32_t next = first_pair(z.path);
         for (uint32_t found = lights.find(next); found != kNone; found = lights.find(next)) {
-            pairs_record->count_item(lights.depth);
-            push_connection<F>(scene, policy, key, item, z, light_vertices.load(found, vertex_lanes<F>()), scale, found, candidates, pairs_record);
+            pairs_record->count_item(z.depth);
+            push_connection<F>(scene, policy, key, packed, load_vertex<F>(light_vertices, found), scale, found, candidates, pairs_record);
         }
     }
 
@@ -239,21 +250,20 @@ struct EyeShade {
     /// True if the walk goes on with the ray `next`. `count`: of hits in this launch, or more.
     AMBILUX_HD bool take(const WalkHit& h, uint32_t count, WalkItem& next) const {
         const WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z, const RngKey& key) {
-            const auto push = [&] { return vertices.push(pack_vertex<F>(z, h), vertex_lanes<F>()); };
             if (!policy.connect_in_shade) {
-                push();
+                push_vertex<F>(vertices, pack_vertex(z, h));
                 return;
             }
-            const uint32_t depth = h.ray.bits.depth();
-            connect.take(z, h.ray.throughput, key, h.ray.path, depth);
+            const EyeVertex eye = {z, h.ray.throughput, h.ray.path, h.ray.bits.depth()};
+            connect.take(z, eye.throughput, key, eye.path, eye.depth);
 #if !defined(__CUDA_ARCH__)
             if (policy.at_once) {
-                if (policy.connect_vertices) connect.connect_all(pack_vertex<F>(z, h), z, key);
+                if (policy.connect_vertices) connect.connect_all(eye, h.ray.d, key);
                 return;
             }
 #endif
             const Warp warp;
-            connect.pair(z, key, h.ray.path, depth, count, push);
+            connect.pair(eye, h.ray.d, key, count);
             warp.meet();  // else lanes that search longer than others stay apart
         });
         next = step.ray;
@@ -264,8 +274,7 @@ struct EyeShade {
 /// An eye vertex that pairs one after the other may have in common.
 struct PairedVertex {
     uint32_t place = kNone;  ///< in the queue of its depth
-    VertexItem item;
-    WalkVertex vertex;
+    EyeVertex z;
 };
 
 /// connect_vertices: an eye vertex and a light vertex (s, t >= 2), of the light walk of its slot, or drawn from a cache of those of all light walks of the wave (Davidovic et al. 2014).
@@ -277,7 +286,7 @@ struct ConnectVertices {
     Wave wave;
     BidirectionalPolicy policy;
     Queue<PairItem> pairs, rest;
-    Queue<VertexItem> vertices;
+    Queue<ConnectionVertex> vertices;
     LightVertices light_vertices;
     ConnectOutlet candidates;
     StageRecord* record;
@@ -291,18 +300,17 @@ struct ConnectVertices {
     }
     AMBILUX_HD void operator()(uint32_t i, Memory& eye) const {
         const PairItem pair = pairs.load(i);
-        const VertexItem light = light_vertices.load(pair.light, vertex_lanes<F>());  // before anything waits for the eye vertex
+        const ConnectionVertex light = load_vertex<F>(light_vertices, pair.light);  // before anything waits for the eye vertex
         if (eye.place != pair.vertex) {
             eye.place = pair.vertex;
-            eye.item = vertices.load(pair.vertex, vertex_lanes<F>());
-            eye.vertex = unpack_vertex<F>(scene, eye.item);
+            eye.z = eye_vertex_of<F>(scene, load_vertex<F>(vertices, pair.vertex));
         }
         const RngKey key = wave.key(pair.path);
         const Warp warp;
         if (pair.next != kNone)
-            push_pairs({scene, policy, light_vertices, key, eye.item.front.side.depth(), eye.vertex}, pairs.counter->size(), pair.path, pair.next, rest, [&] { return pair.vertex; });
+            push_pairs({policy, light_vertices, key, eye.z.depth, eye.z.vertex}, pairs.counter->size(), pair.path, pair.next, rest, [&] { return pair.vertex; });
         warp.meet();
-        push_connection<F>(scene, policy, key, eye.item, eye.vertex, light, policy.cache_draws > 0 ? draw_scale(wave, policy, light_vertices) : 1.0f, pair.light, candidates, record);
+        push_connection<F>(scene, policy, key, eye.z, light, policy.cache_draws > 0 ? draw_scale(wave, policy, light_vertices) : 1.0f, pair.light, candidates, record);
     }
 };
 

@@ -4,7 +4,7 @@
 #include "stages/bidirectional_policy.h"
 #include "stages/splat.h"
 #include "stages/stage.h"
-#include "stages/walk_items.h"
+#include "stages/vertex_items.h"
 #include "stages/wave.h"
 
 namespace ambilux {
@@ -86,8 +86,8 @@ struct ConnectCamera {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const VertexItem item = vertices.load(i, vertex_lanes<F>());
-        take(unpack_vertex<F>(scene, item), item.throughput, wave.key(item.path(), Stream::light), item.path(), item.front.side.depth());
+        const VertexItem item = load_vertex<F>(vertices, i);
+        take(unpack_vertex<F>(scene, item), item.throughput, wave.key(item.path, Stream::light), item.path, item.bits().depth());
     }
 
     AMBILUX_HD void take(const WalkVertex& y, Rgb throughput, const RngKey& key, uint32_t path, uint32_t depth) const {
@@ -133,10 +133,10 @@ struct LightShade {
         // A path has at least one segment more than its light walk.
         WalkStep step = light_step<F>(scene, wave, policy, h, {0}, policy.max_depth - 1, record, [&](const WalkVertex& y, const RngKey& key) {
             if (to_camera && policy.connect_in_shade) connect.take(y, h.ray.throughput, key, h.ray.path, depth);
-            if (to_camera && !policy.connect_in_shade) camera_vertices.push(pack_vertex<F>(y, h), vertex_lanes<F>());
+            if (to_camera && !policy.connect_in_shade) push_vertex<F>(camera_vertices, pack_vertex(y, h));
             if (policy.connect_vertices && depth + 2 <= policy.max_depth) {
                 const bool chained = policy.cache_draws == 0;
-                const uint32_t place = vertices.push(pack_light_vertex<F>(y, {h.u, h.v, h.prim}, h.ray.d, h.ray.throughput, depth, chained ? last_vertex[h.ray.path] : kNone), vertex_lanes<F>());
+                const uint32_t place = push_vertex<F>(vertices, pack_connection_vertex(y, depth, h.ray.d, h.ray.throughput, chained ? last_vertex[h.ray.path] : kNone));
                 if (chained) last_vertex[h.ray.path] = place;
             }
         });

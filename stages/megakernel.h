@@ -7,7 +7,7 @@
 #include "stages/generate.h"
 #include "stages/splat.h"
 #include "stages/stage.h"
-#include "stages/walk_items.h"
+#include "stages/vertex_items.h"
 
 namespace ambilux {
 
@@ -76,10 +76,11 @@ struct Megakernel {
 
 private:
     /// The vertex of the eye walk that is being connected. Its surface is looked up for every pair: a thread has no registers for it.
-    struct EyeVertex {
+    struct WaitingVertex {
         Vec3f d;        ///< of the ray that met it
         uint32_t depth;
-        SurfacePlace place;
+        float u, v;
+        uint32_t prim;
         uint32_t next;  ///< the light vertex to connect next
         Rgb throughput;
         MisSums sums;
@@ -95,7 +96,7 @@ private:
         uint32_t last;      ///< vertex of the light walk
         Walk walk;
         float tmax;         ///< of the walk's ray
-        EyeVertex vertex;
+        WaitingVertex vertex;
         Ray shadow;
         Rgb value;          ///< arrives if the shadow ray is free:
         Vec2f film;         ///< there, from a light walk
@@ -228,9 +229,9 @@ private:
             if (made) test(path, c, k, w.depth, light ? StageId::connect_camera : StageId::connect);
             if (policy.connect_vertices && w.depth + 2 <= policy.max_depth) {
                 if (light)
-                    path.last = light_vertices.push(pack_light_vertex<F>(x, {hit.u, hit.v, hit.prim}, w.d, w.throughput, w.depth, path.last), vertex_lanes<F>());
+                    path.last = push_vertex<F>(light_vertices, pack_connection_vertex(x, w.depth, w.d, w.throughput, path.last));
                 else
-                    path.vertex = {w.d, w.depth, {hit.u, hit.v, hit.prim}, path.last, w.throughput, x.sums};
+                    path.vertex = {w.d, w.depth, hit.u, hit.v, hit.prim, path.last, w.throughput, x.sums};
             }
         }
         // The last segment of an eye walk can bring emission only, and a path has one more than its light walk.
@@ -243,19 +244,19 @@ private:
 
     /// The eye vertex and the next vertex of the light walk that is not too far from the light.
     AMBILUX_HD void connect(Path& path) const {
-        EyeVertex& z = path.vertex;
+        WaitingVertex& z = path.vertex;
         uint32_t place, light_depth;
         do {
             if (!connecting(path)) return;
             place = z.next;
-            const VertexFront front = light_vertices.load_front(place);
-            light_depth = front.side.depth();
+            const ConnectionVertexFront front = light_vertices.load_front(place);
+            light_depth = front.bits.depth();
             z.next = front.link;
         } while (z.depth + light_depth + 1 > policy.max_depth);
         if (!policy.wants(light_depth + 1, z.depth + 1)) return;
-        WalkVertex eye = walk_vertex<F>(scene, z.d, z.depth, z.place.prim, z.place.u, z.place.v);
+        WalkVertex eye = walk_vertex<F>(scene, z.d, z.depth, z.prim, z.u, z.v);
         eye.sums = z.sums;
-        const VertexItem light = light_vertices.load(place, vertex_lanes<F>());
+        const ConnectionVertex light = load_vertex<F>(light_vertices, place);
         WalkConnection c;
         if (connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, light), light.throughput, eye, z.throughput, c))
             test(path, c, key(path), z.depth + (light_depth << WalkBits::kDepthBits), StageId::connect_vertices);

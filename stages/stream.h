@@ -17,13 +17,13 @@ struct StreamPool {
     Wave wave;
     BidirectionalPolicy policy;
     uint32_t slots;
-    Queue<VertexItem> eye;      ///< by slot, not a queue: the vertex that the light walk is for; its path is kNoPath if it is for the camera only
+    Queue<ConnectionVertex> eye;      ///< by slot, not a queue: the vertex that the light walk is for; its path is kNoPath if it is for the camera only
     Queue<WalkItem> pending;    ///< by slot: the ray with which the eye walk goes on; depth 0: it has ended
     Queue<WalkItem> rays;
     Lane* samples;              ///< per path
 
     AMBILUX_HD uint32_t slot_of(uint32_t path) const { return path % slots; }
-    AMBILUX_HD LightWalkNumber number_of(const VertexFront& vertex) const { return {vertex.side.depth() - 1}; }
+    AMBILUX_HD LightWalkNumber number_of(const ConnectionVertexFront& vertex) const { return {vertex.bits.depth() - 1}; }
 
     /// Starts the first of the paths `path`, path + slots ... that has a pixel.
     AMBILUX_HD void begin(uint32_t path) const {
@@ -120,18 +120,18 @@ struct StreamEyeShade {
         const WalkHit h = hits.load(i);
         const BidirectionalPolicy& policy = pool.policy;
         const uint32_t depth = h.ray.bits.depth(), slot = pool.slot_of(h.ray.path);
-        VertexItem vertex = {};
-        vertex.front = {{}, VertexSide::of_depth(depth), {}, kNoPath};
+        ConnectionVertex vertex = {};
+        vertex.front.bits = {depth};
+        vertex.front.link = kNoPath;
         bool connect = false;
         WalkStep step = eye_step<F>(pool.scene, pool.wave, policy, h, candidates, record, [&](const WalkVertex& z, const RngKey&) {
-            const VertexItem item = pack_vertex<F>(z, h);
-            vertices.push(item, vertex_lanes<F>());
+            if (policy.next_event) push_vertex<F>(vertices, pack_vertex(z, h));
             connect = policy.connect_vertices && depth + 2 <= policy.max_depth;
-            if (connect) vertex = item;
+            if (connect) vertex = pack_connection_vertex(z, h);
         });
         if (!step.goes_on) step.ray.bits = {0};
         pool.pending.store(slot, step.ray);
-        pool.eye.store(slot, vertex, vertex_lanes<F>());
+        pool.eye.store(slot, vertex, lanes_of<F>(vertex));
         turns.push({h.ray.path, connect || (policy.splat && depth == 1) ? 1u : 0u, {0, 0}});
     }
 };
@@ -159,7 +159,8 @@ template <Features F>
 struct StreamLightShade {
     StreamPool pool;
     Queue<WalkHit> hits;
-    Queue<VertexItem> camera_vertices, pairs;
+    Queue<VertexItem> camera_vertices;
+    Queue<ConnectionVertex> pairs;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
@@ -167,16 +168,15 @@ struct StreamLightShade {
         const uint32_t path = h.ray.path;
         if (h.prim == kNone) return pool.advance(path);
         const BidirectionalPolicy& policy = pool.policy;
-        const VertexItem eye = pool.eye.load(pool.slot_of(path), vertex_lanes<F>());
-        const LightWalkNumber number = pool.number_of(eye.front);
+        const ConnectionVertexFront eye = pool.eye.load_front(pool.slot_of(path));
+        const LightWalkNumber number = pool.number_of(eye);
         const uint32_t depth = h.ray.bits.depth();
         const bool splat = policy.splat && number.n == 0;
         // A path has one segment more than its light walk, and those of the eye walk if there is one.
-        const uint32_t longest = splat ? policy.max_depth - 1 : policy.max_depth - 1 - eye.front.side.depth();
+        const uint32_t longest = splat ? policy.max_depth - 1 : policy.max_depth - 1 - eye.bits.depth();
         WalkStep step = light_step<F>(pool.scene, pool.wave, policy, h, number, longest, record, [&](const WalkVertex& y, const RngKey&) {
-            const VertexItem item = pack_vertex<F>(y, h);
-            if (splat && depth < policy.max_depth && policy.wants(depth + 1, 1)) camera_vertices.push(item, vertex_lanes<F>());
-            if (eye.path() != kNoPath && depth + eye.front.side.depth() + 1 <= policy.max_depth) pairs.push(item, vertex_lanes<F>());
+            if (splat && depth < policy.max_depth && policy.wants(depth + 1, 1)) push_vertex<F>(camera_vertices, pack_vertex(y, h));
+            if (eye.link != kNoPath && depth + eye.bits.depth() + 1 <= policy.max_depth) push_vertex<F>(pairs, pack_connection_vertex(y, h));
         });
         if (!step.goes_on) return pool.advance(path);
         step.ray.path |= kLightRay;
@@ -188,14 +188,14 @@ struct StreamLightShade {
 template <Features F>
 struct StreamConnect {
     StreamPool pool;
-    Queue<VertexItem> pairs;
+    Queue<ConnectionVertex> pairs;
     ConnectOutlet candidates;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const VertexItem light = pairs.load(i, vertex_lanes<F>());
-        const VertexItem eye = pool.eye.load(pool.slot_of(light.path()), vertex_lanes<F>());
-        push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path()), eye, unpack_vertex<F>(pool.scene, eye), light, 1.0f, kNone, candidates, record);
+        const ConnectionVertex light = load_vertex<F>(pairs, i);
+        const EyeVertex eye = eye_vertex_of<F>(pool.scene, load_vertex<F>(pool.eye, pool.slot_of(light.path())));
+        push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path()), eye, light, 1.0f, kNone, candidates, record);
     }
 };
 

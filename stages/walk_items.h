@@ -1,4 +1,4 @@
-// What travels through the queues of light tracing and bidirectional path tracing.
+// What travels through the queues of light tracing and bidirectional path tracing, but for vertices (stages/vertex_items.h).
 #pragma once
 
 #include "stages/path_items.h"
@@ -30,86 +30,6 @@ struct WalkHit {
     uint32_t prim;
     uint32_t pad;
 };
-
-/// To which sides a vertex scatters, and its depth. Of the normal 8 bits of either coordinate of its octahedral map are kept.
-struct VertexSide {
-    uint32_t bits;
-
-    /// For whoever asks for the depth only.
-    AMBILUX_HD static VertexSide of_depth(uint32_t depth) { return {depth | kThrough}; }
-    /// `n`: unit geometric normal on the side that the walk came from; `through`: the BSDF passes light to the other side too.
-    AMBILUX_HD static VertexSide make(uint32_t depth, Vec3f n, bool through) {
-        const Vec2f e = octahedral_encode(n);
-        return {depth | (through ? kThrough : 0u) | quantised(e.x) << 16 | quantised(e.y) << 24};
-    }
-    AMBILUX_HD uint32_t depth() const { return bits & WalkBits::kMaxDepth; }
-    /// False if nothing is scattered towards `w`, of any length. True for a few directions more: up to two degrees behind the surface.
-    AMBILUX_HD bool reaches(Vec3f w) const {
-        if (bits & kThrough) return true;
-        const Vec3f n = octahedral_decode({(float(bits >> 16 & 255u) - 127.0f) * (1.0f / 127.0f), (float(bits >> 24) - 127.0f) * (1.0f / 127.0f)});
-        const float along = dot(n, w);
-        return !(along <= 0.0f && sqr(along) >= sqr(kError) * length_squared(w));
-    }
-
-private:
-    static constexpr uint32_t kThrough = 1u << WalkBits::kDepthBits;
-    static constexpr float kError = 0.017f;  ///< half a step, 1/254, in x and y, as much as both in z, over the least length, 1/sqrt(3), of a vector whose coordinates have the sum 1
-
-    AMBILUX_HD static uint32_t quantised(float x) { return uint32_t(clamp(x * 127.0f + 127.5f, 0.0f, 254.0f)); }
-};
-
-/// What tells whether a vertex can be connected with a point, and which vertex is next: memory moves 32 bytes at a time, and most pairs need no more.
-struct VertexFront {
-    Vec3f p;
-    VertexSide side;
-    Vec3f d;           ///< of the ray that met it
-    uint32_t link;     ///< the path; of a vertex that is kept over a wave, the one before it in the same walk or kNone
-};
-
-/// A point on a surface as hits name it.
-struct SurfacePlace {
-    float u, v;
-    uint32_t prim;
-};
-
-/// True if vertices hold all that a connection asks for. Else their surfaces are looked up again: without textures that costs less than 64 bytes more of every vertex (docs/performance.md).
-template <Features F>
-constexpr bool vertices_are_whole() {
-    return F.textures;
-}
-
-/// A vertex of a walk.
-struct VertexItem {
-    static constexpr uint32_t kPairedLanes = 8;
-
-    VertexFront front;
-    Rgb throughput;
-    float dvcm;
-    union {
-        SurfacePlace place;        ///< of a vertex that is not whole
-        Rgb specular_reflectance;  ///< of one that is (ScatteringParts), which has what follows `dvc` too
-    };
-    float dvc;
-    Vec3f ng;
-    float offset;                  ///< WalkVertex::offset
-    Vec3f n;
-    uint32_t record;
-    Vec3f tangent;
-    float alpha_u;
-    Rgb color;
-    float alpha_v;
-
-    AMBILUX_HD uint32_t path() const { return front.link; }
-};
-
-/// Lanes of a VertexItem that kernels of these features use.
-template <Features F>
-constexpr uint32_t vertex_lanes() {
-    return vertices_are_whole<F>() ? sizeof(VertexItem) / sizeof(Lane) : 4;
-}
-
-/// Vertices of light walks, kept over a wave.
-using LightVertices = Queue<VertexItem>;
 
 /// An eye vertex and a vertex of a light walk to be connected.
 struct PairItem {
@@ -176,64 +96,6 @@ AMBILUX_HD Walk unpack_walk(const WalkItem& item) {
     w.eta_scale = item.bits.eta_scale();
     w.delta = item.bits.delta();
     return w;
-}
-
-/// The vertex `v` at `place` that a ray along `d` met.
-template <Features F>
-AMBILUX_HD VertexItem pack_vertex(const WalkVertex& v, SurfacePlace place, Vec3f d, Rgb throughput, VertexSide side, uint32_t link) {
-    VertexItem item = {};
-    item.front = {v.point.p, side, d, link};
-    item.throughput = throughput;
-    item.dvcm = v.sums.dvcm;
-    item.dvc = v.sums.dvc;
-    if constexpr (vertices_are_whole<F>()) {
-        const ScatteringParts s = parts_of(v.scattering);
-        item.specular_reflectance = s.parameters.specular_reflectance;
-        item.ng = s.ng;
-        item.offset = v.offset;
-        item.n = s.n;
-        item.record = s.record;
-        item.tangent = s.tangent;
-        item.alpha_u = s.parameters.alpha_u;
-        item.color = s.parameters.color;
-        item.alpha_v = s.parameters.alpha_v;
-    } else {
-        item.place = place;
-    }
-    return item;
-}
-/// For connections of the path of `hit`.
-template <Features F>
-AMBILUX_HD VertexItem pack_vertex(const WalkVertex& v, const WalkHit& hit) {
-    return pack_vertex<F>(v, {hit.u, hit.v, hit.prim}, hit.ray.d, hit.ray.throughput, VertexSide::of_depth(hit.ray.bits.depth()), hit.ray.path);
-}
-/// Of a light walk, after the vertex `previous`.
-template <Features F>
-AMBILUX_HD VertexItem pack_light_vertex(const WalkVertex& y, SurfacePlace place, Vec3f d, Rgb throughput, uint32_t depth, uint32_t previous) {
-    const bool in_front = dot(y.point.ng, d) < 0.0f;
-    return pack_vertex<F>(y, place, d, throughput, VertexSide::make(depth, in_front ? y.point.ng : -y.point.ng, bsdf_transmits(y.scattering.bsdf.type)), previous);
-}
-
-template <Features F>
-AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& item) {
-    WalkVertex v = {};
-    if constexpr (vertices_are_whole<F>()) {
-        v.point.p = item.front.p;
-        v.point.ng = item.ng;
-        v.offset = item.offset;
-        v.scattering = scattering_of<F>(scene, {item.ng, item.n, item.tangent, item.record, {item.color, item.alpha_u, item.specular_reflectance, item.alpha_v}}, -item.front.d);
-        v.first = item.front.side.depth() == 1;
-    } else {
-        v = walk_vertex<F>(scene, item.front.d, item.front.side.depth(), item.place.prim, item.place.u, item.place.v);
-    }
-    v.sums = {item.dvcm, item.dvc};
-    return v;
-}
-
-/// False if no light can pass between the vertex `y` of a light walk and `z`: may_connect of their vertices, in doubt true.
-AMBILUX_HD bool may_connect(const VertexFront& y, const WalkVertex& z) {
-    const Vec3f w = z.point.p - y.p;
-    return y.side.reaches(w) && may_scatter(z.scattering, -w);
 }
 
 }  // namespace ambilux

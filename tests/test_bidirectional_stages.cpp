@@ -82,11 +82,6 @@ struct Bench {
             CpuExecutor::run(id, stage, queue);
         }
         template <class Stage, class Item>
-        void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
-            prepare(id, queue.counter->size());
-            CpuExecutor::run_keeping(id, stage, queue);
-        }
-        template <class Stage, class Item>
         void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
             run(id, stage, queue);
         }
@@ -238,7 +233,7 @@ TEST_CASE("G9: connect and connect_vertices count pairs whose light is none", "[
     for (auto [value, which] : kBad) {
         Bench b(cornell());
         b.run(StageId::generate, [v = value](Bench& x) {
-            for (uint32_t i = 0; i < x.memory.light_vertices.counter->size(); i += 2) edit<VertexItem>(x.memory.light_vertices, i, [v](VertexItem& y) { y.throughput.x = v; });
+            for (uint32_t i = 0; i < x.memory.light_vertices.counter->size(); i += 2) edit<ConnectionVertex>(x.memory.light_vertices, i, [v](ConnectionVertex& y) { y.throughput.x = v; });
         });
         const uint64_t counted = b.count(StageId::connect_vertices, which);
         CHECK(counted > 100);

@@ -2,13 +2,11 @@
 // timeout: 900
 // Variants of bidirectional path tracing give the same image.
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "core/error.h"
 #include "scene/accel/cwbvh.h"
 #include "stages/splat_sums.h"
-#include "stages/walk_items.h"
 #include "tests/bidirectional_images.h"
 #include "transport/walk.h"
 
@@ -307,10 +305,10 @@ TEST_CASE("Sums of splats: cells of floats hold what fixed point holds, and both
         double expected[3] = {};
         for (int k = 0; k < 100; ++k) {
             const Rgb value = {0.5f + float(k), 1e-3f * float(k), 1e5f};  // below and above kLargeLight
-            CHECK(sums.add(1, value));
+            CHECK(sums.add(1, value, false));
             for (int c = 0; c < 3; ++c) expected[c] += double(value[c]);
         }
-        CHECK_FALSE(sums.add(1, {1, 2, 0x1p26f}));
+        CHECK_FALSE(sums.add(1, {1, 2, 0x1p26f}, true));
         double value[3];
         sums.read(1, value);
         for (int c = 0; c < 3; ++c) CHECK(value[c] == Approx(expected[c]).epsilon(sums.fixed ? 1e-9 : 100 * 0x1p-24));
@@ -319,124 +317,5 @@ TEST_CASE("Sums of splats: cells of floats hold what fixed point holds, and both
         for (int c = 0; c < 3; ++c) CHECK(value[c] == 0);
         sums.read(0, value);
         for (int c = 0; c < 3; ++c) CHECK(value[c] == 0);
-    }
-}
-
-TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no light") {
-    for (const char* name : {"cornell", "glass", "materials", "textured"}) {
-        const Scene scene = project_scene(name, 32, 32);
-        const CwbvhAccel accel(scene);
-        const SceneView view = scene.view();
-        const auto at_random = [&](uint32_t i, Stream stream, WalkVertex& v) {
-            const RngKey key = {5, i, 0, stream};
-            const Vec4f u = random_floats(key, 0);
-            // Through the middle of the scene.
-            const Vec3f from = scene.bounds_center + square_to_sphere({u.x, u.y}) * scene.bounds_radius, to = scene.bounds_center + square_to_sphere({u.z, u.w}) * (0.4f * scene.bounds_radius);
-            const Vec3f d = normalize(to - from);
-            Hit hit;
-            if (!accel.tracer().closest<kAllFeatures>(view, {from, kInfinity, d, 0}, hit)) return false;
-            v.point = surface_at<kAllFeatures>(view, hit.prim, hit.u, hit.v);
-            v.offset = ray_offset(v.point.p, v.point.p_error, v.point.ng);
-            v.scattering = make_scattering<kAllFeatures>(view, v.point, -d);
-            v.sums = {1, 1};
-            v.first = false;
-            return bsdf_is_smooth(v.scattering.bsdf);
-        };
-        BidirectionalMis mis{};
-        mis.strategies = kAllStrategies;
-        mis.light_paths = mis.connections = 1.0f;
-        uint32_t pairs = 0, turned_down = 0, lit = 0;
-        for (uint32_t i = 0; i < 20000; ++i) {
-            WalkVertex y, z;
-            if (!at_random(i, Stream::light, y) || !at_random(i, Stream::eye, z)) continue;
-            ++pairs;
-            WalkConnection c;
-            const bool brings = connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c) && !is_zero(c.value);
-            lit += brings;
-            const VertexItem packed = pack_light_vertex<kAllFeatures>(y, {}, -y.scattering.wi_world, {1, 1, 1}, 2, kNone);
-            if (may_connect(y, z)) {
-                REQUIRE(may_connect(packed.front, z));
-                continue;
-            }
-            ++turned_down;
-            REQUIRE_FALSE(brings);
-        }
-        INFO(name << ": " << pairs << " pairs, " << turned_down << " turned down, " << lit << " with light");
-        CHECK(pairs > 1000);
-        CHECK(lit > 100);
-        CHECK(turned_down > pairs / 4);
-    }
-}
-
-TEST_CASE("A vertex that comes from a queue is the one that went in, surface, frame and BSDF") {
-    constexpr Features kLookedUp = {kAllFeatures.bsdfs, kAllFeatures.emitters, kAllFeatures.primitives, false, false, false};
-    static_assert(vertices_are_whole<kAllFeatures>() && !vertices_are_whole<kLookedUp>());
-    const auto same = [](Vec3f a, Vec3f b) { return a.x == b.x && a.y == b.y && a.z == b.z; };
-    const auto close = [](Vec3f a, Vec3f b) { return length(a - b) < 1e-6f; };  // copies of one function round their sums of products differently
-    uint32_t types = 0, behind = 0;
-    for (const char* name : {"cornell", "glass", "materials", "textured"}) {
-        INFO(name);
-        const Scene scene = project_scene(name, 32, 32);
-        const CwbvhAccel accel(scene);
-        const SceneView view = scene.view();
-        uint32_t vertices = 0;
-        for (uint32_t i = 0; i < 20000; ++i) {
-            const RngKey key = {11, i, 0, Stream::eye};
-            const Vec4f u = random_floats(key, 0), t = random_floats(key, 1);
-            const Vec3f from = scene.bounds_center + square_to_sphere({u.x, u.y}) * scene.bounds_radius, to = scene.bounds_center + square_to_sphere({u.z, u.w}) * (0.4f * scene.bounds_radius);
-            const Vec3f d = normalize(to - from);
-            Hit hit;
-            if (!accel.tracer().closest<kAllFeatures>(view, {from, kInfinity, d, 0}, hit)) continue;
-            const uint32_t depth = 1 + i % 2;
-            WalkVertex v = walk_vertex<kAllFeatures>(view, d, depth, hit.prim, hit.u, hit.v);
-            v.sums = {t.z, t.w};
-            ++vertices;
-            behind += v.scattering.flipped;
-            types |= bit(v.scattering.bsdf.type);
-            const auto check = [&](const VertexItem& item, const WalkVertex& back) {
-                const Scattering &a = v.scattering, &b = back.scattering;
-                const Bsdf &f = a.bsdf, &g = b.bsdf;
-                REQUIRE((item.front.side.depth() == depth && item.path() == 7 && same(item.throughput, {1, 2, 3})));
-                REQUIRE((back.first == v.first && back.sums.dvcm == v.sums.dvcm && back.sums.dvc == v.sums.dvc));
-                REQUIRE((close(back.point.p, v.point.p) && std::fabs(back.offset - v.offset) <= 1e-6f * v.offset));
-                REQUIRE((close(back.point.ng, v.point.ng) || close(-back.point.ng, v.point.ng)));  // its side does not matter
-                REQUIRE((close(a.ng, b.ng) && close(a.frame.n, b.frame.n) && close(a.frame.s, b.frame.s) && close(a.frame.t, b.frame.t) && close(a.wi, b.wi) && same(a.wi_world, b.wi_world)));
-                REQUIRE((a.record == b.record && a.flipped == b.flipped && f.type == g.type && f.microfacets == g.microfacets && f.sample_visible == g.sample_visible && f.nonlinear == g.nonlinear));
-                REQUIRE((same(f.reflectance_or_eta, g.reflectance_or_eta) && same(f.specular_reflectance, g.specular_reflectance) && same(f.transmittance_or_k, g.transmittance_or_k)));
-                REQUIRE((f.ior == g.ior && f.alpha_u == g.alpha_u && f.alpha_v == g.alpha_v && f.fdr_internal == g.fdr_internal && f.specular_sampling_weight == g.specular_sampling_weight &&
-                         f.transmittance_table == g.transmittance_table));
-            };
-            const SurfacePlace place = {hit.u, hit.v, hit.prim};
-            const VertexItem whole = pack_vertex<kAllFeatures>(v, place, d, {1, 2, 3}, VertexSide::of_depth(depth), 7);
-            check(whole, unpack_vertex<kAllFeatures>(view, whole));
-            if (scene.features.textures || scene.features.bumps) continue;
-            const VertexItem looked_up = pack_vertex<kLookedUp>(v, place, d, {1, 2, 3}, VertexSide::of_depth(depth), 7);
-            check(looked_up, unpack_vertex<kLookedUp>(view, looked_up));
-        }
-        CHECK(vertices > 1000);
-    }
-    CHECK(std::popcount(types) >= 5);
-    CHECK(behind > 0);
-}
-
-TEST_CASE("The coarse normal of a light vertex turns down nothing in front of it, and what is more than two degrees behind") {
-    for (uint32_t i = 0; i < 400000; ++i) {
-        const RngKey key = {9, i, 0, Stream::eye};
-        const Vec4f u = random_floats(key, 0), v = random_floats(key, 1);
-        Vec3f n = square_to_sphere({u.x, u.y});
-        // Along edges of the octahedron and at its corners too.
-        if (i % 3 == 0) n = normalize(Vec3f{i % 2 ? n.x : 0.0f, i % 4 < 2 ? n.y : 1e-4f * n.y, i % 5 ? n.z : 0.0f});
-        if (!is_finite(n)) continue;
-        const uint32_t depth = 1 + i % WalkBits::kMaxDepth;
-        const VertexSide side = VertexSide::make(depth, n, false);
-        REQUIRE(side.depth() == depth);
-        // A direction at `angle` above the surface, of any length.
-        const Vec3f across = normalize(cross(n, square_to_sphere({v.x, v.y})));
-        const float angle = 0.1f * (2.0f * u.z - 1.0f), distance = std::exp2(60.0f * (u.w - 0.5f));
-        const Vec3f w = (across * std::cos(angle) + n * std::sin(angle)) * distance;
-        INFO("normal " << n.x << " " << n.y << " " << n.z << ", angle " << angle << ", distance " << distance);
-        if (dot(n, w) > 0.0f) REQUIRE(side.reaches(w));
-        if (angle < -0.035f) REQUIRE_FALSE(side.reaches(w));
-        REQUIRE(VertexSide::make(depth, n, true).reaches(w));
     }
 }

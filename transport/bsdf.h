@@ -8,7 +8,7 @@
 // - pdf_sa is the density of wo per solid angle that sample uses; it is the same in both modes up to the swap of roles.
 // - sample takes u.x for the choice of a lobe and (u.y, u.z) for the direction, uniform in [0,1); false means that the walk ends.
 //
-// A new BSDF is one file in transport/bsdf/ with eval, pdf and sample, a BsdfType, a case in look_up_parameters and with_bsdf, and in make_bsdf the constants that it has.
+// A new BSDF is one file in transport/bsdf/ with eval, pdf and sample, a BsdfType, and a case in make_bsdf and with_bsdf.
 #pragma once
 
 #include <bit>
@@ -55,41 +55,72 @@ struct BsdfParameters {
     float alpha_v;
 };
 
-/// Looks up the parameters of `record` at texture coordinates `uv`. Microfacet roughness is at least kMinAlpha.
+/// Looks up the parameters at texture coordinates `uv`.
 template <Features F>
-AMBILUX_HD BsdfParameters look_up_parameters(const SceneView& scene, const BsdfRecord& record, Vec2f uv) {
-    BsdfParameters p = {};
-    const auto specular_reflectance = [&] { p.specular_reflectance = eval_rgb<F>(scene, record.specular_reflectance, uv); };
-    const auto reflectance = [&] { p.color = eval_rgb<F>(scene, record.reflectance, uv); };
+struct ParametersAt {
+    const SceneView& scene;
+    Vec2f uv;
+
+    AMBILUX_HD Rgb rgb(Rgb BsdfParameters::*, const ParamRgb& input) const { return eval_rgb<F>(scene, input, uv); }
+    AMBILUX_HD float number(float BsdfParameters::*, const ParamFloat& input) const { return eval_float<F>(scene, input, uv); }
+};
+
+/// Has them.
+struct KnownParameters {
+    const BsdfParameters& known;
+
+    AMBILUX_HD Rgb rgb(Rgb BsdfParameters::*which, const ParamRgb&) const { return known.*which; }
+    AMBILUX_HD float number(float BsdfParameters::*which, const ParamFloat&) const { return known.*which; }
+};
+
+/// The BSDF of `record` with parameters by `of`, one of the above. Microfacet roughness is at least kMinAlpha.
+template <Features F, class Parameters>
+AMBILUX_HD Bsdf make_bsdf(const SceneView& scene, const BsdfRecord& record, const Parameters& of) {
+    Bsdf b = {};
+    b.type = F.several_bsdfs() ? record.type : BsdfType(std::countr_zero(F.bsdfs));
+    const auto specular_reflectance = [&] { b.specular_reflectance = of.rgb(&BsdfParameters::specular_reflectance, record.specular_reflectance); };
+    const auto reflectance = [&] { b.reflectance_or_eta = of.rgb(&BsdfParameters::color, record.reflectance); };
+    const auto conductor = [&] {
+        specular_reflectance();
+        b.reflectance_or_eta = record.eta;
+        b.transmittance_or_k = record.k;
+    };
     const auto dielectric = [&] {
         specular_reflectance();
-        p.color = eval_rgb<F>(scene, record.specular_transmittance, uv);
+        b.transmittance_or_k = of.rgb(&BsdfParameters::color, record.specular_transmittance);
+        b.ior = record.ior;
     };
     const auto plastic = [&] {
         specular_reflectance();
         reflectance();
+        b.ior = record.ior;
+        b.nonlinear = record.nonlinear != 0;
+        b.fdr_internal = record.fdr_internal;
+        b.specular_sampling_weight = record.specular_sampling_weight;
     };
-    const auto roughness = [&] {
-        p.alpha_u = max(eval_float<F>(scene, record.alpha_u, uv), kMinAlpha);
-        p.alpha_v = max(eval_float<F>(scene, record.alpha_v, uv), kMinAlpha);
+    const auto microfacets = [&] {
+        b.microfacets = record.microfacets;
+        b.sample_visible = record.sample_visible != 0;
+        b.alpha_u = max(of.number(&BsdfParameters::alpha_u, record.alpha_u), kMinAlpha);
+        b.alpha_v = max(of.number(&BsdfParameters::alpha_v, record.alpha_v), kMinAlpha);
     };
-    switch (record.type) {
+    switch (b.type) {
         case BsdfType::diffuse:
             if constexpr (F.has(BsdfType::diffuse)) reflectance();
             break;
         case BsdfType::rough_diffuse:
             if constexpr (F.has(BsdfType::rough_diffuse)) {
                 reflectance();
-                p.alpha_u = eval_float<F>(scene, record.alpha_u, uv);
+                b.alpha_u = of.number(&BsdfParameters::alpha_u, record.alpha_u);
             }
             break;
         case BsdfType::conductor:
-            if constexpr (F.has(BsdfType::conductor)) specular_reflectance();
+            if constexpr (F.has(BsdfType::conductor)) conductor();
             break;
         case BsdfType::rough_conductor:
             if constexpr (F.has(BsdfType::rough_conductor)) {
-                specular_reflectance();
-                roughness();
+                conductor();
+                microfacets();
             }
             break;
         case BsdfType::dielectric:
@@ -101,7 +132,7 @@ AMBILUX_HD BsdfParameters look_up_parameters(const SceneView& scene, const BsdfR
         case BsdfType::rough_dielectric:
             if constexpr (F.has(BsdfType::rough_dielectric)) {
                 dielectric();
-                roughness();
+                microfacets();
             }
             break;
         case BsdfType::plastic:
@@ -110,39 +141,12 @@ AMBILUX_HD BsdfParameters look_up_parameters(const SceneView& scene, const BsdfR
         case BsdfType::rough_plastic:
             if constexpr (F.has(BsdfType::rough_plastic)) {
                 plastic();
-                roughness();
+                microfacets();
+                b.transmittance_table = scene.tables + record.transmittance_table;
             }
             break;
         case BsdfType::count: break;
     }
-    return p;
-}
-
-/// The BSDF of `record` where its parameters are `p`.
-template <Features F>
-AMBILUX_HD Bsdf make_bsdf(const SceneView& scene, const BsdfRecord& record, const BsdfParameters& p) {
-    constexpr auto some = [](auto... types) { return ((F.bsdfs & bit(types)) | ...) != 0; };
-    Bsdf b = {};
-    b.type = F.several_bsdfs() ? record.type : BsdfType(std::countr_zero(F.bsdfs));
-    b.reflectance_or_eta = b.transmittance_or_k = p.color;
-    b.specular_reflectance = p.specular_reflectance;
-    b.alpha_u = p.alpha_u;
-    b.alpha_v = p.alpha_v;
-    if (some(BsdfType::conductor, BsdfType::rough_conductor) && (b.type == BsdfType::conductor || b.type == BsdfType::rough_conductor)) {
-        b.reflectance_or_eta = record.eta;
-        b.transmittance_or_k = record.k;
-    }
-    if constexpr (some(BsdfType::rough_conductor, BsdfType::rough_dielectric, BsdfType::rough_plastic)) {
-        b.microfacets = record.microfacets;
-        b.sample_visible = record.sample_visible != 0;
-    }
-    if constexpr (some(BsdfType::dielectric, BsdfType::thin_dielectric, BsdfType::rough_dielectric, BsdfType::plastic, BsdfType::rough_plastic)) b.ior = record.ior;
-    if constexpr (some(BsdfType::plastic, BsdfType::rough_plastic)) {
-        b.nonlinear = record.nonlinear != 0;
-        b.fdr_internal = record.fdr_internal;
-        b.specular_sampling_weight = record.specular_sampling_weight;
-    }
-    if constexpr (some(BsdfType::rough_plastic)) b.transmittance_table = scene.tables + record.transmittance_table;
     return b;
 }
 
@@ -154,7 +158,7 @@ AMBILUX_HD BsdfParameters parameters_of(const Bsdf& b) {
 /// The BSDF of `record` at texture coordinates `uv`.
 template <Features F>
 AMBILUX_HD Bsdf resolve_bsdf(const SceneView& scene, const BsdfRecord& record, Vec2f uv) {
-    return make_bsdf<F>(scene, record, look_up_parameters<F>(scene, record, uv));
+    return make_bsdf<F>(scene, record, ParametersAt<F>{scene, uv});
 }
 
 /// Calls `op` with the BSDF that `b` stands for; `otherwise` when kernels of features F do not know it.

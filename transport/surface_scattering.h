@@ -85,7 +85,20 @@ AMBILUX_HD Scattering scattering_of(const SceneView& scene, const ScatteringPart
     s.ng = parts.ng;
     s.wi_world = wi_world;
     s.wi = s.frame.to_local(wi_world);
-    s.bsdf = make_bsdf<F>(scene, scene.bsdfs[s.record], parts.parameters);
+    const BsdfRecord& record = scene.bsdfs[s.record];
+    if constexpr (F.textures) s.bsdf = make_bsdf<F>(scene, record, KnownParameters{parts.parameters});
+    else s.bsdf = resolve_bsdf<F>(scene, record, {});
+    return s;
+}
+/// The same of a diffuse BSDF, which needs no more than the normals and its reflectance: without tangents, side and record.
+AMBILUX_HD Scattering diffuse_scattering(const ScatteringParts& parts, Vec3f wi_world) {
+    Scattering s = {};
+    s.frame.n = parts.n;
+    s.ng = parts.ng;
+    s.wi_world = wi_world;
+    s.wi.z = dot(parts.n, wi_world);
+    s.bsdf.type = BsdfType::diffuse;
+    s.bsdf.reflectance_or_eta = parts.parameters.color;
     return s;
 }
 

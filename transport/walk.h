@@ -154,6 +154,9 @@ struct WalkConnection {
     float tmax;
 };
 
+/// True if the point that lies `to` from `x` lies in the plane of its surface, as far as positions are known: no higher than where rays begin. Such points exchange no light.
+AMBILUX_HD bool in_plane(const WalkVertex& x, Vec3f to) { return fabsf(dot(x.point.ng, to)) <= x.offset; }
+
 /// Sets the ray from `from` to the point `to`, both ends moved off their surfaces. False if nothing lies between them.
 AMBILUX_HD bool set_segment(WalkConnection& c, const WalkVertex& from, Vec3f wi, Vec3f to, float to_offset, Vec3f to_ng) {
     c.o = offset_ray_origin(from.point.p, from.offset, from.point.ng, wi);
@@ -207,7 +210,7 @@ template <Features F>
 AMBILUX_HD bool connect_unweighted(const WalkVertex& y, Rgb y_throughput, const WalkVertex& z, Rgb z_throughput, WalkConnection& c, ConnectionDensities& p) {
     const Vec3f to_y = y.point.p - z.point.p;
     const float d2 = length_squared(to_y);
-    if (!(d2 > 0.0f)) return false;
+    if (!(d2 > 0.0f) || in_plane(z, to_y)) return false;
     const Vec3f w = to_y * inverse_sqrt(d2);
     const BsdfValue f_z = scatter_evaluate<F>(z.scattering, w, TransportMode::radiance);
     if (is_zero(f_z.value)) return false;
@@ -231,7 +234,7 @@ AMBILUX_HD bool connect_vertices(const BidirectionalMis& mis, const WalkVertex& 
 /// False if no light can pass between two vertices, told from places and types of BSDFs: most pairs in a room face away from each other.
 AMBILUX_HD bool may_connect(const WalkVertex& y, const WalkVertex& z) {
     const Vec3f w = z.point.p - y.point.p;
-    return may_scatter(y.scattering, w) && may_scatter(z.scattering, -w);
+    return may_scatter(y.scattering, w) && may_scatter(z.scattering, -w) && !in_plane(z, w);
 }
 
 /// False for places on the film that no filter of a pixel reaches: what lands there needs no shadow ray.

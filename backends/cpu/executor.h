@@ -37,11 +37,6 @@ public:
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
         run_in_order<MaterialOrder>(id, stage, queue);
     }
-    /// Items stay where they are until clear().
-    template <class Stage, class Item>
-    void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        run_in_order<void>(id, stage, queue, true);
-    }
     template <class Stage, class Item>
     void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
         run_in_order<MortonOrder>(id, stage, queue);
@@ -78,7 +73,7 @@ private:
 
     /// One place where the stage is called: compilers contract sums of products differently in every copy of a stage, and images should not depend on the order of queues.
     template <class Order, class Stage, class Item>
-    void run_in_order(StageId id, const Stage& stage, const Queue<Item>& queue, bool keep = false) {
+    void run_in_order(StageId id, const Stage& stage, const Queue<Item>& queue) {
         const uint32_t items = queue.counter->size();
         if (items == 0) return;
         const auto start = Clock::now();
@@ -96,7 +91,7 @@ private:
             else
                 stage(list ? list[i] : i);
         }
-        if (!keep) queue.counter->finish();
+        queue.counter->finish();
         record(id, items, start);
     }
     /// What a stage keeps from item to item.

@@ -87,13 +87,6 @@ public:
         detail::launch_tail<<<blocks(detail::launch_tail<Kernel>, kStageBlock), kStageBlock, 0, stream_>>>(Kernel{shade, extend}, hits.counter);
         finish(id, hits.counter);
     }
-    /// Items stay where they are until clear().
-    template <class Stage, class Item>
-    void run_keeping(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        const detail::Items items = prepare<void>(stage, queue);
-        detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
-        finish(id, queue.counter, nullptr, 0, 0, true);
-    }
     /// Rays go through `pairs` instead of the tracer of their stage.
     void use(const PairTracer& pairs) requires kPairs { pairs_ = pairs; }
 
@@ -291,9 +284,9 @@ private:
         cuda_check(cudaStreamSynchronize(stream_), "queue size");
         return c.size();
     }
-    void finish(StageId id, QueueCounter* counter, QueueCounter* out = nullptr, uint32_t slots = 0, uint32_t samples = 0, bool keep = false) {
+    void finish(StageId id, QueueCounter* counter, QueueCounter* out = nullptr, uint32_t slots = 0, uint32_t samples = 0) {
         cuda_check(cudaGetLastError(), kStageNames[uint32_t(id)]);
-        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, out, slots, samples, keep, depth_, state_, clock_);
+        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, out, slots, samples, depth_, state_, clock_);
         depth_ = {};
     }
     /// As many blocks as can be resident.

@@ -296,12 +296,12 @@ struct DepthChange {
 };
 
 /// After a stage: its record, and its queue emptied; `out`, if it is not null, holds as many items as that did. The time since the last such kernel is the stage's.
-__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, QueueCounter* out, uint32_t slots, uint32_t samples, bool keep, DepthChange depth, WaveState* state, uint64_t* clock) {
+__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, QueueCounter* out, uint32_t slots, uint32_t samples, DepthChange depth, WaveState* state, uint64_t* clock) {
     const uint64_t now = device_nanoseconds();
     state->depth = depth.set ? depth.value : state->depth + depth.value;
     if (out) out->count = counter->size();
     record->add(counter ? counter->items() : slots * (samples ? samples : state->samples), state->depth, now - *clock);
-    if (counter && !keep) counter->finish();
+    if (counter) counter->finish();
     (counter ? counter->next : state->next) = 0;
     *clock = now;
 }

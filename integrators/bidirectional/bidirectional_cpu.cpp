@@ -59,7 +59,8 @@ public:
     BidirectionalCpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : scene_(scene), view_(scene.view()), policy_(make_bidirectional_policy(scene, settings)), accel_name_(settings.accel == "cwbvh" ? "cwbvh" : "embree") {
         const auto start = Clock::now();
-        policy_.vertex_lanes = vertex_lanes<F>();
+        policy_.vertex_lanes = VertexItem::lanes<F>();
+        policy_.connection_lanes = ConnectionVertex::lanes<F>();
         policy_.at_once = policy_.connect_in_shade && !policy_.megakernel;
         const int threads = arena_.max_concurrency();
         const Wave film = shape_wave(scene, settings, kTilePixels, 1);

@@ -27,7 +27,8 @@ public:
         : scene_(scene), policy_(make_bidirectional_policy(scene, settings)), use_graph_(settings.graph),
           traced_(settings.specialise ? scene.features : kAllFeatures) {
         const auto start = Clock::now();
-        policy_.vertex_lanes = vertex_lanes<F>();
+        policy_.vertex_lanes = VertexItem::lanes<F>();
+        policy_.connection_lanes = ConnectionVertex::lanes<F>();
         wave_ = shape_wave(scene, settings, kTilePixels, 1);
         wave_.tiles = tile_count(wave_);  // splats may land anywhere on the film
         const uint32_t slots = wave_.tiles * kTilePixels;
@@ -39,14 +40,18 @@ public:
         // Samples that share a cache of light vertices depend on each other, but by one part in the number of light walks only.
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
+        const bool streaming = settings.variant == "streaming";
+        if (streaming) policy_.stream_slots = 1u << 20;
         Layout million;
         lay_out(million, 1u << 20, planned_vertices(mean, 1u << 20), policy_);
         const uint64_t bytes_per_path = (million.bytes() >> 20) + (settings.deterministic ? 3 * sizeof(int64_t) : sizeof(Lane)) + sizeof(Lane);
-        wave_.samples = std::max(1u, device_wave_size(scene, settings, kWavePlateau, bytes_per_path, free) / slots);
-        if (settings.variant == "streaming") {
+        const uint32_t wave_size = device_wave_size(scene, settings, streaming ? kStreamPlateau : kWavePlateau, bytes_per_path, free);
+        wave_.samples = std::max(1u, wave_size / slots);
+        if (streaming) {
+            policy_.stream_slots = wave_size;
             // Enough paths for each slot that the last ones, which leave slots idle, matter little.
-            policy_.stream_slots = settings.wave_size ? settings.wave_size : kStreamSlots;
-            wave_.samples = std::max<uint32_t>(1, uint32_t(std::min<uint64_t>(8ull * policy_.stream_slots, kLightRay - 1) / slots));
+            const uint64_t paths = std::min<uint64_t>(8ull * wave_size, kLightRay - 1), expected = settings.expected_samples;
+            wave_.samples = std::max<uint32_t>(1, uint32_t(expected > 0 ? std::min(paths / slots, expected) : paths / slots));
         }
         // Several pairs of a vertex wherever they fit: every launch lasts as long as its slowest ray.
         policy_.one_pair_from = std::max(policy_.one_pair_from, wave_.slot_count() / policy_.pairs_per_launch);
@@ -153,7 +158,7 @@ private:
     using Clock = std::chrono::steady_clock;
     /// Paths of a wave from which on more do not pay (kCudaWavePlateau tells why); their light vertices take half a kilobyte each beside.
     static constexpr uint32_t kWavePlateau = 1u << 25;
-    static constexpr uint32_t kStreamSlots = 1u << 20;
+    static constexpr uint32_t kStreamPlateau = 1u << 23;
     static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
     uint64_t fixed_bytes() const {

@@ -39,6 +39,7 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     p.one_pair_from = kVerticesForOnePair;
     p.pairs_per_launch = settings.deterministic || p.technique_depth > 0 ? 1 : p.cache_draws > 0 ? std::min(p.cache_draws, kPairsPerLaunch) : kPairsPerLaunch;
     p.vertex_lanes = Queue<VertexItem>::kLanes;
+    p.connection_lanes = Queue<ConnectionVertex>::kLanes;
     p.background_only = p.mis.strategies == kLightStrategies;
     p.hide_emitters = scene.integrator.hide_emitters;
     p.fuse = settings.fuse != Fuse::none;

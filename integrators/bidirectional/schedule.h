@@ -51,7 +51,7 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
             exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
             exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
         }
-        if ((policy.next_event || policy.connect_vertices) && !policy.connect_in_shade) exec.run_keeping(StageId::connect, stages.connect, m.vertices);
+        if ((policy.next_event || policy.connect_vertices) && !policy.connect_in_shade) exec.run(StageId::connect, stages.connect, m.vertices);
         if (policy.next_event) run_connections(exec, stages, tail);
         if (policy.connect_vertices) {
             exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
@@ -64,7 +64,7 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
                     run_connections(exec, stages, tail);
                 });
         }
-        if (policy.next_event || policy.connect_vertices) exec.clear(m.vertices);
+        if (policy.connect_vertices) exec.clear(m.eye_vertices);
     });
     exec.set_depth(0);
 }
@@ -87,8 +87,6 @@ void run_streams(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
         if (policy.next_event) {
             exec.run(StageId::connect, stages.connect, m.vertices);
             run_connections(exec, stages);
-        } else if (policy.connect_vertices) {
-            exec.clear(m.vertices);
         }
         if (policy.connect_vertices) {
             exec.run(StageId::connect_vertices, stages.stream_connect, m.waiting);
@@ -102,7 +100,7 @@ void run_streams(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     });
 }
 
-/// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h), and settle(queue, queue), clear(queue), and run_keeping(id, stage, queue), which leaves the queue as it is.
+/// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h), and settle(queue, queue) and clear(queue).
 template <class Executor, Features F, class Tracer>
 void run_bidirectional_wave(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     if (stages.policy.stream_slots) return run_streams(exec, stages);

@@ -25,12 +25,13 @@ std::vector<std::string> skipped_strategies(const Scene& scene, const Bidirectio
 /// Memory of one wave. All queues but two hold the most they can ever be given, since a slot has one item at a time. Vertices of light walks and what they splat are kept until
 /// the end of the wave; their number is not known before, and a wave for which they do not suffice is done again with more (settle()).
 struct BidirectionalMemory : WalkQueues<WalkItem, WalkHit> {
-    static constexpr uint32_t kQueues = 20;
+    static constexpr uint32_t kQueues = 21;
 
     WaveState* state;
     StageRecord* records;    ///< one per StageId
     QueueCounter* counters;  ///< one per queue
-    Queue<VertexItem> vertices;  ///< of one depth
+    Queue<VertexItem> vertices;            ///< of one depth, for stages that connect them with emitters or the camera
+    Queue<ConnectionVertex> eye_vertices;  ///< of one depth, for pairs
     LightVertices light_vertices;
     Queue<SplatCandidate> splat_candidates, weighted_splats;
     Queue<SplatItem> splats;
@@ -45,7 +46,8 @@ struct BidirectionalMemory : WalkQueues<WalkItem, WalkHit> {
     // Variant streaming.
     Queue<WalkHit> light_hits;
     Queue<TurnItem> turns;
-    Queue<VertexItem> eye, camera_vertices, waiting;
+    Queue<ConnectionVertex> eye, waiting;
+    Queue<VertexItem> camera_vertices;
     Queue<WalkItem> pending;
 };
 
@@ -55,7 +57,7 @@ inline BidirectionalMemory lay_out_megakernel(Layout& layout, uint32_t slots, ui
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
-    m.light_vertices = layout.queue<VertexItem>("light_vertices", m.counters, policy.connect_vertices ? kept : 0, false, policy.vertex_lanes);
+    m.light_vertices = layout.queue<ConnectionVertex>("light_vertices", m.counters, policy.connect_vertices ? kept : 0, false, policy.connection_lanes);
     m.splats = layout.queue<SplatItem>("splats", m.counters, policy.splat ? kept + slots : 0);
     return m;
 }
@@ -73,11 +75,11 @@ inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, con
     m.hits[0] = layout.queue<WalkHit>("hits", m.counters, slots);
     m.light_hits = layout.queue<WalkHit>("light_hits", m.counters, when(policy.light_walks));
     m.turns = layout.queue<TurnItem>("turns", m.counters, slots);
-    m.eye = layout.queue<VertexItem>("eye_vertices", m.counters, slots);
+    m.eye = layout.queue<ConnectionVertex>("eye_vertices", m.counters, slots, false, policy.connection_lanes);
     m.pending = layout.queue<WalkItem>("pending", m.counters, slots);
-    m.vertices = layout.queue<VertexItem>("vertices", m.counters, when(connections));
-    m.camera_vertices = layout.queue<VertexItem>("camera_vertices", m.counters, when(policy.splat));
-    m.waiting = layout.queue<VertexItem>("pairs", m.counters, when(policy.connect_vertices));
+    m.vertices = layout.queue<VertexItem>("vertices", m.counters, when(policy.next_event), false, policy.vertex_lanes);
+    m.camera_vertices = layout.queue<VertexItem>("camera_vertices", m.counters, when(policy.splat), false, policy.vertex_lanes);
+    m.waiting = layout.queue<ConnectionVertex>("pairs", m.counters, when(policy.connect_vertices), false, policy.connection_lanes);
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged));
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat));
     m.splats = layout.queue<SplatItem>("splats", m.counters, with_holes(when(policy.splat)));
@@ -111,8 +113,9 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
     lay_out_walks(layout, m, m.counters, slots, policy.queues);
-    m.vertices = layout.queue<VertexItem>("vertices", m.counters, when((policy.connect_vertices && gathered) || !policy.connect_in_shade), fixed && !policy.connect_in_shade, policy.vertex_lanes);
-    m.light_vertices = layout.queue<VertexItem>("light_vertices", m.counters, when(policy.connect_vertices, kept), false, policy.vertex_lanes);
+    m.vertices = layout.queue<VertexItem>("vertices", m.counters, when(!policy.connect_in_shade), fixed, policy.vertex_lanes);
+    m.eye_vertices = layout.queue<ConnectionVertex>("eye_vertices", m.counters, when(policy.connect_vertices && gathered), false, policy.connection_lanes);
+    m.light_vertices = layout.queue<ConnectionVertex>("light_vertices", m.counters, when(policy.connect_vertices, kept), false, policy.connection_lanes);
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged), fixed);
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat && gathered), fixed);
     m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, kept + slots));
@@ -200,7 +203,7 @@ struct BidirectionalStages {
         const ConnectOutlet connect_outlet = {m.connect_candidates, weight_connections, policy.fuse};
         const SplatOutlet splat_outlet = {m.splat_candidates, weight_splats, policy.fuse};
         connect_camera = {scene, wave, policy, m.vertices, splat_outlet, record(StageId::connect_camera)};
-        connect = {scene, wave, policy, m.vertices, m.light_vertices, m.last_vertex, m.pairs, connect_outlet, record(StageId::connect), record(StageId::connect_vertices)};
+        connect = {scene, wave, policy, m.vertices, m.eye_vertices, m.light_vertices, m.last_vertex, m.pairs, connect_outlet, record(StageId::connect), record(StageId::connect_vertices)};
         for (int k = 0; k < 2; ++k) {
             light_extend[k] = {scene, tracer, wave, Stream::light, m.rays[k], m.hits[k], record(StageId::light_extend)};
             light_shade[k] = {scene, wave, policy, m.hits[k], m.rays[1 - k], m.light_vertices, m.vertices, m.last_vertex, record(StageId::light_shade), connect_camera};
@@ -211,8 +214,8 @@ struct BidirectionalStages {
         occlude_splats = {scene, tracer, m.weighted_splats, m.splats, record(StageId::occlude)};
         splat = {scene, wave, m.splats, film.splats, techniques, record(StageId::splat)};
         generate = {scene, wave, policy, m.rays[0], film.samples, record(StageId::generate)};
-        connect_vertices = {scene, wave, policy, m.pairs, m.rest, m.vertices, m.light_vertices, connect_outlet, record(StageId::connect_vertices)};
-        connect_rest = {scene, wave, policy, m.rest, m.pairs, m.vertices, m.light_vertices, connect_outlet, record(StageId::connect_vertices)};
+        connect_vertices = {scene, wave, policy, m.pairs, m.rest, m.eye_vertices, m.light_vertices, connect_outlet, record(StageId::connect_vertices)};
+        connect_rest = {scene, wave, policy, m.rest, m.pairs, m.eye_vertices, m.light_vertices, connect_outlet, record(StageId::connect_vertices)};
         megakernel = {scene, tracer, wave, policy, m.light_vertices, m.splats, film.samples, m.records};
         const StreamPool pool = {scene, wave, policy, policy.stream_slots, m.eye, m.pending, m.rays[0], film.samples};
         stream_begin = {pool};
