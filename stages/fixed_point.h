@@ -48,6 +48,13 @@ AMBILUX_HD uint32_t threads_with([[maybe_unused]] const void* place) {
     return 1;
 #endif
 }
+AMBILUX_HD uint32_t threads_with([[maybe_unused]] uint32_t key) {
+#if defined(__CUDA_ARCH__)
+    return __match_any_sync(__activemask(), key);
+#else
+    return 1;
+#endif
+}
 AMBILUX_HD bool several(uint32_t threads) { return threads & (threads - 1); }
 
 /// These threads add up what they have, values of less than 2^42: true for the one that is left with the sum.

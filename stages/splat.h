@@ -70,6 +70,8 @@ struct OccludeSplats {
 
 /// Adds light to the pixels whose filters reach it.
 struct Splat {
+    static constexpr uint32_t kBlocksPerSm = 10;  ///< 48 registers: it waits for memory
+
     SceneView scene;
     Wave wave;
     Queue<SplatItem> splats;
@@ -82,19 +84,24 @@ struct Splat {
         if ((item.path == kNoPath) | (item.film.x != item.film.x)) return;  // either would do for a hole; asking for both loads both lanes at once
         const uint32_t sample = wave.sample_of(item.path);
         const float x = item.film.x - float(scene.sensor.crop_x), y = item.film.y - float(scene.sensor.crop_y), r = scene.sensor.filter_radius;
-        const int32_t x0 = int32_t(ceilf(x - r - 0.5f)), x1 = int32_t(floorf(x + r - 0.5f));
-        const int32_t y0 = int32_t(ceilf(y - r - 0.5f)), y1 = int32_t(floorf(y + r - 0.5f));
-        for (int32_t py = y0 > 0 ? y0 : 0; py <= y1 && py < int32_t(wave.height); ++py) {
-            const float row = filter_value_1d(scene, y - (float(py) + 0.5f));
-            for (int32_t px = x0 > 0 ? x0 : 0; px <= x1 && px < int32_t(wave.width); ++px) {
-                const float weight = row * filter_value_1d(scene, x - (float(px) + 0.5f));
-                if (!(weight > 0.0f)) continue;
-                const Rgb value = item.value * weight;
-                const uint32_t pixel = uint32_t(py) * wave.width + uint32_t(px);
-                if (!sums.add(uint64_t(sample) * wave.height * wave.width + pixel, value)) count_one(&record->inf);
-                techniques.add(wave, item.strategy, pixel, value * (1.0f + item.others), value);
+        const int32_t x0 = max(int32_t(ceilf(x - r - 0.5f)), 0), x1 = min(int32_t(floorf(x + r - 0.5f)), int32_t(wave.width) - 1);
+        const int32_t y0 = max(int32_t(ceilf(y - r - 0.5f)), 0), y1 = min(int32_t(floorf(y + r - 0.5f)), int32_t(wave.height) - 1);
+        const uint64_t first = uint64_t(sample) * wave.height * wave.width;
+        // Looked for once, since it costs as much as the rest: splats of a warp that share a pixel most often share all.
+        const bool alone = !several(threads_with(uint32_t(first) + uint32_t(y0) * wave.width + uint32_t(x0)));
+        with_filter(scene, [&](auto filter) {
+            for (int32_t py = y0; py <= y1; ++py) {
+                const float row = filter(y - (float(py) + 0.5f));
+                for (int32_t px = x0; px <= x1; ++px) {
+                    const float weight = row * filter(x - (float(px) + 0.5f));
+                    if (!(weight > 0.0f)) continue;
+                    const Rgb value = item.value * weight;
+                    const uint32_t pixel = uint32_t(py) * wave.width + uint32_t(px);
+                    if (!sums.add(first + pixel, value, alone)) count_one(&record->inf);
+                    techniques.add(wave, item.strategy, pixel, value * (1.0f + item.others), value);
+                }
             }
-        }
+        });
     }
 };
 

@@ -12,11 +12,11 @@ struct SplatSums {
     int64_t* fixed;  ///< three per cell in units of kLightUnit, or null
     Lane* floats;    ///< or a lane per cell
 
-    /// False if the light does not fit.
-    AMBILUX_HD bool add(uint64_t cell, Rgb value) const {
+    /// False if the light does not fit. `alone`: few other threads of the warp, if any, add to the same cell.
+    AMBILUX_HD bool add(uint64_t cell, Rgb value, bool alone) const {
         if (fixed) return add_light(fixed + cell * 3, value);
         if (!(max_component(value) < kTooMuchLight)) return false;
-        if (max_component(value) < kLargeLight) {
+        if (!alone && max_component(value) < kLargeLight) {
             const uint32_t threads = threads_with(floats + cell);
             if (several(threads)) {
                 FixedLight light = to_fixed(value);

@@ -59,14 +59,20 @@ AMBILUX_HD float sample_filter_1d(const SceneView& view, float u) {
     }
 }
 
-/// One factor of filter_value: the density per pixel of sample_filter_1d at offset `x`.
-AMBILUX_HD float filter_value_1d(const SceneView& view, float x) {
-    const float r = view.sensor.filter_radius;
+/// op(filter), where filter(x) is one factor of filter_value: the density per pixel of sample_filter_1d at offset `x`.
+template <class Op>
+AMBILUX_HD void with_filter(const SceneView& view, Op op) {
+    const float r = view.sensor.filter_radius, inv = 1.0f / r;
     switch (view.sensor.filter) {
-        case FilterType::box: return x >= -r && x < r ? 0.5f / r : 0.0f;
-        case FilterType::tent: return max(1.0f - fabsf(x) / r, 0.0f) / r;
-        default: return detail::filter_table_pdf(view.tables + view.sensor.filter_table, x);
+        case FilterType::box: return op([=](float x) { return x >= -r && x < r ? 0.5f * inv : 0.0f; });
+        case FilterType::tent: return op([=](float x) { return max(1.0f - fabsf(x) * inv, 0.0f) * inv; });
+        default: return op([table = view.tables + view.sensor.filter_table](float x) { return detail::filter_table_pdf(table, x); });
     }
+}
+AMBILUX_HD float filter_value_1d(const SceneView& view, float x) {
+    float value = 0.0f;
+    with_filter(view, [&](auto filter) { value = filter(x); });
+    return value;
 }
 
 /// Offset from the pixel's centre, in pixels, distributed as the filter.
