@@ -143,7 +143,7 @@ AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Bidirectional
                                      const ConnectOutlet& candidates, StageRecord* record) {
     const uint32_t light_depth = light.front.bits.depth();
     const Strategy strategy = Strategy::make(light_depth + 1, z.depth + 1);
-    if (!policy.singles.has(strategy)) return;
+    if (!policy.singles.has(strategy) || is_zero(light.throughput) || is_zero(z.throughput)) return;  // black diffuse surfaces
     const WalkVertex y = unpack_vertex<F>(scene, light);
     WalkConnection c;
     if (!may_connect(y, z.vertex) || !connect_vertices<F>(policy.mis, y, light.throughput, z.vertex, z.throughput, c)) return;

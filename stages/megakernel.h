@@ -258,7 +258,7 @@ private:
         eye.sums = z.sums;
         const ConnectionVertex light = load_vertex<F>(light_vertices, place);
         WalkConnection c;
-        if (connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, light), light.throughput, eye, z.throughput, c))
+        if (!is_zero(light.throughput) && connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, light), light.throughput, eye, z.throughput, c))
             test(path, c, key(path), z.depth + (light_depth << WalkBits::kDepthBits), StageId::connect_vertices);
     }
 };

@@ -70,8 +70,6 @@ struct OccludeSplats {
 
 /// Adds light to the pixels whose filters reach it.
 struct Splat {
-    static constexpr uint32_t kBlocksPerSm = 10;  ///< 48 registers: it waits for memory
-
     SceneView scene;
     Wave wave;
     Queue<SplatItem> splats;

@@ -176,7 +176,7 @@ struct StreamLightShade {
         const uint32_t longest = splat ? policy.max_depth - 1 : policy.max_depth - 1 - eye.bits.depth();
         WalkStep step = light_step<F>(pool.scene, pool.wave, policy, h, number, longest, record, [&](const WalkVertex& y, const RngKey&) {
             if (splat && depth < policy.max_depth && policy.wants(depth + 1, 1)) push_vertex<F>(camera_vertices, pack_vertex(y, h));
-            if (eye.link != kNoPath && depth + eye.bits.depth() + 1 <= policy.max_depth) push_vertex<F>(pairs, pack_connection_vertex(y, h));
+            if (eye.link != kNoPath && depth + eye.bits.depth() + 1 <= policy.max_depth && may_connect(eye, y)) push_vertex<F>(pairs, pack_connection_vertex(y, h));
         });
         if (!step.goes_on) return pool.advance(path);
         step.ray.path |= kLightRay;

@@ -31,7 +31,7 @@ private:
     static_assert(kOffsetBit + 15 == 32);
 };
 
-/// What tells whether a light vertex can be connected with a point, and which is next: memory moves 32 bytes at a time, and most pairs need no more.
+/// What tells whether a vertex can be connected with a point, and which is next: memory moves 32 bytes at a time, and most pairs need no more.
 struct ConnectionVertexFront {
     Vec3f p;
     VertexBits bits;
@@ -162,7 +162,7 @@ AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const ConnectionVert
                                     octahedral_decode(item.d), {item.dvcm, item.front.dvc});
 }
 
-/// False if no light can pass between the vertex `y` of a light walk and `z`.
+/// False if no light can pass between a vertex that is in a queue and `z`, of the other walk.
 AMBILUX_HD bool may_connect(const ConnectionVertexFront& y, const WalkVertex& z) {
     const Vec3f w = z.point.p - y.p;
     return y.bits.reaches(octahedral_direction(y.ng), w) && may_scatter(z.scattering, -w) && !in_plane(z, w);
