@@ -196,10 +196,11 @@ struct EyeConnect {
     /// connect_vertices for all that pair() would push, in the same order and of the same vertices.
     AMBILUX_HD void connect_all(const EyeVertex& z, Vec3f d, const RngKey& key) const {
         const LightVertexSearch lights = {policy, light_vertices, key, z.depth, z.vertex};
+        uint32_t next = first_pair(z.path), found = lights.find(next);
+        if (found == kNone) return;
         const float scale = policy.cache_draws > 0 ? draw_scale(wave, policy, light_vertices) : 1.0f;
         const EyeVertex packed = eye_vertex_of<F>(scene, pack_connection_vertex(z.vertex, z.depth, d, z.throughput, z.path));
-        uint32_t next = first_pair(z.path);
-        for (uint32_t found = lights.find(next); found != kNone; found = lights.find(next)) {
+        for (; found != kNone; found = lights.find(next)) {
             pairs_record->count_item(z.depth);
             push_connection<F>(scene, policy, key, packed, load_vertex<F>(light_vertices, found), scale, found, candidates, pairs_record);
         }
