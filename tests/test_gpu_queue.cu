@@ -397,7 +397,7 @@ TEST_CASE("turns: every item once, whatever the lengths of stretches") {
     }
 }
 
-TEST_CASE("turns: launches begin at the first item, also over a queue that is kept and over slots") {
+TEST_CASE("turns: launches go through every item once, one after the other over the same queue or slots") {
     if (!cuda_device_present()) {
         WARN("no CUDA device: skipped");
         return;

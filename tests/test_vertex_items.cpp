@@ -108,8 +108,10 @@ TEST_CASE("A vertex that comes from a queue is the one that went in, surface, fr
             h.ray.throughput = {1, 2, 3};
             h.ray.path = 7;
             const VertexItem eye = pack_vertex(v, h);
-            REQUIRE((same(eye.throughput, {1, 2, 3}) && eye.offset == v.offset));
-            check(eye, unpack_vertex<kAllFeatures>(view, eye), f.reflectance_or_eta);
+            REQUIRE(same(eye.throughput, {1, 2, 3}));
+            const WalkVertex exact = unpack_vertex<kAllFeatures>(view, eye);
+            REQUIRE((exact.offset == v.offset && same(exact.scattering.wi_world, v.scattering.wi_world) && same(exact.scattering.ng, v.scattering.ng) && same(exact.scattering.frame.n, v.scattering.frame.n)));
+            check(eye, exact, f.reflectance_or_eta);
             if (!textured) check(eye, unpack_vertex<kUntextured>(view, eye), f.reflectance_or_eta);
             const ConnectionVertex light = pack_connection_vertex(v, depth, d, {1, 2, 3}, 7);
             REQUIRE(same(light.throughput, diffuse ? Rgb{1, 2, 3} * f.reflectance_or_eta : Rgb{1, 2, 3}));
