@@ -36,6 +36,7 @@ struct RenderSettings {
     SingleStrategies singles;            ///< bdpt: if on, these and not the groups
     uint32_t technique_depth = 0;        ///< light, bdpt: segments up to which images of single strategies are gathered (Renderer::technique_images)
     uint32_t connections = 3;            ///< bdpt, variant lvc: light vertices that an eye vertex draws
+    uint32_t light_walks_per_tile = kTilePixels;  ///< key light_paths: light walks per pixel in multiples of 1/kTilePixels; light, bdpt: lvc or without connections
     int max_depth = -1;                  ///< segments of a path; -1 is unbounded
     int rr_depth = 5;                    ///< Russian roulette starts at this many segments; a value < 0 turns it off
     uint64_t seed = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -101,6 +102,14 @@ float real(const std::string& key, const std::string& value, float lowest, float
     return result;
 }
 
+/// Light walks per pixel, where tiles of the film have a whole number of them.
+uint32_t light_walks_per_tile(const std::string& key, const std::string& value) {
+    const float per_tile = real(key, value, 1.0f / kTilePixels, kMostLightRounds) * kTilePixels;
+    if (per_tile != std::floor(per_tile))
+        refuse(key, value, fmt::format("multiples of 1/{} are needed; the next are {} and {}", kTilePixels, std::floor(per_tile) / kTilePixels, std::ceil(per_tile) / kTilePixels));
+    return uint32_t(per_tile);
+}
+
 bool boolean(const std::string& key, const std::string& value) { return choose(key, value, {"false", "true"}) == 1; }
 
 }  // namespace
@@ -124,6 +133,8 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.automatic = boolean(key, value);
     else if (key == "connections")
         s.connections = integer<uint32_t>(key, value, 1, kMaxCacheDraws);
+    else if (key == "light_paths")
+        s.light_walks_per_tile = light_walks_per_tile(key, value);
     else if (key == "max_depth")
         s.max_depth = integer(key, value, -1, (1 << 14) - 2);
     else if (key == "rr_depth")
@@ -152,7 +163,7 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
         s.graph = boolean(key, value);
     else
         throw Error(ExitCode::usage,
-                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, bdpt.auto, connections, max_depth, rr_depth, seed, accel, wave_size, compaction, ordering, specialise, fuse, cull, tail, deterministic, graph", key));
+                    fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, bdpt.auto, connections, light_paths, max_depth, rr_depth, seed, accel, wave_size, compaction, ordering, specialise, fuse, cull, tail, deterministic, graph", key));
 }
 
 }  // namespace ambilux

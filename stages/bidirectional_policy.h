@@ -3,6 +3,7 @@
 
 #include "queues/order.h"
 #include "stages/techniques.h"
+#include "stages/wave.h"
 #include "transport/bidirectional.h"
 
 namespace ambilux {
@@ -17,6 +18,7 @@ struct BidirectionalPolicy {
     uint32_t max_depth;       ///< segments; WalkBits::kMaxDepth stands for no limit
     uint32_t rr_depth;
     bool light_walks;         ///< some strategy needs them
+    uint32_t light_walks_per_tile; ///< of kTilePixels pixels, in one sample
     bool splat;               ///< light vertices are connected with the camera
     bool connect_vertices;
     uint32_t cache_draws;     ///< light vertices that an eye vertex draws from a cache of all; 0: those of the light walk of its slot
@@ -39,6 +41,10 @@ struct BidirectionalPolicy {
     uint32_t technique_depth; ///< segments up to which images of single strategies are gathered; 0: none
     QueuePolicy queues;
 
+    /// Most light walks of a slot.
+    AMBILUX_HD uint32_t light_rounds() const { return (light_walks_per_tile + kTilePixels - 1) / kTilePixels; }
+    /// Light walks in `slots`, a multiple of kTilePixels.
+    AMBILUX_HD uint32_t light_walks_in(uint32_t slots) const { return slots / kTilePixels * light_walks_per_tile; }
     /// Eye walks of `depth` segments count the environment that they reach: beyond the first segment as hits only.
     AMBILUX_HD bool counts_environment(uint32_t depth) const { return count_environment && (depth == 1 || mis.has(kHitStrategies)); }
     /// The last segment of an eye walk can bring nothing but emission; false if that is not wanted.

@@ -159,7 +159,7 @@ AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Bidirectional
 
 /// What a draw from a cache is worth: M vertices of N walks are in it, and k draws estimate the sum over a walk's vertices by M / (N k) times theirs.
 AMBILUX_HD float draw_scale(const Wave& wave, const BidirectionalPolicy& policy, const LightVertices& light_vertices) {
-    return float(light_vertices.counter->size()) / (float(wave.state->walks) * float(policy.cache_draws));
+    return float(light_vertices.counter->size()) / (float(wave.state->light_walks) * float(policy.cache_draws));
 }
 
 /// connect: an eye vertex samples an emitter (s = 1) and is paired with light vertices.

@@ -56,7 +56,7 @@ AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const B
     return step;
 }
 
-/// One light walk per slot, and the emitter itself as the camera sees it.
+/// A light walk in each slot that has one of this number, and the emitter itself as the camera sees it.
 template <Features F>
 struct LightGenerate {
     SceneView scene;
@@ -66,10 +66,11 @@ struct LightGenerate {
     SplatOutlet splats;
     uint32_t* last_vertex;  ///< per slot: the last vertex of its light walk
     StageRecord* record;
+    uint32_t number = 0;
 
     AMBILUX_HD void operator()(uint32_t slot) const {
         if (policy.cache_draws == 0) last_vertex[slot] = kNone;
-        if (!wave.locate(slot).active || policy.max_depth == 0) return;
+        if (number >= light_walks_of(slot, policy.light_walks_per_tile) || !wave.locate(slot).active || policy.max_depth == 0) return;
         Walk w;
         if (start_light<F>(scene, wave, policy, slot, {0}, splats, record, w)) rays.push(pack_walk(w, slot, true, kInfinity));
     }

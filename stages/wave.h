@@ -18,9 +18,13 @@ struct WaveState {
     uint32_t depth;         ///< segments of the paths in flight
     uint32_t failed;        ///< a wave ran out of memory: it and all after it do nothing until the host has made room
     uint32_t done;          ///< waves that did not fail
-    uint32_t walks;         ///< active slots
+    uint32_t light_walks;   ///< of this wave
     alignas(128) uint32_t next = 0;  ///< slots that threads of a launch have taken in turns; away from what is read all the time
 };
+
+/// Place of slot `z` of a tile, along the Z curve.
+AMBILUX_HD uint32_t x_in_tile(uint32_t z) { return (z & 1) | (z >> 1 & 2) | (z >> 2 & 4); }
+AMBILUX_HD uint32_t y_in_tile(uint32_t z) { return (z >> 1 & 1) | (z >> 2 & 2) | (z >> 3 & 4); }
 
 /// What a slot stands for.
 struct PathSlot {
@@ -39,6 +43,7 @@ struct Wave {
     Divisor tiles_x;         ///< tiles in a row of the film
     Divisor tiles;           ///< tiles per wave
     uint32_t samples;        ///< most samples of a pixel per wave
+    uint32_t first_key = 0;  ///< of the pixels' random numbers: light walks beyond the first of a slot have keys beyond those of all pixels
 
     AMBILUX_HD uint32_t slot_count() const { return tiles * kTilePixels * samples; }
 
@@ -50,8 +55,8 @@ struct Wave {
         const uint32_t tile = state->first_tile + slot / kTilePixels - s * tiles;
         const uint32_t tile_y = tiles_x.quotient(tile), tile_x = tile - tile_y * tiles_x;
         PathSlot p;
-        p.x = tile_x * kTileSide + ((z & 1) | (z >> 1 & 2) | (z >> 2 & 4));
-        p.y = tile_y * kTileSide + ((z >> 1 & 1) | (z >> 2 & 2) | (z >> 3 & 4));
+        p.x = tile_x * kTileSide + x_in_tile(z);
+        p.y = tile_y * kTileSide + y_in_tile(z);
         p.pixel = p.y * width + p.x;
         p.sample = state->first_sample + s;
         p.active = p.x < width && p.y < height && s < state->samples;
@@ -74,19 +79,30 @@ struct Wave {
         return above * width + x * kTileSide * (height - above < kTileSide ? height - above : kTileSide);
     }
 
-    AMBILUX_HD RngKey key(const PathSlot& p, Stream stream = Stream::eye) const { return {seed, p.pixel, p.sample, stream}; }
+    AMBILUX_HD RngKey key(const PathSlot& p, Stream stream = Stream::eye) const { return {seed, first_key + p.pixel, p.sample, stream}; }
     AMBILUX_HD RngKey key(uint32_t slot, Stream stream = Stream::eye) const { return key(locate(slot), stream); }
 };
 
-/// Pixels of the film among the `tiles` tiles from `first_tile` on.
-inline uint32_t active_pixels(const Wave& wave, uint32_t first_tile) {
-    uint32_t pixels = 0;
-    for (uint32_t tile = first_tile; tile < first_tile + wave.tiles; ++tile) {
+/// Most light walks of one slot: each takes a launch of all stages of light walks.
+constexpr uint32_t kMostLightRounds = 16;
+
+/// Light walks that begin in a slot if there are `per_tile` of them in the slots of a tile: as evenly as can be, and some in the first slot, which any tile of the film has.
+AMBILUX_HD uint32_t light_walks_of(uint32_t slot, uint32_t per_tile) {
+    const uint32_t z = slot % kTilePixels, up = kTilePixels - 1;
+    return ((z + 1) * per_tile + up) / kTilePixels - (z * per_tile + up) / kTilePixels;
+}
+
+/// Light walks of one sample that begin in the `tiles` tiles from `first_tile` on.
+inline uint32_t light_walks_in(const Wave& wave, uint32_t first_tile, uint32_t tiles, uint32_t per_tile) {
+    uint32_t walks = 0;
+    for (uint32_t tile = first_tile; tile < first_tile + tiles; ++tile) {
         const uint32_t x = tile % wave.tiles_x * kTileSide, y = tile / wave.tiles_x * kTileSide;
-        if (y >= wave.height) break;
-        pixels += (wave.width - x < kTileSide ? wave.width - x : kTileSide) * (wave.height - y < kTileSide ? wave.height - y : kTileSide);
+        const bool whole = x + kTileSide <= wave.width && y + kTileSide <= wave.height;
+        for (uint32_t z = 0; !whole && z < kTilePixels; ++z)
+            if (x + x_in_tile(z) < wave.width && y + y_in_tile(z) < wave.height) walks += light_walks_of(z, per_tile);
+        if (whole) walks += per_tile;
     }
-    return pixels;
+    return walks;
 }
 
 /// Blocks of random numbers of an eye walk: 0 is the camera's; a vertex at `depth` >= 1 has one to scatter (and for Russian roulette) and one to sample emitters.

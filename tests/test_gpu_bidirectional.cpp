@@ -59,6 +59,45 @@ TEST_CASE("G5: bidirectional renders of both backends at equal seeds: pixels and
     }
 }
 
+TEST_CASE("G5: any number of light walks: both backends start the same ones and find the same light") {
+    if (!device()) return;
+    for (const char* name : {"cornell", "glass", "lights"}) {
+        const Scene scene = project_scene(name, 93, 61);
+        for (const char* integrator : {"light", "bdpt"})
+            for (const char* light_paths : {"0.109375", "0.5", "2.5", "4"}) {
+                INFO(name << " " << integrator << " light_paths=" << light_paths);
+                RenderSettings s = settings_of(scene, integrator, "wavefront", "cuda");
+                apply_setting(s, "strategies", "hits+next_event+light");
+                apply_setting(s, "light_paths", light_paths);
+                s.max_depth = 6;
+                const RenderResult cuda = render_scene(scene, s, 3);
+                s.backend = "cpu";
+                s.accel = "cwbvh";
+                const RenderResult cpu = render_scene(scene, s, 3);
+                CHECK(agreeing_pixels(cuda.film, cpu.film) >= 0.995);
+                CHECK(std::fabs(double(cuda.stats.rays_extend) - double(cpu.stats.rays_extend)) <= 1e-3 * double(cpu.stats.rays_extend) + 3);
+                CHECK(cuda.stats.invalid.total() == 0);
+                CHECK(cuda.stats.memory_bytes == cuda.stats.memory_bytes_predicted);
+                for (const QueueStats& q : cuda.stats.queues) CHECK(q.overflow == 0);
+            }
+    }
+}
+
+TEST_CASE("any number of light walks gives a cache that agrees with paired walks") {
+    if (!device()) return;
+    for (const char* name : {"cornell", "lights"}) {
+        const Scene scene = project_scene(name, 45, 27);
+        RenderSettings s = settings_of(scene, "bdpt", "wavefront", "cuda");
+        const Estimate paired = render_batches(scene, s, 4096);
+        s.variant = "lvc";
+        for (const char* light_paths : {"0.046875", "0.25", "3"}) {
+            apply_setting(s, "light_paths", light_paths);
+            INFO(name << " light_paths=" << light_paths);
+            check_agreement(render_batches(scene, s, 4096, 5000), paired, 0.02);
+        }
+    }
+}
+
 /// Most by which pairs, or the shadow rays of such a render, differ between two runs that draw from a cache, `items` in one of them: four standard deviations. Which draws may be connected is
 /// left to chance, and threads of a warp draw together: over 16 seeds of glass the difference was 2.1 (pairs) and 2.4 (rays) times the root of their number, its mean 0 within that of the mean.
 double drawn_difference(uint64_t items) { return 4 * 2.5 * std::sqrt(double(items)); }

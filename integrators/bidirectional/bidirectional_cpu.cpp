@@ -83,7 +83,7 @@ public:
             const double mean = policy_.light_walks && !policy_.stream_slots ? mean_light_vertices<F>(view_, accel_->tracer(), policy_, settings.seed) : 0.0;
             plan_cache(policy_, mean);
             waves_.resize(size_t(threads));
-            for (WaveMemory& w : waves_) w.allocate(wave_.slot_count(), planned_vertices(mean, wave_.slot_count()), policy_);
+            for (WaveMemory& w : waves_) w.allocate(wave_.slot_count(), planned_vertices(mean, policy_.light_walks_in(wave_.slot_count())), policy_);
         } catch (const std::bad_alloc&) {
             throw Error(ExitCode::device, fmt::format("out of memory: a film of {}x{} needs more than there is; a smaller --size needs less", wave_.width, wave_.height));
         }
@@ -163,7 +163,7 @@ private:
             const BidirectionalFilm film = {samples_of_slots_.data() + size_t(first_tile) * kTilePixels, {splats_.data(), nullptr}, nullptr, nullptr, techniques_.empty() ? nullptr : techniques_.data(), technique_dropped_.data()};
             const BidirectionalStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, m, film);
             CpuExecutor executor(m.state, m.records, view_, memory.order);
-            *m.state = {first_tile, sample, 1, 0, 0, 0, active_pixels(wave_, first_tile)};
+            *m.state = {first_tile, sample, 1, 0, 0, 0, light_walks_in(wave_, first_tile, wave_.tiles, policy_.light_walks_per_tile)};
             run_bidirectional_wave(executor, stages);
             if (!m.state->failed) return;
             const uint64_t needed = std::max(m.light_vertices.counter->peak, m.splats.counter->peak);

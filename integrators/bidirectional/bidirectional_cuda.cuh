@@ -43,7 +43,7 @@ public:
         const bool streaming = settings.variant == "streaming";
         if (streaming) policy_.stream_slots = 1u << 20;
         Layout million;
-        lay_out(million, 1u << 20, planned_vertices(mean, 1u << 20), policy_);
+        lay_out(million, 1u << 20, planned_vertices(mean, policy_.light_walks_in(1u << 20)), policy_);
         const uint64_t bytes_per_path = (million.bytes() >> 20) + (settings.deterministic ? 3 * sizeof(int64_t) : sizeof(Lane)) + sizeof(Lane);
         const uint32_t wave_size = device_wave_size(scene, settings, streaming ? kStreamPlateau : kWavePlateau, bytes_per_path, free);
         wave_.samples = std::max(1u, wave_size / slots);
@@ -74,7 +74,7 @@ public:
         clock_ = DeviceBuffer<uint64_t>(1);
         clear_film();
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        allocate(planned_vertices(mean, wave_.slot_count()));
+        allocate(planned_vertices(mean, policy_.light_walks_in(wave_.slot_count())));
         build_seconds_ = seconds_since(start);
     }
 
@@ -85,6 +85,7 @@ public:
 
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
         const auto start = Clock::now();
+        const uint32_t light_walks = light_walks_in(wave_, 0, tile_count(wave_), policy_.light_walks_per_tile);
         uint32_t done = 0;
         while (done < count && !is_set(interrupt)) {
             // All waves of a pass are queued at once; the host waits for the last.
@@ -92,7 +93,7 @@ public:
             const uint32_t waves_before = read_state().done;
             for (uint32_t s = 0; s < pass; s += wave_.samples) {
                 const uint32_t samples = std::min(wave_.samples, pass - s);
-                detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{0, first + done + s, samples, 0, 0, 0, samples * wave_.width * wave_.height});
+                detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{0, first + done + s, samples, 0, 0, 0, samples * light_walks});
                 if (graph_)
                     cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
                 else

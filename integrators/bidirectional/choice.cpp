@@ -42,8 +42,8 @@ RenderSettings settings_of(const RenderSettings& settings, const ChoiceCandidate
     return s;
 }
 
-/// Candidates of one family do the same but for the number of draws, so that the time of one tells that of the others.
-uint32_t family(const ChoiceCandidate& c) { return (c.pilot.light ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0); }
+/// Candidates of one family do the same but for the numbers of light walks and draws, so that the time of one tells that of the others.
+uint32_t family(const ChoiceCandidate& c) { return (c.pilot.light_paths > 0.0f ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0); }
 
 /// Seconds per sample of every pixel. On a device: of about one full wave, smaller than a render's for the sake of time. What launches cost beside their items is then more than it will be, and for
 /// cheap samples most: so the path tracer's wave holds more of them, and takes about as long as others.
@@ -157,6 +157,8 @@ void check_automatic(const RenderSettings& s) {
     if (s.integrator != "bdpt") refuse(fmt::format("bdpt.auto=true: integrator {} leaves nothing to choose; use integrator bdpt", s.integrator));
     if (s.strategies != kAllStrategies || s.singles.on) refuse("bdpt.auto=true chooses the strategies: leave out the setting strategies, or bdpt.auto");
     if (s.connections != RenderSettings().connections) refuse(fmt::format("connections={}: bdpt.auto=true chooses the number of connections; leave one of the two out", s.connections));
+    if (s.light_walks_per_tile != RenderSettings().light_walks_per_tile)
+        refuse(fmt::format("light_paths={}: bdpt.auto=true chooses the number of light walks; leave one of the two out", double(s.light_walks_per_tile) / kTilePixels));
     if (s.technique_depth > 0)
         refuse(fmt::format("technique_depth={}: bdpt.auto=true may choose the path tracer, which gathers no images of single strategies; render once without them and repeat with the settings that "
                            "were chosen",
@@ -165,18 +167,23 @@ void check_automatic(const RenderSettings& s) {
 
 std::vector<ChoiceCandidate> choice_candidates(const RenderSettings& settings, bool cuda) {
     const std::string& variant = settings.variant;
-    std::vector<ChoiceCandidate> all = {{"path", {false, false, 0}, {{"integrator", "path"}, {"variant", "wavefront"}, {"estimator", "mis"}}}};
-    const auto bdpt = [](const std::string& of, const std::string& strategies) {
-        return std::vector<std::pair<std::string, std::string>>{{"integrator", "bdpt"}, {"variant", of}, {"strategies", strategies}};
+    std::vector<ChoiceCandidate> all = {{"path", {0.0f, false, 0}, {{"integrator", "path"}, {"variant", "wavefront"}, {"estimator", "mis"}}}};
+    const auto add = [&](std::string name, const PilotCandidate& pilot, const std::string& of, const std::string& strategies) {
+        all.push_back({std::move(name), pilot, {{"integrator", "bdpt"}, {"variant", of}, {"strategies", strategies}}});
+        if (pilot.draws > 0) all.back().settings.emplace_back("connections", std::to_string(pilot.draws));
+        if (pilot.light_paths != 1.0f) {
+            all.back().name += fmt::format(", {} light paths per pixel", pilot.light_paths);
+            all.back().settings.emplace_back("light_paths", fmt::format("{}", pilot.light_paths));
+        }
     };
     const std::string plain = variant == "lvc" ? "wavefront" : variant;
-    all.push_back({"bdpt without connections", {true, false, 0}, bdpt(plain, "hits+next_event+light")});
-    if (variant != "lvc") all.push_back({"bdpt, " + variant, {true, true, 0}, bdpt(variant, "all")});
     // On a device the cache has another order in every run.
     const bool cache = variant == "lvc" || (variant == "wavefront" && !(cuda && settings.deterministic));
-    for (uint32_t k = 1; cache && k <= 4; ++k) {
-        all.push_back({fmt::format("bdpt, lvc, {} connection{}", k, k > 1 ? "s" : ""), {true, true, k}, bdpt("lvc", "all")});
-        all.back().settings.emplace_back("connections", std::to_string(k));
+    for (const float light_paths : {0.25f, 1.0f, 4.0f}) {
+        if (light_paths != 1.0f && plain != "wavefront") continue;
+        add("bdpt without connections", {light_paths, false, 0}, plain, "hits+next_event+light");
+        if (light_paths == 1.0f && variant != "lvc") add("bdpt, " + variant, {1.0f, true, 0}, variant, "all");
+        for (uint32_t k = 1; cache && k <= 16; k *= 2) add(fmt::format("bdpt, lvc, {} connection{}", k, k > 1 ? "s" : ""), {light_paths, true, k}, "lvc", "all");
     }
     return all;
 }
@@ -184,10 +191,10 @@ std::vector<ChoiceCandidate> choice_candidates(const RenderSettings& settings, b
 double choice_work(const PilotWork& w, const ChoiceCandidate& candidate, bool cuda) {
     // Fitted to renders (docs/performance.md): shadow rays and connections in rays of walks; what the longer records and further launches of bidirectional methods cost.
     constexpr double kShadow = 0.8;
-    const double eye = w.eye_rays + kShadow * w.next_events, light = w.light_rays + kShadow * w.splats;
+    const double eye = w.eye_rays + kShadow * w.next_events, light = double(candidate.pilot.light_paths) * (w.light_rays + kShadow * w.splats);
     const double pair = cuda ? 1.1 : 0.25, draw = cuda ? 0.55 : 0.25, ray = cuda ? 0.85 : 0.6, bidirectional = cuda ? 1.5 : 1.3;
     const PilotCandidate& c = candidate.pilot;
-    if (!c.light && !c.connect) return eye;
+    if (c.light_paths == 0.0f && !c.connect) return eye;
     double work = eye + light;
     if (c.connect && c.draws == 0) work += pair * w.pairs + ray * w.pair_rays;
     if (c.connect && c.draws > 0) work += c.draws * (draw * w.draws + ray * w.draw_rays);

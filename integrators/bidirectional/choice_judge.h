@@ -9,7 +9,7 @@
 
 namespace ambilux {
 
-constexpr uint32_t kMostCandidates = 8;
+constexpr uint32_t kMostCandidates = 24;
 /// A candidate that finds a path this much less often than the pilot does may show it as single bright pixels.
 constexpr float kRareShare = 0.02f;
 
@@ -52,8 +52,7 @@ struct SecondMoments {
     /// Sum of the candidate's densities over that of the strategy that found the path.
     float sum_of(uint32_t c, const PilotShares& s) const {
         const PilotCandidate& candidate = candidates[c];
-        float sum = s.unidirectional;
-        if (candidate.light) sum += s.light;
+        float sum = s.unidirectional + candidate.light_paths * s.light;
         if (candidate.connect) sum += s.connections * connections(candidate);
         return sum;
     }
@@ -80,7 +79,7 @@ struct SecondMoments {
 
     /// What a path adds to the second moment of a candidate, over its squared value.
     double second_moment(uint32_t c, const PilotEvent& e, float sum) const {
-        const double by_light = candidates[c].light ? double(e.shares.light / sum) : 0.0;
+        const double by_light = double(candidates[c].light_paths * e.shares.light / sum);
         return double(e.coverage) * (1.0 - (1.0 - double(filter_energy)) * by_light) / (double(e.total()) * double(sum));
     }
 };

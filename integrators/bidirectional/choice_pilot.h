@@ -11,9 +11,9 @@ constexpr double kChoiceSamples = 1000, kChoiceTrimmed = 0.001;
 
 /// An estimator that the pilot judges. All have hits and next event estimation.
 struct PilotCandidate {
-    bool light;       ///< light tracing
-    bool connect;     ///< connections
-    uint32_t draws;   ///< of each eye vertex from a cache of light vertices; 0: paired walks
+    float light_paths;  ///< light walks per pixel, each connected with the camera; 0: none
+    bool connect;       ///< connections
+    uint32_t draws;     ///< of each eye vertex from a cache of light vertices; 0: paired walks
 };
 
 /// Mean numbers per eye walk, or per pair of walks.

@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "integrators/bidirectional/wave.h"
+#include "integrators/path/path_wave.h"
 
 namespace ambilux {
 
@@ -14,7 +15,9 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     p.mis.heuristic = settings.heuristic;
     p.mis.strategies = settings.integrator == "light" ? uint32_t(kLightStrategies) : settings.strategies;
     p.singles = settings.integrator == "light" ? SingleStrategies{} : settings.singles;
-    p.mis.light_paths = float(scene.sensor.crop_width) * float(scene.sensor.crop_height);
+    p.light_walks_per_tile = settings.light_walks_per_tile;
+    const Wave film = shape_wave(scene, settings, kTilePixels, 1);
+    p.mis.light_paths = float(light_walks_in(film, 0, tile_count(film), p.light_walks_per_tile));
     p.max_depth = settings.max_depth < 0 ? WalkBits::kMaxDepth : uint32_t(settings.max_depth);
     p.rr_depth = settings.rr_depth < 0 ? ~0u : uint32_t(settings.rr_depth);
     if (p.singles.on) {
@@ -35,6 +38,16 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     p.mis.connections = 1.0f;
     p.megakernel = settings.variant == "megakernel";
     p.cache_draws = settings.variant == "lvc" && p.connect_vertices ? settings.connections : 0;
+    if (p.light_walks_per_tile != kTilePixels) {
+        const double light_paths = double(p.light_walks_per_tile) / kTilePixels;
+        if (p.megakernel || settings.variant == "streaming")
+            throw Error(ExitCode::usage, fmt::format("light_paths={}: variant {} has one light walk per eye walk, or eye vertex; use variant lvc", light_paths, settings.variant));
+        if (p.connect_vertices && p.cache_draws == 0)
+            throw Error(ExitCode::usage,
+                        fmt::format("light_paths={}: variant wavefront connects every eye walk with a light walk of its own; use variant lvc, or strategies without connections", light_paths));
+        if (uint64_t(film.width) * film.height * p.light_rounds() > 0xffffffffull)
+            throw Error(ExitCode::usage, fmt::format("light_paths={}: a film of {}x{} has more light walks than can be numbered (4294967295)", light_paths, film.width, film.height));
+    }
     // A launch with several pairs of one vertex adds to sums in the order in which threads come, and images of single strategies tell contributions of one path apart by launches.
     p.one_pair_from = kVerticesForOnePair;
     p.pairs_per_launch = settings.deterministic || p.technique_depth > 0 ? 1 : p.cache_draws > 0 ? std::min(p.cache_draws, kPairsPerLaunch) : kPairsPerLaunch;

@@ -15,17 +15,20 @@ void run_splats(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
 template <class Executor, Features F, class Tracer>
 void run_light_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     const BidirectionalMemory& m = stages.memory;
-    exec.run_slots(StageId::light_generate, stages.light_generate, stages.wave.tiles * kTilePixels);
-    if (stages.policy.splat) run_splats(exec, stages);
-    exec.set_depth(1);
-    exec.extend(StageId::light_extend, stages.light_extend[0], m.rays[0], m.hits[0]);
-    repeat_depths(exec, StageId::light_shade, stages.light_shade, StageId::light_extend, stages.light_extend, m, stages.policy.tail_below, [&](bool) {
-        if (stages.policy.splat) {
-            if (!stages.policy.connect_in_shade) exec.run(StageId::connect_camera, stages.connect_camera, m.vertices);
-            run_splats(exec, stages);
-        }
-    });
-    exec.set_depth(0);
+    for (uint32_t number = 0; number < stages.policy.light_rounds(); ++number) {
+        const auto light = stages.light(number);
+        exec.run_slots(StageId::light_generate, light.generate, stages.wave.tiles * kTilePixels);
+        if (stages.policy.splat) run_splats(exec, stages);
+        exec.set_depth(1);
+        exec.extend(StageId::light_extend, light.extend[0], m.rays[0], m.hits[0]);
+        repeat_depths(exec, StageId::light_shade, light.shade, StageId::light_extend, light.extend, m, stages.policy.tail_below, [&](bool) {
+            if (stages.policy.splat) {
+                if (!stages.policy.connect_in_shade) exec.run(StageId::connect_camera, light.connect_camera, m.vertices);
+                run_splats(exec, stages);
+            }
+        });
+        exec.set_depth(0);
+    }
     exec.settle(m.light_vertices, m.splats);
 }
 

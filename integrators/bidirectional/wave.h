@@ -118,7 +118,7 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     m.light_vertices = layout.queue<ConnectionVertex>("light_vertices", m.counters, when(policy.connect_vertices, kept), false, policy.connection_lanes);
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged), fixed);
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat && gathered), fixed);
-    m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, kept + slots));
+    m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, kept + policy.light_walks_in(slots)));
     m.pairs = layout.queue<PairItem>("pairs", m.counters, pairs, single);
     m.rest = layout.queue<PairItem>("rest", m.counters, pairs, single);
     m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, when(hits), fixed);
@@ -231,6 +231,23 @@ struct BidirectionalStages {
         develop = {wave, film.samples, film.splats, film.sum, film.sum_squares, record(StageId::develop)};
     }
     BidirectionalStages(const BidirectionalStages&) = delete;  // some stages point to others
+
+    /// The stages of light walks.
+    struct Light {
+        LightGenerate<F> generate;
+        Extend<F, Tracer, WalkItem, WalkHit> extend[2];
+        LightShade<F> shade[2];
+        ConnectCamera<F> connect_camera;
+    };
+    /// Those of the walks of this number in every slot.
+    Light light(uint32_t number) const {
+        Light l = {light_generate, {light_extend[0], light_extend[1]}, {light_shade[0], light_shade[1]}, connect_camera};
+        l.generate.number = number;
+        const uint32_t first_key = number * wave.width * wave.height;
+        l.generate.wave.first_key = l.connect_camera.wave.first_key = first_key;
+        for (int k = 0; k < 2; ++k) l.extend[k].wave.first_key = l.shade[k].wave.first_key = first_key;
+        return l;
+    }
 
 private:
     template <class Stage, class Item>
