@@ -30,7 +30,7 @@ public:
         q.capacity = capacity;
         names_.emplace_back(name);
         capacities_.push_back(capacity);
-        q.base = take<Lane>(uint64_t(capacity) * (lanes < paired_lanes<Item>() ? (lanes + 1) / 2 * 2 : lanes));
+        q.base = take<Lane>(uint64_t(capacity) * (lanes <= paired_lanes<Item>() ? (lanes + 1) / 2 * 2 : lanes));
         if (fixed_places) q.flags = take<uint8_t>(capacity);
         return q;
     }

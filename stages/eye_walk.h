@@ -146,7 +146,7 @@ AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Bidirectional
     if (!policy.singles.has(strategy) || is_zero(light.throughput) || is_zero(z.throughput)) return;  // black diffuse surfaces
     const WalkVertex y = unpack_vertex<F>(scene, light);
     WalkConnection c;
-    if (!may_connect(y, z.vertex) || !connect_vertices<F>(policy.mis, y, light.throughput, z.vertex, z.throughput, c)) return;
+    if (!connect_vertices<F>(policy.mis, y, light.throughput, z.vertex, z.throughput, c)) return;
     c.value *= scale;
     if (!is_light(c.value, record) || is_zero(c.value)) return;
     uint32_t seed = 0;

@@ -40,15 +40,9 @@ struct FixedLight {
 
 AMBILUX_HD FixedLight to_fixed(Rgb value) { return {{llrint(double(value.x) / kLightUnit), llrint(double(value.y) / kLightUnit), llrint(double(value.z) / kLightUnit)}}; }
 
-/// The threads of a warp that come with the same `place`, as bits. A lamp that covers a few pixels gets a splat from every light walk.
-AMBILUX_HD uint32_t threads_with([[maybe_unused]] const void* place) {
-#if defined(__CUDA_ARCH__)
-    return __match_any_sync(__activemask(), reinterpret_cast<unsigned long long>(place));
-#else
-    return 1;
-#endif
-}
-AMBILUX_HD uint32_t threads_with([[maybe_unused]] uint32_t key) {
+/// The threads of a warp that come with the same `key`, as bits. A lamp that covers a few pixels gets a splat from every light walk.
+template <class Key>
+AMBILUX_HD uint32_t threads_with([[maybe_unused]] Key key) {
 #if defined(__CUDA_ARCH__)
     return __match_any_sync(__activemask(), key);
 #else
@@ -78,7 +72,7 @@ AMBILUX_HD bool add_light(int64_t* sums, Rgb value) {
     if (!(most < kTooMuchLight)) return false;
     FixedLight fixed = to_fixed(value);
     if (most < kLargeLight) {
-        if (gather_light(threads_with(sums), fixed))
+        if (gather_light(threads_with(reinterpret_cast<uintptr_t>(sums)), fixed))
             for (int c = 0; c < 3; ++c) add_fixed(sums + c, fixed.value[c]);
         return true;
     }

@@ -17,7 +17,7 @@ struct SplatSums {
         if (fixed) return add_light(fixed + cell * 3, value);
         if (!(max_component(value) < kTooMuchLight)) return false;
         if (!alone && max_component(value) < kLargeLight) {
-            const uint32_t threads = threads_with(floats + cell);
+            const uint32_t threads = threads_with(reinterpret_cast<uintptr_t>(floats + cell));
             if (several(threads)) {
                 FixedLight light = to_fixed(value);
                 if (!gather_light(threads, light)) return true;

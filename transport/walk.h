@@ -194,6 +194,12 @@ AMBILUX_HD bool connect_next_event(const SceneView& scene, const BidirectionalMi
     return true;
 }
 
+/// False if no light can pass between two vertices, told from places and types of BSDFs: most pairs in a room face away from each other.
+AMBILUX_HD bool may_connect(const WalkVertex& y, const WalkVertex& z) {
+    const Vec3f w = z.point.p - y.point.p;
+    return may_scatter(y.scattering, w) && may_scatter(z.scattering, -w) && !in_plane(z, w);
+}
+
 /// Densities along the segment between a light vertex y and an eye vertex z, and of the directions back along their walks (equation 7).
 struct ConnectionDensities {
     float y_area, y_reverse_sa;  ///< of y by sampling at z; of the way back from y
@@ -210,7 +216,7 @@ template <Features F>
 AMBILUX_HD bool connect_unweighted(const WalkVertex& y, Rgb y_throughput, const WalkVertex& z, Rgb z_throughput, WalkConnection& c, ConnectionDensities& p) {
     const Vec3f to_y = y.point.p - z.point.p;
     const float d2 = length_squared(to_y);
-    if (!(d2 > 0.0f) || in_plane(z, to_y)) return false;
+    if (!(d2 > 0.0f) || !may_connect(y, z)) return false;
     const Vec3f w = to_y * inverse_sqrt(d2);
     const BsdfValue f_z = scatter_evaluate<F>(z.scattering, w, TransportMode::radiance);
     if (is_zero(f_z.value)) return false;
@@ -229,12 +235,6 @@ AMBILUX_HD bool connect_vertices(const BidirectionalMis& mis, const WalkVertex& 
     if (!connect_unweighted<F>(y, y_throughput, z, z_throughput, c, p)) return false;
     c.others = others_of_connection(mis, y.sums, y.first, z.sums, z.first, p) / mis.connection_term();
     return true;
-}
-
-/// False if no light can pass between two vertices, told from places and types of BSDFs: most pairs in a room face away from each other.
-AMBILUX_HD bool may_connect(const WalkVertex& y, const WalkVertex& z) {
-    const Vec3f w = z.point.p - y.point.p;
-    return may_scatter(y.scattering, w) && may_scatter(z.scattering, -w) && !in_plane(z, w);
 }
 
 /// False for places on the film that no filter of a pixel reaches: what lands there needs no shadow ray.

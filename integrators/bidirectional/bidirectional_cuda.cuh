@@ -46,13 +46,14 @@ public:
         lay_out(million, 1u << 20, planned_vertices(mean, policy_.light_walks_in(1u << 20)), policy_);
         const uint64_t bytes_per_path = (million.bytes() >> 20) + (settings.deterministic ? 3 * sizeof(int64_t) : sizeof(Lane)) + sizeof(Lane);
         const uint32_t wave_size = device_wave_size(scene, settings, streaming ? kStreamPlateau : kWavePlateau, bytes_per_path, free);
-        wave_.samples = std::max(1u, wave_size / slots);
+        uint64_t samples = wave_size / slots;
         if (streaming) {
             policy_.stream_slots = wave_size;
             // Enough paths for each slot that the last ones, which leave slots idle, matter little.
-            const uint64_t paths = std::min<uint64_t>(8ull * wave_size, kLightRay - 1), expected = settings.expected_samples;
-            wave_.samples = std::max<uint32_t>(1, uint32_t(expected > 0 ? std::min(paths / slots, expected) : paths / slots));
+            samples = std::min<uint64_t>(8ull * wave_size, kLightRay - 1) / slots;
+            if (settings.expected_samples > 0) samples = std::min(samples, settings.expected_samples);
         }
+        wave_.samples = uint32_t(std::max<uint64_t>(1, samples));
         // Several pairs of a vertex wherever they fit: every launch lasts as long as its slowest ray.
         policy_.one_pair_from = std::max(policy_.one_pair_from, wave_.slot_count() / policy_.pairs_per_launch);
         policy_.tail_below = tail_walks(settings, wave_.slot_count());
