@@ -115,7 +115,12 @@ struct Queue {
         if (i < capacity) store(i, item, lanes);
         return i;
     }
-    /// The same, and places may stay empty: whoever goes through the queue skips items whose path is kNoPath. Kernels that call it open and close the stretches of their blocks.
+    /// Stores the item at place `i` of a queue of fixed places.
+    AMBILUX_HD void put(uint32_t i, const Item& item) const {
+        occupy(i);
+        store(i, item);
+    }
+    /// Appends the item, or stores it at its place, and places may stay empty: whoever goes through the queue skips items whose path is kNoPath. Kernels that call it open and close the stretches of their blocks.
     AMBILUX_HD uint32_t push_loosely(const Item& item) const {
 #if defined(__CUDA_ARCH__)
         if (!flags) {
@@ -148,12 +153,15 @@ struct Queue {
 private:
     AMBILUX_HD uint32_t fixed_place(const Item& item) const {
         const uint32_t i = path_of(item);
+        occupy(i);
+        return i;
+    }
+    AMBILUX_HD void occupy(uint32_t i) const {
 #if !defined(__CUDA_ARCH__)
         ++counter->count;  // a device counts before it goes through the queue
         if (i >= capacity || flags[i]) ++counter->overflow;
 #endif
         if (i < capacity) flags[i] = 1;
-        return i;
     }
 };
 

@@ -19,6 +19,7 @@ struct MaterialOrder {
 
     AMBILUX_HD static uint32_t key(const SceneView& scene, const HitItem& hit) { return of(scene, hit.prim); }
     AMBILUX_HD static uint32_t key(const SceneView& scene, const WalkHit& hit) { return of(scene, hit.prim); }
+    AMBILUX_HD static uint32_t key(const SceneView& scene, const SlotHit& hit) { return of(scene, hit.prim); }
 
     AMBILUX_HD static uint32_t of(const SceneView& scene, uint32_t prim) { return prim == kNone ? min(scene.material_count, kMostSortKeys) : scene.sort_keys[prim]; }
 };

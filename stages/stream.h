@@ -11,49 +11,54 @@ namespace ambilux {
 /// Marks the rays of light walks in WalkItem::path.
 constexpr uint32_t kLightRay = 0x80000000u;
 
-/// The slots, and what each of them keeps. Slot i does the paths i, i + slots, i + 2 slots ... of the wave, so that a path tells its slot.
+/// The slots, and what each of them keeps. A slot goes on with whichever path is next when it is done with one, so that all are at work until there are no more.
 struct StreamPool {
     SceneView scene;
     Wave wave;
     BidirectionalPolicy policy;
-    uint32_t slots;
-    Queue<ConnectionVertex> eye;      ///< by slot, not a queue: the vertex that the light walk is for; its path is kNoPath if it is for the camera only
-    Queue<WalkItem> pending;    ///< by slot: the ray with which the eye walk goes on; depth 0: it has ended
-    Queue<WalkItem> rays;
-    Lane* samples;              ///< per path
+    Queue<WalkItem> rays;         ///< by slot, as everything here: of its eye walk or of the light walk for it
+    Queue<ConnectionVertex> eye;  ///< the vertex that the light walk is for; its path is kNoPath if it is for the camera only
+    Queue<WalkItem> pending;      ///< the ray with which the eye walk goes on; depth 0: it has ended
+    Lane* samples;                ///< per path
+    uint32_t* next_path;          ///< WaveState::next_path
 
-    AMBILUX_HD uint32_t slot_of(uint32_t path) const { return path % slots; }
     AMBILUX_HD LightWalkNumber number_of(const ConnectionVertexFront& vertex) const { return {vertex.bits.depth() - 1}; }
+    /// The hit of a slot's ray, and whose it is.
+    AMBILUX_HD WalkHit hit_of(const SlotHit& end) const {
+        WalkHit h = {rays.load(end.slot), end.u, end.v, end.prim, 0};
+        h.ray.path &= ~kLightRay;
+        return h;
+    }
 
-    /// Starts the first of the paths `path`, path + slots ... that has a pixel.
-    AMBILUX_HD void begin(uint32_t path) const {
+    /// Starts `path`, or the next that has a pixel.
+    AMBILUX_HD void begin(uint32_t slot, uint32_t path) const {
         const uint32_t paths = wave.tiles * kTilePixels * wave.state->samples;
-        for (; path < paths; path += slots) {
+        for (; path < paths; path = take_place(next_path)) {
             samples[path] = {};
             const PathSlot p = wave.locate(path);
             if (!p.active || policy.max_depth == 0) continue;
             const CameraSample c = camera_sample(scene, wave, p);
-            rays.push(pack_walk(start_eye_walk(scene, policy.mis, c), path, false, c.tmax));
+            rays.put(slot, pack_walk(start_eye_walk(scene, policy.mis, c), path, false, c.tmax));
             return;
         }
     }
-    /// The light walk of `path` has ended.
-    AMBILUX_HD void advance(uint32_t path) const {
-        const WalkItem next = pending.load(slot_of(path));
+    /// The light walk of a slot has ended.
+    AMBILUX_HD void advance(uint32_t slot) const {
+        const WalkItem next = pending.load(slot);
         if (next.bits.depth() > 0)
-            rays.push(next);
+            rays.put(slot, next);
         else
-            begin(path + slots);
+            begin(slot, take_place(next_path));
     }
 };
 
 struct StreamBegin {
     StreamPool pool;
 
-    AMBILUX_HD void operator()(uint32_t slot) const { pool.begin(slot); }
+    AMBILUX_HD void operator()(uint32_t slot) const { pool.begin(slot, slot); }
 };
 
-/// extend of eye rays and light rays together. Every ray becomes a hit, those that meet nothing too: their slots have to go on.
+/// extend of eye rays and light rays together. Every ray has a hit, those that meet nothing too: their slots have to go on.
 template <Features F, class Tracer>
 struct StreamExtend {
     static constexpr Features kFeatures = F;
@@ -62,64 +67,65 @@ struct StreamExtend {
     SceneView scene;
     Tracer tracer;
     StreamPool pool;
-    Queue<WalkHit> eye_hits, light_hits;
+    Queue<SlotHit> eye_hits, light_hits;
     StageRecord* record;
 
-    AMBILUX_HD bool fetch(uint32_t i, Ray& ray) const {
-        const WalkItem item = pool.rays.load(i);
+    AMBILUX_HD bool fetch(uint32_t slot, Ray& ray) const {
+        const WalkItem item = pool.rays.load(slot);
         ray = ray_of(item);
         if constexpr (F.opacity) {
             const bool light = item.path & kLightRay;
             const uint32_t path = item.path & ~kLightRay, depth = item.bits.depth();
-            ray.alpha_seed = light ? alpha_seed(pool.wave.key(path, Stream::light), pool.number_of(pool.eye.load_front(pool.slot_of(path))).alpha_depth(depth), false)
+            ray.alpha_seed = light ? alpha_seed(pool.wave.key(path, Stream::light), pool.number_of(pool.eye.load_front(slot)).alpha_depth(depth), false)
                                    : alpha_seed(pool.wave.key(path), depth, false);
         }
         if (is_finite(item.o) && is_finite(item.d)) return true;
         count_one(&record->nan);
-        finish(i, {ray.tmax, 0.0f, 0.0f, kNone});
+        finish(slot, {ray.tmax, 0.0f, 0.0f, kNone});
         return false;
     }
 
-    AMBILUX_HD void finish(uint32_t i, const Hit& hit) const {
-        WalkHit h = hit_of(pool.rays.load(i), hit);
-        const bool light = h.ray.path & kLightRay;
-        h.ray.path &= ~kLightRay;
+    AMBILUX_HD void finish(uint32_t slot, const Hit& hit) const {
         // Not one push to either of two queues: lanes that push together share a counter (take_place).
-        if (light)
-            light_hits.push(h);
+        if (pool.rays.load(slot).path & kLightRay)
+            light_hits.push({hit.u, hit.v, hit.prim, slot});
         else
-            eye_hits.push(h);
+            eye_hits.push({hit.u, hit.v, hit.prim, slot});
     }
 
-    AMBILUX_HD void operator()(uint32_t i) const {
+    AMBILUX_HD void operator()(uint32_t slot) const {
         Ray ray;
-        if (!fetch(i, ray)) return;
+        if (!fetch(slot, ray)) return;
         Hit hit;
         tracer.template closest<F>(scene, ray, hit);
-        finish(i, hit);
+        finish(slot, hit);
     }
 };
 
 /// A slot whose eye walk has come to a vertex or to its end.
 struct TurnItem {
     uint32_t path;
+    uint32_t slot;
     uint32_t light_walk;  ///< 1: a light walk is wanted before the eye walk goes on
-    uint32_t pad[2];
+    uint32_t pad;
 };
 
 template <Features F>
 struct StreamEyeShade {
+    static constexpr uint32_t kBlocksPerSm = EyeShade<F>::kBlocksPerSm;
+
     StreamPool pool;
-    Queue<WalkHit> hits;
+    Queue<SlotHit> hits;
     HitOutlet candidates;
     Queue<VertexItem> vertices;
     Queue<TurnItem> turns;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const WalkHit h = hits.load(i);
+        const SlotHit end = hits.load(i);
+        const WalkHit h = pool.hit_of(end);
         const BidirectionalPolicy& policy = pool.policy;
-        const uint32_t depth = h.ray.bits.depth(), slot = pool.slot_of(h.ray.path);
+        const uint32_t depth = h.ray.bits.depth();
         ConnectionVertex vertex = {};
         vertex.front.bits = {depth};
         vertex.front.link = kNoPath;
@@ -130,9 +136,9 @@ struct StreamEyeShade {
             if (connect) vertex = pack_connection_vertex(z, h);
         });
         if (!step.goes_on) step.ray.bits = {0};
-        pool.pending.store(slot, step.ray);
-        pool.eye.store(slot, vertex, lanes_of<F>(vertex));
-        turns.push({h.ray.path, connect || (policy.splat && depth == 1) ? 1u : 0u, {0, 0}});
+        pool.pending.store(end.slot, step.ray);
+        pool.eye.store(end.slot, vertex, lanes_of<F>(vertex));
+        turns.push({h.ray.path, end.slot, connect || (policy.splat && depth == 1) ? 1u : 0u, 0});
     }
 };
 
@@ -147,28 +153,30 @@ struct StreamTurn {
     AMBILUX_HD void operator()(uint32_t i) const {
         const TurnItem turn = turns.load(i);
         Walk w;
-        if (turn.light_walk && start_light<F>(pool.scene, pool.wave, pool.policy, turn.path, pool.number_of(pool.eye.load_front(pool.slot_of(turn.path))), splats, record, w))
-            pool.rays.push(pack_walk(w, turn.path | kLightRay, true, kInfinity));
+        if (turn.light_walk && start_light<F>(pool.scene, pool.wave, pool.policy, turn.path, pool.number_of(pool.eye.load_front(turn.slot)), splats, record, w))
+            pool.rays.put(turn.slot, pack_walk(w, turn.path | kLightRay, true, kInfinity));
         else
-            pool.advance(turn.path);
+            pool.advance(turn.slot);
     }
 };
 
 /// light_shade: a light vertex, for the camera and for the eye vertex that waits.
 template <Features F>
 struct StreamLightShade {
+    static constexpr uint32_t kBlocksPerSm = LightShade<F>::kBlocksPerSm;
+
     StreamPool pool;
-    Queue<WalkHit> hits;
+    Queue<SlotHit> hits;
     Queue<VertexItem> camera_vertices;
-    Queue<ConnectionVertex> pairs;
+    Queue<ConnectionVertex> pairs;  ///< light vertices, whose `link` is the slot of the eye vertex
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const WalkHit h = hits.load(i);
-        const uint32_t path = h.ray.path;
-        if (h.prim == kNone) return pool.advance(path);
+        const SlotHit end = hits.load(i);
+        if (end.prim == kNone) return pool.advance(end.slot);
+        const WalkHit h = pool.hit_of(end);
         const BidirectionalPolicy& policy = pool.policy;
-        const ConnectionVertexFront eye = pool.eye.load_front(pool.slot_of(path));
+        const ConnectionVertexFront eye = pool.eye.load_front(end.slot);
         const LightWalkNumber number = pool.number_of(eye);
         const uint32_t depth = h.ray.bits.depth();
         const bool splat = policy.splat && number.n == 0;
@@ -176,17 +184,20 @@ struct StreamLightShade {
         const uint32_t longest = splat ? policy.max_depth - 1 : policy.max_depth - 1 - eye.bits.depth();
         WalkStep step = light_step<F>(pool.scene, pool.wave, policy, h, number, longest, record, [&](const WalkVertex& y, const RngKey&) {
             if (splat && depth < policy.max_depth && policy.wants(depth + 1, 1)) push_vertex<F>(camera_vertices, pack_vertex(y, h));
-            if (eye.link != kNoPath && depth + eye.bits.depth() + 1 <= policy.max_depth && may_connect(eye, y)) push_vertex<F>(pairs, pack_connection_vertex(y, h));
+            if (eye.link != kNoPath && depth + eye.bits.depth() + 1 <= policy.max_depth && may_connect(eye, y))
+                push_vertex<F>(pairs, pack_connection_vertex(y, depth, h.ray.d, h.ray.throughput, end.slot));
         });
-        if (!step.goes_on) return pool.advance(path);
+        if (!step.goes_on) return pool.advance(end.slot);
         step.ray.path |= kLightRay;
-        pool.rays.push(step.ray);
+        pool.rays.put(end.slot, step.ray);
     }
 };
 
 /// connect_vertices: a light vertex and the eye vertex that waits for it.
 template <Features F>
 struct StreamConnect {
+    static constexpr uint32_t kBlocksPerSm = ConnectVertices<F>::kBlocksPerSm;
+
     StreamPool pool;
     Queue<ConnectionVertex> pairs;
     ConnectOutlet candidates;
@@ -194,8 +205,8 @@ struct StreamConnect {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const ConnectionVertex light = load_vertex<F>(pairs, i);
-        const EyeVertex eye = eye_vertex_of<F>(pool.scene, load_vertex<F>(pool.eye, pool.slot_of(light.path())));
-        push_connection<F>(pool.scene, pool.policy, pool.wave.key(light.path()), eye, light, 1.0f, kNone, candidates, record);
+        const EyeVertex eye = eye_vertex_of<F>(pool.scene, load_vertex<F>(pool.eye, light.front.link));
+        push_connection<F>(pool.scene, pool.policy, pool.wave.key(eye.path), eye, light, 1.0f, kNone, candidates, record);
     }
 };
 

@@ -31,6 +31,13 @@ struct WalkHit {
     uint32_t pad;
 };
 
+/// Where the ray of a slot ended (stages/stream.h); `prim == kNone`: nowhere.
+struct SlotHit {
+    float u, v;
+    uint32_t prim;
+    uint32_t slot;
+};
+
 /// An eye vertex and a vertex of a light walk to be connected.
 struct PairItem {
     uint32_t vertex;  ///< place of the eye vertex in the queue of its depth

@@ -19,6 +19,7 @@ struct WaveState {
     uint32_t failed;        ///< a wave ran out of memory: it and all after it do nothing until the host has made room
     uint32_t done;          ///< waves that did not fail
     uint32_t light_walks;   ///< of this wave
+    alignas(128) uint32_t next_path = 0;  ///< variant streaming: the next that a slot takes
     alignas(128) uint32_t next = 0;  ///< slots that threads of a launch have taken in turns; away from what is read all the time
 };
 

@@ -163,7 +163,7 @@ private:
             const BidirectionalFilm film = {samples_of_slots_.data() + size_t(first_tile) * kTilePixels, {splats_.data(), nullptr}, nullptr, nullptr, techniques_.empty() ? nullptr : techniques_.data(), technique_dropped_.data()};
             const BidirectionalStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, m, film);
             CpuExecutor executor(m.state, m.records, view_, memory.order);
-            *m.state = {first_tile, sample, 1, 0, 0, 0, light_walks_in(wave_, first_tile, wave_.tiles, policy_.light_walks_per_tile)};
+            *m.state = {first_tile, sample, 1, 0, 0, 0, light_walks_in(wave_, first_tile, wave_.tiles, policy_.light_walks_per_tile), policy_.stream_slots};
             run_bidirectional_wave(executor, stages);
             if (!m.state->failed) return;
             const uint64_t needed = std::max(m.light_vertices.counter->peak, m.splats.counter->peak);

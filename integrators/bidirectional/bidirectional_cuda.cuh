@@ -94,7 +94,7 @@ public:
             const uint32_t waves_before = read_state().done;
             for (uint32_t s = 0; s < pass; s += wave_.samples) {
                 const uint32_t samples = std::min(wave_.samples, pass - s);
-                detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{0, first + done + s, samples, 0, 0, 0, samples * light_walks});
+                detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{0, first + done + s, samples, 0, 0, 0, samples * light_walks, policy_.stream_slots});
                 if (graph_)
                     cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
                 else

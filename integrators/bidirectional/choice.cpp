@@ -192,7 +192,7 @@ double choice_work(const PilotWork& w, const ChoiceCandidate& candidate, bool cu
     // Fitted to renders (docs/performance.md): shadow rays and connections in rays of walks; what the longer records and further launches of bidirectional methods cost.
     constexpr double kShadow = 0.8;
     const double eye = w.eye_rays + kShadow * w.next_events, light = double(candidate.pilot.light_paths) * (w.light_rays + kShadow * w.splats);
-    const double pair = cuda ? 1.1 : 0.25, draw = cuda ? 0.55 : 0.25, ray = cuda ? 0.85 : 0.6, bidirectional = cuda ? 1.5 : 1.3;
+    const double pair = cuda ? 0.24 : 0.02, draw = cuda ? 0.12 : 0.07, ray = cuda ? 1.06 : 0.8, bidirectional = cuda ? 1.2 : 1.0;
     const PilotCandidate& c = candidate.pilot;
     if (c.light_paths == 0.0f && !c.connect) return eye;
     double work = eye + light;

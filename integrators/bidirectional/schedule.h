@@ -80,7 +80,7 @@ void run_streams(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     exec.run_slots(StageId::generate, stages.stream_begin, policy.stream_slots, 1);
     exec.repeat_while(m.rays[0], [&] {
         exec.trace(StageId::extend, stages.stream_extend, m.rays[0]);
-        exec.run(StageId::shade, stages.stream_eye_shade, m.hits[0]);
+        exec.run(StageId::shade, stages.stream_eye_shade, m.eye_hits);
         if (policy.light_walks) exec.run(StageId::light_shade, stages.stream_light_shade, m.light_hits);
         exec.run(StageId::light_generate, stages.stream_turn, m.turns);
         if ((policy.count_hits || policy.count_environment) && !policy.fuse) {

@@ -44,7 +44,7 @@ struct BidirectionalMemory : WalkQueues<WalkItem, WalkHit> {
     uint32_t* last_vertex;
     Lane* raw;  ///< TechniqueFilm::raw
     // Variant streaming.
-    Queue<WalkHit> light_hits;
+    Queue<SlotHit> eye_hits, light_hits;
     Queue<TurnItem> turns;
     Queue<ConnectionVertex> eye, waiting;
     Queue<VertexItem> camera_vertices;
@@ -71,9 +71,9 @@ inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, con
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
     m.counters = layout.take<QueueCounter>(BidirectionalMemory::kQueues);
-    m.rays[0] = layout.queue<WalkItem>("rays", m.counters, slots);
-    m.hits[0] = layout.queue<WalkHit>("hits", m.counters, slots);
-    m.light_hits = layout.queue<WalkHit>("light_hits", m.counters, when(policy.light_walks));
+    m.rays[0] = layout.queue<WalkItem>("rays", m.counters, slots, true);
+    m.eye_hits = layout.queue<SlotHit>("eye_hits", m.counters, slots);
+    m.light_hits = layout.queue<SlotHit>("light_hits", m.counters, when(policy.light_walks));
     m.turns = layout.queue<TurnItem>("turns", m.counters, slots);
     m.eye = layout.queue<ConnectionVertex>("eye_vertices", m.counters, slots, false, policy.connection_lanes);
     m.pending = layout.queue<WalkItem>("pending", m.counters, slots);
@@ -217,10 +217,10 @@ struct BidirectionalStages {
         connect_vertices = {scene, wave, policy, m.pairs, m.rest, m.eye_vertices, m.light_vertices, connect_outlet, record(StageId::connect_vertices)};
         connect_rest = {scene, wave, policy, m.rest, m.pairs, m.eye_vertices, m.light_vertices, connect_outlet, record(StageId::connect_vertices)};
         megakernel = {scene, tracer, wave, policy, m.light_vertices, m.splats, film.samples, m.records};
-        const StreamPool pool = {scene, wave, policy, policy.stream_slots, m.eye, m.pending, m.rays[0], film.samples};
+        const StreamPool pool = {scene, wave, policy, m.rays[0], m.eye, m.pending, film.samples, &m.state->next_path};
         stream_begin = {pool};
-        stream_extend = {scene, tracer, pool, m.hits[0], m.light_hits, record(StageId::extend)};
-        stream_eye_shade = {pool, m.hits[0], hit_outlet, m.vertices, m.turns, record(StageId::shade)};
+        stream_extend = {scene, tracer, pool, m.eye_hits, m.light_hits, record(StageId::extend)};
+        stream_eye_shade = {pool, m.eye_hits, hit_outlet, m.vertices, m.turns, record(StageId::shade)};
         stream_turn = {pool, m.turns, splat_outlet, record(StageId::light_generate)};
         stream_light_shade = {pool, m.light_hits, m.camera_vertices, m.waiting, record(StageId::light_shade)};
         stream_connect_camera = {scene, wave, policy, m.camera_vertices, splat_outlet, record(StageId::connect_camera)};
