@@ -25,6 +25,10 @@ struct Occlude {
     AMBILUX_HD bool fetch(uint32_t i, Ray& ray, Kept& kept) const {
         const ShadowItem item = shadows.load(i);
         kept = {item.value, item.path};
+#if defined(__CUDA_ARCH__)
+        // The sample that light would be added to. Where an environment is among the emitters fewer rays are free than this costs (docs/performance.md).
+        if (!F.has_environment() && contributions.through) asm volatile("prefetch.global.L2 [%0];" ::"l"(contributions.next.samples + item.path));
+#endif
         return fetch(item, ray);
     }
     /// False for a ray that is none.
