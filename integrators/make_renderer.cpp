@@ -11,7 +11,7 @@ namespace {
 
 /// What `ordering=auto` stands for (docs/performance.md, "Compaction and ordering").
 Ordering best_ordering(const Scene& scene, const RenderSettings& settings, bool cuda) {
-    const bool sortable = settings.variant == "wavefront" || settings.variant == "lvc";
+    const bool sortable = settings.variant != "megakernel";
     return cuda && sortable && scene.features.several_bsdfs() ? Ordering::material : Ordering::none;
 }
 
@@ -34,11 +34,13 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     if (settings.technique_depth > 0 && (settings.integrator == "path" || settings.variant == "megakernel"))
         throw Error(ExitCode::usage, fmt::format("technique_depth={}: {} gathers no images of single strategies; integrator light and the other variants of bdpt do", settings.technique_depth,
                                                  settings.integrator == "path" ? "integrator path" : "variant megakernel"));
-    const bool switched = settings.queues.compaction != Compaction::atomic || (settings.queues.ordering != Ordering::none && settings.queues.ordering != Ordering::automatic);
-    if (switched && (settings.variant == "megakernel" || settings.variant == "streaming"))
-        throw Error(ExitCode::usage, fmt::format("compaction={}, ordering={}: variant {} {}; the variants wavefront and lvc have these switches", compaction_name(settings.queues.compaction),
-                                                 ordering_name(settings.queues.ordering), settings.variant,
-                                                 settings.variant == "megakernel" ? "has no queues to compact or to sort" : "appends what its slots do in no fixed order"));
+    const bool compacted = settings.queues.compaction != Compaction::atomic, ordered = settings.queues.ordering != Ordering::none && settings.queues.ordering != Ordering::automatic;
+    if (settings.variant == "megakernel" && (compacted || ordered))
+        throw Error(ExitCode::usage, fmt::format("compaction={}, ordering={}: variant megakernel has no queues to compact or to sort; the others have these switches",
+                                                 compaction_name(settings.queues.compaction), ordering_name(settings.queues.ordering)));
+    if (settings.variant == "streaming" && compacted)
+        throw Error(ExitCode::usage, fmt::format("compaction={}: variant streaming has its rays by slot and appends all else; the variants wavefront and lvc have this switch",
+                                                 compaction_name(settings.queues.compaction)));
     const bool cuda = settings.backend == "cuda" || (settings.backend == "auto" && settings.accel != "embree" && cuda_available());
     if (cuda && settings.accel == "embree") throw Error(ExitCode::usage, "accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
     if (settings.accel == "bvh2" && !(cuda && settings.integrator == "path"))

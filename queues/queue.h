@@ -115,7 +115,7 @@ struct Queue {
         if (i < capacity) store(i, item, lanes);
         return i;
     }
-    /// Stores the item at place `i` of a queue of fixed places.
+    /// Stores the item at place `i` of a queue of fixed places, whatever its path.
     AMBILUX_HD void put(uint32_t i, const Item& item) const {
         occupy(i);
         store(i, item);

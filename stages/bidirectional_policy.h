@@ -43,8 +43,8 @@ struct BidirectionalPolicy {
 
     /// Most light walks of a slot.
     AMBILUX_HD uint32_t light_rounds() const { return (light_walks_per_tile + kTilePixels - 1) / kTilePixels; }
-    /// Light walks in `slots`, a multiple of kTilePixels.
-    AMBILUX_HD uint32_t light_walks_in(uint32_t slots) const { return slots / kTilePixels * light_walks_per_tile; }
+    /// Light walks of `slots`, a multiple of kTilePixels, if all of them are active.
+    AMBILUX_HD uint64_t most_light_walks(uint32_t slots) const { return uint64_t(slots / kTilePixels) * light_walks_per_tile; }
     /// Eye walks of `depth` segments count the environment that they reach: beyond the first segment as hits only.
     AMBILUX_HD bool counts_environment(uint32_t depth) const { return count_environment && (depth == 1 || mis.has(kHitStrategies)); }
     /// The last segment of an eye walk can bring nothing but emission; false if that is not wanted.

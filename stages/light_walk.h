@@ -9,7 +9,7 @@
 
 namespace ambilux {
 
-/// Which of the light walks of a path this is: paired walks have one, numbered 0; streams start one for every eye vertex.
+/// Which of the light walks of a path this is: streams start one for every eye vertex, the others one, numbered 0, or in rounds several that differ by their keys (Wave::first_key).
 struct LightWalkNumber {
     uint32_t n;
 
@@ -56,7 +56,7 @@ AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const B
     return step;
 }
 
-/// A light walk in each slot that has one of this number, and the emitter itself as the camera sees it.
+/// A light walk in each slot that has one in this round, and the emitter itself as the camera sees it.
 template <Features F>
 struct LightGenerate {
     SceneView scene;
@@ -66,11 +66,11 @@ struct LightGenerate {
     SplatOutlet splats;
     uint32_t* last_vertex;  ///< per slot: the last vertex of its light walk
     StageRecord* record;
-    uint32_t number = 0;
+    uint32_t round = 0;
 
     AMBILUX_HD void operator()(uint32_t slot) const {
         if (policy.cache_draws == 0) last_vertex[slot] = kNone;
-        if (number >= light_walks_of(slot, policy.light_walks_per_tile) || !wave.locate(slot).active || policy.max_depth == 0) return;
+        if (round >= light_walks_of(slot, policy.light_walks_per_tile) || !wave.locate(slot).active || policy.max_depth == 0) return;
         Walk w;
         if (start_light<F>(scene, wave, policy, slot, {0}, splats, record, w)) rays.push(pack_walk(w, slot, true, kInfinity));
     }

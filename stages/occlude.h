@@ -26,7 +26,7 @@ struct Occlude {
         const ShadowItem item = shadows.load(i);
         kept = {item.value, item.path};
 #if defined(__CUDA_ARCH__)
-        // The sample that light would be added to. Where an environment is among the emitters fewer rays are free than this costs (docs/performance.md).
+        // The sample that light would be added to. In kernels for environments this costs more than it brings (docs/performance.md).
         if (!F.has_environment() && contributions.through) asm volatile("prefetch.global.L2 [%0];" ::"l"(contributions.next.samples + item.path));
 #endif
         return fetch(item, ray);

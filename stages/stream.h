@@ -16,7 +16,7 @@ struct StreamPool {
     SceneView scene;
     Wave wave;
     BidirectionalPolicy policy;
-    Queue<WalkItem> rays;         ///< by slot, as everything here: of its eye walk or of the light walk for it
+    Queue<WalkItem> rays;         ///< by slot, as the next two: of its eye walk or of the light walk for it
     Queue<ConnectionVertex> eye;  ///< the vertex that the light walk is for; its path is kNoPath if it is for the camera only
     Queue<WalkItem> pending;      ///< the ray with which the eye walk goes on; depth 0: it has ended
     Lane* samples;                ///< per path

@@ -225,6 +225,29 @@ TEST_CASE("a path tracer that renders while the pilot runs makes room for a cand
     CHECK(some_timed);
 }
 
+TEST_CASE("what a device has no room for is not chosen: the next best runs") {
+    const Scene scene = project_scene("glass", 48, 32);
+    const RenderSettings s = automatic_settings(scene, 5);
+    SharedAccels accels(scene);
+    uint32_t refused = 0;
+    const auto make = [&](const RenderSettings& chosen) -> std::unique_ptr<Renderer> {
+        if (chosen.integrator == "bdpt" && chosen.variant == "lvc") {
+            ++refused;
+            throw Error(ExitCode::device, "no room");
+        }
+        return make_renderer(scene, chosen);
+    };
+    const auto renderer = make_automatic(scene, s, true, accels, make);
+    const ChoiceStats choice = renderer->stats().choice;
+    INFO(choice.name);
+    CHECK(refused > 0);
+    CHECK(choice.name.find("lvc") == std::string::npos);
+    REQUIRE(renderer->render(0, 2) == 2);
+    CHECK(worst_difference(render_scene(scene, fixed(s, choice.settings), 2).film, mean_image(renderer->film())) < 1e-5);
+    CHECK_THROWS_WITH(make_automatic(scene, s, true, accels, [](const RenderSettings&) -> std::unique_ptr<Renderer> { throw Error(ExitCode::device, "no room at all"); }),
+                      Catch::Contains("no room at all"));
+}
+
 TEST_CASE("variants restrict the choice; other settings that it would make are refused by name") {
     const Scene scene = project_scene("cornell", 24, 24);
     RenderSettings s = automatic_settings(scene);

@@ -41,12 +41,14 @@ TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no li
             WalkVertex y, z;
             if (!at_random(i, Stream::light, y) || !at_random(i, Stream::eye, z)) continue;
             ++pairs;
-            WalkConnection c;
-            const bool brings = connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c) && !is_zero(c.value);
+            const Vec3f w = z.point.p - y.point.p, wi = normalize(w);
+            const bool brings = !in_plane(z, w) && !is_zero(scatter_evaluate<kAllFeatures>(y.scattering, wi, TransportMode::importance).value) &&
+                                !is_zero(scatter_evaluate<kAllFeatures>(z.scattering, -wi, TransportMode::radiance).value);
             lit += brings;
             turned_down += !may_connect(y, z);
             REQUIRE((may_connect(y, z) || !brings));
-            const Vec3f w = z.point.p - y.point.p;
+            WalkConnection c;
+            REQUIRE((brings || !connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c) || is_zero(c.value)));
             if (std::fabs(dot(y.scattering.ng, w)) < 1e-6f * length(w)) continue;  // the side may be another by rounding
             REQUIRE(may_connect(pack_connection_vertex(y, 2, -y.scattering.wi_world, {1, 1, 1}, kNone).front, z) == may_connect(y, z));
         }

@@ -83,7 +83,7 @@ public:
             const double mean = policy_.light_walks && !policy_.stream_slots ? mean_light_vertices<F>(view_, accel_->tracer(), policy_, settings.seed) : 0.0;
             plan_cache(policy_, mean);
             waves_.resize(size_t(threads));
-            for (WaveMemory& w : waves_) w.allocate(wave_.slot_count(), planned_vertices(mean, policy_.light_walks_in(wave_.slot_count())), policy_);
+            for (WaveMemory& w : waves_) w.allocate(wave_.slot_count(), planned_vertices(mean, policy_.most_light_walks(wave_.slot_count())), policy_);
         } catch (const std::bad_alloc&) {
             throw Error(ExitCode::device, fmt::format("out of memory: a film of {}x{} needs more than there is; a smaller --size needs less", wave_.width, wave_.height));
         }

@@ -1,6 +1,8 @@
 // Light tracing and bidirectional path tracing on a CUDA device: one graph per wave over the whole film.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <optional>
@@ -43,7 +45,7 @@ public:
         const bool streaming = settings.variant == "streaming";
         if (streaming) policy_.stream_slots = 1u << 20;
         Layout million;
-        lay_out(million, 1u << 20, planned_vertices(mean, policy_.light_walks_in(1u << 20)), policy_);
+        lay_out(million, 1u << 20, planned_vertices(mean, policy_.most_light_walks(1u << 20)), policy_);
         const uint64_t bytes_per_path = (million.bytes() >> 20) + (settings.deterministic ? 3 * sizeof(int64_t) : sizeof(Lane)) + sizeof(Lane);
         const uint32_t wave_size = device_wave_size(scene, settings, streaming ? kStreamPlateau : kWavePlateau, bytes_per_path, free);
         uint64_t samples = wave_size / slots;
@@ -54,6 +56,9 @@ public:
             if (settings.expected_samples > 0) samples = std::min(samples, settings.expected_samples);
         }
         wave_.samples = uint32_t(std::max<uint64_t>(1, samples));
+        light_walks_ = light_walks_in(wave_, 0, wave_.tiles, policy_.light_walks_per_tile);
+        if (uint64_t(light_walks_) * wave_.samples > 0xffffffffull)
+            throw Error(ExitCode::usage, fmt::format("wave_size={}: more light walks than can be numbered; set a smaller one, or fewer light_paths", settings.wave_size));
         // Several pairs of a vertex wherever they fit: every launch lasts as long as its slowest ray.
         policy_.one_pair_from = std::max(policy_.one_pair_from, wave_.slot_count() / policy_.pairs_per_launch);
         policy_.tail_below = tail_walks(settings, wave_.slot_count());
@@ -75,7 +80,7 @@ public:
         clock_ = DeviceBuffer<uint64_t>(1);
         clear_film();
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        allocate(planned_vertices(mean, policy_.light_walks_in(wave_.slot_count())));
+        allocate(planned_vertices(mean, policy_.most_light_walks(wave_.slot_count())));
         build_seconds_ = seconds_since(start);
     }
 
@@ -86,7 +91,6 @@ public:
 
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
         const auto start = Clock::now();
-        const uint32_t light_walks = light_walks_in(wave_, 0, tile_count(wave_), policy_.light_walks_per_tile);
         uint32_t done = 0;
         while (done < count && !is_set(interrupt)) {
             // All waves of a pass are queued at once; the host waits for the last.
@@ -94,7 +98,7 @@ public:
             const uint32_t waves_before = read_state().done;
             for (uint32_t s = 0; s < pass; s += wave_.samples) {
                 const uint32_t samples = std::min(wave_.samples, pass - s);
-                detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{0, first + done + s, samples, 0, 0, 0, samples * light_walks, policy_.stream_slots});
+                detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{0, first + done + s, samples, 0, 0, 0, samples * light_walks_, policy_.stream_slots});
                 if (graph_)
                     cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
                 else
@@ -234,6 +238,7 @@ private:
     Features traced_;  ///< what rays are traced for
     Wave wave_{};
     Layout layout_;
+    uint32_t light_walks_ = 0;  ///< of one sample
     uint64_t values_ = 0, samples_ = 0, film_samples_ = 0;
     double build_seconds_ = 0, render_seconds_ = 0;
     std::shared_ptr<const DeviceScene> device_scene_;

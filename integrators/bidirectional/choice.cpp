@@ -255,6 +255,15 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     std::vector<double> seconds(candidates.size(), 0.0);
     const size_t best = ranked[0];
     const auto rival = std::find_if(ranked.begin(), ranked.end(), [&](size_t i) { return family(candidates[i]) != family(candidates[best]); });
+    // 0: the device has no room for it.
+    const auto timed_or_none = [&](const ChoiceCandidate& candidate) {
+        try {
+            return timed(scene, settings_of(settings, candidate), cuda, make);
+        } catch (const Error& error) {
+            if (error.code != ExitCode::device) throw;
+            return 0.0;
+        }
+    };
     // On the CPU stages cost what their items do (docs/performance.md), but for variants of other schedules.
     const bool doubtful = cuda || (settings.variant != "wavefront" && settings.variant != "lvc");
     if (doubtful && !settings.deterministic && rival != ranked.end() && variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
@@ -263,17 +272,12 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
                 seconds[i] = head_start->seconds_per_sample();
                 continue;
             }
-            const RenderSettings candidate = settings_of(settings, candidates[i]);
-            try {
-                seconds[i] = timed(scene, candidate, cuda, make);
-            } catch (const Error&) {
-                // A small device has no room for two.
-                if (!head_start) throw;
-                head_start.reset();
-                seconds[i] = timed(scene, candidate, cuda, make);
-            }
+            seconds[i] = timed_or_none(candidates[i]);
+            if (seconds[i] > 0 || !head_start) continue;
+            head_start.reset();  // a small device has no room for two
+            seconds[i] = timed_or_none(candidates[i]);
         }
-        for (size_t c = 0; c < candidates.size(); ++c) {
+        for (size_t c = 0; c < candidates.size() && seconds[best] > 0 && seconds[*rival] > 0; ++c) {
             const size_t like = family(candidates[c]) == family(candidates[*rival]) ? *rival : best;
             cost[c] = seconds[like] * work[c] / work[like];
             // Families that work has put behind both need not win by the error of its estimate.
@@ -282,24 +286,35 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
         ranked = order();
     }
 
-    ChoiceStats choice;
-    choice.name = candidates[ranked[0]].name;
-    choice.settings = candidates[ranked[0]].settings;
-    choice.pilot_samples = pilot.samples;
-    for (size_t c = 0; c < candidates.size(); ++c)
-        choice.candidates.push_back({candidates[c].name, joined(candidates[c].settings), variance[c], work[c], seconds[c],
-                                     std::isfinite(variance[c]) ? variance[ranked[0]] * cost[ranked[0]] / (variance[c] * cost[c]) : 0.0});
-    choice.seconds = seconds_since(start);
+    double choosing = seconds_since(start);
     std::unique_ptr<Renderer> renderer;
     uint32_t ready = 0;
     if (head_start && ranked[0] == 0) {
         ready = head_start->samples();
         renderer = head_start->take();
         // Building it is no cost of the choice either: any render does.
-        if (renderer) choice.seconds = std::max(0.0, choice.seconds - head_start->build_seconds());
+        if (renderer) choosing = std::max(0.0, choosing - head_start->build_seconds());
     }
     head_start.reset();  // and with it the memory of a path tracer that is not wanted
-    if (!renderer) renderer = make(settings_of(settings, candidates[ranked[0]]));
+    size_t chosen = ranked[0];
+    for (size_t rank = 0; !renderer; ++rank) {
+        chosen = ranked[rank];
+        try {
+            renderer = make(settings_of(settings, candidates[chosen]));
+        } catch (const Error& error) {
+            // What is next may need less memory.
+            if (error.code != ExitCode::device || rank + 1 == ranked.size() || !std::isfinite(variance[ranked[rank + 1]])) throw;
+        }
+    }
+
+    ChoiceStats choice;
+    choice.name = candidates[chosen].name;
+    choice.settings = candidates[chosen].settings;
+    choice.seconds = choosing;
+    choice.pilot_samples = pilot.samples;
+    for (size_t c = 0; c < candidates.size(); ++c)
+        choice.candidates.push_back({candidates[c].name, joined(candidates[c].settings), variance[c], work[c], seconds[c],
+                                     std::isfinite(variance[c]) ? variance[chosen] * cost[chosen] / (variance[c] * cost[c]) : 0.0});
     return std::make_unique<Chosen>(std::move(renderer), ready, std::move(choice));
 }
 

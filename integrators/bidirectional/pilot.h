@@ -14,9 +14,9 @@ constexpr uint32_t kPilotWalks = 8192;
 template <Features F, class Tracer>
 double mean_light_vertices(const SceneView& scene, const Tracer& tracer, const BidirectionalPolicy& policy, uint64_t seed);
 
-/// Room for the light vertices of `slots` walks, from the mean of the pilot: a quarter more, and six deviations of a geometric distribution.
-inline uint32_t planned_vertices(double mean, uint32_t slots) {
-    const double n = double(slots);
+/// Room for the light vertices of so many walks, from the mean of the pilot: a quarter more, and six deviations of a geometric distribution.
+inline uint32_t planned_vertices(double mean, uint64_t walks) {
+    const double n = double(walks);
     return uint32_t(std::min(1.25 * mean * n + 6.0 * std::sqrt(n * mean * (mean + 1.0)) + 64.0, 4.0e9));
 }
 

@@ -15,8 +15,8 @@ void run_splats(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
 template <class Executor, Features F, class Tracer>
 void run_light_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     const BidirectionalMemory& m = stages.memory;
-    for (uint32_t number = 0; number < stages.policy.light_rounds(); ++number) {
-        const auto light = stages.light(number);
+    for (uint32_t round = 0; round < stages.policy.light_rounds(); ++round) {
+        const auto light = stages.light(round);
         exec.run_slots(StageId::light_generate, light.generate, stages.wave.tiles * kTilePixels);
         if (stages.policy.splat) run_splats(exec, stages);
         exec.set_depth(1);

@@ -96,9 +96,12 @@ inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, con
 inline uint32_t most_pairs(const BidirectionalPolicy& policy, uint32_t slots) { return std::max(slots, std::min(slots, policy.one_pair_from) * policy.pairs_per_launch); }
 
 /// The most items that a stage goes through in order (OrderMemory::slots).
-inline uint32_t order_slots(const BidirectionalPolicy& policy, uint32_t slots) { return policy.connect_vertices ? most_pairs(policy, slots) : slots; }
+inline uint32_t order_slots(const BidirectionalPolicy& policy, uint32_t slots) {
+    if (policy.stream_slots) return policy.stream_slots;
+    return policy.connect_vertices ? most_pairs(policy, slots) : slots;
+}
 
-/// Lays out the memory for `slots` walks of either kind and `kept` vertices of light walks.
+/// Lays out the memory for `slots` paths and `kept` vertices of their light walks.
 inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept, const BidirectionalPolicy& policy) {
     const auto when = [&](bool needed, uint32_t n = 0) { return needed ? (n ? n : slots) : 0u; };
     // The megakernel keeps vertices and splats only.
@@ -118,7 +121,7 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     m.light_vertices = layout.queue<ConnectionVertex>("light_vertices", m.counters, when(policy.connect_vertices, kept), false, policy.connection_lanes);
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged), fixed);
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat && gathered), fixed);
-    m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, kept + policy.light_walks_in(slots)));
+    m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, uint32_t(std::min<uint64_t>(kept + policy.most_light_walks(slots), 0xfffffff0u))));
     m.pairs = layout.queue<PairItem>("pairs", m.counters, pairs, single);
     m.rest = layout.queue<PairItem>("rest", m.counters, pairs, single);
     m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, when(hits), fixed);
@@ -239,11 +242,11 @@ struct BidirectionalStages {
         LightShade<F> shade[2];
         ConnectCamera<F> connect_camera;
     };
-    /// Those of the walks of this number in every slot.
-    Light light(uint32_t number) const {
+    /// Those of a round: the first walks of all slots, the second ...
+    Light light(uint32_t round) const {
         Light l = {light_generate, {light_extend[0], light_extend[1]}, {light_shade[0], light_shade[1]}, connect_camera};
-        l.generate.number = number;
-        const uint32_t first_key = number * wave.width * wave.height;
+        l.generate.round = round;
+        const uint32_t first_key = round * wave.width * wave.height;
         l.generate.wave.first_key = l.connect_camera.wave.first_key = first_key;
         for (int k = 0; k < 2; ++k) l.extend[k].wave.first_key = l.shade[k].wave.first_key = first_key;
         return l;
