@@ -36,7 +36,7 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
                                                  settings.integrator == "path" ? "integrator path" : "variant megakernel"));
     const bool compacted = settings.queues.compaction != Compaction::atomic, ordered = settings.queues.ordering != Ordering::none && settings.queues.ordering != Ordering::automatic;
     if (settings.variant == "megakernel" && (compacted || ordered))
-        throw Error(ExitCode::usage, fmt::format("compaction={}, ordering={}: variant megakernel has no queues to compact or to sort; the others have these switches",
+        throw Error(ExitCode::usage, fmt::format("compaction={}, ordering={}: variant megakernel has no queues to compact or to sort; the variants wavefront and lvc have these switches",
                                                  compaction_name(settings.queues.compaction), ordering_name(settings.queues.ordering)));
     if (settings.variant == "streaming" && compacted)
         throw Error(ExitCode::usage, fmt::format("compaction={}: variant streaming has its rays by slot and appends all else; the variants wavefront and lvc have this switch",

@@ -1,11 +1,10 @@
 // Light tracing and bidirectional path tracing on a CUDA device: one graph per wave over the whole film.
 #pragma once
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <optional>
+#include <string>
 
 #include "backends/cuda/device_scene.h"
 #include "backends/cuda/executor.cuh"
@@ -58,7 +57,7 @@ public:
         wave_.samples = uint32_t(std::max<uint64_t>(1, samples));
         light_walks_ = light_walks_in(wave_, 0, wave_.tiles, policy_.light_walks_per_tile);
         if (uint64_t(light_walks_) * wave_.samples > 0xffffffffull)
-            throw Error(ExitCode::usage, fmt::format("wave_size={}: more light walks than can be numbered; set a smaller one, or fewer light_paths", settings.wave_size));
+            throw Error(ExitCode::usage, "wave_size=" + std::to_string(settings.wave_size) + ": more light walks than can be numbered; set a smaller one, or fewer light_paths");
         // Several pairs of a vertex wherever they fit: every launch lasts as long as its slowest ray.
         policy_.one_pair_from = std::max(policy_.one_pair_from, wave_.slot_count() / policy_.pairs_per_launch);
         policy_.tail_below = tail_walks(settings, wave_.slot_count());
