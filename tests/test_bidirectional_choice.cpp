@@ -195,6 +195,7 @@ TEST_CASE("a path tracer that renders while the pilot runs makes room for a cand
     for (const char* name : {"cornell", "glass", "lights", "materials"}) {
         const Scene scene = project_scene(name, 48, 32);
         RenderSettings s = automatic_settings(scene, 5);
+        s.variant = "megakernel";  // whose time does not follow from its work
         s.expected_seconds = 1;
         for (const bool small : {false, true}) {
             int living = 0, refused = 0;

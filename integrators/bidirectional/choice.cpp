@@ -264,8 +264,8 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
             return 0.0;
         }
     };
-    // On the CPU stages cost what their items do (docs/performance.md), but for variants of other schedules.
-    const bool doubtful = cuda || (settings.variant != "wavefront" && settings.variant != "lvc");
+    // Times follow from the work to 15 % (docs/performance.md), closer than waves tell that are short enough to be timed; but not for variants of other schedules.
+    const bool doubtful = settings.variant != "wavefront" && settings.variant != "lvc";
     if (doubtful && !settings.deterministic && rival != ranked.end() && variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
         for (const size_t i : {best, *rival}) {
             if (i == 0 && head_start && head_start->seconds_per_sample() > 0) {
