@@ -107,11 +107,11 @@ inline Ray bounced_ray(const BouncePoint& point, RngKey key) {
 /// Rays of size x size paths (a power of two up to 2^15) through pixels in Morton order, with the scene's camera and its horizontal field of view on both axes:
 /// "primary", jittered; "bounce 1" and "bounce 3": cosine-weighted around the geometric normal, origins moved along it by 1e-5 of the scene's
 /// diagonal, paths that escaped left out; "shadow": segments between random points that different paths met, both ends moved off the
-/// surface likewise and 0.9999 of the length; "to emitters": next event estimation where primary rays end, as far as light comes that way; "from emitters": first rays of
+/// surface likewise and 0.9999 of the length; "to emitters" and "to emitters 3": next event estimation where primary rays end, and the rays of bounce 2, as far as light comes that way; "from emitters": first rays of
 /// light walks; "light bounce": cosine-weighted where these end. A function of the scene and of `seed`.
 template <Features F, class Tracer>
 std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tracer, uint32_t size, uint64_t seed) {
-    constexpr uint32_t kBounces = 3, kShadowSample = 1000, kEmitterSample = 1001, kEmissionSample = 1002, kLightBounceSample = 1003;
+    constexpr uint32_t kBounces = 3, kShadowSample = 1000, kEmitterSample[2] = {1001, 1004}, kEmissionSample = 1002, kLightBounceSample = 1003;
     const uint32_t paths = size * size;
     const float offset = 1e-5f * detail::scene_diagonal(scene);
     const auto key = [&](uint32_t path, uint32_t sample) { return RngKey{seed, path, sample, Stream::bench}; };
@@ -133,7 +133,7 @@ std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tra
     batches.push_back({"primary", false, true, rays});
 
     std::vector<detail::BouncePoint> points;
-    std::vector<Ray> to_emitters;
+    RayBatch to_emitters[2] = {{"to emitters", true, false, {}}, {"to emitters 3", true, false, {}}};
     for (uint32_t bounce = 1; bounce <= kBounces; ++bounce) {
         const std::vector<detail::BouncePoint> met = detail::trace_points<F>(scene, tracer, rays, path_of, offset);
         rays.resize(met.size());
@@ -142,13 +142,13 @@ std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tra
             rays[i] = detail::bounced_ray(met[i], key(met[i].path, bounce));
             path_of[i] = met[i].path;
         });
-        if (bounce == 1) {
+        if (bounce != 2) {
             for (const detail::BouncePoint& point : met) {
                 Ray ray;
-                if (detail::ray_to_emitter(scene, point, key(point.path, kEmitterSample), offset, ray)) to_emitters.push_back(ray);
+                if (detail::ray_to_emitter(scene, point, key(point.path, kEmitterSample[bounce / 2]), offset, ray)) to_emitters[bounce / 2].rays.push_back(ray);
             }
+            batches.push_back({"bounce " + std::to_string(bounce), false, false, rays});
         }
-        if (bounce != 2) batches.push_back({"bounce " + std::to_string(bounce), false, false, rays});
         points.insert(points.end(), met.begin(), met.end());
     }
 
@@ -158,7 +158,7 @@ std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tra
         detail::for_all(paths, [&](size_t i) { shadow.rays[i] = detail::shadow_ray(points, key(uint32_t(i), kShadowSample)); });
     }
     batches.push_back(std::move(shadow));
-    batches.push_back({"to emitters", true, false, std::move(to_emitters)});
+    for (RayBatch& batch : to_emitters) batches.push_back(std::move(batch));
 
     rays.clear();
     path_of.clear();

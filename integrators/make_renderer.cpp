@@ -21,6 +21,17 @@ bool cuda_available() { return cuda_device_present(); }
 
 namespace {
 
+/// Settings that would change nothing, as text is rarely written for that. Throws Error(usage).
+void check_applies(const RenderSettings& s) {
+    const RenderSettings defaults;
+    const bool bdpt = s.integrator == "bdpt";
+    const auto refuse = [&](const char* what, const char* whose) { throw Error(ExitCode::usage, fmt::format("{}: {}, and this is integrator {}, variant {}", what, whose, s.integrator, s.variant)); };
+    if (s.estimator != defaults.estimator && s.integrator != "path") refuse("estimator", "integrator path has estimators, bdpt has strategies");
+    if ((s.strategies != defaults.strategies || s.singles.on) && !bdpt) refuse("strategies", "integrator bdpt has strategies to choose from, path has estimators");
+    if (s.connections != defaults.connections && !(bdpt && (s.variant == "lvc" || s.automatic))) refuse("connections", "light vertices are drawn in variant lvc of bdpt");
+    if (s.light_walks_per_tile != defaults.light_walks_per_tile && s.integrator == "path") refuse("light_paths", "integrators light and bdpt have light walks");
+}
+
 std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
     // Settings may come from elsewhere than apply_setting.
     RenderSettings checked;
@@ -28,6 +39,7 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     apply_setting(checked, "variant", settings.variant);
     apply_setting(checked, "backend", settings.backend);
     apply_setting(checked, "accel", settings.accel);
+    check_applies(settings);
     if (settings.automatic) check_automatic(settings);
     if (settings.variant != "wavefront" && settings.integrator != "bdpt")
         throw Error(ExitCode::usage, "variant=" + settings.variant + ": integrator " + settings.integrator + " has the variant wavefront only; megakernel, lvc and streaming belong to bdpt");

@@ -205,6 +205,14 @@ TEST_CASE("G13: every accepted option changes something") {
     CHECK(changes_image({"--set", "estimator=nee"})["estimator"] == "nee");
     CHECK(changes_image({"--set", "rr_depth=1"})["rr_depth"] == 1);
     CHECK(statistics(folder, {"--spp", "3"}, "b.exr")["spp"] == 3);
+    for (const char* strategies : {"all", "hits+light", "s1t2+s2t2"}) {
+        const json j = statistics(folder, {"--spp", "1", "-i", "bdpt", "--set", std::string("strategies=") + strategies}, "b.exr");
+        CHECK(j["strategies"] == strategies);
+        CHECK(j["light_paths"] == 1.0);
+    }
+    const json lvc = statistics(folder, {"--spp", "1", "-i", "bdpt", "--variant", "lvc", "--set", "light_paths=0.25", "--set", "connections=5"}, "b.exr");
+    CHECK(lvc["light_paths"] == 0.25);
+    CHECK(lvc["connections"] == 5);
     CHECK(statistics(folder, {"--spp", "2", "--deterministic"}, "b.exr")["deterministic"] == true);
     CHECK(statistics(folder, {"--spp", "2", "--backend", "cpu"}, "b.exr")["backend"] == "cpu");
     CHECK(base["scene_hash"] == statistics(folder, {"--spp", "1"}, "b.exr")["scene_hash"]);

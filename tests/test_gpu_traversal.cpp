@@ -271,7 +271,7 @@ TEST_CASE("All kernels of bench rays give the same answers (G12)") {
         CHECK(row.at("mrays_per_s") > 0.0);
         hit[row.at("batch")].push_back(row.at("hit"));
     }
-    REQUIRE(hit.size() == 7);
+    REQUIRE(hit.size() == 8);
     for (const auto& [batch, fractions] : hit) {
         INFO(batch);
         CHECK(fractions.size() == 3);

@@ -149,16 +149,22 @@ inline uint64_t technique_values(const BidirectionalPolicy& policy, uint64_t pix
 /// Means of what `sums` gathered.
 std::vector<TechniqueImage> technique_images(uint32_t max_depth, uint64_t samples, const std::vector<int64_t>& sums, const std::vector<uint64_t>& dropped);
 
+/// The stages of light walks.
+template <Features F, class Tracer>
+struct LightStages {
+    LightGenerate<F> generate;
+    Extend<F, Tracer, WalkItem, WalkHit> extend[2];
+    LightShade<F> shade[2];
+    ConnectCamera<F> connect_camera;
+};
+
 /// The stages over one wave, ready to launch.
 template <Features F, class Tracer>
 struct BidirectionalStages {
     BidirectionalPolicy policy;
     Wave wave;
     BidirectionalMemory memory;
-    LightGenerate<F> light_generate;
-    Extend<F, Tracer, WalkItem, WalkHit> light_extend[2];
-    LightShade<F> light_shade[2];
-    ConnectCamera<F> connect_camera;
+    LightStages<F, Tracer> light_walks;
     WeightSplats weight_splats;
     OccludeSplats<F, Tracer> occlude_splats;
     Splat splat;
@@ -205,15 +211,15 @@ struct BidirectionalStages {
         const HitOutlet hit_outlet = {m.hit_candidates, weight_hits, policy.fuse};
         const ConnectOutlet connect_outlet = {m.connect_candidates, weight_connections, policy.fuse};
         const SplatOutlet splat_outlet = {m.splat_candidates, weight_splats, policy.fuse};
-        connect_camera = {scene, wave, policy, m.vertices, splat_outlet, record(StageId::connect_camera)};
+        light_walks.connect_camera = {scene, wave, policy, m.vertices, splat_outlet, record(StageId::connect_camera)};
         connect = {scene, wave, policy, m.vertices, m.eye_vertices, m.light_vertices, m.last_vertex, m.pairs, connect_outlet, record(StageId::connect), record(StageId::connect_vertices)};
         for (int k = 0; k < 2; ++k) {
-            light_extend[k] = {scene, tracer, wave, Stream::light, m.rays[k], m.hits[k], record(StageId::light_extend)};
-            light_shade[k] = {scene, wave, policy, m.hits[k], m.rays[1 - k], m.light_vertices, m.vertices, m.last_vertex, record(StageId::light_shade), connect_camera};
+            light_walks.extend[k] = {scene, tracer, wave, Stream::light, m.rays[k], m.hits[k], record(StageId::light_extend)};
+            light_walks.shade[k] = {scene, wave, policy, m.hits[k], m.rays[1 - k], m.light_vertices, m.vertices, m.last_vertex, record(StageId::light_shade), light_walks.connect_camera};
             extend[k] = {scene, tracer, wave, Stream::eye, m.rays[k], m.hits[k], record(StageId::extend)};
             shade[k] = {scene, wave, policy, m.hits[k], m.rays[1 - k], hit_outlet, m.vertices, record(StageId::shade), connect};
         }
-        light_generate = {scene, wave, policy, m.rays[0], splat_outlet, m.last_vertex, record(StageId::light_generate)};
+        light_walks.generate = {scene, wave, policy, m.rays[0], splat_outlet, m.last_vertex, record(StageId::light_generate)};
         occlude_splats = {scene, tracer, m.weighted_splats, m.splats, record(StageId::occlude)};
         splat = {scene, wave, m.splats, film.splats, techniques, record(StageId::splat)};
         generate = {scene, wave, policy, m.rays[0], film.samples, record(StageId::generate)};
@@ -235,16 +241,9 @@ struct BidirectionalStages {
     }
     BidirectionalStages(const BidirectionalStages&) = delete;  // some stages point to others
 
-    /// The stages of light walks.
-    struct Light {
-        LightGenerate<F> generate;
-        Extend<F, Tracer, WalkItem, WalkHit> extend[2];
-        LightShade<F> shade[2];
-        ConnectCamera<F> connect_camera;
-    };
-    /// Those of a round: the first walks of all slots, the second ...
-    Light light(uint32_t round) const {
-        Light l = {light_generate, {light_extend[0], light_extend[1]}, {light_shade[0], light_shade[1]}, connect_camera};
+    /// The stages of light walks in one round: the first of all slots, the second ...
+    LightStages<F, Tracer> light(uint32_t round) const {
+        LightStages<F, Tracer> l = light_walks;
         l.generate.round = round;
         const uint32_t first_key = round * wave.width * wave.height;
         l.generate.wave.first_key = l.connect_camera.wave.first_key = first_key;
