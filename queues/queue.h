@@ -66,7 +66,7 @@ struct Queue {
     uint16_t* keys = nullptr;  ///< by place: what items are sorted by (queues/order.h), written by those who complete them. Null: looked up when they are sorted
 
     AMBILUX_HD size_t place(uint32_t i, uint32_t lane) const {
-        return lane < paired_lanes<Item>() ? size_t(lane & ~1u) * capacity + 2 * size_t(i) + (lane & 1u) : size_t(lane) * capacity + i;
+        return lane + 1 <= paired_lanes<Item>() ? size_t(lane & ~1u) * capacity + 2 * size_t(i) + (lane & 1u) : size_t(lane) * capacity + i;
     }
 
     /// `lanes`: of the item, the first ones; the others are zero.

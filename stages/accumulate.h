@@ -30,13 +30,14 @@ struct Accumulate {
 
     AMBILUX_HD void operator()(uint32_t i) const { take(contributions.load(i)); }
 
-    AMBILUX_HD void take(const Contribution& c) const {
-        if (!is_light(c.value, record)) return;
+    AMBILUX_HD uint32_t take(const Contribution& c) const {
+        if (!is_light(c.value, record)) return 0;
         if (shared)
             add_shared(samples[c.path], c.value);
         else
             set_start(samples[c.path], start_of<Rgb>(samples[c.path]) + c.value);
         techniques.arrive(wave, c.path, c.value);
+        return 0;
     }
 };
 

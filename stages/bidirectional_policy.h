@@ -8,10 +8,8 @@
 
 namespace ambilux {
 
-/// Most pairs of one eye vertex in a launch of connect_vertices, and from how many vertices on a launch holds one of each, unless there is room for several all the same: the fewer launches,
-/// the better.
-constexpr uint32_t kPairsPerLaunch = 8;
-constexpr uint32_t kVerticesForOnePair = 1u << 16;
+/// Bytes of a structure up to which connect_vertices traces its shadow rays itself, in kernels for diffuse surfaces (docs/performance.md).
+constexpr uint64_t kTracedInPlace = 4096;
 
 struct BidirectionalPolicy {
     BidirectionalMis mis;
@@ -22,8 +20,8 @@ struct BidirectionalPolicy {
     bool splat;               ///< light vertices are connected with the camera
     bool connect_vertices;
     uint32_t cache_draws;     ///< light vertices that an eye vertex draws from a cache of all; 0: those of the light walk of its slot
-    uint32_t one_pair_from;    ///< launches over as many vertices hold one pair of each: kVerticesForOnePair, or what the queue of pairs has room for
-    uint32_t pairs_per_launch; ///< pairs of one eye vertex in a launch of connect_vertices; more than 1: sums of a path depend on the order of threads
+    bool one_pair;            ///< launches of connect_vertices have one pair of an eye vertex; else sums of a path depend on the order of threads
+    bool trace_pairs;         ///< on a device: connect_vertices traces its shadow rays itself
     uint32_t vertex_lanes, connection_lanes; ///< of a VertexItem and a ConnectionVertex that kernels use
     bool next_event;
     bool count_hits;          ///< eye walks count the area emitters that they meet

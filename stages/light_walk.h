@@ -122,12 +122,12 @@ struct LightShade {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         WalkItem next;
-        if (take(hit(i), 0, next)) rays.push(next);
+        if (take(hit(i), next)) rays.push(next);
     }
     AMBILUX_HD WalkHit hit(uint32_t i) const { return hits.load(i); }
 
     /// True if the walk goes on with the ray `next`.
-    AMBILUX_HD bool take(const WalkHit& h, uint32_t, WalkItem& next) const {
+    AMBILUX_HD bool take(const WalkHit& h, WalkItem& next) const {
         if (h.prim == kNone) return false;
         const uint32_t depth = h.ray.bits.depth();
         const bool to_camera = policy.splat && depth < policy.max_depth && policy.wants(depth + 1, 1);

@@ -27,11 +27,11 @@ struct WeightHits {
 
     AMBILUX_HD void operator()(uint32_t i) const { take(candidates.load(i)); }
 
-    AMBILUX_HD void take(const HitCandidate& c) const {
+    AMBILUX_HD uint32_t take(const HitCandidate& c) const {
         const Rgb value = c.value * mis_weight(policy, c.pdf_this, c.pdf_other);
-        if (!is_light(value, record) || is_zero(value)) return;
+        if (!is_light(value, record) || is_zero(value)) return 0;
         techniques.remember(c.path, c.value, c.strategy);
-        contributions.push({value, c.path});
+        return contributions.push({value, c.path});
     }
 };
 
@@ -54,16 +54,22 @@ struct WeightConnections {
 
     AMBILUX_HD void operator()(uint32_t i) const { take(candidates.load(i)); }
 
-    AMBILUX_HD void take(const ConnectCandidate& c) const {
+    AMBILUX_HD uint32_t take(const ConnectCandidate& c) const {
+        ShadowItem item;
+        return weigh(c, item) ? shadows.push(item) : 0;
+    }
+    /// False if nothing is left to be tested.
+    AMBILUX_HD bool weigh(const ConnectCandidate& c, ShadowItem& item) const {
         Rgb value = c.value * mis_weight(policy, c.pdf_this, c.pdf_other);
-        if (!is_light(value, record) || is_zero(value)) return;
+        if (!is_light(value, record) || is_zero(value)) return false;
         if (policy.cull > 0.0f && c.tmax != kTowardsEnvironment) {
             const float factor = survival_factor(policy.cull, value, start_of<Rgb>(samples[c.path]), c.alpha_seed);
-            if (factor == 0.0f) return;
+            if (factor == 0.0f) return false;
             value *= factor;
         }
         techniques.remember(c.path, c.value, c.strategy);
-        shadows.push({value, c.path, c.o, c.tmax, c.d, c.alpha_seed});
+        item = {value, c.path, c.o, c.tmax, c.d, c.alpha_seed};
+        return true;
     }
 };
 

@@ -46,10 +46,14 @@ struct Occlude {
         else
             contributions.push(kept);
     }
-    /// All of it for an item that is in no queue.
-    AMBILUX_HD void take(const ShadowItem& item) const {
+    /// True if nothing is in the way of an item that is in no queue.
+    AMBILUX_HD bool is_free(const ShadowItem& item) const {
         Ray ray;
-        if (fetch(item, ray) && !tracer.template occluded<F>(scene, ray)) arrive({item.value, item.path}, item);
+        return fetch(item, ray) && !tracer.template occluded<F>(scene, ray);
+    }
+    /// All of it for such an item.
+    AMBILUX_HD void take(const ShadowItem& item) const {
+        if (is_free(item)) arrive({item.value, item.path}, item);
     }
 
     AMBILUX_HD void operator()(uint32_t i) const {

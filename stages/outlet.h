@@ -6,19 +6,15 @@
 namespace ambilux {
 
 /// The queue of the stage `Next`, or, if `through`, that stage itself: items that are made and used up by neighbouring stages, one for one, need not go through memory.
-/// `Next` has take(item), which is all that it does with an item of its queue.
+/// `Next` has take(item), which is all that it does with an item of its queue, and returns the place to which it pushes, or 0.
 template <class Item, class Next>
 struct Outlet {
     Queue<Item> queue;
     Next next;
     bool through;
 
-    AMBILUX_HD void push(const Item& item) const {
-        if (through)
-            next.take(item);
-        else
-            queue.push(item);
-    }
+    /// The place where the item, or what `Next` made of it, has gone in a queue; 0 too if it has not.
+    AMBILUX_HD uint32_t push(const Item& item) const { return through ? next.take(item) : queue.push(item); }
 };
 
 /// A queue, or on a host, if `take` is set, a stage of any kind that has each item at once: nothing waits there for many items to come together.
@@ -28,11 +24,12 @@ struct HostOutlet {
     const void* stage = nullptr;
     void (*take)(const void* stage, const Item& item) = nullptr;
 
-    AMBILUX_HD void push(const Item& item) const {
+    /// The place in the queue; 0 too if there is none.
+    AMBILUX_HD uint32_t push(const Item& item) const {
 #if !defined(__CUDA_ARCH__)
-        if (take) return take(stage, item);
+        if (take) return take(stage, item), 0;
 #endif
-        queue.push(item);
+        return queue.push(item);
     }
 };
 

@@ -18,9 +18,9 @@ struct WeightSplats {
 
     AMBILUX_HD void operator()(uint32_t i) const { take(candidates.load(i)); }
 
-    AMBILUX_HD void take(SplatCandidate c) const {
+    AMBILUX_HD uint32_t take(SplatCandidate c) const {
         c.value *= 1.0f / (1.0f + c.others);
-        if (is_light(c.value, record) && !is_zero(c.value)) weighted.push(c);
+        return is_light(c.value, record) && !is_zero(c.value) ? weighted.push(c) : 0;
     }
 };
 

@@ -32,14 +32,15 @@ constexpr const char* kStageNames[kStageCount] = {"light_generate", "light_exten
 /// Items are counted for depths 0 ... kTrackedDepths-1; the last entry gathers all deeper ones.
 constexpr uint32_t kTrackedDepths = 64;
 
-/// Adds 1 to a counter that other threads may add to.
-AMBILUX_HD void count_one(uint64_t* counter) {
+/// Adds to a counter that other threads may add to. Less than 0: subtracts.
+AMBILUX_HD void count_some(uint64_t* counter, int64_t n) {
 #if defined(__CUDA_ARCH__)
-    atomicAdd(reinterpret_cast<unsigned long long*>(counter), 1ull);
+    atomicAdd(reinterpret_cast<unsigned long long*>(counter), static_cast<unsigned long long>(n));
 #else
-    ++*counter;  // a host record belongs to one thread
+    *counter += uint64_t(n);  // a host record belongs to one thread
 #endif
 }
+AMBILUX_HD void count_one(uint64_t* counter) { count_some(counter, 1); }
 
 /// Adds 1 to counters[which]; the threads of a warp that mean the same one add once for all of them.
 AMBILUX_HD void count_together(uint64_t* counters, uint32_t which) {
@@ -62,6 +63,11 @@ struct StageRecord {
         items += new_items;
         nanoseconds += ns;
         items_by_depth[tracked(depth)] += new_items;
+    }
+    /// Items that no launch was made for, or, less than 0, that it has left.
+    AMBILUX_HD void count_items(int64_t n, uint32_t depth) {
+        count_some(&items, n);
+        count_some(items_by_depth + tracked(depth), n);
     }
     /// An item that no launch was made for.
     AMBILUX_HD void count_item(uint32_t depth) {

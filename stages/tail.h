@@ -29,7 +29,7 @@ struct Tail {
                 left = kTailDepths;
             }
             auto ray = decltype(shade.rays.load(0)){};
-            if (!shade.take(hit, count * kTailDepths, ray)) {
+            if (!shade.take(hit, ray)) {
                 left = 0;
             } else if (--left == 0) {
                 shade.rays.push(ray);

@@ -36,11 +36,11 @@ struct Bench {
     std::function<void(Bench&)> change;  ///< called once, before stage `before` runs for the first time
     bool changed = false;
 
-    explicit Bench(Scene s, const Method& method = {"all"}, uint32_t one_pair_from = kVerticesForOnePair) : scene(std::move(s)), accel(scene) {
+    explicit Bench(Scene s, const Method& method = {"all"}, bool one_pair = false) : scene(std::move(s)), accel(scene) {
         RenderSettings settings = method_settings(scene, method, 5);
         settings.fuse = Fuse::none;
         policy = make_bidirectional_policy(scene, settings);
-        policy.one_pair_from = one_pair_from;
+        policy.one_pair = one_pair;
         wave = shape_wave(scene, settings, kTilePixels, 1);
         wave = shape_wave(scene, settings, tile_count(wave) * kTilePixels, tile_count(wave));
         wave.samples = 1;
@@ -170,18 +170,28 @@ TEST_CASE("G9: nothing is counted in a clean wave, whose film is that of the ren
     }
 }
 
-TEST_CASE("Launches with one pair of a path, while there are many vertices, and with several after that connect the same pairs") {
-    Bench several(cornell());
+TEST_CASE("Launches with one pair of a path, and with as many as there is room for, connect the same pairs") {
+    const auto record = [](const Bench& b, StageId id) { return b.memory.records[uint32_t(id)]; };
+    const Method connections = {"connections"};
+    Bench several(cornell(), connections);
     several.run();
-    const uint64_t pairs = several.memory.records[uint32_t(StageId::connect_vertices)].items;
+    const uint64_t pairs = record(several, StageId::connect_vertices).items, rays = record(several, StageId::occlude).items;
     CHECK(pairs > 256);
-    for (const uint32_t one_pair_from : {0u, 1u, 40u, 200u}) {
-        INFO(one_pair_from);
-        Bench b(cornell(), {"all"}, one_pair_from);
+    const auto check_same = [&](Bench& b) {
         b.run();
-        CHECK(b.memory.records[uint32_t(StageId::connect_vertices)].items == pairs);
+        CHECK(record(b, StageId::connect_vertices).items == pairs);
+        CHECK(record(b, StageId::connect_vertices).launches > record(several, StageId::connect_vertices).launches);
+        CHECK(record(b, StageId::occlude).items == rays);
         CHECK(b.sum == several.sum);
         for (uint32_t q = 0; q < BidirectionalMemory::kQueues; ++q) CHECK(b.memory.counters[q].overflow == 0);
+    };
+    Bench one(cornell(), connections, true);
+    check_same(one);
+    for (const uint32_t room : {1u, 7u, 100u}) {
+        INFO(room);
+        Bench b(cornell(), connections);
+        for (auto* q : {&b.memory.connect_candidates.capacity, &b.memory.shadows.capacity, &b.memory.shadow_contributions.capacity}) *q = room;
+        check_same(b);
     }
 }
 

@@ -128,35 +128,69 @@ TEST_CASE("The last walks of light and eye find the same light, several depths i
     }
 }
 
-TEST_CASE("Launches of a device that hold one pair of a path and those that hold several connect the same pairs") {
+namespace {
+
+StageStats stage_of(const RenderResult& r, const std::string& name) {
+    for (const StageStats& t : r.stats.stages)
+        if (t.name == name) return t;
+    return {};
+}
+
+}  // namespace
+
+TEST_CASE("Launches of a device that hold one pair of a path and those that hold as many as there is room for connect the same pairs") {
     if (!device()) return;
-    // More eye vertices than launches of several pairs have room for at first (an eighth or a fifth of the paths, which is more than kVerticesForOnePair), fewer in the end.
-    const Scene scene = project_scene("glass", 1280, 720);
+    // More pairs than a queue of one shadow ray per path has room for at first, and fewer in the end.
+    const Scene scene = project_scene("materials", 1280, 720);
     for (const char* variant : {"wavefront", "lvc"}) {
         INFO(variant);
         RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
         s.max_depth = 12;
         s.connections = 5;
         const RenderResult several = render_scene(scene, s, 1);
-        s.wave_size = 64;  // paths of one sample all the same: the film is one wave
-        if (s.variant == "wavefront") s.deterministic = true;
-        const RenderResult other = render_scene(scene, s, 1);
-        const auto pairs = [](const RenderResult& r) {
-            for (const StageStats& t : r.stats.stages)
-                if (t.name == "connect_vertices") return t.items;
-            return uint64_t(0);
-        };
-        CHECK(pairs(several) > 1280u * 720u / 2);
+        RenderSettings other_settings = s;
+        if (s.variant == "wavefront")
+            other_settings.deterministic = true;
+        else
+            other_settings.queues.compaction = Compaction::select;
+        const RenderResult one = render_scene(scene, other_settings, 1);
+        const StageStats pairs = stage_of(several, "connect_vertices"), other = stage_of(one, "connect_vertices");
+        CHECK(pairs.items > 1280u * 720u);
+        CHECK(pairs.launches < other.launches);
         // The last walks are another kernel's, which rounds differently.
-        const double most = s.variant == "lvc" ? drawn_difference(pairs(several)) : 1e-5 * double(pairs(several)) + 3;
-        CHECK(std::fabs(double(pairs(several)) - double(pairs(other))) <= most);
-        for (const QueueStats& q : several.stats.queues) CHECK(q.overflow == 0);
-        // The CPU has launches of several pairs only. Pairs in one plane are told by rounding, and differ; those that ask for a shadow ray do not.
+        const double most = s.variant == "lvc" ? drawn_difference(pairs.items) : 1e-5 * double(pairs.items) + 3;
+        CHECK(std::fabs(double(pairs.items) - double(other.items)) <= most);
+        if (s.variant == "wavefront") CHECK(agreeing_pixels(several.film, one.film) >= 0.999);
+        for (const QueueStats& q : several.stats.queues) {
+            CHECK(q.overflow == 0);
+            if (q.name == "rest") CHECK(q.peak > 0);  // there was no room
+        }
+        // Pairs in one plane are told by rounding, and differ; those that ask for a shadow ray do not.
         s.backend = "cpu";
-        s.deterministic = false;
-        s.wave_size = 0;
         const double rays = double(several.stats.rays_occlude), on_host = double(render_scene(scene, s, 1).stats.rays_occlude);
         CHECK(std::fabs(rays - on_host) <= 2e-3 * on_host + (s.variant == "lvc" ? drawn_difference(several.stats.rays_occlude) : 0.0));
+    }
+}
+
+TEST_CASE("Shadow rays of pairs that are traced where they are made are those that a queue would hold") {
+    if (!device()) return;
+    const Scene scene = project_scene("cornell", 320, 320);
+    for (const char* variant : {"wavefront", "lvc"}) {
+        INFO(variant);
+        RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
+        const RenderResult in_place = render_scene(scene, s, 4);
+        s.fuse = Fuse::light;
+        const RenderResult queued = render_scene(scene, s, 4);
+        CHECK(stage_of(in_place, "occlude").launches < stage_of(queued, "occlude").launches);
+        for (const char* stage : {"connect_vertices", "occlude"}) {
+            INFO(stage);
+            const StageStats a = stage_of(in_place, stage), b = stage_of(queued, stage);
+            CHECK(a.items > 100000);
+            const double most = s.variant == "lvc" ? drawn_difference(b.items) : 1e-5 * double(b.items) + 3;
+            CHECK(std::fabs(double(a.items) - double(b.items)) <= most);
+        }
+        if (s.variant == "wavefront") CHECK(agreeing_pixels(in_place.film, queued.film) >= 0.999);
+        CHECK(in_place.stats.memory_bytes < queued.stats.memory_bytes);
     }
 }
 

@@ -80,27 +80,15 @@ private:
         const uint32_t* list = make_list<Order>(queue);
         const bool gaps = queue.flags && !list;
         const uint32_t n = gaps ? queue.capacity : items;
-        [[maybe_unused]] auto memory = memory_of(stage);
         for (uint32_t i = 0; i < n; ++i) {
             if constexpr (requires { stage.far_memory(i); }) {
                 if (!queue.flags && !list && i + kPrefetchDistance < n) __builtin_prefetch(stage.far_memory(i + kPrefetchDistance));
             }
             if (gaps && !take(queue, i)) continue;
-            if constexpr (requires { typename Stage::Memory; })
-                stage(list ? list[i] : i, memory);
-            else
-                stage(list ? list[i] : i);
+            stage(list ? list[i] : i);
         }
         queue.counter->finish();
         record(id, items, start);
-    }
-    /// What a stage keeps from item to item.
-    template <class Stage>
-    static auto memory_of(const Stage&) {
-        if constexpr (requires { typename Stage::Memory; })
-            return typename Stage::Memory();
-        else
-            return 0;
     }
     /// The places of all items, if they do not lie one after the other or not in the order in which they are wanted; null: as they lie.
     template <class Order, class Item>

@@ -27,7 +27,8 @@ namespace ambilux {
 template <bool kPairs>
 class BasicCudaExecutor {
 public:
-    static constexpr bool kTails = true;  ///< has run_tail
+    static constexpr bool kTails = true;        ///< has run_tail
+    static constexpr bool kTracesPairs = true;  ///< runs ConnectAndOcclude
 
     /// `traced`: features that rays have to know of, the scene's or more. `clock`: one value on the device.
     BasicCudaExecutor(cudaStream_t stream, const Features& traced, WaveState* state, StageRecord* records, uint64_t* clock, const SceneView& scene, const OrderMemory& order)
@@ -74,7 +75,9 @@ public:
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
         const detail::Items items = prepare<MaterialOrder>(stage, queue);
-        if constexpr (detail::Gathered<Stage>)
+        if constexpr (detail::Chained<Stage>)
+            detail::launch_chains<<<blocks(detail::launch_chains<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
+        else if constexpr (detail::Gathered<Stage>)
             detail::launch_gathered<<<blocks(detail::launch_gathered<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
         else
             detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);

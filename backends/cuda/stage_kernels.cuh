@@ -5,6 +5,7 @@
 
 #include "backends/cuda/trace_kernels.cuh"
 #include "queues/queue.h"
+#include "stages/connect_vertices.h"
 #include "stages/order_keys.h"
 #include "stages/path_items.h"
 #include "stages/settle.h"
@@ -168,6 +169,55 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
     });
     __syncwarp();
     if (lane < held) stage(mine[lane]);
+}
+
+/// Stages whose items are the first steps of chains.
+template <class Stage>
+concept Chained = requires(const Stage& stage, typename Stage::Chain& chain, PairCount& count) { stage.step(chain, count); };
+
+/// A lane that has ended its chain waits until kIdleLanes of its warp have, and begins another together with them. When there is no more room, chains go back for another launch, those that have not
+/// been begun too: as each step fills one place at most, it is enough that a warp looks at the places of its own after every step.
+template <class Stage>
+__global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_chains(const __grid_constant__ Stage stage, const Items all) {
+    constexpr uint32_t kWarp = 0xffffffffu, kIdleLanes = 4;
+    const uint32_t n = all.size(), threads = gridDim.x * kStageBlock, stretch = n / threads >= 16 ? 128 : 32, room = stage.room() > threads ? stage.room() - threads : 0;
+    const Items items = all.of(n);
+    typename Stage::Chain chain = {};
+    PairCount count = {};
+    bool busy = false, full = false;
+    for (uint32_t at = 0, end = 0;;) {  // items that the warp has taken and not begun
+        const uint32_t idle = __ballot_sync(kWarp, !busy);
+        if (at < n && uint32_t(__popc(idle)) >= kIdleLanes) {
+            const uint32_t wanted = uint32_t(__popc(idle)), kept = end - at, rank = lane_rank(idle);
+            uint32_t fresh = at;
+            if (wanted > kept) {
+                if (threadIdx.x % 32 == 0) fresh = add_to(&items.counter->next, stretch);
+                fresh = __shfl_sync(kWarp, fresh, 0);
+                end = fresh + stretch;
+                fresh -= kept;
+            }
+            const uint32_t next = (rank < kept ? at : fresh) + rank;
+            at = fresh + wanted;
+            if (!busy && next < n) {
+                const uint32_t place = items.place(next);
+                busy = items.take(place);
+                if (busy) chain = stage.begin(place);
+            }
+            __syncwarp();
+        } else if (idle == kWarp) {
+            break;
+        }
+        if (busy && !full) busy = stage.step(chain, count);
+        __syncwarp();
+        full = __any_sync(kWarp, full || stage.place(chain) >= room);
+        if (busy && (full || stage.one_pair())) {
+            stage.put_back(chain, count);
+            busy = false;
+        }
+        __syncwarp();
+    }
+    count = {__reduce_add_sync(kWarp, count.pairs), __reduce_add_sync(kWarp, count.rays)};
+    if (threadIdx.x % 32 == 0) stage.add(count);
 }
 
 /// Rays in the order of the queue, one after the other: best while neighbours stay together. `Set`: what traversal has to know of; less than the stage does, where

@@ -59,7 +59,8 @@ public:
         if (uint64_t(light_walks_) * wave_.samples > 0xffffffffull)
             throw Error(ExitCode::usage, "wave_size=" + std::to_string(settings.wave_size) + ": more light walks than can be numbered; set a smaller one, or fewer light_paths");
         // Several pairs of a vertex wherever they fit: every launch lasts as long as its slowest ray.
-        policy_.one_pair_from = std::max(policy_.one_pair_from, wave_.slot_count() / policy_.pairs_per_launch);
+        policy_.trace_pairs = F.bsdfs == bit(BsdfType::diffuse) && policy_.connect_in_shade && policy_.technique_depth == 0 && !settings.deterministic && !policy_.queues.fixed_places() &&
+                              device_accel_->bytes() <= kTracedInPlace;
         policy_.tail_below = tail_walks(settings, wave_.slot_count());
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         sum_ = DeviceBuffer<double>(values_, "film");

@@ -49,8 +49,7 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
             throw Error(ExitCode::usage, fmt::format("light_paths={}: a film of {}x{} has more light walks than can be numbered (4294967295)", light_paths, film.width, film.height));
     }
     // A launch with several pairs of one vertex adds to sums in the order in which threads come, and images of single strategies tell contributions of one path apart by launches.
-    p.one_pair_from = kVerticesForOnePair;
-    p.pairs_per_launch = settings.deterministic || p.technique_depth > 0 ? 1 : p.cache_draws > 0 ? std::min(p.cache_draws, kPairsPerLaunch) : kPairsPerLaunch;
+    p.one_pair = settings.deterministic || p.technique_depth > 0 || p.cache_draws == 1 || settings.queues.fixed_places();
     p.vertex_lanes = Queue<VertexItem>::kLanes;
     p.connection_lanes = Queue<ConnectionVertex>::kLanes;
     p.background_only = p.mis.strategies == kLightStrategies;

@@ -35,13 +35,23 @@ void run_light_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stage
 /// Most pairs of an eye vertex.
 inline uint32_t longest_pairing(const BidirectionalPolicy& policy) { return policy.cache_draws > 0 ? policy.cache_draws : policy.max_depth - 2; }
 
-/// Candidates of one launch: weighted, tested, added to their paths. `tail`: there may be several of a path.
+/// Candidates of one launch: weighted, tested, added to their paths. `several`: there may be several of a path.
 template <class Executor, Features F, class Tracer>
-void run_connections(Executor& exec, const BidirectionalStages<F, Tracer>& stages, bool tail = false) {
+void run_connections(Executor& exec, const BidirectionalStages<F, Tracer>& stages, bool several = false) {
     const BidirectionalMemory& m = stages.memory;
     if (!stages.policy.fuse) exec.run(StageId::mis_weight, stages.weight_connections, m.connect_candidates);
-    exec.trace(StageId::occlude, tail ? stages.occlude_tail : stages.occlude, m.shadows);
-    if (!stages.policy.fuse) exec.run(StageId::accumulate, stages.accumulate_shadows, m.shadow_contributions);
+    exec.trace(StageId::occlude, several ? stages.occlude_several : stages.occlude, m.shadows);
+    if (!stages.policy.fuse) exec.run(StageId::accumulate, several ? stages.accumulate_several : stages.accumulate_shadows, m.shadow_contributions);
+}
+
+/// connect_vertices with its shadow rays, where the policy wants that; else false.
+template <class Executor, Features F, class Tracer>
+bool run_pairs_in_place([[maybe_unused]] Executor& exec, const BidirectionalStages<F, Tracer>& stages, [[maybe_unused]] bool tail) {
+    if constexpr (requires { Executor::kTracesPairs; } && F.bsdfs == bit(BsdfType::diffuse)) {
+        if (stages.policy.trace_pairs) exec.run(StageId::connect_vertices, tail ? stages.connect_and_occlude_several : stages.connect_and_occlude, stages.memory.pairs);
+        return stages.policy.trace_pairs;
+    }
+    return false;
 }
 
 template <class Executor, Features F, class Tracer>
@@ -56,15 +66,16 @@ void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages)
         }
         if ((policy.next_event || policy.connect_vertices) && !policy.connect_in_shade) exec.run(StageId::connect, stages.connect, m.vertices);
         if (policy.next_event) run_connections(exec, stages, tail);
-        if (policy.connect_vertices) {
+        if (policy.connect_vertices && !run_pairs_in_place(exec, stages, tail)) {
+            const bool several = tail || !policy.one_pair;
             exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
-            run_connections(exec, stages, tail);
+            run_connections(exec, stages, several);
             if (longest_pairing(policy) > 1)
                 exec.repeat_while(m.rest, [&] {
                     exec.run(StageId::connect_vertices, stages.connect_rest, m.rest);
-                    run_connections(exec, stages, tail);
+                    run_connections(exec, stages, several);
                     exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
-                    run_connections(exec, stages, tail);
+                    run_connections(exec, stages, several);
                 });
         }
         if (policy.connect_vertices) exec.clear(m.eye_vertices);

@@ -92,14 +92,8 @@ inline BidirectionalMemory lay_out_streaming(Layout& layout, uint32_t paths, con
     return m;
 }
 
-/// Pairs of one launch for `slots` paths (push_pairs).
-inline uint32_t most_pairs(const BidirectionalPolicy& policy, uint32_t slots) { return std::max(slots, std::min(slots, policy.one_pair_from) * policy.pairs_per_launch); }
-
 /// The most items that a stage goes through in order (OrderMemory::slots).
-inline uint32_t order_slots(const BidirectionalPolicy& policy, uint32_t slots) {
-    if (policy.stream_slots) return policy.stream_slots;
-    return policy.connect_vertices ? most_pairs(policy, slots) : slots;
-}
+inline uint32_t order_slots(const BidirectionalPolicy& policy, uint32_t slots) { return policy.stream_slots ? policy.stream_slots : slots; }
 
 /// Lays out the memory for `slots` paths and `kept` vertices of their light walks.
 inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept, const BidirectionalPolicy& policy) {
@@ -107,10 +101,10 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     // The megakernel keeps vertices and splats only.
     if (policy.megakernel) return lay_out_megakernel(layout, slots, kept, policy);
     if (policy.stream_slots) return lay_out_streaming(layout, slots, policy);
-    const bool fixed = policy.queues.fixed_places(), single = fixed && policy.pairs_per_launch == 1;  // several pairs of a path need several places
+    const bool fixed = policy.queues.fixed_places();
     const bool connections = policy.next_event || policy.connect_vertices, staged = !policy.fuse, hits = staged && (policy.count_hits || policy.count_environment);
     const bool gathered = !policy.at_once;
-    const uint32_t pairs = when(policy.connect_vertices && gathered, most_pairs(policy, slots)), shadows = connections && gathered ? std::max(slots, pairs) : 0;
+    const uint32_t pairs = when(policy.connect_vertices && gathered), shadows = when(connections && gathered);
     BidirectionalMemory m{};
     m.state = layout.take<WaveState>(1);
     m.records = layout.take<StageRecord>(kStageCount);
@@ -122,13 +116,13 @@ inline BidirectionalMemory lay_out(Layout& layout, uint32_t slots, uint32_t kept
     m.splat_candidates = layout.queue<SplatCandidate>("splat_candidates", m.counters, when(policy.splat && staged), fixed);
     m.weighted_splats = layout.queue<SplatCandidate>("weighted_splats", m.counters, when(policy.splat && gathered), fixed);
     m.splats = layout.queue<SplatItem>("splats", m.counters, when(policy.splat, uint32_t(std::min<uint64_t>(kept + policy.most_light_walks(slots), 0xfffffff0u))));
-    m.pairs = layout.queue<PairItem>("pairs", m.counters, pairs, single);
-    m.rest = layout.queue<PairItem>("rest", m.counters, pairs, single);
+    m.pairs = layout.queue<PairItem>("pairs", m.counters, pairs, fixed);
+    m.rest = layout.queue<PairItem>("rest", m.counters, policy.trace_pairs ? 0 : pairs, fixed);
     m.hit_candidates = layout.queue<HitCandidate>("hit_candidates", m.counters, when(hits), fixed);
     m.hit_contributions = layout.queue<Contribution>("hit_contributions", m.counters, when(hits), fixed);
-    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, staged ? shadows : 0, single);
-    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, shadows, single);
-    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, staged ? shadows : 0, single);
+    m.connect_candidates = layout.queue<ConnectCandidate>("connect_candidates", m.counters, staged ? shadows : 0, fixed);
+    m.shadows = layout.queue<ShadowItem>("shadows", m.counters, shadows, fixed);
+    m.shadow_contributions = layout.queue<Contribution>("shadow_contributions", m.counters, staged ? shadows : 0, fixed);
     m.last_vertex = layout.take<uint32_t>(slots);
     m.raw = layout.take<Lane>(policy.technique_depth ? slots : 0);
     return m;
@@ -175,6 +169,7 @@ struct BidirectionalStages {
     Accumulate accumulate_hits;
     EyeConnect<F> connect;
     ConnectVertices<F> connect_vertices, connect_rest;
+    ConnectAndOcclude<F, Tracer> connect_and_occlude, connect_and_occlude_several;
     Megakernel<F, Tracer> megakernel;
     StreamBegin stream_begin;
     StreamExtend<F, Tracer> stream_extend;
@@ -184,8 +179,9 @@ struct BidirectionalStages {
     StreamConnect<F> stream_connect;
     ConnectCamera<F> stream_connect_camera;
     WeightConnections weight_connections;
-    Occlude<F, Tracer> occlude, occlude_tail;
-    Accumulate accumulate_shadows;
+    // With one item of a path in a launch, and with several.
+    Occlude<F, Tracer> occlude, occlude_several;
+    Accumulate accumulate_shadows, accumulate_several;
     DevelopSplats develop;
 
     BidirectionalStages(const SceneView& scene, const Tracer& tracer, const BidirectionalPolicy& p, Wave w, const BidirectionalMemory& m, const BidirectionalFilm& film)
@@ -200,7 +196,7 @@ struct BidirectionalStages {
         const TechniqueFilm techniques = {film.techniques, m.raw, film.technique_dropped, policy.technique_depth};
         accumulate_hits = {m.hit_contributions, film.samples, record(StageId::accumulate), wave, techniques};
         weight_hits = {sums, m.hit_candidates, {m.hit_contributions, accumulate_hits, policy.fuse}, record(StageId::mis_weight), techniques};
-        accumulate_shadows = {m.shadow_contributions, film.samples, record(StageId::accumulate), wave, techniques, policy.pairs_per_launch > 1};
+        accumulate_shadows = {m.shadow_contributions, film.samples, record(StageId::accumulate), wave, techniques};
         weight_connections = {sums, m.connect_candidates, {m.shadows}, record(StageId::mis_weight), techniques, film.samples};
         weight_splats = {m.splat_candidates, {m.weighted_splats}, record(StageId::mis_weight)};
         if (policy.at_once) {
@@ -235,8 +231,12 @@ struct BidirectionalStages {
         stream_connect_camera = {scene, wave, policy, m.camera_vertices, splat_outlet, record(StageId::connect_camera)};
         stream_connect = {pool, m.waiting, connect_outlet, record(StageId::connect_vertices)};
         occlude = {scene, tracer, m.shadows, {m.shadow_contributions, accumulate_shadows, policy.fuse}, record(StageId::occlude)};
-        occlude_tail = occlude;
-        occlude_tail.contributions.next.shared = true;
+        occlude_several = occlude;
+        accumulate_several = accumulate_shadows;
+        accumulate_several.shared = true;
+        occlude_several.contributions.next = accumulate_several;
+        connect_and_occlude = {connect_vertices, occlude};
+        connect_and_occlude_several = {connect_vertices, occlude_several};
         develop = {wave, film.samples, film.splats, film.sum, film.sum_squares, record(StageId::develop)};
     }
     BidirectionalStages(const BidirectionalStages&) = delete;  // some stages point to others
