@@ -2,42 +2,13 @@
 
 #include <algorithm>
 
-#include "backends/bench_rays.h"
 #include "backends/cuda/device_memory.h"
 #include "backends/cuda/device_scene.h"
+#include "backends/cuda/median_seconds.cuh"
 #include "backends/cuda/trace_kernels.cuh"
 
 namespace ambilux {
 namespace {
-
-struct Event {
-    cudaEvent_t event = nullptr;
-    Event() { cuda_check(cudaEventCreate(&event), "event"); }
-    ~Event() { cudaEventDestroy(event); }
-    Event(const Event&) = delete;
-    Event& operator=(const Event&) = delete;
-};
-
-/// Median time of launch(i) for i from warm_ups to warm_ups + repetitions. All are queued before the first is waited for: between an event and a
-/// kernel on an idle device lies the time of the launch.
-template <class Launch>
-double median_seconds(int warm_ups, int repetitions, Launch launch) {
-    const std::vector<Event> starts(size_t(warm_ups + repetitions)), stops(starts.size());
-    for (size_t i = 0; i < starts.size(); ++i) {
-        cuda_check(cudaEventRecord(starts[i].event), "event");
-        launch(i);
-        cuda_check(cudaGetLastError(), "launch of ray traversal");
-        cuda_check(cudaEventRecord(stops[i].event), "event");
-    }
-    cuda_check(cudaDeviceSynchronize(), "ray traversal");
-    std::vector<double> seconds;
-    for (size_t i = size_t(warm_ups); i < starts.size(); ++i) {
-        float milliseconds = 0;
-        cuda_check(cudaEventElapsedTime(&milliseconds, starts[i].event, stops[i].event), "event");
-        seconds.push_back(double(milliseconds) * 1e-3);
-    }
-    return median(std::move(seconds));
-}
 
 template <class Set, class Tracer>
 std::vector<KernelTiming> time_batch(const SceneView& scene, const Tracer& tracer, const RayBatch& batch, int warm_ups, int repetitions) {
@@ -65,7 +36,7 @@ std::vector<KernelTiming> time_batch(const SceneView& scene, const Tracer& trace
         next_rays.zero();
         hits.zero();
         blocked.zero();
-        const double seconds = median_seconds(warm_ups, repetitions, [&](size_t i) {
+        const auto launch = [&](size_t i) {
             if (plain && batch.any_hit)
                 trace_any_plain_kernel<Set, Tracer><<<blocks, kTraceBlock>>>(scene, tracer, rays.data(), blocked.data(), count);
             else if (plain)
@@ -74,7 +45,8 @@ std::vector<KernelTiming> time_batch(const SceneView& scene, const Tracer& trace
                 trace_any_kernel<Set, Tracer><<<grid, kTraceBlock>>>(scene, tracer, rays.data(), blocked.data(), ray_count.data(), next_rays.data() + i, v.values);
             else
                 trace_closest_kernel<Set, Tracer><<<grid, kTraceBlock>>>(scene, tracer, rays.data(), hits.data(), ray_count.data(), next_rays.data() + i, v.values);
-        });
+        };
+        const double seconds = median_seconds("ray traversal", warm_ups, repetitions, {launch})[0];
         uint64_t met = 0;
         for (const Hit& hit : hits.download()) met += hit.prim != kNone;
         for (const uint8_t b : blocked.download()) met += b;
