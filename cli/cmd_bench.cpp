@@ -2,6 +2,7 @@
 
 #include <iostream>
 
+#include "backends/bench_queues.h"
 #include "backends/bench_rays.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
@@ -20,6 +21,7 @@ struct Options {
     std::string json;
     std::string backend = "auto";
     int repetitions = 25;
+    uint32_t items = 0;
     bool opaque = false;
     uint32_t spp = 16;
 };
@@ -41,10 +43,7 @@ void print_rows(const nlohmann::json& rows) {
     }
 }
 
-int rays(const Options& o) {
-    if (o.repetitions < 1) throw Error(ExitCode::usage, "--repetitions: at least 1 is needed");
-    const LoadedScene loaded = load_scene(o.scene);
-    const nlohmann::json json = bench_rays(loaded.scene, o.backend, o.repetitions, o.opaque);
+int report(const Options& o, const nlohmann::json& json) {
     if (!o.json.empty()) write_json(o.json, json);
     if (o.json == "-") return int(ExitCode::done);
     for (const auto& [key, value] : json.items()) {
@@ -56,6 +55,20 @@ int rays(const Options& o) {
         }
     }
     return int(ExitCode::done);
+}
+
+void check_repetitions(const Options& o) {
+    if (o.repetitions < 1) throw Error(ExitCode::usage, "--repetitions: at least 1 is needed");
+}
+
+int rays(const Options& o) {
+    check_repetitions(o);
+    return report(o, bench_rays(load_scene(o.scene).scene, o.backend, o.repetitions, o.opaque));
+}
+
+int queues(const Options& o) {
+    check_repetitions(o);
+    return report(o, bench_queues(load_scene(o.scene).scene, o.backend, o.items, o.repetitions));
 }
 
 int stages(const Options& o) {
@@ -96,6 +109,15 @@ void add_bench(CLI::App& app, Run& run) {
     rays_command.add_flag("--opaque", r->opaque, "Take surfaces of partial opacity as opaque");
     rays_command.add_option("--json", r->json, "Write the result to a file, or - for standard output");
     rays_command.callback([r, &run] { run = [r] { return rays(*r); }; });
+
+    auto q = std::make_shared<Options>();
+    CLI::App& queues_command = *command.add_subcommand("queues", "Pushing to queues, compaction, going through them, and ordering a scene's first hits and rays");
+    q->scene.add_to(queues_command);
+    queues_command.add_option("--backend", q->backend, "auto, cpu or cuda")->capture_default_str();
+    queues_command.add_option("--items", q->items, "Threads that look, and items that are ordered; 0: as many as suit the backend")->capture_default_str();
+    queues_command.add_option("--repetitions", q->repetitions, "Timed runs of each operation; the median counts")->capture_default_str();
+    queues_command.add_option("--json", q->json, "Write the result to a file, or - for standard output");
+    queues_command.callback([q, &run] { run = [q] { return queues(*q); }; });
 
     auto s = std::make_shared<Options>();
     CLI::App& stages_command = *command.add_subcommand("stages", "Time and items of every stage of a render");

@@ -103,6 +103,12 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {{"reference", kCornell, "-o", folder / "r.exr", "--spp", "4", "--set", "estimator=nee"}, "estimator mis"},
         {{"reference", kCornell, "-o", folder / "r.exr", "--spp", "4", "-i", "path"}, "-i"},
         {{"bench", "rays", kCornell, "--repetitions", "0"}, "at least 1"},
+        {{"bench", "queues", kCornell, "--repetitions", "0"}, "at least 1"},
+        {{"bench", "queues", kCornell, "--items", "many"}, "--items"},
+        {{"bench", "queues", kCornell, "--items", "-1"}, "--items"},
+        {{"bench", "queues", kCornell, "--items", "300000000"}, "at most"},
+        {{"bench", "queues", kCornell, "--backend", "abacus"}, "auto, cpu, cuda"},
+        {{"bench", "queues"}, "SCENE is required"},
     };
     for (const Case& c : cases) {
         const Outcome o = run(folder, c.arguments);
@@ -345,4 +351,25 @@ TEST_CASE("info and bench stages") {
     CHECK(bench.code == 0);
     CHECK(contains(bench.out, "ns/item"));
     CHECK(json::parse(read_file(folder / "b.json"))["spp"] == 2);
+}
+
+TEST_CASE("bench queues") {
+    const test::TempFolder folder;
+    const std::vector<std::string> command = {"bench", "queues", kCornell, "--backend", "cpu", "--items", "1024", "--repetitions", "1", "--json"};
+    const auto with = [&](const std::string& output) {
+        std::vector<std::string> all = command;
+        all.push_back(output);
+        return run(folder, all);
+    };
+    const Outcome table = with(folder / "q.json"), plain = with("-");
+    REQUIRE(table.code == 0);
+    REQUIRE(plain.code == 0);
+    for (const char* text : {"backend: cpu", "ns_per_item", "ConnectionVertex", "select", "morton"}) CHECK(contains(table.out, text));
+    const json file = json::parse(read_file(folder / "q.json")), printed = json::parse(plain.out);
+    CHECK(file["items"] == 1024);
+    CHECK(file["rows"].size() == printed["rows"].size());
+    // On a machine without a device; with one it has nothing to say.
+    const Outcome device = run(folder, {"bench", "queues", kCornell, "--backend", "cuda", "--items", "1024", "--repetitions", "1"});
+    CHECK((device.code == 0 || device.code == 4));
+    if (device.code == 4) CHECK(contains(device.err, "no CUDA device"));
 }

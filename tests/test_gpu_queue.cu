@@ -5,6 +5,8 @@
 #include <numeric>
 #include <vector>
 
+#include "backends/bench_queue_stages.h"
+#include "backends/bench_queues.h"
 #include "backends/cuda/device_memory.h"
 #include "backends/cuda/executor.cuh"
 #include "backends/cuda/order.h"
@@ -12,6 +14,7 @@
 #include "queues/queue.h"
 #include "stages/path_items.h"
 #include "tests/catch.h"
+#include "tests/render_scene.h"
 
 using namespace ambilux;
 
@@ -436,4 +439,29 @@ TEST_CASE("turns: launches go through every item once, one after the other over 
         CHECK(counter.download()[0].count == 0);
         check("slots", 3, [&] { executor.run_slots(StageId::develop, Mark{visits.data()}, n, 1); });
     }
+}
+
+TEST_CASE("bench queues on a device: rows of every operation, and what is drained is what was pushed") {
+    if (!cuda_device_present()) {
+        WARN("no CUDA device: skipped");
+        return;
+    }
+    const Scene scene = project_scene("cornell");
+    for (const uint32_t n : {1u, 33u, 1000u, 50000u, (1u << 20) + 1}) {
+        INFO(n << " items");
+        const nlohmann::json json = bench_queues(scene, "cuda", n, 1);  // throws if something is lost
+        CHECK(json.at("items") == n);
+        // Four items appended, listed and counted, one appended only, for four shares; hits are sorted by two kinds of keys.
+        const nlohmann::json& rows = json.at("rows");
+        REQUIRE(rows.size() == (4 * (2 + 3 + 3) + 2) * 4 + (n < detail::kSortFrom ? 0 : 5 + 4));
+        uint64_t wrong = 0;
+        for (const nlohmann::json& row : rows) {
+            const uint64_t items = row.at("items"), looked = row.at("looked");
+            wrong += items > n || looked < items || looked > n;
+            if (row.at("item") == "PairItem") wrong += items != pushed_contents<PairItem>(n, uint32_t(1 / double(row.at("share")) + 0.5)).items;
+            if (items > 0) wrong += !(double(row.at("ns_per_item")) > 0 && double(row.at("gb_per_s")) > 0);
+        }
+        CHECK(wrong == 0);
+    }
+    CHECK(bench_queues(Scene{}, "cuda", 50000, 1).at("rows").size() == (4 * (2 + 3 + 3) + 2) * 4 + 5);  // hits of nothing, no rays
 }

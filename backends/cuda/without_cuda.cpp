@@ -1,4 +1,5 @@
 // What stands for the CUDA backend in a build without CUDA.
+#include "backends/cuda/bench_queues.h"
 #include "backends/cuda/bench_rays.h"
 #include "backends/cuda_device.h"
 #include "backends/trace_on_device.h"
@@ -19,5 +20,7 @@ std::vector<Hit> trace_on_device(const Scene&, const std::vector<Ray>&, bool, bo
 
 std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const CwbvhArrays&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
 std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const PairArrays&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
+
+std::vector<QueueTiming> time_queues_on_device(const Scene&, uint32_t, const std::vector<HitItem>&, const std::vector<RayItem>&, int, int) { throw not_built(); }
 
 }  // namespace ambilux
