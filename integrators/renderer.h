@@ -22,7 +22,7 @@ enum class Fuse : uint32_t {
     automatic,  ///< what is fastest on the backend
     none,       ///< every stage is a kernel with a queue
     light,      ///< mis_weight and accumulate are parts of the stages that find the light
-    all         ///< also connect is a part of shade; on a device generate of extend; on a host, for bdpt, connect_vertices and occlude of the stages that make their items
+    all         ///< also connect is a part of shade; on a device generate of extend, and the shadow rays of connect_vertices of it where the structure is small (kTracedInPlace); on a host, for bdpt, connect_vertices and occlude of the stages that make their items
 };
 
 /// All that decides the image, apart from the scene. Every `--set KEY=VALUE` names a field here.

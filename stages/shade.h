@@ -34,7 +34,7 @@ struct Shade {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         RayItem next;
-        if (take(hit(i), 0, next)) rays.push(next);
+        if (take(hit(i), next)) rays.push(next);
     }
 
     /// Hits of camera rays, the only ones while depth is 1, are not kept whole on a device.
@@ -48,7 +48,7 @@ struct Shade {
     }
 
     /// True if the walk goes on with the ray `next`.
-    AMBILUX_HD bool take(const HitItem& h, uint32_t, RayItem& next) const {
+    AMBILUX_HD bool take(const HitItem& h, RayItem& next) const {
         if (h.prim == kNone) {
             if (wants_emission(h)) emit(h, environment_radiance<F>(scene, h.d), can_sample(h) ? pdf_environment_direct<F>(scene, h.d) : 0.0f);
             return false;
