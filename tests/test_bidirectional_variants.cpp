@@ -80,7 +80,7 @@ TEST_CASE("An eye vertex may have one pair in a launch or several, or all at onc
         INFO(variant);
         const Scene scene = project_scene("cornell", 48, 32);
         RenderSettings s = variant_settings(scene, variant);
-        s.connections = 7;  // more than a launch holds
+        if (s.variant == "lvc") s.connections = 7;
         const RenderResult at_once = render_scene(scene, s, 3);
         s.fuse = Fuse::light;
         const RenderResult several = render_scene(scene, s, 3);
@@ -191,6 +191,22 @@ TEST_CASE("lvc over sorted queues has the expectation of paired walks") {
         const ZTestResult result = z_test(render_batches(scene, s, 128), paired);
         INFO(ordering << "\n" << result.report());
         CHECK(result.pass);
+    }
+}
+
+TEST_CASE("settings that would change nothing are refused") {
+    const Scene scene = project_scene("cornell", 16, 16);
+    struct Case {
+        const char *integrator, *variant, *key, *value;
+    };
+    for (const Case& c : {Case{"path", "wavefront", "strategies", "hits"}, {"path", "wavefront", "strategies", "s1t2"}, {"path", "wavefront", "connections", "5"}, {"path", "wavefront", "light_paths", "2"},
+                          {"light", "wavefront", "strategies", "light"}, {"light", "wavefront", "connections", "5"}, {"light", "wavefront", "estimator", "nee"}, {"bdpt", "wavefront", "connections", "5"},
+                          {"bdpt", "streaming", "connections", "5"}, {"bdpt", "megakernel", "connections", "5"}, {"bdpt", "lvc", "estimator", "naive"}}) {
+        INFO(c.integrator << " " << c.variant << " " << c.key);
+        RenderSettings s = variant_settings(scene, c.variant);
+        s.integrator = c.integrator;
+        apply_setting(s, c.key, c.value);
+        CHECK_THROWS_WITH(make_renderer(scene, s), Catch::StartsWith(c.key) && Catch::Contains(c.integrator));
     }
 }
 

@@ -74,7 +74,7 @@ TEST_CASE("G5: any number of light walks: both backends start the same ones and 
             for (const char* light_paths : {"0.109375", "0.5", "2.5", "4"}) {
                 INFO(name << " " << integrator << " light_paths=" << light_paths);
                 RenderSettings s = settings_of(scene, integrator, "wavefront", "cuda");
-                apply_setting(s, "strategies", "hits+next_event+light");
+                if (s.integrator == "bdpt") apply_setting(s, "strategies", "hits+next_event+light");
                 apply_setting(s, "light_paths", light_paths);
                 s.max_depth = 6;
                 check_backends(scene, s, 3);
@@ -108,7 +108,7 @@ TEST_CASE("The last walks of light and eye find the same light, several depths i
         for (const char* variant : {"wavefront", "lvc"}) {
             INFO(name << " " << variant);
             RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
-            s.connections = 2;
+            if (s.variant == "lvc") s.connections = 2;
             const RenderResult tail = render_scene(scene, s, 8);
             s.tail = false;
             const RenderResult none = render_scene(scene, s, 8);
@@ -146,7 +146,7 @@ TEST_CASE("Launches of a device that hold one pair of a path and those that hold
         INFO(variant);
         RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
         s.max_depth = 12;
-        s.connections = 5;
+        if (s.variant == "lvc") s.connections = 5;
         const RenderResult several = render_scene(scene, s, 1);
         RenderSettings other_settings = s;
         if (s.variant == "wavefront")
