@@ -147,6 +147,7 @@ TEST_CASE("Launches of a device that hold one pair of a path and those that hold
         RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
         s.max_depth = 12;
         s.fuse = Fuse::light;  // else shadow rays of so small a structure are in no queue
+        s.wave_size = 64;      // the film in one wave all the same, but no more
         if (s.variant == "lvc") s.connections = 5;
         const RenderResult several = render_scene(scene, s, 1);
         RenderSettings other_settings = s;
