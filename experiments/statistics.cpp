@@ -123,7 +123,6 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& settings, 
             {"scene_hash", scene_hash(scene)},
             {"integrator", settings.integrator},
             {"variant", settings.variant},
-            {"estimator", estimator_name(settings.estimator)},
             {"spp", stats.samples},
             {"seed", settings.seed},
             {"max_depth", settings.max_depth},
@@ -133,7 +132,15 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& settings, 
             {"seconds", stats.render_seconds},
             {"software", fmt::format("ambilux {}", version())},
             {"git_revision", git_revision()}};
-    if (!stats.choice.name.empty()) attributes["choice"] = choice_line(stats.choice);
+    if (settings.integrator == "path") attributes["estimator"] = estimator_name(settings.estimator);
+    if (settings.integrator != "path") attributes["heuristic"] = heuristic_name(settings.heuristic);
+    if (!stats.choice.name.empty()) {
+        attributes["choice"] = choice_line(stats.choice);
+    } else if (settings.integrator != "path") {
+        if (settings.integrator == "bdpt") attributes["strategies"] = strategies_text(settings);
+        attributes["light_paths"] = double(settings.light_walks_per_tile) / kTilePixels;
+        if (settings.variant == "lvc") attributes["connections"] = settings.connections;
+    }
     return attributes;
 }
 

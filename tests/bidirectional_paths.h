@@ -294,7 +294,7 @@ private:
 
     void compare(Kind kind, uint32_t s, float others, const OraclePath& path) {
         const OracleSteps steps = oracle_steps(scene_, path, false);
-        const OracleStrategies all = oracle_strategies(scene_, path, steps, double(mis_.light_paths), double(mis_.connections));
+        const OracleStrategies all = oracle_strategies(scene_, path, steps, double(mis_.light_walks), double(mis_.connections));
         INFO(kKindNames[kind] << " s " << s << " k " << path.k << " index " << index_ << " mask " << mis_.strategies << " heuristic " << int(mis_.heuristic) << " emitter type "
                               << int(scene_.emitters[path.emitter].type) << " vertices " << describe(path));
         if (!(all.group[s] & mis_.strategies)) {
@@ -437,7 +437,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
         }
     }
 
-    const OracleStrategies all = oracle_strategies(scene_, path, oracle_steps(scene_, path, false), double(mis_.light_paths), double(mis_.connections));
+    const OracleStrategies all = oracle_strategies(scene_, path, oracle_steps(scene_, path, false), double(mis_.light_walks), double(mis_.connections));
     double sum = 0;
     std::string weights;
     for (uint32_t s = 0; s <= k; ++s) {

@@ -219,6 +219,12 @@ TEST_CASE("G13: every accepted option changes something") {
     const json lvc = statistics(folder, {"--spp", "1", "-i", "bdpt", "--variant", "lvc", "--set", "light_paths=0.25", "--set", "connections=5"}, "b.exr");
     CHECK(lvc["light_paths"] == 0.25);
     CHECK(lvc["connections"] == 5);
+    Attributes attributes;
+    read_exr(folder / "b.exr", &attributes);
+    CHECK(attributes["light_paths"] == 0.25);
+    CHECK(attributes["connections"] == 5);
+    CHECK(attributes["strategies"] == "all");
+    CHECK_FALSE(attributes.contains("estimator"));
     CHECK(statistics(folder, {"--spp", "2", "--deterministic"}, "b.exr")["deterministic"] == true);
     CHECK(statistics(folder, {"--spp", "2", "--backend", "cpu"}, "b.exr")["backend"] == "cpu");
     CHECK(base["scene_hash"] == statistics(folder, {"--spp", "1"}, "b.exr")["scene_hash"]);

@@ -53,7 +53,7 @@ TEST_CASE("light walks of a film are counted as they begin, also in the tiles al
             CHECK(walks >= wave.tiles);
             RenderSettings s = method_settings(scene, kLvc, 1);
             s.light_walks_per_tile = per_tile;
-            CHECK(make_bidirectional_policy(scene, s).mis.light_paths == float(walks));
+            CHECK(make_bidirectional_policy(scene, s).mis.light_walks == float(walks));
             // A render starts as many, once per sample.
             const RenderResult r = render_scene(scene, s, 2);
             uint32_t stages = 0;

@@ -35,7 +35,7 @@ TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no li
         };
         BidirectionalMis mis{};
         mis.strategies = kAllStrategies;
-        mis.light_paths = mis.connections = 1.0f;
+        mis.light_walks = mis.connections = 1.0f;
         uint32_t pairs = 0, turned_down = 0, lit = 0;
         for (uint32_t i = 0; i < 20000; ++i) {
             WalkVertex y, z;
@@ -211,7 +211,7 @@ TEST_CASE("Points in one plane, as far as positions are known, exchange no light
     const SceneView view = scene.view();
     BidirectionalMis mis{};
     mis.strategies = kAllStrategies;
-    mis.light_paths = mis.connections = 1.0f;
+    mis.light_walks = mis.connections = 1.0f;
     uint32_t points = 0, pairs = 0;
     for (uint32_t i = 0; i < 20000; ++i) {
         const Vec4f u = random_floats({21, i, 0, Stream::eye}, 0);

@@ -27,7 +27,7 @@ enum StrategyBits : uint32_t {
 struct BidirectionalMis {
     MisHeuristic heuristic;
     uint32_t strategies;  ///< StrategyBits
-    float light_paths;    ///< light walks per eye walk of one pixel: of the whole image, over the samples of a pixel
+    float light_walks;    ///< light walks per eye walk of one pixel: of the whole image, over the samples of a pixel
     float connections;    ///< expected number of times that a vertex of an eye walk meets a given light walk: 1 for paired walks
 
     AMBILUX_HD bool has(uint32_t bits) const { return strategies & bits; }
@@ -52,7 +52,7 @@ AMBILUX_HD float camera_walk_pdf(const Sensor& sensor, float cos_camera) {
 
 /// Sums of a camera ray.
 AMBILUX_HD MisSums camera_sums(const BidirectionalMis& mis, const Sensor& sensor, float cos_camera) {
-    return {mis.masked(kLightStrategies, mis.term(mis.light_paths / camera_walk_pdf(sensor, cos_camera))), 0.0f};
+    return {mis.masked(kLightStrategies, mis.term(mis.light_walks / camera_walk_pdf(sensor, cos_camera))), 0.0f};
 }
 
 /// Sums at a vertex that a ray of length² `d2` met at cosine `cos_in` to the geometric normal. `parallel`: the ray came from infinity or from an orthographic
@@ -167,13 +167,13 @@ AMBILUX_HD float others_behind(const BidirectionalMis& mis, MisSums s, bool firs
 /// t = 1: a light vertex with sums `y`, connected with the camera. `cos_y`: between its geometric normal and the direction to the camera. Equation 16.
 AMBILUX_HD float others_of_camera(const SceneView& scene, const BidirectionalMis& mis, MisSums y, bool first, const CameraConnection& c, float cos_y, float pdf_reverse_sa) {
     const float fall_off = camera_delta_direction(scene.sensor) ? 1.0f : 1.0f / sqr(c.camera_distance);
-    return others_behind(mis, y, first, camera_walk_pdf(scene.sensor, c.cos_camera) * cos_y * fall_off / mis.light_paths, pdf_reverse_sa);
+    return others_behind(mis, y, first, camera_walk_pdf(scene.sensor, c.cos_camera) * cos_y * fall_off / mis.light_walks, pdf_reverse_sa);
 }
 
 /// (1,1): a point sampled on an area emitter with density `pdf_pos` (pick included), connected with the camera (equation 17).
 AMBILUX_HD float others_of_visible_light(const SceneView& scene, const BidirectionalMis& mis, const CameraConnection& c, float cos_light, float pdf_pos) {
     const float fall_off = camera_delta_direction(scene.sensor) ? 1.0f : 1.0f / sqr(c.camera_distance);
-    return mis.masked(kHitStrategies, mis.term(camera_walk_pdf(scene.sensor, c.cos_camera) * cos_light * fall_off / (mis.light_paths * pdf_pos)));
+    return mis.masked(kHitStrategies, mis.term(camera_walk_pdf(scene.sensor, c.cos_camera) * cos_light * fall_off / (mis.light_walks * pdf_pos)));
 }
 
 }  // namespace ambilux

@@ -251,7 +251,7 @@ AMBILUX_HD bool connect_camera(const SceneView& scene, const BidirectionalMis& m
     if (!connect_to_camera(scene.sensor, y.point.p, lens_u, camera) || !reaches_pixels(scene.sensor, camera.film_position)) return false;
     const BsdfValue f = scatter_evaluate<F>(y.scattering, camera.wi, TransportMode::importance);
     if (is_zero(f.value)) return false;
-    c.value = throughput * f.value * (camera.weight / mis.light_paths);
+    c.value = throughput * f.value * (camera.weight / mis.light_walks);
     c.others = others_of_camera(scene, mis, y.sums, y.first, camera, fabsf(dot(y.point.ng, camera.wi)), f.pdf_reverse_sa);
     film_position = camera.film_position;
     c.o = offset_ray_origin(y.point.p, y.offset, y.point.ng, camera.wi);
@@ -268,7 +268,7 @@ AMBILUX_HD bool connect_visible_light(const SceneView& scene, const Bidirectiona
     if (!connect_to_camera(scene.sensor, e.p, lens_u, camera) || !reaches_pixels(scene.sensor, camera.film_position)) return false;
     const float cos_light = dot(e.ng, camera.wi), pdf_pos = e.pick * e.pdf_pos;
     if (!(cos_light > 0.0f)) return false;
-    c.value = e.radiance * (cos_light * camera.weight / (pdf_pos * mis.light_paths));
+    c.value = e.radiance * (cos_light * camera.weight / (pdf_pos * mis.light_walks));
     c.others = others_of_visible_light(scene, mis, camera, cos_light, pdf_pos);
     film_position = camera.film_position;
     c.o = offset_ray_origin(e.p, e.p_error, e.ng, camera.wi);

@@ -185,19 +185,10 @@ __global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_chain
     typename Stage::Chain chain = {};
     PairCount count = {};
     bool busy = false, full = false;
-    for (uint32_t at = 0, end = 0;;) {  // items that the warp has taken and not begun
+    for (WarpItems taken;;) {
         const uint32_t idle = __ballot_sync(kWarp, !busy);
-        if (at < n && uint32_t(__popc(idle)) >= kIdleLanes) {
-            const uint32_t wanted = uint32_t(__popc(idle)), kept = end - at, rank = lane_rank(idle);
-            uint32_t fresh = at;
-            if (wanted > kept) {
-                if (threadIdx.x % 32 == 0) fresh = add_to(&items.counter->next, stretch);
-                fresh = __shfl_sync(kWarp, fresh, 0);
-                end = fresh + stretch;
-                fresh -= kept;
-            }
-            const uint32_t next = (rank < kept ? at : fresh) + rank;
-            at = fresh + wanted;
+        if (taken.begin < n && uint32_t(__popc(idle)) >= kIdleLanes) {
+            const uint32_t next = taken.take(idle, &items.counter->next, stretch);
             if (!busy && next < n) {
                 const uint32_t place = items.place(next);
                 busy = items.take(place);

@@ -126,6 +126,26 @@ struct PairWalk {
 template <class Tracer, bool AnyHit>
 using Walk = std::conditional_t<std::is_same_v<Tracer, PairTracer>, PairWalk<AnyHit>, CwbvhWalk<AnyHit>>;
 
+/// Items that a warp has taken and not begun.
+struct WarpItems {
+    uint32_t begin = 0, end = 0;
+
+    /// The next item of each of the lanes `idle`, which may lie past the last of all, from `*counter` on if none are left: then `stretch` of them, at least 32. The whole warp calls it.
+    __device__ uint32_t take(uint32_t idle, uint32_t* counter, uint32_t stretch) {
+        const uint32_t wanted = uint32_t(__popc(idle)), kept = end - begin, rank = lane_rank(idle);
+        uint32_t fresh = begin;
+        if (wanted > kept) {
+            if ((threadIdx.x & 31u) == 0) fresh = atomicAdd(counter, stretch);
+            fresh = __shfl_sync(0xffffffffu, fresh, 0);
+            end = fresh + stretch;
+            fresh -= kept;
+        }
+        const uint32_t next = (rank < kept ? begin : fresh) + rank;
+        begin = fresh + wanted;
+        return next;
+    }
+};
+
 /// The loop behind trace_closest_persistent and trace_any_persistent. `finish(i, hit)` is called once per fetched ray: for all that have ended when the warp fetches others, since the
 /// whole warp waits for what it loads.
 template <Features F, bool AnyHit, class Tracer, class Fetch, class Finish>
@@ -143,7 +163,7 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
     uint32_t prim = kNone;
     uint32_t index = kNone;  // of the ray; kNone while idle
     bool drained = false;
-    uint32_t chunk = 0, chunk_end = 0;  // rays that the warp has taken and not begun
+    WarpItems rays;
 
     for (;;) {
         const bool done = !walk.has_primitives() && !walk.has_nodes();  // or never begun
@@ -154,18 +174,8 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
                 index = kNone;
             }
             if (drained) return;
-            const uint32_t wanted = uint32_t(__popc(idle)), kept = chunk_end - chunk;
-            uint32_t fresh = chunk;
-            if (wanted > kept) {
-                if ((threadIdx.x & 31u) == 0) fresh = atomicAdd(next_ray, stretch);
-                fresh = __shfl_sync(kWarp, fresh, 0);
-                chunk_end = fresh + stretch;
-                fresh -= kept;
-            }
-            const uint32_t rank = lane_rank(idle);
-            const uint32_t next = (rank < kept ? chunk : fresh) + rank;
-            chunk = fresh + wanted;
-            drained = chunk >= ray_count;
+            const uint32_t next = rays.take(idle, next_ray, stretch);
+            drained = rays.begin >= ray_count;
             if (done && next < ray_count && fetch(next, ray)) {
                 if (is_traceable(ray)) {
                     index = next;

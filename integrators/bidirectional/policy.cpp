@@ -17,7 +17,7 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     p.singles = settings.integrator == "light" ? SingleStrategies{} : settings.singles;
     p.light_walks_per_tile = settings.light_walks_per_tile;
     const Wave film = shape_wave(scene, settings, kTilePixels, 1);
-    p.mis.light_paths = float(light_walks_in(film, 0, tile_count(film), p.light_walks_per_tile));
+    p.mis.light_walks = float(light_walks_in(film, 0, tile_count(film), p.light_walks_per_tile));
     p.max_depth = settings.max_depth < 0 ? WalkBits::kMaxDepth : uint32_t(settings.max_depth);
     p.rr_depth = settings.rr_depth < 0 ? ~0u : uint32_t(settings.rr_depth);
     if (p.singles.on) {
