@@ -52,8 +52,9 @@ const char* fuse_name(Fuse fuse) {
 
 const char* heuristic_name(MisHeuristic heuristic) { return heuristic == MisHeuristic::balance ? "balance" : "power"; }
 
-/// As --set strategies takes it.
+/// As --set strategies takes it; of the path tracer, which has none, nothing.
 std::string strategies_text(const RenderSettings& settings) {
+    if (settings.integrator != "bdpt") return settings.integrator == "light" ? "light" : "";
     std::vector<std::string> names;
     if (settings.singles.on) {
         for (uint32_t k = 1; k <= SingleStrategies::kMaxSegments; ++k)
@@ -133,11 +134,11 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& settings, 
             {"software", fmt::format("ambilux {}", version())},
             {"git_revision", git_revision()}};
     if (settings.integrator == "path") attributes["estimator"] = estimator_name(settings.estimator);
-    if (settings.integrator != "path") attributes["heuristic"] = heuristic_name(settings.heuristic);
+    attributes["heuristic"] = heuristic_name(settings.heuristic);
     if (!stats.choice.name.empty()) {
         attributes["choice"] = choice_line(stats.choice);
     } else if (settings.integrator != "path") {
-        if (settings.integrator == "bdpt") attributes["strategies"] = strategies_text(settings);
+        attributes["strategies"] = strategies_text(settings);
         attributes["light_paths"] = double(settings.light_walks_per_tile) / kTilePixels;
         if (settings.variant == "lvc") attributes["connections"] = settings.connections;
     }

@@ -21,7 +21,7 @@ bool cuda_available() { return cuda_device_present(); }
 
 namespace {
 
-/// Settings that would change nothing, as text is rarely written for that. Throws Error(usage).
+/// Whoever sets what has no effect expects one. Throws Error(usage).
 void check_applies(const RenderSettings& s) {
     const RenderSettings defaults;
     const bool bdpt = s.integrator == "bdpt";

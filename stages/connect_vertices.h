@@ -3,6 +3,7 @@
 
 #include "core/warp.h"
 #include "stages/bidirectional_policy.h"
+#include "stages/chain.h"
 #include "stages/mis_weight.h"
 #include "stages/occlude.h"
 #include "stages/stage.h"
@@ -87,11 +88,6 @@ AMBILUX_HD float draw_scale(const Wave& wave, const BidirectionalPolicy& policy,
     return float(light_vertices.counter->size()) / (float(wave.state->light_walks) * float(policy.cache_draws));
 }
 
-/// What a launch over pairs has seen: pairs beyond one per item, and shadow rays that there was no launch for.
-struct PairCount {
-    int32_t pairs, rays;
-};
-
 /// connect_vertices: the pairs of an eye vertex one after the other, with vertices of the light walk of its slot, or drawn from a cache of those of all light walks of the wave (Davidovic et al.
 /// 2014). Chains of pairs for whose shadow rays there is no room go on in another launch.
 template <Features F>
@@ -115,22 +111,22 @@ struct ConnectVertices {
 
     AMBILUX_HD Chain begin(uint32_t i) const { return {pairs.load(i), 0}; }
     /// False if there is no other pair after this.
-    AMBILUX_HD bool step(Chain& chain, PairCount& count) const {
+    AMBILUX_HD bool step(Chain& chain, ChainCount& count) const {
         return step(chain.pair, count, Outlet{candidates, chain});
     }
     AMBILUX_HD uint32_t place(const Chain& chain) const { return chain.place; }
-    AMBILUX_HD bool one_pair() const { return policy.one_pair; }
+    AMBILUX_HD bool one_step() const { return policy.one_pair; }
     /// Places for candidates.
     AMBILUX_HD uint32_t room() const { return policy.one_pair ? ~0u : candidates.through ? candidates.next.shadows.queue.capacity : candidates.queue.capacity; }
-    AMBILUX_HD void put_back(const Chain& chain, PairCount& count) const {
+    AMBILUX_HD void put_back(const Chain& chain, ChainCount& count) const {
         rest.push(chain.pair);
-        --count.pairs;
+        --count.steps;
     }
-    AMBILUX_HD void add(const PairCount& count) const { record->count_items(count.pairs, wave.state->depth); }
+    AMBILUX_HD void add(const ChainCount& count) const { record->count_items(count.steps, wave.state->depth); }
 
     /// As much of a chain as there is room for, on a host.
     AMBILUX_HD void operator()(uint32_t i) const {
-        PairCount count = {};
+        ChainCount count = {};
         Chain chain = begin(i);
         const QueueCounter& taken = candidates.through ? *candidates.next.shadows.queue.counter : *candidates.queue.counter;
         bool goes_on = true;
@@ -144,7 +140,7 @@ struct ConnectVertices {
 
     /// The pair in hand, whose candidate goes to `to`.
     template <class To>
-    AMBILUX_HD bool step(PairItem& pair, PairCount& count, const To& to) const {
+    AMBILUX_HD bool step(PairItem& pair, ChainCount& count, const To& to) const {
         const uint32_t place = pair.light;
         const ConnectionVertex light = load_vertex<F>(light_vertices, place);  // before anything waits for the eye vertex
         const EyeVertex z = eye_vertex_of<F>(scene, load_vertex<F>(vertices, pair.vertex));
@@ -154,7 +150,7 @@ struct ConnectVertices {
         warp.meet();  // else lanes that search longer than others stay apart
         push_connection<F>(scene, policy, key, z, light, policy.cache_draws > 0 ? draw_scale(wave, policy, light_vertices) : 1.0f, place, to, record);
         if (pair.light == kNone) return false;
-        ++count.pairs;
+        ++count.steps;
         return true;
     }
 
@@ -182,16 +178,16 @@ struct ConnectAndOcclude {
     };
 
     AMBILUX_HD Chain begin(uint32_t i) const { return {connect.pairs.load(i), {0.0f, 0.0f, 0.0f}}; }
-    AMBILUX_HD bool step(Chain& chain, PairCount& count) const {
+    AMBILUX_HD bool step(Chain& chain, ChainCount& count) const {
         const bool goes_on = connect.step(chain.pair, count, Outlet{*this, chain, count});
         if (!goes_on && !is_zero(chain.sum)) occlude.contributions.push({chain.sum, chain.pair.path});
         return goes_on;
     }
     AMBILUX_HD uint32_t place(const Chain&) const { return 0; }
     AMBILUX_HD uint32_t room() const { return ~0u; }
-    AMBILUX_HD bool one_pair() const { return false; }
-    AMBILUX_HD void put_back(const Chain&, PairCount&) const {}
-    AMBILUX_HD void add(const PairCount& count) const {
+    AMBILUX_HD bool one_step() const { return false; }
+    AMBILUX_HD void put_back(const Chain&, ChainCount&) const {}
+    AMBILUX_HD void add(const ChainCount& count) const {
         connect.add(count);
         occlude.record->count_items(count.rays, connect.wave.state->depth);
     }
@@ -200,7 +196,7 @@ private:
     struct Outlet {
         const ConnectAndOcclude& stage;
         Chain& chain;
-        PairCount& count;
+        ChainCount& count;
 
         AMBILUX_HD void push(const ConnectCandidate& c) const {
             ShadowItem item;

@@ -66,6 +66,7 @@ struct StageRecord {
     }
     /// Items that no launch was made for, or, less than 0, that it has left.
     AMBILUX_HD void count_items(int64_t n, uint32_t depth) {
+        if (n == 0) return;
         count_some(&items, n);
         count_some(items_by_depth + tracked(depth), n);
     }

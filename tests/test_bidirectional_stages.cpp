@@ -36,9 +36,9 @@ struct Bench {
     std::function<void(Bench&)> change;  ///< called once, before stage `before` runs for the first time
     bool changed = false;
 
-    explicit Bench(Scene s, const Method& method = {"all"}, bool one_pair = false) : scene(std::move(s)), accel(scene) {
+    explicit Bench(Scene s, const Method& method = {"all"}, bool one_pair = false, bool fuse = false) : scene(std::move(s)), accel(scene) {
         RenderSettings settings = method_settings(scene, method, 5);
-        settings.fuse = Fuse::none;
+        settings.fuse = fuse ? Fuse::light : Fuse::none;
         policy = make_bidirectional_policy(scene, settings);
         policy.one_pair = one_pair;
         wave = shape_wave(scene, settings, kTilePixels, 1);
@@ -187,12 +187,16 @@ TEST_CASE("Launches with one pair of a path, and with as many as there is room f
     };
     Bench one(cornell(), connections, true);
     check_same(one);
-    for (const uint32_t room : {1u, 7u, 100u}) {
-        INFO(room);
-        Bench b(cornell(), connections);
-        for (auto* q : {&b.memory.connect_candidates.capacity, &b.memory.shadows.capacity, &b.memory.shadow_contributions.capacity}) *q = room;
-        check_same(b);
-    }
+    for (const bool fuse : {false, true})
+        for (const uint32_t room : {1u, 7u, 100u}) {
+            INFO("room " << room << " fuse " << fuse);
+            Bench b(cornell(), connections, false, fuse);
+            const auto limit = [room](auto& q) {
+                if (q.capacity > 0) q.capacity = q.counter->capacity = room;
+            };
+            limit(b.memory.connect_candidates), limit(b.memory.shadows), limit(b.memory.shadow_contributions);
+            check_same(b);
+        }
 }
 
 TEST_CASE("G9: light_generate counts emission that is none", "[bidirectional]") {

@@ -75,7 +75,7 @@ public:
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
         const detail::Items items = prepare<MaterialOrder>(stage, queue);
-        if constexpr (detail::Chained<Stage>)
+        if constexpr (Chained<Stage>)
             detail::launch_chains<<<blocks(detail::launch_chains<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
         else if constexpr (detail::Gathered<Stage>)
             detail::launch_gathered<<<blocks(detail::launch_gathered<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
@@ -123,7 +123,7 @@ public:
         });
         finish(StageId::extend, extend.rays.counter, extend.hits.counter);
     }
-    /// From the next record on; no kernel but those that keep records asks.
+    /// From the next record on.
     void set_depth(uint32_t depth) { depth_ = {true, depth}; }
     void next_depth(uint32_t depths = 1) { depth_.value += depths; }
 

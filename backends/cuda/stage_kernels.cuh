@@ -5,7 +5,7 @@
 
 #include "backends/cuda/trace_kernels.cuh"
 #include "queues/queue.h"
-#include "stages/connect_vertices.h"
+#include "stages/chain.h"
 #include "stages/order_keys.h"
 #include "stages/path_items.h"
 #include "stages/settle.h"
@@ -171,10 +171,6 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
     if (lane < held) stage(mine[lane]);
 }
 
-/// Stages whose items are the first steps of chains.
-template <class Stage>
-concept Chained = requires(const Stage& stage, typename Stage::Chain& chain, PairCount& count) { stage.step(chain, count); };
-
 /// A lane that has ended its chain waits until kIdleLanes of its warp have, and begins another together with them. When there is no more room, chains go back for another launch, those that have not
 /// been begun too: as each step fills one place at most, it is enough that a warp looks at the places of its own after every step.
 template <class Stage>
@@ -183,7 +179,7 @@ __global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_chain
     const uint32_t n = all.size(), threads = gridDim.x * kStageBlock, stretch = n / threads >= 16 ? 128 : 32, room = stage.room() > threads ? stage.room() - threads : 0;
     const Items items = all.of(n);
     typename Stage::Chain chain = {};
-    PairCount count = {};
+    ChainCount count = {};
     bool busy = false, full = false;
     for (WarpItems taken;;) {
         const uint32_t idle = __ballot_sync(kWarp, !busy);
@@ -201,13 +197,13 @@ __global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_chain
         if (busy && !full) busy = stage.step(chain, count);
         __syncwarp();
         full = __any_sync(kWarp, full || stage.place(chain) >= room);
-        if (busy && (full || stage.one_pair())) {
+        if (busy && (full || stage.one_step())) {
             stage.put_back(chain, count);
             busy = false;
         }
         __syncwarp();
     }
-    count = {__reduce_add_sync(kWarp, count.pairs), __reduce_add_sync(kWarp, count.rays)};
+    count = {__reduce_add_sync(kWarp, count.steps), __reduce_add_sync(kWarp, count.rays)};
     if (threadIdx.x % 32 == 0) stage.add(count);
 }
 

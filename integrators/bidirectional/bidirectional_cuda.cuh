@@ -38,6 +38,9 @@ public:
         plan_cache(policy_, mean);
         device_scene_ = accels.get<DeviceScene>();
         device_accel_ = accels.get<DeviceCwbvh>();
+        // Where one thread may have all pairs of a path, and their rays need not be sorted.
+        policy_.trace_pairs = F.bsdfs == bit(BsdfType::diffuse) && policy_.connect_in_shade && policy_.technique_depth == 0 && !settings.deterministic && !policy_.queues.fixed_places() &&
+                              policy_.queues.ordering != Ordering::morton && device_accel_->bytes() <= kTracedInPlace;
         // Samples that share a cache of light vertices depend on each other, but by one part in the number of light walks only.
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
@@ -58,9 +61,6 @@ public:
         light_walks_ = light_walks_in(wave_, 0, wave_.tiles, policy_.light_walks_per_tile);
         if (uint64_t(light_walks_) * wave_.samples > 0xffffffffull)
             throw Error(ExitCode::usage, "wave_size=" + std::to_string(settings.wave_size) + ": more light walks than can be numbered; set a smaller one, or fewer light_paths");
-        // Several pairs of a vertex wherever they fit: every launch lasts as long as its slowest ray.
-        policy_.trace_pairs = F.bsdfs == bit(BsdfType::diffuse) && policy_.connect_in_shade && policy_.technique_depth == 0 && !settings.deterministic && !policy_.queues.fixed_places() &&
-                              device_accel_->bytes() <= kTracedInPlace;
         policy_.tail_below = tail_walks(settings, wave_.slot_count());
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         sum_ = DeviceBuffer<double>(values_, "film");

@@ -48,7 +48,8 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
         if (uint64_t(film.width) * film.height * p.light_rounds() > 0xffffffffull)
             throw Error(ExitCode::usage, fmt::format("light_paths={}: a film of {}x{} has more light walks than can be numbered (4294967295)", light_paths, film.width, film.height));
     }
-    // A launch with several pairs of one vertex adds to sums in the order in which threads come, and images of single strategies tell contributions of one path apart by launches.
+    // A launch with several pairs of one vertex adds to sums in the order in which threads come, images of single strategies tell contributions of one path apart by launches, and a place of a path
+    // holds one item. Of one draw there is no second.
     p.one_pair = settings.deterministic || p.technique_depth > 0 || p.cache_draws == 1 || settings.queues.fixed_places();
     p.vertex_lanes = Queue<VertexItem>::kLanes;
     p.connection_lanes = Queue<ConnectionVertex>::kLanes;

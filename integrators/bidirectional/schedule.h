@@ -114,7 +114,7 @@ void run_streams(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     });
 }
 
-/// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h), and settle(queue, queue) and clear(queue).
+/// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h), settle(queue, queue) and clear(queue), and may have kTracesPairs: then it runs ConnectAndOcclude.
 template <class Executor, Features F, class Tracer>
 void run_bidirectional_wave(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     if (stages.policy.stream_slots) return run_streams(exec, stages);

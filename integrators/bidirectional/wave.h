@@ -22,8 +22,9 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
 /// Names of strategies and kernel parts that this render does without.
 std::vector<std::string> skipped_strategies(const Scene& scene, const BidirectionalPolicy& policy, const Features& kernels);
 
-/// Memory of one wave. All queues but two hold the most they can ever be given, since a slot has one item at a time. Vertices of light walks and what they splat are kept until
-/// the end of the wave; their number is not known before, and a wave for which they do not suffice is done again with more (settle()).
+/// Memory of one wave. Most queues hold the most they can ever be given, since a slot has one item at a time. Of shadow rays it may have several, as many as there is room for
+/// (ConnectVertices::room). Vertices of light walks and what they splat are kept until the end of the wave; their number is not known before, and a wave for which they do not suffice is done again
+/// with more (settle()).
 struct BidirectionalMemory : WalkQueues<WalkItem, WalkHit> {
     static constexpr uint32_t kQueues = 21;
 
