@@ -175,7 +175,9 @@ TEST_CASE("where items lie and in which order stages go through them changes no 
                     if (s.variant == "lvc" && s.queues.ordering != Ordering::none) continue;
                     CHECK(result.film.sum == first.film.sum);
                     REQUIRE(result.stats.stages.size() == first.stats.stages.size());
-                    for (size_t k = 0; k < first.stats.stages.size(); ++k) CHECK(result.stats.stages[k].items_by_depth == first.stats.stages[k].items_by_depth);
+                    for (size_t k = 0; k < first.stats.stages.size(); ++k)
+                        if (first.stats.stages[k].name != "develop")  // once in every pass, of which a slow machine has more
+                            CHECK(result.stats.stages[k].items_by_depth == first.stats.stages[k].items_by_depth);
                 }
             }
         }

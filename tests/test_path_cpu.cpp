@@ -246,7 +246,9 @@ TEST_CASE("Where items lie and in which order stages go through them changes no 
                 const RenderResult result = render_scene(scene, s, 4);
                 CHECK(same_image(first.film, result.film));
                 REQUIRE(result.stats.stages.size() == first.stats.stages.size());
-                for (size_t k = 0; k < first.stats.stages.size(); ++k) CHECK(result.stats.stages[k].items_by_depth == first.stats.stages[k].items_by_depth);
+                for (size_t k = 0; k < first.stats.stages.size(); ++k)
+                    if (first.stats.stages[k].name != "develop")  // once in every pass, of which a slow machine has more
+                        CHECK(result.stats.stages[k].items_by_depth == first.stats.stages[k].items_by_depth);
                 for (const QueueStats& q : result.stats.queues) CHECK(q.overflow == 0);  // no path pushed twice
                 CHECK(result.stats.memory_bytes == result.stats.memory_bytes_predicted);
             }
