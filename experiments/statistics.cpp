@@ -52,23 +52,6 @@ const char* fuse_name(Fuse fuse) {
 
 const char* heuristic_name(MisHeuristic heuristic) { return heuristic == MisHeuristic::balance ? "balance" : "power"; }
 
-/// As --set strategies takes it; of the path tracer, which has none, nothing.
-std::string strategies_text(const RenderSettings& settings) {
-    if (settings.integrator != "bdpt") return settings.integrator == "light" ? "light" : "";
-    std::vector<std::string> names;
-    if (settings.singles.on) {
-        for (uint32_t k = 1; k <= SingleStrategies::kMaxSegments; ++k)
-            if (const uint8_t s = settings.singles.s[k]; s != SingleStrategies::kNone) names.push_back(fmt::format("s{}t{}", s, k + 1 - s));
-    } else if (settings.strategies == kAllStrategies) {
-        names.emplace_back("all");
-    } else {
-        const char* const groups[] = {"hits", "next_event", "connections", "light"};
-        for (uint32_t g = 0; g < 4; ++g)
-            if (settings.strategies >> g & 1) names.emplace_back(groups[g]);
-    }
-    return fmt::format("{}", fmt::join(names, "+"));
-}
-
 nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats, double load_seconds) {
     nlohmann::json stages = nlohmann::json::array(), queues = nlohmann::json::array();
     for (const StageStats& s : stats.stages)

@@ -57,6 +57,9 @@ struct RenderSettings {
 /// Sets one field from text; throws Error(usage) that names the key, the value and what is allowed.
 void apply_setting(RenderSettings& settings, const std::string& key, const std::string& value);
 
+/// The strategies of a render as key strategies takes them; of the path tracer, which has none, nothing.
+std::string strategies_text(const RenderSettings& settings);
+
 /// What one stage did.
 struct StageStats {
     std::string name;

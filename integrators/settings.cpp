@@ -34,6 +34,9 @@ Integer integer(const std::string& key, const std::string& value, Integer lowest
     return result;
 }
 
+/// Groups of strategies, in the order of StrategyBits.
+const std::vector<std::string> kStrategyGroups = {"hits", "next_event", "connections", "light"};
+
 /// The strategy that "s2t3" names, if that is how `name` is built.
 std::optional<Strategy> single_strategy(const std::string& name) {
     const char *at = name.data(), *end = at + name.size();
@@ -62,7 +65,6 @@ void set_strategies(RenderSettings& settings, const std::string& key, const std:
         settings.singles = {};
         return;
     }
-    const std::vector<std::string> names = {"hits", "next_event", "connections", "light"};
     uint32_t bits = 0;
     SingleStrategies singles;
     std::fill(std::begin(singles.s), std::end(singles.s), SingleStrategies::kNone);
@@ -83,10 +85,10 @@ void set_strategies(RenderSettings& settings, const std::string& key, const std:
             bits |= group_of(*strategy);
             continue;
         }
-        const auto at = std::find(names.begin(), names.end(), name);
-        if (at == names.end())
-            refuse(key, value, fmt::format("'{}' is none of {} and no single strategy such as s2t3; join them with '+', or write all", name, fmt::join(names, ", ")));
-        bits |= 1u << (at - names.begin());
+        const auto at = std::find(kStrategyGroups.begin(), kStrategyGroups.end(), name);
+        if (at == kStrategyGroups.end())
+            refuse(key, value, fmt::format("'{}' is none of {} and no single strategy such as s2t3; join them with '+', or write all", name, fmt::join(kStrategyGroups, ", ")));
+        bits |= 1u << (at - kStrategyGroups.begin());
         groups = true;
     }
     if (groups && singles.on) refuse(key, value, "groups and single strategies cannot be mixed");
@@ -164,6 +166,21 @@ void apply_setting(RenderSettings& s, const std::string& key, const std::string&
     else
         throw Error(ExitCode::usage,
                     fmt::format("unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, strategies, technique_depth, bdpt.auto, connections, light_paths, max_depth, rr_depth, seed, accel, wave_size, compaction, ordering, specialise, fuse, cull, tail, deterministic, graph", key));
+}
+
+std::string strategies_text(const RenderSettings& settings) {
+    if (settings.integrator != "bdpt") return settings.integrator == "light" ? "light" : "";
+    std::vector<std::string> names;
+    if (settings.singles.on) {
+        for (uint32_t k = 1; k <= SingleStrategies::kMaxSegments; ++k)
+            if (const uint8_t s = settings.singles.s[k]; s != SingleStrategies::kNone) names.push_back(fmt::format("s{}t{}", s, k + 1 - s));
+    } else if (settings.strategies == kAllStrategies) {
+        names.emplace_back("all");
+    } else {
+        for (size_t g = 0; g < kStrategyGroups.size(); ++g)
+            if (settings.strategies >> g & 1) names.push_back(kStrategyGroups[g]);
+    }
+    return fmt::format("{}", fmt::join(names, "+"));
 }
 
 }  // namespace ambilux
