@@ -129,12 +129,12 @@ def draw_sweep(experiment, entries, key):
         style.label_log_axis(axes.yaxis, axes.get_ylim())
         if numeric:
             axes.set_xscale("log", base=2)
-        axes.set_xticks(list(x), [value for value, _ in entries])
+        axes.set_xticks(list(x), [style.wrap(value, max(6, 42 // len(entries))) for value, _ in entries])  # 42 letters fit below the axis
         axes.xaxis.set_minor_locator(NullLocator())
         axes.set_xlabel(key)
         axes.set_ylabel("speed-up at equal RMSE")
         axes.grid(True, color="0.92", lw=0.5)
-        figure.legend(loc="outside lower center", ncols=min(3, len(experiment.scenes)), frameon=False)
+        style.legend_below(figure, *axes.get_legend_handles_labels())
     return figure
 
 

@@ -62,9 +62,7 @@ def draw(experiment, x, measure):
             for handle, label in zip(*one.get_legend_handles_labels()):
                 entries.setdefault(label, handle)
         order = [r for r in experiment.runs if r in entries] + [e for e in entries if e not in experiment.runs]
-        longest = max((len(e) for e in order), default=1)
-        across = max(1, min(len(order), int((figure.get_figwidth() - 0.2) / (0.45 + 0.055 * longest))))
-        figure.legend([entries[e] for e in order], order, loc="outside lower center", ncols=across, frameon=False)
+        style.legend_below(figure, [entries[e] for e in order], order)
     return figure
 
 

@@ -58,7 +58,7 @@ def draw(experiment, table, units):
             for handle, text in zip(*one.get_legend_handles_labels()):
                 entries.setdefault(text, handle)
         order = [s for s in [*large, "other"] if s in entries]
-        figure.legend([entries[s] for s in order], order, loc="outside lower center", ncols=max(1, int((figure.get_figwidth() - 0.2) / 1.15)), frameon=False, handlelength=1.2)
+        style.legend_below(figure, [entries[s] for s in order], order, handlelength=1.2)
     return figure
 
 

@@ -22,6 +22,7 @@ ERROR_COLOURS = "magma"  # lightness rises evenly, so that it survives grey prin
 SIGNED_COLOURS = "PuOr"  # diverging, without red against green (Brewer)
 
 COLUMN, PAGE = 3.4, 7.0  # widths in inches of one column and of a page, as in ACM's and Eurographics' two-column layouts
+LEGEND_ROOM = 0.45  # inches below the panels; what a legend needs beyond them is added
 DPI = 200
 
 STYLE = {
@@ -103,10 +104,22 @@ def panels(count, height, columns=None, widest=2.35):
     columns = columns or (2 if count == 4 else min(3, count))
     rows = math.ceil(count / columns)
     width = COLUMN if columns == 1 else min(PAGE, widest * columns + 0.2)
-    figure, grid = plt.subplots(rows, columns, figsize=(width, height * rows + 0.45), squeeze=False, layout="constrained")
+    figure, grid = plt.subplots(rows, columns, figsize=(width, height * rows + LEGEND_ROOM), squeeze=False, layout="constrained")
     for axes in grid.flat[count:]:
         axes.set_axis_off()
     return figure, list(grid.flat[:count]), columns
+
+
+def legend_below(figure, handles, labels, **options):
+    """A legend in as many columns as fit below all panels. The figure grows by its rows, so that any number of runs leaves the panels their size."""
+    renderer = figure.canvas.get_renderer()
+    for columns in range(len(labels), 0, -1):
+        legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, **options)
+        size = legend.get_window_extent(renderer)
+        if size.width <= figure.bbox.width or columns == 1:
+            break
+        legend.remove()
+    figure.set_figheight(figure.get_figheight() + max(0, size.height / figure.dpi - LEGEND_ROOM))
 
 
 def save(figure, path_without_suffix):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from analysis import __main__ as program
-from analysis import ablation, captions, comparison, error_maps, experiment, flip_maps, images, pyramid, stage_times, style
+from analysis import ablation, captions, comparison, convergence, error_maps, experiment, flip_maps, images, pyramid, stage_times, style
 from analysis.tests import synthetic
 
 RUNS = (("nee", 0.7, 1.5), ("lvc[connections=1]", 0.5, 2.0), ("lvc[connections=4]", 0.4, 3.0))
@@ -39,6 +39,29 @@ def test_all_files_are_written(output):
         pytest.skip("flip-evaluator is not installed")
     expected = {f"{n}.{suffix}" for n in NAMES for suffix in ("pdf", "png", "caption.txt")}
     assert {p.name for p in output.iterdir()} == expected | {"table.csv", "table.tex", "tests.tex", "strategy_variance.csv", "report.html"}
+
+
+@pytest.mark.filterwarnings("error::UserWarning")  # what matplotlib says of a layout that has no room
+def test_any_number_of_runs_leaves_room(tmp_path):
+    """A legend of twenty long names lies below the panels, which keep their size; long values of a sweep do not run into each other."""
+    values = ["hits+next_event", "hits+next_event+connections", "hits+next_event+light", *(f"hits+next_event+connections+light+{i}" for i in range(16))]
+    few, many = (experiment.load(synthetic.make(tmp_path / str(n), scenes=("box",), runs=(("nee", 0.7, 1.5), *((f"bdpt[strategies={v}]", 0.5, 2.0) for v in values[:n]))))
+                 for n in (3, 19))
+    sizes = []
+    for data in few, many:
+        figure = convergence.draw(data, "seconds", "rmse")
+        figure.draw_without_rendering()
+        (axes,), (legend,) = figure.axes, figure.legends
+        box = legend.get_window_extent()
+        assert box.y1 < axes.get_tightbbox().y0 and box.y0 >= 0 and box.x0 >= 0 and box.x1 <= figure.bbox.width
+        assert len(legend.get_texts()) == len(data.runs) + 1  # and the slope
+        sizes.append(axes.get_window_extent().size)
+    assert sizes[1] == pytest.approx(sizes[0], rel=0.03)
+
+    figure = ablation.draw_sweep(few, [(v, f"bdpt[strategies={v}]") for v in values[:3]], "strategies")
+    figure.draw_without_rendering()
+    boxes = [label.get_window_extent() for label in figure.axes[0].get_xticklabels()]
+    assert len(boxes) == 3 and all(a.x1 < b.x0 for a, b in zip(boxes, boxes[1:]))
 
 
 def test_captions_state_the_data(output):
