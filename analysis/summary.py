@@ -181,7 +181,7 @@ def lines(experiment):
                 slope=slope_spp,
                 slope_time=slope(experiment, scene, run, "seconds")[0],
                 slope_seeds=slope_seeds,
-                bias=bias.bias_test([r.bias for r in rows], reference_error),
+                bias=bias.bias_test([r.bias for r in rows], reference_error, [r.bias_z for r in rows]),
                 reference_error=reference_error,
                 bias_z=max(abs(r.bias_z) for r in rows),
                 invalid=sum(r.invalid for r in rows)))

@@ -12,4 +12,7 @@ bool cuda_device_present();
 /// Name of the current device; empty if cuda_device_present() is false.
 std::string cuda_device_name();
 
+/// PCI address of the current device, such as "0000:65:00.0", by which nvidia-smi knows it whatever CUDA_VISIBLE_DEVICES says; empty if cuda_device_present() is false.
+std::string cuda_device_bus_id();
+
 }  // namespace ambilux

@@ -6,10 +6,11 @@
 #include <charconv>
 #include <cstdio>
 #include <ctime>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <thread>
+
+#include "backends/cuda_device.h"
 
 namespace ambilux {
 
@@ -63,9 +64,11 @@ nlohmann::json describe_clocks(const std::string& when) {
         ++cores;
     }
     if (cores) clocks["cpu_mhz"] = {{"lowest", lowest}, {"mean", sum / cores}, {"highest", highest}};
-    // Without a driver there is nothing to ask; a driver in trouble may not answer, hence the limit.
-    if (!std::filesystem::exists("/proc/driver/nvidia/version")) return clocks;
-    if (std::FILE* pipe = ::popen("timeout 10 nvidia-smi --query-gpu=clocks.sm,clocks.mem,temperature.gpu --format=csv,noheader,nounits 2>/dev/null", "r")) {
+    const std::string id = cuda_device_bus_id();
+    if (id.empty()) return clocks;
+    // A driver in trouble may not answer, hence the limit.
+    const std::string ask = "timeout 10 nvidia-smi -i " + id + " --query-gpu=clocks.sm,clocks.mem,temperature.gpu --format=csv,noheader,nounits 2>/dev/null";
+    if (std::FILE* pipe = ::popen(ask.c_str(), "r")) {
         std::string lines;
         char buffer[256];
         while (std::fgets(buffer, sizeof buffer, pipe)) lines += buffer;

@@ -3,6 +3,7 @@
 // Budgets, references and the experiment runner, on a process of known mean and variance in the renderer's place.
 #include <sys/wait.h>
 
+#include "backends/cuda_device.h"
 #include "core/log.h"
 #include "experiments/machine.h"
 #include "experiments/reference.h"
@@ -555,6 +556,11 @@ TEST_CASE("clocks of graphics cards are read from what nvidia-smi prints") {
     const auto clocks = describe_clocks("start");
     CHECK(clocks["when"] == "start");
     CHECK(clocks["date"].is_string());
+    // Of the device that renders alone, whatever else the machine has.
+    if (cuda_device_bus_id().empty())
+        CHECK(clocks["gpu"].is_null());
+    else if (!clocks["gpu"].is_null())
+        CHECK(clocks["gpu"].size() == 1);
 }
 
 TEST_CASE("the time that is left: by kind, and for budgets of samples and seconds at once") {

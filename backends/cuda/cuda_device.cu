@@ -29,4 +29,11 @@ std::string cuda_device_name() {
     return properties.name;
 }
 
+std::string cuda_device_bus_id() {
+    int device = 0;
+    char id[32];
+    if (!cuda_device_present() || cudaGetDevice(&device) != cudaSuccess || cudaDeviceGetPCIBusId(id, sizeof id, device) != cudaSuccess) return {};
+    return id;
+}
+
 }  // namespace ambilux

@@ -16,6 +16,8 @@ bool cuda_device_present() { return false; }
 
 std::string cuda_device_name() { return {}; }
 
+std::string cuda_device_bus_id() { return {}; }
+
 std::vector<Hit> trace_on_device(const Scene&, const std::vector<Ray>&, bool, bool, bool) { throw not_built(); }
 
 std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const CwbvhArrays&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
