@@ -116,7 +116,7 @@ def legend_below(figure, handles, labels, **options):
     for columns in range(len(labels), 0, -1):
         legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, **options)
         size = legend.get_window_extent(renderer)
-        if size.width <= figure.bbox.width or columns == 1:
+        if size.width <= (figure.get_figwidth() - 0.2) * figure.dpi or columns == 1:
             break
         legend.remove()
     figure.set_figheight(figure.get_figheight() + max(0, size.height / figure.dpi - LEGEND_ROOM))

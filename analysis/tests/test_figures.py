@@ -53,7 +53,7 @@ def test_any_number_of_runs_leaves_room(tmp_path):
         figure.draw_without_rendering()
         (axes,), (legend,) = figure.axes, figure.legends
         box = legend.get_window_extent()
-        assert box.y1 < axes.get_tightbbox().y0 and box.y0 >= 0 and box.x0 >= 0 and box.x1 <= figure.bbox.width
+        assert box.y1 < axes.get_tightbbox().y0 and box.y0 >= 0 and box.x0 >= 0.05 * figure.dpi and box.x1 <= figure.bbox.width - 0.05 * figure.dpi
         assert len(legend.get_texts()) == len(data.runs) + 1  # and the slope
         sizes.append(axes.get_window_extent().size)
     assert sizes[1] == pytest.approx(sizes[0], rel=0.03)
