@@ -23,7 +23,7 @@ nlohmann::json choice_json(const ChoiceStats& choice) {
                               {"seconds_per_sample", c.seconds > 0 ? nlohmann::json(c.seconds) : nlohmann::json(nullptr)},
                               {"efficiency", c.efficiency}});
     for (const auto& [key, value] : choice.settings) settings[key] = value;
-    return {{"name", choice.name}, {"settings", settings}, {"seconds", choice.seconds}, {"pilot_samples", choice.pilot_samples}, {"candidates", candidates}};
+    return {{"name", choice.name}, {"settings", settings}, {"seconds", choice.seconds}, {"pilot_samples", choice.pilot_samples}, {"expected_samples", choice.expected_samples}, {"candidates", candidates}};
 }
 
 }  // namespace

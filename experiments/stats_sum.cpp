@@ -33,7 +33,7 @@ nlohmann::json save(const ChoiceStats& c) {
     nlohmann::json candidates = nlohmann::json::array();
     // Infinite variances become null.
     for (const ChoiceStats::Candidate& x : c.candidates) candidates.push_back({x.name, x.settings, x.variance, x.work, x.seconds, x.efficiency});
-    return {c.name, c.settings, c.seconds, c.pilot_samples, candidates};
+    return {c.name, c.settings, c.seconds, c.pilot_samples, c.expected_samples, candidates};
 }
 
 ChoiceStats restore_choice(const nlohmann::json& j) {
@@ -42,7 +42,8 @@ ChoiceStats restore_choice(const nlohmann::json& j) {
     c.settings = j.at(1).get<std::vector<std::pair<std::string, std::string>>>();
     c.seconds = j.at(2);
     c.pilot_samples = j.at(3);
-    for (const auto& x : j.at(4))
+    c.expected_samples = j.at(4);
+    for (const auto& x : j.at(5))
         c.candidates.push_back({x.at(0), x.at(1), x.at(2).is_null() ? std::numeric_limits<double>::infinity() : x.at(2).get<double>(), x.at(3), x.at(4), x.at(5)});
     return c;
 }

@@ -92,6 +92,7 @@ struct ChoiceStats {
     std::vector<std::pair<std::string, std::string>> settings;  ///< with them the same estimator runs again
     double seconds = 0;  ///< that the choice took
     uint32_t pilot_samples = 0;
+    double expected_samples = 0;  ///< of every pixel in the whole render: what was optimised for
     std::vector<Candidate> candidates;
 };
 

@@ -80,7 +80,7 @@ TEST_CASE("second moments that the pilot predicts are those of renders, for ever
         uint32_t bx = 0, by = 0;
         for (uint64_t seed = 1; seed <= 12; ++seed) {
             s.seed = seed;
-            const ChoicePilot pilot = run_choice_pilot(scene, s, false, accels, pilots(candidates), 16384);
+            const ChoicePilot pilot = run_choice_pilot(scene, s, false, false, accels, pilots(candidates), 16384);
             bx = pilot.blocks_x;
             by = pilot.blocks_y;
             for (size_t c = 0; c < candidates.size(); ++c) {
@@ -146,6 +146,57 @@ TEST_CASE("light walks run where they find what eye walks do not, and only there
         // A sky over diffuse ground: most light walks miss what the camera sees, and next event estimation is all that is needed.
         const Scene sky = scene_from_text(scene_xml(4, kView + kGround + "<emitter type='constant'><rgb name='radiance' value='1,1,1'/></emitter>"));
         CHECK(name_of(sky, seed) == "path");
+    }
+}
+
+TEST_CASE("the error is predicted for the samples that the render will take") {
+    PilotWork work;
+    work.eye_rays = 3;
+    work.next_events = 2.5;  // 5 rays of walks together
+    RenderSettings s;
+    CHECK(expected_samples(s, work, 10000, false) == 1000);
+    s.expected_seconds = 2;
+    CHECK(expected_samples(s, work, 10000, false) == Approx(400));  // 1e7 rays a second
+    CHECK(expected_samples(s, work, 10000, true) == Approx(200000));  // 5e9
+    CHECK(expected_samples(s, work, 1000000000, false) == 64);
+    s.expected_samples = 333;  // goes before seconds
+    CHECK(expected_samples(s, work, 10000, true) == 333);
+    s.expected_samples = 1;
+    CHECK(expected_samples(s, work, 10000, true) == 64);
+    s.expected_samples = ~uint64_t(0);
+    CHECK(expected_samples(s, work, 10000, true) == 1e6);
+    CHECK(expected_samples({}, PilotWork{}, 0, true) == 1000);
+
+    // Below a glass ball a path tracer meets the small lamp once in many samples. As long as that makes single bright pixels, they are left out; later they are its noise.
+    const Scene scene = project_scene("glass", 64, 48);
+    double before = 0;
+    for (const uint64_t samples : {64u, 2000u}) {
+        s = automatic_settings(scene);
+        s.expected_samples = samples;
+        const ChoiceStats choice = make_renderer(scene, s)->stats().choice;
+        INFO(samples << " samples: " << choice.name);
+        REQUIRE(choice.candidates[0].name == "path");
+        CHECK(choice.expected_samples == double(samples));
+        CHECK(choice.candidates[0].variance > before);
+        before = choice.candidates[0].variance;
+    }
+}
+
+TEST_CASE("speckles that light tracing finds: with few samples the path tracer leaves them out, with many it pays for them") {
+    const std::optional<Scene> scene = published_scene("veach-mis", 160, 90);
+    if (!scene) return;
+    for (uint64_t seed = 1; seed <= 4; ++seed) {
+        RenderSettings s = automatic_settings(*scene, seed);
+        s.deterministic = true;
+        s.expected_samples = 100;
+        const ChoiceStats few = make_renderer(*scene, s)->stats().choice;
+        s.expected_samples = 20000;
+        const ChoiceStats many = make_renderer(*scene, s)->stats().choice;
+        INFO("seed " << seed << ": " << few.name << ", " << many.name);
+        CHECK(few.candidates[0].efficiency > 0.6);
+        // Equal time: 0.25 on an H200 (docs/performance.md).
+        CHECK(many.name != "path");
+        CHECK(many.candidates[0].efficiency < 0.5);
     }
 }
 
@@ -292,7 +343,7 @@ TEST_CASE("nothing to see: scenes without emitters and films of one pixel") {
 
 TEST_CASE("saved statistics keep the choice, and a later part does not lose it") {
     RenderStats first;
-    first.choice = {"bdpt, lvc, 2 connections", {{"integrator", "bdpt"}, {"connections", "2"}}, 0.25, 8192, {{"path", "integrator=path", std::numeric_limits<double>::infinity(), 3, 0, 0}}};
+    first.choice = {"bdpt, lvc, 2 connections", {{"integrator", "bdpt"}, {"connections", "2"}}, 0.25, 8192, 640, {{"path", "integrator=path", std::numeric_limits<double>::infinity(), 3, 0, 0}}};
     RenderStats total;
     add_part(total, {}, first);
     total = restore_stats(nlohmann::json::parse(save_stats(total).dump()));
@@ -300,6 +351,7 @@ TEST_CASE("saved statistics keep the choice, and a later part does not lose it")
     CHECK(total.choice.name == first.choice.name);
     CHECK(total.choice.settings == first.choice.settings);
     CHECK(total.choice.seconds == 0.25);
+    CHECK(total.choice.expected_samples == 640);
     REQUIRE(total.choice.candidates.size() == 1);
     CHECK(std::isinf(total.choice.candidates[0].variance));
 }

@@ -297,7 +297,7 @@ TEST_CASE("a resumed render goes on with what its first part chose, and choosing
     /// Each choice is another one.
     struct Choosing : FakeRenderer {
         Choosing(const Scene& scene, const RenderSettings& settings, World& world, int number) : FakeRenderer(scene, settings, world) {
-            if (settings.automatic) choice = {"choice", {{"connections", std::to_string(number)}}, 1000.0, 1, {}};
+            if (settings.automatic) choice = {"choice", {{"connections", std::to_string(number)}}, 1000.0, 1, 0, {}};
         }
         RenderStats stats() override {
             RenderStats s = FakeRenderer::stats();

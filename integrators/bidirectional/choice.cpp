@@ -190,8 +190,7 @@ std::vector<ChoiceCandidate> choice_candidates(const RenderSettings& settings, b
 
 double choice_work(const PilotWork& w, const ChoiceCandidate& candidate, bool cuda) {
     // Fitted to renders (docs/performance.md): shadow rays and connections in rays of walks; what the longer records and further launches of bidirectional methods cost.
-    constexpr double kShadow = 0.8;
-    const double eye = w.eye_rays + kShadow * w.next_events, light = double(candidate.pilot.light_paths) * (w.light_rays + kShadow * w.splats);
+    const double eye = w.eye_rays + kShadowWork * w.next_events, light = double(candidate.pilot.light_paths) * (w.light_rays + kShadowWork * w.splats);
     const double pair = cuda ? 0.24 : 0.02, draw = cuda ? 0.12 : 0.07, ray = cuda ? 1.06 : 0.8, bidirectional = cuda ? 1.2 : 1.0;
     const PilotCandidate& c = candidate.pilot;
     if (c.light_paths == 0.0f && !c.connect) return eye;
@@ -237,7 +236,7 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     for (const ChoiceCandidate& c : candidates) judged.push_back(c.pilot);
     std::optional<HeadStart> head_start;
     if (cuda && settings.expected_seconds > 0) head_start.emplace(settings_of(settings, candidates[0]), make);
-    const ChoicePilot pilot = run_choice_pilot(scene, settings, cwbvh, accels, judged, cuda ? kPilotSamplesCuda : kPilotSamplesCpu);
+    const ChoicePilot pilot = run_choice_pilot(scene, settings, cuda, cwbvh, accels, judged, cuda ? kPilotSamplesCuda : kPilotSamplesCpu);
     if (head_start) head_start->stop();
     const std::vector<double> variance = choice_variances(pilot);
     std::vector<double> cost;  // of a sample, in any unit; smaller is better in product with the variance
@@ -312,6 +311,7 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     choice.settings = candidates[chosen].settings;
     choice.seconds = choosing;
     choice.pilot_samples = pilot.samples;
+    choice.expected_samples = pilot.expected_samples;
     for (size_t c = 0; c < candidates.size(); ++c)
         choice.candidates.push_back({candidates[c].name, joined(candidates[c].settings), variance[c], work[c], seconds[c],
                                      std::isfinite(variance[c]) ? variance[chosen] * cost[chosen] / (variance[c] * cost[c]) : 0.0});

@@ -27,7 +27,7 @@ void blur(uint32_t width, uint32_t height, const std::vector<Mean>& of, std::vec
 /// The variance of one candidate in every block. False if it cannot find some of the light.
 bool judge(const SecondMoments& moments, const PilotPaths& paths, uint32_t c, uint32_t width, uint32_t height, const std::vector<Mean>& scale, std::vector<double>& variance) {
     const double samples = double(paths.pixels_per_block) * paths.samples_per_pixel;
-    // Outliers: the brightest contributions that after kChoiceSamples samples are in kChoiceTrimmed of the pixels. There they are left out, and elsewhere their light is missing.
+    // Outliers: the brightest contributions that after all samples of the render are in kChoiceTrimmed of the pixels. There they are left out, and elsewhere their light is missing.
     struct Rare {
         double size;
         const PilotEvent* event;
@@ -78,7 +78,7 @@ bool judge(const SecondMoments& moments, const PilotPaths& paths, uint32_t c, ui
         std::nth_element(taken, middle - 1, end, [](const Rare& a, const Rare& b) { return a.size > b.size; });
         double more = 0;
         for (auto r = taken; r != middle; ++r) more += double(r->event->coverage) * double(r->sum) / double(r->event->total()) / double(moments.samples);
-        if (share + more <= kChoiceTrimmed / kChoiceSamples) {
+        if (share + more <= kChoiceTrimmed / paths.expected_samples) {
             share += more;
             taken = middle;
         } else {
@@ -94,7 +94,7 @@ bool judge(const SecondMoments& moments, const PilotPaths& paths, uint32_t c, ui
     }
     blur(width, height, lost, smooth);
     for (uint32_t b = 0; b < scale.size(); ++b)
-        for (int k = 0; k < 3; ++k) variance[b] += kChoiceSamples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale[b].of[k]) + 0.01));
+        for (int k = 0; k < 3; ++k) variance[b] += paths.expected_samples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale[b].of[k]) + 0.01));
     // Without emitters of no extent, eye walks can meet whatever there is: zeros are rounding.
     return !(paths.delta_emitters && blind);
 }

@@ -90,6 +90,7 @@ struct PilotPaths {
     const std::vector<const PilotSplat*>& splats;
     uint32_t pixels_per_block, samples_per_pixel;
     bool delta_emitters;  ///< some emitter has no extent
+    double expected_samples;  ///< of every pixel, that the render takes
 };
 
 /// Fills ChoicePilot::variance and blind from sums over pixels and splats.

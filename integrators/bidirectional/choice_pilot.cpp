@@ -54,8 +54,8 @@ struct LightTask {
 template <Features F, class Tracer>
 class Pilot {
 public:
-    Pilot(const Scene& scene, const RenderSettings& settings, const Tracer& tracer, const std::vector<PilotCandidate>& candidates, uint32_t samples)
-        : view_(scene.view()), tracer_(tracer), moments_{candidates}, seed_(settings.seed) {
+    Pilot(const Scene& scene, const RenderSettings& settings, bool cuda, const Tracer& tracer, const std::vector<PilotCandidate>& candidates, uint32_t samples)
+        : view_(scene.view()), settings_(settings), cuda_(cuda), tracer_(tracer), moments_{candidates}, seed_(settings.seed) {
         RenderSettings all = settings;
         all.integrator = "bdpt";
         all.variant = "wavefront";
@@ -103,7 +103,8 @@ public:
             result_.work.draw_rays += w.draw_rays / n;
         }
         result_.light_vertices = double(vertices_.size()) / n;
-        judge_candidates(moments_, {pixels, splats_, pixels_, kPixelSamples, delta_emitters_}, result_);
+        result_.expected_samples = expected_samples(settings_, result_.work, uint64_t(view_.sensor.crop_width) * view_.sensor.crop_height, cuda_);
+        judge_candidates(moments_, {pixels, splats_, pixels_, kPixelSamples, delta_emitters_, result_.expected_samples}, result_);
         return result_;
     }
 
@@ -405,6 +406,8 @@ private:
 
     ChoicePilot result_;
     SceneView view_;
+    const RenderSettings& settings_;
+    const bool cuda_;
     const Tracer tracer_;
     SecondMoments moments_;
     uint64_t seed_;
@@ -420,12 +423,24 @@ private:
 
 }  // namespace
 
-ChoicePilot run_choice_pilot(const Scene& scene, const RenderSettings& settings, bool cwbvh, SharedAccels& accels, const std::vector<PilotCandidate>& candidates, uint32_t samples) {
+double expected_samples(const RenderSettings& settings, const PilotWork& work, uint64_t pixels, bool cuda) {
+    constexpr double kFewest = 64, kUsual = 1000, kMost = 1e6;
+    // Rays of walks per second, within a factor of two for the scenes of docs/performance.md.
+    const double rate = cuda ? 5e9 : 1e7;
+    double samples = kUsual;
+    if (settings.expected_samples > 0)
+        samples = double(settings.expected_samples);
+    else if (settings.expected_seconds > 0)
+        samples = settings.expected_seconds * rate / (std::max(1.0, work.eye_rays + kShadowWork * work.next_events) * double(std::max<uint64_t>(1, pixels)));
+    return std::clamp(samples, kFewest, kMost);
+}
+
+ChoicePilot run_choice_pilot(const Scene& scene, const RenderSettings& settings, bool cuda, bool cwbvh, SharedAccels& accels, const std::vector<PilotCandidate>& candidates, uint32_t samples) {
     return with_feature_level(scene.features, settings.specialise, [&](auto level) {
         constexpr Features F = decltype(level)::value;
         const auto run = [&](auto accel) {
             const auto tracer = accel->tracer();
-            return Pilot<F, std::remove_cv_t<decltype(tracer)>>(scene, settings, tracer, candidates, samples).run();
+            return Pilot<F, std::remove_cv_t<decltype(tracer)>>(scene, settings, cuda, tracer, candidates, samples).run();
         };
         return cwbvh ? run(accels.get<CwbvhAccel>()) : run(accels.get<EmbreeAccel>());
     });

@@ -6,8 +6,10 @@
 
 namespace ambilux {
 
-/// What is predicted is the error after so many samples of every pixel, without this share of the pixels.
-constexpr double kChoiceSamples = 1000, kChoiceTrimmed = 0.001;
+/// What is predicted is the error after all samples of the render, without this share of the pixels.
+constexpr double kChoiceTrimmed = 0.001;
+/// A shadow ray of next event estimation in rays of walks.
+constexpr double kShadowWork = 0.8;
 
 /// An estimator that the pilot judges. All have hits and next event estimation.
 struct PilotCandidate {
@@ -25,9 +27,14 @@ struct PilotWork {
     double draws = 0, draw_rays = 0;                 ///< of one draw at each eye vertex
 };
 
+/// About how many samples of every pixel the render will take: those asked for; of a render that ends by the clock those that a path tracer makes on the usual machine of its backend, not on
+/// this one, so that the choice repeats everywhere; 1000 if nothing is known. What shows as one bright pixel in a thousand after few samples is a part of the noise after many.
+double expected_samples(const RenderSettings& settings, const PilotWork& work, uint64_t pixels, bool cuda);
+
 struct ChoicePilot {
     uint32_t blocks_x = 0, blocks_y = 0;
     uint32_t samples = 0;  ///< eye walks, and as many light walks
+    double expected_samples = 0;  ///< of the render
     /// Of each candidate and block of the film: variance of one sample of a pixel over the block's squared mean plus 0.01, mean over pixels and channels;
     /// without rare outliers, for which the light that they bring counts as missing.
     std::vector<std::vector<double>> variance;
@@ -37,7 +44,7 @@ struct ChoicePilot {
 };
 
 /// About `samples` eye walks, and as many light walks, over the whole film. The numbers are those of Stream::pilot and depend on the seed alone. Weights are those of the balance
-/// heuristic, whatever the render uses. `cwbvh`: over this structure instead of Embree's.
-ChoicePilot run_choice_pilot(const Scene& scene, const RenderSettings& settings, bool cwbvh, SharedAccels& accels, const std::vector<PilotCandidate>& candidates, uint32_t samples);
+/// heuristic, whatever the render uses. `cuda`: for a render on a device. `cwbvh`: over this structure instead of Embree's.
+ChoicePilot run_choice_pilot(const Scene& scene, const RenderSettings& settings, bool cuda, bool cwbvh, SharedAccels& accels, const std::vector<PilotCandidate>& candidates, uint32_t samples);
 
 }  // namespace ambilux
