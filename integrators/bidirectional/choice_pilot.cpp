@@ -425,7 +425,7 @@ private:
 
 double expected_samples(const RenderSettings& settings, const PilotWork& work, uint64_t pixels, bool cuda) {
     constexpr double kFewest = 64, kUsual = 1000, kMost = 1e6;
-    // Rays of walks per second, within a factor of two for the scenes of docs/performance.md.
+    // Rays of walks per second: of an H200, within a factor of two for the scenes of docs/performance.md; of some cores.
     const double rate = cuda ? 5e9 : 1e7;
     double samples = kUsual;
     if (settings.expected_samples > 0)
