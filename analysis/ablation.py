@@ -129,7 +129,7 @@ def draw_sweep(experiment, entries, key):
         style.label_log_axis(axes.yaxis, axes.get_ylim())
         if numeric:
             axes.set_xscale("log", base=2)
-        axes.set_xticks(list(x), [style.wrap(value, max(6, 42 // len(entries))) for value, _ in entries])  # 42 letters fit below the axis
+        style.name_ticks(axes, list(x), [value for value, _ in entries])
         axes.xaxis.set_minor_locator(NullLocator())
         axes.set_xlabel(key)
         axes.set_ylabel("speed-up at equal RMSE")

@@ -110,8 +110,21 @@ def panels(count, height, columns=None, widest=2.35):
     return figure, list(grid.flat[:count]), columns
 
 
+def name_ticks(axes, at, names):
+    """Names below an axis of one column: lists such as hits+next_event on several lines; upright, in a higher figure, where they would still run into each other."""
+    lines = [name.replace("+", "+\n") for name in names]
+    room = 42 // max(1, len(names))  # letters
+    if max((len(part) for name in lines for part in name.split("\n")), default=0) <= room:
+        axes.set_xticks(at, lines)
+        return
+    axes.set_xticks(at, names, rotation=90)
+    axes.figure.set_figheight(axes.figure.get_figheight() + 0.055 * max(map(len, names)))
+
+
 def legend_below(figure, handles, labels, **options):
     """A legend in as many columns as fit below all panels. The figure grows by its rows, so that any number of runs leaves the panels their size."""
+    if not labels:
+        return
     renderer = figure.canvas.get_renderer()
     for columns in range(len(labels), 0, -1):
         legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, **options)

@@ -48,7 +48,7 @@ nlohmann::json parse_gpu_clocks(const std::string& lines) {
     return gpus;
 }
 
-nlohmann::json describe_clocks(const std::string& when) {
+nlohmann::json describe_clocks(const std::string& when, bool cuda) {
     nlohmann::json clocks = {{"when", when}, {"date", utc_now()}, {"cpu_mhz", nullptr}, {"gpu", nullptr}};
     double lowest = 0, highest = 0, sum = 0;
     int cores = 0;
@@ -64,7 +64,7 @@ nlohmann::json describe_clocks(const std::string& when) {
         ++cores;
     }
     if (cores) clocks["cpu_mhz"] = {{"lowest", lowest}, {"mean", sum / cores}, {"highest", highest}};
-    const std::string id = cuda_device_bus_id();
+    const std::string id = cuda ? cuda_device_bus_id() : "";
     if (id.empty()) return clocks;
     // A driver in trouble may not answer, hence the limit.
     const std::string ask = "timeout 10 nvidia-smi -i " + id + " --query-gpu=clocks.sm,clocks.mem,temperature.gpu --format=csv,noheader,nounits 2>/dev/null";

@@ -65,7 +65,7 @@ public:
         open_folder();
         const FolderLock lock(request_.output);
         read_earlier();
-        manifest_["clocks"].push_back(describe_clocks(manifest_["resumed"].empty() ? "start" : "resumed"));
+        add_clocks(manifest_["resumed"].empty() ? "start" : "resumed");
         write_manifest(false);
         plan();
         Progress progress("experiment " + config_.name);
@@ -79,14 +79,18 @@ public:
                     if (!render(i, run, seed)) return stopped();
         std::error_code ignored;
         fs::remove_all(request_.output + "/state", ignored);
-        manifest_["clocks"].push_back(describe_clocks("end"));
+        add_clocks("end");
         write_manifest(true);
         return ExitCode::done;
     }
 
 private:
+    void add_clocks(const std::string& when) {
+        manifest_["clocks"].push_back(describe_clocks(when, std::find(prepared_.backends.begin(), prepared_.backends.end(), "cuda") != prepared_.backends.end()));
+    }
+
     ExitCode stopped() {
-        manifest_["clocks"].push_back(describe_clocks("interrupted"));
+        add_clocks("interrupted");
         write_manifest(false);
         return ExitCode::interrupted;
     }
@@ -300,7 +304,6 @@ private:
             made.expected_samples = std::max(made.expected_samples, c.samples);
             made.expected_seconds = std::max(made.expected_seconds, c.seconds);
         }
-        if (made.expected_samples > 0) made.expected_seconds = 0;
         const std::unique_ptr<Renderer> renderer = hooks_.make_renderer(scene.scene, made);
         RenderPosition position{state.moments.samples, state.notes["seconds"].get<double>(), false};
         // Choosing is part of the method: its time counts.

@@ -9,7 +9,7 @@
 namespace ambilux {
 namespace {
 
-constexpr char kMagic[] = "ambilux state 1\n";
+constexpr char kMagic[] = "ambilux state 2\n";
 
 /// FNV-1a, 64 bits: against truncation and bit rot, not against people.
 uint64_t checksum(std::string_view bytes) {
@@ -52,7 +52,7 @@ std::optional<RenderState> read_state(const std::string& path) {
     const std::string content = read_file(path);
     std::string_view in = content;
     const auto damaged = [&] {
-        log_warning(path + " is damaged: this render begins anew");
+        log_warning(path + " is damaged, or of another version: this render begins anew");
         return std::nullopt;
     };
     uint64_t hash = 0, numbers[5];

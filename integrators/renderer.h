@@ -43,7 +43,7 @@ struct RenderSettings {
     std::string accel = "auto";          ///< cpu: embree (auto) or cwbvh (the CUDA traversal built for the host). cuda: cwbvh (auto) or, for integrator path, bvh2
     uint32_t wave_size = 0;              ///< paths in flight; 0 chooses
     uint64_t expected_samples = 0;       ///< that will be asked for, of every pixel; 0: not known. Waves that are chosen for a device are no larger
-    double expected_seconds = 0;         ///< that the render is to take, where a time sets its end and nothing else does; 0: not known
+    double expected_seconds = 0;         ///< that the render is to take at least; 0: not known. If both are known, it goes on until it has both
     QueuePolicy queues = {Compaction::atomic, Ordering::automatic};  ///< keys compaction and ordering: where items lie and in which order stages go through them
     bool specialise = true;              ///< kernels hold only what the scene has
     Fuse fuse = Fuse::automatic;         ///< which stages pass their items on without a queue
@@ -92,7 +92,7 @@ struct ChoiceStats {
     std::vector<std::pair<std::string, std::string>> settings;  ///< with them the same estimator runs again
     double seconds = 0;  ///< that the choice took
     uint32_t pilot_samples = 0;
-    double expected_samples = 0;  ///< of every pixel in the whole render: what was optimised for
+    double expected_samples = 0;  ///< of every pixel: what was optimised for (choice_pilot.h)
     std::vector<Candidate> candidates;
 };
 

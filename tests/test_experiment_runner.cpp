@@ -553,7 +553,8 @@ TEST_CASE("clocks of graphics cards are read from what nvidia-smi prints") {
     CHECK(gpus[0]["celsius"] == 41);
     CHECK(gpus[1]["memory_mhz"].is_null());
     CHECK(parse_gpu_clocks("").empty());
-    const auto clocks = describe_clocks("start");
+    CHECK(describe_clocks("start", false)["gpu"].is_null());
+    const auto clocks = describe_clocks("start", true);
     CHECK(clocks["when"] == "start");
     CHECK(clocks["date"].is_string());
     // Of the device that renders alone, whatever else the machine has.

@@ -1,5 +1,6 @@
 """Which files are made of which data, and what is drawn."""
 
+import csv
 import json
 import re
 import shutil
@@ -59,9 +60,30 @@ def test_any_number_of_runs_leaves_room(tmp_path):
     assert sizes[1] == pytest.approx(sizes[0], rel=0.03)
 
     figure = ablation.draw_sweep(few, [(v, f"bdpt[strategies={v}]") for v in values[:3]], "strategies")
-    figure.draw_without_rendering()
-    boxes = [label.get_window_extent() for label in figure.axes[0].get_xticklabels()]
-    assert len(boxes) == 3 and all(a.x1 < b.x0 for a, b in zip(boxes, boxes[1:]))
+    for names in None, values[:6], [str(16777216 + i) for i in range(7)], ["atomic", "none"]:
+        if names:
+            style.name_ticks(figure.axes[0], range(len(names)), names)
+        figure.draw_without_rendering()
+        labels = figure.axes[0].get_xticklabels()
+        boxes = [label.get_window_extent() for label in labels]
+        assert len(boxes) == len(names or values[:3]) and all(a.x1 < b.x0 for a, b in zip(boxes, boxes[1:]))
+        assert [label.get_text().replace("\n", "") for label in labels] == (names or values[:3])
+
+
+def test_errors_of_zero_leave_empty_figures(tmp_path):
+    """What the runner writes where the reference is noisier than the runs."""
+    folder = synthetic.make(tmp_path / "run", scenes=("box",), runs=RUNS)
+    head, *rows = (folder / "runs.csv").read_text().splitlines()
+    columns = [i for i, name in enumerate(head.split(",")) if name in ("rmse_corrected", "relmse_corrected")]
+    broken = [[*csv.reader([row])][0] for row in rows]
+    for row in broken:
+        for i in columns:
+            row[i] = "0"
+    with open(folder / "runs.csv", "w", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([head.split(","), *broken])
+    data = experiment.load(folder)
+    for x in "seconds", "spp":
+        assert convergence.draw(data, x, "rmse").legends == []
 
 
 def test_captions_state_the_data(output):

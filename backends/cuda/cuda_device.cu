@@ -32,8 +32,10 @@ std::string cuda_device_name() {
 std::string cuda_device_bus_id() {
     int device = 0;
     char id[32];
-    if (!cuda_device_present() || cudaGetDevice(&device) != cudaSuccess || cudaDeviceGetPCIBusId(id, sizeof id, device) != cudaSuccess) return {};
-    return id;
+    if (!cuda_device_present()) return {};
+    const bool known = cudaGetDevice(&device) == cudaSuccess && cudaDeviceGetPCIBusId(id, sizeof id, device) == cudaSuccess;
+    cudaGetLastError();
+    return known ? id : "";
 }
 
 }  // namespace ambilux

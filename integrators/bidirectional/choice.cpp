@@ -235,7 +235,7 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     std::vector<PilotCandidate> judged;
     for (const ChoiceCandidate& c : candidates) judged.push_back(c.pilot);
     std::optional<HeadStart> head_start;
-    if (cuda && settings.expected_seconds > 0) head_start.emplace(settings_of(settings, candidates[0]), make);
+    if (cuda && settings.expected_seconds > 0 && settings.expected_samples == 0) head_start.emplace(settings_of(settings, candidates[0]), make);
     const ChoicePilot pilot = run_choice_pilot(scene, settings, cuda, cwbvh, accels, judged, cuda ? kPilotSamplesCuda : kPilotSamplesCpu);
     if (head_start) head_start->stop();
     const std::vector<double> variance = choice_variances(pilot);

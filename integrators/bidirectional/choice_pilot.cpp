@@ -427,12 +427,9 @@ double expected_samples(const RenderSettings& settings, const PilotWork& work, u
     constexpr double kFewest = 64, kUsual = 1000, kMost = 1e6;
     // Rays of walks per second: of an H200, within a factor of two for the scenes of docs/performance.md; of some cores.
     const double rate = cuda ? 5e9 : 1e7;
-    double samples = kUsual;
-    if (settings.expected_samples > 0)
-        samples = double(settings.expected_samples);
-    else if (settings.expected_seconds > 0)
-        samples = settings.expected_seconds * rate / (std::max(1.0, work.eye_rays + kShadowWork * work.next_events) * double(std::max<uint64_t>(1, pixels)));
-    return std::clamp(samples, kFewest, kMost);
+    const double asked = double(settings.expected_samples);
+    const double in_time = settings.expected_seconds * rate / (std::max(1.0, work.eye_rays + kShadowWork * work.next_events) * double(std::max<uint64_t>(1, pixels)));
+    return asked > 0 || in_time > 0 ? std::clamp(std::max(asked, in_time), kFewest, kMost) : kUsual;
 }
 
 ChoicePilot run_choice_pilot(const Scene& scene, const RenderSettings& settings, bool cuda, bool cwbvh, SharedAccels& accels, const std::vector<PilotCandidate>& candidates, uint32_t samples) {

@@ -27,14 +27,14 @@ struct PilotWork {
     double draws = 0, draw_rays = 0;                 ///< of one draw at each eye vertex
 };
 
-/// About how many samples of every pixel the render will take: those asked for; of a render that ends by the clock those that a path tracer makes on the usual machine of its backend, not on
-/// this one, so that the choice repeats everywhere; 1000 if nothing is known. What shows as one bright pixel in a thousand after few samples is a part of the noise after many.
+/// About how many samples of every pixel the render will take: those asked for; those that a path tracer makes in the time asked for, on the usual machine of its backend and not on
+/// this one, so that the choice repeats everywhere; the larger of both; 1000 if nothing is known. What shows as one bright pixel in a thousand after few samples is a part of the noise after many.
 double expected_samples(const RenderSettings& settings, const PilotWork& work, uint64_t pixels, bool cuda);
 
 struct ChoicePilot {
     uint32_t blocks_x = 0, blocks_y = 0;
     uint32_t samples = 0;  ///< eye walks, and as many light walks
-    double expected_samples = 0;  ///< of the render
+    double expected_samples = 0;  ///< see above
     /// Of each candidate and block of the film: variance of one sample of a pixel over the block's squared mean plus 0.01, mean over pixels and channels;
     /// without rare outliers, for which the light that they bring counts as missing.
     std::vector<std::vector<double>> variance;
