@@ -86,7 +86,7 @@ public:
 
 private:
     void add_clocks(const std::string& when) {
-        manifest_["clocks"].push_back(describe_clocks(when, std::find(prepared_.backends.begin(), prepared_.backends.end(), "cuda") != prepared_.backends.end()));
+        manifest_["clocks"].push_back(describe_clocks(when, prepared_.backends.contains("cuda")));
     }
 
     ExitCode stopped() {

@@ -409,7 +409,15 @@ TEST_CASE("checkpoints in samples and in seconds lie within one render") {
     World world;
     world.sleep_per_sample = 0.0005;
     world.batch = 20;
-    CHECK(run_experiment(request(folder, "out"), fake_hooks(world)) == ExitCode::done);
+    Hooks hooks = fake_hooks(world);
+    const auto make = hooks.make_renderer;
+    int told = 0;  // renderers that know of both budgets
+    hooks.make_renderer = [&](const Scene& s, const RenderSettings& settings) {
+        told += settings.expected_samples == 400 && settings.expected_seconds == 0.2;
+        return make(s, settings);
+    };
+    CHECK(run_experiment(request(folder, "out"), hooks) == ExitCode::done);
+    CHECK(told == 8);
     const auto rows = table(folder / "out/runs.csv");
     REQUIRE(rows.size() == 8 * 4);
     const size_t checkpoint = column("checkpoint"), budget = column("budget"), spp = column("spp"), time = column("time");

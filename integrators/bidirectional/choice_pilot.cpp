@@ -55,7 +55,7 @@ template <Features F, class Tracer>
 class Pilot {
 public:
     Pilot(const Scene& scene, const RenderSettings& settings, bool cuda, const Tracer& tracer, const std::vector<PilotCandidate>& candidates, uint32_t samples)
-        : view_(scene.view()), settings_(settings), cuda_(cuda), tracer_(tracer), moments_{candidates}, seed_(settings.seed) {
+        : view_(scene.view()), settings_(settings), cuda_(cuda), tracer_(tracer), moments_{candidates} {
         RenderSettings all = settings;
         all.integrator = "bdpt";
         all.variant = "wavefront";
@@ -168,7 +168,7 @@ private:
     static bool counts(Rgb value) { return is_finite(value) && min_component(value) >= 0.0f && !is_zero(value); }
 
     void light_walk(uint32_t i, LightTask& task) const {
-        const RngKey key = {seed_, i, 2, Stream::pilot};
+        const RngKey key = {settings_.seed, i, 2, Stream::pilot};
         const Vec4f direction = random_floats(key, kEmissionBlock + 1);
         EmissionSample e;
         if (!sample_emission<F>(view_, random_floats(key, kEmissionBlock), {direction.x, direction.y}, e)) return;
@@ -261,11 +261,11 @@ private:
         const uint32_t y0 = edge(by, sensor.crop_height, result_.blocks_y), y1 = edge(by + 1, sensor.crop_height, result_.blocks_y);
         for (uint32_t p = 0; p < pixels_; ++p) {
             const uint32_t first = (b * pixels_ + p) * kPixelSamples;
-            const Uint4 place = random_bits({seed_, first, 3, Stream::pilot}, 0);
+            const Uint4 place = random_bits({settings_.seed, first, 3, Stream::pilot}, 0);
             const uint32_t x = x0 + mul_hi(place.x, x1 - x0), y = y0 + mul_hi(place.y, y1 - y0);
             double sum[kMostCandidates][3] = {}, squares[kMostCandidates][3] = {};
             for (uint32_t s = 0; s < kPixelSamples; ++s) {
-                Eye eye{first + s, {seed_, first + s, 1, Stream::pilot}, pixels[p], work, {}};
+                Eye eye{first + s, {settings_.seed, first + s, 1, Stream::pilot}, pixels[p], work, {}};
                 eye_walk(eye, x, y);
                 for (uint32_t c = 0; c < moments_.candidates.size(); ++c)
                     for (int k = 0; k < 3; ++k) {
@@ -410,7 +410,6 @@ private:
     const bool cuda_;
     const Tracer tracer_;
     SecondMoments moments_;
-    uint64_t seed_;
     BidirectionalPolicy policy_{};
     BidirectionalMis mis_[kSets] = {};
     uint32_t pixels_ = 0;  ///< of a block
