@@ -1,4 +1,5 @@
-// What `bench queues` fills queues with and how it empties them: a stage that makes items in registers, and one that looks at all of every item.
+// What `bench queues` fills queues with and how it empties them: a stage that makes items in registers, and one that
+// looks at all of every item.
 #pragma once
 
 #include <cstddef>
@@ -6,16 +7,16 @@
 #include <type_traits>
 
 #include "core/error.h"
+#include "items/vertex_items.h"
 #include "queues/order.h"
-#include "stages/vertex_items.h"
 
 namespace ambilux {
 
 /// Time of one operation on a queue.
 struct QueueTiming {
-    std::string operation;   ///< push, compact, drain, keys or sort (backends/bench_queues.h)
+    std::string operation;  ///< push, compact, drain, keys or sort (backends/bench_queues.h)
     std::string item;
-    uint32_t bytes;          ///< of an item; keys, sort: of a key
+    uint32_t bytes;  ///< of an item; keys, sort: of a key
     QueuePolicy policy;
     uint32_t one_in;         ///< of so many threads one pushes
     uint64_t looked, items;  ///< threads or places that were looked at, and items that were there
@@ -30,7 +31,8 @@ struct QueueContents {
 /// Throws Error(device) if `found` is not what was `pushed`: a queue that loses items has no speed.
 inline void check_contents(const std::string& item, const QueueContents& found, const QueueContents& pushed) {
     if (found.items == pushed.items && found.sum == pushed.sum) return;
-    throw Error(ExitCode::device, "bench queues: of " + item + " " + std::to_string(pushed.items) + " items were pushed and " + std::to_string(found.items) + " came back" +
+    throw Error(ExitCode::device, "bench queues: of " + item + " " + std::to_string(pushed.items) +
+                                      " items were pushed and " + std::to_string(found.items) + " came back" +
                                       (found.items == pushed.items ? ", but not the same" : ""));
 }
 
@@ -116,7 +118,8 @@ struct PushMade {
     }
 };
 
-/// Adds all items to contents[0]. Unless they are `counted`, a device adds only those whose sum is 0, one of 2^32, to contents[1]: too few to take time, but compilers cannot know that.
+/// Adds all items to contents[0]. Unless they are `counted`, a device adds only those whose sum is 0, one of 2^32, to
+/// contents[1]: too few to take time, but compilers cannot know that.
 template <class Item>
 struct DrainItems {
     Queue<Item> queue;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "accel/embree_tracer.h"
 #include "backends/bench_rays.h"
 #include "backends/cpu/executor.h"
 #include "backends/cpu/wave_bytes.h"
@@ -11,14 +12,13 @@
 #include "backends/cuda_device.h"
 #include "backends/ray_batches.h"
 #include "core/error.h"
-#include "scene/accel/embree_tracer.h"
 
 namespace ambilux {
 namespace {
 
 constexpr uint32_t kCpuItems = 512 * 512, kCudaItems = 2048 * 2048, kMostItems = 1u << 28;
-constexpr uint32_t kMostSide = 2048;       ///< of the film that the scene's items come from
-constexpr uint32_t kCpuWaveSize = 512;     ///< as renders have
+constexpr uint32_t kMostSide = 2048;    ///< of the film that the scene's items come from
+constexpr uint32_t kCpuWaveSize = 512;  ///< as renders have
 constexpr int kWarmUps = 3;
 
 /// What a scene's paths have in their queues after the camera rays: their hits, and the rays that leave these.
@@ -27,7 +27,9 @@ struct SceneItems {
     std::vector<RayItem> rays;
 };
 
-RayItem ray_item(const Ray& ray, uint32_t path, uint32_t depth) { return {ray.o, path, ray.d, WalkBits::make(depth, false, 1.0f), splat(1.0f), 1.0f}; }
+RayItem ray_item(const Ray& ray, uint32_t path, uint32_t depth) {
+    return {ray.o, path, ray.d, WalkBits::make(depth, false, 1.0f), splat(1.0f), 1.0f};
+}
 
 /// Of a film of the least power of two pixels a side that has `items` pixels, but for kMostSide, the first `items`.
 SceneItems make_scene_items(const Scene& scene, uint32_t items) {
@@ -80,9 +82,11 @@ struct HostSeconds {
     double push, drain;
 };
 
-/// Empties a queue that push(executor, queue, wave) has filled, `waves` times on all threads, which is a run, and checks that all runs drain what is `pushed`. By material if items have one, rays by Morton code.
+/// Empties a queue that push(executor, queue, wave) has filled, `waves` times on all threads, which is a run, and
+/// checks that all runs drain what is `pushed`. By material if items have one, rays by Morton code.
 template <class Item, class Push>
-HostSeconds time_on_host(const char* name, const SceneView& scene, const QueuePolicy& policy, uint32_t waves, const QueueContents& pushed, int repetitions, Push push) {
+HostSeconds time_on_host(const char* name, const SceneView& scene, const QueuePolicy& policy, uint32_t waves,
+                         const QueueContents& pushed, int repetitions, Push push) {
     const uint32_t threads = uint32_t(tbb::this_task_arena::max_concurrency());
     std::vector<HostQueue<Item>> queues;
     for (uint32_t t = 0; t < threads; ++t) queues.emplace_back(policy);
@@ -120,34 +124,43 @@ HostSeconds time_on_host(const char* name, const SceneView& scene, const QueuePo
 
 /// The drain of `items` as they are and in order.
 template <class Item>
-void time_order_on_host(const char* name, const SceneView& scene, Ordering ordering, const std::vector<Item>& items, int repetitions, std::vector<QueueTiming>& rows) {
+void time_order_on_host(const char* name, const SceneView& scene, Ordering ordering, const std::vector<Item>& items,
+                        int repetitions, std::vector<QueueTiming>& rows) {
     const uint32_t n = uint32_t(items.size()), waves = (n + kCpuWaveSize - 1) / kCpuWaveSize;
     QueueContents pushed = {n, 0};
     for (const Item& item : items) pushed.sum += item_sum(item);
     for (const QueuePolicy policy : {QueuePolicy{}, QueuePolicy{Compaction::atomic, ordering}}) {
-        const HostSeconds seconds = time_on_host<Item>(name, scene, policy, waves, pushed, repetitions, [&](CpuExecutor&, const Queue<Item>& queue, uint32_t wave) {
-            for (uint32_t i = wave * kCpuWaveSize; i < std::min(n, (wave + 1) * kCpuWaveSize); ++i) queue.push(items[i]);
-        });
+        const HostSeconds seconds = time_on_host<Item>(name, scene, policy, waves, pushed, repetitions,
+                                                       [&](CpuExecutor&, const Queue<Item>& queue, uint32_t wave) {
+                                                           for (uint32_t i = wave * kCpuWaveSize;
+                                                                i < std::min(n, (wave + 1) * kCpuWaveSize); ++i)
+                                                               queue.push(items[i]);
+                                                       });
         rows.push_back({"drain", name, sizeof(Item), policy, 1, n, n, seconds.drain});
     }
 }
 
 /// `items`: a multiple of kCpuWaveSize.
-std::vector<QueueTiming> time_queues_on_host(const Scene& scene, uint32_t items, const SceneItems& scene_items, int repetitions) {
+std::vector<QueueTiming> time_queues_on_host(const Scene& scene, uint32_t items, const SceneItems& scene_items,
+                                             int repetitions) {
     const SceneView view = scene.view();
     const uint32_t waves = items / kCpuWaveSize;
     std::vector<QueueTiming> rows;
     for_pushed_items([&]<class Item>(const char* name, std::type_identity<Item>) {
         for (const uint32_t one_in : kPushShares) {
-            const QueueContents of_wave = pushed_contents<Item>(kCpuWaveSize, one_in), pushed = {of_wave.items * waves, of_wave.sum * waves};
+            const QueueContents of_wave = pushed_contents<Item>(kCpuWaveSize, one_in),
+                                pushed = {of_wave.items * waves, of_wave.sum * waves};
             for (const Compaction compaction : kCompactions) {
                 if (!is_compacted<Item>(compaction)) continue;
                 const QueuePolicy policy = {compaction};
-                const HostSeconds seconds = time_on_host<Item>(name, view, policy, waves, pushed, repetitions, [&](CpuExecutor& executor, const Queue<Item>& queue, uint32_t) {
-                    executor.run_slots(StageId::generate, PushMade<Item>{queue, one_in}, kCpuWaveSize, 1);
-                });
+                const HostSeconds seconds = time_on_host<Item>(
+                    name, view, policy, waves, pushed, repetitions,
+                    [&](CpuExecutor& executor, const Queue<Item>& queue, uint32_t) {
+                        executor.run_slots(StageId::generate, PushMade<Item>{queue, one_in}, kCpuWaveSize, 1);
+                    });
                 rows.push_back({"push", name, sizeof(Item), policy, one_in, items, pushed.items, seconds.push});
-                rows.push_back({"drain", name, sizeof(Item), policy, one_in, policy.fixed_places() ? items : pushed.items, pushed.items, seconds.drain});
+                rows.push_back({"drain", name, sizeof(Item), policy, one_in,
+                                policy.fixed_places() ? items : pushed.items, pushed.items, seconds.drain});
             }
         }
     });
@@ -159,7 +172,8 @@ std::vector<QueueTiming> time_queues_on_host(const Scene& scene, uint32_t items,
 /// Bytes that one run has to read or write: items; flags and list; keys; keys and places, which are read and written.
 double bytes_moved(const QueueTiming& t) {
     const double items = double(t.items);
-    if (t.operation == "compact") return double(t.looked) + (t.policy.compaction == Compaction::select ? sizeof(uint32_t) * items : 0.0);
+    if (t.operation == "compact")
+        return double(t.looked) + (t.policy.compaction == Compaction::select ? sizeof(uint32_t) * items : 0.0);
     if (t.operation == "sort") return 2.0 * (t.bytes + sizeof(uint32_t)) * items;
     return t.bytes * items;
 }
@@ -182,20 +196,28 @@ nlohmann::json row(const QueueTiming& t) {
 }  // namespace
 
 nlohmann::json bench_queues(const Scene& scene, const std::string& backend, uint32_t items, int repetitions) {
-    if (repetitions < 1) throw Error(ExitCode::usage, "bench queues: at least 1 repetition is needed, not " + std::to_string(repetitions));
-    if (items > kMostItems) throw Error(ExitCode::usage, "bench queues: at most " + std::to_string(kMostItems) + " items, not " + std::to_string(items));
-    if (backend != "auto" && backend != "cpu" && backend != "cuda") throw Error(ExitCode::usage, "bench queues: backend '" + backend + "' is not one of auto, cpu, cuda");
+    if (repetitions < 1)
+        throw Error(ExitCode::usage,
+                    "bench queues: at least 1 repetition is needed, not " + std::to_string(repetitions));
+    if (items > kMostItems)
+        throw Error(ExitCode::usage,
+                    "bench queues: at most " + std::to_string(kMostItems) + " items, not " + std::to_string(items));
+    if (backend != "auto" && backend != "cpu" && backend != "cuda")
+        throw Error(ExitCode::usage, "bench queues: backend '" + backend + "' is not one of auto, cpu, cuda");
     const bool cuda = backend == "cuda" || (backend == "auto" && cuda_device_present());
-    if (cuda && !cuda_device_present()) throw Error(ExitCode::device, "--backend cuda: no CUDA device, or this program was built without CUDA");
+    if (cuda && !cuda_device_present())
+        throw Error(ExitCode::device, "--backend cuda: no CUDA device, or this program was built without CUDA");
     if (items == 0) items = cuda ? kCudaItems : kCpuItems;
     if (!cuda) items = (items + kCpuWaveSize - 1) / kCpuWaveSize * kCpuWaveSize;
     const SceneItems from_scene = make_scene_items(scene, items);
     const std::vector<QueueTiming> timings =
-        cuda ? time_queues_on_device(scene, items, from_scene.hits, from_scene.rays, kWarmUps, repetitions) : time_queues_on_host(scene, items, from_scene, repetitions);
+        cuda ? time_queues_on_device(scene, items, from_scene.hits, from_scene.rays, kWarmUps, repetitions)
+             : time_queues_on_host(scene, items, from_scene, repetitions);
     nlohmann::json rows = nlohmann::json::array();
     for (const QueueTiming& timing : timings) rows.push_back(row(timing));
     return {{"backend", cuda ? "cuda" : "cpu"},
-            {"device", cuda ? cuda_device_name() : "cpu, " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads"},
+            {"device", cuda ? cuda_device_name()
+                            : "cpu, " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads"},
             {"items", items},
             {"repetitions", repetitions},
             {"rows", rows}};

@@ -5,14 +5,14 @@
 #include <algorithm>
 #include <chrono>
 
+#include "accel/cwbvh.h"
+#include "accel/embree_tracer.h"
+#include "accel/pair_bvh.h"
 #include "backends/cuda/bench_rays.h"
 #include "backends/cuda_device.h"
 #include "backends/ray_batches.h"
 #include "backends/traversal_features.h"
 #include "core/error.h"
-#include "scene/accel/cwbvh.h"
-#include "scene/accel/embree_tracer.h"
-#include "scene/accel/pair_bvh.h"
 
 namespace ambilux {
 namespace {
@@ -31,7 +31,8 @@ nlohmann::json row(const RayBatch& batch, const KernelTiming& timing) {
 }
 
 template <Features F, class Tracer>
-KernelTiming time_on_host(const SceneView& scene, const Tracer& tracer, const RayBatch& batch, const std::string& kernel, int repetitions) {
+KernelTiming time_on_host(const SceneView& scene, const Tracer& tracer, const RayBatch& batch,
+                          const std::string& kernel, int repetitions) {
     const size_t count = batch.rays.size();
     std::vector<Hit> hits(batch.any_hit ? 0 : count);
     std::vector<uint8_t> blocked(batch.any_hit ? count : 0);
@@ -42,7 +43,8 @@ KernelTiming time_on_host(const SceneView& scene, const Tracer& tracer, const Ra
             detail::for_all(count, [&](size_t k) { blocked[k] = tracer.template occluded<F>(scene, batch.rays[k]); });
         else
             detail::for_all(count, [&](size_t k) { tracer.template closest<F>(scene, batch.rays[k], hits[k]); });
-        if (i >= kWarmUps) seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+        if (i >= kWarmUps)
+            seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     }
     uint64_t met = 0;
     for (const Hit& hit : hits) met += hit.prim != kNone;
@@ -54,15 +56,17 @@ template <Features F, class Tracer>
 nlohmann::json rows_on_host(const Scene& scene, const Tracer& tracer, const std::string& kernel, int repetitions) {
     const SceneView view = scene.view();
     nlohmann::json rows = nlohmann::json::array();
-    for (const RayBatch& batch : make_ray_batches<F>(view, tracer, kCpuSize, 0)) rows.push_back(row(batch, time_on_host<F>(view, tracer, batch, kernel, repetitions)));
+    for (const RayBatch& batch : make_ray_batches<F>(view, tracer, kCpuSize, 0))
+        rows.push_back(row(batch, time_on_host<F>(view, tracer, batch, kernel, repetitions)));
     return rows;
 }
 
 template <class Accel>
 nlohmann::json bench_on_host(const Scene& scene, const std::string& accel_name, int repetitions) {
     const Accel accel(scene);
-    const nlohmann::json rows =
-        with_traversal_features(scene.features, [&](auto set) { return rows_on_host<set.value>(scene, accel.tracer(), accel_name, repetitions); });
+    const nlohmann::json rows = with_traversal_features(scene.features, [&](auto set) {
+        return rows_on_host<set.value>(scene, accel.tracer(), accel_name, repetitions);
+    });
     return {{"device", "cpu, " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads"},
             {"accel", accel_name},
             {"build_seconds", accel.build_seconds()},
@@ -72,13 +76,15 @@ nlohmann::json bench_on_host(const Scene& scene, const std::string& accel_name, 
 
 template <class Accel>
 nlohmann::json bench_on_device(const Scene& scene, const std::string& accel_name, int repetitions) {
-    if (!cuda_device_present()) throw Error(ExitCode::device, "--backend cuda: no CUDA device, or this program was built without CUDA");
+    if (!cuda_device_present())
+        throw Error(ExitCode::device, "--backend cuda: no CUDA device, or this program was built without CUDA");
     const Accel accel(scene);
     const SceneView view = scene.view();
-    const std::vector<RayBatch> batches =
-        with_traversal_features(scene.features, [&](auto set) { return make_ray_batches<set.value>(view, accel.tracer(), kCudaSize, 0); });
+    const std::vector<RayBatch> batches = with_traversal_features(
+        scene.features, [&](auto set) { return make_ray_batches<set.value>(view, accel.tracer(), kCudaSize, 0); });
     nlohmann::json rows = nlohmann::json::array();
-    const std::vector<std::vector<KernelTiming>> timings = time_rays_on_device(scene, accel.arrays(), batches, kWarmUps, repetitions);
+    const std::vector<std::vector<KernelTiming>> timings =
+        time_rays_on_device(scene, accel.arrays(), batches, kWarmUps, repetitions);
     for (size_t i = 0; i < batches.size(); ++i)
         for (const KernelTiming& timing : timings[i]) rows.push_back(row(batches[i], timing));
     return {{"device", cuda_device_name()},
@@ -97,7 +103,8 @@ double median(std::vector<double> seconds) {
 }
 
 nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int repetitions, bool opaque) {
-    if (repetitions < 1) throw Error(ExitCode::usage, "bench rays: at least 1 repetition is needed, not " + std::to_string(repetitions));
+    if (repetitions < 1)
+        throw Error(ExitCode::usage, "bench rays: at least 1 repetition is needed, not " + std::to_string(repetitions));
     if (opaque && scene.features.opacity) {
         Scene solid = scene;
         for (Material& material : solid.materials) material.opacity = {1.0f, -1};
@@ -117,7 +124,8 @@ nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int re
     else if (chosen == "cuda-bvh2")
         json = bench_on_device<PairAccel>(scene, "bvh2", repetitions);
     else
-        throw Error(ExitCode::usage, "bench rays: backend '" + backend + "' is not one of auto, cpu, cpu-cwbvh, cpu-bvh2, cuda, cuda-bvh2");
+        throw Error(ExitCode::usage, "bench rays: backend '" + backend +
+                                         "' is not one of auto, cpu, cpu-cwbvh, cpu-bvh2, cuda, cuda-bvh2");
     json["backend"] = chosen;
     json["opaque"] = opaque;
     json["repetitions"] = repetitions;

@@ -5,14 +5,15 @@
 
 namespace ambilux {
 
-/// True if this build has the CUDA backend and its kernels run on the current device. False without a driver, without a device, or on a
-/// device of another architecture. Never throws, never prints; the answer is kept.
+/// True if this build has the CUDA backend and its kernels run on the current device. False without a driver, without a
+/// device, or on a device of another architecture. Never throws, never prints; the answer is kept.
 bool cuda_device_present();
 
 /// Name of the current device; empty if cuda_device_present() is false.
 std::string cuda_device_name();
 
-/// PCI address of the current device, such as "0000:65:00.0", by which nvidia-smi knows it whatever CUDA_VISIBLE_DEVICES says; empty if cuda_device_present() is false.
+/// PCI address of the current device, such as "0000:65:00.0", by which nvidia-smi knows it whatever
+/// CUDA_VISIBLE_DEVICES says; empty if cuda_device_present() is false.
 std::string cuda_device_bus_id();
 
 }  // namespace ambilux

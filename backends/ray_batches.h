@@ -1,4 +1,5 @@
-// The rays that `bench rays` traces: primary, bounced and shadow rays of the paths of one image, rays to its emitters and from them.
+// The rays that `bench rays` traces: primary, bounced and shadow rays of the paths of one image, rays to its emitters
+// and from them.
 #pragma once
 
 #include <string>
@@ -7,7 +8,7 @@
 #include "core/parallel.h"
 #include "core/rng.h"
 #include "core/sampling.h"
-#include "scene/accel/primitive_bounds.h"
+#include "scene/primitive_bounds.h"
 #include "scene/surface.h"
 #include "transport/emitter.h"
 #include "transport/emitter/emission.h"
@@ -51,7 +52,8 @@ struct BouncePoint {
     uint32_t path;
 };
 
-/// Segment between two points of different paths, drawn again up to 16 times until each lies in front of the other. A pair that is still not, stays.
+/// Segment between two points of different paths, drawn again up to 16 times until each lies in front of the other. A
+/// pair that is still not, stays.
 inline Ray shadow_ray(const std::vector<BouncePoint>& points, RngKey key) {
     BouncePoint a = {}, b = {};
     for (uint32_t block = 0; block < 16; ++block) {
@@ -67,10 +69,13 @@ inline Ray shadow_ray(const std::vector<BouncePoint>& points, RngKey key) {
     return {a.p, 0.9999f * distance, d * (1.0f / distance), key.index};
 }
 
-/// Next event estimation at `point`: a segment to a sampled point of an emitter, or without end towards the environment. False if no light comes that way.
+/// Next event estimation at `point`: a segment to a sampled point of an emitter, or without end towards the
+/// environment. False if no light comes that way.
 inline bool ray_to_emitter(const SceneView& scene, const BouncePoint& point, RngKey key, float offset, Ray& ray) {
     EmitterSample light;
-    if (!sample_emitter_deferred<kAllFeatures>(scene, point.p, random_floats(key, 0), light) || !(dot(point.n, light.wi) > 0.0f)) return false;
+    if (!sample_emitter_deferred<kAllFeatures>(scene, point.p, random_floats(key, 0), light) ||
+        !(dot(point.n, light.wi) > 0.0f))
+        return false;
     ray = {point.p, kInfinity, light.wi, random_bits(key, 1).x};
     if (light.distance < kInfinity) ray.tmax = light.distance - offset;
     return ray.tmax > 0.0f;
@@ -78,7 +83,8 @@ inline bool ray_to_emitter(const SceneView& scene, const BouncePoint& point, Rng
 
 /// Points that rays meet; is_hit[i] tells whether ray i did. Points lie `offset` off the surface.
 template <Features F, class Tracer>
-std::vector<BouncePoint> trace_points(const SceneView& scene, const Tracer& tracer, const std::vector<Ray>& rays, const std::vector<uint32_t>& path_of, float offset) {
+std::vector<BouncePoint> trace_points(const SceneView& scene, const Tracer& tracer, const std::vector<Ray>& rays,
+                                      const std::vector<uint32_t>& path_of, float offset) {
     std::vector<BouncePoint> met(rays.size());
     std::vector<uint8_t> is_hit(rays.size());
     for_all(rays.size(), [&](size_t i) {
@@ -99,19 +105,23 @@ std::vector<BouncePoint> trace_points(const SceneView& scene, const Tracer& trac
 /// Cosine-weighted around the normal.
 inline Ray bounced_ray(const BouncePoint& point, RngKey key) {
     const Vec4f u = random_floats(key, 0);
-    return {point.p, kInfinity, normalize(frame_from_normal(point.n).to_world(square_to_cosine_hemisphere({u.x, u.y}))), random_bits(key, 1).x};
+    return {point.p, kInfinity, normalize(frame_from_normal(point.n).to_world(square_to_cosine_hemisphere({u.x, u.y}))),
+            random_bits(key, 1).x};
 }
 
 }  // namespace detail
 
-/// Rays of size x size paths (a power of two up to 2^15) through pixels in Morton order, with the scene's camera and its horizontal field of view on both axes:
-/// "primary", jittered; "bounce 1" and "bounce 3": cosine-weighted around the geometric normal, origins moved along it by 1e-5 of the scene's
-/// diagonal, paths that escaped left out; "shadow": segments between random points that different paths met, both ends moved off the
-/// surface likewise and 0.9999 of the length; "to emitters" and "to emitters 3": next event estimation where primary rays end, and the rays of bounce 2, as far as light comes that way; "from emitters": first rays of
-/// light walks; "light bounce": cosine-weighted where these end. A function of the scene and of `seed`.
+/// Rays of size x size paths (a power of two up to 2^15) through pixels in Morton order, with the scene's camera and
+/// its horizontal field of view on both axes: "primary", jittered; "bounce 1" and "bounce 3": cosine-weighted around
+/// the geometric normal, origins moved along it by 1e-5 of the scene's diagonal, paths that escaped left out; "shadow":
+/// segments between random points that different paths met, both ends moved off the surface likewise and 0.9999 of the
+/// length; "to emitters" and "to emitters 3": next event estimation where primary rays end, and the rays of bounce 2,
+/// as far as light comes that way; "from emitters": first rays of light walks; "light bounce": cosine-weighted where
+/// these end. A function of the scene and of `seed`.
 template <Features F, class Tracer>
 std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tracer, uint32_t size, uint64_t seed) {
-    constexpr uint32_t kBounces = 3, kShadowSample = 1000, kEmitterSample[2] = {1001, 1004}, kEmissionSample = 1002, kLightBounceSample = 1003;
+    constexpr uint32_t kBounces = 3, kShadowSample = 1000, kEmitterSample[2] = {1001, 1004}, kEmissionSample = 1002,
+                       kLightBounceSample = 1003;
     const uint32_t paths = size * size;
     const float offset = 1e-5f * detail::scene_diagonal(scene);
     const auto key = [&](uint32_t path, uint32_t sample) { return RngKey{seed, path, sample, Stream::bench}; };
@@ -145,7 +155,8 @@ std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tra
         if (bounce != 2) {
             for (const detail::BouncePoint& point : met) {
                 Ray ray;
-                if (detail::ray_to_emitter(scene, point, key(point.path, kEmitterSample[bounce / 2]), offset, ray)) to_emitters[bounce / 2].rays.push_back(ray);
+                if (detail::ray_to_emitter(scene, point, key(point.path, kEmitterSample[bounce / 2]), offset, ray))
+                    to_emitters[bounce / 2].rays.push_back(ray);
             }
             batches.push_back({"bounce " + std::to_string(bounce), false, false, rays});
         }
@@ -155,7 +166,8 @@ std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tra
     RayBatch shadow = {"shadow", true, false, {}};
     if (!points.empty()) {
         shadow.rays.resize(paths);
-        detail::for_all(paths, [&](size_t i) { shadow.rays[i] = detail::shadow_ray(points, key(uint32_t(i), kShadowSample)); });
+        detail::for_all(
+            paths, [&](size_t i) { shadow.rays[i] = detail::shadow_ray(points, key(uint32_t(i), kShadowSample)); });
     }
     batches.push_back(std::move(shadow));
     for (RayBatch& batch : to_emitters) batches.push_back(std::move(batch));
@@ -173,7 +185,8 @@ std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tra
     batches.push_back({"from emitters", false, false, rays});
     const std::vector<detail::BouncePoint> lit = detail::trace_points<F>(scene, tracer, rays, path_of, offset);
     rays.resize(lit.size());
-    detail::for_all(lit.size(), [&](size_t i) { rays[i] = detail::bounced_ray(lit[i], key(lit[i].path, kLightBounceSample)); });
+    detail::for_all(lit.size(),
+                    [&](size_t i) { rays[i] = detail::bounced_ray(lit[i], key(lit[i].path, kLightBounceSample)); });
     batches.push_back({"light bounce", false, false, std::move(rays)});
     return batches;
 }

@@ -1,4 +1,5 @@
-// Traces an array of rays on a CUDA device and brings the hits back: for tests, where the cost of copies does not matter.
+// Traces an array of rays on a CUDA device and brings the hits back: for tests, where the cost of copies does not
+// matter.
 #pragma once
 
 #include <vector>
@@ -8,9 +9,11 @@
 
 namespace ambilux {
 
-/// Hits of `rays` on the device, through a structure built for this call: a CWBVH, or with `binary` a binary BVH. Closest: as CwbvhTracer::closest. With `any_hit` only `prim` counts: kNone where
-/// a ray is free, 0 where it is blocked. `persistent` chooses the kernel with dynamic fetch over the one with a thread per ray.
-/// Throws Error(device) without a device.
-std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& rays, bool any_hit, bool persistent, bool binary = false);
+/// Hits of `rays` on the device, through a structure built for this call: a CWBVH, or with `binary` a binary BVH.
+/// Closest: as CwbvhTracer::closest. With `any_hit` only `prim` counts: kNone where a ray is free, 0 where it is
+/// blocked. `persistent` chooses the kernel with dynamic fetch over the one with a thread per ray. Throws Error(device)
+/// without a device.
+std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& rays, bool any_hit, bool persistent,
+                                 bool binary = false);
 
 }  // namespace ambilux

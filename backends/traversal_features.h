@@ -1,11 +1,12 @@
 // The kinds of scene that ray traversal by itself is compiled for.
 #pragma once
 
-#include "core/features.h"
+#include "models/features.h"
 
 namespace ambilux {
 
-/// Features as a type. Kernels take this one: the host code that nvcc makes for a kernel cannot name a struct that is a template argument itself.
+/// Features as a type. Kernels take this one: the host code that nvcc makes for a kernel cannot name a struct that is a
+/// template argument itself.
 template <Features F>
 struct FeatureSet {
     static constexpr Features value = F;
@@ -17,7 +18,8 @@ constexpr Features kMaskedTriangles = {0, 0, bit(PrimitiveType::triangle), true,
 
 constexpr Features kOpaqueShapes = {0, 0, kAllFeatures.primitives, false, false, false};
 
-/// f(FeatureSet) with the least of kOpaqueTriangles, kMaskedTriangles, kOpaqueShapes and kAllFeatures that tracing rays through a scene of `features` needs.
+/// f(FeatureSet) with the least of kOpaqueTriangles, kMaskedTriangles, kOpaqueShapes and kAllFeatures that tracing rays
+/// through a scene of `features` needs.
 template <class Function>
 auto with_traversal_features(const Features& features, Function f) {
     if (features.has_quadrics() && features.opacity) return f(FeatureSet<kAllFeatures>{});

@@ -88,8 +88,9 @@ int stages(const Options& o) {
     if (!o.json.empty()) write_json(o.json, stats_json(loaded.scene, settings, stats, loaded.seconds));
     if (o.json != "-") {
         const double all = double(stats.rays_extend) + double(stats.rays_occlude);
-        std::cout << fmt::format("{} on {} ({}), {}x{}, {} spp, {}rays/s\n\n", o.scene.path, stats.device, stats.accel, loaded.scene.sensor.crop_width,
-                                 loaded.scene.sensor.crop_height, position.samples, format_count(stats.render_seconds > 0 ? all / stats.render_seconds : 0))
+        std::cout << fmt::format("{} on {} ({}), {}x{}, {} spp, {}rays/s\n\n", o.scene.path, stats.device, stats.accel,
+                                 loaded.scene.sensor.crop_width, loaded.scene.sensor.crop_height, position.samples,
+                                 format_count(stats.render_seconds > 0 ? all / stats.render_seconds : 0))
                   << stage_table(stats);
     }
     return int(position.interrupted ? ExitCode::interrupted : ExitCode::done);
@@ -102,20 +103,31 @@ void add_bench(CLI::App& app, Run& run) {
     command.require_subcommand(1);
 
     auto r = std::make_shared<Options>();
-    CLI::App& rays_command = *command.add_subcommand("rays", "Ray traversal: primary, bounced and shadow rays of a scene");
+    CLI::App& rays_command =
+        *command.add_subcommand("rays", "Ray traversal: primary, bounced and shadow rays of a scene");
     r->scene.add_to(rays_command);
-    rays_command.add_option("--backend", r->backend, "auto, cpu, cuda, cuda-bvh2 (a binary BVH), cpu-cwbvh or cpu-bvh2 (the structures of cuda on the CPU)")->capture_default_str();
-    rays_command.add_option("--repetitions", r->repetitions, "Timed runs of each batch; the median counts")->capture_default_str();
+    rays_command
+        .add_option(
+            "--backend", r->backend,
+            "auto, cpu, cuda, cuda-bvh2 (a binary BVH), cpu-cwbvh or cpu-bvh2 (the structures of cuda on the CPU)")
+        ->capture_default_str();
+    rays_command.add_option("--repetitions", r->repetitions, "Timed runs of each batch; the median counts")
+        ->capture_default_str();
     rays_command.add_flag("--opaque", r->opaque, "Take surfaces of partial opacity as opaque");
     rays_command.add_option("--json", r->json, "Write the result to a file, or - for standard output");
     rays_command.callback([r, &run] { run = [r] { return rays(*r); }; });
 
     auto q = std::make_shared<Options>();
-    CLI::App& queues_command = *command.add_subcommand("queues", "Pushing to queues, compaction, going through them, and ordering a scene's first hits and rays");
+    CLI::App& queues_command = *command.add_subcommand(
+        "queues", "Pushing to queues, compaction, going through them, and ordering a scene's first hits and rays");
     q->scene.add_to(queues_command);
     queues_command.add_option("--backend", q->backend, "auto, cpu or cuda")->capture_default_str();
-    queues_command.add_option("--items", q->items, "Threads that look, and items that are ordered; 0: as many as suit the backend")->capture_default_str();
-    queues_command.add_option("--repetitions", q->repetitions, "Timed runs of each operation; the median counts")->capture_default_str();
+    queues_command
+        .add_option("--items", q->items,
+                    "Threads that look, and items that are ordered; 0: as many as suit the backend")
+        ->capture_default_str();
+    queues_command.add_option("--repetitions", q->repetitions, "Timed runs of each operation; the median counts")
+        ->capture_default_str();
     queues_command.add_option("--json", q->json, "Write the result to a file, or - for standard output");
     queues_command.callback([q, &run] { run = [q] { return queues(*q); }; });
 

@@ -36,11 +36,14 @@ int compare(const Options& o) {
     const bool known = !std::isnan(m.reference_noise);
     std::cout << fmt::format("RMSE    {:.6g}\n", m.rmse);
     if (known)
-        std::cout << fmt::format("        {:.6g} without the reference's own noise of {:.3g}\n", m.rmse_corrected, m.reference_noise);
+        std::cout << fmt::format("        {:.6g} without the reference's own noise of {:.3g}\n", m.rmse_corrected,
+                                 m.reference_noise);
     else
         std::cout << "        holds the reference's own noise, which its file does not state\n";
-    std::cout << fmt::format("relMSE  {:.6g}\n        {:.6g} without the worst {} % of the pixels\nMAPE    {:.6g}\nbias    {:+.6g} ({:+.3f} % of the mean), z = {:+.2f}\n",
-                             m.relmse, m.relmse_trimmed, 100 * kTrimmedShare, m.mape, m.bias, 100 * m.relative_bias, m.bias_z);
+    std::cout << fmt::format(
+        "relMSE  {:.6g}\n        {:.6g} without the worst {} % of the pixels\nMAPE    {:.6g}\nbias    {:+.6g} ({:+.3f} "
+        "% of the mean), z = {:+.2f}\n",
+        m.relmse, m.relmse_trimmed, 100 * kTrimmedShare, m.mape, m.bias, 100 * m.relative_bias, m.bias_z);
     if (m.non_finite) std::cout << fmt::format("{} values of the image are NaN or Inf\n", m.non_finite);
     return int(ExitCode::done);
 }
@@ -49,7 +52,8 @@ int compare(const Options& o) {
 
 void add_compare(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    CLI::App& command = *app.add_subcommand("compare", "Error of an image against a reference: RMSE, relMSE, MAPE, bias");
+    CLI::App& command =
+        *app.add_subcommand("compare", "Error of an image against a reference: RMSE, relMSE, MAPE, bias");
     command.add_option("IMAGE", o->image, "Image (EXR)")->required();
     command.add_option("REF", o->reference, "Reference (EXR), of the same size")->required();
     command.add_option("--json", o->json, "Write the figures to a file, or - for standard output");

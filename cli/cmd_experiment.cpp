@@ -17,10 +17,13 @@ void add_experiment(CLI::App& app, Run& run) {
     CLI::App& command = *app.add_subcommand("experiment", "Run an experiment and measure it against references");
     command.add_option("CONFIG", request->config, "Experiment configuration (TOML)")->required();
     command.add_option("-o,--output", request->output, "Folder for results");
-    command.add_option("--references", request->references, "Folder that keeps references between experiments. Default: OUTPUT/references");
+    command.add_option("--references", request->references,
+                       "Folder that keeps references between experiments. Default: OUTPUT/references");
     command.add_flag("--resume", request->resume, "Go on with the experiment that the folder holds");
-    command.add_flag("--reduced", request->reduced, "Smaller, as the section [reduced] of the configuration says: for a machine without a GPU");
-    command.add_flag("--dry-run", *dry, "Print what would be done, with an estimate of time and memory, and write nothing");
+    command.add_flag("--reduced", request->reduced,
+                     "Smaller, as the section [reduced] of the configuration says: for a machine without a GPU");
+    command.add_flag("--dry-run", *dry,
+                     "Print what would be done, with an estimate of time and memory, and write nothing");
     command.callback([request, dry, &run] {
         run = [request, dry] {
             request->interrupt = interrupt_flag();
@@ -28,7 +31,8 @@ void add_experiment(CLI::App& app, Run& run) {
                 std::cout << describe_plan(*request, default_hooks()) << std::flush;
                 return int(ExitCode::done);
             }
-            if (request->output.empty()) throw Error(ExitCode::usage, "experiment: -o FOLDER is needed, unless --dry-run is given");
+            if (request->output.empty())
+                throw Error(ExitCode::usage, "experiment: -o FOLDER is needed, unless --dry-run is given");
             const ExitCode code = run_experiment(*request, default_hooks());
             if (code == ExitCode::interrupted)
                 log_error("interrupted: all that was finished is saved; the same command with --resume goes on");

@@ -42,8 +42,14 @@ int info(const Options& o) {
     nlohmann::json json = scene_info(loaded.scene);
     // What this scene needs of the renderer is the renderer's own word.
     const RenderStats stats = make_renderer(loaded.scene, settings)->stats();
-    json["kernels"] = {{"integrator", settings.integrator}, {"variant", settings.variant},   {"backend", stats.backend}, {"device", stats.device},
-                       {"features", stats.features},        {"skipped", stats.skipped},      {"accel", stats.accel},     {"memory_bytes", stats.memory_bytes}};
+    json["kernels"] = {{"integrator", settings.integrator},
+                       {"variant", settings.variant},
+                       {"backend", stats.backend},
+                       {"device", stats.device},
+                       {"features", stats.features},
+                       {"skipped", stats.skipped},
+                       {"accel", stats.accel},
+                       {"memory_bytes", stats.memory_bytes}};
     json["seconds"] = {{"load", loaded.seconds}, {"build", stats.build_seconds}};
     if (!o.json.empty()) write_json(o.json, json);
     if (o.json != "-") print(json, 0);
@@ -54,7 +60,8 @@ int info(const Options& o) {
 
 void add_info(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    CLI::App& command = *app.add_subcommand("info", "What is in a scene; which kernels and stages it needs, which it skips");
+    CLI::App& command =
+        *app.add_subcommand("info", "What is in a scene; which kernels and stages it needs, which it skips");
     o->scene.add_to(command);
     o->render.add_to(command, false);
     command.add_option("--json", o->json, "Write it to a file, or - for standard output");

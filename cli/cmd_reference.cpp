@@ -29,7 +29,8 @@ int reference(const Options& o) {
     request.settings = o.render.settings(loaded.scene);
     const RenderSettings defaults;
     if (request.settings.integrator != defaults.integrator || request.settings.estimator != defaults.estimator)
-        throw Error(ExitCode::usage, "a reference is always made by integrator path, estimator mis: leave these settings out");
+        throw Error(ExitCode::usage,
+                    "a reference is always made by integrator path, estimator mis: leave these settings out");
     request.interrupt = interrupt_flag();
 
     ReferenceResult result;
@@ -61,15 +62,19 @@ int reference(const Options& o) {
         write_json(o.json, json);
     }
     if (result.interrupted) {
-        log_error(fmt::format("interrupted: {} holds {} of {} samples per pixel; the same command continues it", o.output, result.reference.samples, o.spp));
+        log_error(fmt::format("interrupted: {} holds {} of {} samples per pixel; the same command continues it",
+                              o.output, result.reference.samples, o.spp));
         return int(ExitCode::interrupted);
     }
     if (result.continued_from >= o.spp)
         log_info(fmt::format("{}: nothing to do, it holds {} samples per pixel", o.output, result.continued_from));
     else
-        log_info(fmt::format("{}: {} spp{}, standard error {:.3g} (root mean square)", o.output, result.reference.samples,
-                             result.continued_from ? fmt::format(", {} of them from before", result.continued_from) : "", noise));
-    if (result.stats.invalid.total()) log_warning(fmt::format("{} invalid values were dropped: see the statistics (--json)", result.stats.invalid.total()));
+        log_info(fmt::format(
+            "{}: {} spp{}, standard error {:.3g} (root mean square)", o.output, result.reference.samples,
+            result.continued_from ? fmt::format(", {} of them from before", result.continued_from) : "", noise));
+    if (result.stats.invalid.total())
+        log_warning(
+            fmt::format("{} invalid values were dropped: see the statistics (--json)", result.stats.invalid.total()));
     return int(ExitCode::done);
 }
 
@@ -77,7 +82,8 @@ int reference(const Options& o) {
 
 void add_reference(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    CLI::App& command = *app.add_subcommand("reference", "Ground truth with its standard error, by the path tracer; continues an existing file");
+    CLI::App& command = *app.add_subcommand(
+        "reference", "Ground truth with its standard error, by the path tracer; continues an existing file");
     o->scene.add_to(command);
     o->render.add_to(command, true);
     command.add_option("-o,--output", o->output, "Reference to write or to continue (EXR)")->required();

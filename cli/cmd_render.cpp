@@ -28,10 +28,12 @@ struct Options {
 };
 
 void check(const Options& o) {
-    if (o.spp && o.time) throw Error(ExitCode::usage, "--spp and --time exclude each other: a render ends by one of them");
+    if (o.spp && o.time)
+        throw Error(ExitCode::usage, "--spp and --time exclude each other: a render ends by one of them");
     if (o.spp && *o.spp == 0) throw Error(ExitCode::usage, "--spp 0: at least one sample per pixel is needed");
     if (o.time && !(*o.time > 0)) throw Error(ExitCode::usage, "--time: more than zero seconds are needed");
-    if (o.exposure && o.png.empty()) throw Error(ExitCode::usage, "--exposure changes only the PNG: give --png FILE as well");
+    if (o.exposure && o.png.empty())
+        throw Error(ExitCode::usage, "--exposure changes only the PNG: give --png FILE as well");
     check_writable(o.output);
     if (!o.png.empty()) check_writable(o.png);
     if (!o.json.empty() && o.json != "-") check_writable(o.json);
@@ -45,9 +47,12 @@ void check(const Options& o) {
 std::string objection(const RenderStats& stats) {
     std::string text;
     for (const auto& [stage, counts] : stats.invalid_by_stage)
-        if (counts.total()) text += fmt::format("stage {} dropped {} NaN, {} Inf, {} negative values; ", stage, counts.nan, counts.inf, counts.negative);
+        if (counts.total())
+            text += fmt::format("stage {} dropped {} NaN, {} Inf, {} negative values; ", stage, counts.nan, counts.inf,
+                                counts.negative);
     if (text.empty() && stats.invalid.total())
-        text += fmt::format("{} NaN, {} Inf, {} negative values were dropped; ", stats.invalid.nan, stats.invalid.inf, stats.invalid.negative);
+        text += fmt::format("{} NaN, {} Inf, {} negative values were dropped; ", stats.invalid.nan, stats.invalid.inf,
+                            stats.invalid.negative);
     for (const QueueStats& q : stats.queues)
         if (q.overflow) text += fmt::format("queue {} of capacity {} lost {} items; ", q.name, q.capacity, q.overflow);
     if (!text.empty()) text.resize(text.size() - 2);
@@ -72,12 +77,14 @@ int render(const Options& o) {
     // Choosing is part of the method: its time counts.
     if (const ChoiceStats choice = renderer->stats().choice; !choice.name.empty()) {
         position.seconds = choice.seconds;
-        log_info(fmt::format("bdpt.auto: {}, after {}. To repeat it: {}", choice.name, format_duration(choice.seconds), choice_line(choice)));
+        log_info(fmt::format("bdpt.auto: {}, after {}. To repeat it: {}", choice.name, format_duration(choice.seconds),
+                             choice_line(choice)));
     }
     {
         Progress progress("render");
         position = drive(*renderer, position, budget, interrupt_flag(), [&](const RenderPosition& p) {
-            const double fraction = budget.samples ? double(p.samples) / double(budget.samples) : p.seconds / budget.seconds;
+            const double fraction =
+                budget.samples ? double(p.samples) / double(budget.samples) : p.seconds / budget.seconds;
             progress.update(std::min(fraction, 1.0), progress_details(p.samples, p.seconds, renderer->stats()));
         });
     }
@@ -88,18 +95,21 @@ int render(const Options& o) {
         write_exr(o.output, image, image_attributes(loaded.scene, settings, stats));
         if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
     }
-    if (position.samples > 0 && !o.techniques.empty()) write_technique_images(o.techniques, loaded.scene, settings, stats, renderer->technique_images());
+    if (position.samples > 0 && !o.techniques.empty())
+        write_technique_images(o.techniques, loaded.scene, settings, stats, renderer->technique_images());
     if (!o.json.empty()) {
         nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
         json["interrupted"] = position.interrupted;
         write_json(o.json, json);
     }
     if (position.interrupted) {
-        log_error(position.samples ? fmt::format("interrupted: {} holds the {} samples per pixel that were finished", o.output, position.samples)
+        log_error(position.samples ? fmt::format("interrupted: {} holds the {} samples per pixel that were finished",
+                                                 o.output, position.samples)
                                    : "interrupted before the first sample was finished: nothing was saved");
         return int(ExitCode::interrupted);
     }
-    log_info(fmt::format("{}: {} spp in {}, {}", o.output, position.samples, format_duration(position.seconds), stats.device));
+    log_info(fmt::format("{}: {} spp in {}, {}", o.output, position.samples, format_duration(position.seconds),
+                         stats.device));
     const std::string text = objection(stats);
     if (text.empty()) return int(ExitCode::done);
     if (!o.strict) {
@@ -117,15 +127,23 @@ void add_render(CLI::App& app, Run& run) {
     o->scene.add_to(command);
     o->render.add_to(command, false);
     command.add_option("-o,--output", o->output, "Image to write (EXR)")->required();
-    CLI::Option* png = command.add_option("--png", o->png, "Write an sRGB PNG as well; without a FILE, beside the image")->expected(0, 1)->type_name("[FILE]");
+    CLI::Option* png =
+        command.add_option("--png", o->png, "Write an sRGB PNG as well; without a FILE, beside the image")
+            ->expected(0, 1)
+            ->type_name("[FILE]");
     command.add_option("--exposure", o->exposure, "Stops by which the PNG is brightened");
     command.add_option("--spp", o->spp, "Samples per pixel. Default: the scene's");
     command.add_option("--time", o->time, "Seconds of wall clock to render instead of --spp");
-    command.add_option("--technique-images", o->techniques, "Folder for raw and weighted images of every strategy (s,t) up to 6 segments, or --set technique_depth=N")->type_name("DIR");
+    command
+        .add_option(
+            "--technique-images", o->techniques,
+            "Folder for raw and weighted images of every strategy (s,t) up to 6 segments, or --set technique_depth=N")
+        ->type_name("DIR");
     command.add_flag("--strict", o->strict, "Fail (exit code 4) if invalid values or lost queue items were counted");
     command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
     command.callback([o, png, &run] {
-        if (png->count() > 0 && o->png.empty()) o->png = std::filesystem::path(o->output).replace_extension(".png").string();
+        if (png->count() > 0 && o->png.empty())
+            o->png = std::filesystem::path(o->output).replace_extension(".png").string();
         run = [o] { return render(*o); };
     });
 }

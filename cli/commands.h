@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "experiments/hooks.h"
+#include "formats/load.h"
 
 namespace ambilux {
 

@@ -9,21 +9,26 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "formats/load.h"
 
 namespace ambilux {
 
 std::pair<std::string, std::string> split_assignment(const std::string& text, const std::string& option) {
     const size_t at = text.find('=');
-    if (at == 0 || at == std::string::npos) throw Error(ExitCode::usage, fmt::format("{} {}: write it as {} NAME=VALUE", option, text, option));
+    if (at == 0 || at == std::string::npos)
+        throw Error(ExitCode::usage, fmt::format("{} {}: write it as {} NAME=VALUE", option, text, option));
     return {text.substr(0, at), text.substr(at + 1)};
 }
 
 void SceneOptions::add_to(CLI::App& command) {
     command.add_option("SCENE", path, "Mitsuba scene description (XML)")->required();
     command.add_option("--size", size, "Film size WxH instead of the scene's");
-    command.add_flag("--lenient", lenient, "Replace what is not known and list each substitution, instead of refusing the scene");
-    command.add_option("-D,--define", parameters, "Value NAME=VALUE of a $parameter of the scene")->allow_extra_args(false);
-    command.add_option("--light-picking", light_picking, "How light sampling chooses an emitter: power or uniform")->capture_default_str();
+    command.add_flag("--lenient", lenient,
+                     "Replace what is not known and list each substitution, instead of refusing the scene");
+    command.add_option("-D,--define", parameters, "Value NAME=VALUE of a $parameter of the scene")
+        ->allow_extra_args(false);
+    command.add_option("--light-picking", light_picking, "How light sampling chooses an emitter: power or uniform")
+        ->capture_default_str();
 }
 
 LoadOptions SceneOptions::load_options() const {
@@ -40,7 +45,8 @@ LoadOptions SceneOptions::load_options() const {
         const auto height = separated ? std::from_chars(width.ptr + 1, end, options.height) : width;
         if (!separated || height.ec != std::errc() || height.ptr != end || options.width == 0 || options.height == 0)
             throw Error(ExitCode::usage, fmt::format("--size {}: write it as WIDTHxHEIGHT, such as 640x360", size));
-        if (options.width > 65536 || options.height > 65536) throw Error(ExitCode::usage, fmt::format("--size {}: at most 65536 pixels a side", size));
+        if (options.width > 65536 || options.height > 65536)
+            throw Error(ExitCode::usage, fmt::format("--size {}: at most 65536 pixels a side", size));
     }
     for (const std::string& parameter : parameters) options.parameters.push_back(split_assignment(parameter, "-D"));
     return options;
@@ -51,11 +57,14 @@ void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
         command.add_option("-i,--integrator", integrator, "path, light or bdpt")->capture_default_str();
         command.add_option("--variant", variant, "Schedule of the same estimator")->capture_default_str();
     }
-    command.add_option("--backend", backend, "auto, cpu or cuda; auto takes a CUDA device if there is one")->capture_default_str();
+    command.add_option("--backend", backend, "auto, cpu or cuda; auto takes a CUDA device if there is one")
+        ->capture_default_str();
     command.add_option("--seed", seed, "Seed of all random numbers")->capture_default_str();
-    command.add_option("--max-depth", max_depth, "Longest path in segments (2: direct light); -1: no limit. Default: the scene's");
+    command.add_option("--max-depth", max_depth,
+                       "Longest path in segments (2: direct light); -1: no limit. Default: the scene's");
     command.add_flag("--deterministic", deterministic, "Same bits in every run on the same backend");
-    command.add_option("--set", set, "KEY=VALUE: any other setting, such as estimator=nee or rr_depth=-1")->allow_extra_args(false);
+    command.add_option("--set", set, "KEY=VALUE: any other setting, such as estimator=nee or rr_depth=-1")
+        ->allow_extra_args(false);
 }
 
 RenderSettings RenderOptions::settings(const Scene& scene) const {

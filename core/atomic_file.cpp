@@ -41,7 +41,8 @@ bool write_all(int fd, std::string_view bytes) {
 
 void write_file_atomic(const std::string& path, std::string_view bytes) {
     std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) throw Error(ExitCode::device, "cannot write " + path + ": it is a folder");
+    if (std::filesystem::is_directory(path, ignored))
+        throw Error(ExitCode::device, "cannot write " + path + ": it is a folder");
     const std::string temporary = temporary_name(path);
     const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (fd < 0) throw system_error(ExitCode::device, "cannot write", path);
@@ -103,7 +104,8 @@ void make_folders(const std::string& path) {
 
 void check_writable(const std::string& path) {
     std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) throw Error(ExitCode::device, "cannot write " + path + ": it is a folder");
+    if (std::filesystem::is_directory(path, ignored))
+        throw Error(ExitCode::device, "cannot write " + path + ": it is a folder");
     const std::string temporary = temporary_name(path);
     const int fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (fd < 0) throw system_error(ExitCode::device, "cannot write", path);

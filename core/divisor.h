@@ -9,7 +9,8 @@
 
 namespace ambilux {
 
-/// A number, and quotients by it with a multiplication (Granlund and Montgomery 1994, "Division by Invariant Integers using Multiplication", figure 4.1).
+/// A number, and quotients by it with a multiplication (Granlund and Montgomery 1994, "Division by Invariant Integers
+/// using Multiplication", figure 4.1).
 class Divisor {
 public:
     Divisor() = default;

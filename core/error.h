@@ -1,4 +1,5 @@
-// The one exception type of the project. What a user did wrong is an Error with an exit code; what we did wrong is an assert.
+// The one exception type of the project. What a user did wrong is an Error with an exit code; what we did wrong is an
+// assert.
 #pragma once
 
 #include <stdexcept>

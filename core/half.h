@@ -15,7 +15,8 @@ constexpr float kMaxHalf = 65504.0f;
 AMBILUX_HD float half_to_float(uint32_t h) {
     const uint32_t magnitude = (h & 0x7fffu) << 13;
     // Denormals: the bits as the fraction of a float from 2^-14 on, less 2^-14.
-    const float f = magnitude < (1u << 23) ? bits_float(magnitude + (113u << 23)) - 0x1p-14f : bits_float(magnitude + (112u << 23));
+    const float f =
+        magnitude < (1u << 23) ? bits_float(magnitude + (113u << 23)) - 0x1p-14f : bits_float(magnitude + (112u << 23));
     return bits_float(float_bits(f) | (h & 0x8000u) << 16);
 }
 
@@ -40,11 +41,16 @@ AMBILUX_HD Vec4f load_half4(const void* at) {
     memcpy(words, __builtin_assume_aligned(at, 8), 8);
 #if defined(__CUDA_ARCH__)
     Vec4f v;
-    asm("{ .reg .b16 lo, hi; mov.b32 {lo, hi}, %2; cvt.f32.f16 %0, lo; cvt.f32.f16 %1, hi; }" : "=f"(v.x), "=f"(v.y) : "r"(words[0]));
-    asm("{ .reg .b16 lo, hi; mov.b32 {lo, hi}, %2; cvt.f32.f16 %0, lo; cvt.f32.f16 %1, hi; }" : "=f"(v.z), "=f"(v.w) : "r"(words[1]));
+    asm("{ .reg .b16 lo, hi; mov.b32 {lo, hi}, %2; cvt.f32.f16 %0, lo; cvt.f32.f16 %1, hi; }"
+        : "=f"(v.x), "=f"(v.y)
+        : "r"(words[0]));
+    asm("{ .reg .b16 lo, hi; mov.b32 {lo, hi}, %2; cvt.f32.f16 %0, lo; cvt.f32.f16 %1, hi; }"
+        : "=f"(v.z), "=f"(v.w)
+        : "r"(words[1]));
     return v;
 #else
-    return {half_to_float(words[0] & 0xffffu), half_to_float(words[0] >> 16), half_to_float(words[1] & 0xffffu), half_to_float(words[1] >> 16)};
+    return {half_to_float(words[0] & 0xffffu), half_to_float(words[0] >> 16), half_to_float(words[1] & 0xffffu),
+            half_to_float(words[1] >> 16)};
 #endif
 #endif
 }

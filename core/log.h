@@ -1,4 +1,5 @@
-// Messages for the person at the terminal, on standard error. Results go to files or standard output, never through here.
+// Messages for the person at the terminal, on standard error. Results go to files or standard output, never through
+// here.
 #pragma once
 
 #include <string>
@@ -16,7 +17,8 @@ void log_warning(const std::string& message);
 /// One line, marked "error: "; always shown.
 void log_error(const std::string& message);
 
-/// Shows `line` in place of the previous status line; "" removes it. Only for terminals; messages move it out of their way.
+/// Shows `line` in place of the previous status line; "" removes it. Only for terminals; messages move it out of their
+/// way.
 void set_status_line(const std::string& line);
 
 }  // namespace ambilux

@@ -17,7 +17,8 @@ constexpr float kInfinity = __builtin_huge_valf();
 /// Largest float below 1.
 constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
 
-/// Correctly rounded on every backend. Elsewhere devices divide within 2 and take roots within 1 unit in the last place (cmake/compiler.cmake).
+/// Correctly rounded on every backend. Elsewhere devices divide within 2 and take roots within 1 unit in the last place
+/// (cmake/compiler.cmake).
 AMBILUX_HD float rounded_divide(float a, float b) {
 #if defined(__CUDA_ARCH__)
     return __fdiv_rn(a, b);
@@ -110,12 +111,18 @@ struct Affine {
     }
 };
 
-/// How far from `p` rays must begin along the normal `ng` of its surface: the absolute error bound `p_error` of each coordinate of `p` (PBRT 4th ed., 6.8.6) and what the sum may be rounded,
-/// instead of stepping to the next float afterwards.
+/// How far from `p` rays must begin along the normal `ng` of its surface: the absolute error bound `p_error` of each
+/// coordinate of `p` (PBRT 4th ed., 6.8.6) and what the sum may be rounded, instead of stepping to the next float
+/// afterwards.
 AMBILUX_HD float ray_offset(Vec3f p, Vec3f p_error, Vec3f ng) { return dot(abs(ng), p_error + abs(p) * 0x1p-23f); }
 
-/// Moves `p` off the surface with normal `ng` to the side of `w`, by `offset` (ray_offset). `ng` need not point to that side.
-AMBILUX_HD Vec3f offset_ray_origin(Vec3f p, float offset, Vec3f ng, Vec3f w) { return p + ng * (dot(w, ng) < 0.0f ? -offset : offset); }
-AMBILUX_HD Vec3f offset_ray_origin(Vec3f p, Vec3f p_error, Vec3f ng, Vec3f w) { return offset_ray_origin(p, ray_offset(p, p_error, ng), ng, w); }
+/// Moves `p` off the surface with normal `ng` to the side of `w`, by `offset` (ray_offset). `ng` need not point to that
+/// side.
+AMBILUX_HD Vec3f offset_ray_origin(Vec3f p, float offset, Vec3f ng, Vec3f w) {
+    return p + ng * (dot(w, ng) < 0.0f ? -offset : offset);
+}
+AMBILUX_HD Vec3f offset_ray_origin(Vec3f p, Vec3f p_error, Vec3f ng, Vec3f w) {
+    return offset_ray_origin(p, ray_offset(p, p_error, ng), ng, w);
+}
 
 }  // namespace ambilux

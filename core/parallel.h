@@ -16,8 +16,9 @@
 namespace ambilux {
 namespace detail {
 
-/// What happened before `happened(a)` happened before what follows a later `happens_after(a)`. TBB guarantees it where these are called, but the thread
-/// sanitizer does not see that, for the distribution's library is not built with it. Nothing without the sanitizer.
+/// What happened before `happened(a)` happened before what follows a later `happens_after(a)`. TBB guarantees it where
+/// these are called, but the thread sanitizer does not see that, for the distribution's library is not built with it.
+/// Nothing without the sanitizer.
 inline void happened([[maybe_unused]] void* address) {
 #if defined(__SANITIZE_THREAD__)
     __tsan_release(address);
@@ -29,7 +30,8 @@ inline void happens_after([[maybe_unused]] void* address) {
 #endif
 }
 
-/// Number that tasks which run at the same time in one arena do not share; beyond the table some do, which can only hide races.
+/// Number that tasks which run at the same time in one arena do not share; beyond the table some do, which can only
+/// hide races.
 inline std::array<char, 256> task_slots;
 
 /// One task of a loop, from its construction to its end by return or exception.
@@ -49,8 +51,9 @@ struct TaskScope {
 
 }  // namespace detail
 
-/// Calls f(i) for 0 <= i < count on all threads of the current arena and returns when all calls have ended. `grain`: the least number of iterations that
-/// are worth a task of their own. An exception from f ends the loop early and is thrown on.
+/// Calls f(i) for 0 <= i < count on all threads of the current arena and returns when all calls have ended. `grain`:
+/// the least number of iterations that are worth a task of their own. An exception from f ends the loop early and is
+/// thrown on.
 template <class Index, class Function>
 void parallel_for(Index count, Function&& f, Index grain = 1) {
     char begin = 0, end = 0;

@@ -28,7 +28,8 @@ std::string format_count(double value) {
 bool Progress::stderr_is_terminal() { return ::isatty(STDERR_FILENO) != 0; }
 
 Progress::Progress(std::string label, bool terminal, double plain_interval)
-    : label_(std::move(label)), terminal_(terminal), plain_interval_(plain_interval), start_(Clock::now()), last_(start_) {}
+    : label_(std::move(label)), terminal_(terminal), plain_interval_(plain_interval), start_(Clock::now()),
+      last_(start_) {}
 
 void Progress::update(double fraction, const std::string& details, double seconds_left) {
     if (is_quiet()) return;

@@ -1,4 +1,5 @@
-// Progress of long work: a line that renews itself on a terminal, a plain line now and then elsewhere, nothing when quiet.
+// Progress of long work: a line that renews itself on a terminal, a plain line now and then elsewhere, nothing when
+// quiet.
 #pragma once
 
 #include <chrono>
@@ -13,13 +14,15 @@ std::string format_count(double value);
 
 class Progress {
 public:
-    /// `terminal`: whether standard error is one; pass explicitly in tests only. `plain_interval`: seconds between plain lines.
+    /// `terminal`: whether standard error is one; pass explicitly in tests only. `plain_interval`: seconds between
+    /// plain lines.
     explicit Progress(std::string label, bool terminal = stderr_is_terminal(), double plain_interval = 10.0);
     ~Progress() { finish(); }
     Progress(const Progress&) = delete;
     Progress& operator=(const Progress&) = delete;
 
-    /// `fraction` done in [0,1]; `details` such as "64 spp, 12 Mrays/s"; seconds left, or negative to compute it from the fraction.
+    /// `fraction` done in [0,1]; `details` such as "64 spp, 12 Mrays/s"; seconds left, or negative to compute it from
+    /// the fraction.
     void update(double fraction, const std::string& details, double seconds_left = -1);
     /// Removes the line from a terminal.
     void finish();

@@ -27,7 +27,8 @@ AMBILUX_HD uint32_t mul_hi(uint32_t a, uint32_t b) { return uint32_t((uint64_t(a
 AMBILUX_HD Uint4 philox4x32(Uint4 c, uint32_t k0, uint32_t k1) {
     for (int round = 0; round < 7; ++round) {
         const uint64_t product0 = uint64_t(0xD2511F53u) * c.x, product1 = uint64_t(0xCD9E8D57u) * c.z;
-        c = {uint32_t(product1 >> 32) ^ c.y ^ k0, uint32_t(product1), uint32_t(product0 >> 32) ^ c.w ^ k1, uint32_t(product0)};
+        c = {uint32_t(product1 >> 32) ^ c.y ^ k0, uint32_t(product1), uint32_t(product0 >> 32) ^ c.w ^ k1,
+             uint32_t(product0)};
         k0 += 0x9E3779B9u;
         k1 += 0xBB67AE85u;
     }
@@ -39,7 +40,8 @@ AMBILUX_HD float uniform_float(uint32_t bits) { return float(bits >> 8) * 0x1p-2
 
 /// Four uniform 32-bit words for `block` of the sequence.
 AMBILUX_HD Uint4 random_bits(const RngKey& key, uint32_t block) {
-    return philox4x32({key.index, key.sample, block, uint32_t(key.stream)}, uint32_t(key.seed), uint32_t(key.seed >> 32));
+    return philox4x32({key.index, key.sample, block, uint32_t(key.stream)}, uint32_t(key.seed),
+                      uint32_t(key.seed >> 32));
 }
 
 /// Four uniform floats in [0,1) for `block` of the sequence.
@@ -48,8 +50,8 @@ AMBILUX_HD Vec4f random_floats(const RngKey& key, uint32_t block) {
     return {uniform_float(b.x), uniform_float(b.y), uniform_float(b.z), uniform_float(b.w)};
 }
 
-/// One uniform float in [0,1) from two words; a cheap hash (Jarzynski and Olano 2020, pcg2d) for decisions that belong to a
-/// (ray, primitive) pair and must not depend on the order in which primitives are visited.
+/// One uniform float in [0,1) from two words; a cheap hash (Jarzynski and Olano 2020, pcg2d) for decisions that belong
+/// to a (ray, primitive) pair and must not depend on the order in which primitives are visited.
 AMBILUX_HD float hash_float(uint32_t a, uint32_t b) {
     uint32_t x = a * 1664525u + 1013904223u, y = b * 1664525u + 1013904223u;
     x += y * 1664525u;
@@ -62,9 +64,11 @@ AMBILUX_HD float hash_float(uint32_t a, uint32_t b) {
     return uniform_float(y ^ y >> 16);
 }
 
-/// One word from four, by a hash that is a quarter of the work of philox4x32 (the same, pcg4d): for seeds of hash_float, one per ray.
+/// One word from four, by a hash that is a quarter of the work of philox4x32 (the same, pcg4d): for seeds of
+/// hash_float, one per ray.
 AMBILUX_HD uint32_t hash_word(Uint4 v) {
-    v = {v.x * 1664525u + 1013904223u, v.y * 1664525u + 1013904223u, v.z * 1664525u + 1013904223u, v.w * 1664525u + 1013904223u};
+    v = {v.x * 1664525u + 1013904223u, v.y * 1664525u + 1013904223u, v.z * 1664525u + 1013904223u,
+         v.w * 1664525u + 1013904223u};
     for (int round = 0; round < 2; ++round) {
         v.x += v.y * v.w;
         v.y += v.z * v.x;

@@ -5,7 +5,8 @@
 
 namespace ambilux {
 
-/// Sine and cosine of x in [-pi/4, pi/4] by their series, which are below rounding after these terms. A general sinf has to reduce its argument first.
+/// Sine and cosine of x in [-pi/4, pi/4] by their series, which are below rounding after these terms. A general sinf
+/// has to reduce its argument first.
 AMBILUX_HD void sin_cos_octant(float x, float& sine, float& cosine) {
     const float x2 = x * x;
     sine = x + x * x2 * (-1.0f / 6 + x2 * (1.0f / 120 + x2 * (-1.0f / 5040 + x2 * (1.0f / 362880))));

@@ -18,9 +18,24 @@ struct Vec3f {
 
     AMBILUX_HD float operator[](int i) const { return i == 0 ? x : (i == 1 ? y : z); }
     AMBILUX_HD float& operator[](int i) { return i == 0 ? x : (i == 1 ? y : z); }
-    AMBILUX_HD Vec3f& operator+=(Vec3f b) { x += b.x; y += b.y; z += b.z; return *this; }
-    AMBILUX_HD Vec3f& operator*=(Vec3f b) { x *= b.x; y *= b.y; z *= b.z; return *this; }
-    AMBILUX_HD Vec3f& operator*=(float s) { x *= s; y *= s; z *= s; return *this; }
+    AMBILUX_HD Vec3f& operator+=(Vec3f b) {
+        x += b.x;
+        y += b.y;
+        z += b.z;
+        return *this;
+    }
+    AMBILUX_HD Vec3f& operator*=(Vec3f b) {
+        x *= b.x;
+        y *= b.y;
+        z *= b.z;
+        return *this;
+    }
+    AMBILUX_HD Vec3f& operator*=(float s) {
+        x *= s;
+        y *= s;
+        z *= s;
+        return *this;
+    }
 };
 
 struct Vec4f {
@@ -59,7 +74,8 @@ AMBILUX_HD float inverse_sqrt(float x) {
 #endif
 }
 AMBILUX_HD Vec3f normalize(Vec3f a) { return a * inverse_sqrt(length_squared(a)); }
-/// The smaller and the larger of two; of a number and a NaN the number. As fminf and fmaxf, which are one instruction on a device but calls of a library on the host.
+/// The smaller and the larger of two; of a number and a NaN the number. As fminf and fmaxf, which are one instruction
+/// on a device but calls of a library on the host.
 #if defined(__CUDA_ARCH__)
 AMBILUX_HD float min(float a, float b) { return fminf(a, b); }
 AMBILUX_HD float max(float a, float b) { return fmaxf(a, b); }
@@ -70,10 +86,14 @@ AMBILUX_HD float max(float a, float b) { return a > b || b != b ? a : b; }
 /// Of other types, exactly: without these, numbers of 32 bits would be converted to floats, which keep 24.
 template <class T>
     requires std::is_arithmetic_v<T>
-AMBILUX_HD T min(T a, T b) { return b < a ? b : a; }
+AMBILUX_HD T min(T a, T b) {
+    return b < a ? b : a;
+}
 template <class T>
     requires std::is_arithmetic_v<T>
-AMBILUX_HD T max(T a, T b) { return a < b ? b : a; }
+AMBILUX_HD T max(T a, T b) {
+    return a < b ? b : a;
+}
 template <class A, class B>
     requires(std::is_arithmetic_v<A> && std::is_arithmetic_v<B> && !std::is_same_v<A, B>)
 void min(A, B) = delete;

@@ -7,7 +7,8 @@
 
 namespace ambilux {
 
-/// On a device the lanes of a warp that are active where this is made; on the host the calling thread alone. All of them must make the same calls.
+/// On a device the lanes of a warp that are active where this is made; on the host the calling thread alone. All of
+/// them must make the same calls.
 struct Warp {
 #if defined(__CUDA_ARCH__)
     uint32_t lanes = __activemask();

@@ -20,7 +20,8 @@ using Names = std::set<std::string>;
 /// Adds a setting of a run, unless it belongs elsewhere.
 void add_setting(const Reader& r, RunEntry& run, const std::string& key, const toml::node& value) {
     if (key == "seed" || key == "max_depth")
-        throw r.error(value, fmt::format("'{}' belongs to the experiment (seeds) or to a scene (max_depth), not to a run", key));
+        throw r.error(
+            value, fmt::format("'{}' belongs to the experiment (seeds) or to a scene (max_depth), not to a run", key));
     if (key == "technique_depth") throw r.error(value, "'technique_depth' is the key 'techniques' of a run");
     for (const auto& [taken, text] : run.settings)
         if (taken == key) throw r.error(value, fmt::format("'{}' of run '{}' is set twice", key, run.name));
@@ -37,7 +38,8 @@ void add_settings(const Reader& r, RunEntry& run, const toml::table& t) {
 }
 
 /// The ground truth: `t` over `inherited`.
-ReferenceEntry read_reference(const Reader& r, const toml::table& t, const std::string& where, ReferenceEntry inherited) {
+ReferenceEntry read_reference(const Reader& r, const toml::table& t, const std::string& where,
+                              ReferenceEntry inherited) {
     if (const toml::node* spp = t.get("spp")) inherited.spp = uint64_t(r.integer(*spp, "spp", 2, kMaxSpp));
     if (!t.get("integrator") && !t.get("variant") && !t.get("set")) return inherited;
     ReferenceEntry reference{inherited.spp, {}};
@@ -46,12 +48,15 @@ ReferenceEntry read_reference(const Reader& r, const toml::table& t, const std::
     const std::string integrator = r.text(r.need(t, "integrator", where), "integrator");
     // Light tracing does not see what mirrors show to the camera: it is no ground truth.
     if (integrator != "path" && integrator != "bdpt")
-        throw r.error(*t.get("integrator"), fmt::format("integrator '{}': a reference is made by path or bdpt, which find all light", integrator));
+        throw r.error(
+            *t.get("integrator"),
+            fmt::format("integrator '{}': a reference is made by path or bdpt, which find all light", integrator));
     add_settings(r, reference.how, t);
     for (size_t i = 0; i < reference.how.settings.size(); ++i)
         for (const char* key : {"estimator", "strategies", "bdpt.auto"})
             if (reference.how.settings[i].first == key)
-                throw input_error(r.file, reference.how.lines[i], fmt::format("'{}' in {}: a reference uses all that its integrator has", key, where));
+                throw input_error(r.file, reference.how.lines[i],
+                                  fmt::format("'{}' in {}: a reference uses all that its integrator has", key, where));
     return reference;
 }
 
@@ -61,8 +66,10 @@ struct Reduction {
     uint64_t reference_spp = 0;  ///< of all scenes; 0: as it is
 };
 
-std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const ReferenceEntry& reference, const Reduction& reduction, Names& names) {
-    r.check_keys(t, "[[scene]]", {"name", "path", "size", "max_depth", "reference_spp", "reference", "lenient", "parameters", "sweep"});
+std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const ReferenceEntry& reference,
+                                   const Reduction& reduction, Names& names) {
+    r.check_keys(t, "[[scene]]",
+                 {"name", "path", "size", "max_depth", "reference_spp", "reference", "lenient", "parameters", "sweep"});
     SceneEntry scene;
     scene.line = Reader::line_of(t);
     scene.name = scene.base = r.name(t, "[[scene]]");
@@ -73,11 +80,15 @@ std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const 
     const std::string data = "$AMBILUX_DATA";
     if (file.starts_with(data + "/")) {
         const char* place = std::getenv("AMBILUX_DATA");
-        if (!place || !*place) throw r.error(path, fmt::format("scene '{}': the environment variable AMBILUX_DATA is not set; it names the folder of the published scenes (README)", scene.name));
+        if (!place || !*place)
+            throw r.error(path, fmt::format("scene '{}': the environment variable AMBILUX_DATA is not set; it names "
+                                            "the folder of the published scenes (README)",
+                                            scene.name));
         file = fs::absolute(place).string() + file.substr(data.size());
     }
     scene.path = (folder / file).lexically_normal().string();
-    if (!fs::is_regular_file(scene.path)) throw r.error(path, fmt::format("scene '{}': there is no file {}", scene.name, scene.path));
+    if (!fs::is_regular_file(scene.path))
+        throw r.error(path, fmt::format("scene '{}': there is no file {}", scene.name, scene.path));
     const auto set = [&r, &reduction](SceneEntry& entry, const std::string& key, const toml::node& value) {
         if (key == "max_depth") {
             entry.max_depth = int(r.integer(value, key, -1, 1 << 20));
@@ -85,7 +96,9 @@ std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const 
         }
         const toml::array& a = r.array(value, key);
         if (a.size() != 2) throw r.error(value, "'size' must be [width, height]");
-        const auto pixels = [&](const toml::node& node) { return uint32_t(std::max(1.0, std::round(reduction.scale * double(r.integer(node, key, 1, 65536))))); };
+        const auto pixels = [&](const toml::node& node) {
+            return uint32_t(std::max(1.0, std::round(reduction.scale * double(r.integer(node, key, 1, 65536)))));
+        };
         entry.width = pixels(a[0]);
         entry.height = pixels(a[1]);
         return fmt::format("{}x{}", entry.width, entry.height);
@@ -93,7 +106,8 @@ std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const 
     for (const char* key : {"size", "max_depth"})
         if (const toml::node* value = t.get(key)) set(scene, key, *value);
     const bool sized = t.contains("size") || t.at_path("sweep.size");
-    if (reduction.scale != 1 && !sized) throw r.error(t, fmt::format("scene '{}': 'scale' of [reduced] needs a 'size' here", scene.name));
+    if (reduction.scale != 1 && !sized)
+        throw r.error(t, fmt::format("scene '{}': 'scale' of [reduced] needs a 'size' here", scene.name));
     scene.reference = reference;
     if (const toml::node* own = t.get("reference")) {
         const toml::table& table = r.table(*own, "reference");
@@ -101,13 +115,15 @@ std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const 
         scene.reference = read_reference(r, table, "'reference' of [[scene]]", reference);
     }
     if (const toml::node* spp = t.get("reference_spp")) {
-        if (t.at_path("reference.spp")) throw r.error(*spp, "'reference_spp' and 'reference.spp' say the same: leave one out");
+        if (t.at_path("reference.spp"))
+            throw r.error(*spp, "'reference_spp' and 'reference.spp' say the same: leave one out");
         scene.reference.spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
     }
     if (reduction.reference_spp) scene.reference.spp = reduction.reference_spp;
     if (const toml::node* lenient = t.get("lenient")) scene.lenient = r.flag(*lenient, "lenient");
     if (const toml::node* parameters = t.get("parameters"))
-        for (const auto& [key, value] : r.table(*parameters, "parameters")) scene.parameters.emplace_back(std::string(key.str()), r.plain(value, key.str()));
+        for (const auto& [key, value] : r.table(*parameters, "parameters"))
+            scene.parameters.emplace_back(std::string(key.str()), r.plain(value, key.str()));
 
     std::vector<SceneEntry> scenes;
     const toml::node* sweep = t.get("sweep");
@@ -116,11 +132,13 @@ std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const 
     } else {
         r.check_keys(r.table(*sweep, "sweep"), "'sweep' of [[scene]]", {"size", "max_depth"});
         for (const char* key : {"size", "max_depth"})
-            if (t.get(key) && sweep->as_table()->get(key)) throw r.error(*sweep, fmt::format("'{}' is set and in 'sweep': leave one out", key));
-        const Sweep lists = read_sweep(r, *sweep, "'sweep' of [[scene]]", [&](const std::string& key, const toml::node& value) {
-            SceneEntry ignored;
-            return set(ignored, key, value);
-        });
+            if (t.get(key) && sweep->as_table()->get(key))
+                throw r.error(*sweep, fmt::format("'{}' is set and in 'sweep': leave one out", key));
+        const Sweep lists =
+            read_sweep(r, *sweep, "'sweep' of [[scene]]", [&](const std::string& key, const toml::node& value) {
+                SceneEntry ignored;
+                return set(ignored, key, value);
+            });
         for (const auto& values : combinations(lists)) {
             scenes.push_back(scene);
             scenes.back().name = swept_name(scene.base, values);
@@ -145,7 +163,9 @@ RunEntry swept(const Reader& r, RunEntry run, const std::vector<SweepValue>& val
         add_setting(r, run, value.key, *value.node);
     }
     if (run.name.size() > Reader::kMaxName)
-        throw r.error(*values[0].node, fmt::format("the name '{}' is longer than {} characters: sweep fewer keys at once", run.name, Reader::kMaxName));
+        throw r.error(*values[0].node,
+                      fmt::format("the name '{}' is longer than {} characters: sweep fewer keys at once", run.name,
+                                  Reader::kMaxName));
     return run;
 }
 
@@ -170,7 +190,9 @@ std::vector<RunEntry> read_run(const Reader& r, const toml::table& t, Names& nam
         for (const auto& values : combinations(read_sweep(r, *sweep, "'sweep'", text))) {
             for (const SweepValue& value : values)
                 for (const auto& [key, ignored] : run.settings)
-                    if (key == value.key) throw r.error(*value.node, fmt::format("'{}' of run '{}' is set and in 'sweep': leave one out", key, run.name));
+                    if (key == value.key)
+                        throw r.error(*value.node, fmt::format("'{}' of run '{}' is set and in 'sweep': leave one out",
+                                                               key, run.name));
             runs.push_back(swept(r, run, values));
         }
     }
@@ -183,21 +205,26 @@ void read_ablation(const Reader& r, const toml::table& t, ExperimentConfig& conf
     r.check_keys(t, "[ablation]", {"default", "switches"});
     const toml::node& node = r.need(t, "default", "[ablation]");
     config.ablation_default = r.text(node, "default");
-    const auto found = std::find_if(config.runs.begin(), config.runs.end(), [&](const RunEntry& run) { return run.name == config.ablation_default; });
+    const auto found = std::find_if(config.runs.begin(), config.runs.end(),
+                                    [&](const RunEntry& run) { return run.name == config.ablation_default; });
     if (found == config.runs.end()) {
         std::vector<std::string> known;
         for (const RunEntry& run : config.runs) known.push_back(run.name);
-        throw r.error(node, fmt::format("[ablation] default '{}' is no run; runs are: {}", config.ablation_default, fmt::join(known, ", ")));
+        throw r.error(node, fmt::format("[ablation] default '{}' is no run; runs are: {}", config.ablation_default,
+                                        fmt::join(known, ", ")));
     }
     const toml::node* switches = t.get("switches");
     if (!switches) return;
     const RunEntry base = *found;
-    if (!base.swept.empty()) throw r.error(*switches, fmt::format("'switches' change a run of its own, and '{}' comes from a sweep", base.name));
+    if (!base.swept.empty())
+        throw r.error(*switches,
+                      fmt::format("'switches' change a run of its own, and '{}' comes from a sweep", base.name));
     const auto text = [&](const std::string& key, const toml::node& value) { return r.plain(value, key); };
     for (const auto& values : one_at_a_time(read_sweep(r, *switches, "'switches'", text))) {
         for (const auto& [key, value] : base.settings)
             if (key == values[0].key && value == values[0].text)
-                throw r.error(*values[0].node, fmt::format("{}={} is what the default run has: leave it out", key, value));
+                throw r.error(*values[0].node,
+                              fmt::format("{}={} is what the default run has: leave it out", key, value));
         config.runs.push_back(swept(r, base, values));
         r.claim(*values[0].node, config.runs.back().name, "[[run]]", names);
     }
@@ -223,14 +250,17 @@ void read_budget(const Reader& r, const toml::table& t, ExperimentConfig& config
     if (spp)
         for (const toml::node& node : r.array(*spp, "spp")) {
             const auto value = uint64_t(r.integer(node, "spp", 1, kMaxSpp));
-            if (!config.spp.empty() && value <= config.spp.back()) throw r.error(node, fmt::format("'spp' must rise; {} does not", value));
+            if (!config.spp.empty() && value <= config.spp.back())
+                throw r.error(node, fmt::format("'spp' must rise; {} does not", value));
             config.spp.push_back(value);
         }
     if (seconds)
         for (const toml::node& node : r.array(*seconds, "seconds")) {
             const auto value = node.value<double>();
-            if (!node.is_number() || !value || !(*value > 0) || !std::isfinite(*value)) throw r.error(node, "'seconds' must be positive numbers");
-            if (!config.seconds.empty() && *value <= config.seconds.back()) throw r.error(node, fmt::format("'seconds' must rise; {} does not", *value));
+            if (!node.is_number() || !value || !(*value > 0) || !std::isfinite(*value))
+                throw r.error(node, "'seconds' must be positive numbers");
+            if (!config.seconds.empty() && *value <= config.seconds.back())
+                throw r.error(node, fmt::format("'seconds' must rise; {} does not", *value));
             config.seconds.push_back(*value);
         }
 }
@@ -253,7 +283,8 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
         throw input_error(path, int(e.source().begin.line), std::string(e.description()));
     }
     const Reader r{path};
-    r.check_keys(root, "the configuration", {"name", "backend", "seeds", "reference", "budget", "scene", "run", "ablation", "reduced"});
+    r.check_keys(root, "the configuration",
+                 {"name", "backend", "seeds", "reference", "budget", "scene", "run", "ablation", "reduced"});
     const auto need = [&](std::string_view key) -> const toml::node& {
         if (const toml::node* node = root.get(key)) return *node;
         throw input_error(path, 0, fmt::format("lacks the key '{}'", key));
@@ -261,7 +292,8 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     ExperimentConfig config;
     config.file = path;
     Names scene_names, run_names;
-    config.name = root.contains("name") ? r.name(root, "the configuration") : std::filesystem::path(path).stem().string();
+    config.name =
+        root.contains("name") ? r.name(root, "the configuration") : std::filesystem::path(path).stem().string();
     if (const toml::node* backend = root.get("backend")) {
         config.backend = r.text(*backend, "backend");
         if (config.backend != "auto" && config.backend != "cpu" && config.backend != "cuda")
@@ -272,7 +304,8 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     r.check_keys(reference, "[reference]", {"spp", "seed", "integrator", "variant", "set"});
     r.need(reference, "spp", "[reference]");
     const ReferenceEntry general = read_reference(r, reference, "[reference]", {});
-    if (const toml::node* seed = reference.get("seed")) config.reference_seed = uint64_t(r.integer(*seed, "seed", 0, INT64_MAX));
+    if (const toml::node* seed = reference.get("seed"))
+        config.reference_seed = uint64_t(r.integer(*seed, "seed", 0, INT64_MAX));
     const toml::table& budget = r.table(need("budget"), "budget");
     r.check_keys(budget, "[budget]", {"spp", "seconds"});
     if (!budget.get("spp") && !budget.get("seconds")) throw r.error(budget, "[budget] needs 'spp', 'seconds' or both");
@@ -285,10 +318,12 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
         r.check_keys(t, "[reduced]", {"scale", "reference_spp", "seeds", "spp", "seconds"});
         if (const toml::node* scale = t.get("scale")) {
             const auto value = scale->value<double>();
-            if (!scale->is_number() || !value || !(*value > 0) || !(*value <= 1)) throw r.error(*scale, "'scale' must be a number above 0, up to 1");
+            if (!scale->is_number() || !value || !(*value > 0) || !(*value <= 1))
+                throw r.error(*scale, "'scale' must be a number above 0, up to 1");
             reduction.scale = *value;
         }
-        if (const toml::node* spp = t.get("reference_spp")) reduction.reference_spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
+        if (const toml::node* spp = t.get("reference_spp"))
+            reduction.reference_spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
         if (const toml::node* seeds = t.get("seeds")) read_seeds(r, *seeds, small);
         read_budget(r, t, small);
         if (reduced) config = small;
@@ -298,10 +333,12 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     }
     if (!reduced) reduction = {};
     for (const toml::node& node : r.array(need("scene"), "scene"))
-        for (SceneEntry& scene : read_scene(r, r.table(node, "scene"), general, reduction, scene_names)) config.scenes.push_back(std::move(scene));
+        for (SceneEntry& scene : read_scene(r, r.table(node, "scene"), general, reduction, scene_names))
+            config.scenes.push_back(std::move(scene));
     for (const toml::node& node : r.array(need("run"), "run"))
         for (RunEntry& run : read_run(r, r.table(node, "run"), run_names)) config.runs.push_back(std::move(run));
-    if (const toml::node* ablation = root.get("ablation")) read_ablation(r, r.table(*ablation, "ablation"), config, run_names);
+    if (const toml::node* ablation = root.get("ablation"))
+        read_ablation(r, r.table(*ablation, "ablation"), config, run_names);
     return config;
 }
 
@@ -313,7 +350,8 @@ std::string resolved_toml(const ExperimentConfig& config) {
     };
     const auto insert_settings = [](toml::table& t, const RunEntry& run) {
         toml::table set;
-        for (const auto& [key, value] : run.settings) (key == "integrator" || key == "variant" || key == "estimator" ? t : set).insert_or_assign(key, value);
+        for (const auto& [key, value] : run.settings)
+            (key == "integrator" || key == "variant" || key == "estimator" ? t : set).insert_or_assign(key, value);
         if (!set.empty()) t.insert("set", set);
     };
     toml::table root;
@@ -323,7 +361,8 @@ std::string resolved_toml(const ExperimentConfig& config) {
     for (const uint64_t seed : config.seeds) seeds.push_back(int64_t(seed));
     root.insert("seeds", seeds);
     // What a scene replaces of this stands with the scene, so that all scenes state theirs in full.
-    root.insert("reference", toml::table{{"spp", int64_t(config.scenes[0].reference.spp)}, {"seed", int64_t(config.reference_seed)}});
+    root.insert("reference", toml::table{{"spp", int64_t(config.scenes[0].reference.spp)},
+                                         {"seed", int64_t(config.reference_seed)}});
     for (const uint64_t samples : config.spp) spp.push_back(int64_t(samples));
     for (const double time : config.seconds) seconds.push_back(time);
     toml::table budget;

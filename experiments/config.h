@@ -13,13 +13,13 @@ using Settings = std::vector<std::pair<std::string, std::string>>;
 
 /// One way to render.
 struct RunEntry {
-    std::string name;         ///< of a sweep's run: "lvc[connections=4]"
-    Settings settings;        ///< for apply_setting, in order
-    std::vector<int> lines;   ///< of each setting
+    std::string name;        ///< of a sweep's run: "lvc[connections=4]"
+    Settings settings;       ///< for apply_setting, in order
+    std::vector<int> lines;  ///< of each setting
     int line = 0;
-    std::string base;         ///< of a sweep's run: the name before the bracket; else the name
-    Settings swept;           ///< what the bracket says
-    int techniques = 0;       ///< longest paths whose single strategies get images; 0: none
+    std::string base;    ///< of a sweep's run: the name before the bracket; else the name
+    Settings swept;      ///< what the bracket says
+    int techniques = 0;  ///< longest paths whose single strategies get images; 0: none
     int techniques_line = 0;
 };
 
@@ -33,7 +33,7 @@ struct ReferenceEntry {
 struct SceneEntry {
     std::string name;  ///< also the name of its folders; of a sweep's scene: "cornell[max_depth=4]"
     std::string base;
-    std::string path;  ///< absolute
+    std::string path;                ///< absolute
     uint32_t width = 0, height = 0;  ///< 0: the scene's own
     std::optional<int> max_depth;    ///< none: the scene's own
     ReferenceEntry reference;        ///< the experiment's, or what the scene replaces of it
@@ -42,7 +42,8 @@ struct SceneEntry {
     int line = 0;
 };
 
-/// Where renders are measured. Each checkpoint is a number of samples or a time; a render passes through all of them and never restarts.
+/// Where renders are measured. Each checkpoint is a number of samples or a time; a render passes through all of them
+/// and never restarts.
 struct Checkpoint {
     uint64_t samples = 0;  ///< per pixel, or
     double seconds = 0;    ///< of render time
@@ -56,19 +57,21 @@ struct ExperimentConfig {
     std::vector<SceneEntry> scenes;
     std::vector<RunEntry> runs;
     std::vector<uint64_t> seeds;
-    std::vector<uint64_t> spp;      ///< checkpoints, rising
-    std::vector<double> seconds;    ///< checkpoints in seconds of render time, rising. One of both is set, or both
-    std::string ablation_default;   ///< run that an ablation compares with; empty: no ablation
+    std::vector<uint64_t> spp;     ///< checkpoints, rising
+    std::vector<double> seconds;   ///< checkpoints in seconds of render time, rising. One of both is set, or both
+    std::string ablation_default;  ///< run that an ablation compares with; empty: no ablation
 
     /// All checkpoints, those in samples first. Their places in this list are the column `checkpoint` of runs.csv.
     std::vector<Checkpoint> checkpoints() const;
 };
 
-/// Reads and checks a configuration as far as that needs no scene; sweeps become single runs and scenes. Throws Error(bad_input) with file, line and the offending key
-/// or value. `reduced`: with what the section [reduced] replaces, for small machines; refused where there is no such section.
+/// Reads and checks a configuration as far as that needs no scene; sweeps become single runs and scenes. Throws
+/// Error(bad_input) with file, line and the offending key or value. `reduced`: with what the section [reduced]
+/// replaces, for small machines; refused where there is no such section.
 ExperimentConfig read_experiment(const std::string& path, bool reduced = false);
 
-/// The configuration with every default filled in and every sweep expanded, as TOML; equal experiments give equal text. It is a configuration itself.
+/// The configuration with every default filled in and every sweep expanded, as TOML; equal experiments give equal text.
+/// It is a configuration itself.
 std::string resolved_toml(const ExperimentConfig& config);
 
 }  // namespace ambilux

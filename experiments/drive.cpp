@@ -12,7 +12,8 @@ namespace ambilux {
 RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& budget, const volatile bool* interrupt,
                      const std::function<void(const RenderPosition&)>& on_batch) {
     constexpr uint64_t kMaxSamples = std::numeric_limits<uint32_t>::max();
-    if (budget.samples == 0 && !(budget.seconds > 0)) throw Error(ExitCode::usage, "a render needs a number of samples or a time");
+    if (budget.samples == 0 && !(budget.seconds > 0))
+        throw Error(ExitCode::usage, "a render needs a number of samples or a time");
     if (budget.samples > kMaxSamples) throw Error(ExitCode::usage, "at most 4294967295 samples per pixel are possible");
     double per_sample = 0;
     uint64_t last_count = 0;

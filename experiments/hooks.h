@@ -5,7 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "integrators/renderer.h"
+#include "formats/load.h"
+#include "render/renderer.h"
 
 namespace ambilux {
 

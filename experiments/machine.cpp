@@ -15,7 +15,8 @@
 namespace ambilux {
 
 nlohmann::json describe_machine() {
-    nlohmann::json machine = {{"cpu", nullptr}, {"cores", std::thread::hardware_concurrency()}, {"system", nullptr}, {"driver", nullptr}};
+    nlohmann::json machine = {
+        {"cpu", nullptr}, {"cores", std::thread::hardware_concurrency()}, {"system", nullptr}, {"driver", nullptr}};
     std::ifstream cpu("/proc/cpuinfo");
     for (std::string line; std::getline(cpu, line);)
         if (line.starts_with("model name")) {
@@ -25,7 +26,8 @@ nlohmann::json describe_machine() {
     // "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build ..."
     std::ifstream driver("/proc/driver/nvidia/version");
     if (std::string line; std::getline(driver, line)) machine["driver"] = line;
-    if (utsname name; ::uname(&name) == 0) machine["system"] = std::string(name.sysname) + " " + name.release + " " + name.machine;
+    if (utsname name; ::uname(&name) == 0)
+        machine["system"] = std::string(name.sysname) + " " + name.release + " " + name.machine;
     return machine;
 }
 
@@ -57,7 +59,9 @@ nlohmann::json describe_clocks(const std::string& when, bool cuda) {
         if (!line.starts_with("cpu MHz")) continue;
         const size_t at = line.find(": ");
         double mhz = 0;
-        if (at == std::string::npos || std::from_chars(line.data() + at + 2, line.data() + line.size(), mhz).ec != std::errc()) continue;
+        if (at == std::string::npos ||
+            std::from_chars(line.data() + at + 2, line.data() + line.size(), mhz).ec != std::errc())
+            continue;
         lowest = cores ? std::min(lowest, mhz) : mhz;
         highest = std::max(highest, mhz);
         sum += mhz;
@@ -67,7 +71,9 @@ nlohmann::json describe_clocks(const std::string& when, bool cuda) {
     const std::string id = cuda ? cuda_device_bus_id() : "";
     if (id.empty()) return clocks;
     // A driver in trouble may not answer, hence the limit.
-    const std::string ask = "timeout 10 nvidia-smi -i " + id + " --query-gpu=clocks.sm,clocks.mem,temperature.gpu --format=csv,noheader,nounits 2>/dev/null";
+    const std::string ask =
+        "timeout 10 nvidia-smi -i " + id +
+        " --query-gpu=clocks.sm,clocks.mem,temperature.gpu --format=csv,noheader,nounits 2>/dev/null";
     if (std::FILE* pipe = ::popen(ask.c_str(), "r")) {
         std::string lines;
         char buffer[256];

@@ -9,8 +9,9 @@ namespace ambilux {
 /// cpu (model), cores, system, driver (of NVIDIA devices; null without), read from /proc.
 nlohmann::json describe_machine();
 
-/// What the clocks run at now, as {when, cpu_mhz {lowest, mean, highest}, gpu [{sm_mhz, memory_mhz, celsius}]}: figures of a machine that was throttled or shared can be told.
-/// From /proc/cpuinfo and nvidia-smi; null where those do not say. `cuda`: a device renders, whose clocks they are; else null. A GPU without work shows its idle clocks.
+/// What the clocks run at now, as {when, cpu_mhz {lowest, mean, highest}, gpu [{sm_mhz, memory_mhz, celsius}]}: figures
+/// of a machine that was throttled or shared can be told. From /proc/cpuinfo and nvidia-smi; null where those do not
+/// say. `cuda`: a device renders, whose clocks they are; else null. A GPU without work shows its idle clocks.
 nlohmann::json describe_clocks(const std::string& when, bool cuda);
 
 /// The "gpu" list from nvidia-smi's lines "1980, 2619, 41"; what is no number becomes null.

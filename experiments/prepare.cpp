@@ -1,4 +1,5 @@
 #include "experiments/prepare.h"
+#include "formats/load.h"
 
 #include <fmt/format.h>
 
@@ -27,7 +28,8 @@ LoadedEntry load_entry(const ExperimentConfig& config, const SceneEntry& entry, 
         RenderSettings probe;
         loaded.max_depth = entry.max_depth.value_or(loaded.scene.integrator.max_depth);
         hooks.apply_setting(probe, "max_depth", std::to_string(loaded.max_depth));
-        for (const std::string& warning : loaded.scene.warnings) log_warning(fmt::format("scene '{}': {}", entry.name, warning));
+        for (const std::string& warning : loaded.scene.warnings)
+            log_warning(fmt::format("scene '{}': {}", entry.name, warning));
         return loaded;
     } catch (const Error& e) {
         if (e.code == ExitCode::device) throw;
@@ -44,8 +46,8 @@ int line_of(const RunEntry& run, const std::string& message, int line) {
 }
 
 /// Makes a renderer and lets it go; what it refuses is refused with the line of `run`.
-RenderStats try_settings(const ExperimentConfig& config, const LoadedEntry& scene, const RunEntry& run, const RenderSettings& settings, const std::string& who, int line,
-                         const Hooks& hooks) {
+RenderStats try_settings(const ExperimentConfig& config, const LoadedEntry& scene, const RunEntry& run,
+                         const RenderSettings& settings, const std::string& who, int line, const Hooks& hooks) {
     try {
         return hooks.make_renderer(scene.scene, settings)->stats();
     } catch (const Error& e) {
@@ -56,7 +58,8 @@ RenderStats try_settings(const ExperimentConfig& config, const LoadedEntry& scen
 
 }  // namespace
 
-RenderSettings settings_for(const ExperimentConfig& config, const LoadedEntry& scene, const RunEntry& run, uint64_t seed, const Hooks& hooks) {
+RenderSettings settings_for(const ExperimentConfig& config, const LoadedEntry& scene, const RunEntry& run,
+                            uint64_t seed, const Hooks& hooks) {
     RenderSettings s;
     s.backend = config.backend;
     s.max_depth = scene.max_depth;
@@ -84,15 +87,20 @@ Prepared prepare_experiment(const std::string& path, bool reduced, const Hooks& 
         std::set<std::tuple<std::string, std::string, std::string>> tried;
         for (const RunEntry& run : p.config.runs) {
             const RenderSettings settings = settings_for(p.config, scene, run, 0, hooks);
-            if (&scene != &p.scenes[0] && !tried.insert({settings.integrator, settings.variant, settings.backend}).second) continue;
-            const RenderStats stats = try_settings(p.config, scene, run, settings, fmt::format("run '{}' on scene '{}'", run.name, scene.entry->name), run.line, hooks);
+            if (&scene != &p.scenes[0] &&
+                !tried.insert({settings.integrator, settings.variant, settings.backend}).second)
+                continue;
+            const RenderStats stats =
+                try_settings(p.config, scene, run, settings,
+                             fmt::format("run '{}' on scene '{}'", run.name, scene.entry->name), run.line, hooks);
             p.devices.insert(stats.device);
             p.backends.insert(stats.backend);
         }
         const RunEntry& how = scene.entry->reference.how;
         if (how.settings.empty()) continue;
         const RenderSettings settings = reference_settings(p.config, *scene.entry, scene.scene, scene.max_depth, hooks);
-        try_settings(p.config, scene, how, settings, fmt::format("reference of '{}'", scene.entry->name), how.line, hooks);
+        try_settings(p.config, scene, how, settings, fmt::format("reference of '{}'", scene.entry->name), how.line,
+                     hooks);
     }
     return p;
 }

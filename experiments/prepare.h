@@ -24,11 +24,13 @@ struct Prepared {
     std::set<std::string> devices, backends;
 };
 
-/// Reads the configuration, loads its scenes and makes the renderer of every run once, so that nothing is refused after hours of work: every run on the first scene, and every
-/// integrator and variant on the others. Throws Error(bad_input) with file, line and the offending name.
+/// Reads the configuration, loads its scenes and makes the renderer of every run once, so that nothing is refused after
+/// hours of work: every run on the first scene, and every integrator and variant on the others. Throws Error(bad_input)
+/// with file, line and the offending name.
 Prepared prepare_experiment(const std::string& path, bool reduced, const Hooks& hooks);
 
 /// All settings of one render. Throws Error(bad_input) that names the line of the setting.
-RenderSettings settings_for(const ExperimentConfig& config, const LoadedEntry& scene, const RunEntry& run, uint64_t seed, const Hooks& hooks);
+RenderSettings settings_for(const ExperimentConfig& config, const LoadedEntry& scene, const RunEntry& run,
+                            uint64_t seed, const Hooks& hooks);
 
 }  // namespace ambilux

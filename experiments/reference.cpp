@@ -23,12 +23,18 @@ std::string text(const Attributes& attributes, const char* name) {
 }
 
 /// Throws if the file at `path` was made from something else than `wanted` describes.
-void check_same(const std::string& path, const Attributes& stored, const Reference& image, const Attributes& wanted, const Scene& scene) {
+void check_same(const std::string& path, const Attributes& stored, const Reference& image, const Attributes& wanted,
+                const Scene& scene) {
     const auto refuse = [&](const std::string& what, const std::string& has, const std::string& asked) {
-        throw input_error(path, 0, fmt::format("cannot be continued: its {} is {}, asked for is {}. Give another file name, or remove the file", what, has, asked));
+        throw input_error(
+            path, 0,
+            fmt::format(
+                "cannot be continued: its {} is {}, asked for is {}. Give another file name, or remove the file", what,
+                has, asked));
     };
     if (image.mean.width != scene.sensor.crop_width || image.mean.height != scene.sensor.crop_height)
-        refuse("size", fmt::format("{}x{}", image.mean.width, image.mean.height), fmt::format("{}x{}", scene.sensor.crop_width, scene.sensor.crop_height));
+        refuse("size", fmt::format("{}x{}", image.mean.width, image.mean.height),
+               fmt::format("{}x{}", scene.sensor.crop_width, scene.sensor.crop_height));
     for (const char* name : kIdentity)
         if (text(stored, name) != text(wanted, name)) refuse(name, text(stored, name), text(wanted, name));
 }
@@ -43,10 +49,14 @@ uint64_t reference_seed(uint64_t seed) {
 }
 
 ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& request, const Hooks& hooks) {
-    if (request.spp < 2) throw Error(ExitCode::usage, "a reference needs at least 2 samples per pixel: one has no standard error");
+    if (request.spp < 2)
+        throw Error(ExitCode::usage, "a reference needs at least 2 samples per pixel: one has no standard error");
     RenderSettings settings = request.settings;
-    if (settings.estimator != Estimator::mis || settings.strategies != kAllStrategies || settings.singles.on || (settings.integrator != "path" && settings.integrator != "bdpt"))
-        throw Error(ExitCode::usage, "a reference is made by integrator path or bdpt with all that it has (estimator mis, all strategies)");
+    if (settings.estimator != Estimator::mis || settings.strategies != kAllStrategies || settings.singles.on ||
+        (settings.integrator != "path" && settings.integrator != "bdpt"))
+        throw Error(
+            ExitCode::usage,
+            "a reference is made by integrator path or bdpt with all that it has (estimator mis, all strategies)");
     settings.seed = reference_seed(request.settings.seed);
 
     const auto attributes_of = [&](const RenderStats& stats, double seconds) {
@@ -66,18 +76,22 @@ ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& reque
     for (const char* name : kIdentity) identity[name] = text(attributes_of({}, 0), name);
     if (std::filesystem::exists(request.path)) {
         result.reference = read_reference_exr(request.path, &result.attributes);
-        // The seed comes back as an integer or, where it does not fit, as text; so does the wanted one after this round.
+        // The seed comes back as an integer or, where it does not fit, as text; so does the wanted one after this
+        // round.
         check_same(request.path, result.attributes, result.reference, attributes_of({}, 0), scene);
         if (result.reference.samples >= request.spp) {
             result.continued_from = result.reference.samples;
             return result;
         }
         total = to_moments(result.reference);
-        if (const auto s = result.attributes.find("seconds"); s != result.attributes.end() && s->is_number()) earlier_seconds = s->get<double>();
+        if (const auto s = result.attributes.find("seconds"); s != result.attributes.end() && s->is_number())
+            earlier_seconds = s->get<double>();
     }
-    // Sums that were saved last are as many as those of the image or more; older ones are left over from something else.
-    if (auto sums = read_state(sums_path); sums && sums->notes["identity"] == identity && sums->moments.samples >= total.samples &&
-                                           sums->moments.width == scene.sensor.crop_width && sums->moments.height == scene.sensor.crop_height) {
+    // Sums that were saved last are as many as those of the image or more; older ones are left over from something
+    // else.
+    if (auto sums = read_state(sums_path);
+        sums && sums->notes["identity"] == identity && sums->moments.samples >= total.samples &&
+        sums->moments.width == scene.sensor.crop_width && sums->moments.height == scene.sensor.crop_height) {
         total = std::move(sums->moments);
         earlier_seconds = sums->notes["seconds"].get<double>();
         result.reference = to_reference(total);
@@ -101,7 +115,8 @@ ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& reque
         stated.samples = total.samples;
         result.attributes = attributes_of(stated, earlier_seconds + position.seconds);
         if (total.samples < 2) continue;
-        if (total.samples < request.spp) write_state(sums_path, {total, {{"identity", identity}, {"seconds", earlier_seconds + position.seconds}}});
+        if (total.samples < request.spp)
+            write_state(sums_path, {total, {{"identity", identity}, {"seconds", earlier_seconds + position.seconds}}});
         write_reference_exr(request.path, result.reference, result.attributes);
     }
     if (std::error_code ignored; total.samples >= request.spp) std::filesystem::remove(sums_path, ignored);

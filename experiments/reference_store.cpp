@@ -21,7 +21,8 @@ namespace ambilux {
 
 namespace fs = std::filesystem;
 
-RenderSettings reference_settings(const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene, int max_depth, const Hooks& hooks) {
+RenderSettings reference_settings(const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene,
+                                  int max_depth, const Hooks& hooks) {
     RenderSettings s;
     s.integrator = "path";
     s.backend = config.backend;
@@ -37,13 +38,14 @@ RenderSettings reference_settings(const ExperimentConfig& config, const SceneEnt
     return s;
 }
 
-ReferencePlace find_reference(const std::string& folder, const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene, int max_depth,
-                              const Hooks& hooks) {
+ReferencePlace find_reference(const std::string& folder, const ExperimentConfig& config, const SceneEntry& entry,
+                              const Scene& scene, int max_depth, const Hooks& hooks) {
     ReferencePlace place;
     place.settings = reference_settings(config, entry, scene, max_depth, hooks);
     const Settings& set = entry.reference.how.settings;
     std::string making;
-    for (const auto& [key, value] : set) place.settings_text += (place.settings_text.empty() ? "" : " ") + key + "=" + value;
+    for (const auto& [key, value] : set)
+        place.settings_text += (place.settings_text.empty() ? "" : " ") + key + "=" + value;
     if (place.settings_text == "integrator=path") place.settings_text.clear();
     if (!place.settings_text.empty()) {
         Sha256 hash;
@@ -54,7 +56,8 @@ ReferencePlace find_reference(const std::string& folder, const ExperimentConfig&
     }
     const std::string depth = max_depth < 0 ? "inf" : std::to_string(max_depth);
     const std::string seed = config.reference_seed ? fmt::format("-s{}", config.reference_seed) : "";
-    const std::string key = fmt::format("-{}-d{}-{}x{}{}{}.exr", scene_hash(scene).substr(0, 12), depth, scene.sensor.crop_width, scene.sensor.crop_height, making, seed);
+    const std::string key = fmt::format("-{}-d{}-{}x{}{}{}.exr", scene_hash(scene).substr(0, 12), depth,
+                                        scene.sensor.crop_width, scene.sensor.crop_height, making, seed);
     place.path = folder + "/" + entry.base + key;
     if (!fs::exists(place.path)) {
         std::vector<std::string> others;
@@ -67,8 +70,7 @@ ReferencePlace find_reference(const std::string& folder, const ExperimentConfig&
         // A file that cannot be read is named when the reference is made.
         try {
             place.cached = read_reference_exr(place.path).samples;
-        } catch (const Error&) {
-        }
+        } catch (const Error&) {}
     }
     return place;
 }

@@ -18,13 +18,17 @@ struct ReferencePlace {
 };
 
 /// Settings of a scene's reference. Throws Error(bad_input) with file and line.
-RenderSettings reference_settings(const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene, int max_depth, const Hooks& hooks);
+RenderSettings reference_settings(const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene,
+                                  int max_depth, const Hooks& hooks);
 
-/// Where the reference of a scene lies in `folder`. A file of another name for the same scene content, depth, size, seed and making is taken as well, so that experiments that
-/// share a folder need not agree on names. The folder may be missing.
-ReferencePlace find_reference(const std::string& folder, const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene, int max_depth, const Hooks& hooks);
+/// Where the reference of a scene lies in `folder`. A file of another name for the same scene content, depth, size,
+/// seed and making is taken as well, so that experiments that share a folder need not agree on names. The folder may be
+/// missing.
+ReferencePlace find_reference(const std::string& folder, const ExperimentConfig& config, const SceneEntry& entry,
+                              const Scene& scene, int max_depth, const Hooks& hooks);
 
-/// Keeps other processes from making the reference at `path` at the same time; the system releases it when this one ends, however it does.
+/// Keeps other processes from making the reference at `path` at the same time; the system releases it when this one
+/// ends, however it does.
 class ReferenceLock {
 public:
     /// Waits for another process. `held()` is false if *interrupt became true meanwhile.

@@ -12,7 +12,8 @@
 namespace ambilux {
 
 const char* const kResultHeader =
-    "scene,run,seed,checkpoint,budget,integrator,variant,estimator,backend,spp,time,rmse,rmse_corrected,reference_noise,relmse,relmse_corrected,relmse_trimmed,"
+    "scene,run,seed,checkpoint,budget,integrator,variant,estimator,backend,spp,time,rmse,rmse_corrected,reference_"
+    "noise,relmse,relmse_corrected,relmse_trimmed,"
     "relmse_trimmed_corrected,mape,bias,bias_z,rays,invalid";
 
 namespace {
@@ -32,13 +33,17 @@ long count_commas(std::string_view line) {
 
 }  // namespace
 
-std::string result_prefix(const std::string& scene, const std::string& run, uint64_t seed) { return fmt::format("{},{},{},", quoted(scene), quoted(run), seed); }
+std::string result_prefix(const std::string& scene, const std::string& run, uint64_t seed) {
+    return fmt::format("{},{},{},", quoted(scene), quoted(run), seed);
+}
 
 std::string result_line(const ResultRow& r) {
     const Metrics& m = r.metrics;
-    return fmt::format("{}{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.5g},{},{}", result_prefix(r.scene, r.run, r.seed),
-                       r.checkpoint, r.budget, r.integrator, r.variant, r.estimator, r.backend, r.spp, r.time, m.rmse, m.rmse_corrected, m.reference_noise,
-                       m.relmse, m.relmse_corrected, m.relmse_trimmed, m.relmse_trimmed_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid);
+    return fmt::format(
+        "{}{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.5g},{},{}",
+        result_prefix(r.scene, r.run, r.seed), r.checkpoint, r.budget, r.integrator, r.variant, r.estimator, r.backend,
+        r.spp, r.time, m.rmse, m.rmse_corrected, m.reference_noise, m.relmse, m.relmse_corrected, m.relmse_trimmed,
+        m.relmse_trimmed_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid);
 }
 
 std::vector<std::string> read_results(const std::string& path) {
@@ -51,7 +56,8 @@ std::vector<std::string> read_results(const std::string& path) {
     for (size_t begin = 0, end; (end = content.find('\n', begin)) != std::string::npos; begin = end + 1) {
         std::string line = content.substr(begin, end - begin);
         if (++number == 1) {
-            if (line != kResultHeader) throw input_error(path, 1, "its columns are not those of this version: choose another output folder");
+            if (line != kResultHeader)
+                throw input_error(path, 1, "its columns are not those of this version: choose another output folder");
             continue;
         }
         if (count_commas(line) == commas && seen.insert(line).second) lines.push_back(std::move(line));

@@ -25,14 +25,15 @@ struct ResultRow {
 /// Column names; the first line of the file.
 extern const char* const kResultHeader;
 
-/// One line without its end. Names with commas (of sweeps) are quoted; none holds a quote (the configuration sees to that).
+/// One line without its end. Names with commas (of sweeps) are quoted; none holds a quote (the configuration sees to
+/// that).
 std::string result_line(const ResultRow& row);
 
 /// "scene,run,seed,": what the lines of one render begin with.
 std::string result_prefix(const std::string& scene, const std::string& run, uint64_t seed);
 
-/// The lines of a results file, without its header. A last line that a killed process left unfinished is dropped; so are repeated lines. Nothing if the file does
-/// not exist. Throws Error(bad_input) if the header is another.
+/// The lines of a results file, without its header. A last line that a killed process left unfinished is dropped; so
+/// are repeated lines. Nothing if the file does not exist. Throws Error(bad_input) if the header is another.
 std::vector<std::string> read_results(const std::string& path);
 
 }  // namespace ambilux

@@ -41,11 +41,13 @@ struct SceneReference {
 /// Keeps a second process out of the folder; the system releases it when this one ends, however it does.
 class FolderLock {
 public:
-    explicit FolderLock(const std::string& folder) : fd_(::open((folder + "/.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
+    explicit FolderLock(const std::string& folder)
+        : fd_(::open((folder + "/.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
         if (fd_ < 0) throw Error(ExitCode::device, "cannot write into the folder " + folder);
         if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
             ::close(fd_);
-            throw Error(ExitCode::device, "another experiment is writing into " + folder + ": wait for it or choose another folder");
+            throw Error(ExitCode::device,
+                        "another experiment is writing into " + folder + ": wait for it or choose another folder");
         }
     }
     ~FolderLock() { ::close(fd_); }
@@ -59,7 +61,8 @@ private:
 class Experiment {
 public:
     Experiment(const ExperimentRequest& request, const Hooks& hooks)
-        : request_(request), hooks_(hooks), prepared_(prepare_experiment(request.config, request.reduced, hooks)), config_(prepared_.config), checkpoints_(config_.checkpoints()) {}
+        : request_(request), hooks_(hooks), prepared_(prepare_experiment(request.config, request.reduced, hooks)),
+          config_(prepared_.config), checkpoints_(config_.checkpoints()) {}
 
     ExitCode run() {
         open_folder();
@@ -104,11 +107,14 @@ private:
         const std::string resolved = resolved_toml(config_), path = request_.output + "/config.resolved.toml";
         if (fs::exists(path)) {
             if (!request_.resume)
-                throw Error(ExitCode::usage, request_.output + " holds an experiment already: continue it with --resume or choose another folder");
+                throw Error(ExitCode::usage,
+                            request_.output +
+                                " holds an experiment already: continue it with --resume or choose another folder");
             check_same_experiment(request_.output, config_);
         } else {
             if (fs::exists(request_.output + "/runs.csv"))
-                throw Error(ExitCode::usage, request_.output + " holds a runs.csv of something else: choose another folder");
+                throw Error(ExitCode::usage,
+                            request_.output + " holds a runs.csv of something else: choose another folder");
             write_file_atomic(path, resolved);
         }
         references_ = request_.references.empty() ? request_.output + "/references" : request_.references;
@@ -121,8 +127,10 @@ private:
     void remove_temporary_files() const {
         std::vector<fs::path> found;
         std::error_code ignored;
-        for (const auto& entry : fs::recursive_directory_iterator(request_.output, fs::directory_options::skip_permission_denied, ignored))
-            if (entry.is_regular_file(ignored) && entry.path().filename().string().find(".tmp-") != std::string::npos) found.push_back(entry.path());
+        for (const auto& entry :
+             fs::recursive_directory_iterator(request_.output, fs::directory_options::skip_permission_denied, ignored))
+            if (entry.is_regular_file(ignored) && entry.path().filename().string().find(".tmp-") != std::string::npos)
+                found.push_back(entry.path());
         for (const fs::path& path : found) fs::remove(path, ignored);
     }
 
@@ -135,11 +143,14 @@ private:
             if (!manifest_.is_object()) throw input_error(path, 0, "is damaged: remove the folder and start again");
             for (const LoadedEntry& scene : prepared_.scenes)
                 for (const auto& earlier : manifest_["scenes"])
-                    if (earlier.value("name", "") == scene.entry->name && earlier.value("hash", "") != scene_hash(scene.scene))
-                        throw input_error(scene.entry->path, 0, "has changed since the experiment began: choose another folder");
+                    if (earlier.value("name", "") == scene.entry->name &&
+                        earlier.value("hash", "") != scene_hash(scene.scene))
+                        throw input_error(scene.entry->path, 0,
+                                          "has changed since the experiment began: choose another folder");
             manifest_["resumed"].push_back(utc_now());
         } else {
-            manifest_ = {{"date", utc_now()}, {"resumed", nlohmann::json::array()}, {"clocks", nlohmann::json::array()}};
+            manifest_ = {
+                {"date", utc_now()}, {"resumed", nlohmann::json::array()}, {"clocks", nlohmann::json::array()}};
         }
         lines_ = read_results(request_.output + "/runs.csv");
         rewrite_results();
@@ -163,7 +174,8 @@ private:
         if (!config_.spp.empty()) manifest_["checkpoints"]["spp"] = config_.spp;
         if (!config_.seconds.empty()) manifest_["checkpoints"]["seconds"] = config_.seconds;
         manifest_["trimmed_share"] = kTrimmedShare;
-        manifest_["ablation_default"] = config_.ablation_default.empty() ? nlohmann::json(nullptr) : nlohmann::json(config_.ablation_default);
+        manifest_["ablation_default"] =
+            config_.ablation_default.empty() ? nlohmann::json(nullptr) : nlohmann::json(config_.ablation_default);
         manifest_["finished"] = finished ? nlohmann::json(utc_now()) : nlohmann::json(nullptr);
         nlohmann::json scenes = nlohmann::json::array(), runs = nlohmann::json::array();
         for (size_t i = 0; i < prepared_.scenes.size(); ++i) {
@@ -189,13 +201,17 @@ private:
         }
         manifest_["scenes"] = scenes;
         manifest_["runs"] = runs;
-        write_file_atomic(request_.output + "/manifest.json", manifest_.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+        write_file_atomic(request_.output + "/manifest.json",
+                          manifest_.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
     }
 
-    static std::string kind(const LoadedEntry& scene, const RunEntry* run) { return scene.entry->name + "/" + (run ? run->name : ""); }
+    static std::string kind(const LoadedEntry& scene, const RunEntry* run) {
+        return scene.entry->name + "/" + (run ? run->name : "");
+    }
     /// What is left of a render that stands at `p`.
     Work work_after(const LoadedEntry& scene, const RenderPosition& p) const {
-        const double samples = config_.spp.empty() ? 0 : double(config_.spp.back()) - double(p.samples), seconds = config_.seconds.empty() ? 0 : config_.seconds.back() - p.seconds;
+        const double samples = config_.spp.empty() ? 0 : double(config_.spp.back()) - double(p.samples),
+                     seconds = config_.seconds.empty() ? 0 : config_.seconds.back() - p.seconds;
         return {std::max(0.0, samples) * double(scene.pixels()), std::max(0.0, seconds)};
     }
 
@@ -205,8 +221,10 @@ private:
             ReferencePlace& place = references_made_[i].place;
             place = find_reference(references_, config_, *scene.entry, scene.scene, scene.max_depth, hooks_);
             const uint64_t wanted = scene.entry->reference.spp;
-            if (place.cached < wanted) work_.plan(kind(scene, nullptr), 1, {double(wanted - place.cached) * double(scene.pixels()), 0});
-            for (const RunEntry& run : config_.runs) work_.plan(kind(scene, &run), double(config_.seeds.size()), work_after(scene, {}));
+            if (place.cached < wanted)
+                work_.plan(kind(scene, nullptr), 1, {double(wanted - place.cached) * double(scene.pixels()), 0});
+            for (const RunEntry& run : config_.runs)
+                work_.plan(kind(scene, &run), double(config_.seeds.size()), work_after(scene, {}));
         }
     }
 
@@ -232,7 +250,9 @@ private:
         work_.begin(work, {double(request.spp - std::min(request.spp, made.place.cached)) * double(scene.pixels()), 0});
         request.on_batch = [&](const RenderPosition& p) {
             // The first call after a continued file has no predecessor: it counts little.
-            if (started) work_.progress(work, double(p.samples - last.samples) * double(scene.pixels()), p.seconds - last.seconds);
+            if (started)
+                work_.progress(work, double(p.samples - last.samples) * double(scene.pixels()),
+                               p.seconds - last.seconds);
             started = true;
             last = p;
             show(fmt::format("reference of {}: {} of {} spp", scene.entry->name, p.samples, request.spp));
@@ -241,7 +261,9 @@ private:
         work_.end(work);
         if (result.interrupted) return false;
         made.image = result.reference;
-        if (result.stats.invalid.total()) log_warning(fmt::format("reference of {}: {} invalid values dropped", scene.entry->name, result.stats.invalid.total()));
+        if (result.stats.invalid.total())
+            log_warning(fmt::format("reference of {}: {} invalid values dropped", scene.entry->name,
+                                    result.stats.invalid.total()));
         write_png(file("images", scene, "reference.png"), made.image.mean);
         double noise = 0;
         for (const float se : made.image.standard_error.rgb) noise += double(se) * double(se);
@@ -270,12 +292,14 @@ private:
     /// One render through all of its checkpoints; false if interrupted.
     bool render(size_t index, const RunEntry& run, uint64_t seed) {
         const LoadedEntry& scene = prepared_.scenes[index];
-        const std::string name = fmt::format("{}_{}", run.name, seed), state_path = file("state", scene, name + ".state");
+        const std::string name = fmt::format("{}_{}", run.name, seed),
+                          state_path = file("state", scene, name + ".state");
         const std::string prefix = result_prefix(scene.entry->name, run.name, seed);
         const auto ours = [&](const std::string& line) { return line.starts_with(prefix); };
         const std::string work = kind(scene, &run);
 
-        if (size_t(std::count_if(lines_.begin(), lines_.end(), ours)) == checkpoints_.size() && !fs::exists(state_path)) {
+        if (size_t(std::count_if(lines_.begin(), lines_.end(), ours)) == checkpoints_.size() &&
+            !fs::exists(state_path)) {
             work_.skip(work);
             return true;
         }
@@ -283,7 +307,9 @@ private:
         RenderStats total;
         state.notes = {{"seconds", 0.0}, {"done", nlohmann::json::array()}, {"rows", nlohmann::json::array()}};
         if (run.techniques) {
-            if (fs::exists(state_path)) log_info(fmt::format("{} {}: starts over, because the sums of its single strategies are not saved", scene.entry->name, name));
+            if (fs::exists(state_path))
+                log_info(fmt::format("{} {}: starts over, because the sums of its single strategies are not saved",
+                                     scene.entry->name, name));
             write_file_atomic(state_path, "begun\n");
         } else if (auto saved = read_state(state_path)) {
             state = std::move(*saved);
@@ -311,25 +337,29 @@ private:
         work_.begin(work, work_after(scene, position));
         std::vector<size_t> pending;
         for (size_t k = 0; k < checkpoints_.size(); ++k)
-            if (std::find(state.notes["done"].begin(), state.notes["done"].end(), k) == state.notes["done"].end()) pending.push_back(k);
+            if (std::find(state.notes["done"].begin(), state.notes["done"].end(), k) == state.notes["done"].end())
+                pending.push_back(k);
         RenderStats counted = renderer->stats();
         while (!pending.empty()) {
             Budget budget;
             for (const size_t k : pending) {
                 const Checkpoint& c = checkpoints_[k];
                 if (c.samples) budget.samples = budget.samples ? std::min(budget.samples, c.samples) : c.samples;
-                if (c.seconds > 0) budget.seconds = budget.seconds > 0 ? std::min(budget.seconds, c.seconds) : c.seconds;
+                if (c.seconds > 0)
+                    budget.seconds = budget.seconds > 0 ? std::min(budget.seconds, c.seconds) : c.seconds;
             }
             RenderPosition last = position;
             const uint64_t before = position.samples;
             position = drive(*renderer, position, budget, request_.interrupt, [&](const RenderPosition& p) {
-                work_.progress(work, double(p.samples - last.samples) * double(scene.pixels()), p.seconds - last.seconds);
+                work_.progress(work, double(p.samples - last.samples) * double(scene.pixels()),
+                               p.seconds - last.seconds);
                 last = p;
                 show(fmt::format("{} {} seed {}: {} spp", scene.entry->name, run.name, seed, p.samples));
             });
             add_part(total, counted, renderer->stats());
             state.notes["seconds"] = position.seconds;
-            // The film restarts at each checkpoint, so that a resumed render adds the same numbers in the same order as an uninterrupted one.
+            // The film restarts at each checkpoint, so that a resumed render adds the same numbers in the same order as
+            // an uninterrupted one.
             if (position.samples > before) {
                 state.moments.add(renderer->film());
                 renderer->clear_film();
@@ -343,7 +373,8 @@ private:
             const bool ended_by_time = budget.seconds > 0 && (budget.samples == 0 || position.samples < budget.samples);
             const auto reached = [&](size_t k) {
                 const Checkpoint& c = checkpoints_[k];
-                return c.samples ? position.samples >= c.samples : position.seconds >= c.seconds || (ended_by_time && c.seconds <= budget.seconds);
+                return c.samples ? position.samples >= c.samples
+                                 : position.seconds >= c.seconds || (ended_by_time && c.seconds <= budget.seconds);
             };
             std::vector<std::string> lines;
             for (const size_t k : pending)
@@ -361,7 +392,8 @@ private:
         work_.end(work);
         finish(scene, name, settings, total, state);
         if (run.techniques) {
-            write_technique_images(file("techniques", scene, name), scene.scene, settings, stated(total, state), renderer->technique_images());
+            write_technique_images(file("techniques", scene, name), scene.scene, settings, stated(total, state),
+                                   renderer->technique_images());
             for (const auto& line : state.notes["rows"]) add_line(line.get<std::string>());
         }
         std::error_code ignored;
@@ -369,7 +401,8 @@ private:
         return true;
     }
 
-    ResultRow row(size_t index, const RunEntry& run, const RenderSettings& settings, const RenderStats& total, const RenderState& state, size_t k) const {
+    ResultRow row(size_t index, const RunEntry& run, const RenderSettings& settings, const RenderStats& total,
+                  const RenderState& state, size_t k) const {
         ResultRow r;
         r.scene = prepared_.scenes[index].entry->name;
         r.run = run.name;
@@ -395,17 +428,24 @@ private:
         return total;
     }
 
-    /// The image at the last checkpoint of the list: where there are checkpoints in seconds, all images have had the same time.
-    void write_images(const LoadedEntry& scene, const std::string& name, const RenderSettings& settings, const RenderStats& total, const RenderState& state) {
+    /// The image at the last checkpoint of the list: where there are checkpoints in seconds, all images have had the
+    /// same time.
+    void write_images(const LoadedEntry& scene, const std::string& name, const RenderSettings& settings,
+                      const RenderStats& total, const RenderState& state) {
         const Image image = mean_image(state.moments);
-        write_exr(file("images", scene, name + ".exr"), image, image_attributes(scene.scene, settings, stated(total, state)));
+        write_exr(file("images", scene, name + ".exr"), image,
+                  image_attributes(scene.scene, settings, stated(total, state)));
         write_png(file("images", scene, name + ".png"), image);
     }
 
-    void finish(const LoadedEntry& scene, const std::string& name, const RenderSettings& settings, const RenderStats& total, const RenderState& state) {
-        if (total.invalid.total()) log_warning(fmt::format("{} {}: {} invalid values dropped", scene.entry->name, name, total.invalid.total()));
+    void finish(const LoadedEntry& scene, const std::string& name, const RenderSettings& settings,
+                const RenderStats& total, const RenderState& state) {
+        if (total.invalid.total())
+            log_warning(
+                fmt::format("{} {}: {} invalid values dropped", scene.entry->name, name, total.invalid.total()));
         const nlohmann::json json = stats_json(scene.scene, settings, stated(total, state), scene.load_seconds);
-        write_file_atomic(file("stats", scene, name + ".json"), json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+        write_file_atomic(file("stats", scene, name + ".json"),
+                          json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
     }
 
     const ExperimentRequest& request_;
@@ -433,10 +473,15 @@ void check_same_experiment(const std::string& folder, const ExperimentConfig& co
         if (!more_a) line_a = "(end)";
         if (!more_b) line_b = "(end)";
         if (line_a != line_b || (!more_a && !more_b))
-            throw input_error(path, line, fmt::format("the experiment in this folder has a different configuration: '{}' there, '{}' now. Choose another folder", line_a, line_b));
+            throw input_error(path, line,
+                              fmt::format("the experiment in this folder has a different configuration: '{}' there, "
+                                          "'{}' now. Choose another folder",
+                                          line_a, line_b));
     }
 }
 
-ExitCode run_experiment(const ExperimentRequest& request, const Hooks& hooks) { return Experiment(request, hooks).run(); }
+ExitCode run_experiment(const ExperimentRequest& request, const Hooks& hooks) {
+    return Experiment(request, hooks).run();
+}
 
 }  // namespace ambilux

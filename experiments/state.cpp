@@ -65,9 +65,13 @@ std::optional<RenderState> read_state(const std::string& path) {
     RenderState state;
     state.notes = nlohmann::json::parse(in.substr(0, numbers[0]), nullptr, false);
     in.remove_prefix(numbers[0]);
-    if (state.notes.is_discarded() || numbers[4] > in.size() || numbers[4] != numbers[1] * numbers[2] * 3) return damaged();
-    state.moments = {uint32_t(numbers[1]), uint32_t(numbers[2]), numbers[3], std::vector<double>(numbers[4]), std::vector<double>(numbers[4])};
-    if (!take(in, state.moments.sum.data(), numbers[4]) || !take(in, state.moments.sum_squares.data(), numbers[4]) || !in.empty()) return damaged();
+    if (state.notes.is_discarded() || numbers[4] > in.size() || numbers[4] != numbers[1] * numbers[2] * 3)
+        return damaged();
+    state.moments = {uint32_t(numbers[1]), uint32_t(numbers[2]), numbers[3], std::vector<double>(numbers[4]),
+                     std::vector<double>(numbers[4])};
+    if (!take(in, state.moments.sum.data(), numbers[4]) || !take(in, state.moments.sum_squares.data(), numbers[4]) ||
+        !in.empty())
+        return damaged();
     return state;
 }
 

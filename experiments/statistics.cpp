@@ -9,21 +9,29 @@
 namespace ambilux {
 namespace {
 
-nlohmann::json invalid_json(const InvalidCounts& invalid) { return {{"nan", invalid.nan}, {"inf", invalid.inf}, {"negative", invalid.negative}}; }
+nlohmann::json invalid_json(const InvalidCounts& invalid) {
+    return {{"nan", invalid.nan}, {"inf", invalid.inf}, {"negative", invalid.negative}};
+}
 
 /// Null where nothing was chosen.
 nlohmann::json choice_json(const ChoiceStats& choice) {
     if (choice.name.empty()) return nullptr;
     nlohmann::json candidates = nlohmann::json::array(), settings = nlohmann::json::object();
     for (const ChoiceStats::Candidate& c : choice.candidates)
-        candidates.push_back({{"name", c.name},
-                              {"settings", c.settings},
-                              {"variance", std::isfinite(c.variance) ? nlohmann::json(c.variance) : nlohmann::json(nullptr)},
-                              {"work", c.work},
-                              {"seconds_per_sample", c.seconds > 0 ? nlohmann::json(c.seconds) : nlohmann::json(nullptr)},
-                              {"efficiency", c.efficiency}});
+        candidates.push_back(
+            {{"name", c.name},
+             {"settings", c.settings},
+             {"variance", std::isfinite(c.variance) ? nlohmann::json(c.variance) : nlohmann::json(nullptr)},
+             {"work", c.work},
+             {"seconds_per_sample", c.seconds > 0 ? nlohmann::json(c.seconds) : nlohmann::json(nullptr)},
+             {"efficiency", c.efficiency}});
     for (const auto& [key, value] : choice.settings) settings[key] = value;
-    return {{"name", choice.name}, {"settings", settings}, {"seconds", choice.seconds}, {"pilot_samples", choice.pilot_samples}, {"expected_samples", choice.expected_samples}, {"candidates", candidates}};
+    return {{"name", choice.name},
+            {"settings", settings},
+            {"seconds", choice.seconds},
+            {"pilot_samples", choice.pilot_samples},
+            {"expected_samples", choice.expected_samples},
+            {"candidates", candidates}};
 }
 
 }  // namespace
@@ -52,10 +60,15 @@ const char* fuse_name(Fuse fuse) {
 
 const char* heuristic_name(MisHeuristic heuristic) { return heuristic == MisHeuristic::balance ? "balance" : "power"; }
 
-nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats, double load_seconds) {
+nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
+                          double load_seconds) {
     nlohmann::json stages = nlohmann::json::array(), queues = nlohmann::json::array();
     for (const StageStats& s : stats.stages)
-        stages.push_back({{"name", s.name}, {"launches", s.launches}, {"items", s.items}, {"seconds", s.seconds}, {"items_by_depth", s.items_by_depth}});
+        stages.push_back({{"name", s.name},
+                          {"launches", s.launches},
+                          {"items", s.items},
+                          {"seconds", s.seconds},
+                          {"items_by_depth", s.items_by_depth}});
     for (const QueueStats& q : stats.queues)
         queues.push_back({{"name", q.name}, {"capacity", q.capacity}, {"peak", q.peak}, {"overflow", q.overflow}});
     nlohmann::json invalid = invalid_json(stats.invalid);
@@ -104,18 +117,18 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, co
 
 Attributes image_attributes(const Scene& scene, const RenderSettings& settings, const RenderStats& stats) {
     Attributes attributes = {{"scene", scene.path},
-            {"scene_hash", scene_hash(scene)},
-            {"integrator", settings.integrator},
-            {"variant", settings.variant},
-            {"spp", stats.samples},
-            {"seed", settings.seed},
-            {"max_depth", settings.max_depth},
-            {"rr_depth", settings.rr_depth},
-            {"backend", stats.backend},
-            {"device", stats.device},
-            {"seconds", stats.render_seconds},
-            {"software", fmt::format("ambilux {}", version())},
-            {"git_revision", git_revision()}};
+                             {"scene_hash", scene_hash(scene)},
+                             {"integrator", settings.integrator},
+                             {"variant", settings.variant},
+                             {"spp", stats.samples},
+                             {"seed", settings.seed},
+                             {"max_depth", settings.max_depth},
+                             {"rr_depth", settings.rr_depth},
+                             {"backend", stats.backend},
+                             {"device", stats.device},
+                             {"seconds", stats.render_seconds},
+                             {"software", fmt::format("ambilux {}", version())},
+                             {"git_revision", git_revision()}};
     if (settings.integrator == "path") attributes["estimator"] = estimator_name(settings.estimator);
     attributes["heuristic"] = heuristic_name(settings.heuristic);
     if (!stats.choice.name.empty()) {
@@ -131,10 +144,12 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& settings, 
 std::string stage_table(const RenderStats& stats) {
     double total = 0;
     for (const StageStats& s : stats.stages) total += s.seconds;
-    std::string table = fmt::format("{:<16} {:>10} {:>7} {:>10} {:>14} {:>10}\n", "stage", "seconds", "share", "launches", "items", "ns/item");
+    std::string table = fmt::format("{:<16} {:>10} {:>7} {:>10} {:>14} {:>10}\n", "stage", "seconds", "share",
+                                    "launches", "items", "ns/item");
     for (const StageStats& s : stats.stages)
-        table += fmt::format("{:<16} {:>10.4f} {:>6.1f}% {:>10} {:>14} {:>10.2f}\n", s.name, s.seconds, total > 0 ? 100 * s.seconds / total : 0, s.launches,
-                             s.items, s.items ? 1e9 * s.seconds / double(s.items) : 0);
+        table += fmt::format("{:<16} {:>10.4f} {:>6.1f}% {:>10} {:>14} {:>10.2f}\n", s.name, s.seconds,
+                             total > 0 ? 100 * s.seconds / total : 0, s.launches, s.items,
+                             s.items ? 1e9 * s.seconds / double(s.items) : 0);
     table += fmt::format("{:<16} {:>10.4f}\n{:<16} {:>10.4f}\n", "all stages", total, "render", stats.render_seconds);
     return table;
 }

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "film/exr_io.h"
-#include "integrators/renderer.h"
+#include "render/renderer.h"
 
 namespace ambilux {
 
@@ -15,9 +15,10 @@ std::string scene_hash(const Scene& scene);
 const char* estimator_name(Estimator estimator);
 const char* heuristic_name(MisHeuristic heuristic);
 
-/// The statistics of a render: scene, integrator, variant, estimator, backend, device, seed, size, spp, seconds {load, build, render}, rays {extend, occlude},
-/// stages, queues, invalid, memory_bytes, features, skipped, version and more.
-nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats, double load_seconds);
+/// The statistics of a render: scene, integrator, variant, estimator, backend, device, seed, size, spp, seconds {load,
+/// build, render}, rays {extend, occlude}, stages, queues, invalid, memory_bytes, features, skipped, version and more.
+nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
+                          double load_seconds);
 
 /// What every image file says about its making.
 Attributes image_attributes(const Scene& scene, const RenderSettings& settings, const RenderStats& stats);

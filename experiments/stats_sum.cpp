@@ -27,12 +27,15 @@ void add(InvalidCounts& total, const InvalidCounts& before, const InvalidCounts&
 }
 
 nlohmann::json save(const InvalidCounts& c) { return {c.nan, c.inf, c.negative}; }
-InvalidCounts restore(const nlohmann::json& j) { return {j.at(0).get<uint64_t>(), j.at(1).get<uint64_t>(), j.at(2).get<uint64_t>()}; }
+InvalidCounts restore(const nlohmann::json& j) {
+    return {j.at(0).get<uint64_t>(), j.at(1).get<uint64_t>(), j.at(2).get<uint64_t>()};
+}
 
 nlohmann::json save(const ChoiceStats& c) {
     nlohmann::json candidates = nlohmann::json::array();
     // Infinite variances become null.
-    for (const ChoiceStats::Candidate& x : c.candidates) candidates.push_back({x.name, x.settings, x.variance, x.work, x.seconds, x.efficiency});
+    for (const ChoiceStats::Candidate& x : c.candidates)
+        candidates.push_back({x.name, x.settings, x.variance, x.work, x.seconds, x.efficiency});
     return {c.name, c.settings, c.seconds, c.pilot_samples, c.expected_samples, candidates};
 }
 
@@ -44,7 +47,9 @@ ChoiceStats restore_choice(const nlohmann::json& j) {
     c.pilot_samples = j.at(3);
     c.expected_samples = j.at(4);
     for (const auto& x : j.at(5))
-        c.candidates.push_back({x.at(0), x.at(1), x.at(2).is_null() ? std::numeric_limits<double>::infinity() : x.at(2).get<double>(), x.at(3), x.at(4), x.at(5)});
+        c.candidates.push_back({x.at(0), x.at(1),
+                                x.at(2).is_null() ? std::numeric_limits<double>::infinity() : x.at(2).get<double>(),
+                                x.at(3), x.at(4), x.at(5)});
     return c;
 }
 
@@ -69,7 +74,8 @@ void add_part(RenderStats& total, const RenderStats& before, const RenderStats& 
         t.items += s.items - b.items;
         t.seconds += s.seconds - b.seconds;
         t.items_by_depth.resize(std::max(t.items_by_depth.size(), s.items_by_depth.size()));
-        for (size_t i = 0; i < s.items_by_depth.size(); ++i) t.items_by_depth[i] += s.items_by_depth[i] - (i < b.items_by_depth.size() ? b.items_by_depth[i] : 0);
+        for (size_t i = 0; i < s.items_by_depth.size(); ++i)
+            t.items_by_depth[i] += s.items_by_depth[i] - (i < b.items_by_depth.size() ? b.items_by_depth[i] : 0);
     }
     for (const QueueStats& q : now.queues) {
         const QueueStats* first = named(before.queues, q.name);
@@ -81,14 +87,17 @@ void add_part(RenderStats& total, const RenderStats& before, const RenderStats& 
     add(sum.invalid, before.invalid, now.invalid);
     for (const auto& [stage, counts] : now.invalid_by_stage) {
         const auto first = before.invalid_by_stage.find(stage);
-        add(sum.invalid_by_stage[stage], first == before.invalid_by_stage.end() ? InvalidCounts{} : first->second, counts);
+        add(sum.invalid_by_stage[stage], first == before.invalid_by_stage.end() ? InvalidCounts{} : first->second,
+            counts);
     }
     total = std::move(sum);
 }
 
 nlohmann::json save_stats(const RenderStats& s) {
-    nlohmann::json stages = nlohmann::json::array(), queues = nlohmann::json::array(), invalid = nlohmann::json::object();
-    for (const StageStats& stage : s.stages) stages.push_back({stage.name, stage.launches, stage.items, stage.seconds, stage.items_by_depth});
+    nlohmann::json stages = nlohmann::json::array(), queues = nlohmann::json::array(),
+                   invalid = nlohmann::json::object();
+    for (const StageStats& stage : s.stages)
+        stages.push_back({stage.name, stage.launches, stage.items, stage.seconds, stage.items_by_depth});
     for (const QueueStats& q : s.queues) queues.push_back({q.name, q.capacity, q.peak, q.overflow});
     for (const auto& [stage, counts] : s.invalid_by_stage) invalid[stage] = save(counts);
     return {{"backend", s.backend},
@@ -119,8 +128,10 @@ RenderStats restore_stats(const nlohmann::json& j) {
     s.rays_extend = j.at("rays").at(0);
     s.rays_occlude = j.at("rays").at(1);
     for (const auto& stage : j.at("stages"))
-        s.stages.push_back({stage.at(0), stage.at(1).get<uint64_t>(), stage.at(2).get<uint64_t>(), stage.at(3).get<double>(), stage.at(4).get<std::vector<uint64_t>>()});
-    for (const auto& q : j.at("queues")) s.queues.push_back({q.at(0), q.at(1).get<uint64_t>(), q.at(2).get<uint64_t>(), q.at(3).get<uint64_t>()});
+        s.stages.push_back({stage.at(0), stage.at(1).get<uint64_t>(), stage.at(2).get<uint64_t>(),
+                            stage.at(3).get<double>(), stage.at(4).get<std::vector<uint64_t>>()});
+    for (const auto& q : j.at("queues"))
+        s.queues.push_back({q.at(0), q.at(1).get<uint64_t>(), q.at(2).get<uint64_t>(), q.at(3).get<uint64_t>()});
     s.invalid = restore(j.at("invalid"));
     for (const auto& [stage, counts] : j.at("invalid_by_stage").items()) s.invalid_by_stage[stage] = restore(counts);
     s.memory_bytes = j.at("memory").at(0);

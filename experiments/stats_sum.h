@@ -3,11 +3,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "integrators/renderer.h"
+#include "render/renderer.h"
 
 namespace ambilux {
 
-/// Adds to `total` what happened between `before` and `now`: counts, times and rays; of queues the highest peak. The rest is taken from `now`.
+/// Adds to `total` what happened between `before` and `now`: counts, times and rays; of queues the highest peak. The
+/// rest is taken from `now`.
 void add_part(RenderStats& total, const RenderStats& before, const RenderStats& now);
 
 /// All fields, and back.

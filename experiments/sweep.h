@@ -20,8 +20,8 @@ constexpr size_t kMaxCombinations = 1000;
 /// Lists by key, in the order of the file.
 using Sweep = std::vector<std::vector<SweepValue>>;
 
-/// Reads { key = [values], ... }. `text_of` turns a value into text. Throws Error(bad_input) for what is no list, for repeated values and for text that cannot be part
-/// of a file name.
+/// Reads { key = [values], ... }. `text_of` turns a value into text. Throws Error(bad_input) for what is no list, for
+/// repeated values and for text that cannot be part of a file name.
 template <class TextOf>
 Sweep read_sweep(const TomlReader& r, const toml::node& node, const std::string& where, TextOf text_of) {
     Sweep sweep;
@@ -29,12 +29,16 @@ Sweep read_sweep(const TomlReader& r, const toml::node& node, const std::string&
         std::vector<SweepValue> values;
         std::set<std::string> taken;
         if (!list.is_array() || list.as_array()->empty())
-            throw r.error(list, fmt::format("{}: '{}' must be a list of values that is not empty, such as [1, 2, 4]", where, key.str()));
+            throw r.error(list, fmt::format("{}: '{}' must be a list of values that is not empty, such as [1, 2, 4]",
+                                            where, key.str()));
         for (const toml::node& value : *list.as_array()) {
             values.push_back({std::string(key.str()), text_of(std::string(key.str()), value), &value});
             const std::string& text = values.back().text;
-            if (text.empty() || !TomlReader::within(text, "._-+")) throw r.error(value, fmt::format("{}: value '{}' of '{}' cannot be part of a name", where, text, key.str()));
-            if (!taken.insert(text).second) throw r.error(value, fmt::format("{}: value {} of '{}' is listed twice", where, text, key.str()));
+            if (text.empty() || !TomlReader::within(text, "._-+"))
+                throw r.error(value,
+                              fmt::format("{}: value '{}' of '{}' cannot be part of a name", where, text, key.str()));
+            if (!taken.insert(text).second)
+                throw r.error(value, fmt::format("{}: value {} of '{}' is listed twice", where, text, key.str()));
         }
         sweep.push_back(std::move(values));
     }
@@ -46,7 +50,8 @@ Sweep read_sweep(const TomlReader& r, const toml::node& node, const std::string&
     if (sweep.empty()) throw r.error(node, where + " is empty: leave it out, or name a key and its values");
     size_t count = 1;
     for (const auto& values : sweep)
-        if ((count *= values.size()) > kMaxCombinations) throw r.error(node, fmt::format("{} has more than {} combinations", where, kMaxCombinations));
+        if ((count *= values.size()) > kMaxCombinations)
+            throw r.error(node, fmt::format("{} has more than {} combinations", where, kMaxCombinations));
     return sweep;
 }
 

@@ -11,11 +11,14 @@
 namespace ambilux {
 namespace {
 
-double mean_of(const std::vector<float>& values) { return values.empty() ? 0.0 : std::accumulate(values.begin(), values.end(), 0.0) / double(values.size()); }
+double mean_of(const std::vector<float>& values) {
+    return values.empty() ? 0.0 : std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
+}
 
 }  // namespace
 
-void write_technique_images(const std::string& folder, const Scene& scene, const RenderSettings& settings, const RenderStats& stats, const std::vector<TechniqueImage>& images) {
+void write_technique_images(const std::string& folder, const Scene& scene, const RenderSettings& settings,
+                            const RenderStats& stats, const std::vector<TechniqueImage>& images) {
     make_folders(folder);
     const uint32_t width = scene.sensor.crop_width, height = scene.sensor.crop_height;
     nlohmann::json entries = nlohmann::json::array();
@@ -40,8 +43,14 @@ void write_technique_images(const std::string& folder, const Scene& scene, const
                            {"mean_weighted", mean_of(image.weighted)},
                            {"dropped", image.dropped}});
     }
-    const nlohmann::json list = {{"scene", scene.path},   {"integrator", settings.integrator}, {"variant", settings.variant}, {"spp", stats.samples},
-                                 {"max_depth", max_depth}, {"width", width},                    {"height", height},            {"entries", entries}};
+    const nlohmann::json list = {{"scene", scene.path},
+                                 {"integrator", settings.integrator},
+                                 {"variant", settings.variant},
+                                 {"spp", stats.samples},
+                                 {"max_depth", max_depth},
+                                 {"width", width},
+                                 {"height", height},
+                                 {"entries", entries}};
     write_file_atomic(folder + "/techniques.json", list.dump(2) + "\n");
 }
 

@@ -17,13 +17,17 @@ struct TomlReader {
     std::string file;
 
     static int line_of(const toml::node& node) { return int(node.source().begin.line); }
-    Error error(const toml::node& node, const std::string& message) const { return input_error(file, line_of(node), message); }
+    Error error(const toml::node& node, const std::string& message) const {
+        return input_error(file, line_of(node), message);
+    }
 
-    void check_keys(const toml::table& table, const std::string& where, std::initializer_list<std::string_view> known) const {
+    void check_keys(const toml::table& table, const std::string& where,
+                    std::initializer_list<std::string_view> known) const {
         for (const auto& [key, node] : table)
             if (std::find(known.begin(), known.end(), key.str()) == known.end())
-                throw input_error(file, int(key.source().begin.line),
-                                  fmt::format("unknown key '{}' in {}; known are: {}", key.str(), where, fmt::join(known, ", ")));
+                throw input_error(
+                    file, int(key.source().begin.line),
+                    fmt::format("unknown key '{}' in {}; known are: {}", key.str(), where, fmt::join(known, ", ")));
     }
     const toml::node& need(const toml::table& table, std::string_view key, const std::string& where) const {
         if (const toml::node* node = table.get(key)) return *node;
@@ -48,7 +52,8 @@ struct TomlReader {
         return *node.as_table();
     }
     const toml::array& array(const toml::node& node, std::string_view key) const {
-        if (!node.is_array() || node.as_array()->empty()) throw error(node, fmt::format("'{}' must be a list that is not empty", key));
+        if (!node.is_array() || node.as_array()->empty())
+            throw error(node, fmt::format("'{}' must be a list that is not empty", key));
         return *node.as_array();
     }
     /// A value of any simple type as the text that --set would take.
@@ -62,23 +67,30 @@ struct TomlReader {
     /// True if all of `s` is letters, digits and what is in `also`.
     static bool within(std::string_view s, std::string_view also) {
         return std::all_of(s.begin(), s.end(), [&](unsigned char c) {
-            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || also.find(char(c)) != also.npos;
+            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                   also.find(char(c)) != also.npos;
         });
     }
-    /// Name that is a file name everywhere: letters, digits, '.', '_', '-', and what a sweep adds, such as "[connections=4,wave_size=512]".
+    /// Name that is a file name everywhere: letters, digits, '.', '_', '-', and what a sweep adds, such as
+    /// "[connections=4,wave_size=512]".
     std::string name(const toml::table& parent, const std::string& where) const {
         const toml::node& node = need(parent, "name", where);
         const std::string value = text(node, "name");
         const size_t bracket = std::min(value.find('['), value.size());
-        const std::string_view base = std::string_view(value).substr(0, bracket), rest = std::string_view(value).substr(bracket);
+        const std::string_view base = std::string_view(value).substr(0, bracket),
+                               rest = std::string_view(value).substr(bracket);
         const bool plain_base = !base.empty() && base.size() <= 64 && base[0] != '.' && within(base, "._-");
-        const bool plain_rest = rest.empty() || (rest.size() > 2 && rest.back() == ']' && within(rest.substr(1, rest.size() - 2), "._-+=,"));
+        const bool plain_rest = rest.empty() || (rest.size() > 2 && rest.back() == ']' &&
+                                                 within(rest.substr(1, rest.size() - 2), "._-+=,"));
         if (!plain_base || !plain_rest || value.size() > kMaxName)
-            throw error(node, fmt::format("name '{}': use 1 to 64 letters, digits, '.', '_' or '-', not beginning with '.'", value));
+            throw error(
+                node,
+                fmt::format("name '{}': use 1 to 64 letters, digits, '.', '_' or '-', not beginning with '.'", value));
         return value;
     }
     /// Throws if `name` is taken already.
-    void claim(const toml::node& node, const std::string& name, const std::string& where, std::set<std::string>& taken) const {
+    void claim(const toml::node& node, const std::string& name, const std::string& where,
+               std::set<std::string>& taken) const {
         if (!taken.insert(name).second) throw error(node, fmt::format("name '{}' of {} is used twice", name, where));
     }
 

@@ -12,8 +12,8 @@ struct Work {
     double samples = 0, seconds = 0;
 };
 
-/// Estimates, not promises: a sample of a kind is taken to cost what those of this kind have cost so far, or those of all kinds where none was made yet. Loading, metrics and
-/// writing of files are not in it.
+/// Estimates, not promises: a sample of a kind is taken to cost what those of this kind have cost so far, or those of
+/// all kinds where none was made yet. Loading, metrics and writing of files are not in it.
 class WorkEstimate {
 public:
     /// `count` more renders of this kind. All renders of one kind ask for the same work.
@@ -37,8 +37,8 @@ public:
 
 private:
     struct Kind {
-        double renders = 0;  ///< not begun
-        Work each, left;     ///< of one that is not begun; of the one that is
+        double renders = 0;               ///< not begun
+        Work each, left;                  ///< of one that is not begun; of the one that is
         double samples = 0, seconds = 0;  ///< measured
     };
     double seconds_of(const Kind& kind, const Work& work) const;

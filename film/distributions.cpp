@@ -11,7 +11,8 @@ constexpr double kTiny = 1e-300;
 constexpr double kEpsilon = 1e-15;
 constexpr int kMaxTerms = 100000;
 
-/// Regularised upper incomplete gamma function Q(a, x): series for x < a+1, else continued fraction by Lentz's method (DLMF 8.7.1 and 8.9.2).
+/// Regularised upper incomplete gamma function Q(a, x): series for x < a+1, else continued fraction by Lentz's method
+/// (DLMF 8.7.1 and 8.9.2).
 double gamma_q(double a, double x) {
     if (x <= 0) return 1;
     const double log_scale = a * std::log(x) - x - std::lgamma(a);
@@ -38,7 +39,8 @@ double gamma_q(double a, double x) {
     return f * std::exp(log_scale);
 }
 
-/// Regularised incomplete beta function I_x(a, b), continued fraction by Lentz's method (DLMF 8.17.22); x, y = 1-x given apart so that neither loses digits.
+/// Regularised incomplete beta function I_x(a, b), continued fraction by Lentz's method (DLMF 8.17.22); x, y = 1-x
+/// given apart so that neither loses digits.
 double beta_i(double x, double y, double a, double b) {
     if (x <= 0) return 0;
     if (y <= 0) return 1;
@@ -62,7 +64,8 @@ double beta_i(double x, double y, double a, double b) {
         }
         if (std::abs(change - 1) < kEpsilon) break;
     }
-    const double log_scale = a * std::log(x) + b * std::log(y) + std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) - std::log(a);
+    const double log_scale =
+        a * std::log(x) + b * std::log(y) + std::lgamma(a + b) - std::lgamma(a) - std::lgamma(b) - std::log(a);
     return f * std::exp(log_scale);
 }
 

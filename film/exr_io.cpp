@@ -44,8 +44,9 @@ void insert_attributes(Imf::Header& header, const Attributes& attributes) {
             header.insert(name, Imf::StringAttribute(value.get<std::string>()));
         else if (value.is_number_float())
             header.insert(name, Imf::DoubleAttribute(value.get<double>()));
-        else if (value.is_number_unsigned() ? value.get<uint64_t>() <= uint64_t(std::numeric_limits<int>::max())
-                                            : value.is_number_integer() && value.get<int64_t>() >= std::numeric_limits<int>::min())
+        else if (value.is_number_unsigned()
+                     ? value.get<uint64_t>() <= uint64_t(std::numeric_limits<int>::max())
+                     : value.is_number_integer() && value.get<int64_t>() >= std::numeric_limits<int>::min())
             header.insert(name, Imf::IntAttribute(value.get<int>()));
         else
             header.insert(name, Imf::StringAttribute(value.dump()));
@@ -73,12 +74,14 @@ constexpr std::array<const char*, 3> kErrorChannels = {"se.R", "se.G", "se.B"};
 
 void check_image(const std::string& path, const Image& image) {
     if (image.width == 0 || image.height == 0 || image.rgb.size() != size_t(image.width) * image.height * 3)
-        throw Error(ExitCode::device, "cannot write " + path + ": the image is empty or its buffer does not fit its size");
+        throw Error(ExitCode::device,
+                    "cannot write " + path + ": the image is empty or its buffer does not fit its size");
 }
 
 /// Writes planes of interleaved RGB floats under the given channel names.
 void write_planes(const std::string& path, uint32_t width, uint32_t height,
-                  const std::vector<std::pair<const float*, std::array<const char*, 3>>>& planes, const Attributes& attributes) {
+                  const std::vector<std::pair<const float*, std::array<const char*, 3>>>& planes,
+                  const Attributes& attributes) {
     StringStream stream;
     try {
         Imf::Header header{int(width), int(height)};
@@ -88,8 +91,8 @@ void write_planes(const std::string& path, uint32_t width, uint32_t height,
         for (const auto& [data, names] : planes)
             for (size_t c = 0; c < 3; ++c) {
                 header.channels().insert(names[c], Imf::Channel(Imf::FLOAT));
-                frame.insert(names[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(data + c)), 3 * sizeof(float),
-                                                  3 * sizeof(float) * width));
+                frame.insert(names[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(data + c)),
+                                                  3 * sizeof(float), 3 * sizeof(float) * width));
             }
         Imf::OutputFile file(stream, header);
         file.setFrameBuffer(frame);
@@ -103,13 +106,16 @@ void write_planes(const std::string& path, uint32_t width, uint32_t height,
 /// Reads three channels (a missing name repeats the first one) into interleaved floats.
 Image read_planes(Imf::InputFile& file, const std::array<const char*, 3>& names) {
     const Imath::Box2i window = file.header().dataWindow();
-    const uint64_t width = uint64_t(int64_t(window.max.x) - window.min.x + 1), height = uint64_t(int64_t(window.max.y) - window.min.y + 1);
+    const uint64_t width = uint64_t(int64_t(window.max.x) - window.min.x + 1),
+                   height = uint64_t(int64_t(window.max.y) - window.min.y + 1);
     Image image{uint32_t(width), uint32_t(height), std::vector<float>(width * height * 3)};
     Imf::FrameBuffer frame;
     for (size_t c = 0; c < 3; ++c) {
         if (c > 0 && std::strcmp(names[c], names[0]) == 0) continue;
-        // OpenEXR addresses pixels by data-window coordinates: Slice::Make takes the window's origin out of the pointer.
-        frame.insert(names[c], Imf::Slice::Make(Imf::FLOAT, image.rgb.data() + c, window, 3 * sizeof(float), 3 * sizeof(float) * width));
+        // OpenEXR addresses pixels by data-window coordinates: Slice::Make takes the window's origin out of the
+        // pointer.
+        frame.insert(names[c], Imf::Slice::Make(Imf::FLOAT, image.rgb.data() + c, window, 3 * sizeof(float),
+                                                3 * sizeof(float) * width));
     }
     file.setFrameBuffer(frame);
     file.readPixels(window.min.y, window.max.y);
@@ -140,7 +146,8 @@ void write_reference_exr(const std::string& path, const Reference& reference, At
         throw Error(ExitCode::device, "cannot write " + path + ": means and standard errors differ in size");
     attributes["spp"] = reference.samples;
     write_planes(path, reference.mean.width, reference.mean.height,
-                 {{reference.mean.rgb.data(), kMeanChannels}, {reference.standard_error.rgb.data(), kErrorChannels}}, attributes);
+                 {{reference.mean.rgb.data(), kMeanChannels}, {reference.standard_error.rgb.data(), kErrorChannels}},
+                 attributes);
 }
 
 Reference read_reference_exr(const std::string& path, Attributes* attributes) {
@@ -154,7 +161,8 @@ Reference read_reference_exr(const std::string& path, Attributes* attributes) {
             reference.mean = read_planes(file, {"Y", "Y", "Y"});
         } else {
             std::string found;
-            for (auto it = file.header().channels().begin(); it != file.header().channels().end(); ++it) found += std::string(" ") + it.name();
+            for (auto it = file.header().channels().begin(); it != file.header().channels().end(); ++it)
+                found += std::string(" ") + it.name();
             throw input_error(path, 0, "no channels R, G, B or Y at full resolution; it has:" + found);
         }
         if (has_channels(file, kErrorChannels)) reference.standard_error = read_planes(file, kErrorChannels);

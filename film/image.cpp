@@ -11,7 +11,8 @@ Image mean_image(const FilmMoments& moments) {
 }
 
 Reference to_reference(const FilmMoments& moments) {
-    Reference r{mean_image(moments), {moments.width, moments.height, std::vector<float>(moments.sum.size())}, moments.samples};
+    Reference r{
+        mean_image(moments), {moments.width, moments.height, std::vector<float>(moments.sum.size())}, moments.samples};
     for (size_t i = 0; i < r.standard_error.rgb.size(); ++i) r.standard_error.rgb[i] = float(moments.standard_error(i));
     return r;
 }
@@ -21,7 +22,8 @@ FilmMoments to_moments(const Reference& reference) {
         throw Error(ExitCode::bad_input, "an image without standard errors or sample count cannot be continued");
     const double n = double(reference.samples);
     const size_t size = reference.mean.rgb.size();
-    FilmMoments m{reference.mean.width, reference.mean.height, reference.samples, std::vector<double>(size), std::vector<double>(size)};
+    FilmMoments m{reference.mean.width, reference.mean.height, reference.samples, std::vector<double>(size),
+                  std::vector<double>(size)};
     for (size_t i = 0; i < size; ++i) {
         const double mean = reference.mean.rgb[i], se = reference.standard_error.rgb[i];
         m.sum[i] = mean * n;

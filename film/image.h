@@ -27,8 +27,9 @@ Image mean_image(const FilmMoments& moments);
 /// Means and standard errors, rounded to float.
 Reference to_reference(const FilmMoments& moments);
 
-/// The sums that a reference came from, so that more samples can be added: sum = mean·n, sum of squares = se²·n(n-1) + n·mean². Exact up to the rounding
-/// of the stored floats (6e-8 relative). Throws Error(bad_input) without standard errors or with fewer than two samples.
+/// The sums that a reference came from, so that more samples can be added: sum = mean·n, sum of squares = se²·n(n-1) +
+/// n·mean². Exact up to the rounding of the stored floats (6e-8 relative). Throws Error(bad_input) without standard
+/// errors or with fewer than two samples.
 FilmMoments to_moments(const Reference& reference);
 
 }  // namespace ambilux

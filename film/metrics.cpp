@@ -12,8 +12,9 @@ namespace {
 
 void check_sizes(uint32_t width, uint32_t height, const Image& reference) {
     if (width != reference.width || height != reference.height)
-        throw Error(ExitCode::bad_input, "the image is " + std::to_string(width) + "x" + std::to_string(height) + " but the reference is " +
-                                             std::to_string(reference.width) + "x" + std::to_string(reference.height) + ": render both at the same size");
+        throw Error(ExitCode::bad_input, "the image is " + std::to_string(width) + "x" + std::to_string(height) +
+                                             " but the reference is " + std::to_string(reference.width) + "x" +
+                                             std::to_string(reference.height) + ": render both at the same size");
 }
 
 template <class Value>
@@ -21,7 +22,8 @@ Metrics compare_values(uint32_t width, uint32_t height, const Reference& referen
     const Image& mean = reference.mean;
     check_sizes(width, height, mean);
     const bool errors = reference.standard_error.rgb.size() == mean.rgb.size();
-    double squares = 0, relative = 0, absolute = 0, noise = 0, relative_noise = 0, total = 0, reference_total = 0, pixel_squares = 0;
+    double squares = 0, relative = 0, absolute = 0, noise = 0, relative_noise = 0, total = 0, reference_total = 0,
+           pixel_squares = 0;
     Metrics m;
     const size_t pixels = size_t(width) * height;
     struct PixelError {
@@ -35,7 +37,8 @@ Metrics compare_values(uint32_t width, uint32_t height, const Reference& referen
         for (size_t c = 0; c < 3; ++c) {
             const size_t i = 3 * p + c;
             const double x = value(i), r = mean.rgb[i], d = x - r;
-            const double se = errors ? double(reference.standard_error.rgb[i]) : std::numeric_limits<double>::quiet_NaN();
+            const double se =
+                errors ? double(reference.standard_error.rgb[i]) : std::numeric_limits<double>::quiet_NaN();
             m.non_finite += !std::isfinite(x);
             squares += d * d;
             relative += d * d / (r * r + 0.01);
@@ -61,9 +64,11 @@ Metrics compare_values(uint32_t width, uint32_t height, const Reference& referen
     m.relmse_corrected = non_negative((relative - relative_noise) / n);
     const size_t kept = pixels - size_t(kTrimmedShare * double(pixels));
     if (m.non_finite || !std::isfinite(relative)) {
-        m.relmse_trimmed = m.relmse_trimmed_corrected = std::numeric_limits<double>::quiet_NaN();  // outliers of this kind are not forgiven
+        m.relmse_trimmed = m.relmse_trimmed_corrected =
+            std::numeric_limits<double>::quiet_NaN();  // outliers of this kind are not forgiven
     } else if (pixels) {
-        std::nth_element(by_pixel.begin(), by_pixel.begin() + long(kept) - 1, by_pixel.end(), [](const PixelError& a, const PixelError& b) { return a.error < b.error; });
+        std::nth_element(by_pixel.begin(), by_pixel.begin() + long(kept) - 1, by_pixel.end(),
+                         [](const PixelError& a, const PixelError& b) { return a.error < b.error; });
         PixelError sum{0, 0};
         for (size_t p = 0; p < kept; ++p) {
             sum.error += by_pixel[p].error;
@@ -89,7 +94,8 @@ BlockAgreement block_agreement(const Image& image, const Image& reference, uint3
         for (uint32_t bx = 0; bx < image.width; bx += block) {
             double x_sum = 0, r_sum = 0;
             for (uint32_t y = by; y < std::min(by + block, image.height); ++y)
-                for (size_t i = (size_t(y) * image.width + bx) * 3; i < (size_t(y) * image.width + std::min(bx + block, image.width)) * 3; ++i) {
+                for (size_t i = (size_t(y) * image.width + bx) * 3;
+                     i < (size_t(y) * image.width + std::min(bx + block, image.width)) * 3; ++i) {
                     x_sum += image.rgb[i];
                     r_sum += reference.rgb[i];
                 }

@@ -19,8 +19,9 @@ void FilmMoments::add(const FilmMoments& other) {
         return;
     }
     if (width != other.width || height != other.height || sum.size() != other.sum.size())
-        throw Error(ExitCode::bad_input, "cannot add films of different sizes: " + std::to_string(width) + "x" + std::to_string(height) + " and " +
-                                             std::to_string(other.width) + "x" + std::to_string(other.height));
+        throw Error(ExitCode::bad_input, "cannot add films of different sizes: " + std::to_string(width) + "x" +
+                                             std::to_string(height) + " and " + std::to_string(other.width) + "x" +
+                                             std::to_string(other.height));
     samples += other.samples;
     for (size_t i = 0; i < sum.size(); ++i) {
         sum[i] += other.sum[i];

@@ -7,8 +7,9 @@
 
 namespace ambilux {
 
-/// Sums over samples, per pixel and channel, row-major from the top left: value (y*width + x)*3 + channel. Samples of a pixel are independent and identically
-/// distributed (the reconstruction filter is sampled, not splatted), so the variance of the mean is sample variance / samples.
+/// Sums over samples, per pixel and channel, row-major from the top left: value (y*width + x)*3 + channel. Samples of a
+/// pixel are independent and identically distributed (the reconstruction filter is sampled, not splatted), so the
+/// variance of the mean is sample variance / samples.
 struct FilmMoments {
     uint32_t width = 0, height = 0;
     uint64_t samples = 0;  ///< per pixel

@@ -26,10 +26,14 @@ float linear_to_srgb(float linear) {
 void write_png(const std::string& path, const Image& image, float exposure) {
     const float scale = std::exp2(exposure);
     std::vector<uint8_t> pixels(image.rgb.size());
-    for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = uint8_t(std::lround(255.0f * linear_to_srgb(scale * image.rgb[i])));
+    for (size_t i = 0; i < pixels.size(); ++i)
+        pixels[i] = uint8_t(std::lround(255.0f * linear_to_srgb(scale * image.rgb[i])));
     std::string bytes;
-    const auto collect = [](void* target, void* data, int size) { static_cast<std::string*>(target)->append(static_cast<char*>(data), size_t(size)); };
-    if (!stbi_write_png_to_func(collect, &bytes, int(image.width), int(image.height), 3, pixels.data(), int(image.width) * 3))
+    const auto collect = [](void* target, void* data, int size) {
+        static_cast<std::string*>(target)->append(static_cast<char*>(data), size_t(size));
+    };
+    if (!stbi_write_png_to_func(collect, &bytes, int(image.width), int(image.height), 3, pixels.data(),
+                                int(image.width) * 3))
         throw Error(ExitCode::device, "cannot write " + path + ": PNG encoding failed");
     write_file_atomic(path, bytes);
 }

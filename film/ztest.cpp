@@ -27,7 +27,8 @@ struct Rectangle {
     uint32_t x, y, width, height;
 };
 
-/// The variance of a block whose pixels are not independent, from the sums of its batches. Events that several pixels share are one.
+/// The variance of a block whose pixels are not independent, from the sums of its batches. Events that several pixels
+/// share are one.
 void correlate(const Estimate& image, const Rectangle& r, uint32_t channel, Side& side) {
     const double n = double(image.batches.size());
     double squares = 0;
@@ -43,9 +44,10 @@ void correlate(const Estimate& image, const Rectangle& r, uint32_t channel, Side
     side.dof_terms = variance * variance / (n - 1);
 }
 
-/// Sums over a block, and how many events its variance comes from. A pixel of n samples with mean m and sample variance s² above a base b, which no event made
-/// bright, has e = n(m-b)²/(s²+(m-b)²) effective ones (Kish 1965): rare equal hits count one each. The base is the darkest mean in the block. Pixels add up
-/// weighted by their share of the variance, so that N rare hits anywhere give N.
+/// Sums over a block, and how many events its variance comes from. A pixel of n samples with mean m and sample variance
+/// s² above a base b, which no event made bright, has e = n(m-b)²/(s²+(m-b)²) effective ones (Kish 1965): rare equal
+/// hits count one each. The base is the darkest mean in the block. Pixels add up weighted by their share of the
+/// variance, so that N rare hits anywhere give N.
 Side measure(const Estimate& image, const Rectangle& r, uint32_t channel) {
     Side side;
     double base = kInf;
@@ -98,7 +100,8 @@ double block_z(const Side& a, const Side& b, const ZTestOptions& options) {
 void pool(Estimate& a, Estimate& b) {
     const double na = double(a.samples), nb = double(b.samples);
     for (size_t i = 0; i < a.mean.size(); ++i) {
-        const double pooled = (a.variance_of_mean[i] * na * (na - 1) + b.variance_of_mean[i] * nb * (nb - 1)) / (na + nb - 2);
+        const double pooled =
+            (a.variance_of_mean[i] * na * (na - 1) + b.variance_of_mean[i] * nb * (nb - 1)) / (na + nb - 2);
         a.variance_of_mean[i] = pooled / na;
         b.variance_of_mean[i] = pooled / nb;
     }
@@ -106,8 +109,9 @@ void pool(Estimate& a, Estimate& b) {
 
 void check(const Estimate& e, const ZTestOptions& options, const char* name) {
     if (e.samples && e.samples < std::max<uint64_t>(options.min_samples, 2))
-        throw Error(ExitCode::bad_input, fmt::format("image {} has {} samples per pixel; the statistical comparison needs at least {}", name, e.samples,
-                                                     std::max<uint64_t>(options.min_samples, 2)));
+        throw Error(ExitCode::bad_input,
+                    fmt::format("image {} has {} samples per pixel; the statistical comparison needs at least {}", name,
+                                e.samples, std::max<uint64_t>(options.min_samples, 2)));
     const size_t size = size_t(e.width) * e.height * 3;
     if (size == 0 || e.mean.size() != size || e.variance_of_mean.size() != size)
         throw Error(ExitCode::bad_input, fmt::format("image {} is empty or its buffers do not fit its size", name));
@@ -126,11 +130,16 @@ Estimate to_estimate(const FilmMoments& m) {
 }
 
 Estimate to_estimate(const std::vector<FilmMoments>& batches) {
-    if (batches.size() < 16) throw Error(ExitCode::bad_input, fmt::format("{} independent parts of an image are too few for the variances of its blocks; 16 are needed", batches.size()));
+    if (batches.size() < 16)
+        throw Error(
+            ExitCode::bad_input,
+            fmt::format("{} independent parts of an image are too few for the variances of its blocks; 16 are needed",
+                        batches.size()));
     FilmMoments all = batches[0];
     for (size_t i = 1; i < batches.size(); ++i) {
         if (batches[i].samples != batches[0].samples || batches[i].sum.size() != all.sum.size())
-            throw Error(ExitCode::bad_input, fmt::format("part {} of an image has another size or sample count than the first", i));
+            throw Error(ExitCode::bad_input,
+                        fmt::format("part {} of an image has another size or sample count than the first", i));
         all.add(batches[i]);
     }
     Estimate e = to_estimate(all);
@@ -146,12 +155,14 @@ Estimate to_estimate(const Reference& r) {
     if (r.standard_error.rgb.empty()) return e;
     if (r.samples < 2) throw Error(ExitCode::bad_input, "the reference has standard errors but states no sample count");
     e.samples = r.samples;
-    for (size_t i = 0; i < e.mean.size(); ++i) e.variance_of_mean[i] = double(r.standard_error.rgb[i]) * double(r.standard_error.rgb[i]);
+    for (size_t i = 0; i < e.mean.size(); ++i)
+        e.variance_of_mean[i] = double(r.standard_error.rgb[i]) * double(r.standard_error.rgb[i]);
     return e;
 }
 
 Estimate exact_estimate(const Image& image) {
-    return {image.width, image.height, 0, std::vector<double>(image.rgb.begin(), image.rgb.end()), std::vector<double>(image.rgb.size())};
+    return {image.width, image.height, 0, std::vector<double>(image.rgb.begin(), image.rgb.end()),
+            std::vector<double>(image.rgb.size())};
 }
 
 ZTestResult z_test(const Estimate& image_a, const Estimate& image_b, const ZTestOptions& options) {
@@ -159,7 +170,8 @@ ZTestResult z_test(const Estimate& image_a, const Estimate& image_b, const ZTest
     check(image_b, options, "b");
     Estimate a = image_a, b = image_b;
     if (a.width != b.width || a.height != b.height)
-        throw Error(ExitCode::bad_input, fmt::format("images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height));
+        throw Error(ExitCode::bad_input,
+                    fmt::format("images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height));
     if (options.same_estimator && a.samples && b.samples) pool(a, b);
 
     const uint32_t smallest = std::max(1u, options.block);
@@ -188,8 +200,8 @@ ZTestResult z_test(const Estimate& image_a, const Estimate& image_b, const ZTest
                     const Side side_a = measure(a, block, c), side_b = measure(b, block, c);
                     const double z = block_z(side_a, side_b, options);
                     const double fewest = std::min(side_a.events, side_b.events);
-                    // The larger block says how many events to expect here. What it expected itself is a bound, so that a block that happens to have met none
-                    // does not overrule those around it.
+                    // The larger block says how many events to expect here. What it expected itself is a bound, so that
+                    // a block that happens to have met none does not overrule those around it.
                     double expected = kInf;
                     if (!whole) {
                         const Events& parent = parents[(size_t(row / 2) * parent_columns + column / 2) * 3 + c];
@@ -203,8 +215,9 @@ ZTestResult z_test(const Estimate& image_a, const Estimate& image_b, const ZTest
                         // Channels of a pixel may be fully correlated: deviations add.
                         deviation += std::sqrt(side_a.variance + side_b.variance);
                     }
-                    const bool conclusive = z == 0 || std::isnan(side_a.mean + side_b.mean) ||
-                                            (fewest >= (whole ? 0.25 : 1.0) * options.min_events && expected >= 0.5 * options.min_events);
+                    const bool conclusive =
+                        z == 0 || std::isnan(side_a.mean + side_b.mean) ||
+                        (fewest >= (whole ? 0.25 : 1.0) * options.min_events && expected >= 0.5 * options.min_events);
                     if (!conclusive) {
                         r.undecided = r.undecided || whole;
                         r.inconclusive += size == smallest;
@@ -216,7 +229,8 @@ ZTestResult z_test(const Estimate& image_a, const Estimate& image_b, const ZTest
                         ++count[c];
                     }
                     // Of infinite ones the smallest block is named.
-                    if (std::abs(z) > std::abs(r.worst_z) || r.worst_width == 0 || (std::isinf(z) && std::isinf(r.worst_z) && r.worst_width > block.width)) {
+                    if (std::abs(z) > std::abs(r.worst_z) || r.worst_width == 0 ||
+                        (std::isinf(z) && std::isinf(r.worst_z) && r.worst_width > block.width)) {
                         r.worst_z = z;
                         r.worst_x = block.x;
                         r.worst_y = block.y;
@@ -229,7 +243,9 @@ ZTestResult z_test(const Estimate& image_a, const Estimate& image_b, const ZTest
                 }
         for (int c = 0; c < 3 && size == smallest; ++c) {
             r.chi_square_dof = std::max(r.chi_square_dof, count[c]);
-            if (count[c] > 0 && a.batches.empty() && b.batches.empty()) r.p_chi_square = std::min(r.p_chi_square, std::min(1.0, 3 * chi_square_tail(r.chi_square[c], count[c])));
+            if (count[c] > 0 && a.batches.empty() && b.batches.empty())
+                r.p_chi_square =
+                    std::min(r.p_chi_square, std::min(1.0, 3 * chi_square_tail(r.chi_square[c], count[c])));
         }
         parents = std::move(events);
         parent_columns = columns;
@@ -237,7 +253,8 @@ ZTestResult z_test(const Estimate& image_a, const Estimate& image_b, const ZTest
 
     r.p_worst = r.tests ? sidak(2 * normal_tail(std::abs(r.worst_z)), double(r.tests)) : 1;
     r.relative_difference = total_a == total_b ? 0 : (total_a - total_b) / total_b;
-    const double threshold = normal_tail_inverse(0.5 * sidak_level(0.5 * options.significance, std::max<double>(1, double(r.tests))));
+    const double threshold =
+        normal_tail_inverse(0.5 * sidak_level(0.5 * options.significance, std::max<double>(1, double(r.tests))));
     r.detectable = threshold * deviation / std::abs(total_b);
     r.pass = !r.undecided && r.p_worst >= 0.5 * options.significance && r.p_chi_square >= 0.5 * options.significance;
     return r;
@@ -248,18 +265,25 @@ std::string ZTestResult::report() const {
         "{}: worst block z = {:+.2f} (corrected p = {:.2g}) of {} tests\n"
         "  at {},{} size {}x{} channel {}: {:.6g} against {:.6g}\n"
         "  whole image z = {:+.2f} {:+.2f} {:+.2f}, relative difference {:+.3g} (would fail from {:.2g})\n"
-        "  chi-square {:.1f} {:.1f} {:.1f} over {} blocks, corrected p = {:.2g}; {} smallest blocks left to larger ones{}",
-        pass ? "pass" : "FAIL", worst_z, p_worst, tests, worst_x, worst_y, worst_width, worst_height, "RGB"[worst_channel], worst_a, worst_b, mean_z[0],
-        mean_z[1], mean_z[2], relative_difference, detectable, chi_square[0], chi_square[1], chi_square[2], chi_square_dof, p_chi_square, inconclusive,
-        undecided ? "\n  a channel has met too few bright samples in the whole image: nothing is shown, use more samples" : "");
+        "  chi-square {:.1f} {:.1f} {:.1f} over {} blocks, corrected p = {:.2g}; {} smallest blocks left to larger "
+        "ones{}",
+        pass ? "pass" : "FAIL", worst_z, p_worst, tests, worst_x, worst_y, worst_width, worst_height,
+        "RGB"[worst_channel], worst_a, worst_b, mean_z[0], mean_z[1], mean_z[2], relative_difference, detectable,
+        chi_square[0], chi_square[1], chi_square[2], chi_square_dof, p_chi_square, inconclusive,
+        undecided
+            ? "\n  a channel has met too few bright samples in the whole image: nothing is shown, use more samples"
+            : "");
 }
 
 MitsubaZTest mitsuba_z_test(const Image& mean, uint64_t spp, const Image& ref, const Image& ref_variance) {
-    if (mean.width != ref.width || mean.height != ref.height || ref.width != ref_variance.width || ref.height != ref_variance.height)
-        throw Error(ExitCode::bad_input, fmt::format("images differ in size: {}x{}, reference {}x{}, variance {}x{}", mean.width, mean.height, ref.width,
-                                                     ref.height, ref_variance.width, ref_variance.height));
+    if (mean.width != ref.width || mean.height != ref.height || ref.width != ref_variance.width ||
+        ref.height != ref_variance.height)
+        throw Error(ExitCode::bad_input,
+                    fmt::format("images differ in size: {}x{}, reference {}x{}, variance {}x{}", mean.width,
+                                mean.height, ref.width, ref.height, ref_variance.width, ref_variance.height));
     // Linear Rec.709 to CIE XYZ (IEC 61966-2-1 with D65).
-    constexpr double kToXyz[3][3] = {{0.412453, 0.357580, 0.180423}, {0.212671, 0.715160, 0.072169}, {0.019334, 0.119193, 0.950227}};
+    constexpr double kToXyz[3][3] = {
+        {0.412453, 0.357580, 0.180423}, {0.212671, 0.715160, 0.072169}, {0.019334, 0.119193, 0.950227}};
     const auto to_xyz = [&](const Image& image, size_t pixel, uint32_t c) {
         const float* p = &image.rgb[pixel * 3];
         return kToXyz[c][0] * p[0] + kToXyz[c][1] * p[1] + kToXyz[c][2] * p[2];

@@ -1,5 +1,5 @@
-// Rays and hits of walks: hits are completed where their rays lie, and a stage that reads the hits of one depth pushes the rays of the next. So there are two places for them, which take
-// turns from depth to depth.
+// Rays and hits of walks: hits are completed where their rays lie, and a stage that reads the hits of one depth pushes
+// the rays of the next. So there are two places for them, which take turns from depth to depth.
 #pragma once
 
 #include <type_traits>
@@ -19,7 +19,8 @@ struct WalkQueues {
 };
 
 template <class RayItem, class HitItem>
-void lay_out_walks(Layout& layout, WalkQueues<RayItem, HitItem>& m, QueueCounter* counters, uint32_t slots, const QueuePolicy& policy) {
+void lay_out_walks(Layout& layout, WalkQueues<RayItem, HitItem>& m, QueueCounter* counters, uint32_t slots,
+                   const QueuePolicy& policy) {
     const bool fixed = policy.fixed_places();
     m.hits[0] = layout.queue<HitItem>("hits", counters, slots, fixed);
     m.rays[0] = layout.front<RayItem>("rays", counters, m.hits[0], fixed);
@@ -31,7 +32,8 @@ void lay_out_walks(Layout& layout, WalkQueues<RayItem, HitItem>& m, QueueCounter
 
 /// Hits of camera rays, in place 0. Executors that can do so make and trace the rays in one launch if `fuse` says so.
 template <class Executor, class Generate, class Extend, class RayItem, class HitItem>
-void start_eye_walks(Executor& exec, const Generate& generate, const Extend& extend, const WalkQueues<RayItem, HitItem>& m, uint32_t slots, [[maybe_unused]] bool fuse) {
+void start_eye_walks(Executor& exec, const Generate& generate, const Extend& extend,
+                     const WalkQueues<RayItem, HitItem>& m, uint32_t slots, [[maybe_unused]] bool fuse) {
     if constexpr (requires { exec.generate_and_extend(generate, extend, slots); }) {
         if (fuse && !m.hits[0].flags) return exec.generate_and_extend(generate, extend, slots);
     }
@@ -40,11 +42,13 @@ void start_eye_walks(Executor& exec, const Generate& generate, const Extend& ext
     exec.extend_coherent(StageId::extend, extend, m.rays[0], m.hits[0]);
 }
 
-/// From the hits of depth 1 in place 0 on: shade[k] goes through the hits of a depth in place k and pushes rays to place 1 - k, which after rest(tail) become the next hits. Executors that
-/// can do so take fewer than `tail_below` walks through several depths at once (stages/tail.h); `tail` is true then, and what is pushed may belong to one path more than once.
+/// From the hits of depth 1 in place 0 on: shade[k] goes through the hits of a depth in place k and pushes rays to
+/// place 1 - k, which after rest(tail) become the next hits. Executors that can do so take fewer than `tail_below`
+/// walks through several depths at once (stages/tail.h); `tail` is true then, and what is pushed may belong to one path
+/// more than once.
 template <class Executor, class RayItem, class HitItem, class Shade, class Extend, class Rest>
-void repeat_depths(Executor& exec, StageId shade_id, const Shade (&shade)[2], StageId extend_id, const Extend (&extend)[2], const WalkQueues<RayItem, HitItem>& m, uint32_t tail_below,
-                   Rest rest) {
+void repeat_depths(Executor& exec, StageId shade_id, const Shade (&shade)[2], StageId extend_id,
+                   const Extend (&extend)[2], const WalkQueues<RayItem, HitItem>& m, uint32_t tail_below, Rest rest) {
     const auto two_rounds = [&](auto tail) {
         for (const int k : {0, 1}) {
             if constexpr (tail)

@@ -15,12 +15,16 @@ struct alignas(16) Lane {
 /// Path of an item that is none.
 constexpr uint32_t kNoPath = 0xffffffffu;
 
-/// State of one queue. Counters lie a kilobyte apart: those that share a part of a device's cache are added to one after the other; one cache line more, lest all fall into few sets of a host's. `count` goes on counting when the queue is full, so that what is lost is known.
+/// State of one queue. Counters lie a kilobyte apart: those that share a part of a device's cache are added to one
+/// after the other; one cache line more, lest all fall into few sets of a host's. `count` goes on counting when the
+/// queue is full, so that what is lost is known.
 struct QueueCounter {
-    uint32_t count;     ///< places given out since the queue was last emptied; of a queue of fixed places known on a device only when it has been counted
+    uint32_t count;  ///< places given out since the queue was last emptied; of a queue of fixed places known on a
+                     ///< device only when it has been counted
     uint32_t capacity;
     uint64_t peak;      ///< most places given out in one filling
-    uint64_t overflow;  ///< items lost: places past the capacity, or to a fixed place that was taken (which only the host looks for)
+    uint64_t overflow;  ///< items lost: places past the capacity, or to a fixed place that was taken (which only the
+                        ///< host looks for)
     uint32_t next;      ///< items that threads of a launch have taken in turns
     uint32_t holes;     ///< places below `count` that hold no item (queues/stretch.h)
     uint32_t pad[264];
@@ -48,16 +52,21 @@ __device__ inline uint32_t lane_rank(uint32_t mask) {
     return uint32_t(__popc(mask & below));
 }
 
-/// Adds to a counter that other threads add to, and returns what it was. By hand, since compilers look once more for threads that add to one place.
+/// Adds to a counter that other threads add to, and returns what it was. By hand, since compilers look once more for
+/// threads that add to one place.
 __device__ inline uint32_t add_to(uint32_t* counter, uint32_t n) {
     uint32_t before;
-    asm volatile("atom.global.add.u32 %0, [%1], %2;" : "=r"(before) : "l"(__cvta_generic_to_global(counter)), "r"(n) : "memory");
+    asm volatile("atom.global.add.u32 %0, [%1], %2;"
+                 : "=r"(before)
+                 : "l"(__cvta_generic_to_global(counter)), "r"(n)
+                 : "memory");
     return before;
 }
 #endif
 
-/// Takes one place for the calling thread. On a device the threads of a warp that push together take theirs with one atomic operation, so all of them must push to the
-/// same queue: a queue that differs from thread to thread is to be chosen by a branch.
+/// Takes one place for the calling thread. On a device the threads of a warp that push together take theirs with one
+/// atomic operation, so all of them must push to the same queue: a queue that differs from thread to thread is to be
+/// chosen by a branch.
 AMBILUX_HD uint32_t take_place(uint32_t* count) {
 #if defined(__CUDA_ARCH__)
     const uint32_t together = __activemask(), rank = lane_rank(together);

@@ -1,4 +1,5 @@
-// One allocation for everything that a wave needs. Run once without memory it tells the bytes; run again with memory it hands out the places.
+// One allocation for everything that a wave needs. Run once without memory it tells the bytes; run again with memory it
+// hands out the places.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +14,8 @@ class Layout {
 public:
     explicit Layout(void* memory = nullptr) : memory_(static_cast<std::byte*>(memory)) {}
 
-    /// Place for `count` values; null while there is no memory. Starts are aligned to 256 bytes, the unit of a device's memory transactions and more.
+    /// Place for `count` values; null while there is no memory. Starts are aligned to 256 bytes, the unit of a device's
+    /// memory transactions and more.
     template <class T>
     T* take(uint64_t count) {
         T* place = memory_ ? reinterpret_cast<T*>(memory_ + bytes_) : nullptr;
@@ -21,10 +23,12 @@ public:
         return place;
     }
 
-    /// A queue without items. Its counter is the next of the array `counters`. With `fixed_places` an item lies at the place of its path; the memory must then be zero at first. `lanes`: of each
-    /// item, the first ones, which are all that is used of it.
+    /// A queue without items. Its counter is the next of the array `counters`. With `fixed_places` an item lies at the
+    /// place of its path; the memory must then be zero at first. `lanes`: of each item, the first ones, which are all
+    /// that is used of it.
     template <class Item>
-    Queue<Item> queue(const char* name, QueueCounter* counters, uint32_t capacity, bool fixed_places = false, uint32_t lanes = Queue<Item>::kLanes) {
+    Queue<Item> queue(const char* name, QueueCounter* counters, uint32_t capacity, bool fixed_places = false,
+                      uint32_t lanes = Queue<Item>::kLanes) {
         Queue<Item> q;
         q.counter = counters ? counters + names_.size() : nullptr;
         q.capacity = capacity;

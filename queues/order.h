@@ -1,4 +1,5 @@
-// Where items of a queue lie and in which order a stage goes through them: two switches for ablation. Both come down to a list of places.
+// Where items of a queue lie and in which order a stage goes through them: two switches for ablation. Both come down to
+// a list of places.
 #pragma once
 
 #include "queues/layout.h"
@@ -15,13 +16,20 @@ enum class Compaction : uint32_t {
 /// What a stage's items are sorted by before it.
 enum class Ordering : uint32_t {
     none,
-    material,  ///< hits by the material that they will be shaded with
-    morton,    ///< rays by octant of direction, then along a Z curve by origin
-    automatic, ///< none or material, whichever is known to be faster (make_renderer)
+    material,   ///< hits by the material that they will be shaded with
+    morton,     ///< rays by octant of direction, then along a Z curve by origin
+    automatic,  ///< none or material, whichever is known to be faster (make_renderer)
 };
 
-inline const char* compaction_name(Compaction c) { return c == Compaction::atomic ? "atomic" : c == Compaction::select ? "select" : "none"; }
-inline const char* ordering_name(Ordering o) { return o == Ordering::none ? "none" : o == Ordering::material ? "material" : o == Ordering::morton ? "morton" : "auto"; }
+inline const char* compaction_name(Compaction c) {
+    return c == Compaction::atomic ? "atomic" : c == Compaction::select ? "select" : "none";
+}
+inline const char* ordering_name(Ordering o) {
+    return o == Ordering::none       ? "none"
+           : o == Ordering::material ? "material"
+           : o == Ordering::morton   ? "morton"
+                                     : "auto";
+}
 
 struct QueuePolicy {
     Compaction compaction = Compaction::atomic;
@@ -36,9 +44,10 @@ struct QueuePolicy {
 struct OrderMemory {
     QueuePolicy policy;
     uint32_t slots;
-    uint32_t* list[2];         ///< places: those selected, or all one after the other; and the same sorted. The second, and keys, for sorting only
+    uint32_t* list[2];  ///< places: those selected, or all one after the other; and the same sorted. The second, and
+                        ///< keys, for sorting only
     uint32_t* keys[2];
-    std::byte* temporary;      ///< what a backend's scans and sorts need
+    std::byte* temporary;  ///< what a backend's scans and sorts need
     uint64_t temporary_bytes;
 };
 

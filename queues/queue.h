@@ -1,5 +1,6 @@
-// Work queues: lanes of 16 bytes, so that neighbouring threads load and store neighbouring 16-byte words, and a counter that lives where the kernels run.
-// Items are appended, or lie at the places of their paths (queues/order.h says what for).
+// Work queues: lanes of 16 bytes, so that neighbouring threads load and store neighbouring 16-byte words, and a counter
+// that lives where the kernels run. Items are appended, or lie at the places of their paths (queues/order.h says what
+// for).
 #pragma once
 
 #include <cstddef>
@@ -42,8 +43,9 @@ AMBILUX_HD uint32_t path_of(const Item& item) {
         return 0;
 }
 
-/// Lanes of an item, the first ones, that lie two by two where the others are apart, since memory moves 32 bytes at least: items say so (kPairedLanes) that are written in order and read in another,
-/// sorted by their materials or drawn.
+/// Lanes of an item, the first ones, that lie two by two where the others are apart, since memory moves 32 bytes at
+/// least: items say so (kPairedLanes) that are written in order and read in another, sorted by their materials or
+/// drawn.
 template <class Item>
 constexpr uint32_t paired_lanes() {
     if constexpr (requires { Item::kPairedLanes; }) {
@@ -53,20 +55,24 @@ constexpr uint32_t paired_lanes() {
     return 0;
 }
 
-/// Fixed-capacity queue of trivially copyable items: lane k of item i is at base[k * capacity + i] but for paired ones. A view: copies share the storage.
+/// Fixed-capacity queue of trivially copyable items: lane k of item i is at base[k * capacity + i] but for paired ones.
+/// A view: copies share the storage.
 template <class Item>
 struct Queue {
-    static_assert(std::is_trivially_copyable_v<Item> && sizeof(Item) % sizeof(Lane) == 0, "items are whole lanes of plain data");
+    static_assert(std::is_trivially_copyable_v<Item> && sizeof(Item) % sizeof(Lane) == 0,
+                  "items are whole lanes of plain data");
     static constexpr uint32_t kLanes = sizeof(Item) / sizeof(Lane);
 
     Lane* base = nullptr;
     QueueCounter* counter = nullptr;
     uint32_t capacity = 0;
     uint8_t* flags = nullptr;  ///< fixed places: 1 where there is an item. Null: items are appended
-    uint16_t* keys = nullptr;  ///< by place: what items are sorted by (queues/order.h), written by those who complete them. Null: looked up when they are sorted
+    uint16_t* keys = nullptr;  ///< by place: what items are sorted by (queues/order.h), written by those who complete
+                               ///< them. Null: looked up when they are sorted
 
     AMBILUX_HD size_t place(uint32_t i, uint32_t lane) const {
-        return lane + 1 <= paired_lanes<Item>() ? size_t(lane & ~1u) * capacity + 2 * size_t(i) + (lane & 1u) : size_t(lane) * capacity + i;
+        return lane + 1 <= paired_lanes<Item>() ? size_t(lane & ~1u) * capacity + 2 * size_t(i) + (lane & 1u)
+                                                : size_t(lane) * capacity + i;
     }
 
     /// `lanes`: of the item, the first ones; the others are zero.
@@ -101,7 +107,9 @@ struct Queue {
         return front;
     }
     /// `lanes`: of the item, the first ones; the others stay as they are.
-    AMBILUX_HD void store(uint32_t i, const Item& item, uint32_t lanes = kLanes) const { store_but(i, kLanes, item, lanes); }
+    AMBILUX_HD void store(uint32_t i, const Item& item, uint32_t lanes = kLanes) const {
+        store_but(i, kLanes, item, lanes);
+    }
     /// The same without lane `known`.
     AMBILUX_HD void store_but(uint32_t i, uint32_t known, const Item& item, uint32_t lanes = kLanes) const {
         Lane all[kLanes];
@@ -109,7 +117,8 @@ struct Queue {
         for (uint32_t k = 0; k < kLanes; ++k)
             if (k != known && k < lanes) base[place(i, k)] = all[k];
     }
-    /// Appends the item, or stores it at the place of its path, and returns the place. Past the capacity the item is lost and counted (QueueCounter::overflow).
+    /// Appends the item, or stores it at the place of its path, and returns the place. Past the capacity the item is
+    /// lost and counted (QueueCounter::overflow).
     AMBILUX_HD uint32_t push(const Item& item, uint32_t lanes = kLanes) const {
         const uint32_t i = flags ? fixed_place(item) : take_place(&counter->count);
         if (i < capacity) store(i, item, lanes);
@@ -120,7 +129,8 @@ struct Queue {
         occupy(i);
         store(i, item);
     }
-    /// Appends the item, or stores it at its place, and places may stay empty: whoever goes through the queue skips items whose path is kNoPath. Kernels that call it open and close the stretches of their blocks.
+    /// Appends the item, or stores it at its place, and places may stay empty: whoever goes through the queue skips
+    /// items whose path is kNoPath. Kernels that call it open and close the stretches of their blocks.
     AMBILUX_HD uint32_t push_loosely(const Item& item) const {
 #if defined(__CUDA_ARCH__)
         if (!flags) {
@@ -132,7 +142,8 @@ struct Queue {
 #endif
         return push(item);
     }
-    /// Writes the last lane of an item whose others are there already (Layout::front). Whoever does so for items that are appended sets the counter.
+    /// Writes the last lane of an item whose others are there already (Layout::front). Whoever does so for items that
+    /// are appended sets the counter.
     template <class Last>
     AMBILUX_HD void complete(uint32_t i, const Last& last) const {
         static_assert(sizeof(Last) == sizeof(Lane));

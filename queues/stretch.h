@@ -1,6 +1,8 @@
-// Places that a warp of a device takes ahead. All warps add to the counter of a queue, one after the other, and wait for what it was: warps that take a stretch of places at a time do so less
-// often. It pays where lanes push one by one; where a whole warp pushes it takes more instructions than it saves (docs/performance.md). What a warp leaves over are holes, all of whose
-// bits are set: whoever goes through the queue skips items whose path is kNoPath (Queue::push_loosely).
+// Places that a warp of a device takes ahead. All warps add to the counter of a queue, one after the other, and wait
+// for what it was: warps that take a stretch of places at a time do so less often. It pays where lanes push one by one;
+// where a whole warp pushes it takes more instructions than it saves (docs/performance.md). What a warp leaves over are
+// holes, all of whose bits are set: whoever goes through the queue skips items whose path is kNoPath
+// (Queue::push_loosely).
 #pragma once
 
 #include "core/hd.h"
@@ -48,7 +50,8 @@ public:
         const Target& t = targets_[threadIdx.x / 32];
         const uint32_t last = end < t.capacity ? end : t.capacity;
         for (uint32_t lane = 0; lane < t.lanes; ++lane)
-            for (uint32_t i = next + threadIdx.x % 32; i < last; i += 32) t.base[lane * t.lane_stride + i * t.place_stride] = {{~0u, ~0u, ~0u, ~0u}};
+            for (uint32_t i = next + threadIdx.x % 32; i < last; i += 32)
+                t.base[lane * t.lane_stride + i * t.place_stride] = {{~0u, ~0u, ~0u, ~0u}};
         if (threadIdx.x % 32 == 0 && next < last) atomicAdd(&t.counter->holes, last - next);
     }
 
@@ -60,15 +63,18 @@ public:
         uint32_t lanes, capacity;
     };
 
-    /// A place for the calling thread. Threads of a warp that come together take theirs together; others may come in between.
+    /// A place for the calling thread. Threads of a warp that come together take theirs together; others may come in
+    /// between.
     __device__ uint32_t take(const Target& queue) {
-        const uint32_t together = __activemask(), wanted = uint32_t(__popc(together)), rank = lane_rank(together), leader = uint32_t(__ffs(int(together)) - 1);
+        const uint32_t together = __activemask(), wanted = uint32_t(__popc(together)), rank = lane_rank(together),
+                       leader = uint32_t(__ffs(int(together)) - 1);
         uint32_t first = 0, from_first = 0, second = 0;
         if (rank == 0) {
             unsigned long long& mine = places_[threadIdx.x / 32];
             const unsigned long long places = *const_cast<volatile unsigned long long*>(&mine);
             bool refill = false;
-            // No second try if others came in between: a loop that may wait for them makes the lanes of a warp part for good.
+            // No second try if others came in between: a loop that may wait for them makes the lanes of a warp part for
+            // good.
             if (size_ > 0 && places != kRefilled) {
                 first = uint32_t(places);
                 const uint32_t left = uint32_t(places >> 32) - first;

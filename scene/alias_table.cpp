@@ -13,7 +13,8 @@ std::vector<uint32_t> deal_tickets(const std::vector<double>& weights) {
     const auto weight = [&](size_t i) { return dark ? 1.0 : weights[i]; };
     uint32_t positive = 0;
     for (size_t i = 0; i < weights.size(); ++i) positive += weight(i) > 0;
-    // One for each positive weight; the others go by differences of the rounded cumulative sum, so that nothing is left over.
+    // One for each positive weight; the others go by differences of the rounded cumulative sum, so that nothing is left
+    // over.
     const double rest = double(kTickets - positive);
     std::vector<uint32_t> tickets(weights.size(), 0);
     double sum = 0;
@@ -42,7 +43,8 @@ std::vector<AliasBucket> make_alias_table(std::vector<uint32_t> left) {
             (left[i] < size(i) ? small : large).push_back(i);
     };
     for (uint32_t i = 0; i < n; ++i) sort(i);
-    // All counts are whole, so that the unfinished ones always average to a bucket: while one is short, another has more.
+    // All counts are whole, so that the unfinished ones always average to a bucket: while one is short, another has
+    // more.
     while (!small.empty()) {
         const uint32_t s = small.back(), l = large.back();
         small.pop_back();

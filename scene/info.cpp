@@ -8,7 +8,8 @@
 namespace ambilux {
 
 const char* name_of(BsdfType type) {
-    static const char* names[] = {"diffuse", "rough_diffuse", "conductor", "rough_conductor", "dielectric", "thin_dielectric", "rough_dielectric", "plastic", "rough_plastic"};
+    static const char* names[] = {"diffuse",         "rough_diffuse",    "conductor", "rough_conductor", "dielectric",
+                                  "thin_dielectric", "rough_dielectric", "plastic",   "rough_plastic"};
     static_assert(std::size(names) == size_t(BsdfType::count));
     return names[size_t(type)];
 }
@@ -59,8 +60,10 @@ nlohmann::json scene_info(const Scene& scene) {
     const Sensor& s = scene.sensor;
     const double degrees = 360 / M_PI;
     nlohmann::json sensor = {{"type", name_of(s.type)}, {"near_clip", s.near_clip}, {"far_clip", s.far_clip}};
-    if (s.type == SensorType::orthographic) sensor["half_extent"] = {s.tan_half_fov.x, s.tan_half_fov.y};
-    else sensor["fov_degrees"] = {std::atan(s.tan_half_fov.x) * degrees, std::atan(s.tan_half_fov.y) * degrees};
+    if (s.type == SensorType::orthographic)
+        sensor["half_extent"] = {s.tan_half_fov.x, s.tan_half_fov.y};
+    else
+        sensor["fov_degrees"] = {std::atan(s.tan_half_fov.x) * degrees, std::atan(s.tan_half_fov.y) * degrees};
     if (s.type == SensorType::thin_lens) {
         sensor["aperture_radius"] = s.aperture_radius;
         sensor["focus_distance"] = s.focus_distance;
@@ -79,11 +82,22 @@ nlohmann::json scene_info(const Scene& scene) {
         {"texel_bytes", scene.texels.size()},
         {"emitters", emitters},
         {"memory_bytes", scene.memory_bytes()},
-        {"bounds", {{"center", {scene.bounds_center.x, scene.bounds_center.y, scene.bounds_center.z}}, {"radius", scene.bounds_radius}}},
+        {"bounds",
+         {{"center", {scene.bounds_center.x, scene.bounds_center.y, scene.bounds_center.z}},
+          {"radius", scene.bounds_radius}}},
         {"sensor", sensor},
-        {"film", {{"width", s.film_width}, {"height", s.film_height}, {"crop", {s.crop_x, s.crop_y, s.crop_width, s.crop_height}}, {"filter", name_of(s.filter)}, {"filter_radius", s.filter_radius}}},
+        {"film",
+         {{"width", s.film_width},
+          {"height", s.film_height},
+          {"crop", {s.crop_x, s.crop_y, s.crop_width, s.crop_height}},
+          {"filter", name_of(s.filter)},
+          {"filter_radius", s.filter_radius}}},
         {"integrator",
-         {{"type", scene.integrator.type}, {"max_depth", scene.integrator.max_depth}, {"rr_depth", scene.integrator.rr_depth}, {"spp", scene.integrator.spp}, {"hide_emitters", scene.integrator.hide_emitters}}},
+         {{"type", scene.integrator.type},
+          {"max_depth", scene.integrator.max_depth},
+          {"rr_depth", scene.integrator.rr_depth},
+          {"spp", scene.integrator.spp},
+          {"hide_emitters", scene.integrator.hide_emitters}}},
         {"features", feature_names(scene.features)},
         {"warnings", scene.warnings},
     };

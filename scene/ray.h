@@ -5,8 +5,9 @@
 
 namespace ambilux {
 
-/// Ray from `o` along unit `d`; hits count for 0 < t < tmax. `alpha_seed` decides, with the primitive, whether a surface of partial
-/// opacity lets this ray pass (core/rng.h, hash_float), so that the answer does not depend on traversal order.
+/// Ray from `o` along unit `d`; hits count for 0 < t < tmax. `alpha_seed` decides, with the primitive, whether a
+/// surface of partial opacity lets this ray pass (core/rng.h, hash_float), so that the answer does not depend on
+/// traversal order.
 struct Ray {
     Vec3f o;
     float tmax;
@@ -14,8 +15,8 @@ struct Ray {
     uint32_t alpha_seed;
 };
 
-/// Nearest hit. `prim == kNone` means none. (u,v): triangle: barycentrics of v1 and v2. Sphere: octahedral map of the local unit normal,
-/// each in [-1,1]. Disk: local (x,y). Cylinder: (local azimuth in [-pi,pi], local z).
+/// Nearest hit. `prim == kNone` means none. (u,v): triangle: barycentrics of v1 and v2. Sphere: octahedral map of the
+/// local unit normal, each in [-1,1]. Disk: local (x,y). Cylinder: (local azimuth in [-pi,pi], local z).
 struct Hit {
     float t;
     float u, v;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <utility>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -10,17 +9,6 @@
 #include "scene/view.h"
 
 namespace ambilux {
-
-/// How light sampling chooses among emitters.
-enum class LightPicking : uint32_t { power, uniform };
-
-/// Options of the loader.
-struct LoadOptions {
-    bool lenient = false;             ///< replace what is not known, and list each substitution, instead of refusing it
-    uint32_t width = 0, height = 0;   ///< nonzero: replaces the film size (a crop is scaled with it)
-    LightPicking light_picking = LightPicking::power;
-    std::vector<std::pair<std::string, std::string>> parameters;  ///< values of $parameters, over the file's defaults
-};
 
 /// What the file asks of the integrator; the command line has the last word.
 struct IntegratorHint {
@@ -32,10 +20,11 @@ struct IntegratorHint {
 };
 
 struct Scene {
-    std::string path;                        ///< file it came from
-    std::array<uint8_t, 32> content_hash{};  ///< over the XML and every file it names, and the options that change the image
-    std::vector<std::string> warnings;       ///< substitutions made by --lenient, parameters without effect
-    uint64_t degenerate_triangles = 0;       ///< triangles without area that the loader left out
+    std::string path;  ///< file it came from
+    std::array<uint8_t, 32>
+        content_hash{};                 ///< over the XML and every file it names, and the options that change the image
+    std::vector<std::string> warnings;  ///< substitutions made by --lenient, parameters without effect
+    uint64_t degenerate_triangles = 0;  ///< triangles without area that the loader left out
     IntegratorHint integrator;
 
     std::vector<Vertex> vertices;
@@ -46,7 +35,7 @@ struct Scene {
     std::vector<BsdfRecord> bsdfs;
     std::vector<Texture> textures;
     std::vector<uint8_t> texels;
-    std::vector<uint16_t> sort_keys;         ///< per primitive (SceneView::sort_keys)
+    std::vector<uint16_t> sort_keys;  ///< per primitive (SceneView::sort_keys)
     std::vector<Emitter> emitters;
     std::vector<float> emitter_cdf;
     std::vector<float> tables;
@@ -61,12 +50,5 @@ struct Scene {
     /// Bytes of all arrays.
     uint64_t memory_bytes() const;
 };
-
-/// Fills in what follows from the rest once shapes, materials, textures, emitters and sensor are set: shape areas and their cdfs, pick probabilities,
-/// environment densities, filter table, bounds, features. Call it once after the arrays are complete.
-void finalize_scene(Scene& scene, LightPicking light_picking);
-
-/// Loads a Mitsuba XML scene (formats 0.5, 0.6, 2.x and 3.x). Throws Error(bad_input) with file and line.
-Scene load_mitsuba(const std::string& path, const LoadOptions& options = {});
 
 }  // namespace ambilux

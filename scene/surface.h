@@ -13,11 +13,12 @@ struct SurfacePoint {
     Vec3f ng;       ///< unit geometric normal; on triangles with vertex normals it lies on their side
     Vec3f ns;       ///< unit shading normal (interpolated), dot(ns, ng) may be negative only for absurd vertex normals
     Vec3f dpdu, dpdv;  ///< partial derivatives of p by uv; zero or arbitrary tangents where uv do not define them
-    Vec2f uv;       ///< texture coordinates as in Mitsuba: triangles without uvs use barycentrics (b1,b2)
+    Vec2f uv;          ///< texture coordinates as in Mitsuba: triangles without uvs use barycentrics (b1,b2)
     uint32_t prim, shape;
 };
 
-/// Octahedral map of a unit vector to [-1,1]² (Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit Vectors").
+/// Octahedral map of a unit vector to [-1,1]² (Cigolle et al. 2014, "A Survey of Efficient Representations for
+/// Independent Unit Vectors").
 AMBILUX_HD Vec2f octahedral_encode(Vec3f n) {
     const float inv = 1.0f / (fabsf(n.x) + fabsf(n.y) + fabsf(n.z));
     const float x = n.x * inv, y = n.y * inv;
@@ -25,10 +26,12 @@ AMBILUX_HD Vec2f octahedral_encode(Vec3f n) {
     return {copysignf(1.0f - fabsf(y), x), copysignf(1.0f - fabsf(x), y)};
 }
 
-/// The point of the octahedron that octahedral_encode maps to `e`: a vector of that direction, between 1/sqrt(3) and 1 long.
+/// The point of the octahedron that octahedral_encode maps to `e`: a vector of that direction, between 1/sqrt(3) and 1
+/// long.
 AMBILUX_HD Vec3f octahedral_direction(Vec2f e) {
     const float z = 1.0f - fabsf(e.x) - fabsf(e.y);
-    return z >= 0.0f ? Vec3f{e.x, e.y, z} : Vec3f{copysignf(1.0f - fabsf(e.y), e.x), copysignf(1.0f - fabsf(e.x), e.y), z};
+    return z >= 0.0f ? Vec3f{e.x, e.y, z}
+                     : Vec3f{copysignf(1.0f - fabsf(e.y), e.x), copysignf(1.0f - fabsf(e.x), e.y), z};
 }
 
 /// Inverse of octahedral_encode; the result is unit within rounding.
@@ -36,7 +39,8 @@ AMBILUX_HD Vec3f octahedral_decode(Vec2f e) { return normalize(octahedral_direct
 
 namespace detail {
 
-/// a·b - c·d with one rounding error at most (Kahan; Jeannerod et al. 2013). Its sign is exact, and the same on host and device whatever a compiler fuses.
+/// a·b - c·d with one rounding error at most (Kahan; Jeannerod et al. 2013). Its sign is exact, and the same on host
+/// and device whatever a compiler fuses.
 AMBILUX_HD float difference_of_products(float a, float b, float c, float d) {
     const float cd = c * d;
     const float difference = fmaf(a, b, -cd);
@@ -49,7 +53,8 @@ AMBILUX_HD Vec3f accurate_cross(Vec3f a, Vec3f b) {
             difference_of_products(a.x, b.y, a.y, b.x)};
 }
 
-/// Unit normal of a triangle; any unit vector if it has no area. Scaled first, so that small triangles do not underflow.
+/// Unit normal of a triangle; any unit vector if it has no area. Scaled first, so that small triangles do not
+/// underflow.
 AMBILUX_HD Vec3f triangle_normal(Vec3f e1, Vec3f e2) {
     const float scale = max(max_component(abs(e1)), max_component(abs(e2)));
     if (!(scale > 0.0f)) return {0.0f, 0.0f, 1.0f};
@@ -116,7 +121,8 @@ AMBILUX_HD SurfacePoint triangle_surface_at(const SceneView& scene, uint32_t pri
 AMBILUX_HD Vec3f quadric_error(const Quadric& q, Vec3f local, float relative) {
     Vec3f e;
     for (int i = 0; i < 3; ++i) {
-        const float linear = fabsf(q.to_world.m[i][0] * local.x) + fabsf(q.to_world.m[i][1] * local.y) + fabsf(q.to_world.m[i][2] * local.z);
+        const float linear = fabsf(q.to_world.m[i][0] * local.x) + fabsf(q.to_world.m[i][1] * local.y) +
+                             fabsf(q.to_world.m[i][2] * local.z);
         e[i] = (gamma_bound(4) + relative) * linear + gamma_bound(2) * fabsf(q.to_world.m[i][3]);
     }
     return e;
@@ -138,7 +144,8 @@ AMBILUX_HD SurfacePoint quadric_surface_at(const SceneView& scene, uint32_t prim
         const float cos_phi = r > 0.0f ? local.x / r : 1.0f, sin_phi = r > 0.0f ? local.y / r : 0.0f;
         s.dpdu = q.to_world.vector(Vec3f{-local.y, local.x, 0.0f} * (2.0f * kPi));
         s.dpdv = q.to_world.vector(Vec3f{local.z * cos_phi, local.z * sin_phi, -r} * kPi);
-        // Unit within rounding (7, where roots and quotients are not correctly rounded), and to_world's scale stands for `radius`, each rounded on its own.
+        // Unit within rounding (7, where roots and quotients are not correctly rounded), and to_world's scale stands
+        // for `radius`, each rounded on its own.
         s.p_error = quadric_error(q, local, gamma_bound(11));
     } else if (q.type == PrimitiveType::disk) {
         local = {u, v, 0.0f};
@@ -149,7 +156,8 @@ AMBILUX_HD SurfacePoint quadric_surface_at(const SceneView& scene, uint32_t prim
         const float cos_phi = r > 0.0f ? u / r : 1.0f, sin_phi = r > 0.0f ? v / r : 0.0f;
         s.dpdu = q.to_world.vector({cos_phi, sin_phi, 0.0f});
         s.dpdv = q.to_world.vector(Vec3f{-sin_phi, cos_phi, 0.0f} * (2.0f * kPi * r));
-        s.p_error = quadric_error(q, local, gamma_bound(5));  // to_local, which decides what is on the plane, is an inverse within rounding
+        s.p_error = quadric_error(
+            q, local, gamma_bound(5));  // to_local, which decides what is on the plane, is an inverse within rounding
     } else {
         normal = {cosf(u), sinf(u), 0.0f};
         local = {normal.x, normal.y, v};
@@ -168,7 +176,8 @@ AMBILUX_HD SurfacePoint quadric_surface_at(const SceneView& scene, uint32_t prim
 
 }  // namespace detail
 
-/// The surface point that (prim,u,v) of a Hit names (scene/ray.h); the same for points that emitters sample. World space.
+/// The surface point that (prim,u,v) of a Hit names (scene/ray.h); the same for points that emitters sample. World
+/// space.
 template <Features F>
 AMBILUX_HD SurfacePoint surface_at(const SceneView& scene, uint32_t prim, float u, float v) {
     if constexpr (F.has_quadrics()) {

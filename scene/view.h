@@ -1,8 +1,8 @@
 // The scene as kernels see it: plain records in flat arrays, the same on the host and on a device.
 #pragma once
 
-#include "core/features.h"
 #include "core/math.h"
+#include "models/features.h"
 
 namespace ambilux {
 
@@ -23,7 +23,11 @@ struct ParamFloat {
 // ---- textures ----
 
 enum class TextureType : uint32_t { bitmap, checkerboard };
-enum class TexelFormat : uint32_t { rgba8, rgba32f, rgba16f };  ///< 4, 16 and 8 bytes per texel; rgba16f: finite halves (core/half.h)
+enum class TexelFormat : uint32_t {
+    rgba8,
+    rgba32f,
+    rgba16f
+};  ///< 4, 16 and 8 bytes per texel; rgba16f: finite halves (core/half.h)
 enum class WrapMode : uint32_t { repeat, mirror, clamp };
 enum class TextureFilter : uint32_t { nearest, bilinear };
 
@@ -60,8 +64,8 @@ struct Triangle {
 };
 
 /// Analytic shape. Local forms: unit sphere at the origin; unit disk z = 0, normal +z; cylinder x²+y² = 1, 0 <= z <= 1,
-/// normal outwards. `to_world` holds scale (radius, length), rotation and translation; scale is uniform for sphere and disk,
-/// uniform in xy for the cylinder. `flip` reverses the normal.
+/// normal outwards. `to_world` holds scale (radius, length), rotation and translation; scale is uniform for sphere and
+/// disk, uniform in xy for the cylinder. `flip` reverses the normal.
 struct Quadric {
     PrimitiveType type;
     uint32_t shape;
@@ -94,18 +98,18 @@ struct BsdfRecord {
     Microfacets microfacets = Microfacets::ggx;
     uint32_t sample_visible = 1;  ///< rough_*: sample visible normals (Heitz and d'Eon 2014)
     uint32_t nonlinear = 0;       ///< plastic, rough_plastic: colour shifts by internal scattering
-    ParamRgb reflectance;             ///< diffuse, rough_diffuse: reflectance; plastic, rough_plastic: diffuse_reflectance
+    ParamRgb reflectance;         ///< diffuse, rough_diffuse: reflectance; plastic, rough_plastic: diffuse_reflectance
     ParamRgb specular_reflectance = {{1, 1, 1}, -1};
     ParamRgb specular_transmittance = {{1, 1, 1}, -1};
-    Rgb eta = {0, 0, 0};     ///< conductors: real part of the index, relative to the outside
-    float ior = 1.5f;        ///< dielectrics, plastics: interior over exterior index of refraction
-    Rgb k = {0, 0, 0};       ///< conductors: imaginary part, relative to the outside
-    float fdr_internal = 0;  ///< plastics: mean diffuse Fresnel reflectance seen from inside
-    ParamFloat alpha_u, alpha_v;      ///< rough_*: roughness along s and t of the shading frame; rough_diffuse: alpha_u
-    float specular_sampling_weight = 0;  ///< plastics: share of the specular lobe in sampling, before Fresnel
+    Rgb eta = {0, 0, 0};          ///< conductors: real part of the index, relative to the outside
+    float ior = 1.5f;             ///< dielectrics, plastics: interior over exterior index of refraction
+    Rgb k = {0, 0, 0};            ///< conductors: imaginary part, relative to the outside
+    float fdr_internal = 0;       ///< plastics: mean diffuse Fresnel reflectance seen from inside
+    ParamFloat alpha_u, alpha_v;  ///< rough_*: roughness along s and t of the shading frame; rough_diffuse: alpha_u
+    float specular_sampling_weight = 0;    ///< plastics: share of the specular lobe in sampling, before Fresnel
     uint32_t transmittance_table = kNone;  ///< rough_plastic: kTransmittanceTableSize floats in SceneView::tables
-    int32_t normal_map = -1;  ///< texture of tangent-space normals, or -1
-    int32_t bump_map = -1;    ///< texture of heights, or -1
+    int32_t normal_map = -1;               ///< texture of tangent-space normals, or -1
+    int32_t bump_map = -1;                 ///< texture of heights, or -1
     float bump_scale = 1;
     uint32_t pad = 0;
 };
@@ -113,8 +117,8 @@ struct BsdfRecord {
 /// Size of the table of directional transmittance over cos(theta) in [0,1] at equal steps, both ends included.
 constexpr uint32_t kTransmittanceTableSize = 64;
 
-/// A BSDF with its adapters. `front` is used where the ray comes from the side of the shading normal. When `two_sided`, rays from
-/// behind use `back` in a flipped frame; otherwise `back` == `front`, unflipped.
+/// A BSDF with its adapters. `front` is used where the ray comes from the side of the shading normal. When `two_sided`,
+/// rays from behind use `back` in a flipped frame; otherwise `back` == `front`, unflipped.
 struct Material {
     uint32_t front, back;
     uint32_t two_sided;
@@ -126,27 +130,32 @@ struct Material {
 
 // ---- emitters ----
 
-/// Bucket of the alias table of one row of an environment map, with the densities of both its cells, so that a single load serves sampling and density.
+/// Bucket of the alias table of one row of an environment map, with the densities of both its cells, so that a single
+/// load serves sampling and density.
 struct EnvironmentCell {
-    uint32_t threshold, alias;       ///< as in AliasBucket; the alias is a column
-    float pdf, alias_pdf;            ///< of the bucket's own cell and of the alias, per unit square of (u,v), the row's probability included
+    uint32_t threshold, alias;  ///< as in AliasBucket; the alias is a column
+    float pdf, alias_pdf;       ///< of the bucket's own cell and of the alias, per unit square of (u,v), the row's
+                                ///< probability included
 };
 
-/// Emitter. `radiance` holds, in this order of types: radiance, intensity (W/sr), intensity, perpendicular irradiance, radiance, radiance scale.
+/// Emitter. `radiance` holds, in this order of types: radiance, intensity (W/sr), intensity, perpendicular irradiance,
+/// radiance, radiance scale.
 struct Emitter {
     EmitterType type;
-    uint32_t shape;           ///< area: its shape
-    uint32_t area_cdf;        ///< area over triangles: primitive_count+1 floats in tables, and then the density per area on each; kNone for a single primitive
-    float pick_probability;   ///< chance that light sampling picks this emitter
-    ParamRgb radiance;        ///< area: textured by surface uv; spot: textured by projection
-    Affine to_world, to_local;///< spot: +z is the axis; envmap: rotation; point, directional: unused
-    Vec3f position;           ///< point, spot
-    Vec3f direction;          ///< directional: direction in which light travels; spot: axis. Unit
+    uint32_t shape;     ///< area: its shape
+    uint32_t area_cdf;  ///< area over triangles: primitive_count+1 floats in tables, and then the density per area on
+                        ///< each; kNone for a single primitive
+    float pick_probability;            ///< chance that light sampling picks this emitter
+    ParamRgb radiance;                 ///< area: textured by surface uv; spot: textured by projection
+    Affine to_world, to_local;         ///< spot: +z is the axis; envmap: rotation; point, directional: unused
+    Vec3f position;                    ///< point, spot
+    Vec3f direction;                   ///< directional: direction in which light travels; spot: axis. Unit
     float cos_cutoff, cos_beam_width;  ///< spot
-    // envmap: latitude-longitude image (texture `radiance.texture` of float texels, row 0 is the top, direction +y) and a piecewise-constant density
-    // over width by height cells (transport/emitter/envmap.h, scene/alias_table.h)
-    uint32_t env_rows;        ///< alias table of the rows: height AliasBuckets in tables, aligned to 8 bytes
-    uint32_t env_cells;       ///< alias table of the cells of each row: height rows of width EnvironmentCells in tables, aligned to 16 bytes
+    // envmap: latitude-longitude image (texture `radiance.texture` of float texels, row 0 is the top, direction +y) and
+    // a piecewise-constant density over width by height cells (transport/emitter/envmap.h, scene/alias_table.h)
+    uint32_t env_rows;   ///< alias table of the rows: height AliasBuckets in tables, aligned to 8 bytes
+    uint32_t env_cells;  ///< alias table of the cells of each row: height rows of width EnvironmentCells in tables,
+                         ///< aligned to 16 bytes
 };
 
 // ---- sensor ----
@@ -158,17 +167,18 @@ constexpr uint32_t kFilterTableSize = 1024;
 /// Sensor and film. Film positions are in pixels of the full film, origin at the top left; the image holds the crop.
 struct Sensor {
     SensorType type;
-    Affine to_world;           ///< camera space: +z is the view direction, +y up, +x LEFT in the image (Mitsuba)
-    Vec2f tan_half_fov;        ///< perspective, thin lens: tangent of half the field of view along x and y of the full film
-                               ///< orthographic: half of the film's extent in camera units
-    Vec2f principal_offset;    ///< shift of the principal point as a fraction of the film size
-    float near_clip, far_clip; ///< along the view axis, scene units
+    Affine to_world;     ///< camera space: +z is the view direction, +y up, +x LEFT in the image (Mitsuba)
+    Vec2f tan_half_fov;  ///< perspective, thin lens: tangent of half the field of view along x and y of the full film
+                         ///< orthographic: half of the film's extent in camera units
+    Vec2f principal_offset;                 ///< shift of the principal point as a fraction of the film size
+    float near_clip, far_clip;              ///< along the view axis, scene units
     float aperture_radius, focus_distance;  ///< thin lens
     uint32_t film_width, film_height;
     uint32_t crop_x, crop_y, crop_width, crop_height;
     FilterType filter;
-    float filter_radius;      ///< pixels
-    uint32_t filter_table;    ///< gaussian, in tables: kFilterTableSize+1 offsets in pixels at equal steps of probability, and what finds one of them (transport/sensor/filter.h)
+    float filter_radius;    ///< pixels
+    uint32_t filter_table;  ///< gaussian, in tables: kFilterTableSize+1 offsets in pixels at equal steps of
+                            ///< probability, and what finds one of them (transport/sensor/filter.h)
 };
 
 /// Materials that hits are told apart by when they are sorted.
@@ -184,13 +194,14 @@ struct SceneView {
     const BsdfRecord* bsdfs;
     const Texture* textures;
     const uint8_t* texels;
-    const uint16_t* sort_keys; ///< per primitive: its material, kMostSortKeys - 1 at most
+    const uint16_t* sort_keys;  ///< per primitive: its material, kMostSortKeys - 1 at most
     const Emitter* emitters;
     const float* emitter_cdf;  ///< emitter_count+1 floats: cumulative pick_probability
     const float* tables;
-    uint32_t vertex_count, triangle_count, quadric_count, shape_count, material_count, bsdf_count, texture_count, emitter_count;
-    uint32_t environment;      ///< index of the constant or envmap emitter, or kNone
-    Vec3f bounds_center;       ///< bounding sphere of all surfaces (and of the camera position)
+    uint32_t vertex_count, triangle_count, quadric_count, shape_count, material_count, bsdf_count, texture_count,
+        emitter_count;
+    uint32_t environment;  ///< index of the constant or envmap emitter, or kNone
+    Vec3f bounds_center;   ///< bounding sphere of all surfaces (and of the camera position)
     float bounds_radius;
     Sensor sensor;
 
@@ -198,7 +209,9 @@ struct SceneView {
     AMBILUX_HD uint32_t primitive_count() const { return triangle_count + quadric_count; }
     AMBILUX_HD bool is_triangle(uint32_t prim) const { return prim < triangle_count; }
     AMBILUX_HD const Quadric& quadric(uint32_t prim) const { return quadrics[prim - triangle_count]; }
-    AMBILUX_HD uint32_t shape_of(uint32_t prim) const { return is_triangle(prim) ? triangles[prim].shape : quadric(prim).shape; }
+    AMBILUX_HD uint32_t shape_of(uint32_t prim) const {
+        return is_triangle(prim) ? triangles[prim].shape : quadric(prim).shape;
+    }
 };
 
 }  // namespace ambilux

@@ -1,9 +1,9 @@
 // accumulate: contributions to samples, and samples to the film.
 #pragma once
 
-#include "stages/path_items.h"
+#include "items/path_items.h"
+#include "queues/wave.h"
 #include "stages/stage.h"
-#include "stages/wave.h"
 
 namespace ambilux {
 
@@ -18,8 +18,8 @@ AMBILUX_HD void add_shared(Lane& sample, Rgb value) {
 #endif
 }
 
-/// Adds contributions to the samples of their paths. As a rule one launch holds at most one contribution per path, so no two threads meet and the sum does not depend on the
-/// order of the queue; launches with several say so by `shared`.
+/// Adds contributions to the samples of their paths. As a rule one launch holds at most one contribution per path, so
+/// no two threads meet and the sum does not depend on the order of the queue; launches with several say so by `shared`.
 struct Accumulate {
     Queue<Contribution> contributions;
     Lane* samples;
@@ -41,11 +41,12 @@ struct Accumulate {
     }
 };
 
-/// Adds the samples of the wave's pixels to the sums of the film, sample after sample: the sums do not depend on how samples are dealt to waves.
+/// Adds the samples of the wave's pixels to the sums of the film, sample after sample: the sums do not depend on how
+/// samples are dealt to waves.
 struct Develop {
     Wave wave;
     const Lane* samples;
-    double* sum;          ///< per pixel and channel (FilmMoments)
+    double* sum;  ///< per pixel and channel (FilmMoments)
     double* sum_squares;
     StageRecord* record;
 
@@ -54,7 +55,8 @@ struct Develop {
         const PathSlot p = wave.locate(i);
         if (!p.active) return;
         const uint64_t at = uint64_t(p.pixel) * 3;
-        double s[3] = {sum[at], sum[at + 1], sum[at + 2]}, q[3] = {sum_squares[at], sum_squares[at + 1], sum_squares[at + 2]};
+        double s[3] = {sum[at], sum[at + 1], sum[at + 2]},
+               q[3] = {sum_squares[at], sum_squares[at + 1], sum_squares[at + 2]};
         const uint32_t stride = wave.tiles * kTilePixels;
         for (uint32_t k = 0; k < wave.state->samples; ++k) {
             Rgb value = start_of<Rgb>(samples[i + k * stride]);

@@ -10,8 +10,10 @@ struct ChainCount {
     int32_t steps, rays;
 };
 
-/// `stage` has begin(i), the chain of an item; step(chain, count), false after its last step; place(chain), where its last step pushed to; room(), how many such places there are, of which one step takes
-/// one at most; one_step(), whether a launch is to take only one of each chain; put_back(chain, count), for what is left to another launch; and add(count), which keeps the records.
+/// `stage` has begin(i), the chain of an item; step(chain, count), false after its last step; place(chain), where its
+/// last step pushed to; room(), how many such places there are, of which one step takes one at most; one_step(),
+/// whether a launch is to take only one of each chain; put_back(chain, count), for what is left to another launch; and
+/// add(count), which keeps the records.
 template <class Stage>
 concept Chained = requires(const Stage& stage, typename Stage::Chain& chain, ChainCount& count) {
     chain = stage.begin(0);

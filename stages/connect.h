@@ -1,11 +1,11 @@
 // connect: a vertex samples an emitter (next event estimation).
 #pragma once
 
+#include "items/path_items.h"
+#include "queues/wave.h"
 #include "stages/mis_weight.h"
-#include "stages/path_items.h"
 #include "stages/path_policy.h"
 #include "stages/stage.h"
-#include "stages/wave.h"
 #include "transport/emitter.h"
 #include "transport/surface_scattering.h"
 
@@ -37,17 +37,21 @@ struct Connect {
     }
 
     /// The same for a vertex whose BSDF and random numbers are known already.
-    AMBILUX_HD void take(const SurfacePoint& point, const Scattering& s, Vec3f wo, const RngKey& key, uint32_t path, uint32_t depth, Rgb throughput) const {
+    AMBILUX_HD void take(const SurfacePoint& point, const Scattering& s, Vec3f wo, const RngKey& key, uint32_t path,
+                         uint32_t depth, Rgb throughput) const {
         EmitterSample light;
         if (sample(point, wo, key, depth, light)) finish(point, s, light, key, path, depth, throughput);
     }
 
 private:
-    AMBILUX_HD bool sample(const SurfacePoint& point, Vec3f wo, const RngKey& key, uint32_t depth, EmitterSample& light) const {
-        return sample_emitter_deferred<F>(scene, point.p, random_floats(key, emitter_block(depth)), light) && may_scatter(scene, point, wo, light.wi);
+    AMBILUX_HD bool sample(const SurfacePoint& point, Vec3f wo, const RngKey& key, uint32_t depth,
+                           EmitterSample& light) const {
+        return sample_emitter_deferred<F>(scene, point.p, random_floats(key, emitter_block(depth)), light) &&
+               may_scatter(scene, point, wo, light.wi);
     }
 
-    AMBILUX_HD void finish(const SurfacePoint& point, const Scattering& s, const EmitterSample& light, const RngKey& key, uint32_t path, uint32_t depth, Rgb throughput) const {
+    AMBILUX_HD void finish(const SurfacePoint& point, const Scattering& s, const EmitterSample& light,
+                           const RngKey& key, uint32_t path, uint32_t depth, Rgb throughput) const {
         const BsdfValue f = scatter_evaluate<F>(s, light.wi, TransportMode::radiance);
         if (is_zero(f.value)) return;
         const bool environment = is_environment<F>(scene, light.emitter);
@@ -56,7 +60,16 @@ private:
         // Only BSDF sampling and a hit could find this light too.
         const bool other = policy.estimator == Estimator::mis && !light.delta;
 
-        ConnectCandidate out = {value, path, light.pdf_sa, other ? f.pdf_sa : 0.0f, 0, environment ? kTowardsEnvironment : kInfinity, {}, {}, light.wi, 0};
+        ConnectCandidate out = {value,
+                                path,
+                                light.pdf_sa,
+                                other ? f.pdf_sa : 0.0f,
+                                0,
+                                environment ? kTowardsEnvironment : kInfinity,
+                                {},
+                                {},
+                                light.wi,
+                                0};
         out.o = offset_ray_origin(point.p, point.p_error, point.ng, light.wi);
         if (light.distance < kInfinity) {
             // Both ends are moved off their surfaces by their error, so the segment between them is open at either end.

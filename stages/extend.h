@@ -1,19 +1,20 @@
 // extend: rays to the next surface.
 #pragma once
 
-#include "scene/accel/traceable.h"
+#include "accel/traceable.h"
+#include "items/path_items.h"
+#include "queues/wave.h"
 #include "stages/order_keys.h"
-#include "stages/path_items.h"
 #include "stages/stage.h"
-#include "stages/wave.h"
 
 namespace ambilux {
 
 /// The ray of an item, without the seed for surfaces of partial opacity.
 AMBILUX_HD Ray ray_of(const RayItem& r) { return {r.o, r.bits.depth() == 1 ? r.pdf_sa : kInfinity, r.d, 0}; }
 
-/// A hit is completed where its ray lies: every ray becomes one, also those that meet nothing. `Tracer` has closest<F>(scene, ray, hit) or is followed by a kernel of its own that
-/// calls fetch and finish. An `Out` is an `Item` and a HitEnd.
+/// A hit is completed where its ray lies: every ray becomes one, also those that meet nothing. `Tracer` has
+/// closest<F>(scene, ray, hit) or is followed by a kernel of its own that calls fetch and finish. An `Out` is an `Item`
+/// and a HitEnd.
 template <Features F, class Tracer, class Item = RayItem, class Out = HitItem>
 struct Extend {
     static constexpr Features kFeatures = F;
@@ -23,7 +24,7 @@ struct Extend {
     SceneView scene;
     Tracer tracer;
     Wave wave;
-    Stream stream;      ///< of the walks
+    Stream stream;  ///< of the walks
     Queue<Item> rays;
     Queue<Out> hits;
     StageRecord* record;

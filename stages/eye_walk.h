@@ -29,21 +29,25 @@ struct EyeGenerate {
     }
 };
 
-/// An eye walk at `h`: emission becomes a candidate, and visit(vertex, random numbers of the walk) is called where connections may start.
+/// An eye walk at `h`: emission becomes a candidate, and visit(vertex, random numbers of the walk) is called where
+/// connections may start.
 template <Features F, class Visit>
-AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, const HitOutlet& candidates, StageRecord* record, Visit visit) {
+AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy,
+                             const WalkHit& h, const HitOutlet& candidates, StageRecord* record, Visit visit) {
     const auto emit = [&](Rgb radiance, float others) {
         const Strategy strategy = Strategy::make(0, h.ray.bits.depth() + 1);
         if (!policy.singles.has(strategy)) return;
         const Rgb value = h.ray.throughput * radiance;
-        if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.ray.path, 1.0f, policy.others(others), strategy, 0});
+        if (is_light(value, record) && !is_zero(value))
+            candidates.push({value, h.ray.path, 1.0f, policy.others(others), strategy, 0});
     };
     WalkStep step = {};
     Walk w = unpack_walk(h.ray);
     const bool visible = !(policy.hide_emitters && w.depth == 1);
     if (h.prim == kNone) {
         if constexpr (F.has_environment())
-            if (policy.counts_environment(w.depth) && visible) emit(environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
+            if (policy.counts_environment(w.depth) && visible)
+                emit(environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
         return step;
     }
     if (policy.background_only) return step;
@@ -51,7 +55,9 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
     const uint32_t emitter = scene.shapes[z.point.shape].emitter;
     if (policy.count_hits && visible && emitter != kNone) {
         const Rgb radiance = emitted_radiance<F>(scene, emitter, z.point, -w.d);
-        if (!is_zero(radiance)) emit(radiance, others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, z.point));
+        if (!is_zero(radiance))
+            emit(radiance,
+                 others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, z.point));
     }
     if (w.depth >= policy.max_depth) return step;
     const RngKey key = wave.key(h.ray.path);
@@ -61,7 +67,9 @@ AMBILUX_HD WalkStep eye_step(const SceneView& scene, const Wave& wave, const Bid
     const uint32_t depth = w.depth;
     if (depth + 1 == policy.max_depth && !policy.counts_last_segment()) return step;
     const Vec4f u = random_floats(key, scatter_block(depth));
-    if (!scatter_walk<F>(policy.mis, z, u, TransportMode::radiance, policy.rr_depth, w) || !is_light(w.throughput, record)) return step;
+    if (!scatter_walk<F>(policy.mis, z, u, TransportMode::radiance, policy.rr_depth, w) ||
+        !is_light(w.throughput, record))
+        return step;
     step.ray = pack_walk(w, h.ray.path, false, kInfinity);
     step.goes_on = true;
     return step;
@@ -93,9 +101,11 @@ struct EyeConnect {
     /// The first pair of the vertex `z`, which a ray along `d` met.
     AMBILUX_HD void pair(const EyeVertex& z, Vec3f d, const RngKey& key) const {
         uint32_t next = first_pair(z.path);
-        const uint32_t light = next == kNone ? kNone : LightVertexSearch{policy, light_vertices, key, z.depth, z.vertex}.find(next);
+        const uint32_t light =
+            next == kNone ? kNone : LightVertexSearch{policy, light_vertices, key, z.depth, z.vertex}.find(next);
         if (light == kNone) return;
-        pairs.push({push_vertex<F>(eye_vertices, pack_connection_vertex(z.vertex, z.depth, d, z.throughput, z.path)), light, z.path, next});
+        pairs.push({push_vertex<F>(eye_vertices, pack_connection_vertex(z.vertex, z.depth, d, z.throughput, z.path)),
+                    light, z.path, next});
     }
 
     /// connect_vertices for all pairs of a vertex, in the same order and of the same vertices.
@@ -104,10 +114,12 @@ struct EyeConnect {
         uint32_t next = first_pair(z.path), found = lights.find(next);
         if (found == kNone) return;
         const float scale = policy.cache_draws > 0 ? draw_scale(wave, policy, light_vertices) : 1.0f;
-        const EyeVertex packed = eye_vertex_of<F>(scene, pack_connection_vertex(z.vertex, z.depth, d, z.throughput, z.path));
+        const EyeVertex packed =
+            eye_vertex_of<F>(scene, pack_connection_vertex(z.vertex, z.depth, d, z.throughput, z.path));
         for (; found != kNone; found = lights.find(next)) {
             pairs_record->count_item(z.depth);
-            push_connection<F>(scene, policy, key, packed, load_vertex<F>(light_vertices, found), scale, found, candidates, pairs_record);
+            push_connection<F>(scene, policy, key, packed, load_vertex<F>(light_vertices, found), scale, found,
+                               candidates, pairs_record);
         }
     }
 
@@ -115,10 +127,14 @@ struct EyeConnect {
         if (!policy.next_event || !policy.wants(1, depth + 1)) return;
         WalkConnection c;
         bool environment = false;
-        if (!connect_next_event_deferred<F>(scene, policy.mis, z, throughput, random_floats(key, emitter_block(depth)), c, environment)) return;
+        if (!connect_next_event_deferred<F>(scene, policy.mis, z, throughput, random_floats(key, emitter_block(depth)),
+                                            c, environment))
+            return;
         if (environment) c.tmax = kTowardsEnvironment;
         if (!is_light(c.value, record) || is_zero(c.value)) return;
-        candidates.push({c.value, path, 1.0f, policy.others(c.others), F.opacity || policy.cull > 0.0f ? alpha_seed(key, depth, true) : 0, c.tmax, c.o, Strategy::make(1, depth + 1), c.d, 0});
+        candidates.push({c.value, path, 1.0f, policy.others(c.others),
+                         F.opacity || policy.cull > 0.0f ? alpha_seed(key, depth, true) : 0, c.tmax, c.o,
+                         Strategy::make(1, depth + 1), c.d, 0});
     }
 
 private:
@@ -131,8 +147,12 @@ private:
 
 template <Features F>
 struct EyeShade {
-    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 5 : 4;  ///< 102 or 128 registers instead of up to 232: more warps hide more latency (docs/performance.md)
-    static constexpr bool kGathers = !F.several_bsdfs() && !F.has_environment();  ///< hits are in no order, and misses of no use
+    static constexpr uint32_t kBlocksPerSm =
+        F.bsdfs == bit(BsdfType::diffuse)
+            ? 5
+            : 4;  ///< 102 or 128 registers instead of up to 232: more warps hide more latency (docs/performance.md)
+    static constexpr bool kGathers =
+        !F.several_bsdfs() && !F.has_environment();  ///< hits are in no order, and misses of no use
 
     SceneView scene;
     Wave wave;
@@ -155,23 +175,24 @@ struct EyeShade {
 
     /// True if the walk goes on with the ray `next`.
     AMBILUX_HD bool take(const WalkHit& h, WalkItem& next) const {
-        const WalkStep step = eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z, const RngKey& key) {
-            if (!policy.connect_in_shade) {
-                push_vertex<F>(vertices, pack_vertex(z, h));
-                return;
-            }
-            const EyeVertex eye = {z, h.ray.throughput, h.ray.path, h.ray.bits.depth()};
-            connect.take(z, eye.throughput, key, eye.path, eye.depth);
+        const WalkStep step =
+            eye_step<F>(scene, wave, policy, h, candidates, record, [&](const WalkVertex& z, const RngKey& key) {
+                if (!policy.connect_in_shade) {
+                    push_vertex<F>(vertices, pack_vertex(z, h));
+                    return;
+                }
+                const EyeVertex eye = {z, h.ray.throughput, h.ray.path, h.ray.bits.depth()};
+                connect.take(z, eye.throughput, key, eye.path, eye.depth);
 #if !defined(__CUDA_ARCH__)
-            if (policy.at_once) {
-                if (policy.connect_vertices) connect.connect_all(eye, h.ray.d, key);
-                return;
-            }
+                if (policy.at_once) {
+                    if (policy.connect_vertices) connect.connect_all(eye, h.ray.d, key);
+                    return;
+                }
 #endif
-            const Warp warp;
-            connect.pair(eye, h.ray.d, key);
-            warp.meet();  // else lanes that search longer than others stay apart
-        });
+                const Warp warp;
+                connect.pair(eye, h.ray.d, key);
+                warp.meet();  // else lanes that search longer than others stay apart
+            });
         next = step.ray;
         return step.goes_on;
     }

@@ -1,10 +1,10 @@
 // generate: one camera ray per slot.
 #pragma once
 
-#include "stages/path_items.h"
+#include "items/path_items.h"
+#include "queues/wave.h"
 #include "stages/path_policy.h"
 #include "stages/stage.h"
-#include "stages/wave.h"
 #include "transport/sensor/camera.h"
 #include "transport/sensor/filter.h"
 

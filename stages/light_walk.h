@@ -1,15 +1,16 @@
 // light_generate and light_shade: walks that start at emitters.
 #pragma once
 
+#include "items/vertex_items.h"
+#include "queues/wave.h"
 #include "stages/bidirectional_policy.h"
 #include "stages/splat.h"
 #include "stages/stage.h"
-#include "stages/vertex_items.h"
-#include "stages/wave.h"
 
 namespace ambilux {
 
-/// Which of the light walks of a path this is: streams start one for every eye vertex, the others one, numbered 0, or in rounds several that differ by their keys (Wave::first_key).
+/// Which of the light walks of a path this is: streams start one for every eye vertex, the others one, numbered 0, or
+/// in rounds several that differ by their keys (Wave::first_key).
 struct LightWalkNumber {
     uint32_t n;
 
@@ -18,28 +19,34 @@ struct LightWalkNumber {
     AMBILUX_HD uint32_t alpha_depth(uint32_t depth) const { return depth + (n << WalkBits::kDepthBits); }
 };
 
-/// Starts light walk `number` of `path`; walk 0 also shows the emitter itself to the camera. False if there is no first ray.
+/// Starts light walk `number` of `path`; walk 0 also shows the emitter itself to the camera. False if there is no first
+/// ray.
 template <Features F>
-AMBILUX_HD bool start_light(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, uint32_t path, LightWalkNumber number, const SplatOutlet& splats,
-                            StageRecord* record, Walk& w) {
+AMBILUX_HD bool start_light(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, uint32_t path,
+                            LightWalkNumber number, const SplatOutlet& splats, StageRecord* record, Walk& w) {
     const RngKey key = wave.key(path, Stream::light);
     const Vec4f direction = random_floats(key, number.block(kEmissionBlock + 1));
     EmissionSample e;
-    if (!sample_emission<F>(scene, random_floats(key, number.block(kEmissionBlock)), {direction.x, direction.y}, e)) return false;
+    if (!sample_emission<F>(scene, random_floats(key, number.block(kEmissionBlock)), {direction.x, direction.y}, e))
+        return false;
     w = start_light_walk(e);
     if (!is_light(w.throughput, record)) return false;
     if (number.n == 0 && policy.splat && !policy.hide_emitters && policy.wants(1, 1)) {
         WalkConnection c;
         Vec2f film;
-        if (connect_visible_light<F>(scene, policy.mis, e, {direction.z, direction.w}, c, film) && is_light(c.value, record) && !is_zero(c.value))
-            splats.push({c.value, path, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, 0, true) : 0, film, policy.others(c.others), Strategy::make(1, 1)});
+        if (connect_visible_light<F>(scene, policy.mis, e, {direction.z, direction.w}, c, film) &&
+            is_light(c.value, record) && !is_zero(c.value))
+            splats.push({c.value, path, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, 0, true) : 0, film,
+                         policy.others(c.others), Strategy::make(1, 1)});
     }
     return policy.max_depth >= 2;
 }
 
-/// A light walk at `h`, where it may have `longest` segments in all. visit(vertex, random numbers of the walk) is called where connections may start.
+/// A light walk at `h`, where it may have `longest` segments in all. visit(vertex, random numbers of the walk) is
+/// called where connections may start.
 template <Features F, class Visit>
-AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy, const WalkHit& h, LightWalkNumber number, uint32_t longest, StageRecord* record,
+AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const BidirectionalPolicy& policy,
+                               const WalkHit& h, LightWalkNumber number, uint32_t longest, StageRecord* record,
                                Visit visit) {
     WalkStep step = {};
     Walk w = unpack_walk(h.ray);
@@ -50,7 +57,9 @@ AMBILUX_HD WalkStep light_step(const SceneView& scene, const Wave& wave, const B
     }
     if (w.depth >= longest) return step;
     const Vec4f u = random_floats(key, number.block(light_scatter_block(w.depth)));
-    if (!scatter_walk<F>(policy.mis, y, u, TransportMode::importance, policy.rr_depth, w) || !is_light(w.throughput, record)) return step;
+    if (!scatter_walk<F>(policy.mis, y, u, TransportMode::importance, policy.rr_depth, w) ||
+        !is_light(w.throughput, record))
+        return step;
     step.ray = pack_walk(w, h.ray.path, true, kInfinity);
     step.goes_on = true;
     return step;
@@ -70,9 +79,12 @@ struct LightGenerate {
 
     AMBILUX_HD void operator()(uint32_t slot) const {
         if (policy.cache_draws == 0) last_vertex[slot] = kNone;
-        if (round >= light_walks_of(slot, policy.light_walks_per_tile) || !wave.locate(slot).active || policy.max_depth == 0) return;
+        if (round >= light_walks_of(slot, policy.light_walks_per_tile) || !wave.locate(slot).active ||
+            policy.max_depth == 0)
+            return;
         Walk w;
-        if (start_light<F>(scene, wave, policy, slot, {0}, splats, record, w)) rays.push(pack_walk(w, slot, true, kInfinity));
+        if (start_light<F>(scene, wave, policy, slot, {0}, splats, record, w))
+            rays.push(pack_walk(w, slot, true, kInfinity));
     }
 };
 
@@ -88,7 +100,8 @@ struct ConnectCamera {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = load_vertex<F>(vertices, i);
-        take(unpack_vertex<F>(scene, item), item.throughput, wave.key(item.path, Stream::light), item.path, item.bits().depth());
+        take(unpack_vertex<F>(scene, item), item.throughput, wave.key(item.path, Stream::light), item.path,
+             item.bits().depth());
     }
 
     AMBILUX_HD void take(const WalkVertex& y, Rgb throughput, const RngKey& key, uint32_t path, uint32_t depth) const {
@@ -97,7 +110,8 @@ struct ConnectCamera {
         Vec2f film;
         if (!connect_camera<F>(scene, policy.mis, y, throughput, {u.x, u.y}, c, film)) return;
         if (!is_light(c.value, record) || is_zero(c.value)) return;
-        splats.push({c.value, path, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, depth, true) : 0, film, policy.others(c.others), Strategy::make(depth + 1, 1)});
+        splats.push({c.value, path, c.o, c.tmax, c.d, F.opacity ? alpha_seed(key, depth, true) : 0, film,
+                     policy.others(c.others), Strategy::make(depth + 1, 1)});
     }
 };
 
@@ -132,15 +146,18 @@ struct LightShade {
         const uint32_t depth = h.ray.bits.depth();
         const bool to_camera = policy.splat && depth < policy.max_depth && policy.wants(depth + 1, 1);
         // A path has at least one segment more than its light walk.
-        WalkStep step = light_step<F>(scene, wave, policy, h, {0}, policy.max_depth - 1, record, [&](const WalkVertex& y, const RngKey& key) {
-            if (to_camera && policy.connect_in_shade) connect.take(y, h.ray.throughput, key, h.ray.path, depth);
-            if (to_camera && !policy.connect_in_shade) push_vertex<F>(camera_vertices, pack_vertex(y, h));
-            if (policy.connect_vertices && depth + 2 <= policy.max_depth) {
-                const bool chained = policy.cache_draws == 0;
-                const uint32_t place = push_vertex<F>(vertices, pack_connection_vertex(y, depth, h.ray.d, h.ray.throughput, chained ? last_vertex[h.ray.path] : kNone));
-                if (chained) last_vertex[h.ray.path] = place;
-            }
-        });
+        WalkStep step = light_step<F>(
+            scene, wave, policy, h, {0}, policy.max_depth - 1, record, [&](const WalkVertex& y, const RngKey& key) {
+                if (to_camera && policy.connect_in_shade) connect.take(y, h.ray.throughput, key, h.ray.path, depth);
+                if (to_camera && !policy.connect_in_shade) push_vertex<F>(camera_vertices, pack_vertex(y, h));
+                if (policy.connect_vertices && depth + 2 <= policy.max_depth) {
+                    const bool chained = policy.cache_draws == 0;
+                    const uint32_t place =
+                        push_vertex<F>(vertices, pack_connection_vertex(y, depth, h.ray.d, h.ray.throughput,
+                                                                        chained ? last_vertex[h.ray.path] : kNone));
+                    if (chained) last_vertex[h.ray.path] = place;
+                }
+            });
         next = step.ray;
         return step.goes_on;
     }

@@ -1,26 +1,29 @@
-// megakernel: one thread does a slot's light walk, its eye walk and all connections, with the functions that the stages use. It is a state machine of at most one ray
-// per round, so that lanes of a warp trace together whatever their rays are for; lanes whose path has ended begin another (Novak et al. 2010, "Path Regeneration for Interactive Path Tracing").
+// megakernel: one thread does a slot's light walk, its eye walk and all connections, with the functions that the stages
+// use. It is a state machine of at most one ray per round, so that lanes of a warp trace together whatever their rays
+// are for; lanes whose path has ended begin another (Novak et al. 2010, "Path Regeneration for Interactive Path
+// Tracing").
 #pragma once
 
 #include "core/warp.h"
+#include "items/vertex_items.h"
 #include "stages/bidirectional_policy.h"
 #include "stages/generate.h"
 #include "stages/splat.h"
 #include "stages/stage.h"
-#include "stages/vertex_items.h"
 
 namespace ambilux {
 
 template <Features F, class Tracer>
 struct Megakernel {
-    static constexpr uint32_t kBlocksPerSm = 4;  ///< on a device: 128 registers per thread
+    static constexpr uint32_t kBlocksPerSm = 4;    ///< on a device: 128 registers per thread
     static constexpr uint32_t kBeginTogether = 8;  ///< lanes without a path wait for as many before they begin new ones
 
     SceneView scene;
     Tracer tracer;
     Wave wave;
     BidirectionalPolicy policy;
-    LightVertices light_vertices;  ///< memory for the vertices of all light walks; used through chains, never as a queue
+    LightVertices
+        light_vertices;  ///< memory for the vertices of all light walks; used through chains, never as a queue
     Queue<SplatItem> splats;
     Lane* samples;
     StageRecord* records;  ///< one per StageId: rays are counted where the stages would
@@ -75,9 +78,10 @@ struct Megakernel {
     }
 
 private:
-    /// The vertex of the eye walk that is being connected. Its surface is looked up for every pair: a thread has no registers for it.
+    /// The vertex of the eye walk that is being connected. Its surface is looked up for every pair: a thread has no
+    /// registers for it.
     struct WaitingVertex {
-        Vec3f d;        ///< of the ray that met it
+        Vec3f d;  ///< of the ray that met it
         uint32_t depth;
         float u, v;
         uint32_t prim;
@@ -86,21 +90,22 @@ private:
         MisSums sums;
     };
 
-    /// What a thread works on. Its next ray is the shadow ray if there is one, else, when the vertex has no connections left, that of the walk.
+    /// What a thread works on. Its next ray is the shadow ray if there is one, else, when the vertex has no connections
+    /// left, that of the walk.
     struct Path {
         bool active;
-        bool light;         ///< on the light walk; else on the eye walk
-        bool walking;       ///< `walk` goes on
-        bool testing;       ///< there is a shadow ray
+        bool light;    ///< on the light walk; else on the eye walk
+        bool walking;  ///< `walk` goes on
+        bool testing;  ///< there is a shadow ray
         uint32_t slot;
-        uint32_t last;      ///< vertex of the light walk
+        uint32_t last;  ///< vertex of the light walk
         Walk walk;
-        float tmax;         ///< of the walk's ray
+        float tmax;  ///< of the walk's ray
         WaitingVertex vertex;
         Ray shadow;
-        Rgb value;          ///< arrives if the shadow ray is free:
-        Vec2f film;         ///< there, from a light walk
-        Rgb sum;            ///< of the eye walk
+        Rgb value;   ///< arrives if the shadow ray is free:
+        Vec2f film;  ///< there, from a light walk
+        Rgb sum;     ///< of the eye walk
     };
 
     struct Counts {
@@ -118,7 +123,9 @@ private:
 #endif
     }
 
-    AMBILUX_HD RngKey key(const Path& path) const { return wave.key(path.slot, path.light ? Stream::light : Stream::eye); }
+    AMBILUX_HD RngKey key(const Path& path) const {
+        return wave.key(path.slot, path.light ? Stream::light : Stream::eye);
+    }
 
     /// A vertex past the capacity was not kept: the wave will be done again.
     AMBILUX_HD bool connecting(const Path& path) const { return path.vertex.next < light_vertices.capacity; }
@@ -143,7 +150,8 @@ private:
         path.tmax = kInfinity;
         if (!is_light(path.walk.throughput, record(StageId::light_generate))) return;
         WalkConnection c;
-        if (policy.splat && !policy.hide_emitters && policy.wants(1, 1) && connect_visible_light<F>(scene, policy.mis, e, {direction.z, direction.w}, c, path.film))
+        if (policy.splat && !policy.hide_emitters && policy.wants(1, 1) &&
+            connect_visible_light<F>(scene, policy.mis, e, {direction.z, direction.w}, c, path.film))
             test(path, c, k, 0, StageId::light_generate);
         path.walking = policy.max_depth >= 2;
     }
@@ -204,10 +212,12 @@ private:
     AMBILUX_HD void escape(Path& path) const {
         const Walk& w = path.walk;
         if (F.has_environment() && !path.light && policy.counts_environment(w.depth) && emitters_shown(w))
-            add_emitted(path, environment_radiance<F>(scene, w.d), others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
+            add_emitted(path, environment_radiance<F>(scene, w.d),
+                        others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
     }
 
-    /// The vertex that the walk met: emission, the connection with camera or emitter, and the next ray. Both walks go through the same code as far as they can.
+    /// The vertex that the walk met: emission, the connection with camera or emitter, and the next ray. Both walks go
+    /// through the same code as far as they can.
     AMBILUX_HD void shade(Path& path, const Hit& hit) const {
         Walk& w = path.walk;
         const bool light = path.light;
@@ -218,18 +228,25 @@ private:
         const uint32_t emitter = scene.shapes[x.point.shape].emitter;
         if (!light && policy.count_hits && emitter != kNone && emitters_shown(w)) {
             const Rgb radiance = emitted_radiance<F>(scene, emitter, x.point, -w.d);
-            if (!is_zero(radiance)) add_emitted(path, radiance, others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, x.point));
+            if (!is_zero(radiance))
+                add_emitted(
+                    path, radiance,
+                    others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, x.point));
         }
         if (w.depth >= policy.max_depth) return;
         if (bsdf_is_smooth(x.scattering.bsdf)) {
             const Vec4f u = random_floats(k, light ? lens_block(w.depth) : emitter_block(w.depth));
             WalkConnection c;
-            const bool made = light ? policy.splat && policy.wants(w.depth + 1, 1) && connect_camera<F>(scene, policy.mis, x, w.throughput, {u.x, u.y}, c, path.film)
-                                    : policy.next_event && policy.wants(1, w.depth + 1) && connect_next_event<F>(scene, policy.mis, x, w.throughput, u, c);
+            const bool made = light
+                                  ? policy.splat && policy.wants(w.depth + 1, 1) &&
+                                        connect_camera<F>(scene, policy.mis, x, w.throughput, {u.x, u.y}, c, path.film)
+                                  : policy.next_event && policy.wants(1, w.depth + 1) &&
+                                        connect_next_event<F>(scene, policy.mis, x, w.throughput, u, c);
             if (made) test(path, c, k, w.depth, light ? StageId::connect_camera : StageId::connect);
             if (policy.connect_vertices && w.depth + 2 <= policy.max_depth) {
                 if (light)
-                    path.last = push_vertex<F>(light_vertices, pack_connection_vertex(x, w.depth, w.d, w.throughput, path.last));
+                    path.last = push_vertex<F>(light_vertices,
+                                               pack_connection_vertex(x, w.depth, w.d, w.throughput, path.last));
                 else
                     path.vertex = {w.d, w.depth, hit.u, hit.v, hit.prim, path.last, w.throughput, x.sums};
             }
@@ -238,7 +255,8 @@ private:
         if (w.depth + 1 >= policy.max_depth && (light || !policy.counts_last_segment())) return;
         const Vec4f u = random_floats(k, light ? light_scatter_block(w.depth) : scatter_block(w.depth));
         path.tmax = kInfinity;
-        path.walking = scatter_walk<F>(policy.mis, x, u, light ? TransportMode::importance : TransportMode::radiance, policy.rr_depth, w) &&
+        path.walking = scatter_walk<F>(policy.mis, x, u, light ? TransportMode::importance : TransportMode::radiance,
+                                       policy.rr_depth, w) &&
                        is_light(w.throughput, record(light ? StageId::light_shade : StageId::shade));
     }
 
@@ -258,7 +276,8 @@ private:
         eye.sums = z.sums;
         const ConnectionVertex light = load_vertex<F>(light_vertices, place);
         WalkConnection c;
-        if (!is_zero(light.throughput) && connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, light), light.throughput, eye, z.throughput, c))
+        if (!is_zero(light.throughput) &&
+            connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, light), light.throughput, eye, z.throughput, c))
             test(path, c, key(path), z.depth + (light_depth << WalkBits::kDepthBits), StageId::connect_vertices);
     }
 };

@@ -1,9 +1,9 @@
 // mis_weight: light is weighted against the other strategy that could have found it.
 #pragma once
 
+#include "items/path_items.h"
 #include "stages/accumulate.h"
 #include "stages/outlet.h"
-#include "stages/path_items.h"
 #include "stages/path_policy.h"
 #include "stages/stage.h"
 #include "transport/mis.h"
@@ -12,7 +12,8 @@ namespace ambilux {
 
 AMBILUX_HD float mis_weight(const PathPolicy& policy, float pdf_this, float pdf_other) {
     if (policy.estimator != Estimator::mis) return 1.0f;
-    return policy.heuristic == MisHeuristic::power ? power_weight(pdf_this, pdf_other) : balance_weight(pdf_this, pdf_other);
+    return policy.heuristic == MisHeuristic::power ? power_weight(pdf_this, pdf_other)
+                                                   : balance_weight(pdf_this, pdf_other);
 }
 
 using ArrivalOutlet = Outlet<Contribution, Accumulate>;
@@ -35,8 +36,9 @@ struct WeightHits {
     }
 };
 
-/// Russian roulette before the shadow ray. What would add less than a share `cull` of the light that its path has brought so far survives with the probability of its part of that share, and is
-/// worth more by the inverse: the expectation stays, since the light so far and `seed` are known before. Returns the factor, 0 for what is dropped.
+/// Russian roulette before the shadow ray. What would add less than a share `cull` of the light that its path has
+/// brought so far survives with the probability of its part of that share, and is worth more by the inverse: the
+/// expectation stays, since the light so far and `seed` are known before. Returns the factor, 0 for what is dropped.
 AMBILUX_HD float survival_factor(float cull, Rgb value, Rgb so_far, uint32_t seed) {
     const float probability = luminance(value) / (cull * luminance(so_far));
     if (!(probability < 1.0f)) return 1.0f;

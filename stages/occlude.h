@@ -1,15 +1,16 @@
 // occlude: light whose way is free becomes a contribution.
 #pragma once
 
+#include "items/path_items.h"
 #include "stages/mis_weight.h"
-#include "stages/path_items.h"
 #include "stages/stage.h"
 #include "transport/emitter.h"
 
 namespace ambilux {
 
-/// `Tracer` has occluded<F>(scene, ray) or is followed by a kernel of its own that calls fetch and finish, and keeps in between what fetch leaves for finish: lanes of a warp end one by
-/// one, and all would wait for what each of them loads.
+/// `Tracer` has occluded<F>(scene, ray) or is followed by a kernel of its own that calls fetch and finish, and keeps in
+/// between what fetch leaves for finish: lanes of a warp end one by one, and all would wait for what each of them
+/// loads.
 template <Features F, class Tracer>
 struct Occlude {
     static constexpr Features kFeatures = F;
@@ -26,8 +27,10 @@ struct Occlude {
         const ShadowItem item = shadows.load(i);
         kept = {item.value, item.path};
 #if defined(__CUDA_ARCH__)
-        // The sample that light would be added to. In kernels for environments this costs more than it brings (docs/performance.md).
-        if (!F.has_environment() && contributions.through) asm volatile("prefetch.global.L2 [%0];" ::"l"(contributions.next.samples + item.path));
+        // The sample that light would be added to. In kernels for environments this costs more than it brings
+        // (docs/performance.md).
+        if (!F.has_environment() && contributions.through)
+            asm volatile("prefetch.global.L2 [%0];" ::"l"(contributions.next.samples + item.path));
 #endif
         return fetch(item, ray);
     }

@@ -4,14 +4,14 @@
 #include <bit>
 
 #include "core/math.h"
+#include "items/walk_items.h"
 #include "queues/order.h"
 #include "scene/view.h"
-#include "stages/walk_items.h"
 
 namespace ambilux {
 
-/// Of hits. Materials, not types of BSDFs: equal materials read the same textures too, and there are far fewer of them than warps, so that warps of mixed types are rare either way.
-/// Rays that met nothing come last.
+/// Of hits. Materials, not types of BSDFs: equal materials read the same textures too, and there are far fewer of them
+/// than warps, so that warps of mixed types are rare either way. Rays that met nothing come last.
 struct MaterialOrder {
     static constexpr Ordering kOrdering = Ordering::material;
 
@@ -21,7 +21,9 @@ struct MaterialOrder {
     AMBILUX_HD static uint32_t key(const SceneView& scene, const WalkHit& hit) { return of(scene, hit.prim); }
     AMBILUX_HD static uint32_t key(const SceneView& scene, const SlotHit& hit) { return of(scene, hit.prim); }
 
-    AMBILUX_HD static uint32_t of(const SceneView& scene, uint32_t prim) { return prim == kNone ? min(scene.material_count, kMostSortKeys) : scene.sort_keys[prim]; }
+    AMBILUX_HD static uint32_t of(const SceneView& scene, uint32_t prim) {
+        return prim == kNone ? min(scene.material_count, kMostSortKeys) : scene.sort_keys[prim];
+    }
 };
 
 /// Rays by octant of direction, then by cell of a grid of 128 cells along each axis of the scene's bounds.

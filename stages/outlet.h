@@ -5,8 +5,9 @@
 
 namespace ambilux {
 
-/// The queue of the stage `Next`, or, if `through`, that stage itself: items that are made and used up by neighbouring stages, one for one, need not go through memory.
-/// `Next` has take(item), which is all that it does with an item of its queue, and returns the place to which it pushes, or 0.
+/// The queue of the stage `Next`, or, if `through`, that stage itself: items that are made and used up by neighbouring
+/// stages, one for one, need not go through memory. `Next` has take(item), which is all that it does with an item of
+/// its queue, and returns the place to which it pushes, or 0.
 template <class Item, class Next>
 struct Outlet {
     Queue<Item> queue;
@@ -17,7 +18,8 @@ struct Outlet {
     AMBILUX_HD uint32_t push(const Item& item) const { return through ? next.take(item) : queue.push(item); }
 };
 
-/// A queue, or on a host, if `take` is set, a stage of any kind that has each item at once: nothing waits there for many items to come together.
+/// A queue, or on a host, if `take` is set, a stage of any kind that has each item at once: nothing waits there for
+/// many items to come together.
 template <class Item>
 struct HostOutlet {
     Queue<Item> queue;

@@ -2,12 +2,13 @@
 #pragma once
 
 #include "queues/queue.h"
-#include "stages/wave.h"
+#include "queues/wave.h"
 
 namespace ambilux {
 
-/// Called between the part of a wave that fills the queues and the part that uses them. If one of them has overflowed, the wave fails: it has no samples any more, so that the
-/// stages that follow find nothing to do, and the film stays as it was. The peaks tell how much room is needed.
+/// Called between the part of a wave that fills the queues and the part that uses them. If one of them has overflowed,
+/// the wave fails: it has no samples any more, so that the stages that follow find nothing to do, and the film stays as
+/// it was. The peaks tell how much room is needed.
 AMBILUX_HD void settle(WaveState& state, QueueCounter& a, QueueCounter& b) {
     if (a.count <= a.capacity && b.count <= b.capacity) return;
     QueueCounter* queues[2] = {&a, &b};

@@ -1,23 +1,30 @@
 // shade: a hit gives light, asks for a connection and goes on.
 #pragma once
 
+#include "items/path_items.h"
+#include "queues/wave.h"
 #include "stages/connect.h"
-#include "stages/path_items.h"
 #include "stages/path_policy.h"
 #include "stages/stage.h"
-#include "stages/wave.h"
 #include "transport/emitter.h"
 #include "transport/surface_scattering.h"
 
 namespace ambilux {
 
-/// Probability with which a walk of `throughput` goes on (Mitsuba's rule: radiance is scaled by the squared index of the medium, which is not loss).
-AMBILUX_HD float survival_probability(Rgb throughput, float eta_scale) { return min(max_component(throughput) * sqr(eta_scale), 0.95f); }
+/// Probability with which a walk of `throughput` goes on (Mitsuba's rule: radiance is scaled by the squared index of
+/// the medium, which is not loss).
+AMBILUX_HD float survival_probability(Rgb throughput, float eta_scale) {
+    return min(max_component(throughput) * sqr(eta_scale), 0.95f);
+}
 
 template <Features F>
 struct Shade {
-    static constexpr bool kGathers = !F.several_bsdfs() && !F.has_environment();  ///< hits are in no order, and misses of no use
-    static constexpr uint32_t kBlocksPerSm = F.bsdfs == bit(BsdfType::diffuse) ? 6 : F.textures ? 4 : 5;  ///< 80, 128 or 102 registers; fewer spill too much (docs/performance.md)
+    static constexpr bool kGathers =
+        !F.several_bsdfs() && !F.has_environment();  ///< hits are in no order, and misses of no use
+    static constexpr uint32_t kBlocksPerSm =
+        F.bsdfs == bit(BsdfType::diffuse) ? 6
+        : F.textures                      ? 4
+                     : 5;  ///< 80, 128 or 102 registers; fewer spill too much (docs/performance.md)
 
     SceneView scene;
     Wave wave;
@@ -30,7 +37,9 @@ struct Shade {
     Connect<F> connect;
 
     /// True if nothing comes of rays that meet nothing.
-    AMBILUX_HD bool skips_misses() const { return !F.has_environment() || scene.environment == kNone || !policy.count_hits; }
+    AMBILUX_HD bool skips_misses() const {
+        return !F.has_environment() || scene.environment == kNone || !policy.count_hits;
+    }
 
     AMBILUX_HD void operator()(uint32_t i) const {
         RayItem next;
@@ -50,14 +59,17 @@ struct Shade {
     /// True if the walk goes on with the ray `next`.
     AMBILUX_HD bool take(const HitItem& h, RayItem& next) const {
         if (h.prim == kNone) {
-            if (wants_emission(h)) emit(h, environment_radiance<F>(scene, h.d), can_sample(h) ? pdf_environment_direct<F>(scene, h.d) : 0.0f);
+            if (wants_emission(h))
+                emit(h, environment_radiance<F>(scene, h.d),
+                     can_sample(h) ? pdf_environment_direct<F>(scene, h.d) : 0.0f);
             return false;
         }
         const SurfacePoint point = surface_at<F>(scene, h.prim, h.u, h.v);
         const uint32_t emitter = scene.shapes[point.shape].emitter;
         if (emitter != kNone && wants_emission(h)) {
             const Rgb radiance = emitted_radiance<F>(scene, emitter, point, -h.d);
-            if (!is_zero(radiance)) emit(h, radiance, can_sample(h) ? pdf_emitter_direct<F>(scene, emitter, h.o, h.d, point) : 0.0f);
+            if (!is_zero(radiance))
+                emit(h, radiance, can_sample(h) ? pdf_emitter_direct<F>(scene, emitter, h.o, h.d, point) : 0.0f);
         }
 
         const uint32_t depth = h.bits.depth();
@@ -74,7 +86,9 @@ struct Shade {
     }
 
 private:
-    AMBILUX_HD bool wants_emission(const HitItem& h) const { return policy.count_hits && !(policy.hide_emitters && h.bits.depth() == 1); }
+    AMBILUX_HD bool wants_emission(const HitItem& h) const {
+        return policy.count_hits && !(policy.hide_emitters && h.bits.depth() == 1);
+    }
 
     /// True if sampling emitters at the previous vertex could have found this light too.
     AMBILUX_HD bool can_sample(const HitItem& h) const { return policy.connect && !h.bits.delta(); }
@@ -85,13 +99,15 @@ private:
         if (is_light(value, record) && !is_zero(value)) candidates.push({value, h.path, h.pdf_sa, pdf_other, {}, 0});
     }
 
-    AMBILUX_HD bool scatter(const HitItem& h, const SurfacePoint& point, const Scattering& s, const RngKey& key, uint32_t depth, RayItem& next) const {
+    AMBILUX_HD bool scatter(const HitItem& h, const SurfacePoint& point, const Scattering& s, const RngKey& key,
+                            uint32_t depth, RayItem& next) const {
         const Vec4f u = random_floats(key, scatter_block(depth));
         ScatterSample sample;
         if (!scatter_sample<F>(s, {u.x, u.y, u.z}, TransportMode::radiance, sample)) return false;
         const bool delta = sample.flags & kScatterDelta;
         // The last segment can bring emission only.
-        if (depth + 1 == policy.max_depth && (!policy.count_hits || (policy.estimator == Estimator::nee && !delta))) return false;
+        if (depth + 1 == policy.max_depth && (!policy.count_hits || (policy.estimator == Estimator::nee && !delta)))
+            return false;
         Rgb throughput = h.throughput * sample.weight;
         if (!is_light(throughput, record) || is_zero(throughput)) return false;
         const float eta_scale = h.bits.eta_scale() * sample.eta;

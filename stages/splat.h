@@ -1,12 +1,13 @@
-// Light that arrives anywhere on the film: weighted, tested for occlusion, added up in fixed point, so that the sum does not depend on the order of threads.
+// Light that arrives anywhere on the film: weighted, tested for occlusion, added up in fixed point, so that the sum
+// does not depend on the order of threads.
 #pragma once
 
+#include "film/splat_sums.h"
+#include "items/walk_items.h"
+#include "queues/wave.h"
 #include "stages/bidirectional_policy.h"
 #include "stages/outlet.h"
-#include "stages/splat_sums.h"
 #include "stages/stage.h"
-#include "stages/walk_items.h"
-#include "stages/wave.h"
 #include "transport/sensor/filter.h"
 
 namespace ambilux {
@@ -59,7 +60,8 @@ struct OccludeSplats {
     /// All of it for a candidate that is in no queue.
     AMBILUX_HD void take(const SplatCandidate& c) const {
         Ray ray;
-        if (fetch(c, ray) && !tracer.template occluded<F>(scene, ray)) splats.push({c.value, c.path, c.film, c.strategy, c.others});
+        if (fetch(c, ray) && !tracer.template occluded<F>(scene, ray))
+            splats.push({c.value, c.path, c.film, c.strategy, c.others});
     }
     AMBILUX_HD void operator()(uint32_t i) const {
         Ray ray;
@@ -79,13 +81,18 @@ struct Splat {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const SplatItem item = splats.load(i);
-        if ((item.path == kNoPath) | (item.film.x != item.film.x)) return;  // either would do for a hole; asking for both loads both lanes at once
+        if ((item.path == kNoPath) | (item.film.x != item.film.x))
+            return;  // either would do for a hole; asking for both loads both lanes at once
         const uint32_t sample = wave.sample_of(item.path);
-        const float x = item.film.x - float(scene.sensor.crop_x), y = item.film.y - float(scene.sensor.crop_y), r = scene.sensor.filter_radius;
-        const int32_t x0 = max(int32_t(ceilf(x - r - 0.5f)), 0), x1 = min(int32_t(floorf(x + r - 0.5f)), int32_t(wave.width) - 1);
-        const int32_t y0 = max(int32_t(ceilf(y - r - 0.5f)), 0), y1 = min(int32_t(floorf(y + r - 0.5f)), int32_t(wave.height) - 1);
+        const float x = item.film.x - float(scene.sensor.crop_x), y = item.film.y - float(scene.sensor.crop_y),
+                    r = scene.sensor.filter_radius;
+        const int32_t x0 = max(int32_t(ceilf(x - r - 0.5f)), 0),
+                      x1 = min(int32_t(floorf(x + r - 0.5f)), int32_t(wave.width) - 1);
+        const int32_t y0 = max(int32_t(ceilf(y - r - 0.5f)), 0),
+                      y1 = min(int32_t(floorf(y + r - 0.5f)), int32_t(wave.height) - 1);
         const uint64_t first = uint64_t(sample) * wave.height * wave.width;
-        // Looked for once, since it costs as much as the rest: splats of a warp that share a pixel most often share all.
+        // Looked for once, since it costs as much as the rest: splats of a warp that share a pixel most often share
+        // all.
         const bool alone = !several(threads_with(uint32_t(first) + uint32_t(y0) * wave.width + uint32_t(x0)));
         with_filter(scene, [&](auto filter) {
             for (int32_t py = y0; py <= y1; ++py) {
@@ -103,7 +110,8 @@ struct Splat {
     }
 };
 
-/// Adds the samples of the film's pixels, what eye walks and what light walks brought, to the sums of the film; empties the sums of splats.
+/// Adds the samples of the film's pixels, what eye walks and what light walks brought, to the sums of the film; empties
+/// the sums of splats.
 struct DevelopSplats {
     Wave wave;
     const Lane* samples;  ///< by slot
@@ -116,7 +124,8 @@ struct DevelopSplats {
         const PathSlot p = wave.locate(i);
         if (!p.active) return;
         const uint64_t at = uint64_t(p.pixel) * 3;
-        double s[3] = {sum[at], sum[at + 1], sum[at + 2]}, q[3] = {sum_squares[at], sum_squares[at + 1], sum_squares[at + 2]};
+        double s[3] = {sum[at], sum[at + 1], sum[at + 2]},
+               q[3] = {sum_squares[at], sum_squares[at + 1], sum_squares[at + 2]};
         const uint32_t stride = wave.tiles * kTilePixels, count = wave.state->samples;
         constexpr uint32_t kTogether = 4;  // loads that do not wait for each other
         for (uint32_t first = 0; first < count; first += kTogether) {

@@ -26,8 +26,9 @@ enum class StageId : uint32_t {
 };
 
 constexpr uint32_t kStageCount = uint32_t(StageId::count);
-constexpr const char* kStageNames[kStageCount] = {"light_generate", "light_extend", "light_shade", "connect_camera", "generate", "extend", "shade",
-                                                   "connect", "connect_vertices", "mis_weight", "occlude", "accumulate", "splat", "megakernel", "develop"};
+constexpr const char* kStageNames[kStageCount] = {
+    "light_generate",   "light_extend", "light_shade", "connect_camera", "generate", "extend",     "shade",  "connect",
+    "connect_vertices", "mis_weight",   "occlude",     "accumulate",     "splat",    "megakernel", "develop"};
 
 /// Items are counted for depths 0 ... kTrackedDepths-1; the last entry gathers all deeper ones.
 constexpr uint32_t kTrackedDepths = 64;
@@ -46,7 +47,9 @@ AMBILUX_HD void count_one(uint64_t* counter) { count_some(counter, 1); }
 AMBILUX_HD void count_together(uint64_t* counters, uint32_t which) {
 #if defined(__CUDA_ARCH__)
     const uint32_t same = __match_any_sync(__activemask(), which);
-    if ((threadIdx.x & 31u) == uint32_t(__ffs(int(same)) - 1)) atomicAdd(reinterpret_cast<unsigned long long*>(counters + which), static_cast<unsigned long long>(__popc(same)));
+    if ((threadIdx.x & 31u) == uint32_t(__ffs(int(same)) - 1))
+        atomicAdd(reinterpret_cast<unsigned long long*>(counters + which),
+                  static_cast<unsigned long long>(__popc(same)));
 #else
     ++counters[which];
 #endif
@@ -80,11 +83,13 @@ private:
     AMBILUX_HD static uint32_t tracked(uint32_t depth) { return depth < kTrackedDepths ? depth : kTrackedDepths - 1; }
 };
 
-/// True if `v` can be light: finite and not negative. Anything else is counted in the record of the stage that made it; the caller drops it.
+/// True if `v` can be light: finite and not negative. Anything else is counted in the record of the stage that made it;
+/// the caller drops it.
 AMBILUX_HD bool is_light(Rgb v, StageRecord* record) {
     // Finite and neither negative nor -0: the bits of such floats are below those of infinity.
     constexpr uint32_t kInfinityBits = 0x7f800000u;
-    if ((float_bits(v.x) < kInfinityBits) & (float_bits(v.y) < kInfinityBits) & (float_bits(v.z) < kInfinityBits)) return true;
+    if ((float_bits(v.x) < kInfinityBits) & (float_bits(v.y) < kInfinityBits) & (float_bits(v.z) < kInfinityBits))
+        return true;
     if (is_finite(v)) {
         if (min_component(v) >= 0.0f) return true;
         count_one(&record->negative);

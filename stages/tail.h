@@ -1,4 +1,5 @@
-// The last walks of a wave. Few of them cost as much as many, since every launch lasts as long as its slowest ray: so they go on for several depths in one launch.
+// The last walks of a wave. Few of them cost as much as many, since every launch lasts as long as its slowest ray: so
+// they go on for several depths in one launch.
 #pragma once
 
 #include "stages/stage.h"
@@ -11,7 +12,8 @@ constexpr uint32_t kTailDepths = 16;
 /// Fewer walks than this do not fill a device (docs/performance.md).
 constexpr uint32_t kTailWalks = 1u << 15;
 
-/// shade and extend in turns, from hits to the rays that are left after kTailDepths. Rays and hits between them count as items of their stages, the time as shade's.
+/// shade and extend in turns, from hits to the rays that are left after kTailDepths. Rays and hits between them count
+/// as items of their stages, the time as shade's.
 template <class Shade, class Extend>
 struct Tail {
     Shade shade;

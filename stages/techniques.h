@@ -1,9 +1,10 @@
-// Images of single strategies (s,t), raw and weighted (Veach 1997, figures 10.2 and 10.3). They are gathered beside the image and change nothing in it.
+// Images of single strategies (s,t), raw and weighted (Veach 1997, figures 10.2 and 10.3). They are gathered beside the
+// image and change nothing in it.
 #pragma once
 
+#include "film/fixed_point.h"
 #include "queues/queue.h"
-#include "stages/fixed_point.h"
-#include "stages/wave.h"
+#include "queues/wave.h"
 
 namespace ambilux {
 
@@ -28,8 +29,8 @@ AMBILUX_HD uint32_t technique_index(Strategy strategy) {
 constexpr uint32_t kMaxTechniqueDepth = 16;
 
 struct TechniqueFilm {
-    int64_t* sums = nullptr;  ///< per technique: raw image, weighted image (kLightUnit). Null: nothing is recorded
-    Lane* raw = nullptr;      ///< per slot: the unweighted value in flight and its strategy
+    int64_t* sums = nullptr;      ///< per technique: raw image, weighted image (kLightUnit). Null: nothing is recorded
+    Lane* raw = nullptr;          ///< per slot: the unweighted value in flight and its strategy
     uint64_t* dropped = nullptr;  ///< per technique: values that were no numbers or too large to be added
     uint32_t max_depth = 0;
 
@@ -43,7 +44,8 @@ struct TechniqueFilm {
     AMBILUX_HD void scale(uint32_t slot, Rgb factor) const {
         if (!sums) return;
         const Lane lane = raw[slot];
-        remember(slot, Rgb{bits_float(lane.word[0]), bits_float(lane.word[1]), bits_float(lane.word[2])} * factor, {lane.word[3]});
+        remember(slot, Rgb{bits_float(lane.word[0]), bits_float(lane.word[1]), bits_float(lane.word[2])} * factor,
+                 {lane.word[3]});
     }
     /// The slot's candidate arrived, worth `weighted` with its weight.
     AMBILUX_HD void arrive(const Wave& wave, uint32_t slot, Rgb weighted) const {
@@ -72,7 +74,9 @@ struct SingleStrategies {
     bool on = false;  ///< false: strategies are on in groups
     uint8_t s[kMaxSegments + 1] = {};
 
-    AMBILUX_HD bool has(Strategy strategy) const { return !on || (strategy.segments() <= kMaxSegments && s[strategy.segments()] == strategy.s()); }
+    AMBILUX_HD bool has(Strategy strategy) const {
+        return !on || (strategy.segments() <= kMaxSegments && s[strategy.segments()] == strategy.s());
+    }
 };
 
 }  // namespace ambilux

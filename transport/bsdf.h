@@ -1,14 +1,19 @@
 // The BSDF interface: a value type with resolved parameters, evaluated in the local shading frame.
 //
 // Conventions (Mitsuba's, Veach 1997 chapter 5 for the two modes):
-// - wi points to where the walk came from, wo to where it goes; both point away from the surface, unit, local frame, z = shading normal.
-// - eval returns f(wi,wo)·|cos(wo)|, without delta lobes. sample returns eval/pdf as `weight`; for delta lobes the ratio in the limit.
-// - TransportMode::radiance: walk from the camera; importance: walk from a light. They differ by eta² on refraction only; the factor for
+// - wi points to where the walk came from, wo to where it goes; both point away from the surface, unit, local frame, z
+// = shading normal.
+// - eval returns f(wi,wo)·|cos(wo)|, without delta lobes. sample returns eval/pdf as `weight`; for delta lobes the
+// ratio in the limit.
+// - TransportMode::radiance: walk from the camera; importance: walk from a light. They differ by eta² on refraction
+// only; the factor for
 //   shading normals is applied outside, once around all BSDFs (transport/surface_scattering.h).
 // - pdf_sa is the density of wo per solid angle that sample uses; it is the same in both modes up to the swap of roles.
-// - sample takes u.x for the choice of a lobe and (u.y, u.z) for the direction, uniform in [0,1); false means that the walk ends.
+// - sample takes u.x for the choice of a lobe and (u.y, u.z) for the direction, uniform in [0,1); false means that the
+// walk ends.
 //
-// A new BSDF is one file in transport/bsdf/ with eval, pdf and sample, a BsdfType, and a case in make_bsdf and with_bsdf.
+// A new BSDF is one file in transport/bsdf/ with eval, pdf and sample, a BsdfType, and a case in make_bsdf and
+// with_bsdf.
 #pragma once
 
 #include <bit>
@@ -28,14 +33,15 @@
 
 namespace ambilux {
 
-/// Parameters of a BsdfRecord at one surface point, textures looked up. Types share fields; each sets and reads its own only.
+/// Parameters of a BsdfRecord at one surface point, textures looked up. Types share fields; each sets and reads its own
+/// only.
 struct Bsdf {
     BsdfType type;
     Microfacets microfacets;
     bool sample_visible, nonlinear;
-    Rgb reflectance_or_eta;       ///< diffuse and plastics: diffuse reflectance; conductors: eta
+    Rgb reflectance_or_eta;  ///< diffuse and plastics: diffuse reflectance; conductors: eta
     Rgb specular_reflectance;
-    Rgb transmittance_or_k;       ///< dielectrics: specular transmittance; conductors: k
+    Rgb transmittance_or_k;  ///< dielectrics: specular transmittance; conductors: k
     float ior;
     float alpha_u, alpha_v;
     float fdr_internal, specular_sampling_weight;
@@ -62,15 +68,17 @@ struct ParametersAt {
     Vec2f uv;
 
     AMBILUX_HD Rgb rgb(Rgb BsdfParameters::*, const ParamRgb& input) const { return eval_rgb<F>(scene, input, uv); }
-    AMBILUX_HD float number(float BsdfParameters::*, const ParamFloat& input) const { return eval_float<F>(scene, input, uv); }
+    AMBILUX_HD float number(float BsdfParameters::*, const ParamFloat& input) const {
+        return eval_float<F>(scene, input, uv);
+    }
 };
 
 /// Has them.
 struct KnownParameters {
     const BsdfParameters& known;
 
-    AMBILUX_HD Rgb rgb(Rgb BsdfParameters::*which, const ParamRgb&) const { return known.*which; }
-    AMBILUX_HD float number(float BsdfParameters::*which, const ParamFloat&) const { return known.*which; }
+    AMBILUX_HD Rgb rgb(Rgb BsdfParameters::* which, const ParamRgb&) const { return known.*which; }
+    AMBILUX_HD float number(float BsdfParameters::* which, const ParamFloat&) const { return known.*which; }
 };
 
 /// The BSDF of `record` with parameters by `of`, one of the above. Microfacet roughness is at least kMinAlpha.
@@ -78,7 +86,9 @@ template <Features F, class Parameters>
 AMBILUX_HD Bsdf make_bsdf(const SceneView& scene, const BsdfRecord& record, const Parameters& of) {
     Bsdf b = {};
     b.type = F.several_bsdfs() ? record.type : BsdfType(std::countr_zero(F.bsdfs));
-    const auto specular_reflectance = [&] { b.specular_reflectance = of.rgb(&BsdfParameters::specular_reflectance, record.specular_reflectance); };
+    const auto specular_reflectance = [&] {
+        b.specular_reflectance = of.rgb(&BsdfParameters::specular_reflectance, record.specular_reflectance);
+    };
     const auto reflectance = [&] { b.reflectance_or_eta = of.rgb(&BsdfParameters::color, record.reflectance); };
     const auto conductor = [&] {
         specular_reflectance();
@@ -152,7 +162,8 @@ AMBILUX_HD Bsdf make_bsdf(const SceneView& scene, const BsdfRecord& record, cons
 
 /// Those with which `b` was made.
 AMBILUX_HD BsdfParameters parameters_of(const Bsdf& b) {
-    return {bsdf_transmits(b.type) ? b.transmittance_or_k : b.reflectance_or_eta, b.alpha_u, b.specular_reflectance, b.alpha_v};
+    return {bsdf_transmits(b.type) ? b.transmittance_or_k : b.reflectance_or_eta, b.alpha_u, b.specular_reflectance,
+            b.alpha_v};
 }
 
 /// The BSDF of `record` at texture coordinates `uv`.
@@ -178,11 +189,12 @@ AMBILUX_HD Result with_bsdf(const Bsdf& b, Result otherwise, Op op) {
             break;
         case BsdfType::rough_conductor:
             if constexpr (F.has(BsdfType::rough_conductor))
-                return op(RoughConductor{b.specular_reflectance, b.reflectance_or_eta, b.transmittance_or_k, microfacets,
-                                         b.sample_visible});
+                return op(RoughConductor{b.specular_reflectance, b.reflectance_or_eta, b.transmittance_or_k,
+                                         microfacets, b.sample_visible});
             break;
         case BsdfType::dielectric:
-            if constexpr (F.has(BsdfType::dielectric)) return op(Dielectric{b.specular_reflectance, b.transmittance_or_k, b.ior});
+            if constexpr (F.has(BsdfType::dielectric))
+                return op(Dielectric{b.specular_reflectance, b.transmittance_or_k, b.ior});
             break;
         case BsdfType::thin_dielectric:
             if constexpr (F.has(BsdfType::thin_dielectric))
@@ -190,12 +202,13 @@ AMBILUX_HD Result with_bsdf(const Bsdf& b, Result otherwise, Op op) {
             break;
         case BsdfType::rough_dielectric:
             if constexpr (F.has(BsdfType::rough_dielectric))
-                return op(RoughDielectric{b.specular_reflectance, b.transmittance_or_k, b.ior, microfacets, b.sample_visible});
+                return op(RoughDielectric{b.specular_reflectance, b.transmittance_or_k, b.ior, microfacets,
+                                          b.sample_visible});
             break;
         case BsdfType::plastic:
             if constexpr (F.has(BsdfType::plastic))
-                return op(Plastic{b.reflectance_or_eta, b.specular_reflectance, b.ior, b.fdr_internal, b.specular_sampling_weight,
-                                  b.nonlinear});
+                return op(Plastic{b.reflectance_or_eta, b.specular_reflectance, b.ior, b.fdr_internal,
+                                  b.specular_sampling_weight, b.nonlinear});
             break;
         case BsdfType::rough_plastic:
             if constexpr (F.has(BsdfType::rough_plastic))
@@ -213,9 +226,12 @@ namespace detail {
 template <Features F>
 AMBILUX_HD_APART BsdfValue bsdf_evaluate_apart(Bsdf b, Vec3f wi, Vec3f wo, TransportMode mode) {
     return with_bsdf<F>(b, no_scattering(), [&](const auto& bsdf) -> BsdfValue {
-        if constexpr (requires { bsdf.evaluate(wi, wo, mode); }) return bsdf.evaluate(wi, wo, mode);
-        else if constexpr (requires { bsdf.evaluate(wi, wo); }) return bsdf.evaluate(wi, wo);
-        else return no_scattering();  // delta lobes only
+        if constexpr (requires { bsdf.evaluate(wi, wo, mode); })
+            return bsdf.evaluate(wi, wo, mode);
+        else if constexpr (requires { bsdf.evaluate(wi, wo); })
+            return bsdf.evaluate(wi, wo);
+        else
+            return no_scattering();  // delta lobes only
     });
 }
 
@@ -233,7 +249,8 @@ AMBILUX_HD_APART SampleOrNone bsdf_sample_apart(Bsdf b, Vec3f wi, Vec3f u, Trans
 
 }  // namespace detail
 
-/// f(wi,wo)·|cos(wo)| of the smooth lobes, and the densities of both directions per solid angle over them, the chance of choosing them included; 0 where sides do not fit.
+/// f(wi,wo)·|cos(wo)| of the smooth lobes, and the densities of both directions per solid angle over them, the chance
+/// of choosing them included; 0 where sides do not fit.
 template <Features F>
 AMBILUX_HD BsdfValue bsdf_evaluate(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
     if constexpr (F.bsdfs == bit(BsdfType::diffuse)) {

@@ -1,4 +1,5 @@
-// Emitters: light towards a point (next event estimation), its density, and radiance seen directly. Units and orientation are Mitsuba's.
+// Emitters: light towards a point (next event estimation), its density, and radiance seen directly. Units and
+// orientation are Mitsuba's.
 #pragma once
 
 #include "transport/emitter/area.h"
@@ -14,8 +15,8 @@ AMBILUX_HD constexpr bool is_delta(EmitterType type) {
     return type == EmitterType::point || type == EmitterType::spot || type == EmitterType::directional;
 }
 
-/// sample_emitter_direct without the lookup of an environment map, which costs more than the rest: s.radiance is to be replaced by emitter_sample_radiance once
-/// it is clear that the sample matters. True does not promise light then.
+/// sample_emitter_direct without the lookup of an environment map, which costs more than the rest: s.radiance is to be
+/// replaced by emitter_sample_radiance once it is clear that the sample matters. True does not promise light then.
 template <Features F>
 AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, Vec3f reference_p, Vec4f u, EmitterSample& s) {
     if (view.emitter_count == 0) return false;
@@ -26,7 +27,8 @@ AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, Vec3f reference_p
     s.emitter = index;
     switch (emitter.type) {
         case EmitterType::area:
-            if constexpr (F.has(EmitterType::area)) lit = area_sample_direct<F>(view, emitter, reference_p, u.w, u_position, s);
+            if constexpr (F.has(EmitterType::area))
+                lit = area_sample_direct<F>(view, emitter, reference_p, u.w, u_position, s);
             break;
         case EmitterType::point:
             if constexpr (F.has(EmitterType::point)) lit = point_sample_direct(emitter, reference_p, s);
@@ -35,13 +37,16 @@ AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, Vec3f reference_p
             if constexpr (F.has(EmitterType::spot)) lit = spot_sample_direct<F>(view, emitter, reference_p, s);
             break;
         case EmitterType::directional:
-            if constexpr (F.has(EmitterType::directional)) lit = directional_sample_direct(view, emitter, reference_p, s);
+            if constexpr (F.has(EmitterType::directional))
+                lit = directional_sample_direct(view, emitter, reference_p, s);
             break;
         case EmitterType::constant:
-            if constexpr (F.has(EmitterType::constant)) lit = constant_sample_direct(view, emitter, reference_p, u_position, s);
+            if constexpr (F.has(EmitterType::constant))
+                lit = constant_sample_direct(view, emitter, reference_p, u_position, s);
             break;
         case EmitterType::envmap:
-            if constexpr (F.has(EmitterType::envmap)) lit = envmap_sample_direct(view, emitter, reference_p, {u.y, u.z, u.w}, s);
+            if constexpr (F.has(EmitterType::envmap))
+                lit = envmap_sample_direct(view, emitter, reference_p, {u.y, u.z, u.w}, s);
             break;
         default: break;
     }
@@ -49,7 +54,8 @@ AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, Vec3f reference_p
     return lit && s.pdf_sa > 0.0f && s.pdf_sa < kInfinity && max_component(s.radiance) > 0.0f;
 }
 
-/// The far memory that sample_emitter_deferred will read for these `u`, or null if there is none worth asking for ahead.
+/// The far memory that sample_emitter_deferred will read for these `u`, or null if there is none worth asking for
+/// ahead.
 template <Features F>
 AMBILUX_HD const void* emitter_sample_memory(const SceneView& view, Vec4f u) {
     if constexpr (F.has(EmitterType::envmap)) {
@@ -76,9 +82,10 @@ AMBILUX_HD bool is_environment(const SceneView& view, uint32_t emitter) {
     return F.has_environment() && emitter == view.environment;
 }
 
-/// Picks an emitter by the scene's pick probabilities and samples its light towards `reference_p` (world space). `u` in [0,1)^4: x picks the
-/// emitter, y and z place the sample on it, w picks the primitive of a mesh or the row of an environment map. False when the sample carries no light
-/// (nothing to add, still one sample); then `s` is not to be read.
+/// Picks an emitter by the scene's pick probabilities and samples its light towards `reference_p` (world space). `u` in
+/// [0,1)^4: x picks the emitter, y and z place the sample on it, w picks the primitive of a mesh or the row of an
+/// environment map. False when the sample carries no light (nothing to add, still one sample); then `s` is not to be
+/// read.
 template <Features F>
 AMBILUX_HD bool sample_emitter_direct(const SceneView& view, Vec3f reference_p, Vec4f u, EmitterSample& s) {
     if (!sample_emitter_deferred<F>(view, reference_p, u, s)) return false;
@@ -86,10 +93,12 @@ AMBILUX_HD bool sample_emitter_direct(const SceneView& view, Vec3f reference_p, 
     return max_component(s.radiance) > 0.0f;
 }
 
-/// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` at `reference_p` by way of area emitter
-/// `emitter`, which a ray along `wi` meets at `hit`. Zero for every other type: no ray meets those.
+/// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` at
+/// `reference_p` by way of area emitter `emitter`, which a ray along `wi` meets at `hit`. Zero for every other type: no
+/// ray meets those.
 template <Features F>
-AMBILUX_HD float pdf_emitter_direct(const SceneView& view, uint32_t emitter, Vec3f reference_p, Vec3f wi, const SurfacePoint& hit) {
+AMBILUX_HD float pdf_emitter_direct(const SceneView& view, uint32_t emitter, Vec3f reference_p, Vec3f wi,
+                                    const SurfacePoint& hit) {
     if constexpr (F.has(EmitterType::area)) {
         const Emitter& e = view.emitters[emitter];
         if (e.type == EmitterType::area) return area_pdf_direct<F>(view, e, reference_p, wi, hit);
@@ -97,7 +106,8 @@ AMBILUX_HD float pdf_emitter_direct(const SceneView& view, uint32_t emitter, Vec
     return 0.0f;
 }
 
-/// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` by way of the environment; zero without one.
+/// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` by way of the
+/// environment; zero without one.
 template <Features F>
 AMBILUX_HD float pdf_environment_direct(const SceneView& view, Vec3f wi) {
     if constexpr (F.has_environment()) {

@@ -7,7 +7,8 @@ namespace ambilux {
 
 enum class MisHeuristic : uint32_t { balance, power };
 
-/// p / (p + q). 1 when q is 0: no other strategy finds the path. Densities that are no numbers give a weight that is none.
+/// p / (p + q). 1 when q is 0: no other strategy finds the path. Densities that are no numbers give a weight that is
+/// none.
 AMBILUX_HD float balance_weight(float p, float q) { return q == 0.0f ? 1.0f : 1.0f / (1.0f + q / p); }
 
 /// p² / (p² + q²), by the ratio so that squares do not overflow.

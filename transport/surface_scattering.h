@@ -1,5 +1,6 @@
-// Scattering at a surface point in world space: which BSDF, in which frame, and what shading normals cost. The one place where the
-// predicate for light leaks and Veach's factor for shading normals are applied, to sampling and evaluation alike.
+// Scattering at a surface point in world space: which BSDF, in which frame, and what shading normals cost. The one
+// place where the predicate for light leaks and Veach's factor for shading normals are applied, to sampling and
+// evaluation alike.
 #pragma once
 
 #include "scene/surface.h"
@@ -9,13 +10,14 @@ namespace ambilux {
 
 /// A surface point ready to scatter light that arrived along -wi_world.
 struct Scattering {
-    Frame frame;     ///< shading frame of the BSDF, bump or normal map applied; n points to the side of the ray when `flipped`
+    Frame frame;     ///< shading frame of the BSDF, bump or normal map applied; n points to the side of the ray when
+                     ///< `flipped`
     Vec3f ng;        ///< unit geometric normal, flipped with frame.n
     Vec3f wi_world;  ///< unit, to where the walk came from
     Vec3f wi;        ///< the same in `frame`
     Bsdf bsdf;
-    uint32_t record; ///< place of its BsdfRecord in SceneView::bsdfs
-    bool flipped;    ///< two-sided material met from behind: frame.n and ng are negated
+    uint32_t record;  ///< place of its BsdfRecord in SceneView::bsdfs
+    bool flipped;     ///< two-sided material met from behind: frame.n and ng are negated
 };
 
 /// Result of scatter_sample: a BsdfSample whose wo is in world space.
@@ -31,7 +33,8 @@ AMBILUX_HD Vec3f perturbed_normal(const SceneView& scene, const BsdfRecord& reco
         const Rgb texel = eval_texture<F>(scene, scene.textures[record.normal_map], point.uv);
         n = frame_from_normal_tangent(point.ns, point.dpdu).to_world(texel * 2.0f - splat(1.0f));
     } else if (record.bump_map >= 0) {
-        const Vec2f g = texture_height_gradient<F>(scene, scene.textures[record.bump_map], point.uv) * record.bump_scale;
+        const Vec2f g =
+            texture_height_gradient<F>(scene, scene.textures[record.bump_map], point.uv) * record.bump_scale;
         const Vec3f du = point.dpdu + n * (g.x - dot(n, point.dpdu)), dv = point.dpdv + n * (g.y - dot(n, point.dpdv));
         n = cross(du, dv);
         if (dot(n, point.ng) < 0.0f) n = -n;
@@ -41,8 +44,8 @@ AMBILUX_HD Vec3f perturbed_normal(const SceneView& scene, const BsdfRecord& reco
     return l2 > 0.0f && l2 < kInfinity ? n * inverse_sqrt(l2) : point.ns;
 }
 
-/// Prepares scattering of a walk that arrived from unit direction `wi_world` (pointing away from the surface). The side is that of
-/// the geometric normal: where the shading normal disagrees, nothing is scattered at all.
+/// Prepares scattering of a walk that arrived from unit direction `wi_world` (pointing away from the surface). The side
+/// is that of the geometric normal: where the shading normal disagrees, nothing is scattered at all.
 template <Features F>
 AMBILUX_HD Scattering make_scattering(const SceneView& scene, const SurfacePoint& point, Vec3f wi_world) {
     const Material& material = scene.materials[scene.shapes[point.shape].material];
@@ -68,13 +71,15 @@ AMBILUX_HD Scattering make_scattering(const SceneView& scene, const SurfacePoint
 
 /// What is left of a Scattering when its point is forgotten: scattering_of() makes it again.
 struct ScatteringParts {
-    Vec3f ng, n;     ///< of Scattering::ng and frame.n
-    Vec3f tangent;   ///< frame.s
-    uint32_t record; ///< and, in the highest bit, whether it was flipped
+    Vec3f ng, n;      ///< of Scattering::ng and frame.n
+    Vec3f tangent;    ///< frame.s
+    uint32_t record;  ///< and, in the highest bit, whether it was flipped
     BsdfParameters parameters;
 };
 
-AMBILUX_HD ScatteringParts parts_of(const Scattering& s) { return {s.ng, s.frame.n, s.frame.s, s.record | uint32_t(s.flipped) << 31, parameters_of(s.bsdf)}; }
+AMBILUX_HD ScatteringParts parts_of(const Scattering& s) {
+    return {s.ng, s.frame.n, s.frame.s, s.record | uint32_t(s.flipped) << 31, parameters_of(s.bsdf)};
+}
 
 template <Features F>
 AMBILUX_HD Scattering scattering_of(const SceneView& scene, const ScatteringParts& parts, Vec3f wi_world) {
@@ -86,11 +91,14 @@ AMBILUX_HD Scattering scattering_of(const SceneView& scene, const ScatteringPart
     s.wi_world = wi_world;
     s.wi = s.frame.to_local(wi_world);
     const BsdfRecord& record = scene.bsdfs[s.record];
-    if constexpr (F.textures) s.bsdf = make_bsdf<F>(scene, record, KnownParameters{parts.parameters});
-    else s.bsdf = resolve_bsdf<F>(scene, record, {});
+    if constexpr (F.textures)
+        s.bsdf = make_bsdf<F>(scene, record, KnownParameters{parts.parameters});
+    else
+        s.bsdf = resolve_bsdf<F>(scene, record, {});
     return s;
 }
-/// The same of a diffuse BSDF, which needs no more than the normals and its reflectance: without tangents, side and record.
+/// The same of a diffuse BSDF, which needs no more than the normals and its reflectance: without tangents, side and
+/// record.
 AMBILUX_HD Scattering diffuse_scattering(const ScatteringParts& parts, Vec3f wi_world) {
     Scattering s = {};
     s.frame.n = parts.n;
@@ -102,14 +110,16 @@ AMBILUX_HD Scattering diffuse_scattering(const ScatteringParts& parts, Vec3f wi_
     return s;
 }
 
-/// True if `cos_shading` = dot(frame.n, w) and dot(ng, w) put w on the same side. Directions where they differ carry no light, in either
-/// mode and for either direction of a pair: reflection then leaves on the side it came from, and transmission passes through.
+/// True if `cos_shading` = dot(frame.n, w) and dot(ng, w) put w on the same side. Directions where they differ carry no
+/// light, in either mode and for either direction of a pair: reflection then leaves on the side it came from, and
+/// transmission passes through.
 AMBILUX_HD bool sides_agree(const Scattering& s, Vec3f w, float cos_shading) {
     const float cos_geometric = dot(s.ng, w);
     return (cos_geometric > 0.0f && cos_shading > 0.0f) || (cos_geometric < 0.0f && cos_shading < 0.0f);
 }
 
-/// False if no BSDF of the surface can send light from `wi_world` to `wo_world`, told from its type and the geometry alone: what does not transmit scatters to its own side only.
+/// False if no BSDF of the surface can send light from `wi_world` to `wo_world`, told from its type and the geometry
+/// alone: what does not transmit scatters to its own side only.
 AMBILUX_HD bool may_scatter(const SceneView& scene, const SurfacePoint& point, Vec3f wi_world, Vec3f wo_world) {
     const float cos_wi = dot(point.ng, wi_world), cos_wo = dot(point.ng, wo_world);
     if (cos_wi * cos_wo > 0.0f) return true;
@@ -118,16 +128,20 @@ AMBILUX_HD bool may_scatter(const SceneView& scene, const SurfacePoint& point, V
 }
 
 /// The same where the BSDF is known.
-AMBILUX_HD bool may_scatter(const Scattering& s, Vec3f wo_world) { return dot(s.ng, s.wi_world) * dot(s.ng, wo_world) > 0.0f || bsdf_transmits(s.bsdf.type); }
+AMBILUX_HD bool may_scatter(const Scattering& s, Vec3f wo_world) {
+    return dot(s.ng, s.wi_world) * dot(s.ng, wo_world) > 0.0f || bsdf_transmits(s.bsdf.type);
+}
 
-/// What a BSDF with shading normals is multiplied with in importance mode, |wi·ns|·|wo·ng| / (|wi·ng|·|wo·ns|), so that both modes
-/// describe one surface (Veach 1997, equations 5.19 and 5.20); 1 in radiance mode. Cosines are those with the shading normal.
+/// What a BSDF with shading normals is multiplied with in importance mode, |wi·ns|·|wo·ng| / (|wi·ng|·|wo·ns|), so that
+/// both modes describe one surface (Veach 1997, equations 5.19 and 5.20); 1 in radiance mode. Cosines are those with
+/// the shading normal.
 AMBILUX_HD float shading_normal_factor(const Scattering& s, Vec3f wo_world, float cos_wo, TransportMode mode) {
     if (mode == TransportMode::radiance) return 1.0f;
     return fabsf(s.wi.z / dot(s.ng, s.wi_world)) * fabsf(dot(s.ng, wo_world) / cos_wo);
 }
 
-/// f(wi,wo)·|wo·ns| of the smooth lobes for unit `wo_world`, with the factor for shading normals in importance mode, and, wherever that is not 0, the densities of scatter_sample.
+/// f(wi,wo)·|wo·ns| of the smooth lobes for unit `wo_world`, with the factor for shading normals in importance mode,
+/// and, wherever that is not 0, the densities of scatter_sample.
 template <Features F>
 AMBILUX_HD BsdfValue scatter_evaluate(const Scattering& s, Vec3f wo_world, TransportMode mode) {
     const Vec3f wo = s.frame.to_local(wo_world);
@@ -142,7 +156,8 @@ AMBILUX_HD Rgb scatter_eval(const Scattering& s, Vec3f wo_world, TransportMode m
     return scatter_evaluate<F>(s, wo_world, mode).value;
 }
 
-/// Density per solid angle with which scatter_sample draws `wo_world`; directions that it rejects for their side keep theirs.
+/// Density per solid angle with which scatter_sample draws `wo_world`; directions that it rejects for their side keep
+/// theirs.
 template <Features F>
 AMBILUX_HD float scatter_pdf(const Scattering& s, Vec3f wo_world) {
     return bsdf_pdf<F>(s.bsdf, s.wi, s.frame.to_local(wo_world), TransportMode::radiance);

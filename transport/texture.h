@@ -31,8 +31,8 @@ AMBILUX_HD Rgb load_texel(const SceneView& view, const Texture& texture, uint32_
     return {decode[texel & 255u], decode[texel >> 8 & 255u], decode[texel >> 16 & 255u]};
 }
 
-/// Reduces a coordinate to one period of the wrap mode, [0,1] or (mirror) [0,2]; what is not finite becomes 0, so that texel
-/// indices stay in range whatever a mesh file says.
+/// Reduces a coordinate to one period of the wrap mode, [0,1] or (mirror) [0,2]; what is not finite becomes 0, so that
+/// texel indices stay in range whatever a mesh file says.
 AMBILUX_HD float reduce_coordinate(float s, WrapMode wrap) {
     if (wrap == WrapMode::repeat) return clamp(s - floorf(s), 0.0f, 1.0f);
     if (wrap == WrapMode::mirror) return clamp(s - 2.0f * floorf(0.5f * s), 0.0f, 2.0f);
@@ -97,8 +97,8 @@ AMBILUX_HD Rgb eval_rgb(const SceneView& view, const ParamRgb& parameter, Vec2f 
     return parameter.value;
 }
 
-/// Value of a scalar parameter at surface coordinates `uv`. A colour image counts by its luminance, as in Mitsuba's eval_1;
-/// a grey one has that in every channel.
+/// Value of a scalar parameter at surface coordinates `uv`. A colour image counts by its luminance, as in Mitsuba's
+/// eval_1; a grey one has that in every channel.
 template <Features F>
 AMBILUX_HD float eval_float(const SceneView& view, const ParamFloat& parameter, Vec2f uv) {
     if constexpr (F.textures)
@@ -107,8 +107,8 @@ AMBILUX_HD float eval_float(const SceneView& view, const ParamFloat& parameter, 
     return parameter.value;
 }
 
-/// Derivatives by u and v of the scalar value of a texture (a height, for bump maps): the exact gradient of the bilinear
-/// interpolant, to_uv included. Zero for checkerboards and nearest-texel lookup, as in Mitsuba's eval_1_grad.
+/// Derivatives by u and v of the scalar value of a texture (a height, for bump maps): the exact gradient of the
+/// bilinear interpolant, to_uv included. Zero for checkerboards and nearest-texel lookup, as in Mitsuba's eval_1_grad.
 template <Features F>
 AMBILUX_HD Vec2f texture_height_gradient(const SceneView& view, const Texture& texture, Vec2f uv) {
     if (texture.type != TextureType::bitmap || texture.filter == TextureFilter::nearest) return {0.0f, 0.0f};

@@ -6,17 +6,18 @@
 
 #include "queues/order.h"
 #include "queues/queue.h"
+#include "queues/wave.h"
 #include "stages/order_keys.h"
 #include "stages/settle.h"
 #include "stages/stage.h"
-#include "stages/wave.h"
 
 namespace ambilux {
 
 class CpuExecutor {
 public:
     CpuExecutor(WaveState* state, StageRecord* records) : state_(state), records_(records) {}
-    CpuExecutor(WaveState* state, StageRecord* records, const SceneView& scene, const OrderMemory& order) : state_(state), records_(records), scene_(&scene), order_(order) {}
+    CpuExecutor(WaveState* state, StageRecord* records, const SceneView& scene, const OrderMemory& order)
+        : state_(state), records_(records), scene_(&scene), order_(order) {}
 
     template <class Stage>
     void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
@@ -71,7 +72,8 @@ private:
     using Clock = std::chrono::steady_clock;
     static constexpr uint32_t kPrefetchDistance = 8;  ///< items; further or nearer makes no difference between 4 and 16
 
-    /// One place where the stage is called: compilers contract sums of products differently in every copy of a stage, and images should not depend on the order of queues.
+    /// One place where the stage is called: compilers contract sums of products differently in every copy of a stage,
+    /// and images should not depend on the order of queues.
     template <class Order, class Stage, class Item>
     void run_in_order(StageId id, const Stage& stage, const Queue<Item>& queue) {
         const uint32_t items = queue.counter->size();
@@ -82,7 +84,8 @@ private:
         const uint32_t n = gaps ? queue.capacity : items;
         for (uint32_t i = 0; i < n; ++i) {
             if constexpr (requires { stage.far_memory(i); }) {
-                if (!queue.flags && !list && i + kPrefetchDistance < n) __builtin_prefetch(stage.far_memory(i + kPrefetchDistance));
+                if (!queue.flags && !list && i + kPrefetchDistance < n)
+                    __builtin_prefetch(stage.far_memory(i + kPrefetchDistance));
             }
             if (gaps && !take(queue, i)) continue;
             stage(list ? list[i] : i);
@@ -90,7 +93,8 @@ private:
         queue.counter->finish();
         record(id, items, start);
     }
-    /// The places of all items, if they do not lie one after the other or not in the order in which they are wanted; null: as they lie.
+    /// The places of all items, if they do not lie one after the other or not in the order in which they are wanted;
+    /// null: as they lie.
     template <class Order, class Item>
     const uint32_t* make_list(const Queue<Item>& queue) const {
         bool sorted = false;
@@ -103,7 +107,8 @@ private:
         if constexpr (Ordered<Order, Item>) {
             if (sorted) {
                 for (uint32_t i = 0; i < n; ++i) keys[list[i]] = order_key<Order>(*scene_, queue, list[i]);
-                std::sort(list, list + n, [&](uint32_t a, uint32_t b) { return keys[a] != keys[b] ? keys[a] < keys[b] : a < b; });
+                std::sort(list, list + n,
+                          [&](uint32_t a, uint32_t b) { return keys[a] != keys[b] ? keys[a] < keys[b] : a < b; });
             }
         }
         return list;

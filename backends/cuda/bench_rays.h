@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "accel/cwbvh.h"
+#include "accel/pair_bvh.h"
 #include "backends/ray_batches.h"
-#include "scene/accel/cwbvh.h"
-#include "scene/accel/pair_bvh.h"
 #include "scene/scene.h"
 
 namespace ambilux {
@@ -18,11 +18,13 @@ struct KernelTiming {
     double seconds;  ///< median of one run over the whole batch
 };
 
-/// For each batch, every kernel that can trace it: the persistent one with the tuning that suits the batch, with the other, and the plain one.
-/// Throws Error(device).
+/// For each batch, every kernel that can trace it: the persistent one with the tuning that suits the batch, with the
+/// other, and the plain one. Throws Error(device).
 std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const CwbvhArrays& cwbvh,
-                                                           const std::vector<RayBatch>& batches, int warm_ups, int repetitions);
+                                                           const std::vector<RayBatch>& batches, int warm_ups,
+                                                           int repetitions);
 std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene& scene, const PairArrays& pairs,
-                                                           const std::vector<RayBatch>& batches, int warm_ups, int repetitions);
+                                                           const std::vector<RayBatch>& batches, int warm_ups,
+                                                           int repetitions);
 
 }  // namespace ambilux

@@ -14,8 +14,8 @@
 
 namespace ambilux {
 
-/// Throws Error(device) with `what`, the error's name and its text unless `error` is cudaSuccess. When memory ran out, also the bytes that were
-/// asked for (if given) and those that are free.
+/// Throws Error(device) with `what`, the error's name and its text unless `error` is cudaSuccess. When memory ran out,
+/// also the bytes that were asked for (if given) and those that are free.
 inline void cuda_check(cudaError_t error, const char* what, uint64_t bytes_asked = 0) {
     if (error == cudaSuccess) return;
     std::string message = std::string(what) + ": " + cudaGetErrorName(error) + ", " + cudaGetErrorString(error);
@@ -23,12 +23,14 @@ inline void cuda_check(cudaError_t error, const char* what, uint64_t bytes_asked
     if (error == cudaErrorMemoryAllocation) {
         size_t free = 0, total = 0;
         if (bytes_asked) message += "; " + std::to_string(bytes_asked) + " bytes asked for";
-        if (cudaMemGetInfo(&free, &total) == cudaSuccess) message += "; " + std::to_string(free) + " of " + std::to_string(total) + " bytes free";
+        if (cudaMemGetInfo(&free, &total) == cudaSuccess)
+            message += "; " + std::to_string(free) + " of " + std::to_string(total) + " bytes free";
     }
     throw Error(ExitCode::device, message);
 }
 
-/// An array on the device, not initialised. Without elements it holds no memory and data() is null. Copies run on the default stream.
+/// An array on the device, not initialised. Without elements it holds no memory and data() is null. Copies run on the
+/// default stream.
 template <class T>
 class DeviceBuffer {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -39,9 +41,13 @@ public:
     explicit DeviceBuffer(size_t size, const char* what = "device memory") : size_(size) {
         if (size) cuda_check(cudaMalloc(reinterpret_cast<void**>(&data_), bytes()), what, bytes());
     }
-    explicit DeviceBuffer(std::span<const T> values, const char* what = "device memory") : DeviceBuffer(values.size(), what) { upload(values); }
+    explicit DeviceBuffer(std::span<const T> values, const char* what = "device memory")
+        : DeviceBuffer(values.size(), what) {
+        upload(values);
+    }
     ~DeviceBuffer() { cudaFree(data_); }
-    DeviceBuffer(DeviceBuffer&& other) noexcept : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+    DeviceBuffer(DeviceBuffer&& other) noexcept
+        : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
     DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {
         std::swap(data_, other.data_);
         std::swap(size_, other.size_);
@@ -64,7 +70,8 @@ public:
     /// Copies to the host, after the work on the default stream.
     std::vector<T> download() const {
         std::vector<T> values(size_);
-        if (size_) cuda_check(cudaMemcpy(values.data(), data_, bytes(), cudaMemcpyDeviceToHost), "copy from the device");
+        if (size_)
+            cuda_check(cudaMemcpy(values.data(), data_, bytes(), cudaMemcpyDeviceToHost), "copy from the device");
         return values;
     }
     /// Sets all bytes to 0, in the order of `stream`.

@@ -3,19 +3,13 @@
 namespace ambilux {
 
 DeviceScene::DeviceScene(const Scene& scene)
-    : vertices_(scene.vertices, "vertices on the device"),
-      triangles_(scene.triangles, "triangles on the device"),
-      quadrics_(scene.quadrics, "analytic shapes on the device"),
-      shapes_(scene.shapes, "shapes on the device"),
-      materials_(scene.materials, "materials on the device"),
-      bsdfs_(scene.bsdfs, "BSDFs on the device"),
-      textures_(scene.textures, "texture records on the device"),
-      texels_(scene.texels, "texels on the device"),
-      sort_keys_(scene.sort_keys, "sort keys on the device"),
-      emitters_(scene.emitters, "emitters on the device"),
+    : vertices_(scene.vertices, "vertices on the device"), triangles_(scene.triangles, "triangles on the device"),
+      quadrics_(scene.quadrics, "analytic shapes on the device"), shapes_(scene.shapes, "shapes on the device"),
+      materials_(scene.materials, "materials on the device"), bsdfs_(scene.bsdfs, "BSDFs on the device"),
+      textures_(scene.textures, "texture records on the device"), texels_(scene.texels, "texels on the device"),
+      sort_keys_(scene.sort_keys, "sort keys on the device"), emitters_(scene.emitters, "emitters on the device"),
       emitter_cdf_(scene.emitter_cdf, "emitter probabilities on the device"),
-      tables_(scene.tables, "tables on the device"),
-      view_(scene.view()) {
+      tables_(scene.tables, "tables on the device"), view_(scene.view()) {
     view_.vertices = vertices_.data();
     view_.triangles = triangles_.data();
     view_.quadrics = quadrics_.data();
@@ -32,13 +26,17 @@ DeviceScene::DeviceScene(const Scene& scene)
 
 uint64_t DeviceScene::bytes() const {
     return vertices_.bytes() + triangles_.bytes() + quadrics_.bytes() + shapes_.bytes() + materials_.bytes() +
-           bsdfs_.bytes() + textures_.bytes() + texels_.bytes() + sort_keys_.bytes() + emitters_.bytes() + emitter_cdf_.bytes() + tables_.bytes();
+           bsdfs_.bytes() + textures_.bytes() + texels_.bytes() + sort_keys_.bytes() + emitters_.bytes() +
+           emitter_cdf_.bytes() + tables_.bytes();
 }
 
-DeviceCwbvh::DeviceCwbvh(const CwbvhArrays& arrays) : nodes_(arrays.nodes, "acceleration structure on the device"), primitives_(arrays.primitives, "primitives on the device") {}
+DeviceCwbvh::DeviceCwbvh(const CwbvhArrays& arrays)
+    : nodes_(arrays.nodes, "acceleration structure on the device"),
+      primitives_(arrays.primitives, "primitives on the device") {}
 
 DevicePairs::DevicePairs(const PairArrays& arrays)
-    : nodes_(arrays.nodes, "acceleration structure on the device"), primitives_(arrays.primitives, "primitives on the device"), root_(arrays.root) {}
+    : nodes_(arrays.nodes, "acceleration structure on the device"),
+      primitives_(arrays.primitives, "primitives on the device"), root_(arrays.root) {}
 
 template <>
 std::shared_ptr<const DeviceScene> SharedAccels::get() {

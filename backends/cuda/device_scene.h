@@ -1,10 +1,10 @@
 // Copies of a scene and of its acceleration structure on a CUDA device.
 #pragma once
 
+#include "accel/cwbvh.h"
+#include "accel/pair_bvh.h"
+#include "accel/shared_accels.h"
 #include "backends/cuda/device_memory.h"
-#include "scene/accel/cwbvh.h"
-#include "scene/accel/pair_bvh.h"
-#include "scene/accel/shared_accels.h"
 #include "scene/scene.h"
 
 namespace ambilux {

@@ -1,5 +1,6 @@
-// Runs the stages of one wave on a CUDA device. They are captured into a graph whose loop over depths is a conditional node; sizes of queues are read on the
-// device: between the launch of a graph and its end the host does nothing. The same can be launched kernel by kernel, for profilers and sanitizers.
+// Runs the stages of one wave on a CUDA device. They are captured into a graph whose loop over depths is a conditional
+// node; sizes of queues are read on the device: between the launch of a graph and its end the host does nothing. The
+// same can be launched kernel by kernel, for profilers and sanitizers.
 #pragma once
 
 #include <cuda_runtime.h>
@@ -31,11 +32,14 @@ public:
     static constexpr bool kTracesPairs = true;  ///< runs ConnectAndOcclude
 
     /// `traced`: features that rays have to know of, the scene's or more. `clock`: one value on the device.
-    BasicCudaExecutor(cudaStream_t stream, const Features& traced, WaveState* state, StageRecord* records, uint64_t* clock, const SceneView& scene, const OrderMemory& order)
-        : stream_(stream), traced_(traced), state_(state), records_(records), clock_(clock), scene_(scene), order_(order) {
+    BasicCudaExecutor(cudaStream_t stream, const Features& traced, WaveState* state, StageRecord* records,
+                      uint64_t* clock, const SceneView& scene, const OrderMemory& order)
+        : stream_(stream), traced_(traced), state_(state), records_(records), clock_(clock), scene_(scene),
+          order_(order) {
         int device = 0;
         cuda_check(cudaGetDevice(&device), "device");
-        cuda_check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device), "multiprocessors");
+        cuda_check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device),
+                   "multiprocessors");
         if (order.policy.ordering != Ordering::none) list_places(order, stream);
     }
 
@@ -64,34 +68,44 @@ public:
 
     template <class Stage>
     void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
-        detail::launch_slots<<<blocks(detail::launch_slots<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, slots, samples, state_);
+        detail::launch_slots<<<blocks(detail::launch_slots<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(
+            stage, slots, samples, state_);
         finish(id, nullptr, nullptr, slots, samples);
     }
     template <class Stage>
     void run_paths(StageId id, const Stage& stage, uint32_t slots) {
-        detail::launch_paths<<<blocks(detail::launch_paths<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, slots, state_);
+        detail::launch_paths<<<blocks(detail::launch_paths<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(
+            stage, slots, state_);
         finish(id, nullptr, nullptr, slots);
     }
     template <class Stage, class Item>
     void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
         const detail::Items items = prepare<MaterialOrder>(stage, queue);
         if constexpr (Chained<Stage>)
-            detail::launch_chains<<<blocks(detail::launch_chains<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
+            detail::launch_chains<<<blocks(detail::launch_chains<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(
+                stage, items);
         else if constexpr (detail::Gathered<Stage>)
-            detail::launch_gathered<<<blocks(detail::launch_gathered<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
+            detail::launch_gathered<<<blocks(detail::launch_gathered<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(
+                stage, items);
         else
-            detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage, items);
+            detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage,
+                                                                                                                items);
         finish(id, queue.counter);
     }
     /// Several depths of the walks of `hits`, which must be appended.
     template <class Shade, class Extend, class Item>
     void run_tail(StageId id, const Shade& shade, const Extend& extend, const Queue<Item>& hits) {
         using Kernel = Tail<Shade, Extend>;
-        detail::launch_tail<<<blocks(detail::launch_tail<Kernel>, kStageBlock), kStageBlock, 0, stream_>>>(Kernel{shade, extend}, hits.counter);
+        detail::launch_tail<<<blocks(detail::launch_tail<Kernel>, kStageBlock), kStageBlock, 0, stream_>>>(
+            Kernel{shade, extend}, hits.counter);
         finish(id, hits.counter);
     }
     /// Rays go through `pairs` instead of the tracer of their stage.
-    void use(const PairTracer& pairs) requires kPairs { pairs_ = pairs; }
+    void use(const PairTracer& pairs)
+        requires kPairs
+    {
+        pairs_ = pairs;
+    }
 
     template <class Stage, class Item>
     void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
@@ -118,7 +132,8 @@ public:
         finish(StageId::generate, nullptr, nullptr, slots);
         set_depth(1);
         with_tracer(extend, [&](auto set, const auto& tracer) {
-            const auto kernel = detail::launch_camera_rays<decltype(set), Generate, Extend, std::remove_cvref_t<decltype(tracer)>>;
+            const auto kernel =
+                detail::launch_camera_rays<decltype(set), Generate, Extend, std::remove_cvref_t<decltype(tracer)>>;
             kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(generate, extend, tracer, slots, state_);
         });
         finish(StageId::extend, extend.rays.counter, extend.hits.counter);
@@ -158,7 +173,8 @@ private:
             kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
         });
     }
-    /// f(FeatureSet, tracer) with the set that tracing needs. Kernels are made only for sets that the stage's own features cover.
+    /// f(FeatureSet, tracer) with the set that tracing needs. Kernels are made only for sets that the stage's own
+    /// features cover.
     template <class Stage, class Function>
     void with_tracer(const Stage& stage, Function f) const {
         with_traversal_features(traced_, [&](auto set) {
@@ -170,37 +186,46 @@ private:
         });
     }
 
-    /// What a launch over `queue` goes through, sorted if it is to be. A loop has counted its queue already when its body begins with that queue.
+    /// What a launch over `queue` goes through, sorted if it is to be. A loop has counted its queue already when its
+    /// body begins with that queue.
     template <class Order, class Stage, class Item>
     detail::Items prepare(const Stage& stage, const Queue<Item>& queue) {
         const bool counted = counted_ == queue.counter;
         counted_ = nullptr;
         if (!counted) count(queue);
         const bool selected = queue.flags && order_.policy.compaction == Compaction::select;
-        detail::Items items = {queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity, nullptr, nullptr, 0};
+        detail::Items items = {
+            queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity, nullptr, nullptr, 0};
         if constexpr (Ordered<Order, Item>) {
             if (order_.policy.ordering == Order::kOrdering && queue.capacity > 0) {
                 const uint32_t bits = Order::bits(scene_);
                 const bool whole = queue.flags && !items.list;
-                const detail::SortSwitch choice = {capturing_ && !whole ? make_condition() : cudaGraphConditionalHandle{}, capturing_ && !whole};
+                const detail::SortSwitch choice = {
+                    capturing_ && !whole ? make_condition() : cudaGraphConditionalHandle{}, capturing_ && !whole};
                 const uint32_t last = (1u << bits) - 1;
                 if (queue.keys)
-                    detail::fill_keys<<<blocks(detail::fill_keys, kStageBlock), kStageBlock, 0, stream_>>>(queue.keys, items, uint16_t(last), choice);
+                    detail::fill_keys<<<blocks(detail::fill_keys, kStageBlock), kStageBlock, 0, stream_>>>(
+                        queue.keys, items, uint16_t(last), choice);
                 else
-                    detail::make_keys<Order, Item><<<blocks(detail::make_keys<Order, Item>, kStageBlock), kStageBlock, 0, stream_>>>(scene_, queue, items, last, order_.keys[0], choice);
+                    detail::make_keys<Order, Item>
+                        <<<blocks(detail::make_keys<Order, Item>, kStageBlock), kStageBlock, 0, stream_>>>(
+                            scene_, queue, items, last, order_.keys[0], choice);
                 if (whole)
                     sort_places(order_, queue.keys, queue.capacity, bits, stream_);
                 else
                     sort_as_many(queue, bits, choice);
                 (whole ? items.list : items.sorted) = order_.list[1];
                 if constexpr (detail::SkipsMisses<Stage>) {
-                    if (queue.keys && !whole && stage.skips_misses()) items.keys = reinterpret_cast<const uint16_t*>(order_.keys[1]), items.end = uint16_t(MaterialOrder::of(scene_, kNone));
+                    if (queue.keys && !whole && stage.skips_misses())
+                        items.keys = reinterpret_cast<const uint16_t*>(order_.keys[1]),
+                        items.end = uint16_t(MaterialOrder::of(scene_, kNone));
                 }
             }
         }
         return items;
     }
-    /// Sorts no more places than hold the items. A graph has a sort for each of several sizes, since its launches are laid down before it is known.
+    /// Sorts no more places than hold the items. A graph has a sort for each of several sizes, since its launches are
+    /// laid down before it is known.
     template <class Item>
     void sort_as_many(const Queue<Item>& queue, uint32_t bits, const detail::SortSwitch& sorts) {
         const auto sort = [&](uint32_t k) {
@@ -218,7 +243,8 @@ private:
         if (order_.policy.compaction == Compaction::select)
             select_places(order_, queue.flags, queue.capacity, &queue.counter->count, stream_);
         else
-            detail::count_items<<<blocks(detail::count_items, kStageBlock), kStageBlock, 0, stream_>>>(queue.flags, queue.capacity, &queue.counter->count);
+            detail::count_items<<<blocks(detail::count_items, kStageBlock), kStageBlock, 0, stream_>>>(
+                queue.flags, queue.capacity, &queue.counter->count);
     }
 
     template <class Count, class Body>
@@ -235,12 +261,14 @@ private:
     }
     cudaGraphConditionalHandle make_condition() const {
         cudaGraphConditionalHandle handle{};
-        cuda_check(cudaGraphConditionalHandleCreate(&handle, captured().first, 0, cudaGraphCondAssignDefault), "conditional handle");
+        cuda_check(cudaGraphConditionalHandleCreate(&handle, captured().first, 0, cudaGraphCondAssignDefault),
+                   "conditional handle");
         return handle;
     }
     /// `bodies` graphs, of which body(k) captures the k-th.
     template <class Body>
-    void capture_conditional(cudaGraphConditionalNodeType type, cudaGraphConditionalHandle handle, uint32_t bodies, Body body) {
+    void capture_conditional(cudaGraphConditionalNodeType type, cudaGraphConditionalHandle handle, uint32_t bodies,
+                             Body body) {
         const auto [graph, dependencies] = captured();
         cudaGraphNodeParams params = {};
         params.type = cudaGraphNodeTypeConditional;
@@ -249,17 +277,23 @@ private:
         params.conditional.size = bodies;
         cudaGraphNode_t node = nullptr;
 #if CUDART_VERSION >= 13000
-        cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), nullptr, dependencies.size(), &params), "conditional node");
-        cuda_check(cudaStreamUpdateCaptureDependencies(stream_, &node, nullptr, 1, cudaStreamSetCaptureDependencies), "conditional node");
+        cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), nullptr, dependencies.size(), &params),
+                   "conditional node");
+        cuda_check(cudaStreamUpdateCaptureDependencies(stream_, &node, nullptr, 1, cudaStreamSetCaptureDependencies),
+                   "conditional node");
 #else
-        cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), dependencies.size(), &params), "conditional node");
-        cuda_check(cudaStreamUpdateCaptureDependencies(stream_, &node, 1, cudaStreamSetCaptureDependencies), "conditional node");
+        cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), dependencies.size(), &params),
+                   "conditional node");
+        cuda_check(cudaStreamUpdateCaptureDependencies(stream_, &node, 1, cudaStreamSetCaptureDependencies),
+                   "conditional node");
 #endif
 
         const cudaStream_t outer = stream_;
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
         for (uint32_t k = 0; k < bodies; ++k) {
-            cuda_check(cudaStreamBeginCaptureToGraph(stream_, params.conditional.phGraph_out[k], nullptr, nullptr, 0, cudaStreamCaptureModeThreadLocal), "begin of conditional capture");
+            cuda_check(cudaStreamBeginCaptureToGraph(stream_, params.conditional.phGraph_out[k], nullptr, nullptr, 0,
+                                                     cudaStreamCaptureModeThreadLocal),
+                       "begin of conditional capture");
             body(k);
             cuda_check(cudaStreamEndCapture(stream_, nullptr), "conditional capture");
         }
@@ -274,7 +308,8 @@ private:
         const cudaGraphNode_t* nodes = nullptr;
         size_t count = 0;
 #if CUDART_VERSION >= 13000
-        cuda_check(cudaStreamGetCaptureInfo(stream_, &status, nullptr, &graph, &nodes, nullptr, &count), "graph capture");
+        cuda_check(cudaStreamGetCaptureInfo(stream_, &status, nullptr, &graph, &nodes, nullptr, &count),
+                   "graph capture");
 #else
         cuda_check(cudaStreamGetCaptureInfo_v2(stream_, &status, nullptr, &graph, &nodes, &count), "graph capture");
 #endif
@@ -287,16 +322,19 @@ private:
         cuda_check(cudaStreamSynchronize(stream_), "queue size");
         return c.size();
     }
-    void finish(StageId id, QueueCounter* counter, QueueCounter* out = nullptr, uint32_t slots = 0, uint32_t samples = 0) {
+    void finish(StageId id, QueueCounter* counter, QueueCounter* out = nullptr, uint32_t slots = 0,
+                uint32_t samples = 0) {
         cuda_check(cudaGetLastError(), kStageNames[uint32_t(id)]);
-        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, out, slots, samples, depth_, state_, clock_);
+        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, out, slots, samples, depth_,
+                                                   state_, clock_);
         depth_ = {};
     }
     /// As many blocks as can be resident.
     template <class Kernel>
     uint32_t blocks(Kernel* kernel, uint32_t threads) const {
         int per_multiprocessor = 0;
-        cuda_check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&per_multiprocessor, kernel, int(threads), 0), "occupancy");
+        cuda_check(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&per_multiprocessor, kernel, int(threads), 0),
+                   "occupancy");
         return uint32_t(multiprocessors_ * (per_multiprocessor > 0 ? per_multiprocessor : 1));
     }
 

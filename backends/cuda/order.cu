@@ -1,8 +1,8 @@
 #include "backends/cuda/order.h"
 
+#include <thrust/iterator/counting_iterator.h>
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_select.cuh>
-#include <thrust/iterator/counting_iterator.h>
 
 #include <algorithm>
 
@@ -17,7 +17,8 @@ __global__ void number_places(uint32_t* list, uint32_t slots) {
 
 size_t select_bytes(uint32_t slots) {
     size_t bytes = 0;
-    cuda_check(cub::DeviceSelect::Flagged(nullptr, bytes, thrust::counting_iterator<uint32_t>(0), static_cast<const uint8_t*>(nullptr), static_cast<uint32_t*>(nullptr),
+    cuda_check(cub::DeviceSelect::Flagged(nullptr, bytes, thrust::counting_iterator<uint32_t>(0),
+                                          static_cast<const uint8_t*>(nullptr), static_cast<uint32_t*>(nullptr),
                                           static_cast<uint32_t*>(nullptr), int(slots)),
                "memory of compaction");
     return bytes;
@@ -28,15 +29,18 @@ size_t sort_bytes(uint32_t slots) {
     size_t bytes = 0;
     const Key* from = nullptr;
     Key* to = nullptr;
-    cuda_check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, from, to, static_cast<const uint32_t*>(nullptr), static_cast<uint32_t*>(nullptr), int(slots)), "memory of sorting");
+    cuda_check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, from, to, static_cast<const uint32_t*>(nullptr),
+                                               static_cast<uint32_t*>(nullptr), int(slots)),
+               "memory of sorting");
     return bytes;
 }
 
 template <class Key>
 void sort_by(const OrderMemory& order, const Key* keys, uint32_t count, uint32_t bits, cudaStream_t stream) {
     size_t bytes = order.temporary_bytes;
-    cuda_check(cub::DeviceRadixSort::SortPairs(order.temporary, bytes, keys, reinterpret_cast<Key*>(order.keys[1]), static_cast<const uint32_t*>(order.list[0]), order.list[1], int(count), 0, int(bits),
-                                               stream),
+    cuda_check(cub::DeviceRadixSort::SortPairs(order.temporary, bytes, keys, reinterpret_cast<Key*>(order.keys[1]),
+                                               static_cast<const uint32_t*>(order.list[0]), order.list[1], int(count),
+                                               0, int(bits), stream),
                "sorting");
 }
 
@@ -45,16 +49,22 @@ void sort_by(const OrderMemory& order, const Key* keys, uint32_t count, uint32_t
 uint64_t order_temporary_bytes(QueuePolicy policy, uint32_t slots) {
     const bool lists = policy.compaction == Compaction::select || policy.ordering != Ordering::none;
     if (lists && slots > 0x7fffffffu)
-        throw Error(ExitCode::usage, "compaction=select and orderings work on at most 2147483647 paths at a time: leave them out, or set a smaller wave_size or --size");
+        throw Error(ExitCode::usage,
+                    "compaction=select and orderings work on at most 2147483647 paths at a time: leave them out, or "
+                    "set a smaller wave_size or --size");
     size_t bytes = 0;
     if (policy.compaction == Compaction::select) bytes = select_bytes(slots);
-    if (policy.ordering != Ordering::none) bytes = std::max({bytes, sort_bytes<uint16_t>(slots), sort_bytes<uint32_t>(slots)});
+    if (policy.ordering != Ordering::none)
+        bytes = std::max({bytes, sort_bytes<uint16_t>(slots), sort_bytes<uint32_t>(slots)});
     return bytes;
 }
 
-void select_places(const OrderMemory& order, const uint8_t* flags, uint32_t capacity, uint32_t* count, cudaStream_t stream) {
+void select_places(const OrderMemory& order, const uint8_t* flags, uint32_t capacity, uint32_t* count,
+                   cudaStream_t stream) {
     size_t bytes = order.temporary_bytes;
-    cuda_check(cub::DeviceSelect::Flagged(order.temporary, bytes, thrust::counting_iterator<uint32_t>(0), flags, order.list[0], count, int(capacity), stream), "compaction");
+    cuda_check(cub::DeviceSelect::Flagged(order.temporary, bytes, thrust::counting_iterator<uint32_t>(0), flags,
+                                          order.list[0], count, int(capacity), stream),
+               "compaction");
 }
 
 void list_places(const OrderMemory& order, cudaStream_t stream) {

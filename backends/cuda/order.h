@@ -11,12 +11,14 @@ namespace ambilux {
 uint64_t order_temporary_bytes(QueuePolicy policy, uint32_t slots);
 
 /// Writes the places among `capacity` whose flag is set to order.list[0], in order, and their number to *count.
-void select_places(const OrderMemory& order, const uint8_t* flags, uint32_t capacity, uint32_t* count, cudaStream_t stream);
+void select_places(const OrderMemory& order, const uint8_t* flags, uint32_t capacity, uint32_t* count,
+                   cudaStream_t stream);
 
 /// Has order.list[0] hold the places 0, 1, 2 ...
 void list_places(const OrderMemory& order, cudaStream_t stream);
 
-/// Sorts `count` places of order.list[0] by the lowest `bits` bits of their keys, `keys` or if it is null order.keys[0], into order.list[1], equal keys in the order they have.
+/// Sorts `count` places of order.list[0] by the lowest `bits` bits of their keys, `keys` or if it is null
+/// order.keys[0], into order.list[1], equal keys in the order they have.
 void sort_places(const OrderMemory& order, const uint16_t* keys, uint32_t count, uint32_t bits, cudaStream_t stream);
 
 }  // namespace ambilux

@@ -1,16 +1,17 @@
-// The kernels that an executor launches: over slots, paths and queues, for rays, for the order of items, and those of one thread that keep records.
+// The kernels that an executor launches: over slots, paths and queues, for rays, for the order of items, and those of
+// one thread that keep records.
 #pragma once
 
 #include <cuda_runtime.h>
 
 #include "backends/cuda/trace_kernels.cuh"
+#include "items/path_items.h"
 #include "queues/queue.h"
+#include "queues/wave.h"
 #include "stages/chain.h"
 #include "stages/order_keys.h"
-#include "stages/path_items.h"
 #include "stages/settle.h"
 #include "stages/stage.h"
-#include "stages/wave.h"
 
 namespace ambilux {
 
@@ -68,12 +69,16 @@ struct Items {
     }
 };
 
-/// body(i), by whole warps, for all i below n and for as many more as fill a warp. Warps take their next stretch of items when they are done with the last: what is in work lies together, so that
-/// all run the same material, and none has more to do than others. Stretches are long, since taking one waits, but not so long that warps would end far apart; where items are few, each warp has
-/// its own. *next must be 0 when the kernel starts.
+/// body(i), by whole warps, for all i below n and for as many more as fill a warp. Warps take their next stretch of
+/// items when they are done with the last: what is in work lies together, so that all run the same material, and none
+/// has more to do than others. Stretches are long, since taking one waits, but not so long that warps would end far
+/// apart; where items are few, each warp has its own. *next must be 0 when the kernel starts.
 template <class Body>
 __device__ void in_turns(uint32_t n, uint32_t* next, Body body) {
-    const uint32_t lane = threadIdx.x % 32, threads = gridDim.x * blockDim.x, stretch = n / threads >= 64 ? 256 : n / threads >= 16 ? 64 : 32;
+    const uint32_t lane = threadIdx.x % 32, threads = gridDim.x * blockDim.x,
+                   stretch = n / threads >= 64   ? 256
+                             : n / threads >= 16 ? 64
+                                                 : 32;
     uint32_t i = (blockIdx.x * blockDim.x + threadIdx.x) / 32 * stretch + lane;
     while (i - lane < n) {
         body(i);
@@ -91,7 +96,8 @@ __device__ void in_turns(uint32_t n, uint32_t* next, Body body) {
 }
 
 template <class Stage>
-__global__ void __launch_bounds__(kStageBlock) launch_slots(const __grid_constant__ Stage stage, uint32_t slots, uint32_t samples, WaveState* state) {
+__global__ void __launch_bounds__(kStageBlock)
+    launch_slots(const __grid_constant__ Stage stage, uint32_t slots, uint32_t samples, WaveState* state) {
     const uint32_t n = slots * (samples ? samples : state->samples);
     in_turns(n, &state->next, [&](uint32_t i) {
         if (i < n) stage(i);
@@ -100,14 +106,18 @@ __global__ void __launch_bounds__(kStageBlock) launch_slots(const __grid_constan
 
 /// All threads stay until the last slot is done.
 template <class Stage>
-__global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_paths(const __grid_constant__ Stage stage, uint32_t slots, const WaveState* state) {
+__global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm)
+    launch_paths(const __grid_constant__ Stage stage, uint32_t slots, const WaveState* state) {
     stage.run(blockIdx.x * kStageBlock + threadIdx.x, slots * state->samples, gridDim.x * kStageBlock);
 }
 
-/// The last walks of a wave (stages/tail.h), as far apart as there are threads for: lanes of a warp wait for each other.
+/// The last walks of a wave (stages/tail.h), as far apart as there are threads for: lanes of a warp wait for each
+/// other.
 template <class Tail>
-__global__ void __launch_bounds__(kStageBlock, 3) launch_tail(const __grid_constant__ Tail tail, const QueueCounter* counter) {
-    const uint32_t walks = counter->size(), threads = gridDim.x * kStageBlock, thread = blockIdx.x * kStageBlock + threadIdx.x;
+__global__ void __launch_bounds__(kStageBlock, 3)
+    launch_tail(const __grid_constant__ Tail tail, const QueueCounter* counter) {
+    const uint32_t walks = counter->size(), threads = gridDim.x * kStageBlock,
+                   thread = blockIdx.x * kStageBlock + threadIdx.x;
     uint32_t apart = 1;
     while (apart < 32 && walks * apart * 2 <= threads) apart *= 2;
     if (thread % apart == 0) tail.run(thread / apart, walks, threads / apart);
@@ -130,7 +140,8 @@ concept Gathered = requires { requires Stage::kGathers; };
 
 /// One kernel, however items lie and are ordered: two of them would round differently.
 template <class Stage>
-__global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>()) launch_items(const __grid_constant__ Stage stage, const Items all) {
+__global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>())
+    launch_items(const __grid_constant__ Stage stage, const Items all) {
     const uint32_t size = all.size();
     const Items items = all.of(size);
     const uint32_t n = SkipsMisses<Stage> ? items.worth(size) : size;
@@ -147,7 +158,8 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
 
 /// A warp gathers 32 hits that are some before it goes on with them.
 template <class Stage>
-__global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>()) launch_gathered(const __grid_constant__ Stage stage, const Items all) {
+__global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>())
+    launch_gathered(const __grid_constant__ Stage stage, const Items all) {
     __shared__ uint32_t gathered[kStageBlock / 32][64];
     const uint32_t n = all.size(), lane = threadIdx.x % 32;
     const Items items = all.of(n);
@@ -160,7 +172,9 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
         if (some) mine[held + lane_rank(found)] = place;
         held += uint32_t(__popc(found));
         __syncwarp();
-        if (const uint32_t ahead = i + 32; ahead < n && !items.list) asm volatile("prefetch.global.L2 [%0];" ::"l"(stage.hits.base + stage.hits.place(ahead, stage.hits.kLanes - 1)));
+        if (const uint32_t ahead = i + 32; ahead < n && !items.list)
+            asm volatile(
+                "prefetch.global.L2 [%0];" ::"l"(stage.hits.base + stage.hits.place(ahead, stage.hits.kLanes - 1)));
         if (held < 32) return;
         held -= 32;
         const uint32_t next = mine[held + lane];
@@ -171,12 +185,15 @@ __global__ void __launch_bounds__(kStageBlock, blocks_per_multiprocessor<Stage>(
     if (lane < held) stage(mine[lane]);
 }
 
-/// A lane that has ended its chain waits until kIdleLanes of its warp have, and begins another together with them. When there is no more room, chains go back for another launch, those that have not
-/// been begun too: as each step fills one place at most, it is enough that a warp looks at the places of its own after every step.
+/// A lane that has ended its chain waits until kIdleLanes of its warp have, and begins another together with them. When
+/// there is no more room, chains go back for another launch, those that have not been begun too: as each step fills one
+/// place at most, it is enough that a warp looks at the places of its own after every step.
 template <class Stage>
-__global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_chains(const __grid_constant__ Stage stage, const Items all) {
+__global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm)
+    launch_chains(const __grid_constant__ Stage stage, const Items all) {
     constexpr uint32_t kWarp = 0xffffffffu, kIdleLanes = 4;
-    const uint32_t n = all.size(), threads = gridDim.x * kStageBlock, stretch = n / threads >= 16 ? 128 : 32, room = stage.room() > threads ? stage.room() - threads : 0;
+    const uint32_t n = all.size(), threads = gridDim.x * kStageBlock, stretch = n / threads >= 16 ? 128 : 32,
+                   room = stage.room() > threads ? stage.room() - threads : 0;
     const Items items = all.of(n);
     typename Stage::Chain chain = {};
     ChainCount count = {};
@@ -207,10 +224,11 @@ __global__ void __launch_bounds__(kStageBlock, Stage::kBlocksPerSm) launch_chain
     if (threadIdx.x % 32 == 0) stage.add(count);
 }
 
-/// Rays in the order of the queue, one after the other: best while neighbours stay together. `Set`: what traversal has to know of; less than the stage does, where
-/// the scene lets it.
+/// Rays in the order of the queue, one after the other: best while neighbours stay together. `Set`: what traversal has
+/// to know of; less than the stage does, where the scene lets it.
 template <class Set, class Stage, class Tracer>
-__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coherent(const __grid_constant__ Stage stage, const Tracer tracer, const Items all) {
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
+    launch_coherent(const __grid_constant__ Stage stage, const Tracer tracer, const Items all) {
     static_assert(!Stage::kAnyHit);
     const uint32_t n = all.size();
     const Items items = all.of(n);
@@ -225,10 +243,12 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_coheren
     });
 }
 
-/// Camera rays, traced as soon as they are made. They are in memory for the stages that follow; each knows its place, since adding to a counter takes longer than tracing it.
+/// Camera rays, traced as soon as they are made. They are in memory for the stages that follow; each knows its place,
+/// since adding to a counter takes longer than tracing it.
 template <class Set, class Generate, class Stage, class Tracer>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
-    launch_camera_rays(const __grid_constant__ Generate generate, const __grid_constant__ Stage stage, const Tracer tracer, uint32_t slots, const WaveState* state) {
+    launch_camera_rays(const __grid_constant__ Generate generate, const __grid_constant__ Stage stage,
+                       const Tracer tracer, uint32_t slots, const WaveState* state) {
     const uint32_t n = slots * state->samples;
     if (blockIdx.x == 0 && threadIdx.x == 0) stage.rays.counter->count = generate.wave.active_before(n);
     in_turns(n, &stage.rays.counter->next, [&](uint32_t i) {
@@ -248,7 +268,8 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
 
 /// Rays by persistent threads.
 template <class Set, class Stage, class Tracer>
-__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(const __grid_constant__ Stage stage, const Tracer tracer, const Items all) {
+__global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
+    launch_trace(const __grid_constant__ Stage stage, const Tracer tracer, const Items all) {
     const uint32_t n = all.size();
     const Items items = all.of(n);
     if constexpr (Stage::kAnyHit) {
@@ -260,18 +281,24 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm) launch_trace(c
             const uint32_t place = items.place(i);
             return items.take(place) && stage.fetch(place, ray, kept[threadIdx.x]);
         };
-        trace_any_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, bool blocked) { stage.finish(items.place(i), kept[threadIdx.x], blocked); }, &n, &items.counter->next);
+        trace_any_persistent<Set::value>(
+            stage.scene, tracer, fetch,
+            [&](uint32_t i, bool blocked) { stage.finish(items.place(i), kept[threadIdx.x], blocked); }, &n,
+            &items.counter->next);
         if constexpr (loose) WarpStretches::mine().close();
     } else {
         const auto fetch = [&](uint32_t i, Ray& ray) {
             const uint32_t place = items.place(i);
             return items.take(place) && stage.fetch(place, ray);
         };
-        trace_closest_persistent<Set::value>(stage.scene, tracer, fetch, [&](uint32_t i, const Hit& hit) { stage.finish(items.place(i), hit); }, &n, &items.counter->next);
+        trace_closest_persistent<Set::value>(
+            stage.scene, tracer, fetch, [&](uint32_t i, const Hit& hit) { stage.finish(items.place(i), hit); }, &n,
+            &items.counter->next);
     }
 }
 
-/// Counts the items of a queue of fixed places, 16 flags at a time: memory of flags is a multiple of that, and those past the capacity are 0.
+/// Counts the items of a queue of fixed places, 16 flags at a time: memory of flags is a multiple of that, and those
+/// past the capacity are 0.
 __global__ inline void count_items(const uint8_t* flags, uint32_t capacity, uint32_t* count) {
     uint32_t mine = 0;
     for (uint32_t i = (blockIdx.x * kStageBlock + threadIdx.x) * 16; i < capacity; i += gridDim.x * kStageBlock * 16) {
@@ -308,7 +335,9 @@ __device__ inline uint32_t places_to_sort(const Items& items, uint32_t n, SortSw
 
 /// Keys of the items that a launch will go through. The last key is that of places without an item.
 template <class Order, class Item>
-__global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__ SceneView scene, const Queue<Item> queue, const Items items, uint32_t last, uint32_t* keys, SortSwitch sorts) {
+__global__ void __launch_bounds__(kStageBlock)
+    make_keys(const __grid_constant__ SceneView scene, const Queue<Item> queue, const Items items, uint32_t last,
+              uint32_t* keys, SortSwitch sorts) {
     const uint32_t n = items.size(), end = places_to_sort(items, n, sorts);
     for (uint32_t i = blockIdx.x * kStageBlock + threadIdx.x; i < end; i += gridDim.x * kStageBlock) {
         uint32_t key = last;
@@ -321,19 +350,22 @@ __global__ void __launch_bounds__(kStageBlock) make_keys(const __grid_constant__
 }
 
 /// The same for items that have their keys.
-__global__ inline void __launch_bounds__(kStageBlock) fill_keys(uint16_t* keys, const Items items, uint16_t last, SortSwitch sorts) {
+__global__ inline void __launch_bounds__(kStageBlock)
+    fill_keys(uint16_t* keys, const Items items, uint16_t last, SortSwitch sorts) {
     const uint32_t n = items.size(), end = places_to_sort(items, n, sorts);
     for (uint32_t i = n + blockIdx.x * kStageBlock + threadIdx.x; i < end; i += gridDim.x * kStageBlock) keys[i] = last;
 }
 
 /// A change of WaveState::depth.
 struct DepthChange {
-    bool set;           ///< to `value`; otherwise `value` is added
+    bool set;  ///< to `value`; otherwise `value` is added
     uint32_t value;
 };
 
-/// After a stage: its record, and its queue emptied; `out`, if it is not null, holds as many items as that did. The time since the last such kernel is the stage's.
-__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, QueueCounter* out, uint32_t slots, uint32_t samples, DepthChange depth, WaveState* state, uint64_t* clock) {
+/// After a stage: its record, and its queue emptied; `out`, if it is not null, holds as many items as that did. The
+/// time since the last such kernel is the stage's.
+__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, QueueCounter* out, uint32_t slots,
+                                    uint32_t samples, DepthChange depth, WaveState* state, uint64_t* clock) {
     const uint64_t now = device_nanoseconds();
     state->depth = depth.set ? depth.value : state->depth + depth.value;
     if (out) out->count = counter->size();
@@ -345,7 +377,9 @@ __global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, 
 
 __global__ inline void start_clock(uint64_t* clock) { *clock = device_nanoseconds(); }
 
-__global__ inline void repeat_while_any(const QueueCounter* counter, uint32_t least, cudaGraphConditionalHandle again) { cudaGraphSetConditional(again, counter->count >= least); }
+__global__ inline void repeat_while_any(const QueueCounter* counter, uint32_t least, cudaGraphConditionalHandle again) {
+    cudaGraphSetConditional(again, counter->count >= least);
+}
 
 /// A failed wave stays failed, and those after it do nothing.
 __global__ inline void set_wave(WaveState* state, WaveState value) {

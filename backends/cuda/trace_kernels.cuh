@@ -1,22 +1,24 @@
-// Ray traversal on a CUDA device: persistent warps that fetch rays as lanes fall idle (Aila and Laine 2009, "Understanding the Efficiency of Ray
-// Traversal on GPUs") over the compressed wide BVH (Ylitie et al. 2017), with primitives postponed until enough lanes hold some. A lane that holds some goes on
-// walking until it meets the next (their speculative traversal). Node and primitive tests are those of scene/accel, so hits agree with the host's.
+// Ray traversal on a CUDA device: persistent warps that fetch rays as lanes fall idle (Aila and Laine 2009,
+// "Understanding the Efficiency of Ray Traversal on GPUs") over the compressed wide BVH (Ylitie et al. 2017), with
+// primitives postponed until enough lanes hold some. A lane that holds some goes on walking until it meets the next
+// (their speculative traversal). Node and primitive tests are those of scene/accel, so hits agree with the host's.
 #pragma once
 
 #include <cuda_runtime.h>
 
+#include "accel/cwbvh.h"
+#include "accel/pair_bvh.h"
 #include "backends/traversal_features.h"
 #include "queues/counter.h"
-#include "scene/accel/cwbvh.h"
-#include "scene/accel/pair_bvh.h"
 
 namespace ambilux {
 
 /// When a warp changes what it does. Values are counts of lanes.
 struct TraceTuning {
-    uint32_t refill_below = 28;   ///< fetch rays when fewer lanes than this are busy; 1 waits for the whole warp, best for coherent rays
-    uint32_t walk_at = 16;        ///< visit nodes again without asking for anything else while this many lanes can
-    uint32_t primitives_at = 8;   ///< likewise for primitives
+    uint32_t refill_below =
+        28;  ///< fetch rays when fewer lanes than this are busy; 1 waits for the whole warp, best for coherent rays
+    uint32_t walk_at = 16;       ///< visit nodes again without asking for anything else while this many lanes can
+    uint32_t primitives_at = 8;  ///< likewise for primitives
 };
 
 /// For rays in no order, and for neighbouring rays that stay together.
@@ -29,8 +31,9 @@ constexpr uint32_t kTraceBlocksPerSm = 8;
 
 namespace detail {
 
-/// Where a ray is in a CWBVH: nodes to visit, and up to two groups of primitives to test. The stack is an array of its own, so that the rest can be in registers;
-/// its last entry holds the barycentrics of the nearest hit: few are found, and every register counts.
+/// Where a ray is in a CWBVH: nodes to visit, and up to two groups of primitives to test. The stack is an array of its
+/// own, so that the rest can be in registers; its last entry holds the barycentrics of the nearest hit: few are found,
+/// and every register counts.
 template <bool AnyHit>
 struct CwbvhWalk {
     using Entry = CwbvhGroup;
@@ -67,13 +70,16 @@ struct CwbvhWalk {
         group.hits = leaves.hits = later.hits = 0;
         top = 0;
     }
-    static __device__ void keep(Entry* stack, float u, float v) { stack[kCwbvhStackSize] = {float_bits(u), float_bits(v)}; }
+    static __device__ void keep(Entry* stack, float u, float v) {
+        stack[kCwbvhStackSize] = {float_bits(u), float_bits(v)};
+    }
     static __device__ Hit kept(const Entry* stack, float t, uint32_t prim) {
         return {t, bits_float(stack[kCwbvhStackSize].base), bits_float(stack[kCwbvhStackSize].hits), prim};
     }
 };
 
-/// The same for a binary BVH: `at` is the reference to look at next, leaves are references too, of which primitives are taken from the front.
+/// The same for a binary BVH: `at` is the reference to look at next, leaves are references too, of which primitives are
+/// taken from the front.
 template <bool AnyHit>
 struct PairWalk {
     using Entry = uint32_t;
@@ -113,8 +119,12 @@ struct PairWalk {
         leaf = later = 0;
         top = 0;
     }
-    static __device__ void keep(Entry* stack, float u, float v) { stack[kPairStackSize] = float_bits(u), stack[kPairStackSize + 1] = float_bits(v); }
-    static __device__ Hit kept(const Entry* stack, float t, uint32_t prim) { return {t, bits_float(stack[kPairStackSize]), bits_float(stack[kPairStackSize + 1]), prim}; }
+    static __device__ void keep(Entry* stack, float u, float v) {
+        stack[kPairStackSize] = float_bits(u), stack[kPairStackSize + 1] = float_bits(v);
+    }
+    static __device__ Hit kept(const Entry* stack, float t, uint32_t prim) {
+        return {t, bits_float(stack[kPairStackSize]), bits_float(stack[kPairStackSize + 1]), prim};
+    }
     __device__ void keep_leaves(const Entry* stack) {
         while (at != kNone && (at & kPairLeaf) && later == 0) {
             (leaf == 0 ? leaf : later) = at;
@@ -130,7 +140,8 @@ using Walk = std::conditional_t<std::is_same_v<Tracer, PairTracer>, PairWalk<Any
 struct WarpItems {
     uint32_t begin = 0, end = 0;
 
-    /// The next item of each of the lanes `idle`, which may lie past the last of all, from `*counter` on if none are left: then `stretch` of them, at least 32. The whole warp calls it.
+    /// The next item of each of the lanes `idle`, which may lie past the last of all, from `*counter` on if none are
+    /// left: then `stretch` of them, at least 32. The whole warp calls it.
     __device__ uint32_t take(uint32_t idle, uint32_t* counter, uint32_t stretch) {
         const uint32_t wanted = uint32_t(__popc(idle)), kept = end - begin, rank = lane_rank(idle);
         uint32_t fresh = begin;
@@ -146,14 +157,18 @@ struct WarpItems {
     }
 };
 
-/// The loop behind trace_closest_persistent and trace_any_persistent. `finish(i, hit)` is called once per fetched ray: for all that have ended when the warp fetches others, since the
-/// whole warp waits for what it loads.
+/// The loop behind trace_closest_persistent and trace_any_persistent. `finish(i, hit)` is called once per fetched ray:
+/// for all that have ended when the warp fetches others, since the whole warp waits for what it loads.
 template <Features F, bool AnyHit, class Tracer, class Fetch, class Finish>
-__device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Finish finish, const uint32_t* count,
-                                 uint32_t* next_ray, TraceTuning tuning) {
+__device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Finish finish,
+                                 const uint32_t* count, uint32_t* next_ray, TraceTuning tuning) {
     constexpr uint32_t kWarp = 0xffffffffu;
-    // Of many rays a warp takes more at a time, since all warps add to the counter, one after the other. What is visible or not is known so fast that waiting for it shows earlier.
-    const uint32_t ray_count = *count, per_thread = ray_count / (gridDim.x * blockDim.x), stretch = per_thread >= 32 ? 128 : AnyHit && per_thread >= 16 ? 64 : 32;
+    // Of many rays a warp takes more at a time, since all warps add to the counter, one after the other. What is
+    // visible or not is known so fast that waiting for it shows earlier.
+    const uint32_t ray_count = *count, per_thread = ray_count / (gridDim.x * blockDim.x),
+                   stretch = per_thread >= 32             ? 128
+                             : AnyHit && per_thread >= 16 ? 64
+                                                          : 32;
     Walk<Tracer, AnyHit> walk;
     typename Walk<Tracer, AnyHit>::Entry stack[Walk<Tracer, AnyHit>::kEntries];
     Ray ray = {};
@@ -222,21 +237,25 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
 
 }  // namespace detail
 
-/// Nearest hits of *count rays. Call it from all threads of the grid; blocks are of whole warps. fetch(i, ray) loads ray i and returns false to leave it
-/// out; emit(i, hit) is called for every other ray, hit or not (hit.prim == kNone). *next_ray_counter must be 0 when the kernel starts. Both
-/// counts live on the device, so no host round trip is needed between the stage that makes rays and this one.
+/// Nearest hits of *count rays. Call it from all threads of the grid; blocks are of whole warps. fetch(i, ray) loads
+/// ray i and returns false to leave it out; emit(i, hit) is called for every other ray, hit or not (hit.prim == kNone).
+/// *next_ray_counter must be 0 when the kernel starts. Both counts live on the device, so no host round trip is needed
+/// between the stage that makes rays and this one.
 template <Features F, class Tracer, class Fetch, class Emit>
-__device__ void trace_closest_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Emit emit, const uint32_t* count,
-                                         uint32_t* next_ray_counter, TraceTuning tuning = kIncoherentTuning) {
+__device__ void trace_closest_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Emit emit,
+                                         const uint32_t* count, uint32_t* next_ray_counter,
+                                         TraceTuning tuning = kIncoherentTuning) {
     detail::trace_persistent<F, false>(scene, tracer, fetch, emit, count, next_ray_counter, tuning);
 }
 
 /// Whether anything blocks each of *count rays; emit(i, blocked). The rest is as for trace_closest_persistent.
 template <Features F, class Tracer, class Fetch, class Emit>
-__device__ void trace_any_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Emit emit, const uint32_t* count,
-                                     uint32_t* next_ray_counter, TraceTuning tuning = kIncoherentTuning) {
+__device__ void trace_any_persistent(const SceneView& scene, const Tracer& tracer, Fetch fetch, Emit emit,
+                                     const uint32_t* count, uint32_t* next_ray_counter,
+                                     TraceTuning tuning = kIncoherentTuning) {
     detail::trace_persistent<F, true>(
-        scene, tracer, fetch, [&](uint32_t i, const Hit& hit) { emit(i, hit.prim != kNone); }, count, next_ray_counter, tuning);
+        scene, tracer, fetch, [&](uint32_t i, const Hit& hit) { emit(i, hit.prim != kNone); }, count, next_ray_counter,
+        tuning);
 }
 
 /// Ray i of an array whose start is aligned to 16 bytes.
@@ -250,11 +269,12 @@ __device__ inline void store_hit(Hit* hits, uint32_t i, const Hit& h) {
     __stcs(reinterpret_cast<float4*>(hits) + i, make_float4(h.t, h.u, h.v, __uint_as_float(h.prim)));
 }
 
-/// Nearest hits of an array of rays; `Set` is a FeatureSet. Launch with persistent_grid() blocks of kTraceBlock threads and *next_ray_counter == 0.
+/// Nearest hits of an array of rays; `Set` is a FeatureSet. Launch with persistent_grid() blocks of kTraceBlock threads
+/// and *next_ray_counter == 0.
 template <class Set, class Tracer>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
-    trace_closest_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, Hit* hits, const uint32_t* count,
-                         uint32_t* next_ray_counter, const TraceTuning tuning) {
+    trace_closest_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, Hit* hits,
+                         const uint32_t* count, uint32_t* next_ray_counter, const TraceTuning tuning) {
     trace_closest_persistent<Set::value>(
         scene, tracer,
         [=](uint32_t i, Ray& ray) {
@@ -267,8 +287,8 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
 /// Any hit: 1 where a ray is blocked, else 0. Launch as trace_closest_kernel.
 template <class Set, class Tracer>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
-    trace_any_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, uint8_t* blocked, const uint32_t* count,
-                     uint32_t* next_ray_counter, const TraceTuning tuning) {
+    trace_any_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, uint8_t* blocked,
+                     const uint32_t* count, uint32_t* next_ray_counter, const TraceTuning tuning) {
     trace_any_persistent<Set::value>(
         scene, tracer,
         [=](uint32_t i, Ray& ray) {
@@ -281,7 +301,8 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
 /// The same answers, one thread per ray and the loop of the host: the yardstick for the kernels above.
 template <class Set, class Tracer>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
-    trace_closest_plain_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, Hit* hits, uint32_t count) {
+    trace_closest_plain_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, Hit* hits,
+                               uint32_t count) {
     const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
     if (i >= count) return;
     Hit hit;
@@ -291,7 +312,8 @@ __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
 
 template <class Set, class Tracer>
 __global__ void __launch_bounds__(kTraceBlock, kTraceBlocksPerSm)
-    trace_any_plain_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays, uint8_t* blocked, uint32_t count) {
+    trace_any_plain_kernel(const __grid_constant__ SceneView scene, const Tracer tracer, const Ray* rays,
+                           uint8_t* blocked, uint32_t count) {
     const uint32_t i = blockIdx.x * blockDim.x + threadIdx.x;
     if (i < count) blocked[i] = tracer.template occluded<Set::value>(scene, load_ray(rays, i));
 }

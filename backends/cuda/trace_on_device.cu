@@ -8,7 +8,8 @@ namespace ambilux {
 namespace {
 
 template <class Set, class Tracer>
-std::vector<Hit> trace(const DeviceScene& scene, const Tracer& tracer, const DeviceBuffer<Ray>& rays, bool any_hit, bool persistent) {
+std::vector<Hit> trace(const DeviceScene& scene, const Tracer& tracer, const DeviceBuffer<Ray>& rays, bool any_hit,
+                       bool persistent) {
     const uint32_t count = uint32_t(rays.size());
     if (count == 0 && !persistent) return {};  // a grid of no blocks is an error
     const uint32_t blocks = (count + kTraceBlock - 1) / kTraceBlock;
@@ -22,15 +23,17 @@ std::vector<Hit> trace(const DeviceScene& scene, const Tracer& tracer, const Dev
     uint32_t* const ray_count = counters.data();
     uint32_t* const next_ray = counters.data() + 1;
     if (persistent && any_hit)
-        trace_any_kernel<Set, Tracer><<<persistent_grid(trace_any_kernel<Set, Tracer>), kTraceBlock>>>(scene.view(), tracer, rays.data(), blocked.data(), ray_count,
-                                                                                       next_ray, kIncoherentTuning);
+        trace_any_kernel<Set, Tracer><<<persistent_grid(trace_any_kernel<Set, Tracer>), kTraceBlock>>>(
+            scene.view(), tracer, rays.data(), blocked.data(), ray_count, next_ray, kIncoherentTuning);
     else if (persistent)
-        trace_closest_kernel<Set, Tracer><<<persistent_grid(trace_closest_kernel<Set, Tracer>), kTraceBlock>>>(scene.view(), tracer, rays.data(), hits.data(),
-                                                                                               ray_count, next_ray, kIncoherentTuning);
+        trace_closest_kernel<Set, Tracer><<<persistent_grid(trace_closest_kernel<Set, Tracer>), kTraceBlock>>>(
+            scene.view(), tracer, rays.data(), hits.data(), ray_count, next_ray, kIncoherentTuning);
     else if (any_hit)
-        trace_any_plain_kernel<Set, Tracer><<<blocks, kTraceBlock>>>(scene.view(), tracer, rays.data(), blocked.data(), count);
+        trace_any_plain_kernel<Set, Tracer>
+            <<<blocks, kTraceBlock>>>(scene.view(), tracer, rays.data(), blocked.data(), count);
     else
-        trace_closest_plain_kernel<Set, Tracer><<<blocks, kTraceBlock>>>(scene.view(), tracer, rays.data(), hits.data(), count);
+        trace_closest_plain_kernel<Set, Tracer>
+            <<<blocks, kTraceBlock>>>(scene.view(), tracer, rays.data(), hits.data(), count);
     cuda_check(cudaGetLastError(), "launch of ray traversal");
     cuda_check(cudaDeviceSynchronize(), "ray traversal");
     if (!any_hit) return hits.download();
@@ -45,12 +48,15 @@ std::vector<Hit> trace(const DeviceScene& scene, const Tracer& tracer, const Dev
 
 }  // namespace
 
-std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& rays, bool any_hit, bool persistent, bool binary) {
+std::vector<Hit> trace_on_device(const Scene& scene, const std::vector<Ray>& rays, bool any_hit, bool persistent,
+                                 bool binary) {
     const DeviceScene device_scene(scene);
     const DeviceBuffer<Ray> device_rays(rays, "rays");
     const auto with = [&](const auto& tracer) {
         using Tracer = std::remove_cvref_t<decltype(tracer)>;
-        return with_traversal_features(scene.features, [&](auto set) { return trace<decltype(set), Tracer>(device_scene, tracer, device_rays, any_hit, persistent); });
+        return with_traversal_features(scene.features, [&](auto set) {
+            return trace<decltype(set), Tracer>(device_scene, tracer, device_rays, any_hit, persistent);
+        });
     };
     if (binary) {
         const DevicePairs pairs(PairAccel(scene).arrays());

@@ -20,9 +20,18 @@ std::string cuda_device_bus_id() { return {}; }
 
 std::vector<Hit> trace_on_device(const Scene&, const std::vector<Ray>&, bool, bool, bool) { throw not_built(); }
 
-std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const CwbvhArrays&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
-std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const PairArrays&, const std::vector<RayBatch>&, int, int) { throw not_built(); }
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const CwbvhArrays&,
+                                                           const std::vector<RayBatch>&, int, int) {
+    throw not_built();
+}
+std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const PairArrays&,
+                                                           const std::vector<RayBatch>&, int, int) {
+    throw not_built();
+}
 
-std::vector<QueueTiming> time_queues_on_device(const Scene&, uint32_t, const std::vector<HitItem>&, const std::vector<RayItem>&, int, int) { throw not_built(); }
+std::vector<QueueTiming> time_queues_on_device(const Scene&, uint32_t, const std::vector<HitItem>&,
+                                               const std::vector<RayItem>&, int, int) {
+    throw not_built();
+}
 
 }  // namespace ambilux

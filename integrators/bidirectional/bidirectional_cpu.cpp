@@ -6,6 +6,8 @@
 #include <new>
 #include <optional>
 
+#include "accel/cwbvh.h"
+#include "accel/embree_tracer.h"
 #include "backends/cpu/executor.h"
 #include "backends/cpu/wave_bytes.h"
 #include "core/error.h"
@@ -14,11 +16,9 @@
 #include "integrators/bidirectional/bidirectional.h"
 #include "integrators/bidirectional/pilot.h"
 #include "integrators/bidirectional/schedule.h"
-#include "integrators/feature_levels.h"
 #include "integrators/path/path_wave.h"
-#include "integrators/wave_stats.h"
-#include "scene/accel/cwbvh.h"
-#include "scene/accel/embree_tracer.h"
+#include "render/feature_levels.h"
+#include "render/wave_stats.h"
 #include "scene/info.h"
 
 namespace ambilux {
@@ -57,7 +57,8 @@ template <Features F, class Accel>
 class BidirectionalCpu final : public Renderer {
 public:
     BidirectionalCpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
-        : scene_(scene), view_(scene.view()), policy_(make_bidirectional_policy(scene, settings)), accel_name_(settings.accel == "cwbvh" ? "cwbvh" : "embree") {
+        : scene_(scene), view_(scene.view()), policy_(make_bidirectional_policy(scene, settings)),
+          accel_name_(settings.accel == "cwbvh" ? "cwbvh" : "embree") {
         const auto start = Clock::now();
         policy_.vertex_lanes = VertexItem::lanes<F>();
         policy_.connection_lanes = ConnectionVertex::lanes<F>();
@@ -80,12 +81,19 @@ public:
             splats_.resize(values);
             techniques_.resize(technique_values(policy_, values / 3));
             technique_dropped_.resize(technique_count(policy_.technique_depth));
-            const double mean = policy_.light_walks && !policy_.stream_slots ? mean_light_vertices<F>(view_, accel_->tracer(), policy_, settings.seed) : 0.0;
+            const double mean = policy_.light_walks && !policy_.stream_slots
+                                    ? mean_light_vertices<F>(view_, accel_->tracer(), policy_, settings.seed)
+                                    : 0.0;
             plan_cache(policy_, mean);
             waves_.resize(size_t(threads));
-            for (WaveMemory& w : waves_) w.allocate(wave_.slot_count(), planned_vertices(mean, policy_.most_light_walks(wave_.slot_count())), policy_);
+            for (WaveMemory& w : waves_)
+                w.allocate(wave_.slot_count(), planned_vertices(mean, policy_.most_light_walks(wave_.slot_count())),
+                           policy_);
         } catch (const std::bad_alloc&) {
-            throw Error(ExitCode::device, fmt::format("out of memory: a film of {}x{} needs more than there is; a smaller --size needs less", wave_.width, wave_.height));
+            throw Error(
+                ExitCode::device,
+                fmt::format("out of memory: a film of {}x{} needs more than there is; a smaller --size needs less",
+                            wave_.width, wave_.height));
         }
         moments_.width = wave_.width;
         moments_.height = wave_.height;
@@ -97,7 +105,8 @@ public:
         uint32_t done = 0;
         arena_.execute([&] {
             while (done < count && !is_set(interrupt)) {
-                parallel_for(film_wave_.tiles / wave_.tiles, [&](uint32_t chunk) { render_tiles(chunk * wave_.tiles, first + done); });
+                parallel_for(film_wave_.tiles / wave_.tiles,
+                             [&](uint32_t chunk) { render_tiles(chunk * wave_.tiles, first + done); });
                 develop(first + done);
                 ++done;
             }
@@ -129,8 +138,10 @@ public:
         StageRecord total[kStageCount] = {};
         add_records(total, film_records_);
         std::vector<const QueueCounter*> counters;
-        s.memory_bytes = scene_.memory_bytes() + accel_->memory_bytes() + (moments_.sum.size() + moments_.sum_squares.size()) * sizeof(double) +
-                         (splats_.size() + techniques_.size()) * sizeof(int64_t) + samples_of_slots_.size() * sizeof(Lane);
+        s.memory_bytes = scene_.memory_bytes() + accel_->memory_bytes() +
+                         (moments_.sum.size() + moments_.sum_squares.size()) * sizeof(double) +
+                         (splats_.size() + techniques_.size()) * sizeof(int64_t) +
+                         samples_of_slots_.size() * sizeof(Lane);
         const Layout* largest = &waves_[0].layout;
         for (const WaveMemory& w : waves_) {
             add_records(total, w.queues.records);
@@ -147,23 +158,39 @@ public:
         return s;
     }
 
-    std::vector<TechniqueImage> technique_images() override { return ambilux::technique_images(policy_.technique_depth, samples_, techniques_, technique_dropped_); }
+    std::vector<TechniqueImage> technique_images() override {
+        return ambilux::technique_images(policy_.technique_depth, samples_, techniques_, technique_dropped_);
+    }
 
     uint32_t preferred_batch() const override { return batch_of(render_seconds_, samples_); }
 
 private:
     using Clock = std::chrono::steady_clock;
-    static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+    static double seconds_since(Clock::time_point start) {
+        return std::chrono::duration<double>(Clock::now() - start).count();
+    }
 
     void render_tiles(uint32_t first_tile, uint32_t sample) {
         WaveMemory& memory = waves_[size_t(tbb::this_task_arena::current_thread_index())];
         using Tracer = decltype(accel_->tracer());
         for (;;) {
             const BidirectionalMemory& m = memory.queues;
-            const BidirectionalFilm film = {samples_of_slots_.data() + size_t(first_tile) * kTilePixels, {splats_.data(), nullptr}, nullptr, nullptr, techniques_.empty() ? nullptr : techniques_.data(), technique_dropped_.data()};
+            const BidirectionalFilm film = {samples_of_slots_.data() + size_t(first_tile) * kTilePixels,
+                                            {splats_.data(), nullptr},
+                                            nullptr,
+                                            nullptr,
+                                            techniques_.empty() ? nullptr : techniques_.data(),
+                                            technique_dropped_.data()};
             const BidirectionalStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, m, film);
             CpuExecutor executor(m.state, m.records, view_, memory.order);
-            *m.state = {first_tile, sample, 1, 0, 0, 0, light_walks_in(wave_, first_tile, wave_.tiles, policy_.light_walks_per_tile), policy_.stream_slots};
+            *m.state = {first_tile,
+                        sample,
+                        1,
+                        0,
+                        0,
+                        0,
+                        light_walks_in(wave_, first_tile, wave_.tiles, policy_.light_walks_per_tile),
+                        policy_.stream_slots};
             run_bidirectional_wave(executor, stages);
             if (!m.state->failed) return;
             const uint64_t needed = std::max(m.light_vertices.counter->peak, m.splats.counter->peak);
@@ -176,7 +203,8 @@ private:
         film_state_ = {0, sample, 1, 0, 0, 0, 0};
         parallel_for(uint32_t(film_wave_.tiles), [&](uint32_t tile) {
             StageRecord record{};
-            const DevelopSplats stage = {film_wave_, samples_of_slots_.data(), {splats_.data(), nullptr}, moments_.sum.data(), moments_.sum_squares.data(), &record};
+            const DevelopSplats stage = {film_wave_,          samples_of_slots_.data(),    {splats_.data(), nullptr},
+                                         moments_.sum.data(), moments_.sum_squares.data(), &record};
             for (uint32_t i = 0; i < kTilePixels; ++i) stage(tile * kTilePixels + i);
             if (record.nan + record.inf + record.negative) {
                 StageRecord& total = film_records_[uint32_t(StageId::develop)];
@@ -208,10 +236,12 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Renderer> make_bidirectional_cpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
+std::unique_ptr<Renderer> make_bidirectional_cpu(const Scene& scene, const RenderSettings& settings,
+                                                 SharedAccels& accels) {
     return with_feature_level(scene.features, settings.specialise, [&](auto level) -> std::unique_ptr<Renderer> {
         constexpr Features F = decltype(level)::value;
-        if (settings.accel == "cwbvh") return std::make_unique<BidirectionalCpu<F, CwbvhAccel>>(scene, settings, accels);
+        if (settings.accel == "cwbvh")
+            return std::make_unique<BidirectionalCpu<F, CwbvhAccel>>(scene, settings, accels);
         return std::make_unique<BidirectionalCpu<F, EmbreeAccel>>(scene, settings, accels);
     });
 }

@@ -14,9 +14,9 @@
 #include "integrators/bidirectional/bidirectional_cuda.h"
 #include "integrators/bidirectional/pilot.h"
 #include "integrators/bidirectional/schedule.h"
-#include "integrators/feature_levels.h"
 #include "integrators/path/path_wave.h"
-#include "integrators/wave_stats.h"
+#include "render/feature_levels.h"
+#include "render/wave_stats.h"
 #include "scene/info.h"
 
 namespace ambilux {
@@ -34,22 +34,29 @@ public:
         wave_.tiles = tile_count(wave_);  // splats may land anywhere on the film
         const uint32_t slots = wave_.tiles * kTilePixels;
         const std::shared_ptr<const CwbvhAccel> accel = accels.get<CwbvhAccel>();
-        const double mean = policy_.light_walks && settings.variant != "streaming" ? mean_light_vertices<F>(scene.view(), accel->tracer(), policy_, settings.seed) : 0.0;
+        const double mean = policy_.light_walks && settings.variant != "streaming"
+                                ? mean_light_vertices<F>(scene.view(), accel->tracer(), policy_, settings.seed)
+                                : 0.0;
         plan_cache(policy_, mean);
         device_scene_ = accels.get<DeviceScene>();
         device_accel_ = accels.get<DeviceCwbvh>();
         // Where one thread may have all pairs of a path, and their rays need not be sorted.
-        policy_.trace_pairs = F.bsdfs == bit(BsdfType::diffuse) && policy_.connect_in_shade && policy_.technique_depth == 0 && !settings.deterministic && !policy_.queues.fixed_places() &&
-                              policy_.queues.ordering != Ordering::morton && device_accel_->bytes() <= kTracedInPlace;
-        // Samples that share a cache of light vertices depend on each other, but by one part in the number of light walks only.
+        policy_.trace_pairs = F.bsdfs == bit(BsdfType::diffuse) && policy_.connect_in_shade &&
+                              policy_.technique_depth == 0 && !settings.deterministic &&
+                              !policy_.queues.fixed_places() && policy_.queues.ordering != Ordering::morton &&
+                              device_accel_->bytes() <= kTracedInPlace;
+        // Samples that share a cache of light vertices depend on each other, but by one part in the number of light
+        // walks only.
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
         const bool streaming = settings.variant == "streaming";
         if (streaming) policy_.stream_slots = 1u << 20;
         Layout million;
         lay_out(million, 1u << 20, planned_vertices(mean, policy_.most_light_walks(1u << 20)), policy_);
-        const uint64_t bytes_per_path = (million.bytes() >> 20) + (settings.deterministic ? 3 * sizeof(int64_t) : sizeof(Lane)) + sizeof(Lane);
-        const uint32_t wave_size = device_wave_size(scene, settings, streaming ? kStreamPlateau : kWavePlateau, bytes_per_path, free);
+        const uint64_t bytes_per_path =
+            (million.bytes() >> 20) + (settings.deterministic ? 3 * sizeof(int64_t) : sizeof(Lane)) + sizeof(Lane);
+        const uint32_t wave_size =
+            device_wave_size(scene, settings, streaming ? kStreamPlateau : kWavePlateau, bytes_per_path, free);
         uint64_t samples = wave_size / slots;
         if (streaming) {
             policy_.stream_slots = wave_size;
@@ -60,7 +67,9 @@ public:
         wave_.samples = uint32_t(std::max<uint64_t>(1, samples));
         light_walks_ = light_walks_in(wave_, 0, wave_.tiles, policy_.light_walks_per_tile);
         if (uint64_t(light_walks_) * wave_.samples > 0xffffffffull)
-            throw Error(ExitCode::usage, "wave_size=" + std::to_string(settings.wave_size) + ": more light walks than can be numbered; set a smaller one, or fewer light_paths");
+            throw Error(ExitCode::usage,
+                        "wave_size=" + std::to_string(settings.wave_size) +
+                            ": more light walks than can be numbered; set a smaller one, or fewer light_paths");
         policy_.tail_below = tail_walks(settings, wave_.slot_count());
         values_ = uint64_t(wave_.width) * wave_.height * 3;
         sum_ = DeviceBuffer<double>(values_, "film");
@@ -98,7 +107,9 @@ public:
             const uint32_t waves_before = read_state().done;
             for (uint32_t s = 0; s < pass; s += wave_.samples) {
                 const uint32_t samples = std::min(wave_.samples, pass - s);
-                detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{0, first + done + s, samples, 0, 0, 0, samples * light_walks_, policy_.stream_slots});
+                detail::set_wave<<<1, 1, 0, stream_>>>(
+                    queues_.state,
+                    WaveState{0, first + done + s, samples, 0, 0, 0, samples * light_walks_, policy_.stream_slots});
                 if (graph_)
                     cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
                 else
@@ -155,25 +166,36 @@ public:
 
     std::vector<TechniqueImage> technique_images() override {
         if (policy_.technique_depth == 0) return {};
-        return ambilux::technique_images(policy_.technique_depth, samples_, techniques_.download(), technique_dropped_.download());
+        return ambilux::technique_images(policy_.technique_depth, samples_, techniques_.download(),
+                                         technique_dropped_.download());
     }
 
-    uint32_t preferred_batch() const override { return whole_waves(batch_of(render_seconds_, samples_), wave_.samples); }
+    uint32_t preferred_batch() const override {
+        return whole_waves(batch_of(render_seconds_, samples_), wave_.samples);
+    }
 
 private:
     using Clock = std::chrono::steady_clock;
-    /// Paths of a wave from which on more do not pay (kCudaWavePlateau tells why); their light vertices take half a kilobyte each beside.
+    /// Paths of a wave from which on more do not pay (kCudaWavePlateau tells why); their light vertices take half a
+    /// kilobyte each beside.
     static constexpr uint32_t kWavePlateau = 1u << 25;
-    static constexpr uint32_t kStreamPlateau = 1u << 23;  ///< slots of streaming: twice as many bring 3 to 8 %, but it is there to need little memory
-    static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+    static constexpr uint32_t kStreamPlateau =
+        1u << 23;  ///< slots of streaming: twice as many bring 3 to 8 %, but it is there to need little memory
+    static double seconds_since(Clock::time_point start) {
+        return std::chrono::duration<double>(Clock::now() - start).count();
+    }
 
     uint64_t fixed_bytes() const {
-        return device_scene_->bytes() + device_accel_->bytes() + sum_.bytes() + sum_squares_.bytes() + fixed_splats_.bytes() + splats_.bytes() + techniques_.bytes() + samples_of_slots_.bytes() + clock_.bytes();
+        return device_scene_->bytes() + device_accel_->bytes() + sum_.bytes() + sum_squares_.bytes() +
+               fixed_splats_.bytes() + splats_.bytes() + techniques_.bytes() + samples_of_slots_.bytes() +
+               clock_.bytes();
     }
 
     /// Queues for `kept` light vertices, and the graph that uses them.
     void allocate(uint64_t kept) {
-        if (kept > 0xf0000000ull) throw Error(ExitCode::device, "light walks have more vertices than can be numbered: set a max_depth or a smaller wave_size");
+        if (kept > 0xf0000000ull)
+            throw Error(ExitCode::device,
+                        "light walks have more vertices than can be numbered: set a max_depth or a smaller wave_size");
         layout_ = Layout();
         lay_out(layout_, wave_.slot_count(), uint32_t(kept), policy_);
         const uint64_t temporary = order_temporary_bytes(policy_.queues, order_slots(policy_, wave_.slot_count()));
@@ -185,13 +207,22 @@ private:
         memory_.zero();
         Layout layout(memory_.data());
         queues_ = lay_out(layout, wave_.slot_count(), uint32_t(kept), policy_);
-        const OrderMemory order = lay_out_order(layout, policy_.queues, order_slots(policy_, wave_.slot_count()), temporary);
+        const OrderMemory order =
+            lay_out_order(layout, policy_.queues, order_slots(policy_, wave_.slot_count()), temporary);
         std::vector<QueueCounter> counters(BidirectionalMemory::kQueues);
         for (size_t q = 0; q < counters.size(); ++q) counters[q].capacity = layout.queue_capacities()[q];
-        cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
+        cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter),
+                              cudaMemcpyHostToDevice),
+                   "queue counters");
         stages_.emplace(device_scene_->view(), device_accel_->tracer(), policy_, wave_, queues_,
-                        BidirectionalFilm{samples_of_slots_.data(), {fixed_splats_.data(), splats_.data()}, sum_.data(), sum_squares_.data(), techniques_.data(), technique_dropped_.data()});
-        executor_.emplace(stream_, traced_, queues_.state, queues_.records, clock_.data(), device_scene_->view(), order);
+                        BidirectionalFilm{samples_of_slots_.data(),
+                                          {fixed_splats_.data(), splats_.data()},
+                                          sum_.data(),
+                                          sum_squares_.data(),
+                                          techniques_.data(),
+                                          technique_dropped_.data()});
+        executor_.emplace(stream_, traced_, queues_.state, queues_.records, clock_.data(), device_scene_->view(),
+                          order);
         if (graph_) cudaGraphExecDestroy(graph_);
         graph_ = nullptr;
         if (use_graph_) graph_ = executor_->capture([&](CudaExecutor& exec) { run(exec); });
@@ -210,10 +241,13 @@ private:
         uint64_t needed = 0;
         const std::vector<QueueCounter> counters = read_counters();
         for (size_t q = 0; q < counters.size(); ++q)
-            if (layout_.queue_names()[q] == "light_vertices" || layout_.queue_names()[q] == "splats") needed = std::max(needed, counters[q].peak);
+            if (layout_.queue_names()[q] == "light_vertices" || layout_.queue_names()[q] == "splats")
+                needed = std::max(needed, counters[q].peak);
         memory_ = DeviceBuffer<std::byte>();
         allocate(needed + needed / 4);
-        cuda_check(cudaMemcpy(queues_.records, records.data(), records.size() * sizeof(StageRecord), cudaMemcpyHostToDevice), "statistics");
+        cuda_check(
+            cudaMemcpy(queues_.records, records.data(), records.size() * sizeof(StageRecord), cudaMemcpyHostToDevice),
+            "statistics");
     }
 
     WaveState read_state() const {
@@ -223,12 +257,16 @@ private:
     }
     std::vector<StageRecord> read_records() const {
         std::vector<StageRecord> records(kStageCount);
-        cuda_check(cudaMemcpy(records.data(), queues_.records, records.size() * sizeof(StageRecord), cudaMemcpyDeviceToHost), "statistics");
+        cuda_check(
+            cudaMemcpy(records.data(), queues_.records, records.size() * sizeof(StageRecord), cudaMemcpyDeviceToHost),
+            "statistics");
         return records;
     }
     std::vector<QueueCounter> read_counters() const {
         std::vector<QueueCounter> counters(BidirectionalMemory::kQueues);
-        cuda_check(cudaMemcpy(counters.data(), queues_.counters, counters.size() * sizeof(QueueCounter), cudaMemcpyDeviceToHost), "statistics");
+        cuda_check(cudaMemcpy(counters.data(), queues_.counters, counters.size() * sizeof(QueueCounter),
+                              cudaMemcpyDeviceToHost),
+                   "statistics");
         return counters;
     }
 

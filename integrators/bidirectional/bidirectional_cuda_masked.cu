@@ -2,7 +2,8 @@
 
 namespace ambilux {
 
-std::unique_ptr<Renderer> make_bidirectional_cuda_masked(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
+std::unique_ptr<Renderer> make_bidirectional_cuda_masked(const Scene& scene, const RenderSettings& settings,
+                                                         SharedAccels& accels) {
     return std::make_unique<BidirectionalCuda<kMaskedFeatures>>(scene, settings, accels);
 }
 

@@ -2,7 +2,8 @@
 
 namespace ambilux {
 
-std::unique_ptr<Renderer> make_bidirectional_cuda_triangles(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
+std::unique_ptr<Renderer> make_bidirectional_cuda_triangles(const Scene& scene, const RenderSettings& settings,
+                                                            SharedAccels& accels) {
     return std::make_unique<BidirectionalCuda<kTriangleFeatures>>(scene, settings, accels);
 }
 

@@ -8,21 +8,23 @@
 #include <optional>
 #include <thread>
 
+#include "accel/cwbvh.h"
+#include "accel/embree_tracer.h"
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "core/flag.h"
-#include "scene/accel/cwbvh.h"
-#include "scene/accel/embree_tracer.h"
 
 namespace ambilux {
 namespace {
 
-/// Pilots: a few hundredths of the shortest renders that are worth a choice, on 2 cores and on the 16 beside a GPU. With half of the latter, one seed in ten (water-caustic) or two
-/// (veach-ajar) put a candidate first that is 1.1 to 1.5 times worse.
+/// Pilots: a few hundredths of the shortest renders that are worth a choice, on 2 cores and on the 16 beside a GPU.
+/// With half of the latter, one seed in ten (water-caustic) or two (veach-ajar) put a candidate first that is 1.1
+/// to 1.5 times worse.
 constexpr uint32_t kPilotSamplesCpu = 8192, kPilotSamplesCuda = 32768;
 /// Share of the blocks that the comparison leaves out.
 constexpr double kTrimmedBlocks = 0.01;
-/// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this factor of the best are timed.
+/// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this
+/// factor of the best are timed.
 constexpr double kDoubt = 1.3;
 constexpr uint32_t kFirstTimedSample = 0xffff0000u;  ///< far from those of the image
 
@@ -42,31 +44,38 @@ RenderSettings settings_of(const RenderSettings& settings, const ChoiceCandidate
     return s;
 }
 
-/// Candidates of one family do the same but for the numbers of light walks and draws, so that the time of one tells that of the others.
-uint32_t family(const ChoiceCandidate& c) { return (c.pilot.light_paths > 0.0f ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0); }
+/// Candidates of one family do the same but for the numbers of light walks and draws, so that the time of one tells
+/// that of the others.
+uint32_t family(const ChoiceCandidate& c) {
+    return (c.pilot.light_paths > 0.0f ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0);
+}
 
-/// Seconds per sample of every pixel. On a device: of about one full wave, smaller than a render's for the sake of time. What launches cost beside their items is then more than it will be, and for
-/// cheap samples most: so the path tracer's wave holds more of them, and takes about as long as others.
+/// Seconds per sample of every pixel. On a device: of about one full wave, smaller than a render's for the sake of
+/// time. What launches cost beside their items is then more than it will be, and for cheap samples most: so the path
+/// tracer's wave holds more of them, and takes about as long as others.
 double timed(const Scene& scene, RenderSettings settings, bool cuda, const MakeRenderer& make) {
     constexpr double kLongEnough = 0.05;
     const uint32_t paths_per_wave = settings.integrator == "path" ? 1u << 22 : 1u << 21;
     if (cuda && settings.wave_size == 0 && settings.variant != "streaming") settings.wave_size = paths_per_wave;
     const std::unique_ptr<Renderer> renderer = make(settings);
     const uint32_t pixels = scene.sensor.crop_width * scene.sensor.crop_height;
-    const uint32_t count = cuda ? std::clamp(paths_per_wave / std::max(1u, pixels), 1u, renderer->preferred_batch()) : 1;
+    const uint32_t count =
+        cuda ? std::clamp(paths_per_wave / std::max(1u, pixels), 1u, renderer->preferred_batch()) : 1;
     const auto seconds_of = [&](uint32_t first, uint32_t samples) {
         const auto start = Clock::now();
         renderer->render(first, samples);
         return seconds_since(start);
     };
-    // The first launch bears what later ones do not. It is short, and counts only where it was long enough for that not to matter.
+    // The first launch bears what later ones do not. It is short, and counts only where it was long enough for that not
+    // to matter.
     const double once = seconds_of(kFirstTimedSample, 1);
     if (count == 1 && once >= kLongEnough) return once;
     return seconds_of(kFirstTimedSample + 1, count) / count;
 }
 
-/// The path tracer of a device, which has nothing else to do while the host runs the pilot. Its samples are those that the render begins with if it is chosen: the pilot, on which that depends,
-/// has random numbers of its own. Otherwise they are dropped. For renders that end by the clock: others gain nothing.
+/// The path tracer of a device, which has nothing else to do while the host runs the pilot. Its samples are those that
+/// the render begins with if it is chosen: the pilot, on which that depends, has random numbers of its own. Otherwise
+/// they are dropped. For renders that end by the clock: others gain nothing.
 class HeadStart {
 public:
     HeadStart(const RenderSettings& settings, const MakeRenderer& make)
@@ -100,7 +109,8 @@ private:
             const auto start = Clock::now();
             samples_ += renderer_->render(samples_, batch);
             const double seconds = seconds_since(start);
-            if (seconds > 0.5 * kBatchSeconds && samples_ > batch) seconds_per_sample_ = seconds / batch;  // the first bears what later ones do not
+            if (seconds > 0.5 * kBatchSeconds && samples_ > batch)
+                seconds_per_sample_ = seconds / batch;  // the first bears what later ones do not
             batch = std::clamp(uint32_t(kBatchSeconds / seconds * batch), 1u, 4 * batch);
         }
     }
@@ -115,7 +125,8 @@ private:
 /// A renderer that also tells how it was chosen. `ready`: samples that are in its film.
 class Chosen final : public Renderer {
 public:
-    Chosen(std::unique_ptr<Renderer> renderer, uint32_t ready, ChoiceStats choice) : renderer_(std::move(renderer)), ready_(ready), choice_(std::move(choice)) {}
+    Chosen(std::unique_ptr<Renderer> renderer, uint32_t ready, ChoiceStats choice)
+        : renderer_(std::move(renderer)), ready_(ready), choice_(std::move(choice)) {}
 
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
         if (first != 0 || count < ready_) drop();
@@ -154,21 +165,31 @@ private:
 
 void check_automatic(const RenderSettings& s) {
     const auto refuse = [](const std::string& text) { throw Error(ExitCode::usage, text); };
-    if (s.integrator != "bdpt") refuse(fmt::format("bdpt.auto=true: integrator {} leaves nothing to choose; use integrator bdpt", s.integrator));
-    if (s.strategies != kAllStrategies || s.singles.on) refuse("bdpt.auto=true chooses the strategies: leave out the setting strategies, or bdpt.auto");
-    if (s.connections != RenderSettings().connections) refuse(fmt::format("connections={}: bdpt.auto=true chooses the number of connections; leave one of the two out", s.connections));
+    if (s.integrator != "bdpt")
+        refuse(
+            fmt::format("bdpt.auto=true: integrator {} leaves nothing to choose; use integrator bdpt", s.integrator));
+    if (s.strategies != kAllStrategies || s.singles.on)
+        refuse("bdpt.auto=true chooses the strategies: leave out the setting strategies, or bdpt.auto");
+    if (s.connections != RenderSettings().connections)
+        refuse(fmt::format("connections={}: bdpt.auto=true chooses the number of connections; leave one of the two out",
+                           s.connections));
     if (s.light_walks_per_tile != RenderSettings().light_walks_per_tile)
-        refuse(fmt::format("light_paths={}: bdpt.auto=true chooses the number of light walks; leave one of the two out", double(s.light_walks_per_tile) / kTilePixels));
+        refuse(fmt::format("light_paths={}: bdpt.auto=true chooses the number of light walks; leave one of the two out",
+                           double(s.light_walks_per_tile) / kTilePixels));
     if (s.technique_depth > 0)
-        refuse(fmt::format("technique_depth={}: bdpt.auto=true may choose the path tracer, which gathers no images of single strategies; render once without them and repeat with the settings that "
-                           "were chosen",
-                           s.technique_depth));
+        refuse(
+            fmt::format("technique_depth={}: bdpt.auto=true may choose the path tracer, which gathers no images of "
+                        "single strategies; render once without them and repeat with the settings that "
+                        "were chosen",
+                        s.technique_depth));
 }
 
 std::vector<ChoiceCandidate> choice_candidates(const RenderSettings& settings, bool cuda) {
     const std::string& variant = settings.variant;
-    std::vector<ChoiceCandidate> all = {{"path", {0.0f, false, 0}, {{"integrator", "path"}, {"variant", "wavefront"}, {"estimator", "mis"}}}};
-    const auto add = [&](std::string name, const PilotCandidate& pilot, const std::string& of, const std::string& strategies) {
+    std::vector<ChoiceCandidate> all = {
+        {"path", {0.0f, false, 0}, {{"integrator", "path"}, {"variant", "wavefront"}, {"estimator", "mis"}}}};
+    const auto add = [&](std::string name, const PilotCandidate& pilot, const std::string& of,
+                         const std::string& strategies) {
         all.push_back({std::move(name), pilot, {{"integrator", "bdpt"}, {"variant", of}, {"strategies", strategies}}});
         if (pilot.draws > 0) all.back().settings.emplace_back("connections", std::to_string(pilot.draws));
         if (pilot.light_paths != 1.0f) {
@@ -183,21 +204,26 @@ std::vector<ChoiceCandidate> choice_candidates(const RenderSettings& settings, b
         if (light_paths != 1.0f && plain != "wavefront") continue;
         add("bdpt without connections", {light_paths, false, 0}, plain, "hits+next_event+light");
         if (light_paths == 1.0f && variant != "lvc") add("bdpt, " + variant, {1.0f, true, 0}, variant, "all");
-        for (uint32_t k = 1; cache && k <= 16; k *= 2) add(fmt::format("bdpt, lvc, {} connection{}", k, k > 1 ? "s" : ""), {light_paths, true, k}, "lvc", "all");
+        for (uint32_t k = 1; cache && k <= 16; k *= 2)
+            add(fmt::format("bdpt, lvc, {} connection{}", k, k > 1 ? "s" : ""), {light_paths, true, k}, "lvc", "all");
     }
     return all;
 }
 
 double choice_work(const PilotWork& w, const ChoiceCandidate& candidate, bool cuda) {
-    // Fitted to renders (docs/performance.md): shadow rays and connections in rays of walks; what the longer records and further launches of bidirectional methods cost.
-    const double eye = w.eye_rays + kShadowWork * w.next_events, light = double(candidate.pilot.light_paths) * (w.light_rays + kShadowWork * w.splats);
-    const double pair = cuda ? 0.24 : 0.02, draw = cuda ? 0.12 : 0.07, ray = cuda ? 1.06 : 0.8, bidirectional = cuda ? 1.2 : 1.0;
+    // Fitted to renders (docs/performance.md): shadow rays and connections in rays of walks; what the longer records
+    // and further launches of bidirectional methods cost.
+    const double eye = w.eye_rays + kShadowWork * w.next_events,
+                 light = double(candidate.pilot.light_paths) * (w.light_rays + kShadowWork * w.splats);
+    const double pair = cuda ? 0.24 : 0.02, draw = cuda ? 0.12 : 0.07, ray = cuda ? 1.06 : 0.8,
+                 bidirectional = cuda ? 1.2 : 1.0;
     const PilotCandidate& c = candidate.pilot;
     if (c.light_paths == 0.0f && !c.connect) return eye;
     double work = eye + light;
     if (c.connect && c.draws == 0) work += pair * w.pairs + ray * w.pair_rays;
     if (c.connect && c.draws > 0) work += c.draws * (draw * w.draws + ray * w.draw_rays);
-    const bool streaming = std::any_of(candidate.settings.begin(), candidate.settings.end(), [](const auto& s) { return s.second == "streaming"; });
+    const bool streaming = std::any_of(candidate.settings.begin(), candidate.settings.end(),
+                                       [](const auto& s) { return s.second == "streaming"; });
     // A light walk for every vertex of an eye walk.
     if (c.connect && streaming) work += std::max(0.0, w.vertices - 1.0) * w.light_rays;
     return bidirectional * work;
@@ -221,7 +247,8 @@ std::vector<double> choice_variances(const ChoicePilot& pilot) {
     return variances;
 }
 
-std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda, SharedAccels& accels, const MakeRenderer& make) {
+std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda,
+                                         SharedAccels& accels, const MakeRenderer& make) {
     check_automatic(settings);
     // Any render builds this, and wakes the device: it is no cost of the choice.
     if (cuda) cuda_device_present();
@@ -235,8 +262,10 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     std::vector<PilotCandidate> judged;
     for (const ChoiceCandidate& c : candidates) judged.push_back(c.pilot);
     std::optional<HeadStart> head_start;
-    if (cuda && settings.expected_seconds > 0 && settings.expected_samples == 0) head_start.emplace(settings_of(settings, candidates[0]), make);
-    const ChoicePilot pilot = run_choice_pilot(scene, settings, cuda, cwbvh, accels, judged, cuda ? kPilotSamplesCuda : kPilotSamplesCpu);
+    if (cuda && settings.expected_seconds > 0 && settings.expected_samples == 0)
+        head_start.emplace(settings_of(settings, candidates[0]), make);
+    const ChoicePilot pilot =
+        run_choice_pilot(scene, settings, cuda, cwbvh, accels, judged, cuda ? kPilotSamplesCuda : kPilotSamplesCpu);
     if (head_start) head_start->stop();
     const std::vector<double> variance = choice_variances(pilot);
     std::vector<double> cost;  // of a sample, in any unit; smaller is better in product with the variance
@@ -247,13 +276,15 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     const auto order = [&] {
         std::vector<size_t> of(candidates.size());
         for (size_t i = 0; i < of.size(); ++i) of[i] = i;
-        std::stable_sort(of.begin(), of.end(), [&](size_t a, size_t b) { return variance[a] * cost[a] < variance[b] * cost[b]; });
+        std::stable_sort(of.begin(), of.end(),
+                         [&](size_t a, size_t b) { return variance[a] * cost[a] < variance[b] * cost[b]; });
         return of;
     };
     std::vector<size_t> ranked = order();
     std::vector<double> seconds(candidates.size(), 0.0);
     const size_t best = ranked[0];
-    const auto rival = std::find_if(ranked.begin(), ranked.end(), [&](size_t i) { return family(candidates[i]) != family(candidates[best]); });
+    const auto rival = std::find_if(ranked.begin(), ranked.end(),
+                                    [&](size_t i) { return family(candidates[i]) != family(candidates[best]); });
     // 0: the device has no room for it.
     const auto timed_or_none = [&](const ChoiceCandidate& candidate) {
         try {
@@ -263,9 +294,11 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
             return 0.0;
         }
     };
-    // Times follow from the work to 15 % (docs/performance.md), closer than waves tell that are short enough to be timed; but not for variants of other schedules.
+    // Times follow from the work to 15 % (docs/performance.md), closer than waves tell that are short enough to be
+    // timed; but not for variants of other schedules.
     const bool doubtful = settings.variant != "wavefront" && settings.variant != "lvc";
-    if (doubtful && !settings.deterministic && rival != ranked.end() && variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
+    if (doubtful && !settings.deterministic && rival != ranked.end() &&
+        variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
         for (const size_t i : {best, *rival}) {
             if (i == 0 && head_start && head_start->seconds_per_sample() > 0) {
                 seconds[i] = head_start->seconds_per_sample();
@@ -302,7 +335,9 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
             renderer = make(settings_of(settings, candidates[chosen]));
         } catch (const Error& error) {
             // What is next may need less memory.
-            if (error.code != ExitCode::device || rank + 1 == ranked.size() || !std::isfinite(variance[ranked[rank + 1]])) throw;
+            if (error.code != ExitCode::device || rank + 1 == ranked.size() ||
+                !std::isfinite(variance[ranked[rank + 1]]))
+                throw;
         }
     }
 
@@ -313,8 +348,9 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     choice.pilot_samples = pilot.samples;
     choice.expected_samples = pilot.expected_samples;
     for (size_t c = 0; c < candidates.size(); ++c)
-        choice.candidates.push_back({candidates[c].name, joined(candidates[c].settings), variance[c], work[c], seconds[c],
-                                     std::isfinite(variance[c]) ? variance[chosen] * cost[chosen] / (variance[c] * cost[c]) : 0.0});
+        choice.candidates.push_back(
+            {candidates[c].name, joined(candidates[c].settings), variance[c], work[c], seconds[c],
+             std::isfinite(variance[c]) ? variance[chosen] * cost[chosen] / (variance[c] * cost[c]) : 0.0});
     return std::make_unique<Chosen>(std::move(renderer), ready, std::move(choice));
 }
 

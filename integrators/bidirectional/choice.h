@@ -21,14 +21,15 @@ std::vector<ChoiceCandidate> choice_candidates(const RenderSettings& settings, b
 /// The rays and connections of one sample of a pixel, in multiples of one ray of a path tracer.
 double choice_work(const PilotWork& work, const ChoiceCandidate& candidate, bool cuda);
 
-/// The variance of one sample, mean over the blocks but for the share that is worst for the best candidate of each: what lies in a few pixels is not trimmed away by chance for
-/// some candidates only.
+/// The variance of one sample, mean over the blocks but for the share that is worst for the best candidate of each:
+/// what lies in a few pixels is not trimmed away by chance for some candidates only.
 std::vector<double> choice_variances(const ChoicePilot& pilot);
 
 /// Makes a renderer of given settings, which are not automatic.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RenderSettings&)>;
 
 /// Runs the pilot, times what it cannot tell apart, and makes the renderer of the choice.
-std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda, SharedAccels& accels, const MakeRenderer& make);
+std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda,
+                                         SharedAccels& accels, const MakeRenderer& make);
 
 }  // namespace ambilux

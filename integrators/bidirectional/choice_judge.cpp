@@ -25,9 +25,11 @@ void blur(uint32_t width, uint32_t height, const std::vector<Mean>& of, std::vec
 }
 
 /// The variance of one candidate in every block. False if it cannot find some of the light.
-bool judge(const SecondMoments& moments, const PilotPaths& paths, uint32_t c, uint32_t width, uint32_t height, const std::vector<Mean>& scale, std::vector<double>& variance) {
+bool judge(const SecondMoments& moments, const PilotPaths& paths, uint32_t c, uint32_t width, uint32_t height,
+           const std::vector<Mean>& scale, std::vector<double>& variance) {
     const double samples = double(paths.pixels_per_block) * paths.samples_per_pixel;
-    // Outliers: the brightest contributions that after all samples of the render are in kChoiceTrimmed of the pixels. There they are left out, and elsewhere their light is missing.
+    // Outliers: the brightest contributions that after all samples of the render are in kChoiceTrimmed of the pixels.
+    // There they are left out, and elsewhere their light is missing.
     struct Rare {
         double size;
         const PilotEvent* event;
@@ -65,19 +67,22 @@ bool judge(const SecondMoments& moments, const PilotPaths& paths, uint32_t c, ui
         }
         const std::array<double, 3> scale2 = scale2_of(s->block, s->seen ? s->radiance : Rgb{0.0f, 0.0f, 0.0f});
         const double moment = moments.second_moment(c, e, sum);
-        for (int k = 0; k < 3; ++k) variance[s->block] += moment * sqr(double(e.value[k])) / (3.0 * samples * scale2[k]);
+        for (int k = 0; k < 3; ++k)
+            variance[s->block] += moment * sqr(double(e.value[k])) / (3.0 * samples * scale2[k]);
         add_rare(e, s->block, scale2, sum);
     }
 
     std::vector<Mean> lost(scale.size()), smooth(scale.size());
-    // Which are the largest matters, not their order: of what is in question the larger half is taken, or the other half is left.
+    // Which are the largest matters, not their order: of what is in question the larger half is taken, or the other
+    // half is left.
     double share = 0;
     auto taken = rare.begin();
     for (auto end = rare.end(); taken != end;) {
         const auto middle = taken + (end - taken) / 2 + 1;
         std::nth_element(taken, middle - 1, end, [](const Rare& a, const Rare& b) { return a.size > b.size; });
         double more = 0;
-        for (auto r = taken; r != middle; ++r) more += double(r->event->coverage) * double(r->sum) / double(r->event->total()) / double(moments.samples);
+        for (auto r = taken; r != middle; ++r)
+            more += double(r->event->coverage) * double(r->sum) / double(r->event->total()) / double(moments.samples);
         if (share + more <= kChoiceTrimmed / paths.expected_samples) {
             share += more;
             taken = middle;
@@ -88,13 +93,15 @@ bool judge(const SecondMoments& moments, const PilotPaths& paths, uint32_t c, ui
     for (auto r = rare.begin(); r != taken; ++r) {
         const PilotEvent& e = *r->event;
         for (int k = 0; k < 3; ++k) {
-            variance[r->block] -= moments.second_moment(c, e, r->sum) * sqr(double(e.value[k])) / (3.0 * samples * r->scale2[k]);
+            variance[r->block] -=
+                moments.second_moment(c, e, r->sum) * sqr(double(e.value[k])) / (3.0 * samples * r->scale2[k]);
             lost[r->block].of[k] += double(e.coverage) * double(e.value[k]) / double(e.total()) / samples;
         }
     }
     blur(width, height, lost, smooth);
     for (uint32_t b = 0; b < scale.size(); ++b)
-        for (int k = 0; k < 3; ++k) variance[b] += paths.expected_samples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale[b].of[k]) + 0.01));
+        for (int k = 0; k < 3; ++k)
+            variance[b] += paths.expected_samples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale[b].of[k]) + 0.01));
     // Without emitters of no extent, eye walks can meet whatever there is: zeros are rounding.
     return !(paths.delta_emitters && blind);
 }
@@ -108,11 +115,14 @@ void judge_candidates(const SecondMoments& moments, const PilotPaths& paths, Cho
     for (size_t p = 0; p < paths.pixels.size(); ++p)
         for (int k = 0; k < 3; ++k) block[p / paths.pixels_per_block].of[k] += paths.pixels[p].mean[k] / samples;
     for (const PilotSplat* s : paths.splats)
-        for (int k = 0; k < 3; ++k) block[s->block].of[k] += double(s->event.value[k] * (s->event.coverage / s->event.total())) / samples;
+        for (int k = 0; k < 3; ++k)
+            block[s->block].of[k] += double(s->event.value[k] * (s->event.coverage / s->event.total())) / samples;
     blur(result.blocks_x, result.blocks_y, block, scale);
     result.variance.assign(moments.candidates.size(), std::vector<double>(count));
     std::array<bool, kMostCandidates> blind{};
-    parallel_for(uint32_t(moments.candidates.size()), [&](uint32_t c) { blind[c] = !judge(moments, paths, c, result.blocks_x, result.blocks_y, scale, result.variance[c]); });
+    parallel_for(uint32_t(moments.candidates.size()), [&](uint32_t c) {
+        blind[c] = !judge(moments, paths, c, result.blocks_x, result.blocks_y, scale, result.variance[c]);
+    });
     result.blind.assign(blind.begin(), blind.begin() + ptrdiff_t(moments.candidates.size()));
 }
 

@@ -13,7 +13,8 @@ constexpr uint32_t kMostCandidates = 24;
 /// A candidate that finds a path this much less often than the pilot does may show it as single bright pixels.
 constexpr float kRareShare = 0.02f;
 
-/// Densities of the groups that could have sampled a path, in multiples of that which did, all with the numbers of samples of paired walks.
+/// Densities of the groups that could have sampled a path, in multiples of that which did, all with the numbers of
+/// samples of paired walks.
 struct PilotShares {
     float unidirectional, light, connections;
 };
@@ -29,7 +30,7 @@ struct PilotEvent {
 struct PilotSplat {
     PilotEvent event;
     uint32_t block;
-    bool seen;  ///< the emitter itself
+    bool seen;     ///< the emitter itself
     Rgb radiance;  ///< of it
 };
 
@@ -37,7 +38,7 @@ struct PilotSplat {
 struct PilotSums {
     double mean[3] = {};
     double variance[kMostCandidates][3] = {};
-    double seen[3] = {};  ///< largest radiance of emitters that the camera sees here
+    double seen[3] = {};               ///< largest radiance of emitters that the camera sees here
     bool blind[kMostCandidates] = {};  ///< a candidate cannot find some light
     std::vector<PilotEvent> rare;      ///< for some candidate
 };
@@ -47,7 +48,8 @@ struct SecondMoments {
     std::vector<PilotCandidate> candidates;
     uint32_t samples = 0;       ///< eye walks of the pilot, and as many light walks
     size_t light_vertices = 0;  ///< of these
-    float filter_energy = 1;    ///< mean over places on the film of the sum of squares of what a splat counts for its pixels
+    float filter_energy =
+        1;  ///< mean over places on the film of the sum of squares of what a splat counts for its pixels
 
     /// Sum of the candidate's densities over that of the strategy that found the path.
     float sum_of(uint32_t c, const PilotShares& s) const {
@@ -57,7 +59,8 @@ struct SecondMoments {
         return sum;
     }
     float connections(const PilotCandidate& c) const {
-        return c.draws == 0 ? 1.0f : float(double(c.draws) * double(samples) / double(std::max<size_t>(1, light_vertices)));
+        return c.draws == 0 ? 1.0f
+                            : float(double(c.draws) * double(samples) / double(std::max<size_t>(1, light_vertices)));
     }
 
     /// Adds a path of the pilot's own estimator to the second moments of all candidates (equation 18).
@@ -80,7 +83,8 @@ struct SecondMoments {
     /// What a path adds to the second moment of a candidate, over its squared value.
     double second_moment(uint32_t c, const PilotEvent& e, float sum) const {
         const double by_light = double(candidates[c].light_paths * e.shares.light / sum);
-        return double(e.coverage) * (1.0 - (1.0 - double(filter_energy)) * by_light) / (double(e.total()) * double(sum));
+        return double(e.coverage) * (1.0 - (1.0 - double(filter_energy)) * by_light) /
+               (double(e.total()) * double(sum));
     }
 };
 
@@ -89,7 +93,7 @@ struct PilotPaths {
     const std::vector<PilotSums>& pixels;  ///< block by block
     const std::vector<const PilotSplat*>& splats;
     uint32_t pixels_per_block, samples_per_pixel;
-    bool delta_emitters;  ///< some emitter has no extent
+    bool delta_emitters;      ///< some emitter has no extent
     double expected_samples;  ///< of every pixel, that the render takes
 };
 

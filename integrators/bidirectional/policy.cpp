@@ -10,7 +10,9 @@ namespace ambilux {
 
 BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSettings& settings) {
     if (settings.max_depth < 0 && settings.rr_depth < 0)
-        throw Error(ExitCode::usage, "max_depth=-1 with rr_depth=-1: without Russian roulette and without a limit walks may never end; set one of them");
+        throw Error(ExitCode::usage,
+                    "max_depth=-1 with rr_depth=-1: without Russian roulette and without a limit walks may never end; "
+                    "set one of them");
     BidirectionalPolicy p{};
     p.mis.heuristic = settings.heuristic;
     p.mis.strategies = settings.integrator == "light" ? uint32_t(kLightStrategies) : settings.strategies;
@@ -27,7 +29,8 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     }
     p.technique_depth = std::min(settings.technique_depth, p.max_depth);
     const bool emitters = !scene.emitters.empty();
-    const bool area = std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return e.type == EmitterType::area; });
+    const bool area = std::any_of(scene.emitters.begin(), scene.emitters.end(),
+                                  [](const Emitter& e) { return e.type == EmitterType::area; });
     p.splat = emitters && p.mis.has(kLightStrategies);
     p.connect_vertices = emitters && p.mis.has(kConnectionStrategies) && p.max_depth >= 3;
     p.light_walks = p.splat || p.connect_vertices;
@@ -41,16 +44,27 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     if (p.light_walks_per_tile != kTilePixels) {
         const double light_paths = double(p.light_walks_per_tile) / kTilePixels;
         if (p.megakernel || settings.variant == "streaming")
-            throw Error(ExitCode::usage, fmt::format("light_paths={}: variant {} has one light walk per eye walk, or eye vertex; use variant lvc", light_paths, settings.variant));
+            throw Error(
+                ExitCode::usage,
+                fmt::format(
+                    "light_paths={}: variant {} has one light walk per eye walk, or eye vertex; use variant lvc",
+                    light_paths, settings.variant));
         if (p.connect_vertices && p.cache_draws == 0)
             throw Error(ExitCode::usage,
-                        fmt::format("light_paths={}: variant wavefront connects every eye walk with a light walk of its own; use variant lvc, or strategies without connections", light_paths));
+                        fmt::format("light_paths={}: variant wavefront connects every eye walk with a light walk of "
+                                    "its own; use variant lvc, or strategies without connections",
+                                    light_paths));
         if (uint64_t(film.width) * film.height * p.light_rounds() > 0xffffffffull)
-            throw Error(ExitCode::usage, fmt::format("light_paths={}: a film of {}x{} has more light walks than can be numbered (4294967295)", light_paths, film.width, film.height));
+            throw Error(
+                ExitCode::usage,
+                fmt::format("light_paths={}: a film of {}x{} has more light walks than can be numbered (4294967295)",
+                            light_paths, film.width, film.height));
     }
-    // A launch with several pairs of one vertex adds to sums in the order in which threads come, images of single strategies tell contributions of one path apart by launches, and a place of a path
-    // holds one item. Of one draw there is no second.
-    p.one_pair = settings.deterministic || p.technique_depth > 0 || p.cache_draws == 1 || settings.queues.fixed_places();
+    // A launch with several pairs of one vertex adds to sums in the order in which threads come, images of single
+    // strategies tell contributions of one path apart by launches, and a place of a path holds one item. Of one draw
+    // there is no second.
+    p.one_pair =
+        settings.deterministic || p.technique_depth > 0 || p.cache_draws == 1 || settings.queues.fixed_places();
     p.vertex_lanes = Queue<VertexItem>::kLanes;
     p.connection_lanes = Queue<ConnectionVertex>::kLanes;
     p.background_only = p.mis.strategies == kLightStrategies;
@@ -62,7 +76,8 @@ BidirectionalPolicy make_bidirectional_policy(const Scene& scene, const RenderSe
     return p;
 }
 
-std::vector<TechniqueImage> technique_images(uint32_t max_depth, uint64_t samples, const std::vector<int64_t>& sums, const std::vector<uint64_t>& dropped) {
+std::vector<TechniqueImage> technique_images(uint32_t max_depth, uint64_t samples, const std::vector<int64_t>& sums,
+                                             const std::vector<uint64_t>& dropped) {
     std::vector<TechniqueImage> images;
     if (max_depth == 0) return images;
     const size_t values = sums.size() / 2 / technique_count(max_depth);
@@ -70,7 +85,8 @@ std::vector<TechniqueImage> technique_images(uint32_t max_depth, uint64_t sample
     for (uint32_t k = 1; k <= max_depth; ++k) {
         for (uint32_t s = 0; s <= k; ++s) {
             const uint32_t technique = technique_index(Strategy::make(s, k + 1 - s));
-            TechniqueImage image = {s, k + 1 - s, std::vector<float>(values), std::vector<float>(values), dropped[technique]};
+            TechniqueImage image = {s, k + 1 - s, std::vector<float>(values), std::vector<float>(values),
+                                    dropped[technique]};
             const int64_t* raw = sums.data() + 2 * technique * values;
             for (size_t i = 0; i < values; ++i) {
                 image.raw[i] = float(double(raw[i]) * scale);
@@ -82,7 +98,8 @@ std::vector<TechniqueImage> technique_images(uint32_t max_depth, uint64_t sample
     return images;
 }
 
-std::vector<std::string> skipped_strategies(const Scene& scene, const BidirectionalPolicy& policy, const Features& kernels) {
+std::vector<std::string> skipped_strategies(const Scene& scene, const BidirectionalPolicy& policy,
+                                            const Features& kernels) {
     std::vector<std::string> parts;
     if (scene.emitters.empty()) parts.emplace_back("all strategies: no emitters");
     if (!policy.light_walks) parts.emplace_back("light walks: no strategy needs them");

@@ -1,4 +1,5 @@
-// Bidirectional path tracing, and light tracing as its part, as a schedule of stages: light walks of a wave first, then the eye walks of the same slots.
+// Bidirectional path tracing, and light tracing as its part, as a schedule of stages: light walks of a wave first, then
+// the eye walks of the same slots.
 #pragma once
 
 #include "integrators/bidirectional/wave.h"
@@ -21,19 +22,23 @@ void run_light_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stage
         if (stages.policy.splat) run_splats(exec, stages);
         exec.set_depth(1);
         exec.extend(StageId::light_extend, light.extend[0], m.rays[0], m.hits[0]);
-        repeat_depths(exec, StageId::light_shade, light.shade, StageId::light_extend, light.extend, m, stages.policy.tail_below, [&](bool) {
-            if (stages.policy.splat) {
-                if (!stages.policy.connect_in_shade) exec.run(StageId::connect_camera, light.connect_camera, m.vertices);
-                run_splats(exec, stages);
-            }
-        });
+        repeat_depths(exec, StageId::light_shade, light.shade, StageId::light_extend, light.extend, m,
+                      stages.policy.tail_below, [&](bool) {
+                          if (stages.policy.splat) {
+                              if (!stages.policy.connect_in_shade)
+                                  exec.run(StageId::connect_camera, light.connect_camera, m.vertices);
+                              run_splats(exec, stages);
+                          }
+                      });
         exec.set_depth(0);
     }
     exec.settle(m.light_vertices, m.splats);
 }
 
 /// Most pairs of an eye vertex.
-inline uint32_t longest_pairing(const BidirectionalPolicy& policy) { return policy.cache_draws > 0 ? policy.cache_draws : policy.max_depth - 2; }
+inline uint32_t longest_pairing(const BidirectionalPolicy& policy) {
+    return policy.cache_draws > 0 ? policy.cache_draws : policy.max_depth - 2;
+}
 
 /// Candidates of one launch: weighted, tested, added to their paths. `several`: there may be several of a path.
 template <class Executor, Features F, class Tracer>
@@ -41,14 +46,19 @@ void run_connections(Executor& exec, const BidirectionalStages<F, Tracer>& stage
     const BidirectionalMemory& m = stages.memory;
     if (!stages.policy.fuse) exec.run(StageId::mis_weight, stages.weight_connections, m.connect_candidates);
     exec.trace(StageId::occlude, several ? stages.occlude_several : stages.occlude, m.shadows);
-    if (!stages.policy.fuse) exec.run(StageId::accumulate, several ? stages.accumulate_several : stages.accumulate_shadows, m.shadow_contributions);
+    if (!stages.policy.fuse)
+        exec.run(StageId::accumulate, several ? stages.accumulate_several : stages.accumulate_shadows,
+                 m.shadow_contributions);
 }
 
 /// connect_vertices with its shadow rays, where the policy wants that; else false.
 template <class Executor, Features F, class Tracer>
-bool run_pairs_in_place([[maybe_unused]] Executor& exec, const BidirectionalStages<F, Tracer>& stages, [[maybe_unused]] bool tail) {
+bool run_pairs_in_place([[maybe_unused]] Executor& exec, const BidirectionalStages<F, Tracer>& stages,
+                        [[maybe_unused]] bool tail) {
     if constexpr (requires { Executor::kTracesPairs; } && F.bsdfs == bit(BsdfType::diffuse)) {
-        if (stages.policy.trace_pairs) exec.run(StageId::connect_vertices, tail ? stages.connect_and_occlude_several : stages.connect_and_occlude, stages.memory.pairs);
+        if (stages.policy.trace_pairs)
+            exec.run(StageId::connect_vertices, tail ? stages.connect_and_occlude_several : stages.connect_and_occlude,
+                     stages.memory.pairs);
         return stages.policy.trace_pairs;
     }
     return false;
@@ -58,32 +68,36 @@ template <class Executor, Features F, class Tracer>
 void run_eye_walks(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     const BidirectionalMemory& m = stages.memory;
     const BidirectionalPolicy& policy = stages.policy;
-    start_eye_walks(exec, stages.generate, stages.extend[0], m, stages.wave.tiles * kTilePixels, policy.connect_in_shade && policy.max_depth > 0);
-    repeat_depths(exec, StageId::shade, stages.shade, StageId::extend, stages.extend, m, policy.tail_below, [&](bool tail) {
-        if ((policy.count_hits || policy.count_environment) && !policy.fuse) {
-            exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
-            exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
-        }
-        if ((policy.next_event || policy.connect_vertices) && !policy.connect_in_shade) exec.run(StageId::connect, stages.connect, m.vertices);
-        if (policy.next_event) run_connections(exec, stages, tail);
-        if (policy.connect_vertices && !run_pairs_in_place(exec, stages, tail)) {
-            const bool several = tail || !policy.one_pair;
-            exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
-            run_connections(exec, stages, several);
-            if (longest_pairing(policy) > 1)
-                exec.repeat_while(m.rest, [&] {
-                    exec.run(StageId::connect_vertices, stages.connect_rest, m.rest);
-                    run_connections(exec, stages, several);
-                    exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
-                    run_connections(exec, stages, several);
-                });
-        }
-        if (policy.connect_vertices) exec.clear(m.eye_vertices);
-    });
+    start_eye_walks(exec, stages.generate, stages.extend[0], m, stages.wave.tiles * kTilePixels,
+                    policy.connect_in_shade && policy.max_depth > 0);
+    repeat_depths(exec, StageId::shade, stages.shade, StageId::extend, stages.extend, m, policy.tail_below,
+                  [&](bool tail) {
+                      if ((policy.count_hits || policy.count_environment) && !policy.fuse) {
+                          exec.run(StageId::mis_weight, stages.weight_hits, m.hit_candidates);
+                          exec.run(StageId::accumulate, stages.accumulate_hits, m.hit_contributions);
+                      }
+                      if ((policy.next_event || policy.connect_vertices) && !policy.connect_in_shade)
+                          exec.run(StageId::connect, stages.connect, m.vertices);
+                      if (policy.next_event) run_connections(exec, stages, tail);
+                      if (policy.connect_vertices && !run_pairs_in_place(exec, stages, tail)) {
+                          const bool several = tail || !policy.one_pair;
+                          exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
+                          run_connections(exec, stages, several);
+                          if (longest_pairing(policy) > 1)
+                              exec.repeat_while(m.rest, [&] {
+                                  exec.run(StageId::connect_vertices, stages.connect_rest, m.rest);
+                                  run_connections(exec, stages, several);
+                                  exec.run(StageId::connect_vertices, stages.connect_vertices, m.pairs);
+                                  run_connections(exec, stages, several);
+                              });
+                      }
+                      if (policy.connect_vertices) exec.clear(m.eye_vertices);
+                  });
     exec.set_depth(0);
 }
 
-/// Variant streaming: one ray per slot in every round, of its eye walk or of a light walk for the eye vertex at which that waits.
+/// Variant streaming: one ray per slot in every round, of its eye walk or of a light walk for the eye vertex at which
+/// that waits.
 template <class Executor, Features F, class Tracer>
 void run_streams(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     const BidirectionalMemory& m = stages.memory;
@@ -114,7 +128,8 @@ void run_streams(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     });
 }
 
-/// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h), settle(queue, queue) and clear(queue), and may have kTracesPairs: then it runs ConnectAndOcclude.
+/// One wave, without developing the film. An executor has what run_path_wave asks for (integrators/path/schedule.h),
+/// settle(queue, queue) and clear(queue), and may have kTracesPairs: then it runs ConnectAndOcclude.
 template <class Executor, Features F, class Tracer>
 void run_bidirectional_wave(Executor& exec, const BidirectionalStages<F, Tracer>& stages) {
     if (stages.policy.stream_slots) return run_streams(exec, stages);

@@ -6,23 +6,24 @@
 #include <new>
 #include <optional>
 
+#include "accel/cwbvh.h"
+#include "accel/embree_tracer.h"
 #include "backends/cpu/executor.h"
 #include "backends/cpu/wave_bytes.h"
 #include "core/error.h"
 #include "core/flag.h"
 #include "core/parallel.h"
-#include "integrators/feature_levels.h"
 #include "integrators/path/path.h"
 #include "integrators/path/schedule.h"
-#include "integrators/wave_stats.h"
-#include "scene/accel/cwbvh.h"
-#include "scene/accel/embree_tracer.h"
+#include "render/feature_levels.h"
+#include "render/wave_stats.h"
 #include "scene/info.h"
 
 namespace ambilux {
 namespace {
 
-/// Paths of one wave: with the surfaces and texels that they meet, about 1 KiB each, they stay in a core's second-level cache from stage to stage.
+/// Paths of one wave: with the surfaces and texels that they meet, about 1 KiB each, they stay in a core's second-level
+/// cache from stage to stage.
 constexpr uint32_t kCpuWaveSize = 512;
 
 /// Queues of one thread.
@@ -43,7 +44,8 @@ template <Features F, class Accel>
 class PathCpu final : public Renderer {
 public:
     PathCpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
-        : scene_(scene), view_(scene.view()), policy_(make_path_policy(scene, settings)), accel_name_(settings.accel == "cwbvh" ? "cwbvh" : "embree") {
+        : scene_(scene), view_(scene.view()), policy_(make_path_policy(scene, settings)),
+          accel_name_(settings.accel == "cwbvh" ? "cwbvh" : "embree") {
         const auto start = Clock::now();
         const int threads = arena_.max_concurrency();
         // Enough tasks that threads end together.
@@ -61,7 +63,9 @@ public:
             film_.sum_squares.resize(values);
             for (int t = 0; t < threads; ++t) waves_.emplace_back(layout_.bytes(), wave_.slot_count(), policy_);
         } catch (const std::bad_alloc&) {
-            throw Error(ExitCode::device, fmt::format("out of memory: film and queues need {} MiB beside the scene; a smaller --size or wave_size needs less", own >> 20));
+            throw Error(ExitCode::device, fmt::format("out of memory: film and queues need {} MiB beside the scene; a "
+                                                      "smaller --size or wave_size needs less",
+                                                      own >> 20));
         }
         film_.width = wave_.width;
         film_.height = wave_.height;
@@ -77,7 +81,8 @@ public:
             const auto pass_start = Clock::now();
             arena_.execute([&] {
                 const uint32_t tiles = tile_count(wave_);
-                parallel_for((tiles + wave_.tiles - 1) / wave_.tiles, [&](uint32_t chunk) { render_tiles(chunk * wave_.tiles, first + done, pass); });
+                parallel_for((tiles + wave_.tiles - 1) / wave_.tiles,
+                             [&](uint32_t chunk) { render_tiles(chunk * wave_.tiles, first + done, pass); });
             });
             done += pass;
             measured_seconds_ = seconds_since(pass_start);
@@ -109,7 +114,8 @@ public:
         s.samples = samples_;
         StageRecord total[kStageCount] = {};
         std::vector<const QueueCounter*> counters;
-        uint64_t bytes = scene_.memory_bytes() + accel_->memory_bytes() + (film_.sum.size() + film_.sum_squares.size()) * sizeof(double);
+        uint64_t bytes = scene_.memory_bytes() + accel_->memory_bytes() +
+                         (film_.sum.size() + film_.sum_squares.size()) * sizeof(double);
         for (const WaveMemory& w : waves_) {
             add_records(total, w.queues.records);
             counters.push_back(w.queues.counters);
@@ -128,13 +134,16 @@ public:
 
 private:
     using Clock = std::chrono::steady_clock;
-    static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+    static double seconds_since(Clock::time_point start) {
+        return std::chrono::duration<double>(Clock::now() - start).count();
+    }
 
     void render_tiles(uint32_t first_tile, uint32_t first_sample, uint32_t count) {
         const WaveMemory& wave = waves_[size_t(tbb::this_task_arena::current_thread_index())];
         const PathMemory& memory = wave.queues;
         using Tracer = decltype(accel_->tracer());
-        const PathStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, memory, {film_.sum.data(), film_.sum_squares.data()});
+        const PathStages<F, Tracer> stages(view_, accel_->tracer(), policy_, wave_, memory,
+                                           {film_.sum.data(), film_.sum_squares.data()});
         CpuExecutor executor(memory.state, memory.records, view_, wave.order);
         for (uint32_t s = 0; s < count; s += wave_.samples) {
             *memory.state = {first_tile, first_sample + s, std::min(wave_.samples, count - s), 0, 0, 0, 0};

@@ -10,16 +10,16 @@
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "core/flag.h"
-#include "integrators/feature_levels.h"
 #include "integrators/path/path_cuda.h"
 #include "integrators/path/schedule.h"
-#include "integrators/wave_stats.h"
+#include "render/feature_levels.h"
+#include "render/wave_stats.h"
 #include "scene/info.h"
 
 namespace ambilux {
 
-/// Paths of one wave from which on more bring less than 5 %, measured on scenes of short paths and long ones (docs/performance.md): the last bounces, which few paths reach, cost as
-/// much for few as for many.
+/// Paths of one wave from which on more bring less than 5 %, measured on scenes of short paths and long ones
+/// (docs/performance.md): the last bounces, which few paths reach, cost as much for few as for many.
 constexpr uint32_t kCudaWavePlateau = 1u << 26;
 
 template <Features F>
@@ -43,7 +43,8 @@ public:
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
         Layout million;
         lay_out(million, 1u << 20, policy_);
-        wave_ = shape_wave(scene, settings, device_wave_size(scene, settings, kCudaWavePlateau, million.bytes() >> 20, free), ~0u);
+        wave_ = shape_wave(scene, settings,
+                           device_wave_size(scene, settings, kCudaWavePlateau, million.bytes() >> 20, free), ~0u);
         policy_.tail_below = tail_walks(settings, wave_.slot_count());
         lay_out(layout_, wave_.slot_count(), policy_);
         const uint64_t temporary = order_temporary_bytes(policy_.queues, wave_.slot_count());
@@ -64,11 +65,15 @@ public:
         const OrderMemory order = lay_out_order(layout, policy_.queues, wave_.slot_count(), temporary);
         std::vector<QueueCounter> counters(PathMemory::kQueues);
         for (size_t q = 0; q < counters.size(); ++q) counters[q].capacity = layout.queue_capacities()[q];
-        cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter), cudaMemcpyHostToDevice), "queue counters");
+        cuda_check(cudaMemcpy(queues_.counters, counters.data(), counters.size() * sizeof(QueueCounter),
+                              cudaMemcpyHostToDevice),
+                   "queue counters");
 
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        stages_.emplace(device_scene_->view(), binary ? CwbvhTracer() : device_accel_->tracer(), policy_, wave_, queues_, FilmPointers{sum_.data(), sum_squares_.data()});
-        executor_.emplace(stream_, settings.specialise ? scene.features : kAllFeatures, queues_.state, queues_.records, clock_.data(), device_scene_->view(), order);
+        stages_.emplace(device_scene_->view(), binary ? CwbvhTracer() : device_accel_->tracer(), policy_, wave_,
+                        queues_, FilmPointers{sum_.data(), sum_squares_.data()});
+        executor_.emplace(stream_, settings.specialise ? scene.features : kAllFeatures, queues_.state, queues_.records,
+                          clock_.data(), device_scene_->view(), order);
         if (binary) executor_->use(device_pairs_->tracer());
         if (settings.graph) graph_ = executor_->capture([&](auto& exec) { run_path_wave(exec, *stages_); });
         cuda_check(cudaDeviceSynchronize(), "preparation");
@@ -89,7 +94,9 @@ public:
             const auto pass_start = Clock::now();
             for (uint32_t s = 0; s < pass; s += wave_.samples) {
                 for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles) {
-                    detail::set_wave<<<1, 1, 0, stream_>>>(queues_.state, WaveState{tile, first + done + s, std::min(wave_.samples, pass - s), 0, 0, 0, 0});
+                    detail::set_wave<<<1, 1, 0, stream_>>>(
+                        queues_.state,
+                        WaveState{tile, first + done + s, std::min(wave_.samples, pass - s), 0, 0, 0, 0});
                     if (graph_)
                         cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
                     else
@@ -135,22 +142,31 @@ public:
         s.samples = samples_;
         std::vector<StageRecord> records(kStageCount);
         std::vector<QueueCounter> counters(PathMemory::kQueues);
-        cuda_check(cudaMemcpy(records.data(), queues_.records, records.size() * sizeof(StageRecord), cudaMemcpyDeviceToHost), "statistics");
-        cuda_check(cudaMemcpy(counters.data(), queues_.counters, counters.size() * sizeof(QueueCounter), cudaMemcpyDeviceToHost), "statistics");
+        cuda_check(
+            cudaMemcpy(records.data(), queues_.records, records.size() * sizeof(StageRecord), cudaMemcpyDeviceToHost),
+            "statistics");
+        cuda_check(cudaMemcpy(counters.data(), queues_.counters, counters.size() * sizeof(QueueCounter),
+                              cudaMemcpyDeviceToHost),
+                   "statistics");
         fill_stage_stats(records.data(), s);
         fill_queue_stats(layout_, {counters.data()}, s);
-        s.memory_bytes = device_scene_->bytes() + (device_pairs_ ? device_pairs_->bytes() : device_accel_->bytes()) + memory_.bytes() + sum_.bytes() + sum_squares_.bytes() + clock_.bytes();
+        s.memory_bytes = device_scene_->bytes() + (device_pairs_ ? device_pairs_->bytes() : device_accel_->bytes()) +
+                         memory_.bytes() + sum_.bytes() + sum_squares_.bytes() + clock_.bytes();
         s.memory_bytes_predicted = predicted_bytes_;
         s.features = feature_names(F);
         s.skipped = skipped_parts(scene_, policy_, F);
         return s;
     }
 
-    uint32_t preferred_batch() const override { return whole_waves(batch_of(measured_seconds_, measured_samples_), wave_.samples); }
+    uint32_t preferred_batch() const override {
+        return whole_waves(batch_of(measured_seconds_, measured_samples_), wave_.samples);
+    }
 
 private:
     using Clock = std::chrono::steady_clock;
-    static double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+    static double seconds_since(Clock::time_point start) {
+        return std::chrono::duration<double>(Clock::now() - start).count();
+    }
 
     const Scene& scene_;
     PathPolicy policy_;

@@ -2,6 +2,8 @@
 
 namespace ambilux {
 
-std::unique_ptr<Renderer> make_path_cuda_all(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) { return std::make_unique<PathCuda<kAllFeatures>>(scene, settings, accels); }
+std::unique_ptr<Renderer> make_path_cuda_all(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
+    return std::make_unique<PathCuda<kAllFeatures>>(scene, settings, accels);
+}
 
 }  // namespace ambilux

@@ -2,6 +2,9 @@
 
 namespace ambilux {
 
-std::unique_ptr<Renderer> make_path_cuda_triangles(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) { return std::make_unique<PathCuda<kTriangleFeatures>>(scene, settings, accels); }
+std::unique_ptr<Renderer> make_path_cuda_triangles(const Scene& scene, const RenderSettings& settings,
+                                                   SharedAccels& accels) {
+    return std::make_unique<PathCuda<kTriangleFeatures>>(scene, settings, accels);
+}
 
 }  // namespace ambilux

@@ -1,4 +1,5 @@
-// Smooth dielectric boundary: Fresnel reflection and refraction (Veach 1997, section 5.2 for the factor eta² of radiance).
+// Smooth dielectric boundary: Fresnel reflection and refraction (Veach 1997, section 5.2 for the factor eta² of
+// radiance).
 #pragma once
 
 #include "transport/bsdf/fresnel.h"
@@ -22,7 +23,12 @@ struct Dielectric {
         }
         if (f.cos_t == 0.0f) return false;
         const float scale = mode == TransportMode::radiance ? 1.0f / sqr(f.eta_it) : 1.0f;
-        out = {refract(wi, f), 1.0f - f.reflectance, 1.0f - f.reflectance, specular_transmittance * scale, f.eta_it, kScatterDelta | kScatterTransmission};
+        out = {refract(wi, f),
+               1.0f - f.reflectance,
+               1.0f - f.reflectance,
+               specular_transmittance * scale,
+               f.eta_it,
+               kScatterDelta | kScatterTransmission};
         return true;
     }
 };

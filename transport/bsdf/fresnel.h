@@ -41,7 +41,8 @@ AMBILUX_HD float fresnel_conductor(float cos_i, float eta, float k) {
 }
 
 AMBILUX_HD Rgb fresnel_conductor(float cos_i, Rgb eta, Rgb k) {
-    return {fresnel_conductor(cos_i, eta.x, k.x), fresnel_conductor(cos_i, eta.y, k.y), fresnel_conductor(cos_i, eta.z, k.z)};
+    return {fresnel_conductor(cos_i, eta.x, k.x), fresnel_conductor(cos_i, eta.y, k.y),
+            fresnel_conductor(cos_i, eta.z, k.z)};
 }
 
 AMBILUX_HD Vec3f reflect(Vec3f wi) { return {-wi.x, -wi.y, wi.z}; }

@@ -1,5 +1,5 @@
-// Microfacet distributions: Beckmann and GGX, anisotropic (Walter et al. 2007; Heitz 2014, "Understanding the Masking-Shadowing
-// Function in Microfacet-Based BRDFs"). Local frame, z = normal of the macrosurface.
+// Microfacet distributions: Beckmann and GGX, anisotropic (Walter et al. 2007; Heitz 2014, "Understanding the
+// Masking-Shadowing Function in Microfacet-Based BRDFs"). Local frame, z = normal of the macrosurface.
 #pragma once
 
 #include "core/sampling.h"
@@ -40,7 +40,8 @@ AMBILUX_HD float inverse_erf(float x) {
     return p * x;
 }
 
-/// Microfacet normal that reflects unit wi to unit wo, both above the horizon, and its cosine with either, the same however they are exchanged; not above 0 if they are opposite.
+/// Microfacet normal that reflects unit wi to unit wo, both above the horizon, and its cosine with either, the same
+/// however they are exchanged; not above 0 if they are opposite.
 AMBILUX_HD Vec3f half_vector(Vec3f wi, Vec3f wo, float& cosine) {
     const Vec3f h = wi + wo;
     const float l2 = length_squared(h), inv = inverse_sqrt(l2);
@@ -79,8 +80,8 @@ struct MicrofacetDistribution {
     }
 
     /// Reflection at m = half_vector(wi, wo, cosine): D·G1(wi)·G1(wo)/(4·cos(wi)), which is f·cos(wo) without
-    /// Fresnel (Walter et al. 2007, equation 20), and the densities of wo and of wi by sample() at the other: that of m, visible D·(w·m)/sigma(w) or all of them D·cos(m), over
-    /// 4·(w·m).
+    /// Fresnel (Walter et al. 2007, equation 20), and the densities of wo and of wi by sample() at the other: that of
+    /// m, visible D·(w·m)/sigma(w) or all of them D·cos(m), over 4·(w·m).
     AMBILUX_HD MicrofacetReflection reflection(Vec3f wi, Vec3f wo, Vec3f m, float cosine, bool visible) const {
         const float density = d(m) * 0.25f, sigma_i = sigma(wi), sigma_o = sigma(wo);
         const float per_i = density / sigma_i;  // G1 = cos/sigma
@@ -118,8 +119,9 @@ struct MicrofacetDistribution {
         return l2 > 0.0f ? m * inverse_sqrt(l2) : Vec3f{0.0f, 0.0f, 1.0f};
     }
 
-    /// Visible slopes (Heitz and d'Eon 2014, "Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible
-    /// Normals", supplemental 1): the slope towards v by inverting its cumulative density, the other one is Gaussian.
+    /// Visible slopes (Heitz and d'Eon 2014, "Importance Sampling Microfacet-Based BSDFs using the Distribution of
+    /// Visible Normals", supplemental 1): the slope towards v by inverting its cumulative density, the other one is
+    /// Gaussian.
     AMBILUX_HD Vec3f sample_visible_beckmann(Vec3f wi, Vec2f u) const {
         const Vec3f v = normalize({wi.x * alpha_u, wi.y * alpha_v, wi.z});
         const float sin_v = sqrtf(v.x * v.x + v.y * v.y);
@@ -128,8 +130,9 @@ struct MicrofacetDistribution {
         return normalize({-alpha_u * (cos_phi * x - sin_phi * y), -alpha_v * (sin_phi * x + cos_phi * y), 1.0f});
     }
 
-    /// Slope x with density (cos - x·sin)·exp(-x²)/√π, x <= cos/sin, at cumulative share u. Solved for b = erf(x), in which the
-    /// cumulative density [cos·(1+b) + sin·exp(-x²)/√π]/2 is close to linear: Newton steps inside a shrinking bracket.
+    /// Slope x with density (cos - x·sin)·exp(-x²)/√π, x <= cos/sin, at cumulative share u. Solved for b = erf(x), in
+    /// which the cumulative density [cos·(1+b) + sin·exp(-x²)/√π]/2 is close to linear: Newton steps inside a shrinking
+    /// bracket.
     AMBILUX_HD static float visible_beckmann_slope(float cosine, float sine, float u) {
         const float inv_sqrt_pi = 0.56418958354775628f;
         float lo = -1.0f, hi = sine > 0.0f ? erff(cosine / sine) : 1.0f;

@@ -1,4 +1,5 @@
-// Smooth plastic: a dielectric coating over a diffuse base with internal scattering (Mitsuba's plastic), front side only.
+// Smooth plastic: a dielectric coating over a diffuse base with internal scattering (Mitsuba's plastic), front side
+// only.
 #pragma once
 
 #include "core/sampling.h"
@@ -36,7 +37,8 @@ struct Plastic {
         const float fi = fresnel_dielectric(wi.z, ior).reflectance, fo = fresnel_dielectric(wo.z, ior).reflectance;
         const float cosine = wo.z * kInvPi;
         const float passed = (1.0f - fi) * (1.0f - fo) / (ior * ior);
-        return {internal_scattering(reflectance, fdr_internal, nonlinear) * (passed * cosine), (1.0f - probability(fi)) * cosine, (1.0f - probability(fo)) * (wi.z * kInvPi)};
+        return {internal_scattering(reflectance, fdr_internal, nonlinear) * (passed * cosine),
+                (1.0f - probability(fi)) * cosine, (1.0f - probability(fo)) * (wi.z * kInvPi)};
     }
     AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
     AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }

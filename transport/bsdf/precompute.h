@@ -1,4 +1,5 @@
-// Host-side integrals that plastics need before rendering: mean Fresnel reflectance and transmittance tables. In double.
+// Host-side integrals that plastics need before rendering: mean Fresnel reflectance and transmittance tables. In
+// double.
 #pragma once
 
 #include <algorithm>
@@ -62,9 +63,9 @@ struct Albedo {
     double reflection, transmission;
 };
 
-/// Directional albedo of a rough dielectric boundary, single scattering, seen at cosine `mu` from the side where the other side has
-/// relative index `eta`. Integral over microfacet normals: slopes are sampled in proportion to D·cos, the azimuth is cut where
-/// normals turn away, so that the integrand is smooth.
+/// Directional albedo of a rough dielectric boundary, single scattering, seen at cosine `mu` from the side where the
+/// other side has relative index `eta`. Integral over microfacet normals: slopes are sampled in proportion to D·cos,
+/// the azimuth is cut where normals turn away, so that the integrand is smooth.
 inline Albedo rough_dielectric_albedo(Microfacets type, double alpha, double eta, double mu, const Quadrature& q) {
     mu = std::max(mu, 1e-6);
     const double sin_i = std::sqrt(std::max(0.0, 1 - mu * mu));
@@ -110,8 +111,9 @@ inline double critical_cosine(double ior) { return ior > 1 ? std::sqrt(1 - 1 / (
 
 }  // namespace precompute
 
-/// Share of diffuse light arriving from inside that a smooth boundary reflects back inside; `eta` is interior over exterior index
-/// (BsdfRecord::ior). Mitsuba's fdr_int = fresnel_diffuse_reflectance(1/eta), by quadrature instead of a fit.
+/// Share of diffuse light arriving from inside that a smooth boundary reflects back inside; `eta` is interior over
+/// exterior index (BsdfRecord::ior). Mitsuba's fdr_int = fresnel_diffuse_reflectance(1/eta), by quadrature instead of a
+/// fit.
 inline float fresnel_diffuse_reflectance(float eta) {
     static const precompute::Quadrature q(64);
     const double ior = eta;
@@ -121,26 +123,29 @@ inline float fresnel_diffuse_reflectance(float eta) {
     }));
 }
 
-/// Fills `out` with kTransmittanceTableSize values of the share of light from outside at cosine i/(size-1) that passes a rough
-/// boundary (single scattering; Mitsuba's roughplastic external transmittance). `ior` is interior over exterior index.
+/// Fills `out` with kTransmittanceTableSize values of the share of light from outside at cosine i/(size-1) that passes
+/// a rough boundary (single scattering; Mitsuba's roughplastic external transmittance). `ior` is interior over exterior
+/// index.
 inline void rough_transmittance_table(Microfacets type, float alpha, float ior, float* out) {
     static const precompute::Quadrature q(80);
     for (uint32_t i = 0; i < kTransmittanceTableSize; ++i) {
         const double mu = double(i) / (kTransmittanceTableSize - 1);
-        out[i] = float(precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), ior, mu, q).transmission);
+        out[i] =
+            float(precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), ior, mu, q).transmission);
     }
 }
 
-/// As fresnel_diffuse_reflectance for a rough boundary, single scattering (Mitsuba's roughplastic internal reflectance). The mean
-/// over angles is Mitsuba's plain sum over the table's cosines, 1.6 % below the integral: the exact value would make rough
-/// plastics 2 % brighter than in the renders we compare with.
+/// As fresnel_diffuse_reflectance for a rough boundary, single scattering (Mitsuba's roughplastic internal
+/// reflectance). The mean over angles is Mitsuba's plain sum over the table's cosines, 1.6 % below the integral: the
+/// exact value would make rough plastics 2 % brighter than in the renders we compare with.
 inline float rough_internal_reflectance(Microfacets type, float alpha, float ior) {
     static const precompute::Quadrature q(64);
     const uint32_t n = kTransmittanceTableSize;
     double sum = 0;
     for (uint32_t i = 1; i < n; ++i) {
         const double mu = double(i) / (n - 1);
-        sum += mu * precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), 1.0 / ior, mu, q).reflection;
+        sum +=
+            mu * precompute::rough_dielectric_albedo(type, std::max(double(alpha), 1e-4), 1.0 / ior, mu, q).reflection;
     }
     return float(2 * sum / n);
 }

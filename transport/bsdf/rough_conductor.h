@@ -1,4 +1,5 @@
-// Rough conductor: microfacet reflection with separable Smith masking (Walter et al. 2007, equation 20), front side only.
+// Rough conductor: microfacet reflection with separable Smith masking (Walter et al. 2007, equation 20), front side
+// only.
 #pragma once
 
 #include "transport/bsdf/fresnel.h"

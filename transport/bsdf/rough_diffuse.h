@@ -1,5 +1,5 @@
-// Rough diffuse reflection (Oren and Nayar 1994, "Generalization of Lambert's Reflectance Model", equations 30 and 31: the full
-// qualitative model with interreflection; Mitsuba's roughdiffuse with use_fast_approx = false, its default).
+// Rough diffuse reflection (Oren and Nayar 1994, "Generalization of Lambert's Reflectance Model", equations 30 and 31:
+// the full qualitative model with interreflection; Mitsuba's roughdiffuse with use_fast_approx = false, its default).
 #pragma once
 
 #include "core/sampling.h"
@@ -31,11 +31,13 @@ struct RoughDiffuse {
         const float c3 = 0.125f * c * sqr(4.0f * a * b * kInvPi * kInvPi);
         const float c4 = 0.17f * sigma2 / (sigma2 + 0.13f);
         // tan((a+b)/2) = (sin a + sin b)/(cos a + cos b).
-        const float single = c1 + cos_phi * c2 * (sin_b / cos_b) + (1.0f - fabsf(cos_phi)) * c3 * ((sin_a + sin_b) / (cos_a + cos_b));
+        const float single =
+            c1 + cos_phi * c2 * (sin_b / cos_b) + (1.0f - fabsf(cos_phi)) * c3 * ((sin_a + sin_b) / (cos_a + cos_b));
         const float twice = c4 * (1.0f - cos_phi * steep * steep);
         const float pdf_sa = wo.z * kInvPi;
         // The fit may fall below zero at opposite grazing directions.
-        return {max(reflectance * single + reflectance * reflectance * twice, splat(0.0f)) * pdf_sa, pdf_sa, wi.z * kInvPi};
+        return {max(reflectance * single + reflectance * reflectance * twice, splat(0.0f)) * pdf_sa, pdf_sa,
+                wi.z * kInvPi};
     }
     AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
     AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }

@@ -1,5 +1,5 @@
-// Rough plastic: a rough dielectric coating over a diffuse base (Mitsuba's roughplastic), front side only. Transmittances of the
-// coating come from a table (transport/bsdf/precompute.h).
+// Rough plastic: a rough dielectric coating over a diffuse base (Mitsuba's roughplastic), front side only.
+// Transmittances of the coating come from a table (transport/bsdf/precompute.h).
 #pragma once
 
 #include "transport/bsdf/microfacet.h"
@@ -35,8 +35,10 @@ struct RoughPlastic {
         const float cosine = wo.z * kInvPi;
         const MicrofacetReflection coating = microfacets.reflection(wi, wo, m, cos_m, sample_visible);
         const float passed = ti * to / (ior * ior) * cosine;
-        return {specular_reflectance * (fresnel_dielectric(cos_m, ior).reflectance * coating.value) + internal_scattering(reflectance, fdr_internal, nonlinear) * passed,
-                pi * coating.pdf_sa + (1.0f - pi) * cosine, po * coating.pdf_reverse_sa + (1.0f - po) * (wi.z * kInvPi)};
+        return {specular_reflectance * (fresnel_dielectric(cos_m, ior).reflectance * coating.value) +
+                    internal_scattering(reflectance, fdr_internal, nonlinear) * passed,
+                pi * coating.pdf_sa + (1.0f - pi) * cosine,
+                po * coating.pdf_reverse_sa + (1.0f - po) * (wi.z * kInvPi)};
     }
     AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
     AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }

@@ -15,14 +15,15 @@ enum ScatterFlags : uint32_t {
 /// Result of sampling a BSDF.
 struct BsdfSample {
     Vec3f wo;
-    float pdf_sa;    ///< density per solid angle of all smooth lobes together; for a delta lobe its probability
+    float pdf_sa;          ///< density per solid angle of all smooth lobes together; for a delta lobe its probability
     float pdf_reverse_sa;  ///< BsdfValue::pdf_reverse_sa; of a delta lobe unspecified
-    Rgb weight;      ///< f·|cos(wo)|/pdf
+    Rgb weight;            ///< f·|cos(wo)|/pdf
     float eta;       ///< relative index passed through (interior/exterior seen along the walk); 1 without refraction
     uint32_t flags;  ///< ScatterFlags
 };
 
-/// f·|cos(wo)| and the densities of both directions together: sample, eval and pdf of a BSDF share one formula, and walks that are connected need all three.
+/// f·|cos(wo)| and the densities of both directions together: sample, eval and pdf of a BSDF share one formula, and
+/// walks that are connected need all three.
 struct BsdfValue {
     Rgb value;
     float pdf_sa;          ///< density of wo per solid angle at wi
@@ -31,7 +32,8 @@ struct BsdfValue {
 
 AMBILUX_HD BsdfValue no_scattering() { return {{0.0f, 0.0f, 0.0f}, 0.0f, 0.0f}; }
 
-/// Fills `out` for a direction drawn from a smooth lobe; false if the density is out of range there (rounding, underflow).
+/// Fills `out` for a direction drawn from a smooth lobe; false if the density is out of range there (rounding,
+/// underflow).
 AMBILUX_HD bool smooth_sample(Vec3f wo, BsdfValue v, float eta, uint32_t flags, BsdfSample& out) {
     if (!(v.pdf_sa > 0.0f && v.pdf_sa < kInfinity)) return false;
     out = {wo, v.pdf_sa, v.pdf_reverse_sa, v.value / v.pdf_sa, eta, flags};

@@ -20,7 +20,12 @@ struct ThinDielectric {
         if (u.x < reflectance)
             out = {reflect(wi), reflectance, reflectance, specular_reflectance, 1.0f, kScatterDelta};
         else
-            out = {-wi, 1.0f - reflectance, 1.0f - reflectance, specular_transmittance, 1.0f, kScatterDelta | kScatterTransmission};
+            out = {-wi,
+                   1.0f - reflectance,
+                   1.0f - reflectance,
+                   specular_transmittance,
+                   1.0f,
+                   kScatterDelta | kScatterTransmission};
         return true;
     }
 };

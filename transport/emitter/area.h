@@ -45,21 +45,25 @@ AMBILUX_HD SurfacePoint area_sample_point(const SceneView& view, const Emitter& 
 
 /// The cone in which a sphere is seen from outside.
 struct SphereCone {
-    Vec3f axis;                ///< unit, from the reference to the centre
-    float distance;            ///< to the centre
-    float sin2_max;            ///< of the half angle
-    float one_minus_cos_max;   ///< without cancellation for small and far spheres
-    bool outside;              ///< false: the cone is no help: the reference is on or inside the sphere, or that radiates inwards; the rest is not set
+    Vec3f axis;               ///< unit, from the reference to the centre
+    float distance;           ///< to the centre
+    float sin2_max;           ///< of the half angle
+    float one_minus_cos_max;  ///< without cancellation for small and far spheres
+    bool outside;  ///< false: the cone is no help: the reference is on or inside the sphere, or that radiates inwards;
+                   ///< the rest is not set
 };
 
-AMBILUX_HD Vec3f quadric_center(const Quadric& q) { return {q.to_world.m[0][3], q.to_world.m[1][3], q.to_world.m[2][3]}; }
+AMBILUX_HD Vec3f quadric_center(const Quadric& q) {
+    return {q.to_world.m[0][3], q.to_world.m[1][3], q.to_world.m[2][3]};
+}
 
 AMBILUX_HD SphereCone sphere_cone(const Quadric& sphere, Vec3f reference_p) {
     const Vec3f to_center = quadric_center(sphere) - reference_p;
     const float d2 = length_squared(to_center), r2 = sphere.radius * sphere.radius;
     SphereCone cone{};
     cone.distance = sqrtf(d2);
-    // Points of a sphere that radiates inwards are outside of it as often as rounding will have it; they see its light all the same.
+    // Points of a sphere that radiates inwards are outside of it as often as rounding will have it; they see its light
+    // all the same.
     cone.outside = !sphere.flip && cone.distance > sphere.radius;
     if (!cone.outside) return cone;
     cone.axis = to_center * (1.0f / cone.distance);
@@ -68,8 +72,9 @@ AMBILUX_HD SphereCone sphere_cone(const Quadric& sphere, Vec3f reference_p) {
     return cone;
 }
 
-/// Direct light from a sphere seen from outside: a direction uniform in its cone (PBRT 4th ed., 6.2.4). Distance and angle at the
-/// centre come from d - r and not from differences of squares, so that they stay right next to the surface and far away.
+/// Direct light from a sphere seen from outside: a direction uniform in its cone (PBRT 4th ed., 6.2.4). Distance and
+/// angle at the centre come from d - r and not from differences of squares, so that they stay right next to the surface
+/// and far away.
 template <Features F>
 AMBILUX_HD bool area_sample_sphere(const SceneView& view, const Emitter& emitter, uint32_t prim, const SphereCone& cone,
                                    Vec2f u, EmitterSample& s) {
@@ -97,8 +102,8 @@ AMBILUX_HD bool area_sample_sphere(const SceneView& view, const Emitter& emitter
     return s.distance > 0.0f;
 }
 
-/// Direct light from an area emitter at `reference_p`; false when the sample carries none. Sphere from outside: by solid angle;
-/// everything else: by area.
+/// Direct light from an area emitter at `reference_p`; false when the sample carries none. Sphere from outside: by
+/// solid angle; everything else: by area.
 template <Features F>
 AMBILUX_HD bool area_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, float u_primitive,
                                    Vec2f u, EmitterSample& s) {
@@ -127,10 +132,11 @@ AMBILUX_HD bool area_sample_direct(const SceneView& view, const Emitter& emitter
     return true;
 }
 
-/// Density per solid angle, pick probability included, with which area_sample_direct returns direction `wi` when that meets the
-/// emitter at `hit`; zero at the back, which it never returns.
+/// Density per solid angle, pick probability included, with which area_sample_direct returns direction `wi` when that
+/// meets the emitter at `hit`; zero at the back, which it never returns.
 template <Features F>
-AMBILUX_HD float area_pdf_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec3f wi, const SurfacePoint& hit) {
+AMBILUX_HD float area_pdf_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec3f wi,
+                                 const SurfacePoint& hit) {
     const float cos_light = -dot(hit.ng, wi);
     if (!(cos_light > 0.0f)) return 0.0f;
     if constexpr (F.has(PrimitiveType::sphere)) {
@@ -140,7 +146,8 @@ AMBILUX_HD float area_pdf_direct(const SceneView& view, const Emitter& emitter, 
             if (cone.outside) return emitter.pick_probability * kInv2Pi / cone.one_minus_cos_max;
         }
     }
-    return emitter.pick_probability * area_pdf_position(view, emitter, hit.prim) * length_squared(hit.p - reference_p) / cos_light;
+    return emitter.pick_probability * area_pdf_position(view, emitter, hit.prim) * length_squared(hit.p - reference_p) /
+           cos_light;
 }
 
 }  // namespace ambilux

@@ -5,7 +5,8 @@
 
 namespace ambilux {
 
-AMBILUX_HD bool constant_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec2f u, EmitterSample& s) {
+AMBILUX_HD bool constant_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec2f u,
+                                       EmitterSample& s) {
     s.wi = square_to_sphere(u);
     place_at_infinity(view, reference_p, s);
     s.radiance = emitter.radiance.value;

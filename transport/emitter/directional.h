@@ -14,7 +14,8 @@ AMBILUX_HD void place_at_infinity(const SceneView& view, Vec3f reference_p, Emit
     s.distance = kInfinity;
 }
 
-AMBILUX_HD bool directional_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, EmitterSample& s) {
+AMBILUX_HD bool directional_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p,
+                                          EmitterSample& s) {
     s.wi = -emitter.direction;
     place_at_infinity(view, reference_p, s);
     s.radiance = emitter.radiance.value;

@@ -1,9 +1,12 @@
-// Light that leaves emitters, for walks that start there (light tracing, bidirectional path tracing; Veach 1997, section 8.3.2).
+// Light that leaves emitters, for walks that start there (light tracing, bidirectional path tracing; Veach 1997,
+// section 8.3.2).
 //
-// Position and direction are sampled one after the other and carry their own measures. For all emitters alike the flux of a sample is
+// Position and direction are sampled one after the other and carry their own measures. For all emitters alike the flux
+// of a sample is
 //   radiance · cos_theta / (pick · pdf_pos · pdf_dir),
-// where a delta position or direction has "density" 1 and `radiance` is then intensity or irradiance. For emitters at infinity the direction comes first and
-// the position lies on the disk perpendicular to it that covers the scene's bounding sphere.
+// where a delta position or direction has "density" 1 and `radiance` is then intensity or irradiance. For emitters at
+// infinity the direction comes first and the position lies on the disk perpendicular to it that covers the scene's
+// bounding sphere.
 #pragma once
 
 #include "transport/emitter.h"
@@ -11,17 +14,17 @@
 namespace ambilux {
 
 struct EmissionSample {
-    Vec3f p;           ///< where the walk starts; infinite: outside of the scene's bounding sphere
-    Vec3f p_error;     ///< bound of the absolute error of each coordinate of p; zero unless p lies on a surface
-    Vec3f ng;          ///< unit normal of the emitting side; d where there is no surface
-    Vec3f d;           ///< unit, direction in which light leaves
-    Rgb radiance;      ///< area, constant, envmap: radiance; point, spot: intensity; directional: irradiance
-    float pdf_pos;     ///< density per area (infinite: on the disk); 1 for a delta position
-    float pdf_dir;     ///< density per solid angle; 1 for a delta direction
-    float cos_theta;   ///< cosine between ng and d; 1 where there is no surface
-    float pick;        ///< probability of this emitter
+    Vec3f p;          ///< where the walk starts; infinite: outside of the scene's bounding sphere
+    Vec3f p_error;    ///< bound of the absolute error of each coordinate of p; zero unless p lies on a surface
+    Vec3f ng;         ///< unit normal of the emitting side; d where there is no surface
+    Vec3f d;          ///< unit, direction in which light leaves
+    Rgb radiance;     ///< area, constant, envmap: radiance; point, spot: intensity; directional: irradiance
+    float pdf_pos;    ///< density per area (infinite: on the disk); 1 for a delta position
+    float pdf_dir;    ///< density per solid angle; 1 for a delta direction
+    float cos_theta;  ///< cosine between ng and d; 1 where there is no surface
+    float pick;       ///< probability of this emitter
     uint32_t emitter;
-    uint32_t prim;     ///< area: the primitive that p lies on; otherwise kNone
+    uint32_t prim;  ///< area: the primitive that p lies on; otherwise kNone
     bool delta_position, delta_direction, infinite;
 };
 
@@ -29,8 +32,8 @@ AMBILUX_HD bool is_infinite(EmitterType type) {
     return type == EmitterType::directional || type == EmitterType::constant || type == EmitterType::envmap;
 }
 
-/// Density per area with which sample_emission starts at a point of emitter `emitter`, given that it was picked: on primitive `prim` of an area emitter,
-/// on the disk for emitters at infinity; 1 for delta positions.
+/// Density per area with which sample_emission starts at a point of emitter `emitter`, given that it was picked: on
+/// primitive `prim` of an area emitter, on the disk for emitters at infinity; 1 for delta positions.
 template <Features F>
 AMBILUX_HD float pdf_emission_position(const SceneView& view, uint32_t emitter, uint32_t prim) {
     const Emitter& e = view.emitters[emitter];
@@ -39,8 +42,8 @@ AMBILUX_HD float pdf_emission_position(const SceneView& view, uint32_t emitter, 
     return 1.0f;
 }
 
-/// Density per solid angle with which sample_emission sends light along unit `d` from a point with emitting normal `ng` (area emitters), given emitter and point;
-/// 1 for delta directions.
+/// Density per solid angle with which sample_emission sends light along unit `d` from a point with emitting normal `ng`
+/// (area emitters), given emitter and point; 1 for delta directions.
 template <Features F>
 AMBILUX_HD float pdf_emission_direction(const SceneView& view, uint32_t emitter, Vec3f ng, Vec3f d) {
     const Emitter& e = view.emitters[emitter];
@@ -55,8 +58,9 @@ AMBILUX_HD float pdf_emission_direction(const SceneView& view, uint32_t emitter,
     }
 }
 
-/// Samples light leaving an emitter. `u_position` in [0,1)^4: x picks the emitter, y and z place the start, w picks the primitive of a mesh or the row of an environment map;
-/// `u_direction` in [0,1)². False when the sample carries no light; then `s` is not to be read.
+/// Samples light leaving an emitter. `u_position` in [0,1)^4: x picks the emitter, y and z place the start, w picks the
+/// primitive of a mesh or the row of an environment map; `u_direction` in [0,1)². False when the sample carries no
+/// light; then `s` is not to be read.
 template <Features F>
 AMBILUX_HD bool sample_emission(const SceneView& view, Vec4f u_position, Vec2f u_direction, EmissionSample& s) {
     if (view.emitter_count == 0) return false;

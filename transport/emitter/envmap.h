@@ -1,10 +1,12 @@
-// Environment map: radiance by a latitude-longitude image, importance sampled by a piecewise-constant density over the image.
+// Environment map: radiance by a latitude-longitude image, importance sampled by a piecewise-constant density over the
+// image.
 //
-// Mapping (Mitsuba 3's envmap): u = atan2(x, -z) / 2pi runs to the right, v = theta / pi from the top (+y) down. Columns are
-// periodic with centres at (i+0.5)/width; rows are spread from pole to pole, row j at v = j/(height-1).
-// Density: cells of 1/width by 1/height in (u,v), drawn from alias tables: a row, then a column in it (one table over all cells would leave no bits
-// of a random number for its threshold). That reads a few bytes that stay in the cache and 16 that do not; the density alone reads those 16. A cell's probability must be positive wherever the interpolated radiance in it is:
-// envmap_cell_weight gives weights that guarantee it.
+// Mapping (Mitsuba 3's envmap): u = atan2(x, -z) / 2pi runs to the right, v = theta / pi from the top (+y) down.
+// Columns are periodic with centres at (i+0.5)/width; rows are spread from pole to pole, row j at v = j/(height-1).
+// Density: cells of 1/width by 1/height in (u,v), drawn from alias tables: a row, then a column in it (one table over
+// all cells would leave no bits of a random number for its threshold). That reads a few bytes that stay in the cache
+// and 16 that do not; the density alone reads those 16. A cell's probability must be positive wherever the interpolated
+// radiance in it is: envmap_cell_weight gives weights that guarantee it.
 #pragma once
 
 #include "core/sampling.h"
@@ -37,8 +39,10 @@ AMBILUX_HD Rgb envmap_lookup(const SceneView& view, const Emitter& emitter, Vec2
     const float y = clamp(uv.y, 0.0f, 1.0f) * float(h - 1);
     const float fx = floorf(x), fy = floorf(y);
     const float wx = x - fx, wy = y - fy;
-    const uint32_t x0 = wrap_texel(int32_t(fx), w, WrapMode::repeat), x1 = wrap_texel(int32_t(fx) + 1, w, WrapMode::repeat);
-    const uint32_t y0 = wrap_texel(int32_t(fy), h, WrapMode::clamp), y1 = wrap_texel(int32_t(fy) + 1, h, WrapMode::clamp);
+    const uint32_t x0 = wrap_texel(int32_t(fx), w, WrapMode::repeat),
+                   x1 = wrap_texel(int32_t(fx) + 1, w, WrapMode::repeat);
+    const uint32_t y0 = wrap_texel(int32_t(fy), h, WrapMode::clamp),
+                   y1 = wrap_texel(int32_t(fy) + 1, h, WrapMode::clamp);
     const Rgb row0 = load_texel(view, texture, x0, y0) * (1.0f - wx) + load_texel(view, texture, x1, y0) * wx;
     const Rgb row1 = load_texel(view, texture, x0, y1) * (1.0f - wx) + load_texel(view, texture, x1, y1) * wx;
     return emitter.radiance.value * (row0 * (1.0f - wy) + row1 * wy);
@@ -49,8 +53,9 @@ AMBILUX_HD Rgb envmap_radiance(const SceneView& view, const Emitter& emitter, Ve
     return envmap_lookup(view, emitter, envmap_uv(emitter.to_local.vector(wi)));
 }
 
-/// Unnormalised probability of density cell (x,y): mean of luminance times sin(theta) over a 4x4 grid in the cell. The grid includes the corners: a texel
-/// reaches a cell from one side, so that the weight is positive wherever the interpolated radiance is.
+/// Unnormalised probability of density cell (x,y): mean of luminance times sin(theta) over a 4x4 grid in the cell. The
+/// grid includes the corners: a texel reaches a cell from one side, so that the weight is positive wherever the
+/// interpolated radiance is.
 AMBILUX_HD float envmap_cell_weight(const SceneView& view, const Emitter& emitter, uint32_t x, uint32_t y) {
     const Texture& texture = view.textures[emitter.radiance.texture];
     float sum = 0.0f;
@@ -65,7 +70,8 @@ AMBILUX_HD float envmap_cell_weight(const SceneView& view, const Emitter& emitte
 }
 
 /// Bucket of cell (x,y) in the alias tables: one aligned load.
-AMBILUX_HD EnvironmentCell load_environment_cell(const SceneView& view, const Emitter& emitter, uint32_t width, uint32_t x, uint32_t y) {
+AMBILUX_HD EnvironmentCell load_environment_cell(const SceneView& view, const Emitter& emitter, uint32_t width,
+                                                 uint32_t x, uint32_t y) {
     EnvironmentCell cell;
     memcpy(&cell, __builtin_assume_aligned(view.tables + emitter.env_cells + 4 * (uint64_t(y) * width + x), 16), 16);
     return cell;
@@ -82,10 +88,12 @@ AMBILUX_HD float envmap_pdf_to_sa(float pdf_uv, float sin_theta) {
     return sin_theta > 0.0f ? pdf_uv / (2.0f * kPi * kPi * sin_theta) : 0.0f;
 }
 
-/// Direction towards the map sampled by its density, and where in the image that is; the radiance is envmap_lookup there. `wi` unit, world space. `u` in
-/// [0,1)^3: x picks the column, z the row (each spends all of its 24 bits, so that density and sampling agree exactly), and the
-/// halves of y place the point in the cell, at one of 4096 by 4096 positions.
-AMBILUX_HD void envmap_sample_direction(const SceneView& view, const Emitter& emitter, Vec3f u, Vec3f& wi, Vec2f& uv, float& pdf_sa) {
+/// Direction towards the map sampled by its density, and where in the image that is; the radiance is envmap_lookup
+/// there. `wi` unit, world space. `u` in [0,1)^3: x picks the column, z the row (each spends all of its 24 bits, so
+/// that density and sampling agree exactly), and the halves of y place the point in the cell, at one of 4096 by 4096
+/// positions.
+AMBILUX_HD void envmap_sample_direction(const SceneView& view, const Emitter& emitter, Vec3f u, Vec3f& wi, Vec2f& uv,
+                                        float& pdf_sa) {
     const Texture& texture = view.textures[emitter.radiance.texture];
     const uint32_t row_ticket = ticket_of(u.z), ticket = ticket_of(u.x), place = ticket_of(u.y);
     uint32_t y = bucket_of(row_ticket, texture.height);
@@ -125,7 +133,8 @@ AMBILUX_HD float envmap_pdf_direction(const SceneView& view, const Emitter& emit
 }
 
 /// Fills in all but the radiance, which is envmap_lookup at `s.env_uv`.
-AMBILUX_HD bool envmap_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec3f u, EmitterSample& s) {
+AMBILUX_HD bool envmap_sample_direct(const SceneView& view, const Emitter& emitter, Vec3f reference_p, Vec3f u,
+                                     EmitterSample& s) {
     envmap_sample_direction(view, emitter, u, s.wi, s.env_uv, s.pdf_sa);
     s.pdf_sa *= emitter.pick_probability;
     place_at_infinity(view, reference_p, s);

@@ -1,5 +1,5 @@
-// Spot emitter: a cone of intensity around its axis, full inside of the beam width, from there falling linearly in the angle to zero at the
-// cutoff; optionally coloured by a projected texture (Mitsuba's spot).
+// Spot emitter: a cone of intensity around its axis, full inside of the beam width, from there falling linearly in the
+// angle to zero at the cutoff; optionally coloured by a projected texture (Mitsuba's spot).
 #pragma once
 
 #include "transport/emitter/point.h"

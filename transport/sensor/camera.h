@@ -1,7 +1,8 @@
 // Camera rays of perspective, thin lens and orthographic sensors (Mitsuba's models).
 //
-// Film positions are in pixels of the full film, origin at the top left, x to the right, y down. Camera space: +z is the view direction, +y up,
-// +x left in the image. A film position shifted by principal_offset·size sees what the centred camera would see there.
+// Film positions are in pixels of the full film, origin at the top left, x to the right, y down. Camera space: +z is
+// the view direction, +y up, +x left in the image. A film position shifted by principal_offset·size sees what the
+// centred camera would see there.
 #pragma once
 
 #include "core/sampling.h"
@@ -9,8 +10,9 @@
 
 namespace ambilux {
 
-/// Ray from the camera: `o` lies on the near plane, `d` is unit, and the ray ends at the far plane, `tmax` from `o`. Its radiance counts with
-/// weight 1 for a film position sampled by sample_film_position and a lens position uniform over the aperture.
+/// Ray from the camera: `o` lies on the near plane, `d` is unit, and the ray ends at the far plane, `tmax` from `o`.
+/// Its radiance counts with weight 1 for a film position sampled by sample_film_position and a lens position uniform
+/// over the aperture.
 struct CameraSample {
     Vec3f o, d;
     float tmax;
@@ -36,11 +38,13 @@ AMBILUX_HD Vec2f lens_point(const Sensor& sensor, Vec2f lens_u) {
     return square_to_disk(lens_u) * sensor.aperture_radius;
 }
 
-/// Ray through `film_position`, for a thin lens through the lens point of `lens_u`. The clip distances count along the view axis.
+/// Ray through `film_position`, for a thin lens through the lens point of `lens_u`. The clip distances count along the
+/// view axis.
 AMBILUX_HD CameraSample sample_camera_ray(const Sensor& sensor, Vec2f film_position, Vec2f lens_u) {
     const Vec2f c = film_to_camera(sensor, film_position);
     if (sensor.type == SensorType::orthographic)
-        return {sensor.to_world.point({c.x, c.y, sensor.near_clip}), normalize(sensor.to_world.vector({0.0f, 0.0f, 1.0f})),
+        return {sensor.to_world.point({c.x, c.y, sensor.near_clip}),
+                normalize(sensor.to_world.vector({0.0f, 0.0f, 1.0f})),
                 (sensor.far_clip - sensor.near_clip) * length(sensor.to_world.vector({0.0f, 0.0f, 1.0f}))};
     const Vec2f lens = lens_point(sensor, lens_u);
     const float focus = sensor.type == SensorType::thin_lens ? sensor.focus_distance : 1.0f;

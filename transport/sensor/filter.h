@@ -1,5 +1,6 @@
-// Reconstruction filters by importance sampling: a sample of a pixel is drawn with the filter's density around its centre and counts with weight 1,
-// so that pixels stay independent (Ernst et al. 2006, "Filter Importance Sampling"). Filters are separable and positive.
+// Reconstruction filters by importance sampling: a sample of a pixel is drawn with the filter's density around its
+// centre and counts with weight 1, so that pixels stay independent (Ernst et al. 2006, "Filter Importance Sampling").
+// Filters are separable and positive.
 #pragma once
 
 #include <vector>
@@ -23,8 +24,9 @@ AMBILUX_HD uint32_t filter_part(const float* table, float x) {
     return part < float(kFilterTableSize - 1) ? uint32_t(part) : kFilterTableSize - 1;
 }
 
-/// Density per pixel of sample_filter_table at offset `x`. The guide says from which entry on to look for that which holds x (Chen and Asmussen 1974, "On Generating Random Variates
-/// from an Empirical Distribution"): a step or two instead of ten of a binary search.
+/// Density per pixel of sample_filter_table at offset `x`. The guide says from which entry on to look for that which
+/// holds x (Chen and Asmussen 1974, "On Generating Random Variates from an Empirical Distribution"): a step or two
+/// instead of ten of a binary search.
 AMBILUX_HD float filter_table_pdf(const float* table, float x) {
     if (!(x >= table[0] && x < table[kFilterTableSize])) return 0.0f;
     uint32_t i = uint32_t(table[kFilterTableSize + 2 + filter_part(table, x)]);
@@ -38,13 +40,15 @@ AMBILUX_HD float filter_table_pdf(const float* table, float x) {
 
 }  // namespace detail
 
-/// Completes the table whose kFilterTableSize+1 offsets are the last of `tables`: appends the parts per pixel, and for each part the last entry below it, or the first of all.
+/// Completes the table whose kFilterTableSize+1 offsets are the last of `tables`: appends the parts per pixel, and for
+/// each part the last entry below it, or the first of all.
 inline void append_filter_guide(std::vector<float>& tables) {
     const size_t first = tables.size() - (kFilterTableSize + 1);
     tables.push_back(float(kFilterTableSize) / (tables.back() - tables[first]));
     uint32_t entry = 0;
     for (uint32_t part = 0; part < kFilterTableSize; ++part) {
-        while (entry < kFilterTableSize && detail::filter_part(tables.data() + first, tables[first + entry + 1]) < part) ++entry;
+        while (entry < kFilterTableSize && detail::filter_part(tables.data() + first, tables[first + entry + 1]) < part)
+            ++entry;
         tables.push_back(float(entry));
     }
 }
@@ -66,7 +70,10 @@ AMBILUX_HD void with_filter(const SceneView& view, Op op) {
     switch (view.sensor.filter) {
         case FilterType::box: return op([=](float x) { return x >= -r && x < r ? 0.5f * inv : 0.0f; });
         case FilterType::tent: return op([=](float x) { return max(1.0f - fabsf(x) * inv, 0.0f) * inv; });
-        default: return op([table = view.tables + view.sensor.filter_table](float x) { return detail::filter_table_pdf(table, x); });
+        default:
+            return op([table = view.tables + view.sensor.filter_table](float x) {
+                return detail::filter_table_pdf(table, x);
+            });
     }
 }
 AMBILUX_HD float filter_value_1d(const SceneView& view, float x) {
@@ -76,16 +83,21 @@ AMBILUX_HD float filter_value_1d(const SceneView& view, float x) {
 }
 
 /// Offset from the pixel's centre, in pixels, distributed as the filter.
-AMBILUX_HD Vec2f sample_filter_offset(const SceneView& view, Vec2f u) { return {sample_filter_1d(view, u.x), sample_filter_1d(view, u.y)}; }
+AMBILUX_HD Vec2f sample_filter_offset(const SceneView& view, Vec2f u) {
+    return {sample_filter_1d(view, u.x), sample_filter_1d(view, u.y)};
+}
 
-/// Value of the normalised filter at an offset from a pixel's centre (per square pixel): the density of sample_filter_offset, hence also the weight
-/// with which light that lands there counts for the pixel.
-AMBILUX_HD float filter_value(const SceneView& view, Vec2f offset) { return filter_value_1d(view, offset.x) * filter_value_1d(view, offset.y); }
+/// Value of the normalised filter at an offset from a pixel's centre (per square pixel): the density of
+/// sample_filter_offset, hence also the weight with which light that lands there counts for the pixel.
+AMBILUX_HD float filter_value(const SceneView& view, Vec2f offset) {
+    return filter_value_1d(view, offset.x) * filter_value_1d(view, offset.y);
+}
 
 /// Film position (pixels of the full film) of a sample of pixel (x,y) of the crop.
 AMBILUX_HD Vec2f sample_film_position(const SceneView& view, uint32_t pixel_x, uint32_t pixel_y, Vec2f u) {
     const Vec2f offset = sample_filter_offset(view, u);
-    return {float(view.sensor.crop_x + pixel_x) + 0.5f + offset.x, float(view.sensor.crop_y + pixel_y) + 0.5f + offset.y};
+    return {float(view.sensor.crop_x + pixel_x) + 0.5f + offset.x,
+            float(view.sensor.crop_y + pixel_y) + 0.5f + offset.y};
 }
 
 }  // namespace ambilux

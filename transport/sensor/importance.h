@@ -1,9 +1,11 @@
 // The camera as an emitter of importance, for light tracing and bidirectional connections.
 //
-// One normalisation throughout (PBRT 4th ed. section 16.1.1 divides by the area of the film, we by that of one pixel): film positions have density 1 per
-// pixel. So We integrates to 1 over the directions (and the lens) of each pixel, and the value of pixel j is
+// One normalisation throughout (PBRT 4th ed. section 16.1.1 divides by the area of the film, we by that of one pixel):
+// film positions have density 1 per pixel. So We integrates to 1 over the directions (and the lens) of each pixel, and
+// the value of pixel j is
 //   I_j = ∫ filter(film - centre_j) We L cos dA dw,
-// whatever the size of film and crop. Along every camera ray We cos = pdf_position · pdf_direction: radiance counts with weight 1.
+// whatever the size of film and crop. Along every camera ray We cos = pdf_position · pdf_direction: radiance counts
+// with weight 1.
 #pragma once
 
 #include "transport/sensor/camera.h"
@@ -12,14 +14,16 @@ namespace ambilux {
 
 /// The camera's position is one point (pinhole): no light path meets it by chance.
 AMBILUX_HD bool camera_delta_position(const Sensor& sensor) {
-    return sensor.type == SensorType::perspective || (sensor.type == SensorType::thin_lens && !(sensor.aperture_radius > 0.0f));
+    return sensor.type == SensorType::perspective ||
+           (sensor.type == SensorType::thin_lens && !(sensor.aperture_radius > 0.0f));
 }
 /// All rays are parallel.
 AMBILUX_HD bool camera_delta_direction(const Sensor& sensor) { return sensor.type == SensorType::orthographic; }
 
 /// Area of one pixel on the plane z = 1 of camera space, or (orthographic) in world units.
 AMBILUX_HD float camera_pixel_area(const Sensor& sensor) {
-    const float area = 4.0f * sensor.tan_half_fov.x * sensor.tan_half_fov.y / (float(sensor.film_width) * float(sensor.film_height));
+    const float area =
+        4.0f * sensor.tan_half_fov.x * sensor.tan_half_fov.y / (float(sensor.film_width) * float(sensor.film_height));
     if (sensor.type != SensorType::orthographic) return area;
     return area * length(cross(sensor.to_world.vector({1, 0, 0}), sensor.to_world.vector({0, 1, 0})));
 }
@@ -31,8 +35,9 @@ AMBILUX_HD float camera_pdf_position(const Sensor& sensor) {
     return 1.0f / (kPi * sqr(sensor.aperture_radius));
 }
 
-/// Density of the ray's direction per solid angle, given the lens point, at density 1 per pixel; 1 for parallel rays. `cos_camera`: cosine between
-/// direction and view axis. A pixel covers A cos³ of solid angle, for the pinhole and for any point of a thin lens alike.
+/// Density of the ray's direction per solid angle, given the lens point, at density 1 per pixel; 1 for parallel rays.
+/// `cos_camera`: cosine between direction and view axis. A pixel covers A cos³ of solid angle, for the pinhole and for
+/// any point of a thin lens alike.
 AMBILUX_HD float camera_pdf_direction_sa(const Sensor& sensor, float cos_camera) {
     if (camera_delta_direction(sensor)) return 1.0f;
     if (!(cos_camera > 0.0f)) return 0.0f;
@@ -48,12 +53,14 @@ AMBILUX_HD float camera_importance(const Sensor& sensor, float cos_camera) {
 
 /// World vector in camera space. The columns of to_world are orthogonal; they may be scaled.
 AMBILUX_HD Vec3f world_to_camera_vector(const Sensor& sensor, Vec3f v) {
-    const Vec3f x = sensor.to_world.vector({1, 0, 0}), y = sensor.to_world.vector({0, 1, 0}), z = sensor.to_world.vector({0, 0, 1});
+    const Vec3f x = sensor.to_world.vector({1, 0, 0}), y = sensor.to_world.vector({0, 1, 0}),
+                z = sensor.to_world.vector({0, 0, 1});
     return {dot(v, x) / length_squared(x), dot(v, y) / length_squared(y), dot(v, z) / length_squared(z)};
 }
 
-/// Film position at which point `p` is seen through lens point `lens` (camera space; see lens_point). False in front of the near plane and
-/// behind the far plane. The position may lie outside of the film: what counts is which pixels' filters reach it.
+/// Film position at which point `p` is seen through lens point `lens` (camera space; see lens_point). False in front of
+/// the near plane and behind the far plane. The position may lie outside of the film: what counts is which pixels'
+/// filters reach it.
 AMBILUX_HD bool project_to_film(const Sensor& sensor, Vec3f p, Vec2f lens, Vec2f& film_position) {
     const Vec3f origin = {sensor.to_world.m[0][3], sensor.to_world.m[1][3], sensor.to_world.m[2][3]};
     const Vec3f c = world_to_camera_vector(sensor, p - origin);
@@ -71,15 +78,17 @@ AMBILUX_HD bool project_to_film(const Sensor& sensor, Vec3f p, Vec2f lens, Vec2f
 
 /// Light from a scene point to the camera (the t = 1 strategy).
 struct CameraConnection {
-    Vec3f wi;                ///< unit, from the reference to the camera
-    float distance;          ///< along wi to the near plane: what lies beyond does not hide the reference
-    float camera_distance;   ///< along wi to the lens (orthographic: sensor plane z = 0)
-    Vec2f film_position;     ///< pixels of the full film, perhaps outside
-    float cos_camera;        ///< cosine between the ray and the view axis
-    float weight;            ///< We cos_camera / (distance² pdf_lens) (orthographic: We): times flux · f · |cos at the reference| = a splat's value
+    Vec3f wi;               ///< unit, from the reference to the camera
+    float distance;         ///< along wi to the near plane: what lies beyond does not hide the reference
+    float camera_distance;  ///< along wi to the lens (orthographic: sensor plane z = 0)
+    Vec2f film_position;    ///< pixels of the full film, perhaps outside
+    float cos_camera;       ///< cosine between the ray and the view axis
+    float weight;  ///< We cos_camera / (distance² pdf_lens) (orthographic: We): times flux · f · |cos at the reference|
+                   ///< = a splat's value
 };
 
-/// Connects `reference_p` with the camera, for a thin lens with the point of `lens_u`. False where the camera cannot see it.
+/// Connects `reference_p` with the camera, for a thin lens with the point of `lens_u`. False where the camera cannot
+/// see it.
 AMBILUX_HD bool connect_to_camera(const Sensor& sensor, Vec3f reference_p, Vec2f lens_u, CameraConnection& c) {
     const Vec2f lens = lens_point(sensor, lens_u);
     if (!project_to_film(sensor, reference_p, lens, c.film_position)) return false;

@@ -1,0 +1,143 @@
+// Compressed wide BVH (Ylitie, Karras, Laine 2017): the structure that CUDA kernels traverse, and a traversal that runs
+// anywhere.
+#pragma once
+
+#include <cstdint>
+#include <type_traits>
+#include <vector>
+
+#include "accel/cwbvh_node.h"
+#include "accel/opacity.h"
+#include "accel/quadric_intersect.h"
+#include "accel/traceable.h"
+#include "accel/triangle_test.h"
+
+namespace ambilux {
+
+struct Scene;
+struct Bvh2;
+
+/// Traces rays through a CWBVH, of a scene whose surfaces are all opaque unless F.opacity. Pointers are host or device
+/// memory.
+struct CwbvhTracer {
+    const CwbvhNode* nodes = nullptr;            ///< the root is nodes[0]; it has no children in an empty scene
+    const CwbvhPrimitive* primitives = nullptr;  ///< in the order of leaves
+
+    /// Nearest hit with 0 < t < ray.tmax; without one, hit.prim is kNone and the result is false.
+    template <Features F>
+    AMBILUX_HD bool closest(const SceneView& scene, const Ray& ray, Hit& hit) const {
+        return traverse<F>(scene, ray, std::false_type(), hit);
+    }
+
+    /// True if anything lies at 0 < t < ray.tmax.
+    template <Features F>
+    AMBILUX_HD bool occluded(const SceneView& scene, const Ray& ray) const {
+        Hit hit;
+        return traverse<F>(scene, ray, std::true_type(), hit);
+    }
+
+    /// Either of them by the same instructions, for lanes of a warp that ask for one and the other. With `any_hit`,
+    /// `hit` is any of those on the way.
+    template <Features F>
+    AMBILUX_HD bool trace(const SceneView& scene, const Ray& ray, bool any_hit, Hit& hit) const {
+        return traverse<F>(scene, ray, any_hit, hit);
+    }
+
+    /// Tests one entry of `primitives`; updates `hit` and returns true if the ray meets it at 0 < t < hit.t.
+    template <Features F>
+    AMBILUX_HD bool intersect_primitive(const SceneView& scene, const Ray& ray, const RayShear& shear, uint32_t index,
+                                        Hit& hit) const {
+        const CwbvhPrimitive p = detail::load_record(primitives + index);
+        if constexpr (F.has_quadrics()) {
+            if (!scene.is_triangle(p.template prim<F>())) {
+                const QuadricCrossings hits =
+                    quadric_crossings<F>(scene.quadric(p.template prim<F>()), ray.o, ray.d, hit.t);
+                for (int i = 0; i < hits.count; ++i) {
+                    if (!accepts<F>(scene, ray, p, hits.u[i], hits.v[i])) continue;
+                    hit = {hits.t[i], hits.u[i], hits.v[i], p.template prim<F>()};
+                    return true;
+                }
+                return false;
+            }
+        }
+        TriangleCrossing crossing;
+        const auto normal = [&] {
+            const Vec3f a = p.v1 - p.v0, b = p.v2 - p.v0;
+            return Vec3f{p.normal_x, p.normal_y, detail::difference_of_products(a.x, b.y, a.y, b.x)};
+        };
+        if (!intersect_triangle(ray.o, ray.d, shear, p.v0, p.v1, p.v2, hit.t, crossing, normal)) return false;
+        if (!accepts<F>(scene, ray, p, crossing.u, crossing.v)) return false;
+        hit = {crossing.t, crossing.u, crossing.v, p.template prim<F>()};
+        return true;
+    }
+
+private:
+    template <Features F>
+    AMBILUX_HD static bool accepts(const SceneView& scene, const Ray& ray, const CwbvhPrimitive& p, float u, float v) {
+        if constexpr (F.opacity) return !p.lets_pass() || accept_hit<F>(scene, ray, p.template prim<F>(), u, v);
+        return true;
+    }
+    /// `AnyHit`: a bool, or a constant.
+    template <Features F, class AnyHit>
+    AMBILUX_HD bool traverse(const SceneView& scene, const Ray& ray, AnyHit any_hit, Hit& hit) const {
+        hit = {ray.tmax, 0.0f, 0.0f, kNone};
+        if (!is_traceable(ray)) return false;
+        const CwbvhRay box_ray = make_cwbvh_ray(ray.o, ray.d);
+        const RayShear shear = make_ray_shear(ray.d);
+        CwbvhGroup stack[kCwbvhStackSize];
+        int top = 0;
+        CwbvhGroup group = {0, 0x80000000u};  // the root, as the only child of nobody
+        for (;;) {
+            const uint32_t index = take_child(group, box_ray.order);
+            if (group.hits & kCwbvhInnerBits) stack[top++] = group;
+            const CwbvhNode node = detail::load_record(nodes + index);
+            const uint32_t hits = child_hits(node, box_ray, hit.t);
+            group = inner_hits(node, hits, box_ray.order);
+            for (CwbvhLeaves leaves = leaf_hits(node, hits); leaves.hits;) {
+                const bool met = intersect_primitive<F>(scene, ray, shear, take_primitive(leaves), hit);
+                if (any_hit && met) return true;
+            }
+            if (!(group.hits & kCwbvhInnerBits)) {
+                if (top == 0) break;
+                group = stack[--top];
+            }
+        }
+        return hit.prim != kNone;
+    }
+};
+
+/// What a device needs: upload both arrays and make_tracer() from the copies.
+struct CwbvhArrays {
+    std::vector<CwbvhNode> nodes;
+    std::vector<CwbvhPrimitive> primitives;
+    uint32_t depth = 0;  ///< levels of nodes; at most kCwbvhStackSize
+    uint64_t bytes() const { return nodes.size() * sizeof(CwbvhNode) + primitives.size() * sizeof(CwbvhPrimitive); }
+};
+
+inline CwbvhTracer make_tracer(const CwbvhNode* nodes, const CwbvhPrimitive* primitives) { return {nodes, primitives}; }
+
+/// Primitive `prim` as leaves hold it.
+CwbvhPrimitive make_cwbvh_primitive(const SceneView& scene, uint32_t prim);
+
+/// Collapses a binary tree into a wide one of least expected cost (Ylitie et al. 2017, section 5.1), with children in
+/// the slots that make octant order the order along rays (section 3.2). Throws Error(device) if the tree is deeper than
+/// the traversal stack.
+CwbvhArrays collapse_bvh2(const SceneView& scene, const Bvh2& bvh);
+
+/// The structure over a scene, built on the host.
+class CwbvhAccel {
+public:
+    explicit CwbvhAccel(const Scene& scene);
+
+    CwbvhTracer tracer() const { return make_tracer(arrays_.nodes.data(), arrays_.primitives.data()); }
+    CwbvhTracer view() const { return tracer(); }
+    const CwbvhArrays& arrays() const { return arrays_; }
+    uint64_t memory_bytes() const { return arrays_.bytes(); }
+    double build_seconds() const { return build_seconds_; }
+
+private:
+    CwbvhArrays arrays_;
+    double build_seconds_ = 0;
+};
+
+}  // namespace ambilux

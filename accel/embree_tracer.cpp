@@ -1,0 +1,162 @@
+#include "accel/embree_tracer.h"
+
+#include <chrono>
+#include <cstring>
+#include <string>
+
+#include "accel/quadric_intersect.h"
+#include "core/error.h"
+#include "scene/primitive_bounds.h"
+
+namespace ambilux {
+
+struct EmbreeAccel::UserData {
+    SceneView view;
+    std::string error;
+};
+
+namespace {
+
+bool count_bytes(void* total, ssize_t bytes, bool) {
+    static_cast<std::atomic<int64_t>*>(total)->fetch_add(bytes, std::memory_order_relaxed);
+    return true;
+}
+
+[[noreturn]] void throw_embree_error(RTCDevice device, const char* what) {
+    throw Error(ExitCode::device, std::string("Embree: ") + what + " failed with error code " +
+                                      std::to_string(int(rtcGetDeviceError(device))));
+}
+
+const detail::EmbreeRayContext& ray_context(EmbreeQueryContext* base) {
+    return *reinterpret_cast<detail::EmbreeRayContext*>(base);
+}
+
+/// Rejects hits on surfaces that let this ray pass.
+void filter_triangle(const RTCFilterFunctionNArguments* args) {
+    const auto& context = ray_context(args->context);
+    if (!context.opacity || args->valid[0] != -1) return;
+    const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);  // N == 1: the layout is that of a single hit
+    if (!accept_hit<kAllFeatures>(*context.scene, *context.ray, hit->primID, hit->u, hit->v)) args->valid[0] = 0;
+}
+
+/// The same, and the triangle on whose plane the ray starts.
+void filter_occluder(const RTCFilterFunctionNArguments* args) {
+    if (args->valid[0] != -1) return;
+    const auto& context = ray_context(args->context);
+    const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
+    const SceneView& view = *context.scene;
+    const Triangle tri = view.triangles[hit->primID];
+    if (detail::starts_on(context.ray->o, view.vertices[tri.v0].p, view.vertices[tri.v1].p, view.vertices[tri.v2].p))
+        args->valid[0] = 0;
+    else
+        filter_triangle(args);
+}
+
+void bound_quadric(const RTCBoundsFunctionArguments* args) {
+    const auto& view = *static_cast<const SceneView*>(args->geometryUserPtr);
+    const Bounds3f b = quadric_bounds(view.quadrics[args->primID]);
+    args->bounds_o->lower_x = b.lower.x, args->bounds_o->lower_y = b.lower.y, args->bounds_o->lower_z = b.lower.z;
+    args->bounds_o->upper_x = b.upper.x, args->bounds_o->upper_y = b.upper.y, args->bounds_o->upper_z = b.upper.z;
+}
+
+/// First crossing that the ray does not pass; `upper` is exclusive.
+bool first_crossing(const detail::EmbreeRayContext& context, const SceneView& view, uint32_t index, float upper,
+                    float& t, float& u, float& v) {
+    const Ray& ray = *context.ray;
+    const QuadricCrossings hits = quadric_crossings<kAllFeatures>(view.quadrics[index], ray.o, ray.d, upper);
+    for (int i = 0; i < hits.count; ++i) {
+        if (context.opacity &&
+            !accept_hit<kAllFeatures>(*context.scene, ray, view.triangle_count + index, hits.u[i], hits.v[i]))
+            continue;
+        t = hits.t[i], u = hits.u[i], v = hits.v[i];
+        return true;
+    }
+    return false;
+}
+
+void intersect_quadric(const RTCIntersectFunctionNArguments* args) {
+    if (args->valid[0] != -1) return;
+    const auto& view = *static_cast<const SceneView*>(args->geometryUserPtr);
+    auto* query = reinterpret_cast<RTCRayHit*>(args->rayhit);
+    float t, u, v;
+    // Against the ray's tmax while nothing is hit, so that the bound is exclusive as for triangles.
+    const auto& context = ray_context(args->context);
+    const float upper = query->hit.geomID == RTC_INVALID_GEOMETRY_ID ? context.ray->tmax : query->ray.tfar;
+    if (!first_crossing(context, view, args->primID, upper, t, u, v)) return;
+    query->ray.tfar = t;
+    query->hit.u = u;
+    query->hit.v = v;
+    query->hit.primID = args->primID;
+    query->hit.geomID = args->geomID;
+    query->hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+}
+
+void occlude_quadric(const RTCOccludedFunctionNArguments* args) {
+    if (args->valid[0] != -1) return;
+    const auto& view = *static_cast<const SceneView*>(args->geometryUserPtr);
+    const auto& context = ray_context(args->context);
+    float t, u, v;
+    if (first_crossing(context, view, args->primID, context.ray->tmax, t, u, v))
+        reinterpret_cast<RTCRay*>(args->ray)->tfar = -kInfinity;
+}
+
+void attach(RTCScene scene, RTCGeometry geometry, unsigned int id) {
+    rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(scene, geometry, id);
+    rtcReleaseGeometry(geometry);
+}
+
+}  // namespace
+
+EmbreeAccel::EmbreeAccel(const Scene& scene)
+    : bytes_(std::make_unique<std::atomic<int64_t>>(0)), user_(std::make_unique<UserData>()),
+      triangle_count_(uint32_t(scene.triangles.size())) {
+    const auto start = std::chrono::steady_clock::now();
+    user_->view = scene.view();
+    device_ = rtcNewDevice(nullptr);
+    if (!device_) throw_embree_error(nullptr, "making a device");
+    rtcSetDeviceMemoryMonitorFunction(device_, count_bytes, bytes_.get());
+    scene_ = rtcNewScene(device_);
+    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
+
+    if (!scene.triangles.empty()) {
+        RTCGeometry mesh = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+        rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, scene.vertices.data(), 0,
+                                   sizeof(Vertex), scene.vertices.size());
+        rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, scene.triangles.data(), 0,
+                                   sizeof(Triangle), scene.triangles.size());
+        if (scene.features.opacity) rtcSetGeometryIntersectFilterFunction(mesh, filter_triangle);
+        rtcSetGeometryOccludedFilterFunction(mesh, filter_occluder);
+        attach(scene_, mesh, 0);
+    }
+    if (!scene.quadrics.empty()) {
+        RTCGeometry shapes = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
+        rtcSetGeometryUserPrimitiveCount(shapes, unsigned(scene.quadrics.size()));
+        rtcSetGeometryUserData(shapes, &user_->view);
+        rtcSetGeometryBoundsFunction(shapes, bound_quadric, nullptr);
+        rtcSetGeometryIntersectFunction(shapes, intersect_quadric);
+        rtcSetGeometryOccludedFunction(shapes, occlude_quadric);
+        attach(scene_, shapes, 1);
+    }
+    rtcCommitScene(scene_);
+    if (const RTCError error = rtcGetDeviceError(device_); error != RTC_ERROR_NONE)
+        throw Error(ExitCode::device,
+                    "Embree: building the structure failed with error code " + std::to_string(int(error)));
+    build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+EmbreeAccel::EmbreeAccel(EmbreeAccel&& other) noexcept
+    : bytes_(std::move(other.bytes_)), user_(std::move(other.user_)), device_(other.device_), scene_(other.scene_),
+      triangle_count_(other.triangle_count_), build_seconds_(other.build_seconds_) {
+    other.device_ = nullptr;
+    other.scene_ = nullptr;
+}
+
+EmbreeAccel::~EmbreeAccel() {
+    if (scene_) rtcReleaseScene(scene_);
+    if (device_) rtcReleaseDevice(device_);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,18 @@
+#include "accel/shared_accels.h"
+
+#include "accel/cwbvh.h"
+#include "accel/embree_tracer.h"
+
+namespace ambilux {
+
+template <>
+std::shared_ptr<const CwbvhAccel> SharedAccels::get() {
+    return once(cwbvh_, [&] { return std::make_shared<const CwbvhAccel>(scene_); });
+}
+
+template <>
+std::shared_ptr<const EmbreeAccel> SharedAccels::get() {
+    return once(embree_, [&] { return std::make_shared<const EmbreeAccel>(scene_); });
+}
+
+}  // namespace ambilux

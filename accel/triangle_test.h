@@ -1,0 +1,82 @@
+// Watertight ray-triangle test.
+#pragma once
+
+#include "accel/reciprocal.h"
+#include "scene/surface.h"
+
+namespace ambilux {
+
+/// Two rows of the shear that maps a ray to the z axis: row·(p - o) are the coordinates of p seen along the ray (Woop,
+/// Benthin, Wald 2013, section 3.1; the permutation of axes is folded into the rows, whose entries are 1, 0 and the
+/// shear itself).
+struct RayShear {
+    Vec3f x, y;
+};
+
+AMBILUX_HD RayShear make_ray_shear(Vec3f d) {
+    const Vec3f m = abs(d);
+    const bool x = m.x > m.y && m.x > m.z, y = !x && m.y > m.z, z = !x && !y;
+    // Selected rather than branched to: lanes of a warp need all three.
+    const float r = -ordinary_reciprocal(x ? d.x : y ? d.y : d.z);
+    const float first = (x ? d.y : y ? d.z : d.x) * r, second = (x ? d.z : y ? d.x : d.y) * r;
+    return {{x ? first : float(z), y ? first : float(x), z ? first : float(y)},
+            {x ? second : float(y), y ? second : float(z), z ? second : float(x)}};
+}
+
+/// Crossing of a ray and a triangle: distance and barycentrics of v1 and v2.
+struct TriangleCrossing {
+    float t, u, v;
+};
+
+namespace detail {
+
+/// Explicit fused operations: the value, and with it the answer on a shared edge, is the same in every triangle and on
+/// host and device.
+AMBILUX_HD float fused_dot(Vec3f a, Vec3f b) { return fmaf(a.x, b.x, fmaf(a.y, b.y, a.z * b.z)); }
+
+}  // namespace detail
+
+/// Height of the origin over the plane of triangle (v0,v1,v2) times |n| for a = v0 - o, zero if it is no more than the
+/// rounding of its distance; `n` is the normal, not unit.
+AMBILUX_HD float height_over_plane(Vec3f a, Vec3f n) {
+    const float height = detail::fused_dot(a, n);
+    return fabsf(height) > gamma_bound(6) * detail::fused_dot(abs(a), abs(n)) ? height : 0.0f;
+}
+
+/// True if the ray o + t d crosses triangle (v0,v1,v2) at 0 < t < tmax. A ray through an edge or a vertex meets at
+/// least one of the triangles that share it: each edge function has the exact sign for its projected end points, and
+/// zero counts as inside. An origin that lies on the triangle's plane within the rounding of the distance does not meet
+/// it. `normal()`: accurate_cross(v1 - v0, v2 - v0).
+template <class Normal>
+AMBILUX_HD bool intersect_triangle(Vec3f o, Vec3f d, const RayShear& shear, Vec3f v0, Vec3f v1, Vec3f v2, float tmax,
+                                   TriangleCrossing& hit, Normal normal) {
+    const Vec3f a = v0 - o, b = v1 - o, c = v2 - o;
+    const float ax = detail::fused_dot(a, shear.x), ay = detail::fused_dot(a, shear.y);
+    const float bx = detail::fused_dot(b, shear.x), by = detail::fused_dot(b, shear.y);
+    const float cx = detail::fused_dot(c, shear.x), cy = detail::fused_dot(c, shear.y);
+    const float u = detail::difference_of_products(cx, by, cy, bx);
+    const float v = detail::difference_of_products(ax, cy, ay, cx);
+    const float w = detail::difference_of_products(bx, ay, by, ax);
+    const float det = u + v + w;
+    // One branch for both: lanes of a warp rarely agree about any of them. The determinant must have a reciprocal.
+    if (((min(u, min(v, w)) < 0.0f) & (max(u, max(v, w)) > 0.0f)) | !(fabsf(det) >= 0x1p-126f)) return false;
+    // Distance along the ray from the plane. Unlike the interpolated depth it is exactly zero for origins on an
+    // axis-aligned triangle.
+    const Vec3f n = normal();
+    const float height = height_over_plane(a, n);
+    const float t = rounded_divide(height, detail::fused_dot(d, n));  // not a number for two zeros
+    if (!(t > 0.0f && t < tmax)) return false;
+    const float r = rounded_divide(1.0f, det);
+    hit.t = t;
+    hit.u = v * r;
+    hit.v = w * r;
+    return true;
+}
+
+AMBILUX_HD bool intersect_triangle(Vec3f o, Vec3f d, const RayShear& shear, Vec3f v0, Vec3f v1, Vec3f v2, float tmax,
+                                   TriangleCrossing& hit) {
+    return intersect_triangle(o, d, shear, v0, v1, v2, tmax, hit,
+                              [&] { return detail::accurate_cross(v1 - v0, v2 - v0); });
+}
+
+}  // namespace ambilux

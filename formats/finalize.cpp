@@ -1,0 +1,338 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "core/error.h"
+#include "core/half.h"
+#include "core/huge_pages.h"
+#include "formats/finalize.h"
+#include "scene/alias_table.h"
+#include "transport/sensor/filter.h"
+
+namespace ambilux {
+
+namespace {
+
+/// Appends the cumulative table of n weights, normalised: 0 ... 1. Returns their sum. All-zero weights count as equal
+/// ones.
+template <class Weight>
+double append_cdf(std::vector<float>& tables, size_t n, const Weight& weight) {
+    double total = 0;
+    for (size_t i = 0; i < n; ++i) total += weight(i);
+    double sum = 0;
+    tables.push_back(0.0f);
+    for (size_t i = 0; i < n; ++i) {
+        sum += total > 0 ? weight(i) : 1.0;
+        tables.push_back(i + 1 == n ? 1.0f : std::min(float(sum / (total > 0 ? total : double(n))), 1.0f));
+    }
+    return total;
+}
+
+double triangle_area(const Scene& scene, const Triangle& t) {
+    const Vec3f &a = scene.vertices[t.v0].p, &b = scene.vertices[t.v1].p, &c = scene.vertices[t.v2].p;
+    const double u[3] = {double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z},
+                 v[3] = {double(c.x) - a.x, double(c.y) - a.y, double(c.z) - a.z};
+    const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
+    return 0.5 * std::sqrt(x * x + y * y + z * z);
+}
+
+Vec3f column(const Affine& a, int i) { return {a.m[0][i], a.m[1][i], a.m[2][i]}; }
+
+double quadric_area(const Quadric& q) {
+    const Vec3f x = column(q.to_world, 0), y = column(q.to_world, 1), z = column(q.to_world, 2);
+    switch (q.type) {
+        case PrimitiveType::sphere: return 4 * M_PI * double(q.radius) * q.radius;
+        case PrimitiveType::disk: return M_PI * length(cross(x, y));
+        case PrimitiveType::cylinder: return 2 * M_PI * q.radius * length(z);
+        default: return 0;
+    }
+}
+
+void fill_areas(Scene& scene) {
+    for (Shape& shape : scene.shapes) {
+        double area = 0;
+        for (uint32_t i = 0; i < shape.primitive_count; ++i) {
+            const uint32_t prim = shape.first_primitive + i;
+            area += prim < scene.triangles.size() ? triangle_area(scene, scene.triangles[prim])
+                                                  : quadric_area(scene.quadrics[prim - scene.triangles.size()]);
+        }
+        shape.area = float(area);
+    }
+    for (Emitter& emitter : scene.emitters) {
+        if (emitter.type != EmitterType::area) continue;
+        const Shape& shape = scene.shapes[emitter.shape];
+        emitter.area_cdf = kNone;
+        if (shape.primitive_count < 2) continue;
+        emitter.area_cdf = uint32_t(scene.tables.size());
+        const auto triangle_area_of = [&](size_t i) {
+            return triangle_area(scene, scene.triangles[shape.first_primitive + i]);
+        };
+        append_cdf(scene.tables, shape.primitive_count, triangle_area_of);
+        // From the rounded table, not 1/area of the shape: that is what sampling does, and in meshes of many triangles
+        // the two differ.
+        for (size_t i = 0; i < shape.primitive_count; ++i) {
+            const float* cdf = scene.tables.data() + emitter.area_cdf + i;
+            const double share = double(cdf[1]) - cdf[0];
+            scene.tables.push_back(share > 0 ? float(share / triangle_area_of(i)) : 0.0f);
+        }
+    }
+}
+
+/// Smallest sphere around the centre of the bounding box that holds all surfaces and the camera.
+void fill_bounds(Scene& scene) {
+    Vec3f lo = splat(kInfinity), hi = splat(-kInfinity);
+    const auto grow = [&](Vec3f a, Vec3f b) { lo = min(lo, a), hi = max(hi, b); };
+    const Vec3f camera = column(scene.sensor.to_world, 3);
+    grow(camera, camera);
+    for (const Triangle& t : scene.triangles)
+        for (uint32_t v : {t.v0, t.v1, t.v2}) grow(scene.vertices[v].p, scene.vertices[v].p);
+    // Centre and half axes of a box around a quadric; a sphere about the origin holds it with radius `reach`.
+    const auto quadric_ball = [](const Quadric& q, Vec3f& center) {
+        center = column(q.to_world, 3);
+        if (q.type == PrimitiveType::sphere) return q.radius;
+        const float flat = length(Vec3f{length(column(q.to_world, 0)), length(column(q.to_world, 1)), 0});
+        if (q.type == PrimitiveType::disk) return std::min(flat, std::max(q.radius, 0.0f));
+        const Vec3f half = column(q.to_world, 2) * 0.5f;
+        center = center + half;
+        return sqrtf(q.radius * q.radius + length_squared(half));
+    };
+    for (const Quadric& q : scene.quadrics) {
+        Vec3f c;
+        const float r = quadric_ball(q, c);
+        grow(c - splat(r), c + splat(r));
+    }
+    const Vec3f center = (lo + hi) * 0.5f;
+    float radius = length(camera - center);
+    for (const Triangle& t : scene.triangles)
+        for (uint32_t v : {t.v0, t.v1, t.v2}) radius = max(radius, length(scene.vertices[v].p - center));
+    for (const Quadric& q : scene.quadrics) {
+        Vec3f c;
+        const float r = quadric_ball(q, c);
+        radius = max(radius, length(c - center) + r);
+    }
+    scene.bounds_center = center;
+    // A little larger against rounding; an empty scene gets a sphere of radius 1, so that distant emitters have
+    // something to aim at.
+    scene.bounds_radius = radius > 0 ? radius * (1 + 1e-5f) : 1.0f;
+}
+
+Rgb load_texel(const Scene& scene, const Texture& t, size_t i) {
+    if (t.format == TexelFormat::rgba32f) {
+        float c[4];
+        memcpy(c, scene.texels.data() + t.offset + i * 16, 16);
+        return {c[0], c[1], c[2]};
+    }
+    if (t.format == TexelFormat::rgba16f) {
+        const Vec4f c = load_half4(scene.texels.data() + t.offset + i * 8);
+        return {c.x, c.y, c.z};
+    }
+    const uint8_t* c = scene.texels.data() + t.offset + i * 4;
+    const float* decode = scene.tables.data() + t.decode_table;
+    return {decode[c[0]], decode[c[1]], decode[c[2]]};
+}
+
+/// Mean luminance of a colour over its texture.
+double mean_luminance(const Scene& scene, const ParamRgb& parameter) {
+    if (parameter.texture < 0) return luminance(parameter.value);
+    const Texture& t = scene.textures[size_t(parameter.texture)];
+    if (t.type == TextureType::checkerboard) return luminance(parameter.value * (t.color0 + t.color1)) / 2;
+    double sum = 0;
+    const size_t n = size_t(t.width) * t.height;
+    for (size_t i = 0; i < n; ++i) sum += luminance(parameter.value * load_texel(scene, t, i));
+    return sum / double(n);
+}
+
+/// Integral of a hat function (1 at 0, 0 at -1 and 1) up to x.
+double hat_integral(double x) {
+    x = std::clamp(x, -1.0, 1.0);
+    return x < 0 ? 0.5 * (1 + x) * (1 + x) : 1 - 0.5 * (1 - x) * (1 - x);
+}
+
+/// Appends the alias tables of an environment map (scene/view.h, Emitter) whose rows, and cells within each row, get
+/// these tickets.
+void append_environment_tables(Scene& scene, Emitter& emitter, size_t width, const std::vector<uint32_t>& row_tickets,
+                               const std::vector<uint32_t>& cell_tickets) {
+    std::vector<float>& tables = scene.tables;
+    // Records lie bitwise among the floats.
+    const size_t height = row_tickets.size(), rows_at = (tables.size() + 3) / 4 * 4,
+                 cells_at = (rows_at + 2 * height + 3) / 4 * 4;
+    tables.resize(cells_at + 4 * width * height);
+    emitter.env_rows = uint32_t(rows_at);
+    emitter.env_cells = uint32_t(cells_at);
+    const std::vector<AliasBucket> rows = make_alias_table(row_tickets);
+    memcpy(tables.data() + rows_at, rows.data(), rows.size() * sizeof rows[0]);
+    static_assert(sizeof(EnvironmentCell) == 16);
+    for (size_t y = 0; y < height; ++y) {
+        const uint32_t* tickets = cell_tickets.data() + y * width;
+        const double scale = double(row_tickets[y]) / kTickets * double(height) / kTickets * double(width);
+        const std::vector<AliasBucket> buckets = make_alias_table({tickets, tickets + width});
+        std::vector<EnvironmentCell> cells(width);
+        for (size_t x = 0; x < width; ++x)
+            cells[x] = {buckets[x].threshold, buckets[x].alias, float(scale * tickets[x]),
+                        float(scale * tickets[buckets[x].alias])};
+        memcpy(tables.data() + cells_at + 4 * y * width, cells.data(), width * sizeof cells[0]);
+    }
+}
+
+/// Density of an environment map over the cells of 1/width by 1/height in (u,v) (transport/emitter/envmap.h): the
+/// integral of the bilinear interpolant over the cell times the cell's solid angle. Along u, texel centres are cell
+/// centres: weights 1, 6, 1 over 8. Along v, texel rows lie at j/(height-1), so that the weights change from row to
+/// row; a row that barely reaches into a cell still gets 1/32, which bounds the ratio of radiance to density there. The
+/// density is zero only where the radiance is. Returns the mean luminance over the sphere.
+double fill_environment(Scene& scene, Emitter& emitter) {
+    const Texture t = scene.textures[size_t(emitter.radiance.texture)];
+    const int64_t w = t.width, h = t.height;
+    if (w > (1 << 20) || h > (1 << 20))
+        throw input_error(scene.path, 0, "environment maps are limited to 2^20 rows and columns");
+    std::vector<float> lum(size_t(w * h));
+    for (size_t i = 0; i < lum.size(); ++i)
+        lum[i] = std::max(0.0f, luminance(emitter.radiance.value * load_texel(scene, t, i)));
+
+    std::vector<double> row_means(size_t(h), 0.0), row_sums(size_t(h), 0.0);
+    for (size_t i = 0; i < lum.size(); ++i) row_means[i / size_t(w)] += lum[i] / double(w);
+    std::vector<uint32_t> cell_tickets(size_t(w * h));
+    std::vector<double> column_weights(static_cast<size_t>(w));
+    double mean = 0;
+    for (int64_t y = 0; y < h; ++y) {
+        // The cell in units of rows.
+        const double a = double(y) * double(h - 1) / double(h), b = double(y + 1) * double(h - 1) / double(h);
+        std::fill(column_weights.begin(), column_weights.end(), 0.0);
+        double exact_mean = 0;
+        for (int64_t r = std::max<int64_t>(y - 1, 0); r <= std::min(y + 1, h - 1); ++r) {
+            const double exact = h > 1 ? (hat_integral(b - double(r)) - hat_integral(a - double(r))) / (b - a) : 1.0;
+            if (!(exact > 0)) continue;
+            const double weight = std::max(exact, 1.0 / 32);
+            const float* row = &lum[size_t(r * w)];
+            exact_mean += exact * row_means[size_t(r)];
+            for (int64_t x = 0; x < w; ++x)
+                column_weights[size_t(x)] += weight * (row[(x + w - 1) % w] + 6.0 * row[x] + row[(x + 1) % w]) / 8;
+        }
+        const double solid_angle =
+            2 * M_PI / double(w) *
+            (std::cos(M_PI * double(y) / double(h)) - std::cos(M_PI * double(y + 1) / double(h)));
+        for (double c : column_weights) row_sums[size_t(y)] += solid_angle * c;
+        const std::vector<uint32_t> tickets = deal_tickets(column_weights);
+        std::copy(tickets.begin(), tickets.end(), cell_tickets.begin() + y * w);
+        mean += exact_mean * solid_angle * double(w) / (4 * M_PI);
+    }
+    append_environment_tables(scene, emitter, t.width, deal_tickets(row_sums), cell_tickets);
+    return mean;
+}
+
+/// Power of an emitter, luminance of watts.
+double emitter_power(Scene& scene, Emitter& e) {
+    const double disk = M_PI * double(scene.bounds_radius) * scene.bounds_radius;
+    switch (e.type) {
+        case EmitterType::area: return M_PI * scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
+        case EmitterType::point: return 4 * M_PI * mean_luminance(scene, e.radiance);
+        // Exact for a constant profile up to the beam width and about right for the falloff.
+        case EmitterType::spot:
+            return 2 * M_PI * (1 - 0.5 * (double(e.cos_cutoff) + e.cos_beam_width)) * mean_luminance(scene, e.radiance);
+        case EmitterType::directional: return disk * mean_luminance(scene, e.radiance);
+        case EmitterType::constant: return disk * 4 * M_PI * mean_luminance(scene, e.radiance);
+        case EmitterType::envmap: return disk * 4 * M_PI * fill_environment(scene, e);
+        default: return 0;
+    }
+}
+
+void fill_emitters(Scene& scene, LightPicking picking) {
+    std::vector<double> power;
+    double total = 0;
+    for (Emitter& e : scene.emitters) {
+        double p = emitter_power(scene, e);
+        if (!(p >= 0) || !std::isfinite(p))
+            throw input_error(scene.path, 0,
+                              "emitter " + std::to_string(power.size()) + " has a power that is not finite");
+        if (picking == LightPicking::uniform && p > 0) p = 1;
+        power.push_back(p);
+        total += p;
+    }
+    // No emitter that shines may vanish in the rounding of the table.
+    for (double& p : power)
+        if (p > 0) p = std::max(p, 1e-6 * total);
+    scene.emitter_cdf.clear();
+    append_cdf(scene.emitter_cdf, power.size(), [&](size_t i) { return power[i]; });
+    // The table's own steps, so that density and sampling agree to the last bit.
+    for (size_t i = 0; i < power.size(); ++i)
+        scene.emitters[i].pick_probability = scene.emitter_cdf[i + 1] - scene.emitter_cdf[i];
+}
+
+/// Cumulative distribution of the Gaussian reconstruction filter of radius r, exp(-x²/2σ²) - exp(-r²/2σ²) with r = 4σ,
+/// at x in [-r, r].
+double filter_cdf(double r, double x) {
+    const double sigma = r / 4, floor = std::exp(-r * r / (2 * sigma * sigma));
+    const auto integral = [&](double a) {
+        return sigma * std::sqrt(M_PI / 2) * std::erf(a / (sigma * std::sqrt(2.0))) - floor * a;
+    };
+    return 0.5 + 0.5 * integral(x) / integral(r);
+}
+
+void fill_filter_table(Scene& scene) {
+    Sensor& sensor = scene.sensor;
+    if (sensor.filter != FilterType::gaussian) return;
+    sensor.filter_table = uint32_t(scene.tables.size());
+    const double r = sensor.filter_radius;
+    for (uint32_t i = 0; i <= kFilterTableSize; ++i) {
+        const double p = double(i) / kFilterTableSize;
+        double lo = -r, hi = r;
+        for (int k = 0; k < 100; ++k) {
+            const double mid = 0.5 * (lo + hi);
+            (filter_cdf(r, mid) < p ? lo : hi) = mid;
+        }
+        scene.tables.push_back(
+            i == 0 ? float(-r)
+                   : (i == kFilterTableSize ? float(r) : (2 * i == kFilterTableSize ? 0.0f : float(0.5 * (lo + hi)))));
+    }
+    append_filter_guide(scene.tables);
+}
+
+void fill_sort_keys(Scene& scene) {
+    const SceneView view = scene.view();
+    scene.sort_keys.resize(view.primitive_count());
+    for (uint32_t prim = 0; prim < view.primitive_count(); ++prim)
+        scene.sort_keys[prim] = uint16_t(std::min(scene.shapes[view.shape_of(prim)].material, kMostSortKeys - 1));
+}
+
+void fill_features(Scene& scene) {
+    Features f;
+    const auto use = [&](int32_t texture) { f.textures |= texture >= 0; };
+    for (const Shape& shape : scene.shapes) {
+        if (shape.primitive_count == 0) continue;
+        const Material& m = scene.materials[shape.material];
+        use(m.opacity.texture);
+        f.opacity |= m.lets_pass();
+        for (uint32_t index : {m.front, m.back}) {
+            const BsdfRecord& b = scene.bsdfs[index];
+            f.bsdfs |= bit(b.type);
+            for (int32_t texture : {b.reflectance.texture, b.specular_reflectance.texture,
+                                    b.specular_transmittance.texture, b.alpha_u.texture, b.alpha_v.texture})
+                use(texture);
+            f.bumps |= b.normal_map >= 0 || b.bump_map >= 0;
+        }
+        const uint32_t first = shape.first_primitive;
+        f.primitives |= bit(first < scene.triangles.size() ? PrimitiveType::triangle
+                                                           : scene.quadrics[first - scene.triangles.size()].type);
+    }
+    for (const Emitter& e : scene.emitters) {
+        f.emitters |= bit(e.type);
+        if (e.type != EmitterType::envmap) use(e.radiance.texture);  // an environment map has its own lookup
+    }
+    scene.features = f;
+}
+
+}  // namespace
+
+void finalize_scene(Scene& scene, LightPicking light_picking) {
+    fill_areas(scene);
+    fill_bounds(scene);
+    fill_emitters(scene, light_picking);
+    fill_filter_table(scene);
+    fill_features(scene);
+    fill_sort_keys(scene);
+    if (scene.tables.size() >= kNone) throw input_error(scene.path, 0, "the scene's tables are too large");
+    // What rays read here and there.
+    const auto large_pages = [](const auto& array) { use_huge_pages(array.data(), array.size() * sizeof array[0]); };
+    large_pages(scene.texels), large_pages(scene.tables), large_pages(scene.triangles), large_pages(scene.vertices);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,26 @@
+// Reading images from files.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/vec.h"
+
+namespace ambilux {
+
+/// Image with RGBA texels, row 0 at the top. 8-bit files keep their bytes, as stored (not linearised); all others are
+/// floats. Files with one or two channels are spread to grey; missing alpha is 1.
+struct Image {
+    uint32_t width = 0, height = 0;
+    bool is_8bit = false;
+    bool is_linear = false;      ///< EXR and HDR; otherwise values are sRGB-encoded unless the scene says different
+    std::vector<uint8_t> bytes;  ///< 4 per texel if is_8bit
+    std::vector<float> floats;   ///< 4 per texel otherwise
+};
+
+/// Decodes png, jpg, tga, bmp, hdr (stb_image) or exr (OpenEXR: channels R G B A or Y, data window). The format follows
+/// from the content. Throws Error(bad_input) with `path`.
+Image read_image(const std::string& path, std::string_view bytes);
+
+}  // namespace ambilux

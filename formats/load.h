@@ -1,0 +1,23 @@
+// Scene files: text and bytes in, a finished scene out.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "formats/finalize.h"
+
+namespace ambilux {
+
+/// Options of the loader.
+struct LoadOptions {
+    bool lenient = false;            ///< replace what is not known, and list each substitution, instead of refusing it
+    uint32_t width = 0, height = 0;  ///< nonzero: replaces the film size (a crop is scaled with it)
+    LightPicking light_picking = LightPicking::power;
+    std::vector<std::pair<std::string, std::string>> parameters;  ///< values of $parameters, over the file's defaults
+};
+
+/// Loads a Mitsuba XML scene (formats 0.5, 0.6, 2.x and 3.x). Throws Error(bad_input) with file and line.
+Scene load_mitsuba(const std::string& path, const LoadOptions& options = {});
+
+}  // namespace ambilux

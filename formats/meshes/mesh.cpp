@@ -1,0 +1,95 @@
+#include "formats/meshes/mesh.h"
+
+#include <cstdio>
+#include <memory>
+
+#include "core/error.h"
+#include "core/math.h"
+
+namespace ambilux {
+
+std::string read_file_bytes(const std::string& path) {
+    const std::unique_ptr<FILE, int (*)(FILE*)> file(fopen(path.c_str(), "rb"), fclose);
+    if (!file) throw input_error(path, 0, "cannot open file");
+    std::string bytes;
+    if (fseek(file.get(), 0, SEEK_END) == 0) {
+        const long size = ftell(file.get());
+        rewind(file.get());
+        if (size > 0 && size < (1L << 40)) bytes.resize(size_t(size));
+    }
+    // A directory opens but cannot be read.
+    if (fread(bytes.data(), 1, bytes.size(), file.get()) != bytes.size())
+        throw input_error(path, 0, "cannot read file");
+    if (fgetc(file.get()) != EOF || ferror(file.get())) throw input_error(path, 0, "cannot read file");
+    return bytes;
+}
+
+Mesh make_rectangle() {
+    Mesh mesh;
+    mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+    mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    mesh.faces = {{0, 1, 2}, {0, 2, 3}};
+    return mesh;
+}
+
+Mesh make_cube() {
+    // Origin (uv = 0,0) and the directions of u and v of each face, as observed in Mitsuba; cross(u,v) is the inward
+    // normal.
+    struct Face {
+        Vec3f origin, u, v;
+    };
+    const Face faces[6] = {
+        {{-1, -1, -1}, {0, 0, 1}, {1, 0, 0}}, {{1, 1, 1}, {-1, 0, 0}, {0, 0, -1}},
+        {{1, -1, 1}, {0, 1, 0}, {0, 0, -1}},  {{-1, -1, 1}, {0, 1, 0}, {1, 0, 0}},
+        {{-1, -1, -1}, {0, 1, 0}, {0, 0, 1}}, {{-1, 1, -1}, {0, -1, 0}, {1, 0, 0}},
+    };
+    const Vec2f corner[4] = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+    Mesh mesh;
+    for (const Face& face : faces) {
+        const uint32_t first = uint32_t(mesh.positions.size());
+        for (Vec2f uv : corner) {
+            mesh.positions.push_back(face.origin + face.u * (2 * uv.x) + face.v * (2 * uv.y));
+            mesh.uvs.push_back(uv);
+        }
+        mesh.faces.push_back({first, first + 1, first + 2});
+        mesh.faces.push_back({first, first + 2, first + 3});
+    }
+    return mesh;
+}
+
+std::vector<Vec3f> smooth_normals(const Mesh& mesh) {
+    std::vector<Vec3f> sums(mesh.positions.size(), Vec3f{0, 0, 0});
+    for (const auto& face : mesh.faces) {
+        const Vec3f p[3] = {mesh.positions[face[0]], mesh.positions[face[1]], mesh.positions[face[2]]};
+        const Vec3f n = cross(p[1] - p[0], p[2] - p[0]);
+        if (!(length_squared(n) > 0)) continue;
+        const Vec3f unit = normalize(n);
+        for (int i = 0; i < 3; ++i) {
+            const Vec3f a = p[(i + 1) % 3] - p[i], b = p[(i + 2) % 3] - p[i];
+            sums[face[i]] += unit * atan2f(length(cross(a, b)), dot(a, b));
+        }
+    }
+    for (Vec3f& n : sums)
+        if (length_squared(n) > 0) n = normalize(n);
+    return sums;
+}
+
+void check_mesh(const std::string& path, const Mesh& mesh) {
+    for (size_t i = 0; i < mesh.positions.size(); ++i)
+        if (!is_finite(mesh.positions[i]))
+            throw input_error(path, 0, "position of vertex " + std::to_string(i) + " is not finite");
+    for (size_t i = 0; i < mesh.normals.size(); ++i)
+        if (!is_finite(mesh.normals[i]))
+            throw input_error(path, 0, "normal of vertex " + std::to_string(i) + " is not finite");
+    for (size_t i = 0; i < mesh.uvs.size(); ++i)
+        if (!is_finite(Vec3f{mesh.uvs[i].x, mesh.uvs[i].y, 0}))
+            throw input_error(path, 0, "texture coordinate of vertex " + std::to_string(i) + " is not finite");
+    for (size_t i = 0; i < mesh.faces.size(); ++i)
+        for (uint32_t v : mesh.faces[i])
+            if (v >= mesh.positions.size())
+                throw input_error(path, 0,
+                                  "face " + std::to_string(i) + " refers to vertex " + std::to_string(v) + " of " +
+                                      std::to_string(mesh.positions.size()));
+}
+
+}  // namespace ambilux

@@ -1,0 +1,48 @@
+// Triangle meshes in object space, and the readers of mesh files.
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/vec.h"
+
+namespace ambilux {
+
+/// Indexed triangles. `normals` and `uvs` hold one entry per vertex, or none at all. Normals need not be unit.
+struct Mesh {
+    std::vector<Vec3f> positions, normals;
+    std::vector<Vec2f> uvs;
+    std::vector<std::array<uint32_t, 3>> faces;
+};
+
+/// Whole file as bytes; Error(bad_input) that names it if it cannot be read.
+std::string read_file_bytes(const std::string& path);
+
+/// Wavefront OBJ: v, vt, vn and f with positive or negative indices and any number of corners (cut into a fan).
+/// Vertices with the same triple of indices are shared. Other statements are skipped. `flip_v`: v becomes 1-v
+/// (Mitsuba's flip_tex_coords). `path` is for messages.
+Mesh read_obj(const std::string& path, std::string_view text, bool flip_v);
+
+/// Stanford PLY, ascii or binary of either byte order. Vertex properties x y z, nx ny nz, and u v (also s t, texture_u
+/// texture_v); faces with three or more corners. Other properties and elements are skipped.
+Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v);
+
+/// Mitsuba's .serialized format, version 3 or 4; `shape_index` picks one of the meshes in the file.
+Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_index, bool flip_v);
+
+/// Two triangles that span [-1,1]² at z = 0, normal +z, uv in [0,1]².
+Mesh make_rectangle();
+
+/// The cube [-1,1]³, normals outwards, each face with uv in [0,1]², oriented as in Mitsuba's `cube`.
+Mesh make_cube();
+
+/// Vertex normals as means of the adjacent faces' normals, weighted by the angle at the vertex (Thürmer and Wüthrich
+/// 1998). Vertices without a proper face get (0,0,0).
+std::vector<Vec3f> smooth_normals(const Mesh& mesh);
+
+/// Throws Error(bad_input) if a coordinate is not finite or an index is out of range.
+void check_mesh(const std::string& path, const Mesh& mesh);
+
+}  // namespace ambilux

@@ -1,0 +1,235 @@
+#include <bit>
+#include <cstring>
+
+#include "core/error.h"
+#include "formats/meshes/mesh.h"
+#include "formats/meshes/text_cursor.h"
+
+namespace ambilux {
+
+namespace {
+
+enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
+enum class Encoding { ascii, little_endian, big_endian };
+
+/// What a property of the vertex element means to us.
+enum class Role { skip, x, y, z, nx, ny, nz, u, v };
+
+struct Property {
+    std::string name;
+    Scalar type;
+    bool list = false;
+    Scalar count_type = Scalar::uint8;
+    Role role = Role::skip;
+};
+
+struct Element {
+    std::string name;
+    uint64_t count = 0;
+    std::vector<Property> properties;
+};
+
+bool scalar_named(std::string_view name, Scalar& type) {
+    struct Name {
+        const char* text;
+        Scalar type;
+    };
+    static constexpr Name names[] = {
+        {"char", Scalar::int8},      {"int8", Scalar::int8},       {"uchar", Scalar::uint8},
+        {"uint8", Scalar::uint8},    {"short", Scalar::int16},     {"int16", Scalar::int16},
+        {"ushort", Scalar::uint16},  {"uint16", Scalar::uint16},   {"int", Scalar::int32},
+        {"int32", Scalar::int32},    {"uint", Scalar::uint32},     {"uint32", Scalar::uint32},
+        {"float", Scalar::float32},  {"float32", Scalar::float32}, {"double", Scalar::float64},
+        {"float64", Scalar::float64}};
+    for (const Name& n : names)
+        if (name == n.text) {
+            type = n.type;
+            return true;
+        }
+    return false;
+}
+
+Role role_named(std::string_view name) {
+    if (name == "x") return Role::x;
+    if (name == "y") return Role::y;
+    if (name == "z") return Role::z;
+    if (name == "nx") return Role::nx;
+    if (name == "ny") return Role::ny;
+    if (name == "nz") return Role::nz;
+    if (name == "u" || name == "s" || name == "texture_u") return Role::u;
+    if (name == "v" || name == "t" || name == "texture_v") return Role::v;
+    return Role::skip;
+}
+
+struct PlyReader {
+    const std::string& path;
+    TextCursor text;
+    Encoding encoding = Encoding::ascii;
+
+    [[noreturn]] void fail(const std::string& message) const {
+        throw input_error(path, encoding == Encoding::ascii ? text.line : 0, message);
+    }
+
+    template <class T>
+    double binary() {
+        if (size_t(text.end - text.at) < sizeof(T)) fail("file ends too early");
+        unsigned char bytes[sizeof(T)];
+        memcpy(bytes, text.at, sizeof(T));
+        text.at += sizeof(T);
+        if ((encoding == Encoding::big_endian) == (std::endian::native == std::endian::little))
+            for (size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(bytes[i], bytes[sizeof(T) - 1 - i]);
+        T value;
+        memcpy(&value, bytes, sizeof(T));
+        return double(value);
+    }
+
+    double value(Scalar type) {
+        if (encoding == Encoding::ascii) {
+            text.skip_space();
+            double number = 0;
+            if (text.done()) fail("file ends too early");
+            if (!text.number(number)) fail("expected a number");
+            return number;
+        }
+        switch (type) {
+            case Scalar::int8: return binary<int8_t>();
+            case Scalar::uint8: return binary<uint8_t>();
+            case Scalar::int16: return binary<int16_t>();
+            case Scalar::uint16: return binary<uint16_t>();
+            case Scalar::int32: return binary<int32_t>();
+            case Scalar::uint32: return binary<uint32_t>();
+            case Scalar::float32: return binary<float>();
+            case Scalar::float64: return binary<double>();
+        }
+        return 0;
+    }
+
+    uint32_t index(Scalar type) {
+        const double number = value(type);
+        if (!(number >= 0 && number < 4294967295.0))
+            fail("vertex index " + std::to_string(int64_t(number)) + " is out of range");
+        return uint32_t(number);
+    }
+};
+
+std::vector<Element> read_header(PlyReader& in) {
+    TextCursor& text = in.text;
+    if (text.word() != "ply") in.fail("not a PLY file (no 'ply' in the first line)");
+    text.next_line();
+    std::vector<Element> elements;
+    bool has_format = false;
+    Encoding encoding = Encoding::ascii;
+    for (;; text.next_line()) {
+        if (text.done()) in.fail("header has no end_header");
+        const std::string_view keyword = text.word();
+        if (keyword == "end_header") break;
+        if (keyword == "format") {
+            const std::string_view name = text.word();
+            if (name == "ascii")
+                encoding = Encoding::ascii;
+            else if (name == "binary_little_endian")
+                encoding = Encoding::little_endian;
+            else if (name == "binary_big_endian")
+                encoding = Encoding::big_endian;
+            else
+                in.fail("unknown format '" + std::string(name) + "'");
+            has_format = true;
+        } else if (keyword == "element") {
+            Element element;
+            element.name = text.word();
+            text.skip_blanks();
+            if (!text.number(element.count)) in.fail("expected a count for element '" + element.name + "'");
+            elements.push_back(element);
+        } else if (keyword == "property") {
+            if (elements.empty()) in.fail("property before any element");
+            Property property;
+            std::string_view type = text.word();
+            if (type == "list") {
+                property.list = true;
+                const std::string_view count_type = text.word();
+                if (!scalar_named(count_type, property.count_type))
+                    in.fail("unknown type '" + std::string(count_type) + "'");
+                type = text.word();
+            }
+            if (!scalar_named(type, property.type)) in.fail("unknown type '" + std::string(type) + "'");
+            property.name = text.word();
+            if (elements.back().name == "vertex" && !property.list) property.role = role_named(property.name);
+            elements.back().properties.push_back(property);
+        } else if (keyword != "comment" && keyword != "obj_info" && !keyword.empty()) {
+            in.fail("unknown header statement '" + std::string(keyword) + "'");
+        }
+    }
+    if (!has_format) in.fail("header has no format");
+    text.next_line();
+    in.encoding = encoding;
+    return elements;
+}
+
+bool has_role(const Element& element, Role role) {
+    for (const Property& p : element.properties)
+        if (p.role == role) return true;
+    return false;
+}
+
+}  // namespace
+
+Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v) {
+    PlyReader in{path, TextCursor(bytes)};
+    const std::vector<Element> elements = read_header(in);
+    Mesh mesh;
+    bool has_vertices = false, has_faces = false;
+    for (const Element& element : elements) {
+        // Every entry takes at least one byte, so that a count beyond the file's size is wrong and must not be
+        // allocated.
+        if (element.count > bytes.size())
+            in.fail("element '" + element.name + "' claims " + std::to_string(element.count) +
+                    " entries, more than the file holds");
+        const bool vertices = element.name == "vertex", faces = element.name == "face";
+        bool normals = false, uvs = false;
+        if (vertices) {
+            has_vertices = true;
+            if (!has_role(element, Role::x) || !has_role(element, Role::y) || !has_role(element, Role::z))
+                in.fail("vertices have no x, y, z");
+            normals = has_role(element, Role::nx) && has_role(element, Role::ny) && has_role(element, Role::nz);
+            uvs = has_role(element, Role::u) && has_role(element, Role::v);
+            mesh.positions.reserve(element.count);
+        }
+        for (uint64_t i = 0; i < element.count; ++i) {
+            float vertex[9] = {};
+            std::vector<uint32_t> polygon;
+            for (const Property& property : element.properties) {
+                if (property.list) {
+                    const uint32_t count = in.index(property.count_type);
+                    const bool corners =
+                        faces && (property.name == "vertex_indices" || property.name == "vertex_index");
+                    if (corners) has_faces = true;
+                    for (uint32_t k = 0; k < count; ++k) {
+                        if (corners)
+                            polygon.push_back(in.index(property.type));
+                        else
+                            in.value(property.type);
+                    }
+                } else {
+                    vertex[int(property.role)] = float(in.value(property.type));
+                }
+            }
+            if (vertices) {
+                mesh.positions.push_back({vertex[int(Role::x)], vertex[int(Role::y)], vertex[int(Role::z)]});
+                if (normals)
+                    mesh.normals.push_back({vertex[int(Role::nx)], vertex[int(Role::ny)], vertex[int(Role::nz)]});
+                const float v = vertex[int(Role::v)];
+                if (uvs) mesh.uvs.push_back({vertex[int(Role::u)], flip_v ? 1 - v : v});
+            } else if (faces) {
+                if (polygon.size() < 3) in.fail("face " + std::to_string(i) + " has fewer than three corners");
+                for (size_t k = 2; k < polygon.size(); ++k)
+                    mesh.faces.push_back({polygon[0], polygon[k - 1], polygon[k]});
+            }
+        }
+    }
+    if (!has_vertices) in.fail("no element 'vertex'");
+    if (!has_faces) in.fail("no faces with vertex_indices");
+    check_mesh(path, mesh);
+    return mesh;
+}
+
+}  // namespace ambilux

@@ -1,0 +1,135 @@
+// Layout (Mitsuba 0.6 documentation, section 8.2.10): u16 0x041C, u16 version, then one deflated stream per mesh: u32
+// flags, (v4) zero-terminated name, u64 vertices, u64 triangles, positions, normals, texture coordinates, colours,
+// indices. At the end of the file the offset of each mesh (u64 in version 4, u32 in version 3) and their number (u32).
+// Little endian.
+#include <zlib.h>
+
+#include <bit>
+#include <cstring>
+
+#include "core/error.h"
+#include "formats/meshes/mesh.h"
+
+namespace ambilux {
+
+static_assert(std::endian::native == std::endian::little, "the reader copies little-endian values as they are");
+
+namespace {
+
+enum Flags : uint32_t { kNormals = 0x0001, kTexcoords = 0x0002, kColors = 0x0008, kDoublePrecision = 0x2000 };
+
+/// Inflates a stream piece by piece.
+struct Inflater {
+    const std::string& path;
+    z_stream stream{};
+
+    Inflater(const std::string& file, std::string_view bytes) : path(file) {
+        stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+        stream.avail_in = uInt(bytes.size());
+        if (inflateInit(&stream) != Z_OK) throw input_error(path, 0, "cannot start zlib");
+    }
+    ~Inflater() { inflateEnd(&stream); }
+    Inflater(const Inflater&) = delete;
+
+    void read(void* data, size_t size) {
+        auto* out = static_cast<Bytef*>(data);
+        while (size > 0) {
+            const uInt chunk = uInt(std::min<size_t>(size, 1u << 30));
+            stream.next_out = out;
+            stream.avail_out = chunk;
+            const int status = inflate(&stream, Z_SYNC_FLUSH);
+            const size_t got = chunk - stream.avail_out;
+            out += got;
+            size -= got;
+            if (status == Z_STREAM_END && size > 0) throw input_error(path, 0, "mesh data ends too early");
+            if (status != Z_OK && status != Z_STREAM_END)
+                throw input_error(
+                    path, 0,
+                    std::string("mesh data is damaged (zlib: ") + (stream.msg ? stream.msg : "no progress") + ")");
+            if (got == 0 && size > 0) throw input_error(path, 0, "mesh data ends too early");
+        }
+    }
+    template <class T>
+    T value() {
+        T v;
+        read(&v, sizeof v);
+        return v;
+    }
+    /// `count` floats, which the file may store as doubles.
+    std::vector<float> floats(size_t count, bool doubles) {
+        std::vector<float> values(count);
+        if (!doubles) {
+            read(values.data(), count * sizeof(float));
+            return values;
+        }
+        std::vector<double> wide(count);
+        read(wide.data(), count * sizeof(double));
+        for (size_t i = 0; i < count; ++i) values[i] = float(wide[i]);
+        return values;
+    }
+};
+
+template <class T>
+T load(const std::string& path, std::string_view bytes, size_t offset) {
+    if (offset + sizeof(T) > bytes.size()) throw input_error(path, 0, "file ends too early");
+    T value;
+    memcpy(&value, bytes.data() + offset, sizeof value);
+    return value;
+}
+
+}  // namespace
+
+Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_index, bool flip_v) {
+    if (load<uint16_t>(path, bytes, 0) != 0x041C) throw input_error(path, 0, "not a Mitsuba serialized mesh");
+    const uint16_t version = load<uint16_t>(path, bytes, 2);
+    if (version != 3 && version != 4)
+        throw input_error(path, 0, "unknown version " + std::to_string(version) + " of the serialized format");
+    if (bytes.size() < 8) throw input_error(path, 0, "file ends too early");
+
+    const uint32_t count = load<uint32_t>(path, bytes, bytes.size() - 4);
+    if (shape_index < 0 || uint32_t(shape_index) >= count)
+        throw input_error(path, 0,
+                          "shape_index " + std::to_string(shape_index) + " is out of range (the file has " +
+                              std::to_string(count) + " meshes)");
+    size_t offset = 0;
+    if (shape_index > 0) {
+        const size_t entry = version == 4 ? 8 : 4, back = entry * (count - uint32_t(shape_index)) + 4;
+        if (back > bytes.size()) throw input_error(path, 0, "the table of meshes is damaged");
+        offset = version == 4 ? load<uint64_t>(path, bytes, bytes.size() - back)
+                              : load<uint32_t>(path, bytes, bytes.size() - back);
+    }
+    if (offset + 4 >= bytes.size() || offset + 4 < offset) throw input_error(path, 0, "the table of meshes is damaged");
+
+    Inflater in(path, bytes.substr(offset + 4));
+    const uint32_t flags = in.value<uint32_t>();
+    if (version == 4)
+        while (in.value<char>() != 0) {}
+    const uint64_t vertices = in.value<uint64_t>(), triangles = in.value<uint64_t>();
+    // Deflate packs at most 1032:1, so larger claims are wrong and must not be allocated.
+    if (vertices > bytes.size() * 1032 / 12 || triangles > bytes.size() * 1032 / 12)
+        throw input_error(path, 0, "mesh claims more data than the file holds");
+
+    const bool doubles = flags & kDoublePrecision;
+    const auto vectors = [&] {
+        const std::vector<float> values = in.floats(vertices * 3, doubles);
+        std::vector<Vec3f> result(vertices);
+        for (size_t i = 0; i < vertices; ++i) result[i] = {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
+        return result;
+    };
+    Mesh mesh;
+    mesh.positions = vectors();
+    if (flags & kNormals) mesh.normals = vectors();
+    if (flags & kTexcoords) {
+        const std::vector<float> values = in.floats(vertices * 2, doubles);
+        mesh.uvs.resize(vertices);
+        for (size_t i = 0; i < vertices; ++i)
+            mesh.uvs[i] = {values[2 * i], flip_v ? 1 - values[2 * i + 1] : values[2 * i + 1]};
+    }
+    if (flags & kColors) vectors();
+    mesh.faces.resize(triangles);
+    in.read(mesh.faces.data(), triangles * 12);
+    check_mesh(path, mesh);
+    return mesh;
+}
+
+}  // namespace ambilux

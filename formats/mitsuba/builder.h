@@ -1,0 +1,119 @@
+// Turns the tree of objects into a Scene. One file per kind of object; this is what they share.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/sha256.h"
+#include "formats/load.h"
+#include "formats/mitsuba/spectrum.h"
+#include "formats/mitsuba/xml.h"
+
+namespace ambilux::mitsuba {
+
+struct Builder {
+    Builder(const Document& d, const LoadOptions& o, Scene& s) : document(d), options(o), scene(s) {}
+
+    const Document& document;
+    const LoadOptions& options;
+    Scene& scene;
+    bool validate_only = false;  ///< look at parameters only: nothing is read from images or added to the scene
+
+    std::vector<std::pair<std::string, Sha256Digest>> file_digests;  ///< of meshes and images
+    std::map<std::string, uint64_t> texel_pool;                      ///< file and decoding -> offset
+    std::map<std::string, int32_t> texture_pool;                     ///< all settings -> texture
+    std::map<std::string, struct LoadedImage> images;                ///< by path and decoding
+    std::vector<Rgb> texture_means;                                  ///< per texture
+    std::map<const Object*, uint32_t> materials;
+    uint32_t default_materials[2] = {kNone, kNone};  ///< of shapes without and with an emitter
+    std::map<std::string, uint32_t> table_pool;      ///< contents' name -> offset in Scene::tables
+    std::map<std::string, float> rough_reflectance_pool;
+    std::set<std::string> reported;
+
+    /// Something we cannot do: an error, or with --lenient a warning that says what is done instead.
+    void refuse(const Where& where, const std::string& problem, const std::string& instead);
+};
+
+/// Size and place of an image whose texels are in the scene.
+struct LoadedImage {
+    uint32_t width = 0, height = 0;
+    uint64_t offset = 0;
+    TexelFormat format = TexelFormat::rgba8;
+    uint32_t decode_table = 0;
+    Rgb mean{};
+};
+
+/// Reads the parameters of one object and keeps track of which were asked for.
+class Reader {
+public:
+    Reader(Builder& builder, const Object& object) : builder_(builder), object_(object) {}
+
+    const Object& object() const { return object_; }
+    Where where() const { return object_.where; }
+    [[noreturn]] void fail(const std::string& message) const;
+    [[noreturn]] void fail(const Where& where, const std::string& message) const;
+
+    bool has(const std::string& name) const { return object_.find(name) || child_named(name); }
+    bool boolean(const std::string& name, bool fallback);
+    int64_t integer(const std::string& name, int64_t fallback);
+    double number(const std::string& name, double fallback);
+    std::string text(const std::string& name, const std::string& fallback);
+    Vec3f vector(const std::string& name, Vec3f fallback);
+    Matrix transform(const std::string& name);
+    /// Index of refraction: a number or a name.
+    float ior(const std::string& name, const std::string& fallback);
+    /// Where the parameter stands, or the object if it is absent.
+    Where where(const std::string& name) const;
+
+    Rgb color(const std::string& name, Rgb fallback, SpectrumUse use);
+    ParamRgb textured_color(const std::string& name, Rgb fallback, SpectrumUse use);
+    ParamFloat textured_number(const std::string& name, float fallback);
+
+    /// Next nested object with this tag that nobody took yet, or null.
+    const Object* take(const std::string& tag);
+    /// The nested object of this name, or null.
+    const Object* take_named(const std::string& name);
+    /// Parameters that are known and change nothing here.
+    void ignore(std::initializer_list<const char*> names);
+    /// Refuses what is left over.
+    void finish();
+
+private:
+    const Value* value(const std::string& name, std::initializer_list<ValueKind> kinds, const char* expected);
+    const Child* child_named(const std::string& name) const;
+
+    Builder& builder_;
+    const Object& object_;
+    std::set<const Value*> used_values_;
+    std::set<const Child*> used_children_;
+};
+
+/// Texture object as index into Scene::textures (0 when only validating).
+int32_t load_texture(Builder& builder, const Object& object);
+/// Image as float texels without flip or decoding table, for environment maps.
+int32_t load_environment_image(Builder& builder, const std::string& path);
+/// Mean colour of a parameter over its texture.
+Rgb mean_color(const Builder& builder, const ParamRgb& parameter);
+
+/// BSDF object with its adapters as index into Scene::materials.
+uint32_t build_material(Builder& builder, const Object& bsdf);
+/// Diffuse material for shapes without a BSDF: reflectance 0.5, on emitters 0.
+uint32_t default_material(Builder& builder, bool emitter);
+
+/// All shapes, with their area emitters.
+void build_shapes(Builder& builder, const Object& scene);
+/// An emitter that is not part of a shape.
+void build_emitter(Builder& builder, const Object& object);
+/// The radiance of an area emitter.
+ParamRgb area_radiance(Builder& builder, const Object& object);
+
+void build_sensor(Builder& builder, const Object& object);
+void build_integrator(Builder& builder, const Object& object);
+
+/// Rotation and translation of `m` without scale, its axes made exactly orthonormal; `problem` is set if `m` scales or
+/// shears.
+Matrix rigid_part(const Matrix& m, bool& problem);
+
+}  // namespace ambilux::mitsuba

@@ -1,0 +1,111 @@
+#include <cmath>
+
+#include "formats/mitsuba/builder.h"
+
+namespace ambilux::mitsuba {
+
+namespace {
+
+/// Weights that only steer another renderer's sampling: ours has its own rule.
+void check_sampling_weight(Builder& builder, Reader& in) {
+    if (in.number("sampling_weight", 1) != 1)
+        builder.refuse(in.where("sampling_weight"), "sampling weights of emitters are not supported", "it is ignored");
+}
+
+Vec3f to_vec3f(Vec3d v) { return {float(v.x), float(v.y), float(v.z)}; }
+
+Matrix rigid_transform(Builder& builder, Reader& in) {
+    bool problem = false;
+    const Matrix m = rigid_part(in.transform("to_world"), problem);
+    if (problem)
+        builder.refuse(in.where("to_world"),
+                       "the transform of an emitter of type '" + in.object().type + "' must not scale or shear",
+                       "scale and shear are left out");
+    return m;
+}
+
+}  // namespace
+
+ParamRgb area_radiance(Builder& builder, const Object& object) {
+    Reader in(builder, object);
+    if (object.type != "area") {
+        builder.refuse(object.where, "emitter type '" + object.type + "' on a shape is not supported",
+                       "the shape does not emit");
+        return {};
+    }
+    const ParamRgb radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
+    check_sampling_weight(builder, in);
+    in.finish();
+    return radiance;
+}
+
+void build_emitter(Builder& builder, const Object& object) {
+    Reader in(builder, object);
+    const std::string& type = object.type;
+    Emitter e{};
+    e.shape = e.area_cdf = kNone;
+    e.to_world = e.to_local = to_affine(Matrix{});
+    if (type == "point") {
+        e.type = EmitterType::point;
+        if (in.has("position") && in.has("to_world"))
+            in.fail(in.where("to_world"), "both 'position' and 'to_world' are given");
+        e.position = in.has("position") ? in.vector("position", {}) : to_vec3f(column(in.transform("to_world"), 3));
+        e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
+    } else if (type == "spot") {
+        e.type = EmitterType::spot;
+        const Matrix m = rigid_transform(builder, in);
+        e.to_world = to_affine(m);
+        e.to_local = to_affine(affine_inverse(m));
+        e.position = to_vec3f(column(m, 3));
+        e.direction = to_vec3f(column(m, 2));
+        const double cutoff = in.number("cutoff_angle", 20), beam = in.number("beam_width", cutoff * 0.75);
+        if (!(cutoff > 0 && cutoff < 90))
+            in.fail(in.where("cutoff_angle"), "cutoff_angle must lie between 0 and 90 degrees");
+        if (!(beam >= 0 && beam <= cutoff))
+            in.fail(in.where("beam_width"), "beam_width must lie between 0 and cutoff_angle");
+        e.cos_cutoff = float(std::cos(cutoff * (M_PI / 180)));
+        e.cos_beam_width = float(std::cos(beam * (M_PI / 180)));
+        e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
+        if (const Object* texture = in.take_named("texture")) e.radiance.texture = load_texture(builder, *texture);
+    } else if (type == "directional") {
+        e.type = EmitterType::directional;
+        if (in.has("direction") && in.has("to_world"))
+            in.fail(in.where("to_world"), "both 'direction' and 'to_world' are given");
+        Vec3d d = column(in.transform("to_world"), 2);
+        if (in.has("direction")) {
+            const Vec3f v = in.vector("direction", {0, 0, 1});
+            d = {v.x, v.y, v.z};
+        }
+        const double l = length(d);
+        if (!(l > 0)) in.fail(in.where("direction"), "the direction of the emitter is zero");
+        e.direction = to_vec3f({d.x / l, d.y / l, d.z / l});
+        e.radiance = {in.color("irradiance", {1, 1, 1}, SpectrumUse::emission), -1};
+    } else if (type == "constant") {
+        e.type = EmitterType::constant;
+        e.radiance = {in.color("radiance", {1, 1, 1}, SpectrumUse::emission), -1};
+    } else if (type == "envmap") {
+        e.type = EmitterType::envmap;
+        const Matrix m = rigid_transform(builder, in);
+        e.to_world = to_affine(m);
+        e.to_local = to_affine(affine_inverse(m));
+        const std::string name = in.text("filename", "");
+        if (name.empty()) in.fail("envmap has no filename");
+        const std::string path = builder.document.resolve(name, in.where("filename"));
+        const double scale = in.number("scale", 1);
+        if (!(scale >= 0)) in.fail(in.where("scale"), "scale must not be negative");
+        in.ignore({"cache"});
+        e.radiance = {splat(float(scale)), load_environment_image(builder, path)};
+    } else {
+        builder.refuse(object.where, "emitter type '" + type + "' is not supported", "it is left out");
+        return;
+    }
+    check_sampling_weight(builder, in);
+    in.finish();
+    if (e.type == EmitterType::constant || e.type == EmitterType::envmap) {
+        if (builder.scene.environment != kNone) in.fail("only one constant or envmap emitter is possible");
+        builder.scene.environment = uint32_t(builder.scene.emitters.size());
+    }
+    builder.scene.emitters.push_back(e);
+}
+
+}  // namespace ambilux::mitsuba

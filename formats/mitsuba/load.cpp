@@ -1,0 +1,66 @@
+#include "formats/load.h"
+#include "core/error.h"
+#include "formats/mitsuba/builder.h"
+
+namespace ambilux {
+
+namespace {
+
+using namespace mitsuba;
+
+/// Fingerprint of all inputs: what the files hold, not where they lie.
+std::array<uint8_t, 32> content_hash(const Builder& builder) {
+    Sha256 hash;
+    const auto add = [&](const std::string& text) {
+        hash.update(std::to_string(text.size()) + ":");
+        hash.update(text);
+    };
+    for (const auto& [path, text] : builder.document.files) add(text);
+    for (const auto& [path, digest] : builder.file_digests) hash.update(digest.data(), digest.size());
+    const LoadOptions& o = builder.options;
+    add(std::to_string(o.width) + " " + std::to_string(o.height) + " " + std::to_string(o.lenient) + " " +
+        std::to_string(int(o.light_picking)));
+    for (const auto& [name, value] : o.parameters) {
+        add(name);
+        add(value);
+    }
+    return hash.digest();
+}
+
+/// Looks at what no shape uses, so that mistakes there are found too.
+void validate_unused(Builder& builder) {
+    builder.validate_only = true;
+    for (const Child& child : builder.document.scene->children) {
+        if (child.object->tag == "bsdf") build_material(builder, *child.object);
+        if (child.object->tag == "texture") load_texture(builder, *child.object);
+    }
+    builder.validate_only = false;
+}
+
+}  // namespace
+
+Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
+    const Document document = parse_document(path, options.parameters);
+    Scene scene;
+    scene.path = path;
+    Builder builder(document, options, scene);
+
+    Reader root(builder, *document.scene);
+    const Object* sensor = root.take("sensor");
+    const Object* integrator = root.take("integrator");
+    if (!sensor) throw input_error(path, 0, "the scene has no sensor");
+    build_sensor(builder, *sensor);
+    if (integrator) build_integrator(builder, *integrator);
+    while (root.take("bsdf")) {}
+    while (root.take("texture")) {}
+    while (root.take("shape")) {}
+    while (const Object* emitter = root.take("emitter")) build_emitter(builder, *emitter);
+    root.finish();
+    build_shapes(builder, *document.scene);
+    validate_unused(builder);
+    scene.content_hash = content_hash(builder);
+    finalize_scene(scene, options.light_picking);
+    return scene;
+}
+
+}  // namespace ambilux

@@ -1,0 +1,228 @@
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "formats/meshes/text_cursor.h"
+#include "formats/mitsuba/builder.h"
+
+namespace ambilux::mitsuba {
+
+namespace {
+
+/// Tangent of half the field of view along x and y. Mitsuba's rule: `fov` with `fov_axis`, or `focal_length` in
+/// millimetres on the diagonal of a 36 x 24 mm film.
+Vec2f field_of_view(Reader& in, double aspect) {
+    if (in.has("fov") && in.has("focal_length"))
+        in.fail(in.where("focal_length"), "both 'fov' and 'focal_length' are given");
+    std::string axis = in.text("fov_axis", "x");
+    double t = 0;
+    if (in.has("fov")) {
+        const double fov = in.number("fov", 0);
+        if (!(fov > 0 && fov < 180)) in.fail(in.where("fov"), "fov must lie between 0 and 180 degrees");
+        t = std::tan(fov * (M_PI / 360));
+    } else {
+        const std::string text = in.text("focal_length", "50mm");
+        TextCursor cursor(text);
+        double focal = 0;
+        const bool ok = cursor.number(focal);
+        if (!ok || !(focal > 0) || (!cursor.done() && cursor.word() != "mm"))
+            in.fail(in.where("focal_length"), "'" + text + "' is not a focal length in mm");
+        t = std::sqrt(36.0 * 36 + 24 * 24) / (2 * focal);
+        axis = "diagonal";
+    }
+    if (axis == "smaller") axis = aspect > 1 ? "y" : "x";
+    if (axis == "larger") axis = aspect > 1 ? "x" : "y";
+    double tx = 0;
+    if (axis == "x")
+        tx = t;
+    else if (axis == "y")
+        tx = t * aspect;
+    else if (axis == "diagonal")
+        tx = t * aspect / std::sqrt(aspect * aspect + 1);
+    else
+        in.fail(in.where("fov_axis"), "unknown fov_axis '" + axis + "'");
+    return {float(tx), float(tx / aspect)};
+}
+
+void read_filter(Builder& builder, Reader& film, Sensor& sensor) {
+    const Object* object = film.take("rfilter");
+    sensor.filter = FilterType::gaussian;
+    sensor.filter_radius = 2;
+    if (!object) return;  // Mitsuba's default
+    Reader in(builder, *object);
+    if (object->type == "box") {
+        sensor.filter = FilterType::box;
+        sensor.filter_radius = float(in.number("radius", 0.5));
+    } else if (object->type == "tent") {
+        sensor.filter = FilterType::tent;
+        sensor.filter_radius = float(in.number("radius", 1));
+    } else if (object->type == "gaussian") {
+        sensor.filter_radius = float(4 * in.number("stddev", 0.5));
+    } else {
+        builder.refuse(object->where, "reconstruction filter '" + object->type + "' is not supported",
+                       "gaussian is used");
+        return;
+    }
+    if (!(sensor.filter_radius > 0)) in.fail("the radius of the reconstruction filter must be positive");
+    in.finish();
+}
+
+uint32_t size_parameter(Reader& in, const char* name, int64_t fallback, int64_t lowest) {
+    const int64_t n = in.integer(name, fallback);
+    if (n < lowest || n > 65536)
+        in.fail(in.where(name),
+                std::string("'") + name + "' must lie between " + std::to_string(lowest) + " and 65536");
+    return uint32_t(n);
+}
+
+void read_film(Builder& builder, const Object* object, Sensor& sensor) {
+    static const Object default_film = [] {
+        Object film;
+        film.tag = "film";
+        film.type = "hdrfilm";
+        return film;
+    }();
+    Reader in(builder, object ? *object : default_film);
+    const std::string& type = in.object().type;
+    if (type != "hdrfilm") builder.refuse(in.where(), "film type '" + type + "' is not supported", "hdrfilm is used");
+    sensor.film_width = size_parameter(in, "width", 768, 1);
+    sensor.film_height = size_parameter(in, "height", 576, 1);
+    sensor.crop_x = size_parameter(in, "crop_offset_x", 0, 0);
+    sensor.crop_y = size_parameter(in, "crop_offset_y", 0, 0);
+    sensor.crop_width = size_parameter(in, "crop_width", int64_t(sensor.film_width) - sensor.crop_x, 1);
+    sensor.crop_height = size_parameter(in, "crop_height", int64_t(sensor.film_height) - sensor.crop_y, 1);
+    if (sensor.crop_x + sensor.crop_width > sensor.film_width ||
+        sensor.crop_y + sensor.crop_height > sensor.film_height)
+        in.fail(in.where("crop_width"), "the crop window is not inside of the film");
+    read_filter(builder, in, sensor);
+    // How files are written and shown; our images are linear and complete.
+    in.ignore({"gamma", "banner", "file_format", "pixel_format", "component_format", "attach_log", "compensate",
+               "high_quality_edges", "sample_border", "exposure", "key", "burn", "tonemap_method", "label", "digits",
+               "variable"});
+    if (type == "hdrfilm" || !builder.options.lenient) in.finish();
+
+    const uint32_t w = builder.options.width ? builder.options.width : sensor.film_width;
+    const uint32_t h = builder.options.height ? builder.options.height : sensor.film_height;
+    const auto rescale = [](uint32_t& offset, uint32_t& size, uint32_t from, uint32_t to) {
+        const double s = double(to) / from;
+        const uint32_t begin = std::min(uint32_t(std::lround(offset * s)), to - 1),
+                       end = std::min(uint32_t(std::lround((double(offset) + size) * s)), to);
+        offset = begin;
+        size = std::max(end, begin + 1) - begin;
+    };
+    rescale(sensor.crop_x, sensor.crop_width, sensor.film_width, w);
+    rescale(sensor.crop_y, sensor.crop_height, sensor.film_height, h);
+    sensor.film_width = w;
+    sensor.film_height = h;
+}
+
+void read_sampler(Builder& builder, const Object* object) {
+    if (!object) return;
+    Reader in(builder, *object);
+    static const std::set<std::string> known = {"independent", "stratified", "multijitter", "orthogonal",
+                                                "ldsampler",   "halton",     "hammersley",  "sobol"};
+    // Every sampler has the same expected image; ours is independent.
+    if (!known.count(object->type))
+        builder.refuse(object->where, "sampler type '" + object->type + "' is not supported", "independent is used");
+    const int64_t spp = in.integer("sample_count", 4);
+    if (spp < 1 || spp > 1000000000) in.fail(in.where("sample_count"), "sample_count must be positive");
+    builder.scene.integrator.spp = int(spp);
+    in.ignore({"seed", "scramble", "jitter", "dimension", "strength"});
+    in.finish();
+}
+
+}  // namespace
+
+void build_sensor(Builder& builder, const Object& object) {
+    Reader in(builder, object);
+    Sensor& sensor = builder.scene.sensor;
+    const std::string& type = object.type;
+    read_film(builder, in.take("film"), sensor);
+    read_sampler(builder, in.take("sampler"));
+
+    if (type == "orthographic")
+        sensor.type = SensorType::orthographic;
+    else if (type == "thinlens")
+        sensor.type = SensorType::thin_lens;
+    else {
+        sensor.type = SensorType::perspective;
+        if (type != "perspective")
+            builder.refuse(object.where, "sensor type '" + type + "' is not supported", "perspective is used");
+    }
+
+    const double aspect = double(sensor.film_width) / sensor.film_height;
+    Matrix to_world = in.transform("to_world");
+    if (!(std::fabs(determinant(to_world)) > 0)) in.fail(in.where("to_world"), "the sensor's transform is singular");
+    bool problem = false;
+    if (sensor.type == SensorType::orthographic) {
+        // The film spans [-1,1] in x; scale in the transform sizes it. Scale moves from the transform to the extent.
+        if (!is_orthogonal(to_world, 1e-3))
+            builder.refuse(in.where("to_world"), "the sensor's transform must not shear", "shear is left out");
+        double lengths[3];
+        for (int j = 0; j < 3; ++j) {
+            lengths[j] = length(column(to_world, j));
+            for (int i = 0; i < 3; ++i) to_world.m[i][j] /= lengths[j];
+        }
+        to_world = rigid_part(to_world, problem);
+        sensor.tan_half_fov = {float(lengths[0]), float(lengths[1] / aspect)};
+    } else {
+        to_world = rigid_part(to_world, problem);
+        if (problem)
+            builder.refuse(in.where("to_world"), "the sensor's transform must not scale or shear",
+                           "scale and shear are left out");
+        sensor.tan_half_fov = field_of_view(in, aspect);
+        sensor.principal_offset = {float(in.number("principal_point_offset_x", 0)),
+                                   float(in.number("principal_point_offset_y", 0))};
+    }
+    sensor.to_world = to_affine(to_world);
+    sensor.near_clip = float(in.number("near_clip", 1e-2));
+    sensor.far_clip = float(in.number("far_clip", 1e4));
+    if (!(sensor.near_clip > 0 && sensor.near_clip < sensor.far_clip))
+        in.fail(in.where("near_clip"), "near_clip must be positive and smaller than far_clip");
+    sensor.focus_distance = float(in.number("focus_distance", sensor.far_clip));
+    if (sensor.type == SensorType::thin_lens) {
+        if (!in.has("aperture_radius")) in.fail("thinlens has no aperture_radius");
+        sensor.aperture_radius = float(in.number("aperture_radius", 0));
+        if (!(sensor.aperture_radius >= 0))
+            in.fail(in.where("aperture_radius"), "aperture_radius must not be negative");
+        if (!(sensor.focus_distance > 0)) in.fail(in.where("focus_distance"), "focus_distance must be positive");
+    }
+    // Nothing moves, so that the shutter has no effect.
+    in.ignore({"shutter_open", "shutter_close"});
+    if (type == "perspective" || type == "thinlens" || type == "orthographic" || !builder.options.lenient) in.finish();
+}
+
+void build_integrator(Builder& builder, const Object& object) {
+    Reader in(builder, object);
+    IntegratorHint& hint = builder.scene.integrator;
+    const std::string& type = object.type;
+    if (type == "moment") {  // adds second moments to what is inside
+        const Object* nested = in.take("integrator");
+        if (!nested) in.fail("moment has no nested integrator");
+        in.finish();
+        build_integrator(builder, *nested);
+        return;
+    }
+    if (type == "direct") {
+        hint.type = "path";
+        hint.max_depth = 2;
+        in.ignore({"shading_samples", "emitter_samples", "bsdf_samples", "luminaire_samples"});
+    } else if (type == "path" || type == "ptracer" || type == "bdpt") {
+        hint.type = type == "ptracer" ? "light" : type;
+        hint.max_depth = int(std::clamp<int64_t>(in.integer("max_depth", -1), -2, 1 << 30));
+        hint.rr_depth = int(std::clamp<int64_t>(in.integer("rr_depth", 5), 0, 1 << 30));
+        if (hint.max_depth < -1) in.fail(in.where("max_depth"), "max_depth must be -1 or larger");
+        if (type != "path") in.ignore({"light_image", "sample_direct", "samples_per_pass"});
+    } else {
+        builder.refuse(object.where, "integrator type '" + type + "' is not supported", "path is used");
+        hint.type = "path";
+        return;
+    }
+    hint.hide_emitters = in.boolean("hide_emitters", false);
+    if (in.boolean("strict_normals", false))
+        builder.refuse(in.where("strict_normals"), "strict_normals is not supported", "it is ignored");
+    in.ignore({"samples_per_pass", "block_size", "timeout"});
+    in.finish();
+}
+
+}  // namespace ambilux::mitsuba

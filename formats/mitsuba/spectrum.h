@@ -1,0 +1,22 @@
+// Spectra as colours.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "core/vec.h"
+
+namespace ambilux::mitsuba {
+
+enum class SpectrumUse {
+    reflectance,  ///< seen under D65 and at most 1
+    unbounded,    ///< seen under D65: refractive indices
+    emission,     ///< as it is
+};
+
+/// Linear Rec.709 of a piecewise linear spectrum, samples (wavelength in nm, value) with rising wavelengths, at least
+/// two; zero outside. Scaled so that a spectrum of ones has luminance 1, as in Mitsuba's RGB mode. Colours out of gamut
+/// are clipped at 0 (reflectance also at 1).
+Rgb spectrum_to_rgb(const std::vector<std::pair<double, double>>& samples, SpectrumUse use);
+
+}  // namespace ambilux::mitsuba

@@ -1,0 +1,217 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "core/error.h"
+#include "core/half.h"
+#include "formats/images/image_io.h"
+#include "formats/meshes/mesh.h"
+#include "formats/mitsuba/builder.h"
+
+namespace ambilux::mitsuba {
+
+namespace {
+
+/// How stored values become linear ones: gamma 1 linear, -1 sRGB, other values a power.
+float decode(float value, double gamma) {
+    if (gamma == 1) return value;
+    const double v = value;
+    if (gamma == -1) return float(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+    return float(std::pow(v, gamma));
+}
+
+uint32_t decode_table(Builder& builder, double gamma) {
+    const std::string key = "decode " + std::to_string(gamma);
+    const auto it = builder.table_pool.find(key);
+    if (it != builder.table_pool.end()) return it->second;
+    const uint32_t offset = uint32_t(builder.scene.tables.size());
+    for (int i = 0; i < 256; ++i) builder.scene.tables.push_back(decode(float(i) / 255.0f, gamma));
+    builder.table_pool[key] = offset;
+    return offset;
+}
+
+/// Appends bytes at the next multiple of 16.
+uint64_t append_texels(Scene& scene, const void* data, size_t size) {
+    const uint64_t offset = (scene.texels.size() + 15) / 16 * 16;
+    scene.texels.resize(offset + size);
+    memcpy(scene.texels.data() + offset, data, size);
+    return offset;
+}
+
+/// True if all colours keep a precision of 2^-11 as halves: none is too large, and none that is not zero too small.
+bool fits_half(const std::vector<float>& texels) {
+    for (size_t i = 0; i < texels.size(); ++i) {
+        if (i % 4 == 3) continue;
+        const float f = texels[i];
+        if (!(std::fabs(f) <= kMaxHalf) || !(std::fabs(half_to_float(float_to_half(f)) - f) <= 0x1p-11f * std::fabs(f)))
+            return false;
+    }
+    return true;
+}
+
+/// Puts the image's texels into the scene, once per file and decoding. `gamma` 0 takes what the file format implies;
+/// `as_float` stores floats (environment maps), as halves where nothing is lost by that; alpha, which no one reads
+/// there, is 1 then.
+LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float) {
+    const std::string key = path + "|" + std::to_string(gamma) + (as_float ? "|float" : "");
+    const auto known = builder.images.find(key);
+    if (known != builder.images.end()) return known->second;
+
+    const std::string bytes = read_file_bytes(path);
+    builder.file_digests.push_back({path, sha256(bytes)});
+    const Image image = read_image(path, bytes);
+    const double used_gamma = gamma != 0 ? gamma : (image.is_linear ? 1 : -1);
+    LoadedImage out;
+    out.width = image.width;
+    out.height = image.height;
+    double mean[3] = {0, 0, 0};
+    const size_t count = size_t(image.width) * image.height;
+    if (image.is_8bit && !as_float) {
+        out.format = TexelFormat::rgba8;
+        out.decode_table = decode_table(builder, used_gamma);
+        const auto [it, added] = builder.texel_pool.try_emplace(path, 0);
+        if (added) it->second = append_texels(builder.scene, image.bytes.data(), image.bytes.size());
+        out.offset = it->second;
+        const float* table = builder.scene.tables.data() + out.decode_table;
+        for (size_t i = 0; i < count; ++i)
+            for (int c = 0; c < 3; ++c) mean[c] += table[image.bytes[4 * i + c]];
+    } else {
+        out.format = TexelFormat::rgba32f;
+        std::vector<float> texels(count * 4);
+        for (size_t i = 0; i < texels.size(); ++i) {
+            const float stored = image.is_8bit ? float(image.bytes[i]) / 255.0f : image.floats[i];
+            texels[i] = i % 4 == 3 ? stored : decode(stored, used_gamma);
+            if (!std::isfinite(texels[i]))
+                throw input_error(path, 0,
+                                  "texel (" + std::to_string(i / 4 % image.width) + ", " +
+                                      std::to_string(i / 4 / image.width) + ") is not finite");
+            if (i % 4 < 3) mean[i % 4] += texels[i];
+        }
+        if (as_float && fits_half(texels)) {
+            out.format = TexelFormat::rgba16f;
+            std::vector<uint16_t> halves(texels.size());
+            for (size_t i = 0; i < texels.size(); ++i)
+                halves[i] = uint16_t(float_to_half(i % 4 == 3 ? 1.0f : texels[i]));
+            out.offset = append_texels(builder.scene, halves.data(), halves.size() * sizeof halves[0]);
+        } else {
+            out.offset = append_texels(builder.scene, texels.data(), texels.size() * sizeof(float));
+        }
+    }
+    out.mean = {float(mean[0] / double(count)), float(mean[1] / double(count)), float(mean[2] / double(count))};
+    builder.images[key] = out;
+    return out;
+}
+
+/// uv transform: `to_uv` of the newer format, scale and offset of the older one.
+void read_to_uv(Reader& in, float out[2][3]) {
+    const Matrix m = in.transform("to_uv");
+    const double su = in.number("uscale", 1), sv = in.number("vscale", 1), ou = in.number("uoffset", 0),
+                 ov = in.number("voffset", 0);
+    const int columns[3] = {0, 1, 3};
+    for (int j = 0; j < 3; ++j) {
+        out[0][j] = float(su * m.m[0][columns[j]] + (j == 2 ? ou : 0));
+        out[1][j] = float(sv * m.m[1][columns[j]] + (j == 2 ? ov : 0));
+    }
+}
+
+WrapMode wrap_mode(Builder& builder, Reader& in) {
+    std::string mode = in.text("wrap_mode", "repeat");
+    const std::string u = in.text("wrap_mode_u", mode), v = in.text("wrap_mode_v", mode);
+    if (u != v)
+        builder.refuse(in.where("wrap_mode_v"), "different wrap modes for u and v are not supported",
+                       "that of u is used for both");
+    mode = u;
+    if (mode == "repeat") return WrapMode::repeat;
+    if (mode == "mirror") return WrapMode::mirror;
+    if (mode == "clamp") return WrapMode::clamp;
+    builder.refuse(in.where(in.has("wrap_mode") ? "wrap_mode" : "wrap_mode_u"), "unknown wrap mode '" + mode + "'",
+                   "repeat is used");
+    return WrapMode::repeat;
+}
+
+TextureFilter texture_filter(Builder& builder, Reader& in) {
+    const std::string filter = in.text("filter_type", "bilinear");
+    if (filter == "nearest") return TextureFilter::nearest;
+    // The older generation's prefiltered lookups have no counterpart for paths without differentials.
+    if (filter != "bilinear" && filter != "trilinear" && filter != "ewa")
+        builder.refuse(in.where("filter_type"), "unknown filter type '" + filter + "'", "bilinear is used");
+    return TextureFilter::bilinear;
+}
+
+int32_t add_texture(Builder& builder, const Texture& texture, Rgb mean) {
+    const std::string key(reinterpret_cast<const char*>(&texture), sizeof texture);
+    const auto [it, added] = builder.texture_pool.try_emplace(key, int32_t(builder.scene.textures.size()));
+    if (added) {
+        builder.scene.textures.push_back(texture);
+        builder.texture_means.push_back(mean);
+    }
+    return it->second;
+}
+
+}  // namespace
+
+int32_t load_texture(Builder& builder, const Object& object) {
+    Reader in(builder, object);
+    Texture texture;
+    memset(&texture, 0, sizeof texture);  // padding too, because the record is its own key
+    Rgb mean{};
+    if (object.type == "bitmap") {
+        texture.type = TextureType::bitmap;
+        const std::string name = in.text("filename", "");
+        if (name.empty()) in.fail("bitmap texture has no filename");
+        const std::string path = builder.document.resolve(name, in.where("filename"));
+        const bool raw = in.boolean("raw", false);
+        double gamma = in.number("gamma", 0);
+        if (raw) gamma = 1;
+        texture.wrap = wrap_mode(builder, in);
+        texture.filter = texture_filter(builder, in);
+        read_to_uv(in, texture.to_uv);
+        in.ignore({"format", "accel", "max_anisotropy", "cache"});  // storage and prefiltering of other renderers
+        in.finish();
+        if (builder.validate_only) return 0;
+        const LoadedImage image = load_image(builder, path, gamma, false);
+        texture.format = image.format;
+        texture.width = image.width;
+        texture.height = image.height;
+        texture.offset = image.offset;
+        texture.decode_table = image.decode_table;
+        mean = image.mean;
+    } else if (object.type == "checkerboard") {
+        texture.type = TextureType::checkerboard;
+        texture.color0 = in.color("color0", splat(0.4f), SpectrumUse::reflectance);
+        texture.color1 = in.color("color1", splat(0.2f), SpectrumUse::reflectance);
+        read_to_uv(in, texture.to_uv);
+        in.finish();
+        if (builder.validate_only) return 0;
+        mean = (texture.color0 + texture.color1) * 0.5f;
+    } else {
+        builder.refuse(object.where, "texture type '" + object.type + "' is not supported", "a grey of 0.5 is used");
+        if (builder.validate_only) return 0;
+        texture.type = TextureType::checkerboard;
+        texture.color0 = texture.color1 = mean = splat(0.5f);
+    }
+    return add_texture(builder, texture, mean);
+}
+
+int32_t load_environment_image(Builder& builder, const std::string& path) {
+    const LoadedImage image = load_image(builder, path, 0, true);
+    Texture texture;
+    memset(&texture, 0, sizeof texture);
+    texture.type = TextureType::bitmap;
+    texture.format = image.format;
+    texture.wrap = WrapMode::repeat;
+    texture.filter = TextureFilter::bilinear;
+    texture.width = image.width;
+    texture.height = image.height;
+    texture.offset = image.offset;
+    texture.to_uv[0][0] = texture.to_uv[1][1] = 1;
+    return add_texture(builder, texture, image.mean);
+}
+
+Rgb mean_color(const Builder& builder, const ParamRgb& parameter) {
+    return parameter.texture >= 0 && !builder.validate_only
+               ? parameter.value * builder.texture_means[size_t(parameter.texture)]
+               : parameter.value;
+}
+
+}  // namespace ambilux::mitsuba

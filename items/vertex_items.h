@@ -1,0 +1,219 @@
+// Vertices of walks as queues keep them: with all that connections ask of their surfaces.
+#pragma once
+
+#include "items/walk_items.h"
+
+namespace ambilux {
+
+/// Depth (14 bits), type and side of a vertex, and its ray_offset in the upper 15 bits: a float without its sign and
+/// its last 16 bits, rounded up by less than 1/128.
+struct VertexBits {
+    uint32_t bits;
+
+    AMBILUX_HD static VertexBits make(uint32_t depth, const WalkVertex& v) {
+        const Scattering& s = v.scattering;
+        return {depth | (s.bsdf.type == BsdfType::diffuse ? kDiffuse : 0u) |
+                (bsdf_transmits(s.bsdf.type) ? kThrough : 0u) | (dot(s.ng, s.wi_world) > 0.0f ? kAbove : 0u) |
+                (float_bits(v.offset) + 0xffffu) >> 16 << kOffsetBit};
+    }
+
+    AMBILUX_HD uint32_t depth() const { return bits & WalkBits::kMaxDepth; }
+    AMBILUX_HD float offset() const { return bits_float(bits >> kOffsetBit << 16); }
+    /// True if kernels of features F know or can tell that its BSDF is diffuse.
+    template <Features F>
+    AMBILUX_HD bool diffuse() const {
+        if constexpr (!F.several_bsdfs())
+            return F.has(BsdfType::diffuse);
+        else
+            return bits & kDiffuse;
+    }
+    /// False if nothing is scattered towards `w`. `ng`: Scattering::ng; neither need be unit.
+    AMBILUX_HD bool reaches(Vec3f ng, Vec3f w) const {
+        return bits & kThrough || (dot(ng, w) > 0.0f) == bool(bits & kAbove);
+    }
+
+private:
+    static constexpr uint32_t kDiffuse = 1u << WalkBits::kDepthBits, kThrough = 2 * kDiffuse, kAbove = 4 * kDiffuse,
+                              kOffsetBit = WalkBits::kDepthBits + 3;
+    static_assert(kOffsetBit + 15 == 32);
+};
+
+/// What tells whether a vertex can be connected with a point, and which is next: memory moves 32 bytes at a time, and
+/// most pairs need no more.
+struct ConnectionVertexFront {
+    Vec3f p;
+    VertexBits bits;
+    Vec2f ng;  ///< octahedral map of Scattering::ng
+    uint32_t
+        link;  ///< of vertices that are kept over a wave: the one before it in the same walk, or kNone; else the path
+    float dvc;
+};
+
+/// A vertex to be connected with one of the other walk, in few bytes: kernels that do so wait for memory. Directions
+/// are octahedral maps in whole floats, exact within rounding.
+struct ConnectionVertex {
+    static constexpr uint32_t kPairedLanes = 6;
+    static constexpr uint32_t kDiffuseLanes = 4;  ///< what there is of a diffuse one
+
+    ConnectionVertexFront front;
+    Rgb throughput;  ///< of a diffuse vertex: times its reflectance
+    float dvcm;
+    Vec2f d, n;  ///< of the ray that met it; frame.n
+    Vec3f tangent;
+    uint32_t record;  ///< ScatteringParts
+    Rgb color;        ///< BsdfParameters, where there are textures
+    float alpha_u;
+    Rgb specular_reflectance;
+    float alpha_v;
+
+    /// Lanes that kernels of features F use.
+    template <Features F>
+    static constexpr uint32_t lanes() {
+        return F.bsdfs == bit(BsdfType::diffuse) ? kDiffuseLanes : F.textures ? 7 : 5;
+    }
+    AMBILUX_HD VertexBits bits() const { return front.bits; }
+    AMBILUX_HD uint32_t path() const { return front.link; }
+};
+
+/// A vertex for a stage that connects it with emitters or the camera where shade does not: as it is, so that images do
+/// not depend on that.
+struct VertexItem {
+    static constexpr uint32_t kPairedLanes = 8;
+    static constexpr uint32_t kDiffuseLanes = 6;
+
+    Vec3f p;
+    VertexBits head;
+    Vec3f d;
+    uint32_t path;
+    Rgb throughput;
+    float dvcm;
+    Vec3f ng;
+    float dvc;
+    Vec3f n;
+    float offset;
+    Rgb color;
+    uint32_t record;
+    Vec3f tangent;
+    float alpha_u;
+    Rgb specular_reflectance;
+    float alpha_v;
+
+    template <Features F>
+    static constexpr uint32_t lanes() {
+        return F.bsdfs == bit(BsdfType::diffuse) ? kDiffuseLanes : F.textures ? 8 : 7;
+    }
+    AMBILUX_HD VertexBits bits() const { return head; }
+};
+
+/// Vertices of light walks, kept over a wave.
+using LightVertices = Queue<ConnectionVertex>;
+
+/// Lanes of `item` that hold something.
+template <Features F, class Item>
+AMBILUX_HD uint32_t lanes_of(const Item& item) {
+    return item.bits().template diffuse<F>() ? Item::kDiffuseLanes : Item::template lanes<F>();
+}
+template <Features F, class Item>
+AMBILUX_HD uint32_t push_vertex(const Queue<Item>& vertices, const Item& item) {
+    return vertices.push(item, lanes_of<F>(item));
+}
+template <Features F, class Item>
+AMBILUX_HD Item load_vertex(const Queue<Item>& vertices, uint32_t i) {
+    Item item = vertices.load(i, Item::kDiffuseLanes);
+    if constexpr (Item::template lanes<F>() > Item::kDiffuseLanes)
+        if (!item.bits().template diffuse<F>())
+            vertices.load_more(i, item, Item::kDiffuseLanes, Item::template lanes<F>());
+    return item;
+}
+
+/// The vertex `v` of a walk.
+AMBILUX_HD VertexItem pack_vertex(const WalkVertex& v, const WalkHit& h) {
+    const ScatteringParts s = parts_of(v.scattering);
+    return {v.point.p,
+            VertexBits::make(h.ray.bits.depth(), v),
+            h.ray.d,
+            h.ray.path,
+            h.ray.throughput,
+            v.sums.dvcm,
+            s.ng,
+            v.sums.dvc,
+            s.n,
+            v.offset,
+            s.parameters.color,
+            s.record,
+            s.tangent,
+            s.parameters.alpha_u,
+            s.parameters.specular_reflectance,
+            s.parameters.alpha_v};
+}
+
+/// The vertex `v` of a walk that a ray along `d` met. `link`: ConnectionVertexFront.
+AMBILUX_HD ConnectionVertex pack_connection_vertex(const WalkVertex& v, uint32_t depth, Vec3f d, Rgb throughput,
+                                                   uint32_t link) {
+    const ScatteringParts s = parts_of(v.scattering);
+    if (v.scattering.bsdf.type == BsdfType::diffuse) throughput *= s.parameters.color;
+    return {{v.point.p, VertexBits::make(depth, v), octahedral_encode(s.ng), link, v.sums.dvc},
+            throughput,
+            v.sums.dvcm,
+            octahedral_encode(d),
+            octahedral_encode(s.n),
+            s.tangent,
+            s.record,
+            s.parameters.color,
+            s.parameters.alpha_u,
+            s.parameters.specular_reflectance,
+            s.parameters.alpha_v};
+}
+AMBILUX_HD ConnectionVertex pack_connection_vertex(const WalkVertex& v, const WalkHit& h) {
+    return pack_connection_vertex(v, h.ray.bits.depth(), h.ray.d, h.ray.throughput, h.ray.path);
+}
+
+namespace detail {
+
+template <Features F>
+AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, Vec3f p, VertexBits bits, float offset,
+                                    const ScatteringParts& parts, Vec3f d, MisSums sums) {
+    WalkVertex v = {};
+    v.point.p = p;
+    v.point.ng = parts.ng;
+    v.offset = offset;
+    v.scattering = bits.template diffuse<F>() ? diffuse_scattering(parts, -d) : scattering_of<F>(scene, parts, -d);
+    v.sums = sums;
+    v.first = bits.depth() == 1;
+    return v;
+}
+
+}  // namespace detail
+
+/// The vertex that was packed; of its point p and ng only, and of diffuse ones no tangents.
+template <Features F>
+AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& item) {
+    return detail::unpack_vertex<F>(scene, item.p, item.head, item.offset,
+                                    {item.ng,
+                                     item.n,
+                                     item.tangent,
+                                     item.record,
+                                     {item.color, item.alpha_u, item.specular_reflectance, item.alpha_v}},
+                                    item.d, {item.dvcm, item.dvc});
+}
+/// The same, with an offset that is rounded up; diffuse ones have reflectance 1.
+template <Features F>
+AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const ConnectionVertex& item) {
+    const VertexBits bits = item.front.bits;
+    const Rgb color = bits.template diffuse<F>() ? splat(1.0f) : item.color;
+    return detail::unpack_vertex<F>(scene, item.front.p, bits, bits.offset(),
+                                    {octahedral_decode(item.front.ng),
+                                     octahedral_decode(item.n),
+                                     item.tangent,
+                                     item.record,
+                                     {color, item.alpha_u, item.specular_reflectance, item.alpha_v}},
+                                    octahedral_decode(item.d), {item.dvcm, item.front.dvc});
+}
+
+/// False if no light can pass between a vertex that is in a queue and `z`, of the other walk.
+AMBILUX_HD bool may_connect(const ConnectionVertexFront& y, const WalkVertex& z) {
+    const Vec3f w = z.point.p - y.p;
+    return y.bits.reaches(octahedral_direction(y.ng), w) && may_scatter(z.scattering, -w) && !in_plane(z, w);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,63 @@
+// What a scene contains, as bits. Kernels are specialised by a constexpr Features, so that what a scene lacks is not in
+// them.
+#pragma once
+
+#include <cstdint>
+
+namespace ambilux {
+
+enum class BsdfType : uint32_t {
+    diffuse = 0,
+    rough_diffuse,
+    conductor,
+    rough_conductor,
+    dielectric,
+    thin_dielectric,
+    rough_dielectric,
+    plastic,
+    rough_plastic,
+    count
+};
+
+enum class EmitterType : uint32_t { area = 0, point, spot, directional, constant, envmap, count };
+
+enum class PrimitiveType : uint32_t { triangle = 0, sphere, disk, cylinder, count };
+
+enum class SensorType : uint32_t { perspective = 0, thin_lens, orthographic, count };
+
+/// Set of features. Structural, so that it can be a template argument.
+struct Features {
+    uint32_t bsdfs = 0;       ///< bit per BsdfType
+    uint32_t emitters = 0;    ///< bit per EmitterType
+    uint32_t primitives = 0;  ///< bit per PrimitiveType
+    bool textures = false;    ///< any parameter comes from a texture
+    bool bumps = false;       ///< any bump or normal map
+    bool opacity = false;     ///< any surface that lets rays pass at random
+
+    constexpr bool has(BsdfType t) const { return bsdfs >> uint32_t(t) & 1u; }
+    constexpr bool has(EmitterType t) const { return emitters >> uint32_t(t) & 1u; }
+    constexpr bool has(PrimitiveType t) const { return primitives >> uint32_t(t) & 1u; }
+    constexpr bool several_bsdfs() const { return bsdfs & (bsdfs - 1); }
+    constexpr bool has_quadrics() const { return primitives & ~1u; }
+    constexpr bool has_environment() const { return has(EmitterType::constant) || has(EmitterType::envmap); }
+
+    /// True if kernels built for *this can render a scene that needs `other`.
+    constexpr bool covers(const Features& other) const {
+        return !(other.bsdfs & ~bsdfs) && !(other.emitters & ~emitters) && !(other.primitives & ~primitives) &&
+               (textures || !other.textures) && (bumps || !other.bumps) && (opacity || !other.opacity);
+    }
+    constexpr bool operator==(const Features&) const = default;
+};
+
+constexpr uint32_t bit(BsdfType t) { return 1u << uint32_t(t); }
+constexpr uint32_t bit(EmitterType t) { return 1u << uint32_t(t); }
+constexpr uint32_t bit(PrimitiveType t) { return 1u << uint32_t(t); }
+
+constexpr Features kAllFeatures = {(1u << uint32_t(BsdfType::count)) - 1,
+                                   (1u << uint32_t(EmitterType::count)) - 1,
+                                   (1u << uint32_t(PrimitiveType::count)) - 1,
+                                   true,
+                                   true,
+                                   true};
+
+}  // namespace ambilux

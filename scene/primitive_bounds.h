@@ -1,0 +1,59 @@
+// World-space boxes of primitives, rounded outwards.
+#pragma once
+
+#include "scene/view.h"
+
+namespace ambilux {
+
+struct Bounds3f {
+    Vec3f lower = splat(kInfinity), upper = splat(-kInfinity);
+
+    AMBILUX_HD void extend(Vec3f p) {
+        lower = min(lower, p);
+        upper = max(upper, p);
+    }
+    AMBILUX_HD void extend(const Bounds3f& b) {
+        lower = min(lower, b.lower);
+        upper = max(upper, b.upper);
+    }
+    AMBILUX_HD bool empty() const { return !(lower.x <= upper.x && lower.y <= upper.y && lower.z <= upper.z); }
+    /// Half the surface area.
+    AMBILUX_HD float half_area() const {
+        if (empty()) return 0.0f;
+        const Vec3f e = upper - lower;
+        return e.x * e.y + e.y * e.z + e.z * e.x;
+    }
+};
+
+/// Box of an analytic shape. Sphere, disk and cylinder caps are images of the unit sphere or disk under an affine map:
+/// along each axis they reach as far as the length of the matrix row says.
+AMBILUX_HD Bounds3f quadric_bounds(const Quadric& q) {
+    Bounds3f b;
+    for (int i = 0; i < 3; ++i) {
+        const float x = q.to_world.m[i][0], y = q.to_world.m[i][1], z = q.to_world.m[i][2], c = q.to_world.m[i][3];
+        float lo, hi;
+        if (q.type == PrimitiveType::sphere) {
+            const float r = sqrtf(x * x + y * y + z * z);
+            lo = c - r, hi = c + r;
+        } else {
+            const float r = sqrtf(x * x + y * y);
+            const float end = q.type == PrimitiveType::cylinder ? z : 0.0f;
+            lo = c + min(0.0f, end) - r, hi = c + max(0.0f, end) + r;
+        }
+        const float pad = gamma_bound(8) * (fabsf(c) + fabsf(x) + fabsf(y) + fabsf(z));
+        b.lower[i] = lo - pad;
+        b.upper[i] = hi + pad;
+    }
+    return b;
+}
+
+AMBILUX_HD Bounds3f triangle_bounds(const SceneView& scene, uint32_t prim) {
+    const Triangle tri = scene.triangles[prim];
+    Bounds3f b;
+    b.extend(scene.vertices[tri.v0].p);
+    b.extend(scene.vertices[tri.v1].p);
+    b.extend(scene.vertices[tri.v2].p);
+    return b;
+}
+
+}  // namespace ambilux

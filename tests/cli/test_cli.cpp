@@ -1,0 +1,404 @@
+// libs: ambilux_film
+// timeout: 300
+// The built program, as a person or a script meets it: exit codes, messages, files, signals.
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "core/atomic_file.h"
+#include "film/exr_io.h"
+#include "tests/support/catch.h"
+#include "tests/support/temp_folder.h"
+
+using namespace ambilux;
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+const std::string kScenes = std::string(AMBILUX_SOURCE_DIR) + "/scenes/";
+const std::string kCornell = kScenes + "cornell.xml";
+
+struct Outcome {
+    int code = -1;
+    std::string out, err;
+};
+
+/// Starts the program with output and messages in files of `folder`.
+pid_t start(const test::TempFolder& folder, const std::vector<std::string>& arguments) {
+    const pid_t child = ::fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+        std::vector<char*> argv = {const_cast<char*>(AMBILUX_PROGRAM)};
+        for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
+        argv.push_back(nullptr);
+        if (!std::freopen((folder / ".out").c_str(), "w", stdout) ||
+            !std::freopen((folder / ".err").c_str(), "w", stderr))
+            ::_exit(99);
+        ::execv(AMBILUX_PROGRAM, argv.data());
+        ::_exit(98);
+    }
+    return child;
+}
+
+Outcome finish(const test::TempFolder& folder, pid_t child) {
+    int status = 0;
+    REQUIRE(::waitpid(child, &status, 0) == child);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), read_file(folder / ".out"),
+            read_file(folder / ".err")};
+}
+
+Outcome run(const test::TempFolder& folder, const std::vector<std::string>& arguments) {
+    return finish(folder, start(folder, arguments));
+}
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+/// Arguments of a small render of the Cornell box to a.exr, and further ones.
+std::vector<std::string> render(const test::TempFolder& folder, std::vector<std::string> more,
+                                const std::string& output = "a.exr") {
+    std::vector<std::string> all = {"render", kCornell, "--size", "24x16", "-o", folder / output};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+}
+
+json statistics(const test::TempFolder& folder, std::vector<std::string> more, const std::string& output = "a.exr") {
+    more.insert(more.end(), {"--json", "-"});
+    const Outcome o = run(folder, render(folder, more, output));
+    INFO(o.err);
+    REQUIRE(o.code == 0);
+    return json::parse(o.out);
+}
+
+}  // namespace
+
+TEST_CASE("wrong use ends with code 2 and says what is right") {
+    const test::TempFolder folder;
+    struct Case {
+        std::vector<std::string> arguments;
+        std::string message;
+    };
+    const std::vector<Case> cases = {
+        {{"frobnicate"}, "unknown command 'frobnicate': render, info"},
+        {{"render", kCornell}, "--output is required"},
+        {{"render", "-o", "x.exr"}, "SCENE is required"},
+        {render(folder, {"--frob"}), "--frob"},
+        {render(folder, {"--spp", "many"}), "--spp"},
+        {render(folder, {"--spp", "0"}), "at least one sample"},
+        {render(folder, {"--spp", "1", "--time", "1"}), "exclude each other"},
+        {render(folder, {"--time", "-1"}), "more than zero seconds"},
+        {render(folder, {"--exposure", "1"}), "--png"},
+        {{"render", kCornell, "-o", folder / "a.exr", "--size", "12"}, "WIDTHxHEIGHT"},
+        {{"render", kCornell, "-o", folder / "a.exr", "--size", "12x"}, "WIDTHxHEIGHT"},
+        {{"render", kCornell, "-o", folder / "a.exr", "--size", "0x5"}, "WIDTHxHEIGHT"},
+        {{"render", kCornell, "-o", folder / "a.exr", "--size", "5x5x5"}, "WIDTHxHEIGHT"},
+        {render(folder, {"-D", "novalue"}), "-D NAME=VALUE"},
+        {render(folder, {"--set", "rr_depth"}), "--set NAME=VALUE"},
+        {render(folder, {"--set", "no_such_key=1"}), "no_such_key"},
+        {render(folder, {"--set", "estimator=best"}), "best"},
+        {render(folder, {"-i", "magic"}), "magic"},
+        {render(folder, {"--backend", "abacus"}), "abacus"},
+        {render(folder, {"--light-picking", "random"}), "power and uniform"},
+        {{"reference", kCornell, "-o", folder / "r.exr", "--spp", "1"}, "at least 2 samples"},
+        {{"reference", kCornell, "-o", folder / "r.exr", "--spp", "4", "--set", "estimator=nee"}, "estimator mis"},
+        {{"reference", kCornell, "-o", folder / "r.exr", "--spp", "4", "-i", "path"}, "-i"},
+        {{"bench", "rays", kCornell, "--repetitions", "0"}, "at least 1"},
+        {{"bench", "queues", kCornell, "--repetitions", "0"}, "at least 1"},
+        {{"bench", "queues", kCornell, "--items", "many"}, "--items"},
+        {{"bench", "queues", kCornell, "--items", "-1"}, "--items"},
+        {{"bench", "queues", kCornell, "--items", "300000000"}, "at most"},
+        {{"bench", "queues", kCornell, "--backend", "abacus"}, "auto, cpu, cuda"},
+        {{"bench", "queues"}, "SCENE is required"},
+    };
+    for (const Case& c : cases) {
+        const Outcome o = run(folder, c.arguments);
+        std::string line;
+        for (const std::string& a : c.arguments) line += a + " ";
+        CAPTURE(line, o.err);
+        CHECK(o.code == 2);
+        CHECK(contains(o.out + o.err, c.message));
+        CHECK_FALSE(fs::exists(folder.path / "a.exr"));
+    }
+    const Outcome help = run(folder, {});
+    CHECK(help.code == 2);
+    CHECK(contains(help.out, "experiment"));
+    CHECK(run(folder, {"render", "--help"}).code == 0);
+    CHECK(contains(run(folder, {"--version"}).out, "ambilux "));
+}
+
+TEST_CASE("bad input ends with code 3, what cannot be written with code 4, before any work") {
+    const test::TempFolder folder;
+    Outcome o = run(folder, {"render", folder / "none.xml", "-o", folder / "a.exr"});
+    CHECK(o.code == 3);
+    CHECK(contains(o.err, "none.xml"));
+    std::ofstream(folder / "bad.xml")
+        << "<scene version=\"3.0.0\">\n  <sensor type=\"perspective\"/>\n  <shape type=\"teapot\"/>\n</scene>\n";
+    o = run(folder, {"render", folder / "bad.xml", "-o", folder / "a.exr"});
+    CHECK(o.code == 3);
+    CHECK(contains(o.err, "bad.xml:3: "));
+    CHECK(contains(o.err, "teapot"));
+    o = run(folder, render(folder, {"-D", "nothing=1"}));
+    CHECK(o.code == 3);
+    CHECK(contains(o.err, "nothing"));
+    std::ofstream(folder / "text.exr") << "text";
+    o = run(folder, {"compare", folder / "text.exr", folder / "text.exr"});
+    CHECK(o.code == 3);
+    CHECK(contains(o.err, "text.exr"));
+
+    for (const char* option : {"--png", "--json"}) {
+        o = run(folder, render(folder, {option, folder / "none/x"}));
+        CHECK(o.code == 4);
+        CHECK(contains(o.err, "none/x: No such file or directory"));
+        CHECK_FALSE(fs::exists(folder.path / "a.exr"));
+    }
+    CHECK(run(folder, render(folder, {}, "none/a.exr")).code == 4);
+    CHECK(run(folder, render(folder, {}, ".")).code == 4);
+}
+
+TEST_CASE("a render writes image, PNG and statistics") {
+    const test::TempFolder folder;
+    const Outcome o =
+        run(folder, render(folder, {"--spp", "4", "--png", folder / "a.png", "--json", folder / "a.json", "--strict"}));
+    INFO(o.err);
+    REQUIRE(o.code == 0);
+    CHECK(contains(o.err, "a.exr: 4 spp"));
+    Attributes a;
+    const Image image = read_exr(folder / "a.exr", &a);
+    CHECK(image.width == 24);
+    CHECK(image.height == 16);
+    for (const char* name : {"scene", "scene_hash", "integrator", "variant", "estimator", "seed", "git_revision",
+                             "backend", "device", "seconds", "max_depth"}) {
+        INFO(name);
+        CHECK(a.contains(name));
+    }
+    CHECK(a["spp"] == 4);
+    CHECK(read_file(folder / "a.png").substr(1, 3) == "PNG");
+    const json j = json::parse(read_file(folder / "a.json"));
+    for (const char* name : {"scene", "integrator", "variant", "backend", "device", "seed", "size", "spp", "seconds",
+                             "rays", "stages", "invalid", "memory_bytes", "features", "skipped"}) {
+        INFO(name);
+        CHECK(j.contains(name));
+    }
+    CHECK(j["size"] == json({24, 16}));
+    CHECK(j["spp"] == 4);
+    for (const char* name : {"load", "build", "render"}) CHECK(j["seconds"][name].is_number());
+    CHECK(j["rays"]["extend"].get<uint64_t>() >= 4 * 24 * 16);
+    REQUIRE_FALSE(j["stages"].empty());
+    for (const char* name : {"name", "launches", "items", "seconds"}) CHECK(j["stages"][0].contains(name));
+    for (const char* name : {"nan", "inf", "negative"}) CHECK(j["invalid"][name] == 0);
+
+    CHECK(run(folder, render(folder, {"--png", "--spp", "1"}, "beside.exr")).code == 0);
+    CHECK(fs::exists(folder.path / "beside.png"));
+
+    const Outcome quiet = run(folder, render(folder, {"--spp", "1", "--quiet"}));
+    CHECK(quiet.code == 0);
+    CHECK(quiet.err.empty());
+    CHECK(quiet.out.empty());
+}
+
+TEST_CASE("G13: every accepted option changes something") {
+    const test::TempFolder folder;
+    const json base = statistics(folder, {"--spp", "2"});
+    const std::vector<float> pixels = read_exr(folder / "a.exr").rgb;
+    const auto changes_image = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> all = {"--spp", "2"};
+        all.insert(all.end(), more.begin(), more.end());
+        const json j = statistics(folder, all, "b.exr");
+        INFO(more[0] << " " << more[1]);
+        CHECK(bool(read_exr(folder / "b.exr").rgb != pixels));
+        return j;
+    };
+    CHECK(changes_image({"--seed", "7"})["seed"] == 7);
+    CHECK(changes_image({"--max-depth", "2"})["max_depth"] == 2);
+    CHECK(changes_image({"--set", "estimator=naive"})["estimator"] == "naive");
+    CHECK(changes_image({"--set", "estimator=nee"})["estimator"] == "nee");
+    CHECK(changes_image({"--set", "rr_depth=1"})["rr_depth"] == 1);
+    CHECK(statistics(folder, {"--spp", "3"}, "b.exr")["spp"] == 3);
+    for (const char* strategies : {"all", "hits+light", "s1t2+s2t2"}) {
+        const json j =
+            statistics(folder, {"--spp", "1", "-i", "bdpt", "--set", std::string("strategies=") + strategies}, "b.exr");
+        CHECK(j["strategies"] == strategies);
+        CHECK(j["light_paths"] == 1.0);
+    }
+    const json lvc = statistics(
+        folder, {"--spp", "1", "-i", "bdpt", "--variant", "lvc", "--set", "light_paths=0.25", "--set", "connections=5"},
+        "b.exr");
+    CHECK(lvc["light_paths"] == 0.25);
+    CHECK(lvc["connections"] == 5);
+    Attributes attributes;
+    read_exr(folder / "b.exr", &attributes);
+    CHECK(attributes["light_paths"] == 0.25);
+    CHECK(attributes["connections"] == 5);
+    CHECK(attributes["strategies"] == "all");
+    CHECK_FALSE(attributes.contains("estimator"));
+    CHECK(statistics(folder, {"--spp", "2", "--deterministic"}, "b.exr")["deterministic"] == true);
+    CHECK(statistics(folder, {"--spp", "2", "--backend", "cpu"}, "b.exr")["backend"] == "cpu");
+    CHECK(base["scene_hash"] == statistics(folder, {"--spp", "1"}, "b.exr")["scene_hash"]);
+
+    run(folder, render(folder, {"--spp", "2", "--png", folder / "a.png"}));
+    run(folder, render(folder, {"--spp", "2", "--png", folder / "b.png", "--exposure", "1"}));
+    CHECK(bool(read_file(folder / "a.png") != read_file(folder / "b.png")));
+
+    // Light picking shows where there are several lights.
+    for (const char* picking : {"power", "uniform"}) {
+        const Outcome o = run(folder, {"render", kScenes + "lights.xml", "--size", "24x16", "--spp", "2",
+                                       "--light-picking", picking, "-o", folder / (picking + std::string(".exr"))});
+        INFO(o.err);
+        CHECK(o.code == 0);
+    }
+    CHECK(bool(read_exr(folder / "power.exr").rgb != read_exr(folder / "uniform.exr").rgb));
+
+    // Lenient: refused without, listed with.
+    std::string text = read_file(kCornell);
+    text.insert(text.find("</scene>"), "<shape type=\"teapot\"/>");
+    std::ofstream(folder / "odd.xml") << text;
+    CHECK(run(folder, {"render", folder / "odd.xml", "--spp", "1", "--size", "8x8", "-o", folder / "c.exr"}).code == 3);
+    const Outcome lenient =
+        run(folder, {"render", folder / "odd.xml", "--lenient", "--spp", "1", "--size", "8x8", "-o", folder / "c.exr"});
+    CHECK(lenient.code == 0);
+    CHECK(contains(lenient.err, "warning: "));
+    CHECK(contains(lenient.err, "teapot"));
+}
+
+TEST_CASE("G14: --time is wall clock, within 5 %") {
+    const test::TempFolder folder;
+    // Other processes may take the processor at the wrong moment: one of three tries must succeed.
+    bool met = false;
+    double last = 0;
+    for (int attempt = 0; attempt < 3 && !met; ++attempt) {
+        const json j = statistics(folder, {"--time", "1.5"});
+        last = j["seconds"]["render"].get<double>();
+        CHECK(j["spp"].get<uint64_t>() >= 1);
+        met = std::abs(last - 1.5) <= 0.05 * 1.5;
+    }
+    CAPTURE(last);
+    CHECK(met);
+}
+
+TEST_CASE("Ctrl-C saves what is done and ends with code 5") {
+    const test::TempFolder folder;
+    for (const int signal : {SIGINT, SIGTERM}) {
+        fs::remove(folder.path / "a.exr");
+        const pid_t child = start(folder, render(folder, {"--spp", "100000000", "--json", folder / "a.json"}));
+        std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+        ::kill(child, signal);
+        // As `timeout` does: once to the process, at once again to its group.
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        ::kill(child, signal);
+        const Outcome o = finish(folder, child);
+        CAPTURE(signal, o.err);
+        CHECK(o.code == 5);
+        CHECK(contains(o.err, "interrupted"));
+        Attributes a;
+        read_exr(folder / "a.exr", &a);
+        CHECK(a["spp"].get<int>() >= 1);
+        const json j = json::parse(read_file(folder / "a.json"));
+        CHECK(j["interrupted"] == true);
+        CHECK(j["spp"] == a["spp"]);
+    }
+}
+
+TEST_CASE("a reference is continued, extended, compared with") {
+    const test::TempFolder folder;
+    const auto reference = [&](const std::string& spp, const std::string& size = "24x16") {
+        return run(folder, {"reference", kCornell, "--size", size, "--spp", spp, "-o", folder / "r.exr", "--json",
+                            folder / "r.json"});
+    };
+    CHECK(reference("16").code == 0);
+    CHECK(reference("48").code == 0);
+    CHECK(json::parse(read_file(folder / "r.json"))["continued_from"] == 16);
+    CHECK(contains(reference("48").err, "nothing to do"));
+    const Reference r = read_reference_exr(folder / "r.exr");
+    CHECK(r.samples == 48);
+    CHECK(r.standard_error.rgb.size() == 24 * 16 * 3);
+    const Outcome other = reference("64", "16x16");
+    CHECK(other.code == 3);
+    CHECK(contains(other.err, "its size is 24x16, asked for is 16x16"));
+
+    REQUIRE(run(folder, render(folder, {"--spp", "16"})).code == 0);
+    const Outcome o = run(folder, {"compare", folder / "a.exr", folder / "r.exr", "--json", "-"});
+    REQUIRE(o.code == 0);
+    const json j = json::parse(o.out);
+    for (const char* name : {"rmse", "rmse_corrected", "reference_noise", "relmse", "mape", "bias_z"})
+        CHECK(j[name].is_number());
+    CHECK(j["reference_spp"] == 48);
+    CHECK(std::abs(j["bias_z"].get<double>()) < 5);
+    CHECK(contains(run(folder, {"compare", folder / "a.exr", folder / "r.exr"}).out, "RMSE"));
+    REQUIRE(run(folder, {"render", kCornell, "--size", "8x8", "--spp", "1", "-o", folder / "small.exr"}).code == 0);
+    const Outcome sizes = run(folder, {"compare", folder / "small.exr", folder / "r.exr"});
+    CHECK(sizes.code == 3);
+    CHECK(contains(sizes.err, "small.exr"));
+    CHECK(contains(sizes.err, "8x8"));
+}
+
+TEST_CASE("an experiment, killed and resumed") {
+    const test::TempFolder folder;
+    std::ofstream(folder / "e.toml")
+        << "seeds = [1, 2]\nreference = { spp = 64 }\nbudget = { spp = [1, 4, 16] }\n[[scene]]\nname = "
+           "\"cornell\"\npath = \""
+        << kCornell
+        << "\"\nsize = [24, 16]\nmax_depth = 4\n[[run]]\nname = \"nee\"\nintegrator = \"path\"\nestimator = \"nee\"\n"
+        << "[[run]]\nname = \"mis\"\nintegrator = \"path\"\n";
+    const pid_t child = start(folder, {"experiment", folder / "e.toml", "-o", folder / "out"});
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    ::kill(child, SIGKILL);
+    finish(folder, child);
+    const Outcome o = run(folder, {"experiment", folder / "e.toml", "-o", folder / "out", "--resume"});
+    INFO(o.err);
+    CHECK(o.code == 0);
+    const std::string csv = read_file(folder / "out/runs.csv");
+    CHECK(std::count(csv.begin(), csv.end(), '\n') == 1 + 2 * 2 * 3);
+    CHECK(fs::exists(folder.path / "out/images/cornell/mis_2.png"));
+    const Outcome again = run(folder, {"experiment", folder / "e.toml", "-o", folder / "out"});
+    CHECK(again.code == 2);
+    CHECK(contains(again.err, "--resume"));
+    std::ofstream(folder / "bad.toml") << "seeds = [1]\nreferense = { spp = 64 }\n";
+    const Outcome bad = run(folder, {"experiment", folder / "bad.toml", "-o", folder / "out2"});
+    CHECK(bad.code == 3);
+    CHECK(contains(bad.err, "bad.toml:2: unknown key 'referense'"));
+}
+
+TEST_CASE("info and bench stages") {
+    const test::TempFolder folder;
+    const Outcome info = run(folder, {"info", kCornell, "--json", "-"});
+    REQUIRE(info.code == 0);
+    const json j = json::parse(info.out);
+    CHECK(j["kernels"]["features"].is_array());
+    CHECK(j["kernels"]["skipped"].is_array());
+    CHECK(contains(run(folder, {"info", kCornell}).out, "kernels:"));
+    const Outcome bench =
+        run(folder, {"bench", "stages", kCornell, "--size", "24x16", "--spp", "2", "--json", folder / "b.json"});
+    CHECK(bench.code == 0);
+    CHECK(contains(bench.out, "ns/item"));
+    CHECK(json::parse(read_file(folder / "b.json"))["spp"] == 2);
+}
+
+TEST_CASE("bench queues") {
+    const test::TempFolder folder;
+    const std::vector<std::string> command = {"bench",   "queues", kCornell,        "--backend", "cpu",
+                                              "--items", "1024",   "--repetitions", "1",         "--json"};
+    const auto with = [&](const std::string& output) {
+        std::vector<std::string> all = command;
+        all.push_back(output);
+        return run(folder, all);
+    };
+    const Outcome table = with(folder / "q.json"), plain = with("-");
+    REQUIRE(table.code == 0);
+    REQUIRE(plain.code == 0);
+    for (const char* text : {"backend: cpu", "ns_per_item", "ConnectionVertex", "select", "morton"})
+        CHECK(contains(table.out, text));
+    const json file = json::parse(read_file(folder / "q.json")), printed = json::parse(plain.out);
+    CHECK(file["items"] == 1024);
+    CHECK(file["rows"].size() == printed["rows"].size());
+    // On a machine without a device; with one it has nothing to say.
+    const Outcome device =
+        run(folder, {"bench", "queues", kCornell, "--backend", "cuda", "--items", "1024", "--repetitions", "1"});
+    CHECK((device.code == 0 || device.code == 4));
+    if (device.code == 4) CHECK(contains(device.err, "no CUDA device"));
+}

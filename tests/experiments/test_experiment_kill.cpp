@@ -1,0 +1,178 @@
+// libs: ambilux_experiments
+// timeout: 300
+// The built program, killed with SIGKILL at random moments and resumed, leaves what an uninterrupted run leaves.
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <random>
+#include <thread>
+
+#include "core/atomic_file.h"
+#include "experiments/results.h"
+#include "film/exr_io.h"
+#include "tests/support/catch.h"
+#include "tests/support/temp_folder.h"
+
+using namespace ambilux;
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+std::string config() {
+    const std::string scenes = std::string(AMBILUX_SOURCE_DIR) + "/scenes/";
+    return R"(seeds = [1, 2]
+[reference]
+spp = 512
+[budget]
+spp = [1, 3, 9, 40]
+[[scene]]
+name = "cornell"
+path = ")" +
+           scenes + R"(cornell.xml"
+size = [24, 16]
+max_depth = 4
+[[scene]]
+name = "glass"
+path = ")" +
+           scenes + R"(glass.xml"
+size = [16, 12]
+max_depth = 6
+reference = { integrator = "bdpt", variant = "wavefront", spp = 100 }
+[[run]]
+name = "path"
+integrator = "path"
+sweep = { estimator = ["nee", "mis"], rr_depth = [2, 5] }
+[[run]]
+name = "lvc"
+integrator = "bdpt"
+variant = "lvc"
+sweep = { connections = [1, 4] }
+[[run]]
+name = "pyramid"
+integrator = "bdpt"
+variant = "wavefront"
+techniques = 3
+)";
+}
+
+pid_t start(const std::vector<std::string>& arguments, const std::string& messages) {
+    const pid_t child = ::fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+        std::vector<char*> argv = {const_cast<char*>(AMBILUX_PROGRAM)};
+        for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
+        argv.push_back(nullptr);
+        if (!std::freopen(messages.c_str(), "w", stderr) || !std::freopen("/dev/null", "w", stdout)) ::_exit(99);
+        ::execv(AMBILUX_PROGRAM, argv.data());
+        ::_exit(98);
+    }
+    return child;
+}
+
+/// The exit code, or minus the signal.
+int finish(pid_t child) {
+    int status = 0;
+    REQUIRE(::waitpid(child, &status, 0) == child);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+/// Rows without the column `time`, which is the 11th; names may hold commas in quotes.
+std::vector<std::string> timeless(const std::string& path) {
+    std::vector<std::string> rows = read_results(path);
+    for (std::string& row : rows) {
+        bool inside = false;
+        int field = 0;
+        std::string kept;
+        for (const char c : row) {
+            if (c == '"') inside = !inside;
+            field += c == ',' && !inside;
+            if (field != 10 || c == ',') kept += c;
+        }
+        row = kept;
+    }
+    return rows;
+}
+
+/// Files below `folder` that a finished experiment is made of, by their relative names.
+std::vector<std::string> files_of(const fs::path& folder) {
+    std::vector<std::string> names;
+    for (const auto& file : fs::recursive_directory_iterator(folder))
+        if (file.is_regular_file()) names.push_back(file.path().lexically_relative(folder).string());
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+}  // namespace
+
+TEST_CASE("kill -9 at random moments, resumed each time: the same rows, images and counts") {
+    const test::TempFolder folder;
+    const std::string file = folder.write("e.toml", config()), whole = (folder.path / "whole").string(),
+                      killed = (folder.path / "killed").string(), messages = (folder.path / "messages").string();
+    const auto begun = std::chrono::steady_clock::now();
+    REQUIRE(finish(start({"experiment", file, "-o", whole}, messages)) == 0);
+    const double duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    const auto expected = timeless(whole + "/runs.csv");
+    REQUIRE(expected.size() == 2 * 2 * 7 * 4);
+
+    const unsigned seed = std::random_device()();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    int kills = 0;
+    size_t rows = 0;
+    for (int attempt = 0; attempt < 8; ++attempt) {
+        const pid_t child = start({"experiment", file, "-o", killed, "--resume"}, messages);
+        std::this_thread::sleep_for(
+            std::chrono::duration<double>(std::uniform_real_distribution<double>(0.02, 0.5)(random) * duration));
+        ::kill(child, SIGKILL);
+        const int code = finish(child);
+        INFO(read_file(messages));
+        REQUIRE((code == -SIGKILL || code == 0));
+        kills += code != 0;
+        const size_t now = fs::exists(killed + "/runs.csv") ? read_results(killed + "/runs.csv").size() : 0;
+        // A render that keeps images of single strategies shows its rows when it is complete, so that none are ever
+        // lost.
+        CHECK(now >= rows);
+        rows = now;
+    }
+    CHECK(kills >= 1);
+    const int code = finish(start({"experiment", file, "-o", killed, "--resume"}, messages));
+    INFO(read_file(messages));
+    REQUIRE(code == 0);
+
+    CHECK(bool(timeless(killed + "/runs.csv") == expected));
+    const auto files = files_of(whole);
+    CHECK(files_of(killed) == files);
+    size_t images = 0, statistics = 0, techniques = 0;
+    for (const std::string& name : files) {
+        CAPTURE(name);
+        if (name.ends_with(".exr")) {
+            CHECK(bool(read_exr(whole + "/" + name).rgb == read_exr(killed + "/" + name).rgb));
+            ++images;
+            techniques += name.starts_with("techniques/");
+        } else if (name.starts_with("stats/")) {
+            // What the parts of a resumed render did adds up.
+            const json a = json::parse(read_file(whole + "/" + name)), b = json::parse(read_file(killed + "/" + name));
+            CHECK(a["rays"] == b["rays"]);
+            CHECK(a["spp"] == b["spp"]);
+            REQUIRE(a["stages"].size() == b["stages"].size());
+            for (size_t i = 0; i < a["stages"].size(); ++i) {
+                CHECK(a["stages"][i]["name"] == b["stages"][i]["name"]);
+                // The clock sizes batches, and a stage that runs over all slots of a batch counts those that stay empty
+                // too.
+                const std::string stage = a["stages"][i]["name"];
+                if (stage == "extend" || stage == "shade" || stage == "occlude")
+                    CHECK(a["stages"][i]["items"] == b["stages"][i]["items"]);
+            }
+            ++statistics;
+        }
+    }
+    CHECK(statistics == 2 * 2 * 7);
+    CHECK(techniques == 2 * 2 * 2 * (2 + 3 + 4));
+    CHECK(images == statistics + techniques + 2);
+    const json manifest = json::parse(read_file(killed + "/manifest.json"));
+    CHECK(manifest["resumed"].size() >= 1);
+    CHECK(manifest["clocks"].back()["when"] == "end");
+}

@@ -1,0 +1,617 @@
+// libs: ambilux_experiments
+// timeout: 120
+// Budgets, references and the experiment runner, on a process of known mean and variance in the renderer's place.
+#include <sys/wait.h>
+
+#include "backends/cuda_device.h"
+#include "core/log.h"
+#include "experiments/machine.h"
+#include "experiments/reference.h"
+#include "experiments/state.h"
+#include "experiments/work_estimate.h"
+#include "film/ztest.h"
+#include "tests/support/experiment_fakes.h"
+
+using namespace ambilux;
+using namespace ambilux::test;
+
+TEST_CASE("G14: a time budget is met within 5 % of wall clock, whatever a sample costs") {
+    for (const double cost : {0.0005, 0.004, 0.02}) {
+        World world;
+        world.sleep_per_sample = cost;
+        world.batch = std::max(1u, uint32_t(0.2 / cost));
+        const Scene scene = [] {
+            Scene s;
+            s.sensor.crop_width = s.sensor.crop_height = 2;
+            return s;
+        }();
+        // A loaded machine may stop the process in the last batch: one of three tries must meet the budget.
+        bool met = false;
+        double wall = 0;
+        for (int attempt = 0; attempt < 3 && !met; ++attempt) {
+            FakeRenderer renderer(scene, {}, world);
+            world.samples = 0;
+            const auto start = std::chrono::steady_clock::now();
+            const RenderPosition p = drive(renderer, {}, {0, 1.0});
+            wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+            met = std::abs(wall - 1.0) <= 0.05;
+            CHECK(p.samples == world.samples);
+            CHECK(p.seconds <= wall);
+        }
+        CAPTURE(cost, wall);
+        CHECK(met);
+    }
+}
+
+TEST_CASE("sample budgets are exact and interruptions keep whole samples") {
+    World world;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 2;
+    FakeRenderer renderer(scene, {}, world);
+    CHECK(drive(renderer, {}, {10, 0}).samples == 10);
+    CHECK(world.calls == 4);  // 3 3 3 1
+    world.stop_at = 6;
+    const RenderPosition p = drive(renderer, {10, 0, false}, {100, 0}, &world.flag);
+    CHECK(p.interrupted);
+    CHECK(p.samples == 14);  // 3, then 1 of 3
+    CHECK(renderer.film().samples == 14);
+    error_of([&] { drive(renderer, {}, {0, 0}); }, ExitCode::usage);
+}
+
+TEST_CASE("samples that a renderer brings along are the first of a render with a time, and are not counted twice") {
+    World world;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 2;
+    struct Prepared : FakeRenderer {
+        using FakeRenderer::FakeRenderer;
+        uint32_t left = 7, first_count = 0;
+        uint32_t ready() const override { return left; }
+        uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+            const uint32_t had = count < left ? 0 : left;
+            if (had) first_count = count;
+            left = 0;
+            return had + FakeRenderer::render(first + had, count - had, interrupt);
+        }
+    };
+    world.sleep_per_sample = 0.01;
+    Prepared timed(scene, {}, world);
+    const RenderPosition p = drive(timed, {}, {0, 0.2});
+    CHECK(timed.first_count == 7);
+    CHECK(p.samples == world.samples + 7);
+    CHECK(world.samples > 0);
+    CHECK(world.samples <= 21);  // what the time suffices for, and one by rounding
+    Prepared counted(scene, {}, world);
+    CHECK(drive(counted, {}, {5, 0}).samples == 5);  // fewer than there are: the renderer sees that
+}
+
+TEST_CASE("the reference: a killed and continued one equals the uninterrupted one") {
+    const TempFolder folder;
+    write_inputs(folder);
+    World world;
+    const Hooks hooks = fake_hooks(world);
+    const Scene scene = fake_scene(folder / "a.xml", {});
+    ReferenceRequest whole;
+    whole.path = folder / "whole.exr";
+    whole.spp = 64;
+    const auto complete = make_reference(scene, whole, hooks);
+    CHECK(complete.reference.samples == 64);
+
+    ReferenceRequest part = whole;
+    part.path = folder / "part.exr";
+    part.checkpoint_seconds = 0;  // after every batch
+    world.stop_at = world.calls + 5;
+    part.interrupt = &world.flag;
+    const auto stopped = make_reference(scene, part, hooks);
+    CHECK(stopped.interrupted);
+    const uint64_t kept = read_reference_exr(part.path).samples;
+    CHECK(kept >= 2);
+    CHECK(kept < 64);
+    CHECK(kept == stopped.reference.samples);
+    world.flag = false;
+    world.sleep_per_sample = 0.001;  // so that checkpoints fall between batches
+    const auto continued = make_reference(scene, part, hooks);
+    CHECK(continued.continued_from == kept);
+    CHECK(continued.reference.samples == 64);
+    for (size_t i = 0; i < complete.reference.mean.rgb.size(); ++i) {
+        REQUIRE(continued.reference.mean.rgb[i] == Approx(complete.reference.mean.rgb[i]).epsilon(1e-6));
+        REQUIRE(continued.reference.standard_error.rgb[i] ==
+                Approx(complete.reference.standard_error.rgb[i]).epsilon(1e-5));
+    }
+    const uint64_t before = world.samples;
+    CHECK(make_reference(scene, part, hooks).continued_from == 64);
+    CHECK(world.samples == before);
+
+    SECTION("what differs is named") {
+        ReferenceRequest other = part;
+        other.settings.max_depth = 3;
+        CHECK(contains(error_of([&] { make_reference(scene, other, hooks); }),
+                       "part.exr: cannot be continued: its max_depth is -1, asked for is 3"));
+        other = part;
+        other.settings.seed = 1ull << 40;
+        CHECK(contains(error_of([&] { make_reference(scene, other, hooks); }),
+                       "its seed is 0, asked for is 1099511627776"));
+        Scene changed = scene;
+        changed.content_hash[0] ^= 1;
+        CHECK(contains(error_of([&] { make_reference(changed, part, hooks); }), "its scene_hash is"));
+        changed = scene;
+        changed.sensor.crop_width = 8;
+        CHECK(
+            contains(error_of([&] { make_reference(changed, part, hooks); }), "its size is 16x12, asked for is 8x12"));
+        write_exr(folder / "image.exr", complete.reference.mean);
+        other = part;
+        other.path = folder / "image.exr";
+        CHECK(contains(error_of([&] { make_reference(scene, other, hooks); }),
+                       "its kind is (not stated), asked for is reference"));
+        other.path = folder / "none/r.exr";
+        error_of([&] { make_reference(scene, other, hooks); }, ExitCode::device);
+    }
+    SECTION("seeds beyond 32 bits come back") {
+        ReferenceRequest big = whole;
+        big.path = folder / "big.exr";
+        big.settings.seed = ~0ull;
+        make_reference(scene, big, hooks);
+        CHECK(make_reference(scene, big, hooks).continued_from == 64);
+    }
+}
+
+TEST_CASE("a reference shares no random numbers with a render of the same seed") {
+    const TempFolder folder;
+    write_inputs(folder);
+    World world;
+    const Hooks hooks = fake_hooks(world);
+    const Scene scene = fake_scene(folder / "a.xml", {});
+    ReferenceRequest r;
+    r.path = folder / "r.exr";
+    r.spp = 64;
+    const auto reference = make_reference(scene, r, hooks);
+    FakeRenderer renderer(scene, {}, world);
+    renderer.render(0, 64, nullptr);
+    const Metrics m = compare_images(renderer.film(), reference.reference);
+    // Independent: E (x-r)² is the sum of both variances; with shared samples it would be zero.
+    CHECK(m.rmse_corrected == Approx(m.reference_noise).epsilon(0.25));
+}
+
+TEST_CASE("an experiment leaves what design.md describes") {
+    const TempFolder folder;
+    write_inputs(folder);
+    World world;
+    world.counters_restart = GENERATE(false, true);
+    CHECK(run_experiment(request(folder, "out"), fake_hooks(world)) == ExitCode::done);
+    const auto rows = table(folder / "out/runs.csv");
+    REQUIRE(rows.size() == 2 * 2 * 2 * 4);
+    CHECK(rows[0][column("scene")] == "a");
+    CHECK(rows[4][column("run")] == "biased");
+    CHECK(rows[15][column("seed")] == "1");  // seeds are the outer loop
+    CHECK(rows[16][column("seed")] == "2");
+    CHECK(rows[3][column("spp")] == "32");
+    CHECK(rows[3][column("rays")] == std::to_string(32 * 16 * 12));
+    CHECK(std::stod(rows[3][column("time")]) >= std::stod(rows[2][column("time")]));
+    for (const char* file : {"config.resolved.toml", "manifest.json", "images/a/good_1.exr", "images/b/biased_2.png",
+                             "images/a/reference.png", "stats/a/good_2.json"})
+        CHECK(fs::exists(folder.path / "out" / file));
+    CHECK_FALSE(fs::exists(folder.path / "out/state"));
+    const auto manifest = nlohmann::json::parse(read_file(folder / "out/manifest.json"));
+    CHECK(manifest["finished"].is_string());
+    CHECK(manifest["devices"][0] == "fake device");
+    CHECK(manifest["scenes"][1]["size"] == nlohmann::json({9, 5}));
+    CHECK(fs::exists(folder.path / "out" / manifest["scenes"][0]["reference"]["file"].get<std::string>()));
+    const auto stats = nlohmann::json::parse(read_file(folder / "out/stats/a/good_2.json"));
+    CHECK(stats["spp"] == 32);
+    CHECK(stats["rays"]["extend"] == 32 * 16 * 12);
+    Attributes attributes;
+    read_exr(folder / "out/images/a/good_2.exr", &attributes);
+    CHECK(attributes["spp"] == 32);
+    CHECK(attributes["seed"] == 2);
+
+    // The error is that of the known process: sqrt(mean of variances/n), mean over channels of (1+c)² = 14/3; plus the
+    // bias of the biased one.
+    double good = 0, biased = 0;
+    for (const auto& row : rows)
+        if (row[column("scene")] == "a" && row[column("spp")] == "32")
+            (row[column("run")] == "good" ? good : biased) += std::pow(std::stod(row[column("rmse_corrected")]), 2) / 2;
+    CHECK(good == Approx(14.0 / 3 / 32).epsilon(0.3));
+    CHECK(biased == Approx(14.0 / 3 * (1.21 / 32 + 0.01)).epsilon(0.3));
+
+    SECTION("the folder is not overwritten, and nothing is left to do for --resume") {
+        CHECK(contains(error_of([&] { run_experiment(request(folder, "out"), fake_hooks(world)); }, ExitCode::usage),
+                       "--resume"));
+        const std::string before = read_file(folder / "out/runs.csv");
+        const uint64_t samples = world.samples;
+        CHECK(run_experiment(request(folder, "out", true), fake_hooks(world)) == ExitCode::done);
+        CHECK(world.samples == samples);
+        CHECK(read_file(folder / "out/runs.csv") == before);
+    }
+    SECTION("a changed configuration or scene is refused by name") {
+        folder.write("e.toml", std::string(kConfig).replace(std::string(kConfig).find("[1, 2]"), 6, "[1, 3]"));
+        CHECK(contains(error_of([&] { run_experiment(request(folder, "out", true), fake_hooks(world)); }),
+                       "'seeds = [ 1, 2 ]' there, 'seeds = [ 1, 3 ]' now"));
+        write_inputs(folder);
+        folder.write("b.xml", "<scene changed>");
+        CHECK(contains(error_of([&] { run_experiment(request(folder, "out", true), fake_hooks(world)); }),
+                       "b.xml: has changed"));
+    }
+    SECTION("references are kept for other experiments") {
+        auto shared = request(folder, "shared1");
+        shared.references = folder / "refs";
+        run_experiment(shared, fake_hooks(world));
+        const uint64_t samples = world.samples;
+        shared.output = folder / "shared2";
+        run_experiment(shared, fake_hooks(world));
+        CHECK(world.samples - samples == 2 * 2 * 2 * 32);
+    }
+}
+
+TEST_CASE("killed at any point and resumed, an experiment equals an uninterrupted one") {
+    const TempFolder folder;
+    write_inputs(folder);
+    World world;
+    run_experiment(request(folder, "whole"), fake_hooks(world));
+    const auto expected = timeless(folder / "whole/runs.csv");
+    const int calls = world.calls;
+    // In references, in the middle of renders, between checkpoints, near the end.
+    for (const int at : {1, 70, calls - 95, calls - 60, calls - 33, calls - 17, calls}) {
+        const std::string out = "killed" + std::to_string(at);
+        int kills = 0;
+        for (int attempt = 0; attempt < 2; ++attempt) {
+            const pid_t child = ::fork();
+            REQUIRE(child >= 0);
+            if (child == 0) {
+                World doomed;
+                doomed.kill_at = at;
+                try {
+                    run_experiment(request(folder, out, attempt > 0), fake_hooks(doomed));
+                } catch (...) {
+                    ::_exit(9);
+                }
+                ::_exit(0);
+            }
+            int status = 0;
+            REQUIRE(::waitpid(child, &status, 0) == child);
+            REQUIRE((WIFSIGNALED(status) || WEXITSTATUS(status) == 0));
+            kills += WIFSIGNALED(status);
+        }
+        CAPTURE(at);
+        CHECK(kills >= 1);
+        append_file(folder / (out + "/runs.csv"), "a,good,1,");  // a line that was cut off
+        World healthy;
+        CHECK(run_experiment(request(folder, out, true), fake_hooks(healthy)) == ExitCode::done);
+        CHECK(bool(timeless(folder / (out + "/runs.csv")) == expected));
+        for (const char* image : {"images/a/good_1.exr", "images/b/biased_2.exr"})
+            CHECK(bool(read_exr(folder / (out + "/" + image)).rgb ==
+                       read_exr(folder / ("whole/" + std::string(image))).rgb));
+    }
+}
+
+TEST_CASE("a signal ends an experiment with what is done saved, and resuming repeats no sample") {
+    const TempFolder folder;
+    write_inputs(folder);
+    World world;
+    world.stop_at = 300;  // in the renders: the references take 2·134 calls
+    auto r = request(folder, "out");
+    r.interrupt = &world.flag;
+    CHECK(run_experiment(r, fake_hooks(world)) == ExitCode::interrupted);
+    CHECK(fs::exists(folder.path / "out/state/a"));
+    world.flag = false;
+    r.resume = true;
+    CHECK(run_experiment(r, fake_hooks(world)) == ExitCode::done);
+    CHECK(world.samples == 2 * 400 + 8 * 32);
+    CHECK(table(folder / "out/runs.csv").size() == 32);
+}
+
+TEST_CASE("a resumed render goes on with what its first part chose, and choosing takes of its time") {
+    const TempFolder folder;
+    std::string config = kConfig;
+    config.replace(config.find("name = \"biased\"\nintegrator = \"path\"\nestimator = \"naive\""), std::string::npos,
+                   "name = \"chosen\"\nintegrator = \"bdpt\"\nset = { \"bdpt.auto\" = true }\n");
+    config.replace(config.find("seeds = [1, 2]"), 14, "seeds = [1]");
+    write_inputs(folder, config);
+    /// Each choice is another one.
+    struct Choosing : FakeRenderer {
+        Choosing(const Scene& scene, const RenderSettings& settings, World& world, int number)
+            : FakeRenderer(scene, settings, world) {
+            if (settings.automatic) choice = {"choice", {{"connections", std::to_string(number)}}, 1000.0, 1, 0, {}};
+        }
+        RenderStats stats() override {
+            RenderStats s = FakeRenderer::stats();
+            s.choice = choice;
+            return s;
+        }
+        ChoiceStats choice;
+    };
+    World world;
+    Hooks hooks = fake_hooks(world);
+    std::vector<RenderSettings> made;
+    hooks.make_renderer = [&](const Scene& scene, const RenderSettings& settings) {
+        made.push_back(settings);
+        return std::make_unique<Choosing>(scene, settings, world, int(made.size()));
+    };
+    auto r = request(folder, "out");
+    r.interrupt = &world.flag;
+    // The references take 2·134 calls, the run "good" 13, of whose number the first of "chosen" on scene a is one more.
+    world.stop_at = 2 * 134 + 13 + 8;
+    REQUIRE(run_experiment(r, hooks) == ExitCode::interrupted);
+    REQUIRE(made.back().automatic);
+    const uint32_t first = uint32_t(made.size());
+    world.flag = false;
+    r.resume = true;
+    made.clear();
+    REQUIRE(run_experiment(r, hooks) == ExitCode::done);
+    // Tried, rendered: the first render that is made again for "chosen" with that number of connections is the one that
+    // was interrupted.
+    const auto resumed = std::find_if(made.begin(), made.end(),
+                                      [&](const RenderSettings& s) { return s.integrator == "bdpt" && !s.automatic; });
+    REQUIRE(resumed != made.end());
+    CHECK(resumed->connections == first);
+    for (const auto& row : table(folder / "out/runs.csv"))
+        if (row[column("run")] == "chosen") CHECK(std::stod(row[column("time")]) >= 1000.0);
+    const auto stats = nlohmann::json::parse(read_file(folder / "out/stats/a/chosen_1.json"));
+    CHECK(stats["choice"]["settings"]["connections"] == std::to_string(first));
+    CHECK(stats["choice"]["seconds"] == 1000.0);
+}
+
+TEST_CASE("a damaged state costs the render, not the experiment") {
+    const TempFolder folder;
+    RenderState state{{1, 1, 2, {1, 2, 3}, {4, 5, 6}}, {{"rows", {"x"}}}};
+    write_state(folder / "s", state);
+    const auto back = read_state(folder / "s");
+    REQUIRE(back);
+    CHECK(back->moments.sum == state.moments.sum);
+    CHECK(back->moments.sum_squares == state.moments.sum_squares);
+    CHECK(back->notes == state.notes);
+    const std::string bytes = read_file(folder / "s");
+    set_quiet(true);
+    for (size_t keep = 0; keep < bytes.size(); ++keep) {
+        folder.write("s", bytes.substr(0, keep));
+        REQUIRE_FALSE(read_state(folder / "s"));
+    }
+    std::string flipped = bytes;
+    flipped[bytes.size() / 2] ^= 1;
+    folder.write("s", flipped);
+    CHECK_FALSE(read_state(folder / "s"));
+    CHECK_FALSE(read_state(folder / "missing"));
+    set_quiet(false);
+}
+
+TEST_CASE("time checkpoints lie within one render") {
+    const TempFolder folder;
+    std::string config = kConfig;
+    config.replace(config.find("spp = [1, 2, 8, 32]"), 19, "seconds = [0.1, 0.3]");
+    config.replace(config.find("seeds = [1, 2]"), 14, "seeds = [7]");
+    write_inputs(folder, config);
+    World world;
+    world.sleep_per_sample = 0.0002;
+    world.batch = 50;
+    CHECK(run_experiment(request(folder, "out"), fake_hooks(world)) == ExitCode::done);
+    const auto rows = table(folder / "out/runs.csv");
+    REQUIRE(rows.size() == 2 * 2 * 2);
+    int met = 0;  // a loaded machine delays some
+    for (size_t i = 0; i < rows.size(); ++i) {
+        const double budget = i % 2 ? 0.3 : 0.1, time = std::stod(rows[i][column("time")]);
+        CHECK(time > 0.95 * budget);
+        met += time < 1.05 * budget;
+    }
+    CHECK(met >= 5);
+}
+
+TEST_CASE("two processes do not share a folder; a folder that cannot be made is a device error") {
+    const TempFolder folder;
+    write_inputs(folder);
+    World world;
+    World* inner_world = &world;
+    Hooks hooks = fake_hooks(world);
+    std::string message;
+    const auto make = hooks.make_renderer;
+    bool once = false;
+    hooks.make_renderer = [&](const Scene& s, const RenderSettings& settings) {
+        if (fs::exists(folder.path / "out/.lock") && !once) {
+            once = true;
+            message = error_of([&] { run_experiment(request(folder, "out", true), fake_hooks(*inner_world)); },
+                               ExitCode::device);
+        }
+        return make(s, settings);
+    };
+    run_experiment(request(folder, "out"), hooks);
+    CHECK(contains(message, "another experiment is writing into"));
+    folder.write("file", "");
+    CHECK(contains(error_of([&] { run_experiment(request(folder, "file/out"), fake_hooks(world)); }, ExitCode::device),
+                   "file/out"));
+}
+
+TEST_CASE("checkpoints in samples and in seconds lie within one render") {
+    const TempFolder folder;
+    std::string config = kConfig;
+    config.replace(config.find("spp = [1, 2, 8, 32]"), 19, "spp = [10, 400]\nseconds = [0.05, 0.2]");
+    write_inputs(folder, config);
+    World world;
+    world.sleep_per_sample = 0.0005;
+    world.batch = 20;
+    Hooks hooks = fake_hooks(world);
+    const auto make = hooks.make_renderer;
+    int told = 0;  // renderers that know of both budgets
+    hooks.make_renderer = [&](const Scene& s, const RenderSettings& settings) {
+        told += settings.expected_samples == 400 && settings.expected_seconds == 0.2;
+        return make(s, settings);
+    };
+    CHECK(run_experiment(request(folder, "out"), hooks) == ExitCode::done);
+    CHECK(told == 8);
+    const auto rows = table(folder / "out/runs.csv");
+    REQUIRE(rows.size() == 8 * 4);
+    const size_t checkpoint = column("checkpoint"), budget = column("budget"), spp = column("spp"),
+                 time = column("time");
+    for (size_t i = 0; i < rows.size(); i += 4) {
+        // Written in the order in which they are reached; a place in the list of checkpoints means the same in every
+        // render.
+        for (size_t k = 0; k + 1 < 4; ++k) CHECK(std::stod(rows[i + k][time]) <= std::stod(rows[i + k + 1][time]));
+        for (size_t k = 0; k < 4; ++k) {
+            const auto& row = rows[i + k];
+            CHECK(row[budget] == (std::stoi(row[checkpoint]) < 2 ? "spp" : "seconds"));
+            if (row[checkpoint] == "0") CHECK(row[spp] == "10");
+            if (row[checkpoint] == "1") CHECK(row[spp] == "400");
+            if (row[checkpoint] == "2") CHECK(std::stod(row[time]) > 0.95 * 0.05);
+            if (row[checkpoint] == "3") {
+                CHECK(std::stod(row[time]) > 0.95 * 0.2);
+                // The image is that of the last checkpoint of the list, not the latest.
+                Attributes attributes;
+                read_exr(folder / ("out/images/" + row[0] + "/" + row[1] + "_" + row[2] + ".exr"), &attributes);
+                CHECK(std::to_string(attributes["spp"].get<int>()) == row[spp]);
+            }
+        }
+    }
+    // One render each, nothing twice: 400 samples unless time allowed more.
+    const uint64_t references = 2 * 400;
+    uint64_t most = 0;
+    for (size_t i = 3; i < rows.size(); i += 4) most += std::stoull(rows[i][spp]);
+    CHECK(world.samples == references + most);
+}
+
+TEST_CASE(
+    "a reference is found by content, extended on demand, and made by the integrator that the configuration names") {
+    const TempFolder folder;
+    write_inputs(folder);
+    World world;
+    auto r = request(folder, "one");
+    r.references = folder / "refs";
+    run_experiment(r, fake_hooks(world));
+    const auto samples_of = [&](const std::string& config, const std::string& output) {
+        folder.write("e.toml", config);
+        r.output = folder / output;
+        const uint64_t before = world.samples;
+        run_experiment(r, fake_hooks(world));
+        return world.samples - before - 8 * 32;
+    };
+    const auto with = [](std::string config, const std::string& from, const std::string& to) {
+        return config.replace(config.find(from), from.size(), to);
+    };
+    CHECK(samples_of(kConfig, "two") == 0);
+    CHECK(samples_of(with(kConfig, "name = \"b\"", "name = \"another\""), "three") == 0);
+    CHECK(samples_of(with(kConfig, "spp = 400", "spp = 500"), "four") == 2 * 100);
+    CHECK(samples_of(kConfig, "five") == 0);  // 500 serve for 400
+    CHECK(samples_of(with(kConfig, "size = [9, 5]", "size = [9, 5]\nmax_depth = 3"), "six") == 400);
+    CHECK(samples_of(with(kConfig, "spp = 400", "spp = 400\nintegrator = \"bdpt\"\nvariant = \"lvc\""), "seven") ==
+          2 * 400);
+    const auto manifest = nlohmann::json::parse(read_file(folder / "seven/manifest.json"));
+    CHECK(manifest["scenes"][0]["reference"]["integrator"] == "bdpt");
+    CHECK(manifest["scenes"][0]["reference"]["settings"] == "integrator=bdpt variant=lvc");
+    Attributes attributes;
+    read_reference_exr(manifest["scenes"][0]["reference"]["file"].get<std::string>(), &attributes);
+    CHECK(attributes["integrator"] == "bdpt");
+    CHECK(samples_of(with(kConfig, "size = [9, 5]",
+                          "size = [9, 5]\nreference = { integrator = \"bdpt\", variant = \"lvc\", spp = 450 }"),
+                     "eight") == 50);
+    // A copy of the scene under another name has the same content.
+    folder.write("copy.xml", "<scene b>");
+    CHECK(samples_of(with(kConfig, "path = \"b.xml\"", "path = \"copy.xml\""), "nine") == 0);
+    // Twice in one experiment, too.
+    r.references = folder / "fresh";
+    CHECK(samples_of(with(kConfig, "path = \"b.xml\"\nsize = [9, 5]", "path = \"a.xml\""), "ten") == 400);
+}
+
+TEST_CASE("a reference that is killed and continued has the bits of one that is not") {
+    const TempFolder folder;
+    write_inputs(folder);
+    World world;
+    const Hooks hooks = fake_hooks(world);
+    const Scene scene = fake_scene(folder / "a.xml", {});
+    ReferenceRequest whole;
+    whole.path = folder / "whole.exr";
+    whole.spp = 64;
+    const auto complete = make_reference(scene, whole, hooks);
+    ReferenceRequest part = whole;
+    part.path = folder / "part.exr";
+    part.checkpoint_seconds = 0;
+    for (const int at : {9, 4, 7}) {
+        const pid_t child = ::fork();
+        REQUIRE(child >= 0);
+        if (child == 0) {
+            World doomed;
+            doomed.kill_at = at;
+            doomed.sleep_per_sample = 0.002;
+            try {
+                make_reference(scene, part, fake_hooks(doomed));
+            } catch (...) {}
+            ::_exit(0);
+        }
+        int status = 0;
+        REQUIRE(::waitpid(child, &status, 0) == child);
+        REQUIRE(WIFSIGNALED(status));
+        CHECK(fs::exists(part.path + ".sums"));
+    }
+    const auto continued = make_reference(scene, part, hooks);
+    CHECK(continued.continued_from >= 4);
+    CHECK(continued.continued_from < 64);
+    CHECK(bool(continued.reference.mean.rgb == complete.reference.mean.rgb));
+    CHECK(bool(continued.reference.standard_error.rgb == complete.reference.standard_error.rgb));
+    CHECK_FALSE(fs::exists(part.path + ".sums"));
+}
+
+TEST_CASE("a render that gathers images of single strategies starts over when it was killed") {
+    const TempFolder folder;
+    std::string config = kConfig;
+    config.replace(config.find("estimator = \"naive\""), 19,
+                   "sweep = { rr_depth = [1, 2], connections = [3] }\ntechniques = 4");
+    write_inputs(folder, config);
+    World world;
+    run_experiment(request(folder, "whole"), fake_hooks(world));
+    const std::string name = "techniques/a/biased[rr_depth=2,connections=3]_1/raw_s00_t02.exr";
+    const Image image = read_exr(folder / ("whole/" + name));
+    CHECK(image.rgb[0] == 32);
+    CHECK_FALSE(fs::exists(folder.path / "whole/techniques/a/good_1"));
+    const pid_t child = ::fork();
+    REQUIRE(child >= 0);
+    if (child == 0) {
+        World doomed;
+        doomed.kill_at = 2 * 134 + 3 * 13 - 2;  // in the third render, which is of this kind
+        run_experiment(request(folder, "out"), fake_hooks(doomed));
+        ::_exit(0);
+    }
+    int status = 0;
+    REQUIRE(::waitpid(child, &status, 0) == child);
+    REQUIRE(WIFSIGNALED(status));
+    const auto before = read_results(folder / "out/runs.csv").size();
+    CHECK(before % 4 == 0);
+    CHECK(run_experiment(request(folder, "out", true), fake_hooks(world)) == ExitCode::done);
+    CHECK(bool(read_exr(folder / ("out/" + name)).rgb == image.rgb));
+    CHECK(bool(timeless(folder / "out/runs.csv") == timeless(folder / "whole/runs.csv")));
+    const auto manifest = nlohmann::json::parse(read_file(folder / "out/manifest.json"));
+    CHECK(manifest["runs"][2]["sweep"] ==
+          nlohmann::json({{"of", "biased"}, {"values", {{"connections", "3"}, {"rr_depth", "2"}}}}));
+    CHECK(manifest["runs"][2]["techniques"] == 4);
+}
+
+TEST_CASE("clocks of graphics cards are read from what nvidia-smi prints") {
+    const auto gpus = parse_gpu_clocks("1980, 2619, 41\n345, [N/A], 30\n");
+    REQUIRE(gpus.size() == 2);
+    CHECK(gpus[0]["sm_mhz"] == 1980);
+    CHECK(gpus[0]["memory_mhz"] == 2619);
+    CHECK(gpus[0]["celsius"] == 41);
+    CHECK(gpus[1]["memory_mhz"].is_null());
+    CHECK(parse_gpu_clocks("").empty());
+    CHECK(describe_clocks("start", false)["gpu"].is_null());
+    const auto clocks = describe_clocks("start", true);
+    CHECK(clocks["when"] == "start");
+    CHECK(clocks["date"].is_string());
+    // Of the device that renders alone, whatever else the machine has.
+    if (cuda_device_bus_id().empty())
+        CHECK(clocks["gpu"].is_null());
+    else if (!clocks["gpu"].is_null())
+        CHECK(clocks["gpu"].size() == 1);
+}
+
+TEST_CASE("the time that is left: by kind, and for budgets of samples and seconds at once") {
+    WorkEstimate work;
+    work.plan("a", 4, {100, 0});
+    work.plan("b", 2, {0, 3});
+    work.plan("c", 1, {100, 5});
+    CHECK(std::isinf(work.seconds_left()));  // nothing is known of samples
+    CHECK(work.seconds_left("b") == 6);
+    work.begin("a", {100, 0});
+    work.progress("a", 50, 1);
+    CHECK(work.seconds_left("a") == Approx(1 + 3 * 2));
+    CHECK(work.seconds_left("c") == Approx(5));  // 100 samples take 2 s
+    work.measured("c", 10, 1);
+    CHECK(work.seconds_left("c") == Approx(10));
+    CHECK(work.fraction() == Approx(1.0 / (1 + 7 + 6 + 10)));
+    work.end("a");
+    work.skip("a");
+    CHECK(work.seconds_left("a") == Approx(2 * 2));
+}

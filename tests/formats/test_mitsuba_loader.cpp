@@ -1,0 +1,817 @@
+// libs: ambilux_formats ambilux_accel
+// timeout: 120
+// The Mitsuba loader: what it understands, and what it says about what it does not. Numbers marked "Mitsuba" were read
+// from Mitsuba 3.9.1.
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "core/error.h"
+#include "core/math.h"
+#include "formats/load.h"
+#include "scene/info.h"
+#include "tests/support/catch.h"
+#include "tests/support/temp_folder.h"
+#include "transport/bsdf/precompute.h"
+#include "transport/texture.h"
+
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STB_IMAGE_WRITE_STATIC
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#include <stb/stb_image_write.h>
+#pragma GCC diagnostic pop
+
+using namespace ambilux;
+
+namespace {
+
+const std::string kSensor = "<sensor type='perspective'><float name='fov' value='90'/></sensor>";
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+std::string wrap(const std::string& body, const std::string& version) {
+    return "<scene version='" + version + "'>\n" + body + "\n</scene>\n";
+}
+
+/// Loads a scene of the given content, with a sensor added unless it has one.
+Scene load(const std::string& body, const LoadOptions& options = {}, const std::string& version = "3.0.0",
+           const test::TempFolder* folder = nullptr) {
+    const test::TempFolder own;
+    const std::string path =
+        (folder ? *folder : own).write("scene.xml", wrap(contains(body, "<sensor") ? body : body + kSensor, version));
+    return load_mitsuba(path, options);
+}
+
+std::string error_of(const std::string& body, const LoadOptions& options = {}, const std::string& version = "3.0.0",
+                     const test::TempFolder* folder = nullptr) {
+    try {
+        load(body, options, version, folder);
+    } catch (const Error& e) {
+        CHECK(e.code == ExitCode::bad_input);
+        return e.what();
+    }
+    return "no error";
+}
+
+/// Record of the BSDF on a rectangle.
+BsdfRecord bsdf(const std::string& xml, const std::string& version = "3.0.0") {
+    const Scene s = load("<shape type='rectangle'>" + xml + "</shape>", {}, version);
+    return s.bsdfs[s.materials[s.shapes[0].material].front];
+}
+
+std::string png(int w, int h, const std::vector<uint8_t>& rgb) {
+    std::string out;
+    stbi_write_png_to_func(
+        [](void* c, void* data, int size) {
+            static_cast<std::string*>(c)->append(static_cast<char*>(data), size_t(size));
+        },
+        &out, w, h, 3, rgb.data(), w * 3);
+    return out;
+}
+
+void check_rgb(Rgb a, Rgb b, double tolerance = 1e-6) {
+    for (int i = 0; i < 3; ++i) CHECK(a[i] == Approx(b[i]).margin(tolerance));
+}
+
+std::string data_folder() {
+    const char* folder = std::getenv("AMBILUX_DATA");
+    if (!folder) WARN("AMBILUX_DATA is not set: the published scenes are not loaded");
+    return folder ? folder : "";
+}
+
+}  // namespace
+
+TEST_CASE("published scenes load without a warning, with the triangles their README lists") {
+    const std::string data = data_folder();
+    if (data.empty()) return;
+    struct Expected {
+        const char* name;
+        uint64_t triangles;
+        size_t quadrics, shapes, emitters;
+    };
+    const Expected scenes[] = {{"veach-bidir", 11544, 0, 0, 2},    {"veach-ajar", 382690, 0, 22, 1},
+                               {"veach-mis", 52, 3, 0, 3},         {"cornell-box", 36, 0, 8, 1},
+                               {"water-caustic", 103487, 0, 0, 1}, {"living-room", 143163, 0, 65, 1},
+                               {"staircase", 262663, 0, 775, 1},   {"glass-and-ice", 150594, 0, 16, 1}};
+    for (const Expected& e : scenes) {
+        INFO(e.name);
+        const Scene s = load_mitsuba(data + "/scenes/" + e.name + "/scene.xml");
+        CHECK(s.warnings.empty());
+        CHECK(s.triangles.size() + s.degenerate_triangles == e.triangles);
+        CHECK(s.quadrics.size() == e.quadrics);
+        if (e.shapes) CHECK(s.shapes.size() == e.shapes);
+        CHECK(s.emitters.size() == e.emitters);
+        CHECK(s.bounds_radius > 0);
+    }
+}
+
+TEST_CASE("Mitsuba's render tests load, but for what is refused by name") {
+    const std::string data = data_folder();
+    if (data.empty()) return;
+    const std::string tests = data + "/mitsuba-tests/tests/scenes/";
+    for (const char* name : {"bsdf_spheres/test_arealight_path", "bsdf_spheres/test_constant_path",
+                             "bsdf_spheres/test_pointlight_path", "floating_sphere/test_directional_direct",
+                             "instancing/test_instancing_path", "orthographic_sensor/test_orthographic_path",
+                             "spot_light/test_spot_direct", "texture_interp/test_texture_interp_direct"}) {
+        INFO(name);
+        const Scene s = load_mitsuba(tests + name + ".xml");
+        CHECK(s.warnings.empty());
+    }
+    const auto message = [&](const std::string& name) {
+        try {
+            load_mitsuba(tests + name);
+        } catch (const Error& e) {
+            return std::string(e.what());
+        }
+        return std::string();
+    };
+    CHECK(contains(message("mesh_attributes/test_mesh_attributes_3_vertex_direct.xml"),
+                   "vertex_direct.xml:34: texture type 'mesh_attribute' is not supported"));
+    CHECK(contains(message("various_shapes/test_various_shapes_path.xml"),
+                   "shapes_path.xml:141: shape type 'sdfgrid' is not supported"));
+    LoadOptions lenient;
+    lenient.lenient = true;
+    const Scene s = load_mitsuba(tests + "various_shapes/test_various_shapes_path.xml", lenient);
+    CHECK(s.quadrics.size() == 3);
+    REQUIRE(s.warnings.size() == 1);
+    CHECK(contains(s.warnings[0], "sdfgrid"));
+}
+
+TEST_CASE("both generations of the format give the same scene") {
+    const test::TempFolder folder;
+    folder.write("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
+    const Scene modern = load(
+        "<integrator type='path'><integer name='max_depth' value='9'/><integer name='rr_depth' value='4'/></integrator>"
+        "<sensor type='thinlens'><float name='fov' value='40'/><string name='fov_axis' value='smaller'/><float "
+        "name='aperture_radius' value='0.1'/>"
+        "<float name='focus_distance' value='3'/><transform name='to_world'><lookat origin='0,0,4' target='0,0,0' "
+        "up='0,1,0'/></transform>"
+        "<sampler type='independent'><integer name='sample_count' value='32'/></sampler>"
+        "<film type='hdrfilm'><integer name='width' value='64'/><integer name='height' value='48'/><string "
+        "name='pixel_format' value='rgb'/><rfilter type='tent'/></film></sensor>"
+        "<bsdf type='roughdielectric' id='g'><string name='int_ior' value='water'/><float name='ext_ior' "
+        "value='1'/><float name='alpha_u' value='0.2'/><float name='alpha_v' value='0.3'/></bsdf>"
+        "<shape type='obj'><string name='filename' value='m.obj'/><boolean name='face_normals' "
+        "value='true'/><transform name='to_world'><scale value='2'/></transform><ref id='g'/></shape>"
+        "<emitter type='spot'><rgb name='intensity' value='1,2,3'/><float name='cutoff_angle' value='30'/></emitter>",
+        {}, "3.0.0", &folder);
+    const Scene old = load(
+        "<integrator type='path'><integer name='maxDepth' value='9'/><integer name='rrDepth' value='4'/></integrator>"
+        "<sensor type='thinlens'><float name='fov' value='40'/><string name='fovAxis' value='smaller'/><float "
+        "name='apertureRadius' value='0.1'/>"
+        "<float name='focusDistance' value='3'/><transform name='toWorld'><lookAt origin='0,0,4' target='0,0,0' "
+        "up='0,1,0'/></transform>"
+        "<sampler type='ldsampler'><integer name='sampleCount' value='32'/></sampler>"
+        "<film type='hdrfilm'><integer name='width' value='64'/><integer name='height' value='48'/><string "
+        "name='pixelFormat' value='rgb'/><boolean name='banner' value='false'/><rfilter type='tent'/></film></sensor>"
+        "<bsdf type='roughdielectric' id='g'><string name='intIOR' value='water'/><float name='extIOR' "
+        "value='1'/><float name='alphaU' value='0.2'/><float name='alphaV' value='0.3'/></bsdf>"
+        "<shape type='obj'><string name='filename' value='m.obj'/><boolean name='faceNormals' value='true'/><transform "
+        "name='toWorld'><scale value='2'/></transform><ref id='g'/></shape>"
+        "<emitter type='spot'><spectrum name='intensity' value='1,2,3'/><float name='cutoffAngle' "
+        "value='30'/></emitter>",
+        {}, "0.6.0", &folder);
+    REQUIRE(modern.vertices.size() == old.vertices.size());
+    for (size_t i = 0; i < old.vertices.size(); ++i) CHECK(modern.vertices[i].p == old.vertices[i].p);
+    CHECK(modern.integrator.max_depth == 9);
+    CHECK(old.integrator.max_depth == 9);
+    CHECK(old.integrator.rr_depth == 4);
+    CHECK(old.integrator.spp == 32);
+    CHECK(memcmp(&modern.sensor, &old.sensor, sizeof(Sensor)) == 0);
+    CHECK(memcmp(modern.bsdfs.data(), old.bsdfs.data(), sizeof(BsdfRecord)) == 0);
+    CHECK(memcmp(modern.emitters.data(), old.emitters.data(), sizeof(Emitter)) == 0);
+    CHECK(modern.tables == old.tables);
+    CHECK(modern.content_hash != old.content_hash);
+    CHECK(modern.vertices[1].p == Vec3f{2, 0, 0});
+    CHECK_FALSE(modern.shapes[0].flags & kShapeHasNormals);
+    // Names of the other generation are unknown parameters, not ignored ones.
+    CHECK(contains(error_of("<shape type='rectangle'><transform name='toWorld'/></shape>"),
+                   "unknown parameter 'toWorld' of shape 'rectangle'"));
+}
+
+TEST_CASE("defaults, parameters, includes, search folders, aliases, references") {
+    const test::TempFolder folder;
+    folder.write("parts/light.xml", wrap("<default name='power' value='3'/><emitter type='point'><rgb name='intensity' "
+                                         "value='$power'/></emitter><shape type='obj'><string name='filename' "
+                                         "value='tri.obj'/><ref id='second'/></shape>",
+                                         "2.1.0"));
+    folder.write("meshes/tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    const std::string body =
+        "<default name='w' value='40'/><default name='wide' value='60'/><path value='meshes'/>"
+        "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='$wide'/><integer name='height' "
+        "value='$w'/></film></sensor>"
+        "<bsdf type='diffuse' id='first'><rgb name='reflectance' value='0.25'/></bsdf><alias id='first' "
+        "as='second'/><include filename='parts/light.xml'/>";
+    const Scene s = load(body, {}, "3.0.0", &folder);
+    CHECK(s.sensor.film_width == 60);  // the longest name wins
+    CHECK(s.sensor.film_height == 40);
+    REQUIRE(s.emitters.size() == 1);
+    CHECK(s.emitters[0].radiance.value.x == 3.0f);
+    CHECK(s.bsdfs[0].reflectance.value.x == 0.25f);
+
+    LoadOptions options;
+    options.parameters = {{"power", "7"}};
+    const Scene t = load(body, options, "3.0.0", &folder);
+    CHECK(t.emitters[0].radiance.value.x == 7.0f);
+    CHECK(t.content_hash != s.content_hash);
+    options.parameters = {{"nothing", "7"}};
+    CHECK(contains(error_of(body, options, "3.0.0", &folder), "the scene has no parameter '$nothing'"));
+}
+
+TEST_CASE("content hash: changes with any file, not with its place") {
+    const std::string body = "<shape type='obj'><string name='filename' value='m.obj'/></shape>";
+    const auto hash = [&](const std::string& obj, const std::string& xml, const LoadOptions& options = {}) {
+        const test::TempFolder folder;
+        folder.write("m.obj", obj);
+        return load(xml, options, "3.0.0", &folder).content_hash;
+    };
+    const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    const auto first = hash(obj, body);
+    CHECK(first == hash(obj, body));
+    CHECK(first != hash(obj + "#\n", body));
+    CHECK(first != hash(obj, body + " "));
+    LoadOptions small;
+    small.width = small.height = 32;
+    CHECK(first != hash(obj, body, small));
+}
+
+TEST_CASE("transforms: later steps apply after earlier ones") {
+    const auto moved = [](const std::string& steps) {
+        // The rectangle's corner (1,1,0), third vertex.
+        return load("<shape type='rectangle'><transform name='to_world'>" + steps + "</transform></shape>")
+            .vertices[2]
+            .p;
+    };
+    check_rgb(moved("<translate x='1' y='2' z='3'/>"), {2, 3, 3});
+    check_rgb(moved("<translate value='1 2 3'/><scale value='2'/>"), {4, 6, 6});
+    check_rgb(moved("<scale x='2' z='5'/><translate value='1,2,3'/>"), {3, 3, 3});
+    check_rgb(moved("<rotate z='1' angle='90'/>"), {-1, 1, 0});
+    check_rgb(moved("<rotate value='0 2 0' angle='90'/>"), {0, 1, -1});
+    check_rgb(moved("<matrix value='1 0 0 7  0 1 0 8  0 0 1 9  0 0 0 1'/>"), {8, 9, 9});
+    check_rgb(moved("<matrix value='0 1 0  2 0 0  0 0 1'/>"), {1, 2, 0});
+    // Camera frame: x left, y up, z ahead.
+    check_rgb(moved("<lookat origin='0 0 5' target='0 0 0' up='0 1 0'/>"), {-1, 1, 5});
+    const Scene s = load(
+        "<sensor type='perspective'><transform name='to_world'><lookat origin='1,2,3' target='1,2,13' "
+        "up='0,3,0'/></transform></sensor>");
+    check_rgb(s.sensor.to_world.vector({0, 0, 1}), {0, 0, 1});
+    check_rgb(s.sensor.to_world.vector({1, 0, 0}), {1, 0, 0});
+    check_rgb(s.sensor.to_world.point({0, 0, 0}), {1, 2, 3});
+}
+
+TEST_CASE("sensors: field of view by every rule, film, crop, size override") {
+    const auto sensor = [](const std::string& xml,
+                           const std::string& film =
+                               "<integer name='width' value='200'/><integer name='height' value='100'/>",
+                           const LoadOptions& options = {}) {
+        return load("<sensor type='perspective'>" + xml + "<film type='hdrfilm'>" + film + "</film></sensor>", options)
+            .sensor;
+    };
+    const auto fov = [](float t) { return 2 * std::atan(t) * 180 / M_PI; };
+    const std::string f60 = "<float name='fov' value='60'/><string name='fov_axis' value='";
+    CHECK(fov(sensor(f60 + "x'/>").tan_half_fov.x) == Approx(60));
+    CHECK(fov(sensor(f60 + "y'/>").tan_half_fov.y) == Approx(60));
+    CHECK(fov(sensor(f60 + "smaller'/>").tan_half_fov.y) == Approx(60));
+    CHECK(fov(sensor(f60 + "larger'/>").tan_half_fov.x) == Approx(60));
+    const Vec2f d = sensor(f60 + "diagonal'/>").tan_half_fov;
+    CHECK(fov(std::sqrt(d.x * d.x + d.y * d.y)) == Approx(60));
+    CHECK(d.x == Approx(2 * d.y));
+    const Sensor standard = load("<sensor type='perspective'/>").sensor;
+    CHECK(standard.film_width == 768);
+    CHECK(standard.film_height == 576);
+    CHECK(fov(standard.tan_half_fov.x) == Approx(38.1848).epsilon(1e-5));  // Mitsuba: 50 mm
+    CHECK(standard.filter == FilterType::gaussian);
+    CHECK(standard.filter_radius == 2.0f);
+    CHECK(standard.near_clip == 0.01f);
+    CHECK(standard.far_clip == 10000.0f);
+    CHECK(fov(sensor("<string name='focal_length' value='25mm'/>").tan_half_fov.x) ==
+          Approx(2 * std::atan(std::sqrt(36.0 * 36 + 24 * 24) / 50 * 2 / std::sqrt(5.0)) * 180 / M_PI));
+
+    const std::string film =
+        "<integer name='width' value='200'/><integer name='height' value='100'/><integer name='crop_offset_x' "
+        "value='20'/><integer name='crop_offset_y' value='10'/>"
+        "<integer name='crop_width' value='50'/><integer name='crop_height' value='60'/><rfilter "
+        "type='gaussian'><float name='stddev' value='0.25'/></rfilter>";
+    const Sensor cropped = sensor("", film);
+    CHECK(std::array<uint32_t, 4>{cropped.crop_x, cropped.crop_y, cropped.crop_width, cropped.crop_height} ==
+          std::array<uint32_t, 4>{20, 10, 50, 60});
+    CHECK(cropped.filter_radius == 1.0f);
+    LoadOptions half;
+    half.width = 100;
+    half.height = 50;
+    const Sensor scaled = sensor("", film, half);
+    CHECK(scaled.film_width == 100);
+    CHECK(std::array<uint32_t, 4>{scaled.crop_x, scaled.crop_y, scaled.crop_width, scaled.crop_height} ==
+          std::array<uint32_t, 4>{10, 5, 25, 30});
+
+    const Sensor ortho = load(
+                             "<sensor type='orthographic'><transform name='to_world'><scale x='1.5' y='3'/><translate "
+                             "x='4'/></transform>"
+                             "<film type='hdrfilm'><integer name='width' value='200'/><integer name='height' "
+                             "value='100'/><rfilter type='box'/></film></sensor>")
+                             .sensor;
+    CHECK(ortho.type == SensorType::orthographic);
+    CHECK(ortho.tan_half_fov.x == Approx(1.5));
+    CHECK(ortho.tan_half_fov.y == Approx(1.5));  // 3 over the aspect ratio
+    check_rgb(ortho.to_world.vector({1, 0, 0}), {1, 0, 0});
+    CHECK(ortho.filter == FilterType::box);
+    // A mirrored camera stays mirrored.
+    const Sensor mirrored =
+        load("<sensor type='perspective'><transform name='to_world'><scale x='-1'/></transform></sensor>").sensor;
+    check_rgb(mirrored.to_world.vector({1, 0, 0}), {-1, 0, 0});
+    check_rgb(mirrored.to_world.vector({0, 0, 1}), {0, 0, 1});
+}
+
+TEST_CASE("integrators: the inner one of moment counts, direct is two segments") {
+    CHECK(load("<integrator type='moment'><integrator type='direct'/></integrator>").integrator.max_depth == 2);
+    const Scene s = load(
+        "<integrator type='moment'><integrator type='path'><integer name='max_depth' value='-1'/><boolean "
+        "name='hide_emitters' value='true'/></integrator></integrator>");
+    CHECK(s.integrator.type == "path");
+    CHECK(s.integrator.max_depth == -1);
+    CHECK(s.integrator.hide_emitters);
+    CHECK(contains(error_of("<integrator type='aov'/>"), ":2: integrator type 'aov' is not supported"));
+}
+
+TEST_CASE("BSDFs: every type and its defaults") {
+    CHECK(bsdf("<bsdf type='diffuse'/>").reflectance.value == splat(0.5f));
+    CHECK(bsdf("").reflectance.value == splat(0.5f));
+    CHECK(bsdf("<emitter type='area'/>").reflectance.value == splat(0.0f));
+    const BsdfRecord rough_diffuse = bsdf("<bsdf type='roughdiffuse'><float name='alpha' value='0.4'/></bsdf>");
+    CHECK(rough_diffuse.type == BsdfType::rough_diffuse);
+    CHECK(rough_diffuse.alpha_u.value == 0.4f);
+
+    BsdfRecord r = bsdf("<bsdf type='conductor'/>");
+    CHECK(r.type == BsdfType::conductor);
+    CHECK(r.eta == Vec3f{0, 0, 0});
+    CHECK(r.k == Vec3f{1, 1, 1});
+    r = bsdf("<bsdf type='conductor'><string name='material' value='Au'/></bsdf>");
+    check_rgb(r.eta, {0.143036f, 0.375307f, 1.442045f}, 1e-5);  // Mitsuba
+    check_rgb(r.k, {3.982997f, 2.385556f, 1.603359f}, 1e-5);
+    // The older generation: copper, relative to air.
+    r = bsdf("<bsdf type='conductor'/>", "0.6.0");
+    CHECK(r.eta.x == Approx(0.201005 / 1.000277).epsilon(1e-5));
+    r = bsdf(
+        "<bsdf type='roughconductor'><rgb name='eta' value='1,2,3'/><rgb name='k' value='4,5,6'/><float name='extEta' "
+        "value='2'/></bsdf>",
+        "0.6.0");
+    CHECK(r.k == Vec3f{2, 2.5f, 3});
+    r = bsdf(
+        "<bsdf type='roughconductor'><string name='distribution' value='ggx'/><float name='alpha' "
+        "value='0.25'/><spectrum name='eta' value='0.789'/><spectrum name='k' value='6.15'/><boolean "
+        "name='sample_visible' value='false'/></bsdf>");
+    CHECK(r.type == BsdfType::rough_conductor);
+    CHECK(r.microfacets == Microfacets::ggx);
+    CHECK(r.alpha_u.value == 0.25f);
+    CHECK(r.alpha_v.value == 0.25f);
+    CHECK(r.eta == splat(0.789f));
+    CHECK(r.sample_visible == 0);
+    CHECK(bsdf("<bsdf type='roughconductor'/>").microfacets == Microfacets::beckmann);
+    CHECK(bsdf("<bsdf type='roughconductor'/>").alpha_v.value == 0.1f);
+
+    CHECK(bsdf("<bsdf type='dielectric'/>").ior == Approx(1.50418).epsilon(1e-5));  // Mitsuba
+    CHECK(bsdf("<bsdf type='dielectric'><string name='int_ior' value='Diamond'/><string name='ext_ior' "
+               "value='vacuum'/></bsdf>")
+              .ior == 2.419f);
+    CHECK(
+        bsdf("<bsdf type='thindielectric'><float name='int_ior' value='1.3'/><float name='ext_ior' value='1'/></bsdf>")
+            .type == BsdfType::thin_dielectric);
+    CHECK(bsdf("<bsdf type='roughdielectric'/>").type == BsdfType::rough_dielectric);
+
+    r = bsdf("<bsdf type='plastic'/>");
+    CHECK(r.type == BsdfType::plastic);
+    CHECK(r.ior == Approx(1.48959).epsilon(1e-5));  // Mitsuba
+    CHECK(r.specular_sampling_weight == Approx(2.0 / 3));
+    CHECK(r.fdr_internal == fresnel_diffuse_reflectance(r.ior));
+    CHECK(r.fdr_internal == Approx(0.590479).epsilon(0.01));  // Mitsuba's fit
+    CHECK(r.nonlinear == 0);
+
+    const Scene s = load(
+        "<shape type='rectangle'><bsdf type='roughplastic'><float name='alpha' value='0.2'/><boolean name='nonlinear' "
+        "value='true'/></bsdf></shape>"
+        "<shape type='rectangle'><bsdf type='roughplastic'><float name='alpha' value='0.2'/><rgb "
+        "name='diffuse_reflectance' value='0.1'/></bsdf></shape>");
+    REQUIRE(s.bsdfs.size() == 2);
+    CHECK(s.bsdfs[0].nonlinear == 1);
+    REQUIRE(s.bsdfs[0].transmittance_table != kNone);
+    CHECK(s.bsdfs[0].transmittance_table == s.bsdfs[1].transmittance_table);  // the same boundary
+    std::vector<float> table(kTransmittanceTableSize);
+    rough_transmittance_table(Microfacets::beckmann, 0.2f, s.bsdfs[0].ior, table.data());
+    CHECK(std::equal(table.begin(), table.end(), s.tables.begin() + s.bsdfs[0].transmittance_table));
+    CHECK(s.bsdfs[1].fdr_internal == rough_internal_reflectance(Microfacets::beckmann, 0.2f, s.bsdfs[1].ior));
+    CHECK(s.bsdfs[1].specular_sampling_weight == Approx(1 / 1.1));
+}
+
+TEST_CASE("adapters flatten into materials") {
+    const test::TempFolder folder;
+    folder.write("t.png", png(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}));
+    const auto texture = [](const std::string& name) {
+        return "<texture type='bitmap' " + name +
+               "><string name='filename' value='t.png'/><boolean name='raw' value='true'/></texture>";
+    };
+    const auto material = [&](const std::string& xml) {
+        const Scene s = load("<shape type='rectangle'>" + xml + "</shape>", {}, "3.0.0", &folder);
+        return std::pair{s.materials[s.shapes[0].material], s};
+    };
+    {
+        const auto [m, s] = material("<bsdf type='twosided'><bsdf type='diffuse'/></bsdf>");
+        CHECK(m.two_sided);
+        CHECK(m.front == m.back);
+        CHECK(m.opacity.value == 1.0f);
+        CHECK_FALSE(s.features.opacity);
+    }
+    {
+        const auto [m, s] = material(
+            "<bsdf type='twosided'><bsdf type='diffuse' name='front'/><bsdf type='plastic' name='back'/></bsdf>");
+        CHECK(s.bsdfs[m.front].type == BsdfType::diffuse);
+        CHECK(s.bsdfs[m.back].type == BsdfType::plastic);
+    }
+    {
+        const auto [m, s] =
+            material("<bsdf type='mask'>" + texture("name='opacity'") + "<bsdf type='twosided'><bsdf type='bumpmap'>" +
+                     texture("") + "<float name='scale' value='3'/><bsdf type='conductor'/></bsdf></bsdf></bsdf>");
+        CHECK(m.opacity.texture == 0);
+        CHECK(m.two_sided);
+        CHECK(s.bsdfs[m.front].type == BsdfType::conductor);
+        CHECK(s.bsdfs[m.front].bump_map == 0);
+        CHECK(s.bsdfs[m.front].bump_scale == 3.0f);
+        CHECK(s.textures.size() == 1);  // the same file with the same settings
+        CHECK(s.features.opacity);
+        CHECK(s.features.bumps);
+    }
+    {
+        const auto [m, s] =
+            material("<bsdf type='normalmap'>" + texture("name='normalmap'") +
+                     "<bsdf type='mask'><float name='opacity' value='0.25'/><bsdf type='dielectric'/></bsdf></bsdf>");
+        CHECK(m.opacity.value == 0.25f);
+        CHECK_FALSE(m.two_sided);
+        CHECK(s.bsdfs[m.front].normal_map == 0);
+    }
+    CHECK(contains(error_of("<shape type='rectangle'><bsdf type='twosided'><bsdf type='dielectric'/></bsdf></shape>"),
+                   "cannot be inside of twosided"));
+    CHECK(contains(error_of("<shape type='rectangle'><bsdf type='twosided'/></shape>"), "twosided has no nested BSDF"));
+    CHECK(contains(error_of("<shape type='rectangle'><bsdf type='mask'><float name='opacity' value='2'/><bsdf "
+                            "type='diffuse'/></bsdf></shape>"),
+                   "opacity must lie between 0 and 1"));
+}
+
+TEST_CASE("spectra become colours as in Mitsuba's RGB mode") {
+    const auto emission = [](const std::string& list) {
+        return load("<emitter type='constant'><spectrum name='radiance' value='" + list + "'/></emitter>")
+            .emitters[0]
+            .radiance.value;
+    };
+    check_rgb(emission("400:0, 500:8, 600:15.6, 700:18.4"), {20.7108f, 10.8546f, 2.77115f}, 2e-3);  // all from Mitsuba
+    check_rgb(emission("400:1, 700:1"), {1.19969f, 0.94952f, 0.903443f}, 2e-4);
+    check_rgb(emission("360:1 830:1"), {1.20488f, 0.948228f, 0.909267f}, 2e-4);
+    check_rgb(emission("2.5"), {2.5f, 2.5f, 2.5f});
+    const auto reflectance = [](const std::string& list) {
+        return bsdf("<bsdf type='diffuse'><spectrum name='reflectance' value='" + list + "'/></bsdf>")
+            .reflectance.value;
+    };
+    check_rgb(reflectance("400:0.78, 500:0.78, 600:0.78, 700:0.78"), {0.776367f, 0.77981f, 0.776029f}, 2e-4);
+    check_rgb(reflectance("400:0.1, 500:0.3, 600:0.6, 700:0.9"), {0.726577f, 0.424956f, 0.17397f}, 2e-4);
+    check_rgb(reflectance("450:1.5, 650:.2"), {0.138936f, 0.993237f, 0.760334f}, 2e-4);
+    check_rgb(bsdf("<bsdf type='diffuse'><rgb name='reflectance' value='#ff8000'/></bsdf>").reflectance.value,
+              {1, 128 / 255.0f, 0});
+    check_rgb(bsdf("<bsdf type='diffuse'><srgb name='reflectance' value='#ff8000'/></bsdf>", "0.6.0").reflectance.value,
+              {1, 0.2158605f, 0}, 1e-5);
+}
+
+TEST_CASE("textures: top row at t = 0, decoding, pooling, transforms") {
+    const test::TempFolder folder;
+    // Top row red and green, bottom row blue and grey 188 (linear 0.5).
+    folder.write("t.png", png(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 188, 188, 188}));
+    folder.write("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
+    const auto diffuse = [](const std::string& extra) {
+        return "<shape type='obj'><string name='filename' value='m.obj'/><bsdf type='diffuse'><texture "
+               "name='reflectance' type='bitmap'><string name='filename' value='t.png'/>" +
+               extra + "</texture></bsdf></shape>";
+    };
+    const Scene s =
+        load(diffuse("") + diffuse("") + diffuse("<boolean name='raw' value='true'/>") +
+                 diffuse("<string name='wrap_mode' value='clamp'/><string name='filter_type' value='nearest'/>"),
+             {}, "3.0.0", &folder);
+    REQUIRE(s.textures.size() == 3);
+    CHECK(s.texels.size() == 16);  // one copy of the pixels
+    CHECK(s.bsdfs[0].reflectance.texture == s.bsdfs[1].reflectance.texture);
+    for (const Texture& t : s.textures) CHECK(t.offset % 16 == 0);
+    CHECK(int(s.texels[0]) == 255);  // red at row 0
+    CHECK(int(s.texels[12]) == 188);
+    CHECK(s.tables[s.textures[0].decode_table + 188] == Approx(0.502886).epsilon(1e-4));
+    CHECK(s.tables[s.textures[0].decode_table + 255] == 1.0f);
+    CHECK(s.tables[s.textures[1].decode_table + 51] == Approx(0.2));
+    CHECK(s.textures[0].wrap == WrapMode::repeat);
+    CHECK(s.textures[0].filter == TextureFilter::bilinear);
+    CHECK(s.textures[2].wrap == WrapMode::clamp);
+    CHECK(s.textures[2].filter == TextureFilter::nearest);
+    // OBJ puts v = 1 at the top: (0,1) of the file must see the top left texel.
+    CHECK(s.vertices[0].uv().y == 1.0f);
+    CHECK(s.vertices[2].uv().y == 0.0f);
+    // The older generation's names, and gamma 1 = raw.
+    const Scene old = load(
+        "<shape type='rectangle'><bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string "
+        "name='filename' value='t.png'/><float name='gamma' value='1'/>"
+        "<float name='uscale' value='2'/><float name='voffset' value='0.5'/><string name='filterType' "
+        "value='trilinear'/><string name='wrapMode' value='mirror'/></texture></bsdf></shape>",
+        {}, "0.6.0", &folder);
+    CHECK(old.tables[old.textures[0].decode_table + 51] == Approx(0.2));
+    CHECK(old.textures[0].to_uv[0][0] == 2.0f);
+    CHECK(old.textures[0].to_uv[1][2] == 0.5f);
+    CHECK(old.textures[0].wrap == WrapMode::mirror);
+    CHECK(old.vertices[2].v == 1.0f);  // rectangle: as it is
+
+    const Scene checker = load(
+        "<shape type='rectangle'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'><rgb "
+        "name='color0' value='0.7'/>"
+        "<transform name='to_uv'><scale x='20' y='80'/><translate x='0.5'/></transform></texture></bsdf></shape>");
+    const Texture& t = checker.textures[0];
+    CHECK(t.type == TextureType::checkerboard);
+    CHECK(t.color0 == splat(0.7f));
+    CHECK(t.color1 == splat(0.2f));
+    CHECK(t.to_uv[0][0] == 20.0f);
+    CHECK(t.to_uv[1][1] == 80.0f);
+    CHECK(t.to_uv[0][2] == 0.5f);
+    CHECK(checker.features.textures);
+}
+
+TEST_CASE("emitters: values, frames, one environment") {
+    const test::TempFolder folder;
+    folder.write("e.png", png(4, 3, std::vector<uint8_t>(36, 255)));
+    const auto one = [&](const std::string& xml) { return load(xml, {}, "3.0.0", &folder).emitters[0]; };
+    Emitter e =
+        one("<emitter type='point'><transform name='to_world'><translate z='10'/></transform><rgb name='intensity' "
+            "value='100'/></emitter>");
+    CHECK(e.position == Vec3f{0, 0, 10});
+    CHECK(e.radiance.value == splat(100));
+    CHECK(one("<emitter type='point'><point name='position' x='1' y='2' z='3'/></emitter>").position == Vec3f{1, 2, 3});
+    e = one("<emitter type='directional'><vector name='direction' value='0,0,-4'/></emitter>");
+    CHECK(e.direction == Vec3f{0, 0, -1});
+    CHECK(e.radiance.value == splat(1));
+    e =
+        one("<emitter type='spot'><transform name='to_world'><lookat origin='1,1,1' target='1,1,9' "
+            "up='0,1,0'/></transform><texture name='texture' type='bitmap'><string name='filename' "
+            "value='e.png'/></texture></emitter>");
+    CHECK(e.cos_cutoff == Approx(std::cos(20 * M_PI / 180)));
+    CHECK(e.cos_beam_width == Approx(std::cos(15 * M_PI / 180)));
+    CHECK(e.radiance.texture == 0);
+    check_rgb(e.direction, {0, 0, 1});
+    check_rgb(e.to_local.point({1, 1, 2}), {0, 0, 1});
+    const Scene env = load(
+        "<emitter type='envmap'><string name='filename' value='e.png'/><float name='scale' value='3'/><transform "
+        "name='to_world'><rotate y='1' angle='90'/></transform></emitter>",
+        {}, "3.0.0", &folder);
+    CHECK(env.environment == 0);
+    CHECK(env.emitters[0].radiance.value == splat(3));
+    CHECK(env.textures[0].format == TexelFormat::rgba16f);
+    check_rgb(env.emitters[0].to_world.vector({0, 0, 1}), {1, 0, 0});
+    CHECK_FALSE(env.features.textures);
+    const Scene area =
+        load("<shape type='sphere'><emitter type='area'><rgb name='radiance' value='1,2,3'/></emitter></shape>");
+    CHECK(area.shapes[0].emitter == 0);
+    CHECK(area.emitters[0].shape == 0);
+    CHECK(area.emitters[0].pick_probability == 1.0f);
+    CHECK(contains(error_of("<emitter type='constant'/>\n<emitter type='constant'/>"),
+                   ":3: only one constant or envmap"));
+    CHECK(contains(error_of("<emitter type='point'><rgb name='intensity' value='-1'/></emitter>"),
+                   "'intensity' is negative"));
+    CHECK(contains(error_of("<emitter type='sky'/>"), "emitter type 'sky' is not supported"));
+}
+
+TEST_CASE("environment maps are stored as halves unless that loses something") {
+    const test::TempFolder folder;
+    // Radiance's RGBE: mantissas over 256 times 2^(exponent-128); two texels, neither compressed.
+    const auto texels = [&](std::vector<uint8_t> rgbe) {
+        folder.write("e.hdr",
+                     "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" + std::string(rgbe.begin(), rgbe.end()));
+        return load("<emitter type='envmap'><string name='filename' value='e.hdr'/></emitter>", {}, "3.0.0", &folder);
+    };
+    const auto check = [&](const Scene& s, TexelFormat format, Rgb first, Rgb second) {
+        REQUIRE(s.textures[0].format == format);
+        CHECK(load_texel(s.view(), s.textures[0], 0, 0) == first);
+        CHECK(load_texel(s.view(), s.textures[0], 1, 0) == second);
+    };
+    check(texels({128, 64, 0, 129, 192, 255, 1, 144}), TexelFormat::rgba16f, {1, 0.5f, 0}, {49152, 65280, 256});
+    check(texels({128, 64, 0, 129, 192, 255, 1, 145}), TexelFormat::rgba32f, {1, 0.5f, 0},
+          {98304, 130560, 512});  // beyond the largest half
+    check(texels({128, 64, 0, 129, 129, 128, 0, 106}), TexelFormat::rgba32f, {1, 0.5f, 0},
+          {129 * 0x1p-30f, 0x1p-23f, 0});  // a denormal half of few bits
+}
+
+TEST_CASE("analytic shapes and instances") {
+    const Scene s = load(
+        "<shape type='sphere'><point name='center' x='1' y='2' z='3'/><float name='radius' value='4'/><boolean "
+        "name='flip_normals' value='true'/></shape>"
+        "<shape type='cylinder'><point name='p0' value='0 0 1'/><point name='p1' value='0 0 5'/><float name='radius' "
+        "value='0.5'/></shape>"
+        "<shape type='disk'><transform name='to_world'><scale x='2' y='3'/></transform></shape><shape "
+        "type='rectangle'/>");
+    REQUIRE(s.quadrics.size() == 3);
+    CHECK(s.shapes[0].first_primitive == 2);  // behind the two triangles
+    CHECK(s.shapes[2].first_primitive == 4);
+    CHECK(s.shapes[3].first_primitive == 0);
+    CHECK(s.quadrics[0].radius == 4.0f);
+    CHECK(s.quadrics[0].flip == 1);
+    check_rgb(s.quadrics[0].to_world.point({0, 0, 1}), {1, 2, 7}, 1e-5);
+    check_rgb(s.quadrics[0].to_local.point({5, 2, 3}), {1, 0, 0}, 1e-5);
+    check_rgb(s.quadrics[1].to_world.point({1, 0, 1}), {0.5f, 0, 5}, 1e-5);
+    CHECK(s.shapes[2].area == Approx(6 * M_PI));
+    CHECK(contains(error_of("<shape type='sphere'><transform name='to_world'><scale x='2'/></transform></shape>"),
+                   "sphere with shear or non-uniform scale"));
+
+    const Scene instanced = load(
+        "<shape type='shapegroup' id='g'><shape type='rectangle'/><shape type='sphere'><transform "
+        "name='to_world'><translate x='1'/></transform></shape></shape>"
+        "<shape type='instance'><ref id='g'/></shape>"
+        "<shape type='instance'><ref id='g'/><transform name='to_world'><scale value='2'/><translate "
+        "z='5'/></transform></shape>");
+    CHECK(instanced.triangles.size() == 4);
+    REQUIRE(instanced.quadrics.size() == 2);
+    check_rgb(instanced.quadrics[1].to_world.point({0, 0, 0}), {2, 0, 5}, 1e-5);
+    CHECK(instanced.quadrics[1].radius == Approx(2));
+}
+
+TEST_CASE("mirrored meshes keep their outside (B12)") {
+    const test::TempFolder folder;
+    // A tetrahedron, outside by winding; with and without vertex normals, the normals once right and once against the
+    // winding.
+    const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+    const std::string faces[4] = {"1 3 2", "1 2 4", "1 4 3", "2 3 4"};
+    const Vec3f normals[4] = {{0, 0, -1}, {0, -1, 0}, {-1, 0, 0}, {0.57735f, 0.57735f, 0.57735f}};
+    std::string plain = vertices, with = vertices;
+    for (const std::string& f : faces) plain += "f " + f + "\n";
+    for (const Vec3f& n : normals)
+        with += "vn " + std::to_string(n.x) + " " + std::to_string(n.y) + " " + std::to_string(n.z) + "\n";
+    std::string against = with;
+    for (int i = 0; i < 4; ++i) {
+        const std::string a(1, faces[i][0]), b(1, faces[i][2]), c(1, faces[i][4]), n = "//" + std::to_string(i + 1);
+        with += "f " + a + n + " " + b + n + " " + c + n + "\n";
+        against += "f " + a + n + " " + c + n + " " + b + n + "\n";
+    }
+    folder.write("plain.obj", plain);
+    folder.write("with.obj", with);
+    folder.write("against.obj", against);
+    for (const std::string file : {"plain", "with", "against"})
+        for (const std::string scale : {"x='1'", "x='-1'", "x='-2' y='-3' z='-0.5'", "x='-2' y='-3' z='0.5'"})
+            for (const bool flip : {false, true})
+                for (const bool face_normals : {false, true}) {
+                    if (file == "against" && face_normals) continue;  // then the winding alone counts
+                    INFO(file << " " << scale << " " << flip << " " << face_normals);
+                    const Scene s =
+                        load("<shape type='obj'><string name='filename' value='" + file +
+                                 ".obj'/><boolean name='flip_normals' value='" + (flip ? "true" : "false") +
+                                 "'/><boolean name='face_normals' value='" + (face_normals ? "true" : "false") +
+                                 "'/><transform name='to_world'><scale " + scale +
+                                 "/><translate value='3 4 5'/></transform></shape>",
+                             {}, "3.0.0", &folder);
+                    REQUIRE(s.triangles.size() == 4);
+                    CHECK(bool(s.shapes[0].flags & kShapeHasNormals) == !face_normals);
+                    Vec3f middle = {0, 0, 0};
+                    for (const Triangle& t : s.triangles)
+                        for (uint32_t v : {t.v0, t.v1, t.v2}) middle += s.vertices[v].p * (1.0f / 12);
+                    for (const Triangle& t : s.triangles) {
+                        const Vec3f a = s.vertices[t.v0].p, ng = cross(s.vertices[t.v1].p - a, s.vertices[t.v2].p - a);
+                        CHECK((dot(ng, a - middle) > 0) == !flip);
+                        if (face_normals) continue;
+                        const Vec3f sum = s.vertices[t.v0].n + s.vertices[t.v1].n + s.vertices[t.v2].n;
+                        CHECK(dot(ng, sum) > 0);
+                        if (file != "plain") CHECK(length(normalize(ng) - s.vertices[t.v0].n) < 1e-4f);
+                    }
+                }
+}
+
+TEST_CASE("triangles without area are left out and counted") {
+    const test::TempFolder folder;
+    folder.write("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\nf 1 1 2\n");
+    const Scene s = load("<shape type='obj'><string name='filename' value='m.obj'/></shape>", {}, "3.0.0", &folder);
+    CHECK(s.triangles.size() == 1);
+    CHECK(s.degenerate_triangles == 2);
+    CHECK(s.shapes[0].primitive_count == 1);
+    for (const Triangle& t : s.triangles)
+        for (uint32_t v : {t.v0, t.v1, t.v2}) CHECK(length(s.vertices[v].n) == Approx(1));
+}
+
+TEST_CASE("mistakes are named with file and line") {
+    const test::TempFolder folder;
+    folder.write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.write("line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+    folder.write("range.obj", "v 0 0 0\nf 1 2 3\n");
+    folder.write("self.xml", wrap("<include filename='self.xml'/>", "3.0.0"));
+    folder.write("notscene.xml", "<bsdf type='diffuse'/>");
+    folder.write("bad.png", "no image");
+    const std::pair<const char*, const char*> cases[] = {
+        {"<bsdf type='diffuse'", "scene.xml:"},
+        {"\n\n<bsdf type='diffuse'></bsd>", "scene.xml:4: XML error"},
+        {"\n<shape type='rectangle'><ref id='nobody'/></shape>", "scene.xml:3: reference to unknown id 'nobody'"},
+        {"<bsdf type='diffuse' id='a'/>\n<bsdf type='diffuse' id='a'/>", "scene.xml:3: id 'a' is already used at "},
+        {"<include filename='self.xml'/>", "self.xml:2: circular include of "},
+        {"<include filename='notscene.xml'/>", "notscene.xml:1: the outermost element is not <scene>"},
+        {"<include filename='missing.xml'/>", "scene.xml:2: file 'missing.xml' does not exist"},
+        {"\n<shape type='$kind'/>", "scene.xml:3: parameter '$kind' has no value and no <default>"},
+        {"<shape type='obj'>\n<string name='filename' value='missing.obj'/></shape>",
+         "scene.xml:3: file 'missing.obj' does not exist"},
+        {"<shape type='obj'><string name='filename' value='nan.obj'/></shape>",
+         "nan.obj: position of vertex 1 is not finite"},
+        {"<shape type='obj'><string name='filename' value='range.obj'/></shape>",
+         "range.obj:2: vertex index 2 is out of range"},
+        {"<shape type='obj'/>", "scene.xml:2: obj shape has no filename"},
+        {"<shape type='obj'><string name='filename' value='line.obj'/><emitter type='area'/></shape>",
+         "scene.xml:2: the shape emits light but has no area"},
+        {"<shape type='rectangle'>\n<float name='colour' value='1'/></shape>",
+         "scene.xml:3: unknown parameter 'colour' of shape 'rectangle'"},
+        {"<bsdf type='diffuse' id='unused'>\n<float name='colour' value='1'/></bsdf>",
+         "scene.xml:3: unknown parameter 'colour' of bsdf 'diffuse'"},
+        {"<shape type='rectangle'><bsdf type='measured'/></shape>",
+         "scene.xml:2: BSDF type 'measured' is not supported"},
+        {"<shape type='rectangle'>\n<bsdf type='diffuse'><texture type='noise' name='reflectance'/></bsdf></shape>",
+         "scene.xml:3: texture type 'noise' is not supported"},
+        {"<shape type='rectangle'><bsdf type='diffuse'><texture type='bitmap' name='reflectance'><string "
+         "name='filename' value='bad.png'/></texture></bsdf></shape>",
+         "bad.png: cannot read image"},
+        {"<shape type='rectangle'><bsdf type='diffuse'><rgb name='reflectance' value='1,2'/></bsdf></shape>",
+         "<rgb> needs one or three numbers, not 2"},
+        {"<shape type='rectangle'><bsdf type='diffuse'><rgb name='reflectance' value='2'/></bsdf></shape>",
+         "'reflectance' is larger than 1"},
+        {"<shape type='rectangle'><bsdf type='conductor'><string name='material' value='Unobtainium'/></bsdf></shape>",
+         "no optical constants are known for 'Unobtainium'"},
+        {"<shape type='rectangle'><bsdf type='dielectric'><string name='int_ior' value='jelly'/></bsdf></shape>",
+         "no index of refraction is known for 'jelly'"},
+        {"<shape type='rectangle'><bsdf type='roughconductor'><string name='distribution' "
+         "value='phong'/></bsdf></shape>",
+         "microfacet distribution 'phong' is not supported"},
+        {"<shape type='rectangle'><transform name='to_world'><scale x='0'/></transform></shape>",
+         "the transform of the shape is singular"},
+        {"<shape type='rectangle'><transform name='to_world'>\n<twist/></transform></shape>",
+         "scene.xml:3: unknown element <twist> in <transform>"},
+        {"<shape type='rectangle'><transform name='to_world'><matrix value='1 2 3'/></transform></shape>",
+         "<matrix> needs 16 or 9 numbers, not 3"},
+        {"<sensor type='perspective'><transform name='to_world'><lookat origin='0,0,0' target='0,0,0' "
+         "up='0,1,0'/></transform></sensor>",
+         "<lookat> is degenerate"},
+        {"<sensor type='perspective'><transform name='to_world'><scale value='2'/></transform></sensor>",
+         "must not scale or shear"},
+        {"<sensor type='perspective'><float name='fov' value='200'/></sensor>", "fov must lie between 0 and 180"},
+        {"<sensor type='perspective'><float name='fov' value='nan'/></sensor>", "'nan' is not a number (float)"},
+        {"<sensor type='perspective'><film type='hdrfilm'><rfilter type='lanczos'/></film></sensor>",
+         "reconstruction filter 'lanczos' is not supported"},
+        {"<sensor type='perspective'><film type='hdrfilm'><integer name='crop_width' value='9999'/></film></sensor>",
+         "the crop window is not inside of the film"},
+        {"<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='1.5'/></film></sensor>",
+         "'1.5' is not an integer"},
+        {"<sensor type='perspective'/><sensor type='perspective'/>", "unexpected sensor 'perspective' in scene"},
+        {"<sensor type='thinlens'/>", "thinlens has no aperture_radius"},
+        {"<bsdf type='mask' id='m'><ref id='m'/></bsdf>", "circular reference to id 'm'"},
+        {"<medium type='homogeneous'/>", "unexpected medium 'homogeneous' in scene"},
+        {"<thing/>", "scene.xml:2: unknown element <thing>"},
+        {"<shape type='rectangle' colour='red'/>", "unexpected attribute 'colour' in <shape>"},
+        {"<shape type='rectangle'><float name='a' value='1'/><float name='a' value='1'/></shape>",
+         "parameter 'a' is given twice"},
+        {"<shape type='rectangle'><boolean name='flip_normals' value='maybe'/></shape>",
+         "'maybe' is neither true nor false"},
+        {"<shape type='rectangle'><float name='flip_normals' value='1'/></shape>",
+         "parameter 'flip_normals' of rectangle must be a boolean"},
+        {"<shape type='instance'/>", "instance has no shapegroup"},
+    };
+    for (const auto& [body, expected] : cases) {
+        INFO(body);
+        const std::string message = error_of(body, {}, "3.0.0", &folder);
+        INFO(message);
+        CHECK(contains(message, expected));
+    }
+    CHECK_THROWS_AS(load_mitsuba("/nonexistent/scene.xml"), Error);
+    const std::string empty = folder.write("empty.xml", "<scene version='3.0.0'/>");
+    CHECK_THROWS_WITH(load_mitsuba(empty), empty + ": the scene has no sensor");
+}
+
+TEST_CASE("lenient loading lists each substitution once") {
+    LoadOptions lenient;
+    lenient.lenient = true;
+    const Scene s = load(
+        "<integrator type='volpath'/>\n"
+        "<sensor type='perspective'><film type='hdrfilm'><rfilter type='mitchell'/></film></sensor>\n"
+        "<bsdf type='principled' id='p'><float name='roughness' value='1'/></bsdf>\n"
+        "<shape type='rectangle'><ref id='p'/></shape>\n<shape type='rectangle'><ref id='p'/></shape>\n"
+        "<shape type='bsplinecurve'/>\n<emitter type='sunsky'/>\n<shape type='rectangle'><float name='odd' "
+        "value='1'/></shape>",
+        lenient);
+    CHECK(s.shapes.size() == 3);
+    CHECK(s.sensor.filter == FilterType::gaussian);
+    CHECK(s.integrator.type == "path");
+    const char* expected[] = {":3: reconstruction filter 'mitchell' is not supported; gaussian is used",
+                              ":2: integrator type 'volpath' is not supported; path is used",
+                              ":8: emitter type 'sunsky'",
+                              ":4: BSDF type 'principled' is not supported",
+                              ":7: shape type 'bsplinecurve'",
+                              ":9: unknown parameter 'odd' of shape 'rectangle'; it is ignored"};
+    for (const char* part : expected) {
+        INFO(part);
+        CHECK(std::count_if(s.warnings.begin(), s.warnings.end(),
+                            [&](const std::string& w) { return contains(w, part); }) == 1);
+    }
+    CHECK(s.warnings.size() == std::size(expected));
+    // Mistakes stay mistakes.
+    CHECK(contains(error_of("<shape type='rectangle'><ref id='nobody'/></shape>", lenient), "unknown id"));
+}

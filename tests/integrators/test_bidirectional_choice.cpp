@@ -1,0 +1,393 @@
+// libs: ambilux_experiments ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// timeout: 900
+// bdpt.auto=true: what the pilot predicts is what renders show, and what follows from it.
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "experiments/stats_sum.h"
+#include "integrators/bidirectional/choice.h"
+#include "tests/support/bidirectional_images.h"
+
+using namespace ambilux;
+
+namespace {
+
+RenderSettings automatic_settings(const Scene& scene, uint64_t seed = 1) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
+    s.integrator = "bdpt";
+    s.automatic = true;
+    return s;
+}
+
+RenderSettings fixed(RenderSettings s, const std::vector<std::pair<std::string, std::string>>& settings) {
+    s.automatic = false;
+    for (const auto& [key, value] : settings) apply_setting(s, key, value);
+    return s;
+}
+
+std::vector<PilotCandidate> pilots(const std::vector<ChoiceCandidate>& candidates) {
+    std::vector<PilotCandidate> p;
+    for (const ChoiceCandidate& c : candidates) p.push_back(c.pilot);
+    return p;
+}
+
+struct Mean {
+    double mean, error;  ///< standard error
+};
+Mean mean_of(const std::vector<double>& values) {
+    double sum = 0, squares = 0;
+    for (const double v : values) sum += v;
+    const double n = double(values.size()), mean = sum / n;
+    for (const double v : values) squares += (v - mean) * (v - mean);
+    return {mean, std::sqrt(squares / (n - 1) / n)};
+}
+
+/// Variance of one sample of a pixel, relative to the squared mean of its block and the neighbours, as the pilot scales
+/// it; mean over the film.
+double relative_variance(const FilmMoments& film, const FilmMoments& truth, uint32_t blocks_x, uint32_t blocks_y) {
+    const uint32_t w = film.width / blocks_x, h = film.height / blocks_y;
+    double sum = 0;
+    for (uint32_t y = 0; y < film.height; ++y)
+        for (uint32_t x = 0; x < film.width; ++x)
+            for (uint32_t c = 0; c < 3; ++c) {
+                const uint32_t x0 = (x / w ? x / w - 1 : 0) * w, x1 = std::min(film.width, (x / w + 2) * w),
+                               y0 = (y / h ? y / h - 1 : 0) * h, y1 = std::min(film.height, (y / h + 2) * h);
+                double mean = 0;
+                for (uint32_t j = y0; j < y1; ++j)
+                    for (uint32_t i = x0; i < x1; ++i)
+                        mean += truth.mean((size_t(j) * film.width + i) * 3 + c) / ((x1 - x0) * (y1 - y0));
+                sum += film.variance((size_t(y) * film.width + x) * 3 + c) / (mean * mean + 0.01);
+            }
+    return sum / double(film.sum.size());
+}
+
+const std::string kGround = "<shape type='rectangle'><transform name='to_world'><scale value='4'/></transform>" +
+                            diffuse({0.5f, 0.5f, 0.5f}) + "</shape>";
+const std::string kGlassBall =
+    "<shape type='sphere'><point name='center' x='0' y='0' z='0.7'/><float name='radius' value='0.5'/><bsdf "
+    "type='dielectric'/></shape>";
+const std::string kView = "<sensor type='perspective'><float name='fov' value='45'/>" +
+                          lookat("origin='0,-3,2.5' target='0,0,0.3' up='0,0,1'") + film(32) + "</sensor>";
+
+}  // namespace
+
+TEST_CASE("second moments that the pilot predicts are those of renders, for every candidate") {
+    // Splats of light tracing are spread by the filter, eye walks are not.
+    for (const char* filter : {"box", "gaussian"}) {
+        const std::string text = "<sensor type='perspective'><float name='fov' value='45'/>" +
+                                 lookat("origin='0,-3,2.5' target='0,0,0.3' up='0,0,1'") + film(32, filter) +
+                                 "</sensor>" + kGround +
+                                 "<shape type='cube'><transform name='to_world'><scale value='0.3'/><translate "
+                                 "x='-0.4' z='0.5'/></transform>" +
+                                 diffuse({0.8f, 0.5f, 0.3f}) + "</shape>" +
+                                 "<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' "
+                                 "angle='180'/><translate z='2.4'/></transform>" +
+                                 diffuse({0, 0, 0}) + area_light({4, 5, 3}) + "</shape>";
+        const Scene scene = scene_from_text(scene_xml(5, text));
+        RenderSettings s = automatic_settings(scene);
+        const auto candidates = choice_candidates(s, false);
+        SharedAccels accels(scene);
+        std::vector<std::vector<double>> predicted(candidates.size());
+        uint32_t bx = 0, by = 0;
+        for (uint64_t seed = 1; seed <= 12; ++seed) {
+            s.seed = seed;
+            const ChoicePilot pilot = run_choice_pilot(scene, s, false, false, accels, pilots(candidates), 16384);
+            bx = pilot.blocks_x;
+            by = pilot.blocks_y;
+            for (size_t c = 0; c < candidates.size(); ++c) {
+                CHECK_FALSE(pilot.blind[c]);
+                double sum = 0;
+                for (const double v : pilot.variance[c]) sum += v;
+                predicted[c].push_back(sum / double(pilot.variance[c].size()));
+            }
+        }
+        s.seed = 77;
+        const FilmMoments truth = render_scene(scene, fixed(s, {{"variant", "lvc"}}), 1024).film;
+        for (size_t c = 0; c < candidates.size(); ++c) {
+            std::vector<double> measured;
+            const auto renderer = make_renderer(scene, fixed(s, candidates[c].settings));
+            for (uint32_t k = 0; k < 12; ++k) {
+                renderer->clear_film();
+                renderer->render(k * 64, 64);
+                measured.push_back(relative_variance(renderer->film(), truth, bx, by));
+            }
+            const Mean p = mean_of(predicted[c]), m = mean_of(measured);
+            INFO(filter << " " << candidates[c].name << ": predicted " << p.mean << " +- " << p.error << ", measured "
+                        << m.mean << " +- " << m.error);
+            // One in 100 beside the errors: block means of a pilot are noisy, and light walks of a wave are shared.
+            CHECK(std::abs(p.mean - m.mean) < 4.5 * std::hypot(p.error, m.error) + 0.015 * m.mean);
+            CHECK(std::hypot(p.error, m.error) < 0.04 * m.mean);
+        }
+    }
+}
+
+TEST_CASE("what is chosen renders as if its settings had been given: the pilot leaves nothing in the image") {
+    for (const char* name : {"cornell", "glass", "lights", "materials"}) {
+        const Scene scene = project_scene(name, 40, 30);
+        const RenderSettings s = automatic_settings(scene, 5);
+        const RenderResult chosen = render_scene(scene, s, 4);
+        const ChoiceStats& choice = chosen.stats.choice;
+        INFO(name << ": " << choice.name);
+        REQUIRE_FALSE(choice.name.empty());
+        CHECK(choice.seconds > 0);
+        CHECK(choice.candidates.size() == 20);
+        const RenderResult again = render_scene(scene, fixed(s, choice.settings), 4);
+        CHECK(again.stats.choice.name.empty());
+        CHECK(worst_difference(again.film, mean_image(chosen.film)) < 1e-5);
+        CHECK(again.stats.rays_extend == chosen.stats.rays_extend);
+        CHECK(again.stats.samples == chosen.stats.samples);
+        // Every candidate has the same expectation (other tests); these once more, but for glass, whose rare hits of
+        // the lamp would need too many samples.
+        if (name == std::string("glass")) continue;
+        RenderSettings reference = cpu_settings(scene, Estimator::mis, 99);
+        reference.integrator = "bdpt";
+        const ZTestResult z = z_test(render_batches(scene, s, 256), render_batches(scene, reference, 256));
+        INFO(z.report());
+        CHECK(z.pass);
+    }
+}
+
+TEST_CASE("light walks run where they find what eye walks do not, and only there") {
+    const auto name_of = [](const Scene& scene, uint64_t seed) {
+        RenderSettings s = automatic_settings(scene, seed);
+        s.deterministic = true;
+        return make_renderer(scene, s)->stats().choice.name;
+    };
+    for (uint64_t seed = 1; seed <= 4; ++seed) {
+        INFO("seed " << seed);
+        CHECK(name_of(project_scene("glass", 64, 48), seed) != "path");
+        // A sky over diffuse ground: most light walks miss what the camera sees, and next event estimation is all that
+        // is needed.
+        const Scene sky = scene_from_text(
+            scene_xml(4, kView + kGround + "<emitter type='constant'><rgb name='radiance' value='1,1,1'/></emitter>"));
+        CHECK(name_of(sky, seed) == "path");
+    }
+}
+
+TEST_CASE("the error is predicted for the samples that the render will take") {
+    PilotWork work;
+    work.eye_rays = 3;
+    work.next_events = 2.5;  // 5 rays of walks together
+    RenderSettings s;
+    CHECK(expected_samples(s, work, 10000, false) == 1000);
+    s.expected_seconds = 2;
+    CHECK(expected_samples(s, work, 10000, false) == Approx(400));    // 1e7 rays a second
+    CHECK(expected_samples(s, work, 10000, true) == Approx(200000));  // 5e9
+    CHECK(expected_samples(s, work, 1000000000, false) == 64);
+    s.expected_samples = 333;  // and the time besides: it ends when it has both
+    CHECK(expected_samples(s, work, 10000, false) == Approx(400));
+    s.expected_samples = 4000;
+    CHECK(expected_samples(s, work, 10000, false) == 4000);
+    s.expected_seconds = 0;
+    s.expected_samples = 1;
+    CHECK(expected_samples(s, work, 10000, true) == 64);
+    s.expected_samples = ~uint64_t(0);
+    CHECK(expected_samples(s, work, 10000, true) == 1e6);
+    CHECK(expected_samples({}, PilotWork{}, 0, true) == 1000);
+
+    // Below a glass ball a path tracer meets the small lamp once in many samples. As long as that makes single bright
+    // pixels, they are left out; later they are its noise.
+    const Scene scene = project_scene("glass", 64, 48);
+    double before = 0;
+    for (const uint64_t samples : {64u, 2000u}) {
+        s = automatic_settings(scene);
+        s.expected_samples = samples;
+        const ChoiceStats choice = make_renderer(scene, s)->stats().choice;
+        INFO(samples << " samples: " << choice.name);
+        REQUIRE(choice.candidates[0].name == "path");
+        CHECK(choice.expected_samples == double(samples));
+        CHECK(choice.candidates[0].variance > before);
+        before = choice.candidates[0].variance;
+    }
+}
+
+TEST_CASE(
+    "speckles that light tracing finds: with few samples the path tracer leaves them out, with many it pays for them") {
+    const std::optional<Scene> scene = published_scene("veach-mis", 160, 90);
+    if (!scene) return;
+    for (uint64_t seed = 1; seed <= 4; ++seed) {
+        RenderSettings s = automatic_settings(*scene, seed);
+        s.deterministic = true;
+        s.expected_samples = 100;
+        const ChoiceStats few = make_renderer(*scene, s)->stats().choice;
+        s.expected_samples = 20000;
+        const ChoiceStats many = make_renderer(*scene, s)->stats().choice;
+        INFO("seed " << seed << ": " << few.name << ", " << many.name);
+        CHECK(few.candidates[0].efficiency > 0.6);
+        // Equal time: 0.19 on an H200 at 640x360 (docs/performance.md).
+        CHECK(many.name != "path");
+        CHECK(many.candidates[0].efficiency < 0.5);
+    }
+}
+
+TEST_CASE("a candidate that cannot find some of the light is never chosen") {
+    const Scene scene = scene_from_text(scene_xml(6, kView + kGround + kGlassBall +
+                                                         "<emitter type='point'><point name='position' x='0.5' y='0.2' "
+                                                         "z='3'/><rgb name='intensity' value='5,5,5'/></emitter>"));
+    RenderSettings s = automatic_settings(scene);
+    const ChoiceStats choice = make_renderer(scene, s)->stats().choice;
+    REQUIRE(choice.candidates[0].name == "path");
+    CHECK(std::isinf(choice.candidates[0].variance));
+    CHECK(choice.candidates[0].efficiency == 0);
+    CHECK(choice.name != "path");
+}
+
+TEST_CASE("the choice repeats: it depends on the seed, and on clocks only where it says so") {
+    const Scene scene = project_scene("materials", 40, 30);
+    RenderSettings s = automatic_settings(scene, 3);
+    s.deterministic = true;
+    const ChoiceStats a = make_renderer(scene, s)->stats().choice, b = make_renderer(scene, s)->stats().choice;
+    s.accel = "cwbvh";
+    const ChoiceStats other_rays = make_renderer(scene, s)->stats().choice;
+    s.seed = 4;
+    const ChoiceStats other_seed = make_renderer(scene, s)->stats().choice;
+    CHECK(a.name == b.name);
+    for (size_t c = 0; c < a.candidates.size(); ++c) {
+        CHECK(a.candidates[c].variance == b.candidates[c].variance);
+        CHECK(a.candidates[c].work == b.candidates[c].work);
+        CHECK(a.candidates[c].seconds == 0);
+        CHECK(other_rays.candidates[c].variance == Approx(a.candidates[c].variance).epsilon(0.05));
+        CHECK(other_seed.candidates[c].variance != a.candidates[c].variance);
+    }
+}
+
+TEST_CASE("a path tracer that renders while the pilot runs makes room for a candidate that has none beside it") {
+    // What a device does, by renderers of the host.
+    struct Counted : Renderer {
+        Counted(std::unique_ptr<Renderer> r, int& l) : renderer(std::move(r)), living(l) { ++living; }
+        ~Counted() override { --living; }
+        uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+            return renderer->render(first, count, interrupt);
+        }
+        FilmMoments film() override { return renderer->film(); }
+        void clear_film() override { renderer->clear_film(); }
+        RenderStats stats() override { return renderer->stats(); }
+        uint32_t preferred_batch() const override { return 4; }
+        std::unique_ptr<Renderer> renderer;
+        int& living;
+    };
+    bool some_timed = false;
+    for (const char* name : {"cornell", "glass", "lights", "materials"}) {
+        const Scene scene = project_scene(name, 48, 32);
+        RenderSettings s = automatic_settings(scene, 5);
+        s.variant = "megakernel";  // whose time does not follow from its work
+        s.expected_seconds = 1;
+        for (const bool small : {false, true}) {
+            int living = 0, refused = 0;
+            SharedAccels accels(scene);
+            const auto make = [&](const RenderSettings& chosen) -> std::unique_ptr<Renderer> {
+                if (small && living > 0) {
+                    ++refused;
+                    throw Error(ExitCode::device, "no room");
+                }
+                return std::make_unique<Counted>(make_renderer(scene, chosen), living);
+            };
+            const auto renderer = make_automatic(scene, s, true, accels, make);
+            const ChoiceStats choice = renderer->stats().choice;
+            INFO(name << (small ? ", small: " : ", large: ") << choice.name << ", ready " << renderer->ready());
+            const bool timed = std::any_of(choice.candidates.begin(), choice.candidates.end(),
+                                           [](const ChoiceStats::Candidate& c) { return c.seconds > 0; });
+            some_timed |= timed;
+            CHECK(living == 1);
+            CHECK(refused == (small && timed ? 1 : 0));
+            CHECK((renderer->ready() > 0) == (choice.name == "path" && !(small && timed)));
+            CHECK(choice.seconds >= 0);
+            const uint32_t samples = renderer->ready() + 2;
+            REQUIRE(renderer->render(0, samples) == samples);
+            const FilmMoments film = renderer->film();
+            CHECK(film.samples == samples);
+            CHECK(worst_difference(render_scene(scene, fixed(s, choice.settings), samples).film, mean_image(film)) <
+                  1e-5);
+        }
+    }
+    CHECK(some_timed);
+}
+
+TEST_CASE("what a device has no room for is not chosen: the next best runs") {
+    const Scene scene = project_scene("glass", 48, 32);
+    const RenderSettings s = automatic_settings(scene, 5);
+    SharedAccels accels(scene);
+    uint32_t refused = 0;
+    const auto make = [&](const RenderSettings& chosen) -> std::unique_ptr<Renderer> {
+        if (chosen.integrator == "bdpt" && chosen.variant == "lvc") {
+            ++refused;
+            throw Error(ExitCode::device, "no room");
+        }
+        return make_renderer(scene, chosen);
+    };
+    const auto renderer = make_automatic(scene, s, true, accels, make);
+    const ChoiceStats choice = renderer->stats().choice;
+    INFO(choice.name);
+    CHECK(refused > 0);
+    CHECK(choice.name.find("lvc") == std::string::npos);
+    REQUIRE(renderer->render(0, 2) == 2);
+    CHECK(worst_difference(render_scene(scene, fixed(s, choice.settings), 2).film, mean_image(renderer->film())) <
+          1e-5);
+    CHECK_THROWS_WITH(make_automatic(scene, s, true, accels,
+                                     [](const RenderSettings&) -> std::unique_ptr<Renderer> {
+                                         throw Error(ExitCode::device, "no room at all");
+                                     }),
+                      Catch::Contains("no room at all"));
+}
+
+TEST_CASE("variants restrict the choice; other settings that it would make are refused by name") {
+    const Scene scene = project_scene("cornell", 24, 24);
+    RenderSettings s = automatic_settings(scene);
+    s.variant = "lvc";
+    CHECK(choice_candidates(s, false).size() == 19);
+    s.variant = "streaming";
+    REQUIRE(choice_candidates(s, false).size() == 3);
+    CHECK(make_renderer(scene, s)->stats().choice.candidates[2].name == "bdpt, streaming");
+    s.variant = "wavefront";
+    s.deterministic = true;
+    CHECK(choice_candidates(s, false).size() == 20);
+    CHECK(choice_candidates(s, true).size() == 5);  // a cache on a device has another order in every run
+    const auto refused = [&](const std::string& key, const std::string& value, const std::string& part) {
+        RenderSettings other = automatic_settings(scene);
+        apply_setting(other, key, value);
+        try {
+            make_renderer(scene, other);
+            FAIL("not refused: " << key << "=" << value);
+        } catch (const Error& error) {
+            CHECK(error.code == ExitCode::usage);
+            INFO(error.what());
+            CHECK(std::string(error.what()).find(part) != std::string::npos);
+        }
+    };
+    refused("integrator", "path", "integrator path");
+    refused("integrator", "light", "integrator light");
+    refused("strategies", "hits+next_event", "strategies");
+    refused("strategies", "s1t2", "strategies");
+    refused("connections", "2", "connections=2");
+    refused("light_paths", "0.5", "light_paths=0.5");
+    refused("technique_depth", "4", "technique_depth=4");
+    CHECK_THROWS_AS(apply_setting(s, "bdpt.auto", "yes"), Error);
+}
+
+TEST_CASE("nothing to see: scenes without emitters and films of one pixel") {
+    const Scene dark = scene_from_text(scene_xml(4, kView + kGround));
+    CHECK(render_scene(dark, automatic_settings(dark), 2).stats.choice.name == "path");
+    const Scene pixel = project_scene("cornell", 1, 1);
+    CHECK(render_scene(pixel, automatic_settings(pixel), 2).stats.choice.candidates.size() == 20);
+}
+
+TEST_CASE("saved statistics keep the choice, and a later part does not lose it") {
+    RenderStats first;
+    first.choice = {"bdpt, lvc, 2 connections",
+                    {{"integrator", "bdpt"}, {"connections", "2"}},
+                    0.25,
+                    8192,
+                    640,
+                    {{"path", "integrator=path", std::numeric_limits<double>::infinity(), 3, 0, 0}}};
+    RenderStats total;
+    add_part(total, {}, first);
+    total = restore_stats(nlohmann::json::parse(save_stats(total).dump()));
+    add_part(total, {}, {});
+    CHECK(total.choice.name == first.choice.name);
+    CHECK(total.choice.settings == first.choice.settings);
+    CHECK(total.choice.seconds == 0.25);
+    CHECK(total.choice.expected_samples == 640);
+    REQUIRE(total.choice.candidates.size() == 1);
+    CHECK(std::isinf(total.choice.candidates[0].variance));
+}

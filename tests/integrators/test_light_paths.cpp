@@ -1,0 +1,195 @@
+// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// timeout: 600
+// How many light walks there are (light_paths): the image stays what it is, whatever their number, and more of them
+// find more.
+#include <cmath>
+
+#include "core/error.h"
+#include "integrators/bidirectional/wave.h"
+#include "integrators/path/path_wave.h"
+#include "tests/support/bidirectional_images.h"
+
+using namespace ambilux;
+
+namespace {
+
+RenderSettings with_light_paths(RenderSettings s, const std::string& light_paths) {
+    apply_setting(s, "light_paths", light_paths);
+    return s;
+}
+
+const Method kLvc = {"all", MisHeuristic::balance, "lvc"}, kLvcPower = {"all", MisHeuristic::power, "lvc"},
+             kWithoutConnections = {"hits+next_event+light"};
+
+}  // namespace
+
+TEST_CASE("light walks lie evenly in tiles, and every tile has some") {
+    for (uint32_t per_tile = 1; per_tile <= kMostLightRounds * kTilePixels; ++per_tile) {
+        uint32_t sum = 0, most = 0;
+        for (uint32_t slot = kTilePixels; slot < 2 * kTilePixels; ++slot) {
+            const uint32_t walks = light_walks_of(slot, per_tile);
+            sum += walks;
+            most = std::max(most, walks);
+            const double even = double(slot - kTilePixels + 1) * per_tile / kTilePixels;
+            if (std::fabs(double(sum) - even) >= 1.0)
+                FAIL("slot " << slot << ", " << per_tile << " per tile: " << sum << " so far");
+        }
+        BidirectionalPolicy policy{};
+        policy.light_walks_per_tile = per_tile;
+        if (sum != per_tile || most != policy.light_rounds() || light_walks_of(0, per_tile) < 1)
+            FAIL(per_tile << " per tile: " << sum << ", at most " << most);
+    }
+}
+
+TEST_CASE("light walks of a film are counted as they begin, also in the tiles along its edges") {
+    for (const auto& [width, height] : {std::pair{64u, 32u}, {1u, 1u}, {9u, 7u}, {61u, 43u}}) {
+        const Scene scene = project_scene("cornell", width, height);
+        Wave wave = shape_wave(scene, RenderSettings(), kTilePixels, 1);
+        WaveState state{};
+        state.samples = 1;
+        wave.state = &state;
+        wave.tiles = tile_count(wave);
+        for (const uint32_t per_tile : {1u, 5u, 16u, 63u, 64u, 65u, 192u, 1024u}) {
+            uint32_t walks = 0;
+            for (uint32_t slot = 0; slot < wave.slot_count(); ++slot)
+                walks += wave.locate(slot).active ? light_walks_of(slot, per_tile) : 0;
+            INFO(width << "x" << height << ", " << per_tile << " per tile");
+            CHECK(light_walks_in(wave, 0, wave.tiles, per_tile) == walks);
+            CHECK(walks >= wave.tiles);
+            RenderSettings s = method_settings(scene, kLvc, 1);
+            s.light_walks_per_tile = per_tile;
+            CHECK(make_bidirectional_policy(scene, s).mis.light_walks == float(walks));
+            // A render starts as many, once per sample.
+            const RenderResult r = render_scene(scene, s, 2);
+            uint32_t stages = 0;
+            for (const StageStats& stage : r.stats.stages) {
+                if (stage.name != "light_extend") continue;
+                ++stages;
+                CHECK(stage.items_by_depth[1] == 2 * walks);
+            }
+            CHECK(stages == 1);
+        }
+    }
+}
+
+TEST_CASE("any number of light walks gives the image of one for every pixel", "[bidirectional]") {
+    // Paired walks have less noise than the path tracer, with which they agree (test_bidirectional_images).
+    for (const auto& [name, spp] : {std::pair{"cornell", 512u}, {"lights", 1536u}}) {
+        const Scene scene = project_scene(name, 45, 27);
+        const Estimate paired = render_batches(scene, method_settings(scene, kAll, 1001), spp);
+        for (const auto& [light_paths, m] : {std::pair{"0.015625", kLvc},
+                                             {"0.015625", kWithoutConnections},
+                                             {"0.25", kLvcPower},
+                                             {"2.5", kLvc},
+                                             {"2.5", kWithoutConnections}}) {
+            INFO(name << " " << m.name << " " << m.variant << " light_paths=" << light_paths);
+            check_agreement(render_batches(scene, with_light_paths(method_settings(scene, m, 5), light_paths), spp),
+                            paired, 0.02);
+        }
+    }
+}
+
+TEST_CASE("any number of light walks gives the direct light of a lamp, by t = 1 alone and by all strategies",
+          "[bidirectional]") {
+    const Image expected =
+        plane_image(kLight, [](double x, double y) { return rectangle_irradiance(x, y, -0.4, 0.8, -0.3, 0.5, 1.2); });
+    const Scene scene = plane_under(lamp(0.6, 0.4, 0.2, 0.1, 1.2));
+    for (const char* light_paths : {"0.03125", "0.5", "2", "2.25"})
+        for (const Method& m : {kLightTracer, kWithoutConnections, kLvc}) {
+            INFO(m.name << " " << m.variant << " light_paths=" << light_paths);
+            check_image(scene, with_light_paths(method_settings(scene, m, 11), light_paths), expected);
+        }
+}
+
+TEST_CASE("light walks of one slot differ: four times as many have a quarter of the variance") {
+    const Scene scene = project_scene("cornell", 32, 32);
+    const auto variance = [&](const char* light_paths, uint64_t seed) {
+        const FilmMoments film =
+            render_scene(scene, with_light_paths(method_settings(scene, kLightTracer, seed), light_paths), 256).film;
+        double sum = 0;
+        for (size_t i = 0; i < film.sum.size(); ++i) sum += film.variance(i);
+        return sum;
+    };
+    for (const auto& [few, many] : {std::pair{"1", "4"}, {"0.25", "1"}, {"4", "16"}}) {
+        double ratio = 0, square = 0;
+        constexpr int kSeeds = 8;
+        for (uint64_t seed = 1; seed <= kSeeds; ++seed) {
+            const double r = variance(few, seed) / variance(many, seed + 100);
+            ratio += r / kSeeds;
+            square += r * r / kSeeds;
+        }
+        const double error = std::sqrt(std::max(0.0, square - ratio * ratio) / (kSeeds - 1));
+        INFO(few << " against " << many << ": " << ratio << " +- " << error);
+        CHECK(std::fabs(ratio - 4) < 4.5 * error + 0.004);
+        CHECK(error < 0.1);
+    }
+}
+
+TEST_CASE("rounds of light walks use queues again: where items lie and which stages are fused changes no bit") {
+    for (const char* name : {"glass", "textured"}) {
+        const Scene scene = project_scene(name, 45, 27);
+        for (const Method& m : {kLightTracer, kWithoutConnections}) {
+            RenderSettings s = with_light_paths(method_settings(scene, m, 7), "2.5");
+            s.deterministic = true;
+            const FilmMoments first = render_scene(scene, s, 2).film;
+            for (const auto& [key, value] : {std::pair{"fuse", "none"},
+                                             {"fuse", "light"},
+                                             {"compaction", "select"},
+                                             {"compaction", "none"},
+                                             {"ordering", "material"},
+                                             {"ordering", "morton"}}) {
+                INFO(name << " " << m.name << " " << key << "=" << value);
+                RenderSettings other = s;
+                apply_setting(other, key, value);
+                CHECK(render_scene(scene, other, 2).film.sum == first.sum);
+            }
+        }
+    }
+}
+
+TEST_CASE("images of single strategies add up to the image, whatever the number of light walks") {
+    const Scene scene = project_scene("cornell", 24, 16);
+    for (const char* light_paths : {"0.25", "3"}) {
+        RenderSettings s = with_light_paths(method_settings(scene, kLvc, 3), light_paths);
+        s.max_depth = s.technique_depth = 5;
+        const auto renderer = make_renderer(scene, s);
+        renderer->render(0, 16);
+        const FilmMoments film = renderer->film();
+        std::vector<double> sum(film.sum.size());
+        for (const TechniqueImage& image : renderer->technique_images())
+            for (size_t i = 0; i < sum.size(); ++i) sum[i] += double(image.weighted[i]);
+        for (size_t i = 0; i < sum.size(); ++i)
+            if (std::fabs(sum[i] - film.mean(i)) > 1e-4 * film.mean(i) + 1e-6)
+                FAIL(light_paths << " value " << i << ": " << sum[i] << " " << film.mean(i));
+    }
+}
+
+TEST_CASE("numbers of light walks that cannot be are refused by name") {
+    RenderSettings s;
+    for (const char* value : {"0", "-1", "17", "0.3", "x", "1.001", ""}) {
+        INFO(value);
+        try {
+            apply_setting(s, "light_paths", value);
+            FAIL("not refused");
+        } catch (const Error& error) {
+            CHECK(error.code == ExitCode::usage);
+            CHECK(std::string(error.what()).find(std::string("light_paths=") + value) == 0);
+        }
+    }
+    const Scene scene = project_scene("cornell", 16, 16);
+    for (const char* variant : {"wavefront", "megakernel", "streaming"}) {
+        INFO(variant);
+        const RenderSettings other =
+            with_light_paths(method_settings(scene, {"all", MisHeuristic::balance, variant}, 1), "0.5");
+        try {
+            make_renderer(scene, other);
+            FAIL("not refused");
+        } catch (const Error& error) {
+            CHECK(error.code == ExitCode::usage);
+            const std::string text = error.what();
+            CHECK(text.find("light_paths=0.5") != std::string::npos);
+            CHECK(text.find(variant) != std::string::npos);
+            CHECK(text.find("lvc") != std::string::npos);
+        }
+    }
+}

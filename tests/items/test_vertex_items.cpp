@@ -1,0 +1,263 @@
+// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// What queues keep of a vertex is what connections are made of, and tells beforehand which of them bring nothing.
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include "accel/cwbvh.h"
+#include "items/vertex_items.h"
+#include "queues/layout.h"
+#include "tests/support/bidirectional_images.h"
+#include "transport/walk.h"
+
+using namespace ambilux;
+
+TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no light") {
+    for (const char* name : {"cornell", "glass", "materials", "textured"}) {
+        const Scene scene = project_scene(name, 32, 32);
+        const CwbvhAccel accel(scene);
+        const SceneView view = scene.view();
+        const auto at_random = [&](uint32_t i, Stream stream, WalkVertex& v) {
+            const RngKey key = {5, i, 0, stream};
+            const Vec4f u = random_floats(key, 0);
+            // Through the middle of the scene.
+            const Vec3f from = scene.bounds_center + square_to_sphere({u.x, u.y}) * scene.bounds_radius,
+                        to = scene.bounds_center + square_to_sphere({u.z, u.w}) * (0.4f * scene.bounds_radius);
+            const Vec3f d = normalize(to - from);
+            Hit hit;
+            if (!accel.tracer().closest<kAllFeatures>(view, {from, kInfinity, d, 0}, hit)) return false;
+            v.point = surface_at<kAllFeatures>(view, hit.prim, hit.u, hit.v);
+            v.offset = ray_offset(v.point.p, v.point.p_error, v.point.ng);
+            v.scattering = make_scattering<kAllFeatures>(view, v.point, -d);
+            v.sums = {1, 1};
+            v.first = false;
+            return bsdf_is_smooth(v.scattering.bsdf);
+        };
+        BidirectionalMis mis{};
+        mis.strategies = kAllStrategies;
+        mis.light_walks = mis.connections = 1.0f;
+        uint32_t pairs = 0, turned_down = 0, lit = 0;
+        for (uint32_t i = 0; i < 20000; ++i) {
+            WalkVertex y, z;
+            if (!at_random(i, Stream::light, y) || !at_random(i, Stream::eye, z)) continue;
+            ++pairs;
+            const Vec3f w = z.point.p - y.point.p, wi = normalize(w);
+            const bool brings =
+                !in_plane(z, w) &&
+                !is_zero(scatter_evaluate<kAllFeatures>(y.scattering, wi, TransportMode::importance).value) &&
+                !is_zero(scatter_evaluate<kAllFeatures>(z.scattering, -wi, TransportMode::radiance).value);
+            lit += brings;
+            turned_down += !may_connect(y, z);
+            REQUIRE((may_connect(y, z) || !brings));
+            WalkConnection c;
+            REQUIRE(
+                (brings || !connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c) || is_zero(c.value)));
+            if (std::fabs(dot(y.scattering.ng, w)) < 1e-6f * length(w))
+                continue;  // the side may be another by rounding
+            REQUIRE(may_connect(pack_connection_vertex(y, 2, -y.scattering.wi_world, {1, 1, 1}, kNone).front, z) ==
+                    may_connect(y, z));
+        }
+        INFO(name << ": " << pairs << " pairs, " << turned_down << " turned down, " << lit << " with light");
+        CHECK(pairs > 1000);
+        CHECK(lit > 100);
+        CHECK(turned_down > pairs / 4);
+    }
+}
+
+TEST_CASE("A vertex that comes from a queue is the one that went in, surface, frame and BSDF") {
+    constexpr Features kUntextured = {
+        kAllFeatures.bsdfs, kAllFeatures.emitters, kAllFeatures.primitives, false, false, false};
+    const auto same = [](Vec3f a, Vec3f b) { return a.x == b.x && a.y == b.y && a.z == b.z; };
+    const auto close = [](Vec3f a, Vec3f b) {
+        return length(a - b) < 1e-6f;
+    };  // copies of one function round their sums of products differently
+    uint32_t types = 0, behind = 0;
+    for (const char* name : {"cornell", "glass", "materials", "textured"}) {
+        INFO(name);
+        const Scene scene = project_scene(name, 32, 32);
+        const CwbvhAccel accel(scene);
+        const SceneView view = scene.view();
+        uint32_t vertices = 0;
+        for (uint32_t i = 0; i < 20000; ++i) {
+            const RngKey key = {11, i, 0, Stream::eye};
+            const Vec4f u = random_floats(key, 0), t = random_floats(key, 1);
+            const Vec3f from = scene.bounds_center + square_to_sphere({u.x, u.y}) * scene.bounds_radius,
+                        to = scene.bounds_center + square_to_sphere({u.z, u.w}) * (0.4f * scene.bounds_radius);
+            const Vec3f d = normalize(to - from);
+            Hit hit;
+            if (!accel.tracer().closest<kAllFeatures>(view, {from, kInfinity, d, 0}, hit)) continue;
+            const uint32_t depth = 1 + i % 2;
+            WalkVertex v = walk_vertex<kAllFeatures>(view, d, depth, hit.prim, hit.u, hit.v);
+            v.sums = {t.z, t.w};
+            const Bsdf& f = v.scattering.bsdf;
+            const bool diffuse = f.type == BsdfType::diffuse;
+            ++vertices;
+            behind += v.scattering.flipped;
+            types |= bit(f.type);
+            // What is common to vertices of both kinds of walk, `reflectance` that of a diffuse one, which has no
+            // tangents and no record.
+            const auto check = [&](const auto& item, const WalkVertex& back, Rgb reflectance) {
+                const Scattering &a = v.scattering, &b = back.scattering;
+                const Bsdf& g = b.bsdf;
+                REQUIRE((item.bits().depth() == depth && path_of(item) == 7 &&
+                         item.bits().template diffuse<kAllFeatures>() == diffuse));
+                REQUIRE((back.first == v.first && back.sums.dvcm == v.sums.dvcm && back.sums.dvc == v.sums.dvc &&
+                         same(back.point.p, v.point.p)));
+                REQUIRE((close(back.point.ng, v.point.ng) ||
+                         close(-back.point.ng, v.point.ng)));  // its side does not matter
+                REQUIRE((close(a.ng, b.ng) && close(a.frame.n, b.frame.n) && close(a.wi_world, b.wi_world) &&
+                         std::fabs(a.wi.z - b.wi.z) < 1e-6f && f.type == g.type));
+                if (diffuse) {
+                    REQUIRE(same(g.reflectance_or_eta, reflectance));
+                    return;
+                }
+                REQUIRE((close(a.frame.s, b.frame.s) && close(a.frame.t, b.frame.t) && close(a.wi, b.wi)));
+                REQUIRE((a.record == b.record && a.flipped == b.flipped && f.microfacets == g.microfacets &&
+                         f.sample_visible == g.sample_visible && f.nonlinear == g.nonlinear));
+                REQUIRE((same(f.reflectance_or_eta, g.reflectance_or_eta) &&
+                         same(f.specular_reflectance, g.specular_reflectance) &&
+                         same(f.transmittance_or_k, g.transmittance_or_k)));
+                REQUIRE((f.ior == g.ior && f.alpha_u == g.alpha_u && f.alpha_v == g.alpha_v &&
+                         f.fdr_internal == g.fdr_internal && f.specular_sampling_weight == g.specular_sampling_weight &&
+                         f.transmittance_table == g.transmittance_table));
+            };
+            const bool textured = scene.features.textures || scene.features.bumps;
+            WalkHit h = {};
+            h.ray.d = d;
+            h.ray.bits = WalkBits::make(depth, false, 1.0f);
+            h.ray.throughput = {1, 2, 3};
+            h.ray.path = 7;
+            const VertexItem eye = pack_vertex(v, h);
+            REQUIRE(same(eye.throughput, {1, 2, 3}));
+            const WalkVertex exact = unpack_vertex<kAllFeatures>(view, eye);
+            REQUIRE((exact.offset == v.offset && same(exact.scattering.wi_world, v.scattering.wi_world) &&
+                     same(exact.scattering.ng, v.scattering.ng) &&
+                     same(exact.scattering.frame.n, v.scattering.frame.n)));
+            check(eye, exact, f.reflectance_or_eta);
+            if (!textured) check(eye, unpack_vertex<kUntextured>(view, eye), f.reflectance_or_eta);
+            const ConnectionVertex light = pack_connection_vertex(v, depth, d, {1, 2, 3}, 7);
+            REQUIRE(same(light.throughput, diffuse ? Rgb{1, 2, 3} * f.reflectance_or_eta : Rgb{1, 2, 3}));
+            const WalkVertex back = unpack_vertex<kAllFeatures>(view, light);
+            REQUIRE((back.offset >= v.offset && back.offset <= v.offset * (1.0f + 1.0f / 128.0f)));
+            check(light, back, {1, 1, 1});
+            if (!textured) check(light, unpack_vertex<kUntextured>(view, light), {1, 1, 1});
+        }
+        CHECK(vertices > 1000);
+    }
+    CHECK(std::popcount(types) >= 5);
+    CHECK(behind > 0);
+}
+
+TEST_CASE("Queues hold of a vertex what its BSDF needs, and give it back") {
+    constexpr Features kPlain = {bit(BsdfType::diffuse), 0, 1, false, false, false},
+                       kUntextured = {kAllFeatures.bsdfs, 0, 1, false, false, false};
+    const auto check = [](auto features, auto item) {
+        constexpr Features F = decltype(features)::value;
+        using Item = decltype(item);
+        QueueCounter counter = {};
+        counter.capacity = 3;
+        Layout sizes;
+        sizes.queue<Item>("vertices", nullptr, 3, false, Item::template lanes<F>());
+        std::vector<Lane> memory(sizes.bytes() / sizeof(Lane) + 16, Lane{{~0u, ~0u, ~0u, ~0u}});
+        void* start = memory.data();
+        size_t room = memory.size() * sizeof(Lane);
+        Layout layout(std::align(256, sizes.bytes(), start, room));
+        const Queue<Item> queue = layout.queue<Item>("vertices", &counter, 3, false, Item::template lanes<F>());
+        for (const bool diffuse : {true, false, true}) {
+            if (!diffuse && F.bsdfs == bit(BsdfType::diffuse)) continue;
+            WalkVertex v = {};
+            v.point.p = {1, 2, 3};
+            v.scattering.bsdf.type = diffuse ? BsdfType::diffuse : BsdfType::rough_plastic;
+            v.scattering.wi_world = v.scattering.ng = v.scattering.frame.n = {0, 0, 1};
+            v.scattering.frame.s = {1, 0, 0};
+            v.scattering.record = 5;
+            v.scattering.bsdf.reflectance_or_eta = {4, 5, 6};
+            v.scattering.bsdf.specular_reflectance = {7, 8, 9};
+            v.scattering.bsdf.alpha_u = v.scattering.bsdf.alpha_v = 10;
+            v.sums = {11, 12};
+            WalkHit h = {};
+            h.ray.d = {0, 0, -1};
+            h.ray.bits = WalkBits::make(3, false, 1.0f);
+            h.ray.throughput = {1, 1, 1};
+            h.ray.path = 13;
+            if constexpr (std::is_same_v<Item, VertexItem>)
+                item = pack_vertex(v, h);
+            else
+                item = pack_connection_vertex(v, h);
+            const uint32_t place = push_vertex<F>(queue, item), lanes = lanes_of<F>(item);
+            CHECK(lanes == (diffuse ? Item::kDiffuseLanes : Item::template lanes<F>()));
+            const Item back = load_vertex<F>(queue, place);
+            CHECK(std::memcmp(&back, &item, lanes * sizeof(Lane)) == 0);
+        }
+        CHECK(counter.count == (F.bsdfs == bit(BsdfType::diffuse) ? 2 : 3));
+    };
+    const auto both = [&](auto features) {
+        check(features, VertexItem{});
+        check(features, ConnectionVertex{});
+    };
+    both(std::integral_constant<Features, kPlain>{});
+    both(std::integral_constant<Features, kUntextured>{});
+    both(std::integral_constant<Features, kAllFeatures>{});
+}
+
+TEST_CASE("A light vertex in a queue tells to which sides it scatters") {
+    for (uint32_t i = 0; i < 400000; ++i) {
+        const RngKey key = {9, i, 0, Stream::eye};
+        const Vec4f u = random_floats(key, 0), v = random_floats(key, 1), t = random_floats(key, 2);
+        Vec3f n = square_to_sphere({u.x, u.y});
+        // Along edges of the octahedron and at its corners too.
+        if (i % 3 == 0) n = normalize(Vec3f{i % 2 ? n.x : 0.0f, i % 4 < 2 ? n.y : 1e-4f * n.y, i % 5 ? n.z : 0.0f});
+        if (!is_finite(n)) continue;
+        WalkVertex y = {};
+        y.scattering.ng = y.scattering.frame.n = n;
+        y.scattering.wi_world = square_to_sphere({t.x, t.y});
+        y.offset = std::exp2(60.0f * (t.z - 0.5f));
+        // A direction at `angle` above the surface, of any length.
+        const Vec3f across = normalize(cross(n, square_to_sphere({v.x, v.y})));
+        const float angle = 0.1f * (2.0f * u.z - 1.0f), distance = std::exp2(60.0f * (u.w - 0.5f));
+        const Vec3f w = (across * std::cos(angle) + n * std::sin(angle)) * distance;
+        INFO("normal " << n.x << " " << n.y << " " << n.z << ", angle " << angle << ", distance " << distance);
+        const uint32_t depth = 1 + i % WalkBits::kMaxDepth;
+        for (const BsdfType type : {BsdfType::diffuse, BsdfType::rough_plastic, BsdfType::rough_dielectric}) {
+            y.scattering.bsdf.type = type;
+            const ConnectionVertexFront front =
+                pack_connection_vertex(y, depth, -y.scattering.wi_world, {1, 1, 1}, kNone).front;
+            REQUIRE(front.bits.depth() == depth);
+            REQUIRE((front.bits.offset() >= y.offset && front.bits.offset() <= y.offset * (1.0f + 1.0f / 128.0f)));
+            if (std::fabs(angle) < 1e-6f || std::fabs(dot(n, y.scattering.wi_world)) < 1e-6f) continue;
+            REQUIRE(front.bits.reaches(octahedral_direction(front.ng), w) == may_scatter(y.scattering, w));
+        }
+    }
+}
+
+TEST_CASE("Points in one plane, as far as positions are known, exchange no light; points above it do") {
+    const Scene scene = project_scene("cornell", 32, 32);
+    const SceneView view = scene.view();
+    BidirectionalMis mis{};
+    mis.strategies = kAllStrategies;
+    mis.light_walks = mis.connections = 1.0f;
+    uint32_t points = 0, pairs = 0;
+    for (uint32_t i = 0; i < 20000; ++i) {
+        const Vec4f u = random_floats({21, i, 0, Stream::eye}, 0);
+        const uint32_t prim = i % (scene.shapes.back().first_primitive + scene.shapes.back().primitive_count);
+        // Two points of one triangle, and the second one moved up.
+        const auto at = [&](float a, float b) { return a + b < 1.0f ? Vec2f{a, b} : Vec2f{1.0f - a, 1.0f - b}; };
+        const Vec2f p = at(u.x, u.y), q = at(u.z, u.w);
+        const SurfacePoint point = surface_at<kAllFeatures>(view, prim, p.x, p.y);
+        WalkVertex z = walk_vertex<kAllFeatures>(view, -point.ng, 1, prim, p.x, p.y),
+                   y = walk_vertex<kAllFeatures>(view, -point.ng, 1, prim, q.x, q.y);
+        z.sums = y.sums = {1, 1};
+        if (is_zero(z.scattering.bsdf.reflectance_or_eta)) continue;
+        ++points;
+        WalkConnection c;
+        REQUIRE_FALSE(may_connect(y, z));
+        REQUIRE_FALSE(connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c));
+        y.point.p += z.point.ng * (8.0f * z.offset);
+        y.point.ng = y.scattering.ng = y.scattering.frame.n = -z.scattering.ng;
+        y.scattering.wi_world = -z.scattering.wi_world;
+        pairs += connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c) && !is_zero(c.value);
+    }
+    CHECK(points > 15000);
+    CHECK(pairs > points - points / 50);  // but those whose rays begin above each other
+}

@@ -1,0 +1,465 @@
+// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// timeout: 300
+// Stages of light tracing and bidirectional path tracing over a wave whose queues a test may change: what is counted
+// when values are no light or too large, and where splats land.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <memory>
+
+#include "accel/cwbvh.h"
+#include "backends/cpu/executor.h"
+#include "integrators/bidirectional/schedule.h"
+#include "integrators/path/path_wave.h"
+#include "tests/support/bidirectional_images.h"
+#include "tests/support/closed_forms.h"
+#include "tests/support/render_checks.h"
+
+using namespace ambilux;
+
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+/// A wave over a whole film whose queues can be changed before a stage runs.
+struct Bench {
+    Scene scene;
+    CwbvhAccel accel;
+    BidirectionalPolicy policy;
+    Wave wave, film_wave;
+    std::vector<Lane> bytes, samples;
+    std::vector<int64_t> splats;
+    std::vector<double> sum, sum_squares;
+    BidirectionalMemory memory;
+    StageId before = StageId::count;
+    std::function<void(Bench&)> change;  ///< called once, before stage `before` runs for the first time
+    bool changed = false;
+
+    explicit Bench(Scene s, const Method& method = {"all"}, bool one_pair = false, bool fuse = false)
+        : scene(std::move(s)), accel(scene) {
+        RenderSettings settings = method_settings(scene, method, 5);
+        settings.fuse = fuse ? Fuse::light : Fuse::none;
+        policy = make_bidirectional_policy(scene, settings);
+        policy.one_pair = one_pair;
+        wave = shape_wave(scene, settings, kTilePixels, 1);
+        wave = shape_wave(scene, settings, tile_count(wave) * kTilePixels, tile_count(wave));
+        wave.samples = 1;
+        const uint32_t slots = wave.slot_count();
+        Layout sizes;
+        lay_out(sizes, slots, slots * 64, policy);
+        bytes.resize(sizes.bytes() / sizeof(Lane) + 64);
+        void* start = bytes.data();
+        size_t room = bytes.size() * sizeof(Lane);
+        std::align(256, sizes.bytes(), start, room);
+        Layout layout(start);
+        memory = lay_out(layout, slots, slots * 64, policy);
+        for (size_t q = 0; q < layout.queue_capacities().size(); ++q)
+            memory.counters[q].capacity = layout.queue_capacities()[q];
+        *memory.state = {};
+        memory.state->samples = 1;
+        samples.resize(slots);
+        splats.resize(size_t(wave.width) * wave.height * 3);
+        sum.resize(splats.size());
+        sum_squares.resize(splats.size());
+    }
+
+    /// Runs stages like CpuExecutor, after the change.
+    struct Executor : CpuExecutor {
+        Bench& bench;
+        explicit Executor(Bench& b) : CpuExecutor(b.memory.state, b.memory.records), bench(b) {}
+        void prepare(StageId id, uint32_t items) {
+            if (id != bench.before || bench.changed || items == 0) return;
+            bench.changed = true;
+            bench.change(bench);
+        }
+        template <class Stage>
+        void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
+            prepare(id, slots);
+            CpuExecutor::run_slots(id, stage, slots, samples);
+        }
+        template <class Stage, class Item>
+        void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
+            prepare(id, queue.counter->size());
+            CpuExecutor::run(id, stage, queue);
+        }
+        template <class Stage, class Item>
+        void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
+            run(id, stage, queue);
+        }
+        template <class Stage, class Item, class Out>
+        void extend(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
+            prepare(id, rays.counter->size());
+            CpuExecutor::extend(id, stage, rays, hits);
+        }
+        template <class Stage, class Item, class Out>
+        void extend_coherent(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
+            extend(id, stage, rays, hits);
+        }
+    };
+
+    using Stages = BidirectionalStages<kAllFeatures, CwbvhTracer>;
+    Stages stages() {
+        return Stages(scene.view(), accel.tracer(), policy, wave, memory,
+                      {samples.data(), {splats.data(), nullptr}, sum.data(), sum_squares.data()});
+    }
+
+    void run(StageId id = StageId::count, std::function<void(Bench&)> f = {}) {
+        before = id;
+        change = std::move(f);
+        Executor executor(*this);
+        const Stages s = stages();
+        run_bidirectional_wave(executor, s);
+        executor.prepare(StageId::develop, 1);
+        for (uint32_t i = 0; i < wave.tiles * kTilePixels; ++i) s.develop(i);
+        REQUIRE((change == nullptr || changed));
+        REQUIRE(memory.state->failed == 0);
+        for (double v : sum) {
+            CHECK(std::isfinite(v));
+            CHECK(v >= 0);
+        }
+    }
+    /// Only stage `id` counted anything, and what it counted is this.
+    void check_counts(StageId id, uint64_t nan, uint64_t inf, uint64_t negative) const {
+        for (uint32_t s = 0; s < kStageCount; ++s) {
+            INFO("counts of " << kStageNames[s] << ", injected into "
+                              << kStageNames[std::min(uint32_t(id), kStageCount - 1)]);
+            CHECK(memory.records[s].nan == (s == uint32_t(id) ? nan : 0));
+            CHECK(memory.records[s].inf == (s == uint32_t(id) ? inf : 0));
+            CHECK(memory.records[s].negative == (s == uint32_t(id) ? negative : 0));
+        }
+    }
+    uint64_t count(StageId id, int which) const {
+        const StageRecord& r = memory.records[uint32_t(id)];
+        return which == 0 ? r.nan : which == 1 ? r.inf : r.negative;
+    }
+    double total() const {
+        double t = 0;
+        for (double v : sum) t += v;
+        return t;
+    }
+};
+
+template <class Item>
+void edit(const Queue<Item>& queue, uint32_t i, const std::function<void(Item&)>& f) {
+    REQUIRE(i < queue.counter->size());
+    Item item = queue.load(i);
+    f(item);
+    queue.store(i, item);
+}
+
+Scene cornell() { return project_scene("cornell", 16, 16); }
+
+/// A camera in front of a plane that is a lamp.
+Scene lamp_seen() {
+    return scene_from_text(scene_xml(1,
+                                     "<sensor type='orthographic'><transform name='to_world'><lookat origin='0,0,1' "
+                                     "target='0,0,0' up='0,1,0'/></transform>" +
+                                         square_film(8) +
+                                         "</sensor><shape type='rectangle'><transform "
+                                         "name='to_world'><scale value='0.999'/></transform>" +
+                                         area_light({1, 1, 1}) + "</shape>"));
+}
+
+constexpr std::pair<float, int> kBad[] = {{kNan, 0}, {kInf, 1}, {-1.0f, 2}};
+
+}  // namespace
+
+TEST_CASE("G9: nothing is counted in a clean wave, whose film is that of the renderer", "[bidirectional]") {
+    for (const Method& m : kMethods) {
+        INFO(m.name);
+        Bench b(cornell(), m);
+        b.run();
+        b.check_counts(StageId::count, 0, 0, 0);
+        CHECK(b.total() > 0);
+        RenderSettings s = method_settings(b.scene, m, 5);
+        s.accel = "cwbvh";
+        s.specialise = false;
+        const FilmMoments film = render_scene(b.scene, s, 1).film;
+        CHECK(film.sum == b.sum);
+        CHECK(film.sum_squares == b.sum_squares);
+    }
+}
+
+TEST_CASE("Launches with one pair of a path, and with as many as there is room for, connect the same pairs") {
+    const auto record = [](const Bench& b, StageId id) { return b.memory.records[uint32_t(id)]; };
+    const Method connections = {"connections"};
+    Bench several(cornell(), connections);
+    several.run();
+    const uint64_t pairs = record(several, StageId::connect_vertices).items,
+                   rays = record(several, StageId::occlude).items;
+    CHECK(pairs > 256);
+    const auto check_same = [&](Bench& b) {
+        b.run();
+        CHECK(record(b, StageId::connect_vertices).items == pairs);
+        CHECK(record(b, StageId::connect_vertices).launches > record(several, StageId::connect_vertices).launches);
+        CHECK(record(b, StageId::occlude).items == rays);
+        CHECK(b.sum == several.sum);
+        for (uint32_t q = 0; q < BidirectionalMemory::kQueues; ++q) CHECK(b.memory.counters[q].overflow == 0);
+    };
+    Bench one(cornell(), connections, true);
+    check_same(one);
+    for (const bool fuse : {false, true})
+        for (const uint32_t room : {1u, 7u, 100u}) {
+            INFO("room " << room << " fuse " << fuse);
+            Bench b(cornell(), connections, false, fuse);
+            const auto limit = [room](auto& q) {
+                if (q.capacity > 0) q.capacity = q.counter->capacity = room;
+            };
+            limit(b.memory.connect_candidates), limit(b.memory.shadows), limit(b.memory.shadow_contributions);
+            check_same(b);
+        }
+}
+
+TEST_CASE("G9: light_generate counts emission that is none", "[bidirectional]") {
+    for (auto [value, which] : kBad) {
+        Bench b(cornell(), {"-i light"});
+        b.scene.emitters[0].radiance.value.y = value;
+        b.run();
+        CHECK(b.count(StageId::light_generate, which) > 200);
+        CHECK(b.total() == 0);
+    }
+}
+
+TEST_CASE("G9: light_extend counts rays that are not finite", "[bidirectional]") {
+    Bench b(cornell());
+    b.run(StageId::light_extend, [](Bench& x) {
+        edit<WalkItem>(x.memory.rays[0], 3, [](WalkItem& r) { r.d.y = kNan; });
+        edit<WalkItem>(x.memory.rays[0], 5, [](WalkItem& r) { r.o.x = kInf; });
+    });
+    b.check_counts(StageId::light_extend, 2, 0, 0);
+}
+
+TEST_CASE("G9: light_shade counts throughput that is no light, and neither of its vertices reaches the film",
+          "[bidirectional]") {
+    for (auto [value, which] : kBad) {
+        Bench b(cornell(), {"-i light"});
+        b.run(StageId::light_shade, [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.hits[0].counter->size(); ++i)
+                edit<WalkHit>(x.memory.hits[0], i, [v](WalkHit& h) { h.ray.throughput.z = v; });
+        });
+        CHECK(b.count(StageId::light_shade, which) > 50);
+        CHECK(b.count(StageId::connect_camera, which) > 50);
+        for (StageId later : {StageId::mis_weight, StageId::occlude, StageId::splat, StageId::develop})
+            CHECK(b.count(later, which) == 0);
+    }
+}
+
+TEST_CASE("G9: connect_camera counts vertices whose light is none", "[bidirectional]") {
+    for (auto [value, which] : kBad) {
+        Bench b(cornell());
+        b.run(StageId::connect_camera, [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.vertices.counter->size(); i += 2)
+                edit<VertexItem>(x.memory.vertices, i, [v](VertexItem& y) { y.throughput.x = v; });
+        });
+        const uint64_t counted = b.count(StageId::connect_camera, which);
+        CHECK(counted > 20);
+        b.check_counts(StageId::connect_camera, which == 0 ? counted : 0, which == 1 ? counted : 0,
+                       which == 2 ? counted : 0);
+        CHECK(b.total() > 0);
+    }
+}
+
+TEST_CASE("G9: connect and connect_vertices count pairs whose light is none", "[bidirectional]") {
+    for (auto [value, which] : kBad) {
+        Bench b(cornell());
+        b.run(StageId::generate, [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.light_vertices.counter->size(); i += 2)
+                edit<ConnectionVertex>(x.memory.light_vertices, i, [v](ConnectionVertex& y) { y.throughput.x = v; });
+        });
+        const uint64_t counted = b.count(StageId::connect_vertices, which);
+        CHECK(counted > 100);
+        b.check_counts(StageId::connect_vertices, which == 0 ? counted : 0, which == 1 ? counted : 0,
+                       which == 2 ? counted : 0);
+        CHECK(b.total() > 0);
+
+        Bench e(cornell(), {"next_event"});
+        e.run(StageId::connect, [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.vertices.counter->size(); i += 2)
+                edit<VertexItem>(x.memory.vertices, i, [v](VertexItem& z) { z.throughput.x = v; });
+        });
+        const uint64_t sampled = e.count(StageId::connect, which);
+        CHECK(sampled > 20);
+        e.check_counts(StageId::connect, which == 0 ? sampled : 0, which == 1 ? sampled : 0, which == 2 ? sampled : 0);
+    }
+}
+
+TEST_CASE("G9: shade counts emission and throughput that are no light", "[bidirectional]") {
+    for (auto [value, which] : kBad) {
+        Bench b(lamp_seen(), {"hits"});
+        b.scene.emitters[0].radiance.value.y = value;
+        b.run();
+        CHECK(b.count(StageId::shade, which) > 60);
+        CHECK(b.total() == 0);
+    }
+}
+
+TEST_CASE("G9: mis_weight counts densities and splats that are none", "[bidirectional]") {
+    Bench b(cornell());
+    b.run(StageId::mis_weight, [](Bench& x) {
+        edit<SplatCandidate>(x.memory.splat_candidates, 0, [](SplatCandidate& c) { c.others = kNan; });
+        edit<SplatCandidate>(x.memory.splat_candidates, 1, [](SplatCandidate& c) { c.value.x = kInf; });
+        edit<SplatCandidate>(x.memory.splat_candidates, 2, [](SplatCandidate& c) { c.value.x = -1; });
+    });
+    b.check_counts(StageId::mis_weight, 1, 1, 1);
+}
+
+TEST_CASE("B28: where other strategies are infinitely denser, a splat is nothing, not a NaN", "[bidirectional]") {
+    Bench b(cornell());
+    b.run(StageId::mis_weight, [](Bench& x) {
+        for (uint32_t i = 0; i < x.memory.splat_candidates.counter->size(); ++i)
+            edit<SplatCandidate>(x.memory.splat_candidates, i, [](SplatCandidate& c) { c.others = kInf; });
+    });
+    b.check_counts(StageId::count, 0, 0, 0);
+}
+
+TEST_CASE("G9: occlude counts rays of splats that are not finite", "[bidirectional]") {
+    Bench b(cornell());
+    b.run(StageId::occlude, [](Bench& x) {
+        edit<SplatCandidate>(x.memory.weighted_splats, 0, [](SplatCandidate& c) { c.d.x = kNan; });
+        edit<SplatCandidate>(x.memory.weighted_splats, 1, [](SplatCandidate& c) { c.o.z = kInf; });
+    });
+    b.check_counts(StageId::occlude, 2, 0, 0);
+}
+
+TEST_CASE("G9: develop counts samples that are no light", "[bidirectional]") {
+    Bench b(cornell());
+    b.run(StageId::develop, [](Bench& x) {
+        const float bad[3] = {kNan, kInf, -1e9f};
+        for (uint32_t i = 0; i < 3; ++i) {
+            const Rgb value = {bad[i], 0, 0};
+            memcpy(&x.samples[i], &value, sizeof(value));
+        }
+    });
+    b.check_counts(StageId::develop, 1, 1, 1);
+}
+
+// ---- splats ----
+
+namespace {
+
+/// Film of a Bench without light of its own, with `splats` alone.
+struct SplatFilm {
+    Bench bench;
+    explicit SplatFilm(const std::string& filter = "box", const std::string& crop = "")
+        : bench(scene_from_text(scene_xml(1,
+                                          "<sensor type='perspective'><film type='hdrfilm'><integer name='width' "
+                                          "value='16'/><integer name='height' value='16'/>" +
+                                              crop + "<rfilter type='" + filter +
+                                              "'/></film></sensor><emitter type='point'/>")),
+                {"light"}) {}
+    void add(std::initializer_list<std::pair<Rgb, Vec2f>> items) {
+        for (const auto& [value, film] : items) {
+            bench.memory.splats.push({value, 0, film, {}, 0.0f});
+        }
+        const Bench::Stages s = bench.stages();
+        const uint32_t n = bench.memory.splats.counter->size();
+        for (uint32_t i = 0; i < n; ++i) s.splat(i);
+        bench.memory.splats.counter->finish();
+    }
+    double at(uint32_t x, uint32_t y, uint32_t c = 0) const {
+        return double(bench.splats[(size_t(y) * bench.wave.width + x) * 3 + c]) * kLightUnit;
+    }
+    double total() const {
+        double t = 0;
+        for (size_t i = 0; i < bench.splats.size(); i += 3) t += double(bench.splats[i]) * kLightUnit;
+        return t;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("B18: splats land in the pixel that they are in, whatever the border; outside nothing lands",
+          "[bidirectional]") {
+    for (auto [x, y, px, py] : {std::tuple{0.0f, 0.0f, 0, 0},
+                                {0.5f, 0.5f, 0, 0},
+                                {0.999f, 3.001f, 0, 3},
+                                {1.0f, 2.0f, 1, 2},
+                                {15.0f, 15.0f, 15, 15},
+                                {15.999f, 15.999f, 15, 15},
+                                {7.25f, 0.0f, 7, 0}}) {
+        INFO(x << "," << y);
+        SplatFilm f;
+        f.add({{{1, 2, 3}, {x, y}}});
+        CHECK(f.at(uint32_t(px), uint32_t(py), 0) == Approx(1));
+        CHECK(f.at(uint32_t(px), uint32_t(py), 1) == Approx(2));
+        CHECK(f.at(uint32_t(px), uint32_t(py), 2) == Approx(3));
+        CHECK(f.total() == Approx(1));
+    }
+    for (auto [x, y] : {std::pair{-0.001f, 5.0f},
+                        {16.0f, 5.0f},
+                        {5.0f, -0.5f},
+                        {5.0f, 16.0f},
+                        {-1e30f, 5.0f},
+                        {1e30f, 1e30f},
+                        {kNan, 5.0f},
+                        {5.0f, -kInf}}) {
+        INFO(x << "," << y);
+        SplatFilm f;
+        f.add({{{1, 1, 1}, {x, y}}});
+        CHECK(f.total() == 0);
+    }
+}
+
+TEST_CASE("B19: a splat is spread by the filter: its energy is 1 on average, and it lands where the filter reaches",
+          "[bidirectional]") {
+    for (const char* filter : {"box", "tent", "gaussian"}) {
+        INFO(filter);
+        // The filter has an integral of 1: averaged over one pixel's positions, its sum over the pixels is 1.
+        SplatFilm f(filter);
+        const int n = 211;  // no multiple of the table's steps
+        for (int i = 0; i < n; ++i)
+            for (int j = 0; j < n; ++j)
+                f.add({{{1, 1, 1}, {8 + (float(i) + 0.5f) / float(n), 8 + (float(j) + 0.5f) / float(n)}}});
+        CHECK(f.total() / (n * n) == Approx(1).epsilon(2e-3));
+        CHECK(f.at(7, 8) == Approx(f.at(9, 8)).epsilon(5e-3).margin(1e-6));
+        CHECK(f.at(8, 7) == Approx(f.at(8, 9)).epsilon(5e-3).margin(1e-6));
+        CHECK(f.at(7, 7) == Approx(f.at(9, 9)).epsilon(5e-3).margin(1e-6));
+        for (uint32_t y = 0; y < 16; ++y)
+            for (uint32_t x = 0; x < 16; ++x)
+                if (std::abs(float(x) - 8.0f) > f.bench.scene.sensor.filter_radius + 0.5f) CHECK(f.at(x, y) == 0);
+    }
+}
+
+TEST_CASE("B16: splats on a crop are those on the whole film there", "[bidirectional]") {
+    SplatFilm whole("gaussian");
+    SplatFilm part("gaussian",
+                   "<integer name='crop_offset_x' value='5'/><integer name='crop_offset_y' value='3'/><integer "
+                   "name='crop_width' value='4'/><integer name='crop_height' value='9'/>");
+    for (int i = 0; i < 200; ++i) {
+        const Vec2f at = {float(i * 37 % 160) / 10.0f, float(i * 53 % 160) / 10.0f};
+        whole.add({{{1, 1, 1}, at}});
+        part.add({{{1, 1, 1}, at}});
+    }
+    for (uint32_t y = 0; y < 9; ++y)
+        for (uint32_t x = 0; x < 4; ++x)
+            CHECK(part.at(x, y) == Approx(whole.at(x + 5, y + 3)).epsilon(1e-6).margin(1e-9));
+}
+
+TEST_CASE("G1: splats are summed exactly, in any order, and what is too large is counted, not wrapped",
+          "[bidirectional]") {
+    SplatFilm f;
+    for (int i = 0; i < 10000; ++i) f.add({{{0.1f, 1e-9f, 1e3f}, {3.5f, 4.5f}}});
+    CHECK(f.at(3, 4, 0) == Approx(1e3).epsilon(1e-6));
+    CHECK(f.at(3, 4, 1) == Approx(1e-5).epsilon(1e-2));
+    CHECK(f.bench.memory.records[uint32_t(StageId::splat)].inf == 0);
+
+    SplatFilm large;
+    large.add({{{1, 0x1p26f, 1}, {3.5f, 4.5f}},
+               {{kInf, 1, 1}, {3.5f, 4.5f}},
+               {{kNan, kNan, kNan}, {3.5f, 4.5f}},
+               {{1, 1, 1e30f}, {5.5f, 4.5f}}});
+    CHECK(large.total() == 0);
+    CHECK(large.bench.memory.records[uint32_t(StageId::splat)].inf == 4);
+    large.add({{{0x1.fffffep25f, 1, 1}, {3.5f, 4.5f}}});
+    CHECK(large.at(3, 4) == double(0x1.fffffep25f));
+    CHECK(large.bench.memory.records[uint32_t(StageId::splat)].inf == 4);
+}
+
+TEST_CASE("G1: a pixel that more light reaches than it can hold does not turn dark", "[bidirectional]") {
+    SplatFilm f;
+    for (int i = 0; i < 40; ++i) f.add({{{6e7f, 1, 1}, {3.5f, 4.5f}}});
+    CHECK(f.at(3, 4) >= 0);
+    CHECK((f.bench.memory.records[uint32_t(StageId::splat)].inf > 0 || f.at(3, 4) == Approx(40 * 6e7)));
+}

@@ -1,0 +1,307 @@
+// The weights of bidirectional path tracing in the slow and obvious way: the density of every strategy that can sample
+// a given path, as a product of the densities of its steps in double precision. Nothing here is recursive and nothing
+// comes from transport/bidirectional.h but the names of masks; single densities of BSDFs, emitters and sensors are the
+// project's, which have tests of their own. Definitions: docs/theory.md.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "transport/bidirectional.h"
+#include "transport/surface_scattering.h"
+
+namespace ambilux::test {
+
+constexpr Features kOracleFeatures = kAllFeatures;
+
+/// Path x_0 ... x_k from the light to the camera: x_0 is on an emitter, x_1 ... x_(k-1) on surfaces, x_k on the camera.
+struct OraclePath {
+    struct Vertex {
+        SurfacePoint point;
+        bool delta;  ///< light goes on here by a delta lobe
+        uint32_t prim;
+        float u, v;
+    };
+    uint32_t k;  ///< segments
+    uint32_t emitter;
+    SurfacePoint light;            ///< x_0 of an area emitter
+    Vec3f light_p;                 ///< x_0 of a point or spot emitter
+    std::vector<Vertex> vertices;  ///< [i] is x_i; the first entry is not used
+    std::vector<Vec3f> to_eye;     ///< [i]: unit direction from x_i to x_(i+1)
+    Vec3f camera_p;                ///< x_k: pinhole or lens point
+    Vec2f lens_u;
+};
+
+/// A local density, and how much rounding of its arguments may change it (relative).
+struct OracleDensity {
+    double value = 1, error = 0;
+};
+
+/// Densities of the steps of both walks over one path.
+struct OracleSteps {
+    std::vector<OracleDensity> light;  ///< [i]: of x_i by a light walk that came through x_0 ... x_(i-1)
+    std::vector<OracleDensity> eye;    ///< [i]: of x_i by an eye walk that came through x_k ... x_(i+1)
+    OracleDensity next_event;          ///< of x_0 by next event estimation at x_1
+};
+
+/// Strategies s = 0 ... k of one path: which of StrategyBits they belong to (0: does not exist) and the density to
+/// sample the path.
+struct OracleStrategies {
+    std::vector<uint32_t> group;
+    std::vector<double> density;
+};
+
+namespace oracle {
+
+constexpr Features F = kOracleFeatures;
+/// Rounding of a unit vector that went through a frame and back.
+constexpr float kDirectionError = 0x1p-21f;
+
+inline double dot64(Vec3f a, Vec3f b) { return double(a.x) * b.x + double(a.y) * b.y + double(a.z) * b.z; }
+
+inline double distance2(Vec3f a, Vec3f b) {
+    const double x = double(a.x) - b.x, y = double(a.y) - b.y, z = double(a.z) - b.z;
+    return x * x + y * y + z * z;
+}
+
+/// A density of the vertex at `p` that a ray along `d` meets under normal `ng`, per area of the plane across the ray,
+/// to one per area of the surface.
+inline void times_cosine(OracleDensity& q, Vec3f ng, Vec3f d) {
+    const double c = std::abs(dot64(ng, d));
+    q.value *= c;
+    q.error += double(kDirectionError) / c;
+}
+inline void over_distance(OracleDensity& q, double d2, Vec3f error_a, Vec3f error_b) {
+    q.value /= d2;
+    q.error +=
+        4.0 * double(length(error_a) + length(error_b)) / std::sqrt(d2);  // rays start that far off their surfaces
+}
+
+/// f at (a,b), and how it changes when the unit vectors a and b are off by rounding.
+template <class Function>
+OracleDensity at_directions(Vec3f a, Vec3f b, bool conditioning, Function f) {
+    OracleDensity q{double(f(a, b)), 0};
+    if (!conditioning) return q;
+    for (int which = 0; which < 2; ++which) {
+        const Frame frame = frame_from_normal(which ? b : a);
+        for (Vec3f step : {frame.s, frame.t}) {
+            double worst = 0;
+            for (float sign : {-1.0f, 1.0f}) {
+                const Vec3f moved = normalize((which ? b : a) + step * (sign * kDirectionError));
+                const double changed = double(which ? f(a, moved) : f(moved, b));
+                worst = std::max(worst, std::abs(changed / q.value - 1));
+            }
+            q.error += worst;
+        }
+    }
+    return q;
+}
+
+/// The delta lobe that sends `arrived` (pointing away from the surface) to `left`: its probability, and relative index
+/// of the side of `left` to that of `arrived`.
+struct DeltaLobe {
+    double probability, eta, cos_arrived, cos_left;  ///< cosines to the shading normal
+};
+inline DeltaLobe delta_lobe(const SceneView& scene, const SurfacePoint& point, Vec3f arrived, Vec3f left) {
+    const Scattering s = make_scattering<F>(scene, point, arrived);
+    const Vec3f local = s.frame.to_local(left);
+    const bool transmitted = s.wi.z * local.z < 0;
+    BsdfSample sample;
+    // Every BSDF draws its reflected delta for small numbers and its transmitted one for large ones.
+    if (!bsdf_sample<F>(s.bsdf, s.wi, {transmitted ? kOneMinusEpsilon : 0.0f, 0.5f, 0.5f}, TransportMode::radiance,
+                        sample))
+        return {0, 1, 1, 1};
+    const bool found = (sample.flags & kScatterDelta) && bool(sample.flags & kScatterTransmission) == transmitted;
+    return {found ? double(sample.pdf_sa) : 0.0, double(sample.eta), std::abs(double(s.wi.z)),
+            std::abs(double(local.z))};
+}
+
+/// Density per solid angle of `left` for a walk that arrived from `arrived`. For a delta: the coefficient of delta(left
+/// - the direction that the light takes), a delta function over directions towards the eye. A walk from the eye draws
+/// directions towards the light; the change of variables is the ratio of solid angles, n_l² cos_l / (n_e² cos_e) by
+/// Snell's law (Veach 1997, section 5.2).
+inline OracleDensity scattering_step(const SceneView& scene, const OraclePath::Vertex& x, Vec3f arrived, Vec3f left,
+                                     bool from_light, bool conditioning) {
+    return at_directions(arrived, left, conditioning, [&](Vec3f a, Vec3f l) -> double {
+        if (!x.delta) return scatter_pdf<F>(make_scattering<F>(scene, x.point, a), l);
+        const DeltaLobe lobe = delta_lobe(scene, x.point, a, l);
+        if (from_light) return lobe.probability;
+        // Here `arrived` is towards the eye and `left` towards the light, eta = n_l / n_e.
+        return lobe.probability * (lobe.eta == 1 ? 1.0 : lobe.eta * lobe.eta * lobe.cos_left / lobe.cos_arrived);
+    });
+}
+
+}  // namespace oracle
+
+/// Densities of all steps. Measures: area; x_0 of an emitter at infinity: solid angle; the camera: 1 (both walks take
+/// its lens point alike), and x_(k-1) by the camera at density 1 per pixel. `conditioning`: errors too.
+inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, bool conditioning) {
+    using namespace oracle;
+    const uint32_t k = path.k;
+    const Emitter& e = scene.emitters[path.emitter];
+    const bool infinite = is_infinite(e.type), area = e.type == EmitterType::area;
+    const Vec3f none = {0, 0, 0};
+    const auto position = [&](uint32_t i) {
+        return i == k ? path.camera_p : (i == 0 ? (area ? path.light.p : path.light_p) : path.vertices[i].point.p);
+    };
+    const auto error = [&](uint32_t i) {
+        return i == k ? none : (i == 0 ? (area ? path.light.p_error : none) : path.vertices[i].point.p_error);
+    };
+    const auto normal = [&](uint32_t i) { return i == 0 ? path.light.ng : path.vertices[i].point.ng; };
+    OracleSteps steps;
+    steps.light.resize(k);
+    steps.eye.resize(k);
+
+    // Light walk: a point or direction of the emitter, the other of the two, then BSDFs.
+    const double pick = e.pick_probability;
+    const OracleDensity emission = at_directions(path.to_eye[0], path.to_eye[0], conditioning, [&](Vec3f d, Vec3f) {
+        return pdf_emission_direction<F>(scene, path.emitter, path.light.ng, d);
+    });
+    const double emission_position = pdf_emission_position<F>(scene, path.emitter, area ? path.light.prim : kNone);
+    steps.light[0].value = pick;
+    if (infinite) {
+        steps.light[0].value *= emission.value;
+        steps.light[0].error = emission.error;
+    } else {
+        steps.light[0].value *= emission_position;
+    }
+    for (uint32_t i = 1; i < k; ++i) {
+        OracleDensity& q = steps.light[i];
+        if (i == 1)
+            q = infinite ? OracleDensity{emission_position, 0} : emission;
+        else
+            q = scattering_step(scene, path.vertices[i - 1], -path.to_eye[i - 2], path.to_eye[i - 1], true,
+                                conditioning);
+        times_cosine(q, normal(i), path.to_eye[i - 1]);
+        if (!(infinite && i == 1)) over_distance(q, distance2(position(i - 1), position(i)), error(i - 1), error(i));
+    }
+
+    // Next event estimation.
+    if (k >= 2) {
+        const Vec3f to_light = -path.to_eye[0];
+        if (area) {
+            const auto direct = [&](Vec3f from) {
+                return pdf_emitter_direct<F>(scene, path.emitter, from, to_light, path.light);
+            };
+            OracleDensity& q = steps.next_event;
+            q.value = direct(position(1));
+            if (conditioning)
+                for (int axis = 0; axis < 3; ++axis) {
+                    Vec3f moved = position(1);
+                    moved[axis] += 2 * error(1)[axis] + length(error(0));
+                    q.error += std::abs(double(direct(moved)) / q.value - 1);
+                }
+            times_cosine(q, normal(0), to_light);
+            over_distance(q, distance2(position(0), position(1)), error(0), error(1));
+        } else if (is_delta(e.type)) {
+            steps.next_event.value = pick;
+        } else {
+            steps.next_event = at_directions(to_light, to_light, conditioning,
+                                             [&](Vec3f d, Vec3f) { return pdf_environment_direct<F>(scene, d); });
+        }
+    }
+
+    // Eye walk.
+    const Sensor& sensor = scene.sensor;
+    const Vec3f towards = -path.to_eye[k - 1];
+    const Vec3f axis = sensor.to_world.vector({0, 0, 1});
+    for (uint32_t i = 0; i < k; ++i) {
+        if (i == 0 && !area && !(infinite && !is_delta(e.type))) {
+            steps.eye[0].value = 0;  // no ray meets it
+            continue;
+        }
+        OracleDensity& q = steps.eye[i];
+        if (i == k - 1) {
+            const double cos_camera = dot64(towards, axis) / std::sqrt(dot64(axis, axis));
+            q.value = camera_delta_direction(sensor) ? camera_pdf_position(sensor)
+                                                     : camera_pdf_direction_sa(sensor, float(cos_camera));
+            q.error = camera_delta_direction(sensor) ? 0 : 3 * double(kDirectionError) / cos_camera;
+        } else {
+            q = scattering_step(scene, path.vertices[i + 1], path.to_eye[i + 1], -path.to_eye[i], false, conditioning);
+        }
+        if (i == 0 && infinite) continue;
+        times_cosine(q, normal(i), path.to_eye[i]);
+        if (!(i == k - 1 && camera_delta_direction(sensor)))
+            over_distance(q, distance2(position(i), position(i + 1)), error(i), error(i + 1));
+    }
+    return steps;
+}
+
+/// Densities of all strategies for a path. `light_paths`: light walks per eye walk of a pixel; `connections`: light
+/// walks that an eye vertex is connected with.
+inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePath& path, const OracleSteps& steps,
+                                          double light_paths, double connections) {
+    const uint32_t k = path.k;
+    const EmitterType type = scene.emitters[path.emitter].type;
+    const auto delta = [&](uint32_t i) { return path.vertices[i].delta; };
+    OracleStrategies r;
+    r.group.assign(k + 1, 0);
+    r.density.assign(k + 1, 0.0);
+    for (uint32_t s = 0; s <= k; ++s) {
+        double p = 1;
+        for (uint32_t i = 0; i < k; ++i)
+            p *= i >= s ? steps.eye[i].value
+                        : (i == 0 && s == 1 && k > 1 ? steps.next_event.value : steps.light[i].value);
+        uint32_t group = 0;
+        if (s == 0) {
+            if (!is_delta(type)) group = kHitStrategies;
+        } else if (s == k) {
+            // A light walk to the vertex that the camera is connected with. Of one segment: a point of an area emitter,
+            // which nothing else is connected with.
+            if (k == 1 ? type == EmitterType::area : !delta(k - 1)) group = kLightStrategies;
+            p *= light_paths;
+        } else if (s == 1) {
+            if (!delta(1)) group = kNextEventStrategies;
+        } else if (!delta(s - 1) && !delta(s)) {
+            group = kConnectionStrategies;
+            p *= connections;
+        }
+        r.group[s] = group;
+        r.density[s] = group ? p : 0.0;
+    }
+    // The environment that the camera sees belongs to both masks that could show it.
+    if (k == 1 && is_infinite(type) && !is_delta(type)) r.group[0] = kHitStrategies | kLightStrategies;
+    return r;
+}
+
+/// Weight of strategy s when only the strategies of `mask` are used.
+inline double oracle_weight(const OracleStrategies& all, uint32_t s, uint32_t mask, MisHeuristic heuristic) {
+    double sum = 0;
+    for (size_t i = 0; i < all.density.size(); ++i) {
+        if (!(all.group[i] & mask)) continue;
+        const double ratio = all.density[i] / all.density[s];
+        sum += heuristic == MisHeuristic::power ? ratio * ratio : ratio;
+    }
+    return 1 / sum;
+}
+
+/// How much rounding of directions and positions may change that weight, relative, to first order: densities i and s
+/// differ in the steps between them.
+inline double oracle_weight_error(const OracleStrategies& all, const OracleSteps& steps, uint32_t s, uint32_t mask,
+                                  MisHeuristic heuristic) {
+    const uint32_t k = uint32_t(all.density.size()) - 1;
+    const auto step = [&](uint32_t strategy, uint32_t i) {
+        return i >= strategy ? steps.eye[i].error
+                             : (i == 0 && strategy == 1 && k > 1 ? steps.next_event.error : steps.light[i].error);
+    };
+    double sum = 0, error = 0;
+    for (uint32_t other = 0; other <= k; ++other) {
+        if (!(all.group[other] & mask) || !(all.density[other] > 0)) continue;
+        const double ratio = all.density[other] / all.density[s],
+                     term = heuristic == MisHeuristic::power ? ratio * ratio : ratio;
+        double e = 0;
+        for (uint32_t i = 0; i < std::max(other, s); ++i) {
+            // Light steps below both are the same factor, except that of next event estimation.
+            const bool differs = i >= std::min(other, s) || (i == 0 && (other == 1 || s == 1));
+            if (differs && other != s) e += step(other, i) + step(s, i);
+        }
+        sum += term;
+        error += term * e * (heuristic == MisHeuristic::power ? 2 : 1);
+    }
+    return error / sum;
+}
+
+}  // namespace ambilux::test

@@ -1,0 +1,16 @@
+// Whether tests of a device can run.
+#pragma once
+
+#include "render/renderer.h"
+#include "tests/support/catch.h"
+
+namespace ambilux {
+
+/// False, with a warning that the test was skipped, where no device answers.
+inline bool device() {
+    if (cuda_available()) return true;
+    WARN("no CUDA device: skipped");
+    return false;
+}
+
+}  // namespace ambilux
