@@ -124,7 +124,7 @@ EmbreeAccel::EmbreeAccel(const Scene& scene)
     if (!scene.triangles.empty()) {
         RTCGeometry mesh = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
         rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, scene.vertices.data(), 0,
-                                   sizeof(Vertex), scene.vertices.size());
+                                   sizeof(MeshVertex), scene.vertices.size());
         rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, scene.triangles.data(), 0,
                                    sizeof(Triangle), scene.triangles.size());
         if (scene.features.opacity) rtcSetGeometryIntersectFilterFunction(mesh, filter_triangle);

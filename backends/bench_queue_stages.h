@@ -7,7 +7,9 @@
 #include <type_traits>
 
 #include "core/error.h"
+#include "items/candidate_items.h"
 #include "items/vertex_items.h"
+#include "queues/stage_record.h"
 #include "queues/order.h"
 
 namespace ambilux {
@@ -41,8 +43,8 @@ template <class Function>
 void for_pushed_items(Function f) {
     f("PairItem", std::type_identity<PairItem>());
     f("ShadowItem", std::type_identity<ShadowItem>());
-    f("WalkItem", std::type_identity<WalkItem>());
-    f("WalkHit", std::type_identity<WalkHit>());
+    f("SubpathRay", std::type_identity<SubpathRay>());
+    f("SubpathHit", std::type_identity<SubpathHit>());
     f("ConnectionVertex", std::type_identity<ConnectionVertex>());
 }
 
@@ -91,7 +93,7 @@ AMBILUX_HD Item made_item(uint32_t i) {
 /// Tells items apart by all of their words and the order of these.
 template <class Item>
 AMBILUX_HD uint32_t item_sum(const Item& item) {
-    Lane lanes[Queue<Item>::kLanes];
+    Lane lanes[LaneArray<Item>::kLanes];
     memcpy(lanes, &item, sizeof(Item));
     uint32_t sum = 0, factor = 1;
     for (const Lane& lane : lanes)
@@ -110,8 +112,11 @@ QueueContents pushed_contents(uint32_t n, uint32_t one_in) {
 
 template <class Item>
 struct PushMade {
+    static constexpr const char* kName = "push";
+
     Queue<Item> queue;
     uint32_t one_in;
+    StageRecord* record = nullptr;
 
     AMBILUX_HD void operator()(uint32_t i) const {
         if (pushes(i, one_in)) queue.push(made_item<Item>(i));
@@ -122,9 +127,14 @@ struct PushMade {
 /// contents[1]: too few to take time, but compilers cannot know that.
 template <class Item>
 struct DrainItems {
+    static constexpr const char* kName = "drain";
+
     Queue<Item> queue;
     QueueContents* contents;
     bool counted;
+    StageRecord* record = nullptr;
+
+    const Queue<Item>& items() const { return queue; }
 
     AMBILUX_HD void operator()(uint32_t place) const {
         const uint32_t sum = item_sum(queue.load(place));

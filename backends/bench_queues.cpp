@@ -23,12 +23,12 @@ constexpr int kWarmUps = 3;
 
 /// What a scene's paths have in their queues after the camera rays: their hits, and the rays that leave these.
 struct SceneItems {
-    std::vector<HitItem> hits;
-    std::vector<RayItem> rays;
+    std::vector<PathHit> hits;
+    std::vector<PathRay> rays;
 };
 
-RayItem ray_item(const Ray& ray, uint32_t path, uint32_t depth) {
-    return {ray.o, path, ray.d, WalkBits::make(depth, false, 1.0f), splat(1.0f), 1.0f};
+PathRay ray_item(const Ray& ray, uint32_t path, uint32_t depth) {
+    return {ray.o, path, ray.d, SubpathBits::make(depth, false, 1.0f), splat(1.0f), 1.0f};
 }
 
 /// Of a film of the least power of two pixels a side that has `items` pixels, but for kMostSide, the first `items`.
@@ -45,7 +45,7 @@ SceneItems make_scene_items(const Scene& scene, uint32_t items) {
     detail::for_all(s.hits.size(), [&](size_t i) {
         Hit hit;
         accel.tracer().closest<kAllFeatures>(view, camera[i], hit);
-        s.hits[i] = hit_of(ray_item(camera[i], uint32_t(i), 1), hit);
+        s.hits[i] = {ray_item(camera[i], uint32_t(i), 1), hit.u, hit.v, hit.prim, 0};
     });
     detail::for_all(s.rays.size(), [&](size_t i) { s.rays[i] = ray_item(bounced[i], uint32_t(i), 2); });
     return s;
@@ -55,24 +55,22 @@ SceneItems make_scene_items(const Scene& scene, uint32_t items) {
 template <class Item>
 struct HostQueue {
     WaveBytes bytes;
-    QueueCounter* counter;
     Queue<Item> queue;
     OrderMemory order;
     WaveState state = {};
-    StageRecord records[kStageCount] = {};
+    StageRecord push = {}, drain = {};
     QueueContents contents = {};
 
     explicit HostQueue(const QueuePolicy& policy) {
         Layout sizes;
         lay_out(sizes, policy);
         bytes = make_wave_bytes(sizes.bytes());
-        Layout layout(bytes.get());
+        Layout layout(sizes, bytes.get());
         lay_out(layout, policy);
-        set_capacities(counter, layout);
+        *queue.counter = layout.first_counters()[0];
     }
     void lay_out(Layout& layout, const QueuePolicy& policy) {
-        counter = layout.take<QueueCounter>(1);
-        queue = layout.queue<Item>("items", counter, kCpuWaveSize, policy.fixed_places());
+        queue = layout.queue<Item>("items", kCpuWaveSize, policy.fixed_places());
         order = lay_out_order(layout, policy, kCpuWaveSize);
     }
 };
@@ -94,25 +92,25 @@ HostSeconds time_on_host(const char* name, const SceneView& scene, const QueuePo
     for (int run = 0; run < kWarmUps + repetitions; ++run) {
         parallel_for(threads, [&](uint32_t t) {
             HostQueue<Item>& q = queues[t];
-            for (StageRecord& record : q.records) record = {};
+            q.push = q.drain = {};
             q.contents = {};
-            CpuExecutor executor(&q.state, q.records, scene, q.order);
-            const DrainItems<Item> drain = {q.queue, &q.contents, true};
+            CpuExecutor executor(&q.state, scene, q.order);
+            const DrainItems<Item> drain = {q.queue, &q.contents, true, &q.drain};
             for (uint32_t wave = t; wave < waves; wave += threads) {
-                push(executor, q.queue, wave);
-                if constexpr (std::is_same_v<Item, RayItem>)
-                    executor.trace(StageId::extend, drain, q.queue);
+                push(executor, q, wave);
+                if constexpr (std::is_same_v<Item, PathRay>)
+                    executor.trace(drain);
                 else
-                    executor.run(StageId::extend, drain, q.queue);
+                    executor.run(drain);
             }
         });
         QueueContents found = {};
         uint64_t pushing = 0, draining = 0;
         for (const HostQueue<Item>& q : queues) {
-            found.items += q.contents.items + q.counter->overflow;
+            found.items += q.contents.items + q.queue.counter->overflow;
             found.sum += q.contents.sum;
-            pushing += q.records[uint32_t(StageId::generate)].nanoseconds;
-            draining += q.records[uint32_t(StageId::extend)].nanoseconds;
+            pushing += q.push.nanoseconds;
+            draining += q.drain.nanoseconds;
         }
         check_contents(name, found, pushed);
         if (run < kWarmUps) continue;
@@ -131,10 +129,10 @@ void time_order_on_host(const char* name, const SceneView& scene, Ordering order
     for (const Item& item : items) pushed.sum += item_sum(item);
     for (const QueuePolicy policy : {QueuePolicy{}, QueuePolicy{Compaction::atomic, ordering}}) {
         const HostSeconds seconds = time_on_host<Item>(name, scene, policy, waves, pushed, repetitions,
-                                                       [&](CpuExecutor&, const Queue<Item>& queue, uint32_t wave) {
+                                                       [&](CpuExecutor&, HostQueue<Item>& q, uint32_t wave) {
                                                            for (uint32_t i = wave * kCpuWaveSize;
                                                                 i < std::min(n, (wave + 1) * kCpuWaveSize); ++i)
-                                                               queue.push(items[i]);
+                                                               q.queue.push(items[i]);
                                                        });
         rows.push_back({"drain", name, sizeof(Item), policy, 1, n, n, seconds.drain});
     }
@@ -155,8 +153,8 @@ std::vector<QueueTiming> time_queues_on_host(const Scene& scene, uint32_t items,
                 const QueuePolicy policy = {compaction};
                 const HostSeconds seconds = time_on_host<Item>(
                     name, view, policy, waves, pushed, repetitions,
-                    [&](CpuExecutor& executor, const Queue<Item>& queue, uint32_t) {
-                        executor.run_slots(StageId::generate, PushMade<Item>{queue, one_in}, kCpuWaveSize, 1);
+                    [&](CpuExecutor& executor, HostQueue<Item>& q, uint32_t) {
+                        executor.run_slots(PushMade<Item>{q.queue, one_in, &q.push}, kCpuWaveSize, 1);
                     });
                 rows.push_back({"push", name, sizeof(Item), policy, one_in, items, pushed.items, seconds.push});
                 rows.push_back({"drain", name, sizeof(Item), policy, one_in,
@@ -164,8 +162,8 @@ std::vector<QueueTiming> time_queues_on_host(const Scene& scene, uint32_t items,
             }
         }
     });
-    time_order_on_host("HitItem", view, Ordering::material, scene_items.hits, repetitions, rows);
-    time_order_on_host("RayItem", view, Ordering::morton, scene_items.rays, repetitions, rows);
+    time_order_on_host("PathHit", view, Ordering::material, scene_items.hits, repetitions, rows);
+    time_order_on_host("PathRay", view, Ordering::morton, scene_items.rays, repetitions, rows);
     return rows;
 }
 

@@ -75,7 +75,7 @@ int render(const Options& o) {
 
     RenderPosition position;
     // Choosing is part of the method: its time counts.
-    if (const ChoiceStats choice = renderer->stats().choice; !choice.name.empty()) {
+    if (const SelectionStats choice = renderer->stats().choice; !choice.name.empty()) {
         position.seconds = choice.seconds;
         log_info(fmt::format("bdpt.auto: {}, after {}. To repeat it: {}", choice.name, format_duration(choice.seconds),
                              choice_line(choice)));
@@ -96,7 +96,7 @@ int render(const Options& o) {
         if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
     }
     if (position.samples > 0 && !o.techniques.empty())
-        write_technique_images(o.techniques, loaded.scene, settings, stats, renderer->technique_images());
+        write_technique_images(o.techniques, loaded.scene, settings, stats, renderer->strategy_images());
     if (!o.json.empty()) {
         nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
         json["interrupted"] = position.interrupted;

@@ -393,7 +393,7 @@ private:
         finish(scene, name, settings, total, state);
         if (run.techniques) {
             write_technique_images(file("techniques", scene, name), scene.scene, settings, stated(total, state),
-                                   renderer->technique_images());
+                                   renderer->strategy_images());
             for (const auto& line : state.notes["rows"]) add_line(line.get<std::string>());
         }
         std::error_code ignored;

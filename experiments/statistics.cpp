@@ -14,10 +14,10 @@ nlohmann::json invalid_json(const InvalidCounts& invalid) {
 }
 
 /// Null where nothing was chosen.
-nlohmann::json choice_json(const ChoiceStats& choice) {
+nlohmann::json choice_json(const SelectionStats& choice) {
     if (choice.name.empty()) return nullptr;
     nlohmann::json candidates = nlohmann::json::array(), settings = nlohmann::json::object();
-    for (const ChoiceStats::Candidate& c : choice.candidates)
+    for (const SelectionStats::Candidate& c : choice.candidates)
         candidates.push_back(
             {{"name", c.name},
              {"settings", c.settings},
@@ -36,7 +36,7 @@ nlohmann::json choice_json(const ChoiceStats& choice) {
 
 }  // namespace
 
-std::string choice_line(const ChoiceStats& choice) {
+std::string choice_line(const SelectionStats& choice) {
     std::string line;
     for (const auto& [key, value] : choice.settings) line += " --set " + key + "=" + value;
     return line.empty() ? line : line.substr(1);
@@ -54,14 +54,27 @@ const char* estimator_name(Estimator estimator) {
 }
 
 const char* fuse_name(Fuse fuse) {
-    const char* names[] = {"auto", "none", "light", "all"};
+    const char* names[] = {"auto", "none"};
     return names[size_t(fuse)];
 }
 
-const char* heuristic_name(MisHeuristic heuristic) { return heuristic == MisHeuristic::balance ? "balance" : "power"; }
+const char* draws_name(CacheDraws draws) {
+    const char* names[] = {"auto", "coherent", "independent"};
+    return names[size_t(draws)];
+}
 
-nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
+const char* heuristic_name(MisHeuristic heuristic) { return Heuristics::kNames[uint32_t(heuristic)]; }
+
+/// The settings that the estimator ran with: bdpt.auto replaces some of those asked for.
+RenderSettings used_settings(const RenderSettings& asked, const SelectionStats& choice) {
+    RenderSettings settings = asked;
+    for (const auto& [key, value] : choice.settings) apply_setting(settings, key, value);
+    return settings;
+}
+
+nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const RenderStats& stats,
                           double load_seconds) {
+    const RenderSettings settings = used_settings(asked, stats.choice);
     nlohmann::json stages = nlohmann::json::array(), queues = nlohmann::json::array();
     for (const StageStats& s : stats.stages)
         stages.push_back({{"name", s.name},
@@ -92,14 +105,15 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, co
             {"rr_depth", settings.rr_depth},
             {"strategies", strategies_text(settings)},
             {"connections", settings.connections},
-            {"light_paths", double(settings.light_walks_per_tile) / kTilePixels},
+            {"light_paths", double(settings.light_subpaths_per_tile) / kTilePixels},
             {"deterministic", settings.deterministic},
             {"specialise", settings.specialise},
-            {"fuse", fuse_name(stats.fuse)},
+            {"fuse", fuse_name(settings.fuse)},
+            {"draws", draws_name(stats.settings.draws)},
             {"cull", settings.cull},
             {"tail", settings.tail},
-            {"compaction", compaction_name(stats.queue_policy.compaction)},
-            {"ordering", ordering_name(stats.queue_policy.ordering)},
+            {"compaction", compaction_name(settings.queues.compaction)},
+            {"ordering", ordering_name(stats.settings.queues.ordering)},
             {"seconds", {{"load", load_seconds}, {"build", stats.build_seconds}, {"render", stats.render_seconds}}},
             {"rays", {{"extend", stats.rays_extend}, {"occlude", stats.rays_occlude}}},
             {"rays_per_second", stats.render_seconds > 0 ? rays / stats.render_seconds : 0.0},
@@ -115,7 +129,8 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, co
             {"git_revision", git_revision()}};
 }
 
-Attributes image_attributes(const Scene& scene, const RenderSettings& settings, const RenderStats& stats) {
+Attributes image_attributes(const Scene& scene, const RenderSettings& asked, const RenderStats& stats) {
+    const RenderSettings settings = used_settings(asked, stats.choice);
     Attributes attributes = {{"scene", scene.path},
                              {"scene_hash", scene_hash(scene)},
                              {"integrator", settings.integrator},
@@ -135,7 +150,7 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& settings, 
         attributes["choice"] = choice_line(stats.choice);
     } else if (settings.integrator != "path") {
         attributes["strategies"] = strategies_text(settings);
-        attributes["light_paths"] = double(settings.light_walks_per_tile) / kTilePixels;
+        attributes["light_paths"] = double(settings.light_subpaths_per_tile) / kTilePixels;
         if (settings.variant == "lvc") attributes["connections"] = settings.connections;
     }
     return attributes;

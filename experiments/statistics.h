@@ -24,7 +24,7 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, co
 Attributes image_attributes(const Scene& scene, const RenderSettings& settings, const RenderStats& stats);
 
 /// The settings with which the choice of bdpt.auto runs again, as options; empty if nothing was chosen.
-std::string choice_line(const ChoiceStats& choice);
+std::string choice_line(const SelectionStats& choice);
 
 /// The stages as a table for a person: share of time, items, launches, time per item.
 std::string stage_table(const RenderStats& stats);

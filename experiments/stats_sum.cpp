@@ -31,16 +31,16 @@ InvalidCounts restore(const nlohmann::json& j) {
     return {j.at(0).get<uint64_t>(), j.at(1).get<uint64_t>(), j.at(2).get<uint64_t>()};
 }
 
-nlohmann::json save(const ChoiceStats& c) {
+nlohmann::json save(const SelectionStats& c) {
     nlohmann::json candidates = nlohmann::json::array();
     // Infinite variances become null.
-    for (const ChoiceStats::Candidate& x : c.candidates)
+    for (const SelectionStats::Candidate& x : c.candidates)
         candidates.push_back({x.name, x.settings, x.variance, x.work, x.seconds, x.efficiency});
     return {c.name, c.settings, c.seconds, c.pilot_samples, c.expected_samples, candidates};
 }
 
-ChoiceStats restore_choice(const nlohmann::json& j) {
-    ChoiceStats c;
+SelectionStats restore_choice(const nlohmann::json& j) {
+    SelectionStats c;
     c.name = j.at(0);
     c.settings = j.at(1).get<std::vector<std::pair<std::string, std::string>>>();
     c.seconds = j.at(2);

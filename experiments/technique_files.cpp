@@ -18,12 +18,12 @@ double mean_of(const std::vector<float>& values) {
 }  // namespace
 
 void write_technique_images(const std::string& folder, const Scene& scene, const RenderSettings& settings,
-                            const RenderStats& stats, const std::vector<TechniqueImage>& images) {
+                            const RenderStats& stats, const std::vector<StrategyImage>& images) {
     make_folders(folder);
     const uint32_t width = scene.sensor.crop_width, height = scene.sensor.crop_height;
     nlohmann::json entries = nlohmann::json::array();
     uint32_t max_depth = 0;
-    for (const TechniqueImage& image : images) {
+    for (const StrategyImage& image : images) {
         max_depth = std::max(max_depth, image.s + image.t - 1);
         Attributes attributes = image_attributes(scene, settings, stats);
         attributes["s"] = image.s;

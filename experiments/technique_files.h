@@ -14,6 +14,6 @@ constexpr uint32_t kDefaultTechniqueDepth = 6;
 /// techniques.json, which lists them: {scene, integrator, variant, spp, max_depth, width, height, entries: [{s, t, raw,
 /// weighted, mean_raw, mean_weighted, dropped}]}. Means are over all pixels and channels. Throws Error(device).
 void write_technique_images(const std::string& folder, const Scene& scene, const RenderSettings& settings,
-                            const RenderStats& stats, const std::vector<TechniqueImage>& images);
+                            const RenderStats& stats, const std::vector<StrategyImage>& images);
 
 }  // namespace ambilux

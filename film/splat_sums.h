@@ -1,32 +1,32 @@
-// What light walks bring to the pixels.
+// What light subpaths bring to the pixels.
 #pragma once
 
 #include "film/fixed_point.h"
-#include "stages/accumulate.h"
+#include "queues/lane_array.h"
 
 namespace ambilux {
 
-/// A cell per pixel and sample of a wave, of one of two kinds. Fixed point does not depend on the order in which
-/// threads add. A cell of floats takes one operation of memory instead of three: n values are added up with an error of
-/// at most n 2^-24 of their sum.
+/// A cell per pixel and sample of a wave, of one of two kinds. Fixed point does not depend on the order in which threads
+/// add. A cell of floats takes one operation of memory instead of three: n values are added up with an error of at most
+/// n 2^-24 of their sum.
 struct SplatSums {
-    int64_t* fixed;  ///< three per cell in units of kLightUnit, or null
-    Lane* floats;    ///< or a lane per cell
+    int64_t* fixed = nullptr;  ///< three per cell in units of kLightUnit
+    Lane* floats = nullptr;    ///< or a lane per cell
 
+    AMBILUX_HD bool exists() const { return fixed || floats; }
     /// False if the light does not fit. `alone`: few other threads of the warp, if any, add to the same cell.
     AMBILUX_HD bool add(uint64_t cell, Rgb value, bool alone) const {
         if (fixed) return add_light(fixed + cell * 3, value);
         if (!(max_component(value) < kTooMuchLight)) return false;
         if (!alone && max_component(value) < kLargeLight) {
-            const uint32_t threads = threads_with(reinterpret_cast<uintptr_t>(floats + cell));
-            if (several(threads)) {
-                FixedLight light = to_fixed(value);
-                if (!gather_light(threads, light)) return true;
-                value = {float(double(light.value[0]) * kLightUnit), float(double(light.value[1]) * kLightUnit),
-                         float(double(light.value[2]) * kLightUnit)};
+            const SameKey lanes = same_key(reinterpret_cast<uintptr_t>(floats + cell));
+            if (lanes.several()) {
+                FixedLight light = FixedLight::of(value);
+                if (!gather_light(lanes, light)) return true;
+                value = light.rgb();
             }
         }
-        add_shared(floats[cell], value);
+        add_rgb(reinterpret_cast<float*>(floats + cell), value);
         return true;
     }
     AMBILUX_HD void read(uint64_t cell, double (&value)[3]) const {

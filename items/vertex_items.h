@@ -1,23 +1,28 @@
-// Vertices of walks as queues keep them: with all that connections ask of their surfaces.
+// Vertices of bidirectional subpaths as queues keep them: with all that connections ask of their surfaces.
 #pragma once
 
-#include "items/walk_items.h"
+#include "items/subpath_items.h"
+#include "transport/subpath/connection.h"
 
 namespace ambilux {
+
+using BidirectionalVertex = Vertex<BidirectionalMis>;
+using BidirectionalEnd = SubpathEnd<BidirectionalMis>;
 
 /// Depth (14 bits), type and side of a vertex, and its ray_offset in the upper 15 bits: a float without its sign and
 /// its last 16 bits, rounded up by less than 1/128.
 struct VertexBits {
     uint32_t bits;
 
-    AMBILUX_HD static VertexBits make(uint32_t depth, const WalkVertex& v) {
+    template <class Mis>
+    AMBILUX_HD static VertexBits make(uint32_t depth, const Vertex<Mis>& v) {
         const Scattering& s = v.scattering;
         return {depth | (s.bsdf.type == BsdfType::diffuse ? kDiffuse : 0u) |
                 (bsdf_transmits(s.bsdf.type) ? kThrough : 0u) | (dot(s.ng, s.wi_world) > 0.0f ? kAbove : 0u) |
                 (float_bits(v.offset) + 0xffffu) >> 16 << kOffsetBit};
     }
 
-    AMBILUX_HD uint32_t depth() const { return bits & WalkBits::kMaxDepth; }
+    AMBILUX_HD uint32_t depth() const { return bits & kMaxDepth; }
     AMBILUX_HD float offset() const { return bits_float(bits >> kOffsetBit << 16); }
     /// True if kernels of features F know or can tell that its BSDF is diffuse.
     template <Features F>
@@ -33,8 +38,8 @@ struct VertexBits {
     }
 
 private:
-    static constexpr uint32_t kDiffuse = 1u << WalkBits::kDepthBits, kThrough = 2 * kDiffuse, kAbove = 4 * kDiffuse,
-                              kOffsetBit = WalkBits::kDepthBits + 3;
+    static constexpr uint32_t kDiffuse = 1u << kDepthBits, kThrough = 2 * kDiffuse, kAbove = 4 * kDiffuse,
+                              kOffsetBit = kDepthBits + 3;
     static_assert(kOffsetBit + 15 == 32);
 };
 
@@ -45,11 +50,11 @@ struct ConnectionVertexFront {
     VertexBits bits;
     Vec2f ng;  ///< octahedral map of Scattering::ng
     uint32_t
-        link;  ///< of vertices that are kept over a wave: the one before it in the same walk, or kNone; else the path
+        link;  ///< of vertices that are kept over a wave: the one before it of the same subpath, or kNone; else the path
     float dvc;
 };
 
-/// A vertex to be connected with one of the other walk, in few bytes: kernels that do so wait for memory. Directions
+/// A vertex to be connected with one of the other subpath, in few bytes: kernels that do so wait for memory. Directions
 /// are octahedral maps in whole floats, exact within rounding.
 struct ConnectionVertex {
     static constexpr uint32_t kPairedLanes = 6;
@@ -105,7 +110,7 @@ struct VertexItem {
     AMBILUX_HD VertexBits bits() const { return head; }
 };
 
-/// Vertices of light walks, kept over a wave.
+/// Vertices of light subpaths, kept over a wave.
 using LightVertices = Queue<ConnectionVertex>;
 
 /// Lanes of `item` that hold something.
@@ -119,24 +124,49 @@ AMBILUX_HD uint32_t push_vertex(const Queue<Item>& vertices, const Item& item) {
 }
 template <Features F, class Item>
 AMBILUX_HD Item load_vertex(const Queue<Item>& vertices, uint32_t i) {
-    Item item = vertices.load(i, Item::kDiffuseLanes);
+    Item item = vertices.items.load(i, Item::kDiffuseLanes);
     if constexpr (Item::template lanes<F>() > Item::kDiffuseLanes)
         if (!item.bits().template diffuse<F>())
-            vertices.load_more(i, item, Item::kDiffuseLanes, Item::template lanes<F>());
+            vertices.items.load_more(i, item, Item::kDiffuseLanes, Item::template lanes<F>());
     return item;
 }
 
-/// The vertex `v` of a walk.
-AMBILUX_HD VertexItem pack_vertex(const WalkVertex& v, const WalkHit& h) {
+namespace detail {
+
+AMBILUX_HD MisSums packed_sums(MisSums sums) { return sums; }
+AMBILUX_HD MisSums packed_sums(UnidirectionalMis::Sums) { return {0.0f, 0.0f}; }  // nothing is asked of them at a vertex
+AMBILUX_HD void unpack_sums(MisSums packed, MisSums& sums) { sums = packed; }
+AMBILUX_HD void unpack_sums(MisSums, UnidirectionalMis::Sums&) {}
+
+template <Features F, class Mis>
+AMBILUX_HD SubpathEnd<Mis> unpack_end(const SceneView& scene, Vec3f p, VertexBits bits, float offset,
+                                      const ScatteringParts& parts, Vec3f d, MisSums sums, Rgb throughput) {
+    SubpathEnd<Mis> end = {{}, throughput, bits.depth()};
+    Vertex<Mis>& v = end.vertex;
+    v.point.p = p;
+    v.point.ng = parts.ng;
+    v.offset = offset;
+    v.scattering = bits.template diffuse<F>() ? diffuse_scattering(parts, -d) : scattering_of<F>(scene, parts, -d);
+    unpack_sums(sums, v.sums);
+    v.first = end.depth == 1;
+    return end;
+}
+
+}  // namespace detail
+
+/// The vertex `v` that the ray of `path` met; `slot`: of the subpath.
+template <class Mis>
+AMBILUX_HD VertexItem pack_vertex(const Vertex<Mis>& v, const Subpath<Mis>& path, uint32_t slot) {
     const ScatteringParts s = parts_of(v.scattering);
+    const MisSums sums = detail::packed_sums(v.sums);
     return {v.point.p,
-            VertexBits::make(h.ray.bits.depth(), v),
-            h.ray.d,
-            h.ray.path,
-            h.ray.throughput,
-            v.sums.dvcm,
+            VertexBits::make(path.depth, v),
+            path.direction,
+            slot,
+            path.throughput,
+            sums.dvcm,
             s.ng,
-            v.sums.dvc,
+            sums.dvc,
             s.n,
             v.offset,
             s.parameters.color,
@@ -147,15 +177,16 @@ AMBILUX_HD VertexItem pack_vertex(const WalkVertex& v, const WalkHit& h) {
             s.parameters.alpha_v};
 }
 
-/// The vertex `v` of a walk that a ray along `d` met. `link`: ConnectionVertexFront.
-AMBILUX_HD ConnectionVertex pack_connection_vertex(const WalkVertex& v, uint32_t depth, Vec3f d, Rgb throughput,
-                                                   uint32_t link) {
+/// The vertex `v` that the ray of `path` met. `link`: ConnectionVertexFront.
+AMBILUX_HD ConnectionVertex pack_connection_vertex(const BidirectionalVertex& v,
+                                                   const Subpath<BidirectionalMis>& path, uint32_t link) {
     const ScatteringParts s = parts_of(v.scattering);
+    Rgb throughput = path.throughput;
     if (v.scattering.bsdf.type == BsdfType::diffuse) throughput *= s.parameters.color;
-    return {{v.point.p, VertexBits::make(depth, v), octahedral_encode(s.ng), link, v.sums.dvc},
+    return {{v.point.p, VertexBits::make(path.depth, v), octahedral_encode(s.ng), link, v.sums.dvc},
             throughput,
             v.sums.dvcm,
-            octahedral_encode(d),
+            octahedral_encode(path.direction),
             octahedral_encode(s.n),
             s.tangent,
             s.record,
@@ -164,54 +195,35 @@ AMBILUX_HD ConnectionVertex pack_connection_vertex(const WalkVertex& v, uint32_t
             s.parameters.specular_reflectance,
             s.parameters.alpha_v};
 }
-AMBILUX_HD ConnectionVertex pack_connection_vertex(const WalkVertex& v, const WalkHit& h) {
-    return pack_connection_vertex(v, h.ray.bits.depth(), h.ray.d, h.ray.throughput, h.ray.path);
-}
 
-namespace detail {
-
-template <Features F>
-AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, Vec3f p, VertexBits bits, float offset,
-                                    const ScatteringParts& parts, Vec3f d, MisSums sums) {
-    WalkVertex v = {};
-    v.point.p = p;
-    v.point.ng = parts.ng;
-    v.offset = offset;
-    v.scattering = bits.template diffuse<F>() ? diffuse_scattering(parts, -d) : scattering_of<F>(scene, parts, -d);
-    v.sums = sums;
-    v.first = bits.depth() == 1;
-    return v;
-}
-
-}  // namespace detail
-
-/// The vertex that was packed; of its point p and ng only, and of diffuse ones no tangents.
-template <Features F>
-AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const VertexItem& item) {
-    return detail::unpack_vertex<F>(scene, item.p, item.head, item.offset,
-                                    {item.ng,
-                                     item.n,
-                                     item.tangent,
-                                     item.record,
-                                     {item.color, item.alpha_u, item.specular_reflectance, item.alpha_v}},
-                                    item.d, {item.dvcm, item.dvc});
+/// The end of a subpath that was packed; of its point p and ng only, and of diffuse ones no tangents.
+template <Features F, class Mis>
+AMBILUX_HD SubpathEnd<Mis> unpack_end(const SceneView& scene, const VertexItem& item) {
+    return detail::unpack_end<F, Mis>(scene, item.p, item.head, item.offset,
+                                      {item.ng,
+                                       item.n,
+                                       item.tangent,
+                                       item.record,
+                                       {item.color, item.alpha_u, item.specular_reflectance, item.alpha_v}},
+                                      item.d, {item.dvcm, item.dvc}, item.throughput);
 }
 /// The same, with an offset that is rounded up; diffuse ones have reflectance 1.
 template <Features F>
-AMBILUX_HD WalkVertex unpack_vertex(const SceneView& scene, const ConnectionVertex& item) {
+AMBILUX_HD BidirectionalEnd unpack_end(const SceneView& scene, const ConnectionVertex& item) {
     const VertexBits bits = item.front.bits;
     const Rgb color = bits.template diffuse<F>() ? splat(1.0f) : item.color;
-    return detail::unpack_vertex<F>(scene, item.front.p, bits, bits.offset(),
-                                    {octahedral_decode(item.front.ng),
-                                     octahedral_decode(item.n),
-                                     item.tangent,
-                                     item.record,
-                                     {color, item.alpha_u, item.specular_reflectance, item.alpha_v}},
-                                    octahedral_decode(item.d), {item.dvcm, item.front.dvc});
+    return detail::unpack_end<F, BidirectionalMis>(scene, item.front.p, bits, bits.offset(),
+                                                   {octahedral_decode(item.front.ng),
+                                                    octahedral_decode(item.n),
+                                                    item.tangent,
+                                                    item.record,
+                                                    {color, item.alpha_u, item.specular_reflectance, item.alpha_v}},
+                                                   octahedral_decode(item.d), {item.dvcm, item.front.dvc},
+                                                   item.throughput);
 }
 
-/// False if no light can pass between a vertex that is in a queue and `z`, of the other walk.
-AMBILUX_HD bool may_connect(const ConnectionVertexFront& y, const WalkVertex& z) {
+/// False if no light can pass between a vertex that is in a queue and `z`, of the other subpath.
+AMBILUX_HD bool may_connect(const ConnectionVertexFront& y, const BidirectionalVertex& z) {
     const Vec3f w = z.point.p - y.p;
     return y.bits.reaches(octahedral_direction(y.ng), w) && may_scatter(z.scattering, -w) && !in_plane(z, w);
 }

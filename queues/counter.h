@@ -1,9 +1,9 @@
-// What a queue is made of: lanes of 16 bytes, and a counter that lives where the kernels run.
+// The counter of a queue, which lives where the kernels run.
 #pragma once
 
-#include "core/hd.h"
-
 #include <cstdint>
+
+#include "core/warp.h"
 
 namespace ambilux {
 
@@ -12,24 +12,23 @@ struct alignas(16) Lane {
     uint32_t word[4];
 };
 
-/// Path of an item that is none.
+/// Path of an empty slot.
 constexpr uint32_t kNoPath = 0xffffffffu;
 
-/// State of one queue. Counters lie a kilobyte apart: those that share a part of a device's cache are added to one
-/// after the other; one cache line more, lest all fall into few sets of a host's. `count` goes on counting when the
-/// queue is full, so that what is lost is known.
+/// State of one queue. Counters lie a kilobyte apart: those that share a part of a device's cache are added to one after
+/// the other; one cache line more, lest all fall into few sets of a host's. `count` goes on counting when the queue is
+/// full, so that what is lost is known.
 struct QueueCounter {
-    uint32_t count;  ///< places given out since the queue was last emptied; of a queue of fixed places known on a
-                     ///< device only when it has been counted
-    uint32_t capacity;
-    uint64_t peak;      ///< most places given out in one filling
-    uint64_t overflow;  ///< items lost: places past the capacity, or to a fixed place that was taken (which only the
-                        ///< host looks for)
-    uint32_t next;      ///< items that threads of a launch have taken in turns
-    uint32_t holes;     ///< places below `count` that hold no item (queues/stretch.h)
+    uint32_t count;     ///< slots given out since the queue was last emptied; of a queue by path known on a device only
+                        ///< when it has been counted
+    uint32_t capacity;  ///< slots
+    uint64_t peak;      ///< most slots given out in one filling
+    uint64_t overflow;  ///< items lost: slots past the capacity, or one that was occupied (which only the host looks for)
+    uint32_t next;      ///< items that threads of a launch have claimed
+    uint32_t holes;     ///< slots below `count` that are empty (queues/reserved_queue.h)
     uint32_t pad[264];
 
-    /// Places to go through.
+    /// Slots to go through.
     AMBILUX_HD uint32_t size() const { return count < capacity ? count : capacity; }
     AMBILUX_HD uint32_t items() const { return size() - holes; }
     /// Empties the queue and keeps what its filling tells.
@@ -45,15 +44,8 @@ struct QueueCounter {
 static_assert(sizeof(QueueCounter) == 1024 + 64);
 
 #if defined(__CUDACC__)
-/// Rank of the calling lane among the lanes of `mask`.
-__device__ inline uint32_t lane_rank(uint32_t mask) {
-    uint32_t below;
-    asm("mov.u32 %0, %%lanemask_lt;" : "=r"(below));
-    return uint32_t(__popc(mask & below));
-}
-
 /// Adds to a counter that other threads add to, and returns what it was. By hand, since compilers look once more for
-/// threads that add to one place.
+/// threads that add to one counter.
 __device__ inline uint32_t add_to(uint32_t* counter, uint32_t n) {
     uint32_t before;
     asm volatile("atom.global.add.u32 %0, [%1], %2;"
@@ -64,15 +56,18 @@ __device__ inline uint32_t add_to(uint32_t* counter, uint32_t n) {
 }
 #endif
 
-/// Takes one place for the calling thread. On a device the threads of a warp that push together take theirs with one
-/// atomic operation, so all of them must push to the same queue: a queue that differs from thread to thread is to be
-/// chosen by a branch.
-AMBILUX_HD uint32_t take_place(uint32_t* count) {
+/// Allocates one slot for the calling thread. On a device the lanes of a warp that push together share one atomic
+/// operation, so all of them must push to the same queue: a queue that differs from lane to lane is chosen by a branch.
+/// Debug builds trap otherwise.
+AMBILUX_HD uint32_t allocate_slot(uint32_t* count) {
 #if defined(__CUDA_ARCH__)
-    const uint32_t together = __activemask(), rank = lane_rank(together);
+    const Warp warp;
     uint32_t first = 0;
-    if (rank == 0) first = add_to(count, uint32_t(__popc(together)));
-    return __shfl_sync(together, first, __ffs(int(together)) - 1) + rank;
+#if !defined(NDEBUG)
+    if (warp.first(reinterpret_cast<uintptr_t>(count)) != reinterpret_cast<uintptr_t>(count)) __trap();
+#endif
+    if (warp.rank() == 0) first = add_to(count, warp.size());
+    return warp.first(first) + warp.rank();
 #else
     return (*count)++;  // a host queue belongs to one thread
 #endif

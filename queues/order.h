@@ -56,10 +56,10 @@ inline OrderMemory lay_out_order(Layout& layout, QueuePolicy policy, uint32_t sl
     OrderMemory m{};
     m.policy = policy;
     m.slots = slots;
-    m.list[0] = layout.take<uint32_t>(sorts || policy.compaction == Compaction::select ? slots : 0);
-    m.list[1] = layout.take<uint32_t>(sorts ? slots : 0);
-    for (uint32_t*& keys : m.keys) keys = layout.take<uint32_t>(sorts ? slots : 0);
-    m.temporary = layout.take<std::byte>(temporary_bytes);
+    m.list[0] = layout.allocate<uint32_t>(sorts || policy.compaction == Compaction::select ? slots : 0);
+    m.list[1] = layout.allocate<uint32_t>(sorts ? slots : 0);
+    for (uint32_t*& keys : m.keys) keys = layout.allocate<uint32_t>(sorts ? slots : 0);
+    m.temporary = layout.allocate<std::byte>(temporary_bytes);
     m.temporary_bytes = temporary_bytes;
     return m;
 }

@@ -1,34 +1,9 @@
-// Work queues: lanes of 16 bytes, so that neighbouring threads load and store neighbouring 16-byte words, and a counter
-// that lives where the kernels run. Items are appended, or lie at the places of their paths (queues/order.h says what
-// for).
+// Work queues: items that stages push, and a counter that lives where the kernels run.
 #pragma once
 
-#include <cstddef>
-#include <cstring>
-#include <type_traits>
-
-#include "queues/counter.h"
-#include "queues/stretch.h"
+#include "queues/lane_array.h"
 
 namespace ambilux {
-
-/// The start of a lane as a value. The lane is loaded whole: copying a part of it is compiled to loads of single bytes.
-template <class Value>
-AMBILUX_HD Value start_of(const Lane& place) {
-    static_assert(sizeof(Value) <= sizeof(Lane));
-    const Lane lane = place;
-    Value value;
-    memcpy(&value, &lane, sizeof(value));
-    return value;
-}
-
-/// Replaces a lane by `value` and zeros.
-template <class Value>
-AMBILUX_HD void set_start(Lane& place, const Value& value) {
-    Lane lane = {};
-    memcpy(&lane, &value, sizeof(value));
-    place = lane;
-}
 
 /// The path that an item belongs to.
 template <class Item>
@@ -43,111 +18,43 @@ AMBILUX_HD uint32_t path_of(const Item& item) {
         return 0;
 }
 
-/// Lanes of an item, the first ones, that lie two by two where the others are apart, since memory moves 32 bytes at
-/// least: items say so (kPairedLanes) that are written in order and read in another, sorted by their materials or
-/// drawn.
-template <class Item>
-constexpr uint32_t paired_lanes() {
-    if constexpr (requires { Item::kPairedLanes; }) {
-        static_assert(Item::kPairedLanes % 2 == 0 && Item::kPairedLanes <= sizeof(Item) / sizeof(Lane));
-        return Item::kPairedLanes;
-    }
-    return 0;
-}
-
-/// Fixed-capacity queue of trivially copyable items: lane k of item i is at base[k * capacity + i] but for paired ones.
-/// A view: copies share the storage.
+/// Queue of fixed capacity. Items are appended, or lie at the slots of their paths (queues/order.h says what for). A
+/// view: copies share the storage.
 template <class Item>
 struct Queue {
-    static_assert(std::is_trivially_copyable_v<Item> && sizeof(Item) % sizeof(Lane) == 0,
-                  "items are whole lanes of plain data");
-    static constexpr uint32_t kLanes = sizeof(Item) / sizeof(Lane);
+    using value_type = Item;
 
-    Lane* base = nullptr;
+    LaneArray<Item> items;
     QueueCounter* counter = nullptr;
-    uint32_t capacity = 0;
-    uint8_t* flags = nullptr;  ///< fixed places: 1 where there is an item. Null: items are appended
-    uint16_t* keys = nullptr;  ///< by place: what items are sorted by (queues/order.h), written by those who complete
+    uint8_t* flags = nullptr;  ///< by path: 1 where there is an item. Null: items are appended
+    uint16_t* keys = nullptr;  ///< by slot: what items are sorted by (queues/order.h), written by those who complete
                                ///< them. Null: looked up when they are sorted
 
-    AMBILUX_HD size_t place(uint32_t i, uint32_t lane) const {
-        return lane + 1 <= paired_lanes<Item>() ? size_t(lane & ~1u) * capacity + 2 * size_t(i) + (lane & 1u)
-                                                : size_t(lane) * capacity + i;
-    }
+    AMBILUX_HD uint32_t capacity() const { return items.capacity; }
+    AMBILUX_HD Item load(uint32_t i) const { return items.load(i); }
+    AMBILUX_HD void store(uint32_t i, const Item& item) const { items.store(i, item); }
 
-    /// `lanes`: of the item, the first ones; the others are zero.
-    AMBILUX_HD Item load(uint32_t i, uint32_t lanes = kLanes) const { return load_but(i, kLanes, {}, lanes); }
-    /// Lane `known` is `value`, and what is in memory is not looked at.
-    AMBILUX_HD Item load_but(uint32_t i, uint32_t known, const Lane& value, uint32_t lanes = kLanes) const {
-        Lane all[kLanes];
-        for (uint32_t k = 0; k < kLanes; ++k) {
-            all[k] = value;
-            if (k != known && k < lanes) all[k] = base[place(i, k)];
-        }
-        Item item;
-        memcpy(&item, all, sizeof(Item));
-        return item;
-    }
-    /// Lanes of an item from `first` to before `end`; what else `item` has stays as it is.
-    AMBILUX_HD void load_more(uint32_t i, Item& item, uint32_t first, uint32_t end) const {
-        Lane all[kLanes];
-        memcpy(all, &item, sizeof(Item));
-        for (uint32_t k = 0; k < kLanes; ++k)
-            if (k >= first && k < end) all[k] = base[place(i, k)];
-        memcpy(&item, all, sizeof(Item));
-    }
-    /// The first member of an item, which is some lanes long.
-    AMBILUX_HD auto load_front(uint32_t i) const {
-        using Front = decltype(Item::front);
-        static_assert(offsetof(Item, front) == 0 && sizeof(Front) % sizeof(Lane) == 0);
-        Lane lanes[sizeof(Front) / sizeof(Lane)];
-        for (uint32_t k = 0; k < sizeof(Front) / sizeof(Lane); ++k) lanes[k] = base[place(i, k)];
-        Front front;
-        memcpy(&front, lanes, sizeof(Front));
-        return front;
-    }
-    /// `lanes`: of the item, the first ones; the others stay as they are.
-    AMBILUX_HD void store(uint32_t i, const Item& item, uint32_t lanes = kLanes) const {
-        store_but(i, kLanes, item, lanes);
-    }
-    /// The same without lane `known`.
-    AMBILUX_HD void store_but(uint32_t i, uint32_t known, const Item& item, uint32_t lanes = kLanes) const {
-        Lane all[kLanes];
-        memcpy(all, &item, sizeof(Item));
-        for (uint32_t k = 0; k < kLanes; ++k)
-            if (k != known && k < lanes) base[place(i, k)] = all[k];
-    }
-    /// Appends the item, or stores it at the place of its path, and returns the place. Past the capacity the item is
-    /// lost and counted (QueueCounter::overflow).
-    AMBILUX_HD uint32_t push(const Item& item, uint32_t lanes = kLanes) const {
-        const uint32_t i = flags ? fixed_place(item) : take_place(&counter->count);
-        if (i < capacity) store(i, item, lanes);
+    /// Appends the item, or stores it at the slot of its path, and returns the slot. Past the capacity the item is lost
+    /// and counted (QueueCounter::overflow). `lanes`: of the item, those that are stored.
+    AMBILUX_HD uint32_t push(const Item& item, uint32_t lanes = LaneArray<Item>::kLanes) const {
+        uint32_t i;
+        if (flags)
+            occupy(i = path_of(item));
+        else
+            i = allocate_slot(&counter->count);
+        if (i < items.capacity) items.store(i, item, lanes);
         return i;
     }
-    /// Stores the item at place `i` of a queue of fixed places, whatever its path.
+    /// Stores the item at slot `i` of a queue that is not appended to, whatever its path.
     AMBILUX_HD void put(uint32_t i, const Item& item) const {
         occupy(i);
-        store(i, item);
-    }
-    /// Appends the item, or stores it at its place, and places may stay empty: whoever goes through the queue skips
-    /// items whose path is kNoPath. Kernels that call it open and close the stretches of their blocks.
-    AMBILUX_HD uint32_t push_loosely(const Item& item) const {
-#if defined(__CUDA_ARCH__)
-        if (!flags) {
-            static_assert(paired_lanes<Item>() == 0, "holes are filled lane by lane");
-            const uint32_t i = WarpStretches::mine().take({counter, base, place(0, 1), place(1, 0), kLanes, capacity});
-            if (i < capacity) store(i, item);
-            return i;
-        }
-#endif
-        return push(item);
+        items.store(i, item);
     }
     /// Writes the last lane of an item whose others are there already (Layout::front). Whoever does so for items that
     /// are appended sets the counter.
     template <class Last>
     AMBILUX_HD void complete(uint32_t i, const Last& last) const {
-        static_assert(sizeof(Last) == sizeof(Lane));
-        set_start(base[place(i, kLanes - 1)], last);
+        items.store_last(i, last);
         if (!flags) return;
         flags[i] = 1;
 #if !defined(__CUDA_ARCH__)
@@ -155,24 +62,13 @@ struct Queue {
 #endif
     }
 
-    /// What complete() wrote.
-    template <class Last>
-    AMBILUX_HD Last last(uint32_t i) const {
-        return start_of<Last>(base[place(i, kLanes - 1)]);
-    }
-
 private:
-    AMBILUX_HD uint32_t fixed_place(const Item& item) const {
-        const uint32_t i = path_of(item);
-        occupy(i);
-        return i;
-    }
     AMBILUX_HD void occupy(uint32_t i) const {
 #if !defined(__CUDA_ARCH__)
         ++counter->count;  // a device counts before it goes through the queue
-        if (i >= capacity || flags[i]) ++counter->overflow;
+        if (i >= items.capacity || flags[i]) ++counter->overflow;
 #endif
-        if (i < capacity) flags[i] = 1;
+        if (i < items.capacity) flags[i] = 1;
     }
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/divisor.h"
+#include "queues/lane_array.h"
 #include "core/rng.h"
 
 namespace ambilux {
@@ -18,10 +19,10 @@ struct WaveState {
     uint32_t depth;         ///< segments of the paths in flight
     uint32_t failed;        ///< a wave ran out of memory: it and all after it do nothing until the host has made room
     uint32_t done;          ///< waves that did not fail
-    uint32_t light_walks;   ///< of this wave
-    alignas(128) uint32_t next_path = 0;  ///< variant streaming: the next that a slot takes
+    uint32_t light_subpaths;   ///< of this wave
+    alignas(128) uint32_t next_path = 0;  ///< variant streaming: the next that a slot claims
     alignas(128) uint32_t next =
-        0;  ///< slots that threads of a launch have taken in turns; away from what is read all the time
+        0;  ///< slots that threads of a launch have claimed; away from what is read all the time
 };
 
 /// Place of slot `z` of a tile, along the Z curve.
@@ -45,7 +46,7 @@ struct Wave {
     Divisor tiles_x;         ///< tiles in a row of the film
     Divisor tiles;           ///< tiles per wave
     uint32_t samples;        ///< most samples of a pixel per wave
-    uint32_t first_key = 0;  ///< of the pixels' random numbers: light walks beyond the first of a slot have keys beyond
+    uint32_t first_key = 0;  ///< of the pixels' random numbers: light subpaths beyond the first of a slot have keys beyond
                              ///< those of all pixels
 
     AMBILUX_HD uint32_t slot_count() const { return tiles * kTilePixels * samples; }
@@ -91,51 +92,35 @@ struct Wave {
     AMBILUX_HD RngKey key(uint32_t slot, Stream stream = Stream::eye) const { return key(locate(slot), stream); }
 };
 
-/// Most light walks of one slot: each takes a launch of all stages of light walks.
+/// Most light subpaths of one slot: each takes a launch of all stages of light subpaths.
 constexpr uint32_t kMostLightRounds = 16;
 
-/// Light walks that begin in a slot if there are `per_tile` of them in the slots of a tile: as evenly as can be, and
+/// Light subpaths that begin in a slot if there are `per_tile` of them in the slots of a tile: as evenly as can be, and
 /// some in the first slot, which any tile of the film has.
-AMBILUX_HD uint32_t light_walks_of(uint32_t slot, uint32_t per_tile) {
+AMBILUX_HD uint32_t light_subpaths_of(uint32_t slot, uint32_t per_tile) {
     const uint32_t z = slot % kTilePixels, up = kTilePixels - 1;
     return ((z + 1) * per_tile + up) / kTilePixels - (z * per_tile + up) / kTilePixels;
 }
 
-/// Light walks of one sample that begin in the `tiles` tiles from `first_tile` on.
-inline uint32_t light_walks_in(const Wave& wave, uint32_t first_tile, uint32_t tiles, uint32_t per_tile) {
-    uint32_t walks = 0;
+/// Light subpaths of one sample that begin in the `tiles` tiles from `first_tile` on.
+inline uint32_t light_subpaths_in(const Wave& wave, uint32_t first_tile, uint32_t tiles, uint32_t per_tile) {
+    uint32_t count = 0;
     for (uint32_t tile = first_tile; tile < first_tile + tiles; ++tile) {
         const uint32_t x = tile % wave.tiles_x * kTileSide, y = tile / wave.tiles_x * kTileSide;
         const bool whole = x + kTileSide <= wave.width && y + kTileSide <= wave.height;
         for (uint32_t z = 0; !whole && z < kTilePixels; ++z)
-            if (x + x_in_tile(z) < wave.width && y + y_in_tile(z) < wave.height) walks += light_walks_of(z, per_tile);
-        if (whole) walks += per_tile;
+            if (x + x_in_tile(z) < wave.width && y + y_in_tile(z) < wave.height) count += light_subpaths_of(z, per_tile);
+        if (whole) count += per_tile;
     }
-    return walks;
+    return count;
 }
 
-/// Blocks of random numbers of an eye walk: 0 is the camera's; a vertex at `depth` >= 1 has one to scatter (and for
-/// Russian roulette) and one to sample emitters.
-constexpr uint32_t kCameraBlock = 0;
-AMBILUX_HD uint32_t scatter_block(uint32_t depth) { return 2 * depth - 1; }
-AMBILUX_HD uint32_t emitter_block(uint32_t depth) { return 2 * depth; }
-
-/// Blocks of a light walk: 0 and 1 are the emitter's (place; direction, and the lens that sees it); a vertex has one to
-/// scatter and one for the lens.
-constexpr uint32_t kEmissionBlock = 0;
-AMBILUX_HD uint32_t light_scatter_block(uint32_t depth) { return 2 * depth; }
-AMBILUX_HD uint32_t lens_block(uint32_t depth) { return 2 * depth + 1; }
-
-/// Blocks of an eye vertex that draws light vertices from a cache.
+/// Most light vertices that an eye vertex draws from a cache.
 constexpr uint32_t kMaxCacheDraws = 256;
-AMBILUX_HD uint32_t cache_block(uint32_t depth, uint32_t draw) { return 0x10000u + depth * kMaxCacheDraws + draw; }
 
-/// Seed of the decisions whether surfaces of partial opacity let a ray pass: another one for every ray. `shadow`: rays
-/// of connections.
-AMBILUX_HD uint32_t alpha_seed(const RngKey& key, uint32_t depth, bool shadow) {
-    const uint32_t which = 2 * depth + (shadow ? 1 : 0);
-    return hash_word({key.index, key.sample, which,
-                      uint32_t(key.seed) ^ uint32_t(key.seed >> 32) * 0x9e3779b9u ^ uint32_t(key.stream) << 29});
+/// Random numbers of a light vertex that an eye vertex at `depth` draws.
+AMBILUX_HD Uint4 cache_draw(const RngKey& key, uint32_t depth, uint32_t draw) {
+    return random_bits(key, 0x10000u + depth * kMaxCacheDraws + draw);
 }
 
 }  // namespace ambilux

@@ -2,104 +2,139 @@
 
 #include "backends/cuda_device.h"
 #include "core/error.h"
-#include "integrators/bidirectional/bidirectional.h"
-#include "integrators/bidirectional/choice.h"
-#include "integrators/path/path.h"
+#include "integrators/registry.h"
+#include "render/make_on_backend.h"
+#include "render/selection.h"
 
 namespace ambilux {
 namespace {
 
-/// What `ordering=auto` stands for (docs/performance.md, "Compaction and ordering").
-Ordering best_ordering(const Scene& scene, const RenderSettings& settings, bool cuda) {
-    const bool sortable = settings.variant != "megakernel";
-    return cuda && sortable && scene.features.several_bsdfs() ? Ordering::material : Ordering::none;
-}
+/// What settings are asked of, and what they ask for.
+struct Request {
+    const RenderSettings& settings;
+    const VariantInfo& variant;
+    bool cuda;
 
-}  // namespace
+    /// Throws Error(usage): `what` has no effect here, and why.
+    template <class... Args>
+    [[noreturn]] void refuse(fmt::format_string<Args...> what, Args&&... args) const {
+        throw Error(ExitCode::usage, fmt::format("{}; this is integrator {}, variant {}",
+                                                 fmt::format(what, std::forward<Args>(args)...), variant.integrator,
+                                                 variant.variant));
+    }
+};
 
-bool cuda_available() { return cuda_device_present(); }
-
-namespace {
-
-/// Whoever sets what has no effect expects one. Throws Error(usage).
-void check_applies(const RenderSettings& s) {
+/// Whoever sets what has no effect expects one.
+void check_estimator(const Request& r) {
+    const RenderSettings& s = r.settings;
     const RenderSettings defaults;
     const bool bdpt = s.integrator == "bdpt";
-    const auto refuse = [&](const char* what, const char* whose) {
-        throw Error(ExitCode::usage,
-                    fmt::format("{}: {}, and this is integrator {}, variant {}", what, whose, s.integrator, s.variant));
-    };
-    if (s.estimator != defaults.estimator && s.integrator != "path")
-        refuse("estimator", "integrator path has estimators, bdpt has strategies");
+    if (s.estimator != defaults.estimator && r.variant.bidirectional)
+        r.refuse("estimator: integrator path has estimators, bdpt has strategies");
     if ((s.strategies != defaults.strategies || s.singles.on) && !bdpt)
-        refuse("strategies", "integrator bdpt has strategies to choose from, path has estimators");
-    if (s.connections != defaults.connections && !(bdpt && (s.variant == "lvc" || s.automatic)))
-        refuse("connections", "light vertices are drawn in variant lvc of bdpt");
-    if (s.light_walks_per_tile != defaults.light_walks_per_tile && s.integrator == "path")
-        refuse("light_paths", "integrators light and bdpt have light walks");
+        r.refuse("strategies: integrator bdpt has strategies to choose from, path has estimators");
+    if (s.connections != defaults.connections && !(bdpt && (r.variant.draws || s.automatic)))
+        r.refuse("connections: light vertices are drawn in variant lvc of bdpt");
+    if (s.draws != CacheDraws::automatic && !(bdpt && (r.variant.draws || s.automatic)))
+        r.refuse("draws: light vertices are drawn in variant lvc of bdpt");
+    if (s.draws == CacheDraws::coherent && !r.cuda)
+        r.refuse("draws=coherent: lanes of a warp draw together, on the cuda backend");
+    if (s.light_subpaths_per_tile != defaults.light_subpaths_per_tile && !r.variant.bidirectional)
+        r.refuse("light_paths: integrators light and bdpt have light subpaths");
+    if (s.technique_depth > 0 && !r.variant.strategy_images)
+        r.refuse("technique_depth={}: no images of single strategies are gathered here; integrator light and the "
+                 "variants wavefront, lvc and streaming of bdpt do",
+                 s.technique_depth);
 }
 
-std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
+void check_queues(const Request& r) {
+    const QueuePolicy& q = r.settings.queues;
+    if (q.ordering != Ordering::none && q.ordering != Ordering::automatic && !r.variant.sorts)
+        r.refuse("ordering={}: there are no queues to sort; the variants wavefront and lvc have this switch",
+                 ordering_name(q.ordering));
+    if (q.compaction != Compaction::atomic && !r.variant.compacts)
+        r.refuse("compaction={}: there are no queues of one item per path; the variants wavefront and lvc have this "
+                 "switch",
+                 compaction_name(q.compaction));
+}
+
+void check_backend(const Request& r) {
+    const RenderSettings& s = r.settings;
+    if (r.cuda && s.accel == "embree")
+        r.refuse("accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
+    if (s.accel == "bvh2" && !(r.cuda && r.variant.binary_bvh))
+        r.refuse("accel=bvh2: a binary BVH to compare with, on the cuda backend for integrator path; {} has {}",
+                 r.cuda ? "this" : "the cpu backend", r.cuda ? "cwbvh" : "embree and cwbvh");
+    if (r.cuda && s.deterministic && !r.variant.repeats)
+        r.refuse("deterministic=true: variant lvc draws from a cache whose order differs between runs on a CUDA "
+                 "device; use wavefront or megakernel");
+}
+
+const VariantInfo& variant_of(const RenderSettings& settings) {
     // Settings may come from elsewhere than apply_setting.
     RenderSettings checked;
     apply_setting(checked, "integrator", settings.integrator);
     apply_setting(checked, "variant", settings.variant);
     apply_setting(checked, "backend", settings.backend);
     apply_setting(checked, "accel", settings.accel);
-    check_applies(settings);
-    if (settings.automatic) check_automatic(settings);
-    if (settings.variant != "wavefront" && settings.integrator != "bdpt")
-        throw Error(ExitCode::usage,
-                    "variant=" + settings.variant + ": integrator " + settings.integrator +
-                        " has the variant wavefront only; megakernel, lvc and streaming belong to bdpt");
-    if (settings.technique_depth > 0 && (settings.integrator == "path" || settings.variant == "megakernel"))
-        throw Error(ExitCode::usage,
-                    fmt::format("technique_depth={}: {} gathers no images of single strategies; integrator light and "
-                                "the other variants of bdpt do",
-                                settings.technique_depth,
-                                settings.integrator == "path" ? "integrator path" : "variant megakernel"));
-    const bool compacted = settings.queues.compaction != Compaction::atomic,
-               ordered = settings.queues.ordering != Ordering::none && settings.queues.ordering != Ordering::automatic;
-    if (settings.variant == "megakernel" && (compacted || ordered))
-        throw Error(ExitCode::usage,
-                    fmt::format("compaction={}, ordering={}: variant megakernel has no queues to compact or to sort; "
-                                "the variants wavefront and lvc have these switches",
-                                compaction_name(settings.queues.compaction), ordering_name(settings.queues.ordering)));
-    if (settings.variant == "streaming" && compacted)
-        throw Error(ExitCode::usage, fmt::format("compaction={}: variant streaming has its rays by slot and appends "
-                                                 "all else; the variants wavefront and lvc have this switch",
-                                                 compaction_name(settings.queues.compaction)));
+    if (const VariantInfo* v = find_variant(settings.integrator, settings.variant)) return *v;
+    throw Error(ExitCode::usage,
+                fmt::format("variant={}: integrator {} has the variant wavefront only; megakernel, lvc and streaming "
+                            "belong to bdpt",
+                            settings.variant, settings.integrator));
+}
+
+/// What settings that are left open stand for (docs/performance.md).
+RenderSettings settled(const RenderSettings& settings, const Request& r, const Scene& scene) {
+    RenderSettings s = settings;
+    const bool several = scene.features.several_bsdfs();
+    if (s.queues.ordering == Ordering::automatic)
+        s.queues.ordering = r.cuda && r.variant.sorts && several ? Ordering::material : Ordering::none;
+    s.queues.keyed_hits =
+        s.queues.ordering == Ordering::material && s.queues.compaction == Compaction::atomic && several;
+    if (s.draws == CacheDraws::automatic) s.draws = r.cuda ? CacheDraws::coherent : CacheDraws::independent;
+    return s;
+}
+
+std::unique_ptr<Renderer> make_on(bool cuda, const Scene& scene, const RenderSettings& s, SharedAccels& accels) {
+#if defined(AMBILUX_HAS_CUDA)
+    if (cuda && !cuda_device_present())
+        throw Error(ExitCode::device,
+                    "no CUDA device answers: check the driver with nvidia-smi, or use --backend cpu");
+#else
+    if (cuda)
+        throw Error(ExitCode::device, "this program was built without CUDA: install the CUDA toolkit and build again, "
+                                      "or use --backend cpu");
+#endif
+    const bool specialise = s.specialise && s.fuse != Fuse::none;
+    return with_family(s.integrator, [&]<class Family>() {
+        return with_feature_level(scene.features, specialise, [&]<Features F>() {
+#if defined(AMBILUX_HAS_CUDA)
+            if (cuda) return make_on_cuda<Family, F>(scene, s, accels);
+#endif
+            return make_on_cpu<Family, F>(scene, s, accels);
+        });
+    });
+}
+
+std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
+    const VariantInfo& variant = variant_of(settings);
     const bool cuda =
         settings.backend == "cuda" || (settings.backend == "auto" && settings.accel != "embree" && cuda_available());
-    if (cuda && settings.accel == "embree")
-        throw Error(ExitCode::usage,
-                    "accel=embree: the cuda backend has its own structure, cwbvh; use --backend cpu for Embree");
-    if (settings.accel == "bvh2" && !(cuda && settings.integrator == "path"))
-        throw Error(
-            ExitCode::usage,
-            fmt::format("accel=bvh2: a binary BVH to compare with, on the cuda backend for integrator path; {} has {}",
-                        cuda ? "integrator " + settings.integrator : "the cpu backend",
-                        cuda ? "cwbvh" : "embree and cwbvh"));
-    if (cuda && settings.deterministic && settings.variant == "lvc")
-        throw Error(ExitCode::usage,
-                    "deterministic=true: variant lvc draws from a cache whose order differs between runs on a CUDA "
-                    "device; use wavefront or megakernel");
+    const Request request = {settings, variant, cuda};
+    check_estimator(request);
+    if (settings.automatic) check_automatic(settings);
+    check_queues(request);
+    check_backend(request);
     if (settings.automatic)
         return make_automatic(scene, settings, cuda, accels,
                               [&](const RenderSettings& chosen) { return make_from(scene, chosen, accels); });
-    RenderSettings chosen = settings;
-    // On a host connect of the path tracer waits for the tables of environments, which it can ask for ahead only as a
-    // stage of its own.
-    if (chosen.fuse == Fuse::automatic) chosen.fuse = cuda || chosen.integrator != "path" ? Fuse::all : Fuse::light;
-    if (chosen.queues.ordering == Ordering::automatic) chosen.queues.ordering = best_ordering(scene, settings, cuda);
-    chosen.queues.keyed_hits = chosen.queues.ordering == Ordering::material &&
-                               chosen.queues.compaction == Compaction::atomic && scene.features.several_bsdfs();
-    if (chosen.integrator != "path")
-        return cuda ? make_bidirectional_cuda(scene, chosen, accels) : make_bidirectional_cpu(scene, chosen, accels);
-    return cuda ? make_path_cuda(scene, chosen, accels) : make_path_cpu(scene, chosen, accels);
+    return make_on(cuda, scene, settled(settings, request, scene), accels);
 }
 
 }  // namespace
+
+bool cuda_available() { return cuda_device_present(); }
 
 std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings& settings) {
     SharedAccels accels(scene);

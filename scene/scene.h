@@ -27,7 +27,7 @@ struct Scene {
     uint64_t degenerate_triangles = 0;  ///< triangles without area that the loader left out
     IntegratorHint integrator;
 
-    std::vector<Vertex> vertices;
+    std::vector<MeshVertex> vertices;
     std::vector<Triangle> triangles;
     std::vector<Quadric> quadrics;
     std::vector<Shape> shapes;

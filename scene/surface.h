@@ -78,7 +78,7 @@ AMBILUX_HD void any_tangents(SurfacePoint& s) {
 AMBILUX_HD SurfacePoint triangle_surface_at(const SceneView& scene, uint32_t prim, float b1, float b2) {
     const Triangle tri = scene.triangles[prim];
     const uint32_t flags = scene.shapes[tri.shape].flags;
-    const Vertex &a = scene.vertices[tri.v0], &b = scene.vertices[tri.v1], &c = scene.vertices[tri.v2];
+    const MeshVertex &a = scene.vertices[tri.v0], &b = scene.vertices[tri.v1], &c = scene.vertices[tri.v2];
     const Vec3f p0 = a.p, p1 = b.p, p2 = c.p;
     const float b0 = 1.0f - b1 - b2;
     SurfacePoint s;

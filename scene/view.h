@@ -48,7 +48,7 @@ struct Texture {
 // ---- surfaces ----
 
 /// Vertex of a mesh in two loads of 16 bytes, so that a surface point reads one line of memory per vertex. World space.
-struct alignas(32) Vertex {
+struct alignas(32) MeshVertex {
     Vec3f p;
     float u = 0;
     Vec3f n = {0, 0, 0};  ///< unit; arbitrary where the shape lacks normals
@@ -186,7 +186,7 @@ constexpr uint32_t kMostSortKeys = 0xfffe;
 
 /// Everything a kernel may read. Pointers are host or device memory, as a whole.
 struct SceneView {
-    const Vertex* vertices;
+    const MeshVertex* vertices;
     const Triangle* triangles;
     const Quadric* quadrics;
     const Shape* shapes;

@@ -1,84 +1,88 @@
-// megakernel: one thread does a slot's light walk, its eye walk and all connections, with the functions that the stages
-// use. It is a state machine of at most one ray per round, so that lanes of a warp trace together whatever their rays
-// are for; lanes whose path has ended begin another (Novak et al. 2010, "Path Regeneration for Interactive Path
+// megakernel: one thread does a slot's light subpath, its eye subpath and all connections, with the functions that the
+// stages use. It is a state machine of at most one ray per round, so that lanes of a warp trace together whatever their
+// rays are for; lanes whose path has ended begin another (Novak et al. 2010, "Path Regeneration for Interactive Path
 // Tracing").
 #pragma once
 
 #include "core/warp.h"
-#include "items/vertex_items.h"
-#include "stages/bidirectional_policy.h"
 #include "stages/generate.h"
-#include "stages/splat.h"
 #include "stages/stage.h"
+#include "transport/mis/heuristic.h"
+#include "transport/subpath/next_event.h"
+#include "transport/subpath/visit.h"
 
 namespace ambilux {
 
+/// Where the work of the megakernel is counted: as that of the stages that it stands for.
+struct MegakernelRecords {
+    StageRecord *light_generate, *light_extend, *light_shade, *connect_camera, *extend, *shade, *connect,
+        *connect_vertices, *mis_weight, *occlude;
+};
+
 template <Features F, class Tracer>
 struct Megakernel {
-    static constexpr uint32_t kBlocksPerSm = 4;    ///< on a device: 128 registers per thread
+    static constexpr const char* kName = "megakernel";
     static constexpr uint32_t kBeginTogether = 8;  ///< lanes without a path wait for as many before they begin new ones
+    using Mis = BidirectionalMis;
 
     SceneView scene;
     Tracer tracer;
     Wave wave;
-    BidirectionalPolicy policy;
-    LightVertices
-        light_vertices;  ///< memory for the vertices of all light walks; used through chains, never as a queue
+    Rules<Mis> rules;
+    LightVertices light_vertices;  ///< memory for the vertices of all light subpaths; used by links, never as a queue
     Queue<SplatItem> splats;
     Lane* samples;
-    StageRecord* records;  ///< one per StageId: rays are counted where the stages would
+    MegakernelRecords records;
+    StageRecord* record;
 
     /// Does the slots `slot`, `slot + stride` ... below `end`, one after the other.
     AMBILUX_HD void run(uint32_t slot, uint32_t end, uint32_t stride) const {
-        const Warp warp;
-        Path path{};
+        const WholeWarp warp;
+        State s{};
         Counts counts{};
         for (;;) {
-            const bool idle = !path.active && slot < end;
-            const uint32_t waiting = warp.count(idle), working = warp.count(path.active);
+            const bool idle = !s.active && slot < end;
+            const uint32_t waiting = warp.count(idle), working = warp.count(s.active);
             if (waiting + working == 0) break;
             if (idle && (working == 0 || waiting >= kBeginTogether)) {
-                begin(path, slot);
+                begin(s, slot);
                 slot += stride;
             }
 
             warp.meet();
-            Hit hit;
+            Hit hit = {0.0f, 0.0f, 0.0f, kNone};
             bool met = false;
-            const bool tested = path.testing, walked = !tested && path.walking && !connecting(path);
-            if (tested || walked) met = trace(path, hit, counts);
+            const bool tested = s.testing, extended = !tested && s.going && !connecting(s);
+            if (tested || extended) met = trace(s, hit, counts);
 
             warp.meet();
             if (tested) {
-                path.testing = false;
-                if (!met) deliver(path);
+                s.testing = false;
+                if (!met) arrive(s);
             }
-            if (walked) {
-                path.walking = false;
-                if (met)
-                    shade(path, hit);
-                else
-                    escape(path);
+            if (extended) {
+                if (!met) hit.prim = kNone;
+                step(s, hit);
             }
 
             warp.meet();
-            if (!path.testing && connecting(path)) connect(path);
+            if (!s.testing && connecting(s)) connect(s);
 
             warp.meet();
-            if (path.active && !path.testing && !path.walking && !connecting(path)) {
-                if (path.light)
-                    begin_eye_walk(path);
+            if (s.active && !s.testing && !s.going && !connecting(s)) {
+                if (s.side == Side::light)
+                    begin_eye(s);
                 else
-                    finish(path);
+                    finish(s);
             }
         }
-        add(StageId::light_extend, counts.light_rays);
-        add(StageId::extend, counts.eye_rays);
-        add(StageId::occlude, counts.shadow_rays);
+        add_count(&records.light_extend->items, counts.light_rays);
+        add_count(&records.extend->items, counts.eye_rays);
+        add_count(&records.occlude->items, counts.shadow_rays);
     }
 
 private:
-    /// The vertex of the eye walk that is being connected. Its surface is looked up for every pair: a thread has no
+    /// The vertex of the eye subpath that is being connected. Its surface is looked up for every pair: a thread has no
     /// registers for it.
     struct WaitingVertex {
         Vec3f d;  ///< of the ray that met it
@@ -91,194 +95,160 @@ private:
     };
 
     /// What a thread works on. Its next ray is the shadow ray if there is one, else, when the vertex has no connections
-    /// left, that of the walk.
-    struct Path {
+    /// left, that of the subpath.
+    struct State {
         bool active;
-        bool light;    ///< on the light walk; else on the eye walk
-        bool walking;  ///< `walk` goes on
+        bool going;    ///< the subpath goes on
         bool testing;  ///< there is a shadow ray
+        Side side;
         uint32_t slot;
-        uint32_t last;  ///< vertex of the light walk
-        Walk walk;
-        float tmax;  ///< of the walk's ray
+        uint32_t last;  ///< vertex of the light subpath
+        Subpath<Mis> path;
+        float tmax;  ///< of the subpath's ray
         WaitingVertex vertex;
         Ray shadow;
         Rgb value;   ///< arrives if the shadow ray is free:
-        Vec2f film;  ///< there, from a light walk
-        Rgb sum;     ///< of the eye walk
+        Vec2f film;  ///< there, from a light subpath
+        Rgb sum;     ///< of the eye subpath
     };
 
     struct Counts {
         uint32_t light_rays, eye_rays, shadow_rays;
     };
 
-    AMBILUX_HD StageRecord* record(StageId id) const { return records + uint32_t(id); }
-
-    AMBILUX_HD void add(StageId id, uint32_t n) const {
-        if (n == 0) return;
-#if defined(__CUDA_ARCH__)
-        atomicAdd(reinterpret_cast<unsigned long long*>(&record(id)->items), static_cast<unsigned long long>(n));
-#else
-        record(id)->items += n;
-#endif
+    AMBILUX_HD Draws draws(const State& s) const {
+        return {wave.key(s.slot, s.side == Side::light ? Stream::light : Stream::eye)};
     }
-
-    AMBILUX_HD RngKey key(const Path& path) const {
-        return wave.key(path.slot, path.light ? Stream::light : Stream::eye);
-    }
-
     /// A vertex past the capacity was not kept: the wave will be done again.
-    AMBILUX_HD bool connecting(const Path& path) const { return path.vertex.next < light_vertices.capacity; }
+    AMBILUX_HD bool connecting(const State& s) const { return s.vertex.next < light_vertices.capacity(); }
 
-    AMBILUX_HD void begin(Path& path, uint32_t slot) const {
+    AMBILUX_HD void begin(State& s, uint32_t slot) const {
         samples[slot] = {};
-        path.active = policy.max_depth > 0 && wave.locate(slot).active;
-        if (!path.active) return;
-        path.light = true;
-        path.slot = slot;
-        path.last = kNone;
-        path.vertex.next = kNone;
-        if (policy.light_walks) begin_light_walk(path);
+        s.active = wave.locate(slot).active;
+        if (!s.active) return;
+        s.side = Side::light;
+        s.slot = slot;
+        s.last = s.vertex.next = kNone;
+        if (rules.splat || rules.connect) begin_light(s);
     }
 
-    AMBILUX_HD void begin_light_walk(Path& path) const {
-        const RngKey k = key(path);
-        const Vec4f direction = random_floats(k, kEmissionBlock + 1);
+    AMBILUX_HD void begin_light(State& s) const {
+        const Draws d = draws(s);
         EmissionSample e;
-        if (!sample_emission<F>(scene, random_floats(k, kEmissionBlock), {direction.x, direction.y}, e)) return;
-        path.walk = start_light_walk(e);
-        path.tmax = kInfinity;
-        if (!is_light(path.walk.throughput, record(StageId::light_generate))) return;
-        WalkConnection c;
-        if (policy.splat && !policy.hide_emitters && policy.wants(1, 1) &&
-            connect_visible_light<F>(scene, policy.mis, e, {direction.z, direction.w}, c, path.film))
-            test(path, c, k, 0, StageId::light_generate);
-        path.walking = policy.max_depth >= 2;
+        if (!sample_start<F>(scene, d, e)) return;
+        s.path = start_light(rules.mis, e);
+        s.tmax = kInfinity;
+        if (!is_valid_radiance(s.path.throughput, records.light_generate)) return;
+        const Vec4f u = d.emission_direction();
+        Candidate<Mis> c;
+        if (visible_emitter(scene, rules, e, {u.z, u.w}, c)) test(s, c, d, 0, records.light_generate);
+        s.going = rules.max_depth >= 2;
     }
 
-    AMBILUX_HD void begin_eye_walk(Path& path) const {
-        const CameraSample camera = camera_sample(scene, wave, wave.locate(path.slot));
-        path.light = false;
-        path.walk = start_eye_walk(scene, policy.mis, camera);
-        path.tmax = camera.tmax;
-        path.walking = true;
-        path.sum = {0.0f, 0.0f, 0.0f};
+    AMBILUX_HD void begin_eye(State& s) const {
+        s.side = Side::eye;
+        const CameraSample camera = camera_sample(scene, wave.locate(s.slot), draws(s));
+        s.path = start_eye(scene, rules.mis, camera);
+        s.tmax = camera.tmax;
+        s.going = true;
+        s.sum = {0.0f, 0.0f, 0.0f};
     }
 
-    AMBILUX_HD void finish(Path& path) const {
-        set_start(samples[path.slot], path.sum);
-        path.active = false;
+    AMBILUX_HD void finish(State& s) const {
+        set_start(samples[s.slot], s.sum);
+        s.active = false;
     }
 
-    AMBILUX_HD bool trace(const Path& path, Hit& hit, Counts& counts) const {
-        const bool any_hit = path.testing;
-        ++(any_hit ? counts.shadow_rays : path.light ? counts.light_rays : counts.eye_rays);
-        Ray ray = path.shadow;
-        if (!any_hit) {
-            ray = {path.walk.o, path.tmax, path.walk.d, 0};
-            if constexpr (F.opacity) ray.alpha_seed = alpha_seed(key(path), path.walk.depth, false);
+    AMBILUX_HD bool trace(const State& s, Hit& hit, Counts& counts) const {
+        ++(s.testing ? counts.shadow_rays : s.side == Side::light ? counts.light_rays : counts.eye_rays);
+        Ray ray = s.shadow;
+        if (!s.testing) {
+            ray = {s.path.origin, s.tmax, s.path.direction, 0};
+            if constexpr (F.opacity) ray.alpha_seed = draws(s).opacity_seed(s.path.depth);
         }
-        return tracer.template trace<F>(scene, ray, any_hit, hit);
+        return tracer.template trace<F>(scene, ray, s.testing, hit);
     }
 
-    AMBILUX_HD void deliver(Path& path) const {
-        if (!path.light) {
-            path.sum += path.value;
-            return;
+    AMBILUX_HD void arrive(State& s) const {
+        if (s.side == Side::eye)
+            s.sum += s.value;
+        else
+            splats.push({s.value, s.slot, s.film, Strategy::make(0, 0), 0.0f});
+    }
+
+    /// The candidate, weighted, asks for a shadow ray.
+    AMBILUX_HD void test(State& s, const Candidate<Mis>& c, const Draws& d, uint32_t which, StageRecord* maker) const {
+        if (!is_valid_radiance(c.value, maker)) return;
+        s.value = c.value * mis_weight(c.ratio);
+        if (!is_valid_radiance(s.value, records.mis_weight) || is_zero(s.value)) return;
+        s.film = c.film;
+        s.shadow = {c.origin, c.tmax, c.direction, F.opacity ? d.shadow_seed(which) : 0};
+        s.testing = true;
+    }
+
+    struct Sink {
+        const Megakernel& kernel;
+        State& s;
+        const Hit& hit;
+        const Draws& draws;
+
+        AMBILUX_HD void add(const Candidate<Mis>& c) const {
+            if (!is_valid_radiance(c.value, kernel.records.shade)) return;
+            const Rgb weighted = c.value * mis_weight(c.ratio);
+            if (is_valid_radiance(weighted, kernel.records.mis_weight)) s.sum += weighted;
         }
-        const SplatItem item = {path.value, path.slot, path.film, Strategy::make(0, 0), 0.0f};
-        splats.push(item);
-    }
-
-    /// The connection, weighted, asks for a shadow ray.
-    AMBILUX_HD void test(Path& path, const WalkConnection& c, const RngKey& k, uint32_t which, StageId maker) const {
-        if (!is_light(c.value, record(maker))) return;
-        path.value = c.value * (1.0f / (1.0f + policy.others(c.others)));
-        if (!is_light(path.value, record(StageId::mis_weight)) || is_zero(path.value)) return;
-        path.shadow = {c.o, c.tmax, c.d, F.opacity ? alpha_seed(k, which, true) : 0};
-        path.testing = true;
-    }
-
-    AMBILUX_HD bool emitters_shown(const Walk& w) const { return !(policy.hide_emitters && w.depth == 1); }
-
-    AMBILUX_HD void add_emitted(Path& path, Rgb radiance, float others) const {
-        if (!policy.wants(0, path.walk.depth + 1)) return;
-        const Rgb value = path.walk.throughput * radiance;
-        if (!is_light(value, record(StageId::shade)) || is_zero(value)) return;
-        const Rgb weighted = value * (1.0f / (1.0f + policy.others(others)));
-        if (is_light(weighted, record(StageId::mis_weight))) path.sum += weighted;
-    }
-
-    AMBILUX_HD void escape(Path& path) const {
-        const Walk& w = path.walk;
-        if (F.has_environment() && !path.light && policy.counts_environment(w.depth) && emitters_shown(w))
-            add_emitted(path, environment_radiance<F>(scene, w.d),
-                        others_of_escape<F>(scene, policy.mis, w.sums, w.depth, w.d));
-    }
-
-    /// The vertex that the walk met: emission, the connection with camera or emitter, and the next ray. Both walks go
-    /// through the same code as far as they can.
-    AMBILUX_HD void shade(Path& path, const Hit& hit) const {
-        Walk& w = path.walk;
-        const bool light = path.light;
-        if (!light && policy.background_only) return;
-        const RngKey k = key(path);
-        WalkVertex x = walk_vertex<F>(scene, w.d, w.depth, hit.prim, hit.u, hit.v);
-        x.sums = light ? light_sums<F>(scene, policy.mis, w, x.point) : eye_sums(scene, policy.mis, w, x.point);
-        const uint32_t emitter = scene.shapes[x.point.shape].emitter;
-        if (!light && policy.count_hits && emitter != kNone && emitters_shown(w)) {
-            const Rgb radiance = emitted_radiance<F>(scene, emitter, x.point, -w.d);
-            if (!is_zero(radiance))
-                add_emitted(
-                    path, radiance,
-                    others_of_hit<F>(scene, policy.mis, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, x.point));
+        AMBILUX_HD void at(const BidirectionalVertex& x, const Subpath<Mis>& path) const {
+            kernel.connect_end(s, x, path, hit, draws);
         }
-        if (w.depth >= policy.max_depth) return;
-        if (bsdf_is_smooth(x.scattering.bsdf)) {
-            const Vec4f u = random_floats(k, light ? lens_block(w.depth) : emitter_block(w.depth));
-            WalkConnection c;
-            const bool made = light
-                                  ? policy.splat && policy.wants(w.depth + 1, 1) &&
-                                        connect_camera<F>(scene, policy.mis, x, w.throughput, {u.x, u.y}, c, path.film)
-                                  : policy.next_event && policy.wants(1, w.depth + 1) &&
-                                        connect_next_event<F>(scene, policy.mis, x, w.throughput, u, c);
-            if (made) test(path, c, k, w.depth, light ? StageId::connect_camera : StageId::connect);
-            if (policy.connect_vertices && w.depth + 2 <= policy.max_depth) {
-                if (light)
-                    path.last = push_vertex<F>(light_vertices,
-                                               pack_connection_vertex(x, w.depth, w.d, w.throughput, path.last));
-                else
-                    path.vertex = {w.d, w.depth, hit.u, hit.v, hit.prim, path.last, w.throughput, x.sums};
-            }
+        AMBILUX_HD bool valid(Rgb throughput) const {
+            return is_valid_radiance(throughput,
+                                     s.side == Side::light ? kernel.records.light_shade : kernel.records.shade);
         }
-        // The last segment of an eye walk can bring emission only, and a path has one more than its light walk.
-        if (w.depth + 1 >= policy.max_depth && (light || !policy.counts_last_segment())) return;
-        const Vec4f u = random_floats(k, light ? light_scatter_block(w.depth) : scatter_block(w.depth));
-        path.tmax = kInfinity;
-        path.walking = scatter_walk<F>(policy.mis, x, u, light ? TransportMode::importance : TransportMode::radiance,
-                                       policy.rr_depth, w) &&
-                       is_light(w.throughput, record(light ? StageId::light_shade : StageId::shade));
+    };
+
+    /// Where the ray of the subpath ended. Both sides go through the same code as far as they can.
+    AMBILUX_HD void step(State& s, const Hit& hit) const {
+        const Draws d = draws(s);
+        s.tmax = kInfinity;
+        s.going = visit<F>(scene, rules, d, s.side, rules.longest(s.side), hit, s.path, Sink{*this, s, hit, d});
     }
 
-    /// The eye vertex and the next vertex of the light walk that is not too far from the light.
-    AMBILUX_HD void connect(Path& path) const {
-        WaitingVertex& z = path.vertex;
+    /// A vertex and the camera or an emitter; and it is kept, or waits, for connections.
+    AMBILUX_HD void connect_end(State& s, const BidirectionalVertex& x, const Subpath<Mis>& path, const Hit& hit,
+                                const Draws& d) const {
+        const bool light = s.side == Side::light;
+        Candidate<Mis> c;
+        c.environment = false;
+        const Vec4f u = light ? d.lens(path.depth) : d.next_event(path.depth);
+        const bool made = light ? camera_connection<F>(scene, rules, x, path.throughput, path.depth, {u.x, u.y}, c)
+                                : next_event<F>(scene, rules, x, path.throughput, path.depth, u, c);
+        if (made) {
+            if (c.environment) c.value *= environment_radiance<F>(scene, c.direction);
+            test(s, c, d, path.depth, light ? records.connect_camera : records.connect);
+        }
+        if (!rules.connect || path.depth + 2 > rules.max_depth) return;
+        if (light)
+            s.last = push_vertex<F>(light_vertices, pack_connection_vertex(x, path, s.last));
+        else
+            s.vertex = {path.direction, path.depth, hit.u, hit.v, hit.prim, s.last, path.throughput, x.sums};
+    }
+
+    /// The eye vertex and the next vertex of the light subpath that is not too far from the light.
+    AMBILUX_HD void connect(State& s) const {
+        WaitingVertex& z = s.vertex;
         uint32_t place, light_depth;
         do {
-            if (!connecting(path)) return;
+            if (!connecting(s)) return;
             place = z.next;
-            const ConnectionVertexFront front = light_vertices.load_front(place);
+            const ConnectionVertexFront front = light_vertices.items.load_front(place);
             light_depth = front.bits.depth();
             z.next = front.link;
-        } while (z.depth + light_depth + 1 > policy.max_depth);
-        if (!policy.wants(light_depth + 1, z.depth + 1)) return;
-        WalkVertex eye = walk_vertex<F>(scene, z.d, z.depth, z.prim, z.u, z.v);
-        eye.sums = z.sums;
-        const ConnectionVertex light = load_vertex<F>(light_vertices, place);
-        WalkConnection c;
-        if (!is_zero(light.throughput) &&
-            connect_vertices<F>(policy.mis, unpack_vertex<F>(scene, light), light.throughput, eye, z.throughput, c))
-            test(path, c, key(path), z.depth + (light_depth << WalkBits::kDepthBits), StageId::connect_vertices);
+        } while (z.depth + light_depth + 1 > rules.max_depth);
+        const SurfacePoint point = surface_at<F>(scene, z.prim, z.u, z.v);
+        const BidirectionalEnd eye = {vertex_with<F, Mis>(scene, z.d, z.depth, point, z.sums), z.throughput, z.depth};
+        Candidate<Mis> c;
+        if (connection<F>(rules, eye, unpack_end<F>(scene, load_vertex<F>(light_vertices, place)), 1.0f, c))
+            test(s, c, draws(s), connection_ray(z.depth, light_depth), records.connect_vertices);
     }
 };
 

@@ -1,18 +1,17 @@
-// occlude: light whose way is free becomes a contribution.
+// occlude: light whose way is free arrives. A device traces in a kernel of its own that calls fetch and finish, and
+// keeps in between what fetch leaves for finish: lanes of a warp end one by one, and all would wait for what each of
+// them loads.
 #pragma once
 
-#include "items/path_items.h"
-#include "stages/mis_weight.h"
-#include "stages/stage.h"
+#include "stages/accumulate.h"
 #include "transport/emitter.h"
 
 namespace ambilux {
 
-/// `Tracer` has occluded<F>(scene, ray) or is followed by a kernel of its own that calls fetch and finish, and keeps in
-/// between what fetch leaves for finish: lanes of a warp end one by one, and all would wait for what each of them
-/// loads.
-template <Features F, class Tracer>
+/// Shadow rays of eye vertices. `Out` takes contributions.
+template <Features F, class Tracer, class Out>
 struct Occlude {
+    static constexpr const char* kName = "occlude";
     static constexpr Features kFeatures = F;
     static constexpr bool kAnyHit = true;
     using Kept = Contribution;
@@ -20,28 +19,20 @@ struct Occlude {
     SceneView scene;
     Tracer tracer;
     Queue<ShadowItem> shadows;
-    ArrivalOutlet contributions;
+    Out contributions;
     StageRecord* record;
+    StrategyFilm strategies;
+
+    const Queue<ShadowItem>& items() const { return shadows; }
 
     AMBILUX_HD bool fetch(uint32_t i, Ray& ray, Kept& kept) const {
         const ShadowItem item = shadows.load(i);
         kept = {item.value, item.path};
-#if defined(__CUDA_ARCH__)
-        // The sample that light would be added to. In kernels for environments this costs more than it brings
-        // (docs/performance.md).
-        if (!F.has_environment() && contributions.through)
-            asm volatile("prefetch.global.L2 [%0];" ::"l"(contributions.next.samples + item.path));
-#endif
+        // The sample that light would be added to. In kernels for environments this costs more than it brings.
+        if constexpr (!F.has_environment() && requires { contributions.samples; })
+            prefetch_line(contributions.samples + item.path);
         return fetch(item, ray);
     }
-    /// False for a ray that is none.
-    AMBILUX_HD bool fetch(const ShadowItem& item, Ray& ray) const {
-        ray = {item.o, fabsf(item.tmax), item.d, item.alpha_seed};
-        if (is_finite(item.o) && is_finite(item.d)) return true;
-        count_one(&record->nan);
-        return false;
-    }
-
     AMBILUX_HD void finish([[maybe_unused]] uint32_t i, Kept kept, bool blocked) const {
         if (blocked) return;
         if constexpr (F.has_environment())
@@ -49,33 +40,78 @@ struct Occlude {
         else
             contributions.push(kept);
     }
-    /// True if nothing is in the way of an item that is in no queue.
+    AMBILUX_HD void operator()(uint32_t i) const { process(shadows.load(i)); }
+    AMBILUX_HD void process(const ShadowItem& item) const {
+        if (is_free(item)) arrive({item.value, item.path}, item);
+    }
     AMBILUX_HD bool is_free(const ShadowItem& item) const {
         Ray ray;
         return fetch(item, ray) && !tracer.template occluded<F>(scene, ray);
     }
-    /// All of it for such an item.
-    AMBILUX_HD void take(const ShadowItem& item) const {
-        if (is_free(item)) arrive({item.value, item.path}, item);
-    }
-
-    AMBILUX_HD void operator()(uint32_t i) const {
-        Ray ray;
-        Kept kept;
-        if (fetch(i, ray, kept)) finish(i, kept, tracer.template occluded<F>(scene, ray));
+    /// The same stage for launches with several shadow rays of a path.
+    AMBILUX_HD Occlude with_atomic_add(bool on) const {
+        Occlude stage = *this;
+        if constexpr (requires { stage.contributions.needs_atomic_add; }) stage.contributions.needs_atomic_add = on;
+        return stage;
     }
 
 private:
+    /// False for a ray that is invalid.
+    AMBILUX_HD bool fetch(const ShadowItem& item, Ray& ray) const {
+        ray = {item.origin, fabsf(item.tmax), item.direction, item.opacity_seed};
+        return is_valid_ray(item.origin, item.direction, record);
+    }
     AMBILUX_HD void arrive(Kept kept, const ShadowItem& item) const {
         if constexpr (F.has_environment()) {
             if (item.tmax == kTowardsEnvironment) {
-                const Rgb radiance = environment_radiance<F>(scene, item.d);
-                contributions.next.techniques.scale(kept.path, radiance);
+                const Rgb radiance = environment_radiance<F>(scene, item.direction);
+                strategies.scale(kept.path, radiance);
                 kept.value *= radiance;
-                if (!is_light(kept.value, record)) return;
+                if (!is_valid_radiance(kept.value, record)) return;
             }
         }
         contributions.push(kept);
+    }
+};
+
+/// Shadow rays of splats.
+template <Features F, class Tracer>
+struct OccludeSplats {
+    static constexpr const char* kName = "occlude";
+    static constexpr Features kFeatures = F;
+    static constexpr bool kAnyHit = true;
+    static constexpr bool kReservesSlots = true;
+    using Kept = Contribution;
+
+    SceneView scene;
+    Tracer tracer;
+    Queue<CandidateItem> candidates;
+    ReservedQueue<SplatItem> splats;
+    StageRecord* record;
+
+    const Queue<CandidateItem>& items() const { return candidates; }
+
+    AMBILUX_HD bool fetch(uint32_t i, Ray& ray, Kept& kept) const {
+        const CandidateItem c = candidates.load(i);
+        kept = {c.value, c.path};
+        return fetch(c, ray);
+    }
+    AMBILUX_HD void finish(uint32_t i, const Kept& kept, bool blocked) const {
+        if (blocked) return;
+        const CandidateItem c = candidates.load(i);
+        splats.push({kept.value, kept.path, c.film, c.strategy, c.ratio});
+    }
+    AMBILUX_HD void operator()(uint32_t i) const { process(candidates.load(i)); }
+    AMBILUX_HD void process(const CandidateItem& c) const {
+        Ray ray;
+        if (fetch(c, ray) && !tracer.template occluded<F>(scene, ray))
+            splats.queue.push({c.value, c.path, c.film, c.strategy, c.ratio});
+    }
+
+private:
+    AMBILUX_HD bool fetch(const CandidateItem& c, Ray& ray) const {
+        ray = {c.origin, c.tmax, c.direction, c.opacity_seed};
+        return is_valid_ray(c.origin, c.direction, record);
     }
 };
 

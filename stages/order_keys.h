@@ -4,21 +4,23 @@
 #include <bit>
 
 #include "core/math.h"
-#include "items/walk_items.h"
+#include "items/subpath_items.h"
 #include "queues/order.h"
 #include "scene/view.h"
 
 namespace ambilux {
 
 /// Of hits. Materials, not types of BSDFs: equal materials read the same textures too, and there are far fewer of them
-/// than warps, so that warps of mixed types are rare either way. Rays that met nothing come last.
+/// than warps, so that warps of mixed types are rare either way. Misses come last.
 struct MaterialOrder {
     static constexpr Ordering kOrdering = Ordering::material;
 
     static uint32_t bits(const SceneView& scene) { return uint32_t(std::bit_width(of(scene, kNone) + 1u)); }
 
-    AMBILUX_HD static uint32_t key(const SceneView& scene, const HitItem& hit) { return of(scene, hit.prim); }
-    AMBILUX_HD static uint32_t key(const SceneView& scene, const WalkHit& hit) { return of(scene, hit.prim); }
+    template <class Ray>
+    AMBILUX_HD static uint32_t key(const SceneView& scene, const HitItem<Ray>& hit) {
+        return of(scene, hit.prim);
+    }
     AMBILUX_HD static uint32_t key(const SceneView& scene, const SlotHit& hit) { return of(scene, hit.prim); }
 
     AMBILUX_HD static uint32_t of(const SceneView& scene, uint32_t prim) {
@@ -34,8 +36,8 @@ struct MortonOrder {
 
     template <class Item>
     AMBILUX_HD static uint32_t key(const SceneView& scene, const Item& ray) {
-        const Vec3f at = (ray.o - scene.bounds_center) * (64.0f / scene.bounds_radius) + Vec3f{64.0f, 64.0f, 64.0f};
-        const uint32_t octant = (ray.d.x < 0.0f ? 1u : 0u) | (ray.d.y < 0.0f ? 2u : 0u) | (ray.d.z < 0.0f ? 4u : 0u);
+        const Vec3f at = (ray.origin - scene.bounds_center) * (64.0f / scene.bounds_radius) + Vec3f{64.0f, 64.0f, 64.0f};
+        const uint32_t octant = (ray.direction.x < 0.0f ? 1u : 0u) | (ray.direction.y < 0.0f ? 2u : 0u) | (ray.direction.z < 0.0f ? 4u : 0u);
         const uint32_t key = octant << 21 | spread(at.x) | spread(at.y) << 1 | spread(at.z) << 2;
         return key < 0xffffffu ? key : 0xfffffeu;  // the last key is that of places without a ray
     }

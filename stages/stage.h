@@ -1,103 +1,68 @@
-// What all stages share: their names, their records, and the count of values that are no light.
+// What all stages share. A stage is a struct: where its items come from (items()), where its results go, the record of
+// what it did, and operator()(i) for one item. Its type is its identity; kName is what statistics call it. It drops and
+// counts what is no radiance.
 #pragma once
 
-#include "core/math.h"
+#include "items/candidate_items.h"
+#include "items/subpath_items.h"
+#include "items/vertex_items.h"
+#include "queues/reserved_queue.h"
+#include "queues/stage_record.h"
+#include "queues/wave.h"
+#include "transport/subpath/rules.h"
 
 namespace ambilux {
 
-/// Kernels of a wave, in the order in which they first run.
-enum class StageId : uint32_t {
-    light_generate = 0,
-    light_extend,
-    light_shade,
-    connect_camera,
-    generate,
-    extend,
-    shade,
-    connect,
-    connect_vertices,
-    mis_weight,
-    occlude,
-    accumulate,
-    splat,
-    megakernel,
-    develop,
-    count
-};
-
-constexpr uint32_t kStageCount = uint32_t(StageId::count);
-constexpr const char* kStageNames[kStageCount] = {
-    "light_generate",   "light_extend", "light_shade", "connect_camera", "generate", "extend",     "shade",  "connect",
-    "connect_vertices", "mis_weight",   "occlude",     "accumulate",     "splat",    "megakernel", "develop"};
-
-/// Items are counted for depths 0 ... kTrackedDepths-1; the last entry gathers all deeper ones.
-constexpr uint32_t kTrackedDepths = 64;
-
-/// Adds to a counter that other threads may add to. Less than 0: subtracts.
-AMBILUX_HD void count_some(uint64_t* counter, int64_t n) {
-#if defined(__CUDA_ARCH__)
-    atomicAdd(reinterpret_cast<unsigned long long*>(counter), static_cast<unsigned long long>(n));
-#else
-    *counter += uint64_t(n);  // a host record belongs to one thread
-#endif
-}
-AMBILUX_HD void count_one(uint64_t* counter) { count_some(counter, 1); }
-
-/// Adds 1 to counters[which]; the threads of a warp that mean the same one add once for all of them.
-AMBILUX_HD void count_together(uint64_t* counters, uint32_t which) {
-#if defined(__CUDA_ARCH__)
-    const uint32_t same = __match_any_sync(__activemask(), which);
-    if ((threadIdx.x & 31u) == uint32_t(__ffs(int(same)) - 1))
-        atomicAdd(reinterpret_cast<unsigned long long*>(counters + which),
-                  static_cast<unsigned long long>(__popc(same)));
-#else
-    ++counters[which];
-#endif
-}
-
-/// What one stage did; lives where the kernels run.
-struct StageRecord {
-    uint64_t launches, items, nanoseconds;
-    uint64_t nan, inf, negative;  ///< values it dropped
-    uint64_t items_by_depth[kTrackedDepths];
-
-    AMBILUX_HD void add(uint64_t new_items, uint32_t depth, uint64_t ns) {
-        ++launches;
-        items += new_items;
-        nanoseconds += ns;
-        items_by_depth[tracked(depth)] += new_items;
-    }
-    /// Items that no launch was made for, or, less than 0, that it has left.
-    AMBILUX_HD void count_items(int64_t n, uint32_t depth) {
-        if (n == 0) return;
-        count_some(&items, n);
-        count_some(items_by_depth + tracked(depth), n);
-    }
-    /// An item that no launch was made for.
-    AMBILUX_HD void count_item(uint32_t depth) {
-        count_together(&items, 0);
-        count_together(items_by_depth, tracked(depth));
-    }
-
-private:
-    AMBILUX_HD static uint32_t tracked(uint32_t depth) { return depth < kTrackedDepths ? depth : kTrackedDepths - 1; }
-};
-
-/// True if `v` can be light: finite and not negative. Anything else is counted in the record of the stage that made it;
-/// the caller drops it.
-AMBILUX_HD bool is_light(Rgb v, StageRecord* record) {
-    // Finite and neither negative nor -0: the bits of such floats are below those of infinity.
-    constexpr uint32_t kInfinityBits = 0x7f800000u;
-    if ((float_bits(v.x) < kInfinityBits) & (float_bits(v.y) < kInfinityBits) & (float_bits(v.z) < kInfinityBits))
-        return true;
+/// True if `v` can be radiance: finite and not negative. Anything else is counted in the record of the stage that made
+/// it, which drops it.
+AMBILUX_HD bool is_valid_radiance(Rgb v, StageRecord* record) {
+    if (is_valid_radiance(v)) return true;
     if (is_finite(v)) {
-        if (min_component(v) >= 0.0f) return true;
-        count_one(&record->negative);
+        if (min_component(v) >= 0.0f) return true;  // -0
+        add_count(&record->negative, 1);
         return false;
     }
     const bool nan = v.x != v.x || v.y != v.y || v.z != v.z;
-    count_one(nan ? &record->nan : &record->inf);
+    add_count(nan ? &record->nan : &record->inf, 1);
     return false;
+}
+
+/// True if `ray` can be traced; otherwise it is counted.
+AMBILUX_HD bool is_valid_ray(Vec3f origin, Vec3f direction, StageRecord* record) {
+    if (is_finite(origin) && is_finite(direction)) return true;
+    add_count(&record->nan, 1);
+    return false;
+}
+
+/// What a backend runs as part of the stage before it, without a queue in between.
+struct Fusion {
+    bool weigh = false;     ///< mis_weight, and accumulate
+    bool connect = false;   ///< connect_emitter and connect_camera, in the stage that makes the vertex
+    bool occlude = false;   ///< shadow rays, and for bdpt connect_vertices: on a host, where nothing waits for many items
+    bool generate = false;  ///< camera rays, in extend
+};
+
+/// A stage that has each item at once, in place of a queue.
+template <class Stage>
+struct InPlace {
+    Stage stage;
+    const WaveState* state;
+
+    template <class Item>
+    AMBILUX_HD uint32_t push(const Item& item) const {
+        stage.record->count_item(state->depth);
+        stage.process(item);
+        return 0;
+    }
+};
+
+/// `a` or `b`, of different types.
+template <bool kFirst, class A, class B>
+constexpr auto choose(const A& a, const B& b) {
+    if constexpr (kFirst)
+        return a;
+    else
+        return b;
 }
 
 }  // namespace ambilux

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <memory>
+#include <cstdint>
 #include <new>
-
-#include "queues/layout.h"
 
 namespace ambilux {
 
@@ -25,11 +24,6 @@ inline WaveBytes make_wave_bytes(uint64_t size) {
     WaveBytes bytes(static_cast<std::byte*>(::operator new[](size, std::align_val_t(256))));
     std::fill_n(bytes.get(), size, std::byte{0});
     return bytes;
-}
-
-/// Tells the counters of a laid-out wave their capacities.
-inline void set_capacities(QueueCounter* counters, const Layout& layout) {
-    for (size_t q = 0; q < layout.queue_capacities().size(); ++q) counters[q].capacity = layout.queue_capacities()[q];
 }
 
 }  // namespace ambilux

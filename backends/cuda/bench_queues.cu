@@ -193,8 +193,8 @@ void time_order(const char* name, const SceneView& scene, const SceneView& devic
 
 }  // namespace
 
-std::vector<QueueTiming> time_queues_on_device(const Scene& scene, uint32_t items, const std::vector<HitItem>& hits,
-                                               const std::vector<RayItem>& rays, int warm_ups, int repetitions) {
+std::vector<QueueTiming> time_queues_on_device(const Scene& scene, uint32_t items, const std::vector<PathHit>& hits,
+                                               const std::vector<PathRay>& rays, int warm_ups, int repetitions) {
     const Runs runs = {warm_ups, repetitions};
     std::vector<QueueTiming> rows;
     for_pushed_items([&]<class Item>(const char* name, std::type_identity<Item>) {
@@ -206,8 +206,8 @@ std::vector<QueueTiming> time_queues_on_device(const Scene& scene, uint32_t item
         }
     });
     const DeviceScene device(scene);
-    time_order<MaterialOrder>("HitItem", scene.view(), device.view(), hits, runs, rows);
-    time_order<MortonOrder>("RayItem", scene.view(), device.view(), rays, runs, rows);
+    time_order<MaterialOrder>("PathHit", scene.view(), device.view(), hits, runs, rows);
+    time_order<MortonOrder>("PathRay", scene.view(), device.view(), rays, runs, rows);
     return rows;
 }
 

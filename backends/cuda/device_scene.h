@@ -22,7 +22,7 @@ public:
     static uint64_t predicted_bytes(const Scene& scene) { return scene.memory_bytes(); }
 
 private:
-    DeviceBuffer<Vertex> vertices_;
+    DeviceBuffer<MeshVertex> vertices_;
     DeviceBuffer<Triangle> triangles_;
     DeviceBuffer<Quadric> quadrics_;
     DeviceBuffer<Shape> shapes_;

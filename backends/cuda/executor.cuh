@@ -1,156 +1,132 @@
-// Runs the stages of one wave on a CUDA device. They are captured into a graph whose loop over depths is a conditional
-// node; sizes of queues are read on the device: between the launch of a graph and its end the host does nothing. The
-// same can be launched kernel by kernel, for profilers and sanitizers.
+// Runs the stages of one wave on a CUDA device (integrators/integrator.h says what an executor has). They are captured
+// into a graph whose loop over depths is a conditional node; sizes of queues are read on the device: between the launch
+// of a graph and its end the host does nothing. The same can be launched kernel by kernel, for profilers and sanitizers.
 #pragma once
 
 #include <cuda_runtime.h>
 
 #include <optional>
 #include <type_traits>
-#include <utility>
-#include <vector>
 
 #include "backends/cuda/device_memory.h"
+#include "backends/cuda/graph_capture.h"
 #include "backends/cuda/order.h"
+#include "backends/cuda/ray_kernels.cuh"
+#include "backends/cuda/record_kernels.cuh"
 #include "backends/cuda/stage_kernels.cuh"
-#include "queues/queue.h"
-#include "stages/order_keys.h"
-#include "stages/stage.h"
-#include "stages/tail.h"
-
-#if CUDART_VERSION < 12080
-#error "Graphs that choose one of several bodies need CUDA 12.8 or newer"
-#endif
 
 namespace ambilux {
 
-/// Executor of a schedule (integrators/path/schedule.h). `kPairs`: kernels are made for binary BVHs too.
+/// `kPairs`: kernels are made for binary BVHs too.
 template <bool kPairs>
-class BasicCudaExecutor {
+class CudaExecutor {
 public:
-    static constexpr bool kTails = true;        ///< has run_tail
-    static constexpr bool kTracesPairs = true;  ///< runs ConnectAndOcclude
+    static constexpr bool kMultiBounce = true;  ///< takes the last subpaths of a wave through several bounces at once
 
     /// `traced`: features that rays have to know of, the scene's or more. `clock`: one value on the device.
-    BasicCudaExecutor(cudaStream_t stream, const Features& traced, WaveState* state, StageRecord* records,
-                      uint64_t* clock, const SceneView& scene, const OrderMemory& order)
-        : stream_(stream), traced_(traced), state_(state), records_(records), clock_(clock), scene_(scene),
-          order_(order) {
+    CudaExecutor(cudaStream_t stream, const Features& traced, WaveState* state, uint64_t* clock, const SceneView& scene,
+                 const OrderMemory& order)
+        : graph_(stream), traced_(traced), state_(state), clock_(clock), scene_(scene), order_(order) {
         int device = 0;
         cuda_check(cudaGetDevice(&device), "device");
         cuda_check(cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device),
                    "multiprocessors");
         if (order.policy.ordering != Ordering::none) list_places(order, stream);
     }
+    /// Rays go through `pairs` instead of the tracer of their stage.
+    void use(const PairTracer& pairs) requires kPairs { pairs_ = pairs; }
 
     /// Captures what `schedule(*this)` launches.
     template <class Schedule>
     cudaGraphExec_t capture(Schedule schedule) {
-        cuda_check(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), "begin of graph capture");
-        capturing_ = true;
-        launch(schedule);
-        capturing_ = false;
-        cudaGraph_t graph = nullptr;
-        cuda_check(cudaStreamEndCapture(stream_, &graph), "graph capture");
-        cudaGraphExec_t exec = nullptr;
-        const cudaError_t made = cudaGraphInstantiate(&exec, graph, 0);
-        cudaGraphDestroy(graph);
-        cuda_check(made, "graph instantiation");
-        return exec;
+        return graph_.capture([&] { launch(schedule); });
     }
-
     /// Launches kernel by kernel; the host reads the size of a queue wherever the schedule loops.
     template <class Schedule>
     void launch(Schedule schedule) {
-        detail::start_clock<<<1, 1, 0, stream_>>>(clock_);
+        detail::start_clock<<<1, 1, 0, stream()>>>(clock_);
         schedule(*this);
     }
 
     template <class Stage>
-    void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
-        detail::launch_slots<<<blocks(detail::launch_slots<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(
-            stage, slots, samples, state_);
-        finish(id, nullptr, nullptr, slots, samples);
+    void run_slots(const Stage& stage, uint32_t slots, uint32_t samples = 0) {
+        const auto kernel = detail::launch_slots<Stage>;
+        kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(stage, slots, samples, state_);
+        finish(stage, nullptr, nullptr, slots, samples);
     }
     template <class Stage>
-    void run_paths(StageId id, const Stage& stage, uint32_t slots) {
-        detail::launch_paths<<<blocks(detail::launch_paths<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(
-            stage, slots, state_);
-        finish(id, nullptr, nullptr, slots);
+    void run_paths(const Stage& stage, uint32_t slots) {
+        const auto kernel = detail::launch_paths<Stage>;
+        kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(stage, slots, state_);
+        finish(stage, nullptr, nullptr, slots);
     }
-    template <class Stage, class Item>
-    void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        const detail::Items items = prepare<MaterialOrder>(stage, queue);
-        if constexpr (Chained<Stage>)
-            detail::launch_chains<<<blocks(detail::launch_chains<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(
-                stage, items);
-        else if constexpr (detail::Gathered<Stage>)
-            detail::launch_gathered<<<blocks(detail::launch_gathered<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(
-                stage, items);
+    template <class Stage>
+    void run(const Stage& stage) {
+        const detail::Items items = prepare<MaterialOrder>(stage);
+        const auto launch = [&](auto kernel) {
+            kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(stage, items);
+        };
+        if constexpr (ConnectionLoop<Stage>)
+            launch(detail::launch_loops<Stage>);
+        else if constexpr (LaunchTraits<Stage>::kGathers)
+            launch(detail::launch_gathered<Stage>);
         else
-            detail::launch_items<<<blocks(detail::launch_items<Stage>, kStageBlock), kStageBlock, 0, stream_>>>(stage,
-                                                                                                                items);
-        finish(id, queue.counter);
+            launch(detail::launch_items<Stage>);
+        finish(stage, items.counter);
     }
-    /// Several depths of the walks of `hits`, which must be appended.
-    template <class Shade, class Extend, class Item>
-    void run_tail(StageId id, const Shade& shade, const Extend& extend, const Queue<Item>& hits) {
-        using Kernel = Tail<Shade, Extend>;
-        detail::launch_tail<<<blocks(detail::launch_tail<Kernel>, kStageBlock), kStageBlock, 0, stream_>>>(
-            Kernel{shade, extend}, hits.counter);
-        finish(id, hits.counter);
+    /// Several bounces of the subpaths of hits, which must be appended.
+    template <class VertexStage, class Extend>
+    void run(const MultiBounce<VertexStage, Extend>& stage) {
+        const auto kernel = detail::launch_bounces<MultiBounce<VertexStage, Extend>>;
+        QueueCounter* const counter = stage.items().counter;
+        kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(stage, counter);
+        finish(stage, counter);
     }
-    /// Rays go through `pairs` instead of the tracer of their stage.
-    void use(const PairTracer& pairs)
-        requires kPairs
-    {
-        pairs_ = pairs;
+    template <class Stage>
+    void trace(const Stage& stage) {
+        launch_traces(stage);
+        finish(stage, stage.items().counter);
     }
-
-    template <class Stage, class Item>
-    void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
-        launch_traces(stage, queue);
-        finish(id, queue.counter);
+    template <class Stage>
+    void extend(const Stage& stage) {
+        launch_traces(stage);
+        finish_extend(stage);
     }
-    template <class Stage, class Item, class Out>
-    void extend(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
-        launch_traces(stage, rays);
-        finish(id, rays.counter, hits.flags ? nullptr : hits.counter);
-    }
-    template <class Stage, class Item, class Out>
-    void extend_coherent(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
-        const detail::Items items = prepare<void>(stage, rays);  // in order as they are
+    template <class Stage>
+    void extend_coherent(const Stage& stage) {
+        const detail::Items items = prepare<void>(stage);  // in order as they are
         with_tracer(stage, [&](auto set, const auto& tracer) {
-            const auto kernel = detail::launch_coherent<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
-            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
+            const auto kernel =
+                detail::launch_coherent<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
+            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream()>>>(stage, tracer, items);
         });
-        finish(id, rays.counter, hits.flags ? nullptr : hits.counter);
+        finish_extend(stage);
     }
     /// generate and the extend that follows, of depth 1; the time is extend's. Items must be appended.
     template <class Generate, class Extend>
     void generate_and_extend(const Generate& generate, const Extend& extend, uint32_t slots) {
-        finish(StageId::generate, nullptr, nullptr, slots);
+        finish(generate, nullptr, nullptr, slots);
         set_depth(1);
         with_tracer(extend, [&](auto set, const auto& tracer) {
             const auto kernel =
                 detail::launch_camera_rays<decltype(set), Generate, Extend, std::remove_cvref_t<decltype(tracer)>>;
-            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(generate, extend, tracer, slots, state_);
+            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream()>>>(generate, extend, tracer, slots, state_);
         });
-        finish(StageId::extend, extend.rays.counter, extend.hits.counter);
+        finish_extend(extend);
     }
     /// From the next record on.
     void set_depth(uint32_t depth) { depth_ = {true, depth}; }
-    void next_depth(uint32_t depths = 1) { depth_.value += depths; }
+    void next_depth(uint32_t depths) { depth_.value += depths; }
 
     template <class A, class B>
-    void settle(const A& a, const B& b) {
-        detail::settle_queues<<<1, 1, 0, stream_>>>(state_, a.counter, b.counter);
+    void fail_on_overflow(const Queue<A>& a, const Queue<B>& b) {
+        detail::fail_on_overflow<<<1, 1, 0, stream()>>>(state_, a.counter, b.counter);
     }
     template <class Item>
     void clear(const Queue<Item>& queue) {
-        detail::clear_queue<<<1, 1, 0, stream_>>>(queue.counter);
+        detail::clear_queue<<<1, 1, 0, stream()>>>(queue.counter);
     }
-    void finish_wave() { detail::finish_wave<<<1, 1, 0, stream_>>>(state_); }
+    void finish_wave() { detail::finish_wave<<<1, 1, 0, stream()>>>(state_); }
 
     /// While there are `least` items.
     template <class Item, class Body>
@@ -159,18 +135,19 @@ public:
             counted_ = queue.counter;
             body();
         };
-        const auto count = [&] { this->count(queue); };
-        if (capturing_) return capture_loop(queue.counter, least, count, counted_body);
-        for (count(); size_of(queue.counter) >= least; count()) counted_body();
+        if (graph_.active()) return capture_loop(queue, least, counted_body);
+        for (count(queue); size_of(queue.counter) >= least; count(queue)) counted_body();
     }
 
 private:
-    template <class Stage, class Item>
-    void launch_traces(const Stage& stage, const Queue<Item>& rays) {
-        const detail::Items items = prepare<MortonOrder>(stage, rays);
+    cudaStream_t stream() const { return graph_.stream(); }
+
+    template <class Stage>
+    void launch_traces(const Stage& stage) {
+        const detail::Items items = prepare<MortonOrder>(stage);
         with_tracer(stage, [&](auto set, const auto& tracer) {
             const auto kernel = detail::launch_trace<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
-            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream_>>>(stage, tracer, items);
+            kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream()>>>(stage, tracer, items);
         });
     }
     /// f(FeatureSet, tracer) with the set that tracing needs. Kernels are made only for sets that the stage's own
@@ -186,148 +163,98 @@ private:
         });
     }
 
-    /// What a launch over `queue` goes through, sorted if it is to be. A loop has counted its queue already when its
-    /// body begins with that queue.
-    template <class Order, class Stage, class Item>
-    detail::Items prepare(const Stage& stage, const Queue<Item>& queue) {
-        const bool counted = counted_ == queue.counter;
-        counted_ = nullptr;
-        if (!counted) count(queue);
+    /// What a launch over the items of `stage` goes through, sorted if it is to be. A loop has counted its queue already
+    /// when its body begins with that queue.
+    template <class Order, class Stage>
+    detail::Items prepare(const Stage& stage) {
+        const auto& queue = stage.items();
+        if (std::exchange(counted_, nullptr) != queue.counter) count(queue);
         const bool selected = queue.flags && order_.policy.compaction == Compaction::select;
-        detail::Items items = {
-            queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity, nullptr, nullptr, 0};
-        if constexpr (Ordered<Order, Item>) {
-            if (order_.policy.ordering == Order::kOrdering && queue.capacity > 0) {
-                const uint32_t bits = Order::bits(scene_);
-                const bool whole = queue.flags && !items.list;
-                const detail::SortSwitch choice = {
-                    capturing_ && !whole ? make_condition() : cudaGraphConditionalHandle{}, capturing_ && !whole};
-                const uint32_t last = (1u << bits) - 1;
-                if (queue.keys)
-                    detail::fill_keys<<<blocks(detail::fill_keys, kStageBlock), kStageBlock, 0, stream_>>>(
-                        queue.keys, items, uint16_t(last), choice);
-                else
-                    detail::make_keys<Order, Item>
-                        <<<blocks(detail::make_keys<Order, Item>, kStageBlock), kStageBlock, 0, stream_>>>(
-                            scene_, queue, items, last, order_.keys[0], choice);
-                if (whole)
-                    sort_places(order_, queue.keys, queue.capacity, bits, stream_);
-                else
-                    sort_as_many(queue, bits, choice);
-                (whole ? items.list : items.sorted) = order_.list[1];
-                if constexpr (detail::SkipsMisses<Stage>) {
-                    if (queue.keys && !whole && stage.skips_misses())
-                        items.keys = reinterpret_cast<const uint16_t*>(order_.keys[1]),
-                        items.end = uint16_t(MaterialOrder::of(scene_, kNone));
-                }
-            }
-        }
+        detail::Items items = {queue.counter,    selected ? order_.list[0] : nullptr, queue.flags, queue.capacity(),
+                               nullptr, nullptr, 0};
+        if constexpr (Ordered<Order, typename std::remove_cvref_t<decltype(queue)>::value_type>)
+            if (order_.policy.ordering == Order::kOrdering && queue.capacity() > 0) sort<Order>(stage, queue, items);
         return items;
+    }
+    template <class Order, class Stage, class Item>
+    void sort(const Stage& stage, const Queue<Item>& queue, detail::Items& items) {
+        const uint32_t bits = Order::bits(scene_), last = (1u << bits) - 1;
+        const bool whole = queue.flags && !items.list, switched = graph_.active() && !whole;
+        const detail::SortSwitch choice = {switched ? graph_.make_condition() : cudaGraphConditionalHandle{},
+                                           switched};
+        if (queue.keys) {
+            detail::fill_keys<<<blocks(detail::fill_keys, kStageBlock), kStageBlock, 0, stream()>>>(
+                queue.keys, items, uint16_t(last), choice);
+        } else {
+            const auto kernel = detail::make_keys<Order, Item>;
+            kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(scene_, queue, items, last,
+                                                                               order_.keys[0], choice);
+        }
+        if (whole)
+            sort_places(order_, queue.keys, queue.capacity(), bits, stream());
+        else
+            sort_as_many(queue, bits, choice);
+        (whole ? items.list : items.sorted) = order_.list[1];
+        if constexpr (detail::SkipsMisses<Stage>) {
+            if (!queue.keys || whole || !stage.skips_misses()) return;
+            items.keys = reinterpret_cast<const uint16_t*>(order_.keys[1]);
+            items.end = uint16_t(MaterialOrder::of(scene_, kNone));
+        }
     }
     /// Sorts no more places than hold the items. A graph has a sort for each of several sizes, since its launches are
     /// laid down before it is known.
     template <class Item>
     void sort_as_many(const Queue<Item>& queue, uint32_t bits, const detail::SortSwitch& sorts) {
         const auto sort = [&](uint32_t k) {
-            if (k < detail::kSortSizes) sort_places(order_, queue.keys, queue.capacity >> k, bits, stream_);
+            if (k < detail::kSortSizes) sort_places(order_, queue.keys, queue.capacity() >> k, bits, stream());
         };
-        if (capturing_)
-            capture_conditional(cudaGraphCondTypeSwitch, sorts.handle, detail::kSortSizes, sort);
+        if (graph_.active())
+            graph_.conditional(cudaGraphCondTypeSwitch, sorts.handle, detail::kSortSizes, sort);
         else
-            sort(detail::sort_choice(queue.capacity, size_of(queue.counter)));
+            sort(detail::sort_choice(queue.capacity(), size_of(queue.counter)));
     }
-    /// Has the counter of a queue of fixed places tell its size; compaction select makes the list too.
+    /// Has the counter of a queue by path tell its size; compaction select makes the list too.
     template <class Item>
     void count(const Queue<Item>& queue) {
-        if (!queue.flags || queue.capacity == 0) return;
+        if (!queue.flags || queue.capacity() == 0) return;
+        uint32_t* const n = &queue.counter->count;
         if (order_.policy.compaction == Compaction::select)
-            select_places(order_, queue.flags, queue.capacity, &queue.counter->count, stream_);
+            select_places(order_, queue.flags, queue.capacity(), n, stream());
         else
-            detail::count_items<<<blocks(detail::count_items, kStageBlock), kStageBlock, 0, stream_>>>(
-                queue.flags, queue.capacity, &queue.counter->count);
+            detail::count_items<<<blocks(detail::count_items, kStageBlock), kStageBlock, 0, stream()>>>(
+                queue.flags, queue.capacity(), n);
     }
-
-    template <class Count, class Body>
-    void capture_loop(const QueueCounter* counter, uint32_t least, Count count, Body body) {
-        const cudaGraphConditionalHandle again = make_condition();
-        // Set before every entry, since a loop inside of a loop is entered more than once.
-        count();
-        detail::repeat_while_any<<<1, 1, 0, stream_>>>(counter, least, again);
-        capture_conditional(cudaGraphCondTypeWhile, again, 1, [&](uint32_t) {
+    template <class Item, class Body>
+    void capture_loop(const Queue<Item>& queue, uint32_t least, Body body) {
+        const cudaGraphConditionalHandle again = graph_.make_condition();
+        const auto ask = [&] {
+            count(queue);
+            detail::repeat_while_any<<<1, 1, 0, stream()>>>(queue.counter, least, again);
+        };
+        ask();  // before every entry, since a loop inside of a loop is entered more than once
+        graph_.conditional(cudaGraphCondTypeWhile, again, 1, [&](uint32_t) {
             body();
-            count();
-            detail::repeat_while_any<<<1, 1, 0, stream_>>>(counter, least, again);
+            ask();
         });
-    }
-    cudaGraphConditionalHandle make_condition() const {
-        cudaGraphConditionalHandle handle{};
-        cuda_check(cudaGraphConditionalHandleCreate(&handle, captured().first, 0, cudaGraphCondAssignDefault),
-                   "conditional handle");
-        return handle;
-    }
-    /// `bodies` graphs, of which body(k) captures the k-th.
-    template <class Body>
-    void capture_conditional(cudaGraphConditionalNodeType type, cudaGraphConditionalHandle handle, uint32_t bodies,
-                             Body body) {
-        const auto [graph, dependencies] = captured();
-        cudaGraphNodeParams params = {};
-        params.type = cudaGraphNodeTypeConditional;
-        params.conditional.handle = handle;
-        params.conditional.type = type;
-        params.conditional.size = bodies;
-        cudaGraphNode_t node = nullptr;
-#if CUDART_VERSION >= 13000
-        cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), nullptr, dependencies.size(), &params),
-                   "conditional node");
-        cuda_check(cudaStreamUpdateCaptureDependencies(stream_, &node, nullptr, 1, cudaStreamSetCaptureDependencies),
-                   "conditional node");
-#else
-        cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), dependencies.size(), &params),
-                   "conditional node");
-        cuda_check(cudaStreamUpdateCaptureDependencies(stream_, &node, 1, cudaStreamSetCaptureDependencies),
-                   "conditional node");
-#endif
-
-        const cudaStream_t outer = stream_;
-        cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        for (uint32_t k = 0; k < bodies; ++k) {
-            cuda_check(cudaStreamBeginCaptureToGraph(stream_, params.conditional.phGraph_out[k], nullptr, nullptr, 0,
-                                                     cudaStreamCaptureModeThreadLocal),
-                       "begin of conditional capture");
-            body(k);
-            cuda_check(cudaStreamEndCapture(stream_, nullptr), "conditional capture");
-        }
-        cuda_check(cudaStreamDestroy(stream_), "stream");
-        stream_ = outer;
-    }
-
-    /// The graph that the stream is captured into, and the nodes that the next one depends on.
-    std::pair<cudaGraph_t, std::vector<cudaGraphNode_t>> captured() const {
-        cudaStreamCaptureStatus status;
-        cudaGraph_t graph = nullptr;
-        const cudaGraphNode_t* nodes = nullptr;
-        size_t count = 0;
-#if CUDART_VERSION >= 13000
-        cuda_check(cudaStreamGetCaptureInfo(stream_, &status, nullptr, &graph, &nodes, nullptr, &count),
-                   "graph capture");
-#else
-        cuda_check(cudaStreamGetCaptureInfo_v2(stream_, &status, nullptr, &graph, &nodes, &count), "graph capture");
-#endif
-        return {graph, {nodes, nodes + count}};
     }
 
     uint32_t size_of(const QueueCounter* counter) const {
         QueueCounter c;
-        cuda_check(cudaMemcpyAsync(&c, counter, sizeof(c), cudaMemcpyDeviceToHost, stream_), "queue size");
-        cuda_check(cudaStreamSynchronize(stream_), "queue size");
+        cuda_check(cudaMemcpyAsync(&c, counter, sizeof(c), cudaMemcpyDeviceToHost, stream()), "queue size");
+        cuda_check(cudaStreamSynchronize(stream()), "queue size");
         return c.size();
     }
-    void finish(StageId id, QueueCounter* counter, QueueCounter* out = nullptr, uint32_t slots = 0,
+    template <class Stage>
+    void finish(const Stage& stage, QueueCounter* counter, QueueCounter* out = nullptr, uint32_t slots = 0,
                 uint32_t samples = 0) {
-        cuda_check(cudaGetLastError(), kStageNames[uint32_t(id)]);
-        detail::finish_stage<<<1, 1, 0, stream_>>>(records_ + uint32_t(id), counter, out, slots, samples, depth_,
-                                                   state_, clock_);
+        cuda_check(cudaGetLastError(), Stage::kName);
+        detail::finish_stage<<<1, 1, 0, stream()>>>(stage.record, counter, out, slots, samples, depth_, state_,
+                                                    clock_);
         depth_ = {};
+    }
+    template <class Stage>
+    void finish_extend(const Stage& stage) {
+        finish(stage, stage.rays.counter, stage.hits.flags ? nullptr : stage.hits.counter);
     }
     /// As many blocks as can be resident.
     template <class Kernel>
@@ -338,20 +265,16 @@ private:
         return uint32_t(multiprocessors_ * (per_multiprocessor > 0 ? per_multiprocessor : 1));
     }
 
-    cudaStream_t stream_;
+    GraphCapture graph_;
     Features traced_;
     std::optional<PairTracer> pairs_;
     WaveState* state_;
-    StageRecord* records_;
     uint64_t* clock_;
     SceneView scene_;
     OrderMemory order_;
-    const QueueCounter* counted_ = nullptr;  ///< of the queue whose count and list are known before the next launch
+    const QueueCounter* counted_ = nullptr;  ///< of the queue whose size and list are known before the next launch
     int multiprocessors_ = 0;
-    bool capturing_ = false;
     detail::DepthChange depth_{};
 };
-
-using CudaExecutor = BasicCudaExecutor<false>;
 
 }  // namespace ambilux

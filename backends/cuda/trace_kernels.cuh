@@ -9,7 +9,7 @@
 #include "accel/cwbvh.h"
 #include "accel/pair_bvh.h"
 #include "backends/traversal_features.h"
-#include "queues/counter.h"
+#include "core/warp.h"
 
 namespace ambilux {
 
@@ -35,7 +35,7 @@ namespace detail {
 /// own, so that the rest can be in registers; its last entry holds the barycentrics of the nearest hit: few are found,
 /// and every register counts.
 template <bool AnyHit>
-struct CwbvhWalk {
+struct CwbvhCursor {
     using Entry = CwbvhGroup;
     static constexpr int kEntries = kCwbvhStackSize + 1;
     int top = 0;
@@ -81,7 +81,7 @@ struct CwbvhWalk {
 /// The same for a binary BVH: `at` is the reference to look at next, leaves are references too, of which primitives are
 /// taken from the front.
 template <bool AnyHit>
-struct PairWalk {
+struct PairCursor {
     using Entry = uint32_t;
     static constexpr int kEntries = kPairStackSize + 2;
     int top = 0;
@@ -134,15 +134,15 @@ struct PairWalk {
 };
 
 template <class Tracer, bool AnyHit>
-using Walk = std::conditional_t<std::is_same_v<Tracer, PairTracer>, PairWalk<AnyHit>, CwbvhWalk<AnyHit>>;
+using Walk = std::conditional_t<std::is_same_v<Tracer, PairTracer>, PairCursor<AnyHit>, CwbvhCursor<AnyHit>>;
 
-/// Items that a warp has taken and not begun.
+/// Items that a warp has claimed and not begun.
 struct WarpItems {
     uint32_t begin = 0, end = 0;
 
     /// The next item of each of the lanes `idle`, which may lie past the last of all, from `*counter` on if none are
     /// left: then `stretch` of them, at least 32. The whole warp calls it.
-    __device__ uint32_t take(uint32_t idle, uint32_t* counter, uint32_t stretch) {
+    __device__ uint32_t claim(uint32_t idle, uint32_t* counter, uint32_t stretch) {
         const uint32_t wanted = uint32_t(__popc(idle)), kept = end - begin, rank = lane_rank(idle);
         uint32_t fresh = begin;
         if (wanted > kept) {
@@ -189,7 +189,7 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
                 index = kNone;
             }
             if (drained) return;
-            const uint32_t next = rays.take(idle, next_ray, stretch);
+            const uint32_t next = rays.claim(idle, next_ray, stretch);
             drained = rays.begin >= ray_count;
             if (done && next < ray_count && fetch(next, ray)) {
                 if (is_traceable(ray)) {

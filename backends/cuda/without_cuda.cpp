@@ -29,8 +29,8 @@ std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const P
     throw not_built();
 }
 
-std::vector<QueueTiming> time_queues_on_device(const Scene&, uint32_t, const std::vector<HitItem>&,
-                                               const std::vector<RayItem>&, int, int) {
+std::vector<QueueTiming> time_queues_on_device(const Scene&, uint32_t, const std::vector<PathHit>&,
+                                               const std::vector<PathRay>&, int, int) {
     throw not_built();
 }
 

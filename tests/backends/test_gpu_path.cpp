@@ -234,7 +234,7 @@ TEST_CASE("by default a device sorts hits by material where there are several ty
     for (const auto& [name, ordering] : {std::pair{"cornell", Ordering::none}, {"materials", Ordering::material}}) {
         const Scene scene = project_scene(name, 32, 32);
         const QueuePolicy used =
-            render_scene(scene, on("cuda", cpu_settings(scene, Estimator::mis)), 1).stats.queue_policy;
+            render_scene(scene, on("cuda", cpu_settings(scene, Estimator::mis)), 1).stats.settings.queues;
         CHECK(used.compaction == Compaction::atomic);
         CHECK(used.ordering == ordering);
     }

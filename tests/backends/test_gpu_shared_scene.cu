@@ -67,10 +67,10 @@ TEST_CASE("what is chosen on a device renders as if its settings had been given,
         s.integrator = "bdpt";
         s.automatic = true;
         const RenderResult chosen = render_scene(scene, s, 4);
-        const ChoiceStats& choice = chosen.stats.choice;
+        const SelectionStats& choice = chosen.stats.choice;
         INFO(name << ": " << choice.name);
         REQUIRE_FALSE(choice.name.empty());
-        for (const ChoiceStats::Candidate& c : choice.candidates)
+        for (const SelectionStats::Candidate& c : choice.candidates)
             CHECK(c.seconds == 0);  // their work tells more than short waves would
         s.automatic = false;
         for (const auto& [key, value] : choice.settings) apply_setting(s, key, value);

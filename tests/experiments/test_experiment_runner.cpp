@@ -316,7 +316,7 @@ TEST_CASE("a resumed render goes on with what its first part chose, and choosing
             s.choice = choice;
             return s;
         }
-        ChoiceStats choice;
+        SelectionStats choice;
     };
     World world;
     Hooks hooks = fake_hooks(world);

@@ -202,7 +202,7 @@ TEST_CASE("bounds hold every surface and the camera; an empty scene has a radius
     finalize_scene(s, LightPicking::power);
     const auto inside = [&](Vec3f p) { return length(p - s.bounds_center) <= s.bounds_radius; };
     CHECK(inside({0, 0, -20}));
-    for (const Vertex& v : s.vertices) CHECK(inside(v.p));
+    for (const MeshVertex& v : s.vertices) CHECK(inside(v.p));
     for (uint32_t i = 0; i < 1000; ++i) {
         const Vec4f u = random_floats({1, i, 0, Stream::test}, 0);
         const Vec3f d = square_to_sphere({u.x, u.y});

@@ -127,7 +127,7 @@ TEST_CASE("what is chosen renders as if its settings had been given: the pilot l
         const Scene scene = project_scene(name, 40, 30);
         const RenderSettings s = automatic_settings(scene, 5);
         const RenderResult chosen = render_scene(scene, s, 4);
-        const ChoiceStats& choice = chosen.stats.choice;
+        const SelectionStats& choice = chosen.stats.choice;
         INFO(name << ": " << choice.name);
         REQUIRE_FALSE(choice.name.empty());
         CHECK(choice.seconds > 0);
@@ -193,7 +193,7 @@ TEST_CASE("the error is predicted for the samples that the render will take") {
     for (const uint64_t samples : {64u, 2000u}) {
         s = automatic_settings(scene);
         s.expected_samples = samples;
-        const ChoiceStats choice = make_renderer(scene, s)->stats().choice;
+        const SelectionStats choice = make_renderer(scene, s)->stats().choice;
         INFO(samples << " samples: " << choice.name);
         REQUIRE(choice.candidates[0].name == "path");
         CHECK(choice.expected_samples == double(samples));
@@ -210,9 +210,9 @@ TEST_CASE(
         RenderSettings s = automatic_settings(*scene, seed);
         s.deterministic = true;
         s.expected_samples = 100;
-        const ChoiceStats few = make_renderer(*scene, s)->stats().choice;
+        const SelectionStats few = make_renderer(*scene, s)->stats().choice;
         s.expected_samples = 20000;
-        const ChoiceStats many = make_renderer(*scene, s)->stats().choice;
+        const SelectionStats many = make_renderer(*scene, s)->stats().choice;
         INFO("seed " << seed << ": " << few.name << ", " << many.name);
         CHECK(few.candidates[0].efficiency > 0.6);
         // Equal time: 0.19 on an H200 at 640x360 (docs/performance.md).
@@ -226,7 +226,7 @@ TEST_CASE("a candidate that cannot find some of the light is never chosen") {
                                                          "<emitter type='point'><point name='position' x='0.5' y='0.2' "
                                                          "z='3'/><rgb name='intensity' value='5,5,5'/></emitter>"));
     RenderSettings s = automatic_settings(scene);
-    const ChoiceStats choice = make_renderer(scene, s)->stats().choice;
+    const SelectionStats choice = make_renderer(scene, s)->stats().choice;
     REQUIRE(choice.candidates[0].name == "path");
     CHECK(std::isinf(choice.candidates[0].variance));
     CHECK(choice.candidates[0].efficiency == 0);
@@ -237,11 +237,11 @@ TEST_CASE("the choice repeats: it depends on the seed, and on clocks only where 
     const Scene scene = project_scene("materials", 40, 30);
     RenderSettings s = automatic_settings(scene, 3);
     s.deterministic = true;
-    const ChoiceStats a = make_renderer(scene, s)->stats().choice, b = make_renderer(scene, s)->stats().choice;
+    const SelectionStats a = make_renderer(scene, s)->stats().choice, b = make_renderer(scene, s)->stats().choice;
     s.accel = "cwbvh";
-    const ChoiceStats other_rays = make_renderer(scene, s)->stats().choice;
+    const SelectionStats other_rays = make_renderer(scene, s)->stats().choice;
     s.seed = 4;
-    const ChoiceStats other_seed = make_renderer(scene, s)->stats().choice;
+    const SelectionStats other_seed = make_renderer(scene, s)->stats().choice;
     CHECK(a.name == b.name);
     for (size_t c = 0; c < a.candidates.size(); ++c) {
         CHECK(a.candidates[c].variance == b.candidates[c].variance);
@@ -284,10 +284,10 @@ TEST_CASE("a path tracer that renders while the pilot runs makes room for a cand
                 return std::make_unique<Counted>(make_renderer(scene, chosen), living);
             };
             const auto renderer = make_automatic(scene, s, true, accels, make);
-            const ChoiceStats choice = renderer->stats().choice;
+            const SelectionStats choice = renderer->stats().choice;
             INFO(name << (small ? ", small: " : ", large: ") << choice.name << ", ready " << renderer->ready());
             const bool timed = std::any_of(choice.candidates.begin(), choice.candidates.end(),
-                                           [](const ChoiceStats::Candidate& c) { return c.seconds > 0; });
+                                           [](const SelectionStats::Candidate& c) { return c.seconds > 0; });
             some_timed |= timed;
             CHECK(living == 1);
             CHECK(refused == (small && timed ? 1 : 0));
@@ -317,7 +317,7 @@ TEST_CASE("what a device has no room for is not chosen: the next best runs") {
         return make_renderer(scene, chosen);
     };
     const auto renderer = make_automatic(scene, s, true, accels, make);
-    const ChoiceStats choice = renderer->stats().choice;
+    const SelectionStats choice = renderer->stats().choice;
     INFO(choice.name);
     CHECK(refused > 0);
     CHECK(choice.name.find("lvc") == std::string::npos);

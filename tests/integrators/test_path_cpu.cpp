@@ -296,7 +296,7 @@ TEST_CASE("Where items lie and in which order stages go through them changes no 
 
 TEST_CASE("By default queues of the CPU are appended to and gone through as they are", "[path]") {
     const Scene scene = small_scene("materials");
-    const QueuePolicy used = render_scene(scene, settings_of(scene), 1).stats.queue_policy;
+    const QueuePolicy used = render_scene(scene, settings_of(scene), 1).stats.settings.queues;
     CHECK(used.compaction == Compaction::atomic);
     CHECK(used.ordering == Ordering::none);
 }

@@ -1,0 +1,52 @@
+// How the kernels of stages are compiled: blocks of kStageBlock threads that are to be resident on a multiprocessor, so
+// many registers less for a thread, measured on an H200 (docs/performance.md).
+#pragma once
+
+#include "stages/connect_vertices.h"
+#include "stages/eye_vertex.h"
+#include "stages/light_vertex.h"
+#include "stages/megakernel.h"
+#include "stages/streaming.h"
+
+namespace ambilux {
+
+constexpr uint32_t kStageBlock = 128;
+
+/// 1 leaves registers to the compiler. kGathers: hits are in no order, and misses of no use.
+template <class Stage>
+struct LaunchTraits {
+    static constexpr uint32_t kBlocksPerSm = 1;
+    static constexpr bool kGathers = false;
+};
+
+template <uint32_t kBlocks, bool kGathersHits = false>
+struct BlocksPerSm {
+    static constexpr uint32_t kBlocksPerSm = kBlocks;
+    static constexpr bool kGathers = kGathersHits;
+};
+
+constexpr bool is_diffuse(Features f) { return f.bsdfs == bit(BsdfType::diffuse); }
+constexpr bool needs_no_misses(Features f) { return !f.several_bsdfs() && !f.has_environment(); }
+
+template <Features F, class EmissionOut, class AtVertex>
+struct LaunchTraits<EyeVertex<F, UnidirectionalMis, EmissionOut, AtVertex>>
+    : BlocksPerSm<is_diffuse(F) ? 6 : F.textures ? 4 : 5, needs_no_misses(F)> {};
+template <Features F, class EmissionOut, class AtVertex>
+struct LaunchTraits<EyeVertex<F, BidirectionalMis, EmissionOut, AtVertex>>
+    : BlocksPerSm<is_diffuse(F) ? 5 : 4, needs_no_misses(F)> {};
+template <Features F, class AtVertex>
+struct LaunchTraits<LightVertex<F, AtVertex>> : BlocksPerSm<is_diffuse(F) ? 5 : 4> {};
+template <Features F, class Out>
+struct LaunchTraits<ConnectVertices<F, Out>> : BlocksPerSm<is_diffuse(F) ? 7 : 4> {};
+template <Features F, class Tracer, class Shadows>
+struct LaunchTraits<ConnectAndOcclude<F, Tracer, Shadows>> : BlocksPerSm<8> {};
+template <Features F, class EmissionOut>
+struct LaunchTraits<StreamEyeVertex<F, EmissionOut>> : BlocksPerSm<is_diffuse(F) ? 5 : 4> {};
+template <Features F>
+struct LaunchTraits<StreamLightVertex<F>> : BlocksPerSm<is_diffuse(F) ? 5 : 4> {};
+template <Features F, class Out>
+struct LaunchTraits<StreamConnect<F, Out>> : BlocksPerSm<is_diffuse(F) ? 7 : 4> {};
+template <Features F, class Tracer>
+struct LaunchTraits<Megakernel<F, Tracer>> : BlocksPerSm<4> {};
+
+}  // namespace ambilux

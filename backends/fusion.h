@@ -1,0 +1,18 @@
+// Which stages a backend runs as parts of others: all that it decides of a schedule.
+#pragma once
+
+#include "stages/stage.h"
+
+namespace ambilux {
+
+/// fuse=none: every stage is a kernel with a queue, for ablation. With kernels that hold all features only.
+constexpr Fusion kNoFusion = {};
+/// A device traces shadow rays in persistent kernels, and camera rays as soon as they are made.
+constexpr Fusion kDeviceFusion = {.weigh = true, .connect = true, .occlude = false, .generate = true};
+/// A host traces shadow rays in the stage that made them: nothing waits there for many items.
+constexpr Fusion kHostFusion = {.weigh = true, .connect = true, .occlude = true, .generate = false};
+/// But next event estimation of a path tracer waits for the tables of environments, which it can ask for ahead only as a
+/// stage of its own.
+constexpr Fusion kHostPathFusion = {.weigh = true, .connect = false, .occlude = false, .generate = false};
+
+}  // namespace ambilux

@@ -1,0 +1,22 @@
+# instantiate(TARGET): a translation unit for each family of integrators, level of features and backend, so that they
+# compile side by side and a change of one rebuilds its own.
+set(AMBILUX_FAMILIES path:PathFamily bdpt:BdptFamily)
+set(AMBILUX_LEVELS Diffuse Untextured Triangle Masked All)
+
+function(instantiate target)
+  foreach(entry ${AMBILUX_FAMILIES})
+    string(REPLACE ":" ";" parts ${entry})
+    list(GET parts 0 FAMILY_NAME)
+    list(GET parts 1 FAMILY)
+    foreach(level ${AMBILUX_LEVELS})
+      set(LEVEL k${level}Features)
+      set(stem ${CMAKE_CURRENT_BINARY_DIR}/${FAMILY_NAME}_${level})
+      configure_file(${PROJECT_SOURCE_DIR}/cmake/renderer_cpu.cpp.in ${stem}.cpp @ONLY)
+      target_sources(${target} PRIVATE ${stem}.cpp)
+      if(AMBILUX_HAS_CUDA)
+        configure_file(${PROJECT_SOURCE_DIR}/cmake/renderer_cuda.cu.in ${stem}_cuda.cu @ONLY)
+        target_sources(${target} PRIVATE ${stem}_cuda.cu)
+      endif()
+    endforeach()
+  endforeach()
+endfunction()

@@ -1,0 +1,47 @@
+// Sums that threads of a device add to together. On a host they belong to one thread unless a function says otherwise.
+#pragma once
+
+#include <cstdint>
+
+#include "core/vec.h"
+
+namespace ambilux {
+
+/// Less than 0: subtracts.
+AMBILUX_HD void add_count(uint64_t* counter, int64_t n) {
+#if defined(__CUDA_ARCH__)
+    atomicAdd(reinterpret_cast<unsigned long long*>(counter), static_cast<unsigned long long>(n));
+#else
+    *counter += uint64_t(n);
+#endif
+}
+
+/// Threads of a host may share `sum` too. Returns what it was.
+AMBILUX_HD int64_t fetch_add_shared(int64_t* sum, int64_t value) {
+#if defined(__CUDA_ARCH__)
+    return static_cast<int64_t>(
+        atomicAdd(reinterpret_cast<unsigned long long*>(sum), static_cast<unsigned long long>(value)));
+#else
+    return __atomic_fetch_add(sum, value, __ATOMIC_RELAXED);
+#endif
+}
+
+/// Adds to the first three of four floats, aligned to 16 bytes.
+AMBILUX_HD void add_rgb(float* sum, Rgb value) {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+    atomicAdd(reinterpret_cast<float4*>(sum), make_float4(value.x, value.y, value.z, 0.0f));
+#elif defined(__CUDA_ARCH__)
+    for (int k = 0; k < 3; ++k) atomicAdd(sum + k, value[k]);
+#else
+    for (int k = 0; k < 3; ++k) sum[k] += value[k];
+#endif
+}
+
+/// Asks a device for the cache line at `address`, which will be needed soon.
+AMBILUX_HD void prefetch_line([[maybe_unused]] const void* address) {
+#if defined(__CUDA_ARCH__)
+    asm volatile("prefetch.global.L2 [%0];" ::"l"(address));
+#endif
+}
+
+}  // namespace ambilux

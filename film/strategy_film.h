@@ -1,0 +1,45 @@
+// Images of single strategies (s,t), raw and weighted (Veach 1997, figures 10.2 and 10.3). They are gathered beside the
+// image and change nothing in it.
+#pragma once
+
+#include "film/fixed_point.h"
+#include "queues/wave.h"
+#include "transport/mis/strategy.h"
+
+namespace ambilux {
+
+/// Deepest paths of which images can be asked for.
+constexpr uint32_t kMaxStrategyDepth = 16;
+
+struct StrategyFilm {
+    int64_t* sums = nullptr;      ///< per strategy: raw image, weighted image (kLightUnit). Null: nothing is recorded
+    uint64_t* dropped = nullptr;  ///< per strategy: values that were not finite or too large to be added
+    Lane* raw = nullptr;          ///< per slot: the unweighted value in flight and its strategy
+    uint32_t max_depth = 0;
+
+    /// Notes what a slot's candidate is worth without its weight; a slot has one candidate at a time.
+    AMBILUX_HD void remember(uint32_t slot, Rgb value, Strategy strategy) const {
+        if (!sums) return;
+        const uint32_t words[4] = {float_bits(value.x), float_bits(value.y), float_bits(value.z), strategy.code};
+        memcpy(&raw[slot], words, sizeof(words));
+    }
+    /// What the slot's candidate is worth lacked this factor.
+    AMBILUX_HD void scale(uint32_t slot, Rgb factor) const {
+        if (sums) remember(slot, start_of<Rgb>(raw[slot]) * factor, {raw[slot].word[3]});
+    }
+    /// The slot's candidate arrived, worth `weighted` with its weight.
+    AMBILUX_HD void arrive(const Wave& wave, uint32_t slot, Rgb weighted) const {
+        if (sums) add(wave, {raw[slot].word[3]}, wave.locate(slot).pixel, start_of<Rgb>(raw[slot]), weighted);
+    }
+    AMBILUX_HD void add(const Wave& wave, Strategy strategy, uint32_t pixel, Rgb value, Rgb weighted) const {
+        if (!sums || strategy.segments() > max_depth) return;
+        const uint64_t image = uint64_t(wave.width) * wave.height * 3;
+        const uint32_t index = strategy_index(strategy);
+        int64_t* at = sums + 2 * index * image + uint64_t(pixel) * 3;
+        const bool finite = is_finite(value) && is_finite(weighted);
+        if (finite && add_light(at, value) && add_light(at + image, weighted)) return;
+        fetch_add_shared(reinterpret_cast<int64_t*>(dropped + index), 1);  // tasks of the host share these counters
+    }
+};
+
+}  // namespace ambilux

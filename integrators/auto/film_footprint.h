@@ -1,0 +1,55 @@
+// What a splat counts for on the film of a pilot.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "transport/sensor/filter.h"
+
+namespace ambilux {
+
+/// Mean over places on the film of the sum of squares of what a splat counts for its pixels.
+inline float filter_energy(const SceneView& scene) {
+    constexpr int kSteps = 64;
+    const float r = scene.sensor.filter_radius;
+    double sum = 0;
+    for (int y = 0; y < kSteps; ++y)
+        for (int x = 0; x < kSteps; ++x) {
+            const float value = filter_value(scene, {r * (2.0f * (float(x) + 0.5f) / kSteps - 1.0f),
+                                                     r * (2.0f * (float(y) + 0.5f) / kSteps - 1.0f)});
+            sum += double(value) * double(value);
+        }
+    return float(std::min(1.0, sum * 4.0 * double(r) * double(r) / (kSteps * kSteps)));
+}
+
+/// Sum of the filters of the film's pixels at a place; less than one along the edges.
+inline float filter_coverage(const SceneView& scene, Vec2f film) {
+    const Sensor& s = scene.sensor;
+    const float x = film.x - float(s.crop_x), y = film.y - float(s.crop_y), r = s.filter_radius;
+    if (x >= r && y >= r && x <= float(s.crop_width) - r && y <= float(s.crop_height) - r) return 1.0f;
+    float sum = 0.0f;
+    for (float py = max(0.0f, ceilf(y - r - 0.5f)); py <= y + r - 0.5f && py < float(s.crop_height); py += 1.0f)
+        for (float px = max(0.0f, ceilf(x - r - 0.5f)); px <= x + r - 0.5f && px < float(s.crop_width); px += 1.0f)
+            sum += filter_value(scene, {x - (px + 0.5f), y - (py + 0.5f)});
+    return min(sum, 1.0f);
+}
+
+/// The film in blocks of about as many pixels each.
+struct FilmBlocks {
+    uint32_t x = 0, y = 0;
+
+    uint32_t count() const { return x * y; }
+    uint32_t at(const Sensor& s, Vec2f film) const {
+        const auto index = [](float position, uint32_t pixels, uint32_t blocks) {
+            return uint32_t(
+                std::clamp(int64_t(std::floor(double(position) * blocks / pixels)), int64_t(0), int64_t(blocks) - 1));
+        };
+        return index(film.y - float(s.crop_y), s.crop_height, y) * x + index(film.x - float(s.crop_x), s.crop_width, x);
+    }
+    /// First pixel of a column or row of blocks.
+    static uint32_t edge(uint32_t block, uint32_t pixels, uint32_t blocks) {
+        return uint32_t(uint64_t(block) * pixels / blocks);
+    }
+};
+
+}  // namespace ambilux

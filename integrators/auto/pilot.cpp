@@ -1,0 +1,385 @@
+#include "integrators/auto/pilot.h"
+
+#include <algorithm>
+#include <array>
+
+#include "accel/host_tracer.h"
+#include "core/parallel.h"
+#include "integrators/auto/film_footprint.h"
+#include "integrators/auto/pilot_mis.h"
+#include "integrators/auto/variance_prediction.h"
+#include "integrators/bdpt/shared/policy.h"
+#include "integrators/feature_levels.h"
+#include "stages/generate.h"
+#include "transport/subpath/connection.h"
+#include "transport/subpath/next_event.h"
+#include "transport/subpath/visit.h"
+
+namespace ambilux {
+namespace {
+
+/// Samples of one pixel: their products estimate its squared mean.
+constexpr uint32_t kPixelSamples = 4;
+constexpr uint32_t kMostBlocks = 32;    ///< a side
+constexpr uint32_t kSmallestBlock = 4;  ///< pixels
+constexpr uint32_t kSubpathsPerTask = 32;
+
+using PilotSubpath = Subpath<PilotMis>;
+using PilotVertex = SubpathEnd<PilotMis>;
+using PilotCandidatePath = Candidate<PilotMis>;
+
+/// From the ratios of each set; `own`: the first set that has the strategy itself.
+PilotShares shares_of(const PilotMis::Ratio& ratio, uint32_t own) {
+    float sum[PilotMis::kSets];
+    for (uint32_t m = 0; m < PilotMis::kSets; ++m) sum[m] = ratio.of[m] + (m >= own ? 1.0f : 0.0f);
+    return {sum[0], std::max(0.0f, sum[1] - sum[0]), std::max(0.0f, sum[2] - sum[1])};
+}
+
+struct LightTask {
+    std::vector<PilotVertex> vertices;
+    std::vector<uint32_t> ends;  ///< of the subpaths' vertices
+    std::vector<PilotSplat> splats;
+    double rays = 0, splat_rays = 0;
+};
+
+/// What the eye subpath of one sample brings to a candidate. The product of `first` and `second` without `own` is what
+/// contributions of one sample have in common.
+struct EyeSums {
+    double first[3] = {},
+           second[3] = {};  ///< with the first and the second draw of every vertex; the same for paired subpaths
+    double own[3] = {};     ///< products of contributions with themselves
+
+    /// `share`: of the product that belongs to single contributions.
+    void add(Rgb a, Rgb b, double share) {
+        for (int k = 0; k < 3; ++k) {
+            first[k] += double(a[k]);
+            second[k] += double(b[k]);
+            own[k] += double(a[k]) * double(b[k]) * share;
+        }
+    }
+};
+
+/// An eye subpath and where its results go.
+struct Eye {
+    uint32_t number;
+    Draws draws;
+    PilotSums& pixel;
+    PilotWork& work;
+    EyeSums sums[kMostCandidates];
+};
+
+template <Features F>
+class PilotRun {
+public:
+    PilotRun(const Scene& scene, const RenderSettings& settings, bool cuda, const HostTracer& tracer,
+             const std::vector<PilotCandidate>& candidates, uint32_t samples)
+        : view_(scene.view()), settings_(settings), cuda_(cuda), tracer_(tracer), moments_{candidates} {
+        set_rules(scene);
+        const Sensor& sensor = view_.sensor;
+        const auto blocks = [](uint32_t pixels) { return std::clamp(pixels / kSmallestBlock, 1u, kMostBlocks); };
+        blocks_ = {blocks(sensor.crop_width), blocks(sensor.crop_height)};
+        result_.blocks_x = blocks_.x;
+        result_.blocks_y = blocks_.y;
+        pixels_ = std::max(1u, (samples / kPixelSamples + blocks_.count() / 2) / blocks_.count());
+        result_.samples = moments_.samples = blocks_.count() * pixels_ * kPixelSamples;
+        moments_.filter_energy = filter_energy(view_);
+        delta_emitters_ = std::any_of(scene.emitters.begin(), scene.emitters.end(),
+                                      [](const Emitter& e) { return is_delta(e.type); });
+    }
+
+    Pilot run() {
+        const uint32_t count = blocks_.count();
+        const double n = result_.samples;
+        tasks_.resize((result_.samples + kSubpathsPerTask - 1) / kSubpathsPerTask);
+        if (rules_.splat || rules_.connect)
+            parallel_for(uint32_t(tasks_.size()), [&](uint32_t t) {
+                for (uint32_t i = t * kSubpathsPerTask; i < std::min((t + 1) * kSubpathsPerTask, result_.samples); ++i) {
+                    light_subpath(i, tasks_[t]);
+                    tasks_[t].ends.push_back(uint32_t(tasks_[t].vertices.size()));
+                }
+            });
+        gather();
+        std::vector<PilotSums> pixels(size_t(count) * pixels_);
+        std::vector<PilotWork> work(count);
+        parallel_for(count, [&](uint32_t b) { eye_block(b, &pixels[size_t(b) * pixels_], work[b]); });
+        for (const PilotWork& w : work) {
+            PilotWork& all = result_.work;
+            all.eye_rays += w.eye_rays / n;
+            all.next_events += w.next_events / n;
+            all.vertices += w.vertices / n;
+            all.pairs += w.pairs / n;
+            all.pair_rays += w.pair_rays / n;
+            all.draws += w.draws / n;
+            all.draw_rays += w.draw_rays / n;
+        }
+        result_.light_vertices = double(vertices_.size()) / n;
+        result_.expected_samples = expected_samples(
+            settings_, result_.work, uint64_t(view_.sensor.crop_width) * view_.sensor.crop_height, cuda_);
+        predict_variances(moments_,
+                          {pixels, splats_, pixels_, kPixelSamples, delta_emitters_, result_.expected_samples},
+                          result_);
+        return result_;
+    }
+
+private:
+    /// Those of bdpt with all strategies, whatever the render uses.
+    void set_rules(const Scene& scene) {
+        RenderSettings all = settings_;
+        all.integrator = "bdpt";
+        all.variant = "wavefront";
+        all.heuristic = MisHeuristic::balance;
+        all.strategies = kAllStrategies;
+        all.singles = {};
+        const Rules<BidirectionalMis> r = plan_bdpt(scene, all).rules;
+        rules_ = {PilotMis(r.mis), r.max_depth,           r.rr_depth,   r.hide_emitters,
+                  r.count_hits,    r.count_environment, r.next_event, r.splat,
+                  r.connect,       r.background_only,   r.singles};
+    }
+
+    static bool counts(Rgb value) { return is_finite(value) && min_component(value) >= 0.0f && !is_zero(value); }
+
+    bool closest(const PilotSubpath& path, float tmax, const Draws& draws, Hit& hit) const {
+        const uint32_t seed = F.opacity ? draws.opacity_seed(path.depth) : 0;
+        return tracer_.closest<F>(view_, Ray{path.origin, tmax, path.direction, seed}, hit);
+    }
+    bool is_free(const PilotCandidatePath& c, const Draws& draws, uint32_t which) const {
+        if (!is_finite(c.origin) || !is_finite(c.direction)) return false;
+        const uint32_t seed = F.opacity ? draws.shadow_seed(which) : 0;
+        return !tracer_.occluded<F>(view_, Ray{c.origin, c.tmax, c.direction, seed});
+    }
+
+    // ---- light subpaths ----
+
+    void splat(LightTask& task, const PilotCandidatePath& c, const Draws& draws, uint32_t which, Rgb emitted) const {
+        if (!counts(c.value)) return;
+        task.splat_rays += 1;
+        if (is_free(c, draws, which))
+            task.splats.push_back({{c.value, shares_of(c.ratio, 1), filter_coverage(view_, c.film)},
+                                   blocks_.at(view_.sensor, c.film),
+                                   which == 0,
+                                   emitted});
+    }
+
+    struct LightSink {
+        const PilotRun& pilot;
+        LightTask& task;
+        const Draws& draws;
+        Rgb emitted;
+
+        void add(const PilotCandidatePath&) const {}
+        void at(const Vertex<PilotMis>& y, const PilotSubpath& path) const {
+            const Vec4f u = draws.lens(path.depth);
+            PilotCandidatePath c;
+            if (camera_connection<F>(pilot.view_, pilot.rules_, y, path.throughput, path.depth, {u.x, u.y}, c))
+                pilot.splat(task, c, draws, path.depth, emitted);
+            if (pilot.rules_.connect && path.depth + 2 <= pilot.rules_.max_depth)
+                task.vertices.push_back({y, path.throughput, path.depth});
+        }
+        bool valid(Rgb throughput) const { return is_finite(throughput) && min_component(throughput) >= 0.0f; }
+    };
+
+    void light_subpath(uint32_t i, LightTask& task) const {
+        const Draws draws = {{settings_.seed, i, 2, Stream::pilot}};
+        EmissionSample e;
+        if (!sample_start<F>(view_, draws, e)) return;
+        const Vec4f u = draws.emission_direction();
+        PilotCandidatePath c;
+        if (visible_emitter(view_, rules_, e, {u.z, u.w}, c)) splat(task, c, draws, 0, e.radiance);
+        PilotSubpath path = start_light(rules_.mis, e);
+        if (rules_.max_depth < 2 || !is_finite(path.throughput)) return;
+        Hit hit;
+        do {
+            task.rays += 1;
+            closest(path, kInfinity, draws, hit);
+        } while (visit<F>(view_, rules_, draws, Side::light, rules_.longest(Side::light), hit, path,
+                          LightSink{*this, task, draws, e.radiance}));
+    }
+
+    /// Vertices and splats stay where they are: they are large.
+    void gather() {
+        first_.reserve(result_.samples + 1);
+        first_.push_back(0);
+        for (const LightTask& t : tasks_) {
+            for (const uint32_t end : t.ends) first_.push_back(uint32_t(vertices_.size()) + end);
+            for (const PilotVertex& v : t.vertices) vertices_.push_back(&v);
+            for (const PilotSplat& e : t.splats) splats_.push_back(&e);
+            result_.work.light_rays += t.rays / result_.samples;
+            result_.work.splats += t.splat_rays / result_.samples;
+        }
+        first_.resize(result_.samples + 1, uint32_t(vertices_.size()));
+        moments_.light_vertices = vertices_.size();
+    }
+
+    // ---- eye subpaths ----
+
+    /// The pilot's pixels of a block, with all but (18) of the variance (equation 19).
+    void eye_block(uint32_t b, PilotSums* pixels, PilotWork& work) const {
+        const Sensor& sensor = view_.sensor;
+        const uint32_t bx = b % blocks_.x, by = b / blocks_.x;
+        const uint32_t x0 = FilmBlocks::edge(bx, sensor.crop_width, blocks_.x),
+                       x1 = FilmBlocks::edge(bx + 1, sensor.crop_width, blocks_.x);
+        const uint32_t y0 = FilmBlocks::edge(by, sensor.crop_height, blocks_.y),
+                       y1 = FilmBlocks::edge(by + 1, sensor.crop_height, blocks_.y);
+        for (uint32_t p = 0; p < pixels_; ++p) {
+            const uint32_t first = (b * pixels_ + p) * kPixelSamples;
+            const Uint4 place = random_bits({settings_.seed, first, 3, Stream::pilot}, 0);
+            const uint32_t x = x0 + mul_hi(place.x, x1 - x0), y = y0 + mul_hi(place.y, y1 - y0);
+            double sum[kMostCandidates][3] = {}, squares[kMostCandidates][3] = {};
+            for (uint32_t s = 0; s < kPixelSamples; ++s) {
+                Eye eye{first + s, {{settings_.seed, first + s, 1, Stream::pilot}}, pixels[p], work, {}};
+                eye_subpath(eye, x, y);
+                for (uint32_t c = 0; c < moments_.candidates.size(); ++c)
+                    for (int k = 0; k < 3; ++k) {
+                        const EyeSums& e = eye.sums[c];
+                        pixels[p].variance[c][k] += e.first[k] * e.second[k] - e.own[k];
+                        const double value = 0.5 * (e.first[k] + e.second[k]);
+                        sum[c][k] += value;
+                        squares[c][k] += value * value;
+                    }
+            }
+            // Products of different samples: the squared mean, without bias.
+            for (uint32_t c = 0; c < moments_.candidates.size(); ++c)
+                for (int k = 0; k < 3; ++k)
+                    pixels[p].variance[c][k] -= (sum[c][k] * sum[c][k] - squares[c][k]) / (kPixelSamples - 1);
+        }
+    }
+
+    /// A hit or a sample of next event estimation.
+    void found(Eye& eye, const PilotEvent& e) const {
+        moments_.add(e, eye.pixel);
+        for (uint32_t c = 0; c < moments_.candidates.size(); ++c) {
+            const Rgb value = e.value * (1.0f / moments_.sum_of(c, e.shares));
+            eye.sums[c].add(value, value, 1.0);
+        }
+    }
+
+    struct EyeSink {
+        const PilotRun& pilot;
+        Eye& eye;
+
+        void add(const PilotCandidatePath& c) const {
+            if (!counts(c.value)) return;
+            if (c.strategy.segments() == 1)
+                for (int k = 0; k < 3; ++k) eye.pixel.seen[k] = std::max(eye.pixel.seen[k], double(c.value[k]));
+            pilot.found(eye, {c.value, shares_of(c.ratio, 0)});
+        }
+        void at(const Vertex<PilotMis>& z, const PilotSubpath& path) const {
+            const PilotVertex end = {z, path.throughput, path.depth};
+            pilot.next_event(eye, end);
+            if (pilot.rules_.connect && !pilot.vertices_.empty()) pilot.connect(eye, end);
+        }
+        bool valid(Rgb throughput) const { return is_finite(throughput) && min_component(throughput) >= 0.0f; }
+    };
+
+    void eye_subpath(Eye& eye, uint32_t x, uint32_t y) const {
+        if (rules_.max_depth == 0) return;
+        const CameraSample camera = camera_sample(view_, PathSlot{x, y, 0, 0, true}, eye.draws);
+        PilotSubpath path = start_eye(view_, rules_.mis, camera);
+        Hit hit;
+        do {
+            eye.work.eye_rays += 1;
+            closest(path, path.depth == 1 ? camera.tmax : kInfinity, eye.draws, hit);
+        } while (visit<F>(view_, rules_, eye.draws, Side::eye, rules_.longest(Side::eye), hit, path,
+                          EyeSink{*this, eye}));
+    }
+
+    void next_event(Eye& eye, const PilotVertex& z) const {
+        PilotCandidatePath c;
+        if (!ambilux::next_event<F>(view_, rules_, z.vertex, z.throughput, z.depth, eye.draws.next_event(z.depth), c))
+            return;
+        if (c.environment) c.value *= environment_radiance<F>(view_, c.direction);
+        if (!counts(c.value)) return;
+        eye.work.next_events += 1;
+        if (is_free(c, eye.draws, z.depth)) found(eye, {c.value, shares_of(c.ratio, 0)});
+    }
+
+    /// The connection of two vertices; false if it brings nothing.
+    bool connection(const Eye& eye, const PilotVertex& y, const PilotVertex& z, uint32_t which, PilotEvent& e,
+                    double& tried, double& rays) const {
+        if (z.depth + y.depth + 1 > rules_.max_depth) return false;
+        PilotCandidatePath c;
+        tried += 1;
+        if (!ambilux::connection<F>(rules_, z, y, 1.0f, c) || !counts(c.value)) return false;
+        rays += 1;
+        if (!is_free(c, eye.draws, connection_ray(z.depth, which))) return false;
+        e = {c.value, shares_of(c.ratio, 2)};
+        return true;
+    }
+
+    void connect(Eye& eye, const PilotVertex& z) const {
+        PilotWork& work = eye.work;
+        work.vertices += 1;
+        const Uint4 bits = cache_draw(eye.draws.key, z.depth, 0);
+        const PilotVertex* drawn_vertices[2] = {vertices_[mul_hi(bits.x, uint32_t(vertices_.size()))],
+                                                vertices_[mul_hi(bits.y, uint32_t(vertices_.size()))]};
+        for (const PilotVertex* v : drawn_vertices)
+            for (uint32_t at = 0; at < sizeof(PilotVertex); at += 64)
+                __builtin_prefetch(reinterpret_cast<const char*>(v) + at);
+        PilotEvent e;
+        for (uint32_t v = first_[eye.number]; v < first_[eye.number + 1]; ++v) {
+            if (!connection(eye, *vertices_[v], z, vertices_[v]->depth, e, work.pairs, work.pair_rays)) continue;
+            moments_.add(e, eye.pixel);
+            for (uint32_t c = 0; c < moments_.candidates.size(); ++c) {
+                if (!moments_.candidates[c].connect || moments_.candidates[c].draws > 0) continue;
+                const Rgb value = e.value * (1.0f / moments_.sum_of(c, e.shares));
+                eye.sums[c].add(value, value, 1.0);
+            }
+        }
+        PilotEvent drawn[2];
+        bool made[2];
+        double tried = 0, rays = 0;
+        for (uint32_t d = 0; d < 2; ++d)
+            made[d] = connection(eye, *drawn_vertices[d], z, kMaxDepth + d, drawn[d], tried, rays);
+        work.draws += tried / 2;
+        work.draw_rays += rays / 2;
+        if (!made[0] && !made[1]) return;
+        for (uint32_t c = 0; c < moments_.candidates.size(); ++c) {
+            if (moments_.candidates[c].draws == 0) continue;
+            const float draws = float(moments_.candidates[c].draws);  // each of the two stands for all of its vertex
+            Rgb value[2];
+            for (uint32_t d = 0; d < 2; ++d)
+                value[d] = made[d] ? drawn[d].value * (draws / moments_.sum_of(c, drawn[d].shares)) : splat_none();
+            eye.sums[c].add(value[0], value[1], 1.0 / double(draws));
+        }
+    }
+    static Rgb splat_none() { return {0.0f, 0.0f, 0.0f}; }
+
+    Pilot result_;
+    SceneView view_;
+    const RenderSettings& settings_;
+    const bool cuda_;
+    const HostTracer tracer_;
+    SecondMoments moments_;
+    Rules<PilotMis> rules_{};
+    FilmBlocks blocks_;
+    uint32_t pixels_ = 0;  ///< of a block
+    bool delta_emitters_ = false;
+    std::vector<LightTask> tasks_;
+    std::vector<const PilotVertex*> vertices_;  ///< of all tasks
+    std::vector<const PilotSplat*> splats_;
+    std::vector<uint32_t> first_;  ///< vertex of each light subpath
+};
+
+}  // namespace
+
+double expected_samples(const RenderSettings& settings, const PilotWork& work, uint64_t pixels, bool cuda) {
+    constexpr double kFewest = 64, kUsual = 1000, kMost = 1e6;
+    // Rays of subpaths per second: of an H200, within a factor of two for the scenes of docs/performance.md; of some
+    // cores.
+    const double rate = cuda ? 5e9 : 1e7;
+    const double asked = double(settings.expected_samples);
+    const double rays = std::max(1.0, work.eye_rays + kShadowWork * work.next_events);
+    const double in_time = settings.expected_seconds * rate / (rays * double(std::max<uint64_t>(1, pixels)));
+    return asked > 0 || in_time > 0 ? std::clamp(std::max(asked, in_time), kFewest, kMost) : kUsual;
+}
+
+Pilot run_pilot(const Scene& scene, const RenderSettings& settings, bool cuda, bool cwbvh, SharedAccels& accels,
+                const std::vector<PilotCandidate>& candidates, uint32_t samples) {
+    const HostTracer tracer = cwbvh ? HostTracer(accels.get<CwbvhAccel>()->tracer())
+                                    : HostTracer(accels.get<EmbreeAccel>()->tracer());
+    return with_feature_level(scene.features, settings.specialise, [&]<Features F>() {
+        return PilotRun<F>(scene, settings, cuda, tracer, candidates, samples).run();
+    });
+}
+
+}  // namespace ambilux

@@ -1,0 +1,42 @@
+// bdpt, variant lvc: eye vertices draw from a cache of the light vertices of all light subpaths of the wave (Davidovic
+// et al. 2014).
+#pragma once
+
+#include "integrators/bdpt/shared/two_sides.h"
+
+namespace ambilux {
+
+template <Features F, class Tracer, Fusion kFusion>
+struct LvcIntegrator {
+    using Policy = BdptPolicy;
+    using Memory = TwoSidesMemory;
+    using Stages = TwoSidesStages<F, Tracer, kFusion>;
+    static constexpr bool kFilmWide = true;
+
+    static Policy plan(const Scene& scene, const RenderSettings& settings) {
+        Policy p = plan_bdpt(scene, settings);
+        if (!p.rules.connect) return p;
+        p.cache_draws = settings.connections;
+        p.coherent_draws = settings.draws == CacheDraws::coherent;
+        p.one_connection_per_launch |= p.cache_draws == 1;  // of one draw there is no second
+        return p;
+    }
+    /// An eye vertex draws k of the M vertices of N subpaths: it meets a given subpath's vertex k N / M times on
+    /// average.
+    static double pilot(Policy& p, const SceneView& scene, const HostTracer& tracer, uint64_t seed) {
+        if (!p.light_subpaths()) return 0.0;
+        const double mean = mean_light_vertices<F>(scene, tracer, p.rules, seed);
+        if (p.cache_draws > 0 && mean > 0.0) p.rules.mis.connections = float(p.cache_draws / mean);
+        return mean;
+    }
+    static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
+        return Memory::lay_out<kFusion, F>(layout, p, n);
+    }
+    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) { return skipped_strategies(scene, p); }
+    template <class Executor>
+    static void schedule(Executor& exec, const Stages& s) {
+        run_two_sides(exec, s);
+    }
+};
+
+}  // namespace ambilux

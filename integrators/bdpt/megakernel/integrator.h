@@ -1,0 +1,67 @@
+// bdpt, variant megakernel: one kernel instead of stages, whose subpaths live in registers.
+#pragma once
+
+#include "stages/megakernel.h"
+#include "integrators/bdpt/shared/light_side.h"
+#include "integrators/bdpt/shared/pilot.h"
+
+namespace ambilux {
+
+template <Features F, class Tracer, Fusion kFusion>
+struct MegakernelIntegrator {
+    using Policy = BdptPolicy;
+    static constexpr bool kFilmWide = true;
+
+    static Policy plan(const Scene& scene, const RenderSettings& settings) {
+        need_one_light_subpath(settings, "variant megakernel has one light subpath per eye subpath; use variant lvc");
+        return plan_bdpt(scene, settings);
+    }
+    static double pilot(Policy& p, const SceneView& scene, const HostTracer& tracer, uint64_t seed) {
+        return p.light_subpaths() ? mean_light_vertices<F>(scene, tracer, p.rules, seed) : 0.0;
+    }
+    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) { return skipped_strategies(scene, p); }
+
+    struct Memory {
+        LightVertices light_vertices;
+        Queue<SplatItem> splats;
+    };
+    static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
+        Memory m;
+        m.light_vertices = layout.queue<ConnectionVertex>("light_vertices", p.rules.connect ? n.kept : 0, false,
+                                                          ConnectionVertex::lanes<F>());
+        m.splats = layout.queue<SplatItem>("splats", p.rules.splat ? n.kept + n.slots : 0);
+        return m;
+    }
+
+    struct Stages {
+        Policy policy;
+        Wave wave;
+        Megakernel<F, Tracer> megakernel;
+        Splat splat;
+
+        Stages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
+               const Memory& m, const FilmBuffers& film)
+            : policy(p), wave(w) {
+            const auto record = [&](const char* name) { return layout.record(name); };
+            const MegakernelRecords records = {record("light_generate"),   record("light_extend"),
+                                               record("light_shade"),      record("connect_camera"),
+                                               record("extend"),           record("shade"),
+                                               record("connect"),          record("connect_vertices"),
+                                               record("mis_weight"),       record("occlude")};
+            megakernel = {scene,        tracer,  wave,    p.rules, m.light_vertices, m.splats,
+                          film.samples, records, record(megakernel.kName)};
+            splat = {scene, wave, m.splats, film.splats, {}, record(Splat::kName)};
+        }
+    };
+
+    template <class Executor>
+    static void schedule(Executor& exec, const Stages& s) {
+        if (s.policy.rules.max_depth == 0) return;
+        exec.run_paths(s.megakernel, s.wave.tiles * kTilePixels);
+        exec.fail_on_overflow(s.megakernel.light_vertices, s.megakernel.splats);
+        if (s.policy.rules.splat) exec.run(s.splat);
+        if (s.policy.rules.connect) exec.clear(s.megakernel.light_vertices);
+    }
+};
+
+}  // namespace ambilux

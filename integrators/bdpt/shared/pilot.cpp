@@ -1,0 +1,60 @@
+#include "integrators/bdpt/shared/pilot.h"
+
+#include <atomic>
+
+#include "core/parallel.h"
+#include "integrators/feature_levels.h"
+#include "transport/subpath/start.h"
+#include "transport/subpath/visit.h"
+
+namespace ambilux {
+namespace {
+
+/// Counts the vertices where connections may start.
+struct CountVertices {
+    uint32_t& count;
+    uint32_t max_depth;
+
+    void add(const Candidate<BidirectionalMis>&) const {}
+    void at(const Vertex<BidirectionalMis>&, const Subpath<BidirectionalMis>& path) const {
+        count += path.depth + 2 <= max_depth;
+    }
+    bool valid(Rgb) const { return true; }
+};
+
+}  // namespace
+
+template <Features F>
+double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, const Rules<BidirectionalMis>& rules,
+                           uint64_t seed) {
+    std::atomic<uint64_t> vertices = 0;
+    parallel_for(
+        kPilotSubpaths,
+        [&](uint32_t i) {
+            const Draws draws = {{seed, i, 0, Stream::pilot}};
+            EmissionSample e;
+            if (!sample_start<F>(scene, draws, e)) return;
+            Subpath<BidirectionalMis> path = start_light(rules.mis, e);
+            uint32_t count = 0;
+            Hit hit;
+            do {
+                const Ray ray = {path.origin, kInfinity, path.direction, draws.opacity_seed(path.depth)};
+                tracer.closest<F>(scene, ray, hit);
+            } while (visit<F>(scene, rules, draws, Side::light, rules.longest(Side::light), hit, path,
+                              CountVertices{count, rules.max_depth}));
+            vertices.fetch_add(count, std::memory_order_relaxed);
+        },
+        64u);
+    return double(vertices.load()) / kPilotSubpaths;
+}
+
+#define AMBILUX_LEVEL(F) \
+    template double mean_light_vertices<F>(const SceneView&, const HostTracer&, const Rules<BidirectionalMis>&, uint64_t);
+AMBILUX_LEVEL(kDiffuseFeatures)
+AMBILUX_LEVEL(kUntexturedFeatures)
+AMBILUX_LEVEL(kTriangleFeatures)
+AMBILUX_LEVEL(kMaskedFeatures)
+AMBILUX_LEVEL(kAllFeatures)
+#undef AMBILUX_LEVEL
+
+}  // namespace ambilux

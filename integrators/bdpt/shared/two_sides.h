@@ -1,0 +1,160 @@
+// Light subpaths of a wave first, then the eye subpaths of the same slots, whose vertices are connected with the light
+// vertices that were kept. The variants wavefront and lvc differ by which light vertices these are.
+#pragma once
+
+#include "integrators/bdpt/shared/light_side.h"
+#include "integrators/bdpt/shared/pilot.h"
+#include "integrators/shared/eye_side.h"
+#include "stages/connect_vertices.h"
+
+namespace ambilux {
+
+
+/// Memory of one wave. Most queues hold the most they can ever be given, since a slot has one item at a time. Of shadow
+/// rays it may have several, as many as there is capacity for.
+struct TwoSidesMemory {
+    SubpathQueues<SubpathRay> subpaths;
+    EyeQueues eye;
+    SplatQueues splats;
+    Queue<ConnectionVertex> eye_vertices;  ///< of one depth, for pairs
+    LightVertices light_vertices;
+    Queue<PairItem> pairs, deferred;
+    uint32_t* last_vertex;
+
+    template <Fusion K, Features F>
+    static TwoSidesMemory lay_out(Layout& layout, const BdptPolicy& p, WaveSize n) {
+        const bool by_path = p.waves.queues.fixed_places();
+        const uint32_t lanes = ConnectionVertex::lanes<F>(), pairs = p.rules.connect && !K.occlude ? n.slots : 0;
+        TwoSidesMemory m;
+        m.subpaths = {layout, n.slots, p.waves.queues};
+        m.eye = EyeQueues::lay_out<K, F>(layout, n.slots, n.slots, p.rules, p.waves);
+        m.splats = SplatQueues::lay_out<K, F>(layout, n.slots, n.kept + p.waves.most_light_subpaths(n.slots), p);
+        m.eye_vertices = layout.queue<ConnectionVertex>("eye_vertices", pairs, false, lanes);
+        m.light_vertices =
+            layout.queue<ConnectionVertex>("light_vertices", p.rules.connect ? n.kept : 0, false, lanes);
+        m.pairs = layout.queue<PairItem>("pairs", pairs, by_path);
+        m.deferred = layout.queue<PairItem>("deferred", p.traces_connections ? 0 : pairs, by_path);
+        m.last_vertex = p.cache_draws == 0 ? layout.allocate<uint32_t>(n.slots) : nullptr;
+        return m;
+    }
+};
+
+template <Features F, class Tracer, Fusion K>
+struct TwoSidesStages {
+    using Mis = BidirectionalMis;
+    using Eye = EyeSide<F, Tracer, K>;
+    using Splats = SplatSide<F, Tracer, K>;
+    using Candidates = typename Eye::Candidates;
+    using Connect =
+        std::conditional_t<K.occlude, NextEventAndConnections<F, Candidates>, NextEventAndPair<F, Candidates>>;
+    using AtVertex = std::conditional_t<K.connect, Connect, QueueVertex<F, Mis>>;
+    /// A device may trace connections in place, in kernels for diffuse surfaces.
+    static constexpr bool kTracesConnections = K.weigh && !K.occlude && F.bsdfs == bit(BsdfType::diffuse);
+
+    BdptPolicy policy;
+    Wave wave;
+    Eye eye;
+    Splats splats;
+    LightStages<F, Tracer, K> light;
+    LightVertexSource source;
+    GenerateEye<Mis> generate;
+    Extend<F, Tracer, Mis, Side::eye> extend[2];
+    EyeVertex<F, Mis, typename Eye::Emission, AtVertex> eye_vertex[2];
+    ConnectEmitter<F, Mis, Connect> connect_emitter;
+    ConnectVertices<F, Candidates> connect_vertices, connect_deferred;
+
+    TwoSidesStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const BdptPolicy& p, const Wave& w,
+                   const TwoSidesMemory& m, const FilmBuffers& film)
+        : policy(p),
+          wave(w),
+          eye(layout, scene, tracer, w, m.eye, film, p.waves),
+          splats(layout, scene, tracer, w, m.splats, film, p, m.eye.raw),
+          light(layout, scene, tracer, w, m.subpaths, m.light_vertices, m.last_vertex, splats, p),
+          source{m.light_vertices, m.last_vertex, p.cache_draws, p.coherent_draws} {
+        const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
+        const bool seeds = F.opacity || p.waves.cull > 0.0f;
+        const NextEvent<F, Mis, Candidates> next_event = {eye.candidates(), record(connect_emitter), seeds};
+        Connect connect;
+        if constexpr (K.occlude)
+            connect = {next_event, source, w.state, record(connect_vertices)};
+        else
+            connect = {next_event, source, m.eye_vertices, m.pairs};
+        const SubpathQueues<SubpathRay>& q = m.subpaths;
+        generate = {scene, wave, p.rules.mis, q.rays[0], film.samples, record(generate)};
+        connect_emitter = {scene, wave, p.rules, m.eye.vertices, connect, next_event.record};
+        const auto at_vertex = choose<K.connect>(connect, QueueVertex<F, Mis>{m.eye.vertices});
+        for (int k = 0; k < 2; ++k) {
+            extend[k] = {scene, tracer, wave, q.rays[k], q.hits[k], record(extend[k])};
+            eye_vertex[k] = {scene,          wave,      p.rules,               q.hits[k], q.rays[1 - k],
+                             eye.emission(), at_vertex, record(eye_vertex[k]), false};
+        }
+        connect_vertices = {scene,
+                            wave,
+                            p.rules,
+                            m.pairs,
+                            m.deferred,
+                            m.eye_vertices,
+                            source,
+                            eye.candidates(),
+                            eye.candidate_capacity(),
+                            eye.candidate_counter(),
+                            record(connect_vertices),
+                            seeds,
+                            p.one_connection_per_launch};
+        connect_deferred = connect_vertices;
+        std::swap(connect_deferred.pairs, connect_deferred.deferred);
+    }
+
+    /// connect_vertices with its shadow rays.
+    auto connect_and_occlude(bool several) const requires kTracesConnections {
+        return ConnectAndOcclude<F, Tracer, typename Eye::Shadows>{connect_vertices, eye.occlude.with_atomic_add(several),
+                                                                   connect_vertices.record};
+    }
+};
+
+/// The pairs of one depth: connected, weighted, tested, added to their paths.
+template <class Executor, Features F, class Tracer, Fusion K>
+void run_connections(Executor& exec, const TwoSidesStages<F, Tracer, K>& s, bool several_bounces) {
+    if constexpr (s.kTracesConnections && Executor::kMultiBounce)
+        if (s.policy.traces_connections) return exec.run(s.connect_and_occlude(several_bounces));
+    const bool several = several_bounces || !s.policy.one_connection_per_launch;
+    exec.run(s.connect_vertices);
+    run_candidates(exec, s.eye, several);
+    const uint32_t longest = s.policy.cache_draws > 0 ? s.policy.cache_draws : s.policy.rules.max_depth - 2;
+    if (longest <= 1) return;
+    exec.repeat_while(s.connect_vertices.deferred, [&] {
+        exec.run(s.connect_deferred);
+        run_candidates(exec, s.eye, several);
+        exec.run(s.connect_vertices);
+        run_candidates(exec, s.eye, several);
+    });
+}
+
+template <class Executor, Features F, class Tracer, Fusion K>
+void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K>& s) {
+    const Rules<BidirectionalMis>& rules = s.policy.rules;
+    start_eye_subpaths<K.generate>(exec, s.generate, s.extend[0], s.wave.tiles * kTilePixels);
+    repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several) {
+        run_emission(exec, s.eye);
+        if constexpr (!K.connect) exec.run(s.connect_emitter);
+        if (rules.next_event) run_candidates(exec, s.eye, several);
+        if constexpr (!K.occlude) {
+            if (!rules.connect) return;
+            run_connections(exec, s, several);
+            exec.clear(s.connect_vertices.vertices);
+        }
+    });
+    exec.set_depth(0);
+}
+
+/// One wave.
+template <class Executor, Features F, class Tracer, Fusion K>
+void run_two_sides(Executor& exec, const TwoSidesStages<F, Tracer, K>& s) {
+    if (s.policy.rules.max_depth == 0) return;
+    if (s.policy.light_subpaths()) run_light_subpaths(exec, s.light, s.splats, s.policy);
+    run_eye_subpaths(exec, s);
+    if (s.policy.rules.splat) exec.run(s.splats.splat);
+    if (s.policy.rules.connect) exec.clear(s.source.vertices);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,35 @@
+// bdpt, variant wavefront: every eye subpath is connected with the light subpath of its slot.
+#pragma once
+
+#include "integrators/bdpt/shared/two_sides.h"
+
+namespace ambilux {
+
+template <Features F, class Tracer, Fusion kFusion>
+struct WavefrontIntegrator {
+    using Policy = BdptPolicy;
+    using Memory = TwoSidesMemory;
+    using Stages = TwoSidesStages<F, Tracer, kFusion>;
+    static constexpr bool kFilmWide = true;
+
+    /// Throws Error(usage) for numbers of light subpaths that leave an eye subpath without its own.
+    static Policy plan(const Scene& scene, const RenderSettings& settings) {
+        const Policy p = plan_bdpt(scene, settings);
+        if (p.rules.connect)
+            need_one_light_subpath(settings,
+                                   "variant wavefront connects every eye subpath with a light subpath of its own; use "
+                                   "variant lvc, or strategies without connections");
+        return p;
+    }
+    static double pilot(Policy& p, const SceneView& scene, const HostTracer& tracer, uint64_t seed) {
+        return p.light_subpaths() ? mean_light_vertices<F>(scene, tracer, p.rules, seed) : 0.0;
+    }
+    static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) { return Memory::lay_out<kFusion, F>(layout, p, n); }
+    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) { return skipped_strategies(scene, p); }
+    template <class Executor>
+    static void schedule(Executor& exec, const Stages& s) {
+        run_two_sides(exec, s);
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,41 @@
+// The sets of features that kernels are compiled for, on both backends (cmake/instantiate.cmake has a translation unit
+// for each). A scene gets the first that covers it.
+#pragma once
+
+#include "models/features.h"
+
+namespace ambilux {
+
+/// Diffuse triangles under area lights.
+constexpr Features kDiffuseFeatures = {
+    bit(BsdfType::diffuse), bit(EmitterType::area), bit(PrimitiveType::triangle), false, false, false};
+
+/// What most scenes of light transport papers are made of: any shapes under area lights, no textures.
+constexpr Features kUntexturedFeatures = {bit(BsdfType::diffuse) | bit(BsdfType::conductor) |
+                                              bit(BsdfType::rough_conductor) | bit(BsdfType::dielectric),
+                                          bit(EmitterType::area),
+                                          kAllFeatures.primitives,
+                                          false,
+                                          false,
+                                          false};
+
+/// Every BSDF, texture and emitter, on triangles that are neither bumped nor holed.
+constexpr Features kTriangleFeatures = {
+    kAllFeatures.bsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false, false};
+
+/// The same with holes.
+constexpr Features kMaskedFeatures = {
+    kAllFeatures.bsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false, true};
+
+/// Calls f.template operator()<F>() with the smallest level F that covers `needed`; with the full set if `specialise` is
+/// false.
+template <class Function>
+decltype(auto) with_feature_level(const Features& needed, bool specialise, Function&& f) {
+    if (specialise && kDiffuseFeatures.covers(needed)) return f.template operator()<kDiffuseFeatures>();
+    if (specialise && kUntexturedFeatures.covers(needed)) return f.template operator()<kUntexturedFeatures>();
+    if (specialise && kTriangleFeatures.covers(needed)) return f.template operator()<kTriangleFeatures>();
+    if (specialise && kMaskedFeatures.covers(needed)) return f.template operator()<kMaskedFeatures>();
+    return f.template operator()<kAllFeatures>();
+}
+
+}  // namespace ambilux

@@ -1,0 +1,91 @@
+// What an integrator is to the renderers: a struct
+//   template <Features F, class Tracer, Fusion kFusion> struct Integrator
+// with
+//   Policy, plan(scene, settings)       what it does where, decided once by the host; has a WavePolicy `waves`
+//   Memory, lay_out(layout, policy, n)  the queues of one wave
+//   Stages(layout, scene, tracer, policy, wave, memory, film)
+//   schedule(executor, stages)          one wave, without the update of the film
+//   kFilmWide                           light may land anywhere on the film: a sample is complete when all of it is
+//   skipped(scene, policy, features)    names of what this render does without
+// An executor has, for a stage with items() and a record:
+//   run(stage)            over its items, which are then gone
+//   trace(stage)          the same for rays in no order
+//   extend(stage)         rays become hits where they lie; extend_coherent for neighbouring rays that stay together
+//   run_slots(stage, n)   over n slots for each sample of the wave; with a last argument 1, over n slots once
+//   run_paths(stage, n)   a stage that claims its slots by itself
+//   set_depth(d), next_depth(n), clear(queue), fail_on_overflow(queue, queue)
+//   repeat_while(queue, body)  until the queue is found empty
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "queues/order.h"
+#include "integrators/settings.h"
+#include "scene/scene.h"
+#include "stages/multi_bounce.h"
+#include "stages/update_film.h"
+
+namespace ambilux {
+
+/// What every integrator decides.
+struct WavePolicy {
+    QueuePolicy queues;
+    uint32_t multi_bounce_below = 0;  ///< on a device: fewer subpaths than this take several bounces in one launch
+    float cull = 0;                   ///< cull_factor; 0: none
+    uint32_t strategy_depth = 0;      ///< segments up to which images of single strategies are gathered; 0: none
+    bool deterministic = false;
+    uint32_t slots_in_flight = 0;     ///< variant streaming: paths that are worked on at once; 0: all of a wave
+    uint32_t light_subpaths_per_tile = 0;  ///< of kTilePixels pixels, in one sample; 0: none
+    bool keeps_light_vertices = false;     ///< queues of light vertices or splats hold those of a whole wave
+
+    /// Most light subpaths of a slot.
+    uint32_t light_rounds() const { return (light_subpaths_per_tile + kTilePixels - 1) / kTilePixels; }
+    /// Light subpaths of `slots`, a multiple of kTilePixels, if all of them are active.
+    uint64_t most_light_subpaths(uint32_t slots) const {
+        return uint64_t(slots / kTilePixels) * light_subpaths_per_tile;
+    }
+    /// The most items that a stage goes through in order (OrderMemory::slots).
+    uint32_t order_slots(uint32_t slots) const { return slots_in_flight ? slots_in_flight : slots; }
+};
+
+/// How much a wave holds.
+struct WaveSize {
+    uint32_t slots;
+    uint32_t kept;  ///< vertices of its light subpaths
+};
+
+/// Buffers of the film that a wave works on. `samples`: by slot of this wave.
+struct FilmBuffers {
+    Lane* samples;
+    SplatSums splats;
+    FilmSums sums;
+    int64_t* strategies = nullptr;  ///< StrategyFilm
+    uint64_t* strategies_dropped = nullptr;
+};
+
+/// Room for the light vertices of so many subpaths, from the mean of the pilot: a quarter more, and six deviations of a
+/// geometric distribution.
+inline uint32_t planned_light_vertices(double mean, uint64_t subpaths) {
+    const double n = double(subpaths);
+    return uint32_t(std::min(1.25 * mean * n + 6.0 * std::sqrt(n * mean * (mean + 1.0)) + 64.0, 4.0e9));
+}
+
+/// Throws Error(usage) when subpaths might never end.
+void check_depths(const RenderSettings& settings);
+/// Segments and roulette as kernels count them.
+uint32_t segment_limit(const RenderSettings& settings);
+uint32_t roulette_depth(const RenderSettings& settings);
+
+/// Names of kernel parts that this scene does without.
+void skipped_features(const Features& kernels, std::vector<std::string>& parts);
+
+/// Which tiles and samples fit into a wave of about `wave_size` paths. Throws Error(usage) if slots would not fit 32
+/// bits.
+Wave shape_wave(const Scene& scene, uint64_t seed, uint32_t wave_size, uint32_t max_tiles);
+/// Tiles of the whole film.
+uint32_t tile_count(const Wave& wave);
+
+}  // namespace ambilux

@@ -1,0 +1,97 @@
+// path: the unidirectional path tracer. Hits of emitters, next event estimation, or both with weights.
+#pragma once
+
+#include "integrators/shared/eye_side.h"
+#include "integrators/shared/subpath_queues.h"
+#include "stages/connect_emitter.h"
+#include "stages/extend.h"
+#include "stages/eye_vertex.h"
+#include "stages/generate.h"
+
+namespace ambilux {
+
+struct PathPolicy {
+    Rules<UnidirectionalMis> rules;
+    WavePolicy waves;
+};
+/// Throws Error(usage) when paths might never end.
+PathPolicy plan_path(const Scene& scene, const RenderSettings& settings);
+
+template <Features F, class Tracer, Fusion kFusion>
+struct PathIntegrator {
+    using Mis = UnidirectionalMis;
+    using Policy = PathPolicy;
+    static constexpr bool kFilmWide = false;
+
+    static Policy plan(const Scene& scene, const RenderSettings& settings) { return plan_path(scene, settings); }
+    static std::vector<std::string> skipped(const Scene& scene, const Policy& policy);
+
+    struct Memory {
+        SubpathQueues<PathRay> subpaths;
+        EyeQueues eye;
+    };
+    /// Every queue holds the most it can ever be given: a slot has at most one item of each kind at a time.
+    static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
+        Memory m;
+        m.subpaths = {layout, n.slots, p.waves.queues};
+        m.eye = EyeQueues::lay_out<kFusion, F>(layout, n.slots, n.slots, p.rules, p.waves);
+        return m;
+    }
+
+    struct Stages {
+        using Eye = EyeSide<F, Tracer, kFusion>;
+        using Connect = NextEvent<F, Mis, typename Eye::Candidates>;
+        using AtVertex = std::conditional_t<kFusion.connect, Connect, QueueVertex<F, Mis>>;
+
+        Policy policy;
+        Wave wave;
+        Eye eye;
+        GenerateEye<Mis> generate;
+        Extend<F, Tracer, Mis, Side::eye> extend[2];
+        EyeVertex<F, Mis, typename Eye::Emission, AtVertex> eye_vertex[2];
+        ConnectEmitter<F, Mis, Connect> connect_emitter;
+
+        Stages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
+               const Memory& m, const FilmBuffers& film)
+            : policy(p), wave(w), eye(layout, scene, tracer, w, m.eye, film, p.waves) {
+            const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
+            const SubpathQueues<PathRay>& q = m.subpaths;
+            const bool seeds = F.opacity || p.waves.cull > 0.0f;
+            const Connect connect = {eye.candidates(), record(connect_emitter), seeds};
+            generate = {scene, wave, p.rules.mis, q.rays[0], film.samples, record(generate)};
+            connect_emitter = {scene, wave, p.rules, m.eye.vertices, connect, connect.record};
+            const auto at_vertex = choose<kFusion.connect>(connect, QueueVertex<F, Mis>{m.eye.vertices});
+            for (int k = 0; k < 2; ++k) {
+                extend[k] = {scene, tracer, wave, q.rays[k], q.hits[k], record(extend[k])};
+                eye_vertex[k] = {scene,     wave,      p.rules,
+                                 q.hits[k], q.rays[1 - k], eye.emission(),
+                                 at_vertex, record(eye_vertex[k]), kFusion.generate && !q.hits[0].flags};
+            }
+        }
+    };
+
+    template <class Executor>
+    static void schedule(Executor& exec, const Stages& s) {
+        if (s.policy.rules.max_depth == 0) return;
+        start_eye_subpaths<kFusion.generate>(exec, s.generate, s.extend[0], s.wave.tiles * kTilePixels);
+        repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several) {
+            run_emission(exec, s.eye);
+            if (!s.policy.rules.next_event) return;
+            if constexpr (!kFusion.connect) exec.run(s.connect_emitter);
+            run_candidates(exec, s.eye, several);
+        });
+        exec.set_depth(0);
+    }
+};
+
+/// Names of stages that this render does without.
+std::vector<std::string> skipped_path_parts(const Scene& scene, const PathPolicy& policy);
+
+template <Features F, class Tracer, Fusion kFusion>
+std::vector<std::string> PathIntegrator<F, Tracer, kFusion>::skipped(const Scene& scene, const Policy& policy) {
+    std::vector<std::string> parts = skipped_path_parts(scene, policy);
+    skipped_features(F, parts);
+    return parts;
+}
+
+}  // namespace ambilux

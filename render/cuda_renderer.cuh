@@ -1,0 +1,302 @@
+// Renders on a CUDA device: one graph per wave.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include "accel/host_tracer.h"
+#include "accel/shared_accels.h"
+#include "backends/cuda/device_scene.h"
+#include "backends/cuda/executor.cuh"
+#include "backends/cuda_device.h"
+#include "core/error.h"
+#include "core/flag.h"
+#include "integrators/integrator.h"
+#include "render/device_wave.h"
+#include "render/statistics.h"
+#include "scene/info.h"
+
+namespace ambilux {
+
+template <class Integrator, Features F>
+class CudaRenderer final : public Renderer {
+    static constexpr bool kFilmWide = Integrator::kFilmWide;
+    using Stages = typename Integrator::Stages;
+
+public:
+    CudaRenderer(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
+        : scene_(scene),
+          settings_(settings),
+          policy_(Integrator::plan(scene, settings)),
+          traced_(settings.specialise ? scene.features : kAllFeatures),
+          use_graph_(settings.graph) {
+        const auto start = Clock::now();
+        take_accel(settings, accels);
+        double mean = 0;
+        if constexpr (kFilmWide) {
+            const HostTracer tracer(accels.get<CwbvhAccel>()->tracer());
+            mean = Integrator::pilot(policy_, scene.view(), tracer, settings.seed);
+            if constexpr (requires { Stages::kTracesConnections; })
+                policy_.traces_connections = Stages::kTracesConnections && traces_connections(policy_, accel_->bytes());
+        }
+        shape(settings, mean);
+        allocate_film(settings);
+        cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
+        allocate(policy_.waves.keeps_light_vertices
+                     ? planned_light_vertices(mean, policy_.waves.most_light_subpaths(wave_.slot_count()))
+                     : 0);
+        build_seconds_ = seconds_since(start);
+    }
+    ~CudaRenderer() override {
+        if (graph_) cudaGraphExecDestroy(graph_);
+        if (stream_) cudaStreamDestroy(stream_);
+    }
+
+    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+        const auto start = Clock::now();
+        uint32_t done = 0;
+        while (done < count && !is_set(interrupt)) {
+            // All waves of a pass are queued at once; the host waits for the last.
+            const uint32_t pass = std::min(count - done, preferred_batch());
+            const auto pass_start = Clock::now();
+            const uint32_t waves_before = read_state().done;
+            uint32_t waves_per_sample = 0;
+            for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles) ++waves_per_sample;
+            for (uint32_t s = 0; s < pass; s += wave_.samples)
+                for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles)
+                    launch_wave(tile, first + done + s, std::min(wave_.samples, pass - s));
+            cuda_check(cudaStreamSynchronize(stream_), "wave");
+            const WaveState state = read_state();
+            const uint32_t finished =
+                std::min(pass, (state.done - waves_before) / waves_per_sample * wave_.samples);
+            if (state.failed) grow();
+            done += finished;
+            if (finished == 0) continue;
+            measured_seconds_ = seconds_since(pass_start);
+            measured_samples_ = finished;
+        }
+        samples_ += done;
+        film_samples_ += done;
+        render_seconds_ += seconds_since(start);
+        return done;
+    }
+
+    FilmMoments film() override {
+        FilmMoments film;
+        film.width = wave_.width;
+        film.height = wave_.height;
+        film.samples = film_samples_;
+        film.sum = sum_.download();
+        film.sum_squares = sum_squares_.download();
+        return film;
+    }
+    void clear_film() override {
+        sum_.zero();
+        sum_squares_.zero();
+        film_samples_ = 0;
+    }
+
+    RenderStats stats() override {
+        RenderStats s;
+        s.backend = "cuda";
+        s.device = cuda_device_name();
+        s.accel = pairs_ ? "bvh2" : "cwbvh";
+        s.settings = settings_;
+        s.build_seconds = build_seconds_;
+        s.render_seconds = render_seconds_;
+        s.samples = samples_;
+        const std::vector<QueueCounter> counters = read(layout_.counters(), layout_.queue_names().size());
+        fill_stage_stats(layout_.record_names(), read(layout_.records(), layout_.record_names().size()), s);
+        fill_queue_stats(layout_, {counters.data()}, s);
+        s.memory_bytes = fixed_bytes() + memory_.bytes();
+        s.memory_bytes_predicted = fixed_bytes() + layout_.bytes();
+        s.features = feature_names(F);
+        s.skipped = Integrator::skipped(scene_, policy_);
+        skipped_features(F, s.skipped);
+        return s;
+    }
+
+    std::vector<StrategyImage> strategy_images() override {
+        if (policy_.waves.strategy_depth == 0) return {};
+        return ambilux::strategy_images(policy_.waves.strategy_depth, samples_, strategies_.download(),
+                                        strategies_dropped_.download());
+    }
+
+    uint32_t preferred_batch() const override {
+        return whole_waves(batch_of(measured_seconds_, measured_samples_), wave_.samples);
+    }
+
+private:
+    using Executor = CudaExecutor<!kFilmWide>;  ///< binary BVHs are there for the path tracer
+
+    void take_accel(const RenderSettings& settings, SharedAccels& accels) {
+        device_scene_ = accels.get<DeviceScene>();
+        if (settings.accel == "bvh2")
+            pairs_.emplace(PairAccel(scene_).arrays());
+        else
+            accel_ = accels.get<DeviceCwbvh>();
+    }
+    /// Which tiles and how many samples a wave holds.
+    void shape(const RenderSettings& settings, double mean) {
+        constexpr uint32_t kMillion = 1u << 20;
+        const bool streams = policy_.waves.slots_in_flight > 0;
+        if (streams) policy_.waves.slots_in_flight = kMillion;
+        Layout million;
+        Integrator::lay_out(million, policy_,
+                            {kMillion, uint32_t(planned_light_vertices(
+                                           mean, policy_.waves.most_light_subpaths(kMillion)))});
+        const uint64_t splat_bytes = !kFilmWide ? 0 : settings.deterministic ? 3 * sizeof(int64_t) : sizeof(Lane);
+        const uint64_t bytes_per_path = (million.bytes() >> 20) + splat_bytes + sizeof(Lane);
+        const uint32_t plateau = streams ? kStreamPlateau : kFilmWide ? kFilmWidePlateau : kWavePlateau;
+        const uint32_t size = device_wave_size(scene_, settings, plateau, bytes_per_path, free_device_bytes());
+        wave_ = shape_wave(scene_, settings.seed, size, ~0u);
+        if (kFilmWide) {  // splats may land anywhere
+            wave_.tiles = tile_count(wave_);
+            wave_.samples = std::max(1u, size / (wave_.tiles * kTilePixels));
+        }
+        if (streams) {
+            policy_.waves.slots_in_flight = size;
+            wave_.samples = stream_samples(size, wave_.tiles * kTilePixels, settings.expected_samples, kLightRay - 1);
+        }
+        light_subpaths_ = light_subpaths_in(wave_, 0, wave_.tiles, policy_.waves.light_subpaths_per_tile);
+        if (uint64_t(light_subpaths_) * wave_.samples > 0xffffffffull)
+            throw Error(ExitCode::usage, "wave_size=" + std::to_string(settings.wave_size) +
+                                             ": more light subpaths than can be numbered; set a smaller one, or fewer "
+                                             "light_paths");
+        policy_.waves.multi_bounce_below = multi_bounce_below(settings, wave_.slot_count());
+    }
+    void allocate_film(const RenderSettings& settings) {
+        const uint64_t pixels = uint64_t(wave_.width) * wave_.height, cells = kFilmWide ? pixels * wave_.samples : 0;
+        sum_ = DeviceBuffer<double>(pixels * 3, "film");
+        sum_squares_ = DeviceBuffer<double>(pixels * 3, "film");
+        fixed_splats_ = DeviceBuffer<int64_t>(settings.deterministic ? cells * 3 : 0, "splats");
+        splats_ = DeviceBuffer<Lane>(settings.deterministic ? 0 : cells, "splats");
+        slot_samples_ = DeviceBuffer<Lane>(wave_.slot_count(), "samples");
+        const uint32_t depth = policy_.waves.strategy_depth;
+        strategies_ = DeviceBuffer<int64_t>(strategy_values(depth, pixels), "images of single strategies");
+        strategies_dropped_ = DeviceBuffer<uint64_t>(strategy_count(depth));
+        clock_ = DeviceBuffer<uint64_t>(1);
+        for (auto* buffer : {&fixed_splats_, &strategies_}) buffer->zero();
+        for (auto* buffer : {&splats_, &slot_samples_}) buffer->zero();
+        strategies_dropped_.zero();
+        clear_film();
+    }
+    uint64_t fixed_bytes() const {
+        return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) + sum_.bytes() +
+               sum_squares_.bytes() + fixed_splats_.bytes() + splats_.bytes() + strategies_.bytes() +
+               slot_samples_.bytes() + clock_.bytes();
+    }
+
+    /// Memory of a wave, and what works on it.
+    struct WaveParts {
+        WaveState* state;
+        OrderMemory order;
+        Stages stages;
+    };
+    WaveParts lay_out(Layout& layout, uint32_t kept) {
+        const uint32_t slots = wave_.slot_count(), listed = policy_.waves.order_slots(slots);
+        WaveState* const state = layout.allocate<WaveState>(1);
+        const typename Integrator::Memory queues = Integrator::lay_out(layout, policy_, {slots, kept});
+        const OrderMemory order = lay_out_order(layout, policy_.waves.queues, listed,
+                                                order_temporary_bytes(policy_.waves.queues, listed));
+        wave_.state = state;
+        const FilmBuffers film = {slot_samples_.data(), splat_sums(), {sum_.data(), sum_squares_.data()},
+                                  strategies_.data(), strategies_dropped_.data()};
+        const CwbvhTracer tracer = accel_ ? accel_->tracer() : CwbvhTracer();
+        layout.record(UpdateFilm::kName);
+        return {state, order, Stages(layout, device_scene_->view(), tracer, policy_, wave_, queues, film)};
+    }
+    SplatSums splat_sums() { return {fixed_splats_.data(), splats_.data()}; }
+
+    /// Queues for `kept` light vertices, and the graph that uses them.
+    void allocate(uint64_t kept) {
+        if (kept > 0xf0000000ull)
+            throw Error(ExitCode::device, "light subpaths have more vertices than can be numbered: set a max_depth or "
+                                          "a smaller wave_size");
+        Layout plan;
+        lay_out(plan, uint32_t(kept));
+        check_memory(plan.bytes(), free_device_bytes(), wave_.slot_count());
+        memory_ = DeviceBuffer<std::byte>(plan.bytes(), "queues");
+        memory_.zero();
+        layout_ = Layout(plan, memory_.data());
+        const WaveParts parts = lay_out(layout_, uint32_t(kept));
+        const std::vector<QueueCounter> counters = layout_.first_counters();
+        cuda_check(cudaMemcpy(layout_.counters(), counters.data(), counters.size() * sizeof(QueueCounter),
+                              cudaMemcpyHostToDevice),
+                   "queue counters");
+        state_ = parts.state;
+        stages_.emplace(parts.stages);
+        executor_.emplace(stream_, traced_, state_, clock_.data(), device_scene_->view(), parts.order);
+        if constexpr (!kFilmWide)
+            if (pairs_) executor_->use(pairs_->tracer());
+        if (graph_) cudaGraphExecDestroy(graph_);
+        graph_ = nullptr;
+        if (use_graph_) graph_ = executor_->capture([&](Executor& exec) { run(exec); });
+        cuda_check(cudaDeviceSynchronize(), "preparation");
+    }
+    void run(Executor& exec) {
+        Integrator::schedule(exec, *stages_);
+        const UpdateFilm update = {wave_, slot_samples_.data(), splat_sums(), {sum_.data(), sum_squares_.data()},
+                                   layout_.record(UpdateFilm::kName)};
+        exec.run_slots(update, wave_.tiles * kTilePixels, 1);
+        exec.finish_wave();
+    }
+    void launch_wave(uint32_t tile, uint32_t sample, uint32_t samples) {
+        const WaveState state = {tile, sample, samples, 0, 0, 0, samples * light_subpaths_,
+                                 policy_.waves.slots_in_flight};
+        detail::set_wave<<<1, 1, 0, stream_>>>(state_, state);
+        if (graph_)
+            cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
+        else
+            executor_->launch([&](Executor& exec) { run(exec); });
+    }
+    /// A wave had more light vertices than there was capacity for.
+    void grow() {
+        const std::vector<StageRecord> records = read(layout_.records(), layout_.record_names().size());
+        const std::vector<QueueCounter> counters = read(layout_.counters(), layout_.queue_names().size());
+        uint64_t needed = 0;
+        for (size_t q = 0; q < counters.size(); ++q)
+            if (layout_.queue_names()[q] == "light_vertices" || layout_.queue_names()[q] == "splats")
+                needed = std::max(needed, counters[q].peak);
+        memory_ = DeviceBuffer<std::byte>();
+        allocate(needed + needed / 4);
+        cuda_check(cudaMemcpy(layout_.records(), records.data(), records.size() * sizeof(StageRecord),
+                              cudaMemcpyHostToDevice),
+                   "statistics");
+    }
+
+    template <class T>
+    static std::vector<T> read(const T* place, size_t count) {
+        std::vector<T> values(count);
+        cuda_check(cudaMemcpy(values.data(), place, count * sizeof(T), cudaMemcpyDeviceToHost), "statistics");
+        return values;
+    }
+    WaveState read_state() const { return read(static_cast<const WaveState*>(state_), 1)[0]; }
+
+    const Scene& scene_;
+    RenderSettings settings_;
+    typename Integrator::Policy policy_;
+    Features traced_;  ///< what rays are traced for
+    bool use_graph_;
+    Wave wave_{};
+    Layout layout_;
+    uint32_t light_subpaths_ = 0;  ///< of one sample
+    uint64_t samples_ = 0, film_samples_ = 0, measured_samples_ = 0;
+    double build_seconds_ = 0, render_seconds_ = 0, measured_seconds_ = 0;
+    std::shared_ptr<const DeviceScene> device_scene_;
+    std::shared_ptr<const DeviceCwbvh> accel_;
+    std::optional<DevicePairs> pairs_;  ///< instead, with accel=bvh2
+    DeviceBuffer<std::byte> memory_;
+    DeviceBuffer<double> sum_, sum_squares_;
+    DeviceBuffer<int64_t> fixed_splats_, strategies_;
+    DeviceBuffer<Lane> splats_, slot_samples_;
+    DeviceBuffer<uint64_t> strategies_dropped_, clock_;
+    WaveState* state_ = nullptr;
+    cudaStream_t stream_ = nullptr;
+    std::optional<Stages> stages_;
+    std::optional<Executor> executor_;
+    cudaGraphExec_t graph_ = nullptr;
+};
+
+}  // namespace ambilux

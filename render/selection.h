@@ -1,0 +1,36 @@
+// bdpt.auto=true: a pilot decides which strategies run and in which variant (docs/theory.md, section 6).
+#pragma once
+
+#include <functional>
+
+#include "integrators/auto/pilot.h"
+#include "render/renderer.h"
+
+namespace ambilux {
+
+/// Throws Error(usage) for settings that the choice cannot be combined with.
+void check_automatic(const RenderSettings& settings);
+
+/// What `settings` leave to choose from, the path tracer first.
+struct SelectionCandidate {
+    std::string name;
+    PilotCandidate pilot;
+    std::vector<std::pair<std::string, std::string>> settings;
+};
+std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda);
+
+/// The rays and connections of one sample of a pixel, in multiples of one ray of a path tracer.
+double selection_work(const PilotWork& work, const SelectionCandidate& candidate, bool cuda);
+
+/// The variance of one sample, mean over the blocks but for the share that is worst for the best candidate of each:
+/// what lies in a few pixels is not trimmed away by chance for some candidates only.
+std::vector<double> selection_variances(const Pilot& pilot);
+
+/// Makes a renderer of given settings, which are not automatic.
+using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RenderSettings&)>;
+
+/// Runs the pilot, times what it cannot tell apart, and makes the renderer of the choice.
+std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda,
+                                         SharedAccels& accels, const MakeRenderer& make);
+
+}  // namespace ambilux

@@ -1,0 +1,72 @@
+#include "render/statistics.h"
+
+#include <algorithm>
+
+#include "film/fixed_point.h"
+
+namespace ambilux {
+
+void fill_stage_stats(const std::vector<std::string>& names, const std::vector<StageRecord>& records,
+                      RenderStats& stats) {
+    for (size_t s = 0; s < names.size(); ++s) {
+        const StageRecord& r = records[s];
+        if (r.launches == 0 && r.items == 0) continue;
+        StageStats stage;
+        stage.name = names[s];
+        stage.launches = r.launches;
+        stage.items = r.items;
+        stage.seconds = double(r.nanoseconds) * 1e-9;
+        uint32_t depths = kTrackedDepths;
+        while (depths > 0 && r.items_by_depth[depths - 1] == 0) --depths;
+        stage.items_by_depth.assign(r.items_by_depth, r.items_by_depth + depths);
+        stats.stages.push_back(stage);
+        if (r.nan + r.inf + r.negative) stats.invalid_by_stage[stage.name] = {r.nan, r.inf, r.negative};
+        stats.invalid.nan += r.nan;
+        stats.invalid.inf += r.inf;
+        stats.invalid.negative += r.negative;
+        if (stage.name == "extend" || stage.name == "light_extend") stats.rays_extend += r.items;
+        if (stage.name == "occlude") stats.rays_occlude += r.items;
+    }
+}
+
+void fill_queue_stats(const Layout& layout, const std::vector<const QueueCounter*>& sets, RenderStats& stats) {
+    for (size_t q = 0; q < layout.queue_names().size(); ++q) {
+        QueueStats queue;
+        queue.name = layout.queue_names()[q];
+        queue.capacity = layout.queue_capacities()[q];
+        for (const QueueCounter* counters : sets) {
+            queue.peak = std::max(queue.peak, counters[q].peak);
+            queue.overflow += counters[q].overflow;
+        }
+        stats.queues.push_back(queue);
+    }
+}
+
+std::vector<StrategyImage> strategy_images(uint32_t max_depth, uint64_t samples, const std::vector<int64_t>& sums,
+                                           const std::vector<uint64_t>& dropped) {
+    std::vector<StrategyImage> images;
+    if (max_depth == 0) return images;
+    const size_t values = sums.size() / 2 / strategy_count(max_depth);
+    const double scale = samples ? kLightUnit / double(samples) : 0.0;
+    for (uint32_t k = 1; k <= max_depth; ++k) {
+        for (uint32_t s = 0; s <= k; ++s) {
+            const uint32_t index = strategy_index(Strategy::make(s, k + 1 - s));
+            StrategyImage image = {s, k + 1 - s, std::vector<float>(values), std::vector<float>(values),
+                                   dropped[index]};
+            const int64_t* raw = sums.data() + 2 * index * values;
+            for (size_t i = 0; i < values; ++i) {
+                image.raw[i] = float(double(raw[i]) * scale);
+                image.weighted[i] = float(double(raw[values + i]) * scale);
+            }
+            images.push_back(std::move(image));
+        }
+    }
+    return images;
+}
+
+uint32_t batch_of(double seconds, uint64_t samples) {
+    if (samples == 0 || !(seconds > 0)) return 1;
+    return uint32_t(std::clamp(0.2 * double(samples) / seconds, 1.0, 65536.0));
+}
+
+}  // namespace ambilux

@@ -1,0 +1,35 @@
+// From the records that stages keep to the statistics of a render.
+#pragma once
+
+#include <chrono>
+#include <vector>
+
+#include "queues/layout.h"
+#include "render/renderer.h"
+
+namespace ambilux {
+
+using Clock = std::chrono::steady_clock;
+inline double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// Fills stages, rays and invalid counts from one record for each name. Stages that did nothing are left out.
+void fill_stage_stats(const std::vector<std::string>& names, const std::vector<StageRecord>& records,
+                      RenderStats& stats);
+
+/// Fills the queues: the largest peak and all losses over `sets` sets of counters.
+void fill_queue_stats(const Layout& layout, const std::vector<const QueueCounter*>& sets, RenderStats& stats);
+
+/// Sums of StrategyFilm for a film of `pixels`.
+inline uint64_t strategy_values(uint32_t max_depth, uint64_t pixels) {
+    return uint64_t(strategy_count(max_depth)) * 2 * pixels * 3;
+}
+/// Means of what they gathered.
+std::vector<StrategyImage> strategy_images(uint32_t max_depth, uint64_t samples, const std::vector<int64_t>& sums,
+                                           const std::vector<uint64_t>& dropped);
+
+/// Samples of every pixel that take about 0.2 s, from what was measured so far; 1 when nothing was.
+uint32_t batch_of(double seconds, uint64_t samples);
+
+}  // namespace ambilux

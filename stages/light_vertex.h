@@ -1,0 +1,104 @@
+// light_shade and connect_camera: vertices of light subpaths.
+#pragma once
+
+#include "stages/stage.h"
+#include "transport/subpath/camera_connection.h"
+#include "transport/subpath/visit.h"
+
+namespace ambilux {
+
+/// t = 1 at a light vertex. `Out` takes splat candidates.
+template <Features F, class Out>
+struct ConnectCamera {
+    Out splats;
+    StageRecord* record;
+
+    AMBILUX_HD void at(const SceneView& scene, const Rules<BidirectionalMis>& rules, const BidirectionalVertex& y,
+                       const Subpath<BidirectionalMis>& path, uint32_t slot, const Draws& draws) const {
+        const Vec4f u = draws.lens(path.depth);
+        Candidate<BidirectionalMis> c;
+        if (camera_connection<F>(scene, rules, y, path.throughput, path.depth, {u.x, u.y}, c) &&
+            is_valid_radiance(c.value, record))
+            splats.push(pack_candidate(c, slot, F.opacity ? draws.shadow_seed(path.depth) : 0));
+    }
+};
+
+/// The same over vertices that wait in a queue.
+template <Features F, class Out>
+struct ConnectCameraQueue {
+    static constexpr const char* kName = "connect_camera";
+
+    SceneView scene;
+    Wave wave;
+    Rules<BidirectionalMis> rules;
+    Queue<VertexItem> vertices;
+    ConnectCamera<F, Out> connect;
+    StageRecord* record;
+
+    const Queue<VertexItem>& items() const { return vertices; }
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const VertexItem item = load_vertex<F>(vertices, i);
+        const BidirectionalEnd end = unpack_end<F, BidirectionalMis>(scene, item);
+        Subpath<BidirectionalMis> path{};
+        path.throughput = end.throughput;
+        path.depth = end.depth;
+        connect.at(scene, rules, end.vertex, path, item.path, {wave.key(item.path, Stream::light)});
+    }
+};
+
+/// Kept for connections, connected with the camera by `AtVertex`, and left again.
+template <Features F, class AtVertex>
+struct LightVertex {
+    static constexpr const char* kName = "light_shade";
+    using Items = SubpathItems<BidirectionalMis>;
+
+    SceneView scene;
+    Wave wave;
+    Rules<BidirectionalMis> rules;
+    Queue<SubpathHit> hits;
+    Queue<SubpathRay> rays;
+    LightVertices vertices;  ///< all vertices of all light subpaths of the wave
+    uint32_t* last_vertex;   ///< per slot: to link the vertices of a subpath; null if nobody asks
+    AtVertex camera;
+    StageRecord* record;
+
+    const Queue<SubpathHit>& items() const { return hits; }
+    AMBILUX_HD bool skips_misses() const { return true; }
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        SubpathRay next;
+        if (step(hit(i), next)) rays.push(next);
+    }
+    AMBILUX_HD SubpathHit hit(uint32_t i) const { return hits.load(i); }
+
+    struct Sink {
+        const LightVertex& stage;
+        uint32_t slot;
+        const Draws& draws;
+
+        AMBILUX_HD void add(const Candidate<BidirectionalMis>&) const {}
+        AMBILUX_HD void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& path) const {
+            const Rules<BidirectionalMis>& rules = stage.rules;
+            if (rules.splat && rules.wants(path.depth + 1, 1))
+                stage.camera.at(stage.scene, rules, y, path, slot, draws);
+            if (!rules.connect || path.depth + 2 > rules.max_depth) return;
+            const uint32_t link = stage.last_vertex ? stage.last_vertex[slot] : kNone;
+            const uint32_t place = push_vertex<F>(stage.vertices, pack_connection_vertex(y, path, link));
+            if (stage.last_vertex) stage.last_vertex[slot] = place;
+        }
+        AMBILUX_HD bool valid(Rgb throughput) const { return is_valid_radiance(throughput, stage.record); }
+    };
+
+    /// True if the subpath goes on with the ray `next`.
+    AMBILUX_HD bool step(const SubpathHit& h, SubpathRay& next) const {
+        Subpath<BidirectionalMis> path = Items::unpack(h.ray);
+        const Draws draws = {wave.key(h.ray.path, Stream::light)};
+        if (!visit<F>(scene, rules, draws, Side::light, rules.longest(Side::light), h.hit(), path,
+                      Sink{*this, h.ray.path, draws}))
+            return false;
+        next = Items::pack(path, Side::light, h.ray.path, kInfinity);
+        return true;
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,69 @@
+// Which light vertices an eye vertex is connected with: those of the light subpath of its slot, or drawn from a cache of
+// those of all light subpaths of the wave (Davidovic et al. 2014).
+#pragma once
+
+#include "core/warp.h"
+#include "stages/stage.h"
+
+namespace ambilux {
+
+/// The light vertices of a wave.
+struct LightVertexSource {
+    LightVertices vertices;
+    const uint32_t* last_vertex;  ///< per slot: of its light subpath. Not used by draws
+    uint32_t draws;               ///< of an eye vertex from all vertices; 0: those of the light subpath of its slot
+    bool coherent;                ///< lanes of a warp draw vertices that lie together; else each draws by itself
+
+    /// Where a search starts; kNone: there is nothing to connect with.
+    AMBILUX_HD uint32_t first(uint32_t slot) const { return draws > 0 ? draws : last_vertex[slot]; }
+
+    /// What a connection is worth: M vertices of N subpaths are in a cache, and k draws estimate the sum over a
+    /// subpath's vertices by M / (N k) times theirs.
+    AMBILUX_HD float scale(const WaveState& state) const {
+        if (draws == 0) return 1.0f;
+        return float(vertices.counter->size()) / (float(state.light_subpaths) * float(draws));
+    }
+};
+
+/// Which of `size` light vertices a draw of the eye vertex at `depth` finds, each with the same probability. Coherent
+/// draws begin at one random place of the cache for all lanes: so does what they load, and mostly it was left by light
+/// subpaths on one material.
+AMBILUX_HD uint32_t drawn_vertex(RngKey key, uint32_t depth, uint32_t draw, uint32_t size, bool coherent) {
+    if (!coherent) return mul_hi(cache_draw(key, depth, draw).x, size);
+    const Warp warp;
+    key.index = warp.first(key.index);
+    key.sample = warp.first(key.sample);
+    const uint32_t at =
+        mul_hi(cache_draw(key, warp.first(depth), warp.first(draw)).x, size) + warp.rank();
+    return at < size ? at : at % size;
+}
+
+/// Goes through the light vertices that an eye vertex may be connected with.
+struct LightVertexSearch {
+    const LightVertexSource& source;
+    const RngKey& key;  ///< of the eye subpath
+    uint32_t depth;     ///< of the eye vertex `z`
+    const BidirectionalVertex& z;
+    uint32_t max_depth;  ///< of a path
+
+    /// The next one, kNone if there is none, from `next` on, which goes on: a vertex of the light subpath of the same
+    /// slot, or, over a cache, the number of draws that are left.
+    AMBILUX_HD uint32_t find(uint32_t& next) const {
+        const bool drawn = source.draws > 0;
+        const uint32_t size = source.vertices.counter->size();
+        if (size == 0 || depth + 2 > max_depth) next = kNone;
+        while (next != kNone) {
+            uint32_t light = next;
+            if (drawn) light = drawn_vertex(key, depth, --next, size, source.coherent);
+            const ConnectionVertexFront y = source.vertices.items.load_front(light);
+            if (!drawn)
+                next = y.link;
+            else if (next == 0)
+                next = kNone;
+            if (depth + y.bits.depth() + 1 <= max_depth && may_connect(y, z)) return light;
+        }
+        return kNone;
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,68 @@
+// Multiple importance sampling of the path tracer: hits of emitters against next event estimation at the vertex before.
+#pragma once
+
+#include "transport/emitter.h"
+#include "transport/mis/heuristic.h"
+#include "transport/subpath/subpath.h"
+
+namespace ambilux {
+
+/// Strategies of the path tracer: hits only, next event estimation wherever it can find the light, both with weights.
+enum class Estimator : uint32_t { naive, nee, mis };
+
+struct UnidirectionalMis {
+    /// Density of the ray's direction by BSDF sampling; after a delta a probability.
+    struct Sums {
+        float pdf_sa;
+    };
+    struct Start {};
+    using Ratio = float;
+    static constexpr bool kBidirectional = false;
+
+    Estimator estimator;
+    MisHeuristic heuristic;
+    bool next_event;  ///< emitters are sampled
+
+    AMBILUX_HD void start_eye(const SceneView&, Vec3f, Sums& sums, Start&) const { sums = {0.0f}; }
+
+    template <Features F, class Path>
+    AMBILUX_HD Sums sums_at(const SceneView&, Side, const Path&, Sums sums, const SurfacePoint&) const {
+        return sums;
+    }
+    AMBILUX_HD Sums sums_after_scatter(Sums, bool, bool, float pdf_forward_sa, float, float) const {
+        return {pdf_forward_sa};
+    }
+
+    /// `pdf_other_sa`: of next event estimation for what the ray of `path` met. False if that finds it alone.
+    template <class Path>
+    AMBILUX_HD bool ratio_to(const Path& path, Sums ray, float pdf_other_sa, float& ratio) const {
+        if (estimator == Estimator::nee && pdf_other_sa > 0.0f) return false;
+        ratio = estimator == Estimator::mis ? heuristic_term(heuristic, pdf_other_sa / ray.pdf_sa) : 0.0f;
+        if (pdf_other_sa == 0.0f) ratio = 0.0f;
+        return true;
+    }
+    template <Features F, class Path>
+    AMBILUX_HD bool hit_ratio(const SceneView& scene, const Path& path, Sums ray, uint32_t emitter,
+                              const SurfacePoint& light, float& ratio) const {
+        const bool sampled = next_event && !path.delta;
+        return ratio_to(
+            path, ray,
+            sampled ? pdf_emitter_direct<F>(scene, emitter, path.origin, path.direction, light) : 0.0f, ratio);
+    }
+    template <Features F, class Path>
+    AMBILUX_HD bool escape_ratio(const SceneView& scene, const Path& path, Sums ray, float& ratio) const {
+        const bool sampled = next_event && !path.delta;
+        return ratio_to(path, ray, sampled ? pdf_environment_direct<F>(scene, path.direction) : 0.0f, ratio);
+    }
+    template <Features F>
+    AMBILUX_HD float next_event_ratio(const SceneView&, Sums, bool, const EmitterSample& light, const BsdfValue& f,
+                                      float) const {
+        // Only BSDF sampling and a hit could find this light too.
+        const bool other = estimator == Estimator::mis && !light.delta;
+        return other ? heuristic_term(heuristic, f.pdf_sa / light.pdf_sa) : 0.0f;
+    }
+    /// The last segment brings emission only, which next event estimation leaves to hits after a delta.
+    AMBILUX_HD bool counts_last_segment(bool delta) const { return estimator != Estimator::nee || delta; }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,34 @@
+// s = 1: an eye vertex samples an emitter (next event estimation).
+#pragma once
+
+#include "transport/emitter.h"
+#include "transport/subpath/rules.h"
+#include "transport/subpath/vertex.h"
+
+namespace ambilux {
+
+/// The vertex `z` of an eye subpath of `depth` segments and `throughput` up to there samples an emitter with `u`. False
+/// if that gives nothing.
+template <Features F, class Mis>
+AMBILUX_HD bool next_event(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& z, Rgb throughput,
+                           uint32_t depth, Vec4f u, Candidate<Mis>& c) {
+    EmitterSample light;
+    if (!rules.next_event || !rules.wants(1, depth + 1)) return false;
+    if (!sample_emitter_deferred<F>(scene, z.point.p, u, light) || !may_scatter(z.scattering, light.wi)) return false;
+    const BsdfValue f = scatter_evaluate<F>(z.scattering, light.wi, TransportMode::radiance);
+    if (is_zero(f.value)) return false;
+    c.environment = is_environment<F>(scene, light.emitter);
+    c.value = throughput * f.value * ((c.environment ? splat(1.0f) : light.radiance) / light.pdf_sa);
+    if (is_zero(c.value)) return false;
+    const float cos_z = fabsf(dot(z.point.ng, light.wi));
+    c.ratio = rules.counted(rules.mis.template next_event_ratio<F>(scene, z.sums, z.first, light, f, cos_z));
+    c.strategy = Strategy::make(1, depth + 1);
+    if (light.distance < kInfinity)
+        return set_segment(c, z, light.wi, light.p, ray_offset(light.p, light.p_error, light.ng), light.ng);
+    c.origin = offset_ray_origin(z.point.p, z.offset, z.point.ng, light.wi);
+    c.direction = light.wi;
+    c.tmax = kInfinity;
+    return true;
+}
+
+}  // namespace ambilux

@@ -1,0 +1,32 @@
+// Russian roulette. It enters no density: the subpaths of every strategy are thinned and repaid alike, so that weights,
+// which depend on the path alone, still sum to one.
+#pragma once
+
+#include "transport/subpath/subpath.h"
+
+namespace ambilux {
+
+/// Product of relative indices with the bits that items keep (16 of a float): every schedule then takes the same
+/// decisions. Any value keeps roulette unbiased.
+AMBILUX_HD float rounded_eta(float eta) { return bits_float(float_bits(eta) & 0xffff0000u); }
+
+/// Thins a subpath by its throughput; `u` uniform in [0,1). False if it ends. Radiance is scaled by the squared index of
+/// the medium, which is not loss (Mitsuba's rule).
+template <class Mis>
+AMBILUX_HD bool survives(Subpath<Mis>& path, float u) {
+    const float probability = min(max_component(path.throughput) * sqr(path.eta), 0.95f);
+    if (!(u < probability)) return false;
+    path.throughput = path.throughput / probability;
+    return true;
+}
+
+/// Roulette before the shadow ray: what would add less than a share `cull` of the light `so_far` that its path has
+/// brought survives with the probability of its part of that share, and is worth more by the inverse. The expectation
+/// stays, since `so_far` and `seed` are known before. Returns the factor, 0 for what is dropped.
+AMBILUX_HD float cull_factor(float cull, Rgb value, Rgb so_far, uint32_t seed) {
+    const float probability = luminance(value) / (cull * luminance(so_far));
+    if (!(probability < 1.0f)) return 1.0f;
+    return hash_float(seed, 0x63756c6cu) < probability ? 1.0f / probability : 0.0f;
+}
+
+}  // namespace ambilux

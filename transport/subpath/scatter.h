@@ -1,0 +1,41 @@
+// The next ray of a subpath.
+#pragma once
+
+#include "transport/subpath/roulette.h"
+#include "transport/subpath/rules.h"
+#include "transport/subpath/vertex.h"
+
+namespace ambilux {
+
+/// Density of the way back over a delta, as a multiple of that of the way there. Fresnel terms are symmetric, but a
+/// delta function of the direction on one side counts otherwise as one of the direction on the other: refraction spreads
+/// solid angles by n_i² cos_i / (n_o² cos_o). `eta`: of the sample, n_o / n_i.
+AMBILUX_HD float delta_reverse_pdf(const Scattering& s, Vec3f wo, float eta) {
+    if (eta == 1.0f) return 1.0f;
+    // Never 0 by rounding, where a subpath leaves along the surface.
+    return fabsf(s.wi.z) / (max(fabsf(dot(s.frame.n, wo)), 1e-7f) * sqr(eta));
+}
+
+/// Scatters `path` at `vertex` with `u`: xyz for the BSDF, w for Russian roulette. False if the subpath ends.
+template <Features F, class Mis>
+AMBILUX_HD bool scatter(const Rules<Mis>& rules, Side side, const Vertex<Mis>& vertex, Vec4f u, Subpath<Mis>& path) {
+    ScatterSample s;
+    if (!scatter_sample<F>(vertex.scattering, {u.x, u.y, u.z}, transport_mode(side), s)) return false;
+    const bool delta = s.flags & kScatterDelta;
+    const uint32_t met = path.depth;
+    if (met + 1 == rules.max_depth && !rules.mis.counts_last_segment(delta)) return false;
+    path.throughput = path.throughput * s.weight;
+    if (is_zero(path.throughput)) return false;
+    const float cos_out = fabsf(dot(vertex.point.ng, s.wo));
+    const float forward = delta ? 1.0f : s.pdf_sa;
+    const float reverse = delta ? delta_reverse_pdf(vertex.scattering, s.wo, s.eta) : s.pdf_reverse_sa;
+    path.sums = rules.mis.sums_after_scatter(vertex.sums, vertex.first, delta, forward, reverse, cos_out);
+    path.origin = offset_ray_origin(vertex.point.p, vertex.offset, vertex.point.ng, s.wo);
+    path.direction = s.wo;
+    if (side == Side::eye) path.eta = rounded_eta(path.eta * s.eta);
+    path.delta = delta;
+    path.depth = met + 1;
+    return met < rules.rr_depth || survives(path, u.w);
+}
+
+}  // namespace ambilux
