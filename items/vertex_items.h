@@ -17,9 +17,11 @@ struct VertexBits {
     template <class Mis>
     AMBILUX_HD static VertexBits make(uint32_t depth, const Vertex<Mis>& v) {
         const Scattering& s = v.scattering;
-        return {depth | (s.bsdf.type == BsdfType::diffuse ? kDiffuse : 0u) |
-                (bsdf_transmits(s.bsdf.type) ? kThrough : 0u) | (dot(s.ng, s.wi_world) > 0.0f ? kAbove : 0u) |
-                (float_bits(v.offset) + 0xffffu) >> 16 << kOffsetBit};
+        uint32_t word = depth | (float_bits(v.offset) + 0xffffu) >> 16 << kOffsetBit;
+        if (s.bsdf.type == BsdfType::diffuse) word |= kDiffuse;
+        if (bsdf_transmits(s.bsdf.type)) word |= kThrough;
+        if (dot(s.ng, s.wi_world) > 0.0f) word |= kAbove;
+        return VertexBits{word};
     }
 
     AMBILUX_HD uint32_t depth() const { return bits & kMaxDepth; }

@@ -7,9 +7,10 @@
 
 namespace ambilux {
 
-template <Features F, class Tracer, class Mis, Side kSide>
+template <Features F, class Tracer, class Mis>
 struct Extend {
-    static constexpr const char* kName = kSide == Side::eye ? "extend" : "light_extend";
+    static constexpr const char* kName = "extend";
+    static constexpr const char* kLightName = "light_extend";  ///< the record for rays of light subpaths
     static constexpr Features kFeatures = F;
     static constexpr bool kAnyHit = false;
     using Items = SubpathItems<Mis>;
@@ -18,6 +19,7 @@ struct Extend {
     SceneView scene;
     Tracer tracer;
     Wave wave;
+    Stream stream;  ///< of the subpaths
     Queue<RayItem> rays;
     Queue<HitItem<RayItem>> hits;
     StageRecord* record;
@@ -32,7 +34,6 @@ struct Extend {
     /// False for an invalid ray.
     AMBILUX_HD bool fetch(const RayItem& item, Ray& ray) const {
         ray = {item.origin, Items::tmax(item), item.direction, 0};
-        constexpr Stream stream = kSide == Side::eye ? Stream::eye : Stream::light;
         if constexpr (F.opacity) ray.alpha_seed = Draws{wave.key(item.path, stream)}.opacity_seed(item.bits.depth());
         return is_valid_ray(item.origin, item.direction, record);
     }

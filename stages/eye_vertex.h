@@ -33,7 +33,7 @@ struct EyeVertex {
     StageRecord* record;
     bool camera_lane_known;  ///< camera rays lie without the lane that all of them share
 
-    const Queue<HitItem<RayItem>>& items() const { return hits; }
+    AMBILUX_HD const Queue<HitItem<RayItem>>& items() const { return hits; }
     /// True if misses contribute nothing.
     AMBILUX_HD bool skips_misses() const {
         return !F.has_environment() || scene.environment == kNone || !rules.count_environment;

@@ -170,10 +170,12 @@ private:
     }
 
     AMBILUX_HD void arrive(State& s) const {
-        if (s.side == Side::eye)
+        if (s.side == Side::eye) {
             s.sum += s.value;
-        else
-            splats.push({s.value, s.slot, s.film, Strategy::make(0, 0), 0.0f});
+        } else {
+            const SplatItem item = {s.value, s.slot, s.film, Strategy::make(0, 0), 0.0f};
+            splats.push(item);
+        }
     }
 
     /// The candidate, weighted, asks for a shadow ray.

@@ -3,6 +3,7 @@
 #include "backends/cuda/device_scene.h"
 #include "backends/cuda/median_seconds.cuh"
 #include "backends/cuda/order.h"
+#include "backends/cuda/record_kernels.cuh"
 #include "backends/cuda/stage_kernels.cuh"
 
 namespace ambilux {
@@ -39,7 +40,7 @@ struct DeviceQueue {
         lay_out(sizes, n, policy, temporary);
         bytes = DeviceBuffer<std::byte>(sizes.bytes(), "queue");
         bytes.zero();
-        Layout layout(bytes.data());
+        Layout layout(sizes, bytes.data());
         lay_out(layout, n, policy, temporary);
         QueueCounter first[2] = {};
         first[0].capacity = first[1].capacity = first[1].count = n;
@@ -48,14 +49,15 @@ struct DeviceQueue {
         if (policy.ordering != Ordering::none) list_places(order, nullptr);
     }
     void lay_out(Layout& layout, uint32_t n, const QueuePolicy& policy, uint64_t temporary) {
-        counters = layout.take<QueueCounter>(2);
-        queue = layout.queue<Item>("items", counters, n, policy.fixed_places());
-        kept_keys = layout.take<uint16_t>(policy.keyed_hits ? n : 0);
+        queue = layout.queue<Item>("items", n, policy.fixed_places());
+        counters = queue.counter;
+        layout.queue<PairItem>("full", 0);
+        kept_keys = layout.allocate<uint16_t>(policy.keyed_hits ? n : 0);
         order = lay_out_order(layout, policy, n, temporary);
-        state = layout.take<WaveState>(1);
-        record = layout.take<StageRecord>(1);
-        clock = layout.take<uint64_t>(1);
-        contents = layout.take<QueueContents>(2);
+        state = layout.allocate<WaveState>(1);
+        record = layout.record("queue");
+        clock = layout.allocate<uint64_t>(1);
+        contents = layout.allocate<QueueContents>(2);
     }
 
     /// Before a launch over either counter, which starts at their first items.
@@ -67,7 +69,7 @@ struct DeviceQueue {
     void drain(const uint32_t* list, bool counted) const {
         const DrainItems<Item> stage = {queue, contents, counted};
         detail::launch_items<<<drain_grid, kStageBlock>>>(
-            stage, detail::Items{counters, list, queue.flags, queue.capacity, nullptr, nullptr, 0});
+            stage, detail::Items{counters, list, queue.flags, queue.capacity(), nullptr, nullptr, 0});
     }
     template <class T>
     T read(const T* place) const {
@@ -145,17 +147,17 @@ void time_order(const char* name, const SceneView& scene, const SceneView& devic
     if (n < detail::kSortFrom) return;
     const QueuePolicy policy = {Compaction::atomic, Order::kOrdering, kept};
     const DeviceQueue<Item> q(n, policy, n);
-    std::vector<Lane> lanes(size_t(n) * Queue<Item>::kLanes);
+    std::vector<Lane> lanes(size_t(n) * LaneArray<Item>::kLanes);
     std::vector<uint16_t> keys(kept ? n : 0);
     QueueCounter counter = {};
-    const Queue<Item> here = {lanes.data(), &counter, n};
+    const Queue<Item> here = {{lanes.data(), n}, &counter};
     QueueContents pushed = {n, 0};
     for (uint32_t i = 0; i < n; ++i) {
         here.push(items[i]);
         pushed.sum += item_sum(items[i]);
         if constexpr (kept) keys[i] = uint16_t(Order::key(scene, items[i]));
     }
-    cuda_check(cudaMemcpy(q.queue.base, lanes.data(), lanes.size() * sizeof(Lane), cudaMemcpyHostToDevice), "items");
+    cuda_check(cudaMemcpy(q.queue.items.base, lanes.data(), lanes.size() * sizeof(Lane), cudaMemcpyHostToDevice), "items");
     if (kept)
         cuda_check(cudaMemcpy(q.kept_keys, keys.data(), keys.size() * sizeof(uint16_t), cudaMemcpyHostToDevice),
                    "keys");

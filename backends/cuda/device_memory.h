@@ -29,6 +29,13 @@ inline void cuda_check(cudaError_t error, const char* what, uint64_t bytes_asked
     throw Error(ExitCode::device, message);
 }
 
+/// Bytes of the current device that nobody holds.
+inline uint64_t free_device_bytes() {
+    size_t free = 0, total = 0;
+    cuda_check(cudaMemGetInfo(&free, &total), "device memory");
+    return free;
+}
+
 /// An array on the device, not initialised. Without elements it holds no memory and data() is null. Copies run on the
 /// default stream.
 template <class T>

@@ -47,7 +47,7 @@ struct PathIntegrator {
         Wave wave;
         Eye eye;
         GenerateEye<Mis> generate;
-        Extend<F, Tracer, Mis, Side::eye> extend[2];
+        Extend<F, Tracer, Mis> extend[2];
         EyeVertex<F, Mis, typename Eye::Emission, AtVertex> eye_vertex[2];
         ConnectEmitter<F, Mis, Connect> connect_emitter;
 
@@ -62,7 +62,7 @@ struct PathIntegrator {
             connect_emitter = {scene, wave, p.rules, m.eye.vertices, connect, connect.record};
             const auto at_vertex = choose<kFusion.connect>(connect, QueueVertex<F, Mis>{m.eye.vertices});
             for (int k = 0; k < 2; ++k) {
-                extend[k] = {scene, tracer, wave, q.rays[k], q.hits[k], record(extend[k])};
+                extend[k] = {scene, tracer, wave, Stream::eye, q.rays[k], q.hits[k], record(extend[k])};
                 eye_vertex[k] = {scene,     wave,      p.rules,
                                  q.hits[k], q.rays[1 - k], eye.emission(),
                                  at_vertex, record(eye_vertex[k]), kFusion.generate && !q.hits[0].flags};

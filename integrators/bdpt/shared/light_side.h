@@ -81,7 +81,7 @@ struct LightStages {
     using Splats = SplatSide<F, Tracer, K>;
 
     GenerateLight<F, typename Splats::Candidates> generate;
-    Extend<F, Tracer, BidirectionalMis, Side::light> extend[2];
+    Extend<F, Tracer, BidirectionalMis> extend[2];
     LightVertex<F, typename Splats::AtVertex> vertex[2];
     ConnectCameraQueue<F, typename Splats::Candidates> connect_camera;
 
@@ -93,7 +93,8 @@ struct LightStages {
         generate = {scene, wave, p.rules, q.rays[0], splats.candidates(), last_vertex, record(generate),
                     p.waves.light_subpaths_per_tile};
         for (int k = 0; k < 2; ++k) {
-            extend[k] = {scene, tracer, wave, q.rays[k], q.hits[k], record(extend[k])};
+            extend[k] = {scene,     tracer,    wave, Stream::light, q.rays[k],
+                         q.hits[k], layout.record(extend[k].kLightName)};
             vertex[k] = {scene,    wave,        p.rules,            q.hits[k],        q.rays[1 - k],
                          vertices, last_vertex, splats.at_vertex(), record(vertex[k])};
         }

@@ -58,7 +58,7 @@ struct TwoSidesStages {
     LightStages<F, Tracer, K> light;
     LightVertexSource source;
     GenerateEye<Mis> generate;
-    Extend<F, Tracer, Mis, Side::eye> extend[2];
+    Extend<F, Tracer, Mis> extend[2];
     EyeVertex<F, Mis, typename Eye::Emission, AtVertex> eye_vertex[2];
     ConnectEmitter<F, Mis, Connect> connect_emitter;
     ConnectVertices<F, Candidates> connect_vertices, connect_deferred;
@@ -84,7 +84,7 @@ struct TwoSidesStages {
         connect_emitter = {scene, wave, p.rules, m.eye.vertices, connect, next_event.record};
         const auto at_vertex = choose<K.connect>(connect, QueueVertex<F, Mis>{m.eye.vertices});
         for (int k = 0; k < 2; ++k) {
-            extend[k] = {scene, tracer, wave, q.rays[k], q.hits[k], record(extend[k])};
+            extend[k] = {scene, tracer, wave, Stream::eye, q.rays[k], q.hits[k], record(extend[k])};
             eye_vertex[k] = {scene,          wave,      p.rules,               q.hits[k], q.rays[1 - k],
                              eye.emission(), at_vertex, record(eye_vertex[k]), false};
         }
