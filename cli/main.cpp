@@ -1,5 +1,5 @@
 // The `ambilux` program: reads the command line, runs one command, turns errors into messages and exit codes
-// (design.md, section 5).
+// (README.md).
 #include <fmt/format.h>
 
 #include <new>
