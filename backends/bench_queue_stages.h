@@ -9,8 +9,8 @@
 #include "core/error.h"
 #include "items/candidate_items.h"
 #include "items/vertex_items.h"
-#include "queues/stage_record.h"
 #include "queues/order.h"
+#include "queues/stage_record.h"
 
 namespace ambilux {
 

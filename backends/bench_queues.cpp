@@ -128,12 +128,11 @@ void time_order_on_host(const char* name, const SceneView& scene, Ordering order
     QueueContents pushed = {n, 0};
     for (const Item& item : items) pushed.sum += item_sum(item);
     for (const QueuePolicy policy : {QueuePolicy{}, QueuePolicy{Compaction::atomic, ordering}}) {
-        const HostSeconds seconds = time_on_host<Item>(name, scene, policy, waves, pushed, repetitions,
-                                                       [&](CpuExecutor&, HostQueue<Item>& q, uint32_t wave) {
-                                                           for (uint32_t i = wave * kCpuWaveSize;
-                                                                i < std::min(n, (wave + 1) * kCpuWaveSize); ++i)
-                                                               q.queue.push(items[i]);
-                                                       });
+        const HostSeconds seconds = time_on_host<Item>(
+            name, scene, policy, waves, pushed, repetitions, [&](CpuExecutor&, HostQueue<Item>& q, uint32_t wave) {
+                for (uint32_t i = wave * kCpuWaveSize; i < std::min(n, (wave + 1) * kCpuWaveSize); ++i)
+                    q.queue.push(items[i]);
+            });
         rows.push_back({"drain", name, sizeof(Item), policy, 1, n, n, seconds.drain});
     }
 }

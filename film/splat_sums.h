@@ -6,9 +6,9 @@
 
 namespace ambilux {
 
-/// A cell per pixel and sample of a wave, of one of two kinds. Fixed point does not depend on the order in which threads
-/// add. A cell of floats takes one operation of memory instead of three: n values are added up with an error of at most
-/// n 2^-24 of their sum.
+/// A cell per pixel and sample of a wave, of one of two kinds. Fixed point does not depend on the order in which
+/// threads add. A cell of floats takes one operation of memory instead of three: n values are added up with an error of
+/// at most n 2^-24 of their sum.
 struct SplatSums {
     int64_t* fixed = nullptr;  ///< three per cell in units of kLightUnit
     Lane* floats = nullptr;    ///< or a lane per cell

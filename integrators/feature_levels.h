@@ -11,13 +11,13 @@ constexpr Features kDiffuseFeatures = {
     bit(BsdfType::diffuse), bit(EmitterType::area), bit(PrimitiveType::triangle), false, false, false};
 
 /// What most scenes of light transport papers are made of: any shapes under area lights, no textures.
-constexpr Features kUntexturedFeatures = {bit(BsdfType::diffuse) | bit(BsdfType::conductor) |
-                                              bit(BsdfType::rough_conductor) | bit(BsdfType::dielectric),
-                                          bit(EmitterType::area),
-                                          kAllFeatures.primitives,
-                                          false,
-                                          false,
-                                          false};
+constexpr Features kUntexturedFeatures = {
+    bit(BsdfType::diffuse) | bit(BsdfType::conductor) | bit(BsdfType::rough_conductor) | bit(BsdfType::dielectric),
+    bit(EmitterType::area),
+    kAllFeatures.primitives,
+    false,
+    false,
+    false};
 
 /// Every BSDF, texture and emitter, on triangles that are neither bumped nor holed.
 constexpr Features kTriangleFeatures = {
@@ -27,8 +27,8 @@ constexpr Features kTriangleFeatures = {
 constexpr Features kMaskedFeatures = {
     kAllFeatures.bsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false, true};
 
-/// Calls f.template operator()<F>() with the smallest level F that covers `needed`; with the full set if `specialise` is
-/// false.
+/// Calls f.template operator()<F>() with the smallest level F that covers `needed`; with the full set if `specialise`
+/// is false.
 template <class Function>
 decltype(auto) with_feature_level(const Features& needed, bool specialise, Function&& f) {
     if (specialise && kDiffuseFeatures.covers(needed)) return f.template operator()<kDiffuseFeatures>();

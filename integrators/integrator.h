@@ -22,8 +22,8 @@
 #include <string>
 #include <vector>
 
-#include "queues/order.h"
 #include "integrators/settings.h"
+#include "queues/order.h"
 #include "scene/scene.h"
 #include "stages/multi_bounce.h"
 #include "stages/update_film.h"
@@ -37,7 +37,7 @@ struct WavePolicy {
     float cull = 0;                   ///< cull_factor; 0: none
     uint32_t strategy_depth = 0;      ///< segments up to which images of single strategies are gathered; 0: none
     bool deterministic = false;
-    uint32_t slots_in_flight = 0;     ///< variant streaming: paths that are worked on at once; 0: all of a wave
+    uint32_t slots_in_flight = 0;          ///< variant streaming: paths that are worked on at once; 0: all of a wave
     uint32_t light_subpaths_per_tile = 0;  ///< of kTilePixels pixels, in one sample; 0: none
     bool keeps_light_vertices = false;     ///< queues of light vertices or splats hold those of a whole wave
 

@@ -68,9 +68,8 @@ struct PairItem {
 
 template <class Mis>
 AMBILUX_HD CandidateItem pack_candidate(const Candidate<Mis>& c, uint32_t path, uint32_t opacity_seed) {
-    return {c.value,     path,         c.origin, c.environment ? kTowardsEnvironment : c.tmax,
-            c.direction, opacity_seed, c.film,   c.ratio,
-            c.strategy};
+    return {c.value, path,    c.origin,  c.environment ? kTowardsEnvironment : c.tmax, c.direction, opacity_seed,
+            c.film,  c.ratio, c.strategy};
 }
 
 }  // namespace ambilux

@@ -47,7 +47,7 @@ struct SubpathRay {
     Rgb throughput;
     float tmax;              ///< of camera rays
     float sums_or_start[2];  ///< MisSums; first ray of a light subpath: SubpathStart::inv_pdf and direction
-    uint32_t start[2];  ///< first rays: camera_distance (eye), prim and emitter (light) of SubpathStart
+    uint32_t start[2];       ///< first rays: camera_distance (eye), prim and emitter (light) of SubpathStart
 };
 
 /// Where a ray ended: the last lane of a HitItem.
@@ -90,12 +90,13 @@ struct SubpathItems<UnidirectionalMis> {
 
     /// `tmax`: of a camera ray.
     AMBILUX_HD static Ray pack(const Path& p, Side, uint32_t path, float tmax) {
-        return {p.origin,     path, p.direction, SubpathBits::make(p.depth, p.delta, p.eta),
+        return {p.origin,     path,
+                p.direction,  SubpathBits::make(p.depth, p.delta, p.eta),
                 p.throughput, p.depth == 1 ? tmax : p.sums.pdf_sa};
     }
     AMBILUX_HD static Path unpack(const Ray& r) {
-        return {r.origin,      r.direction,    r.throughput, {r.pdf_sa_or_tmax}, {}, r.bits.depth(), r.bits.eta(),
-                r.bits.delta()};
+        return {r.origin, r.direction,    r.throughput, {r.pdf_sa_or_tmax},
+                {},       r.bits.depth(), r.bits.eta(), r.bits.delta()};
     }
     AMBILUX_HD static float tmax(const Ray& r) { return r.bits.depth() == 1 ? r.pdf_sa_or_tmax : kInfinity; }
 };
@@ -106,8 +107,14 @@ struct SubpathItems<BidirectionalMis> {
     using Ray = SubpathRay;
 
     AMBILUX_HD static Ray pack(const Path& p, Side side, uint32_t path, float tmax) {
-        Ray r = {p.origin,     path, p.direction,           SubpathBits::make(p.depth, p.delta, p.eta),
-                 p.throughput, tmax, {p.sums.dvcm, p.sums.dvc}, {0, 0}};
+        Ray r = {p.origin,
+                 path,
+                 p.direction,
+                 SubpathBits::make(p.depth, p.delta, p.eta),
+                 p.throughput,
+                 tmax,
+                 {p.sums.dvcm, p.sums.dvc},
+                 {0, 0}};
         if (p.depth == 1 && side == Side::light) {
             r.sums_or_start[0] = p.start.inv_pdf;
             r.sums_or_start[1] = p.start.direction;

@@ -50,9 +50,9 @@ private:
 struct ConnectionVertexFront {
     Vec3f p;
     VertexBits bits;
-    Vec2f ng;  ///< octahedral map of Scattering::ng
-    uint32_t
-        link;  ///< of vertices that are kept over a wave: the one before it of the same subpath, or kNone; else the path
+    Vec2f ng;       ///< octahedral map of Scattering::ng
+    uint32_t link;  ///< of vertices that are kept over a wave: the one before it of the same subpath, or kNone; else
+                    ///< the path
     float dvc;
 };
 
@@ -136,7 +136,9 @@ AMBILUX_HD Item load_vertex(const Queue<Item>& vertices, uint32_t i) {
 namespace detail {
 
 AMBILUX_HD MisSums packed_sums(MisSums sums) { return sums; }
-AMBILUX_HD MisSums packed_sums(UnidirectionalMis::Sums) { return {0.0f, 0.0f}; }  // nothing is asked of them at a vertex
+AMBILUX_HD MisSums packed_sums(UnidirectionalMis::Sums) {
+    return {0.0f, 0.0f};
+}  // nothing is asked of them at a vertex
 AMBILUX_HD void unpack_sums(MisSums packed, MisSums& sums) { sums = packed; }
 AMBILUX_HD void unpack_sums(MisSums, UnidirectionalMis::Sums&) {}
 
@@ -180,8 +182,8 @@ AMBILUX_HD VertexItem pack_vertex(const Vertex<Mis>& v, const Subpath<Mis>& path
 }
 
 /// The vertex `v` that the ray of `path` met. `link`: ConnectionVertexFront.
-AMBILUX_HD ConnectionVertex pack_connection_vertex(const BidirectionalVertex& v,
-                                                   const Subpath<BidirectionalMis>& path, uint32_t link) {
+AMBILUX_HD ConnectionVertex pack_connection_vertex(const BidirectionalVertex& v, const Subpath<BidirectionalMis>& path,
+                                                   uint32_t link) {
     const ScatteringParts s = parts_of(v.scattering);
     Rgb throughput = path.throughput;
     if (v.scattering.bsdf.type == BsdfType::diffuse) throughput *= s.parameters.color;

@@ -15,17 +15,18 @@ struct alignas(16) Lane {
 /// Path of an empty slot.
 constexpr uint32_t kNoPath = 0xffffffffu;
 
-/// State of one queue. Counters lie a kilobyte apart: those that share a part of a device's cache are added to one after
-/// the other; one cache line more, lest all fall into few sets of a host's. `count` goes on counting when the queue is
-/// full, so that what is lost is known.
+/// State of one queue. Counters lie a kilobyte apart: those that share a part of a device's cache are added to one
+/// after the other; one cache line more, lest all fall into few sets of a host's. `count` goes on counting when the
+/// queue is full, so that what is lost is known.
 struct QueueCounter {
     uint32_t count;     ///< slots given out since the queue was last emptied; of a queue by path known on a device only
                         ///< when it has been counted
     uint32_t capacity;  ///< slots
     uint64_t peak;      ///< most slots given out in one filling
-    uint64_t overflow;  ///< items lost: slots past the capacity, or one that was occupied (which only the host looks for)
-    uint32_t next;      ///< items that threads of a launch have claimed
-    uint32_t holes;     ///< slots below `count` that are empty (queues/reserved_queue.h)
+    uint64_t
+        overflow;    ///< items lost: slots past the capacity, or one that was occupied (which only the host looks for)
+    uint32_t next;   ///< items that threads of a launch have claimed
+    uint32_t holes;  ///< slots below `count` that are empty (queues/reserved_queue.h)
     uint32_t pad[264];
 
     /// Slots to go through.

@@ -28,7 +28,8 @@ AMBILUX_HD void set_start(Lane& place, const Value& value) {
 }
 
 /// Lanes of an item, the first ones, that lie two by two where the others are apart, since memory moves 32 bytes at
-/// least: items say so (kPairedLanes) that are written in order and read in another, sorted by their materials or drawn.
+/// least: items say so (kPairedLanes) that are written in order and read in another, sorted by their materials or
+/// drawn.
 template <class Item>
 constexpr uint32_t paired_lanes() {
     if constexpr (requires { Item::kPairedLanes; }) {

@@ -18,8 +18,7 @@ public:
     Layout() = default;
     /// The run that hands out `memory`, of as many bytes as `plan` tells. Counters and records come first.
     Layout(const Layout& plan, void* memory)
-        : memory_(static_cast<std::byte*>(memory)),
-          bytes_(plan.head_bytes()),
+        : memory_(static_cast<std::byte*>(memory)), bytes_(plan.head_bytes()),
           counters_(reinterpret_cast<QueueCounter*>(memory_)),
           records_(reinterpret_cast<StageRecord*>(memory_ + aligned(plan.names_.size() * sizeof(QueueCounter)))) {}
 
@@ -43,6 +42,7 @@ public:
         capacities_.push_back(capacity);
         q.items = array<Item>(capacity, lanes);
         if (by_path) q.flags = allocate<uint8_t>(capacity);
+        last_by_path_ = by_path;
         return q;
     }
     template <class Item>
@@ -60,10 +60,11 @@ public:
     template <class Front, class Item>
     Queue<Front> front(const char* name, const Queue<Item>& whole) {
         static_assert(sizeof(Front) < sizeof(Item));
+        const bool by_path = last_by_path_;
         Queue<Front> q = queue<Front>(name, 0);
         q.items = {whole.items.base, whole.capacity()};
         capacities_.back() = whole.capacity();
-        if (whole.flags) q.flags = allocate<uint8_t>(whole.capacity());
+        if (by_path) q.flags = allocate<uint8_t>(whole.capacity());
         return q;
     }
 
@@ -95,6 +96,7 @@ private:
 
     std::byte* memory_ = nullptr;
     uint64_t bytes_ = 0;
+    bool last_by_path_ = false;
     QueueCounter* counters_ = nullptr;
     StageRecord* records_ = nullptr;
     std::vector<std::string> names_, record_names_;

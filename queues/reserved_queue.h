@@ -33,8 +33,7 @@ public:
     /// For a launch over `items`, by all threads of the block before anything is pushed.
     __device__ void open(uint32_t items) {
         if (threadIdx.x == 0) {
-            const uint32_t most =
-                (items / 16 < kMostHoles ? items / 16 : kMostHoles) / (gridDim.x * (blockDim.x / 32));
+            const uint32_t most = (items / 16 < kMostHoles ? items / 16 : kMostHoles) / (gridDim.x * (blockDim.x / 32));
             run_ = most < 64 ? 0 : most < 128 ? 64 : 128;
         }
         if (threadIdx.x < blockDim.x / 32) reserved_[threadIdx.x] = 0;
@@ -107,8 +106,8 @@ private:
 
 #endif
 
-/// A queue that kernels push to through ReservedSlots, which they open and close; with `reserve` unset, or on a host, as
-/// to any other.
+/// A queue that kernels push to through ReservedSlots, which they open and close; with `reserve` unset, or on a host,
+/// as to any other.
 template <class Item>
 struct ReservedQueue {
     Queue<Item> queue;

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "core/divisor.h"
-#include "queues/lane_array.h"
 #include "core/rng.h"
+#include "queues/lane_array.h"
 
 namespace ambilux {
 
@@ -13,13 +13,13 @@ constexpr uint32_t kTilePixels = kTileSide * kTileSide;
 
 /// Part of a wave that changes from one to the next; lives where the kernels run.
 struct WaveState {
-    uint32_t first_tile;    ///< of this wave
-    uint32_t first_sample;  ///< of this wave
-    uint32_t samples;       ///< of each pixel in this wave, at most Wave::samples
-    uint32_t depth;         ///< segments of the paths in flight
-    uint32_t failed;        ///< a wave ran out of memory: it and all after it do nothing until the host has made room
-    uint32_t done;          ///< waves that did not fail
-    uint32_t light_subpaths;   ///< of this wave
+    uint32_t first_tile;      ///< of this wave
+    uint32_t first_sample;    ///< of this wave
+    uint32_t samples;         ///< of each pixel in this wave, at most Wave::samples
+    uint32_t depth;           ///< segments of the paths in flight
+    uint32_t failed;          ///< a wave ran out of memory: it and all after it do nothing until the host has made room
+    uint32_t done;            ///< waves that did not fail
+    uint32_t light_subpaths;  ///< of this wave
     alignas(128) uint32_t next_path = 0;  ///< variant streaming: the next that a slot claims
     alignas(128) uint32_t next =
         0;  ///< slots that threads of a launch have claimed; away from what is read all the time
@@ -46,8 +46,8 @@ struct Wave {
     Divisor tiles_x;         ///< tiles in a row of the film
     Divisor tiles;           ///< tiles per wave
     uint32_t samples;        ///< most samples of a pixel per wave
-    uint32_t first_key = 0;  ///< of the pixels' random numbers: light subpaths beyond the first of a slot have keys beyond
-                             ///< those of all pixels
+    uint32_t first_key = 0;  ///< of the pixels' random numbers: light subpaths beyond the first of a slot have keys
+                             ///< beyond those of all pixels
 
     AMBILUX_HD uint32_t slot_count() const { return tiles * kTilePixels * samples; }
 
@@ -109,7 +109,8 @@ inline uint32_t light_subpaths_in(const Wave& wave, uint32_t first_tile, uint32_
         const uint32_t x = tile % wave.tiles_x * kTileSide, y = tile / wave.tiles_x * kTileSide;
         const bool whole = x + kTileSide <= wave.width && y + kTileSide <= wave.height;
         for (uint32_t z = 0; !whole && z < kTilePixels; ++z)
-            if (x + x_in_tile(z) < wave.width && y + y_in_tile(z) < wave.height) count += light_subpaths_of(z, per_tile);
+            if (x + x_in_tile(z) < wave.width && y + y_in_tile(z) < wave.height)
+                count += light_subpaths_of(z, per_tile);
         if (whole) count += per_tile;
     }
     return count;

@@ -29,10 +29,7 @@ template <class Integrator, Features F>
 class CpuRenderer final : public Renderer {
 public:
     CpuRenderer(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
-        : scene_(scene),
-          settings_(settings),
-          view_(scene.view()),
-          policy_(Integrator::plan(scene, settings)),
+        : scene_(scene), settings_(settings), view_(scene.view()), policy_(Integrator::plan(scene, settings)),
           accel_name_(settings.accel == "cwbvh" ? "cwbvh" : "embree") {
         const auto start = Clock::now();
         shape(settings);
@@ -94,8 +91,7 @@ public:
         s.samples = samples_;
         s.memory_bytes = scene_.memory_bytes() + accel_bytes_ +
                          (film_.sum.size() + film_.sum_squares.size()) * sizeof(double) +
-                         (splats_.size() + strategies_.size()) * sizeof(int64_t) +
-                         film_samples_.size() * sizeof(Lane);
+                         (splats_.size() + strategies_.size()) * sizeof(int64_t) + film_samples_.size() * sizeof(Lane);
         const Layout* largest = &waves_[0].layout;
         std::vector<StageRecord> total(largest->record_names().size() + 1);
         std::vector<const QueueCounter*> counters;
@@ -192,15 +188,17 @@ private:
         lay_out(w.layout, w, kept);
         const std::vector<QueueCounter> counters = w.layout.first_counters();
         std::copy(counters.begin(), counters.end(), w.layout.counters());
-        for (size_t r = 0; r < old.layout.record_names().size(); ++r)
-            w.layout.records()[r] = old.layout.records()[r];
+        for (size_t r = 0; r < old.layout.record_names().size(); ++r) w.layout.records()[r] = old.layout.records()[r];
     }
     typename Integrator::Stages stages(Layout& layout, WaveMemory& w, uint32_t first_tile) {
         Wave wave = wave_;
         wave.state = w.state;
         Lane* const samples = kFilmWide ? film_samples_.data() + size_t(first_tile) * kTilePixels : w.samples;
-        const FilmBuffers film = {samples, {splats_.data(), nullptr}, sums(),
-                                  strategies_.empty() ? nullptr : strategies_.data(), strategies_dropped_.data()};
+        const FilmBuffers film = {samples,
+                                  {splats_.data(), nullptr},
+                                  sums(),
+                                  strategies_.empty() ? nullptr : strategies_.data(),
+                                  strategies_dropped_.data()};
         if constexpr (!kFilmWide) layout.record(UpdateFilm::kName);
         return {layout, view_, tracer_, policy_, wave, w.queues, film};
     }
@@ -214,7 +212,13 @@ private:
         CpuExecutor executor(w.state, view_, w.order);
         for (uint32_t s = 0; s < count; s += wave_.samples) {
             const uint32_t samples = std::min(wave_.samples, count - s);
-            *w.state = {first_tile, first_sample + s, samples, 0, 0, 0, samples * light_subpaths,
+            *w.state = {first_tile,
+                        first_sample + s,
+                        samples,
+                        0,
+                        0,
+                        0,
+                        samples * light_subpaths,
                         policy_.waves.slots_in_flight};
             Integrator::schedule(executor, stages);
             if (w.state->failed) {

@@ -26,11 +26,8 @@ class CudaRenderer final : public Renderer {
 
 public:
     CudaRenderer(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
-        : scene_(scene),
-          settings_(settings),
-          policy_(Integrator::plan(scene, settings)),
-          traced_(settings.specialise ? scene.features : kAllFeatures),
-          use_graph_(settings.graph) {
+        : scene_(scene), settings_(settings), policy_(Integrator::plan(scene, settings)),
+          traced_(settings.specialise ? scene.features : kAllFeatures), use_graph_(settings.graph) {
         const auto start = Clock::now();
         take_accel(settings, accels);
         double mean = 0;
@@ -68,8 +65,7 @@ public:
                     launch_wave(tile, first + done + s, std::min(wave_.samples, pass - s));
             cuda_check(cudaStreamSynchronize(stream_), "wave");
             const WaveState state = read_state();
-            const uint32_t finished =
-                std::min(pass, (state.done - waves_before) / waves_per_sample * wave_.samples);
+            const uint32_t finished = std::min(pass, (state.done - waves_before) / waves_per_sample * wave_.samples);
             if (state.failed) grow();
             done += finished;
             if (finished == 0) continue;
@@ -143,9 +139,9 @@ private:
         const bool streams = policy_.waves.slots_in_flight > 0;
         if (streams) policy_.waves.slots_in_flight = kMillion;
         Layout million;
-        Integrator::lay_out(million, policy_,
-                            {kMillion, uint32_t(planned_light_vertices(
-                                           mean, policy_.waves.most_light_subpaths(kMillion)))});
+        Integrator::lay_out(
+            million, policy_,
+            {kMillion, uint32_t(planned_light_vertices(mean, policy_.waves.most_light_subpaths(kMillion)))});
         const uint64_t splat_bytes = !kFilmWide ? 0 : settings.deterministic ? 3 * sizeof(int64_t) : sizeof(Lane);
         const uint64_t bytes_per_path = (million.bytes() >> 20) + splat_bytes + sizeof(Lane);
         const uint32_t plateau = streams ? kStreamPlateau : kFilmWide ? kFilmWidePlateau : kWavePlateau;
@@ -198,11 +194,14 @@ private:
         const uint32_t slots = wave_.slot_count(), listed = policy_.waves.order_slots(slots);
         WaveState* const state = layout.allocate<WaveState>(1);
         const typename Integrator::Memory queues = Integrator::lay_out(layout, policy_, {slots, kept});
-        const OrderMemory order = lay_out_order(layout, policy_.waves.queues, listed,
-                                                order_temporary_bytes(policy_.waves.queues, listed));
+        const OrderMemory order =
+            lay_out_order(layout, policy_.waves.queues, listed, order_temporary_bytes(policy_.waves.queues, listed));
         wave_.state = state;
-        const FilmBuffers film = {slot_samples_.data(), splat_sums(), {sum_.data(), sum_squares_.data()},
-                                  strategies_.data(), strategies_dropped_.data()};
+        const FilmBuffers film = {slot_samples_.data(),
+                                  splat_sums(),
+                                  {sum_.data(), sum_squares_.data()},
+                                  strategies_.data(),
+                                  strategies_dropped_.data()};
         const CwbvhTracer tracer = accel_ ? accel_->tracer() : CwbvhTracer();
         layout.record(UpdateFilm::kName);
         return {state, order, Stages(layout, device_scene_->view(), tracer, policy_, wave_, queues, film)};
@@ -212,8 +211,9 @@ private:
     /// Queues for `kept` light vertices, and the graph that uses them.
     void allocate(uint64_t kept) {
         if (kept > 0xf0000000ull)
-            throw Error(ExitCode::device, "light subpaths have more vertices than can be numbered: set a max_depth or "
-                                          "a smaller wave_size");
+            throw Error(ExitCode::device,
+                        "light subpaths have more vertices than can be numbered: set a max_depth or "
+                        "a smaller wave_size");
         Layout plan;
         lay_out(plan, uint32_t(kept));
         check_memory(plan.bytes(), free_device_bytes(), wave_.slot_count());
@@ -237,14 +237,17 @@ private:
     }
     void run(Executor& exec) {
         Integrator::schedule(exec, *stages_);
-        const UpdateFilm update = {wave_, slot_samples_.data(), splat_sums(), {sum_.data(), sum_squares_.data()},
+        const UpdateFilm update = {wave_,
+                                   slot_samples_.data(),
+                                   splat_sums(),
+                                   {sum_.data(), sum_squares_.data()},
                                    layout_.record(UpdateFilm::kName)};
         exec.run_slots(update, wave_.tiles * kTilePixels, 1);
         exec.finish_wave();
     }
     void launch_wave(uint32_t tile, uint32_t sample, uint32_t samples) {
-        const WaveState state = {tile, sample, samples, 0, 0, 0, samples * light_subpaths_,
-                                 policy_.waves.slots_in_flight};
+        const WaveState state = {
+            tile, sample, samples, 0, 0, 0, samples * light_subpaths_, policy_.waves.slots_in_flight};
         detail::set_wave<<<1, 1, 0, stream_>>>(state_, state);
         if (graph_)
             cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
@@ -261,9 +264,9 @@ private:
                 needed = std::max(needed, counters[q].peak);
         memory_ = DeviceBuffer<std::byte>();
         allocate(needed + needed / 4);
-        cuda_check(cudaMemcpy(layout_.records(), records.data(), records.size() * sizeof(StageRecord),
-                              cudaMemcpyHostToDevice),
-                   "statistics");
+        cuda_check(
+            cudaMemcpy(layout_.records(), records.data(), records.size() * sizeof(StageRecord), cudaMemcpyHostToDevice),
+            "statistics");
     }
 
     template <class T>

@@ -6,8 +6,8 @@
 
 namespace ambilux {
 
-uint32_t device_wave_size(const Scene& scene, const RenderSettings& settings, uint32_t plateau,
-                          uint64_t bytes_per_path, uint64_t free) {
+uint32_t device_wave_size(const Scene& scene, const RenderSettings& settings, uint32_t plateau, uint64_t bytes_per_path,
+                          uint64_t free) {
     if (settings.wave_size > 0) return settings.wave_size;
     const auto tiles = [](uint32_t pixels) { return uint64_t(pixels + kTileSide - 1) / kTileSide; };
     const uint64_t slots = tiles(scene.sensor.crop_width) * tiles(scene.sensor.crop_height) * kTilePixels;
@@ -30,10 +30,11 @@ uint32_t multi_bounce_below(const RenderSettings& settings, uint32_t slots) {
 
 void check_memory(uint64_t needed, uint64_t free, uint32_t paths) {
     if (needed <= free) return;
-    throw Error(ExitCode::device,
-                fmt::format("this render needs {} MiB on the device, and {} MiB are free: try a smaller --size or --set "
-                            "wave_size=N (now {} paths)",
-                            needed >> 20, free >> 20, paths));
+    throw Error(
+        ExitCode::device,
+        fmt::format("this render needs {} MiB on the device, and {} MiB are free: try a smaller --size or --set "
+                    "wave_size=N (now {} paths)",
+                    needed >> 20, free >> 20, paths));
 }
 
 }  // namespace ambilux

@@ -15,8 +15,8 @@ constexpr uint32_t kStreamPlateau = 1u << 23;
 
 /// Paths of a wave where `settings` leave it open: `plateau`, from which on more do not pay, or as many as the render
 /// has, or as fit into half of the `free` bytes beside what other programs hold.
-uint32_t device_wave_size(const Scene& scene, const RenderSettings& settings, uint32_t plateau,
-                          uint64_t bytes_per_path, uint64_t free);
+uint32_t device_wave_size(const Scene& scene, const RenderSettings& settings, uint32_t plateau, uint64_t bytes_per_path,
+                          uint64_t free);
 
 /// Samples of a wave of variant streaming: enough paths for each of `slots` that the last ones, which leave slots idle,
 /// matter little. `paths`: of a sample; `expected`: samples of the render, 0 if not known; `most`: paths of a wave.
@@ -27,8 +27,8 @@ uint32_t stream_samples(uint32_t slots, uint32_t paths, uint64_t expected, uint3
 /// appended. Stages that pass light on without queues do not need that room.
 uint32_t multi_bounce_below(const RenderSettings& settings, uint32_t slots);
 
-/// BdptPolicy::traces_connections: where one thread may have all pairs of a path, their rays need not be sorted, and the
-/// acceleration structure of `bytes` is small. Kernels for it are there for some features only.
+/// BdptPolicy::traces_connections: where one thread may have all pairs of a path, their rays need not be sorted, and
+/// the acceleration structure of `bytes` is small. Kernels for it are there for some features only.
 template <class Policy>
 bool traces_connections(const Policy& policy, uint64_t bytes) {
     constexpr uint64_t kTracedInPlace = 4096;

@@ -18,9 +18,9 @@ struct Request {
     /// Throws Error(usage): `what` has no effect here, and why.
     template <class... Args>
     [[noreturn]] void refuse(fmt::format_string<Args...> what, Args&&... args) const {
-        throw Error(ExitCode::usage, fmt::format("{}; this is integrator {}, variant {}",
-                                                 fmt::format(what, std::forward<Args>(args)...), variant.integrator,
-                                                 variant.variant));
+        throw Error(ExitCode::usage,
+                    fmt::format("{}; this is integrator {}, variant {}", fmt::format(what, std::forward<Args>(args)...),
+                                variant.integrator, variant.variant));
     }
 };
 
@@ -42,9 +42,10 @@ void check_estimator(const Request& r) {
     if (s.light_subpaths_per_tile != defaults.light_subpaths_per_tile && !r.variant.bidirectional)
         r.refuse("light_paths: integrators light and bdpt have light subpaths");
     if (s.technique_depth > 0 && !r.variant.strategy_images)
-        r.refuse("technique_depth={}: no images of single strategies are gathered here; integrator light and the "
-                 "variants wavefront, lvc and streaming of bdpt do",
-                 s.technique_depth);
+        r.refuse(
+            "technique_depth={}: no images of single strategies are gathered here; integrator light and the "
+            "variants wavefront, lvc and streaming of bdpt do",
+            s.technique_depth);
 }
 
 void check_queues(const Request& r) {
@@ -53,9 +54,10 @@ void check_queues(const Request& r) {
         r.refuse("ordering={}: there are no queues to sort; the variants wavefront and lvc have this switch",
                  ordering_name(q.ordering));
     if (q.compaction != Compaction::atomic && !r.variant.compacts)
-        r.refuse("compaction={}: there are no queues of one item per path; the variants wavefront and lvc have this "
-                 "switch",
-                 compaction_name(q.compaction));
+        r.refuse(
+            "compaction={}: there are no queues of one item per path; the variants wavefront and lvc have this "
+            "switch",
+            compaction_name(q.compaction));
 }
 
 void check_backend(const Request& r) {
@@ -66,8 +68,9 @@ void check_backend(const Request& r) {
         r.refuse("accel=bvh2: a binary BVH to compare with, on the cuda backend for integrator path; {} has {}",
                  r.cuda ? "this" : "the cpu backend", r.cuda ? "cwbvh" : "embree and cwbvh");
     if (r.cuda && s.deterministic && !r.variant.repeats)
-        r.refuse("deterministic=true: variant lvc draws from a cache whose order differs between runs on a CUDA "
-                 "device; use wavefront or megakernel");
+        r.refuse(
+            "deterministic=true: variant lvc draws from a cache whose order differs between runs on a CUDA "
+            "device; use wavefront or megakernel");
 }
 
 const VariantInfo& variant_of(const RenderSettings& settings) {
@@ -92,19 +95,20 @@ RenderSettings settled(const RenderSettings& settings, const Request& r, const S
         s.queues.ordering = r.cuda && r.variant.sorts && several ? Ordering::material : Ordering::none;
     s.queues.keyed_hits =
         s.queues.ordering == Ordering::material && s.queues.compaction == Compaction::atomic && several;
-    if (s.draws == CacheDraws::automatic) s.draws = r.cuda ? CacheDraws::coherent : CacheDraws::independent;
+    if (s.draws == CacheDraws::automatic && r.variant.draws)
+        s.draws = r.cuda ? CacheDraws::coherent : CacheDraws::independent;
     return s;
 }
 
 std::unique_ptr<Renderer> make_on(bool cuda, const Scene& scene, const RenderSettings& s, SharedAccels& accels) {
 #if defined(AMBILUX_HAS_CUDA)
     if (cuda && !cuda_device_present())
-        throw Error(ExitCode::device,
-                    "no CUDA device answers: check the driver with nvidia-smi, or use --backend cpu");
+        throw Error(ExitCode::device, "no CUDA device answers: check the driver with nvidia-smi, or use --backend cpu");
 #else
     if (cuda)
-        throw Error(ExitCode::device, "this program was built without CUDA: install the CUDA toolkit and build again, "
-                                      "or use --backend cpu");
+        throw Error(ExitCode::device,
+                    "this program was built without CUDA: install the CUDA toolkit and build again, "
+                    "or use --backend cpu");
 #endif
     const bool specialise = s.specialise && s.fuse != Fuse::none;
     return with_family(s.integrator, [&]<class Family>() {

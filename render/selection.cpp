@@ -41,6 +41,7 @@ RenderSettings settings_of(const RenderSettings& settings, const SelectionCandid
     RenderSettings s = settings;
     s.automatic = false;
     for (const auto& [key, value] : candidate.settings) apply_setting(s, key, value);
+    if (s.variant != "lvc") s.draws = CacheDraws::automatic;  // others have no draws to be set
     return s;
 }
 
@@ -174,8 +175,9 @@ void check_automatic(const RenderSettings& s) {
         refuse(fmt::format("connections={}: bdpt.auto=true chooses the number of connections; leave one of the two out",
                            s.connections));
     if (s.light_subpaths_per_tile != RenderSettings().light_subpaths_per_tile)
-        refuse(fmt::format("light_paths={}: bdpt.auto=true chooses the number of light subpaths; leave one of the two out",
-                           double(s.light_subpaths_per_tile) / kTilePixels));
+        refuse(
+            fmt::format("light_paths={}: bdpt.auto=true chooses the number of light subpaths; leave one of the two out",
+                        double(s.light_subpaths_per_tile) / kTilePixels));
     if (s.technique_depth > 0)
         refuse(
             fmt::format("technique_depth={}: bdpt.auto=true may choose the path tracer, which gathers no images of "

@@ -6,8 +6,8 @@
 
 namespace ambilux {
 
-/// As a rule one launch holds at most one contribution per path, so that no two threads meet and the sum does not depend
-/// on the order of the queue; launches with several say so by `needs_atomic_add`.
+/// As a rule one launch holds at most one contribution per path, so that no two threads meet and the sum does not
+/// depend on the order of the queue; launches with several say so by `needs_atomic_add`.
 struct Accumulate {
     static constexpr const char* kName = "accumulate";
 

@@ -83,7 +83,7 @@ struct ConnectVertices {
     uint32_t candidate_capacity;
     const QueueCounter* candidate_counter;
     StageRecord* record;
-    bool seeds;                        ///< NextEvent
+    bool seeds;                      ///< NextEvent
     bool one_connection_per_launch;  ///< else sums of a path depend on the order of threads
 
     const Queue<PairItem>& items() const { return pairs; }

@@ -1,5 +1,5 @@
-// Which light vertices an eye vertex is connected with: those of the light subpath of its slot, or drawn from a cache of
-// those of all light subpaths of the wave (Davidovic et al. 2014).
+// Which light vertices an eye vertex is connected with: those of the light subpath of its slot, or drawn from a cache
+// of those of all light subpaths of the wave (Davidovic et al. 2014).
 #pragma once
 
 #include "core/warp.h"
@@ -33,8 +33,7 @@ AMBILUX_HD uint32_t drawn_vertex(RngKey key, uint32_t depth, uint32_t draw, uint
     const Warp warp;
     key.index = warp.first(key.index);
     key.sample = warp.first(key.sample);
-    const uint32_t at =
-        mul_hi(cache_draw(key, warp.first(depth), warp.first(draw)).x, size) + warp.rank();
+    const uint32_t at = mul_hi(cache_draw(key, warp.first(depth), warp.first(draw)).x, size) + warp.rank();
     return at < size ? at : at % size;
 }
 

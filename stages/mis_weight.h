@@ -1,5 +1,5 @@
-// mis_weight: light is weighted against the other strategies that could have found it. `Out` takes what is left: a queue,
-// or the stage that follows.
+// mis_weight: light is weighted against the other strategies that could have found it. `Out` takes what is left: a
+// queue, or the stage that follows.
 #pragma once
 
 #include "film/strategy_film.h"

@@ -36,8 +36,10 @@ struct MortonOrder {
 
     template <class Item>
     AMBILUX_HD static uint32_t key(const SceneView& scene, const Item& ray) {
-        const Vec3f at = (ray.origin - scene.bounds_center) * (64.0f / scene.bounds_radius) + Vec3f{64.0f, 64.0f, 64.0f};
-        const uint32_t octant = (ray.direction.x < 0.0f ? 1u : 0u) | (ray.direction.y < 0.0f ? 2u : 0u) | (ray.direction.z < 0.0f ? 4u : 0u);
+        const Vec3f at =
+            (ray.origin - scene.bounds_center) * (64.0f / scene.bounds_radius) + Vec3f{64.0f, 64.0f, 64.0f};
+        const uint32_t octant = (ray.direction.x < 0.0f ? 1u : 0u) | (ray.direction.y < 0.0f ? 2u : 0u) |
+                                (ray.direction.z < 0.0f ? 4u : 0u);
         const uint32_t key = octant << 21 | spread(at.x) | spread(at.y) << 1 | spread(at.z) << 2;
         return key < 0xffffffu ? key : 0xfffffeu;  // the last key is that of places without a ray
     }

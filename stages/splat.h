@@ -32,7 +32,8 @@ struct Splat {
         const int32_t y0 = max(int32_t(ceilf(y - r - 0.5f)), 0);
         const int32_t y1 = min(int32_t(floorf(y + r - 0.5f)), int32_t(wave.height) - 1);
         const uint64_t first = uint64_t(wave.sample_of(item.path)) * wave.height * wave.width;
-        // Looked for once, since it costs as much as the rest: splats of a warp that share a pixel most often share all.
+        // Looked for once, since it costs as much as the rest: splats of a warp that share a pixel most often share
+        // all.
         const bool alone = !same_key(uint32_t(first) + uint32_t(y0) * wave.width + uint32_t(x0)).several();
         with_filter(scene, [&](auto filter) {
             for (int32_t py = y0; py <= y1; ++py) {

@@ -36,9 +36,10 @@ AMBILUX_HD bool is_valid_ray(Vec3f origin, Vec3f direction, StageRecord* record)
 
 /// What a backend runs as part of the stage before it, without a queue in between.
 struct Fusion {
-    bool weigh = false;     ///< mis_weight, and accumulate
-    bool connect = false;   ///< connect_emitter and connect_camera, in the stage that makes the vertex
-    bool occlude = false;   ///< shadow rays, and for bdpt connect_vertices: on a host, where nothing waits for many items
+    bool weigh = false;    ///< mis_weight, and accumulate
+    bool connect = false;  ///< connect_emitter and connect_camera, in the stage that makes the vertex
+    bool occlude =
+        false;  ///< shadow rays, and for bdpt connect_vertices: on a host, where nothing waits for many items
     bool generate = false;  ///< camera rays, in extend
 };
 

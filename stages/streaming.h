@@ -1,7 +1,7 @@
 // Stages of streaming bidirectional path tracing (van Antwerpen 2011, "Improving SIMD Efficiency for Parallel Monte
-// Carlo Light Transport on the GPU"): of either subpath only the last vertex is in memory, so that memory depends on the
-// number of slots alone. An eye subpath waits at each of its vertices while a light subpath, made for this vertex, is
-// connected with it vertex by vertex; then it goes on. A slot whose eye subpath has ended starts the next path. The
+// Carlo Light Transport on the GPU"): of either subpath only the last vertex is in memory, so that memory depends on
+// the number of slots alone. An eye subpath waits at each of its vertices while a light subpath, made for this vertex,
+// is connected with it vertex by vertex; then it goes on. A slot whose eye subpath has ended starts the next path. The
 // first light subpath of a path also meets the camera (t = 1).
 #pragma once
 
@@ -24,9 +24,9 @@ struct StreamPool {
     SceneView scene;
     Wave wave;
     Rules<BidirectionalMis> rules;
-    Queue<SubpathRay> rays;  ///< by slot: of its eye subpath or of the light subpath for it
-    LaneArray<ConnectionVertex> eye;  ///< by slot: the vertex that the light subpath is for; its path is kNoPath if it is
-                                      ///< for the camera only
+    Queue<SubpathRay> rays;           ///< by slot: of its eye subpath or of the light subpath for it
+    LaneArray<ConnectionVertex> eye;  ///< by slot: the vertex that the light subpath is for; its path is kNoPath if it
+                                      ///< is for the camera only
     LaneArray<SubpathRay> pending;  ///< by slot: the ray with which the eye subpath goes on; depth 0: it has ended
     Lane* samples;                  ///< per path
     uint32_t* next_path;            ///< WaveState::next_path
@@ -92,8 +92,8 @@ struct StreamExtend {
         ray = {item.origin, StreamPool::Items::tmax(item), item.direction, 0};
         if constexpr (F.opacity) {
             const uint32_t path = item.path & ~kLightRay;
-            const Draws draws = item.path & kLightRay ? pool.light_draws(path, pool.eye.load_front(slot))
-                                                      : Draws{pool.wave.key(path)};
+            const Draws draws =
+                item.path & kLightRay ? pool.light_draws(path, pool.eye.load_front(slot)) : Draws{pool.wave.key(path)};
             ray.alpha_seed = draws.opacity_seed(item.bits.depth());
         }
         if (is_valid_ray(item.origin, item.direction, record)) return true;
@@ -193,9 +193,8 @@ struct StreamTurn {
         const TurnItem turn = turns.load(i);
         Subpath<BidirectionalMis> path;
         if (turn.light_subpath &&
-            start_light_subpath<F>(pool.scene, pool.rules,
-                                   pool.light_draws(turn.path, pool.eye.load_front(turn.slot)), turn.path, splats,
-                                   record, path))
+            start_light_subpath<F>(pool.scene, pool.rules, pool.light_draws(turn.path, pool.eye.load_front(turn.slot)),
+                                   turn.path, splats, record, path))
             pool.rays.put(turn.slot, StreamPool::Items::pack(path, Side::light, turn.path | kLightRay, kInfinity));
         else
             pool.advance(turn.slot);

@@ -21,7 +21,7 @@ def picture(width=48, height=36):
     return np.stack([0.2 + x, 0.3 + 0.5 * y, 0.6 * np.exp(-8 * ((x - 0.6) ** 2 + (y - 0.5) ** 2))], axis=-1)
 
 
-STAGES = (("extend", 0.5), ("shade", 0.29), ("connect", 0.2), ("develop", 0.01))  # shares of the time
+STAGES = (("extend", 0.5), ("shade", 0.29), ("connect", 0.2), ("update_film", 0.01))  # shares of the time
 
 
 def stats(milliseconds, spp, width=48, height=36):

@@ -1,6 +1,7 @@
 // Runs the stages of one wave on a CUDA device (integrators/integrator.h says what an executor has). They are captured
 // into a graph whose loop over depths is a conditional node; sizes of queues are read on the device: between the launch
-// of a graph and its end the host does nothing. The same can be launched kernel by kernel, for profilers and sanitizers.
+// of a graph and its end the host does nothing. The same can be launched kernel by kernel, for profilers and
+// sanitizers.
 #pragma once
 
 #include <cuda_runtime.h>
@@ -34,7 +35,11 @@ public:
         if (order.policy.ordering != Ordering::none) list_places(order, stream);
     }
     /// Rays go through `pairs` instead of the tracer of their stage.
-    void use(const PairTracer& pairs) requires kPairs { pairs_ = pairs; }
+    void use(const PairTracer& pairs)
+        requires kPairs
+    {
+        pairs_ = pairs;
+    }
 
     /// Captures what `schedule(*this)` launches.
     template <class Schedule>
@@ -96,8 +101,7 @@ public:
     void extend_coherent(const Stage& stage) {
         const detail::Items items = prepare<void>(stage);  // in order as they are
         with_tracer(stage, [&](auto set, const auto& tracer) {
-            const auto kernel =
-                detail::launch_coherent<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
+            const auto kernel = detail::launch_coherent<decltype(set), Stage, std::remove_cvref_t<decltype(tracer)>>;
             kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream()>>>(stage, tracer, items);
         });
         finish_extend(stage);
@@ -163,15 +167,15 @@ private:
         });
     }
 
-    /// What a launch over the items of `stage` goes through, sorted if it is to be. A loop has counted its queue already
-    /// when its body begins with that queue.
+    /// What a launch over the items of `stage` goes through, sorted if it is to be. A loop has counted its queue
+    /// already when its body begins with that queue.
     template <class Order, class Stage>
     detail::Items prepare(const Stage& stage) {
         const auto& queue = stage.items();
         if (std::exchange(counted_, nullptr) != queue.counter) count(queue);
         const bool selected = queue.flags && order_.policy.compaction == Compaction::select;
-        detail::Items items = {queue.counter,    selected ? order_.list[0] : nullptr, queue.flags, queue.capacity(),
-                               nullptr, nullptr, 0};
+        detail::Items items = {
+            queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity(), nullptr, nullptr, 0};
         if constexpr (Ordered<Order, typename std::remove_cvref_t<decltype(queue)>::value_type>)
             if (order_.policy.ordering == Order::kOrdering && queue.capacity() > 0) sort<Order>(stage, queue, items);
         return items;
@@ -180,15 +184,14 @@ private:
     void sort(const Stage& stage, const Queue<Item>& queue, detail::Items& items) {
         const uint32_t bits = Order::bits(scene_), last = (1u << bits) - 1;
         const bool whole = queue.flags && !items.list, switched = graph_.active() && !whole;
-        const detail::SortSwitch choice = {switched ? graph_.make_condition() : cudaGraphConditionalHandle{},
-                                           switched};
+        const detail::SortSwitch choice = {switched ? graph_.make_condition() : cudaGraphConditionalHandle{}, switched};
         if (queue.keys) {
             detail::fill_keys<<<blocks(detail::fill_keys, kStageBlock), kStageBlock, 0, stream()>>>(
                 queue.keys, items, uint16_t(last), choice);
         } else {
             const auto kernel = detail::make_keys<Order, Item>;
             kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(scene_, queue, items, last,
-                                                                               order_.keys[0], choice);
+                                                                              order_.keys[0], choice);
         }
         if (whole)
             sort_places(order_, queue.keys, queue.capacity(), bits, stream());
@@ -248,8 +251,7 @@ private:
     void finish(const Stage& stage, QueueCounter* counter, QueueCounter* out = nullptr, uint32_t slots = 0,
                 uint32_t samples = 0) {
         cuda_check(cudaGetLastError(), Stage::kName);
-        detail::finish_stage<<<1, 1, 0, stream()>>>(stage.record, counter, out, slots, samples, depth_, state_,
-                                                    clock_);
+        detail::finish_stage<<<1, 1, 0, stream()>>>(stage.record, counter, out, slots, samples, depth_, state_, clock_);
         depth_ = {};
     }
     template <class Stage>

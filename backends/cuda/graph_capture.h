@@ -58,9 +58,8 @@ public:
 #if CUDART_VERSION >= 13000
         cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), nullptr, dependencies.size(), &params),
                    "conditional node");
-        cuda_check(
-            cudaStreamUpdateCaptureDependencies(stream_, &node, nullptr, 1, cudaStreamSetCaptureDependencies),
-            "conditional node");
+        cuda_check(cudaStreamUpdateCaptureDependencies(stream_, &node, nullptr, 1, cudaStreamSetCaptureDependencies),
+                   "conditional node");
 #else
         cuda_check(cudaGraphAddNode(&node, graph, dependencies.data(), dependencies.size(), &params),
                    "conditional node");

@@ -59,8 +59,8 @@ template <class Body>
 __device__ void in_turns(uint32_t n, uint32_t* next, Body body) {
     const uint32_t lane = threadIdx.x % 32, threads = gridDim.x * blockDim.x,
                    run = n / threads >= 64   ? 256
-                             : n / threads >= 16 ? 64
-                                                 : 32;
+                         : n / threads >= 16 ? 64
+                                             : 32;
     uint32_t i = (blockIdx.x * blockDim.x + threadIdx.x) / 32 * run + lane;
     while (i - lane < n) {
         body(i);

@@ -29,8 +29,10 @@ constexpr bool is_diffuse(Features f) { return f.bsdfs == bit(BsdfType::diffuse)
 constexpr bool needs_no_misses(Features f) { return !f.several_bsdfs() && !f.has_environment(); }
 
 template <Features F, class EmissionOut, class AtVertex>
-struct LaunchTraits<EyeVertex<F, UnidirectionalMis, EmissionOut, AtVertex>>
-    : BlocksPerSm<is_diffuse(F) ? 6 : F.textures ? 4 : 5, needs_no_misses(F)> {};
+struct LaunchTraits<EyeVertex<F, UnidirectionalMis, EmissionOut, AtVertex>> : BlocksPerSm<is_diffuse(F) ? 6
+                                                                                          : F.textures  ? 4
+                                                                                                        : 5,
+                                                                                          needs_no_misses(F)> {};
 template <Features F, class EmissionOut, class AtVertex>
 struct LaunchTraits<EyeVertex<F, BidirectionalMis, EmissionOut, AtVertex>>
     : BlocksPerSm<is_diffuse(F) ? 5 : 4, needs_no_misses(F)> {};

@@ -88,8 +88,8 @@ __global__ void __launch_bounds__(kStageBlock, LaunchTraits<Stage>::kBlocksPerSm
 }
 
 /// A lane that has ended its loop waits until kIdleLanes of its warp have, and begins another together with them. When
-/// the capacity is used up, loops are deferred to another launch, those that have not been begun too: as each step fills
-/// one slot at most, it is enough that a warp looks at the slots of its own after every step.
+/// the capacity is used up, loops are deferred to another launch, those that have not been begun too: as each step
+/// fills one slot at most, it is enough that a warp looks at the slots of its own after every step.
 template <class Stage>
 __global__ void __launch_bounds__(kStageBlock, LaunchTraits<Stage>::kBlocksPerSm)
     launch_loops(const __grid_constant__ Stage stage, const Items all) {

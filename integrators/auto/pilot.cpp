@@ -93,7 +93,8 @@ public:
         tasks_.resize((result_.samples + kSubpathsPerTask - 1) / kSubpathsPerTask);
         if (rules_.splat || rules_.connect)
             parallel_for(uint32_t(tasks_.size()), [&](uint32_t t) {
-                for (uint32_t i = t * kSubpathsPerTask; i < std::min((t + 1) * kSubpathsPerTask, result_.samples); ++i) {
+                for (uint32_t i = t * kSubpathsPerTask; i < std::min((t + 1) * kSubpathsPerTask, result_.samples);
+                     ++i) {
                     light_subpath(i, tasks_[t]);
                     tasks_[t].ends.push_back(uint32_t(tasks_[t].vertices.size()));
                 }
@@ -115,9 +116,8 @@ public:
         result_.light_vertices = double(vertices_.size()) / n;
         result_.expected_samples = expected_samples(
             settings_, result_.work, uint64_t(view_.sensor.crop_width) * view_.sensor.crop_height, cuda_);
-        predict_variances(moments_,
-                          {pixels, splats_, pixels_, kPixelSamples, delta_emitters_, result_.expected_samples},
-                          result_);
+        predict_variances(
+            moments_, {pixels, splats_, pixels_, kPixelSamples, delta_emitters_, result_.expected_samples}, result_);
         return result_;
     }
 
@@ -131,9 +131,8 @@ private:
         all.strategies = kAllStrategies;
         all.singles = {};
         const Rules<BidirectionalMis> r = plan_bdpt(scene, all).rules;
-        rules_ = {PilotMis(r.mis), r.max_depth,           r.rr_depth,   r.hide_emitters,
-                  r.count_hits,    r.count_environment, r.next_event, r.splat,
-                  r.connect,       r.background_only,   r.singles};
+        rules_ = {PilotMis(r.mis), r.max_depth, r.rr_depth, r.hide_emitters,   r.count_hits, r.count_environment,
+                  r.next_event,    r.splat,     r.connect,  r.background_only, r.singles};
     }
 
     static bool counts(Rgb value) { return is_finite(value) && min_component(value) >= 0.0f && !is_zero(value); }
@@ -279,8 +278,8 @@ private:
         do {
             eye.work.eye_rays += 1;
             closest(path, path.depth == 1 ? camera.tmax : kInfinity, eye.draws, hit);
-        } while (visit<F>(view_, rules_, eye.draws, Side::eye, rules_.longest(Side::eye), hit, path,
-                          EyeSink{*this, eye}));
+        } while (
+            visit<F>(view_, rules_, eye.draws, Side::eye, rules_.longest(Side::eye), hit, path, EyeSink{*this, eye}));
     }
 
     void next_event(Eye& eye, const PilotVertex& z) const {
@@ -375,8 +374,8 @@ double expected_samples(const RenderSettings& settings, const PilotWork& work, u
 
 Pilot run_pilot(const Scene& scene, const RenderSettings& settings, bool cuda, bool cwbvh, SharedAccels& accels,
                 const std::vector<PilotCandidate>& candidates, uint32_t samples) {
-    const HostTracer tracer = cwbvh ? HostTracer(accels.get<CwbvhAccel>()->tracer())
-                                    : HostTracer(accels.get<EmbreeAccel>()->tracer());
+    const HostTracer tracer =
+        cwbvh ? HostTracer(accels.get<CwbvhAccel>()->tracer()) : HostTracer(accels.get<EmbreeAccel>()->tracer());
     return with_feature_level(scene.features, settings.specialise, [&]<Features F>() {
         return PilotRun<F>(scene, settings, cuda, tracer, candidates, samples).run();
     });

@@ -14,8 +14,8 @@ constexpr double kShadowWork = 0.8;
 /// An estimator that the pilot judges. All have hits and next event estimation.
 struct PilotCandidate {
     float light_subpaths;  ///< light subpaths per pixel, each connected with the camera; 0: none
-    bool connect;       ///< connections
-    uint32_t draws;     ///< of each eye vertex from a cache of light vertices; 0: paired subpaths
+    bool connect;          ///< connections
+    uint32_t draws;        ///< of each eye vertex from a cache of light vertices; 0: paired subpaths
 };
 
 /// Mean numbers per eye subpath, or per pair of subpaths.
@@ -41,15 +41,15 @@ struct Pilot {
     /// 0.01, mean over pixels and channels; without rare outliers, for which the light that they bring counts as
     /// missing.
     std::vector<std::vector<double>> variance;
-    std::vector<bool> cannot_find_light;    ///< the candidate cannot find some of the light
-    double light_vertices = 0;  ///< mean of a light subpath
+    std::vector<bool> cannot_find_light;  ///< the candidate cannot find some of the light
+    double light_vertices = 0;            ///< mean of a light subpath
     PilotWork work;
 };
 
-/// About `samples` eye subpaths, and as many light subpaths, over the whole film. The numbers are those of Stream::pilot and
-/// depend on the seed alone. Weights are those of the balance heuristic, whatever the render uses. `cuda`: for a render
-/// on a device. `cwbvh`: over this structure instead of Embree's.
-Pilot run_pilot(const Scene& scene, const RenderSettings& settings, bool cuda, bool cwbvh,
-                             SharedAccels& accels, const std::vector<PilotCandidate>& candidates, uint32_t samples);
+/// About `samples` eye subpaths, and as many light subpaths, over the whole film. The numbers are those of
+/// Stream::pilot and depend on the seed alone. Weights are those of the balance heuristic, whatever the render uses.
+/// `cuda`: for a render on a device. `cwbvh`: over this structure instead of Embree's.
+Pilot run_pilot(const Scene& scene, const RenderSettings& settings, bool cuda, bool cwbvh, SharedAccels& accels,
+                const std::vector<PilotCandidate>& candidates, uint32_t samples);
 
 }  // namespace ambilux

@@ -82,8 +82,7 @@ struct PilotMis {
     }
     Ratio visible_emitter_ratio(const SceneView& scene, const CameraConnection& c, float cos_light,
                                 float pdf_pos) const {
-        return each<Ratio>(
-            [&](uint32_t m) { return sets[m].visible_emitter_ratio(scene, c, cos_light, pdf_pos); });
+        return each<Ratio>([&](uint32_t m) { return sets[m].visible_emitter_ratio(scene, c, cos_light, pdf_pos); });
     }
 
 private:

@@ -26,7 +26,7 @@ void blur(uint32_t width, uint32_t height, const std::vector<Mean>& of, std::vec
 
 /// The variance of one candidate in every block. False if it cannot find some of the light.
 bool predict(const SecondMoments& moments, const PilotPaths& paths, uint32_t c, uint32_t width, uint32_t height,
-           const std::vector<Mean>& scale, std::vector<double>& variance) {
+             const std::vector<Mean>& scale, std::vector<double>& variance) {
     const double samples = double(paths.pixels_per_block) * paths.samples_per_pixel;
     // Outliers: the brightest contributions that after all samples of the render are in kTrimmedPixels of the pixels.
     // There they are left out, and elsewhere their light is missing.
@@ -123,7 +123,8 @@ void predict_variances(const SecondMoments& moments, const PilotPaths& paths, Pi
     parallel_for(uint32_t(moments.candidates.size()), [&](uint32_t c) {
         cannot_find_light[c] = !predict(moments, paths, c, result.blocks_x, result.blocks_y, scale, result.variance[c]);
     });
-    result.cannot_find_light.assign(cannot_find_light.begin(), cannot_find_light.begin() + ptrdiff_t(moments.candidates.size()));
+    result.cannot_find_light.assign(cannot_find_light.begin(),
+                                    cannot_find_light.begin() + ptrdiff_t(moments.candidates.size()));
 }
 
 }  // namespace ambilux

@@ -38,9 +38,9 @@ struct PilotSplat {
 struct PilotSums {
     double mean[3] = {};
     double variance[kMostCandidates][3] = {};
-    double seen[3] = {};               ///< largest radiance of emitters that the camera sees here
+    double seen[3] = {};                           ///< largest radiance of emitters that the camera sees here
     bool cannot_find_light[kMostCandidates] = {};  ///< a candidate cannot find some light
-    std::vector<PilotEvent> rare;      ///< for some candidate
+    std::vector<PilotEvent> rare;                  ///< for some candidate
 };
 
 /// How the paths that a pilot found would add to the second moments of its candidates.

@@ -63,9 +63,15 @@ struct PathIntegrator {
             const auto at_vertex = choose<kFusion.connect>(connect, QueueVertex<F, Mis>{m.eye.vertices});
             for (int k = 0; k < 2; ++k) {
                 extend[k] = {scene, tracer, wave, Stream::eye, q.rays[k], q.hits[k], record(extend[k])};
-                eye_vertex[k] = {scene,     wave,      p.rules,
-                                 q.hits[k], q.rays[1 - k], eye.emission(),
-                                 at_vertex, record(eye_vertex[k]), kFusion.generate && !q.hits[0].flags};
+                eye_vertex[k] = {scene,
+                                 wave,
+                                 p.rules,
+                                 q.hits[k],
+                                 q.rays[1 - k],
+                                 eye.emission(),
+                                 at_vertex,
+                                 record(eye_vertex[k]),
+                                 kFusion.generate && !q.hits[0].flags};
             }
         }
     };

@@ -13,8 +13,8 @@ PathPolicy plan_path(const Scene& scene, const RenderSettings& settings) {
     r.rr_depth = roulette_depth(settings);
     r.next_event = !scene.emitters.empty() && settings.estimator != Estimator::naive && r.max_depth >= 2;
     r.mis = {settings.estimator, settings.heuristic, r.next_event};
-    r.count_hits = std::any_of(scene.emitters.begin(), scene.emitters.end(),
-                               [](const Emitter& e) { return !is_delta(e.type); });
+    r.count_hits =
+        std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return !is_delta(e.type); });
     r.count_environment = scene.environment != kNone;
     r.hide_emitters = scene.integrator.hide_emitters;
     p.waves.queues = settings.queues;
@@ -35,8 +35,8 @@ std::vector<std::string> skipped_path_parts(const Scene& scene, const PathPolicy
         parts.emplace_back(scene.emitters.empty()
                                ? "mis_weight and accumulate of hits: no emitters"
                                : "mis_weight and accumulate of hits: no ray can meet these emitters");
-    if (r.mis.estimator == Estimator::naive && std::any_of(scene.emitters.begin(), scene.emitters.end(),
-                                                           [](const Emitter& e) { return is_delta(e.type); }))
+    if (r.mis.estimator == Estimator::naive &&
+        std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return is_delta(e.type); }))
         parts.emplace_back("light of point, spot and directional emitters: estimator naive cannot find it");
     return parts;
 }

@@ -1,5 +1,5 @@
-// What becomes of light that eye subpaths find: emission and candidates, weighted, tested, added to their samples. Which
-// of these stages run as parts of others is the type's matter (Fusion).
+// What becomes of light that eye subpaths find: emission and candidates, weighted, tested, added to their samples.
+// Which of these stages run as parts of others is the type's matter (Fusion).
 #pragma once
 
 #include "integrators/integrator.h"
@@ -24,7 +24,8 @@ struct EyeQueues {
     template <Fusion K, Features F, class Mis>
     static EyeQueues lay_out(Layout& layout, uint32_t slots, uint32_t paths, const Rules<Mis>& rules,
                              const WavePolicy& waves) {
-        const bool by_path = waves.queues.fixed_places(), hits = !K.weigh && (rules.count_hits || rules.count_environment);
+        const bool by_path = waves.queues.fixed_places(),
+                   hits = !K.weigh && (rules.count_hits || rules.count_environment);
         const uint32_t connects = rules.next_event || rules.connect ? slots : 0, emits = hits ? slots : 0;
         EyeQueues q;
         q.vertices = layout.queue<VertexItem>("vertices", K.connect ? 0 : connects, by_path, VertexItem::lanes<F>());
@@ -69,9 +70,9 @@ struct EyeSide {
                    choose<K.weigh>(accumulate, q.shadow_contributions),
                    layout.record(OccludeStage::kName),
                    strategies};
-        weigh = {q.candidates, choose<K.occlude>(InPlace<OccludeStage>{occlude, wave.state}, q.shadows), weighs,
-                 strategies,   film.samples,
-                 waves.cull};
+        weigh = {q.candidates, choose<K.occlude>(InPlace<OccludeStage>{occlude, wave.state}, q.shadows),
+                 weighs,       strategies,
+                 film.samples, waves.cull};
     }
 
     Emission emission() const { return choose<K.weigh>(weigh_emission, weigh_emission.candidates); }

@@ -7,9 +7,9 @@
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"
 #include "accel/pair_bvh.h"
-#include "queues/wave.h"
 #include "tests/support/accel_scenes.h"
 #include "tests/support/catch.h"
+#include "transport/subpath/subpath.h"
 
 using namespace ambilux;
 using namespace ambilux::accel_test;
@@ -192,11 +192,15 @@ TEST_CASE("Decisions of a ray at neighbouring primitives are independent") {
         }
 }
 
-TEST_CASE("Seeds of rays: neighbouring pixels, samples, depths, walks and random seeds decide independently") {
+TEST_CASE("Seeds of rays: neighbouring pixels, samples, depths, subpaths and random seeds decide independently") {
     // Chance that a ray passes, and that it and its neighbour both do, within 5 standard errors.
     const uint32_t n = 1000000;
     const RngKey base = {7, 0, 0, Stream::eye};
-    const auto neighbour = [](RngKey key, uint32_t& depth, bool& shadow, int which) {
+    // `number`: of the light subpath among those of its key, or of the light vertex that a shadow ray is for.
+    const auto seed = [](const RngKey& key, uint32_t depth, uint32_t number, bool shadow) {
+        return shadow ? Draws{key}.shadow_seed(connection_ray(depth, number)) : Draws{key, number}.opacity_seed(depth);
+    };
+    const auto neighbour = [](RngKey key, uint32_t& depth, uint32_t& number, bool& shadow, int which) {
         switch (which) {
             case 0: ++key.index; break;
             case 1: ++key.sample; break;
@@ -205,7 +209,7 @@ TEST_CASE("Seeds of rays: neighbouring pixels, samples, depths, walks and random
             case 4: key.stream = Stream::light; break;
             case 5: ++key.seed; break;
             case 6: key.seed += 1ull << 32; break;
-            case 7: depth += 1u << 14; break;
+            case 7: ++number; break;
             default: key.index += 1024;
         }
         return key;
@@ -217,12 +221,12 @@ TEST_CASE("Seeds of rays: neighbouring pixels, samples, depths, walks and random
                 for (uint32_t i = 0; i < n; ++i) {
                     RngKey key = base;
                     (along_samples ? key.sample : key.index) = i;
-                    uint32_t depth = 1 + i % 7;
+                    uint32_t depth = 1 + i % 7, number = 0;
                     bool shadow = false;
-                    const bool one = hash_float(alpha_seed(key, depth, shadow), 100) < p;
-                    const RngKey other = neighbour(key, depth, shadow, which);
+                    const bool one = hash_float(seed(key, depth, number, shadow), 100) < p;
+                    const RngKey other = neighbour(key, depth, number, shadow, which);
                     passed += one;
-                    both += one && hash_float(alpha_seed(other, depth, shadow), 100) < p;
+                    both += one && hash_float(seed(other, depth, number, shadow), 100) < p;
                 }
                 INFO("neighbour " << which << " along samples " << along_samples << " p " << p);
                 const auto within = [&](uint32_t count, double expected) {

@@ -109,7 +109,7 @@ TEST_CASE("bench queues reports complete rows on the CPU") {
             CHECK(looked == (operation == "push" || compaction != "atomic" ? 5120 : items));
         } else {
             CHECK(operation == "drain");
-            CHECK(row.at("item") == (i + 2 < rows.size() ? "HitItem" : "RayItem"));
+            CHECK(row.at("item") == (i + 2 < rows.size() ? "PathHit" : "PathRay"));
             CHECK(row.at("order") == (i % 2 == 0 ? "none" : i + 2 < rows.size() ? "material" : "morton"));
             CHECK(items <= 5120);
             CHECK(items > 4000);  // of a closed box, as the camera sees it

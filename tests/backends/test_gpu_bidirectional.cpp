@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: gpu
 // timeout: 900
 // Light tracing and bidirectional path tracing on a CUDA device against the CPU, at equal seeds.
@@ -69,7 +69,7 @@ TEST_CASE("G5: bidirectional renders of both backends at equal seeds: pixels and
     }
 }
 
-TEST_CASE("G5: any number of light walks: both backends start the same ones and find the same light") {
+TEST_CASE("G5: any number of light subpaths: both backends start the same ones and find the same light") {
     if (!device()) return;
     for (const char* name : {"cornell", "glass", "lights"}) {
         const Scene scene = project_scene(name, 93, 61);
@@ -85,7 +85,7 @@ TEST_CASE("G5: any number of light walks: both backends start the same ones and 
     }
 }
 
-TEST_CASE("any number of light walks gives a cache that agrees with paired walks") {
+TEST_CASE("any number of light subpaths gives a cache that agrees with paired subpaths") {
     if (!device()) return;
     for (const char* name : {"cornell", "lights"}) {
         const Scene scene = project_scene(name, 45, 27);
@@ -106,7 +106,7 @@ TEST_CASE("any number of light walks gives a cache that agrees with paired walks
 /// mean 0 within that of the mean.
 double drawn_difference(uint64_t items) { return 4 * 2.5 * std::sqrt(double(items)); }
 
-TEST_CASE("The last walks of light and eye find the same light, several depths in a launch") {
+TEST_CASE("The last subpaths of light and eye find the same light, several depths in a launch") {
     if (!device()) return;
     for (const char* name : {"cornell", "glass", "materials"}) {
         const Scene scene = project_scene(name, 160, 90);
@@ -114,23 +114,23 @@ TEST_CASE("The last walks of light and eye find the same light, several depths i
             INFO(name << " " << variant);
             RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
             if (s.variant == "lvc") s.connections = 2;
-            const RenderResult tail = render_scene(scene, s, 8);
+            const RenderResult together = render_scene(scene, s, 8);
             s.tail = false;
             const RenderResult none = render_scene(scene, s, 8);
-            for (const StageStats& t : tail.stats.stages)
+            for (const StageStats& t : together.stats.stages)
                 for (const StageStats& n : none.stats.stages) {
                     if (t.name != n.name) continue;
                     INFO(t.name);
-                    // Connections of a cache are those of other vertices in every run; else walks differ where kernels
-                    // round differently.
+                    // Connections of a cache are those of other vertices in every run; else subpaths differ where
+                    // kernels round differently.
                     double most = 1e-5 * double(n.items) + 3;
                     if (s.variant == "lvc" && (t.name == "occlude" || t.name == "connect_vertices"))
                         most = drawn_difference(n.items);
                     CHECK(std::fabs(double(t.items) - double(n.items)) <= most);
                     if (t.name == "shade" || t.name == "light_shade") CHECK(t.launches < n.launches);
                 }
-            if (s.variant == "wavefront") CHECK(agreeing_pixels(tail.film, none.film) >= 0.999);
-            for (const QueueStats& q : tail.stats.queues) CHECK(q.overflow == 0);
+            if (s.variant == "wavefront") CHECK(agreeing_pixels(together.film, none.film) >= 0.999);
+            for (const QueueStats& q : together.stats.queues) CHECK(q.overflow == 0);
         }
     }
 }
@@ -153,8 +153,8 @@ QueueStats queue_of(const RenderResult& r, const std::string& name) {
 }  // namespace
 
 TEST_CASE(
-    "Launches of a device that hold one pair of a path and those that hold as many as there is room for connect the "
-    "same pairs") {
+    "Launches of a device that hold one pair of a path and those that hold as many as there is capacity for connect "
+    "the same pairs") {
     if (!device()) return;
     // More pairs than a queue of one shadow ray per path has room for at first, and fewer in the end.
     const Scene scene = project_scene("cornell", 1280, 720);
@@ -162,8 +162,8 @@ TEST_CASE(
         INFO(variant);
         RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
         s.max_depth = 12;
-        s.fuse = Fuse::light;  // else shadow rays of so small a structure are in no queue
-        s.wave_size = 64;      // the film in one wave all the same, but no more
+        s.queues.ordering = Ordering::morton;  // else shadow rays of so small a structure are in no queue
+        s.wave_size = 64;                      // the film in one wave all the same, but no more
         if (s.variant == "lvc") s.connections = 5;
         const RenderResult several = render_scene(scene, s, 1);
         RenderSettings other_settings = s;
@@ -175,12 +175,12 @@ TEST_CASE(
         const StageStats pairs = stage_of(several, "connect_vertices"), other = stage_of(one, "connect_vertices");
         CHECK(pairs.items > 1280u * 720u);
         CHECK(pairs.launches < other.launches);
-        // The last walks are another kernel's, which rounds differently.
+        // The last subpaths are another kernel's, which rounds differently.
         const double most = s.variant == "lvc" ? drawn_difference(pairs.items) : 1e-5 * double(pairs.items) + 3;
         CHECK(std::fabs(double(pairs.items) - double(other.items)) <= most);
         if (s.variant == "wavefront") CHECK(agreeing_pixels(several.film, one.film) >= 0.999);
         for (const QueueStats& q : several.stats.queues) CHECK(q.overflow == 0);
-        CHECK(queue_of(several, "rest").peak > 0);  // there was no room
+        CHECK(queue_of(several, "deferred").peak > 0);  // there was no capacity
         // Pairs in one plane are told by rounding, and differ; those that ask for a shadow ray do not.
         s.backend = "cpu";
         const double rays = double(several.stats.rays_occlude),
@@ -197,7 +197,7 @@ TEST_CASE("Shadow rays of pairs that are traced where they are made are those th
         INFO(variant);
         RenderSettings s = settings_of(scene, "bdpt", variant, "cuda");
         const RenderResult in_place = render_scene(scene, s, 4);
-        s.fuse = Fuse::light;
+        s.queues.ordering = Ordering::morton;  // of rays in queues
         const RenderResult queued = render_scene(scene, s, 4);
         CHECK(stage_of(in_place, "occlude").launches < stage_of(queued, "occlude").launches);
         for (const char* stage : {"connect_vertices", "occlude"}) {
@@ -208,8 +208,8 @@ TEST_CASE("Shadow rays of pairs that are traced where they are made are those th
             CHECK(std::fabs(double(a.items) - double(b.items)) <= most);
         }
         if (s.variant == "wavefront") CHECK(agreeing_pixels(in_place.film, queued.film) >= 0.999);
-        CHECK(queue_of(in_place, "rest").capacity == 0);
-        CHECK(queue_of(queued, "rest").capacity > 0);
+        CHECK(queue_of(in_place, "deferred").capacity == 0);
+        CHECK(queue_of(queued, "deferred").capacity > 0);
     }
 }
 
@@ -265,18 +265,22 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("lvc of a device over compacted and sorted queues has the expectation of paired walks") {
+TEST_CASE("lvc of a device over compacted and sorted queues has the expectation of paired subpaths") {
     if (!device()) return;
     const Scene scene = project_scene("materials", 48, 32);
     const Estimate paired = render_batches(scene, settings_of(scene, "bdpt", "wavefront", "cuda"), 1024);
-    for (const auto& [compaction, ordering] :
-         {std::pair{"select", "none"}, {"none", "none"}, {"atomic", "material"}, {"none", "morton"}}) {
+    for (const auto& [compaction, ordering, draws] : {std::tuple{"select", "none", "auto"},
+                                                      {"none", "none", "auto"},
+                                                      {"atomic", "material", "auto"},
+                                                      {"none", "morton", "auto"},
+                                                      {"atomic", "material", "independent"}}) {
         RenderSettings s = settings_of(scene, "bdpt", "lvc", "cuda");
         s.seed = 7;
         apply_setting(s, "compaction", compaction);
         apply_setting(s, "ordering", ordering);
+        apply_setting(s, "draws", draws);
         const ZTestResult result = z_test(render_batches(scene, s, 1024), paired);
-        INFO("compaction=" << compaction << " ordering=" << ordering << "\n" << result.report());
+        INFO("compaction=" << compaction << " ordering=" << ordering << " draws=" << draws << "\n" << result.report());
         CHECK(result.pass);
     }
 }
@@ -289,9 +293,9 @@ TEST_CASE("variants of a device give the same image up to rounding") {
     CHECK(agreeing_pixels(wavefront.film, megakernel.film) >= 0.99);
 }
 
-TEST_CASE("long light walks of a device: as on the CPU, in memory that is what was predicted") {
+TEST_CASE("long light subpaths of a device: as on the CPU, in memory that is what was predicted") {
     if (!device()) return;
-    // Long walks: the number of vertices of one wave scatters widely around the pilot's mean.
+    // Long subpaths: the number of vertices of one wave scatters widely around the pilot's mean.
     Scene scene = project_scene("furnace", 16, 16);
     RenderSettings s = settings_of(scene, "bdpt", "wavefront", "cuda");
     s.max_depth = 200;
@@ -335,13 +339,13 @@ TEST_CASE("images of single strategies on a device are those of the CPU and add 
         s.accel = "cwbvh";
         const std::unique_ptr<Renderer> cpu = make_renderer(scene, s);
         REQUIRE(cpu->render(0, 4) == 4);
-        const std::vector<TechniqueImage> a = cuda->technique_images(), b = cpu->technique_images();
+        const std::vector<StrategyImage> a = cuda->strategy_images(), b = cpu->strategy_images();
         REQUIRE(a.size() == b.size());
         const FilmMoments film = cuda->film();
         double worst = 0, total = 0;
         for (size_t i = 0; i < film.sum.size(); ++i) {
             double sum = 0;
-            for (const TechniqueImage& image : a) sum += image.weighted[i];
+            for (const StrategyImage& image : a) sum += image.weighted[i];
             worst = std::max(worst, std::fabs(sum - film.mean(i)));
             total += film.mean(i) / double(film.sum.size());
         }

@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: gpu
 // timeout: 900
 // The path tracer on a CUDA device against the same stages on the CPU, at equal seeds.
@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "film/image.h"
 #include "film/ztest.h"
-#include "stages/tail.h"
+#include "stages/multi_bounce.h"
 #include "tests/support/gpu_device.h"
 #include "tests/support/render_scene.h"
 
@@ -37,7 +37,7 @@ void check_counts(const RenderStats& a, const RenderStats& b, double share, cons
     for (const StageStats& s : b.stages) of_b[s.name] = &s;
     for (const StageStats& s : a.stages) {
         if (!only.empty() && !only.count(s.name)) continue;
-        if (s.name == "generate" || s.name == "develop")
+        if (s.name == "generate" || s.name == "update_film")
             continue;  // run over slots, of which a backend's tiles leave some empty
         REQUIRE(of_b.count(s.name));
         const StageStats& t = *of_b[s.name];
@@ -68,7 +68,7 @@ double agreeing_pixels(const FilmMoments& a, const FilmMoments& b) {
 }
 
 void check_parity(const Scene& scene, RenderSettings settings, uint32_t spp) {
-    settings.deterministic = true;  // without a tail, whose launches cover several depths
+    settings.deterministic = true;  // else the last subpaths take several bounces in one launch
     const RenderResult cuda = render_scene(scene, on("cuda", settings), spp);
     const RenderResult embree = render_scene(scene, on("cpu", settings, "embree"), spp);
     const RenderResult host = render_scene(scene, on("cpu", settings, "cwbvh"), spp);
@@ -180,24 +180,25 @@ TEST_CASE("a graph and single launches give the same bits and counts") {
     check_counts(graph.stats, single.stats, 0);
 }
 
-TEST_CASE("the last walks find the same light, several depths in a launch") {
+TEST_CASE("the last subpaths find the same light, several depths in a launch") {
     if (!device()) return;
     for (const char* name : {"lights", "materials", "glass"}) {
         INFO(name);
         const Scene scene = project_scene(name, 160, 90);
         RenderSettings s = on("cuda", cpu_settings(scene, Estimator::mis));
         constexpr uint32_t kSpp = 2;
-        static_assert(160 * 90 * kSpp < kTailWalks, "few enough for a tail from the first depth on");
-        const RenderResult tail = render_scene(scene, s, kSpp);
+        static_assert(160 * 90 * kSpp < kMultiBounceBelow,
+                      "few enough for several bounces in a launch from the first depth on");
+        const RenderResult together = render_scene(scene, s, kSpp);
         s.tail = false;
         const RenderResult none = render_scene(scene, s, kSpp);
-        CHECK(stage_of(tail.stats, "shade").launches < stage_of(none.stats, "shade").launches);
-        check_counts(tail.stats, none.stats, 1e-5, {"extend", "shade"});
+        CHECK(stage_of(together.stats, "shade").launches < stage_of(none.stats, "shade").launches);
+        check_counts(together.stats, none.stats, 1e-5, {"extend", "shade"});
         const double rays = double(none.stats.rays_occlude);
-        CHECK(std::fabs(double(tail.stats.rays_occlude) - rays) <= 1e-5 * rays + 3);
-        CHECK(agreeing_pixels(tail.film, none.film) >= 0.999);
-        for (const QueueStats& q : tail.stats.queues) CHECK(q.overflow == 0);
-        CHECK(tail.stats.invalid.total() == none.stats.invalid.total());
+        CHECK(std::fabs(double(together.stats.rays_occlude) - rays) <= 1e-5 * rays + 3);
+        CHECK(agreeing_pixels(together.film, none.film) >= 0.999);
+        for (const QueueStats& q : together.stats.queues) CHECK(q.overflow == 0);
+        CHECK(together.stats.invalid.total() == none.stats.invalid.total());
     }
 }
 

@@ -11,8 +11,8 @@
 #include "backends/cuda/executor.cuh"
 #include "backends/cuda/order.h"
 #include "backends/cuda_device.h"
-#include "items/path_items.h"
-#include "queues/queue.h"
+#include "items/subpath_items.h"
+#include "queues/reserved_queue.h"
 #include "tests/support/catch.h"
 #include "tests/support/render_scene.h"
 
@@ -50,7 +50,7 @@ TEST_CASE("queue on a device: every push arrives once, for any size and divergen
             std::vector<QueueCounter> counters(1);
             counters[0].capacity = capacity;
             DeviceBuffer<QueueCounter> counter{std::span<const QueueCounter>(counters)};
-            push_some<<<(n + 127) / 128, 128>>>(Queue<Item>{memory.data(), counter.data(), capacity}, n, keep);
+            push_some<<<(n + 127) / 128, 128>>>(Queue<Item>{{memory.data(), capacity}, counter.data()}, n, keep);
             cuda_check(cudaDeviceSynchronize(), "push_some");
             REQUIRE(counter.download()[0].count == expected);
             const std::vector<Lane> lanes = memory.download();
@@ -79,7 +79,7 @@ TEST_CASE("G3: a full queue on a device loses items by count, not in silence") {
     std::vector<QueueCounter> counters(1);
     counters[0].capacity = 100;
     DeviceBuffer<QueueCounter> counter{std::span<const QueueCounter>(counters)};
-    push_some<<<8, 128>>>(Queue<Item>{memory.data(), counter.data(), 100}, 1000, 1);
+    push_some<<<8, 128>>>(Queue<Item>{{memory.data(), 100}, counter.data()}, 1000, 1);
     cuda_check(cudaDeviceSynchronize(), "push_some");
     QueueCounter c = counter.download()[0];
     CHECK(c.count == 1000);
@@ -90,28 +90,28 @@ TEST_CASE("G3: a full queue on a device loses items by count, not in silence") {
 
 namespace {
 
-/// An item of two lanes, as those that are pushed loosely are.
-struct Loose {
+/// An item of two lanes, as those whose slots are reserved ahead.
+struct Reserved {
     uint32_t number, pad[2], path;
     uint32_t again[4];
 };
 
 /// Threads that `keep` selects push their number, from one of two places.
-__global__ void __launch_bounds__(128) push_loosely(Queue<Loose> queue, uint32_t n, uint32_t keep) {
-    WarpStretches& stretches = WarpStretches::mine();
-    stretches.open(n);
+__global__ void __launch_bounds__(128) push_reserved(ReservedQueue<Reserved> queue, uint32_t n, uint32_t keep) {
+    ReservedSlots& slots = ReservedSlots::of_block();
+    slots.open(n);
     for (uint32_t i = blockIdx.x * 128 + threadIdx.x; i < n; i += gridDim.x * 128) {
-        const Loose item = {i, {0, 0}, i / 2, {0, 0, 0, i}};
+        const Reserved item = {i, {0, 0}, i / 2, {0, 0, 0, i}};
         if (i % keep == 0)
-            queue.push_loosely(item);
+            queue.push(item);
         else if (keep == 3 && i % keep == 1)
-            queue.push_loosely(item);
+            queue.push(item);
     }
-    stretches.close();
+    slots.close();
 }
 
 /// Numbers of items, their order given up, of a queue that 132 * `blocks` blocks have pushed to.
-void check_loose(uint32_t n, uint32_t keep, uint32_t blocks) {
+void check_reserved(uint32_t n, uint32_t keep, uint32_t blocks) {
     INFO(n << " threads, 1 of " << keep << ", " << 132 * blocks << " blocks");
     const uint32_t expected = keep == 3 ? (n + 2) / 3 + (n + 1) / 3 : (n + keep - 1) / keep, capacity = with_holes(n);
     DeviceBuffer<Lane> memory(size_t(capacity) * 2);
@@ -119,18 +119,18 @@ void check_loose(uint32_t n, uint32_t keep, uint32_t blocks) {
     std::vector<QueueCounter> counters(1);
     counters[0].capacity = capacity;
     DeviceBuffer<QueueCounter> counter{std::span<const QueueCounter>(counters)};
-    const Queue<Loose> queue{memory.data(), counter.data(), capacity};
-    push_loosely<<<132 * blocks, 128>>>(queue, n, keep);
-    cuda_check(cudaDeviceSynchronize(), "push_loosely");
+    const Queue<Reserved> queue{{memory.data(), capacity}, counter.data()};
+    push_reserved<<<132 * blocks, 128>>>({queue}, n, keep);
+    cuda_check(cudaDeviceSynchronize(), "push_reserved");
     const QueueCounter c = counter.download()[0];
     REQUIRE(c.count <= capacity);
     REQUIRE(c.items() == expected);
     std::vector<Lane> lanes = memory.download();
-    const Queue<Loose> here{lanes.data(), nullptr, capacity};
+    const LaneArray<Reserved> here{lanes.data(), capacity};
     std::vector<uint32_t> seen;
     uint64_t holes = 0, wrong = 0;
     for (uint32_t i = 0; i < c.count; ++i) {
-        const Loose item = here.load(i);
+        const Reserved item = here.load(i);
         if (item.path == kNoPath) {
             ++holes;
             continue;
@@ -152,19 +152,19 @@ void check_loose(uint32_t n, uint32_t keep, uint32_t blocks) {
 
 }  // namespace
 
-TEST_CASE("places taken ahead: every loose push arrives once, what is left over is marked and counted") {
+TEST_CASE("slots reserved ahead: every push arrives once, what is left over is marked and counted") {
     if (!cuda_device_present()) {
         WARN("no CUDA device: skipped");
         return;
     }
     for (const uint32_t n : {1u, 33u, 1000u, (1u << 20) + 1, (1u << 23) + 7, (1u << 25) + 5}) {
         for (const uint32_t keep : {1u, 2u, 3u, 33u}) {
-            for (const uint32_t blocks : {1u, 7u}) check_loose(n, keep, blocks);
+            for (const uint32_t blocks : {1u, 7u}) check_reserved(n, keep, blocks);
         }
     }
 }
 
-TEST_CASE("places taken ahead: a queue that is too small loses items by count") {
+TEST_CASE("slots reserved ahead: a queue that is too small loses items by count") {
     if (!cuda_device_present()) {
         WARN("no CUDA device: skipped");
         return;
@@ -175,8 +175,8 @@ TEST_CASE("places taken ahead: a queue that is too small loses items by count") 
     std::vector<QueueCounter> counters(1);
     counters[0].capacity = capacity;
     DeviceBuffer<QueueCounter> counter{std::span<const QueueCounter>(counters)};
-    push_loosely<<<132, 128>>>(Queue<Loose>{memory.data(), counter.data(), capacity}, n, 1);
-    cuda_check(cudaDeviceSynchronize(), "push_loosely");
+    push_reserved<<<132, 128>>>({Queue<Reserved>{{memory.data(), capacity}, counter.data()}}, n, 1);
+    cuda_check(cudaDeviceSynchronize(), "push_reserved");
     QueueCounter c = counter.download()[0];
     CHECK(c.count >= n);
     CHECK(c.items() <= capacity);
@@ -203,7 +203,7 @@ struct OwnedOrder {
         Layout sizes;
         lay_out_order(sizes, policy, n, temporary);
         memory = DeviceBuffer<std::byte>(sizes.bytes());
-        Layout layout(memory.data());
+        Layout layout(sizes, memory.data());
         order = lay_out_order(layout, policy, n, temporary);
     }
     std::vector<uint32_t> read(const uint32_t* list, uint32_t n) const {
@@ -278,19 +278,28 @@ namespace {
 /// Counts how often it is called for each hit. `Gathers`: as stages of one BSDF are.
 template <bool Gathers>
 struct Visit {
-    static constexpr bool kGathers = Gathers;
+    static constexpr const char* kName = "visit";
 
-    Queue<HitItem> hits;
+    Queue<PathHit> hits;
     uint32_t* visits;
     bool skips;
+    StageRecord* record;
 
+    AMBILUX_HD const Queue<PathHit>& items() const { return hits; }
     bool skips_misses() const { return skips; }
     AMBILUX_HD void operator()(uint32_t i) const {
 #if defined(__CUDA_ARCH__)
-        atomicAdd(visits + hits.load(i).path, 1u);
+        atomicAdd(visits + hits.load(i).ray.path, 1u);
 #endif
     }
 };
+
+}  // namespace
+
+template <bool Gathers>
+struct ambilux::LaunchTraits<Visit<Gathers>> : BlocksPerSm<1, Gathers> {};
+
+namespace {
 
 /// Runs Visit over the hits of `n` paths of which some have ended and some have met nothing: one in `misses`, all for
 /// 1, none for 0.
@@ -300,18 +309,18 @@ void check_visits(const QueuePolicy& policy, uint32_t n, uint32_t misses, bool s
            << ", ordering " << ordering_name(policy.ordering) << ", gathers " << Gathers << ", skips " << skips);
     constexpr uint32_t kMaterials = 5;
     const OwnedOrder owned(policy, n);
-    std::vector<Lane> lanes(size_t(n) * Queue<HitItem>::kLanes + 1);
+    std::vector<Lane> lanes(size_t(n) * LaneArray<PathHit>::kLanes + 1);
     std::vector<QueueCounter> counters(1);
     counters[0].capacity = n;
     std::vector<uint8_t> flags((n + 255) / 256 * 256 + 256);
     std::vector<uint16_t> keys(n + 1);
-    Queue<HitItem> queue = {lanes.data(), counters.data(), n, policy.fixed_places() ? flags.data() : nullptr};
+    Queue<PathHit> queue = {{lanes.data(), n}, counters.data(), policy.fixed_places() ? flags.data() : nullptr};
     std::vector<uint32_t> expected(n + 1), met(n + 1);
     for (uint32_t path = 0; path < n; ++path) {
         if (scrambled(path) % 4 == 0) continue;
         const bool miss = misses > 0 && scrambled(path + n) % misses == 0;
-        HitItem item{};
-        item.path = path;
+        PathHit item{};
+        item.ray.path = path;
         item.prim = miss ? kNone : path;
         keys[queue.push(item)] = uint16_t(miss ? kMaterials : scrambled(path) % kMaterials);
         expected[path] = 1;
@@ -324,23 +333,25 @@ void check_visits(const QueuePolicy& policy, uint32_t n, uint32_t misses, bool s
     DeviceBuffer<uint16_t> device_keys{std::span<const uint16_t>(keys)};
     DeviceBuffer<QueueCounter> device_counters{std::span<const QueueCounter>(counters)};
     DeviceBuffer<WaveState> state(1);
-    DeviceBuffer<StageRecord> records(kStageCount);
+    DeviceBuffer<StageRecord> record(1);
     DeviceBuffer<uint64_t> clock(1);
     DeviceBuffer<uint32_t> visits(n + 1);
     state.zero();
-    records.zero();
+    record.zero();
     clock.zero();
     visits.zero();
-    queue = {device_lanes.data(), device_counters.data(), n, policy.fixed_places() ? device_flags.data() : nullptr,
+    queue = {{device_lanes.data(), n},
+             device_counters.data(),
+             policy.fixed_places() ? device_flags.data() : nullptr,
              policy.keyed_hits ? device_keys.data() : nullptr};
     SceneView scene{};
     scene.material_count = kMaterials;
-    CudaExecutor executor(nullptr, {}, state.data(), records.data(), clock.data(), scene, owned.order);
-    executor.run(StageId::shade, Visit<Gathers>{queue, visits.data(), skips}, queue);
+    CudaExecutor<false> executor(nullptr, {}, state.data(), clock.data(), scene, owned.order);
+    executor.run(Visit<Gathers>{queue, visits.data(), skips, record.data()});
     cuda_check(cudaDeviceSynchronize(), "visits");
     const bool without_misses = Gathers || (skips && policy.keyed_hits && items >= detail::kSortFrom);
     CHECK(visits.download() == (without_misses ? met : expected));
-    CHECK(records.download()[uint32_t(StageId::shade)].items == items);
+    CHECK(record.download()[0].items == items);
     CHECK(device_counters.download()[0].count == 0);
 }
 
@@ -372,8 +383,13 @@ struct Word {
 };
 
 struct Mark {
-    uint32_t* visits;
+    static constexpr const char* kName = "mark";
 
+    Queue<Word> queue;
+    uint32_t* visits;
+    StageRecord* record;
+
+    AMBILUX_HD const Queue<Word>& items() const { return queue; }
     AMBILUX_HD void operator()(uint32_t i) const {
 #if defined(__CUDA_ARCH__)
         atomicAdd(visits + i, 1u);
@@ -383,7 +399,7 @@ struct Mark {
 
 }  // namespace
 
-TEST_CASE("turns: every item once, whatever the lengths of stretches") {
+TEST_CASE("turns: every item once, whatever the lengths of runs") {
     if (!cuda_device_present()) {
         WARN("no CUDA device: skipped");
         return;
@@ -414,7 +430,7 @@ TEST_CASE("turns: launches go through every item once, one after the other over 
     int device = 0, multiprocessors = 0;
     cuda_check(cudaGetDevice(&device), "device");
     cuda_check(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device), "multiprocessors");
-    const uint32_t most_threads = uint32_t(multiprocessors) * 2048;  // resident, so that stretches are of all lengths
+    const uint32_t most_threads = uint32_t(multiprocessors) * 2048;  // resident, so that runs are of all lengths
     for (const uint32_t n : {1000u, 16 * most_threads + 5, 64 * most_threads + 77}) {
         INFO(n << " items");
         DeviceBuffer<Lane> unused(1);
@@ -422,12 +438,12 @@ TEST_CASE("turns: launches go through every item once, one after the other over 
         counters[0].capacity = counters[0].count = n;
         DeviceBuffer<QueueCounter> counter{std::span<const QueueCounter>(counters)};
         DeviceBuffer<WaveState> state(1);
-        DeviceBuffer<StageRecord> records(kStageCount);
+        DeviceBuffer<StageRecord> record(1);
         DeviceBuffer<uint64_t> clock(1);
-        state.zero(), records.zero(), clock.zero();
-        const Queue<Word> queue = {unused.data(), counter.data(), n};  // of which only the counter is used
+        state.zero(), record.zero(), clock.zero();
+        const Queue<Word> queue = {{unused.data(), n}, counter.data()};  // of which only the counter is used
         const OwnedOrder owned({}, 0);
-        CudaExecutor executor(nullptr, {}, state.data(), records.data(), clock.data(), SceneView{}, owned.order);
+        CudaExecutor<false> executor(nullptr, {}, state.data(), clock.data(), SceneView{}, owned.order);
         DeviceBuffer<uint32_t> visits(n);
         const auto check = [&](const char* what, uint32_t times, auto launch) {
             INFO(what);
@@ -441,9 +457,10 @@ TEST_CASE("turns: launches go through every item once, one after the other over 
             for (uint32_t i = 0; i < n; ++i) wrong += seen[i] != times;
             CHECK(wrong == 0);
         };
-        check("items", 3, [&] { executor.run(StageId::shade, Mark{visits.data()}, queue); });
+        const Mark mark = {queue, visits.data(), record.data()};
+        check("items", 3, [&] { executor.run(mark); });
         CHECK(counter.download()[0].count == 0);
-        check("slots", 3, [&] { executor.run_slots(StageId::develop, Mark{visits.data()}, n, 1); });
+        check("slots", 3, [&] { executor.run_slots(mark, n, 1); });
     }
 }
 

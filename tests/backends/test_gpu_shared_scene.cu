@@ -1,9 +1,9 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: gpu
 // What renderers of one scene share on a device, and choices that are made there.
 #include "backends/cuda/device_scene.h"
-#include "integrators/bidirectional/bidirectional.h"
-#include "integrators/path/path.h"
+#include "integrators/registry.h"
+#include "render/make_on_backend.h"
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/gpu_device.h"
 
@@ -15,7 +15,6 @@ RenderSettings fixed_settings(const Scene& scene, const char* integrator) {
     RenderSettings s = cpu_settings(scene, Estimator::mis);
     s.backend = "cuda";
     s.integrator = integrator;
-    s.fuse = Fuse::all;
     s.queues.ordering = Ordering::none;
     s.deterministic = true;  // bits are compared
     return s;
@@ -32,8 +31,10 @@ TEST_CASE("renderers of one scene share its copy on the device, which lives as l
     std::weak_ptr<const DeviceCwbvh> structure;
     {
         SharedAccels accels(scene);
-        a = make_path_cuda(scene, path, accels);
-        b = make_bidirectional_cuda(scene, light, accels);
+        with_feature_level(scene.features, true, [&]<Features F>() {
+            a = make_on_cuda<PathFamily, F>(scene, path, accels);
+            b = make_on_cuda<BdptFamily, F>(scene, light, accels);
+        });
         copy = accels.get<DeviceScene>();
         structure = accels.get<DeviceCwbvh>();
         CHECK(accels.get<DeviceScene>() == copy.lock());

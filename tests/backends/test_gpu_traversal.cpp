@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_backends ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_backends ambilux_formats ambilux_accel ambilux_core
 // labels: gpu
 // Traversal on a CUDA device against the same traversal on the host: same rays, same hits (pitfall G12).
 #include <cmath>
@@ -196,7 +196,7 @@ TEST_CASE("Device and host agree for any number of rays (G12)") {
     check(compare_all(ball, test_rays(ball, kMany, 1.0f, 33), kCounts), true);
 }
 
-TEST_CASE("Of many rays, which warps take in longer stretches, each is traced once (G12)") {
+TEST_CASE("Of many rays, which warps take in longer runs, each is traced once (G12)") {
     if (no_device()) return;
     Scene ball;
     add_ball(ball, {0, 0, 0}, 1.0f, 40, 0.1f, 3);

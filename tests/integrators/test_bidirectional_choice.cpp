@@ -1,4 +1,4 @@
-// libs: ambilux_experiments ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_experiments ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 900
 // bdpt.auto=true: what the pilot predicts is what renders show, and what follows from it.
 #include <algorithm>
@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "experiments/stats_sum.h"
-#include "integrators/bidirectional/choice.h"
+#include "render/selection.h"
 #include "tests/support/bidirectional_images.h"
 
 using namespace ambilux;
@@ -26,9 +26,9 @@ RenderSettings fixed(RenderSettings s, const std::vector<std::pair<std::string, 
     return s;
 }
 
-std::vector<PilotCandidate> pilots(const std::vector<ChoiceCandidate>& candidates) {
+std::vector<PilotCandidate> pilots(const std::vector<SelectionCandidate>& candidates) {
     std::vector<PilotCandidate> p;
-    for (const ChoiceCandidate& c : candidates) p.push_back(c.pilot);
+    for (const SelectionCandidate& c : candidates) p.push_back(c.pilot);
     return p;
 }
 
@@ -73,7 +73,7 @@ const std::string kView = "<sensor type='perspective'><float name='fov' value='4
 }  // namespace
 
 TEST_CASE("second moments that the pilot predicts are those of renders, for every candidate") {
-    // Splats of light tracing are spread by the filter, eye walks are not.
+    // Splats of light tracing are spread by the filter, eye subpaths are not.
     for (const char* filter : {"box", "gaussian"}) {
         const std::string text = "<sensor type='perspective'><float name='fov' value='45'/>" +
                                  lookat("origin='0,-3,2.5' target='0,0,0.3' up='0,0,1'") + film(32, filter) +
@@ -86,17 +86,17 @@ TEST_CASE("second moments that the pilot predicts are those of renders, for ever
                                  diffuse({0, 0, 0}) + area_light({4, 5, 3}) + "</shape>";
         const Scene scene = scene_from_text(scene_xml(5, text));
         RenderSettings s = automatic_settings(scene);
-        const auto candidates = choice_candidates(s, false);
+        const auto candidates = selection_candidates(s, false);
         SharedAccels accels(scene);
         std::vector<std::vector<double>> predicted(candidates.size());
         uint32_t bx = 0, by = 0;
         for (uint64_t seed = 1; seed <= 12; ++seed) {
             s.seed = seed;
-            const ChoicePilot pilot = run_choice_pilot(scene, s, false, false, accels, pilots(candidates), 16384);
+            const Pilot pilot = run_pilot(scene, s, false, false, accels, pilots(candidates), 16384);
             bx = pilot.blocks_x;
             by = pilot.blocks_y;
             for (size_t c = 0; c < candidates.size(); ++c) {
-                CHECK_FALSE(pilot.blind[c]);
+                CHECK_FALSE(pilot.cannot_find_light[c]);
                 double sum = 0;
                 for (const double v : pilot.variance[c]) sum += v;
                 predicted[c].push_back(sum / double(pilot.variance[c].size()));
@@ -115,7 +115,7 @@ TEST_CASE("second moments that the pilot predicts are those of renders, for ever
             const Mean p = mean_of(predicted[c]), m = mean_of(measured);
             INFO(filter << " " << candidates[c].name << ": predicted " << p.mean << " +- " << p.error << ", measured "
                         << m.mean << " +- " << m.error);
-            // One in 100 beside the errors: block means of a pilot are noisy, and light walks of a wave are shared.
+            // One in 100 beside the errors: block means of a pilot are noisy, and light subpaths of a wave are shared.
             CHECK(std::abs(p.mean - m.mean) < 4.5 * std::hypot(p.error, m.error) + 0.015 * m.mean);
             CHECK(std::hypot(p.error, m.error) < 0.04 * m.mean);
         }
@@ -148,7 +148,7 @@ TEST_CASE("what is chosen renders as if its settings had been given: the pilot l
     }
 }
 
-TEST_CASE("light walks run where they find what eye walks do not, and only there") {
+TEST_CASE("light subpaths run where they find what eye subpaths do not, and only there") {
     const auto name_of = [](const Scene& scene, uint64_t seed) {
         RenderSettings s = automatic_settings(scene, seed);
         s.deterministic = true;
@@ -157,8 +157,8 @@ TEST_CASE("light walks run where they find what eye walks do not, and only there
     for (uint64_t seed = 1; seed <= 4; ++seed) {
         INFO("seed " << seed);
         CHECK(name_of(project_scene("glass", 64, 48), seed) != "path");
-        // A sky over diffuse ground: most light walks miss what the camera sees, and next event estimation is all that
-        // is needed.
+        // A sky over diffuse ground: most light subpaths miss what the camera sees, and next event estimation is all
+        // that is needed.
         const Scene sky = scene_from_text(
             scene_xml(4, kView + kGround + "<emitter type='constant'><rgb name='radiance' value='1,1,1'/></emitter>"));
         CHECK(name_of(sky, seed) == "path");
@@ -168,7 +168,7 @@ TEST_CASE("light walks run where they find what eye walks do not, and only there
 TEST_CASE("the error is predicted for the samples that the render will take") {
     PilotWork work;
     work.eye_rays = 3;
-    work.next_events = 2.5;  // 5 rays of walks together
+    work.next_events = 2.5;  // 5 rays of subpaths together
     RenderSettings s;
     CHECK(expected_samples(s, work, 10000, false) == 1000);
     s.expected_seconds = 2;
@@ -335,14 +335,14 @@ TEST_CASE("variants restrict the choice; other settings that it would make are r
     const Scene scene = project_scene("cornell", 24, 24);
     RenderSettings s = automatic_settings(scene);
     s.variant = "lvc";
-    CHECK(choice_candidates(s, false).size() == 19);
+    CHECK(selection_candidates(s, false).size() == 19);
     s.variant = "streaming";
-    REQUIRE(choice_candidates(s, false).size() == 3);
+    REQUIRE(selection_candidates(s, false).size() == 3);
     CHECK(make_renderer(scene, s)->stats().choice.candidates[2].name == "bdpt, streaming");
     s.variant = "wavefront";
     s.deterministic = true;
-    CHECK(choice_candidates(s, false).size() == 20);
-    CHECK(choice_candidates(s, true).size() == 5);  // a cache on a device has another order in every run
+    CHECK(selection_candidates(s, false).size() == 20);
+    CHECK(selection_candidates(s, true).size() == 5);  // a cache on a device has another order in every run
     const auto refused = [&](const std::string& key, const std::string& value, const std::string& part) {
         RenderSettings other = automatic_settings(scene);
         apply_setting(other, key, value);
@@ -363,6 +363,22 @@ TEST_CASE("variants restrict the choice; other settings that it would make are r
     refused("light_paths", "0.5", "light_paths=0.5");
     refused("technique_depth", "4", "technique_depth=4");
     CHECK_THROWS_AS(apply_setting(s, "bdpt.auto", "yes"), Error);
+}
+
+TEST_CASE("how light vertices are drawn can be set beside the choice, whichever candidate that is") {
+    const Scene glass = project_scene("glass", 48, 32);
+    const Scene sky = scene_from_text(
+        scene_xml(4, kView + kGround + "<emitter type='constant'><rgb name='radiance' value='1,1,1'/></emitter>"));
+    for (const Scene* scene : {&glass, &sky}) {
+        RenderSettings s = automatic_settings(*scene, 2);
+        s.deterministic = true;
+        const RenderResult chosen = render_scene(*scene, s, 2);
+        INFO(chosen.stats.choice.name);
+        s.draws = CacheDraws::independent;  // what the CPU does anyway
+        const RenderResult set = render_scene(*scene, s, 2);
+        CHECK(set.stats.choice.name == chosen.stats.choice.name);
+        CHECK(set.film.sum == chosen.film.sum);
+    }
 }
 
 TEST_CASE("nothing to see: scenes without emitters and films of one pixel") {

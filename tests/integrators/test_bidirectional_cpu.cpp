@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 300
 // What must not change the image of light tracing and bidirectional path tracing on the CPU and what must; memory that
 // grows; settings.
@@ -40,8 +40,8 @@ void check_queues(const RenderStats& stats) {
     }
 }
 
-/// Closed sphere that radiates inwards, of albedo 0.95: walks are as long as max_depth lets them.
-Scene long_walks(uint32_t size = 24) {
+/// Closed sphere that radiates inwards, of albedo 0.95: subpaths are as long as max_depth lets them.
+Scene long_subpaths(uint32_t size = 24) {
     const std::string n = std::to_string(size);
     return scene_from_text(
         scene_xml(40, "<sensor type='perspective'><float name='near_clip' value='1e-4'/>" + square_film(size) +
@@ -85,7 +85,7 @@ TEST_CASE("G7: one seed is one image, whatever the waves, the batches and the th
     }
 }
 
-TEST_CASE("G7: eye walks and light walks of one seed share no random numbers", "[bidirectional]") {
+TEST_CASE("G7: eye subpaths and light subpaths of one seed share no random numbers", "[bidirectional]") {
     // With the same numbers at both ends, hits and splats of one sample would be correlated: seen in the variance of
     // all strategies together.
     const Scene scene = project_scene("cornell", 16, 16);
@@ -191,7 +191,7 @@ TEST_CASE("G3, G8: memory is what was predicted, queues never overflow, and coun
 TEST_CASE(
     "G3: a wave with more light vertices than there is room for is done again, and its image is that of any other",
     "[bidirectional]") {
-    const Scene scene = long_walks();
+    const Scene scene = long_subpaths();
     for (const char* name : {"all", "connections", "-i light"}) {
         INFO(name);
         RenderSettings s = settings_of(scene, {name});
@@ -199,7 +199,7 @@ TEST_CASE(
         const std::unique_ptr<Renderer> renderer = make_renderer(scene, s);
         REQUIRE(renderer->render(0, 2) == 2);
         const RenderStats first = renderer->stats();
-        // 38 vertices per walk and more do not fit into what there was to begin with.
+        // 38 vertices per subpath and more do not fit into what there was to begin with.
         const std::string kept = std::string(name) == "-i light" ? "splats" : "light_vertices";
         CHECK(queue_peak(first, kept) > 0);
         CHECK(queue_capacity(first, kept) >= queue_peak(first, kept));
@@ -217,7 +217,7 @@ TEST_CASE(
         }
         CHECK(first.invalid.total() == 0);
     }
-    // One segment less room than a walk needs, no walk at all, and every depth between.
+    // One segment less room than a subpath needs, no subpath at all, and every depth between.
     for (int depth : {1, 2, 3, 4, 5, 6, 7}) {
         RenderSettings s = settings_of(scene);
         s.rr_depth = -1;

@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 600
 // Light tracing and bidirectional path tracing, all strategies together and by themselves, against the path tracer and
 // against closed forms (B1-B34).

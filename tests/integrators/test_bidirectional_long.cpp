@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: long
 // timeout: 3600
 // Every mask of strategies that can sample a scene, both heuristics, every variant and the light tracer against the
@@ -69,7 +69,7 @@ bool samples_all(const Scene& scene, const Comparison& c, uint32_t bits) {
 }
 
 /// Compares renders of one scene with those of the path tracer. Where no strategy sees emitters directly, or only light
-/// walks do, they are hidden from both.
+/// subpaths do, they are hidden from both.
 class Comparator {
 public:
     Comparator(Scene scene, const Comparison& c) : scene_(std::move(scene)), c_(c) {

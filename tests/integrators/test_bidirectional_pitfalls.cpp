@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 600
 // Where other bidirectional renderers broke (B1-B34): shading normals, refraction, lights, specular chains, coincident
 // vertices, scale, opacity. What concerns furnaces, cameras and films is in test_bidirectional_images.cpp.
@@ -171,7 +171,7 @@ TEST_CASE("B4: rays along surfaces and lights in their plane give no NaN", "[bid
         CHECK(render_scene(scene, method_settings(scene, m, 1), 64).stats.invalid.total() == 0);
 }
 
-TEST_CASE("B6: light through refraction is scaled alike by walks from either end", "[bidirectional]") {
+TEST_CASE("B6: light through refraction is scaled alike by subpaths from either end", "[bidirectional]") {
     const std::string floor =
         "<shape type='rectangle'><transform name='to_world'><scale value='3'/><translate z='-1'/></transform>" +
         kWhite + "</shape>";
@@ -207,7 +207,7 @@ TEST_CASE("B6: a lamp behind a glass slab, segment by segment", "[bidirectional]
             check_black(render_scene(scene, method_settings(scene, kAll, 1), 16));
         else
             check_image(scene, method_settings(scene, kAll, 1), constant_image(kSize, kSize, kLight * float(expected)));
-        // The camera sees nothing but glass: no light walk can be connected with it.
+        // The camera sees nothing but glass: no light subpath can be connected with it.
         check_black(render_scene(scene, method_settings(scene, kLightTracer, 1), 16));
     }
 }
@@ -355,19 +355,20 @@ TEST_CASE("B14: a plane seen from 0 to 89 degrees has the radiance that its irra
                              rgb("irradiance", kLight) + "</emitter>"));
         const Image expected = constant_image(8, 8, kLight * kPlaneAlbedo * float(1 / std::sqrt(1.25) / M_PI));
         check_image(scene, method_settings(scene, kAll, 1), expected);
-        // The more grazing, the less of the floor does the camera see that light walks reach.
+        // The more grazing, the less of the floor does the camera see that light subpaths reach.
         if (angle < 85) check_image(scene, method_settings(scene, kLightTracer, 2), expected);
     }
 }
 
 // ---- specular chains ----
 
-TEST_CASE("B23: a glass ball between a small lamp and a floor: caustics by light walks, reflections by hits",
+TEST_CASE("B23: a glass ball between a small lamp and a floor: caustics by light subpaths, reflections by hits",
           "[bidirectional]") {
     const std::string ball =
         "<shape type='sphere'><point name='center' x='0' y='0' z='0.6'/><float name='radius' value='0.5'/><bsdf "
         "type='dielectric'><float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/></bsdf></shape>";
-    // From the side; what the ball shows the camera has a delta next to it, which light walks cannot be connected with.
+    // From the side; what the ball shows the camera has a delta next to it, which light subpaths cannot be connected
+    // with.
     const Scene scene = scene_from_text(
         scene_xml(6, camera("0,-4,1.6", "0,0,0.3", 35) + ball + kPlane + lamp(0.3, 0.3, 0.5, 0, 2.2, {20, 20, 20})));
     agree(scene, {kAll, kPower, {"hits+light"}}, 4096, 512, 0.09);

@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: statistical
 // timeout: 900
 // Strategies (s,t) one by one: their images beside a render, and as masks.
@@ -6,7 +6,7 @@
 #include <map>
 
 #include "core/error.h"
-#include "stages/techniques.h"
+#include "film/strategy_film.h"
 #include "tests/support/bidirectional_images.h"
 
 using namespace ambilux;
@@ -20,14 +20,14 @@ RenderSettings single(const Scene& scene, uint32_t s, uint32_t t, uint64_t seed)
 /// Mean image and the images of its strategies.
 struct Gathered {
     FilmMoments film;
-    std::vector<TechniqueImage> images;
+    std::vector<StrategyImage> images;
 };
 
 Gathered gather(const Scene& scene, RenderSettings settings, uint32_t depth, uint32_t spp) {
     settings.technique_depth = depth;
     const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
     REQUIRE(renderer->render(0, spp) == spp);
-    return {renderer->film(), renderer->technique_images()};
+    return {renderer->film(), renderer->strategy_images()};
 }
 
 bool close(double a, double b) { return std::abs(a - b) <= 2e-5 * std::max(std::abs(a), std::abs(b)) + 1e-7; }
@@ -36,12 +36,13 @@ bool close(double a, double b) { return std::abs(a - b) <= 2e-5 * std::max(std::
 
 TEST_CASE("Images of strategies are numbered without gaps") {
     uint32_t next = 0;
-    for (uint32_t k = 1; k <= kMaxTechniqueDepth; ++k)
-        for (uint32_t s = 0; s <= k; ++s) CHECK(technique_index(Strategy::make(s, k + 1 - s)) == next++);
-    CHECK(technique_count(kMaxTechniqueDepth) == next);
+    for (uint32_t k = 1; k <= kMaxStrategyDepth; ++k)
+        for (uint32_t s = 0; s <= k; ++s) CHECK(strategy_index(Strategy::make(s, k + 1 - s)) == next++);
+    CHECK(strategy_count(kMaxStrategyDepth) == next);
 }
 
-TEST_CASE("Technique images change no bit of the image, and their weighted ones add up to it", "[bidirectional]") {
+TEST_CASE("Images of single strategies change no bit of the image, and their weighted ones add up to it",
+          "[bidirectional]") {
     for (auto [name, depth] : {std::pair{"cornell", 4}, {"glass", 5}, {"lights", 3}, {"textured", 3}}) {
         INFO(name);
         Scene scene = project_scene(name, 24, 16);
@@ -51,7 +52,7 @@ TEST_CASE("Technique images change no bit of the image, and their weighted ones 
             RenderSettings settings = method_settings(scene, kAll, 5);
             settings.variant = variant;
             const Gathered with = gather(scene, settings, uint32_t(depth), 16);
-            // The cache of lvc holds the walks of one task, whose order is that of threads: its images are compared
+            // The cache of lvc holds the subpaths of one task, whose order is that of threads: its images are compared
             // within the same render only.
             if (settings.variant == "wavefront") {
                 const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
@@ -59,17 +60,17 @@ TEST_CASE("Technique images change no bit of the image, and their weighted ones 
                 const FilmMoments without = renderer->film();
                 CHECK(without.sum == with.film.sum);
                 CHECK(without.sum_squares == with.film.sum_squares);
-                CHECK(renderer->technique_images().empty());
+                CHECK(renderer->strategy_images().empty());
             }
-            REQUIRE(with.images.size() == technique_count(uint32_t(depth)));
+            REQUIRE(with.images.size() == strategy_count(uint32_t(depth)));
             size_t differ = 0;
             for (size_t i = 0; i < with.film.sum.size(); ++i) {
                 double total = 0;
-                for (const TechniqueImage& image : with.images) total += image.weighted[i];
+                for (const StrategyImage& image : with.images) total += image.weighted[i];
                 differ += !close(total, with.film.mean(i));
             }
             CHECK(differ == 0);
-            for (const TechniqueImage& image : with.images) CHECK(image.dropped == 0);
+            for (const StrategyImage& image : with.images) CHECK(image.dropped == 0);
         }
     }
 }
@@ -80,7 +81,7 @@ TEST_CASE("A single strategy as a mask is its raw image", "[bidirectional]") {
         Scene scene = project_scene(name, 24, 16);
         scene.integrator.max_depth = 4;
         const Gathered all = gather(scene, method_settings(scene, kAll, 7), 4, 8);
-        for (const TechniqueImage& image : all.images) {
+        for (const StrategyImage& image : all.images) {
             INFO("(" << image.s << "," << image.t << ")");
             const FilmMoments alone = render_scene(scene, single(scene, image.s, image.t, 7), 8).film;
             size_t differ = 0;

@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 900
 // Variants of bidirectional path tracing give the same image.
 #include <algorithm>
@@ -8,7 +8,6 @@
 #include "core/error.h"
 #include "film/splat_sums.h"
 #include "tests/support/bidirectional_images.h"
-#include "transport/walk.h"
 
 using namespace ambilux;
 
@@ -64,6 +63,7 @@ TEST_CASE(
         for (const char* variant : {"wavefront", "lvc", "streaming"}) {
             INFO(name << " " << variant);
             RenderSettings s = variant_settings(scene, variant);
+            s.specialise = false;  // stages of their own hold all features
             const RenderResult fused = render_scene(scene, s, 3);
             s.fuse = Fuse::none;
             const RenderResult staged = render_scene(scene, s, 3);
@@ -87,8 +87,9 @@ TEST_CASE("An eye vertex may have one pair in a launch or several, or all at onc
         const Scene scene = project_scene("cornell", 48, 32);
         RenderSettings s = variant_settings(scene, variant);
         if (s.variant == "lvc") s.connections = 7;
+        s.specialise = false;  // stages of their own hold all features
         const RenderResult at_once = render_scene(scene, s, 3);
-        s.fuse = Fuse::light;
+        s.fuse = Fuse::none;
         const RenderResult several = render_scene(scene, s, 3);
         s.deterministic = true;
         const RenderResult one = render_scene(scene, s, 3);
@@ -102,7 +103,7 @@ TEST_CASE("An eye vertex may have one pair in a launch or several, or all at onc
     }
 }
 
-TEST_CASE("lvc has the expectation of paired walks, for few draws and many, and for both heuristics") {
+TEST_CASE("lvc has the expectation of paired subpaths, for few draws and many, and for both heuristics") {
     for (const char* name : {"cornell", "glass", "lights", "materials"}) {
         const Scene scene = project_scene(name, 40, 30);
         // In glass, hits of the lamp by way of the sphere are so rare that they alone would decide about the number of
@@ -185,7 +186,7 @@ TEST_CASE(
                     REQUIRE(result.stats.stages.size() == first.stats.stages.size());
                     for (size_t k = 0; k < first.stats.stages.size(); ++k)
                         if (first.stats.stages[k].name !=
-                            "develop")  // once in every pass, of which a slow machine has more
+                            "update_film")  // once in every pass, of which a slow machine has more
                             CHECK(result.stats.stages[k].items_by_depth == first.stats.stages[k].items_by_depth);
                 }
             }
@@ -193,7 +194,7 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("lvc over sorted queues has the expectation of paired walks") {
+TEST_CASE("lvc over sorted queues has the expectation of paired subpaths") {
     const Scene scene = project_scene("materials", 40, 30);
     const Estimate paired = render_batches(scene, variant_settings(scene, "wavefront", 51), 256);
     RenderSettings s = variant_settings(scene, "lvc", 52);
@@ -245,7 +246,7 @@ TEST_CASE("compaction and ordering are refused where there are no such queues") 
     }
 }
 
-TEST_CASE("streaming samples the paths of paired walks but for connections beyond the first eye vertex") {
+TEST_CASE("streaming samples the paths of paired subpaths but for connections beyond the first eye vertex") {
     for (const char* name : {"cornell", "furnace", "glass", "lights", "materials", "textured"}) {
         for (const auto& [strategies, max_depth] : {std::pair{"hits+next_event", 6},
                                                     {"light", 6},
@@ -267,7 +268,7 @@ TEST_CASE("streaming samples the paths of paired walks but for connections beyon
     }
 }
 
-TEST_CASE("streaming has the expectation of paired walks") {
+TEST_CASE("streaming has the expectation of paired subpaths") {
     for (const char* name : {"cornell", "glass", "lights", "materials"}) {
         const Scene scene = project_scene(name, 40, 30);
         const char* strategies = name == std::string("glass") ? "next_event+connections+light" : "all";

@@ -1,12 +1,11 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 600
-// How many light walks there are (light_paths): the image stays what it is, whatever their number, and more of them
+// How many light subpaths there are (light_paths): the image stays what it is, whatever their number, and more of them
 // find more.
 #include <cmath>
 
 #include "core/error.h"
-#include "integrators/bidirectional/wave.h"
-#include "integrators/path/path_wave.h"
+#include "integrators/bdpt/shared/policy.h"
 #include "tests/support/bidirectional_images.h"
 
 using namespace ambilux;
@@ -23,57 +22,57 @@ const Method kLvc = {"all", MisHeuristic::balance, "lvc"}, kLvcPower = {"all", M
 
 }  // namespace
 
-TEST_CASE("light walks lie evenly in tiles, and every tile has some") {
+TEST_CASE("light subpaths lie evenly in tiles, and every tile has some") {
     for (uint32_t per_tile = 1; per_tile <= kMostLightRounds * kTilePixels; ++per_tile) {
         uint32_t sum = 0, most = 0;
         for (uint32_t slot = kTilePixels; slot < 2 * kTilePixels; ++slot) {
-            const uint32_t walks = light_walks_of(slot, per_tile);
-            sum += walks;
-            most = std::max(most, walks);
+            const uint32_t subpaths = light_subpaths_of(slot, per_tile);
+            sum += subpaths;
+            most = std::max(most, subpaths);
             const double even = double(slot - kTilePixels + 1) * per_tile / kTilePixels;
             if (std::fabs(double(sum) - even) >= 1.0)
                 FAIL("slot " << slot << ", " << per_tile << " per tile: " << sum << " so far");
         }
-        BidirectionalPolicy policy{};
-        policy.light_walks_per_tile = per_tile;
-        if (sum != per_tile || most != policy.light_rounds() || light_walks_of(0, per_tile) < 1)
+        WavePolicy policy{};
+        policy.light_subpaths_per_tile = per_tile;
+        if (sum != per_tile || most != policy.light_rounds() || light_subpaths_of(0, per_tile) < 1)
             FAIL(per_tile << " per tile: " << sum << ", at most " << most);
     }
 }
 
-TEST_CASE("light walks of a film are counted as they begin, also in the tiles along its edges") {
+TEST_CASE("light subpaths of a film are counted as they begin, also in the tiles along its edges") {
     for (const auto& [width, height] : {std::pair{64u, 32u}, {1u, 1u}, {9u, 7u}, {61u, 43u}}) {
         const Scene scene = project_scene("cornell", width, height);
-        Wave wave = shape_wave(scene, RenderSettings(), kTilePixels, 1);
+        Wave wave = shape_wave(scene, 0, kTilePixels, 1);
         WaveState state{};
         state.samples = 1;
         wave.state = &state;
         wave.tiles = tile_count(wave);
         for (const uint32_t per_tile : {1u, 5u, 16u, 63u, 64u, 65u, 192u, 1024u}) {
-            uint32_t walks = 0;
+            uint32_t subpaths = 0;
             for (uint32_t slot = 0; slot < wave.slot_count(); ++slot)
-                walks += wave.locate(slot).active ? light_walks_of(slot, per_tile) : 0;
+                subpaths += wave.locate(slot).active ? light_subpaths_of(slot, per_tile) : 0;
             INFO(width << "x" << height << ", " << per_tile << " per tile");
-            CHECK(light_walks_in(wave, 0, wave.tiles, per_tile) == walks);
-            CHECK(walks >= wave.tiles);
+            CHECK(light_subpaths_in(wave, 0, wave.tiles, per_tile) == subpaths);
+            CHECK(subpaths >= wave.tiles);
             RenderSettings s = method_settings(scene, kLvc, 1);
-            s.light_walks_per_tile = per_tile;
-            CHECK(make_bidirectional_policy(scene, s).mis.light_walks == float(walks));
+            s.light_subpaths_per_tile = per_tile;
+            CHECK(plan_bdpt(scene, s).rules.mis.light_subpaths == float(subpaths));
             // A render starts as many, once per sample.
             const RenderResult r = render_scene(scene, s, 2);
             uint32_t stages = 0;
             for (const StageStats& stage : r.stats.stages) {
                 if (stage.name != "light_extend") continue;
                 ++stages;
-                CHECK(stage.items_by_depth[1] == 2 * walks);
+                CHECK(stage.items_by_depth[1] == 2 * subpaths);
             }
             CHECK(stages == 1);
         }
     }
 }
 
-TEST_CASE("any number of light walks gives the image of one for every pixel", "[bidirectional]") {
-    // Paired walks have less noise than the path tracer, with which they agree (test_bidirectional_images).
+TEST_CASE("any number of light subpaths gives the image of one for every pixel", "[bidirectional]") {
+    // Paired subpaths have less noise than the path tracer, with which they agree (test_bidirectional_images).
     for (const auto& [name, spp] : {std::pair{"cornell", 512u}, {"lights", 1536u}}) {
         const Scene scene = project_scene(name, 45, 27);
         const Estimate paired = render_batches(scene, method_settings(scene, kAll, 1001), spp);
@@ -89,7 +88,7 @@ TEST_CASE("any number of light walks gives the image of one for every pixel", "[
     }
 }
 
-TEST_CASE("any number of light walks gives the direct light of a lamp, by t = 1 alone and by all strategies",
+TEST_CASE("any number of light subpaths gives the direct light of a lamp, by t = 1 alone and by all strategies",
           "[bidirectional]") {
     const Image expected =
         plane_image(kLight, [](double x, double y) { return rectangle_irradiance(x, y, -0.4, 0.8, -0.3, 0.5, 1.2); });
@@ -101,7 +100,7 @@ TEST_CASE("any number of light walks gives the direct light of a lamp, by t = 1 
         }
 }
 
-TEST_CASE("light walks of one slot differ: four times as many have a quarter of the variance") {
+TEST_CASE("light subpaths of one slot differ: four times as many have a quarter of the variance") {
     const Scene scene = project_scene("cornell", 32, 32);
     const auto variance = [&](const char* light_paths, uint64_t seed) {
         const FilmMoments film =
@@ -125,15 +124,17 @@ TEST_CASE("light walks of one slot differ: four times as many have a quarter of 
     }
 }
 
-TEST_CASE("rounds of light walks use queues again: where items lie and which stages are fused changes no bit") {
+TEST_CASE("rounds of light subpaths use queues again: where items lie and which stages are fused changes no bit") {
     for (const char* name : {"glass", "textured"}) {
         const Scene scene = project_scene(name, 45, 27);
         for (const Method& m : {kLightTracer, kWithoutConnections}) {
             RenderSettings s = with_light_paths(method_settings(scene, m, 7), "2.5");
             s.deterministic = true;
             const FilmMoments first = render_scene(scene, s, 2).film;
+            RenderSettings all_features = s;  // which stages of their own hold
+            all_features.specialise = false;
+            const FilmMoments fused = render_scene(scene, all_features, 2).film;
             for (const auto& [key, value] : {std::pair{"fuse", "none"},
-                                             {"fuse", "light"},
                                              {"compaction", "select"},
                                              {"compaction", "none"},
                                              {"ordering", "material"},
@@ -141,13 +142,13 @@ TEST_CASE("rounds of light walks use queues again: where items lie and which sta
                 INFO(name << " " << m.name << " " << key << "=" << value);
                 RenderSettings other = s;
                 apply_setting(other, key, value);
-                CHECK(render_scene(scene, other, 2).film.sum == first.sum);
+                CHECK(render_scene(scene, other, 2).film.sum == (other.fuse == Fuse::none ? fused : first).sum);
             }
         }
     }
 }
 
-TEST_CASE("images of single strategies add up to the image, whatever the number of light walks") {
+TEST_CASE("images of single strategies add up to the image, whatever the number of light subpaths") {
     const Scene scene = project_scene("cornell", 24, 16);
     for (const char* light_paths : {"0.25", "3"}) {
         RenderSettings s = with_light_paths(method_settings(scene, kLvc, 3), light_paths);
@@ -156,7 +157,7 @@ TEST_CASE("images of single strategies add up to the image, whatever the number 
         renderer->render(0, 16);
         const FilmMoments film = renderer->film();
         std::vector<double> sum(film.sum.size());
-        for (const TechniqueImage& image : renderer->technique_images())
+        for (const StrategyImage& image : renderer->strategy_images())
             for (size_t i = 0; i < sum.size(); ++i) sum[i] += double(image.weighted[i]);
         for (size_t i = 0; i < sum.size(); ++i)
             if (std::fabs(sum[i] - film.mean(i)) > 1e-4 * film.mean(i) + 1e-6)
@@ -164,7 +165,7 @@ TEST_CASE("images of single strategies add up to the image, whatever the number 
     }
 }
 
-TEST_CASE("numbers of light walks that cannot be are refused by name") {
+TEST_CASE("numbers of light subpaths that cannot be are refused by name") {
     RenderSettings s;
     for (const char* value : {"0", "-1", "17", "0.3", "x", "1.001", ""}) {
         INFO(value);

@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 300
 // The estimators naive, nee and mis (balance, power) have the same expectation on every scene: z-tests of pairs that
 // share no random numbers.

@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 900
 // Renders of published scenes against the images that were published with them, made by other renderers.
 #include "core/error.h"

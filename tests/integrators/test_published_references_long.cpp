@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: long
 // timeout: 3600
 // The published images by blocks of 16 x 16 pixels: enough samples that the noise of a block does not decide.

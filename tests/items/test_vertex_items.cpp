@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // What queues keep of a vertex is what connections are made of, and tells beforehand which of them bring nothing.
 #include <bit>
 #include <cmath>
@@ -9,16 +9,47 @@
 #include "items/vertex_items.h"
 #include "queues/layout.h"
 #include "tests/support/bidirectional_images.h"
-#include "transport/walk.h"
+#include "transport/subpath/vertex.h"
 
 using namespace ambilux;
+
+namespace {
+
+using BidirectionalSubpath = Subpath<BidirectionalMis>;
+
+/// A ray along `d` of `depth` segments that brings `throughput`.
+BidirectionalSubpath ray_along(Vec3f d, uint32_t depth, Rgb throughput = {1, 1, 1}) {
+    BidirectionalSubpath path = {};
+    path.direction = d;
+    path.depth = depth;
+    path.throughput = throughput;
+    return path;
+}
+
+Rules<BidirectionalMis> all_rules() {
+    Rules<BidirectionalMis> rules = {};
+    rules.mis.strategies = kAllStrategies;
+    rules.mis.light_subpaths = rules.mis.connections = 1.0f;
+    rules.max_depth = kMaxDepth;
+    rules.rr_depth = ~0u;
+    rules.count_hits = rules.count_environment = rules.next_event = rules.splat = rules.connect = true;
+    return rules;
+}
+
+/// Both with throughput 1.
+bool connects(const Rules<BidirectionalMis>& rules, const BidirectionalVertex& y, const BidirectionalVertex& z) {
+    Candidate<BidirectionalMis> c;
+    return connection<kAllFeatures>(rules, {z, {1, 1, 1}, 1}, {y, {1, 1, 1}, 1}, 1.0f, c) && !is_zero(c.value);
+}
+
+}  // namespace
 
 TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no light") {
     for (const char* name : {"cornell", "glass", "materials", "textured"}) {
         const Scene scene = project_scene(name, 32, 32);
         const CwbvhAccel accel(scene);
         const SceneView view = scene.view();
-        const auto at_random = [&](uint32_t i, Stream stream, WalkVertex& v) {
+        const auto at_random = [&](uint32_t i, Stream stream, BidirectionalVertex& v) {
             const RngKey key = {5, i, 0, stream};
             const Vec4f u = random_floats(key, 0);
             // Through the middle of the scene.
@@ -34,12 +65,10 @@ TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no li
             v.first = false;
             return bsdf_is_smooth(v.scattering.bsdf);
         };
-        BidirectionalMis mis{};
-        mis.strategies = kAllStrategies;
-        mis.light_walks = mis.connections = 1.0f;
+        const Rules<BidirectionalMis> rules = all_rules();
         uint32_t pairs = 0, turned_down = 0, lit = 0;
         for (uint32_t i = 0; i < 20000; ++i) {
-            WalkVertex y, z;
+            BidirectionalVertex y, z;
             if (!at_random(i, Stream::light, y) || !at_random(i, Stream::eye, z)) continue;
             ++pairs;
             const Vec3f w = z.point.p - y.point.p, wi = normalize(w);
@@ -50,12 +79,10 @@ TEST_CASE("Pairs that are turned down by geometry and types of BSDFs bring no li
             lit += brings;
             turned_down += !may_connect(y, z);
             REQUIRE((may_connect(y, z) || !brings));
-            WalkConnection c;
-            REQUIRE(
-                (brings || !connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c) || is_zero(c.value)));
+            REQUIRE((brings || !connects(rules, y, z)));
             if (std::fabs(dot(y.scattering.ng, w)) < 1e-6f * length(w))
                 continue;  // the side may be another by rounding
-            REQUIRE(may_connect(pack_connection_vertex(y, 2, -y.scattering.wi_world, {1, 1, 1}, kNone).front, z) ==
+            REQUIRE(may_connect(pack_connection_vertex(y, ray_along(-y.scattering.wi_world, 2), kNone).front, z) ==
                     may_connect(y, z));
         }
         INFO(name << ": " << pairs << " pairs, " << turned_down << " turned down, " << lit << " with light");
@@ -88,16 +115,16 @@ TEST_CASE("A vertex that comes from a queue is the one that went in, surface, fr
             Hit hit;
             if (!accel.tracer().closest<kAllFeatures>(view, {from, kInfinity, d, 0}, hit)) continue;
             const uint32_t depth = 1 + i % 2;
-            WalkVertex v = walk_vertex<kAllFeatures>(view, d, depth, hit.prim, hit.u, hit.v);
-            v.sums = {t.z, t.w};
+            const BidirectionalVertex v = vertex_with<kAllFeatures, BidirectionalMis>(
+                view, d, depth, surface_at<kAllFeatures>(view, hit.prim, hit.u, hit.v), {t.z, t.w});
             const Bsdf& f = v.scattering.bsdf;
             const bool diffuse = f.type == BsdfType::diffuse;
             ++vertices;
             behind += v.scattering.flipped;
             types |= bit(f.type);
-            // What is common to vertices of both kinds of walk, `reflectance` that of a diffuse one, which has no
+            // What is common to vertices of both sides, `reflectance` that of a diffuse one, which has no
             // tangents and no record.
-            const auto check = [&](const auto& item, const WalkVertex& back, Rgb reflectance) {
+            const auto check = [&](const auto& item, const BidirectionalVertex& back, Rgb reflectance) {
                 const Scattering &a = v.scattering, &b = back.scattering;
                 const Bsdf& g = b.bsdf;
                 REQUIRE((item.bits().depth() == depth && path_of(item) == 7 &&
@@ -122,26 +149,38 @@ TEST_CASE("A vertex that comes from a queue is the one that went in, surface, fr
                          f.fdr_internal == g.fdr_internal && f.specular_sampling_weight == g.specular_sampling_weight &&
                          f.transmittance_table == g.transmittance_table));
             };
+            const Subpath<UnidirectionalMis> unidirectional = {{}, d, {1, 2, 3}, {0.5f}, {}, depth, 1.0f, false};
+            const VertexItem without_sums =
+                pack_vertex(vertex_with<kAllFeatures, UnidirectionalMis>(
+                                view, d, depth, surface_at<kAllFeatures>(view, hit.prim, hit.u, hit.v), {0.5f}),
+                            unidirectional, 7);
             const bool textured = scene.features.textures || scene.features.bumps;
-            WalkHit h = {};
-            h.ray.d = d;
-            h.ray.bits = WalkBits::make(depth, false, 1.0f);
-            h.ray.throughput = {1, 2, 3};
-            h.ray.path = 7;
-            const VertexItem eye = pack_vertex(v, h);
+            const BidirectionalSubpath path = ray_along(d, depth, {1, 2, 3});
+            const VertexItem eye = pack_vertex(v, path, 7);
             REQUIRE(same(eye.throughput, {1, 2, 3}));
-            const WalkVertex exact = unpack_vertex<kAllFeatures>(view, eye);
+            // That of a path tracer, which asks for no sums, is the same without them.
+            VertexItem expected = eye;
+            expected.dvcm = expected.dvc = 0.0f;
+            REQUIRE(std::memcmp(&expected, &without_sums, sizeof(VertexItem)) == 0);
+            const auto vertex_of = [&](const BidirectionalEnd& end, Rgb throughput) {
+                REQUIRE((end.depth == depth && same(end.throughput, throughput)));
+                return end.vertex;
+            };
+            const BidirectionalVertex exact =
+                vertex_of(unpack_end<kAllFeatures, BidirectionalMis>(view, eye), {1, 2, 3});
             REQUIRE((exact.offset == v.offset && same(exact.scattering.wi_world, v.scattering.wi_world) &&
                      same(exact.scattering.ng, v.scattering.ng) &&
                      same(exact.scattering.frame.n, v.scattering.frame.n)));
             check(eye, exact, f.reflectance_or_eta);
-            if (!textured) check(eye, unpack_vertex<kUntextured>(view, eye), f.reflectance_or_eta);
-            const ConnectionVertex light = pack_connection_vertex(v, depth, d, {1, 2, 3}, 7);
+            if (!textured)
+                check(eye, vertex_of(unpack_end<kUntextured, BidirectionalMis>(view, eye), {1, 2, 3}),
+                      f.reflectance_or_eta);
+            const ConnectionVertex light = pack_connection_vertex(v, path, 7);
             REQUIRE(same(light.throughput, diffuse ? Rgb{1, 2, 3} * f.reflectance_or_eta : Rgb{1, 2, 3}));
-            const WalkVertex back = unpack_vertex<kAllFeatures>(view, light);
+            const BidirectionalVertex back = vertex_of(unpack_end<kAllFeatures>(view, light), light.throughput);
             REQUIRE((back.offset >= v.offset && back.offset <= v.offset * (1.0f + 1.0f / 128.0f)));
             check(light, back, {1, 1, 1});
-            if (!textured) check(light, unpack_vertex<kUntextured>(view, light), {1, 1, 1});
+            if (!textured) check(light, vertex_of(unpack_end<kUntextured>(view, light), light.throughput), {1, 1, 1});
         }
         CHECK(vertices > 1000);
     }
@@ -155,18 +194,17 @@ TEST_CASE("Queues hold of a vertex what its BSDF needs, and give it back") {
     const auto check = [](auto features, auto item) {
         constexpr Features F = decltype(features)::value;
         using Item = decltype(item);
-        QueueCounter counter = {};
-        counter.capacity = 3;
         Layout sizes;
-        sizes.queue<Item>("vertices", nullptr, 3, false, Item::template lanes<F>());
+        sizes.queue<Item>("vertices", 3, false, Item::template lanes<F>());
         std::vector<Lane> memory(sizes.bytes() / sizeof(Lane) + 16, Lane{{~0u, ~0u, ~0u, ~0u}});
         void* start = memory.data();
         size_t room = memory.size() * sizeof(Lane);
-        Layout layout(std::align(256, sizes.bytes(), start, room));
-        const Queue<Item> queue = layout.queue<Item>("vertices", &counter, 3, false, Item::template lanes<F>());
+        Layout layout(sizes, std::align(256, sizes.bytes(), start, room));
+        const Queue<Item> queue = layout.queue<Item>("vertices", 3, false, Item::template lanes<F>());
+        *queue.counter = layout.first_counters()[0];
         for (const bool diffuse : {true, false, true}) {
             if (!diffuse && F.bsdfs == bit(BsdfType::diffuse)) continue;
-            WalkVertex v = {};
+            BidirectionalVertex v = {};
             v.point.p = {1, 2, 3};
             v.scattering.bsdf.type = diffuse ? BsdfType::diffuse : BsdfType::rough_plastic;
             v.scattering.wi_world = v.scattering.ng = v.scattering.frame.n = {0, 0, 1};
@@ -176,21 +214,17 @@ TEST_CASE("Queues hold of a vertex what its BSDF needs, and give it back") {
             v.scattering.bsdf.specular_reflectance = {7, 8, 9};
             v.scattering.bsdf.alpha_u = v.scattering.bsdf.alpha_v = 10;
             v.sums = {11, 12};
-            WalkHit h = {};
-            h.ray.d = {0, 0, -1};
-            h.ray.bits = WalkBits::make(3, false, 1.0f);
-            h.ray.throughput = {1, 1, 1};
-            h.ray.path = 13;
+            const BidirectionalSubpath path = ray_along({0, 0, -1}, 3);
             if constexpr (std::is_same_v<Item, VertexItem>)
-                item = pack_vertex(v, h);
+                item = pack_vertex(v, path, 13);
             else
-                item = pack_connection_vertex(v, h);
+                item = pack_connection_vertex(v, path, 13);
             const uint32_t place = push_vertex<F>(queue, item), lanes = lanes_of<F>(item);
             CHECK(lanes == (diffuse ? Item::kDiffuseLanes : Item::template lanes<F>()));
             const Item back = load_vertex<F>(queue, place);
             CHECK(std::memcmp(&back, &item, lanes * sizeof(Lane)) == 0);
         }
-        CHECK(counter.count == (F.bsdfs == bit(BsdfType::diffuse) ? 2 : 3));
+        CHECK(queue.counter->count == (F.bsdfs == bit(BsdfType::diffuse) ? 2 : 3));
     };
     const auto both = [&](auto features) {
         check(features, VertexItem{});
@@ -209,7 +243,7 @@ TEST_CASE("A light vertex in a queue tells to which sides it scatters") {
         // Along edges of the octahedron and at its corners too.
         if (i % 3 == 0) n = normalize(Vec3f{i % 2 ? n.x : 0.0f, i % 4 < 2 ? n.y : 1e-4f * n.y, i % 5 ? n.z : 0.0f});
         if (!is_finite(n)) continue;
-        WalkVertex y = {};
+        BidirectionalVertex y = {};
         y.scattering.ng = y.scattering.frame.n = n;
         y.scattering.wi_world = square_to_sphere({t.x, t.y});
         y.offset = std::exp2(60.0f * (t.z - 0.5f));
@@ -218,11 +252,11 @@ TEST_CASE("A light vertex in a queue tells to which sides it scatters") {
         const float angle = 0.1f * (2.0f * u.z - 1.0f), distance = std::exp2(60.0f * (u.w - 0.5f));
         const Vec3f w = (across * std::cos(angle) + n * std::sin(angle)) * distance;
         INFO("normal " << n.x << " " << n.y << " " << n.z << ", angle " << angle << ", distance " << distance);
-        const uint32_t depth = 1 + i % WalkBits::kMaxDepth;
+        const uint32_t depth = 1 + i % kMaxDepth;
         for (const BsdfType type : {BsdfType::diffuse, BsdfType::rough_plastic, BsdfType::rough_dielectric}) {
             y.scattering.bsdf.type = type;
             const ConnectionVertexFront front =
-                pack_connection_vertex(y, depth, -y.scattering.wi_world, {1, 1, 1}, kNone).front;
+                pack_connection_vertex(y, ray_along(-y.scattering.wi_world, depth), kNone).front;
             REQUIRE(front.bits.depth() == depth);
             REQUIRE((front.bits.offset() >= y.offset && front.bits.offset() <= y.offset * (1.0f + 1.0f / 128.0f)));
             if (std::fabs(angle) < 1e-6f || std::fabs(dot(n, y.scattering.wi_world)) < 1e-6f) continue;
@@ -234,9 +268,7 @@ TEST_CASE("A light vertex in a queue tells to which sides it scatters") {
 TEST_CASE("Points in one plane, as far as positions are known, exchange no light; points above it do") {
     const Scene scene = project_scene("cornell", 32, 32);
     const SceneView view = scene.view();
-    BidirectionalMis mis{};
-    mis.strategies = kAllStrategies;
-    mis.light_walks = mis.connections = 1.0f;
+    const Rules<BidirectionalMis> rules = all_rules();
     uint32_t points = 0, pairs = 0;
     for (uint32_t i = 0; i < 20000; ++i) {
         const Vec4f u = random_floats({21, i, 0, Stream::eye}, 0);
@@ -245,19 +277,54 @@ TEST_CASE("Points in one plane, as far as positions are known, exchange no light
         const auto at = [&](float a, float b) { return a + b < 1.0f ? Vec2f{a, b} : Vec2f{1.0f - a, 1.0f - b}; };
         const Vec2f p = at(u.x, u.y), q = at(u.z, u.w);
         const SurfacePoint point = surface_at<kAllFeatures>(view, prim, p.x, p.y);
-        WalkVertex z = walk_vertex<kAllFeatures>(view, -point.ng, 1, prim, p.x, p.y),
-                   y = walk_vertex<kAllFeatures>(view, -point.ng, 1, prim, q.x, q.y);
-        z.sums = y.sums = {1, 1};
+        const auto vertex = [&](const SurfacePoint& x) {
+            return vertex_with<kAllFeatures, BidirectionalMis>(view, -point.ng, 1, x, {1, 1});
+        };
+        const BidirectionalVertex z = vertex(point);
+        BidirectionalVertex y = vertex(surface_at<kAllFeatures>(view, prim, q.x, q.y));
         if (is_zero(z.scattering.bsdf.reflectance_or_eta)) continue;
         ++points;
-        WalkConnection c;
+        Candidate<BidirectionalMis> c;
         REQUIRE_FALSE(may_connect(y, z));
-        REQUIRE_FALSE(connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c));
+        REQUIRE_FALSE(connection<kAllFeatures>(rules, {z, {1, 1, 1}, 1}, {y, {1, 1, 1}, 1}, 1.0f, c));
         y.point.p += z.point.ng * (8.0f * z.offset);
         y.point.ng = y.scattering.ng = y.scattering.frame.n = -z.scattering.ng;
         y.scattering.wi_world = -z.scattering.wi_world;
-        pairs += connect_vertices<kAllFeatures>(mis, y, {1, 1, 1}, z, {1, 1, 1}, c) && !is_zero(c.value);
+        pairs += connects(rules, y, z);
     }
     CHECK(points > 15000);
     CHECK(pairs > points - points / 50);  // but those whose rays begin above each other
+}
+
+TEST_CASE("A ray that comes from a queue is the one that went in, with all that its subpath carries") {
+    const auto same = [](Vec3f a, Vec3f b) { return a.x == b.x && a.y == b.y && a.z == b.z; };
+    const auto check = [&](auto mis, Side side, const auto& path, float tmax) {
+        using Items = SubpathItems<decltype(mis)>;
+        const typename Items::Ray ray = Items::pack(path, side, 9, tmax);
+        CHECK(path_of(ray) == 9);
+        CHECK(Items::tmax(ray) == (path.depth == 1 ? tmax : kInfinity));
+        const auto back = Items::unpack(ray);
+        CHECK((same(back.origin, path.origin) && same(back.direction, path.direction) &&
+               same(back.throughput, path.throughput)));
+        CHECK((back.depth == path.depth && back.delta == path.delta && back.eta == path.eta));
+        return back;
+    };
+    for (const uint32_t depth : {1u, 2u, kMaxDepth})
+        for (const bool delta : {false, true}) {
+            INFO("depth " << depth << " delta " << delta);
+            const Subpath<UnidirectionalMis> alone = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10}, {}, depth, 1.5f, delta};
+            const auto back = check(UnidirectionalMis{}, Side::eye, alone, 100.0f);
+            if (depth > 1) CHECK(back.sums.pdf_sa == 10);
+            for (const Side side : {Side::eye, Side::light}) {
+                BidirectionalSubpath path = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11}, {}, depth, 1.5f, delta};
+                path.start = {12, 13, 14, 15, 16};
+                const BidirectionalSubpath b = check(BidirectionalMis{}, side, path, 100.0f);
+                // First rays of light subpaths have no sums yet; others have no start.
+                if (side == Side::eye || depth > 1) CHECK((b.sums.dvcm == 10 && b.sums.dvc == 11));
+                if (side == Side::eye && depth == 1) CHECK(b.start.camera_distance == 16);
+                if (side == Side::light && depth == 1)
+                    CHECK((b.start.inv_pdf == 12 && b.start.direction == 13 && b.start.prim == 14 &&
+                           b.start.emitter == 15));
+            }
+        }
 }

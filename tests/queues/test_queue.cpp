@@ -1,9 +1,11 @@
 // libs: ambilux_stages ambilux_queues
-// Queues on the host: storage, counting, layout, fixed places, the order in which stages go through them.
+// Queues on the host: storage, counting, layout, queues by path, the order in which stages go through them.
 #include <algorithm>
 #include <limits>
 #include <memory>
 #include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "backends/cpu/executor.h"
@@ -30,9 +32,9 @@ struct OwnedQueue {
     QueueCounter counter{};
     Queue<Item> queue;
 
-    explicit OwnedQueue(uint32_t capacity) : memory(size_t(capacity) * Queue<Item>::kLanes + 1) {
+    explicit OwnedQueue(uint32_t capacity) : memory(size_t(capacity) * LaneArray<Item>::kLanes + 1) {
         counter.capacity = capacity;
-        queue = {memory.data(), &counter, capacity};
+        queue = {{memory.data(), capacity}, &counter};
     }
 };
 
@@ -50,23 +52,23 @@ struct Whole {
 }  // namespace
 
 TEST_CASE("queue: a lane that is known is neither stored nor loaded, and the last lane is read alone") {
-    std::vector<Lane> memory(2 * Queue<Whole>::kLanes + 1, Lane{{9, 9, 9, 9}});
+    std::vector<Lane> memory(2 * LaneArray<Whole>::kLanes + 1, Lane{{9, 9, 9, 9}});
     QueueCounter counter{};
-    const Queue<Whole> queue = {memory.data(), &counter, 2};
+    const Queue<Whole> queue = {{memory.data(), 2}, &counter};
     const Whole item = {{{{1, 2, 3, 4}}, {{5, 6, 7, 8}}, {{10, 11, 12, 13}}, {{14, 15, 16, 17}}}};
     const auto same = [](const Lane& a, const Lane& b) { return std::equal(a.word, a.word + 4, b.word); };
-    for (uint32_t known = 0; known <= Queue<Whole>::kLanes; ++known) {
+    for (uint32_t known = 0; known <= LaneArray<Whole>::kLanes; ++known) {
         std::fill(memory.begin(), memory.end(), Lane{{9, 9, 9, 9}});
-        queue.store_but(1, known, item);
+        queue.items.store_but(1, known, item);
         const Whole stored = queue.load(1), untouched = queue.load(0);
         queue.store(1, item);
-        const Whole loaded = queue.load_but(1, known, {{20, 21, 22, 23}});
-        for (uint32_t k = 0; k < Queue<Whole>::kLanes; ++k) {
+        const Whole loaded = queue.items.load_but(1, known, {{20, 21, 22, 23}});
+        for (uint32_t k = 0; k < LaneArray<Whole>::kLanes; ++k) {
             CHECK(same(stored.lane[k], k == known ? Lane{{9, 9, 9, 9}} : item.lane[k]));
             CHECK(same(untouched.lane[k], {{9, 9, 9, 9}}));
             CHECK(same(loaded.lane[k], k == known ? Lane{{20, 21, 22, 23}} : item.lane[k]));
         }
-        CHECK(same(queue.last<Lane>(1), item.lane[3]));
+        CHECK(same(queue.items.load_last<Lane>(1), item.lane[3]));
     }
 }
 
@@ -92,11 +94,15 @@ TEST_CASE("queue: lanes of an item lie a capacity apart, so that neighbours are 
 }
 
 TEST_CASE("queue: the first lanes of items that ask for it lie two by two, and fronts lie where their items do") {
-    Lane memory[64] = {};
-    QueueCounter counters[2] = {};
-    Layout layout(memory);
-    const Queue<Whole> whole = layout.queue<Whole>("whole", counters, 5);
-    const Queue<Front> front = layout.front<Front>("front", counters, whole, false);
+    const auto lay = [](Layout& layout) {
+        const Queue<Whole> whole = layout.queue<Whole>("whole", 5);
+        return std::pair(whole, layout.front<Front>("front", whole));
+    };
+    Layout plan;
+    lay(plan);
+    std::vector<Lane> memory(plan.bytes() / sizeof(Lane));
+    Layout layout(plan, memory.data());
+    const auto [whole, front] = lay(layout);
     std::set<const Lane*> places;
     for (uint32_t i = 0; i < 5; ++i) {
         Front item{};
@@ -109,9 +115,9 @@ TEST_CASE("queue: the first lanes of items that ask for it lie two by two, and f
     for (uint32_t i = 0; i < 5; ++i) {
         const Whole item = whole.load(i);
         for (uint32_t k = 0; k < 4; ++k) CHECK(item.lane[k].word[0] == 10 * i + k);
-        for (uint32_t k = 0; k < 4; ++k) places.insert(&whole.base[whole.place(i, k)]);
-        CHECK(whole.place(i, 1) == 2 * i + 1);
-        CHECK(whole.place(i, 2) == 10 + i);
+        for (uint32_t k = 0; k < 4; ++k) places.insert(&whole.items.base[whole.items.place(i, k)]);
+        CHECK(whole.items.place(i, 1) == 2 * i + 1);
+        CHECK(whole.items.place(i, 2) == 10 + i);
     }
     CHECK(places.size() == 20);
     CHECK(*places.rbegin() - *places.begin() == 19);
@@ -135,37 +141,103 @@ TEST_CASE("G3: a push past the capacity is counted, and touches nothing") {
 }
 
 TEST_CASE("G8: a layout without memory tells the bytes that one with memory uses") {
-    const auto lay = [](Layout& layout, QueueCounter* counters) {
-        std::vector<const void*> places;
-        places.push_back(layout.take<uint32_t>(3));
-        for (const uint32_t n : {0u, 1u, 100u, 4097u}) places.push_back(layout.queue<Item>("q", counters, n).base);
-        places.push_back(layout.take<double>(7));
+    struct Places {
+        std::vector<const void*> values, records;
+    };
+    const auto lay = [](Layout& layout) {
+        Places places;
+        places.values.push_back(layout.allocate<uint32_t>(3));
+        places.records.push_back(layout.record("a"));
+        for (const uint32_t n : {0u, 1u, 100u, 4097u}) places.values.push_back(layout.queue<Item>("q", n).items.base);
+        places.records.push_back(layout.record("b"));
+        places.records.push_back(layout.record("a"));
+        places.values.push_back(layout.allocate<double>(7));
         return places;
     };
     Layout dry;
-    lay(dry, nullptr);
+    for (const auto& nothing : {lay(dry)}) {
+        for (const void* p : nothing.values) CHECK(p == nullptr);
+        for (const void* p : nothing.records) CHECK(p == nullptr);
+    }
     std::vector<Lane> memory(dry.bytes() / sizeof(Lane) + 16);
     void* start = memory.data();
     size_t space = memory.size() * sizeof(Lane);
     start = std::align(256, dry.bytes(), start, space);
-    QueueCounter counters[4] = {};
-    Layout real(start);
-    const auto places = lay(real, counters);
+    Layout real(dry, start);
+    const Places places = lay(real);
     CHECK(real.bytes() == dry.bytes());
     CHECK(real.queue_names().size() == 4);
     CHECK(real.queue_capacities() == std::vector<uint32_t>{0, 1, 100, 4097});
-    for (const void* p : places) CHECK(reinterpret_cast<uintptr_t>(p) % 256 == 0);
+    for (const void* p : places.values) CHECK(reinterpret_cast<uintptr_t>(p) % 256 == 0);
     // Only the empty queue may share its place.
-    CHECK(std::set<const void*>(places.begin(), places.end()).size() == places.size() - 1);
+    CHECK(std::set<const void*>(places.values.begin(), places.values.end()).size() == places.values.size() - 1);
+
+    // Counters and records come first, each in the order in which they were asked for; a name has one record.
+    CHECK(real.record_names() == std::vector<std::string>{"a", "b"});
+    CHECK(real.record_names() == dry.record_names());
+    CHECK(static_cast<void*>(real.counters()) == start);
+    CHECK(places.records == std::vector<const void*>{real.records(), real.records() + 1, real.records()});
+    CHECK(static_cast<const void*>(real.counters() + 4) <= static_cast<const void*>(real.records()));
+    for (const void* p : places.values) {
+        CHECK(p >= static_cast<const void*>(real.records() + 2));
+        CHECK(p < static_cast<const std::byte*>(start) + dry.bytes());
+    }
+    const std::vector<QueueCounter> counters = real.first_counters();
+    REQUIRE(counters.size() == 4);
+    for (size_t q = 0; q < 4; ++q) {
+        CHECK(counters[q].capacity == real.queue_capacities()[q]);
+        CHECK(counters[q].count + counters[q].peak + counters[q].overflow + counters[q].next + counters[q].holes == 0);
+    }
 }
 
-TEST_CASE(
-    "queue of fixed places: an item lies where its path says; a second one for the same path is counted as lost") {
+TEST_CASE("G8: a layout without memory tells the bytes of every kind of queue, by path or appended to") {
+    for (const bool by_path : {false, true})
+        for (const uint32_t n : {0u, 1u, 257u, 5000u}) {
+            INFO(n << " slots, by path " << by_path);
+            const auto lay = [&](Layout& layout) {
+                std::vector<std::pair<const void*, uint64_t>> places;
+                const auto add = [&](const void* start, uint64_t bytes) { places.emplace_back(start, bytes); };
+                const Queue<Whole> whole = layout.queue<Whole>("whole", n, by_path);
+                const Queue<Front> front = layout.front<Front>("front", whole);
+                const Queue<Whole> other = layout.alternate(whole);
+                add(whole.items.base, n * sizeof(Whole));
+                add(other.items.base, n * sizeof(Whole));
+                add(whole.flags, by_path ? n : 0);
+                add(front.flags, by_path ? n : 0);
+                add(layout.array<Whole>(n, 3).base, 3 * n * sizeof(Lane));
+                add(layout.queue<Item>("last", n, by_path).flags, by_path ? n : 0);
+                CHECK(whole.capacity() == n);
+                CHECK(front.capacity() == n);
+                CHECK(other.capacity() == n);
+                return places;
+            };
+            Layout plan;
+            lay(plan);
+            std::vector<Lane> memory(plan.bytes() / sizeof(Lane) + n + 16);
+            void* start = memory.data();
+            size_t room = memory.size() * sizeof(Lane);
+            Layout layout(plan, std::align(256, plan.bytes(), start, room));
+            auto places = lay(layout);
+            CHECK(layout.bytes() == plan.bytes());
+            CHECK(layout.queue_capacities() == std::vector<uint32_t>(3, n));
+            // None lies in another, and all in what was planned.
+            std::erase_if(places, [](const auto& p) { return p.second == 0; });
+            std::sort(places.begin(), places.end());
+            for (size_t k = 0; k < places.size(); ++k) {
+                const std::byte* const end = static_cast<const std::byte*>(places[k].first) + places[k].second;
+                CHECK(places[k].first != nullptr);
+                CHECK(end <= (k + 1 < places.size() ? places[k + 1].first
+                                                    : static_cast<const std::byte*>(start) + plan.bytes()));
+            }
+        }
+}
+
+TEST_CASE("queue by path: an item lies where its path says; a second one for the same path is counted as lost") {
     std::vector<Lane> memory(5);
     std::vector<uint8_t> flags(5);
     QueueCounter counter{};
     counter.capacity = 5;
-    const Queue<Contribution> queue = {memory.data(), &counter, 5, flags.data()};
+    const Queue<Contribution> queue = {{memory.data(), 5}, &counter, flags.data()};
     for (const uint32_t path : {3u, 0u, 4u}) CHECK(queue.push({{float(path), 0.0f, 0.0f}, path}) == path);
     CHECK(flags == std::vector<uint8_t>{1, 0, 0, 1, 1});
     for (const uint32_t path : {0u, 3u, 4u}) CHECK(queue.load(path).value.x == float(path));
@@ -176,8 +248,8 @@ TEST_CASE(
     queue.push({{}, 5});
     CHECK(counter.overflow == 2);
     CHECK(flags == std::vector<uint8_t>{1, 0, 0, 1, 1});
-    // The path of a hit of a walk is that of its ray.
-    WalkHit hit{};
+    // The path of a hit is that of its ray.
+    SubpathHit hit{};
     hit.ray.path = 7;
     CHECK(path_of(hit) == 7);
 }
@@ -186,13 +258,17 @@ namespace {
 
 /// Notes what it is called with, and puts an item of every second path into another queue.
 struct Note {
-    Queue<HitItem> in, out;
-    std::vector<uint32_t>* paths;
+    static constexpr const char* kName = "note";
 
+    Queue<PathHit> in, out;
+    std::vector<uint32_t>* paths;
+    StageRecord* record;
+
+    const Queue<PathHit>& items() const { return in; }
     void operator()(uint32_t i) const {
-        const HitItem item = in.load(i);
-        paths->push_back(item.path);
-        if (item.path % 2 == 0) out.push(item);
+        const PathHit item = in.load(i);
+        paths->push_back(item.ray.path);
+        if (item.ray.path % 2 == 0) out.push(item);
     }
 };
 
@@ -205,22 +281,23 @@ TEST_CASE("an executor goes through all items once, in the order that is asked f
                 INFO(n << " slots, compaction " << compaction_name(compaction) << ", ordering "
                        << ordering_name(ordering));
                 const QueuePolicy policy = {compaction, ordering};
-                const auto lay = [&](Layout& layout, Queue<HitItem>* queues, QueueCounter* counters,
-                                     OrderMemory& order) {
-                    for (int q = 0; q < 2; ++q)
-                        queues[q] = layout.queue<HitItem>("hits", counters, n, policy.fixed_places());
-                    order = lay_out_order(layout, policy, n);
-                };
-                Queue<HitItem> queues[2];
+                Queue<PathHit> queues[2];
                 OrderMemory order;
+                const auto lay = [&](Layout& layout) {
+                    for (Queue<PathHit>& q : queues) q = layout.queue<PathHit>("hits", n, policy.fixed_places());
+                    order = lay_out_order(layout, policy, n);
+                    layout.record(Note::kName);
+                };
                 Layout sizes;
-                lay(sizes, queues, nullptr, order);
+                lay(sizes);
                 std::vector<Lane> memory(sizes.bytes() / sizeof(Lane) + 1);
-                QueueCounter counters[2] = {};
-                for (QueueCounter& c : counters) c.capacity = n;
-                Layout layout(memory.data());
-                lay(layout, queues, counters, order);
+                Layout layout(sizes, memory.data());
+                lay(layout);
                 CHECK(layout.bytes() == sizes.bytes());
+                const std::vector<QueueCounter> first = layout.first_counters();
+                std::copy(first.begin(), first.end(), layout.counters());
+                const QueueCounter* const counters = layout.counters();
+                StageRecord* const record = layout.record(Note::kName);
 
                 // Three materials in turn, and one hit in seven of nothing.
                 const uint16_t materials[3] = {2, 0, 1};
@@ -239,13 +316,12 @@ TEST_CASE("an executor goes through all items once, in the order that is asked f
                 if (kept) queues[0].keys = keys.data();
 
                 WaveState state{};
-                StageRecord records[kStageCount] = {};
-                CpuExecutor executor(&state, records, scene, order);
+                CpuExecutor executor(&state, scene, order);
                 std::vector<uint32_t> expected, paths;
                 for (uint32_t path = 0; path < n; ++path) {
                     if (path % 5 == 1) continue;
-                    HitItem item{};
-                    item.path = path;
+                    PathHit item{};
+                    item.ray.path = path;
                     item.prim = path % 7 == 0 ? kNone : path % 3;
                     keys[queues[0].push(item)] = key(path);
                     expected.push_back(path);
@@ -256,21 +332,21 @@ TEST_CASE("an executor goes through all items once, in the order that is asked f
                                          [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
                     return list;
                 };
-                executor.run(StageId::shade, Note{queues[0], queues[1], &paths}, queues[0]);
+                executor.run(Note{queues[0], queues[1], &paths, record});
                 CHECK(paths == by_material(expected));
                 CHECK(counters[0].count == 0);
                 CHECK(counters[0].peak == expected.size());
                 // What was pushed while the first queue was gone through.
                 std::erase_if(expected, [](uint32_t path) { return path % 2 == 1; });
                 paths.clear();
-                executor.run(StageId::shade, Note{queues[1], queues[0], &paths}, queues[1]);
+                executor.run(Note{queues[1], queues[0], &paths, record});
                 std::vector<uint32_t> sorted = paths;
                 std::sort(sorted.begin(), sorted.end());
                 CHECK(sorted == expected);
                 if (compaction != Compaction::atomic || ordering != Ordering::material)
                     CHECK(paths == by_material(expected));
-                CHECK(records[uint32_t(StageId::shade)].items == counters[0].count + counters[0].peak);
-                for (const QueueCounter& c : counters) CHECK(c.overflow == 0);
+                CHECK(record->items == counters[0].count + counters[0].peak);
+                for (int q = 0; q < 2; ++q) CHECK(counters[q].overflow == 0);
             }
         }
     }
@@ -281,9 +357,9 @@ TEST_CASE("keys of rays: octant first, then the Z curve of a grid over the scene
     scene.bounds_center = {1.0f, 2.0f, 3.0f};
     scene.bounds_radius = 4.0f;
     const auto key = [&](Vec3f o, Vec3f d) {
-        RayItem ray{};
-        ray.o = o;
-        ray.d = d;
+        PathRay ray{};
+        ray.origin = o;
+        ray.direction = d;
         return MortonOrder::key(scene, ray);
     };
     const Vec3f up = {1.0f, 1.0f, 1.0f};

@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 300
 // Stages of light tracing and bidirectional path tracing over a wave whose queues a test may change: what is counted
 // when values are no light or too large, and where splats land.
@@ -7,11 +7,11 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <utility>
 
 #include "accel/cwbvh.h"
 #include "backends/cpu/executor.h"
-#include "integrators/bidirectional/schedule.h"
-#include "integrators/path/path_wave.h"
+#include "integrators/bdpt/wavefront/integrator.h"
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/closed_forms.h"
 #include "tests/support/render_checks.h"
@@ -24,114 +24,136 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
 /// A wave over a whole film whose queues can be changed before a stage runs.
-struct Bench {
+template <Fusion kFusion>
+struct FusedBench {
+    using Integrator = WavefrontIntegrator<kAllFeatures, CwbvhTracer, kFusion>;
+    using Stages = typename Integrator::Stages;
+
     Scene scene;
     CwbvhAccel accel;
-    BidirectionalPolicy policy;
-    Wave wave, film_wave;
+    BdptPolicy policy;
+    Wave wave;
+    WaveState state{};
     std::vector<Lane> bytes, samples;
     std::vector<int64_t> splats;
     std::vector<double> sum, sum_squares;
-    BidirectionalMemory memory;
-    StageId before = StageId::count;
-    std::function<void(Bench&)> change;  ///< called once, before stage `before` runs for the first time
+    Layout layout;
+    typename Integrator::Memory memory;
+    std::string before;
+    std::function<void(FusedBench&)> change;  ///< called once, before stage `before` runs for the first time
     bool changed = false;
 
-    explicit Bench(Scene s, const Method& method = {"all"}, bool one_pair = false, bool fuse = false)
+    explicit FusedBench(Scene s, const Method& method = {"all"}, bool one_connection_per_launch = false)
         : scene(std::move(s)), accel(scene) {
-        RenderSettings settings = method_settings(scene, method, 5);
-        settings.fuse = fuse ? Fuse::light : Fuse::none;
-        policy = make_bidirectional_policy(scene, settings);
-        policy.one_pair = one_pair;
-        wave = shape_wave(scene, settings, kTilePixels, 1);
-        wave = shape_wave(scene, settings, tile_count(wave) * kTilePixels, tile_count(wave));
+        const RenderSettings settings = method_settings(scene, method, 5);
+        policy = Integrator::plan(scene, settings);
+        policy.one_connection_per_launch = one_connection_per_launch;
+        const uint32_t film_tiles = tile_count(shape_wave(scene, settings.seed, kTilePixels, 1));
+        wave = shape_wave(scene, settings.seed, film_tiles * kTilePixels, film_tiles);
         wave.samples = 1;
         const uint32_t slots = wave.slot_count();
-        Layout sizes;
-        lay_out(sizes, slots, slots * 64, policy);
-        bytes.resize(sizes.bytes() / sizeof(Lane) + 64);
-        void* start = bytes.data();
-        size_t room = bytes.size() * sizeof(Lane);
-        std::align(256, sizes.bytes(), start, room);
-        Layout layout(start);
-        memory = lay_out(layout, slots, slots * 64, policy);
-        for (size_t q = 0; q < layout.queue_capacities().size(); ++q)
-            memory.counters[q].capacity = layout.queue_capacities()[q];
-        *memory.state = {};
-        memory.state->samples = 1;
         samples.resize(slots);
         splats.resize(size_t(wave.width) * wave.height * 3);
         sum.resize(splats.size());
         sum_squares.resize(splats.size());
+        memory = Integrator::lay_out(layout, policy, {slots, slots * 64});
+        stages(), update();
+        const Layout plan = layout;
+        bytes.resize(plan.bytes() / sizeof(Lane) + 64);
+        void* start = bytes.data();
+        size_t room = bytes.size() * sizeof(Lane);
+        layout = Layout(plan, std::align(256, plan.bytes(), start, room));
+        memory = Integrator::lay_out(layout, policy, {slots, slots * 64});
+        stages(), update();
+        REQUIRE(layout.bytes() == plan.bytes());
+        const std::vector<QueueCounter> counters = layout.first_counters();
+        std::copy(counters.begin(), counters.end(), layout.counters());
+        state.samples = 1;
     }
 
     /// Runs stages like CpuExecutor, after the change.
     struct Executor : CpuExecutor {
-        Bench& bench;
-        explicit Executor(Bench& b) : CpuExecutor(b.memory.state, b.memory.records), bench(b) {}
-        void prepare(StageId id, uint32_t items) {
-            if (id != bench.before || bench.changed || items == 0) return;
+        FusedBench& bench;
+        explicit Executor(FusedBench& b) : CpuExecutor(&b.state), bench(b) {}
+        /// `id`: of the stage's record.
+        void prepare(const StageRecord* id, uint32_t items) {
+            if (bench.changed || items == 0 || bench.before.empty() || id != &bench.record(bench.before)) return;
             bench.changed = true;
             bench.change(bench);
         }
         template <class Stage>
-        void run_slots(StageId id, const Stage& stage, uint32_t slots, uint32_t samples = 0) {
-            prepare(id, slots);
-            CpuExecutor::run_slots(id, stage, slots, samples);
+        void run_slots(const Stage& stage, uint32_t slots, uint32_t samples = 0) {
+            prepare(stage.record, slots);
+            CpuExecutor::run_slots(stage, slots, samples);
         }
-        template <class Stage, class Item>
-        void run(StageId id, const Stage& stage, const Queue<Item>& queue) {
-            prepare(id, queue.counter->size());
-            CpuExecutor::run(id, stage, queue);
+        template <class Stage>
+        void run(const Stage& stage) {
+            prepare(stage.record, stage.items().counter->size());
+            CpuExecutor::run(stage);
         }
-        template <class Stage, class Item>
-        void trace(StageId id, const Stage& stage, const Queue<Item>& queue) {
-            run(id, stage, queue);
+        template <class Stage>
+        void trace(const Stage& stage) {
+            run(stage);
         }
-        template <class Stage, class Item, class Out>
-        void extend(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
-            prepare(id, rays.counter->size());
-            CpuExecutor::extend(id, stage, rays, hits);
+        template <class Stage>
+        void extend(const Stage& stage) {
+            prepare(stage.record, stage.items().counter->size());
+            CpuExecutor::extend(stage);
         }
-        template <class Stage, class Item, class Out>
-        void extend_coherent(StageId id, const Stage& stage, const Queue<Item>& rays, const Queue<Out>& hits) {
-            extend(id, stage, rays, hits);
+        template <class Stage>
+        void extend_coherent(const Stage& stage) {
+            extend(stage);
         }
     };
 
-    using Stages = BidirectionalStages<kAllFeatures, CwbvhTracer>;
+    Wave this_wave() const {
+        Wave w = wave;
+        w.state = &state;
+        return w;
+    }
+    SplatSums splat_sums() { return {splats.data(), nullptr}; }
+    FilmSums sums() { return {sum.data(), sum_squares.data()}; }
     Stages stages() {
-        return Stages(scene.view(), accel.tracer(), policy, wave, memory,
-                      {samples.data(), {splats.data(), nullptr}, sum.data(), sum_squares.data()});
+        return {
+            layout, scene.view(), accel.tracer(), policy, this_wave(), memory, {samples.data(), splat_sums(), sums()}};
+    }
+    UpdateFilm update() {
+        return {this_wave(), samples.data(), splat_sums(), sums(), layout.record(UpdateFilm::kName)};
+    }
+    StageRecord& record(const std::string& name) const {
+        const std::vector<std::string>& names = layout.record_names();
+        const auto at = std::find(names.begin(), names.end(), name);
+        REQUIRE(at != names.end());
+        return layout.records()[at - names.begin()];
     }
 
-    void run(StageId id = StageId::count, std::function<void(Bench&)> f = {}) {
-        before = id;
+    void run(const std::string& stage = "", std::function<void(FusedBench&)> f = {}) {
+        before = stage;
         change = std::move(f);
         Executor executor(*this);
-        const Stages s = stages();
-        run_bidirectional_wave(executor, s);
-        executor.prepare(StageId::develop, 1);
-        for (uint32_t i = 0; i < wave.tiles * kTilePixels; ++i) s.develop(i);
+        Integrator::schedule(executor, stages());
+        const UpdateFilm film = update();
+        executor.prepare(film.record, 1);
+        for (uint32_t i = 0; i < wave.tiles * kTilePixels; ++i) film(i);
         REQUIRE((change == nullptr || changed));
-        REQUIRE(memory.state->failed == 0);
+        REQUIRE(state.failed == 0);
         for (double v : sum) {
             CHECK(std::isfinite(v));
             CHECK(v >= 0);
         }
     }
-    /// Only stage `id` counted anything, and what it counted is this.
-    void check_counts(StageId id, uint64_t nan, uint64_t inf, uint64_t negative) const {
-        for (uint32_t s = 0; s < kStageCount; ++s) {
-            INFO("counts of " << kStageNames[s] << ", injected into "
-                              << kStageNames[std::min(uint32_t(id), kStageCount - 1)]);
-            CHECK(memory.records[s].nan == (s == uint32_t(id) ? nan : 0));
-            CHECK(memory.records[s].inf == (s == uint32_t(id) ? inf : 0));
-            CHECK(memory.records[s].negative == (s == uint32_t(id) ? negative : 0));
+    /// Only stage `stage` counted anything, and what it counted is this; "": none did.
+    void check_counts(const std::string& stage, uint64_t nan, uint64_t inf, uint64_t negative) const {
+        if (!stage.empty()) record(stage);
+        for (const std::string& name : layout.record_names()) {
+            INFO("counts of " << name << ", injected into " << stage);
+            CHECK(record(name).nan == (name == stage ? nan : 0));
+            CHECK(record(name).inf == (name == stage ? inf : 0));
+            CHECK(record(name).negative == (name == stage ? negative : 0));
         }
     }
-    uint64_t count(StageId id, int which) const {
-        const StageRecord& r = memory.records[uint32_t(id)];
+    uint64_t count(const std::string& stage, int which) const {
+        const StageRecord& r = record(stage);
         return which == 0 ? r.nan : which == 1 ? r.inf : r.negative;
     }
     double total() const {
@@ -140,6 +162,11 @@ struct Bench {
         return t;
     }
 };
+
+/// Every stage by itself, with queues between them.
+using Bench = FusedBench<Fusion{}>;
+/// Candidates are weighted where they are found; shadow rays wait in a queue.
+using WeighingBench = FusedBench<Fusion{.weigh = true, .connect = true}>;
 
 template <class Item>
 void edit(const Queue<Item>& queue, uint32_t i, const std::function<void(Item&)>& f) {
@@ -171,7 +198,7 @@ TEST_CASE("G9: nothing is counted in a clean wave, whose film is that of the ren
         INFO(m.name);
         Bench b(cornell(), m);
         b.run();
-        b.check_counts(StageId::count, 0, 0, 0);
+        b.check_counts("", 0, 0, 0);
         CHECK(b.total() > 0);
         RenderSettings s = method_settings(b.scene, m, 5);
         s.accel = "cwbvh";
@@ -182,34 +209,35 @@ TEST_CASE("G9: nothing is counted in a clean wave, whose film is that of the ren
     }
 }
 
-TEST_CASE("Launches with one pair of a path, and with as many as there is room for, connect the same pairs") {
-    const auto record = [](const Bench& b, StageId id) { return b.memory.records[uint32_t(id)]; };
+TEST_CASE("Launches with one pair of a path, and with as many as there is capacity for, connect the same pairs") {
     const Method connections = {"connections"};
     Bench several(cornell(), connections);
     several.run();
-    const uint64_t pairs = record(several, StageId::connect_vertices).items,
-                   rays = record(several, StageId::occlude).items;
+    const uint64_t pairs = several.record("connect_vertices").items, rays = several.record("occlude").items;
     CHECK(pairs > 256);
-    const auto check_same = [&](Bench& b) {
+    const auto check_same = [&](auto& b) {
         b.run();
-        CHECK(record(b, StageId::connect_vertices).items == pairs);
-        CHECK(record(b, StageId::connect_vertices).launches > record(several, StageId::connect_vertices).launches);
-        CHECK(record(b, StageId::occlude).items == rays);
+        CHECK(b.record("connect_vertices").items == pairs);
+        CHECK(b.record("connect_vertices").launches > several.record("connect_vertices").launches);
+        CHECK(b.record("occlude").items == rays);
         CHECK(b.sum == several.sum);
-        for (uint32_t q = 0; q < BidirectionalMemory::kQueues; ++q) CHECK(b.memory.counters[q].overflow == 0);
+        for (size_t q = 0; q < b.layout.queue_names().size(); ++q) CHECK(b.layout.counters()[q].overflow == 0);
     };
     Bench one(cornell(), connections, true);
     check_same(one);
-    for (const bool fuse : {false, true})
-        for (const uint32_t room : {1u, 7u, 100u}) {
-            INFO("room " << room << " fuse " << fuse);
-            Bench b(cornell(), connections, false, fuse);
-            const auto limit = [room](auto& q) {
-                if (q.capacity > 0) q.capacity = q.counter->capacity = room;
-            };
-            limit(b.memory.connect_candidates), limit(b.memory.shadows), limit(b.memory.shadow_contributions);
-            check_same(b);
-        }
+    const auto check_capacity = [&]<class AnyBench>(uint32_t capacity) {
+        INFO("capacity " << capacity);
+        AnyBench b(cornell(), connections);
+        const auto limit = [capacity](auto& q) {
+            if (q.capacity() > 0) q.items.capacity = q.counter->capacity = capacity;
+        };
+        limit(b.memory.eye.candidates), limit(b.memory.eye.shadows), limit(b.memory.eye.shadow_contributions);
+        check_same(b);
+    };
+    for (const uint32_t capacity : {1u, 7u, 100u}) {
+        check_capacity.template operator()<Bench>(capacity);
+        check_capacity.template operator()<WeighingBench>(capacity);
+    }
 }
 
 TEST_CASE("G9: light_generate counts emission that is none", "[bidirectional]") {
@@ -217,46 +245,44 @@ TEST_CASE("G9: light_generate counts emission that is none", "[bidirectional]") 
         Bench b(cornell(), {"-i light"});
         b.scene.emitters[0].radiance.value.y = value;
         b.run();
-        CHECK(b.count(StageId::light_generate, which) > 200);
+        CHECK(b.count("light_generate", which) > 200);
         CHECK(b.total() == 0);
     }
 }
 
 TEST_CASE("G9: light_extend counts rays that are not finite", "[bidirectional]") {
     Bench b(cornell());
-    b.run(StageId::light_extend, [](Bench& x) {
-        edit<WalkItem>(x.memory.rays[0], 3, [](WalkItem& r) { r.d.y = kNan; });
-        edit<WalkItem>(x.memory.rays[0], 5, [](WalkItem& r) { r.o.x = kInf; });
+    b.run("light_extend", [](Bench& x) {
+        edit<SubpathRay>(x.memory.subpaths.rays[0], 3, [](SubpathRay& r) { r.direction.y = kNan; });
+        edit<SubpathRay>(x.memory.subpaths.rays[0], 5, [](SubpathRay& r) { r.origin.x = kInf; });
     });
-    b.check_counts(StageId::light_extend, 2, 0, 0);
+    b.check_counts("light_extend", 2, 0, 0);
 }
 
 TEST_CASE("G9: light_shade counts throughput that is no light, and neither of its vertices reaches the film",
           "[bidirectional]") {
     for (auto [value, which] : kBad) {
         Bench b(cornell(), {"-i light"});
-        b.run(StageId::light_shade, [v = value](Bench& x) {
-            for (uint32_t i = 0; i < x.memory.hits[0].counter->size(); ++i)
-                edit<WalkHit>(x.memory.hits[0], i, [v](WalkHit& h) { h.ray.throughput.z = v; });
+        b.run("light_shade", [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.subpaths.hits[0].counter->size(); ++i)
+                edit<SubpathHit>(x.memory.subpaths.hits[0], i, [v](SubpathHit& h) { h.ray.throughput.z = v; });
         });
-        CHECK(b.count(StageId::light_shade, which) > 50);
-        CHECK(b.count(StageId::connect_camera, which) > 50);
-        for (StageId later : {StageId::mis_weight, StageId::occlude, StageId::splat, StageId::develop})
-            CHECK(b.count(later, which) == 0);
+        CHECK(b.count("light_shade", which) > 50);
+        CHECK(b.count("connect_camera", which) > 50);
+        for (const char* later : {"mis_weight", "occlude", "splat", "update_film"}) CHECK(b.count(later, which) == 0);
     }
 }
 
 TEST_CASE("G9: connect_camera counts vertices whose light is none", "[bidirectional]") {
     for (auto [value, which] : kBad) {
         Bench b(cornell());
-        b.run(StageId::connect_camera, [v = value](Bench& x) {
-            for (uint32_t i = 0; i < x.memory.vertices.counter->size(); i += 2)
-                edit<VertexItem>(x.memory.vertices, i, [v](VertexItem& y) { y.throughput.x = v; });
+        b.run("connect_camera", [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.splats.vertices.counter->size(); i += 2)
+                edit<VertexItem>(x.memory.splats.vertices, i, [v](VertexItem& y) { y.throughput.x = v; });
         });
-        const uint64_t counted = b.count(StageId::connect_camera, which);
+        const uint64_t counted = b.count("connect_camera", which);
         CHECK(counted > 20);
-        b.check_counts(StageId::connect_camera, which == 0 ? counted : 0, which == 1 ? counted : 0,
-                       which == 2 ? counted : 0);
+        b.check_counts("connect_camera", which == 0 ? counted : 0, which == 1 ? counted : 0, which == 2 ? counted : 0);
         CHECK(b.total() > 0);
     }
 }
@@ -264,24 +290,24 @@ TEST_CASE("G9: connect_camera counts vertices whose light is none", "[bidirectio
 TEST_CASE("G9: connect and connect_vertices count pairs whose light is none", "[bidirectional]") {
     for (auto [value, which] : kBad) {
         Bench b(cornell());
-        b.run(StageId::generate, [v = value](Bench& x) {
+        b.run("generate", [v = value](Bench& x) {
             for (uint32_t i = 0; i < x.memory.light_vertices.counter->size(); i += 2)
                 edit<ConnectionVertex>(x.memory.light_vertices, i, [v](ConnectionVertex& y) { y.throughput.x = v; });
         });
-        const uint64_t counted = b.count(StageId::connect_vertices, which);
+        const uint64_t counted = b.count("connect_vertices", which);
         CHECK(counted > 100);
-        b.check_counts(StageId::connect_vertices, which == 0 ? counted : 0, which == 1 ? counted : 0,
+        b.check_counts("connect_vertices", which == 0 ? counted : 0, which == 1 ? counted : 0,
                        which == 2 ? counted : 0);
         CHECK(b.total() > 0);
 
         Bench e(cornell(), {"next_event"});
-        e.run(StageId::connect, [v = value](Bench& x) {
-            for (uint32_t i = 0; i < x.memory.vertices.counter->size(); i += 2)
-                edit<VertexItem>(x.memory.vertices, i, [v](VertexItem& z) { z.throughput.x = v; });
+        e.run("connect", [v = value](Bench& x) {
+            for (uint32_t i = 0; i < x.memory.eye.vertices.counter->size(); i += 2)
+                edit<VertexItem>(x.memory.eye.vertices, i, [v](VertexItem& z) { z.throughput.x = v; });
         });
-        const uint64_t sampled = e.count(StageId::connect, which);
+        const uint64_t sampled = e.count("connect", which);
         CHECK(sampled > 20);
-        e.check_counts(StageId::connect, which == 0 ? sampled : 0, which == 1 ? sampled : 0, which == 2 ? sampled : 0);
+        e.check_counts("connect", which == 0 ? sampled : 0, which == 1 ? sampled : 0, which == 2 ? sampled : 0);
     }
 }
 
@@ -290,49 +316,49 @@ TEST_CASE("G9: shade counts emission and throughput that are no light", "[bidire
         Bench b(lamp_seen(), {"hits"});
         b.scene.emitters[0].radiance.value.y = value;
         b.run();
-        CHECK(b.count(StageId::shade, which) > 60);
+        CHECK(b.count("shade", which) > 60);
         CHECK(b.total() == 0);
     }
 }
 
 TEST_CASE("G9: mis_weight counts densities and splats that are none", "[bidirectional]") {
     Bench b(cornell());
-    b.run(StageId::mis_weight, [](Bench& x) {
-        edit<SplatCandidate>(x.memory.splat_candidates, 0, [](SplatCandidate& c) { c.others = kNan; });
-        edit<SplatCandidate>(x.memory.splat_candidates, 1, [](SplatCandidate& c) { c.value.x = kInf; });
-        edit<SplatCandidate>(x.memory.splat_candidates, 2, [](SplatCandidate& c) { c.value.x = -1; });
+    b.run("mis_weight", [](Bench& x) {
+        edit<CandidateItem>(x.memory.splats.candidates, 0, [](CandidateItem& c) { c.ratio = kNan; });
+        edit<CandidateItem>(x.memory.splats.candidates, 1, [](CandidateItem& c) { c.value.x = kInf; });
+        edit<CandidateItem>(x.memory.splats.candidates, 2, [](CandidateItem& c) { c.value.x = -1; });
     });
-    b.check_counts(StageId::mis_weight, 1, 1, 1);
+    b.check_counts("mis_weight", 1, 1, 1);
 }
 
 TEST_CASE("B28: where other strategies are infinitely denser, a splat is nothing, not a NaN", "[bidirectional]") {
     Bench b(cornell());
-    b.run(StageId::mis_weight, [](Bench& x) {
-        for (uint32_t i = 0; i < x.memory.splat_candidates.counter->size(); ++i)
-            edit<SplatCandidate>(x.memory.splat_candidates, i, [](SplatCandidate& c) { c.others = kInf; });
+    b.run("mis_weight", [](Bench& x) {
+        for (uint32_t i = 0; i < x.memory.splats.candidates.counter->size(); ++i)
+            edit<CandidateItem>(x.memory.splats.candidates, i, [](CandidateItem& c) { c.ratio = kInf; });
     });
-    b.check_counts(StageId::count, 0, 0, 0);
+    b.check_counts("", 0, 0, 0);
 }
 
 TEST_CASE("G9: occlude counts rays of splats that are not finite", "[bidirectional]") {
     Bench b(cornell());
-    b.run(StageId::occlude, [](Bench& x) {
-        edit<SplatCandidate>(x.memory.weighted_splats, 0, [](SplatCandidate& c) { c.d.x = kNan; });
-        edit<SplatCandidate>(x.memory.weighted_splats, 1, [](SplatCandidate& c) { c.o.z = kInf; });
+    b.run("occlude", [](Bench& x) {
+        edit<CandidateItem>(x.memory.splats.weighted, 0, [](CandidateItem& c) { c.direction.x = kNan; });
+        edit<CandidateItem>(x.memory.splats.weighted, 1, [](CandidateItem& c) { c.origin.z = kInf; });
     });
-    b.check_counts(StageId::occlude, 2, 0, 0);
+    b.check_counts("occlude", 2, 0, 0);
 }
 
-TEST_CASE("G9: develop counts samples that are no light", "[bidirectional]") {
+TEST_CASE("G9: update_film counts samples that are no light", "[bidirectional]") {
     Bench b(cornell());
-    b.run(StageId::develop, [](Bench& x) {
+    b.run("update_film", [](Bench& x) {
         const float bad[3] = {kNan, kInf, -1e9f};
         for (uint32_t i = 0; i < 3; ++i) {
             const Rgb value = {bad[i], 0, 0};
             memcpy(&x.samples[i], &value, sizeof(value));
         }
     });
-    b.check_counts(StageId::develop, 1, 1, 1);
+    b.check_counts("update_film", 1, 1, 1);
 }
 
 // ---- splats ----
@@ -351,12 +377,12 @@ struct SplatFilm {
                 {"light"}) {}
     void add(std::initializer_list<std::pair<Rgb, Vec2f>> items) {
         for (const auto& [value, film] : items) {
-            bench.memory.splats.push({value, 0, film, {}, 0.0f});
+            bench.memory.splats.splats.push({value, 0, film, {}, 0.0f});
         }
         const Bench::Stages s = bench.stages();
-        const uint32_t n = bench.memory.splats.counter->size();
-        for (uint32_t i = 0; i < n; ++i) s.splat(i);
-        bench.memory.splats.counter->finish();
+        const uint32_t n = bench.memory.splats.splats.counter->size();
+        for (uint32_t i = 0; i < n; ++i) s.splats.splat(i);
+        bench.memory.splats.splats.counter->finish();
     }
     double at(uint32_t x, uint32_t y, uint32_t c = 0) const {
         return double(bench.splats[(size_t(y) * bench.wave.width + x) * 3 + c]) * kLightUnit;
@@ -443,7 +469,7 @@ TEST_CASE("G1: splats are summed exactly, in any order, and what is too large is
     for (int i = 0; i < 10000; ++i) f.add({{{0.1f, 1e-9f, 1e3f}, {3.5f, 4.5f}}});
     CHECK(f.at(3, 4, 0) == Approx(1e3).epsilon(1e-6));
     CHECK(f.at(3, 4, 1) == Approx(1e-5).epsilon(1e-2));
-    CHECK(f.bench.memory.records[uint32_t(StageId::splat)].inf == 0);
+    CHECK(f.bench.record("splat").inf == 0);
 
     SplatFilm large;
     large.add({{{1, 0x1p26f, 1}, {3.5f, 4.5f}},
@@ -451,15 +477,15 @@ TEST_CASE("G1: splats are summed exactly, in any order, and what is too large is
                {{kNan, kNan, kNan}, {3.5f, 4.5f}},
                {{1, 1, 1e30f}, {5.5f, 4.5f}}});
     CHECK(large.total() == 0);
-    CHECK(large.bench.memory.records[uint32_t(StageId::splat)].inf == 4);
+    CHECK(large.bench.record("splat").inf == 4);
     large.add({{{0x1.fffffep25f, 1, 1}, {3.5f, 4.5f}}});
     CHECK(large.at(3, 4) == double(0x1.fffffep25f));
-    CHECK(large.bench.memory.records[uint32_t(StageId::splat)].inf == 4);
+    CHECK(large.bench.record("splat").inf == 4);
 }
 
 TEST_CASE("G1: a pixel that more light reaches than it can hold does not turn dark", "[bidirectional]") {
     SplatFilm f;
     for (int i = 0; i < 40; ++i) f.add({{{6e7f, 1, 1}, {3.5f, 4.5f}}});
     CHECK(f.at(3, 4) >= 0);
-    CHECK((f.bench.memory.records[uint32_t(StageId::splat)].inf > 0 || f.at(3, 4) == Approx(40 * 6e7)));
+    CHECK((f.bench.record("splat").inf > 0 || f.at(3, 4) == Approx(40 * 6e7)));
 }

@@ -1,4 +1,4 @@
-// libs: ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 120
 // The stages of the path tracer, run by hand over host queues: what is no light is counted where it appears (G9), ids
 // hold what they must (G4), queues count what they lose (G3).
@@ -15,7 +15,7 @@
 
 #include "accel/cwbvh.h"
 #include "core/error.h"
-#include "integrators/path/path_wave.h"
+#include "integrators/path/integrator.h"
 #include "tests/support/render_scene.h"
 
 using namespace ambilux;
@@ -25,7 +25,9 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-using Stages = PathStages<kAllFeatures, CwbvhTracer>;
+/// Every stage by itself, with queues between them.
+using Integrator = PathIntegrator<kAllFeatures, CwbvhTracer, Fusion{}>;
+using Stages = Integrator::Stages;
 
 /// A wave over the whole film of a scene, stopped between stages.
 struct Bench {
@@ -33,38 +35,58 @@ struct Bench {
     CwbvhAccel accel;
     PathPolicy policy;
     Wave wave;
+    WaveState state{};
     std::vector<std::byte> bytes;
+    std::vector<Lane> samples;
     std::vector<double> sum, sum_squares;
-    PathMemory memory;
-    int place = 0;  ///< of the walks of this depth
+    Layout layout;
+    Integrator::Memory memory;
+    int place = 0;  ///< of the subpaths of this depth
 
-    explicit Bench(Scene s, uint32_t samples = 1) : scene(std::move(s)), accel(scene) {
-        RenderSettings settings = cpu_settings(scene, Estimator::mis);
-        settings.fuse = Fuse::none;
-        policy = make_path_policy(scene, settings);
-        const Wave film = shape_wave(scene, settings, kTilePixels, 1);
-        wave = shape_wave(scene, settings, tile_count(film) * kTilePixels * samples, tile_count(film));
-        Layout sizes;
-        lay_out(sizes, wave.slot_count(), policy);
-        bytes.resize(sizes.bytes() + 256);
-        void* start = bytes.data();
-        size_t room = bytes.size();
-        std::align(256, sizes.bytes(), start, room);
-        Layout layout(start);
-        memory = lay_out(layout, wave.slot_count(), policy);
-        for (size_t q = 0; q < layout.queue_capacities().size(); ++q)
-            memory.counters[q].capacity = layout.queue_capacities()[q];
-        *memory.state = {0, 0, samples, 1, 0, 0, 0};
+    explicit Bench(Scene s, uint32_t samples_per_pixel = 1) : scene(std::move(s)), accel(scene) {
+        const RenderSettings settings = cpu_settings(scene, Estimator::mis);
+        policy = Integrator::plan(scene, settings);
+        const uint32_t film_tiles = tile_count(shape_wave(scene, settings.seed, kTilePixels, 1));
+        wave = shape_wave(scene, settings.seed, film_tiles * kTilePixels * samples_per_pixel, film_tiles);
+        const uint32_t slots = wave.slot_count();
+        samples.resize(slots);
         sum.resize(size_t(wave.width) * wave.height * 3);
         sum_squares.resize(sum.size());
+        memory = Integrator::lay_out(layout, policy, {slots, 0});
+        stages(), update();
+        const Layout plan = layout;
+        bytes.resize(plan.bytes() + 256);
+        void* start = bytes.data();
+        size_t room = bytes.size();
+        layout = Layout(plan, std::align(256, plan.bytes(), start, room));
+        memory = Integrator::lay_out(layout, policy, {slots, 0});
+        stages(), update();
+        REQUIRE(layout.bytes() == plan.bytes());
+        REQUIRE(layout.record_names() == plan.record_names());
+        const std::vector<QueueCounter> counters = layout.first_counters();
+        std::copy(counters.begin(), counters.end(), layout.counters());
+        state = {0, 0, samples_per_pixel, 1, 0, 0, 0};
     }
+    Wave this_wave() const {
+        Wave w = wave;
+        w.state = &state;
+        return w;
+    }
+    FilmSums sums() { return {sum.data(), sum_squares.data()}; }
     Stages stages() {
-        return Stages(scene.view(), accel.tracer(), policy, wave, memory, {sum.data(), sum_squares.data()});
+        return {layout, scene.view(), accel.tracer(), policy, this_wave(), memory, {samples.data(), {}, sums()}};
     }
-    const StageRecord& record(StageId id) const { return memory.records[uint32_t(id)]; }
+    UpdateFilm update() { return {this_wave(), samples.data(), {}, sums(), layout.record(UpdateFilm::kName)}; }
+    const StageRecord& record(const std::string& name) const {
+        const std::vector<std::string>& names = layout.record_names();
+        const auto at = std::find(names.begin(), names.end(), name);
+        REQUIRE(at != names.end());
+        return layout.records()[at - names.begin()];
+    }
 
-    template <class Stage, class Item>
-    void run(const Stage& stage, const Queue<Item>& queue) {
+    template <class Stage>
+    void run(const Stage& stage) {
+        const auto& queue = stage.items();
         const uint32_t n = queue.counter->size();
         for (uint32_t i = 0; i < n; ++i) stage(i);
         queue.counter->finish();
@@ -75,18 +97,19 @@ struct Bench {
     }
     /// From a wave of rays to the film.
     void finish() {
-        while (memory.rays[0].counter->count > 0) {
+        while (memory.subpaths.rays[0].counter->count > 0) {
             extend();
             finish_depth();
         }
-        develop();
+        update_film();
     }
     void extend() {
-        memory.hits[place].counter->count = memory.rays[place].counter->size();
-        run(stages().extend[place], memory.rays[place]);
+        const SubpathQueues<PathRay>& q = memory.subpaths;
+        q.hits[place].counter->count = q.rays[place].counter->size();
+        run(stages().extend[place]);
     }
     void shade() {
-        run(stages().shade[place], memory.hits[place]);
+        run(stages().eye_vertex[place]);
         place = 1 - place;
     }
     /// From hits to the samples.
@@ -96,24 +119,25 @@ struct Bench {
     }
     void finish_contributions() {
         const Stages s = stages();
-        run(s.weight_hits, memory.hit_candidates);
-        run(s.accumulate_hits, memory.hit_contributions);
-        run(s.connect, memory.connections);
-        run(s.weight_connections, memory.connect_candidates);
-        run(s.occlude, memory.shadows);
-        run(s.accumulate_shadows, memory.shadow_contributions);
+        run(s.eye.weigh_emission);
+        run(s.eye.accumulate_emission);
+        run(s.connect_emitter);
+        run(s.eye.weigh);
+        run(s.eye.occlude);
+        run(s.eye.accumulate);
     }
-    void develop() {
-        const Stages s = stages();
-        for (uint32_t i = 0; i < wave.tiles * kTilePixels; ++i) s.develop(i);
+    void update_film() {
+        const UpdateFilm stage = update();
+        for (uint32_t i = 0; i < wave.tiles * kTilePixels; ++i) stage(i);
     }
-    /// Only stage `id` counted anything, and what it counted is this; the film is finite, and light all the same.
-    void check_counts(StageId id, uint64_t nan, uint64_t inf, uint64_t negative) const {
-        for (uint32_t s = 0; s < kStageCount; ++s) {
-            INFO("counts of " << kStageNames[s] << ", injected into " << kStageNames[uint32_t(id)]);
-            CHECK(memory.records[s].nan == (s == uint32_t(id) ? nan : 0));
-            CHECK(memory.records[s].inf == (s == uint32_t(id) ? inf : 0));
-            CHECK(memory.records[s].negative == (s == uint32_t(id) ? negative : 0));
+    /// Only stage `stage` counted anything, and what it counted is this; the film is finite, and light all the same.
+    void check_counts(const std::string& stage, uint64_t nan, uint64_t inf, uint64_t negative) const {
+        record(stage);
+        for (const std::string& name : layout.record_names()) {
+            INFO("counts of " << name << ", injected into " << stage);
+            CHECK(record(name).nan == (name == stage ? nan : 0));
+            CHECK(record(name).inf == (name == stage ? inf : 0));
+            CHECK(record(name).negative == (name == stage ? negative : 0));
         }
         double total = 0;
         for (double v : sum) {
@@ -139,9 +163,9 @@ void change(const Queue<Item>& queue, uint32_t i, const std::function<void(Item&
 
 TEST_CASE("the active slots before a slot are counted without a look at them", "[stages]") {
     const Scene scene = project_scene("cornell", 37, 21);  // the last tiles of rows and columns are cut
-    RenderSettings settings = cpu_settings(scene, Estimator::mis);
+    const RenderSettings settings = cpu_settings(scene, Estimator::mis);
     for (const uint32_t tiles : {15u, 5u, 4u, 1u}) {
-        Wave wave = shape_wave(scene, settings, tiles * kTilePixels * 3, tiles);
+        Wave wave = shape_wave(scene, settings.seed, tiles * kTilePixels * 3, tiles);
         REQUIRE(wave.tiles == tiles);
         for (uint32_t first = 0; first < 15; first += tiles) {
             const WaveState state = {first, 7, 2, 0, 0, 0, 0};  // fewer samples than there is room for
@@ -162,7 +186,7 @@ TEST_CASE("G9: nothing is counted in a clean wave", "[stages]") {
     Bench b = cornell();
     b.generate();
     b.finish();
-    b.check_counts(StageId::generate, 0, 0, 0);
+    b.check_counts("generate", 0, 0, 0);
 }
 
 TEST_CASE("G9: a sensor without a place is counted by extend, ray by ray", "[stages]") {
@@ -170,18 +194,18 @@ TEST_CASE("G9: a sensor without a place is counted by extend, ray by ray", "[sta
     b.scene.sensor.to_world.m[0][3] = kNan;
     b.generate();
     b.finish();
-    CHECK(b.record(StageId::generate).nan == 0);
-    CHECK(b.record(StageId::extend).nan == 256);
+    CHECK(b.record("generate").nan == 0);
+    CHECK(b.record("extend").nan == 256);
     for (double v : b.sum) CHECK(v == 0);
 }
 
 TEST_CASE("G9: extend counts rays that are not finite", "[stages]") {
     Bench b = cornell();
     b.generate();
-    change<RayItem>(b.memory.rays[0], 3, [](RayItem& r) { r.d.y = kNan; });
-    change<RayItem>(b.memory.rays[0], 5, [](RayItem& r) { r.o.x = kInf; });
+    change<PathRay>(b.memory.subpaths.rays[0], 3, [](PathRay& r) { r.direction.y = kNan; });
+    change<PathRay>(b.memory.subpaths.rays[0], 5, [](PathRay& r) { r.origin.x = kInf; });
     b.finish();
-    b.check_counts(StageId::extend, 2, 0, 0);
+    b.check_counts("extend", 2, 0, 0);
 }
 
 TEST_CASE("G9: shade counts emission and throughput that are no light", "[stages]") {
@@ -190,14 +214,14 @@ TEST_CASE("G9: shade counts emission and throughput that are no light", "[stages
         b.generate();
         b.extend();
         uint32_t wall = kNone;
-        for (uint32_t i = 0; i < b.memory.hits[0].counter->size(); ++i) {
-            const uint32_t prim = b.memory.hits[0].load(i).prim;
+        for (uint32_t i = 0; i < b.memory.subpaths.hits[0].counter->size(); ++i) {
+            const uint32_t prim = b.memory.subpaths.hits[0].load(i).prim;
             if (prim != kNone && b.scene.shapes[b.scene.view().shape_of(prim)].emitter == kNone) wall = i;
         }
         REQUIRE(wall != kNone);
-        change<HitItem>(b.memory.hits[0], wall, [v = value](HitItem& h) { h.throughput = {1, v, 1}; });
+        change<PathHit>(b.memory.subpaths.hits[0], wall, [v = value](PathHit& h) { h.ray.throughput = {1, v, 1}; });
         b.shade();
-        const StageRecord& r = b.record(StageId::shade);
+        const StageRecord& r = b.record("shade");
         CHECK(r.nan == (which == 0 ? 1 : 0));
         CHECK(r.inf == (which == 1 ? 1 : 0));
         CHECK(r.negative == (which == 2 ? 1 : 0));
@@ -212,7 +236,7 @@ TEST_CASE("G9: shade counts emission and throughput that are no light", "[stages
         b.scene.emitters[0].radiance.value.y = value;
         b.generate();
         b.finish();
-        const StageRecord& r = b.record(StageId::shade);
+        const StageRecord& r = b.record("shade");
         CHECK(r.nan == (which == 0 ? 16 : 0));
         CHECK(r.inf == (which == 1 ? 16 : 0));
         CHECK(r.negative == (which == 2 ? 16 : 0));
@@ -226,17 +250,17 @@ TEST_CASE("G9: connect counts light that is none", "[stages]") {
         b.generate();
         b.extend();
         b.shade();
-        const uint32_t n = b.memory.connections.counter->size();
+        const uint32_t n = b.memory.eye.vertices.counter->size();
         REQUIRE(n > 100);
         for (uint32_t i = 0; i < n; i += 2)
-            change<ConnectItem>(b.memory.connections, i, [v = value](ConnectItem& c) { c.throughput.z = v; });
+            change<VertexItem>(b.memory.eye.vertices, i, [v = value](VertexItem& x) { x.throughput.z = v; });
         b.finish_contributions();
-        b.develop();
-        const StageRecord& r = b.record(StageId::connect);
+        b.update_film();
+        const StageRecord& r = b.record("connect");
         const uint64_t counted = which == 0 ? r.nan : which == 1 ? r.inf : r.negative;
         CHECK(counted > n / 4);  // those that see the front of the lamp
         CHECK(counted <= (n + 1) / 2);
-        b.check_counts(StageId::connect, which == 0 ? counted : 0, which == 1 ? counted : 0, which == 2 ? counted : 0);
+        b.check_counts("connect", which == 0 ? counted : 0, which == 1 ? counted : 0, which == 2 ? counted : 0);
     }
 }
 
@@ -245,13 +269,13 @@ TEST_CASE("G9: mis_weight counts densities and light that are none", "[stages]")
     b.generate();
     b.extend();
     b.shade();
-    b.run(b.stages().connect, b.memory.connections);
-    change<ConnectCandidate>(b.memory.connect_candidates, 0, [](ConnectCandidate& c) { c.pdf_this = kNan; });
-    change<ConnectCandidate>(b.memory.connect_candidates, 1, [](ConnectCandidate& c) { c.value.x = kInf; });
-    change<ConnectCandidate>(b.memory.connect_candidates, 2, [](ConnectCandidate& c) { c.value.x = -1; });
+    b.run(b.stages().connect_emitter);
+    change<CandidateItem>(b.memory.eye.candidates, 0, [](CandidateItem& c) { c.ratio = kNan; });
+    change<CandidateItem>(b.memory.eye.candidates, 1, [](CandidateItem& c) { c.value.x = kInf; });
+    change<CandidateItem>(b.memory.eye.candidates, 2, [](CandidateItem& c) { c.value.x = -1; });
     b.finish_contributions();
-    b.develop();
-    b.check_counts(StageId::mis_weight, 1, 1, 1);
+    b.update_film();
+    b.check_counts("mis_weight", 1, 1, 1);
 }
 
 TEST_CASE("G9: occlude counts shadow rays that are not finite", "[stages]") {
@@ -259,49 +283,49 @@ TEST_CASE("G9: occlude counts shadow rays that are not finite", "[stages]") {
     b.generate();
     b.extend();
     b.shade();
-    b.run(b.stages().connect, b.memory.connections);
-    b.run(b.stages().weight_connections, b.memory.connect_candidates);
-    change<ShadowItem>(b.memory.shadows, 0, [](ShadowItem& s) { s.d.x = kNan; });
-    change<ShadowItem>(b.memory.shadows, 1, [](ShadowItem& s) { s.o.z = kInf; });
+    b.run(b.stages().connect_emitter);
+    b.run(b.stages().eye.weigh);
+    change<ShadowItem>(b.memory.eye.shadows, 0, [](ShadowItem& s) { s.direction.x = kNan; });
+    change<ShadowItem>(b.memory.eye.shadows, 1, [](ShadowItem& s) { s.origin.z = kInf; });
     b.finish_contributions();
-    b.develop();
-    b.check_counts(StageId::occlude, 2, 0, 0);
+    b.update_film();
+    b.check_counts("occlude", 2, 0, 0);
 }
 
-TEST_CASE("G9: accumulate and develop count what reaches them", "[stages]") {
+TEST_CASE("G9: accumulate and update_film count what reaches them", "[stages]") {
     Bench b = cornell();
     b.generate();
-    b.memory.hit_contributions.push({{kNan, 0, 0}, 0});
-    b.memory.hit_contributions.push({{0, kInf, 0}, 1});
-    b.memory.hit_contributions.push({{0, 0, -1}, 2});
-    b.memory.hit_contributions.push({{kInf, kNan, 0}, 3});
+    b.memory.eye.emission_contributions.push({{kNan, 0, 0}, 0});
+    b.memory.eye.emission_contributions.push({{0, kInf, 0}, 1});
+    b.memory.eye.emission_contributions.push({{0, 0, -1}, 2});
+    b.memory.eye.emission_contributions.push({{kInf, kNan, 0}, 3});
     b.finish_contributions();
     b.finish();
-    b.check_counts(StageId::accumulate, 2, 1, 1);
+    b.check_counts("accumulate", 2, 1, 1);
 
     Bench d = cornell();
     d.generate();
     const float bad[3] = {kNan, kInf, -1};
     for (uint32_t i = 0; i < 3; ++i) {
         const Rgb value = {bad[i], 0, 0};
-        std::memcpy(&d.memory.samples[i], &value, sizeof(value));
+        std::memcpy(&d.samples[i], &value, sizeof(value));
     }
-    d.memory.hit_contributions.push({{1, 1, 1}, 10});
+    d.memory.eye.emission_contributions.push({{1, 1, 1}, 10});
     d.finish_contributions();
-    d.develop();
-    d.check_counts(StageId::develop, 1, 1, 1);
+    d.update_film();
+    d.check_counts("update_film", 1, 1, 1);
 }
 
-TEST_CASE("G4: walk bits hold every depth, flag and scale", "[stages]") {
+TEST_CASE("G4: subpath bits hold every depth, flag and index", "[stages]") {
     for (uint32_t depth : {0u, 1u, 20u, 255u, 256u, 16382u, 16383u})
         for (bool delta : {false, true})
             for (float eta : {0.0f, 0.25f, 1.0f, 1.5f, 7.3e4f, 1e-30f}) {
-                const WalkBits b = WalkBits::make(depth, delta, eta);
+                const SubpathBits b = SubpathBits::make(depth, delta, eta);
                 CHECK(b.depth() == depth);
                 CHECK(b.delta() == delta);
-                CHECK(std::abs(b.eta_scale() - eta) <= eta * 0.0079f);  // 7 bits of mantissa
+                CHECK(std::abs(b.eta() - eta) <= eta * 0.0079f);  // 7 bits of mantissa
             }
-    CHECK(WalkBits::kMaxDepth == 16383);
+    CHECK(kMaxDepth == 16383);
 }
 
 TEST_CASE("Quotients by multiplication are exact", "[stages]") {
@@ -385,7 +409,7 @@ TEST_CASE("G4: a film of 4097 x 4097 at depth 20 renders, and one that cannot be
 
     const Scene huge = project_scene("cornell", 65536, 65536);
     try {
-        shape_wave(huge, cpu_settings(huge, Estimator::mis), 2048, 1);
+        shape_wave(huge, 1, 2048, 1);
         FAIL("a film of 65536x65536 was accepted");
     } catch (const Error& e) {
         CHECK(e.code == ExitCode::usage);
@@ -397,28 +421,24 @@ TEST_CASE("G3: queues of any size hold what fits and count what does not", "[sta
     for (uint32_t capacity : {0u, 1u, 31u, 32u, 33u, 1000u}) {
         INFO("capacity " << capacity);
         constexpr uint32_t kGuard = 16;
-        std::vector<Lane> lanes(size_t(capacity) * Queue<HitItem>::kLanes + kGuard, Lane{{7, 7, 7, 7}});
+        std::vector<Lane> lanes(size_t(capacity) * LaneArray<PathHit>::kLanes + kGuard, Lane{{7, 7, 7, 7}});
         QueueCounter counter{};
         counter.capacity = capacity;
-        const Queue<HitItem> queue = {lanes.data(), &counter, capacity};
+        const Queue<PathHit> queue = {{lanes.data(), capacity}, &counter};
         for (uint32_t i = 0; i < capacity + 5; ++i)
-            queue.push({{float(i), 1, 2},
-                        i,
-                        {3, 4, 5},
-                        WalkBits::make(i % 16384, i & 1, 1),
-                        {6, 7, 8},
-                        float(i) / 2,
-                        0.25f,
-                        0.5f,
-                        i + 1,
-                        0});
+            queue.push(
+                {{{float(i), 1, 2}, i, {3, 4, 5}, SubpathBits::make(i % 16384, i & 1, 1), {6, 7, 8}, float(i) / 2},
+                 0.25f,
+                 0.5f,
+                 i + 1,
+                 0});
         CHECK(counter.size() == capacity);
         for (uint32_t i = 0; i < capacity; ++i) {
-            const HitItem h = queue.load(i);
-            CHECK(h.o.x == float(i));
-            CHECK(h.path == i);
-            CHECK(h.bits.depth() == i % 16384);
-            CHECK(h.pdf_sa == float(i) / 2);
+            const PathHit h = queue.load(i);
+            CHECK(h.ray.origin.x == float(i));
+            CHECK(path_of(h) == i);
+            CHECK(h.ray.bits.depth() == i % 16384);
+            CHECK(h.ray.pdf_sa_or_tmax == float(i) / 2);
             CHECK(h.prim == i + 1);
         }
         for (uint32_t g = 0; g < kGuard; ++g) CHECK(lanes[lanes.size() - 1 - g].word[0] == 7);

@@ -20,7 +20,7 @@ struct Method {
     std::string variant = "wavefront";
 };
 
-/// One of each kind: all strategies by either heuristic, one walk alone, one group alone.
+/// One of each kind: all strategies by either heuristic, one subpath alone, one group alone.
 inline const Method kMethods[] = {{"all"},  {"all", MisHeuristic::power}, {"-i light"},
                                   {"hits"}, {"next_event+connections"},   {"light"}};
 
@@ -39,8 +39,8 @@ inline RenderSettings method_settings(const Scene& scene, const Method& method, 
 
 inline constexpr uint32_t kBatches = 32;
 
-/// `spp` samples (a multiple of kBatches) from sample `first` on. One light walk splats onto many pixels, so variances
-/// of blocks come from batches of samples.
+/// `spp` samples (a multiple of kBatches) from sample `first` on. One light subpath splats onto many pixels, so
+/// variances of blocks come from batches of samples.
 inline Estimate render_batches(const Scene& scene, const RenderSettings& settings, uint32_t spp, uint32_t first = 0) {
     REQUIRE(spp % kBatches == 0);
     const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
@@ -97,8 +97,8 @@ inline void check_image(const Scene& scene, const RenderSettings& settings, cons
     const uint32_t n = uint32_t(std::clamp(samples, double(kPilot), double(most))) / kBatches * kBatches;
     const ZTestResult z = z_test(render_batches(scene, settings, n, kPilot), truth, options);
     INFO(n << " samples: " << z.report());
-    // Almost without variance: the few walks that differ are too few to be tested, and together may matter one in 1000
-    // at most.
+    // Almost without variance: the few subpaths that differ are too few to be tested, and together may matter one in
+    // 1000 at most.
     if (z.undecided)
         CHECK(std::abs(z.relative_difference) < 1e-3);
     else

@@ -1,7 +1,7 @@
 // The weights of bidirectional path tracing in the slow and obvious way: the density of every strategy that can sample
 // a given path, as a product of the densities of its steps in double precision. Nothing here is recursive and nothing
-// comes from transport/bidirectional.h but the names of masks; single densities of BSDFs, emitters and sensors are the
-// project's, which have tests of their own. Definitions: docs/theory.md.
+// comes from transport/mis/bidirectional.h but the names of masks; single densities of BSDFs, emitters and sensors are
+// the project's, which have tests of their own. Definitions: docs/theory.md.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include <limits>
 #include <vector>
 
-#include "transport/bidirectional.h"
+#include "transport/mis/bidirectional.h"
 #include "transport/surface_scattering.h"
 
 namespace ambilux::test {
@@ -40,10 +40,10 @@ struct OracleDensity {
     double value = 1, error = 0;
 };
 
-/// Densities of the steps of both walks over one path.
+/// Densities of the steps of both subpaths over one path.
 struct OracleSteps {
-    std::vector<OracleDensity> light;  ///< [i]: of x_i by a light walk that came through x_0 ... x_(i-1)
-    std::vector<OracleDensity> eye;    ///< [i]: of x_i by an eye walk that came through x_k ... x_(i+1)
+    std::vector<OracleDensity> light;  ///< [i]: of x_i by a light subpath that came through x_0 ... x_(i-1)
+    std::vector<OracleDensity> eye;    ///< [i]: of x_i by an eye subpath that came through x_k ... x_(i+1)
     OracleDensity next_event;          ///< of x_0 by next event estimation at x_1
 };
 
@@ -119,10 +119,11 @@ inline DeltaLobe delta_lobe(const SceneView& scene, const SurfacePoint& point, V
             std::abs(double(local.z))};
 }
 
-/// Density per solid angle of `left` for a walk that arrived from `arrived`. For a delta: the coefficient of delta(left
-/// - the direction that the light takes), a delta function over directions towards the eye. A walk from the eye draws
-/// directions towards the light; the change of variables is the ratio of solid angles, n_l² cos_l / (n_e² cos_e) by
-/// Snell's law (Veach 1997, section 5.2).
+/// Density per solid angle of `left` for a subpath that arrived from `arrived`. For a delta: the coefficient of
+/// delta(left
+/// - the direction that the light takes), a delta function over directions towards the eye. A subpath from the eye
+/// draws directions towards the light; the change of variables is the ratio of solid angles, n_l² cos_l / (n_e² cos_e)
+/// by Snell's law (Veach 1997, section 5.2).
 inline OracleDensity scattering_step(const SceneView& scene, const OraclePath::Vertex& x, Vec3f arrived, Vec3f left,
                                      bool from_light, bool conditioning) {
     return at_directions(arrived, left, conditioning, [&](Vec3f a, Vec3f l) -> double {
@@ -136,8 +137,8 @@ inline OracleDensity scattering_step(const SceneView& scene, const OraclePath::V
 
 }  // namespace oracle
 
-/// Densities of all steps. Measures: area; x_0 of an emitter at infinity: solid angle; the camera: 1 (both walks take
-/// its lens point alike), and x_(k-1) by the camera at density 1 per pixel. `conditioning`: errors too.
+/// Densities of all steps. Measures: area; x_0 of an emitter at infinity: solid angle; the camera: 1 (both subpaths
+/// take its lens point alike), and x_(k-1) by the camera at density 1 per pixel. `conditioning`: errors too.
 inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, bool conditioning) {
     using namespace oracle;
     const uint32_t k = path.k;
@@ -155,7 +156,7 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
     steps.light.resize(k);
     steps.eye.resize(k);
 
-    // Light walk: a point or direction of the emitter, the other of the two, then BSDFs.
+    // Light subpath: a point or direction of the emitter, the other of the two, then BSDFs.
     const double pick = e.pick_probability;
     const OracleDensity emission = at_directions(path.to_eye[0], path.to_eye[0], conditioning, [&](Vec3f d, Vec3f) {
         return pdf_emission_direction<F>(scene, path.emitter, path.light.ng, d);
@@ -204,7 +205,7 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
         }
     }
 
-    // Eye walk.
+    // Eye subpath.
     const Sensor& sensor = scene.sensor;
     const Vec3f towards = -path.to_eye[k - 1];
     const Vec3f axis = sensor.to_world.vector({0, 0, 1});
@@ -230,10 +231,10 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
     return steps;
 }
 
-/// Densities of all strategies for a path. `light_paths`: light walks per eye walk of a pixel; `connections`: light
-/// walks that an eye vertex is connected with.
+/// Densities of all strategies for a path. `light_subpaths`: light subpaths per eye subpath of a pixel; `connections`:
+/// light subpaths that an eye vertex is connected with.
 inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePath& path, const OracleSteps& steps,
-                                          double light_paths, double connections) {
+                                          double light_subpaths, double connections) {
     const uint32_t k = path.k;
     const EmitterType type = scene.emitters[path.emitter].type;
     const auto delta = [&](uint32_t i) { return path.vertices[i].delta; };
@@ -249,10 +250,10 @@ inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePa
         if (s == 0) {
             if (!is_delta(type)) group = kHitStrategies;
         } else if (s == k) {
-            // A light walk to the vertex that the camera is connected with. Of one segment: a point of an area emitter,
-            // which nothing else is connected with.
+            // A light subpath to the vertex that the camera is connected with. Of one segment: a point of an area
+            // emitter, which nothing else is connected with.
             if (k == 1 ? type == EmitterType::area : !delta(k - 1)) group = kLightStrategies;
-            p *= light_paths;
+            p *= light_subpaths;
         } else if (s == 1) {
             if (!delta(1)) group = kNextEventStrategies;
         } else if (!delta(s - 1) && !delta(s)) {

@@ -1,5 +1,5 @@
-// Paths that light and eye walks find in small scenes of everything, and the comparison of their recursive weights with
-// tests/bidirectional_oracle.h.
+// Paths that light and eye subpaths find in small scenes of everything, and the comparison of their recursive weights
+// with tests/support/bidirectional_oracle.h.
 #pragma once
 
 #include <cstdio>
@@ -12,12 +12,32 @@
 #include "tests/support/bidirectional_oracle.h"
 #include "tests/support/catch.h"
 #include "tests/support/temp_folder.h"
-#include "transport/walk.h"
+#include "transport/mis/bidirectional.h"
+#include "transport/subpath/camera_connection.h"
+#include "transport/subpath/connection.h"
+#include "transport/subpath/emission.h"
+#include "transport/subpath/next_event.h"
+#include "transport/subpath/scatter.h"
+#include "transport/subpath/start.h"
 
 namespace ambilux::test {
 
 constexpr Features F = kOracleFeatures;
-constexpr uint32_t kMaxVertices = 6;  ///< surfaces per walk
+constexpr uint32_t kMaxVertices = 6;  ///< surfaces per subpath
+
+using BidirectionalSubpath = Subpath<BidirectionalMis>;
+using BidirectionalVertex = Vertex<BidirectionalMis>;
+using BidirectionalCandidate = Candidate<BidirectionalMis>;
+
+/// Everything counts, and nothing ends a subpath.
+inline Rules<BidirectionalMis> all_rules(const BidirectionalMis& mis) {
+    Rules<BidirectionalMis> r{};
+    r.mis = mis;
+    r.max_depth = kMaxDepth;
+    r.rr_depth = ~0u;
+    r.count_hits = r.count_environment = r.next_event = r.splat = r.connect = true;
+    return r;
+}
 
 // ---- scenes ----
 
@@ -108,7 +128,7 @@ inline std::string sensor(const std::string& type, const std::string& parameters
 
 struct SceneCase {
     const char* name;
-    uint32_t walks;  ///< for a few hundred thousand paths, or what the scene has of them
+    uint32_t subpaths;  ///< for a few hundred thousand paths, or what the scene has of them
     std::string xml;
 };
 
@@ -175,14 +195,14 @@ inline Scene load(const SceneCase& c) {
     return load_mitsuba(folder.write("scene.xml", c.xml));
 }
 
-// ---- walks ----
+// ---- subpaths ----
 
-/// A vertex of a walk and the ray that met it.
+/// A vertex of a subpath and the ray that met it.
 struct Node {
-    WalkVertex vertex;
+    BidirectionalVertex vertex;
     Vec3f d;
     Hit hit;
-    bool delta = false;  ///< the walk left it by a delta lobe
+    bool delta = false;  ///< the subpath left it by a delta lobe
 };
 
 enum Kind : uint32_t { kHit, kEscape, kNextEvent, kConnect, kSplat, kVisible, kKinds };
@@ -196,7 +216,7 @@ struct Tally {
     double worst = 0, worst_of_bound = 0, worst_sum = 0;
 };
 
-/// Density of s.wi_world for a walk that arrives from `wo_world`: directions exchanged.
+/// Density of s.wi_world for a subpath that arrives from `wo_world`: directions exchanged.
 inline float reverse_pdf(const Scattering& s, Vec3f wo_world) {
     return bsdf_pdf<F>(s.bsdf, s.frame.to_local(wo_world), s.wi, TransportMode::radiance);
 }
@@ -206,14 +226,15 @@ public:
     Bench(const Scene& scene, Tally& tally)
         : scene_(scene.view()), accel_(scene), tracer_(accel_.tracer()), tally_(tally) {}
 
-    /// One light walk and one eye walk, and all paths that they make together.
+    /// One light subpath and one eye subpath, and all paths that they make together.
     void run(const BidirectionalMis& mis, uint32_t index) {
         mis_ = mis;
+        rules_ = all_rules(mis);
         index_ = index;
-        light_walk();
-        eye_walk();
+        light_subpath();
+        eye_subpath();
         for (uint32_t b = 1; b <= eye_.size(); ++b) {
-            next_event(b);
+            next_events(b);
             for (uint32_t a = 1; a <= light_.size(); ++a) connect(a, b);
         }
         for (uint32_t a = 1; a <= light_.size(); ++a) splat(a);
@@ -222,24 +243,25 @@ public:
 private:
     Vec4f random(uint32_t block) const { return random_floats({0xb1d1, index_, 0, Stream::test}, block); }
 
-    void light_walk() {
+    SurfacePoint point(const Hit& hit) const { return surface_at<F>(scene_, hit.prim, hit.u, hit.v); }
+
+    void light_subpath() {
         light_.clear();
         const Vec4f d = random(1);
         lit_ = sample_emission<F>(scene_, random(0), {d.x, d.y}, emission_);
         if (!lit_) return;
-        Walk w = start_light_walk(emission_);
+        BidirectionalSubpath path = start_light(mis_, emission_);
         if (mis_.has(kLightStrategies)) visible({d.z, d.w});
         while (light_.size() < kMaxVertices) {
             Hit hit;
-            if (!tracer_.closest<F>(scene_, {w.o, kInfinity, w.d, 0}, hit)) return;
-            light_.push_back({light_vertex<F>(scene_, mis_, w, hit.prim, hit.u, hit.v), w.d, hit});
-            if (!scatter_walk<F>(mis_, light_.back().vertex, random(10 + w.depth), TransportMode::importance, ~0u, w))
-                return;
-            light_.back().delta = w.delta;
+            if (!tracer_.closest<F>(scene_, {path.origin, kInfinity, path.direction, 0}, hit)) return;
+            light_.push_back({vertex_at<F>(scene_, mis_, Side::light, path, point(hit)), path.direction, hit});
+            if (!scatter<F>(rules_, Side::light, light_.back().vertex, random(10 + path.depth), path)) return;
+            light_.back().delta = path.delta;
         }
     }
 
-    void eye_walk() {
+    void eye_subpath() {
         eye_.clear();
         const Vec4f u = random(2);
         const Sensor& sensor = scene_.sensor;
@@ -247,20 +269,20 @@ private:
         const CameraSample c =
             sample_camera_ray(sensor, {u.x * float(sensor.film_width), u.y * float(sensor.film_height)}, lens_u_);
         camera_p_ = lens(lens_u_);
-        Walk w = start_eye_walk(scene_, mis_, c);
+        BidirectionalSubpath path = start_eye(scene_, mis_, c);
         float tmax = c.tmax;
         while (eye_.size() < kMaxVertices) {
             Hit hit;
-            if (!tracer_.closest<F>(scene_, {w.o, tmax, w.d, 0}, hit)) {
-                escape(w);
+            if (!tracer_.closest<F>(scene_, {path.origin, tmax, path.direction, 0}, hit)) {
+                escaped(path);
                 return;
             }
             tmax = kInfinity;
-            const WalkVertex z = eye_vertex<F>(scene_, mis_, w, hit.prim, hit.u, hit.v);
-            hit_emitter(w, z);
-            eye_.push_back({z, w.d, hit});
-            if (!scatter_walk<F>(mis_, z, random(30 + w.depth), TransportMode::radiance, ~0u, w)) return;
-            eye_.back().delta = w.delta;
+            const BidirectionalVertex z = vertex_at<F>(scene_, mis_, Side::eye, path, point(hit));
+            hit_emitter(path, z);
+            eye_.push_back({z, path.direction, hit});
+            if (!scatter<F>(rules_, Side::eye, z, random(30 + path.depth), path)) return;
+            eye_.back().delta = path.delta;
         }
     }
 
@@ -269,8 +291,8 @@ private:
         return scene_.sensor.to_world.point({l.x, l.y, 0.0f});
     }
 
-    /// Path over the first `a` vertices of the light walk and the first `b` of the eye walk; `across`: from the last of
-    /// the former to the last of the latter.
+    /// Path over the first `a` vertices of the light subpath and the first `b` of the eye subpath; `across`: from the
+    /// last of the former to the last of the latter.
     OraclePath join(uint32_t a, uint32_t b, Vec3f across, bool left_eye = false) const {
         OraclePath p{};
         p.k = a + b + 1;
@@ -307,28 +329,36 @@ private:
         return s;
     }
 
-    void escape(const Walk& w) {
-        if (scene_.environment == kNone || is_zero(environment_radiance<F>(scene_, w.d))) return;
-        OraclePath p = join(0, uint32_t(eye_.size()), -w.d, true);
+    void escaped(BidirectionalSubpath path) {
+        if (scene_.environment == kNone || is_zero(environment_radiance<F>(scene_, path.direction))) return;
+        OraclePath p = join(0, uint32_t(eye_.size()), -path.direction, true);
         p.emitter = scene_.environment;
-        compare(kEscape, 0, others_of_escape<F>(scene_, mis_, w.sums, w.depth, w.d), p);
+        path.throughput = {1, 1, 1};
+        BidirectionalCandidate c{};
+        const bool counts = escape<F>(scene_, rules_, path, c);
+        // The rules and the ratio agree on that.
+        float ratio;
+        CHECK(mis_.escape_ratio<F>(scene_, path, path.sums, ratio) == counts);
+        compare(kEscape, 0, c, p, counts);
     }
 
-    void hit_emitter(const Walk& w, const WalkVertex& z) {
+    void hit_emitter(BidirectionalSubpath path, const BidirectionalVertex& z) {
         const uint32_t emitter = scene_.shapes[z.point.shape].emitter;
-        if (emitter == kNone || is_zero(emitted_radiance<F>(scene_, emitter, z.point, -w.d))) return;
-        OraclePath p = join(0, uint32_t(eye_.size()), -w.d, true);
+        if (emitter == kNone || is_zero(emitted_radiance<F>(scene_, emitter, z.point, -path.direction))) return;
+        OraclePath p = join(0, uint32_t(eye_.size()), -path.direction, true);
         p.emitter = emitter;
         p.light = z.point;
-        compare(kHit, 0, others_of_hit<F>(scene_, mis_, w.sums, w.depth, emitter, w.o, w.d, w.start_distance, z.point),
-                p);
+        path.throughput = {1, 1, 1};
+        BidirectionalCandidate c{};
+        const bool counts = emission<F>(scene_, rules_, path, z.point, c);
+        compare(kHit, 0, c, p, counts);
     }
 
-    void next_event(uint32_t b) {
-        const WalkVertex& z = eye_[b - 1].vertex;
+    void next_events(uint32_t b) {
+        const BidirectionalVertex& z = eye_[b - 1].vertex;
         const Vec4f u = random(50 + b);
-        WalkConnection c;
-        if (!connect_next_event<F>(scene_, mis_, z, {1, 1, 1}, u, c)) return;
+        BidirectionalCandidate c;
+        if (!next_event<F>(scene_, rules_, z, {1, 1, 1}, b, u, c)) return;
         EmitterSample light;
         REQUIRE(sample_emitter_deferred<F>(scene_, z.point.p, u, light));
         OraclePath p = join(0, b, -light.wi);
@@ -340,54 +370,57 @@ private:
             p.light.ng = light.ng;
             p.light.prim = light.prim;
         }
-        compare(kNextEvent, 1, c.others, p);
+        compare(kNextEvent, 1, c, p);
     }
 
     void connect(uint32_t a, uint32_t b) {
-        const WalkVertex &y = light_[a - 1].vertex, &z = eye_[b - 1].vertex;
-        WalkConnection c;
-        if (!connect_vertices<F>(mis_, y, {1, 1, 1}, z, {1, 1, 1}, c)) return;
+        const BidirectionalVertex &y = light_[a - 1].vertex, &z = eye_[b - 1].vertex;
+        BidirectionalCandidate c;
+        if (!connection<F>(rules_, {z, {1, 1, 1}, b}, {y, {1, 1, 1}, a}, 1.0f, c)) return;
         const Vec3f to_y = y.point.p - z.point.p;
-        compare(kConnect, a + 1, c.others, join(a, b, to_y * (-1.0f / sqrtf(length_squared(to_y)))));
+        compare(kConnect, a + 1, c, join(a, b, to_y * (-1.0f / sqrtf(length_squared(to_y)))));
     }
 
     void splat(uint32_t a) {
         const Vec4f u = random(70 + a);
-        WalkConnection c;
-        Vec2f film;
-        if (!connect_camera<F>(scene_, mis_, light_[a - 1].vertex, {1, 1, 1}, {u.x, u.y}, c, film)) return;
-        OraclePath p = join(a, 0, c.d);
+        BidirectionalCandidate c;
+        if (!camera_connection<F>(scene_, rules_, light_[a - 1].vertex, {1, 1, 1}, a, {u.x, u.y}, c)) return;
+        OraclePath p = join(a, 0, c.direction);
         p.lens_u = {u.x, u.y};
         p.camera_p = lens(p.lens_u);
-        compare(kSplat, a + 1, c.others, p);
+        compare(kSplat, a + 1, c, p);
     }
 
     void visible(Vec2f lens_u) {
-        WalkConnection c;
-        Vec2f film;
-        if (!connect_visible_light<F>(scene_, mis_, emission_, lens_u, c, film)) return;
-        OraclePath p = join(0, 0, c.d);
+        BidirectionalCandidate c;
+        if (!visible_emitter(scene_, rules_, emission_, lens_u, c)) return;
+        OraclePath p = join(0, 0, c.direction);
         p.emitter = emission_.emitter;
         p.light = emission_point();
         p.lens_u = lens_u;
         p.camera_p = lens(lens_u);
-        compare(kVisible, 1, c.others, p);
+        compare(kVisible, 1, c, p);
     }
 
-    void compare(Kind kind, uint32_t s, float others, const OraclePath& path) {
+    /// `counts`: strategy s has a candidate, which is `c`.
+    void compare(Kind kind, uint32_t s, const BidirectionalCandidate& c, const OraclePath& path, bool counts = true) {
         const OracleSteps steps = oracle_steps(scene_, path, false);
         const OracleStrategies all =
-            oracle_strategies(scene_, path, steps, double(mis_.light_walks), double(mis_.connections));
+            oracle_strategies(scene_, path, steps, double(mis_.light_subpaths), double(mis_.connections));
         INFO(kKindNames[kind] << " s " << s << " k " << path.k << " index " << index_ << " mask " << mis_.strategies
                               << " heuristic " << int(mis_.heuristic) << " emitter type "
                               << int(scene_.emitters[path.emitter].type) << " vertices " << describe(path));
         if (!(all.group[s] & mis_.strategies)) {
-            // Eye walks meet the environment for light tracing too: beyond what the camera sees, that must not count.
-            if (kind == kEscape && path.k > 1) CHECK(others == kInfinity);
+            // Eye subpaths meet the environment for light tracing too: beyond what the camera sees, that must not
+            // count.
+            if (kind == kEscape && path.k > 1) CHECK_FALSE(counts);
             return;
         }
+        CHECK(counts);
+        CHECK((c.strategy.s() == s && c.strategy.segments() == path.k));
+        const float ratio = c.ratio;
         const double expected = oracle_weight(all, s, mis_.strategies, mis_.heuristic),
-                     weight = 1.0 / (1.0 + double(others));
+                     weight = 1.0 / (1.0 + double(ratio));
         const double error = std::abs(weight / expected - 1);
         ++tally_.paths;
         if (error <= 1e-4) {
@@ -444,6 +477,7 @@ private:
     CwbvhTracer tracer_;
     Tally& tally_;
     BidirectionalMis mis_{};
+    Rules<BidirectionalMis> rules_{};
     uint32_t index_ = 0;
     EmissionSample emission_{};
     bool lit_ = false;
@@ -452,9 +486,9 @@ private:
     Vec2f lens_u_{};
 };
 
-/// Every strategy's weight by the recursion, each along its own walks over the vertices of one path. Directions are
-/// those between the vertices as they are stored, so that all walks agree on them to the bit and the sum tells of the
-/// recursion alone.
+/// Every strategy's weight by the recursion, each along its own subpaths over the vertices of one path. Directions are
+/// those between the vertices as they are stored, so that all subpaths agree on them to the bit and the sum tells of
+/// the recursion alone.
 inline void Bench::sum_of_weights(const OraclePath& sampled) {
     OraclePath path = sampled;
     const uint32_t k = path.k;
@@ -474,7 +508,8 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
         if (!connect_to_camera(scene_.sensor, position(k - 1), path.lens_u, camera)) return;
         path.to_eye[k - 1] = camera.wi;
     }
-    const auto go_on = [&](const WalkVertex& vertex, const OraclePath::Vertex& x, Vec3f wo, Walk& w) {
+    const auto go_on = [&](const BidirectionalVertex& vertex, const OraclePath::Vertex& x, Vec3f wo,
+                           BidirectionalSubpath& w) {
         float forward = 1.0f, reverse = 1.0f;
         if (x.delta) {
             const Scattering& s = vertex.scattering;
@@ -489,16 +524,20 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
             reverse = reverse_pdf(vertex.scattering, wo);
             if (!(forward > 0.0f)) return false;
         }
-        w.sums = sums_after_scatter(mis_, vertex.sums, vertex.first, x.delta, forward, reverse,
-                                    fabsf(dot(vertex.point.ng, wo)));
-        w.o = vertex.point.p;
-        w.d = wo;
+        w.sums = mis_.sums_after_scatter(vertex.sums, vertex.first, x.delta, forward, reverse,
+                                         fabsf(dot(vertex.point.ng, wo)));
+        w.origin = vertex.point.p;
+        w.direction = wo;
         ++w.depth;
         return true;
     };
 
-    // Light walk over x_1 ... x_(k-1).
-    std::vector<WalkVertex> y(k), z(k);
+    const auto meet = [&](Side side, const BidirectionalSubpath& w, const OraclePath::Vertex& x) {
+        return vertex_at<F>(scene_, mis_, side, w, surface_at<F>(scene_, x.prim, x.u, x.v));
+    };
+
+    // Light subpath over x_1 ... x_(k-1).
+    std::vector<BidirectionalVertex> y(k), z(k);
     EmissionSample start{};
     start.p = infinite ? position(1 < k ? 1 : 0) - path.to_eye[0] * (2.0f * scene_.bounds_radius) : position(0);
     start.ng = area ? path.light.ng : path.to_eye[0];
@@ -512,21 +551,21 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
     start.infinite = infinite;
     start.prim = area ? path.light.prim : kNone;
     if (!(start.pdf_dir > 0.0f)) return;
-    Walk w = start_light_walk(start);
-    w.o = start.p;
+    BidirectionalSubpath w = start_light(mis_, start);
+    w.origin = start.p;
     for (uint32_t i = 1; i < k; ++i) {
-        y[i] = light_vertex<F>(scene_, mis_, w, path.vertices[i].prim, path.vertices[i].u, path.vertices[i].v);
+        y[i] = meet(Side::light, w, path.vertices[i]);
         if (i + 1 < k && !go_on(y[i], path.vertices[i], path.to_eye[i], w)) return;
     }
-    // Eye walk over x_(k-1) ... x_1, and its ray to x_0.
+    // Eye subpath over x_(k-1) ... x_1, and its ray to x_0.
     const Vec3f axis = scene_.sensor.to_world.vector({0, 0, 1});
     const float axis_length = length(axis), cos_camera = -dot(path.to_eye[k - 1], axis) / axis_length;
     CameraSample c{};
     c.d = -path.to_eye[k - 1];
     c.o = path.camera_p + c.d * (scene_.sensor.near_clip * axis_length / cos_camera);
-    w = start_eye_walk(scene_, mis_, c);
+    w = start_eye(scene_, mis_, c);
     for (uint32_t i = k - 1; i > 0; --i) {
-        z[i] = eye_vertex<F>(scene_, mis_, w, path.vertices[i].prim, path.vertices[i].u, path.vertices[i].v);
+        z[i] = meet(Side::eye, w, path.vertices[i]);
         if (i == 1 && path.vertices[1].delta && is_delta(e.type)) break;
         if (!go_on(z[i], path.vertices[i], -path.to_eye[i - 1], w)) {
             if (i > 1 || !is_delta(e.type)) return;
@@ -534,23 +573,21 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
     }
 
     const OracleStrategies all = oracle_strategies(scene_, path, oracle_steps(scene_, path, false),
-                                                   double(mis_.light_walks), double(mis_.connections));
+                                                   double(mis_.light_subpaths), double(mis_.connections));
     double sum = 0;
     std::string weights;
     for (uint32_t s = 0; s <= k; ++s) {
         if (!(all.group[s] & mis_.strategies)) continue;
-        float others = 0;
-        WalkConnection connection;
-        Vec2f film;
+        float ratio = 0;
+        BidirectionalCandidate candidate;
         if (s == 0) {
-            others = infinite ? others_of_escape<F>(scene_, mis_, w.sums, k, w.d)
-                              : others_of_hit<F>(scene_, mis_, w.sums, k, path.emitter, w.o, w.d, w.start_distance,
-                                                 path.light);
+            CHECK((infinite ? mis_.escape_ratio<F>(scene_, w, w.sums, ratio)
+                            : mis_.hit_ratio<F>(scene_, w, w.sums, path.emitter, path.light, ratio)));
         } else if (s == k) {
-            if (k == 1 ? !connect_visible_light<F>(scene_, mis_, start, path.lens_u, connection, film)
-                       : !connect_camera<F>(scene_, mis_, y[k - 1], {1, 1, 1}, path.lens_u, connection, film))
+            if (k == 1 ? !visible_emitter(scene_, rules_, start, path.lens_u, candidate)
+                       : !camera_connection<F>(scene_, rules_, y[k - 1], {1, 1, 1}, k - 1, path.lens_u, candidate))
                 return;
-            others = connection.others;
+            ratio = candidate.ratio;
         } else if (s == 1) {
             EmitterSample light{};
             light.emitter = path.emitter;
@@ -561,17 +598,19 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
             light.distance = infinite ? kInfinity : sqrtf(length_squared(position(0) - position(1)));
             light.pdf_sa = area ? pdf_emitter_direct<F>(scene_, path.emitter, position(1), light.wi, path.light)
                                 : (light.delta ? e.pick_probability : pdf_environment_direct<F>(scene_, light.wi));
-            others = others_of_next_event<F>(
-                scene_, mis_, z[1].sums, z[1].first, light, scatter_pdf<F>(z[1].scattering, light.wi),
-                reverse_pdf(z[1].scattering, light.wi), fabsf(dot(z[1].point.ng, light.wi)));
+            BsdfValue f{};
+            f.pdf_sa = scatter_pdf<F>(z[1].scattering, light.wi);
+            f.pdf_reverse_sa = reverse_pdf(z[1].scattering, light.wi);
+            ratio =
+                mis_.next_event_ratio<F>(scene_, z[1].sums, z[1].first, light, f, fabsf(dot(z[1].point.ng, light.wi)));
         } else {
-            if (!connect_vertices<F>(mis_, y[s - 1], {1, 1, 1}, z[s], {1, 1, 1}, connection)) return;
-            others = connection.others;
+            if (!connection<F>(rules_, {z[s], {1, 1, 1}, k - s}, {y[s - 1], {1, 1, 1}, s - 1}, 1.0f, candidate)) return;
+            ratio = candidate.ratio;
         }
-        double weight = 1.0 / (1.0 + double(others));
-        if (std::isnan(others)) {
-            // A walk that would have to draw what it all but never draws: floats overflow. No such walk exists, and its
-            // weight would be nothing.
+        double weight = 1.0 / (1.0 + double(ratio));
+        if (std::isnan(ratio)) {
+            // A subpath that would have to draw what it all but never draws: floats overflow. No such subpath exists,
+            // and its weight would be nothing.
             ++tally_.overflows;
             weight = oracle_weight(all, s, mis_.strategies, mis_.heuristic);
             CHECK(weight < 1e-7);
@@ -585,16 +624,16 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
     CHECK(std::abs(sum - 1) < 1e-5);
 }
 
-/// The i-th of the settings that tests go through: all masks, both heuristics, several numbers of light walks and
+/// The i-th of the settings that tests go through: all masks, both heuristics, several numbers of light subpaths and
 /// connections.
 inline BidirectionalMis settings(uint32_t i) {
-    const float light_paths[] = {64 * 48, 1, 0.1f, 1e6f};
+    const float light_subpaths[] = {64 * 48, 1, 0.1f, 1e6f};
     return {i / 16 % 2 ? MisHeuristic::power : MisHeuristic::balance, i % 16 ? i % 16 : uint32_t(kAllStrategies),
-            light_paths[i / 32 % 4], i / 128 % 2 ? 3.0f : 1.0f};
+            light_subpaths[i / 32 % 4], i / 128 % 2 ? 3.0f : 1.0f};
 }
 
-/// Compares `walks` times as many walks as each scene asks for, and reports what was seen.
-inline std::map<std::string, uint64_t> compare_weights(double walks) {
+/// Compares `times` as many subpaths as each scene asks for, and reports what was seen.
+inline std::map<std::string, uint64_t> compare_weights(double times) {
     std::map<std::string, uint64_t> seen;
     for (const SceneCase& c : scene_cases()) {
         Tally tally;
@@ -602,7 +641,7 @@ inline std::map<std::string, uint64_t> compare_weights(double walks) {
             INFO(c.name);
             const Scene scene = load(c);
             Bench bench(scene, tally);
-            for (uint32_t i = 0; i < uint32_t(c.walks * walks); ++i) bench.run(settings(i / 4), i);
+            for (uint32_t i = 0; i < uint32_t(c.subpaths * times); ++i) bench.run(settings(i / 4), i);
             CHECK(tally.unbounded < 1e-5 * double(tally.paths) + 1);
             CHECK(tally.ill < 1e-3 * double(tally.paths));
         }

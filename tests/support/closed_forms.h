@@ -84,7 +84,7 @@ inline void check_expectation(const Scene& scene, const RenderSettings& settings
         REQUIRE(renderer->render(kPilot, n) == n);
         const ZTestResult z = z_test(to_estimate(renderer->film()), exact_estimate(expected), options);
         INFO(n << " samples: " << z.report());
-        // Almost without variance: the few walks that met roulette are too few to be tested, and together may matter
+        // Almost without variance: the few subpaths that met roulette are too few to be tested, and together may matter
         // one in 1000 at most.
         if (z.undecided)
             CHECK(std::abs(z.relative_difference) < 1e-3);

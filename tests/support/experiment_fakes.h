@@ -76,7 +76,7 @@ public:
         film_.sum.assign(size_t(film_.width) * film_.height * 3, 0.0);
         film_.sum_squares = film_.sum;
     }
-    std::vector<TechniqueImage> technique_images() override {
+    std::vector<StrategyImage> strategy_images() override {
         const std::vector<float> values(size_t(film_.width) * film_.height * 3, float(rendered_));
         return {{0, 2, values, values, 0}};
     }

@@ -1,8 +1,8 @@
 // libs: ambilux_formats ambilux_accel ambilux_core
 // timeout: 300
-// Weights of bidirectional path tracing (transport/bidirectional.h, transport/walk.h) against
-// tests/bidirectional_oracle.h, over paths that the walks themselves find: every BSDF, emitter and sensor, every
-// strategy, all masks, both heuristics.
+// Weights of bidirectional path tracing (transport/mis/bidirectional.h, transport/subpath/) against
+// tests/support/bidirectional_oracle.h, over paths that the subpaths themselves find: every BSDF, emitter and sensor,
+// every strategy, all masks, both heuristics.
 #include "tests/support/bidirectional_paths.h"
 
 using namespace ambilux;

@@ -118,7 +118,7 @@ bool same_side(Vec3f w, Vec3f ng, Vec3f ns) { return (dot(ng, w) > 0) == (dot(ns
 
 }  // namespace
 
-TEST_CASE("B1: the walk's throughput factor is scatter_eval/scatter_pdf, for random normals, both modes") {
+TEST_CASE("B1: a subpath's throughput factor is scatter_eval/scatter_pdf, for random normals, both modes") {
     OneSurface surface;
     int compared = 0, delta = 0;
     double worst_pdf = 0, worst_weight = 0;
@@ -190,9 +190,9 @@ TEST_CASE("B3: one predicate: light leaks carry nothing in either mode, whicheve
 }
 
 TEST_CASE("B1, B5: with shading normals, importance from wi to wo is the adjoint of radiance from wo to wi") {
-    // Both walks carry the same light along the same path: f_rad(wo→wi)·|wi·ns| / |wi·ng| = f_imp(wi→wo)·|wo·ns|·factor
-    // / |wo·ng| (Veach 1997, equation 5.17: scattering with the cosines of the geometric normal is what the adjoint is
-    // defined by).
+    // Both subpaths carry the same light along the same path: f_rad(wo→wi)·|wi·ns| / |wi·ng| =
+    // f_imp(wi→wo)·|wo·ns|·factor / |wo·ng| (Veach 1997, equation 5.17: scattering with the cosines of the geometric
+    // normal is what the adjoint is defined by).
     OneSurface surface;
     double worst = 0;
     int compared = 0;

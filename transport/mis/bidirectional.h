@@ -1,6 +1,6 @@
-// Multiple importance sampling over all strategies (s,t) of bidirectional path tracing by sums that subpaths carry along
-// (van Antwerpen 2011; Georgiev 2012, "Implementing Vertex Connection and Merging", technical report). The derivation
-// with every edge case is in docs/theory.md, whose equations the comments name.
+// Multiple importance sampling over all strategies (s,t) of bidirectional path tracing by sums that subpaths carry
+// along (van Antwerpen 2011; Georgiev 2012, "Implementing Vertex Connection and Merging", technical report). The
+// derivation with every edge case is in docs/theory.md, whose equations the comments name.
 //
 // A path x_0 ... x_k starts at the light. Strategy (s,t) samples s vertices from the light and t = k+1-s from the
 // camera with the product density p_s. The weight of a strategy is 1 / (1 + sum of (p_i/p_s)^beta over the other
@@ -74,7 +74,8 @@ struct BidirectionalMis {
         const Vec3f axis = scene.sensor.to_world.vector({0.0f, 0.0f, 1.0f});
         const float scale = length(axis), cos_camera = dot(d, axis) / scale;
         sums = {masked(kLightStrategies, term(light_subpaths / camera_pdf(scene.sensor, cos_camera))), 0.0f};
-        start.camera_distance = camera_delta_direction(scene.sensor) ? 0.0f : scene.sensor.near_clip * scale / cos_camera;
+        start.camera_distance =
+            camera_delta_direction(scene.sensor) ? 0.0f : scene.sensor.near_clip * scale / cos_camera;
     }
 
     AMBILUX_HD static void start_light(const EmissionSample& e, SubpathStart& start) {
@@ -133,8 +134,8 @@ struct BidirectionalMis {
                 light.p = path.origin;
                 light.ng = path.direction * start.direction;
                 light.prim = start.prim;
-                next_event = pdf_emitter_direct<F>(scene, start.emitter, p, -path.direction, light) * start.direction *
-                             scale;
+                next_event =
+                    pdf_emitter_direct<F>(scene, start.emitter, p, -path.direction, light) * start.direction * scale;
                 hit = start.direction * scale;
                 break;
             }
@@ -162,14 +163,13 @@ struct BidirectionalMis {
         // The other strategy of a path of one segment is (1,1): a light vertex seen by the camera.
         if (path.depth == 1) {
             const float distance = length(light.p - path.origin) + path.start.camera_distance;
-            ratio = sums_at_hit(ray, sqr(distance), cos_light, camera_delta_direction(scene.sensor)).dvcm *
-                    term(pdf_pos);
+            ratio =
+                sums_at_hit(ray, sqr(distance), cos_light, camera_delta_direction(scene.sensor)).dvcm * term(pdf_pos);
             return true;
         }
-        const float next_event = masked(
-            kNextEventStrategies, term(pdf_emitter_direct<F>(scene, emitter, path.origin, d, light)));
-        const float emission =
-            term(pdf_pos * pdf_emission_direction<F>(scene, emitter, light.ng, -d) / cos_light);
+        const float next_event =
+            masked(kNextEventStrategies, term(pdf_emitter_direct<F>(scene, emitter, path.origin, d, light)));
+        const float emission = term(pdf_pos * pdf_emission_direction<F>(scene, emitter, light.ng, -d) / cos_light);
         ratio = next_event * ray.dvcm + emission * ray.dvc;
         return true;
     }
@@ -240,8 +240,8 @@ struct BidirectionalMis {
     AMBILUX_HD float visible_emitter_ratio(const SceneView& scene, const CameraConnection& c, float cos_light,
                                            float pdf_pos) const {
         const float fall_off = camera_delta_direction(scene.sensor) ? 1.0f : 1.0f / sqr(c.camera_distance);
-        return masked(kHitStrategies, term(camera_pdf(scene.sensor, c.cos_camera) * cos_light * fall_off /
-                                           (light_subpaths * pdf_pos)));
+        return masked(kHitStrategies,
+                      term(camera_pdf(scene.sensor, c.cos_camera) * cos_light * fall_off / (light_subpaths * pdf_pos)));
     }
     /// Eye subpaths whose last scattering was this count what their last segment meets.
     AMBILUX_HD static constexpr bool counts_last_segment(bool) { return true; }

@@ -45,9 +45,9 @@ struct UnidirectionalMis {
     AMBILUX_HD bool hit_ratio(const SceneView& scene, const Path& path, Sums ray, uint32_t emitter,
                               const SurfacePoint& light, float& ratio) const {
         const bool sampled = next_event && !path.delta;
-        return ratio_to(
-            path, ray,
-            sampled ? pdf_emitter_direct<F>(scene, emitter, path.origin, path.direction, light) : 0.0f, ratio);
+        return ratio_to(path, ray,
+                        sampled ? pdf_emitter_direct<F>(scene, emitter, path.origin, path.direction, light) : 0.0f,
+                        ratio);
     }
     template <Features F, class Path>
     AMBILUX_HD bool escape_ratio(const SceneView& scene, const Path& path, Sums ray, float& ratio) const {

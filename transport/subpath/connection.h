@@ -43,8 +43,8 @@ AMBILUX_HD bool connection(const Rules<Mis>& rules, const SubpathEnd<Mis>& z, co
     const ConnectionDensities densities = {f_z.pdf_sa * cos_y / d2, f_y.pdf_reverse_sa, f_y.pdf_sa * cos_z / d2,
                                            f_z.pdf_reverse_sa};
     if (!set_segment(c, z.vertex, w, y.vertex.point.p, y.vertex.offset, y.vertex.point.ng)) return false;
-    c.ratio = rules.counted(rules.mis.connection_ratio(y.vertex.sums, y.vertex.first, z.vertex.sums, z.vertex.first,
-                                                       densities));
+    c.ratio = rules.counted(
+        rules.mis.connection_ratio(y.vertex.sums, y.vertex.first, z.vertex.sums, z.vertex.first, densities));
     c.value *= scale;
     c.environment = false;
     return !is_zero(c.value);

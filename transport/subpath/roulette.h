@@ -10,8 +10,8 @@ namespace ambilux {
 /// decisions. Any value keeps roulette unbiased.
 AMBILUX_HD float rounded_eta(float eta) { return bits_float(float_bits(eta) & 0xffff0000u); }
 
-/// Thins a subpath by its throughput; `u` uniform in [0,1). False if it ends. Radiance is scaled by the squared index of
-/// the medium, which is not loss (Mitsuba's rule).
+/// Thins a subpath by its throughput; `u` uniform in [0,1). False if it ends. Radiance is scaled by the squared index
+/// of the medium, which is not loss (Mitsuba's rule).
 template <class Mis>
 AMBILUX_HD bool survives(Subpath<Mis>& path, float u) {
     const float probability = min(max_component(path.throughput) * sqr(path.eta), 0.95f);

@@ -17,8 +17,8 @@ struct Rules {
     bool next_event;         ///< eye vertices sample emitters
     bool splat;              ///< light vertices are connected with the camera
     bool connect;            ///< eye vertices are connected with light vertices
-    bool background_only;    ///< eye subpaths end at their first vertex: they serve the directly seen environment, which
-                             ///< no light subpath finds
+    bool background_only;  ///< eye subpaths end at their first vertex: they serve the directly seen environment, which
+                           ///< no light subpath finds
     SingleStrategies singles;
 
     /// Eye subpaths of `depth` segments count the environment that they reach: beyond the first segment as hits only.
@@ -29,8 +29,8 @@ struct Rules {
             return count_environment;
     }
     AMBILUX_HD bool sees_emitters(uint32_t depth) const { return !(hide_emitters && depth == 1); }
-    /// Segments that a subpath may have: the last of an eye subpath brings nothing but emission, and a path has one more
-    /// than its light subpath.
+    /// Segments that a subpath may have: the last of an eye subpath brings nothing but emission, and a path has one
+    /// more than its light subpath.
     AMBILUX_HD uint32_t longest(Side side) const {
         return side == Side::eye && (count_hits || counts_environment(2)) ? max_depth : max_depth - 1;
     }

@@ -8,8 +8,8 @@
 namespace ambilux {
 
 /// Density of the way back over a delta, as a multiple of that of the way there. Fresnel terms are symmetric, but a
-/// delta function of the direction on one side counts otherwise as one of the direction on the other: refraction spreads
-/// solid angles by n_i² cos_i / (n_o² cos_o). `eta`: of the sample, n_o / n_i.
+/// delta function of the direction on one side counts otherwise as one of the direction on the other: refraction
+/// spreads solid angles by n_i² cos_i / (n_o² cos_o). `eta`: of the sample, n_o / n_i.
 AMBILUX_HD float delta_reverse_pdf(const Scattering& s, Vec3f wo, float eta) {
     if (eta == 1.0f) return 1.0f;
     // Never 0 by rounding, where a subpath leaves along the surface.

@@ -35,8 +35,8 @@ AMBILUX_HD Subpath<Mis> start_eye(const SceneView& scene, const Mis& mis, const 
 template <class Mis>
 AMBILUX_HD Subpath<Mis> start_light(const Mis& mis, const EmissionSample& e) {
     const float pdf = e.pick * e.pdf_pos * e.pdf_dir;
-    Subpath<Mis> path = detail::first_ray<Mis>(
-        e.prim == kNone ? e.p : offset_ray_origin(e.p, e.p_error, e.ng, e.d), e.d, e.radiance * (e.cos_theta / pdf));
+    Subpath<Mis> path = detail::first_ray<Mis>(e.prim == kNone ? e.p : offset_ray_origin(e.p, e.p_error, e.ng, e.d),
+                                               e.d, e.radiance * (e.cos_theta / pdf));
     mis.start_light(e, path.start);
     return path;
 }

@@ -24,7 +24,7 @@ constexpr uint32_t kMaxDepth = (1u << kDepthBits) - 1;
 template <class Mis>
 struct Subpath {
     Vec3f origin, direction;
-    Rgb throughput;           ///< eye: importance; light: flux. Everything up to and with the scattering into `direction`
+    Rgb throughput;  ///< eye: importance; light: flux. Everything up to and with the scattering into `direction`
     typename Mis::Sums sums;  ///< of the ray; those of a light subpath begin at its first vertex
     [[no_unique_address]] typename Mis::Start start;  ///< of first rays
     uint32_t depth;                                   ///< segments, this one included
@@ -76,8 +76,7 @@ struct Draws {
 
 private:
     AMBILUX_HD uint32_t seed(uint32_t which) const {
-        const uint32_t word =
-            uint32_t(key.seed) ^ uint32_t(key.seed >> 32) * 0x9e3779b9u ^ uint32_t(key.stream) << 29;
+        const uint32_t word = uint32_t(key.seed) ^ uint32_t(key.seed >> 32) * 0x9e3779b9u ^ uint32_t(key.stream) << 29;
         return hash_word({key.index, key.sample, which, word});
     }
 };

@@ -32,7 +32,9 @@ struct LvcIntegrator {
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
         return Memory::lay_out<kFusion, F>(layout, p, n);
     }
-    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) { return skipped_strategies(scene, p); }
+    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) {
+        return skipped_strategies(scene, p);
+    }
     template <class Executor>
     static void schedule(Executor& exec, const Stages& s) {
         run_two_sides(exec, s);

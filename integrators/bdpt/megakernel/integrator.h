@@ -1,9 +1,9 @@
 // bdpt, variant megakernel: one kernel instead of stages, whose subpaths live in registers.
 #pragma once
 
-#include "stages/megakernel.h"
 #include "integrators/bdpt/shared/light_side.h"
 #include "integrators/bdpt/shared/pilot.h"
+#include "stages/megakernel.h"
 
 namespace ambilux {
 
@@ -19,7 +19,9 @@ struct MegakernelIntegrator {
     static double pilot(Policy& p, const SceneView& scene, const HostTracer& tracer, uint64_t seed) {
         return p.light_subpaths() ? mean_light_vertices<F>(scene, tracer, p.rules, seed) : 0.0;
     }
-    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) { return skipped_strategies(scene, p); }
+    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) {
+        return skipped_strategies(scene, p);
+    }
 
     struct Memory {
         LightVertices light_vertices;
@@ -43,13 +45,13 @@ struct MegakernelIntegrator {
                const Memory& m, const FilmBuffers& film)
             : policy(p), wave(w) {
             const auto record = [&](const char* name) { return layout.record(name); };
-            const MegakernelRecords records = {record("light_generate"),   record("light_extend"),
-                                               record("light_shade"),      record("connect_camera"),
-                                               record("extend"),           record("shade"),
-                                               record("connect"),          record("connect_vertices"),
-                                               record("mis_weight"),       record("occlude")};
-            megakernel = {scene,        tracer,  wave,    p.rules, m.light_vertices, m.splats,
-                          film.samples, records, record(megakernel.kName)};
+            const MegakernelRecords records = {
+                record("light_generate"), record("light_extend"), record("light_shade"), record("connect_camera"),
+                record("extend"),         record("shade"),        record("connect"),     record("connect_vertices"),
+                record("mis_weight"),     record("occlude")};
+            megakernel = {scene,        tracer,           wave,
+                          p.rules,      m.light_vertices, m.splats,
+                          film.samples, records,          record(megakernel.kName)};
             splat = {scene, wave, m.splats, film.splats, {}, record(Splat::kName)};
         }
     };

@@ -13,8 +13,8 @@
 
 namespace ambilux {
 
-/// Queues of splats. Those that arrived are kept until the end of the wave; their number is not known before, and a wave
-/// for which there is no room is done again with more.
+/// Queues of splats. Those that arrived are kept until the end of the wave; their number is not known before, and a
+/// wave for which there is no room is done again with more.
 struct SplatQueues {
     Queue<VertexItem> vertices;  ///< of one depth, for a stage that connects them with the camera
     Queue<CandidateItem> candidates, weighted;
@@ -30,8 +30,8 @@ struct SplatQueues {
         q.vertices = layout.queue<VertexItem>("camera_vertices", K.connect ? 0 : n, by_path, VertexItem::lanes<F>());
         q.candidates = layout.queue<CandidateItem>("splat_candidates", K.weigh ? 0 : n, by_path);
         q.weighted = layout.queue<CandidateItem>("weighted_splats", K.occlude ? 0 : n, by_path);
-        q.splats = layout.queue<SplatItem>(
-            "splats", p.rules.splat ? uint32_t(std::min<uint64_t>(kept, 0xfffffff0u)) : 0);
+        q.splats =
+            layout.queue<SplatItem>("splats", p.rules.splat ? uint32_t(std::min<uint64_t>(kept, 0xfffffff0u)) : 0);
         return q;
     }
 };
@@ -86,17 +86,29 @@ struct LightStages {
     ConnectCameraQueue<F, typename Splats::Candidates> connect_camera;
 
     LightStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave,
-                const SubpathQueues<SubpathRay>& q, LightVertices vertices, uint32_t* last_vertex,
-                const Splats& splats, const BdptPolicy& p)
+                const SubpathQueues<SubpathRay>& q, LightVertices vertices, uint32_t* last_vertex, const Splats& splats,
+                const BdptPolicy& p)
         : connect_camera(splats.connect_camera) {
         const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
-        generate = {scene, wave, p.rules, q.rays[0], splats.candidates(), last_vertex, record(generate),
+        generate = {scene,
+                    wave,
+                    p.rules,
+                    q.rays[0],
+                    splats.candidates(),
+                    last_vertex,
+                    record(generate),
                     p.waves.light_subpaths_per_tile};
         for (int k = 0; k < 2; ++k) {
-            extend[k] = {scene,     tracer,    wave, Stream::light, q.rays[k],
-                         q.hits[k], layout.record(extend[k].kLightName)};
-            vertex[k] = {scene,    wave,        p.rules,            q.hits[k],        q.rays[1 - k],
-                         vertices, last_vertex, splats.at_vertex(), record(vertex[k])};
+            extend[k] = {scene, tracer, wave, Stream::light, q.rays[k], q.hits[k], layout.record(extend[k].kLightName)};
+            vertex[k] = {scene,
+                         wave,
+                         p.rules,
+                         q.hits[k],
+                         q.rays[1 - k],
+                         vertices,
+                         last_vertex,
+                         splats.at_vertex(),
+                         record(vertex[k])};
         }
     }
 

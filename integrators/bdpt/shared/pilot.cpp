@@ -48,8 +48,9 @@ double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, con
     return double(vertices.load()) / kPilotSubpaths;
 }
 
-#define AMBILUX_LEVEL(F) \
-    template double mean_light_vertices<F>(const SceneView&, const HostTracer&, const Rules<BidirectionalMis>&, uint64_t);
+#define AMBILUX_LEVEL(F)                                                                                        \
+    template double mean_light_vertices<F>(const SceneView&, const HostTracer&, const Rules<BidirectionalMis>&, \
+                                           uint64_t);
 AMBILUX_LEVEL(kDiffuseFeatures)
 AMBILUX_LEVEL(kUntexturedFeatures)
 AMBILUX_LEVEL(kTriangleFeatures)

@@ -50,8 +50,7 @@ BdptPolicy plan_bdpt(const Scene& scene, const RenderSettings& settings) {
     p.waves.keeps_light_vertices = true;
     p.rules.mis.heuristic = settings.heuristic;
     p.rules.mis.connections = 1.0f;
-    p.rules.mis.light_subpaths =
-        float(light_subpaths_in(film, 0, tile_count(film), p.waves.light_subpaths_per_tile));
+    p.rules.mis.light_subpaths = float(light_subpaths_in(film, 0, tile_count(film), p.waves.light_subpaths_per_tile));
     if (uint64_t(film.width) * film.height * p.waves.light_rounds() > 0xffffffffull)
         throw Error(ExitCode::usage,
                     fmt::format("light_paths={}: a film of {}x{} has more light subpaths than can be numbered "

@@ -9,7 +9,6 @@
 
 namespace ambilux {
 
-
 /// Memory of one wave. Most queues hold the most they can ever be given, since a slot has one item at a time. Of shadow
 /// rays it may have several, as many as there is capacity for.
 struct TwoSidesMemory {
@@ -30,8 +29,7 @@ struct TwoSidesMemory {
         m.eye = EyeQueues::lay_out<K, F>(layout, n.slots, n.slots, p.rules, p.waves);
         m.splats = SplatQueues::lay_out<K, F>(layout, n.slots, n.kept + p.waves.most_light_subpaths(n.slots), p);
         m.eye_vertices = layout.queue<ConnectionVertex>("eye_vertices", pairs, false, lanes);
-        m.light_vertices =
-            layout.queue<ConnectionVertex>("light_vertices", p.rules.connect ? n.kept : 0, false, lanes);
+        m.light_vertices = layout.queue<ConnectionVertex>("light_vertices", p.rules.connect ? n.kept : 0, false, lanes);
         m.pairs = layout.queue<PairItem>("pairs", pairs, by_path);
         m.deferred = layout.queue<PairItem>("deferred", p.traces_connections ? 0 : pairs, by_path);
         m.last_vertex = p.cache_draws == 0 ? layout.allocate<uint32_t>(n.slots) : nullptr;
@@ -65,9 +63,7 @@ struct TwoSidesStages {
 
     TwoSidesStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const BdptPolicy& p, const Wave& w,
                    const TwoSidesMemory& m, const FilmBuffers& film)
-        : policy(p),
-          wave(w),
-          eye(layout, scene, tracer, w, m.eye, film, p.waves),
+        : policy(p), wave(w), eye(layout, scene, tracer, w, m.eye, film, p.waves),
           splats(layout, scene, tracer, w, m.splats, film, p, m.eye.raw),
           light(layout, scene, tracer, w, m.subpaths, m.light_vertices, m.last_vertex, splats, p),
           source{m.light_vertices, m.last_vertex, p.cache_draws, p.coherent_draws} {
@@ -85,8 +81,9 @@ struct TwoSidesStages {
         const auto at_vertex = choose<K.connect>(connect, QueueVertex<F, Mis>{m.eye.vertices});
         for (int k = 0; k < 2; ++k) {
             extend[k] = {scene, tracer, wave, Stream::eye, q.rays[k], q.hits[k], record(extend[k])};
-            eye_vertex[k] = {scene,          wave,      p.rules,               q.hits[k], q.rays[1 - k],
-                             eye.emission(), at_vertex, record(eye_vertex[k]), false};
+            eye_vertex[k] = {scene,         wave,           p.rules,   q.hits[k],
+                             q.rays[1 - k], eye.emission(), at_vertex, record(eye_vertex[k]),
+                             false};
         }
         connect_vertices = {scene,
                             wave,
@@ -106,9 +103,11 @@ struct TwoSidesStages {
     }
 
     /// connect_vertices with its shadow rays.
-    auto connect_and_occlude(bool several) const requires kTracesConnections {
-        return ConnectAndOcclude<F, Tracer, typename Eye::Shadows>{connect_vertices, eye.occlude.with_atomic_add(several),
-                                                                   connect_vertices.record};
+    auto connect_and_occlude(bool several) const
+        requires kTracesConnections
+    {
+        return ConnectAndOcclude<F, Tracer, typename Eye::Shadows>{
+            connect_vertices, eye.occlude.with_atomic_add(several), connect_vertices.record};
     }
 };
 

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "integrators/bdpt/shared/light_side.h"
-#include "stages/streaming.h"
 #include "integrators/shared/eye_side.h"
+#include "stages/streaming.h"
 
 namespace ambilux {
 
@@ -26,7 +26,9 @@ struct StreamingIntegrator {
         return p;
     }
     static double pilot(Policy&, const SceneView&, const HostTracer&, uint64_t) { return 0.0; }
-    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) { return skipped_strategies(scene, p); }
+    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) {
+        return skipped_strategies(scene, p);
+    }
 
     struct Memory {
         Queue<SubpathRay> rays;
@@ -72,9 +74,7 @@ struct StreamingIntegrator {
 
         Stages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
                const Memory& m, const FilmBuffers& film)
-            : policy(p),
-              wave(w),
-              eye(layout, scene, tracer, w, m.eye, film, p.waves),
+            : policy(p), wave(w), eye(layout, scene, tracer, w, m.eye, film, p.waves),
               splats(layout, scene, tracer, w, m.splats, film, p, m.eye.raw) {
             const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
             const bool seeds = F.opacity || p.waves.cull > 0.0f;
@@ -86,7 +86,11 @@ struct StreamingIntegrator {
             eye_vertex = {pool, m.eye_hits, eye.emission(), m.eye.vertices, m.turns, record(eye_vertex)};
             turn = {pool, m.turns, splats.candidates(), record(turn)};
             light_vertex = {pool, m.light_hits, m.splats.vertices, m.pairs, record(light_vertex)};
-            connect_emitter = {scene, wave, p.rules, m.eye.vertices, {eye.candidates(), record(connect_emitter), seeds},
+            connect_emitter = {scene,
+                               wave,
+                               p.rules,
+                               m.eye.vertices,
+                               {eye.candidates(), record(connect_emitter), seeds},
                                record(connect_emitter)};
             connect_vertices = {pool, m.pairs, {}, eye.candidates(), record(connect_vertices), seeds};
         }

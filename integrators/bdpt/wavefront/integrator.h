@@ -24,8 +24,12 @@ struct WavefrontIntegrator {
     static double pilot(Policy& p, const SceneView& scene, const HostTracer& tracer, uint64_t seed) {
         return p.light_subpaths() ? mean_light_vertices<F>(scene, tracer, p.rules, seed) : 0.0;
     }
-    static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) { return Memory::lay_out<kFusion, F>(layout, p, n); }
-    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) { return skipped_strategies(scene, p); }
+    static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
+        return Memory::lay_out<kFusion, F>(layout, p, n);
+    }
+    static std::vector<std::string> skipped(const Scene& scene, const Policy& p) {
+        return skipped_strategies(scene, p);
+    }
     template <class Executor>
     static void schedule(Executor& exec, const Stages& s) {
         run_two_sides(exec, s);
