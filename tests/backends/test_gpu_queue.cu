@@ -1,4 +1,4 @@
-// libs: ambilux_backends ambilux_queues ambilux_core
+// libs: ambilux_backends ambilux_formats ambilux_accel ambilux_queues ambilux_core
 // labels: gpu
 // Queues on a device: pushes of divergent threads, warp by warp; lists of places.
 #include <algorithm>
