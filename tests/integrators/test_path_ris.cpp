@@ -22,20 +22,20 @@ RenderSettings ris_settings(const Scene& scene, const char* candidates, uint64_t
 std::string many_lights() {
     std::string xml =
         "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='2'/></integrator>"
-        "<sensor type='perspective'><float name='fov' value='60'/><transform name='to_world'><lookat origin='0,6,5' "
-        "target='0,0,2' up='0,0,1'/></transform><film type='hdrfilm'><integer name='width' value='32'/>"
+        "<sensor type='perspective'><float name='fov' value='60'/><transform name='to_world'><lookat origin='0,9,4' "
+        "target='0,4,0' up='0,0,1'/></transform><film type='hdrfilm'><integer name='width' value='32'/>"
         "<integer name='height' value='24'/><rfilter type='box'/></film></sensor>"
         "<shape type='rectangle'><transform name='to_world'><scale value='20'/></transform></shape>"
         "<shape type='rectangle'><transform name='to_world'><scale value='20'/><rotate x='1' angle='90'/>"
         "<translate y='-1'/></transform></shape>";
     for (int i = 0; i < 400; ++i) {
-        const double x = -9.5 + i % 20, row = i / 20, y = row < 10 ? row : -2.0 - (row - 10);
+        const double x = -9.5 + i % 20, row = i / 20, y = row < 10 ? row : -3.0 - (row - 10);
         const int k = i * 37 % 101;
         xml += fmt::format(
             "<shape type='rectangle'><transform name='to_world'><scale value='{}'/><rotate x='1' angle='180'/>"
             "<translate x='{}' y='{}' z='{}'/></transform><emitter type='area'><rgb name='radiance' value='{}'/>"
             "</emitter></shape>",
-            0.03 + 0.05 * (k % 7) / 7.0, x, y, 0.6 + 0.8 * (k % 5) / 5.0, 2.0 + k);
+            0.03 + 0.05 * (k % 7) / 7.0, x, y, 1.5 + 0.8 * (k % 5) / 5.0, 2.0 + k);
     }
     return xml + "</scene>";
 }
