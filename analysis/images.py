@@ -47,7 +47,7 @@ def tone_map(image, factor):
 
 
 def relative_error(image, reference):
-    """|x - r| / (|r| + 0.01), the summand of MAPE (design.md, section 5), averaged over the channels. Shape (height, width)."""
+    """|x - r| / (|r| + 0.01), the summand of MAPE (film/metrics.h), averaged over the channels. Shape (height, width)."""
     return (np.abs(image - reference) / (np.abs(reference) + 0.01)).mean(axis=2)
 
 

@@ -1,5 +1,5 @@
 // The `ambilux` program: reads the command line, runs one command, turns errors into messages and exit codes
-// (design.md, section 5).
+// (README.md).
 #include <fmt/format.h>
 
 #include <new>
@@ -28,8 +28,8 @@ int main(int argc, char** argv) {
     add_help(app, run);
     const auto named = [&](CLI::App* command) { return argc > 1 && command->check_name(argv[1]); };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(named).empty()) {
-        log_error(fmt::format("unknown command '{}': render, info, reference, compare, experiment, bench and help are known",
-                              argv[1]));
+        log_error(fmt::format(
+            "unknown command '{}': render, info, reference, compare, experiment, bench and help are known", argv[1]));
         return int(ExitCode::usage);
     }
     try {

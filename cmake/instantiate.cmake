@@ -18,10 +18,12 @@ function(instantiate target table)
       string(APPEND headers_${UNIT}_${level} "#include \"integrators/${FOLDER}/integrator.h\"\n")
       string(APPEND variants_${UNIT}_${level} "#include \"integrators/${FOLDER}/variant.h\"\n")
       string(APPEND traits_${UNIT}_${level}
-        "struct ${NAME}Variant;\ntemplate <>\nstruct IntegratorOf<${NAME}Variant> {\n    template <Features F, class Tracer, Fusion K>\n"
+        "struct ${NAME}Variant;\ntemplate <>\nstruct IntegratorOf<${NAME}Variant> {\n"
+        "    template <Features F, class Tracer, Fusion K>\n"
         "    using Type = ${NAME}Integrator<F, Tracer, K>;\n};\n")
       foreach(backend cpu cuda)
-        string(APPEND ${backend}_${UNIT}_${level} "template std::unique_ptr<Renderer> make_on_${backend}<${NAME}Variant, "
+        string(APPEND ${backend}_${UNIT}_${level}
+          "template std::unique_ptr<Renderer> make_on_${backend}<${NAME}Variant, "
           "k${level}Features>(const Scene&, const RenderSettings&, SharedAccels&);\n")
       endforeach()
     endforeach()

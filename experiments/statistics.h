@@ -1,4 +1,4 @@
-// What a render did, as JSON and as image attributes (design.md, section 5).
+// What a render did, as JSON and as image attributes.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// Error of an image against a reference (design.md, section 5).
+// Error of an image against a reference.
 #pragma once
 
 #include <nlohmann/json.hpp>

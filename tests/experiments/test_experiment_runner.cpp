@@ -171,7 +171,7 @@ TEST_CASE("a reference shares no random numbers with a render of the same seed")
     CHECK(m.rmse_corrected == Approx(m.reference_noise).epsilon(0.25));
 }
 
-TEST_CASE("an experiment leaves what design.md describes") {
+TEST_CASE("an experiment leaves the files that docs/experiments.md lists") {
     const TempFolder folder;
     write_inputs(folder);
     World world;
