@@ -10,6 +10,7 @@
 #include "experiments/reference.h"
 #include "experiments/statistics.h"
 #include "film/png_io.h"
+#include "integrators/setting.h"
 
 namespace ambilux {
 namespace {
@@ -27,10 +28,10 @@ int reference(const Options& o) {
     request.path = o.output;
     request.spp = o.spp;
     request.settings = o.render.settings(loaded.scene);
-    const RenderSettings defaults;
-    if (request.settings.integrator != defaults.integrator || request.settings.estimator != defaults.estimator)
-        throw Error(ExitCode::usage,
-                    "a reference is always made by integrator path, estimator mis: leave these settings out");
+    for (const char* key : {"integrator", "variant", "estimator"})
+        if (!find_general_setting(key)->is_default(request.settings))
+            throw Error(ExitCode::usage,
+                        "a reference is always made by integrator path, estimator mis: leave these settings out");
     request.interrupt = interrupt_flag();
 
     ReferenceResult result;

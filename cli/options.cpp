@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/progress.h"
 #include "formats/load.h"
+#include "integrators/registry.h"
 
 namespace ambilux {
 
@@ -18,6 +19,12 @@ std::pair<std::string, std::string> split_assignment(const std::string& text, co
     if (at == 0 || at == std::string::npos)
         throw Error(ExitCode::usage, fmt::format("{} {}: write it as {} NAME=VALUE", option, text, option));
     return {text.substr(0, at), text.substr(at + 1)};
+}
+
+/// What a setting is, and its values.
+static std::string help_of(const std::string& key) {
+    const Setting& s = *find_general_setting(key);
+    return fmt::format("{}: {}", s.what.help, s.what.allowed);
 }
 
 void SceneOptions::add_to(CLI::App& command) {
@@ -54,16 +61,14 @@ LoadOptions SceneOptions::load_options() const {
 
 void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
     if (!fixed_integrator) {
-        command.add_option("-i,--integrator", integrator, "path, light or bdpt")->capture_default_str();
-        command.add_option("--variant", variant, "Schedule of the same estimator")->capture_default_str();
+        command.add_option("-i,--integrator", integrator, help_of("integrator"))->capture_default_str();
+        command.add_option("--variant", variant, help_of("variant"))->capture_default_str();
     }
-    command.add_option("--backend", backend, "auto, cpu or cuda; auto takes a CUDA device if there is one")
-        ->capture_default_str();
-    command.add_option("--seed", seed, "Seed of all random numbers")->capture_default_str();
-    command.add_option("--max-depth", max_depth,
-                       "Longest path in segments (2: direct light); -1: no limit. Default: the scene's");
-    command.add_flag("--deterministic", deterministic, "Same bits in every run on the same backend");
-    command.add_option("--set", set, "KEY=VALUE: any other setting, such as estimator=nee or rr_depth=-1")
+    command.add_option("--backend", backend, help_of("backend"))->capture_default_str();
+    command.add_option("--seed", seed, help_of("seed"))->capture_default_str();
+    command.add_option("--max-depth", max_depth, help_of("max_depth"));
+    command.add_flag("--deterministic", deterministic, help_of("deterministic"));
+    command.add_option("--set", set, "KEY=VALUE: any setting of `ambilux help settings`, such as estimator=nee")
         ->allow_extra_args(false);
 }
 

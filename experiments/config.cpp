@@ -3,11 +3,11 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <sstream>
 
 #include "core/atomic_file.h"
 #include "experiments/sweep.h"
 #include "experiments/toml_reader.h"
+#include "integrators/registry.h"
 
 namespace ambilux {
 namespace {
@@ -19,19 +19,25 @@ using Names = std::set<std::string>;
 
 /// Adds a setting of a run, unless it belongs elsewhere.
 void add_setting(const Reader& r, RunEntry& run, const std::string& key, const toml::node& value) {
-    if (key == "seed" || key == "max_depth")
-        throw r.error(
-            value, fmt::format("'{}' belongs to the experiment (seeds) or to a scene (max_depth), not to a run", key));
-    if (key == "technique_depth") throw r.error(value, "'technique_depth' is the key 'techniques' of a run");
+    if (const Setting* s = find_general_setting(key); s && s->place == InExperiment::experiment)
+        throw r.error(value, fmt::format("'{}' belongs to {}, not to the settings of a run", key, s->place_text));
     for (const auto& [taken, text] : run.settings)
         if (taken == key) throw r.error(value, fmt::format("'{}' of run '{}' is set twice", key, run.name));
     run.settings.emplace_back(key, r.plain(value, key));
     run.lines.push_back(Reader::line_of(value));
 }
 
-/// integrator, variant, estimator and set, as runs and references have them.
+/// Settings that are keys of a run: integrator, variant and estimator.
+std::vector<std::string> keys_of_runs() {
+    std::vector<std::string> keys;
+    for (const Setting& s : general_settings())
+        if (s.place == InExperiment::run_key) keys.push_back(s.what.key);
+    return keys;
+}
+
+/// They and `set`, as runs and references have them.
 void add_settings(const Reader& r, RunEntry& run, const toml::table& t) {
-    for (const char* key : {"integrator", "variant", "estimator"})
+    for (const std::string& key : keys_of_runs())
         if (const toml::node* value = t.get(key)) add_setting(r, run, key, *value);
     if (const toml::node* set = t.get("set"))
         for (const auto& [key, value] : r.table(*set, "set")) add_setting(r, run, std::string(key.str()), value);
@@ -47,16 +53,16 @@ ReferenceEntry read_reference(const Reader& r, const toml::table& t, const std::
     reference.how.line = Reader::line_of(t);
     const std::string integrator = r.text(r.need(t, "integrator", where), "integrator");
     // Light tracing does not see what mirrors show to the camera: it is no ground truth.
-    if (integrator != "path" && integrator != "bdpt")
-        throw r.error(
-            *t.get("integrator"),
-            fmt::format("integrator '{}': a reference is made by path or bdpt, which find all light", integrator));
+    if (!makes_references(integrator))
+        throw r.error(*t.get("integrator"),
+                      fmt::format("integrator '{}': a reference is made by {}, which find all light", integrator,
+                                  fmt::join(reference_integrators(), " or ")));
     add_settings(r, reference.how, t);
     for (size_t i = 0; i < reference.how.settings.size(); ++i)
-        for (const char* key : {"estimator", "strategies", "bdpt.auto"})
-            if (reference.how.settings[i].first == key)
-                throw input_error(r.file, reference.how.lines[i],
-                                  fmt::format("'{}' in {}: a reference uses all that its integrator has", key, where));
+        if (const Setting* s = find_general_setting(reference.how.settings[i].first); s && s->partial)
+            throw input_error(
+                r.file, reference.how.lines[i],
+                fmt::format("'{}' in {}: a reference uses all that its integrator has", s->what.key, where));
     return reference;
 }
 
@@ -170,7 +176,10 @@ RunEntry swept(const Reader& r, RunEntry run, const std::vector<SweepValue>& val
 }
 
 std::vector<RunEntry> read_run(const Reader& r, const toml::table& t, Names& names) {
-    r.check_keys(t, "[[run]]", {"name", "integrator", "variant", "estimator", "set", "sweep", "techniques"});
+    std::vector<std::string> keys = keys_of_runs();
+    keys.insert(keys.begin(), "name");
+    keys.insert(keys.end(), {"set", "sweep", "techniques"});
+    r.check_keys(t, "[[run]]", keys);
     RunEntry run;
     run.line = Reader::line_of(t);
     run.name = run.base = r.name(t, "[[run]]");
@@ -296,8 +305,12 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
         root.contains("name") ? r.name(root, "the configuration") : std::filesystem::path(path).stem().string();
     if (const toml::node* backend = root.get("backend")) {
         config.backend = r.text(*backend, "backend");
-        if (config.backend != "auto" && config.backend != "cpu" && config.backend != "cuda")
-            throw r.error(*backend, fmt::format("backend '{}': auto, cpu and cuda are known", config.backend));
+        try {
+            RenderSettings parsed;
+            apply_setting(parsed, "backend", config.backend);
+        } catch (const Error& e) {
+            throw r.error(*backend, e.what());
+        }
     }
     read_seeds(r, need("seeds"), config);
     const toml::table& reference = r.table(need("reference"), "reference");
@@ -340,57 +353,6 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     if (const toml::node* ablation = root.get("ablation"))
         read_ablation(r, r.table(*ablation, "ablation"), config, run_names);
     return config;
-}
-
-std::string resolved_toml(const ExperimentConfig& config) {
-    const auto table_of = [](const Settings& pairs) {
-        toml::table t;
-        for (const auto& [key, value] : pairs) t.insert_or_assign(key, value);
-        return t;
-    };
-    const auto insert_settings = [](toml::table& t, const RunEntry& run) {
-        toml::table set;
-        for (const auto& [key, value] : run.settings)
-            (key == "integrator" || key == "variant" || key == "estimator" ? t : set).insert_or_assign(key, value);
-        if (!set.empty()) t.insert("set", set);
-    };
-    toml::table root;
-    root.insert("name", config.name);
-    root.insert("backend", config.backend);
-    toml::array seeds, scenes, runs, spp, seconds;
-    for (const uint64_t seed : config.seeds) seeds.push_back(int64_t(seed));
-    root.insert("seeds", seeds);
-    // What a scene replaces of this stands with the scene, so that all scenes state theirs in full.
-    root.insert("reference", toml::table{{"spp", int64_t(config.scenes[0].reference.spp)},
-                                         {"seed", int64_t(config.reference_seed)}});
-    for (const uint64_t samples : config.spp) spp.push_back(int64_t(samples));
-    for (const double time : config.seconds) seconds.push_back(time);
-    toml::table budget;
-    if (!spp.empty()) budget.insert("spp", spp);
-    if (!seconds.empty()) budget.insert("seconds", seconds);
-    root.insert("budget", budget);
-    if (!config.ablation_default.empty()) root.insert("ablation", toml::table{{"default", config.ablation_default}});
-    for (const SceneEntry& s : config.scenes) {
-        toml::table reference{{"spp", int64_t(s.reference.spp)}};
-        insert_settings(reference, s.reference.how);
-        toml::table t{{"name", s.name}, {"path", s.path}, {"reference", reference}};
-        if (s.width) t.insert("size", toml::array{int64_t(s.width), int64_t(s.height)});
-        if (s.max_depth) t.insert("max_depth", int64_t(*s.max_depth));
-        if (s.lenient) t.insert("lenient", true);
-        if (!s.parameters.empty()) t.insert("parameters", table_of(s.parameters));
-        scenes.push_back(t);
-    }
-    root.insert("scene", scenes);
-    for (const RunEntry& run : config.runs) {
-        toml::table t{{"name", run.name}};
-        insert_settings(t, run);
-        if (run.techniques) t.insert("techniques", int64_t(run.techniques));
-        runs.push_back(t);
-    }
-    root.insert("run", runs);
-    std::ostringstream out;
-    out << root << "\n";
-    return out.str();
 }
 
 }  // namespace ambilux

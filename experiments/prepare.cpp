@@ -84,7 +84,7 @@ Prepared prepare_experiment(const std::string& path, bool reduced, const Hooks& 
     for (const RunEntry& run : p.config.runs) settings_for(p.config, {}, run, 0, hooks);
     for (const SceneEntry& entry : p.config.scenes) p.scenes.push_back(load_entry(p.config, entry, hooks));
     for (const LoadedEntry& scene : p.scenes) {
-        std::set<std::tuple<std::string, std::string, std::string>> tried;
+        std::set<std::tuple<std::string, std::string, Backend>> tried;
         for (const RunEntry& run : p.config.runs) {
             const RenderSettings settings = settings_for(p.config, scene, run, 0, hooks);
             if (&scene != &p.scenes[0] &&

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "experiments/state.h"
 #include "experiments/statistics.h"
+#include "integrators/registry.h"
 
 namespace ambilux {
 namespace {
@@ -52,11 +53,14 @@ ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& reque
     if (request.spp < 2)
         throw Error(ExitCode::usage, "a reference needs at least 2 samples per pixel: one has no standard error");
     RenderSettings settings = request.settings;
-    if (settings.estimator != Estimator::mis || settings.strategies != kAllStrategies || settings.singles.on ||
-        (settings.integrator != "path" && settings.integrator != "bdpt"))
-        throw Error(
-            ExitCode::usage,
-            "a reference is made by integrator path or bdpt with all that it has (estimator mis, all strategies)");
+    const auto& all = general_settings();
+    const bool partial =
+        std::any_of(all.begin(), all.end(), [&](const Setting& s) { return s.partial && !s.is_default(settings); });
+    if (partial || !makes_references(settings.integrator))
+        throw Error(ExitCode::usage,
+                    fmt::format("a reference is made by integrator {} with all that it has (estimator mis, all "
+                                "strategies)",
+                                fmt::join(reference_integrators(), " or ")));
     settings.seed = reference_seed(request.settings.seed);
 
     const auto attributes_of = [&](const RenderStats& stats, double seconds) {

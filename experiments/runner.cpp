@@ -411,7 +411,7 @@ private:
         r.budget = checkpoints_[k].samples ? "spp" : "seconds";
         r.integrator = settings.integrator;
         r.variant = settings.variant;
-        r.estimator = estimator_name(settings.estimator);
+        r.estimator = setting_text(settings, "estimator");
         r.backend = total.backend;
         r.spp = state.moments.samples;
         r.time = state.notes["seconds"].get<double>();

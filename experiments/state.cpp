@@ -9,7 +9,7 @@
 namespace ambilux {
 namespace {
 
-constexpr char kMagic[] = "ambilux state 2\n";
+constexpr char kMagic[] = "ambilux state 3\n";
 
 /// FNV-1a, 64 bits: against truncation and bit rot, not against people.
 uint64_t checksum(std::string_view bytes) {

@@ -5,12 +5,17 @@
 #include <cmath>
 
 #include "core/version.h"
+#include "integrators/registry.h"
 
 namespace ambilux {
 namespace {
 
 nlohmann::json invalid_json(const InvalidCounts& invalid) {
     return {{"nan", invalid.nan}, {"inf", invalid.inf}, {"negative", invalid.negative}};
+}
+
+nlohmann::json to_json(const SettingValue& value) {
+    return std::visit([](const auto& v) { return nlohmann::json(v); }, value);
 }
 
 /// Null where nothing was chosen.
@@ -48,33 +53,27 @@ std::string scene_hash(const Scene& scene) {
     return hex;
 }
 
-const char* estimator_name(Estimator estimator) {
-    constexpr const char* kNames[] = {"naive", "nee", "mis"};
-    return kNames[uint32_t(estimator)];
+RenderSettings used_settings(const RenderSettings& asked, const RenderStats& stats) {
+    RenderSettings used = asked;
+    if (!stats.choice.name.empty()) used.automatic = false;
+    for (const auto& [key, value] : stats.choice.settings) apply_setting(used, key, value);
+    // What was left open is what the renderer made of it.
+    for (const Setting& s : general_settings())
+        if (s.text(used) == "auto") s.what.set(used, s.text(stats.settings));
+    return used;
 }
 
-const char* fuse_name(Fuse fuse) {
-    const char* names[] = {"auto", "none"};
-    return names[size_t(fuse)];
-}
-
-const char* draws_name(CacheDraws draws) {
-    const char* names[] = {"auto", "coherent", "independent"};
-    return names[size_t(draws)];
-}
-
-const char* heuristic_name(MisHeuristic heuristic) { return Heuristics::kNames[uint32_t(heuristic)]; }
-
-/// The settings that the estimator ran with: bdpt.auto replaces some of those asked for.
-RenderSettings used_settings(const RenderSettings& asked, const SelectionStats& choice) {
-    RenderSettings settings = asked;
-    for (const auto& [key, value] : choice.settings) apply_setting(settings, key, value);
-    return settings;
+nlohmann::json settings_json(const RenderSettings& settings) {
+    nlohmann::json json = nlohmann::json::object();
+    for (const Setting& s : general_settings())
+        json[s.what.key] = to_json(s.shown ? s.shown(settings) : s.what.get(settings));
+    if (const Variant* v = find_variant(settings.integrator, settings.variant))
+        for (const Setting& s : v->own) json[s.what.key] = to_json(s.what.get(settings));
+    return json;
 }
 
 nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const RenderStats& stats,
                           double load_seconds) {
-    const RenderSettings settings = used_settings(asked, stats.choice);
     nlohmann::json stages = nlohmann::json::array(), queues = nlohmann::json::array();
     for (const StageStats& s : stats.stages)
         stages.push_back({{"name", s.name},
@@ -88,71 +87,53 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const
     invalid["by_stage"] = nlohmann::json::object();
     for (const auto& [stage, counts] : stats.invalid_by_stage) invalid["by_stage"][stage] = invalid_json(counts);
     const double rays = double(stats.rays_extend) + double(stats.rays_occlude);
-    return {{"scene", scene.path},
-            {"scene_hash", scene_hash(scene)},
-            {"warnings", scene.warnings},
-            {"integrator", settings.integrator},
-            {"variant", settings.variant},
-            {"estimator", estimator_name(settings.estimator)},
-            {"heuristic", heuristic_name(settings.heuristic)},
-            {"backend", stats.backend},
-            {"device", stats.device},
-            {"accel", stats.accel},
-            {"seed", settings.seed},
-            {"size", {scene.sensor.crop_width, scene.sensor.crop_height}},
-            {"spp", stats.samples},
-            {"max_depth", settings.max_depth},
-            {"rr_depth", settings.rr_depth},
-            {"strategies", strategies_text(settings)},
-            {"connections", settings.connections},
-            {"light_paths", double(settings.light_subpaths_per_tile) / kTilePixels},
-            {"deterministic", settings.deterministic},
-            {"specialise", settings.specialise},
-            {"fuse", fuse_name(settings.fuse)},
-            {"draws", draws_name(stats.settings.draws)},
-            {"cull", settings.cull},
-            {"tail", settings.tail},
-            {"compaction", compaction_name(settings.queues.compaction)},
-            {"ordering", ordering_name(stats.settings.queues.ordering)},
-            {"seconds", {{"load", load_seconds}, {"build", stats.build_seconds}, {"render", stats.render_seconds}}},
-            {"rays", {{"extend", stats.rays_extend}, {"occlude", stats.rays_occlude}}},
-            {"rays_per_second", stats.render_seconds > 0 ? rays / stats.render_seconds : 0.0},
-            {"stages", stages},
-            {"queues", queues},
-            {"invalid", invalid},
-            {"memory_bytes", stats.memory_bytes},
-            {"memory_bytes_predicted", stats.memory_bytes_predicted},
-            {"features", stats.features},
-            {"skipped", stats.skipped},
-            {"choice", choice_json(stats.choice)},
-            {"version", version()},
-            {"git_revision", git_revision()}};
+    nlohmann::json json = settings_json(used_settings(asked, stats));
+    json.update(
+        {{"asked", settings_json(asked)},
+         {"scene", scene.path},
+         {"scene_hash", scene_hash(scene)},
+         {"warnings", scene.warnings},
+         {"backend", stats.backend},
+         {"device", stats.device},
+         {"accel", stats.accel},
+         {"size", {scene.sensor.crop_width, scene.sensor.crop_height}},
+         {"spp", stats.samples},
+         {"seconds", {{"load", load_seconds}, {"build", stats.build_seconds}, {"render", stats.render_seconds}}},
+         {"rays", {{"extend", stats.rays_extend}, {"occlude", stats.rays_occlude}}},
+         {"rays_per_second", stats.render_seconds > 0 ? rays / stats.render_seconds : 0.0},
+         {"stages", stages},
+         {"queues", queues},
+         {"invalid", invalid},
+         {"memory_bytes", stats.memory_bytes},
+         {"memory_bytes_predicted", stats.memory_bytes_predicted},
+         {"features", stats.features},
+         {"skipped", stats.skipped},
+         {"choice", choice_json(stats.choice)},
+         {"version", version()},
+         {"git_revision", git_revision()}});
+    return json;
 }
 
 Attributes image_attributes(const Scene& scene, const RenderSettings& asked, const RenderStats& stats) {
-    const RenderSettings settings = used_settings(asked, stats.choice);
     Attributes attributes = {{"scene", scene.path},
                              {"scene_hash", scene_hash(scene)},
-                             {"integrator", settings.integrator},
-                             {"variant", settings.variant},
                              {"spp", stats.samples},
-                             {"seed", settings.seed},
-                             {"max_depth", settings.max_depth},
-                             {"rr_depth", settings.rr_depth},
                              {"backend", stats.backend},
                              {"device", stats.device},
                              {"seconds", stats.render_seconds},
                              {"software", fmt::format("ambilux {}", version())},
                              {"git_revision", git_revision()}};
-    if (settings.integrator == "path") attributes["estimator"] = estimator_name(settings.estimator);
-    attributes["heuristic"] = heuristic_name(settings.heuristic);
-    if (!stats.choice.name.empty()) {
-        attributes["choice"] = choice_line(stats.choice);
-    } else if (settings.integrator != "path") {
-        attributes["strategies"] = strategies_text(settings);
-        attributes["light_paths"] = double(settings.light_subpaths_per_tile) / kTilePixels;
-        if (settings.variant == "lvc") attributes["connections"] = settings.connections;
-    }
+    const RenderSettings settings = used_settings(asked, stats);
+    const Variant* const variant = find_variant(settings.integrator, settings.variant);
+    const VariantTraits traits = variant ? variant->traits : VariantTraits{};
+    const auto add = [&](const Setting& s) {
+        if (s.in_images && s.applies_to(traits, settings.backend == Backend::cuda))
+            attributes[s.what.key] = to_json(s.what.get(settings));
+    };
+    for (const Setting& s : general_settings()) add(s);
+    if (variant)
+        for (const Setting& s : variant->own) add(s);
+    if (!stats.choice.name.empty()) attributes["choice"] = choice_line(stats.choice);
     return attributes;
 }
 

@@ -12,11 +12,15 @@ namespace ambilux {
 /// SHA-256 of the scene's content as 64 hexadecimal digits.
 std::string scene_hash(const Scene& scene);
 
-const char* estimator_name(Estimator estimator);
-const char* heuristic_name(MisHeuristic heuristic);
+/// The settings that a render ran with: bdpt.auto replaces some of those asked for, the renderer those left open.
+RenderSettings used_settings(const RenderSettings& asked, const RenderStats& stats);
 
-/// The statistics of a render: scene, integrator, variant, estimator, backend, device, seed, size, spp, seconds {load,
-/// build, render}, rays {extend, occlude}, stages, queues, invalid, memory_bytes, features, skipped, version and more.
+/// All settings by key (integrators/settings.cpp), and those of the variant's own.
+nlohmann::json settings_json(const RenderSettings& settings);
+
+/// The statistics of a render: the settings as used and, under `asked`, as asked for; scene, backend, device, size,
+/// spp, seconds {load, build, render}, rays {extend, occlude}, stages, queues, invalid, memory_bytes, features,
+/// skipped, version and more.
 nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
                           double load_seconds);
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "integrators/setting.h"
+
 namespace ambilux {
 namespace {
 
@@ -29,6 +31,13 @@ void add(InvalidCounts& total, const InvalidCounts& before, const InvalidCounts&
 nlohmann::json save(const InvalidCounts& c) { return {c.nan, c.inf, c.negative}; }
 InvalidCounts restore(const nlohmann::json& j) {
     return {j.at(0).get<uint64_t>(), j.at(1).get<uint64_t>(), j.at(2).get<uint64_t>()};
+}
+
+nlohmann::json save(const RenderSettings& settings) {
+    nlohmann::json pairs = nlohmann::json::array();
+    for (const Setting& s : general_settings()) pairs.push_back({s.what.key, s.text(settings)});
+    for (const auto& [key, value] : settings.own) pairs.push_back({key, value});
+    return pairs;
 }
 
 nlohmann::json save(const SelectionStats& c) {
@@ -103,6 +112,7 @@ nlohmann::json save_stats(const RenderStats& s) {
     return {{"backend", s.backend},
             {"device", s.device},
             {"accel", s.accel},
+            {"settings", save(s.settings)},
             {"build_seconds", s.build_seconds},
             {"render_seconds", s.render_seconds},
             {"samples", s.samples},
@@ -122,6 +132,7 @@ RenderStats restore_stats(const nlohmann::json& j) {
     s.backend = j.at("backend");
     s.device = j.at("device");
     s.accel = j.at("accel");
+    for (const auto& setting : j.at("settings")) apply_setting(s.settings, setting.at(0), setting.at(1));
     s.build_seconds = j.at("build_seconds");
     s.render_seconds = j.at("render_seconds");
     s.samples = j.at("samples");

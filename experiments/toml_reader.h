@@ -21,8 +21,7 @@ struct TomlReader {
         return input_error(file, line_of(node), message);
     }
 
-    void check_keys(const toml::table& table, const std::string& where,
-                    std::initializer_list<std::string_view> known) const {
+    void check_keys(const toml::table& table, const std::string& where, const std::vector<std::string>& known) const {
         for (const auto& [key, node] : table)
             if (std::find(known.begin(), known.end(), key.str()) == known.end())
                 throw input_error(

@@ -1,45 +1,59 @@
-// All integrators and variants by name: the only place that knows them.
+// All variants of integrators. Each has a folder; integrators/registry.list has a line for each, from which CMake makes
+// the list behind variants() and the renderers.
 #pragma once
 
 #include <string>
+#include <vector>
+
+#include "integrators/setting.h"
 
 namespace ambilux {
 
-struct PathFamily;
-struct BdptFamily;
+/// A variant of an integrator.
+struct Variant {
+    std::string integrator, variant;
+    VariantTraits traits;
+    std::string help;          ///< one sentence
+    std::vector<Setting> own;  ///< settings that only this variant has
 
-/// A variant of an integrator, and which settings have an effect on it.
-struct VariantInfo {
-    const char *integrator, *variant;
-    bool bidirectional;    ///< has strategies (s,t); otherwise estimators
-    bool draws;            ///< draws light vertices from a cache
-    bool strategy_images;  ///< gathers images of single strategies
-    bool sorts, compacts;  ///< has queues that can be sorted; whose items can lie by path
-    bool repeats;          ///< on a device too, bits repeat with deterministic=true
-    bool binary_bvh;       ///< has kernels for accel=bvh2
+    std::string name() const { return integrator + " " + variant; }
+    /// Null if it declares no setting of this key.
+    const Setting* find_own(const std::string& key) const;
 };
 
-constexpr VariantInfo kVariants[] = {
-    {"path", "wavefront", false, false, false, true, true, true, true},
-    {"light", "wavefront", true, false, true, true, true, true, false},
-    {"bdpt", "wavefront", true, false, true, true, true, true, false},
-    {"bdpt", "lvc", true, true, true, true, true, false, false},
-    {"bdpt", "streaming", true, false, true, true, false, true, false},
-    {"bdpt", "megakernel", true, false, false, false, false, true, false},
-};
+/// What `Description` (a folder's variant.h) says of itself.
+template <class Description>
+Variant describe(std::string integrator, std::string variant) {
+    Variant v = {std::move(integrator), std::move(variant), Description::kTraits, Description::kHelp, {}};
+    if constexpr (requires { Description::settings(); })
+        for (const auto& declaration : Description::settings()) v.own.push_back(own_setting(declaration));
+    return v;
+}
+
+/// In the order of integrators/registry.list.
+const std::vector<Variant>& variants();
+
+/// Names, each once.
+std::vector<std::string> integrator_names();
+std::vector<std::string> variant_names();
+
+/// Those that find all light, as ground truth must.
+std::vector<std::string> reference_integrators();
+bool makes_references(const std::string& integrator);
 
 /// Null if there is none of this name.
-constexpr const VariantInfo* find_variant(const std::string& integrator, const std::string& variant) {
-    for (const VariantInfo& v : kVariants)
-        if (integrator == v.integrator && variant == v.variant) return &v;
-    return nullptr;
-}
+const Variant* find_variant(const std::string& integrator, const std::string& variant);
+/// The variant that `settings` name. Throws Error(usage).
+const Variant& variant_of(const RenderSettings& settings);
 
-/// f.template operator()<Family>() with what holds the variants of an integrator (integrators/NAME/variants.h).
-template <class Function>
-auto with_family(const std::string& integrator, Function f) {
-    if (integrator == "path") return f.template operator()<PathFamily>();
-    return f.template operator()<BdptFamily>();
-}
+/// Where a setting has an effect: "everywhere", or which variants on which backend.
+std::string applies_text(Applies applies);
+
+/// Throws Error(usage) that names the first setting, or value, without an effect on `variant`: whoever sets it expects
+/// one.
+void check_settings(const RenderSettings& settings, const Variant& variant, bool cuda);
+
+/// The setting strategies in statistics: of variants that have none to choose from, what they sample.
+SettingValue shown_strategies(const RenderSettings& settings);
 
 }  // namespace ambilux

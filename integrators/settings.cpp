@@ -1,205 +1,238 @@
-#include <fmt/format.h>
+#include "integrators/settings.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <optional>
-#include <vector>
 
 #include "core/error.h"
 #include "film/strategy_film.h"
-#include "integrators/settings.h"
+#include "integrators/registry.h"
+#include "integrators/strategies_setting.h"
 
 namespace ambilux {
 namespace {
 
-[[noreturn]] void refuse(const std::string& key, const std::string& value, const std::string& allowed) {
-    throw Error(ExitCode::usage, fmt::format("{}={}: {}", key, value, allowed));
+using Of = Declare<RenderSettings>;
+using S = RenderSettings;
+
+/// A name of integrators or variants; `field` keeps it.
+Declaration<S> name_of(std::string key, std::string S::* field, std::vector<std::string> names, std::string help) {
+    return {key, fmt::format("{}", fmt::join(names, ", ")), std::move(help),
+            [=](S& s, const std::string& value) { s.*field = names[parse_choice(key, value, names)]; },
+            [=](const S& s) -> SettingValue { return s.*field; }};
 }
 
-/// Index of `value` among `names`.
-size_t choose(const std::string& key, const std::string& value, const std::vector<std::string>& names) {
-    const auto at = std::find(names.begin(), names.end(), value);
-    if (at == names.end()) refuse(key, value, fmt::format("allowed are {}", fmt::join(names, ", ")));
-    return size_t(at - names.begin());
-}
-
-template <class Integer>
-Integer integer(const std::string& key, const std::string& value, Integer lowest, Integer highest) {
-    Integer result{};
-    const char* end = value.data() + value.size();
-    const auto parsed = std::from_chars(value.data(), end, result);
-    if (parsed.ec != std::errc() || parsed.ptr != end || result < lowest || result > highest)
-        refuse(key, value, fmt::format("an integer from {} to {} is needed", lowest, highest));
-    return result;
-}
-
-/// Groups of strategies, in the order of StrategyBits.
-const std::vector<std::string> kStrategyGroups = {"hits", "next_event", "connections", "light"};
-
-/// The strategy that "s2t3" names, if that is how `name` is built.
-std::optional<Strategy> single_strategy(const std::string& name) {
-    const char *at = name.data(), *end = at + name.size();
-    const auto number = [&](char letter, uint32_t& n) {
-        if (at == end || *at != letter) return false;
-        const auto parsed = std::from_chars(at + 1, end, n);
-        at = parsed.ptr;
-        return parsed.ec == std::errc() && n <= SingleStrategies::kMaxSegments + 1;
-    };
-    uint32_t s = 0, t = 0;
-    if (!number('s', s) || !number('t', t) || at != end) return {};
-    return Strategy::make(s, t);
-}
-
-/// The group that samples a strategy.
-uint32_t group_of(Strategy strategy) {
-    if (strategy.s() == 0) return kHitStrategies;
-    if (strategy.t() == 1) return kLightStrategies;
-    return strategy.s() == 1 ? kNextEventStrategies : kConnectionStrategies;
-}
-
-/// Names joined by '+': groups, such as "hits+next_event", or single strategies, such as "s1t2+s2t2".
-void set_strategies(RenderSettings& settings, const std::string& key, const std::string& value) {
-    if (value == "all") {
-        settings.strategies = kAllStrategies;
-        settings.singles = {};
-        return;
-    }
-    uint32_t bits = 0;
-    SingleStrategies singles;
-    std::fill(std::begin(singles.s), std::end(singles.s), SingleStrategies::kNone);
-    bool groups = false;
-    for (size_t start = 0; start <= value.size();) {
-        const size_t end = std::min(value.find('+', start), value.size());
-        const std::string name = value.substr(start, end - start);
-        start = end + 1;
-        if (const auto strategy = single_strategy(name)) {
-            const uint32_t s = strategy->s(), t = strategy->t();
-            if (t == 0 || s + t < 2 || strategy->segments() > SingleStrategies::kMaxSegments)
-                refuse(key, value,
-                       fmt::format("'{}': t is at least 1, and s + t from 2 to {}", name,
-                                   SingleStrategies::kMaxSegments + 1));
-            uint8_t& slot = singles.s[strategy->segments()];
-            if (slot != SingleStrategies::kNone && slot != s)
-                refuse(key, value,
-                       fmt::format("'{}' and 's{}t{}' sample the same paths; single strategies have weight 1, so only "
-                                   "one for each s + t can be on",
-                                   name, slot, s + t - slot));
-            slot = uint8_t(s);
-            singles.on = true;
-            bits |= group_of(*strategy);
-            continue;
-        }
-        const auto at = std::find(kStrategyGroups.begin(), kStrategyGroups.end(), name);
-        if (at == kStrategyGroups.end())
-            refuse(
-                key, value,
-                fmt::format("'{}' is none of {} and no single strategy such as s2t3; join them with '+', or write all",
-                            name, fmt::join(kStrategyGroups, ", ")));
-        bits |= 1u << (at - kStrategyGroups.begin());
-        groups = true;
-    }
-    if (groups && singles.on) refuse(key, value, "groups and single strategies cannot be mixed");
-    settings.strategies = bits;
-    settings.singles = singles;
-}
-
-float real(const std::string& key, const std::string& value, float lowest, float highest) {
-    float result{};
-    const char* end = value.data() + value.size();
-    const auto parsed = std::from_chars(value.data(), end, result);
-    if (parsed.ec != std::errc() || parsed.ptr != end || !(result >= lowest && result <= highest))
-        refuse(key, value, fmt::format("a number from {} to {} is needed", lowest, highest));
-    return result;
+Declaration<S> strategies() {
+    return {"strategies", allowed_strategies(), "groups of strategies (s,t), or single ones",
+            [](S& s, const std::string& value) { set_strategies(s, value); },
+            [](const S& s) -> SettingValue { return strategies_text(s); }};
 }
 
 /// Light subpaths per pixel, where tiles of the film have a whole number of them.
-uint32_t light_subpaths_per_tile(const std::string& key, const std::string& value) {
-    const float per_tile = real(key, value, 1.0f / kTilePixels, kMostLightRounds) * kTilePixels;
-    if (per_tile != std::floor(per_tile))
-        refuse(key, value,
-               fmt::format("multiples of 1/{} are needed; the next are {} and {}", kTilePixels,
-                           std::floor(per_tile) / kTilePixels, std::ceil(per_tile) / kTilePixels));
-    return uint32_t(per_tile);
+Declaration<S> light_paths() {
+    const char* const key = "light_paths";
+    constexpr float kLeast = 1.0f / kTilePixels, kMost = float(kMostLightRounds);
+    const auto set = [=](S& s, const std::string& value) {
+        const float per_tile = parse_number(key, value, kLeast, kMost) * kTilePixels;
+        if (per_tile != std::floor(per_tile))
+            refuse_value(key, value,
+                         fmt::format("multiples of 1/{} are needed; the next are {} and {}", kTilePixels,
+                                     std::floor(per_tile) / kTilePixels, std::ceil(per_tile) / kTilePixels));
+        s.light_subpaths_per_tile = uint32_t(per_tile);
+    };
+    return {key, fmt::format("{} in multiples of 1/{}", allowed_numbers(kLeast, kMost), kTilePixels),
+            "light subpaths per pixel; with connections in variant lvc only", set,
+            [](const S& s) -> SettingValue { return float(s.light_subpaths_per_tile) / kTilePixels; }};
 }
 
-bool boolean(const std::string& key, const std::string& value) { return choose(key, value, {"false", "true"}) == 1; }
+auto& compaction(auto& s) { return s.queues.compaction; }
+auto& ordering(auto& s) { return s.queues.ordering; }
+
+// Where settings have an effect.
+bool has_estimators(const VariantTraits& v, bool) { return v.estimators; }
+bool has_strategies(const VariantTraits& v, bool) { return v.strategies; }
+bool has_light_subpaths(const VariantTraits& v, bool) { return v.light_subpaths; }
+bool weighs(const VariantTraits& v, bool) { return v.weights; }
+bool culls(const VariantTraits& v, bool) { return v.culls; }
+bool gathers_strategies(const VariantTraits& v, bool) { return v.strategy_images; }
+bool draws_vertices(const VariantTraits& v, bool) { return v.draws; }
+bool sorts(const VariantTraits& v, bool) { return v.sorts; }
+bool compacts(const VariantTraits& v, bool) { return v.compacts; }
+bool repeats(const VariantTraits& v, bool cuda) { return v.repeats || !cuda; }
+bool has_binary_bvh(const VariantTraits& v, bool cuda) { return v.binary_bvh && cuda; }
+bool on_cpu(const VariantTraits&, bool cuda) { return !cuda; }
+bool on_cuda(const VariantTraits&, bool cuda) { return cuda; }
+
+const char* const kAutoChooses = "bdpt.auto=true chooses it; leave one of the two out";
+
+/// What is rendered, where and how long its paths are.
+std::vector<Setting> main_settings() {
+    using Is = Setting;
+    return {
+        Is(name_of("integrator", &S::integrator, integrator_names(), "which paths are sampled"))
+            .key_of_runs()
+            .image_attribute(),
+        Is(name_of("variant", &S::variant, variant_names(), "schedule, or variation, of the integrator"))
+            .key_of_runs()
+            .image_attribute(),
+        Is(Of::choice("backend", &S::backend, {"auto", "cpu", "cuda"},
+                      "where it runs; auto takes a CUDA device if there is one")),
+        Is(Of::number("seed", &S::seed, uint64_t(0), ~uint64_t(0), "seed of all random numbers"))
+            .not_in_runs("the experiment (seeds)")
+            .image_attribute(),
+        Is(Of::number("max_depth", &S::max_depth, -1, int(kMaxDepth) - 1,
+                      "longest path in segments (2: direct light); -1: no limit. A scene may bring its own"))
+            .not_in_runs("the experiment and its scenes (max_depth)")
+            .image_attribute(),
+        Is(Of::number("rr_depth", &S::rr_depth, -1, 1 << 14,
+                      "Russian roulette starts at this many segments; -1: never. A scene may bring its own"))
+            .image_attribute(),
+        Is(Of::flag("deterministic", &S::deterministic, "same bits in every run on the same backend"))
+            .limit("true", repeats, "a cache's order differs between runs on a CUDA device"),
+        Is(Of::choice("accel", &S::accel, {"auto", "embree", "cwbvh", "bvh2"},
+                      "what rays are traced through; auto: embree on the CPU, cwbvh on CUDA"))
+            .limit("embree", on_cpu, "the cuda backend has a structure of its own, cwbvh")
+            .limit("bvh2", has_binary_bvh, "a binary BVH to compare with cwbvh"),
+    };
+}
+
+/// Strategies, their weights and their numbers.
+std::vector<Setting> estimator_settings() {
+    using Is = Setting;
+    Setting groups = Is(strategies())
+                         .where(has_strategies, "there are no strategies to choose from")
+                         .not_with_auto(kAutoChooses)
+                         .image_attribute()
+                         .leaves_out();
+    groups.shown = shown_strategies;
+    return {
+        Is(Of::choice("estimator", &S::estimator, {"naive", "nee", "mis"},
+                      "hits of emitters alone, next event estimation wherever it finds the light, or both, weighted"))
+            .where(has_estimators, "there is but one")
+            .key_of_runs()
+            .image_attribute()
+            .leaves_out(),
+        Is(Of::choice("heuristic", &S::heuristic, {std::begin(Heuristics::kNames), std::end(Heuristics::kNames)},
+                      "heuristic of multiple importance sampling"))
+            .where(weighs, "nothing is weighted")
+            .image_attribute(),
+        groups,
+        Is(Of::number("technique_depth", &S::technique_depth, 0u, kMaxStrategyDepth,
+                      "segments up to which images of single strategies are gathered; 0: none"))
+            .where(gathers_strategies, "no images of single strategies are gathered")
+            .not_with_auto("bdpt.auto=true may choose the path tracer, which gathers no images of single strategies; "
+                           "render once without them and repeat with the settings that were chosen")
+            .not_in_runs("the experiment: a run has the key 'techniques' for it"),
+        Is(Of::flag("bdpt.auto", &S::automatic,
+                    "a short pilot chooses strategies, variant and numbers, the path tracer among them"))
+            .where(has_strategies, "there is nothing to choose")
+            .leaves_out(),
+        Is(Of::number("connections", &S::connections, 1u, kMaxCacheDraws, "light vertices that an eye vertex draws"))
+            .where(draws_vertices, "no light vertices are drawn")
+            .chosen_by_auto()
+            .not_with_auto(kAutoChooses)
+            .image_attribute(),
+        Is(Of::choice("draws", &S::draws, {"auto", "coherent", "independent"},
+                      "lanes of a warp draw light vertices that lie together (auto on CUDA), or each for itself"))
+            .where(draws_vertices, "no light vertices are drawn")
+            .chosen_by_auto()
+            .limit("coherent", on_cuda, "lanes of a warp draw together"),
+        Is(light_paths())
+            .where(has_light_subpaths, "there are no light subpaths")
+            .not_with_auto(kAutoChooses)
+            .image_attribute(),
+        Is(Of::number("cull", &S::cull, 0.0f, 1.0f,
+                      "Russian roulette before shadow rays that would add less than this times what their path has "
+                      "brought; 0: none"))
+            .where(culls, "there are no shadow rays to leave out"),
+    };
+}
+
+/// The same image, made in another way.
+std::vector<Setting> schedule_settings() {
+    using Is = Setting;
+    return {
+        Is(Of::number("wave_size", &S::wave_size, 0u, 1u << 28, "paths in flight; 0: as many as pay")),
+        Is(Of::choice("fuse", &S::fuse, {"auto", "none"},
+                      "stages run as parts of others, as suits the backend, or each with queues")),
+        Is(Of::flag("specialise", &S::specialise, "kernels hold only what the scene has")),
+        Is(Of::flag("tail", &S::tail, "CUDA: the last subpaths of a wave take several bounces in one launch")),
+        Is(Of::choice(
+               "compaction", [](auto& s) -> auto& { return compaction(s); }, {"atomic", "select", "none"},
+               "items are appended to queues; lie at the places of their paths and are listed by a scan; or "
+               "without a list"))
+            .where(compacts, "there are no queues of one item per path"),
+        Is(Of::choice(
+               "ordering", [](auto& s) -> auto& { return ordering(s); }, {"none", "material", "morton", "auto"},
+               "hits are sorted by material, or rays by octant and Morton code; auto: by material on CUDA, for "
+               "scenes with several types of BSDFs"))
+            .limit("material", sorts, "there are no queues to sort")
+            .limit("morton", sorts, "there are no queues to sort"),
+        Is(Of::flag("graph", &S::graph, "CUDA: one graph per wave; false launches kernel by kernel, for profilers")),
+    };
+}
+
+/// General or of a variant. Null if there is none.
+const Setting* find_setting(const std::string& key) {
+    if (const Setting* general = find_general_setting(key)) return general;
+    for (const Variant& v : variants())
+        if (const Setting* own = v.find_own(key)) return own;
+    return nullptr;
+}
+
+[[noreturn]] void refuse_key(const std::string& key) {
+    std::vector<std::string> known;
+    for (const Setting& s : general_settings()) known.push_back(s.what.key);
+    for (const Variant& v : variants())
+        for (const Setting& s : v.own) known.push_back(fmt::format("{} ({})", s.what.key, v.name()));
+    throw Error(ExitCode::usage, fmt::format("unknown setting '{}': known are {}", key, fmt::join(known, ", ")));
+}
 
 }  // namespace
 
-void apply_setting(RenderSettings& s, const std::string& key, const std::string& value) {
-    if (key == "integrator")
-        s.integrator = (choose(key, value, {"path", "light", "bdpt"}), value);
-    else if (key == "variant")
-        s.variant = (choose(key, value, {"wavefront", "megakernel", "lvc", "streaming"}), value);
-    else if (key == "backend")
-        s.backend = (choose(key, value, {"auto", "cpu", "cuda"}), value);
-    else if (key == "estimator")
-        s.estimator = Estimator(choose(key, value, {"naive", "nee", "mis"}));
-    else if (key == "heuristic")
-        s.heuristic = MisHeuristic(choose(key, value, {std::begin(Heuristics::kNames), std::end(Heuristics::kNames)}));
-    else if (key == "strategies")
-        set_strategies(s, key, value);
-    else if (key == "technique_depth")
-        s.technique_depth = integer<uint32_t>(key, value, 0, kMaxStrategyDepth);
-    else if (key == "bdpt.auto")
-        s.automatic = boolean(key, value);
-    else if (key == "connections")
-        s.connections = integer<uint32_t>(key, value, 1, kMaxCacheDraws);
-    else if (key == "draws")
-        s.draws = CacheDraws(choose(key, value, {"auto", "coherent", "independent"}));
-    else if (key == "light_paths")
-        s.light_subpaths_per_tile = light_subpaths_per_tile(key, value);
-    else if (key == "max_depth")
-        s.max_depth = integer(key, value, -1, (1 << 14) - 2);
-    else if (key == "rr_depth")
-        s.rr_depth = integer(key, value, -1, 1 << 14);
-    else if (key == "seed")
-        s.seed = integer<uint64_t>(key, value, 0, ~0ull);
-    else if (key == "accel")
-        s.accel = (choose(key, value, {"auto", "embree", "cwbvh", "bvh2"}), value);
-    else if (key == "wave_size")
-        s.wave_size = integer<uint32_t>(key, value, 0, 1u << 28);
-    else if (key == "compaction")
-        s.queues.compaction = Compaction(choose(key, value, {"atomic", "select", "none"}));
-    else if (key == "ordering")
-        s.queues.ordering = Ordering(choose(key, value, {"none", "material", "morton", "auto"}));
-    else if (key == "specialise")
-        s.specialise = boolean(key, value);
-    else if (key == "fuse")
-        s.fuse = Fuse(choose(key, value, {"auto", "none"}));
-    else if (key == "cull")
-        s.cull = real(key, value, 0.0f, 1.0f);
-    else if (key == "tail")
-        s.tail = boolean(key, value);
-    else if (key == "deterministic")
-        s.deterministic = boolean(key, value);
-    else if (key == "graph")
-        s.graph = boolean(key, value);
-    else
-        throw Error(
-            ExitCode::usage,
-            fmt::format(
-                "unknown setting '{}': known are integrator, variant, backend, estimator, heuristic, "
-                "strategies, technique_depth, bdpt.auto, connections, draws, light_paths, max_depth, rr_depth, seed, "
-                "accel, wave_size, compaction, ordering, specialise, fuse, cull, tail, deterministic, graph",
-                key));
+std::string text_of(const SettingValue& value) {
+    return std::visit([](const auto& v) { return fmt::format("{}", v); }, value);
 }
 
-std::string strategies_text(const RenderSettings& settings) {
-    if (settings.integrator != "bdpt") return settings.integrator == "light" ? "light" : "";
-    std::vector<std::string> names;
-    if (settings.singles.on) {
-        for (uint32_t k = 1; k <= SingleStrategies::kMaxSegments; ++k)
-            if (const uint8_t s = settings.singles.s[k]; s != SingleStrategies::kNone)
-                names.push_back(fmt::format("s{}t{}", s, k + 1 - s));
-    } else if (settings.strategies == kAllStrategies) {
-        names.emplace_back("all");
-    } else {
-        for (size_t g = 0; g < kStrategyGroups.size(); ++g)
-            if (settings.strategies >> g & 1) names.push_back(kStrategyGroups[g]);
-    }
-    return fmt::format("{}", fmt::join(names, "+"));
+const std::vector<Setting>& general_settings() {
+    static const std::vector<Setting> all = [] {
+        std::vector<Setting> list;
+        for (const auto& part : {main_settings(), estimator_settings(), schedule_settings()})
+            list.insert(list.end(), part.begin(), part.end());
+        return list;
+    }();
+    return all;
+}
+
+const Setting* find_general_setting(const std::string& key) {
+    const auto& all = general_settings();
+    const auto at = std::find_if(all.begin(), all.end(), [&](const Setting& s) { return s.what.key == key; });
+    return at == all.end() ? nullptr : &*at;
+}
+
+void apply_setting(RenderSettings& settings, const std::string& key, const std::string& value) {
+    const Setting* setting = find_setting(key);
+    if (!setting) refuse_key(key);
+    setting->what.set(settings, value);
+}
+
+std::string setting_text(const RenderSettings& settings, const std::string& key) {
+    const Setting* setting = find_setting(key);
+    if (!setting) refuse_key(key);
+    return setting->text(settings);
+}
+
+template <>
+Choice<Backend>::Choice(const std::string& name) : value_(Backend::automatic) {
+    RenderSettings parsed;
+    apply_setting(parsed, "backend", name);
+    value_ = parsed.backend;
+}
+
+template <>
+Choice<AccelKind>::Choice(const std::string& name) : value_(AccelKind::automatic) {
+    RenderSettings parsed;
+    apply_setting(parsed, "accel", name);
+    value_ = parsed.accel;
 }
 
 }  // namespace ambilux

@@ -30,7 +30,7 @@ class CpuRenderer final : public Renderer {
 public:
     CpuRenderer(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : scene_(scene), settings_(settings), view_(scene.view()), policy_(Integrator::plan(scene, settings)),
-          accel_name_(settings.accel == "cwbvh" ? "cwbvh" : "embree") {
+          accel_name_(settings.accel == AccelKind::cwbvh ? "cwbvh" : "embree") {
         const auto start = Clock::now();
         shape(settings);
         const uint64_t values = uint64_t(wave_.width) * wave_.height * 3;
@@ -151,7 +151,7 @@ private:
             accel_bytes_ = accel->memory_bytes();
             accel_ = accel;
         };
-        if (settings.accel == "cwbvh")
+        if (settings.accel == AccelKind::cwbvh)
             take(accels.get<CwbvhAccel>());
         else
             take(accels.get<EmbreeAccel>());

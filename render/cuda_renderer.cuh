@@ -128,7 +128,7 @@ private:
 
     void take_accel(const RenderSettings& settings, SharedAccels& accels) {
         device_scene_ = accels.get<DeviceScene>();
-        if (settings.accel == "bvh2")
+        if (settings.accel == AccelKind::bvh2)
             pairs_.emplace(PairAccel(scene_).arrays());
         else
             accel_ = accels.get<DeviceCwbvh>();

@@ -24,7 +24,7 @@ uint32_t stream_samples(uint32_t slots, uint32_t paths, uint64_t expected, uint3
 
 uint32_t multi_bounce_below(const RenderSettings& settings, uint32_t slots) {
     const bool suits = !settings.deterministic && settings.technique_depth == 0 && settings.fuse != Fuse::none &&
-                       !settings.queues.fixed_places() && settings.accel != "bvh2";
+                       !settings.queues.fixed_places() && settings.accel != AccelKind::bvh2;
     return settings.tail && suits ? std::min(kMultiBounceBelow, slots / kBouncesPerLaunch) : 0;
 }
 

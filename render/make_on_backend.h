@@ -1,4 +1,4 @@
-// Renderers of a family of integrators, compiled once for each level of features and backend
+// Renderers of all variants of integrators, compiled once for each level of features and backend
 // (cmake/instantiate.cmake).
 #pragma once
 
@@ -9,11 +9,27 @@
 
 namespace ambilux {
 
-template <class Family, Features F>
+template <class Variant, Features F>
 std::unique_ptr<Renderer> make_on_cpu(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
 
-template <class Family, Features F>
+template <class Variant, Features F>
 std::unique_ptr<Renderer> make_on_cuda(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
+
+/// The template behind a variant: IntegratorOf<Variant>::Type<Features, Tracer, Fusion>.
+template <class Variant>
+struct IntegratorOf;
+
+/// A variant as it is compiled for one level of features.
+struct CompiledRenderer {
+    using Make = std::unique_ptr<Renderer> (*)(const Scene&, const RenderSettings&, SharedAccels&);
+
+    const char *integrator, *variant;
+    Features level;
+    Make cpu, cuda;  ///< cuda: null without that backend
+};
+
+/// Levels of one variant follow each other from the smallest on; the last holds all features.
+const std::vector<CompiledRenderer>& compiled_renderers();
 
 /// fuse=none is compiled for the level of all features only.
 template <Features F, Fusion kFused, class Make>

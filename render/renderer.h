@@ -53,7 +53,7 @@ struct SelectionStats {
 
 struct RenderStats {
     std::string backend, device, accel;
-    RenderSettings settings;    ///< as used: bdpt.auto has chosen some of them
+    RenderSettings settings;    ///< as used: bdpt.auto has chosen some of them, and others were left open
     double build_seconds = 0;   ///< acceleration structure, upload, allocation
     double render_seconds = 0;  ///< inside render(), wall clock
     uint64_t samples = 0;       ///< per pixel

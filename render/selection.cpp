@@ -13,6 +13,7 @@
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "core/flag.h"
+#include "integrators/registry.h"
 
 namespace ambilux {
 namespace {
@@ -45,6 +46,10 @@ RenderSettings settings_of(const RenderSettings& settings, const SelectionCandid
     return s;
 }
 
+/// The variant of bdpt that leaves all variants to choose from.
+const char* const kPaired = "wavefront";
+bool is_paired(const RenderSettings& settings) { return &variant_of(settings) == find_variant("bdpt", kPaired); }
+
 /// Candidates of one family do the same but for the numbers of light subpaths and draws, so that the time of one tells
 /// that of the others.
 uint32_t family(const SelectionCandidate& c) {
@@ -56,8 +61,9 @@ uint32_t family(const SelectionCandidate& c) {
 /// tracer's wave holds more of them, and takes about as long as others.
 double timed(const Scene& scene, RenderSettings settings, bool cuda, const MakeRenderer& make) {
     constexpr double kLongEnough = 0.05;
-    const uint32_t paths_per_wave = settings.integrator == "path" ? 1u << 22 : 1u << 21;
-    if (cuda && settings.wave_size == 0 && settings.variant != "streaming") settings.wave_size = paths_per_wave;
+    const VariantTraits& traits = variant_of(settings).traits;
+    const uint32_t paths_per_wave = traits.light_subpaths ? 1u << 21 : 1u << 22;
+    if (cuda && settings.wave_size == 0 && !traits.streams) settings.wave_size = paths_per_wave;
     const std::unique_ptr<Renderer> renderer = make(settings);
     const uint32_t pixels = scene.sensor.crop_width * scene.sensor.crop_height;
     const uint32_t count =
@@ -164,30 +170,10 @@ private:
 
 }  // namespace
 
-void check_automatic(const RenderSettings& s) {
-    const auto refuse = [](const std::string& text) { throw Error(ExitCode::usage, text); };
-    if (s.integrator != "bdpt")
-        refuse(
-            fmt::format("bdpt.auto=true: integrator {} leaves nothing to choose; use integrator bdpt", s.integrator));
-    if (s.strategies != kAllStrategies || s.singles.on)
-        refuse("bdpt.auto=true chooses the strategies: leave out the setting strategies, or bdpt.auto");
-    if (s.connections != RenderSettings().connections)
-        refuse(fmt::format("connections={}: bdpt.auto=true chooses the number of connections; leave one of the two out",
-                           s.connections));
-    if (s.light_subpaths_per_tile != RenderSettings().light_subpaths_per_tile)
-        refuse(
-            fmt::format("light_paths={}: bdpt.auto=true chooses the number of light subpaths; leave one of the two out",
-                        double(s.light_subpaths_per_tile) / kTilePixels));
-    if (s.technique_depth > 0)
-        refuse(
-            fmt::format("technique_depth={}: bdpt.auto=true may choose the path tracer, which gathers no images of "
-                        "single strategies; render once without them and repeat with the settings that "
-                        "were chosen",
-                        s.technique_depth));
-}
-
 std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda) {
+    const VariantTraits& asked = variant_of(settings).traits;
     const std::string& variant = settings.variant;
+    const bool paired = is_paired(settings);  // else the choice is restricted to the variant that was asked for
     std::vector<SelectionCandidate> all = {
         {"path", {0.0f, false, 0}, {{"integrator", "path"}, {"variant", "wavefront"}, {"estimator", "mis"}}}};
     const auto add = [&](std::string name, const PilotCandidate& pilot, const std::string& of,
@@ -199,13 +185,13 @@ std::vector<SelectionCandidate> selection_candidates(const RenderSettings& setti
             all.back().settings.emplace_back("light_paths", fmt::format("{}", pilot.light_subpaths));
         }
     };
-    const std::string plain = variant == "lvc" ? "wavefront" : variant;
+    const std::string plain = asked.draws ? kPaired : variant;
     // On a device the cache has another order in every run.
-    const bool cache = variant == "lvc" || (variant == "wavefront" && !(cuda && settings.deterministic));
+    const bool cache = asked.draws || (paired && !(cuda && settings.deterministic));
     for (const float light_paths : {0.25f, 1.0f, 4.0f}) {
-        if (light_paths != 1.0f && plain != "wavefront") continue;
+        if (light_paths != 1.0f && !paired && !asked.draws) continue;
         add("bdpt without connections", {light_paths, false, 0}, plain, "hits+next_event+light");
-        if (light_paths == 1.0f && variant != "lvc") add("bdpt, " + variant, {1.0f, true, 0}, variant, "all");
+        if (light_paths == 1.0f && !asked.draws) add("bdpt, " + variant, {1.0f, true, 0}, variant, "all");
         for (uint32_t k = 1; cache && k <= 16; k *= 2)
             add(fmt::format("bdpt, lvc, {} connection{}", k, k > 1 ? "s" : ""), {light_paths, true, k}, "lvc", "all");
     }
@@ -224,8 +210,7 @@ double selection_work(const PilotWork& w, const SelectionCandidate& candidate, b
     double work = eye + light;
     if (c.connect && c.draws == 0) work += pair * w.pairs + ray * w.pair_rays;
     if (c.connect && c.draws > 0) work += c.draws * (draw * w.draws + ray * w.draw_rays);
-    const bool streaming = std::any_of(candidate.settings.begin(), candidate.settings.end(),
-                                       [](const auto& s) { return s.second == "streaming"; });
+    const bool streaming = variant_of(settings_of({}, candidate)).traits.streams;
     // A light subpath for every vertex of an eye subpath.
     if (c.connect && streaming) work += std::max(0.0, w.vertices - 1.0) * w.light_rays;
     return bidirectional * work;
@@ -251,10 +236,9 @@ std::vector<double> selection_variances(const Pilot& pilot) {
 
 std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda,
                                          SharedAccels& accels, const MakeRenderer& make) {
-    check_automatic(settings);
     // Any render builds this, and wakes the device: it is no cost of the choice.
     if (cuda) cuda_device_present();
-    const bool cwbvh = cuda || settings.accel == "cwbvh";
+    const bool cwbvh = cuda || settings.accel == AccelKind::cwbvh;
     if (cwbvh)
         accels.get<CwbvhAccel>();
     else
@@ -298,7 +282,7 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
     };
     // Times follow from the work to 15 % (docs/performance.md), closer than waves tell that are short enough to be
     // timed; but not for variants of other schedules.
-    const bool doubtful = settings.variant != "wavefront" && settings.variant != "lvc";
+    const bool doubtful = !is_paired(settings) && !variant_of(settings).traits.draws;
     if (doubtful && !settings.deterministic && rival != ranked.end() &&
         variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
         for (const size_t i : {best, *rival}) {

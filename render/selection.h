@@ -8,9 +8,6 @@
 
 namespace ambilux {
 
-/// Throws Error(usage) for settings that the choice cannot be combined with.
-void check_automatic(const RenderSettings& settings);
-
 /// What `settings` leave to choose from, the path tracer first.
 struct SelectionCandidate {
     std::string name;

@@ -16,15 +16,35 @@ struct PathPolicy {
 };
 /// Throws Error(usage) when paths might never end.
 PathPolicy plan_path(const Scene& scene, const RenderSettings& settings);
+/// Names of stages that this render does without.
+std::vector<std::string> skipped_path_parts(const Scene& scene, const Rules<UnidirectionalMis>& rules);
 
-template <Features F, class Tracer, Fusion kFusion>
+/// Of a Sampling that is told nothing.
+struct NoSettings {
+    static NoSettings plan(const RenderSettings&) { return {}; }
+};
+
+/// `Sampling`: how eye vertices sample emitters, with `SamplingSettings` as its last member unless that is empty.
+template <Features F, class Tracer, Fusion kFusion, template <Features, class, class> class Sampling = NextEvent,
+          class SamplingSettings = NoSettings>
 struct PathIntegrator {
     using Mis = UnidirectionalMis;
-    using Policy = PathPolicy;
     static constexpr bool kFilmWide = false;
 
-    static Policy plan(const Scene& scene, const RenderSettings& settings) { return plan_path(scene, settings); }
-    static std::vector<std::string> skipped(const Scene& scene, const Policy& policy);
+    struct Policy {
+        Rules<Mis> rules;
+        WavePolicy waves;
+        SamplingSettings sampling;
+    };
+    static Policy plan(const Scene& scene, const RenderSettings& settings) {
+        const PathPolicy p = plan_path(scene, settings);
+        return {p.rules, p.waves, SamplingSettings::plan(settings)};
+    }
+    static std::vector<std::string> skipped(const Scene& scene, const Policy& policy) {
+        std::vector<std::string> parts = skipped_path_parts(scene, policy.rules);
+        skipped_features(F, parts);
+        return parts;
+    }
 
     struct Memory {
         SubpathQueues<PathRay> subpaths;
@@ -40,7 +60,7 @@ struct PathIntegrator {
 
     struct Stages {
         using Eye = EyeSide<F, Tracer, kFusion>;
-        using Connect = NextEvent<F, Mis, typename Eye::Candidates>;
+        using Connect = Sampling<F, Mis, typename Eye::Candidates>;
         using AtVertex = std::conditional_t<kFusion.connect, Connect, QueueVertex<F, Mis>>;
 
         Policy policy;
@@ -57,7 +77,7 @@ struct PathIntegrator {
             const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
             const SubpathQueues<PathRay>& q = m.subpaths;
             const bool seeds = F.opacity || p.waves.cull > 0.0f;
-            const Connect connect = {eye.candidates(), record(connect_emitter), seeds};
+            const Connect connect = sampling(record(connect_emitter), seeds);
             generate = {scene, wave, p.rules.mis, q.rays[0], film.samples, record(generate)};
             connect_emitter = {scene, wave, p.rules, m.eye.vertices, connect, connect.record};
             const auto at_vertex = choose<kFusion.connect>(connect, QueueVertex<F, Mis>{m.eye.vertices});
@@ -74,6 +94,13 @@ struct PathIntegrator {
                                  kFusion.generate && !q.hits[0].flags};
             }
         }
+
+        Connect sampling(StageRecord* record, bool seeds) const {
+            if constexpr (std::is_empty_v<SamplingSettings>)
+                return {eye.candidates(), record, seeds};
+            else
+                return {eye.candidates(), record, seeds, policy.sampling};
+        }
     };
 
     template <class Executor>
@@ -89,15 +116,5 @@ struct PathIntegrator {
         exec.set_depth(0);
     }
 };
-
-/// Names of stages that this render does without.
-std::vector<std::string> skipped_path_parts(const Scene& scene, const PathPolicy& policy);
-
-template <Features F, class Tracer, Fusion kFusion>
-std::vector<std::string> PathIntegrator<F, Tracer, kFusion>::skipped(const Scene& scene, const Policy& policy) {
-    std::vector<std::string> parts = skipped_path_parts(scene, policy);
-    skipped_features(F, parts);
-    return parts;
-}
 
 }  // namespace ambilux

@@ -23,8 +23,7 @@ PathPolicy plan_path(const Scene& scene, const RenderSettings& settings) {
     return p;
 }
 
-std::vector<std::string> skipped_path_parts(const Scene& scene, const PathPolicy& policy) {
-    const Rules<UnidirectionalMis>& r = policy.rules;
+std::vector<std::string> skipped_path_parts(const Scene& scene, const Rules<UnidirectionalMis>& r) {
     std::vector<std::string> parts;
     if (!r.next_event)
         parts.emplace_back(scene.emitters.empty() ? "connect, occlude: no emitters"

@@ -5,15 +5,16 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "integrators/registry.h"
 
 namespace ambilux {
 namespace {
 
 /// Groups and single strategies that are on, and the longest path that one of these finds.
 void set_strategies(Rules<BidirectionalMis>& r, const RenderSettings& settings) {
-    const bool light = settings.integrator == "light";
-    r.mis.strategies = light ? uint32_t(kLightStrategies) : settings.strategies;
-    r.singles = light ? SingleStrategies{} : settings.singles;
+    const bool all = variant_of(settings).traits.strategies;  // else those of the light tracer
+    r.mis.strategies = all ? settings.strategies : uint32_t(kLightStrategies);
+    r.singles = all ? settings.singles : SingleStrategies{};
     if (!r.singles.on) return;
     uint32_t longest = SingleStrategies::kMaxSegments;
     while (longest > 0 && r.singles.s[longest] == SingleStrategies::kNone) --longest;

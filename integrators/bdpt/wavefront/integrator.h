@@ -36,4 +36,8 @@ struct WavefrontIntegrator {
     }
 };
 
+/// Integrator light has the stages of its one group of strategies (plan_bdpt).
+template <Features F, class Tracer, Fusion kFusion>
+using LightIntegrator = WavefrontIntegrator<F, Tracer, kFusion>;
+
 }  // namespace ambilux

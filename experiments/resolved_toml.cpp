@@ -1,0 +1,67 @@
+#include <toml++/toml.h>
+#include <sstream>
+
+#include "experiments/config.h"
+#include "integrators/setting.h"
+
+namespace ambilux {
+namespace {
+
+bool is_key_of_runs(const std::string& key) {
+    const Setting* s = find_general_setting(key);
+    return s && s->place == InExperiment::run_key;
+}
+
+}  // namespace
+
+std::string resolved_toml(const ExperimentConfig& config) {
+    const auto table_of = [](const Settings& pairs) {
+        toml::table t;
+        for (const auto& [key, value] : pairs) t.insert_or_assign(key, value);
+        return t;
+    };
+    const auto insert_settings = [](toml::table& t, const RunEntry& run) {
+        toml::table set;
+        for (const auto& [key, value] : run.settings) (is_key_of_runs(key) ? t : set).insert_or_assign(key, value);
+        if (!set.empty()) t.insert("set", set);
+    };
+    toml::table root;
+    root.insert("name", config.name);
+    root.insert("backend", config.backend);
+    toml::array seeds, scenes, runs, spp, seconds;
+    for (const uint64_t seed : config.seeds) seeds.push_back(int64_t(seed));
+    root.insert("seeds", seeds);
+    // What a scene replaces of this stands with the scene, so that all scenes state theirs in full.
+    root.insert("reference", toml::table{{"spp", int64_t(config.scenes[0].reference.spp)},
+                                         {"seed", int64_t(config.reference_seed)}});
+    for (const uint64_t samples : config.spp) spp.push_back(int64_t(samples));
+    for (const double time : config.seconds) seconds.push_back(time);
+    toml::table budget;
+    if (!spp.empty()) budget.insert("spp", spp);
+    if (!seconds.empty()) budget.insert("seconds", seconds);
+    root.insert("budget", budget);
+    if (!config.ablation_default.empty()) root.insert("ablation", toml::table{{"default", config.ablation_default}});
+    for (const SceneEntry& s : config.scenes) {
+        toml::table reference{{"spp", int64_t(s.reference.spp)}};
+        insert_settings(reference, s.reference.how);
+        toml::table t{{"name", s.name}, {"path", s.path}, {"reference", reference}};
+        if (s.width) t.insert("size", toml::array{int64_t(s.width), int64_t(s.height)});
+        if (s.max_depth) t.insert("max_depth", int64_t(*s.max_depth));
+        if (s.lenient) t.insert("lenient", true);
+        if (!s.parameters.empty()) t.insert("parameters", table_of(s.parameters));
+        scenes.push_back(t);
+    }
+    root.insert("scene", scenes);
+    for (const RunEntry& run : config.runs) {
+        toml::table t{{"name", run.name}};
+        insert_settings(t, run);
+        if (run.techniques) t.insert("techniques", int64_t(run.techniques));
+        runs.push_back(t);
+    }
+    root.insert("run", runs);
+    std::ostringstream out;
+    out << root << "\n";
+    return out.str();
+}
+
+}  // namespace ambilux

@@ -1,0 +1,96 @@
+// connect by resampled importance sampling (Talbot, Cline and Egbert 2005, "Importance Resampling for Global
+// Illumination"): an eye vertex draws M emitter samples x_i of density p and keeps one, y, with a chance in proportion
+// to w_i = p_hat(x_i) / p(x_i). With p_hat the unshadowed light, f L V / p_hat(y) * (w_1 + ... + w_M) / M has the
+// expectation of one plain sample, and less variance where lights differ more in what they bring here than in their
+// power. Weights against hits are those of the plain sample: they depend on y alone, so they still sum to one per path.
+#pragma once
+
+#include "integrators/path/ris/settings.h"
+#include "stages/connect_emitter.h"
+
+namespace ambilux {
+
+/// An emitter sample and how the vertex scatters its light.
+struct LightCandidate {
+    EmitterSample light;
+    BsdfValue f;
+};
+
+/// Keeps one of the candidates that it is shown, in proportion to their weights, with one random number in [0,1).
+struct Reservoir {
+    LightCandidate kept;
+    float target = 0.0f;  ///< p_hat of `kept`
+    float sum = 0.0f;     ///< of all weights
+    float u;
+
+    AMBILUX_HD void show(const LightCandidate& c, float c_target, float weight) {
+        sum += weight;
+        const float chance = weight / sum;
+        if (u < chance) {
+            kept = c;
+            target = c_target;
+            u /= chance;
+        } else {
+            u = (u - chance) / (1.0f - chance);
+        }
+    }
+};
+
+/// At an eye vertex, in the place of NextEvent. `Out` takes candidates.
+template <Features F, class Mis, class Out>
+struct ResampledNextEvent {
+    Out candidates;
+    StageRecord* record;
+    bool seeds;  ///< shadow rays need a seed
+    RisSettings settings;
+
+    AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
+                       uint32_t slot, const Draws& draws) const {
+        Candidate<Mis> c;
+        if (resample(scene, rules, v, path, draws, c) && is_valid_radiance(c.value, record))
+            candidates.push(pack_candidate(c, slot, seeds ? draws.shadow_seed(path.depth) : 0));
+    }
+
+private:
+    /// Blocks of random numbers beyond those of Draws.
+    static constexpr uint32_t kFirstBlock = 0x20000u;
+
+    AMBILUX_HD static Vec4f numbers(const Draws& draws, uint32_t depth, uint32_t i) {
+        return draws.block(kFirstBlock + depth * RisSettings::kMostCandidates + i);
+    }
+    AMBILUX_HD bool resample(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v,
+                             const Subpath<Mis>& path, const Draws& draws, Candidate<Mis>& c) const {
+        if (!rules.next_event) return false;
+        Reservoir reservoir;
+        reservoir.u = draws.next_event(path.depth).x;
+        for (uint32_t i = 0; i < settings.candidates; ++i) {
+            LightCandidate x;
+            // The target needs the radiance of environments now, not once the way is known to be free.
+            if (!sample_emitter_direct<F>(scene, v.point.p, numbers(draws, path.depth, i), x.light) ||
+                !may_scatter(v.scattering, x.light.wi))
+                continue;
+            x.f = scatter_evaluate<F>(v.scattering, x.light.wi, TransportMode::radiance);
+            const float target = luminance(x.f.value * x.light.radiance), weight = target / x.light.pdf_sa;
+            if (weight > 0.0f && weight < kInfinity) reservoir.show(x, target, weight);
+        }
+        if (!(reservoir.target > 0.0f)) return false;
+        const LightCandidate& y = reservoir.kept;
+        const float scale = reservoir.sum / (float(settings.candidates) * reservoir.target);
+        c.value = path.throughput * y.f.value * (y.light.radiance * scale);
+        const float cos_z = fabsf(dot(v.point.ng, y.light.wi));
+        c.ratio = rules.counted(rules.mis.template next_event_ratio<F>(scene, v.sums, v.first, y.light, y.f, cos_z));
+        c.strategy = Strategy::make(1, path.depth + 1);
+        c.environment = false;  // its radiance is in the value
+        return !is_zero(c.value) && set_shadow_ray(v, y.light, c);
+    }
+    AMBILUX_HD static bool set_shadow_ray(const Vertex<Mis>& v, const EmitterSample& light, Candidate<Mis>& c) {
+        if (light.distance < kInfinity)
+            return set_segment(c, v, light.wi, light.p, ray_offset(light.p, light.p_error, light.ng), light.ng);
+        c.origin = offset_ray_origin(v.point.p, v.offset, v.point.ng, light.wi);
+        c.direction = light.wi;
+        c.tmax = kInfinity;
+        return true;
+    }
+};
+
+}  // namespace ambilux

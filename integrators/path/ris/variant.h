@@ -1,0 +1,20 @@
+// What variant ris of integrator path has.
+#pragma once
+
+#include "integrators/path/ris/settings.h"
+#include "integrators/path/variant.h"
+#include "integrators/setting.h"
+
+namespace ambilux {
+
+struct PathRisVariant {
+    static constexpr const char* kHelp =
+        "next event estimation by resampling: of several emitter samples one is kept, in proportion to its light "
+        "(Talbot et al. 2005)";
+    static constexpr VariantTraits kTraits = PathVariant::kTraits;
+    static constexpr bool kConnectsOnHost = PathVariant::kConnectsOnHost;
+
+    static std::vector<Declaration<RisSettings>> settings();
+};
+
+}  // namespace ambilux

@@ -1,0 +1,142 @@
+#include "integrators/registry.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "integrators/strategies_setting.h"
+
+namespace ambilux {
+namespace {
+
+std::vector<std::string> names_of(std::string Variant::* name) {
+    std::vector<std::string> names;
+    for (const Variant& v : variants())
+        if (std::find(names.begin(), names.end(), v.*name) == names.end()) names.push_back(v.*name);
+    return names;
+}
+
+/// "path, bdpt (lvc, streaming)": all variants of an integrator, or some.
+std::string list_variants(Applies applies, bool cuda) {
+    std::vector<std::string> parts;
+    for (const std::string& integrator : integrator_names()) {
+        std::vector<std::string> some;
+        bool all = true;
+        for (const Variant& v : variants()) {
+            if (v.integrator != integrator) continue;
+            if (applies(v.traits, cuda))
+                some.push_back(v.variant);
+            else
+                all = false;
+        }
+        if (!some.empty())
+            parts.push_back(all ? integrator : fmt::format("{} ({})", integrator, fmt::join(some, ", ")));
+    }
+    return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+/// What settings are asked of.
+struct Place {
+    const RenderSettings& settings;
+    const Variant& variant;
+    bool cuda;
+
+    bool has(Applies applies) const { return !applies || applies(variant.traits, cuda); }
+    [[noreturn]] void refuse(const std::string& key, const std::string& value, const std::string& why,
+                             const std::string& where) const {
+        throw Error(ExitCode::usage,
+                    fmt::format("{}={}: {}; this is integrator {}, variant {}, backend {}{}", key, value, why,
+                                variant.integrator, variant.variant, cuda ? "cuda" : "cpu", where));
+    }
+    [[noreturn]] void refuse(const std::string& key, const std::string& value, const std::string& why,
+                             Applies applies) const {
+        refuse(key, value, why, fmt::format(". It has an effect on {}", applies_text(applies)));
+    }
+};
+
+void check(const Setting& s, const Place& at) {
+    const std::string value = s.text(at.settings);
+    const bool asked = value != s.default_text(), open = at.settings.automatic && s.left_to_auto;
+    if (asked && !open && !at.has(s.applies)) at.refuse(s.what.key, value, s.because, s.applies);
+    for (const Setting::Limit& limit : s.limits)
+        if (value == limit.value && !at.has(limit.applies)) at.refuse(s.what.key, value, limit.because, limit.applies);
+    if (asked && at.settings.automatic && !s.against_auto.empty()) at.refuse(s.what.key, value, s.against_auto, "");
+}
+
+}  // namespace
+
+const Setting* Variant::find_own(const std::string& key) const {
+    const auto at = std::find_if(own.begin(), own.end(), [&](const Setting& s) { return s.what.key == key; });
+    return at == own.end() ? nullptr : &*at;
+}
+
+std::vector<std::string> integrator_names() { return names_of(&Variant::integrator); }
+std::vector<std::string> variant_names() { return names_of(&Variant::variant); }
+
+std::vector<std::string> reference_integrators() {
+    std::vector<std::string> names;
+    for (const std::string& name : integrator_names())
+        if (makes_references(name)) names.push_back(name);
+    return names;
+}
+bool makes_references(const std::string& integrator) {
+    const auto& all = variants();
+    return std::any_of(all.begin(), all.end(),
+                       [&](const Variant& v) { return v.integrator == integrator && v.traits.finds_all_light; });
+}
+
+const Variant* find_variant(const std::string& integrator, const std::string& variant) {
+    for (const Variant& v : variants())
+        if (integrator == v.integrator && variant == v.variant) return &v;
+    return nullptr;
+}
+
+const Variant& variant_of(const RenderSettings& settings) {
+    if (const Variant* v = find_variant(settings.integrator, settings.variant)) return *v;
+    // Names may come from elsewhere than apply_setting.
+    parse_choice("integrator", settings.integrator, integrator_names());
+    parse_choice("variant", settings.variant, variant_names());
+    std::vector<std::string> names;
+    for (const Variant& v : variants())
+        if (v.integrator == settings.integrator) names.push_back(v.variant);
+    throw Error(ExitCode::usage, fmt::format("variant={}: integrator {} has {}", settings.variant, settings.integrator,
+                                             names.size() > 1 ? fmt::format("the variants {}", fmt::join(names, ", "))
+                                                              : fmt::format("the variant {} only", names[0])));
+}
+
+std::string applies_text(Applies applies) {
+    const auto never = [](const VariantTraits&, bool) { return false; };
+    const auto always = [](const VariantTraits&, bool) { return true; };
+    if (!applies) applies = always;
+    const std::string cpu = list_variants(applies, false), cuda = list_variants(applies, true);
+    const std::string all = list_variants(always, false), none = list_variants(never, false);
+    const auto text = [&](const std::string& list) { return list == all ? std::string("all integrators") : list; };
+    if (cpu == cuda) return text(cpu);
+    if (cpu == none) return text(cuda) + " on cuda";
+    if (cuda == none) return text(cpu) + " on cpu";
+    return fmt::format("{} on cpu, {} on cuda", text(cpu), text(cuda));
+}
+
+void check_settings(const RenderSettings& settings, const Variant& variant, bool cuda) {
+    const Place at = {settings, variant, cuda};
+    for (const Setting& s : general_settings()) check(s, at);
+    for (const auto& [key, value] : settings.own) {
+        if (const Setting* own = variant.find_own(key)) {
+            RenderSettings parsed;
+            own->what.set(parsed, value);  // another variant's setting of this key may allow more
+            continue;
+        }
+        std::vector<std::string> owners;
+        for (const Variant& v : variants())
+            if (v.find_own(key)) owners.push_back(v.name());
+        at.refuse(key, value, "this integrator has no such setting",
+                  fmt::format(". It belongs to {}", fmt::join(owners, ", ")));
+    }
+}
+
+SettingValue shown_strategies(const RenderSettings& settings) {
+    const Variant* v = find_variant(settings.integrator, settings.variant);
+    if (!v || !v->traits.light_subpaths) return std::string();
+    return v->traits.strategies ? strategies_text(settings) : std::string("light");
+}
+
+}  // namespace ambilux

@@ -1,0 +1,13 @@
+// All settings and variants for people (ambilux help settings, docs/reference.md).
+#pragma once
+
+#include <string>
+
+namespace ambilux {
+
+/// A block of lines for each setting.
+std::string settings_help();
+/// The same as tables in Markdown: docs/reference.md.
+std::string settings_reference();
+
+}  // namespace ambilux

@@ -1,0 +1,73 @@
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// Ambient occlusion against what is known: an open plane, a closed box, a plane under a disk.
+#include <cmath>
+
+#include "film/ztest.h"
+#include "tests/support/render_scene.h"
+
+using namespace ambilux;
+
+namespace {
+
+const char* const kDown =
+    "<scene version='3.0.0'><sensor type='perspective'><float name='fov' value='30'/><transform name='to_world'>"
+    "<lookat origin='0,0,0.5' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
+    "value='16'/><integer name='height' value='16'/><rfilter type='box'/></film></sensor>"
+    "<emitter type='constant'/><shape type='rectangle'><transform name='to_world'><scale value='1000'/></transform>"
+    "</shape>";
+
+RenderSettings toy_settings(const Scene& scene, const char* radius = "0") {
+    RenderSettings s = cpu_settings(scene, Estimator::mis);
+    s.integrator = "toy";
+    apply_setting(s, "radius", radius);
+    return s;
+}
+
+void check_constant(const Scene& scene, const RenderSettings& settings, double value) {
+    const RenderResult r = render_scene(scene, settings, 16);
+    CHECK(r.stats.invalid.total() == 0);
+    for (const double sum : r.film.sum) CHECK(sum == 16 * value);
+}
+
+}  // namespace
+
+TEST_CASE("an open plane sees all of the sky, the inside of a box none of it") {
+    const Scene plane = scene_from_text(std::string(kDown) + "</scene>");
+    check_constant(plane, toy_settings(plane), 1);
+    const Scene box = scene_from_text(std::string(kDown) +
+                                      "<shape type='cube'><transform name='to_world'><scale value='3'/>"
+                                      "</transform></shape></scene>");
+    check_constant(box, toy_settings(box), 0);
+    // Nothing lies within a tenth of the floor where the camera looks.
+    check_constant(box, toy_settings(box, "0.1"), 1);
+    RenderSettings staged = toy_settings(box);
+    staged.fuse = Fuse::none;
+    check_constant(box, staged, 0);
+}
+
+TEST_CASE("a disk above a plane hides its form factor from the point below") {
+    // A disk of radius r at height h covers r² / (r² + h²) of the cosine-weighted sky. The film is a small spot below
+    // it.
+    const Scene scene = scene_from_text(
+        "<scene version='3.0.0'><sensor type='perspective'><float name='fov' value='1'/><transform name='to_world'>"
+        "<lookat origin='0,0,0.5' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
+        "value='16'/><integer name='height' value='16'/><rfilter type='box'/></film></sensor><emitter type='constant'/>"
+        "<shape type='rectangle'><transform name='to_world'><scale value='1000'/></transform></shape>"
+        "<shape type='disk'><transform name='to_world'><scale value='2'/><translate z='1'/></transform></shape>"
+        "</scene>");
+    const RenderResult r = render_scene(scene, toy_settings(scene), 1024);
+    const ZTestResult z = z_test(to_estimate(r.film), exact_estimate({16, 16, std::vector<float>(16 * 16 * 3, 0.2f)}));
+    INFO(z.report());
+    CHECK(z.pass);
+    CHECK(z.detectable < 0.05);
+}
+
+TEST_CASE("toy refuses what it has not") {
+    const Scene scene = project_scene("cornell", 16, 16);
+    for (const auto& [key, value] :
+         {std::pair{"estimator", "nee"}, {"heuristic", "power"}, {"connections", "2"}, {"candidates", "4"}}) {
+        RenderSettings s = toy_settings(scene);
+        apply_setting(s, key, value);
+        CHECK_THROWS_WITH(make_renderer(scene, s), Catch::StartsWith(key) && Catch::Contains("integrator toy"));
+    }
+}
