@@ -304,9 +304,7 @@ void fill_features(Scene& scene) {
         for (uint32_t index : {m.front, m.back}) {
             const BsdfRecord& b = scene.bsdfs[index];
             f.bsdfs |= bit(b.type);
-            for (int32_t texture : {b.reflectance.texture, b.specular_reflectance.texture,
-                                    b.specular_transmittance.texture, b.alpha_u.texture, b.alpha_v.texture})
-                use(texture);
+            f.textures |= is_textured(b);
             f.bumps |= b.normal_map >= 0 || b.bump_map >= 0;
         }
         const uint32_t first = shape.first_primitive;

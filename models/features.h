@@ -4,20 +4,9 @@
 
 #include <cstdint>
 
-namespace ambilux {
+#include "models/bsdf_list.h"
 
-enum class BsdfType : uint32_t {
-    diffuse = 0,
-    rough_diffuse,
-    conductor,
-    rough_conductor,
-    dielectric,
-    thin_dielectric,
-    rough_dielectric,
-    plastic,
-    rough_plastic,
-    count
-};
+namespace ambilux {
 
 enum class EmitterType : uint32_t { area = 0, point, spot, directional, constant, envmap, count };
 
@@ -53,7 +42,7 @@ constexpr uint32_t bit(BsdfType t) { return 1u << uint32_t(t); }
 constexpr uint32_t bit(EmitterType t) { return 1u << uint32_t(t); }
 constexpr uint32_t bit(PrimitiveType t) { return 1u << uint32_t(t); }
 
-constexpr Features kAllFeatures = {(1u << uint32_t(BsdfType::count)) - 1,
+constexpr Features kAllFeatures = {BsdfModels::kAll,
                                    (1u << uint32_t(EmitterType::count)) - 1,
                                    (1u << uint32_t(PrimitiveType::count)) - 1,
                                    true,

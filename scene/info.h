@@ -9,7 +9,6 @@
 
 namespace ambilux {
 
-const char* name_of(BsdfType type);
 const char* name_of(EmitterType type);
 const char* name_of(PrimitiveType type);
 const char* name_of(SensorType type);
