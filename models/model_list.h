@@ -21,7 +21,7 @@ struct ModelTag {
 template <class... Models>
 struct ModelList {
     static constexpr uint32_t count = sizeof...(Models), kAll = (1u << count) - 1;
-    static_assert(count < 32);
+    static_assert(count <= 16);  // cases of visit
     template <uint32_t I>
     using At = std::tuple_element_t<I, std::tuple<Models...>>;
 
@@ -54,18 +54,35 @@ struct ModelList {
         (op(ModelTag<Models>{}), ...);
     }
 
-    /// op(ModelTag<Model>) for the model at `i`, if that is one of those in the mask; `otherwise` if not. Comparisons
-    /// with the models of the mask, one after the other, which compilers turn into a switch.
-    template <uint32_t Mask, class Result, class Op, uint32_t First = 0>
+    /// op(ModelTag<Model>) for the model at `i`, if that is one of those in the mask; `otherwise` if not. A switch as
+    /// one would write it by hand: a chain of comparisons is inlined otherwise by nvcc, and kernels spill.
+    template <uint32_t Mask, class Result, class Op>
     AMBILUX_HD static Result visit(uint32_t i, Result otherwise, Op op) {
-        constexpr uint32_t kRest = First < count ? Mask >> First << First : 0;
-        if constexpr (kRest == 0) {
-            return otherwise;
-        } else {
-            constexpr uint32_t kNext = std::countr_zero(kRest);
-            if (i == kNext) return op(ModelTag<At<kNext>>{});
-            return visit<Mask, Result, Op, kNext + 1>(i, otherwise, op);
+#define AMBILUX_CASE(I)                                                            \
+    case I:                                                                        \
+        if constexpr ((Mask >> I & 1u) && I < count) return op(ModelTag<At<I>>{}); \
+        break;
+        switch (i) {
+            AMBILUX_CASE(0)
+            AMBILUX_CASE(1)
+            AMBILUX_CASE(2)
+            AMBILUX_CASE(3)
+            AMBILUX_CASE(4)
+            AMBILUX_CASE(5)
+            AMBILUX_CASE(6)
+            AMBILUX_CASE(7)
+            AMBILUX_CASE(8)
+            AMBILUX_CASE(9)
+            AMBILUX_CASE(10)
+            AMBILUX_CASE(11)
+            AMBILUX_CASE(12)
+            AMBILUX_CASE(13)
+            AMBILUX_CASE(14)
+            AMBILUX_CASE(15)
+            default: break;
         }
+#undef AMBILUX_CASE
+        return otherwise;
     }
 };
 

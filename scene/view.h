@@ -3,6 +3,7 @@
 
 #include "core/math.h"
 #include "models/features.h"
+#include "models/sensor_list.h"
 
 namespace ambilux {
 
