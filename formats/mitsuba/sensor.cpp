@@ -131,6 +131,19 @@ void read_sampler(Builder& builder, const Object* object) {
     in.finish();
 }
 
+/// The sensor of that plugin; perspective, and false, if there is none.
+bool find_sensor(const std::string& plugin, SensorType& type) {
+    type = SensorType::perspective;
+    bool known = false;
+    SensorModels::for_each([&](auto model) {
+        using Model = typename decltype(model)::type;
+        if (plugin != Model::plugin) return;
+        type = SensorType(SensorModels::index<Model>());
+        known = true;
+    });
+    return known;
+}
+
 }  // namespace
 
 void build_sensor(Builder& builder, const Object& object) {
@@ -140,19 +153,8 @@ void build_sensor(Builder& builder, const Object& object) {
     read_film(builder, in.take("film"), sensor);
     read_sampler(builder, in.take("sampler"));
 
-    bool known = false;
-    uint32_t place = 0;
-    SensorModels::for_each([&](auto model) {
-        if (type == decltype(model)::type::plugin) {
-            sensor.type = SensorType(place);
-            known = true;
-        }
-        ++place;
-    });
-    if (!known) {
-        sensor.type = SensorType::perspective;
-        builder.refuse(object.where, "sensor type '" + type + "' is not supported", "perspective is used");
-    }
+    const bool known = find_sensor(type, sensor.type);
+    if (!known) builder.refuse(object.where, "sensor type '" + type + "' is not supported", "perspective is used");
 
     const double aspect = double(sensor.film_width) / sensor.film_height;
     Matrix to_world = in.transform("to_world");
