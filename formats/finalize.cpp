@@ -219,20 +219,32 @@ double fill_environment(Scene& scene, Emitter& emitter) {
     return mean;
 }
 
-/// Power of an emitter, luminance of watts.
+// Power of an emitter, luminance of watts, one function a model. `disk`: area of the scene seen from far away.
+
+double power(ModelTag<AreaEmitter>, Scene& scene, Emitter& e, double) {
+    return M_PI * scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
+}
+double power(ModelTag<PointEmitter>, Scene& scene, Emitter& e, double) {
+    return 4 * M_PI * mean_luminance(scene, e.radiance);
+}
+/// Exact for a constant profile up to the beam width and about right for the falloff.
+double power(ModelTag<SpotEmitter>, Scene& scene, Emitter& e, double) {
+    return 2 * M_PI * (1 - 0.5 * (double(e.cos_cutoff) + e.cos_beam_width)) * mean_luminance(scene, e.radiance);
+}
+double power(ModelTag<DirectionalEmitter>, Scene& scene, Emitter& e, double disk) {
+    return disk * mean_luminance(scene, e.radiance);
+}
+double power(ModelTag<ConstantEmitter>, Scene& scene, Emitter& e, double disk) {
+    return disk * 4 * M_PI * mean_luminance(scene, e.radiance);
+}
+double power(ModelTag<EnvmapEmitter>, Scene& scene, Emitter& e, double disk) {
+    return disk * 4 * M_PI * fill_environment(scene, e);
+}
+
 double emitter_power(Scene& scene, Emitter& e) {
     const double disk = M_PI * double(scene.bounds_radius) * scene.bounds_radius;
-    switch (e.type) {
-        case EmitterType::area: return M_PI * scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
-        case EmitterType::point: return 4 * M_PI * mean_luminance(scene, e.radiance);
-        // Exact for a constant profile up to the beam width and about right for the falloff.
-        case EmitterType::spot:
-            return 2 * M_PI * (1 - 0.5 * (double(e.cos_cutoff) + e.cos_beam_width)) * mean_luminance(scene, e.radiance);
-        case EmitterType::directional: return disk * mean_luminance(scene, e.radiance);
-        case EmitterType::constant: return disk * 4 * M_PI * mean_luminance(scene, e.radiance);
-        case EmitterType::envmap: return disk * 4 * M_PI * fill_environment(scene, e);
-        default: return 0;
-    }
+    return EmitterModels::visit<EmitterModels::kAll>(uint32_t(e.type), 0.0,
+                                                     [&](auto model) { return power(model, scene, e, disk); });
 }
 
 void fill_emitters(Scene& scene, LightPicking picking) {
@@ -304,9 +316,7 @@ void fill_features(Scene& scene) {
         for (uint32_t index : {m.front, m.back}) {
             const BsdfRecord& b = scene.bsdfs[index];
             f.bsdfs |= bit(b.type);
-            for (int32_t texture : {b.reflectance.texture, b.specular_reflectance.texture,
-                                    b.specular_transmittance.texture, b.alpha_u.texture, b.alpha_v.texture})
-                use(texture);
+            f.textures |= is_textured(b);
             f.bumps |= b.normal_map >= 0 || b.bump_map >= 0;
         }
         const uint32_t first = shape.first_primitive;

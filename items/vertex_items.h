@@ -68,10 +68,10 @@ struct ConnectionVertex {
     Vec2f d, n;  ///< of the ray that met it; frame.n
     Vec3f tangent;
     uint32_t record;  ///< ScatteringParts
-    Rgb color;        ///< BsdfParameters, where there are textures
-    float alpha_u;
-    Rgb specular_reflectance;
-    float alpha_v;
+    Rgb color0;       ///< BsdfInputs, where there are textures
+    float number0;
+    Rgb color1;
+    float number1;
 
     /// Lanes that kernels of features F use.
     template <Features F>
@@ -98,12 +98,12 @@ struct VertexItem {
     float dvc;
     Vec3f n;
     float offset;
-    Rgb color;
+    Rgb color0;  ///< BsdfInputs
     uint32_t record;
     Vec3f tangent;
-    float alpha_u;
-    Rgb specular_reflectance;
-    float alpha_v;
+    float number0;
+    Rgb color1;
+    float number1;
 
     template <Features F>
     static constexpr uint32_t lanes() {
@@ -173,12 +173,12 @@ AMBILUX_HD VertexItem pack_vertex(const Vertex<Mis>& v, const Subpath<Mis>& path
             sums.dvc,
             s.n,
             v.offset,
-            s.parameters.color,
+            s.inputs.colors[0],
             s.record,
             s.tangent,
-            s.parameters.alpha_u,
-            s.parameters.specular_reflectance,
-            s.parameters.alpha_v};
+            s.inputs.numbers[0],
+            s.inputs.colors[1],
+            s.inputs.numbers[1]};
 }
 
 /// The vertex `v` that the ray of `path` met. `link`: ConnectionVertexFront.
@@ -186,7 +186,7 @@ AMBILUX_HD ConnectionVertex pack_connection_vertex(const BidirectionalVertex& v,
                                                    uint32_t link) {
     const ScatteringParts s = parts_of(v.scattering);
     Rgb throughput = path.throughput;
-    if (v.scattering.bsdf.type == BsdfType::diffuse) throughput *= s.parameters.color;
+    if (v.scattering.bsdf.type == BsdfType::diffuse) throughput *= s.inputs.colors[0];
     return {{v.point.p, VertexBits::make(path.depth, v), octahedral_encode(s.ng), link, v.sums.dvc},
             throughput,
             v.sums.dvcm,
@@ -194,34 +194,31 @@ AMBILUX_HD ConnectionVertex pack_connection_vertex(const BidirectionalVertex& v,
             octahedral_encode(s.n),
             s.tangent,
             s.record,
-            s.parameters.color,
-            s.parameters.alpha_u,
-            s.parameters.specular_reflectance,
-            s.parameters.alpha_v};
+            s.inputs.colors[0],
+            s.inputs.numbers[0],
+            s.inputs.colors[1],
+            s.inputs.numbers[1]};
 }
 
 /// The end of a subpath that was packed; of its point p and ng only, and of diffuse ones no tangents.
 template <Features F, class Mis>
 AMBILUX_HD SubpathEnd<Mis> unpack_end(const SceneView& scene, const VertexItem& item) {
-    return detail::unpack_end<F, Mis>(scene, item.p, item.head, item.offset,
-                                      {item.ng,
-                                       item.n,
-                                       item.tangent,
-                                       item.record,
-                                       {item.color, item.alpha_u, item.specular_reflectance, item.alpha_v}},
-                                      item.d, {item.dvcm, item.dvc}, item.throughput);
+    return detail::unpack_end<F, Mis>(
+        scene, item.p, item.head, item.offset,
+        {item.ng, item.n, item.tangent, item.record, {{item.color0, item.color1}, {item.number0, item.number1}}},
+        item.d, {item.dvcm, item.dvc}, item.throughput);
 }
 /// The same, with an offset that is rounded up; diffuse ones have reflectance 1.
 template <Features F>
 AMBILUX_HD BidirectionalEnd unpack_end(const SceneView& scene, const ConnectionVertex& item) {
     const VertexBits bits = item.front.bits;
-    const Rgb color = bits.template diffuse<F>() ? splat(1.0f) : item.color;
+    const Rgb color = bits.template diffuse<F>() ? splat(1.0f) : item.color0;
     return detail::unpack_end<F, BidirectionalMis>(scene, item.front.p, bits, bits.offset(),
                                                    {octahedral_decode(item.front.ng),
                                                     octahedral_decode(item.n),
                                                     item.tangent,
                                                     item.record,
-                                                    {color, item.alpha_u, item.specular_reflectance, item.alpha_v}},
+                                                    {{color, item.color1}, {item.number0, item.number1}}},
                                                    octahedral_decode(item.d), {item.dvcm, item.front.dvc},
                                                    item.throughput);
 }

@@ -4,26 +4,11 @@
 
 #include <cstdint>
 
+#include "models/bsdf_list.h"
+#include "models/emitter_list.h"
+#include "models/primitive_list.h"
+
 namespace ambilux {
-
-enum class BsdfType : uint32_t {
-    diffuse = 0,
-    rough_diffuse,
-    conductor,
-    rough_conductor,
-    dielectric,
-    thin_dielectric,
-    rough_dielectric,
-    plastic,
-    rough_plastic,
-    count
-};
-
-enum class EmitterType : uint32_t { area = 0, point, spot, directional, constant, envmap, count };
-
-enum class PrimitiveType : uint32_t { triangle = 0, sphere, disk, cylinder, count };
-
-enum class SensorType : uint32_t { perspective = 0, thin_lens, orthographic, count };
 
 /// Set of features. Structural, so that it can be a template argument.
 struct Features {
@@ -39,7 +24,7 @@ struct Features {
     constexpr bool has(PrimitiveType t) const { return primitives >> uint32_t(t) & 1u; }
     constexpr bool several_bsdfs() const { return bsdfs & (bsdfs - 1); }
     constexpr bool has_quadrics() const { return primitives & ~1u; }
-    constexpr bool has_environment() const { return has(EmitterType::constant) || has(EmitterType::envmap); }
+    constexpr bool has_environment() const { return emitters & detail::kEnvironmentEmitters; }
 
     /// True if kernels built for *this can render a scene that needs `other`.
     constexpr bool covers(const Features& other) const {
@@ -53,11 +38,7 @@ constexpr uint32_t bit(BsdfType t) { return 1u << uint32_t(t); }
 constexpr uint32_t bit(EmitterType t) { return 1u << uint32_t(t); }
 constexpr uint32_t bit(PrimitiveType t) { return 1u << uint32_t(t); }
 
-constexpr Features kAllFeatures = {(1u << uint32_t(BsdfType::count)) - 1,
-                                   (1u << uint32_t(EmitterType::count)) - 1,
-                                   (1u << uint32_t(PrimitiveType::count)) - 1,
-                                   true,
-                                   true,
-                                   true};
+constexpr Features kAllFeatures = {
+    BsdfModels::kAll, EmitterModels::kAll, (1u << uint32_t(PrimitiveType::count)) - 1, true, true, true};
 
 }  // namespace ambilux

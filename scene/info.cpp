@@ -7,27 +7,6 @@
 
 namespace ambilux {
 
-const char* name_of(BsdfType type) {
-    static const char* names[] = {"diffuse",         "rough_diffuse",    "conductor", "rough_conductor", "dielectric",
-                                  "thin_dielectric", "rough_dielectric", "plastic",   "rough_plastic"};
-    static_assert(std::size(names) == size_t(BsdfType::count));
-    return names[size_t(type)];
-}
-const char* name_of(EmitterType type) {
-    static const char* names[] = {"area", "point", "spot", "directional", "constant", "envmap"};
-    static_assert(std::size(names) == size_t(EmitterType::count));
-    return names[size_t(type)];
-}
-const char* name_of(PrimitiveType type) {
-    static const char* names[] = {"triangle", "sphere", "disk", "cylinder"};
-    static_assert(std::size(names) == size_t(PrimitiveType::count));
-    return names[size_t(type)];
-}
-const char* name_of(SensorType type) {
-    static const char* names[] = {"perspective", "thin_lens", "orthographic"};
-    static_assert(std::size(names) == size_t(SensorType::count));
-    return names[size_t(type)];
-}
 const char* name_of(FilterType type) {
     static const char* names[] = {"box", "tent", "gaussian"};
     return names[size_t(type)];

@@ -9,10 +9,6 @@
 
 namespace ambilux {
 
-const char* name_of(BsdfType type);
-const char* name_of(EmitterType type);
-const char* name_of(PrimitiveType type);
-const char* name_of(SensorType type);
 const char* name_of(FilterType type);
 
 /// Names of the features, in a fixed order: bsdf types, emitter types, primitive types, then textures, bumps, opacity.

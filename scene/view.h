@@ -3,22 +3,9 @@
 
 #include "core/math.h"
 #include "models/features.h"
+#include "models/sensor_list.h"
 
 namespace ambilux {
-
-constexpr uint32_t kNone = 0xffffffffu;
-
-/// Colour parameter: `value`, or texture `texture` times `value` when texture >= 0.
-struct ParamRgb {
-    Rgb value = {0, 0, 0};
-    int32_t texture = -1;
-};
-
-/// Scalar parameter: `value`, or the luminance of the texture times `value`.
-struct ParamFloat {
-    float value = 0;
-    int32_t texture = -1;
-};
 
 // ---- textures ----
 
@@ -89,33 +76,6 @@ struct Shape {
 };
 
 // ---- materials ----
-
-enum class Microfacets : uint32_t { beckmann, ggx };
-
-/// Parameters of one BSDF without its adapters; each type reads what it needs (see transport/bsdf/).
-struct BsdfRecord {
-    BsdfType type = BsdfType::diffuse;
-    Microfacets microfacets = Microfacets::ggx;
-    uint32_t sample_visible = 1;  ///< rough_*: sample visible normals (Heitz and d'Eon 2014)
-    uint32_t nonlinear = 0;       ///< plastic, rough_plastic: colour shifts by internal scattering
-    ParamRgb reflectance;         ///< diffuse, rough_diffuse: reflectance; plastic, rough_plastic: diffuse_reflectance
-    ParamRgb specular_reflectance = {{1, 1, 1}, -1};
-    ParamRgb specular_transmittance = {{1, 1, 1}, -1};
-    Rgb eta = {0, 0, 0};          ///< conductors: real part of the index, relative to the outside
-    float ior = 1.5f;             ///< dielectrics, plastics: interior over exterior index of refraction
-    Rgb k = {0, 0, 0};            ///< conductors: imaginary part, relative to the outside
-    float fdr_internal = 0;       ///< plastics: mean diffuse Fresnel reflectance seen from inside
-    ParamFloat alpha_u, alpha_v;  ///< rough_*: roughness along s and t of the shading frame; rough_diffuse: alpha_u
-    float specular_sampling_weight = 0;    ///< plastics: share of the specular lobe in sampling, before Fresnel
-    uint32_t transmittance_table = kNone;  ///< rough_plastic: kTransmittanceTableSize floats in SceneView::tables
-    int32_t normal_map = -1;               ///< texture of tangent-space normals, or -1
-    int32_t bump_map = -1;                 ///< texture of heights, or -1
-    float bump_scale = 1;
-    uint32_t pad = 0;
-};
-
-/// Size of the table of directional transmittance over cos(theta) in [0,1] at equal steps, both ends included.
-constexpr uint32_t kTransmittanceTableSize = 64;
 
 /// A BSDF with its adapters. `front` is used where the ray comes from the side of the shading normal. When `two_sided`,
 /// rays from behind use `back` in a flipped frame; otherwise `back` == `front`, unflipped.

@@ -12,8 +12,7 @@
 // - sample takes u.x for the choice of a lobe and (u.y, u.z) for the direction, uniform in [0,1); false means that the
 // walk ends.
 //
-// A new BSDF is one file in transport/bsdf/ with eval, pdf and sample, a BsdfType, and a case in make_bsdf and
-// with_bsdf.
+// A new BSDF is a model in models/bsdf/, its functions in transport/bsdf/, and a line in models/bsdf_list.h.
 #pragma once
 
 #include <bit>
@@ -33,192 +32,93 @@
 
 namespace ambilux {
 
-/// Parameters of a BsdfRecord at one surface point, textures looked up. Types share fields; each sets and reads its own
-/// only.
+/// A BSDF at one surface point: the model and its parameters, textures looked up.
 struct Bsdf {
     BsdfType type;
-    Microfacets microfacets;
-    bool sample_visible, nonlinear;
-    Rgb reflectance_or_eta;  ///< diffuse and plastics: diffuse reflectance; conductors: eta
-    Rgb specular_reflectance;
-    Rgb transmittance_or_k;  ///< dielectrics: specular transmittance; conductors: k
-    float ior;
-    float alpha_u, alpha_v;
-    float fdr_internal, specular_sampling_weight;
-    const float* transmittance_table;
-};
+    BsdfInputs inputs;
+    BsdfConstants constants;
+    const float* tables;  ///< SceneView::tables for the models that read them
 
-/// True if light can pass to the other side.
-AMBILUX_HD bool bsdf_transmits(BsdfType type) {
-    return type == BsdfType::dielectric || type == BsdfType::thin_dielectric || type == BsdfType::rough_dielectric;
-}
-
-/// Parameters that textures may set. What else a Bsdf has is the same at all points of its record.
-struct BsdfParameters {
-    Rgb color;  ///< reflectance; of dielectrics specular transmittance
-    float alpha_u;
-    Rgb specular_reflectance;
-    float alpha_v;
-};
-
-/// Looks up the parameters at texture coordinates `uv`.
-template <Features F>
-struct ParametersAt {
-    const SceneView& scene;
-    Vec2f uv;
-
-    AMBILUX_HD Rgb rgb(Rgb BsdfParameters::*, const ParamRgb& input) const { return eval_rgb<F>(scene, input, uv); }
-    AMBILUX_HD float number(float BsdfParameters::*, const ParamFloat& input) const {
-        return eval_float<F>(scene, input, uv);
+    /// Parameters of the model, which must be `Model`.
+    template <class Model>
+    AMBILUX_HD Resolved<Model> as() const {
+        return resolved<Model>(inputs, constants.get<typename Model::Constants>());
     }
 };
 
-/// Has them.
-struct KnownParameters {
-    const BsdfParameters& known;
-
-    AMBILUX_HD Rgb rgb(Rgb BsdfParameters::* which, const ParamRgb&) const { return known.*which; }
-    AMBILUX_HD float number(float BsdfParameters::* which, const ParamFloat&) const { return known.*which; }
-};
-
-/// The BSDF of `record` with parameters by `of`, one of the above. Microfacet roughness is at least kMinAlpha.
-template <Features F, class Parameters>
-AMBILUX_HD Bsdf make_bsdf(const SceneView& scene, const BsdfRecord& record, const Parameters& of) {
+template <class Model>
+AMBILUX_HD Bsdf bsdf_of(const Resolved<Model>& parameters, const float* tables = nullptr) {
     Bsdf b = {};
-    b.type = F.several_bsdfs() ? record.type : BsdfType(std::countr_zero(F.bsdfs));
-    const auto specular_reflectance = [&] {
-        b.specular_reflectance = of.rgb(&BsdfParameters::specular_reflectance, record.specular_reflectance);
-    };
-    const auto reflectance = [&] { b.reflectance_or_eta = of.rgb(&BsdfParameters::color, record.reflectance); };
-    const auto conductor = [&] {
-        specular_reflectance();
-        b.reflectance_or_eta = record.eta;
-        b.transmittance_or_k = record.k;
-    };
-    const auto dielectric = [&] {
-        specular_reflectance();
-        b.transmittance_or_k = of.rgb(&BsdfParameters::color, record.specular_transmittance);
-        b.ior = record.ior;
-    };
-    const auto plastic = [&] {
-        specular_reflectance();
-        reflectance();
-        b.ior = record.ior;
-        b.nonlinear = record.nonlinear != 0;
-        b.fdr_internal = record.fdr_internal;
-        b.specular_sampling_weight = record.specular_sampling_weight;
-    };
-    const auto microfacets = [&] {
-        b.microfacets = record.microfacets;
-        b.sample_visible = record.sample_visible != 0;
-        b.alpha_u = max(of.number(&BsdfParameters::alpha_u, record.alpha_u), kMinAlpha);
-        b.alpha_v = max(of.number(&BsdfParameters::alpha_v, record.alpha_v), kMinAlpha);
-    };
-    switch (b.type) {
-        case BsdfType::diffuse:
-            if constexpr (F.has(BsdfType::diffuse)) reflectance();
-            break;
-        case BsdfType::rough_diffuse:
-            if constexpr (F.has(BsdfType::rough_diffuse)) {
-                reflectance();
-                b.alpha_u = of.number(&BsdfParameters::alpha_u, record.alpha_u);
-            }
-            break;
-        case BsdfType::conductor:
-            if constexpr (F.has(BsdfType::conductor)) conductor();
-            break;
-        case BsdfType::rough_conductor:
-            if constexpr (F.has(BsdfType::rough_conductor)) {
-                conductor();
-                microfacets();
-            }
-            break;
-        case BsdfType::dielectric:
-            if constexpr (F.has(BsdfType::dielectric)) dielectric();
-            break;
-        case BsdfType::thin_dielectric:
-            if constexpr (F.has(BsdfType::thin_dielectric)) dielectric();
-            break;
-        case BsdfType::rough_dielectric:
-            if constexpr (F.has(BsdfType::rough_dielectric)) {
-                dielectric();
-                microfacets();
-            }
-            break;
-        case BsdfType::plastic:
-            if constexpr (F.has(BsdfType::plastic)) plastic();
-            break;
-        case BsdfType::rough_plastic:
-            if constexpr (F.has(BsdfType::rough_plastic)) {
-                plastic();
-                microfacets();
-                b.transmittance_table = scene.tables + record.transmittance_table;
-            }
-            break;
-        case BsdfType::count: break;
-    }
+    b.type = kBsdfType<Model>;
+    b.inputs = inputs_of(parameters);
+    b.constants.set<typename Model::Constants>(parameters);
+    b.tables = tables;
     return b;
 }
 
-/// Those with which `b` was made.
-AMBILUX_HD BsdfParameters parameters_of(const Bsdf& b) {
-    return {bsdf_transmits(b.type) ? b.transmittance_or_k : b.reflectance_or_eta, b.alpha_u, b.specular_reflectance,
-            b.alpha_v};
+AMBILUX_HD bool bsdf_is_smooth(const Bsdf& b) { return bsdf_is_smooth(b.type); }
+
+/// `op` with the model of that type; `otherwise` when kernels of features F do not know it.
+template <Features F, class Result, class Op>
+AMBILUX_HD Result visit_bsdf(BsdfType type, Result otherwise, Op op) {
+    return BsdfModels::visit<F.bsdfs>(uint32_t(type), otherwise, op);
+}
+
+/// Looks up inputs at texture coordinates `uv`.
+template <Features F>
+struct InputsAt {
+    const SceneView& scene;
+    Vec2f uv;
+
+    template <class Model>
+    AMBILUX_HD void operator()(const Textured<Model>& parameters, BsdfInputs& inputs) const {
+        for_each_input(parameters, inputs, [&](const auto& parameter, auto& value) {
+            if constexpr (std::is_same_v<decltype(value), Rgb&>)
+                value = eval_rgb<F>(scene, parameter, uv);
+            else
+                value = eval_float<F>(scene, parameter, uv);
+        });
+    }
+};
+
+/// The BSDF of `record`; `find_inputs(parameters, inputs)` sets what textures may set.
+template <Features F, class FindInputs>
+AMBILUX_HD Bsdf make_bsdf(const SceneView& scene, const BsdfRecord& record, const FindInputs& find_inputs) {
+    Bsdf b = {};
+    b.type = F.several_bsdfs() ? record.type : BsdfType(std::countr_zero(F.bsdfs));
+    if constexpr (F.bsdfs & detail::kTabulatedBsdfs) b.tables = scene.tables;
+    visit_bsdf<F>(b.type, false, [&](auto model) {
+        using Model = typename decltype(model)::type;
+        const Textured<Model>& parameters = record.as<Model>();
+        find_inputs(parameters, b.inputs);
+        b.constants.set<typename Model::Constants>(parameters);
+        return true;
+    });
+    return b;
 }
 
 /// The BSDF of `record` at texture coordinates `uv`.
 template <Features F>
 AMBILUX_HD Bsdf resolve_bsdf(const SceneView& scene, const BsdfRecord& record, Vec2f uv) {
-    return make_bsdf<F>(scene, record, ParametersAt<F>{scene, uv});
+    return make_bsdf<F>(scene, record, InputsAt<F>{scene, uv});
+}
+
+/// The BSDF of `record` with inputs that are known.
+template <Features F>
+AMBILUX_HD Bsdf resolve_bsdf(const SceneView& scene, const BsdfRecord& record, const BsdfInputs& known) {
+    return make_bsdf<F>(scene, record, [&](const auto&, BsdfInputs& inputs) { inputs = known; });
 }
 
 /// Calls `op` with the BSDF that `b` stands for; `otherwise` when kernels of features F do not know it.
 template <Features F, typename Result, typename Op>
 AMBILUX_HD Result with_bsdf(const Bsdf& b, Result otherwise, Op op) {
-    const MicrofacetDistribution microfacets = {b.microfacets, b.alpha_u, b.alpha_v};
-    switch (b.type) {
-        case BsdfType::diffuse:
-            if constexpr (F.has(BsdfType::diffuse)) return op(Diffuse{b.reflectance_or_eta});
-            break;
-        case BsdfType::rough_diffuse:
-            if constexpr (F.has(BsdfType::rough_diffuse)) return op(RoughDiffuse{b.reflectance_or_eta, b.alpha_u});
-            break;
-        case BsdfType::conductor:
-            if constexpr (F.has(BsdfType::conductor))
-                return op(Conductor{b.specular_reflectance, b.reflectance_or_eta, b.transmittance_or_k});
-            break;
-        case BsdfType::rough_conductor:
-            if constexpr (F.has(BsdfType::rough_conductor))
-                return op(RoughConductor{b.specular_reflectance, b.reflectance_or_eta, b.transmittance_or_k,
-                                         microfacets, b.sample_visible});
-            break;
-        case BsdfType::dielectric:
-            if constexpr (F.has(BsdfType::dielectric))
-                return op(Dielectric{b.specular_reflectance, b.transmittance_or_k, b.ior});
-            break;
-        case BsdfType::thin_dielectric:
-            if constexpr (F.has(BsdfType::thin_dielectric))
-                return op(ThinDielectric{b.specular_reflectance, b.transmittance_or_k, b.ior});
-            break;
-        case BsdfType::rough_dielectric:
-            if constexpr (F.has(BsdfType::rough_dielectric))
-                return op(RoughDielectric{b.specular_reflectance, b.transmittance_or_k, b.ior, microfacets,
-                                          b.sample_visible});
-            break;
-        case BsdfType::plastic:
-            if constexpr (F.has(BsdfType::plastic))
-                return op(Plastic{b.reflectance_or_eta, b.specular_reflectance, b.ior, b.fdr_internal,
-                                  b.specular_sampling_weight, b.nonlinear});
-            break;
-        case BsdfType::rough_plastic:
-            if constexpr (F.has(BsdfType::rough_plastic))
-                return op(RoughPlastic{b.reflectance_or_eta, b.specular_reflectance, b.ior, b.fdr_internal,
-                                       b.specular_sampling_weight, b.nonlinear, microfacets, b.sample_visible,
-                                       b.transmittance_table});
-            break;
-        case BsdfType::count: break;
-    }
-    return otherwise;
+    return visit_bsdf<F>(b.type, otherwise, [&](auto model) -> Result {
+        using Model = typename decltype(model)::type;
+        if constexpr (Model::tabulated)
+            return op(BsdfAt<Model>{b.as<Model>(), b.tables});
+        else
+            return op(BsdfAt<Model>{b.as<Model>()});
+    });
 }
 
 namespace detail {
@@ -226,12 +126,12 @@ namespace detail {
 template <Features F>
 AMBILUX_HD_APART BsdfValue bsdf_evaluate_apart(Bsdf b, Vec3f wi, Vec3f wo, TransportMode mode) {
     return with_bsdf<F>(b, no_scattering(), [&](const auto& bsdf) -> BsdfValue {
-        if constexpr (requires { bsdf.evaluate(wi, wo, mode); })
+        constexpr bool kSmooth = requires { bsdf.evaluate(wi, wo, mode); };
+        static_assert(kSmooth == std::remove_cvref_t<decltype(bsdf)>::Model::smooth, "smooth ones have evaluate");
+        if constexpr (kSmooth)
             return bsdf.evaluate(wi, wo, mode);
-        else if constexpr (requires { bsdf.evaluate(wi, wo); })
-            return bsdf.evaluate(wi, wo);
         else
-            return no_scattering();  // delta lobes only
+            return no_scattering();
     });
 }
 
@@ -254,7 +154,7 @@ AMBILUX_HD_APART SampleOrNone bsdf_sample_apart(Bsdf b, Vec3f wi, Vec3f u, Trans
 template <Features F>
 AMBILUX_HD BsdfValue bsdf_evaluate(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
     if constexpr (F.bsdfs == bit(BsdfType::diffuse)) {
-        return Diffuse{b.reflectance_or_eta}.evaluate(wi, wo);
+        return BsdfAt<Diffuse>{b.as<Diffuse>()}.evaluate(wi, wo, mode);
     } else {
         return detail::bsdf_evaluate_apart<F>(b, wi, wo, mode);
     }
@@ -274,17 +174,12 @@ AMBILUX_HD float bsdf_pdf(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode)
 template <Features F>
 AMBILUX_HD bool bsdf_sample(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) {
     if constexpr (F.bsdfs == bit(BsdfType::diffuse)) {
-        return Diffuse{b.reflectance_or_eta}.sample(wi, u, mode, out);
+        return BsdfAt<Diffuse>{b.as<Diffuse>()}.sample(wi, u, mode, out);
     } else {
         const detail::SampleOrNone s = detail::bsdf_sample_apart<F>(b, wi, u, mode);
         if (s.some) out = s.sample;
         return s.some;
     }
-}
-
-/// True if there is a lobe that is not a delta, so that connecting to other vertices can give light.
-AMBILUX_HD bool bsdf_is_smooth(const Bsdf& b) {
-    return b.type != BsdfType::conductor && b.type != BsdfType::dielectric && b.type != BsdfType::thin_dielectric;
 }
 
 }  // namespace ambilux

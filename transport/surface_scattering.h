@@ -74,11 +74,11 @@ struct ScatteringParts {
     Vec3f ng, n;      ///< of Scattering::ng and frame.n
     Vec3f tangent;    ///< frame.s
     uint32_t record;  ///< and, in the highest bit, whether it was flipped
-    BsdfParameters parameters;
+    BsdfInputs inputs;
 };
 
 AMBILUX_HD ScatteringParts parts_of(const Scattering& s) {
-    return {s.ng, s.frame.n, s.frame.s, s.record | uint32_t(s.flipped) << 31, parameters_of(s.bsdf)};
+    return {s.ng, s.frame.n, s.frame.s, s.record | uint32_t(s.flipped) << 31, s.bsdf.inputs};
 }
 
 template <Features F>
@@ -92,9 +92,9 @@ AMBILUX_HD Scattering scattering_of(const SceneView& scene, const ScatteringPart
     s.wi = s.frame.to_local(wi_world);
     const BsdfRecord& record = scene.bsdfs[s.record];
     if constexpr (F.textures)
-        s.bsdf = make_bsdf<F>(scene, record, KnownParameters{parts.parameters});
+        s.bsdf = resolve_bsdf<F>(scene, record, parts.inputs);
     else
-        s.bsdf = resolve_bsdf<F>(scene, record, {});
+        s.bsdf = resolve_bsdf<F>(scene, record, Vec2f{});
     return s;
 }
 /// The same of a diffuse BSDF, which needs no more than the normals and its reflectance: without tangents, side and
@@ -105,8 +105,7 @@ AMBILUX_HD Scattering diffuse_scattering(const ScatteringParts& parts, Vec3f wi_
     s.ng = parts.ng;
     s.wi_world = wi_world;
     s.wi.z = dot(parts.n, wi_world);
-    s.bsdf.type = BsdfType::diffuse;
-    s.bsdf.reflectance_or_eta = parts.parameters.color;
+    s.bsdf = bsdf_of(Resolved<Diffuse>{{parts.inputs.colors[0]}, {}});
     return s;
 }
 

@@ -106,8 +106,8 @@ uint32_t default_material(Builder& builder, bool emitter);
 void build_shapes(Builder& builder, const Object& scene);
 /// An emitter that is not part of a shape.
 void build_emitter(Builder& builder, const Object& object);
-/// The radiance of an area emitter.
-ParamRgb area_radiance(Builder& builder, const Object& object);
+/// An emitter that is part of a shape or not; of type `count` if none of these has that name.
+Emitter read_emitter(Builder& builder, const Object& object, bool on_shape);
 
 void build_sensor(Builder& builder, const Object& object);
 void build_integrator(Builder& builder, const Object& object);

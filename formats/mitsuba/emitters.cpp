@@ -24,85 +24,95 @@ Matrix rigid_transform(Builder& builder, Reader& in) {
     return m;
 }
 
+// One plugin a model: what its XML says.
+
+void read_plugin(ModelTag<AreaEmitter>, Builder&, Reader& in, Emitter& e) {
+    e.radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
+}
+
+void read_plugin(ModelTag<PointEmitter>, Builder&, Reader& in, Emitter& e) {
+    if (in.has("position") && in.has("to_world"))
+        in.fail(in.where("to_world"), "both 'position' and 'to_world' are given");
+    e.position = in.has("position") ? in.vector("position", {}) : to_vec3f(column(in.transform("to_world"), 3));
+    e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
+}
+
+void read_plugin(ModelTag<SpotEmitter>, Builder& builder, Reader& in, Emitter& e) {
+    const Matrix m = rigid_transform(builder, in);
+    e.to_world = to_affine(m);
+    e.to_local = to_affine(affine_inverse(m));
+    e.position = to_vec3f(column(m, 3));
+    e.direction = to_vec3f(column(m, 2));
+    const double cutoff = in.number("cutoff_angle", 20), beam = in.number("beam_width", cutoff * 0.75);
+    if (!(cutoff > 0 && cutoff < 90))
+        in.fail(in.where("cutoff_angle"), "cutoff_angle must lie between 0 and 90 degrees");
+    if (!(beam >= 0 && beam <= cutoff))
+        in.fail(in.where("beam_width"), "beam_width must lie between 0 and cutoff_angle");
+    e.cos_cutoff = float(std::cos(cutoff * (M_PI / 180)));
+    e.cos_beam_width = float(std::cos(beam * (M_PI / 180)));
+    e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
+    if (const Object* texture = in.take_named("texture")) e.radiance.texture = load_texture(builder, *texture);
+}
+
+void read_plugin(ModelTag<DirectionalEmitter>, Builder&, Reader& in, Emitter& e) {
+    if (in.has("direction") && in.has("to_world"))
+        in.fail(in.where("to_world"), "both 'direction' and 'to_world' are given");
+    Vec3d d = column(in.transform("to_world"), 2);
+    if (in.has("direction")) {
+        const Vec3f v = in.vector("direction", {0, 0, 1});
+        d = {v.x, v.y, v.z};
+    }
+    const double l = length(d);
+    if (!(l > 0)) in.fail(in.where("direction"), "the direction of the emitter is zero");
+    e.direction = to_vec3f({d.x / l, d.y / l, d.z / l});
+    e.radiance = {in.color("irradiance", {1, 1, 1}, SpectrumUse::emission), -1};
+}
+
+void read_plugin(ModelTag<ConstantEmitter>, Builder&, Reader& in, Emitter& e) {
+    e.radiance = {in.color("radiance", {1, 1, 1}, SpectrumUse::emission), -1};
+}
+
+void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter& e) {
+    const Matrix m = rigid_transform(builder, in);
+    e.to_world = to_affine(m);
+    e.to_local = to_affine(affine_inverse(m));
+    const std::string name = in.text("filename", "");
+    if (name.empty()) in.fail("envmap has no filename");
+    const std::string path = builder.document.resolve(name, in.where("filename"));
+    const double scale = in.number("scale", 1);
+    if (!(scale >= 0)) in.fail(in.where("scale"), "scale must not be negative");
+    in.ignore({"cache"});
+    e.radiance = {splat(float(scale)), load_environment_image(builder, path)};
+}
+
 }  // namespace
 
-ParamRgb area_radiance(Builder& builder, const Object& object) {
-    Reader in(builder, object);
-    if (object.type != "area") {
-        builder.refuse(object.where, "emitter type '" + object.type + "' on a shape is not supported",
-                       "the shape does not emit");
-        return {};
-    }
-    const ParamRgb radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
-    check_sampling_weight(builder, in);
-    in.finish();
-    return radiance;
+Emitter read_emitter(Builder& builder, const Object& object, bool on_shape) {
+    Emitter e{};
+    e.type = EmitterType::count;
+    e.shape = e.area_cdf = kNone;
+    e.to_world = e.to_local = to_affine(Matrix{});
+    EmitterModels::for_each([&](auto model) {
+        using Model = typename decltype(model)::type;
+        if (object.type != Model::plugin || Model::surface != on_shape) return;
+        Reader in(builder, object);
+        e.type = kEmitterType<Model>;
+        read_plugin(model, builder, in, e);
+        check_sampling_weight(builder, in);
+        in.finish();
+    });
+    return e;
 }
 
 void build_emitter(Builder& builder, const Object& object) {
-    Reader in(builder, object);
-    const std::string& type = object.type;
-    Emitter e{};
-    e.shape = e.area_cdf = kNone;
-    e.to_world = e.to_local = to_affine(Matrix{});
-    if (type == "point") {
-        e.type = EmitterType::point;
-        if (in.has("position") && in.has("to_world"))
-            in.fail(in.where("to_world"), "both 'position' and 'to_world' are given");
-        e.position = in.has("position") ? in.vector("position", {}) : to_vec3f(column(in.transform("to_world"), 3));
-        e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
-    } else if (type == "spot") {
-        e.type = EmitterType::spot;
-        const Matrix m = rigid_transform(builder, in);
-        e.to_world = to_affine(m);
-        e.to_local = to_affine(affine_inverse(m));
-        e.position = to_vec3f(column(m, 3));
-        e.direction = to_vec3f(column(m, 2));
-        const double cutoff = in.number("cutoff_angle", 20), beam = in.number("beam_width", cutoff * 0.75);
-        if (!(cutoff > 0 && cutoff < 90))
-            in.fail(in.where("cutoff_angle"), "cutoff_angle must lie between 0 and 90 degrees");
-        if (!(beam >= 0 && beam <= cutoff))
-            in.fail(in.where("beam_width"), "beam_width must lie between 0 and cutoff_angle");
-        e.cos_cutoff = float(std::cos(cutoff * (M_PI / 180)));
-        e.cos_beam_width = float(std::cos(beam * (M_PI / 180)));
-        e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
-        if (const Object* texture = in.take_named("texture")) e.radiance.texture = load_texture(builder, *texture);
-    } else if (type == "directional") {
-        e.type = EmitterType::directional;
-        if (in.has("direction") && in.has("to_world"))
-            in.fail(in.where("to_world"), "both 'direction' and 'to_world' are given");
-        Vec3d d = column(in.transform("to_world"), 2);
-        if (in.has("direction")) {
-            const Vec3f v = in.vector("direction", {0, 0, 1});
-            d = {v.x, v.y, v.z};
-        }
-        const double l = length(d);
-        if (!(l > 0)) in.fail(in.where("direction"), "the direction of the emitter is zero");
-        e.direction = to_vec3f({d.x / l, d.y / l, d.z / l});
-        e.radiance = {in.color("irradiance", {1, 1, 1}, SpectrumUse::emission), -1};
-    } else if (type == "constant") {
-        e.type = EmitterType::constant;
-        e.radiance = {in.color("radiance", {1, 1, 1}, SpectrumUse::emission), -1};
-    } else if (type == "envmap") {
-        e.type = EmitterType::envmap;
-        const Matrix m = rigid_transform(builder, in);
-        e.to_world = to_affine(m);
-        e.to_local = to_affine(affine_inverse(m));
-        const std::string name = in.text("filename", "");
-        if (name.empty()) in.fail("envmap has no filename");
-        const std::string path = builder.document.resolve(name, in.where("filename"));
-        const double scale = in.number("scale", 1);
-        if (!(scale >= 0)) in.fail(in.where("scale"), "scale must not be negative");
-        in.ignore({"cache"});
-        e.radiance = {splat(float(scale)), load_environment_image(builder, path)};
-    } else {
-        builder.refuse(object.where, "emitter type '" + type + "' is not supported", "it is left out");
+    const Emitter e = read_emitter(builder, object, false);
+    if (e.type == EmitterType::count) {
+        builder.refuse(object.where, "emitter type '" + object.type + "' is not supported", "it is left out");
         return;
     }
-    check_sampling_weight(builder, in);
-    in.finish();
-    if (e.type == EmitterType::constant || e.type == EmitterType::envmap) {
-        if (builder.scene.environment != kNone) in.fail("only one constant or envmap emitter is possible");
+    if (is_environment(e.type)) {
+        if (builder.scene.environment != kNone)
+            Reader(builder, object).fail("only one constant or envmap emitter is possible");
         builder.scene.environment = uint32_t(builder.scene.emitters.size());
     }
     builder.scene.emitters.push_back(e);

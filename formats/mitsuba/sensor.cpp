@@ -131,6 +131,19 @@ void read_sampler(Builder& builder, const Object* object) {
     in.finish();
 }
 
+/// The sensor of that plugin; perspective, and false, if there is none.
+bool find_sensor(const std::string& plugin, SensorType& type) {
+    type = SensorType::perspective;
+    bool known = false;
+    SensorModels::for_each([&](auto model) {
+        using Model = typename decltype(model)::type;
+        if (plugin != Model::plugin) return;
+        type = SensorType(SensorModels::index<Model>());
+        known = true;
+    });
+    return known;
+}
+
 }  // namespace
 
 void build_sensor(Builder& builder, const Object& object) {
@@ -140,21 +153,14 @@ void build_sensor(Builder& builder, const Object& object) {
     read_film(builder, in.take("film"), sensor);
     read_sampler(builder, in.take("sampler"));
 
-    if (type == "orthographic")
-        sensor.type = SensorType::orthographic;
-    else if (type == "thinlens")
-        sensor.type = SensorType::thin_lens;
-    else {
-        sensor.type = SensorType::perspective;
-        if (type != "perspective")
-            builder.refuse(object.where, "sensor type '" + type + "' is not supported", "perspective is used");
-    }
+    const bool known = find_sensor(type, sensor.type);
+    if (!known) builder.refuse(object.where, "sensor type '" + type + "' is not supported", "perspective is used");
 
     const double aspect = double(sensor.film_width) / sensor.film_height;
     Matrix to_world = in.transform("to_world");
     if (!(std::fabs(determinant(to_world)) > 0)) in.fail(in.where("to_world"), "the sensor's transform is singular");
     bool problem = false;
-    if (sensor.type == SensorType::orthographic) {
+    if (is_parallel(sensor.type)) {
         // The film spans [-1,1] in x; scale in the transform sizes it. Scale moves from the transform to the extent.
         if (!is_orthogonal(to_world, 1e-3))
             builder.refuse(in.where("to_world"), "the sensor's transform must not shear", "shear is left out");
@@ -180,7 +186,7 @@ void build_sensor(Builder& builder, const Object& object) {
     if (!(sensor.near_clip > 0 && sensor.near_clip < sensor.far_clip))
         in.fail(in.where("near_clip"), "near_clip must be positive and smaller than far_clip");
     sensor.focus_distance = float(in.number("focus_distance", sensor.far_clip));
-    if (sensor.type == SensorType::thin_lens) {
+    if (has_lens(sensor.type)) {
         if (!in.has("aperture_radius")) in.fail("thinlens has no aperture_radius");
         sensor.aperture_radius = float(in.number("aperture_radius", 0));
         if (!(sensor.aperture_radius >= 0))
@@ -189,7 +195,7 @@ void build_sensor(Builder& builder, const Object& object) {
     }
     // Nothing moves, so that the shutter has no effect.
     in.ignore({"shutter_open", "shutter_close"});
-    if (type == "perspective" || type == "thinlens" || type == "orthographic" || !builder.options.lenient) in.finish();
+    if (known || !builder.options.lenient) in.finish();
 }
 
 void build_integrator(Builder& builder, const Object& object) {

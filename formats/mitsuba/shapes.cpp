@@ -129,11 +129,12 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     if (emitter && in_instance)
         builder.refuse(emitter->where, "an emitter inside of a shapegroup is not supported", "the shape does not emit");
     else if (emitter) {
-        Emitter e{};
-        e.type = EmitterType::area;
-        e.radiance = area_radiance(builder, *emitter);
-        e.area_cdf = kNone;
-        e.to_world = e.to_local = to_affine(Matrix{});
+        Emitter e = read_emitter(builder, *emitter, true);
+        if (e.type == EmitterType::count) {
+            builder.refuse(emitter->where, "emitter type '" + emitter->type + "' on a shape is not supported",
+                           "the shape does not emit");
+            e.type = EmitterType::area;
+        }
         job.emitter = uint32_t(builder.scene.emitters.size());
         builder.scene.emitters.push_back(e);
     }

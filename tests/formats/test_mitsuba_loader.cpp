@@ -56,6 +56,13 @@ std::string error_of(const std::string& body, const LoadOptions& options = {}, c
     return "no error";
 }
 
+/// Parameters of a BSDF of that model.
+template <class Model>
+Textured<Model> parameters(const BsdfRecord& record) {
+    REQUIRE(record.type == kBsdfType<Model>);
+    return record.as<Model>();
+}
+
 /// Record of the BSDF on a rectangle.
 BsdfRecord bsdf(const std::string& xml, const std::string& version = "3.0.0") {
     const Scene s = load("<shape type='rectangle'>" + xml + "</shape>", {}, version);
@@ -210,7 +217,7 @@ TEST_CASE("defaults, parameters, includes, search folders, aliases, references")
     CHECK(s.sensor.film_height == 40);
     REQUIRE(s.emitters.size() == 1);
     CHECK(s.emitters[0].radiance.value.x == 3.0f);
-    CHECK(s.bsdfs[0].reflectance.value.x == 0.25f);
+    CHECK(parameters<Diffuse>(s.bsdfs[0]).reflectance.value.x == 0.25f);
 
     LoadOptions options;
     options.parameters = {{"power", "7"}};
@@ -337,57 +344,54 @@ TEST_CASE("integrators: the inner one of moment counts, direct is two segments")
 }
 
 TEST_CASE("BSDFs: every type and its defaults") {
-    CHECK(bsdf("<bsdf type='diffuse'/>").reflectance.value == splat(0.5f));
-    CHECK(bsdf("").reflectance.value == splat(0.5f));
-    CHECK(bsdf("<emitter type='area'/>").reflectance.value == splat(0.0f));
-    const BsdfRecord rough_diffuse = bsdf("<bsdf type='roughdiffuse'><float name='alpha' value='0.4'/></bsdf>");
-    CHECK(rough_diffuse.type == BsdfType::rough_diffuse);
-    CHECK(rough_diffuse.alpha_u.value == 0.4f);
+    CHECK(parameters<Diffuse>(bsdf("<bsdf type='diffuse'/>")).reflectance.value == splat(0.5f));
+    CHECK(parameters<Diffuse>(bsdf("")).reflectance.value == splat(0.5f));
+    CHECK(parameters<Diffuse>(bsdf("<emitter type='area'/>")).reflectance.value == splat(0.0f));
+    CHECK(parameters<RoughDiffuse>(bsdf("<bsdf type='roughdiffuse'><float name='alpha' value='0.4'/></bsdf>"))
+              .alpha.value == 0.4f);
 
-    BsdfRecord r = bsdf("<bsdf type='conductor'/>");
-    CHECK(r.type == BsdfType::conductor);
+    auto r = parameters<Conductor>(bsdf("<bsdf type='conductor'/>"));
     CHECK(r.eta == Vec3f{0, 0, 0});
     CHECK(r.k == Vec3f{1, 1, 1});
-    r = bsdf("<bsdf type='conductor'><string name='material' value='Au'/></bsdf>");
+    r = parameters<Conductor>(bsdf("<bsdf type='conductor'><string name='material' value='Au'/></bsdf>"));
     check_rgb(r.eta, {0.143036f, 0.375307f, 1.442045f}, 1e-5);  // Mitsuba
     check_rgb(r.k, {3.982997f, 2.385556f, 1.603359f}, 1e-5);
     // The older generation: copper, relative to air.
-    r = bsdf("<bsdf type='conductor'/>", "0.6.0");
+    r = parameters<Conductor>(bsdf("<bsdf type='conductor'/>", "0.6.0"));
     CHECK(r.eta.x == Approx(0.201005 / 1.000277).epsilon(1e-5));
-    r = bsdf(
+    auto rough = parameters<RoughConductor>(bsdf(
         "<bsdf type='roughconductor'><rgb name='eta' value='1,2,3'/><rgb name='k' value='4,5,6'/><float name='extEta' "
         "value='2'/></bsdf>",
-        "0.6.0");
-    CHECK(r.k == Vec3f{2, 2.5f, 3});
-    r = bsdf(
-        "<bsdf type='roughconductor'><string name='distribution' value='ggx'/><float name='alpha' "
-        "value='0.25'/><spectrum name='eta' value='0.789'/><spectrum name='k' value='6.15'/><boolean "
-        "name='sample_visible' value='false'/></bsdf>");
-    CHECK(r.type == BsdfType::rough_conductor);
-    CHECK(r.microfacets == Microfacets::ggx);
-    CHECK(r.alpha_u.value == 0.25f);
-    CHECK(r.alpha_v.value == 0.25f);
-    CHECK(r.eta == splat(0.789f));
-    CHECK(r.sample_visible == 0);
-    CHECK(bsdf("<bsdf type='roughconductor'/>").microfacets == Microfacets::beckmann);
-    CHECK(bsdf("<bsdf type='roughconductor'/>").alpha_v.value == 0.1f);
+        "0.6.0"));
+    CHECK(rough.k == Vec3f{2, 2.5f, 3});
+    rough = parameters<RoughConductor>(
+        bsdf("<bsdf type='roughconductor'><string name='distribution' value='ggx'/><float name='alpha' "
+             "value='0.25'/><spectrum name='eta' value='0.789'/><spectrum name='k' value='6.15'/><boolean "
+             "name='sample_visible' value='false'/></bsdf>"));
+    CHECK(rough.distribution == Microfacets::ggx);
+    CHECK(rough.alpha_u.value == 0.25f);
+    CHECK(rough.alpha_v.value == 0.25f);
+    CHECK(rough.eta == splat(0.789f));
+    CHECK(rough.sample_visible == 0);
+    rough = parameters<RoughConductor>(bsdf("<bsdf type='roughconductor'/>"));
+    CHECK(rough.distribution == Microfacets::beckmann);
+    CHECK(rough.alpha_v.value == 0.1f);
 
-    CHECK(bsdf("<bsdf type='dielectric'/>").ior == Approx(1.50418).epsilon(1e-5));  // Mitsuba
-    CHECK(bsdf("<bsdf type='dielectric'><string name='int_ior' value='Diamond'/><string name='ext_ior' "
-               "value='vacuum'/></bsdf>")
+    CHECK(parameters<Dielectric>(bsdf("<bsdf type='dielectric'/>")).ior == Approx(1.50418).epsilon(1e-5));  // Mitsuba
+    CHECK(parameters<Dielectric>(bsdf("<bsdf type='dielectric'><string name='int_ior' value='Diamond'/><string "
+                                      "name='ext_ior' value='vacuum'/></bsdf>"))
               .ior == 2.419f);
     CHECK(
         bsdf("<bsdf type='thindielectric'><float name='int_ior' value='1.3'/><float name='ext_ior' value='1'/></bsdf>")
             .type == BsdfType::thin_dielectric);
     CHECK(bsdf("<bsdf type='roughdielectric'/>").type == BsdfType::rough_dielectric);
 
-    r = bsdf("<bsdf type='plastic'/>");
-    CHECK(r.type == BsdfType::plastic);
-    CHECK(r.ior == Approx(1.48959).epsilon(1e-5));  // Mitsuba
-    CHECK(r.specular_sampling_weight == Approx(2.0 / 3));
-    CHECK(r.fdr_internal == fresnel_diffuse_reflectance(r.ior));
-    CHECK(r.fdr_internal == Approx(0.590479).epsilon(0.01));  // Mitsuba's fit
-    CHECK(r.nonlinear == 0);
+    const auto coated = parameters<Plastic>(bsdf("<bsdf type='plastic'/>"));
+    CHECK(coated.ior == Approx(1.48959).epsilon(1e-5));  // Mitsuba
+    CHECK(coated.specular_sampling_weight == Approx(2.0 / 3));
+    CHECK(coated.fdr_internal == fresnel_diffuse_reflectance(coated.ior));
+    CHECK(coated.fdr_internal == Approx(0.590479).epsilon(0.01));  // Mitsuba's fit
+    CHECK(coated.nonlinear == 0);
 
     const Scene s = load(
         "<shape type='rectangle'><bsdf type='roughplastic'><float name='alpha' value='0.2'/><boolean name='nonlinear' "
@@ -395,14 +399,15 @@ TEST_CASE("BSDFs: every type and its defaults") {
         "<shape type='rectangle'><bsdf type='roughplastic'><float name='alpha' value='0.2'/><rgb "
         "name='diffuse_reflectance' value='0.1'/></bsdf></shape>");
     REQUIRE(s.bsdfs.size() == 2);
-    CHECK(s.bsdfs[0].nonlinear == 1);
-    REQUIRE(s.bsdfs[0].transmittance_table != kNone);
-    CHECK(s.bsdfs[0].transmittance_table == s.bsdfs[1].transmittance_table);  // the same boundary
+    const auto first = parameters<RoughPlastic>(s.bsdfs[0]), second = parameters<RoughPlastic>(s.bsdfs[1]);
+    CHECK(first.nonlinear == 1);
+    REQUIRE(first.transmittance_table != kNone);
+    CHECK(first.transmittance_table == second.transmittance_table);  // the same boundary
     std::vector<float> table(kTransmittanceTableSize);
-    rough_transmittance_table(Microfacets::beckmann, 0.2f, s.bsdfs[0].ior, table.data());
-    CHECK(std::equal(table.begin(), table.end(), s.tables.begin() + s.bsdfs[0].transmittance_table));
-    CHECK(s.bsdfs[1].fdr_internal == rough_internal_reflectance(Microfacets::beckmann, 0.2f, s.bsdfs[1].ior));
-    CHECK(s.bsdfs[1].specular_sampling_weight == Approx(1 / 1.1));
+    rough_transmittance_table(Microfacets::beckmann, 0.2f, first.ior, table.data());
+    CHECK(std::equal(table.begin(), table.end(), s.tables.begin() + first.transmittance_table));
+    CHECK(second.fdr_internal == rough_internal_reflectance(Microfacets::beckmann, 0.2f, second.ior));
+    CHECK(second.specular_sampling_weight == Approx(1 / 1.1));
 }
 
 TEST_CASE("adapters flatten into materials") {
@@ -469,16 +474,18 @@ TEST_CASE("spectra become colours as in Mitsuba's RGB mode") {
     check_rgb(emission("360:1 830:1"), {1.20488f, 0.948228f, 0.909267f}, 2e-4);
     check_rgb(emission("2.5"), {2.5f, 2.5f, 2.5f});
     const auto reflectance = [](const std::string& list) {
-        return bsdf("<bsdf type='diffuse'><spectrum name='reflectance' value='" + list + "'/></bsdf>")
+        return parameters<Diffuse>(
+                   bsdf("<bsdf type='diffuse'><spectrum name='reflectance' value='" + list + "'/></bsdf>"))
             .reflectance.value;
     };
     check_rgb(reflectance("400:0.78, 500:0.78, 600:0.78, 700:0.78"), {0.776367f, 0.77981f, 0.776029f}, 2e-4);
     check_rgb(reflectance("400:0.1, 500:0.3, 600:0.6, 700:0.9"), {0.726577f, 0.424956f, 0.17397f}, 2e-4);
     check_rgb(reflectance("450:1.5, 650:.2"), {0.138936f, 0.993237f, 0.760334f}, 2e-4);
-    check_rgb(bsdf("<bsdf type='diffuse'><rgb name='reflectance' value='#ff8000'/></bsdf>").reflectance.value,
-              {1, 128 / 255.0f, 0});
-    check_rgb(bsdf("<bsdf type='diffuse'><srgb name='reflectance' value='#ff8000'/></bsdf>", "0.6.0").reflectance.value,
-              {1, 0.2158605f, 0}, 1e-5);
+    const auto diffuse_color = [](const std::string& value, const char* version) {
+        return parameters<Diffuse>(bsdf("<bsdf type='diffuse'>" + value + "</bsdf>", version)).reflectance.value;
+    };
+    check_rgb(diffuse_color("<rgb name='reflectance' value='#ff8000'/>", "3.0.0"), {1, 128 / 255.0f, 0});
+    check_rgb(diffuse_color("<srgb name='reflectance' value='#ff8000'/>", "0.6.0"), {1, 0.2158605f, 0}, 1e-5);
 }
 
 TEST_CASE("textures: top row at t = 0, decoding, pooling, transforms") {
@@ -497,7 +504,7 @@ TEST_CASE("textures: top row at t = 0, decoding, pooling, transforms") {
              {}, "3.0.0", &folder);
     REQUIRE(s.textures.size() == 3);
     CHECK(s.texels.size() == 16);  // one copy of the pixels
-    CHECK(s.bsdfs[0].reflectance.texture == s.bsdfs[1].reflectance.texture);
+    CHECK(parameters<Diffuse>(s.bsdfs[0]).reflectance.texture == parameters<Diffuse>(s.bsdfs[1]).reflectance.texture);
     for (const Texture& t : s.textures) CHECK(t.offset % 16 == 0);
     CHECK(int(s.texels[0]) == 255);  // red at row 0
     CHECK(int(s.texels[12]) == 188);

@@ -343,8 +343,8 @@ TEST_CASE("features: the smallest set that covers the scene") {
     CHECK(s.features == Features{});
     add_triangles(s, {{Vec3f{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}});
     s.bsdfs.resize(3);
-    s.bsdfs[1].type = BsdfType::dielectric;
-    s.bsdfs[2].type = BsdfType::plastic;
+    s.bsdfs[1] = bsdf_record(Textured<Dielectric>{});
+    s.bsdfs[2] = bsdf_record(Textured<Plastic>{});
     s.bsdfs[2].bump_map = 0;
     s.materials.push_back({1, 1, 0, {0.5f, -1}});  // no shape uses it
     s.emitters.push_back(emitter(EmitterType::point, {1, 1, 1}));

@@ -201,7 +201,7 @@ TEST_CASE("A plane under a constant environment shows the albedo of its BSDF", "
         const Scene scene = scene_from_text(text);
         const SceneView view = scene.view();
         const uint32_t material = scene.shapes[0].material;
-        const Bsdf b = resolve_bsdf<kAllFeatures>(view, view.bsdfs[scene.materials[material].front], {0, 0});
+        const Bsdf b = resolve_bsdf<kAllFeatures>(view, view.bsdfs[scene.materials[material].front], Vec2f{0, 0});
         double albedo[3] = {0, 0, 0};
         const int n = 1200;
         for (int i = 0; i < n; ++i)

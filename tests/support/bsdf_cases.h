@@ -19,9 +19,43 @@ struct BsdfCase {
     Bsdf bsdf;
 };
 
-inline bool is_transmissive(const Bsdf& b) {
-    return b.type == BsdfType::dielectric || b.type == BsdfType::thin_dielectric ||
-           b.type == BsdfType::rough_dielectric;
+inline bool is_transmissive(const Bsdf& b) { return bsdf_transmits(b.type); }
+
+/// op(parameters) with those of b's model; what it changes is changed in b.
+template <class Op>
+void edit_parameters(Bsdf& b, Op op) {
+    BsdfModels::visit<BsdfModels::kAll>(uint32_t(b.type), false, [&](auto model) {
+        auto parameters = b.as<typename decltype(model)::type>();
+        op(parameters);
+        b = bsdf_of(parameters, b.tables);
+        return true;
+    });
+}
+template <class Model, class Op>
+Bsdf edited(const Bsdf& b, Op op) {
+    Resolved<Model> parameters = b.as<Model>();
+    op(parameters);
+    return bsdf_of(parameters, b.tables);
+}
+
+/// Index of refraction; 0 for a BSDF without one.
+inline float ior_of(Bsdf b) {
+    float ior = 0;
+    edit_parameters(b, [&](auto& p) {
+        if constexpr (requires { p.ior; }) ior = p.ior;
+    });
+    return ior;
+}
+/// The smaller roughness of a microfacet distribution, which the others have not: 0.
+inline float least_alpha(Bsdf b) {
+    float alpha = 0;
+    edit_parameters(b, [&](auto& p) {
+        if constexpr (requires { p.alpha_u; })
+            alpha = std::min(p.alpha_u, p.alpha_v);
+        else if constexpr (requires { p.alpha, p.distribution; })
+            alpha = p.alpha;
+    });
+    return alpha;
 }
 
 /// Transmittance table that lives as long as the test.
@@ -32,44 +66,65 @@ inline const float* cached_table(Microfacets m, float alpha, float ior) {
     return it->second.data();
 }
 
-inline Bsdf make_bsdf(BsdfType type) {
-    Bsdf b = {};
-    b.type = type;
-    b.microfacets = Microfacets::ggx;
-    b.sample_visible = true;
-    b.specular_reflectance = b.transmittance_or_k = b.reflectance_or_eta = {1, 1, 1};
-    b.ior = 1.5f;
-    return b;
+/// All colours 1, index 1.5.
+template <class Model>
+Resolved<Model> white() {
+    Resolved<Model> p = resolved<Model>({{splat(1), splat(1)}, {}}, {});
+    if constexpr (requires { p.ior; }) p.ior = 1.5f;
+    return p;
+}
+inline Bsdf conductor(Rgb eta, Rgb k) {
+    Resolved<Conductor> p = white<Conductor>();
+    p.eta = eta;
+    p.k = k;
+    return bsdf_of(p);
+}
+template <class Model>
+Bsdf smooth_dielectric(float ior = 1.5f) {
+    Resolved<Model> p = white<Model>();
+    p.ior = ior;
+    return bsdf_of(p);
 }
 
-inline Bsdf rough(BsdfType type, Microfacets m, bool visible, float alpha_u, float alpha_v, float ior = 1.5f) {
-    Bsdf b = make_bsdf(type);
-    b.microfacets = m;
-    b.sample_visible = visible;
-    b.alpha_u = alpha_u;
-    b.alpha_v = alpha_v;
-    b.ior = ior;
-    if (type == BsdfType::rough_conductor) {
-        b.reflectance_or_eta = {0.2f, 0.92f, 1.1f};
-        b.transmittance_or_k = {3.9f, 2.45f, 2.14f};
-    }
-    if (type == BsdfType::rough_plastic) {
-        b.reflectance_or_eta = {0.8f, 0.5f, 0.1f};
-        b.fdr_internal = rough_internal_reflectance(m, alpha_u, ior);
-        b.specular_sampling_weight = 0.6f;
-        b.transmittance_table = cached_table(m, alpha_u, ior);
-    }
-    return b;
+inline Bsdf rough_conductor(Microfacets m, bool visible, float alpha_u, float alpha_v) {
+    Resolved<RoughConductor> p = white<RoughConductor>();
+    p.distribution = m;
+    p.sample_visible = visible;
+    p.alpha_u = alpha_u;
+    p.alpha_v = alpha_v;
+    p.eta = {0.2f, 0.92f, 1.1f};
+    p.k = {3.9f, 2.45f, 2.14f};
+    return bsdf_of(p);
+}
+inline Bsdf rough_dielectric(Microfacets m, bool visible, float alpha_u, float alpha_v, float ior = 1.5f) {
+    Resolved<RoughDielectric> p = white<RoughDielectric>();
+    p.distribution = m;
+    p.sample_visible = visible;
+    p.alpha_u = alpha_u;
+    p.alpha_v = alpha_v;
+    p.ior = ior;
+    return bsdf_of(p);
+}
+inline Bsdf rough_plastic(Microfacets m, bool visible, float alpha, float ior = 1.5f) {
+    Resolved<RoughPlastic> p = white<RoughPlastic>();
+    p.distribution = m;
+    p.sample_visible = visible;
+    p.alpha = alpha;
+    p.ior = ior;
+    p.reflectance = {0.8f, 0.5f, 0.1f};
+    p.fdr_internal = rough_internal_reflectance(m, alpha, ior);
+    p.specular_sampling_weight = 0.6f;
+    return bsdf_of(p, cached_table(m, alpha, ior));
 }
 
 inline Bsdf plastic(float ior, bool nonlinear, Rgb diffuse) {
-    Bsdf b = make_bsdf(BsdfType::plastic);
-    b.ior = ior;
-    b.nonlinear = nonlinear;
-    b.reflectance_or_eta = diffuse;
-    b.fdr_internal = fresnel_diffuse_reflectance(ior);
-    b.specular_sampling_weight = 0.55f;
-    return b;
+    Resolved<Plastic> p = white<Plastic>();
+    p.ior = ior;
+    p.nonlinear = nonlinear;
+    p.reflectance = diffuse;
+    p.fdr_internal = fresnel_diffuse_reflectance(ior);
+    p.specular_sampling_weight = 0.55f;
+    return bsdf_of(p);
 }
 
 /// Every BSDF type over roughness 0.01 to 1, isotropic and not, both distributions and both ways to sample them, ior
@@ -77,29 +132,16 @@ inline Bsdf plastic(float ior, bool nonlinear, Rgb diffuse) {
 inline std::vector<BsdfCase> bsdf_cases() {
     std::vector<BsdfCase> cases;
     const auto add = [&](std::string name, Bsdf b) { cases.push_back({std::move(name), b}); };
-    Bsdf b = make_bsdf(BsdfType::diffuse);
-    b.reflectance_or_eta = {0.9f, 0.5f, 0.0f};
-    add("diffuse", b);
-    for (float alpha : {0.2f, 1.0f}) {
-        b = make_bsdf(BsdfType::rough_diffuse);
-        b.reflectance_or_eta = {0.9f, 0.5f, 0.1f};
-        b.alpha_u = alpha;
-        add("rough_diffuse " + std::to_string(alpha), b);
-    }
-    b = make_bsdf(BsdfType::conductor);
-    b.reflectance_or_eta = {0.2f, 0.92f, 1.1f};
-    b.transmittance_or_k = {3.9f, 2.45f, 2.14f};
-    add("conductor", b);
+    add("diffuse", bsdf_of(Resolved<Diffuse>{{{0.9f, 0.5f, 0.0f}}, {}}));
+    for (float alpha : {0.2f, 1.0f})
+        add("rough_diffuse " + std::to_string(alpha), bsdf_of(Resolved<RoughDiffuse>{{{0.9f, 0.5f, 0.1f}, alpha}, {}}));
+    add("conductor", conductor({0.2f, 0.92f, 1.1f}, {3.9f, 2.45f, 2.14f}));
     for (float ior : {1.5f, 0.75f}) {
-        for (BsdfType t : {BsdfType::dielectric, BsdfType::thin_dielectric}) {
-            b = make_bsdf(t);
-            b.ior = ior;
-            add(std::string(t == BsdfType::dielectric ? "dielectric" : "thin_dielectric") + " ior " +
-                    std::to_string(ior),
-                b);
-        }
-        add("plastic ior " + std::to_string(ior), plastic(ior, false, {0.8f, 0.5f, 0.1f}));
-        add("plastic nonlinear ior " + std::to_string(ior), plastic(ior, true, {0.8f, 0.5f, 0.1f}));
+        const std::string suffix = " ior " + std::to_string(ior);
+        add("dielectric" + suffix, smooth_dielectric<Dielectric>(ior));
+        add("thin_dielectric" + suffix, smooth_dielectric<ThinDielectric>(ior));
+        add("plastic" + suffix, plastic(ior, false, {0.8f, 0.5f, 0.1f}));
+        add("plastic nonlinear" + suffix, plastic(ior, true, {0.8f, 0.5f, 0.1f}));
     }
     for (Microfacets m : {Microfacets::beckmann, Microfacets::ggx})
         for (bool visible : {true, false}) {
@@ -109,15 +151,15 @@ inline std::vector<BsdfCase> bsdf_cases() {
                  {std::pair{0.01f, 0.01f}, {0.1f, 0.1f}, {0.5f, 0.5f}, {1.0f, 1.0f}, {0.05f, 0.4f}, {0.6f, 0.1f}}) {
                 char alpha[32];
                 std::snprintf(alpha, sizeof alpha, " %g,%g", double(au), double(av));
-                add("rough_conductor" + suffix + alpha, rough(BsdfType::rough_conductor, m, visible, au, av));
+                add("rough_conductor" + suffix + alpha, rough_conductor(m, visible, au, av));
                 for (float ior : {1.5f, 0.75f})
                     add("rough_dielectric" + suffix + alpha + " ior " + std::to_string(ior),
-                        rough(BsdfType::rough_dielectric, m, visible, au, av, ior));
+                        rough_dielectric(m, visible, au, av, ior));
             }
             for (float alpha : {0.02f, 0.3f, 1.0f}) {
-                Bsdf p = rough(BsdfType::rough_plastic, m, visible, alpha, alpha);
-                p.nonlinear = alpha == 0.3f;
-                add("rough_plastic" + suffix + " " + std::to_string(alpha), p);
+                add("rough_plastic" + suffix + " " + std::to_string(alpha),
+                    edited<RoughPlastic>(rough_plastic(m, visible, alpha),
+                                         [&](auto& p) { p.nonlinear = alpha == 0.3f; }));
             }
         }
     return cases;

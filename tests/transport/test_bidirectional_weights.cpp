@@ -40,9 +40,7 @@ TEST_CASE("The way back over a refraction counts by the solid angles on both sid
                 Scattering s{};
                 s.frame = frame_from_normal(normalize(Vec3f{0.2f, 0.5f, bumped ? 0.7f : -0.4f}));
                 s.ng = s.frame.n;
-                s.bsdf.type = BsdfType::dielectric;
-                s.bsdf.specular_reflectance = s.bsdf.transmittance_or_k = {1, 1, 1};
-                s.bsdf.ior = ior;
+                s.bsdf = bsdf_of(Resolved<Dielectric>{{{1, 1, 1}, {1, 1, 1}}, {ior}});
                 float eta = 0;
                 const auto refracted = [&](Vec3f wi_local) {
                     s.wi = normalize(wi_local);

@@ -17,8 +17,8 @@ constexpr int kSamples = 200000;
 
 /// Angular width of the lobes.
 double lobe_width(const Bsdf& b) {
-    if (b.alpha_u == 0 || b.type == BsdfType::rough_diffuse) return 0.3;
-    return std::min(0.3f, 2 * std::min(b.alpha_u, b.alpha_v));
+    const float alpha = least_alpha(b);
+    return alpha == 0 ? 0.3f : std::min(0.3f, 2 * alpha);
 }
 
 struct Outcome {
@@ -30,7 +30,7 @@ struct Outcome {
 /// Chi-square over cells around mirror direction and refracted direction, plus one cell for what is rejected or taken
 /// by delta lobes.
 Outcome test_sampling(const Bsdf& b, Vec3f wi, uint32_t sequence) {
-    const FresnelDielectric f = fresnel_dielectric(wi.z, b.ior);
+    const FresnelDielectric f = fresnel_dielectric(wi.z, ior_of(b));
     const Vec3f refracted = f.cos_t != 0 ? normalize(refract(wi, f)) : Vec3f{0, 0, std::copysign(1.0f, -wi.z)};
     const bool through = is_transmissive(b);
     const LobeGrid mirror(reflect(wi), lobe_width(b), 16, 16), behind(refracted, lobe_width(b), 16, 16);
@@ -136,9 +136,8 @@ TEST_CASE("Delta BSDFs choose lobes with the probability they state") {
 }
 
 TEST_CASE("The chi-square test itself rejects a density that is 2 % off") {
-    const Bsdf b = rough(BsdfType::rough_conductor, Microfacets::ggx, true, 0.3f, 0.3f);
-    Bsdf wrong = b;
-    wrong.alpha_u = wrong.alpha_v = 0.3f * 1.02f;
+    const Bsdf b = rough_conductor(Microfacets::ggx, true, 0.3f, 0.3f);
+    const Bsdf wrong = edited<RoughConductor>(b, [](auto& p) { p.alpha_u = p.alpha_v = 0.3f * 1.02f; });
     const Vec3f wi = direction(0.5f);
     const LobeGrid grid(reflect(wi), 0.3, 16, 16);
     std::vector<double> observed(grid.size()), expected(grid.size());

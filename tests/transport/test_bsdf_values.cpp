@@ -176,14 +176,13 @@ TEST_CASE("B5, B6: refraction: the modes differ by exactly eta², and f_importan
         if (!(s.flags & kScatterTransmission) || c.bsdf.type != BsdfType::rough_dielectric) return;
         const Rgb radiance = eval(c.bsdf, wi, s.wo, TransportMode::radiance),
                   importance = eval(c.bsdf, wi, s.wo, TransportMode::importance);
-        const double eta = wi.z > 0 ? c.bsdf.ior : 1 / c.bsdf.ior;
+        const double eta = wi.z > 0 ? ior_of(c.bsdf) : 1 / ior_of(c.bsdf);
         CHECK_FALSE(relative_difference(s.eta, eta) > 1e-6);
         worst_eta = std::max(worst_eta, relative_difference(radiance.x * eta * eta, importance.x));
         // Rounding: float half vectors of narrow lobes move by 1e-7/alpha slopes and the density by some times that;
         // near total reflection 1-F goes with the smaller cosine to the facet, c, which is off by 1e-7/c.
         const Vec3f m = normalize(wi + s.wo * float(eta));
-        const double alpha = std::min(c.bsdf.alpha_u, c.bsdf.alpha_v),
-                     grazing = std::min(std::fabs(dot(wi, m)), std::fabs(dot(s.wo, m)));
+        const double alpha = least_alpha(c.bsdf), grazing = std::min(std::fabs(dot(wi, m)), std::fabs(dot(s.wo, m)));
         const double tolerance = 3e-5 + 3e-5 / alpha + 5e-7 / (grazing * grazing);
         const Rgb back = eval(c.bsdf, s.wo, wi, TransportMode::importance) / std::fabs(wi.z);
         worst_adjoint = std::max(worst_adjoint, relative_difference(back, radiance / std::fabs(s.wo.z)) / tolerance);
@@ -204,7 +203,8 @@ TEST_CASE("B5, B6: smooth dielectrics: eta² in radiance mode only, and the reve
             REQUIRE(sample(c.bsdf, direction(mu), {0.999f, 0, 0}, TransportMode::radiance, radiance));
             REQUIRE(sample(c.bsdf, direction(mu), {0.999f, 0, 0}, TransportMode::importance, importance));
             REQUIRE((radiance.flags & kScatterTransmission) != 0);
-            const double eta = c.bsdf.type == BsdfType::thin_dielectric ? 1 : (mu > 0 ? c.bsdf.ior : 1 / c.bsdf.ior);
+            const double eta =
+                c.bsdf.type == BsdfType::thin_dielectric ? 1 : (mu > 0 ? ior_of(c.bsdf) : 1 / ior_of(c.bsdf));
             CHECK(relative_difference(radiance.weight.x * eta * eta, importance.weight.x) < 1e-6);
             CHECK(relative_difference(radiance.eta, eta) < 1e-6);
             // Snell's law.
@@ -226,12 +226,11 @@ TEST_CASE("No BSDF scatters more than it receives") {
     double largest = 0, largest_oren_nayar = 0;
     std::string where;
     for (auto c : bsdf_cases()) {
-        c.bsdf.specular_reflectance = {1, 1, 1};
-        if (c.bsdf.type == BsdfType::plastic || c.bsdf.type == BsdfType::rough_plastic) {
-            c.bsdf.reflectance_or_eta = {1, 1, 1};
-            c.bsdf.nonlinear = true;
-        }
-        if (c.bsdf.type == BsdfType::rough_diffuse) c.bsdf.reflectance_or_eta = {1, 1, 1};
+        edit_parameters(c.bsdf, [](auto& p) {
+            if constexpr (requires { p.specular_reflectance; }) p.specular_reflectance = {1, 1, 1};
+            if constexpr (requires { p.nonlinear; } || requires { p.alpha; }) p.reflectance = {1, 1, 1};
+            if constexpr (requires { p.nonlinear; }) p.nonlinear = true;
+        });
         for (float mu : incident_cosines(c.bsdf, {1.0f, 0.7f, 0.3f, 0.05f, 0.005f}))
             for (TransportMode mode : kModes) {
                 const Albedo a = sampled_albedo(c.bsdf, direction(mu), n, ++sequence, mode);
@@ -252,17 +251,16 @@ TEST_CASE("No BSDF scatters more than it receives") {
 TEST_CASE("White furnace: lossless BSDFs return exactly what they receive") {
     for (float mu : {1.0f, 0.6f, 0.1f, -0.1f, -0.9f}) {
         // Smooth dielectric and thin plate: R·1 + T·1.
-        for (BsdfType type : {BsdfType::dielectric, BsdfType::thin_dielectric}) {
-            const Albedo a = sampled_albedo(make_bsdf(type), direction(mu), 2000, 7, TransportMode::importance);
+        for (const Bsdf& b : {smooth_dielectric<Dielectric>(), smooth_dielectric<ThinDielectric>()}) {
+            const Albedo a = sampled_albedo(b, direction(mu), 2000, 7, TransportMode::importance);
             CHECK(a.total.mean() == Approx(1).epsilon(1e-6));
         }
         if (mu < 0) continue;
-        Bsdf mirror = make_bsdf(BsdfType::conductor);  // Mitsuba's material "none": eta 0, k 1
-        mirror.reflectance_or_eta = {0, 0, 0};
+        const Bsdf mirror = conductor(splat(0), splat(1));  // Mitsuba's material "none"
         BsdfSample s;
         REQUIRE(sample(mirror, direction(mu), {0.5f, 0.5f, 0.5f}, TransportMode::radiance, s));
         CHECK(s.weight == Rgb{1, 1, 1});
-        REQUIRE(sample(make_bsdf(BsdfType::diffuse), direction(mu), {0.5f, 0.3f, 0.6f}, TransportMode::radiance, s));
+        REQUIRE(sample(bsdf_of(white<Diffuse>()), direction(mu), {0.5f, 0.3f, 0.6f}, TransportMode::radiance, s));
         CHECK(s.weight == Rgb{1, 1, 1});
         // White plastic with all internal bounces: what enters leaves again, F + (1-F)·(1-fdr_ext)/(n²·(1-fdr_int))
         // = 1.
@@ -286,7 +284,7 @@ TEST_CASE("Rough dielectrics reflect and transmit what an independent quadrature
         for (bool visible : {true, false})
             for (float alpha : {0.1f, 0.4f, 1.0f})
                 for (float mu : {0.95f, 0.4f, -0.95f, -0.6f}) {
-                    const Bsdf b = rough(BsdfType::rough_dielectric, m, visible, alpha, alpha);
+                    const Bsdf b = rough_dielectric(m, visible, alpha, alpha);
                     const double eta = mu > 0 ? 1.5 : 1 / 1.5;
                     const precompute::Albedo expected =
                         precompute::rough_dielectric_albedo(m, alpha, eta, std::fabs(mu), q);
@@ -314,9 +312,10 @@ TEST_CASE("Rough conductors of Fresnel 1 and rough plastics have the albedo of t
         for (bool visible : {true, false})
             for (float alpha : {0.1f, 0.5f})
                 for (float mu : {0.9f, 0.3f}) {
-                    Bsdf b = rough(BsdfType::rough_conductor, m, visible, alpha, alpha);
-                    b.reflectance_or_eta = {0, 0, 0};
-                    b.transmittance_or_k = {1, 1, 1};
+                    const Bsdf b = edited<RoughConductor>(rough_conductor(m, visible, alpha, alpha), [](auto& r) {
+                        r.eta = splat(0);
+                        r.k = splat(1);
+                    });
                     // An index near infinity reflects everything.
                     const double expected = precompute::rough_dielectric_albedo(m, alpha, 1e9, mu, q).reflection;
                     const Albedo a = sampled_albedo(b, direction(mu), 100000, ++sequence, TransportMode::radiance);
@@ -324,8 +323,8 @@ TEST_CASE("Rough conductors of Fresnel 1 and rough plastics have the albedo of t
                                 << expected);
                     CHECK(std::fabs(a.total.mean() - expected) < 4.5 * a.total.error() + 3e-4);
 
-                    Bsdf p = rough(BsdfType::rough_plastic, m, visible, alpha, alpha);
-                    p.reflectance_or_eta = {0, 0, 0};
+                    const Bsdf p = edited<RoughPlastic>(rough_plastic(m, visible, alpha),
+                                                        [](auto& r) { r.reflectance = splat(0); });
                     const double coating = precompute::rough_dielectric_albedo(m, alpha, 1.5, mu, q).reflection;
                     const Albedo c = sampled_albedo(p, direction(mu), 100000, ++sequence, TransportMode::radiance);
                     CHECK(std::fabs(c.total.mean() - coating) < 4.5 * c.total.error() + 3e-4);
@@ -337,18 +336,18 @@ TEST_CASE("B4, B28: extreme inputs give finite values") {
     for (Microfacets m : {Microfacets::beckmann, Microfacets::ggx})
         for (bool visible : {true, false})
             for (auto [au, av] : {std::pair{1e-4f, 1e-4f}, {1e-4f, 1.0f}, {5.0f, 5.0f}})
-                for (BsdfType t : {BsdfType::rough_conductor, BsdfType::rough_dielectric, BsdfType::rough_plastic})
-                    for (float ior : {1.5f, 1.0001f, 0.4f, 3.0f})
-                        cases.push_back(
-                            {"extreme", rough(t, m, visible, au, t == BsdfType::rough_plastic ? au : av, ior)});
+                for (float ior : {1.5f, 1.0001f, 0.4f, 3.0f})
+                    for (const Bsdf& b :
+                         {rough_conductor(m, visible, au, av), rough_dielectric(m, visible, au, av, ior),
+                          rough_plastic(m, visible, au, ior)})
+                        cases.push_back({"extreme", b});
     for (float weight : {0.0f, 1.0f}) {
-        cases.push_back({"plastic weight", plastic(1.5f, true, {1, 1, 1})});
-        cases.back().bsdf.specular_sampling_weight = weight;
-        cases.push_back({"rough plastic weight", rough(BsdfType::rough_plastic, Microfacets::ggx, true, 0.1f, 0.1f)});
-        cases.back().bsdf.specular_sampling_weight = weight;
+        const auto weighted = [&](auto& p) { p.specular_sampling_weight = weight; };
+        cases.push_back({"plastic weight", edited<Plastic>(plastic(1.5f, true, {1, 1, 1}), weighted)});
+        cases.push_back(
+            {"rough plastic weight", edited<RoughPlastic>(rough_plastic(Microfacets::ggx, true, 0.1f), weighted)});
     }
-    cases.push_back({"dielectric ior 1", make_bsdf(BsdfType::dielectric)});
-    cases.back().bsdf.ior = 1;
+    cases.push_back({"dielectric ior 1", smooth_dielectric<Dielectric>(1)});
     std::vector<Vec3f> directions = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {0, -1, 0}, {0.6f, 0.8f, 0}};
     for (float mu : {1e-30f, 1e-38f, 1e-20f, 1e-7f, 1e-4f, 0.7f, 0.9999999f})
         for (float sign : {1.0f, -1.0f})
@@ -406,23 +405,26 @@ TEST_CASE("Values agree with Mitsuba 3.9.1") {
     const auto R = TransportMode::radiance, I = TransportMode::importance;
     const auto ggx = Microfacets::ggx, beckmann = Microfacets::beckmann;
     const auto weighted = [](Bsdf b, bool nonlinear) {
-        b.specular_sampling_weight = 0.68181818f;
-        b.nonlinear = nonlinear;
+        edit_parameters(b, [&](auto& p) {
+            if constexpr (requires { p.nonlinear; }) {
+                p.specular_sampling_weight = 0.68181818f;
+                p.nonlinear = nonlinear;
+            }
+        });
         return b;
     };
-    const Bsdf conductor = rough(BsdfType::rough_conductor, ggx, true, 0.2f, 0.5f);
-    const Bsdf conductor_b = rough(BsdfType::rough_conductor, beckmann, false, 0.3f, 0.3f);
+    const Bsdf metal = rough_conductor(ggx, true, 0.2f, 0.5f);
+    const Bsdf metal_b = rough_conductor(beckmann, false, 0.3f, 0.3f);
     const Bsdf coated = weighted(plastic(1.5f, true, {0.8f, 0.5f, 0.1f}), true);
-    const Bsdf rough_coated = weighted(rough(BsdfType::rough_plastic, ggx, true, 0.3f, 0.3f), false);
-    const Bsdf rough_coated_b = weighted(rough(BsdfType::rough_plastic, beckmann, true, 0.1f, 0.1f), true);
-    const Bsdf glass = rough(BsdfType::rough_dielectric, ggx, true, 0.4f, 0.4f),
-               glass_all = rough(BsdfType::rough_dielectric, ggx, false, 0.4f, 0.4f);
-    const Bsdf glass_uv = rough(BsdfType::rough_dielectric, ggx, true, 0.4f, 0.2f);
+    const Bsdf rough_coated = weighted(rough_plastic(ggx, true, 0.3f), false);
+    const Bsdf rough_coated_b = weighted(rough_plastic(beckmann, true, 0.1f), true);
+    const Bsdf glass = rough_dielectric(ggx, true, 0.4f, 0.4f), glass_all = rough_dielectric(ggx, false, 0.4f, 0.4f);
+    const Bsdf glass_uv = rough_dielectric(ggx, true, 0.4f, 0.2f);
     const Row rows[] = {
-        {conductor, 0.8f, 0.6f, 2.5f, R, {0.1993089f, 0.1298656f, 0.1071854f}, 0.2197324f, 1e-5},
-        {conductor, 0.3f, 0.5f, 2.5f, R, {0.204156f, 0.1332645f, 0.1107368f}, 0.2321324f, 1e-5},
-        {conductor_b, 0.8f, 0.6f, 2.5f, R, {0.02445605f, 0.01593506f, 0.01315211f}, 0.02100149f, 4e-3},
-        {conductor_b, 0.3f, 0.5f, 2.5f, R, {5.123819e-09f, 3.344616e-09f, 2.779226e-09f}, 1.370802e-09f, 4e-3},
+        {metal, 0.8f, 0.6f, 2.5f, R, {0.1993089f, 0.1298656f, 0.1071854f}, 0.2197324f, 1e-5},
+        {metal, 0.3f, 0.5f, 2.5f, R, {0.204156f, 0.1332645f, 0.1107368f}, 0.2321324f, 1e-5},
+        {metal_b, 0.8f, 0.6f, 2.5f, R, {0.02445605f, 0.01593506f, 0.01315211f}, 0.02100149f, 4e-3},
+        {metal_b, 0.3f, 0.5f, 2.5f, R, {5.123819e-09f, 3.344616e-09f, 2.779226e-09f}, 1.370802e-09f, 4e-3},
         {coated, 0.8f, 0.6f, 2.5f, R, {0.1162299f, 0.0541054f, 0.008073868f}, 0.1738799f, 1e-3},
         {coated, 0.3f, 0.5f, 2.5f, R, {0.07814243f, 0.03637555f, 0.005428134f}, 0.1018958f, 1e-3},
         {rough_coated, 0.8f, 0.6f, 2.5f, R, {0.1021326f, 0.06494942f, 0.01537187f}, 0.1765467f, 5e-4},

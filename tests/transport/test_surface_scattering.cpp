@@ -16,6 +16,8 @@ namespace {
 constexpr Features F = kAllFeatures;
 constexpr TransportMode kModes[] = {TransportMode::radiance, TransportMode::importance};
 
+BsdfRecord diffuse(Rgb reflectance) { return bsdf_record(Textured<Diffuse>{{{reflectance, -1}}, {}}); }
+
 /// A scene of one shape whose material can be set; enough for make_scattering.
 struct OneSurface {
     Shape shape = {};
@@ -28,7 +30,7 @@ struct OneSurface {
     OneSurface() {
         shape.material = 0;
         material = {0, 0, 0, {1, -1}};
-        for (BsdfRecord& b : bsdfs) b.reflectance = {{1, 1, 1}, -1};
+        for (BsdfRecord& b : bsdfs) b = diffuse({1, 1, 1});
     }
     OneSurface(const OneSurface&) = delete;
 
@@ -85,25 +87,15 @@ SurfacePoint random_point(uint32_t i, float degrees) {
 
 /// Rough and smooth, one- and two-sided records.
 std::vector<BsdfRecord> records() {
-    std::vector<BsdfRecord> out;
-    BsdfRecord r;
-    r.reflectance = {{0.9f, 0.5f, 0.2f}, -1};
-    out.push_back(r);
-    r.type = BsdfType::rough_conductor;
-    r.alpha_u = {0.3f, -1};
-    r.alpha_v = {0.6f, -1};
-    r.eta = {0.2f, 0.9f, 1.1f};
-    r.k = {3.9f, 2.4f, 2.1f};
-    out.push_back(r);
-    r.type = BsdfType::rough_dielectric;
-    out.push_back(r);
-    r.type = BsdfType::dielectric;
-    out.push_back(r);
-    r.type = BsdfType::plastic;
-    r.fdr_internal = fresnel_diffuse_reflectance(1.5f);
-    r.specular_sampling_weight = 0.5f;
-    out.push_back(r);
-    return out;
+    const ParamRgb white = {{1, 1, 1}, -1};
+    const ParamFloat alpha_u = {0.3f, -1}, alpha_v = {0.6f, -1};
+    const Rgb color = {0.9f, 0.5f, 0.2f};
+    return {diffuse(color),
+            bsdf_record(Textured<RoughConductor>{{white, alpha_u, alpha_v},
+                                                 {{0.2f, 0.9f, 1.1f}, {3.9f, 2.4f, 2.1f}, Microfacets::ggx, 1}}),
+            bsdf_record(Textured<RoughDielectric>{{white, white, alpha_u, alpha_v}, {1.5f, Microfacets::ggx, 1}}),
+            bsdf_record(Textured<Dielectric>{{white, white}, {1.5f}}),
+            bsdf_record(Textured<Plastic>{{{color, -1}, white}, {1.5f, fresnel_diffuse_reflectance(1.5f), 0.5f, 0}})};
 }
 
 double relative_difference(Rgb a, Rgb b) {
@@ -284,8 +276,8 @@ TEST_CASE("scatter_sample in importance mode estimates the integral of scatter_e
 TEST_CASE(
     "Two-sided: from behind the back BSDF is used in the flipped frame; one-sided surfaces are black from behind") {
     OneSurface surface;
-    surface.bsdfs[0].reflectance.value = {0.5f, 0, 0};
-    surface.bsdfs[1].reflectance.value = {0, 0.25f, 0};
+    surface.bsdfs[0] = diffuse({0.5f, 0, 0});
+    surface.bsdfs[1] = diffuse({0, 0.25f, 0});
     surface.material = {0, 1, 1, {1, -1}};
     const SurfacePoint p = point_with({0, 0, 1}, {0, 0, 1});
     const Vec3f up = direction(0.6f), up2 = direction(0.8f, 3), down = -up, down2 = -up2;

@@ -2,18 +2,14 @@
 // radiance).
 #pragma once
 
+#include "models/bsdf/dielectric.h"
 #include "transport/bsdf/fresnel.h"
 #include "transport/bsdf/sample.h"
 
 namespace ambilux {
 
-struct Dielectric {
-    Rgb specular_reflectance, specular_transmittance;
-    float ior;
-
-    AMBILUX_HD Rgb eval(Vec3f, Vec3f, TransportMode) const { return {0.0f, 0.0f, 0.0f}; }
-    AMBILUX_HD float pdf(Vec3f, Vec3f, TransportMode) const { return 0.0f; }
-
+template <>
+struct BsdfAt<Dielectric> : Resolved<Dielectric> {
     AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) const {
         if (wi.z == 0.0f) return false;
         const FresnelDielectric f = fresnel_dielectric(wi.z, ior);

@@ -2,20 +2,18 @@
 #pragma once
 
 #include "core/sampling.h"
+#include "models/bsdf/diffuse.h"
 #include "transport/bsdf/sample.h"
 
 namespace ambilux {
 
-struct Diffuse {
-    Rgb reflectance;
-
-    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
+template <>
+struct BsdfAt<Diffuse> : Resolved<Diffuse> {
+    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
         const float pdf_sa = wo.z * kInvPi;
         return {reflectance * pdf_sa, pdf_sa, wi.z * kInvPi};
     }
-    AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
-    AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }
 
     AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode, BsdfSample& out) const {
         if (!(wi.z > 0.0f)) return false;

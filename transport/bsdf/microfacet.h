@@ -3,7 +3,7 @@
 #pragma once
 
 #include "core/sampling.h"
-#include "scene/view.h"
+#include "models/bsdf/model.h"
 
 namespace ambilux {
 
@@ -150,5 +150,10 @@ struct MicrofacetDistribution {
         return x;
     }
 };
+
+/// The distribution of a BSDF, with at least kMinAlpha.
+AMBILUX_HD MicrofacetDistribution microfacet_distribution(Microfacets type, float alpha_u, float alpha_v) {
+    return {type, max(alpha_u, kMinAlpha), max(alpha_v, kMinAlpha)};
+}
 
 }  // namespace ambilux

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/sampling.h"
+#include "models/bsdf/plastic.h"
 #include "transport/bsdf/fresnel.h"
 #include "transport/bsdf/sample.h"
 
@@ -22,16 +23,13 @@ AMBILUX_HD float specular_probability(float specular, float diffuse, float weigh
     return s + d > 0.0f ? s / (s + d) : 0.0f;
 }
 
-struct Plastic {
-    Rgb reflectance, specular_reflectance;
-    float ior, fdr_internal, specular_sampling_weight;
-    bool nonlinear;
-
+template <>
+struct BsdfAt<Plastic> : Resolved<Plastic> {
     AMBILUX_HD float probability(float reflected) const {
         return specular_probability(reflected, 1.0f - reflected, specular_sampling_weight);
     }
 
-    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const { return formula_apart(*this, wi, wo); }
+    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode) const { return formula_apart(*this, wi, wo); }
     AMBILUX_HD BsdfValue formula(Vec3f wi, Vec3f wo) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
         const float fi = fresnel_dielectric(wi.z, ior).reflectance, fo = fresnel_dielectric(wo.z, ior).reflectance;
@@ -40,10 +38,8 @@ struct Plastic {
         return {internal_scattering(reflectance, fdr_internal, nonlinear) * (passed * cosine),
                 (1.0f - probability(fi)) * cosine, (1.0f - probability(fo)) * (wi.z * kInvPi)};
     }
-    AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
-    AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }
 
-    AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode, BsdfSample& out) const {
+    AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) const {
         if (!(wi.z > 0.0f)) return false;
         const float f = fresnel_dielectric(wi.z, ior).reflectance, p = probability(f);
         if (u.x < p) {
@@ -51,7 +47,7 @@ struct Plastic {
             return true;
         }
         const Vec3f wo = square_to_cosine_hemisphere({u.y, u.z});
-        return smooth_sample(wo, evaluate(wi, wo), 1.0f, 0, out);
+        return smooth_sample(wo, evaluate(wi, wo, mode), 1.0f, 0, out);
     }
 };
 

@@ -2,23 +2,25 @@
 // sides.
 #pragma once
 
+#include "models/bsdf/rough_dielectric.h"
 #include "transport/bsdf/fresnel.h"
 #include "transport/bsdf/microfacet.h"
 #include "transport/bsdf/sample.h"
 
 namespace ambilux {
 
-struct RoughDielectric {
-    Rgb specular_reflectance, specular_transmittance;
-    float ior;
-    MicrofacetDistribution microfacets;
-    bool sample_visible;
+template <>
+struct BsdfAt<RoughDielectric> : Resolved<RoughDielectric> {
+    AMBILUX_HD MicrofacetDistribution microfacets() const {
+        return microfacet_distribution(distribution, alpha_u, alpha_v);
+    }
 
     /// The distribution that sample() draws from: without visible normals, widened to bound the weights (section 5.3).
     AMBILUX_HD MicrofacetDistribution sampled_microfacets(Vec3f wi) const {
-        if (sample_visible) return microfacets;
+        if (sample_visible) return microfacets();
         const float scale = 1.2f - 0.2f * sqrtf(fabsf(wi.z));
-        return {microfacets.type, microfacets.alpha_u * scale, microfacets.alpha_v * scale};
+        const MicrofacetDistribution m = microfacets();
+        return {m.type, m.alpha_u * scale, m.alpha_v * scale};
     }
 
     AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode mode) const {
@@ -43,7 +45,7 @@ struct RoughDielectric {
         const float cos_i = fabsf(i_dot_m), cos_o = fabsf(o_dot_m);
         const float f =
             fresnel_dielectric(reflects ? 0.5f * (i_dot_m + o_dot_m) : (above ? cos_i : cos_o), ior).reflectance;
-        const float d = microfacets.d(m), sigma_i = microfacets.sigma(i), sigma_o = microfacets.sigma(o);
+        const float d = microfacets().d(m), sigma_i = microfacets().sigma(i), sigma_o = microfacets().sigma(o);
         // Density of m. Visible normals: D·|i·m|/sigma(i); the whole distribution: D·cos.
         const float density_i = sample_visible ? d * cos_i / sigma_i : sampled_microfacets(wi).d(m) * m.z;
         const float density_o = sample_visible ? d * cos_o / sigma_o : sampled_microfacets(wo).d(m) * m.z;
@@ -60,8 +62,6 @@ struct RoughDielectric {
         return {specular_transmittance * ((1.0f - f) * lobe * cos_i * jacobian_o * scale),
                 (1.0f - f) * density_i * jacobian_o, (1.0f - f) * density_o * jacobian_i};
     }
-    AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode mode) const { return evaluate(wi, wo, mode).value; }
-    AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode mode) const { return evaluate(wi, wo, mode).pdf_sa; }
 
     AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) const {
         if (wi.z == 0.0f) return false;

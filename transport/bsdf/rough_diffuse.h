@@ -3,15 +3,14 @@
 #pragma once
 
 #include "core/sampling.h"
+#include "models/bsdf/rough_diffuse.h"
 #include "transport/bsdf/sample.h"
 
 namespace ambilux {
 
-struct RoughDiffuse {
-    Rgb reflectance;
-    float alpha;  ///< root mean square slope of the microfacets; the paper's sigma is alpha/√2 (Mitsuba's fit)
-
-    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo) const {
+template <>
+struct BsdfAt<RoughDiffuse> : Resolved<RoughDiffuse> {
+    AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode) const {
         if (!(wi.z > 0.0f) || !(wo.z > 0.0f)) return no_scattering();
         const float sigma2 = 0.5f * alpha * alpha;
         const float sin_i = safe_sqrt(1.0f - wi.z * wi.z), sin_o = safe_sqrt(1.0f - wo.z * wo.z);
@@ -39,13 +38,11 @@ struct RoughDiffuse {
         return {max(reflectance * single + reflectance * reflectance * twice, splat(0.0f)) * pdf_sa, pdf_sa,
                 wi.z * kInvPi};
     }
-    AMBILUX_HD Rgb eval(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).value; }
-    AMBILUX_HD float pdf(Vec3f wi, Vec3f wo, TransportMode) const { return evaluate(wi, wo).pdf_sa; }
 
-    AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode, BsdfSample& out) const {
+    AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) const {
         if (!(wi.z > 0.0f)) return false;
         const Vec3f wo = square_to_cosine_hemisphere({u.y, u.z});
-        return smooth_sample(wo, evaluate(wi, wo), 1.0f, 0, out);
+        return smooth_sample(wo, evaluate(wi, wo, mode), 1.0f, 0, out);
     }
 };
 

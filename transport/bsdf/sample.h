@@ -5,6 +5,11 @@
 
 namespace ambilux {
 
+/// Parameters of a model at a point and its functions: a specialisation in transport/bsdf/NAME.h for every model of the
+/// list, derived from Resolved<Model>. Smooth ones have `evaluate`, all of them `sample`.
+template <class Model>
+struct BsdfAt;
+
 enum class TransportMode : uint32_t { radiance, importance };
 
 enum ScatterFlags : uint32_t {

@@ -1,18 +1,14 @@
 // Thin dielectric plate: both boundaries at once, with all internal reflections, and no displacement or bending.
 #pragma once
 
+#include "models/bsdf/thin_dielectric.h"
 #include "transport/bsdf/fresnel.h"
 #include "transport/bsdf/sample.h"
 
 namespace ambilux {
 
-struct ThinDielectric {
-    Rgb specular_reflectance, specular_transmittance;
-    float ior;
-
-    AMBILUX_HD Rgb eval(Vec3f, Vec3f, TransportMode) const { return {0.0f, 0.0f, 0.0f}; }
-    AMBILUX_HD float pdf(Vec3f, Vec3f, TransportMode) const { return 0.0f; }
-
+template <>
+struct BsdfAt<ThinDielectric> : Resolved<ThinDielectric> {
     AMBILUX_HD bool sample(Vec3f wi, Vec3f u, TransportMode, BsdfSample& out) const {
         if (wi.z == 0.0f) return false;
         // R + T·R·T + T·R³·T + ... with T = 1-R sums to 2R/(1+R) (Stokes 1860).

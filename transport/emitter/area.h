@@ -150,4 +150,32 @@ AMBILUX_HD float area_pdf_direct(const SceneView& view, const Emitter& emitter, 
            cos_light;
 }
 
+template <>
+struct EmitterFunctions<AreaEmitter> {
+    template <Features F>
+    AMBILUX_HD static bool sample_direct(const SceneView& view, const Emitter& e, Vec3f reference_p, Vec3f u,
+                                         EmitterSample& s) {
+        return area_sample_direct<F>(view, e, reference_p, u.z, {u.x, u.y}, s);
+    }
+    template <Features F>
+    AMBILUX_HD static void sample_emission(const SceneView& view, const Emitter& e, Vec3f u, Vec2f u_direction,
+                                           EmissionSample& s) {
+        const SurfacePoint point = area_sample_point<F>(view, e, u.z, {u.x, u.y});
+        const Vec3f local = square_to_cosine_hemisphere(u_direction);
+        s.p = point.p;
+        s.prim = point.prim;
+        s.p_error = point.p_error;
+        s.ng = point.ng;
+        s.d = frame_from_normal(point.ng).to_world(local);
+        s.cos_theta = local.z;
+        s.radiance = eval_rgb<F>(view, e.radiance, point.uv);
+        s.pdf_pos = area_pdf_position(view, e, point.prim);
+        s.pdf_dir = local.z * kInvPi;
+    }
+    template <Features F>
+    AMBILUX_HD static float pdf_emission_direction(const SceneView&, const Emitter&, Vec3f ng, Vec3f d) {
+        return max(dot(ng, d), 0.0f) * kInvPi;
+    }
+};
+
 }  // namespace ambilux

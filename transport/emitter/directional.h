@@ -24,4 +24,22 @@ AMBILUX_HD bool directional_sample_direct(const SceneView& view, const Emitter& 
     return true;
 }
 
+template <>
+struct EmitterFunctions<DirectionalEmitter> {
+    template <Features F>
+    AMBILUX_HD static bool sample_direct(const SceneView& view, const Emitter& e, Vec3f reference_p, Vec3f,
+                                         EmitterSample& s) {
+        return directional_sample_direct(view, e, reference_p, s);
+    }
+    template <Features F>
+    AMBILUX_HD static void sample_emission(const SceneView&, const Emitter& e, Vec3f, Vec2f, EmissionSample& s) {
+        s.d = e.direction;
+        s.pdf_dir = 1.0f;
+    }
+    template <Features F>
+    AMBILUX_HD static float pdf_emission_direction(const SceneView&, const Emitter&, Vec3f, Vec3f) {
+        return 1.0f;
+    }
+};
+
 }  // namespace ambilux

@@ -143,4 +143,25 @@ AMBILUX_HD bool envmap_sample_direct(const SceneView& view, const Emitter& emitt
     return true;
 }
 
+template <>
+struct EmitterFunctions<EnvmapEmitter> {
+    template <Features F>
+    AMBILUX_HD static bool sample_direct(const SceneView& view, const Emitter& e, Vec3f reference_p, Vec3f u,
+                                         EmitterSample& s) {
+        return envmap_sample_direct(view, e, reference_p, u, s);
+    }
+    template <Features F>
+    AMBILUX_HD static void sample_emission(const SceneView& view, const Emitter& e, Vec3f u, Vec2f u_direction,
+                                           EmissionSample& s) {
+        Vec2f uv;
+        envmap_sample_direction(view, e, {u_direction.x, u_direction.y, u.z}, s.d, uv, s.pdf_dir);
+        s.radiance = envmap_lookup(view, e, uv);
+        s.d = -s.d;
+    }
+    template <Features F>
+    AMBILUX_HD static float pdf_emission_direction(const SceneView& view, const Emitter& e, Vec3f, Vec3f d) {
+        return envmap_pdf_direction(view, e, -d);
+    }
+};
+
 }  // namespace ambilux

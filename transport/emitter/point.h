@@ -26,4 +26,23 @@ AMBILUX_HD bool point_sample_direct(const Emitter& emitter, Vec3f reference_p, E
     return true;
 }
 
+template <>
+struct EmitterFunctions<PointEmitter> {
+    template <Features F>
+    AMBILUX_HD static bool sample_direct(const SceneView&, const Emitter& e, Vec3f reference_p, Vec3f,
+                                         EmitterSample& s) {
+        return point_sample_direct(e, reference_p, s);
+    }
+    template <Features F>
+    AMBILUX_HD static void sample_emission(const SceneView&, const Emitter&, Vec3f, Vec2f u_direction,
+                                           EmissionSample& s) {
+        s.d = square_to_sphere(u_direction);
+        s.pdf_dir = kInv4Pi;
+    }
+    template <Features F>
+    AMBILUX_HD static float pdf_emission_direction(const SceneView&, const Emitter&, Vec3f, Vec3f) {
+        return kInv4Pi;
+    }
+};
+
 }  // namespace ambilux

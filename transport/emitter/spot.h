@@ -31,4 +31,24 @@ AMBILUX_HD bool spot_sample_direct(const SceneView& view, const Emitter& emitter
     return true;
 }
 
+template <>
+struct EmitterFunctions<SpotEmitter> {
+    template <Features F>
+    AMBILUX_HD static bool sample_direct(const SceneView& view, const Emitter& e, Vec3f reference_p, Vec3f,
+                                         EmitterSample& s) {
+        return spot_sample_direct<F>(view, e, reference_p, s);
+    }
+    template <Features F>
+    AMBILUX_HD static void sample_emission(const SceneView& view, const Emitter& e, Vec3f, Vec2f u_direction,
+                                           EmissionSample& s) {
+        s.d = frame_from_normal(e.direction).to_world(square_to_cone(u_direction, 1.0f - e.cos_cutoff));
+        s.radiance = spot_intensity<F>(view, e, s.d);
+        s.pdf_dir = kInv2Pi / (1.0f - e.cos_cutoff);
+    }
+    template <Features F>
+    AMBILUX_HD static float pdf_emission_direction(const SceneView&, const Emitter& e, Vec3f, Vec3f d) {
+        return dot(e.direction, d) > e.cos_cutoff ? kInv2Pi / (1.0f - e.cos_cutoff) : 0.0f;
+    }
+};
+
 }  // namespace ambilux

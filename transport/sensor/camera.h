@@ -34,7 +34,7 @@ AMBILUX_HD Vec2f camera_to_film(const Sensor& sensor, Vec2f c) {
 
 /// Point of the lens in camera space for `lens_u` in [0,1)²; the origin where there is no lens.
 AMBILUX_HD Vec2f lens_point(const Sensor& sensor, Vec2f lens_u) {
-    if (sensor.type != SensorType::thin_lens) return {0.0f, 0.0f};
+    if (!has_lens(sensor.type)) return {0.0f, 0.0f};
     return square_to_disk(lens_u) * sensor.aperture_radius;
 }
 
@@ -42,12 +42,12 @@ AMBILUX_HD Vec2f lens_point(const Sensor& sensor, Vec2f lens_u) {
 /// view axis.
 AMBILUX_HD CameraSample sample_camera_ray(const Sensor& sensor, Vec2f film_position, Vec2f lens_u) {
     const Vec2f c = film_to_camera(sensor, film_position);
-    if (sensor.type == SensorType::orthographic)
+    if (is_parallel(sensor.type))
         return {sensor.to_world.point({c.x, c.y, sensor.near_clip}),
                 normalize(sensor.to_world.vector({0.0f, 0.0f, 1.0f})),
                 (sensor.far_clip - sensor.near_clip) * length(sensor.to_world.vector({0.0f, 0.0f, 1.0f}))};
     const Vec2f lens = lens_point(sensor, lens_u);
-    const float focus = sensor.type == SensorType::thin_lens ? sensor.focus_distance : 1.0f;
+    const float focus = has_lens(sensor.type) ? sensor.focus_distance : 1.0f;
     // (dx,dy,1) leads from the lens point to the point in focus.
     const Vec3f local = {c.x - lens.x / focus, c.y - lens.y / focus, 1.0f};
     const Vec3f o = {lens.x + local.x * sensor.near_clip, lens.y + local.y * sensor.near_clip, sensor.near_clip};

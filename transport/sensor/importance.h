@@ -14,24 +14,23 @@ namespace ambilux {
 
 /// The camera's position is one point (pinhole): no light path meets it by chance.
 AMBILUX_HD bool camera_delta_position(const Sensor& sensor) {
-    return sensor.type == SensorType::perspective ||
-           (sensor.type == SensorType::thin_lens && !(sensor.aperture_radius > 0.0f));
+    return !is_parallel(sensor.type) && (!has_lens(sensor.type) || !(sensor.aperture_radius > 0.0f));
 }
 /// All rays are parallel.
-AMBILUX_HD bool camera_delta_direction(const Sensor& sensor) { return sensor.type == SensorType::orthographic; }
+AMBILUX_HD bool camera_delta_direction(const Sensor& sensor) { return is_parallel(sensor.type); }
 
 /// Area of one pixel on the plane z = 1 of camera space, or (orthographic) in world units.
 AMBILUX_HD float camera_pixel_area(const Sensor& sensor) {
     const float area =
         4.0f * sensor.tan_half_fov.x * sensor.tan_half_fov.y / (float(sensor.film_width) * float(sensor.film_height));
-    if (sensor.type != SensorType::orthographic) return area;
+    if (!is_parallel(sensor.type)) return area;
     return area * length(cross(sensor.to_world.vector({1, 0, 0}), sensor.to_world.vector({0, 1, 0})));
 }
 
 /// Density of the ray's start per area (lens; orthographic: sensor plane, at density 1 per pixel); 1 for a pinhole.
 AMBILUX_HD float camera_pdf_position(const Sensor& sensor) {
     if (camera_delta_position(sensor)) return 1.0f;
-    if (sensor.type == SensorType::orthographic) return 1.0f / camera_pixel_area(sensor);
+    if (is_parallel(sensor.type)) return 1.0f / camera_pixel_area(sensor);
     return 1.0f / (kPi * sqr(sensor.aperture_radius));
 }
 
@@ -65,12 +64,12 @@ AMBILUX_HD bool project_to_film(const Sensor& sensor, Vec3f p, Vec2f lens, Vec2f
     const Vec3f origin = {sensor.to_world.m[0][3], sensor.to_world.m[1][3], sensor.to_world.m[2][3]};
     const Vec3f c = world_to_camera_vector(sensor, p - origin);
     if (!(c.z >= sensor.near_clip && c.z <= sensor.far_clip)) return false;
-    if (sensor.type == SensorType::orthographic) {
+    if (is_parallel(sensor.type)) {
         film_position = camera_to_film(sensor, {c.x, c.y});
         return true;
     }
     if (!(c.z > 0.0f)) return false;
-    const float focus = sensor.type == SensorType::thin_lens ? sensor.focus_distance : 1.0f;
+    const float focus = has_lens(sensor.type) ? sensor.focus_distance : 1.0f;
     const Vec2f slope = {(c.x - lens.x) / c.z, (c.y - lens.y) / c.z};
     film_position = camera_to_film(sensor, {slope.x + lens.x / focus, slope.y + lens.y / focus});
     return true;
@@ -92,7 +91,7 @@ struct CameraConnection {
 AMBILUX_HD bool connect_to_camera(const Sensor& sensor, Vec3f reference_p, Vec2f lens_u, CameraConnection& c) {
     const Vec2f lens = lens_point(sensor, lens_u);
     if (!project_to_film(sensor, reference_p, lens, c.film_position)) return false;
-    if (sensor.type == SensorType::orthographic) {
+    if (is_parallel(sensor.type)) {
         const Vec3f axis = sensor.to_world.vector({0, 0, 1});
         const float scale = length(axis);
         c.wi = axis * (-1.0f / scale);

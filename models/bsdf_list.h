@@ -1,0 +1,100 @@
+// The BSDFs there are: the only list of them.
+#pragma once
+
+#include "models/bsdf/conductor.h"
+#include "models/bsdf/dielectric.h"
+#include "models/bsdf/diffuse.h"
+#include "models/bsdf/plastic.h"
+#include "models/bsdf/rough_conductor.h"
+#include "models/bsdf/rough_dielectric.h"
+#include "models/bsdf/rough_diffuse.h"
+#include "models/bsdf/rough_plastic.h"
+#include "models/bsdf/thin_dielectric.h"
+
+/// X(model, name): the struct and the name in messages and files.
+#define AMBILUX_BSDFS(X)                 \
+    X(Diffuse, diffuse)                  \
+    X(RoughDiffuse, rough_diffuse)       \
+    X(Conductor, conductor)              \
+    X(RoughConductor, rough_conductor)   \
+    X(Dielectric, dielectric)            \
+    X(ThinDielectric, thin_dielectric)   \
+    X(RoughDielectric, rough_dielectric) \
+    X(Plastic, plastic)                  \
+    X(RoughPlastic, rough_plastic)
+
+namespace ambilux {
+
+AMBILUX_MODEL_ENUM(BsdfType, AMBILUX_BSDFS)
+
+template <class, BsdfModel... Models>
+using BsdfModelsOf = ModelList<Models...>;
+using BsdfModels = BsdfModelsOf<void AMBILUX_BSDFS(AMBILUX_MODEL_TYPE)>;
+
+template <class Model>
+constexpr BsdfType kBsdfType = BsdfType(BsdfModels::index<Model>());
+
+namespace detail {
+
+constexpr uint32_t kSmoothBsdfs = BsdfModels::mask([](auto m) { return decltype(m)::type::smooth; });
+constexpr uint32_t kDeltaOnlyBsdfs = BsdfModels::kAll & ~kSmoothBsdfs;
+constexpr uint32_t kTransmittingBsdfs = BsdfModels::mask([](auto m) { return decltype(m)::type::transmits; });
+constexpr uint32_t kTabulatedBsdfs = BsdfModels::mask([](auto m) { return decltype(m)::type::tabulated; });
+
+template <class... Models>
+OneOf<Textured<Models>...> textured_of(ModelList<Models...>);
+template <class... Models>
+OneOf<typename Models::Constants...> constants_of(ModelList<Models...>);
+
+}  // namespace detail
+
+/// Those of one of the models.
+using BsdfParameters = decltype(detail::textured_of(BsdfModels{}));
+using BsdfConstants = decltype(detail::constants_of(BsdfModels{}));
+
+/// True if light can pass to the other side.
+AMBILUX_HD constexpr bool bsdf_transmits(BsdfType type) {
+    return BsdfModels::contains<detail::kTransmittingBsdfs>(uint32_t(type));
+}
+/// True if there is a lobe that is not a delta, so that connecting to other vertices can give light.
+AMBILUX_HD constexpr bool bsdf_is_smooth(BsdfType type) {
+    return !BsdfModels::contains<detail::kDeltaOnlyBsdfs>(uint32_t(type));
+}
+
+/// Parameters of one BSDF as a scene has them, and the maps that change its frame.
+struct BsdfRecord {
+    BsdfType type = BsdfType::diffuse;
+    int32_t normal_map = -1;  ///< texture of tangent-space normals, or -1
+    int32_t bump_map = -1;    ///< texture of heights, or -1
+    float bump_scale = 1;
+    BsdfParameters parameters;
+
+    BsdfRecord() { parameters.set(Textured<Diffuse>{}); }
+    /// Parameters of the model, which must be `Model`.
+    template <class Model>
+    AMBILUX_HD const Textured<Model>& as() const {
+        return parameters.ref<Textured<Model>>();
+    }
+};
+
+/// True if any parameter of the record comes from a texture.
+inline bool is_textured(const BsdfRecord& record) {
+    return BsdfModels::visit<BsdfModels::kAll>(uint32_t(record.type), false, [&](auto model) {
+        using Model = typename decltype(model)::type;
+        BsdfInputs inputs;
+        bool textured = false;
+        for_each_input(record.as<Model>(), inputs,
+                       [&](const auto& parameter, auto&) { textured |= parameter.texture >= 0; });
+        return textured;
+    });
+}
+
+template <class Model>
+BsdfRecord bsdf_record(const Textured<Model>& parameters) {
+    BsdfRecord record;
+    record.type = kBsdfType<Model>;
+    record.parameters.set(parameters);
+    return record;
+}
+
+}  // namespace ambilux

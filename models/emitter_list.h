@@ -1,0 +1,103 @@
+// The emitters there are: the only list of them, and what each says of itself.
+//
+// - plugin: its name in Mitsuba's scene files;
+// - surface: it is part of a shape, and rays can meet it;
+// - delta_position, delta_direction: its light starts at one point, or leaves in one direction, so that no ray finds it
+//   by chance;
+// - infinite: its light comes from outside of the scene.
+//
+// Functions are in transport/emitter/, plugins in formats/mitsuba/emitters.cpp, powers in formats/finalize.cpp.
+#pragma once
+
+#include <concepts>
+
+#include "models/model_list.h"
+
+namespace ambilux {
+
+struct AreaEmitter {
+    static constexpr const char* plugin = "area";
+    static constexpr bool surface = true, delta_position = false, delta_direction = false, infinite = false;
+};
+struct PointEmitter {
+    static constexpr const char* plugin = "point";
+    static constexpr bool surface = false, delta_position = true, delta_direction = false, infinite = false;
+};
+struct SpotEmitter {
+    static constexpr const char* plugin = "spot";
+    static constexpr bool surface = false, delta_position = true, delta_direction = false, infinite = false;
+};
+struct DirectionalEmitter {
+    static constexpr const char* plugin = "directional";
+    static constexpr bool surface = false, delta_position = false, delta_direction = true, infinite = true;
+};
+struct ConstantEmitter {
+    static constexpr const char* plugin = "constant";
+    static constexpr bool surface = false, delta_position = false, delta_direction = false, infinite = true;
+};
+struct EnvmapEmitter {
+    static constexpr const char* plugin = "envmap";
+    static constexpr bool surface = false, delta_position = false, delta_direction = false, infinite = true;
+};
+
+}  // namespace ambilux
+
+/// X(model, name): the struct and the name in messages and files.
+#define AMBILUX_EMITTERS(X)            \
+    X(AreaEmitter, area)               \
+    X(PointEmitter, point)             \
+    X(SpotEmitter, spot)               \
+    X(DirectionalEmitter, directional) \
+    X(ConstantEmitter, constant)       \
+    X(EnvmapEmitter, envmap)
+
+namespace ambilux {
+
+AMBILUX_MODEL_ENUM(EmitterType, AMBILUX_EMITTERS)
+
+/// What a member of the list must say of itself.
+template <class Model>
+concept EmitterModel = requires {
+    { (Model::plugin) } -> std::same_as<const char* const&>;
+    { (Model::surface) } -> std::same_as<const bool&>;
+    { (Model::delta_position) } -> std::same_as<const bool&>;
+    { (Model::delta_direction) } -> std::same_as<const bool&>;
+    { (Model::infinite) } -> std::same_as<const bool&>;
+    requires Model::surface + Model::delta_position + Model::infinite == 1;
+};
+template <class, EmitterModel... Models>
+using EmitterModelsOf = ModelList<Models...>;
+using EmitterModels = EmitterModelsOf<void AMBILUX_EMITTERS(AMBILUX_MODEL_TYPE)>;
+
+template <class Model>
+constexpr EmitterType kEmitterType = EmitterType(EmitterModels::index<Model>());
+
+namespace detail {
+
+constexpr uint32_t kPositionEmitters = EmitterModels::mask([](auto m) { return decltype(m)::type::delta_position; });
+constexpr uint32_t kDirectionEmitters = EmitterModels::mask([](auto m) { return decltype(m)::type::delta_direction; });
+constexpr uint32_t kDeltaEmitters = kPositionEmitters | kDirectionEmitters;
+constexpr uint32_t kInfiniteEmitters = EmitterModels::mask([](auto m) { return decltype(m)::type::infinite; });
+constexpr uint32_t kEnvironmentEmitters = kInfiniteEmitters & ~kDirectionEmitters;
+
+}  // namespace detail
+
+AMBILUX_HD constexpr bool has_delta_position(EmitterType type) {
+    return EmitterModels::contains<detail::kPositionEmitters>(uint32_t(type));
+}
+AMBILUX_HD constexpr bool has_delta_direction(EmitterType type) {
+    return EmitterModels::contains<detail::kDirectionEmitters>(uint32_t(type));
+}
+/// No ray meets it by chance.
+AMBILUX_HD constexpr bool is_delta(EmitterType type) {
+    return EmitterModels::contains<detail::kDeltaEmitters>(uint32_t(type));
+}
+AMBILUX_HD constexpr bool is_infinite(EmitterType type) {
+    return EmitterModels::contains<detail::kInfiniteEmitters>(uint32_t(type));
+}
+/// It surrounds the scene: what rays see that meet nothing. A scene has one at most.
+constexpr bool is_environment(EmitterType type) {
+    return EmitterModels::contains<detail::kEnvironmentEmitters>(uint32_t(type));
+}
+
+}  // namespace ambilux

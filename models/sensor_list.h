@@ -1,0 +1,59 @@
+// The sensors there are: the only list of them, and what each says of itself.
+//
+// - plugin: its name in Mitsuba's scene files;
+// - parallel: all rays have one direction;
+// - lens: rays start on an aperture, which may be of size 0; else, unless they are parallel, at one point.
+#pragma once
+
+#include <concepts>
+
+#include "models/model_list.h"
+
+namespace ambilux {
+
+struct PerspectiveSensor {
+    static constexpr const char* plugin = "perspective";
+    static constexpr bool parallel = false, lens = false;
+};
+struct ThinLensSensor {
+    static constexpr const char* plugin = "thinlens";
+    static constexpr bool parallel = false, lens = true;
+};
+struct OrthographicSensor {
+    static constexpr const char* plugin = "orthographic";
+    static constexpr bool parallel = true, lens = false;
+};
+
+}  // namespace ambilux
+
+/// X(model, name): the struct and the name in messages and files.
+#define AMBILUX_SENSORS(X)            \
+    X(PerspectiveSensor, perspective) \
+    X(ThinLensSensor, thin_lens)      \
+    X(OrthographicSensor, orthographic)
+
+namespace ambilux {
+
+AMBILUX_MODEL_ENUM(SensorType, AMBILUX_SENSORS)
+
+/// What a member of the list must say of itself.
+template <class Model>
+concept SensorModel = requires {
+    { (Model::plugin) } -> std::same_as<const char* const&>;
+    { (Model::parallel) } -> std::same_as<const bool&>;
+    { (Model::lens) } -> std::same_as<const bool&>;
+    requires !(Model::parallel && Model::lens);
+};
+template <class, SensorModel... Models>
+using SensorModelsOf = ModelList<Models...>;
+using SensorModels = SensorModelsOf<void AMBILUX_SENSORS(AMBILUX_MODEL_TYPE)>;
+
+AMBILUX_HD constexpr bool is_parallel(SensorType type) {
+    return SensorModels::contains<SensorModels::mask([](auto m) { return decltype(m)::type::parallel; })>(
+        uint32_t(type));
+}
+AMBILUX_HD constexpr bool has_lens(SensorType type) {
+    return SensorModels::contains<SensorModels::mask([](auto m) { return decltype(m)::type::lens; })>(uint32_t(type));
+}
+
+}  // namespace ambilux
