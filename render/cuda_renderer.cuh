@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/flag.h"
 #include "integrators/integrator.h"
+#include "render/device_film.h"
 #include "render/device_wave.h"
 #include "render/statistics.h"
 #include "scene/info.h"
@@ -38,11 +39,19 @@ public:
                 policy_.traces_connections = Stages::kTracesConnections && traces_connections(policy_, accel_->bytes());
         }
         shape(settings, mean);
-        allocate_film(settings);
+        const uint64_t kept = policy_.waves.keeps_light_vertices
+                                  ? planned_light_vertices(mean, policy_.waves.most_light_subpaths(wave_.slot_count()))
+                                  : 0;
+        Layout film;
+        lay_out_film(film, wave_, policy_.waves, kFilmWide);
+        const Layout queues = plan_queues(kept, film.bytes());
+        film_memory_ = DeviceBuffer<std::byte>(film.bytes(), "film");
+        film_memory_.zero();
+        Layout placed(film, film_memory_.data());
+        film_ = lay_out_film(placed, wave_, policy_.waves, kFilmWide);
+        clock_ = DeviceBuffer<uint64_t>(1);
         cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        allocate(policy_.waves.keeps_light_vertices
-                     ? planned_light_vertices(mean, policy_.waves.most_light_subpaths(wave_.slot_count()))
-                     : 0);
+        allocate_queues(queues, kept);
         build_seconds_ = seconds_since(start);
     }
     ~CudaRenderer() override {
@@ -83,13 +92,14 @@ public:
         film.width = wave_.width;
         film.height = wave_.height;
         film.samples = film_samples_;
-        film.sum = sum_.download();
-        film.sum_squares = sum_squares_.download();
+        film.sum = read(film_.sums.sum, film_values());
+        film.sum_squares = read(film_.sums.sum_squares, film_values());
         return film;
     }
     void clear_film() override {
-        sum_.zero();
-        sum_squares_.zero();
+        for (double* sums : {film_.sums.sum, film_.sums.sum_squares})
+            cuda_check(cudaMemset(sums, 0, film_values() * sizeof(double)), "clear the film");
+        cuda_check(cudaDeviceSynchronize(), "clear the film");  // waves run on a stream of their own
         film_samples_ = 0;
     }
 
@@ -114,9 +124,11 @@ public:
     }
 
     std::vector<StrategyImage> strategy_images() override {
-        if (policy_.waves.strategy_depth == 0) return {};
-        return ambilux::strategy_images(policy_.waves.strategy_depth, samples_, strategies_.download(),
-                                        strategies_dropped_.download());
+        const uint32_t depth = policy_.waves.strategy_depth;
+        if (depth == 0) return {};
+        return ambilux::strategy_images(depth, samples_,
+                                        read(film_.strategies, strategy_values(depth, film_values() / 3)),
+                                        read(film_.strategies_dropped, strategy_count(depth)));
     }
 
     uint32_t preferred_batch() const override {
@@ -162,26 +174,9 @@ private:
                                              "light_paths");
         policy_.waves.multi_bounce_below = multi_bounce_below(settings, wave_.slot_count());
     }
-    void allocate_film(const RenderSettings& settings) {
-        const uint64_t pixels = uint64_t(wave_.width) * wave_.height, cells = kFilmWide ? pixels * wave_.samples : 0;
-        sum_ = DeviceBuffer<double>(pixels * 3, "film");
-        sum_squares_ = DeviceBuffer<double>(pixels * 3, "film");
-        fixed_splats_ = DeviceBuffer<int64_t>(settings.deterministic ? cells * 3 : 0, "splats");
-        splats_ = DeviceBuffer<Lane>(settings.deterministic ? 0 : cells, "splats");
-        slot_samples_ = DeviceBuffer<Lane>(wave_.slot_count(), "samples");
-        const uint32_t depth = policy_.waves.strategy_depth;
-        strategies_ = DeviceBuffer<int64_t>(strategy_values(depth, pixels), "images of single strategies");
-        strategies_dropped_ = DeviceBuffer<uint64_t>(strategy_count(depth));
-        clock_ = DeviceBuffer<uint64_t>(1);
-        for (auto* buffer : {&fixed_splats_, &strategies_}) buffer->zero();
-        for (auto* buffer : {&splats_, &slot_samples_}) buffer->zero();
-        strategies_dropped_.zero();
-        clear_film();
-    }
     uint64_t fixed_bytes() const {
-        return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) + sum_.bytes() +
-               sum_squares_.bytes() + fixed_splats_.bytes() + splats_.bytes() + strategies_.bytes() +
-               slot_samples_.bytes() + clock_.bytes();
+        return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) + film_memory_.bytes() +
+               clock_.bytes();
     }
 
     /// Memory of a wave, and what works on it.
@@ -197,26 +192,25 @@ private:
         const OrderMemory order =
             lay_out_order(layout, policy_.waves.queues, listed, order_temporary_bytes(policy_.waves.queues, listed));
         wave_.state = state;
-        const FilmBuffers film = {slot_samples_.data(),
-                                  splat_sums(),
-                                  {sum_.data(), sum_squares_.data()},
-                                  strategies_.data(),
-                                  strategies_dropped_.data()};
         const CwbvhTracer tracer = accel_ ? accel_->tracer() : CwbvhTracer();
         layout.record(UpdateFilm::kName);
-        return {state, order, Stages(layout, device_scene_->view(), tracer, policy_, wave_, queues, film)};
+        return {state, order, Stages(layout, device_scene_->view(), tracer, policy_, wave_, queues, film_)};
     }
-    SplatSums splat_sums() { return {fixed_splats_.data(), splats_.data()}; }
+    uint64_t film_values() const { return uint64_t(wave_.width) * wave_.height * 3; }
 
-    /// Queues for `kept` light vertices, and the graph that uses them.
-    void allocate(uint64_t kept) {
+    /// Queues for `kept` light vertices, which must fit beside `other_bytes`.
+    Layout plan_queues(uint64_t kept, uint64_t other_bytes) {
         if (kept > 0xf0000000ull)
             throw Error(ExitCode::device,
                         "light subpaths have more vertices than can be numbered: set a max_depth or "
                         "a smaller wave_size");
         Layout plan;
         lay_out(plan, uint32_t(kept));
-        check_memory(plan.bytes(), free_device_bytes(), wave_.slot_count());
+        check_memory(plan.bytes() + other_bytes, free_device_bytes(), wave_.slot_count());
+        return plan;
+    }
+    /// The queues, and the graph that uses them.
+    void allocate_queues(const Layout& plan, uint64_t kept) {
         memory_ = DeviceBuffer<std::byte>(plan.bytes(), "queues");
         memory_.zero();
         layout_ = Layout(plan, memory_.data());
@@ -237,11 +231,7 @@ private:
     }
     void run(Executor& exec) {
         Integrator::schedule(exec, *stages_);
-        const UpdateFilm update = {wave_,
-                                   slot_samples_.data(),
-                                   splat_sums(),
-                                   {sum_.data(), sum_squares_.data()},
-                                   layout_.record(UpdateFilm::kName)};
+        const UpdateFilm update = {wave_, film_.samples, film_.splats, film_.sums, layout_.record(UpdateFilm::kName)};
         exec.run_slots(update, wave_.tiles * kTilePixels, 1);
         exec.finish_wave();
     }
@@ -263,7 +253,8 @@ private:
             if (layout_.queue_names()[q] == "light_vertices" || layout_.queue_names()[q] == "splats")
                 needed = std::max(needed, counters[q].peak);
         memory_ = DeviceBuffer<std::byte>();
-        allocate(needed + needed / 4);
+        needed += needed / 4;
+        allocate_queues(plan_queues(needed, 0), needed);
         cuda_check(
             cudaMemcpy(layout_.records(), records.data(), records.size() * sizeof(StageRecord), cudaMemcpyHostToDevice),
             "statistics");
@@ -290,11 +281,9 @@ private:
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceCwbvh> accel_;
     std::optional<DevicePairs> pairs_;  ///< instead, with accel=bvh2
-    DeviceBuffer<std::byte> memory_;
-    DeviceBuffer<double> sum_, sum_squares_;
-    DeviceBuffer<int64_t> fixed_splats_, strategies_;
-    DeviceBuffer<Lane> splats_, slot_samples_;
-    DeviceBuffer<uint64_t> strategies_dropped_, clock_;
+    DeviceBuffer<std::byte> memory_, film_memory_;
+    FilmBuffers film_{};
+    DeviceBuffer<uint64_t> clock_;
     WaveState* state_ = nullptr;
     cudaStream_t stream_ = nullptr;
     std::optional<Stages> stages_;

@@ -2,6 +2,8 @@
 // labels: gpu
 // What renderers of one scene share on a device, and choices that are made there.
 #include "backends/cuda/device_scene.h"
+#include "integrators/bdpt/wavefront/variant.h"
+#include "integrators/path/variant.h"
 #include "integrators/registry.h"
 #include "render/make_on_backend.h"
 #include "tests/support/bidirectional_images.h"
@@ -32,8 +34,8 @@ TEST_CASE("renderers of one scene share its copy on the device, which lives as l
     {
         SharedAccels accels(scene);
         with_feature_level(scene.features, true, [&]<Features F>() {
-            a = make_on_cuda<PathFamily, F>(scene, path, accels);
-            b = make_on_cuda<BdptFamily, F>(scene, light, accels);
+            a = make_on_cuda<PathVariant, F>(scene, path, accels);
+            b = make_on_cuda<LightVariant, F>(scene, light, accels);
         });
         copy = accels.get<DeviceScene>();
         structure = accels.get<DeviceCwbvh>();

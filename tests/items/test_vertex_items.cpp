@@ -285,7 +285,7 @@ TEST_CASE("Points in one plane, as far as positions are known, exchange no light
         };
         const BidirectionalVertex z = vertex(point);
         BidirectionalVertex y = vertex(surface_at<kAllFeatures>(view, prim, q.x, q.y));
-        if (is_zero(z.scattering.bsdreflectance_of(f))) continue;
+        if (is_zero(reflectance_of(z.scattering.bsdf))) continue;
         ++points;
         Candidate<BidirectionalMis> c;
         REQUIRE_FALSE(may_connect(y, z));

@@ -33,7 +33,7 @@ using Stages = Integrator::Stages;
 struct Bench {
     Scene scene;
     CwbvhAccel accel;
-    PathPolicy policy;
+    Integrator::Policy policy;
     Wave wave;
     WaveState state{};
     std::vector<std::byte> bytes;
