@@ -4,7 +4,6 @@
 #include "backends/cuda/device_scene.h"
 #include "integrators/bdpt/wavefront/variant.h"
 #include "integrators/path/variant.h"
-#include "integrators/registry.h"
 #include "render/make_on_backend.h"
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/gpu_device.h"
