@@ -9,15 +9,18 @@
 
 namespace ambilux {
 
-/// The eye end `z` of `slot` and light vertex `light`, which lies at `place`. `Out` takes candidates.
+/// The eye end `z` of `slot` and light vertex `light`, which lies at `place`. `Out` takes candidates. The scale is
+/// asked for last: until then no register keeps it.
 template <Features F, class Out>
 AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Rules<BidirectionalMis>& rules,
-                                     const LightVertexSource& source, const Draws& draws, const BidirectionalEnd& z,
-                                     uint32_t slot, const ConnectionVertex& light, uint32_t place, float scale,
-                                     bool seeds, const Out& candidates, StageRecord* record) {
+                                     const LightVertexSource& source, const WaveState& state, const Draws& draws,
+                                     const BidirectionalEnd& z, uint32_t slot, const ConnectionVertex& light,
+                                     uint32_t place, bool seeds, const Out& candidates, StageRecord* record) {
     const BidirectionalEnd y = unpack_end<F>(scene, light);
     Candidate<BidirectionalMis> c;
-    if (!connection<F>(rules, z, y, scale, c) || !is_valid_radiance(c.value, record)) return;
+    if (!connection<F>(rules, z, y, c)) return;
+    c.value *= source.scale(state);
+    if (!is_valid_radiance(c.value, record)) return;
     const uint32_t which = connection_ray(z.depth, source.draws > 0 ? kMaxDepth + place : y.depth);
     candidates.push(pack_candidate(c, slot, seeds ? draws.shadow_seed(which) : 0));
 }
@@ -58,12 +61,11 @@ struct NextEventAndConnections {
         const LightVertexSearch lights = {source, draws.key, path.depth, v, rules.max_depth};
         uint32_t next = source.first(slot), found = lights.find(next);
         if (found == kNone) return;
-        const float scale = source.scale(*state);
         const BidirectionalEnd end = unpack_end<F>(scene, pack_connection_vertex(v, path, slot));
         for (; found != kNone; found = lights.find(next)) {
             record->count_item(path.depth);
-            push_connection<F>(scene, rules, source, draws, end, slot, load_vertex<F>(source.vertices, found), found,
-                               scale, next_event.seeds, next_event.candidates, record);
+            push_connection<F>(scene, rules, source, *state, draws, end, slot, load_vertex<F>(source.vertices, found),
+                               found, next_event.seeds, next_event.candidates, record);
         }
     }
 };
@@ -129,8 +131,7 @@ struct ConnectVertices {
         const Warp warp;
         pair.light = LightVertexSearch{source, draws.key, z.depth, z.vertex, rules.max_depth}.find(pair.next);
         warp.meet();  // else lanes that search longer than others stay apart
-        push_connection<F>(scene, rules, source, draws, z, pair.path, light, place, source.scale(*wave.state), seeds,
-                           out, record);
+        push_connection<F>(scene, rules, source, *wave.state, draws, z, pair.path, light, place, seeds, out, record);
         if (pair.light == kNone) return false;
         ++count.steps;
         return true;

@@ -57,13 +57,13 @@ struct EyeVertex {
     struct Sink {
         const EyeVertex& stage;
         uint32_t slot;
-        const Draws& draws;
 
+        AMBILUX_HD Draws draws() const { return {stage.wave.key(slot)}; }
         AMBILUX_HD void add(const Candidate<Mis>& c) const {
             if (is_valid_radiance(c.value, stage.record))
                 stage.emission.push(EmissionItem{c.value, slot, c.ratio, c.strategy, {}});
         }
-        AMBILUX_HD void at(const Vertex<Mis>& v, const Subpath<Mis>& path) const {
+        AMBILUX_HD void at(const Vertex<Mis>& v, const Subpath<Mis>& path, const Draws& draws) const {
             if (stage.rules.next_event || stage.rules.connect)
                 stage.vertices.at(stage.scene, stage.rules, v, path, slot, draws);
         }
@@ -73,9 +73,7 @@ struct EyeVertex {
     /// True if the subpath goes on with the ray `next`.
     AMBILUX_HD bool step(const HitItem<RayItem>& h, RayItem& next) const {
         Subpath<Mis> path = Items::unpack(h.ray);
-        const Draws draws = {wave.key(h.ray.path)};
-        if (!visit<F>(scene, rules, draws, Side::eye, rules.longest(Side::eye), h.hit(), path,
-                      Sink{*this, h.ray.path, draws}))
+        if (!visit<F>(scene, rules, Side::eye, rules.longest(Side::eye), h.hit(), path, Sink{*this, h.ray.path}))
             return false;
         next = Items::pack(path, Side::eye, h.ray.path, kInfinity);
         return true;

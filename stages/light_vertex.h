@@ -74,10 +74,11 @@ struct LightVertex {
     struct Sink {
         const LightVertex& stage;
         uint32_t slot;
-        const Draws& draws;
 
+        AMBILUX_HD Draws draws() const { return {stage.wave.key(slot, Stream::light)}; }
         AMBILUX_HD void add(const Candidate<BidirectionalMis>&) const {}
-        AMBILUX_HD void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& path) const {
+        AMBILUX_HD void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& path,
+                           const Draws& draws) const {
             const Rules<BidirectionalMis>& rules = stage.rules;
             if (rules.splat && rules.wants(path.depth + 1, 1))
                 stage.camera.at(stage.scene, rules, y, path, slot, draws);
@@ -92,9 +93,7 @@ struct LightVertex {
     /// True if the subpath goes on with the ray `next`.
     AMBILUX_HD bool step(const SubpathHit& h, SubpathRay& next) const {
         Subpath<BidirectionalMis> path = Items::unpack(h.ray);
-        const Draws draws = {wave.key(h.ray.path, Stream::light)};
-        if (!visit<F>(scene, rules, draws, Side::light, rules.longest(Side::light), h.hit(), path,
-                      Sink{*this, h.ray.path, draws}))
+        if (!visit<F>(scene, rules, Side::light, rules.longest(Side::light), h.hit(), path, Sink{*this, h.ray.path}))
             return false;
         next = Items::pack(path, Side::light, h.ray.path, kInfinity);
         return true;

@@ -192,14 +192,14 @@ private:
         const Megakernel& kernel;
         State& s;
         const Hit& hit;
-        const Draws& draws;
 
+        AMBILUX_HD Draws draws() const { return kernel.draws(s); }
         AMBILUX_HD void add(const Candidate<Mis>& c) const {
             if (!is_valid_radiance(c.value, kernel.records.shade)) return;
             const Rgb weighted = c.value * mis_weight(c.ratio);
             if (is_valid_radiance(weighted, kernel.records.mis_weight)) s.sum += weighted;
         }
-        AMBILUX_HD void at(const BidirectionalVertex& x, const Subpath<Mis>& path) const {
+        AMBILUX_HD void at(const BidirectionalVertex& x, const Subpath<Mis>& path, const Draws& draws) const {
             kernel.connect_end(s, x, path, hit, draws);
         }
         AMBILUX_HD bool valid(Rgb throughput) const {
@@ -210,9 +210,8 @@ private:
 
     /// Where the ray of the subpath ended. Both sides go through the same code as far as they can.
     AMBILUX_HD void step(State& s, const Hit& hit) const {
-        const Draws d = draws(s);
         s.tmax = kInfinity;
-        s.going = visit<F>(scene, rules, d, s.side, rules.longest(s.side), hit, s.path, Sink{*this, s, hit, d});
+        s.going = visit<F>(scene, rules, s.side, rules.longest(s.side), hit, s.path, Sink{*this, s, hit});
     }
 
     /// A vertex and the camera or an emitter; and it is kept, or waits, for connections.
@@ -249,7 +248,7 @@ private:
         const SurfacePoint point = surface_at<F>(scene, z.prim, z.u, z.v);
         const BidirectionalEnd eye = {vertex_with<F, Mis>(scene, z.d, z.depth, point, z.sums), z.throughput, z.depth};
         Candidate<Mis> c;
-        if (connection<F>(rules, eye, unpack_end<F>(scene, load_vertex<F>(light_vertices, place)), 1.0f, c))
+        if (connection<F>(rules, eye, unpack_end<F>(scene, load_vertex<F>(light_vertices, place)), c))
             test(s, c, draws(s), connection_ray(z.depth, light_depth), records.connect_vertices);
     }
 };

@@ -27,9 +27,9 @@ struct StreamPool {
     Queue<SubpathRay> rays;           ///< by slot: of its eye subpath or of the light subpath for it
     LaneArray<ConnectionVertex> eye;  ///< by slot: the vertex that the light subpath is for; its path is kNoPath if it
                                       ///< is for the camera only
-    LaneArray<SubpathRay> pending;  ///< by slot: the ray with which the eye subpath goes on; depth 0: it has ended
-    Lane* samples;                  ///< per path
-    uint32_t* next_path;            ///< WaveState::next_path
+    LaneArray<SubpathRay> pending;    ///< by slot: the ray with which the eye subpath goes on; depth 0: it has ended
+    Lane* samples;                    ///< per path
+    uint32_t* next_path;              ///< WaveState::next_path
 
     /// Random numbers of the light subpath for an eye vertex: another one for each depth.
     AMBILUX_HD Draws light_draws(uint32_t path, const ConnectionVertexFront& vertex) const {
@@ -144,11 +144,12 @@ struct StreamEyeVertex {
         ConnectionVertex& waiting;
         bool& connects;
 
+        AMBILUX_HD Draws draws() const { return {stage.pool.wave.key(path)}; }
         AMBILUX_HD void add(const Candidate<BidirectionalMis>& c) const {
             if (is_valid_radiance(c.value, stage.record))
                 stage.emission.push(EmissionItem{c.value, path, c.ratio, c.strategy, {}});
         }
-        AMBILUX_HD void at(const BidirectionalVertex& z, const Subpath<BidirectionalMis>& s) const {
+        AMBILUX_HD void at(const BidirectionalVertex& z, const Subpath<BidirectionalMis>& s, const Draws&) const {
             const Rules<BidirectionalMis>& rules = stage.pool.rules;
             if (rules.next_event) push_vertex<F>(stage.vertices, pack_vertex(z, s, path));
             connects = rules.connect && s.depth + 2 <= rules.max_depth;
@@ -168,8 +169,8 @@ struct StreamEyeVertex {
         bool connects = false;
         Subpath<BidirectionalMis> path = StreamPool::Items::unpack(h.ray);
         SubpathRay next = {};  // depth 0
-        if (visit<F>(pool.scene, rules, Draws{pool.wave.key(h.ray.path)}, Side::eye, rules.longest(Side::eye), h.hit(),
-                     path, Sink{*this, h.ray.path, vertex, connects}))
+        if (visit<F>(pool.scene, rules, Side::eye, rules.longest(Side::eye), h.hit(), path,
+                     Sink{*this, h.ray.path, vertex, connects}))
             next = StreamPool::Items::pack(path, Side::eye, h.ray.path, kInfinity);
         pool.pending.store(end.slot, next);
         pool.eye.store(end.slot, vertex, lanes_of<F>(vertex));
@@ -217,11 +218,13 @@ struct StreamLightVertex {
     struct Sink {
         const StreamLightVertex& stage;
         const ConnectionVertexFront& eye;
+        const Draws& subpath_draws;
         bool splat;
         uint32_t slot, path;
 
+        AMBILUX_HD Draws draws() const { return subpath_draws; }
         AMBILUX_HD void add(const Candidate<BidirectionalMis>&) const {}
-        AMBILUX_HD void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& s) const {
+        AMBILUX_HD void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& s, const Draws&) const {
             if (splat && stage.pool.rules.wants(s.depth + 1, 1))
                 push_vertex<F>(stage.camera_vertices, pack_vertex(y, s, path));
             if (eye.link != kNoPath && s.depth + eye.bits.depth() + 1 <= stage.pool.rules.max_depth &&
@@ -242,8 +245,8 @@ struct StreamLightVertex {
         // A path has one segment more than its light subpath, and those of the eye subpath if there is one.
         const uint32_t longest = splat ? rules.max_depth - 1 : rules.max_depth - 1 - eye.bits.depth();
         Subpath<BidirectionalMis> path = StreamPool::Items::unpack(h.ray);
-        if (!visit<F>(pool.scene, rules, draws, Side::light, longest, h.hit(), path,
-                      Sink{*this, eye, splat, end.slot, h.ray.path}))
+        if (!visit<F>(pool.scene, rules, Side::light, longest, h.hit(), path,
+                      Sink{*this, eye, draws, splat, end.slot, h.ray.path}))
             return pool.advance(end.slot);
         pool.rays.put(end.slot, StreamPool::Items::pack(path, Side::light, h.ray.path | kLightRay, kInfinity));
     }
@@ -270,8 +273,8 @@ struct StreamConnect {
         if constexpr (ConnectionVertex::lanes<F>() > ConnectionVertex::kDiffuseLanes)
             if (!eye.bits().template diffuse<F>())
                 pool.eye.load_more(slot, eye, ConnectionVertex::kDiffuseLanes, ConnectionVertex::lanes<F>());
-        push_connection<F>(pool.scene, pool.rules, source, Draws{pool.wave.key(eye.path())},
-                           unpack_end<F>(pool.scene, eye), eye.path(), light, kNone, 1.0f, seeds, candidates, record);
+        push_connection<F>(pool.scene, pool.rules, source, *pool.wave.state, Draws{pool.wave.key(eye.path())},
+                           unpack_end<F>(pool.scene, eye), eye.path(), light, kNone, seeds, candidates, record);
     }
 };
 

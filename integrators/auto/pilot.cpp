@@ -162,11 +162,12 @@ private:
     struct LightSink {
         const PilotRun& pilot;
         LightTask& task;
-        const Draws& draws;
+        const Draws& subpath_draws;
         Rgb emitted;
 
+        Draws draws() const { return subpath_draws; }
         void add(const PilotCandidatePath&) const {}
-        void at(const Vertex<PilotMis>& y, const PilotSubpath& path) const {
+        void at(const Vertex<PilotMis>& y, const PilotSubpath& path, const Draws& draws) const {
             const Vec4f u = draws.lens(path.depth);
             PilotCandidatePath c;
             if (camera_connection<F>(pilot.view_, pilot.rules_, y, path.throughput, path.depth, {u.x, u.y}, c))
@@ -190,7 +191,7 @@ private:
         do {
             task.rays += 1;
             closest(path, kInfinity, draws, hit);
-        } while (visit<F>(view_, rules_, draws, Side::light, rules_.longest(Side::light), hit, path,
+        } while (visit<F>(view_, rules_, Side::light, rules_.longest(Side::light), hit, path,
                           LightSink{*this, task, draws, e.radiance}));
     }
 
@@ -256,13 +257,14 @@ private:
         const PilotRun& pilot;
         Eye& eye;
 
+        const Draws& draws() const { return eye.draws; }
         void add(const PilotCandidatePath& c) const {
             if (!counts(c.value)) return;
             if (c.strategy.segments() == 1)
                 for (int k = 0; k < 3; ++k) eye.pixel.seen[k] = std::max(eye.pixel.seen[k], double(c.value[k]));
             pilot.found(eye, {c.value, shares_of(c.ratio, 0)});
         }
-        void at(const Vertex<PilotMis>& z, const PilotSubpath& path) const {
+        void at(const Vertex<PilotMis>& z, const PilotSubpath& path, const Draws&) const {
             const PilotVertex end = {z, path.throughput, path.depth};
             pilot.next_event(eye, end);
             if (pilot.rules_.connect && !pilot.vertices_.empty()) pilot.connect(eye, end);
@@ -278,8 +280,7 @@ private:
         do {
             eye.work.eye_rays += 1;
             closest(path, path.depth == 1 ? camera.tmax : kInfinity, eye.draws, hit);
-        } while (
-            visit<F>(view_, rules_, eye.draws, Side::eye, rules_.longest(Side::eye), hit, path, EyeSink{*this, eye}));
+        } while (visit<F>(view_, rules_, Side::eye, rules_.longest(Side::eye), hit, path, EyeSink{*this, eye}));
     }
 
     void next_event(Eye& eye, const PilotVertex& z) const {
@@ -298,7 +299,7 @@ private:
         if (z.depth + y.depth + 1 > rules_.max_depth) return false;
         PilotCandidatePath c;
         tried += 1;
-        if (!ambilux::connection<F>(rules_, z, y, 1.0f, c) || !counts(c.value)) return false;
+        if (!ambilux::connection<F>(rules_, z, y, c) || !counts(c.value)) return false;
         rays += 1;
         if (!is_free(c, eye.draws, connection_ray(z.depth, which))) return false;
         e = {c.value, shares_of(c.ratio, 2)};

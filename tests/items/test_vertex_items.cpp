@@ -51,7 +51,7 @@ Rules<BidirectionalMis> all_rules() {
 /// Both with throughput 1.
 bool connects(const Rules<BidirectionalMis>& rules, const BidirectionalVertex& y, const BidirectionalVertex& z) {
     Candidate<BidirectionalMis> c;
-    return connection<kAllFeatures>(rules, {z, {1, 1, 1}, 1}, {y, {1, 1, 1}, 1}, 1.0f, c) && !is_zero(c.value);
+    return connection<kAllFeatures>(rules, {z, {1, 1, 1}, 1}, {y, {1, 1, 1}, 1}, c) && !is_zero(c.value);
 }
 
 }  // namespace
@@ -289,7 +289,7 @@ TEST_CASE("Points in one plane, as far as positions are known, exchange no light
         ++points;
         Candidate<BidirectionalMis> c;
         REQUIRE_FALSE(may_connect(y, z));
-        REQUIRE_FALSE(connection<kAllFeatures>(rules, {z, {1, 1, 1}, 1}, {y, {1, 1, 1}, 1}, 1.0f, c));
+        REQUIRE_FALSE(connection<kAllFeatures>(rules, {z, {1, 1, 1}, 1}, {y, {1, 1, 1}, 1}, c));
         y.point.p += z.point.ng * (8.0f * z.offset);
         y.point.ng = y.scattering.ng = y.scattering.frame.n = -z.scattering.ng;
         y.scattering.wi_world = -z.scattering.wi_world;

@@ -376,7 +376,7 @@ private:
     void connect(uint32_t a, uint32_t b) {
         const BidirectionalVertex &y = light_[a - 1].vertex, &z = eye_[b - 1].vertex;
         BidirectionalCandidate c;
-        if (!connection<F>(rules_, {z, {1, 1, 1}, b}, {y, {1, 1, 1}, a}, 1.0f, c)) return;
+        if (!connection<F>(rules_, {z, {1, 1, 1}, b}, {y, {1, 1, 1}, a}, c)) return;
         const Vec3f to_y = y.point.p - z.point.p;
         compare(kConnect, a + 1, c, join(a, b, to_y * (-1.0f / sqrtf(length_squared(to_y)))));
     }
@@ -604,7 +604,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
             ratio =
                 mis_.next_event_ratio<F>(scene_, z[1].sums, z[1].first, light, f, fabsf(dot(z[1].point.ng, light.wi)));
         } else {
-            if (!connection<F>(rules_, {z[s], {1, 1, 1}, k - s}, {y[s - 1], {1, 1, 1}, s - 1}, 1.0f, candidate)) return;
+            if (!connection<F>(rules_, {z[s], {1, 1, 1}, k - s}, {y[s - 1], {1, 1, 1}, s - 1}, candidate)) return;
             ratio = candidate.ratio;
         }
         double weight = 1.0 / (1.0 + double(ratio));

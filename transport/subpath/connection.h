@@ -23,9 +23,9 @@ AMBILUX_HD bool may_connect(const Vertex<Mis>& y, const Vertex<Mis>& z) {
     return may_scatter(y.scattering, w) && may_scatter(z.scattering, -w) && !in_plane(z, w);
 }
 
-/// The eye end `z` and the light end `y`, worth `scale` times their product. False if that gives nothing.
+/// The eye end `z` and the light end `y`. False if that gives nothing.
 template <Features F, class Mis>
-AMBILUX_HD bool connection(const Rules<Mis>& rules, const SubpathEnd<Mis>& z, const SubpathEnd<Mis>& y, float scale,
+AMBILUX_HD bool connection(const Rules<Mis>& rules, const SubpathEnd<Mis>& z, const SubpathEnd<Mis>& y,
                            Candidate<Mis>& c) {
     c.strategy = Strategy::make(y.depth + 1, z.depth + 1);
     if (!rules.wants(y.depth + 1, z.depth + 1)) return false;
@@ -45,7 +45,6 @@ AMBILUX_HD bool connection(const Rules<Mis>& rules, const SubpathEnd<Mis>& z, co
     if (!set_segment(c, z.vertex, w, y.vertex.point.p, y.vertex.offset, y.vertex.point.ng)) return false;
     c.ratio = rules.counted(
         rules.mis.connection_ratio(y.vertex.sums, y.vertex.first, z.vertex.sums, z.vertex.first, densities));
-    c.value *= scale;
     c.environment = false;
     return !is_zero(c.value);
 }

@@ -7,13 +7,14 @@
 
 namespace ambilux {
 
-/// The ray of `path` ended at `hit`; a miss if hit.prim is kNone. Emission goes to sink.add(candidate);
-/// sink.at(vertex, path) is called where connections may start; sink.valid(throughput) may end the subpath. True if it
-/// goes on, with `path` as the next ray. `longest`: segments that the subpath may have (Rules::longest, or fewer).
-/// No visibility and no loop over connections: schedules hold one ray per slot.
+/// The ray of `path` ended at `hit`; a miss if hit.prim is kNone. Emission goes to sink.add(candidate); sink.draws()
+/// gives the random numbers of the subpath, late, so that no register keeps them before; sink.at(vertex, path, draws)
+/// is called where connections may start; sink.valid(throughput) may end the subpath. True if it goes on, with `path`
+/// as the next ray. `longest`: segments that the subpath may have (Rules::longest, or fewer). No visibility and no loop
+/// over connections: schedules hold one ray per slot.
 template <Features F, class Mis, class Sink>
-AMBILUX_HD bool visit(const SceneView& scene, const Rules<Mis>& rules, const Draws& draws, Side side, uint32_t longest,
-                      const Hit& hit, Subpath<Mis>& path, const Sink& sink) {
+AMBILUX_HD bool visit(const SceneView& scene, const Rules<Mis>& rules, Side side, uint32_t longest, const Hit& hit,
+                      Subpath<Mis>& path, const Sink& sink) {
     if (hit.prim == kNone) {
         Candidate<Mis> c;
         if (side == Side::eye && escape<F>(scene, rules, path, c)) sink.add(c);
@@ -27,7 +28,8 @@ AMBILUX_HD bool visit(const SceneView& scene, const Rules<Mis>& rules, const Dra
     }
     if (path.depth >= rules.max_depth) return false;
     const Vertex<Mis> vertex = vertex_at<F>(scene, rules.mis, side, path, point);
-    if (bsdf_is_smooth(vertex.scattering.bsdf)) sink.at(vertex, path);
+    const Draws draws = sink.draws();
+    if (bsdf_is_smooth(vertex.scattering.bsdf)) sink.at(vertex, path, draws);
     if (path.depth >= longest) return false;
     return scatter<F>(rules, side, vertex, draws.scatter(side, path.depth), path) && sink.valid(path.throughput);
 }

@@ -14,9 +14,11 @@ namespace {
 struct CountVertices {
     uint32_t& count;
     uint32_t max_depth;
+    const Draws& subpath_draws;
 
+    Draws draws() const { return subpath_draws; }
     void add(const Candidate<BidirectionalMis>&) const {}
-    void at(const Vertex<BidirectionalMis>&, const Subpath<BidirectionalMis>& path) const {
+    void at(const Vertex<BidirectionalMis>&, const Subpath<BidirectionalMis>& path, const Draws&) const {
         count += path.depth + 2 <= max_depth;
     }
     bool valid(Rgb) const { return true; }
@@ -40,8 +42,8 @@ double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, con
             do {
                 const Ray ray = {path.origin, kInfinity, path.direction, draws.opacity_seed(path.depth)};
                 tracer.closest<F>(scene, ray, hit);
-            } while (visit<F>(scene, rules, draws, Side::light, rules.longest(Side::light), hit, path,
-                              CountVertices{count, rules.max_depth}));
+            } while (visit<F>(scene, rules, Side::light, rules.longest(Side::light), hit, path,
+                              CountVertices{count, rules.max_depth, draws}));
             vertices.fetch_add(count, std::memory_order_relaxed);
         },
         64u);
