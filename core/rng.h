@@ -22,10 +22,11 @@ struct Uint4 {
 
 AMBILUX_HD uint32_t mul_hi(uint32_t a, uint32_t b) { return uint32_t((uint64_t(a) * b) >> 32); }
 
-/// Philox 4x32 with 7 rounds, the fewest that pass BigCrush (Salmon et al. 2011, "Parallel Random Numbers: As Easy
-/// as 1, 2, 3", table 2).
+/// Philox 4x32 (Salmon et al. 2011, "Parallel Random Numbers: As Easy as 1, 2, 3"). 7 rounds are the fewest that pass
+/// BigCrush (table 2); the tests also run the 10 of other libraries.
+template <int Rounds = 7>
 AMBILUX_HD Uint4 philox4x32(Uint4 c, uint32_t k0, uint32_t k1) {
-    for (int round = 0; round < 7; ++round) {
+    for (int round = 0; round < Rounds; ++round) {
         const uint64_t product0 = uint64_t(0xD2511F53u) * c.x, product1 = uint64_t(0xCD9E8D57u) * c.z;
         c = {uint32_t(product1 >> 32) ^ c.y ^ k0, uint32_t(product1), uint32_t(product0 >> 32) ^ c.w ^ k1,
              uint32_t(product0)};
