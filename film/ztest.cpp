@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/distributions.h"
 #include "core/error.h"
-#include "film/distributions.h"
 
 namespace ambilux {
 namespace {
@@ -93,7 +93,8 @@ double block_z(const Side& a, const Side& b, const ZTestOptions& options) {
         t = std::max(0.0, std::min(t, t - g * t * t / 3 + g * g * t * t * t / 27 - g / 6));
     }
     const double dof = variance * variance / (a.dof_terms + b.dof_terms);
-    return std::copysign(std::min(normal_tail_inverse(student_tail(t, dof)), t), difference);
+    // In this order: no degrees of freedom (one sample) leave t.
+    return std::copysign(std::min(t, normal_tail_inverse(student_tail(t, dof))), difference);
 }
 
 /// Pools the variances of two images of one estimator, pixel by pixel.

@@ -39,7 +39,7 @@ TEST_CASE("draws from a cache: every light vertex with the same probability; coh
     const uint32_t sizes[] = {1, 2, 7, 31, 32, 33, 1000, 20011}, draws[] = {0, 5};
     const std::pair<uint32_t, uint32_t> lanes[] = {
         {0, 1}, {1, 1}, {31, 1}, {30, 2}, {0, 32}};  // and which of them draw
-    const double level = test::sidak_level(1e-4, std::size(sizes) * std::size(lanes) * std::size(draws));
+    const double level = sidak_level(1e-4, std::size(sizes) * std::size(lanes) * std::size(draws));
     for (const uint32_t size : sizes)
         for (const auto& [lane, apart] : lanes)
             for (const uint32_t number : draws)

@@ -5,30 +5,10 @@
 #include <cmath>
 #include <vector>
 
+#include "core/distributions.h"
 #include "core/math.h"
 
 namespace ambilux::test {
-
-/// Upper tail Q(a,x) of the regularised incomplete gamma function (Abramowitz and Stegun 6.5.29 and 6.5.31).
-inline double gamma_q(double a, double x) {
-    if (x <= 0) return 1;
-    const double scale = std::exp(a * std::log(x) - x - std::lgamma(a));
-    if (x < a + 1) {
-        double term = 1 / a, sum = term;
-        for (int n = 1; n < 100000 && term > sum * 1e-16; ++n) sum += term *= x / (a + n);
-        return 1 - scale * sum;
-    }
-    double b = x + 1 - a, c = 1e300, d = 1 / b, h = d;
-    for (int n = 1; n < 100000; ++n) {
-        const double an = -n * (n - a);
-        b += 2;
-        d = 1 / (an * d + b);
-        c = b + an / c;
-        h *= d * c;
-        if (std::fabs(d * c - 1) < 1e-15) break;
-    }
-    return scale * h;
-}
 
 struct ChiSquare {
     double statistic, p_value;
@@ -53,11 +33,8 @@ inline ChiSquare chi_square(const std::vector<double>& observed, const std::vect
     }
     // A sample where hardly any was expected must count against the density.
     if (pooled_expected >= 1 || pooled_observed > 0) add(pooled_observed, std::max(pooled_expected, 0.1));
-    return {statistic, cells > 1 ? gamma_q(0.5 * (cells - 1), 0.5 * statistic) : 1.0, cells - 1};
+    return {statistic, cells > 1 ? chi_square_tail(statistic, cells - 1) : 1.0, cells - 1};
 }
-
-/// Level of one test among `count` that together reject a right program with chance `level` (Sidak 1967).
-inline double sidak_level(double level, double count) { return -std::expm1(std::log1p(-level) / count); }
 
 /// Cells over the sphere in coordinates (t, phi) around an axis: the angle theta to the axis is w·sqrt((1+(pi/w)²)^t -
 /// 1), so that cells resolve a lobe of angular width w and yet cover the sphere with few cells. An axis near the
@@ -164,6 +141,6 @@ private:
 };
 
 /// Two-sided chance that a normal variable lies |z| or more from its mean.
-inline double normal_two_sided(double z) { return std::erfc(std::fabs(z) * 0.70710678118654752); }
+inline double normal_two_sided(double z) { return 2 * normal_tail(std::fabs(z)); }
 
 }  // namespace ambilux::test

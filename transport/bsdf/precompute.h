@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <boost/math/special_functions/legendre.hpp>
 #include <cmath>
 #include <vector>
 
@@ -17,25 +18,19 @@ constexpr double kPiD = 3.14159265358979323846;
 struct Quadrature {
     std::vector<double> node, weight;
 
-    explicit Quadrature(int n) : node(n), weight(n) {
-        for (int i = 0; i < n; ++i) {
-            double x = std::cos(kPiD * (i + 0.75) / (n + 0.5)), derivative = 1;
-            for (int iteration = 0; iteration < 50; ++iteration) {
-                double p0 = 1, p1 = x;
-                for (int k = 2; k <= n; ++k) {
-                    const double p2 = ((2 * k - 1) * x * p1 - (k - 1) * p0) / k;
-                    p0 = p1;
-                    p1 = p2;
-                }
-                if (n == 1) p0 = 1;
-                derivative = n * (x * p1 - p0) / (x * x - 1);
-                const double step = p1 / derivative;
-                x -= step;
-                if (std::fabs(step) < 1e-15) break;
-            }
-            node[i] = 0.5 * (1 - x);
-            weight[i] = 1 / ((1 - x * x) * derivative * derivative);
+    explicit Quadrature(int n) {
+        for (const double zero : boost::math::legendre_p_zeros<double>(n)) {  // those that are not negative
+            const double slope = boost::math::legendre_p_prime(n, zero);
+            const double w = 1 / ((1 - zero * zero) * slope * slope);
+            add(0.5 * (1 + zero), w);
+            if (zero > 0) add(0.5 * (1 - zero), w);
         }
+    }
+
+private:
+    void add(double x, double w) {
+        node.push_back(x);
+        weight.push_back(w);
     }
 };
 

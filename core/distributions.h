@@ -1,4 +1,5 @@
-// Tail probabilities for statistical tests. Double precision, accurate far into the tails.
+// Tail probabilities for statistical tests, by Boost.Math. Double precision, accurate far into the tails. A NaN gives
+// a NaN.
 #pragma once
 
 namespace ambilux {
