@@ -9,6 +9,7 @@ find_package(nlohmann_json REQUIRED)
 find_package(tomlplusplus REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(ZLIB REQUIRED)
+find_package(OpenSSL 3 REQUIRED COMPONENTS Crypto)
 find_package(Boost 1.74 CONFIG REQUIRED)  # headers alone, for Boost.Math
 find_path(STB_INCLUDE_DIR stb/stb_image.h REQUIRED)
 

@@ -48,11 +48,7 @@ ReferencePlace find_reference(const std::string& folder, const ExperimentConfig&
         place.settings_text += (place.settings_text.empty() ? "" : " ") + key + "=" + value;
     if (place.settings_text == "integrator=path") place.settings_text.clear();
     if (!place.settings_text.empty()) {
-        Sha256 hash;
-        hash.update(place.settings_text);
-        making = "-" + place.settings.integrator + "-";
-        const auto digest = hash.digest();
-        for (size_t i = 0; i < 4; ++i) making += fmt::format("{:02x}", digest[i]);
+        making = "-" + place.settings.integrator + "-" + to_hex(sha256(place.settings_text)).substr(0, 8);
     }
     const std::string depth = max_depth < 0 ? "inf" : std::to_string(max_depth);
     const std::string seed = config.reference_seed ? fmt::format("-s{}", config.reference_seed) : "";

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/sha256.h"
 #include "core/version.h"
 #include "integrators/registry.h"
 
@@ -47,11 +48,7 @@ std::string choice_line(const SelectionStats& choice) {
     return line.empty() ? line : line.substr(1);
 }
 
-std::string scene_hash(const Scene& scene) {
-    std::string hex;
-    for (const uint8_t byte : scene.content_hash) hex += fmt::format("{:02x}", byte);
-    return hex;
-}
+std::string scene_hash(const Scene& scene) { return to_hex(scene.content_hash); }
 
 RenderSettings used_settings(const RenderSettings& asked, const RenderStats& stats) {
     RenderSettings used = asked;
