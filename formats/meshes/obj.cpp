@@ -1,4 +1,5 @@
 #include <cstring>
+#include <unordered_map>
 
 #include "core/error.h"
 #include "formats/meshes/mesh.h"
@@ -16,34 +17,10 @@ struct Corner {
     bool operator==(const Corner&) const = default;
 };
 
-/// Open-addressing map from a corner to its vertex; grows by doubling.
-struct CornerMap {
-    std::vector<Corner> keys;
-    std::vector<uint32_t> slots;  ///< index into keys or kAbsent
-
-    CornerMap() : slots(64, kAbsent) {}
-
-    static uint64_t hash(const Corner& c) {
-        uint64_t h = c.v * 0x9E3779B97F4A7C15ull ^ c.vt * 0xC2B2AE3D27D4EB4Full ^ c.vn * 0x165667B19E3779F9ull;
+struct CornerHash {
+    size_t operator()(const Corner& c) const {
+        const uint64_t h = c.v * 0x9E3779B97F4A7C15ull ^ c.vt * 0xC2B2AE3D27D4EB4Full ^ c.vn * 0x165667B19E3779F9ull;
         return h ^ h >> 29;
-    }
-    size_t slot_of(const Corner& c) const {
-        size_t slot = hash(c) & (slots.size() - 1);
-        while (slots[slot] != kAbsent && !(keys[slots[slot]] == c)) slot = (slot + 1) & (slots.size() - 1);
-        return slot;
-    }
-    /// Index of the corner among all distinct ones.
-    uint32_t insert(const Corner& c) {
-        size_t slot = slot_of(c);
-        if (slots[slot] != kAbsent) return slots[slot];
-        keys.push_back(c);
-        slots[slot] = uint32_t(keys.size() - 1);
-        const uint32_t index = slots[slot];
-        if (keys.size() * 2 > slots.size()) {
-            slots.assign(slots.size() * 2, kAbsent);
-            for (uint32_t i = 0; i < keys.size(); ++i) slots[slot_of(keys[i])] = i;
-        }
-        return index;
     }
 };
 
@@ -96,7 +73,8 @@ struct ObjReader {
 
 Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v) {
     ObjReader in{path, TextCursor(bytes), {}, {}, {}};
-    CornerMap corners;
+    std::unordered_map<Corner, uint32_t, CornerHash> vertex_of;
+    std::vector<Corner> corners;  ///< of each vertex
     Mesh mesh;
     std::vector<uint32_t> polygon;
     bool some_normals = false, some_uvs = false, lacks_normals = false;
@@ -120,14 +98,16 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v) {
                 some_normals |= c.vn != kAbsent;
                 lacks_normals |= c.vn == kAbsent;
                 some_uvs |= c.vt != kAbsent;
-                polygon.push_back(corners.insert(c));
+                const auto [vertex, is_new] = vertex_of.try_emplace(c, uint32_t(corners.size()));
+                if (is_new) corners.push_back(c);
+                polygon.push_back(vertex->second);
             }
             if (polygon.size() < 3) in.fail("a face needs at least three corners");
             for (size_t i = 2; i < polygon.size(); ++i) mesh.faces.push_back({polygon[0], polygon[i - 1], polygon[i]});
         }
     }
 
-    for (const Corner& c : corners.keys) {
+    for (const Corner& c : corners) {
         mesh.positions.push_back(in.positions[c.v]);
         if (some_uvs) mesh.uvs.push_back(c.vt == kAbsent ? Vec2f{0, 0} : in.uvs[c.vt]);
         if (some_normals) mesh.normals.push_back(c.vn == kAbsent ? Vec3f{0, 0, 0} : in.normals[c.vn]);
@@ -138,8 +118,8 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v) {
             const Vec3f n = cross(mesh.positions[face[1]] - mesh.positions[face[0]],
                                   mesh.positions[face[2]] - mesh.positions[face[0]]);
             for (uint32_t& v : face) {
-                if (corners.keys[v].vn != kAbsent) continue;
-                corners.keys.push_back(corners.keys[v]);
+                if (corners[v].vn != kAbsent) continue;
+                corners.push_back(corners[v]);
                 mesh.positions.push_back(mesh.positions[v]);
                 mesh.normals.push_back(n);
                 if (some_uvs) mesh.uvs.push_back(mesh.uvs[v]);

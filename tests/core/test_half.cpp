@@ -1,5 +1,8 @@
-// Half floats: every one of them, and the rounding of floats between.
+// libs: ambilux_core Imath::Imath
+// Half floats: every one of them, and the rounding of floats between; the same bits as Imath's.
 #include "core/half.h"
+
+#include <Imath/half.h>
 
 #include <cmath>
 
@@ -21,6 +24,7 @@ TEST_CASE("halves become floats exactly, by arithmetic and by the instruction al
         REQUIRE(float_bits(v.z) == float_bits(-expected));
         REQUIRE(v.w == 0x1p-24f);
         REQUIRE(float_to_half(expected) == h);
+        REQUIRE(float_bits(imath_half_to_float(uint16_t(h))) == float_bits(expected));
     }
 }
 
@@ -31,6 +35,8 @@ TEST_CASE("floats round to the nearest half, ties to even") {
         REQUIRE(float_to_half(middle) == h + (h & 1u));
         REQUIRE(float_to_half(next_float_up(middle)) == h + 1);
         REQUIRE(float_to_half(-next_float_up(middle)) == (h + 1 | 0x8000u));
+        for (const float f : {next_float_down(middle), middle, next_float_up(middle), a + 0.25f * (b - a)})
+            REQUIRE(float_to_half(f) == imath_float_to_half(f));
     }
     CHECK(float_to_half(0x1p-30f) == 0);
     CHECK(float_to_half(kMaxHalf) == 0x7bff);
