@@ -14,7 +14,7 @@ void use_huge_pages(const void* begin, size_t bytes) {
     const uintptr_t first = (reinterpret_cast<uintptr_t>(begin) + kPage - 1) / kPage * kPage;
     const uintptr_t end = (reinterpret_cast<uintptr_t>(begin) + bytes) / kPage * kPage;
     if (first >= end) return;
-    void* const p = reinterpret_cast<void*>(first);
+    void* const p = reinterpret_cast<void*>(first);  // NOLINT(performance-no-int-to-ptr): rounded up
     constexpr int kCollapse = 25;  // MADV_COLLAPSE, since Linux 6.1: at once, for pages that are in use
     madvise(p, end - first, MADV_HUGEPAGE);
     madvise(p, end - first, kCollapse);

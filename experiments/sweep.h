@@ -49,9 +49,11 @@ Sweep read_sweep(const TomlReader& r, const toml::node& node, const std::string&
     });
     if (sweep.empty()) throw r.error(node, where + " is empty: leave it out, or name a key and its values");
     size_t count = 1;
-    for (const auto& values : sweep)
-        if ((count *= values.size()) > kMaxCombinations)
+    for (const auto& values : sweep) {
+        count *= values.size();
+        if (count > kMaxCombinations)
             throw r.error(node, fmt::format("{} has more than {} combinations", where, kMaxCombinations));
+    }
     return sweep;
 }
 

@@ -1,8 +1,8 @@
 // What light subpaths bring to the pixels.
 #pragma once
 
+#include "core/lane.h"
 #include "film/fixed_point.h"
-#include "queues/lane_array.h"
 
 namespace ambilux {
 

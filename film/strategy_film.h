@@ -2,8 +2,8 @@
 // image and change nothing in it.
 #pragma once
 
+#include "core/lane.h"
 #include "film/fixed_point.h"
-#include "queues/wave.h"
 #include "transport/mis/strategy.h"
 
 namespace ambilux {
@@ -27,13 +27,13 @@ struct StrategyFilm {
     AMBILUX_HD void scale(uint32_t slot, Rgb factor) const {
         if (sums) remember(slot, start_of<Rgb>(raw[slot]) * factor, {raw[slot].word[3]});
     }
-    /// The slot's candidate arrived, worth `weighted` with its weight.
-    AMBILUX_HD void arrive(const Wave& wave, uint32_t slot, Rgb weighted) const {
-        if (sums) add(wave, {raw[slot].word[3]}, wave.locate(slot).pixel, start_of<Rgb>(raw[slot]), weighted);
+    /// The slot's candidate arrived at a pixel of an image of `pixels`, worth `weighted` with its weight.
+    AMBILUX_HD void arrive(uint32_t slot, uint32_t pixels, uint32_t pixel, Rgb weighted) const {
+        if (sums) add({raw[slot].word[3]}, pixels, pixel, start_of<Rgb>(raw[slot]), weighted);
     }
-    AMBILUX_HD void add(const Wave& wave, Strategy strategy, uint32_t pixel, Rgb value, Rgb weighted) const {
+    AMBILUX_HD void add(Strategy strategy, uint32_t pixels, uint32_t pixel, Rgb value, Rgb weighted) const {
         if (!sums || strategy.segments() > max_depth) return;
-        const uint64_t image = uint64_t(wave.width) * wave.height * 3;
+        const uint64_t image = uint64_t(pixels) * 3;
         const uint32_t index = strategy_index(strategy);
         int64_t* at = sums + 2 * index * image + uint64_t(pixel) * 3;
         const bool finite = is_finite(value) && is_finite(weighted);

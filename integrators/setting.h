@@ -33,7 +33,7 @@ struct Declare {
 
     /// An enumeration whose values have `names`, in their order.
     template <class Field>
-    static Declaration<S> choice(std::string key, Field field, Names names, std::string help) {
+    static Declaration<S> choice(const std::string& key, Field field, Names names, std::string help) {
         return {key, fmt::format("{}", fmt::join(names, ", ")), std::move(help),
                 [=](S& s, const std::string& value) {
                     auto& place = std::invoke(field, s);
@@ -45,7 +45,7 @@ struct Declare {
                 }};
     }
     template <class Field>
-    static Declaration<S> flag(std::string key, Field field, std::string help) {
+    static Declaration<S> flag(const std::string& key, Field field, std::string help) {
         return {key, "false, true", std::move(help),
                 [=](S& s, const std::string& value) {
                     std::invoke(field, s) = parse_choice(key, value, {"false", "true"}) == 1;
@@ -54,7 +54,7 @@ struct Declare {
     }
     /// An integer or a float in [lowest, highest].
     template <class Field, class Number>
-    static Declaration<S> number(std::string key, Field field, Number lowest, Number highest, std::string help) {
+    static Declaration<S> number(const std::string& key, Field field, Number lowest, Number highest, std::string help) {
         return {key, allowed_numbers(lowest, highest), std::move(help),
                 [=](S& s, const std::string& value) {
                     std::invoke(field, s) = parse_number<Number>(key, value, lowest, highest);

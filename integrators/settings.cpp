@@ -15,7 +15,8 @@ using Of = Declare<RenderSettings>;
 using S = RenderSettings;
 
 /// A name of integrators or variants; `field` keeps it.
-Declaration<S> name_of(std::string key, std::string S::* field, std::vector<std::string> names, std::string help) {
+Declaration<S> name_of(const std::string& key, std::string S::* field, std::vector<std::string> names,
+                       std::string help) {
     return {key, fmt::format("{}", fmt::join(names, ", ")), std::move(help),
             [=](S& s, const std::string& value) { s.*field = names[parse_choice(key, value, names)]; },
             [=](const S& s) -> SettingValue { return s.*field; }};

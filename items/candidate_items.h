@@ -1,7 +1,6 @@
 // Light on its way to a pixel, as queues keep it.
 #pragma once
 
-#include "queues/queue.h"
 #include "transport/mis/strategy.h"
 #include "transport/subpath/subpath.h"
 

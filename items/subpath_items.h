@@ -1,7 +1,6 @@
 // Rays of subpaths and where they end, as queues keep them.
 #pragma once
 
-#include "queues/queue.h"
 #include "scene/ray.h"
 #include "transport/mis/bidirectional.h"
 #include "transport/mis/unidirectional.h"

@@ -112,25 +112,10 @@ struct VertexItem {
     AMBILUX_HD VertexBits bits() const { return head; }
 };
 
-/// Vertices of light subpaths, kept over a wave.
-using LightVertices = Queue<ConnectionVertex>;
-
 /// Lanes of `item` that hold something.
 template <Features F, class Item>
 AMBILUX_HD uint32_t lanes_of(const Item& item) {
     return item.bits().template diffuse<F>() ? Item::kDiffuseLanes : Item::template lanes<F>();
-}
-template <Features F, class Item>
-AMBILUX_HD uint32_t push_vertex(const Queue<Item>& vertices, const Item& item) {
-    return vertices.push(item, lanes_of<F>(item));
-}
-template <Features F, class Item>
-AMBILUX_HD Item load_vertex(const Queue<Item>& vertices, uint32_t i) {
-    Item item = vertices.items.load(i, Item::kDiffuseLanes);
-    if constexpr (Item::template lanes<F>() > Item::kDiffuseLanes)
-        if (!item.bits().template diffuse<F>())
-            vertices.items.load_more(i, item, Item::kDiffuseLanes, Item::template lanes<F>());
-    return item;
 }
 
 namespace detail {

@@ -7,11 +7,6 @@
 
 namespace ambilux {
 
-/// The unit of storage: one coalesced access per thread.
-struct alignas(16) Lane {
-    uint32_t word[4];
-};
-
 /// Path of an empty slot.
 constexpr uint32_t kNoPath = 0xffffffffu;
 

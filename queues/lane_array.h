@@ -5,27 +5,9 @@
 #include <cstring>
 #include <type_traits>
 
-#include "queues/counter.h"
+#include "core/lane.h"
 
 namespace ambilux {
-
-/// The start of a lane as a value. The lane is loaded whole: copying a part of it is compiled to loads of single bytes.
-template <class Value>
-AMBILUX_HD Value start_of(const Lane& place) {
-    static_assert(sizeof(Value) <= sizeof(Lane));
-    const Lane lane = place;
-    Value value;
-    memcpy(&value, &lane, sizeof(value));
-    return value;
-}
-
-/// Replaces a lane by `value` and zeros.
-template <class Value>
-AMBILUX_HD void set_start(Lane& place, const Value& value) {
-    Lane lane = {};
-    memcpy(&lane, &value, sizeof(value));
-    place = lane;
-}
 
 /// Lanes of an item, the first ones, that lie two by two where the others are apart, since memory moves 32 bytes at
 /// least: items say so (kPairedLanes) that are written in order and read in another, sorted by their materials or

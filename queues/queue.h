@@ -1,6 +1,7 @@
 // Work queues: items that stages push, and a counter that lives where the kernels run.
 #pragma once
 
+#include "queues/counter.h"
 #include "queues/lane_array.h"
 
 namespace ambilux {

@@ -146,7 +146,7 @@ private:
             policy_.waves.slots_in_flight = std::max(kTilePixels, wave_.slot_count() / 4);
     }
     void take_accel(const RenderSettings& settings, SharedAccels& accels) {
-        const auto take = [&](auto accel) {
+        const auto take = [&](const auto& accel) {
             tracer_ = HostTracer(accel->tracer());
             accel_bytes_ = accel->memory_bytes();
             accel_ = accel;

@@ -27,7 +27,7 @@ struct Accumulate {
             add_rgb(reinterpret_cast<float*>(samples + c.path), c.value);
         else
             set_start(samples[c.path], start_of<Rgb>(samples[c.path]) + c.value);
-        strategies.arrive(wave, c.path, c.value);
+        if (strategies.sums) strategies.arrive(c.path, wave.width * wave.height, wave.locate(c.path).pixel, c.value);
         return 0;
     }
 };

@@ -5,10 +5,10 @@
 
 #include "items/candidate_items.h"
 #include "items/subpath_items.h"
-#include "items/vertex_items.h"
 #include "queues/reserved_queue.h"
 #include "queues/stage_record.h"
 #include "queues/wave.h"
+#include "stages/vertex_queues.h"
 #include "transport/subpath/rules.h"
 
 namespace ambilux {

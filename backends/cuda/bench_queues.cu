@@ -157,7 +157,8 @@ void time_order(const char* name, const SceneView& scene, const SceneView& devic
         pushed.sum += item_sum(items[i]);
         if constexpr (kept) keys[i] = uint16_t(Order::key(scene, items[i]));
     }
-    cuda_check(cudaMemcpy(q.queue.items.base, lanes.data(), lanes.size() * sizeof(Lane), cudaMemcpyHostToDevice), "items");
+    cuda_check(cudaMemcpy(q.queue.items.base, lanes.data(), lanes.size() * sizeof(Lane), cudaMemcpyHostToDevice),
+               "items");
     if (kept)
         cuda_check(cudaMemcpy(q.kept_keys, keys.data(), keys.size() * sizeof(uint16_t), cudaMemcpyHostToDevice),
                    "keys");

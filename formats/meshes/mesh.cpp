@@ -14,7 +14,7 @@ std::string read_file_bytes(const std::string& path) {
     std::string bytes;
     if (fseek(file.get(), 0, SEEK_END) == 0) {
         const long size = ftell(file.get());
-        rewind(file.get());
+        if (fseek(file.get(), 0, SEEK_SET) != 0) throw input_error(path, 0, "cannot read file");
         if (size > 0 && size < (1L << 40)) bytes.resize(size_t(size));
     }
     // A directory opens but cannot be read.

@@ -78,9 +78,11 @@ constexpr Metal kMetals[] = {
 };
 
 bool equal_ignoring_case(std::string_view a, const char* b) {
-    for (char c : a)
-        if (!*b || std::tolower(static_cast<unsigned char>(c)) != std::tolower(static_cast<unsigned char>(*b++)))
+    for (char c : a) {
+        if (!*b || std::tolower(static_cast<unsigned char>(c)) != std::tolower(static_cast<unsigned char>(*b)))
             return false;
+        ++b;
+    }
     return !*b;
 }
 

@@ -21,7 +21,8 @@ struct PilotMis {
     BidirectionalMis sets[kSets];
     float light_subpaths;
 
-    explicit PilotMis(BidirectionalMis mis = {}) : light_subpaths(mis.light_subpaths) {
+    PilotMis() : PilotMis(BidirectionalMis{}) {}
+    explicit PilotMis(BidirectionalMis mis) : light_subpaths(mis.light_subpaths) {
         constexpr uint32_t kStrategies[kSets] = {kHitStrategies | kNextEventStrategies,
                                                  kHitStrategies | kNextEventStrategies | kLightStrategies,
                                                  kAllStrategies};

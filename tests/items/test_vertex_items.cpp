@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "accel/cwbvh.h"
-#include "items/vertex_items.h"
 #include "queues/layout.h"
+#include "stages/vertex_queues.h"
 #include "tests/support/bidirectional_images.h"
 #include "transport/subpath/vertex.h"
 

@@ -1,0 +1,119 @@
+"""Rules for the C++ and CUDA sources: who includes whom, lengths, format."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+# A folder includes those above it, and none below or beside it (docs/architecture.md, "Who may include whom").
+ORDER = [
+    ["core"], ["models"], ["scene"], ["transport"], ["accel"], ["formats"], ["items", "queues", "film"], ["stages"],
+    ["integrators"], ["backends"], ["render"], ["experiments"], ["cli", "python"],
+]
+RANK = {folder: rank for rank, folders in enumerate(ORDER) for folder in folders}
+# (file, included file): why it is right all the same. docs/architecture.md lists them too.
+EXCEPTIONS: dict[tuple[str, str], str] = {}
+
+MAX_COLUMNS = 120
+MAX_LINES = 400
+# Longer ones that are yet to be split.
+LONG_FILES = {"experiments/runner.cpp", "formats/mitsuba/xml.cpp"}
+SUFFIXES = (".h", ".cpp", ".cu", ".cuh", ".cpp.in", ".cu.in", ".h.in")
+# Templates of cmake/ become files of these folders.
+GENERATED_IN = {"cmake/registry.cpp.in": "integrators"}
+
+
+def sources():
+    """Paths, relative to the root, of what is not a test: all folders of the order, and the templates of cmake/."""
+    for folder in [*RANK, "cmake"]:
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.name.endswith(SUFFIXES):
+                yield path.relative_to(ROOT).as_posix()
+
+
+def folder_of(path):
+    if path.startswith("cmake/"):
+        return GENERATED_IN.get(path, "render")
+    return path.split("/")[0]
+
+
+def includes(text):
+    return re.findall(r'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE)
+
+
+def wrong_arrows(path, text):
+    """What a file includes and may not."""
+    own = folder_of(path)
+    wrong = []
+    for included in includes(text):
+        other = folder_of(included)
+        if other not in RANK:
+            wrong.append(f"{path} includes {included}, which is in no folder of the order")
+        elif other != own and RANK[other] >= RANK[own] and (path, included) not in EXCEPTIONS:
+            wrong.append(f"{path} includes {included}, but {own}/ does not lie below {other}/")
+    return wrong
+
+
+def too_long(path, text):
+    lines = text.splitlines()
+    wrong = [f"{path}:{i} has {len(line)} columns" for i, line in enumerate(lines, 1) if len(line) > MAX_COLUMNS]
+    if len(lines) > MAX_LINES and path not in LONG_FILES:
+        wrong.append(f"{path} has {len(lines)} lines")
+    return wrong
+
+
+def all_wrong(check):
+    found = list(sources())
+    assert len(found) > 200
+    return [line for path in found for line in check(path, (ROOT / path).read_text(encoding="utf-8"))]
+
+
+def test_a_folder_includes_only_those_above_it():
+    wrong = all_wrong(wrong_arrows)
+    assert not wrong, "\n".join(["", *wrong])
+
+
+def test_exceptions_are_still_needed():
+    for path, included in EXCEPTIONS:
+        assert included in includes((ROOT / path).read_text(encoding="utf-8")), (path, included)
+    for path in LONG_FILES:
+        lines = len((ROOT / path).read_text(encoding="utf-8").splitlines())
+        assert lines > MAX_LINES, f"{path} has {lines} lines: take it out of LONG_FILES"
+
+
+def test_no_line_and_no_file_is_too_long():
+    wrong = all_wrong(too_long)
+    assert not wrong, "\n".join(["", *wrong])
+
+
+def test_every_folder_of_sources_has_its_place_in_the_order():
+    known = {*RANK, "tests", "examples", "cmake"}
+    ignored = (".", "build", "out", "bundle")
+    folders = [path for path in ROOT.iterdir() if path.is_dir() and not path.name.startswith(ignored)]
+    found = {folder.name for folder in folders if any(path.name.endswith(SUFFIXES) for path in folder.rglob("*"))}
+    assert found <= known
+
+
+@pytest.mark.parametrize(("path", "line", "wrong"), [
+    ("core/a.h", '#include "core/b.h"', 0),
+    ("stages/a.h", '#include "film/b.h"', 0),
+    ("core/a.h", '#include "scene/b.h"', 1),
+    ("film/a.h", '#include "queues/b.h"', 1),
+    ("film/a.h", '  # include "cli/b.h"  // why', 1),
+    ("film/a.h", "#include <queues/b.h>", 0),
+    ("cli/a.h", '#include "tests/b.h"', 1),
+    ("cmake/registry.cpp.in", '#include "render/b.h"', 1),
+    ("cmake/renderers.cpp.in", '#include "render/b.h"', 0),
+])
+def test_arrows_are_judged_by_their_folders(path, line, wrong):
+    assert len(wrong_arrows(path, f"// x\n{line}\n")) == wrong
+
+
+def test_sources_are_formatted():
+    if not (ROOT / ".git").exists():
+        pytest.skip("no git checkout")
+    done = subprocess.run([ROOT / "scripts" / "check_format.sh"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
