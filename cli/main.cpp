@@ -10,6 +10,8 @@
 #include "core/log.h"
 #include "core/version.h"
 
+// What throws before the first `try` is a mistake of ours.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
     using namespace ambilux;
     CLI::App app{"Ambilux: a testbed for bidirectional light transport"};
