@@ -9,6 +9,7 @@
 
 #include "core/progress.h"
 #include "experiments/drive.h"
+#include "experiments/experiment_folder.h"
 #include "experiments/prepare.h"
 #include "experiments/reference_store.h"
 #include "experiments/results.h"
@@ -66,126 +67,167 @@ double technique_bytes(int depth, double pixels) {
     return strategies * 2 * 12 * pixels;
 }
 
-}  // namespace
+/// How many of an experiment's renders of one run on one scene have all of their rows.
+size_t finished_renders(const ExperimentConfig& config, const LoadedEntry& scene, const RunEntry& run,
+                        const std::vector<std::string>& lines) {
+    return size_t(std::count_if(config.seeds.begin(), config.seeds.end(), [&](uint64_t seed) {
+        const std::string prefix = result_prefix(scene.entry->name, run.name, seed);
+        const auto ours = [&](const std::string& line) { return line.starts_with(prefix); };
+        return size_t(std::count_if(lines.begin(), lines.end(), ours)) == config.checkpoints().size();
+    }));
+}
 
-std::string describe_plan(const ExperimentRequest& request, const Hooks& hooks) {
-    const Prepared prepared = prepare_experiment(request.config, request.reduced, hooks);
-    const ExperimentConfig& config = prepared.config;
-    const size_t checkpoints = config.checkpoints().size(), seeds = config.seeds.size();
-    namespace fs = std::filesystem;
-
-    std::vector<std::string> lines;
-    if (!request.output.empty() && fs::exists(request.output + "/config.resolved.toml")) {
-        check_same_experiment(request.output, config);
-        lines = read_results(request.output + "/runs.csv");
+/// Gathers what each reference and each render would cost, then describes it.
+class DryRun {
+public:
+    DryRun(const ExperimentRequest& request, const Hooks& hooks)
+        : request_(request), hooks_(hooks), prepared_(prepare_experiment(request.config, request.reduced, hooks)),
+          config_(prepared_.config) {
+        if (!request.output.empty() && std::filesystem::exists(request.output + "/config.resolved.toml")) {
+            check_same_experiment(request.output, config_);
+            lines_ = read_results(request.output + "/runs.csv");
+        }
     }
-    const std::string references = !request.references.empty() ? request.references
-                                   : request.output.empty()    ? ""
-                                                               : request.output + "/references";
 
-    WorkEstimate work;
-    std::string scene_rows, run_rows;
-    const auto kind = [](const LoadedEntry& scene, const RunEntry* run) {
+    std::string describe() {
+        for (const LoadedEntry& scene : prepared_.scenes) add_reference(scene);
+        for (const LoadedEntry& scene : prepared_.scenes)
+            for (const RunEntry& run : config_.runs) add_renders(scene, run);
+        return size_text() + tables_text() + cost_text();
+    }
+
+private:
+    static std::string kind(const LoadedEntry& scene, const RunEntry* run) {
         return scene.entry->name + "/" + (run ? run->name : "");
-    };
-    double disk = 0;
-    uint64_t memory = 0;
-    std::string memory_of;
-    const auto remember = [&](uint64_t bytes, const std::string& what) {
-        if (bytes <= memory) return;
-        memory = bytes;
-        memory_of = what;
-    };
-    double reference_seconds = 0, render_seconds = 0;
-    for (const LoadedEntry& scene : prepared.scenes) {
+    }
+
+    void remember(uint64_t bytes, const std::string& what) {
+        if (bytes <= memory_) return;
+        memory_ = bytes;
+        memory_of_ = what;
+    }
+
+    std::string references() const {
+        if (!request_.references.empty() || request_.output.empty()) return request_.references;
+        return request_.output + "/references";
+    }
+
+    void add_reference(const LoadedEntry& scene) {
         const double pixels = double(scene.pixels());
         const ReferencePlace place =
-            find_reference(references, config, *scene.entry, scene.scene, scene.max_depth, hooks);
+            find_reference(references(), config_, *scene.entry, scene.scene, scene.max_depth, hooks_);
         const uint64_t wanted = scene.entry->reference.spp;
         std::string state = fmt::format("cached with {} spp", place.cached);
         if (place.cached < wanted) {
-            const Pilot pilot = measure(scene.scene, place.settings, request.interrupt, hooks);
+            const std::string work = kind(scene, nullptr);
+            const Pilot pilot = measure(scene.scene, place.settings, request_.interrupt, hooks_);
             remember(pilot.memory, "the reference of " + scene.entry->name);
-            work.measured(kind(scene, nullptr), pilot.samples * pixels, pilot.seconds);
-            work.plan(kind(scene, nullptr), 1, {double(wanted - place.cached) * pixels, 0});
-            const double seconds = work.seconds_left(kind(scene, nullptr));
-            reference_seconds += seconds;
-            disk += pixels * 24;
+            work_.measured(work, pilot.samples * pixels, pilot.seconds);
+            work_.plan(work, 1, {double(wanted - place.cached) * pixels, 0});
+            const double seconds = work_.seconds_left(work);
+            reference_seconds_ += seconds;
+            disk_ += pixels * 24;
             state = place.cached ? fmt::format("to extend from {} spp, {}", place.cached, about(seconds))
                                  : "to make, " + about(seconds);
         }
         const std::string making = place.settings_text.empty() ? "path" : place.settings_text;
-        scene_rows +=
+        scene_rows_ +=
             fmt::format("  {:<28} {:>11} {:>6}  {} spp by {}: {}\n", scene.entry->name,
                         fmt::format("{}x{}", scene.scene.sensor.crop_width, scene.scene.sensor.crop_height),
                         scene.max_depth < 0 ? "none" : std::to_string(scene.max_depth), wanted, making, state);
     }
-    std::map<std::string, std::string> times;
-    for (const LoadedEntry& scene : prepared.scenes)
-        for (const RunEntry& run : config.runs) {
-            const double pixels = double(scene.pixels());
-            size_t done = 0;
-            for (const uint64_t seed : config.seeds) {
-                const std::string prefix = result_prefix(scene.entry->name, run.name, seed);
-                done += size_t(std::count_if(lines.begin(), lines.end(), [&](const std::string& line) {
-                            return line.starts_with(prefix);
-                        })) == checkpoints;
-            }
-            const std::string k = kind(scene, &run);
-            if (done == seeds) {
-                times[run.name] += fmt::format("    {:<28} done\n", scene.entry->name);
-                continue;
-            }
-            // Without sample budgets the time is known; the renderer still says how much memory it takes.
-            const RenderSettings settings = settings_for(config, scene, run, config.seeds[0], hooks);
-            if (!config.spp.empty()) {
-                const Pilot pilot = measure(scene.scene, settings, request.interrupt, hooks);
-                work.measured(k, pilot.samples * pixels, pilot.seconds);
-                remember(pilot.memory, fmt::format("run {} on {}", run.name, scene.entry->name));
-            } else {
-                const RenderStats stats = hooks.make_renderer(scene.scene, settings)->stats();
-                remember(std::max(stats.memory_bytes, stats.memory_bytes_predicted),
-                         fmt::format("run {} on {}", run.name, scene.entry->name));
-            }
-            const double samples = config.spp.empty() ? 0 : double(config.spp.back()) * pixels,
-                         seconds = config.seconds.empty() ? 0 : config.seconds.back();
-            work.plan(k, double(seeds - done), {samples, seconds});
-            const double left = work.seconds_left(k);
-            render_seconds += left;
-            disk +=
-                double(seeds - done) * (pixels * 15 + (run.techniques ? technique_bytes(run.techniques, pixels) : 0));
-            times[run.name] +=
-                fmt::format("    {:<28} {} per seed\n", scene.entry->name, about(left / double(seeds - done)));
-        }
-    for (const RunEntry& run : config.runs)
-        run_rows += fmt::format("  {}: {}\n{}", run.name, settings_text(run), times[run.name]);
 
-    std::string budgets;
-    if (!config.spp.empty()) budgets += fmt::format("  {} at {} spp\n", config.spp.size(), fmt::join(config.spp, ", "));
-    if (!config.seconds.empty())
-        budgets += fmt::format("  {} at {} s\n", config.seconds.size(), fmt::join(config.seconds, ", "));
-    const size_t renders = prepared.scenes.size() * config.runs.size() * seeds;
-    std::string text = fmt::format(
-        "experiment {}: {}\n{} scenes x {} runs x {} seeds = {} renders; {} checkpoints each, {} rows", config.name,
-        config.file, prepared.scenes.size(), config.runs.size(), seeds, renders, checkpoints, renders * checkpoints);
-    if (!lines.empty()) text += fmt::format(", {} of them made already", lines.size());
-    text += "\n\ncheckpoints of every render\n" + budgets;
-    if (!config.ablation_default.empty())
-        text += "\nablation: every run is compared with " + config.ablation_default + "\n";
-    text +=
-        fmt::format("\n  {:<28} {:>11} {:>6}  reference\n{}\nruns\n{}", "scene", "size", "depth", scene_rows, run_rows);
-    text += fmt::format("\ndevice  {}\n", fmt::join(prepared.devices, ", "));
-    text += fmt::format("time    {}: references {}, renders {}\n", about(reference_seconds + render_seconds),
-                        format_duration(reference_seconds), format_duration(render_seconds));
-    if (memory) text += fmt::format("memory  {} for the largest render ({})\n", bytes_text(double(memory)), memory_of);
-    text += fmt::format("disk    up to {}\n", bytes_text(disk));
-    text += "These are estimates. ";
-    if (!config.spp.empty() || reference_seconds > 0)
-        text +=
-            fmt::format("What a sample costs was measured for {} s per scene and run, on this machine as it is now. ",
-                        kPilotSeconds);
-    text += "Loading, error figures and files come on top. Nothing was written.\n";
-    return text;
+    /// All seeds of a run on a scene.
+    void add_renders(const LoadedEntry& scene, const RunEntry& run) {
+        const double pixels = double(scene.pixels());
+        const size_t left = config_.seeds.size() - finished_renders(config_, scene, run, lines_);
+        if (left == 0) {
+            times_[run.name] += fmt::format("    {:<28} done\n", scene.entry->name);
+            return;
+        }
+        measure_render(scene, run);
+        const double samples = config_.spp.empty() ? 0 : double(config_.spp.back()) * pixels,
+                     seconds = config_.seconds.empty() ? 0 : config_.seconds.back();
+        const std::string work = kind(scene, &run);
+        work_.plan(work, double(left), {samples, seconds});
+        const double seconds_left = work_.seconds_left(work);
+        render_seconds_ += seconds_left;
+        disk_ += double(left) * (pixels * 15 + (run.techniques ? technique_bytes(run.techniques, pixels) : 0));
+        times_[run.name] +=
+            fmt::format("    {:<28} {} per seed\n", scene.entry->name, about(seconds_left / double(left)));
+    }
+
+    /// Without sample budgets the time is known; the renderer still says how much memory it takes.
+    void measure_render(const LoadedEntry& scene, const RunEntry& run) {
+        const RenderSettings settings = settings_for(config_, scene, run, config_.seeds[0], hooks_);
+        const std::string what = fmt::format("run {} on {}", run.name, scene.entry->name);
+        if (config_.spp.empty()) {
+            const RenderStats stats = hooks_.make_renderer(scene.scene, settings)->stats();
+            remember(std::max(stats.memory_bytes, stats.memory_bytes_predicted), what);
+            return;
+        }
+        const Pilot pilot = measure(scene.scene, settings, request_.interrupt, hooks_);
+        work_.measured(kind(scene, &run), pilot.samples * double(scene.pixels()), pilot.seconds);
+        remember(pilot.memory, what);
+    }
+
+    std::string size_text() const {
+        const size_t scenes = prepared_.scenes.size(), runs = config_.runs.size(), seeds = config_.seeds.size(),
+                     checkpoints = config_.checkpoints().size(), renders = scenes * runs * seeds;
+        std::string text =
+            fmt::format("experiment {}: {}\n{} scenes x {} runs x {} seeds = {} renders; {} checkpoints each, {} rows",
+                        config_.name, config_.file, scenes, runs, seeds, renders, checkpoints, renders * checkpoints);
+        if (!lines_.empty()) text += fmt::format(", {} of them made already", lines_.size());
+        text += "\n\ncheckpoints of every render\n";
+        if (!config_.spp.empty())
+            text += fmt::format("  {} at {} spp\n", config_.spp.size(), fmt::join(config_.spp, ", "));
+        if (!config_.seconds.empty())
+            text += fmt::format("  {} at {} s\n", config_.seconds.size(), fmt::join(config_.seconds, ", "));
+        if (!config_.ablation_default.empty())
+            text += "\nablation: every run is compared with " + config_.ablation_default + "\n";
+        return text;
+    }
+
+    std::string tables_text() {
+        std::string text =
+            fmt::format("\n  {:<28} {:>11} {:>6}  reference\n{}\nruns\n", "scene", "size", "depth", scene_rows_);
+        for (const RunEntry& run : config_.runs)
+            text += fmt::format("  {}: {}\n{}", run.name, settings_text(run), times_[run.name]);
+        return text;
+    }
+
+    std::string cost_text() const {
+        std::string text = fmt::format("\ndevice  {}\n", fmt::join(prepared_.devices, ", "));
+        text += fmt::format("time    {}: references {}, renders {}\n", about(reference_seconds_ + render_seconds_),
+                            format_duration(reference_seconds_), format_duration(render_seconds_));
+        if (memory_)
+            text += fmt::format("memory  {} for the largest render ({})\n", bytes_text(double(memory_)), memory_of_);
+        text += fmt::format("disk    up to {}\n", bytes_text(disk_));
+        text += "These are estimates. ";
+        if (!config_.spp.empty() || reference_seconds_ > 0)
+            text += fmt::format(
+                "What a sample costs was measured for {} s per scene and run, on this machine as it is now. ",
+                kPilotSeconds);
+        return text + "Loading, error figures and files come on top. Nothing was written.\n";
+    }
+
+    const ExperimentRequest& request_;
+    const Hooks& hooks_;
+    const Prepared prepared_;
+    const ExperimentConfig& config_;
+    std::vector<std::string> lines_;  ///< rows that are there already
+    WorkEstimate work_;
+    std::string scene_rows_;
+    std::map<std::string, std::string> times_;  ///< by run
+    uint64_t memory_ = 0;
+    std::string memory_of_;
+    double disk_ = 0, reference_seconds_ = 0, render_seconds_ = 0;
+};
+
+}  // namespace
+
+std::string describe_plan(const ExperimentRequest& request, const Hooks& hooks) {
+    return DryRun(request, hooks).describe();
 }
 
 }  // namespace ambilux

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "core/error.h"
-#include "experiments/config.h"
 #include "experiments/hooks.h"
 
 namespace ambilux {
@@ -29,8 +28,5 @@ struct ExperimentRequest {
 /// more than the work since the last checkpoint, or since the start of a render that gathers images of single
 /// strategies. Returns done or interrupted. Throws Error.
 ExitCode run_experiment(const ExperimentRequest& request, const Hooks& hooks);
-
-/// Throws Error(bad_input) that shows the first difference if the folder holds an experiment of another configuration.
-void check_same_experiment(const std::string& folder, const ExperimentConfig& config);
 
 }  // namespace ambilux

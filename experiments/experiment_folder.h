@@ -1,0 +1,69 @@
+// The folder that an experiment writes into: its lock, the rows and manifest of all parts, and where files lie.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "experiments/prepare.h"
+
+namespace ambilux {
+
+/// Keeps a second process out of the folder; the system releases it when this one ends, however it does.
+class FolderLock {
+public:
+    explicit FolderLock(const std::string& folder);
+    ~FolderLock();
+    FolderLock(const FolderLock&) = delete;
+    FolderLock& operator=(const FolderLock&) = delete;
+
+private:
+    int fd_;
+};
+
+class ExperimentFolder {
+public:
+    /// Makes the folder, or with `resume` continues one of the same configuration and scenes. `references`: where they
+    /// are kept; empty: inside. Throws Error.
+    ExperimentFolder(const std::string& path, const std::string& references, bool resume, const Prepared& prepared);
+
+    const std::string& path() const { return path_; }
+    const std::string& references() const { return references_; }
+    std::string file(const std::string& folder, const LoadedEntry& scene, const std::string& name) const;
+    void remove_states() const;
+
+    /// Rows of runs.csv that begin with `prefix`.
+    size_t rows(const std::string& prefix) const;
+    /// Appends a row unless the file has it.
+    void add_row(const std::string& line);
+    void remove_rows(const std::string& prefix);
+
+    void add_clocks(const std::string& when);
+    /// That an earlier part of the experiment wrote here.
+    bool is_resumed() const { return !manifest_["resumed"].empty(); }
+    /// What the manifest says of the reference of a scene.
+    void describe_reference(size_t scene, const nlohmann::json& notes) { reference_notes_[scene] = notes; }
+    void write_manifest(bool finished);
+
+private:
+    void open(bool resume) const;
+    void remove_temporary_files() const;
+    void read_manifest();
+    void write_rows() const;
+    nlohmann::json describe_scenes() const;
+    nlohmann::json describe_runs() const;
+
+    const std::string path_, references_;
+    const Prepared& prepared_;
+    const ExperimentConfig& config_;
+    std::optional<FolderLock> lock_;
+    std::vector<std::string> lines_;  ///< of runs.csv
+    nlohmann::json manifest_;
+    std::vector<nlohmann::json> reference_notes_;  ///< by scene
+};
+
+/// Throws Error(bad_input) that shows the first difference if the folder holds an experiment of another configuration.
+void check_same_experiment(const std::string& folder, const ExperimentConfig& config);
+
+}  // namespace ambilux
