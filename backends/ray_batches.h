@@ -109,6 +109,80 @@ inline Ray bounced_ray(const BouncePoint& point, RngKey key) {
             random_bits(key, 1).x};
 }
 
+/// Rays, and the path of each.
+struct PathRays {
+    std::vector<Ray> rays;
+    std::vector<uint32_t> path_of;
+
+    void resize(size_t count) {
+        rays.resize(count);
+        path_of.resize(count);
+    }
+};
+
+/// Numbers of samples: below them are those of the bounces.
+constexpr uint32_t kShadowSample = 1000, kEmitterSample[2] = {1001, 1004}, kEmissionSample = 1002,
+                   kLightBounceSample = 1003;
+
+struct BatchKeys {
+    uint64_t seed;
+    RngKey operator()(uint32_t path, uint32_t sample) const { return {seed, path, sample, Stream::bench}; }
+};
+
+/// Jittered, through size x size pixels in Morton order.
+inline PathRays camera_rays(const SceneView& scene, uint32_t size, BatchKeys key) {
+    Sensor sensor = scene.sensor;
+    sensor.film_width = sensor.film_height = size;
+    sensor.tan_half_fov.y = sensor.tan_half_fov.x;
+    PathRays camera;
+    camera.resize(size_t(size) * size);
+    for_all(camera.rays.size(), [&](size_t i) {
+        const uint32_t path = uint32_t(i);
+        const Vec4f u = random_floats(key(path, 0), 0);
+        const float x = float(even_bits(path)) + u.x, y = float(even_bits(path >> 1)) + u.y;
+        const CameraSample sample = sample_camera_ray(sensor, {x, y}, {u.z, u.w});
+        camera.rays[i] = {sample.o, sample.tmax, sample.d, random_bits(key(path, 0), 1).x};
+        camera.path_of[i] = path;
+    });
+    return camera;
+}
+
+inline void bounce_rays(const std::vector<BouncePoint>& points, uint32_t sample, BatchKeys key, PathRays& bounced) {
+    bounced.resize(points.size());
+    for_all(points.size(), [&](size_t i) {
+        bounced.rays[i] = bounced_ray(points[i], key(points[i].path, sample));
+        bounced.path_of[i] = points[i].path;
+    });
+}
+
+inline void add_rays_to_emitters(const SceneView& scene, const std::vector<BouncePoint>& points, uint32_t sample,
+                                 float offset, BatchKeys key, std::vector<Ray>& rays) {
+    for (const BouncePoint& point : points) {
+        Ray ray;
+        if (ray_to_emitter(scene, point, key(point.path, sample), offset, ray)) rays.push_back(ray);
+    }
+}
+
+inline std::vector<Ray> shadow_rays(const std::vector<BouncePoint>& points, uint32_t count, BatchKeys key) {
+    std::vector<Ray> rays(points.empty() ? 0 : count);
+    for_all(rays.size(), [&](size_t i) { rays[i] = shadow_ray(points, key(uint32_t(i), kShadowSample)); });
+    return rays;
+}
+
+/// First rays of light subpaths.
+inline PathRays emitted_rays(const SceneView& scene, uint32_t paths, float offset, BatchKeys key) {
+    PathRays emitted;
+    for (uint32_t path = 0; path < paths; ++path) {
+        const RngKey k = key(path, kEmissionSample);
+        const Vec4f direction = random_floats(k, 1);
+        EmissionSample e;
+        if (!sample_emission<kAllFeatures>(scene, random_floats(k, 0), {direction.x, direction.y}, e)) continue;
+        emitted.rays.push_back({e.prim == kNone ? e.p : e.p + e.ng * offset, kInfinity, e.d, random_bits(k, 2).x});
+        emitted.path_of.push_back(path);
+    }
+    return emitted;
+}
+
 }  // namespace detail
 
 /// Rays of size x size paths (a power of two up to 2^15) through pixels in Morton order, with the scene's camera and
@@ -116,78 +190,41 @@ inline Ray bounced_ray(const BouncePoint& point, RngKey key) {
 /// the geometric normal, origins moved along it by 1e-5 of the scene's diagonal, paths that escaped left out; "shadow":
 /// segments between random points that different paths met, both ends moved off the surface likewise and 0.9999 of the
 /// length; "to emitters" and "to emitters 3": next event estimation where primary rays end, and the rays of bounce 2,
-/// as far as light comes that way; "from emitters": first rays of light walks; "light bounce": cosine-weighted where
+/// as far as light comes that way; "from emitters": first rays of light subpaths; "light bounce": cosine-weighted where
 /// these end. A function of the scene and of `seed`.
 template <Features F, class Tracer>
 std::vector<RayBatch> make_ray_batches(const SceneView& scene, const Tracer& tracer, uint32_t size, uint64_t seed) {
-    constexpr uint32_t kBounces = 3, kShadowSample = 1000, kEmitterSample[2] = {1001, 1004}, kEmissionSample = 1002,
-                       kLightBounceSample = 1003;
+    constexpr uint32_t kBounces = 3;
     const uint32_t paths = size * size;
     const float offset = 1e-5f * detail::scene_diagonal(scene);
-    const auto key = [&](uint32_t path, uint32_t sample) { return RngKey{seed, path, sample, Stream::bench}; };
+    const detail::BatchKeys key = {seed};
 
-    Sensor sensor = scene.sensor;
-    sensor.film_width = sensor.film_height = size;
-    sensor.tan_half_fov.y = sensor.tan_half_fov.x;
-    std::vector<Ray> rays(paths);
-    std::vector<uint32_t> path_of(paths);
-    detail::for_all(paths, [&](size_t i) {
-        const uint32_t path = uint32_t(i);
-        const Vec4f u = random_floats(key(path, 0), 0);
-        const float x = float(detail::even_bits(path)) + u.x, y = float(detail::even_bits(path >> 1)) + u.y;
-        const CameraSample camera = sample_camera_ray(sensor, {x, y}, {u.z, u.w});
-        rays[i] = {camera.o, camera.tmax, camera.d, random_bits(key(path, 0), 1).x};
-        path_of[i] = path;
-    });
+    detail::PathRays eye = detail::camera_rays(scene, size, key);
     std::vector<RayBatch> batches;
-    batches.push_back({"primary", false, true, rays});
+    batches.push_back({"primary", false, true, eye.rays});
 
     std::vector<detail::BouncePoint> points;
     RayBatch to_emitters[2] = {{"to emitters", true, false, {}}, {"to emitters 3", true, false, {}}};
     for (uint32_t bounce = 1; bounce <= kBounces; ++bounce) {
-        const std::vector<detail::BouncePoint> met = detail::trace_points<F>(scene, tracer, rays, path_of, offset);
-        rays.resize(met.size());
-        path_of.resize(met.size());
-        detail::for_all(met.size(), [&](size_t i) {
-            rays[i] = detail::bounced_ray(met[i], key(met[i].path, bounce));
-            path_of[i] = met[i].path;
-        });
+        const std::vector<detail::BouncePoint> met =
+            detail::trace_points<F>(scene, tracer, eye.rays, eye.path_of, offset);
+        detail::bounce_rays(met, bounce, key, eye);
         if (bounce != 2) {
-            for (const detail::BouncePoint& point : met) {
-                Ray ray;
-                if (detail::ray_to_emitter(scene, point, key(point.path, kEmitterSample[bounce / 2]), offset, ray))
-                    to_emitters[bounce / 2].rays.push_back(ray);
-            }
-            batches.push_back({"bounce " + std::to_string(bounce), false, false, rays});
+            detail::add_rays_to_emitters(scene, met, detail::kEmitterSample[bounce / 2], offset, key,
+                                         to_emitters[bounce / 2].rays);
+            batches.push_back({"bounce " + std::to_string(bounce), false, false, eye.rays});
         }
         points.insert(points.end(), met.begin(), met.end());
     }
-
-    RayBatch shadow = {"shadow", true, false, {}};
-    if (!points.empty()) {
-        shadow.rays.resize(paths);
-        detail::for_all(
-            paths, [&](size_t i) { shadow.rays[i] = detail::shadow_ray(points, key(uint32_t(i), kShadowSample)); });
-    }
-    batches.push_back(std::move(shadow));
+    batches.push_back({"shadow", true, false, detail::shadow_rays(points, paths, key)});
     for (RayBatch& batch : to_emitters) batches.push_back(std::move(batch));
 
-    rays.clear();
-    path_of.clear();
-    for (uint32_t path = 0; path < paths; ++path) {
-        const RngKey k = key(path, kEmissionSample);
-        const Vec4f direction = random_floats(k, 1);
-        EmissionSample e;
-        if (!sample_emission<kAllFeatures>(scene, random_floats(k, 0), {direction.x, direction.y}, e)) continue;
-        rays.push_back({e.prim == kNone ? e.p : e.p + e.ng * offset, kInfinity, e.d, random_bits(k, 2).x});
-        path_of.push_back(path);
-    }
-    batches.push_back({"from emitters", false, false, rays});
-    const std::vector<detail::BouncePoint> lit = detail::trace_points<F>(scene, tracer, rays, path_of, offset);
-    rays.resize(lit.size());
-    detail::for_all(lit.size(),
-                    [&](size_t i) { rays[i] = detail::bounced_ray(lit[i], key(lit[i].path, kLightBounceSample)); });
-    batches.push_back({"light bounce", false, false, std::move(rays)});
+    detail::PathRays light = detail::emitted_rays(scene, paths, offset, key);
+    batches.push_back({"from emitters", false, false, light.rays});
+    const std::vector<detail::BouncePoint> lit =
+        detail::trace_points<F>(scene, tracer, light.rays, light.path_of, offset);
+    detail::bounce_rays(lit, detail::kLightBounceSample, key, light);
+    batches.push_back({"light bounce", false, false, std::move(light.rays)});
     return batches;
 }
 

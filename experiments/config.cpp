@@ -72,14 +72,8 @@ struct Reduction {
     uint64_t reference_spp = 0;  ///< of all scenes; 0: as it is
 };
 
-std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const ReferenceEntry& reference,
-                                   const Reduction& reduction, Names& names) {
-    r.check_keys(t, "[[scene]]",
-                 {"name", "path", "size", "max_depth", "reference_spp", "reference", "lenient", "parameters", "sweep"});
-    SceneEntry scene;
-    scene.line = Reader::line_of(t);
-    scene.name = scene.base = r.name(t, "[[scene]]");
-    const toml::node& path = r.need(t, "path", "[[scene]]");
+/// File of a scene: relative to the configuration, or to the folder of the published scenes.
+std::string scene_file(const Reader& r, const toml::node& path, const std::string& scene) {
     namespace fs = std::filesystem;
     const fs::path folder = fs::absolute(fs::path(r.file)).parent_path();
     std::string file = r.text(path, "path");
@@ -89,68 +83,91 @@ std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const 
         if (!place || !*place)
             throw r.error(path, fmt::format("scene '{}': the environment variable AMBILUX_DATA is not set; it names "
                                             "the folder of the published scenes (README)",
-                                            scene.name));
+                                            scene));
         file = fs::absolute(place).string() + file.substr(data.size());
     }
-    scene.path = (folder / file).lexically_normal().string();
-    if (!fs::is_regular_file(scene.path))
-        throw r.error(path, fmt::format("scene '{}': there is no file {}", scene.name, scene.path));
-    const auto set = [&r, &reduction](SceneEntry& entry, const std::string& key, const toml::node& value) {
-        if (key == "max_depth") {
-            entry.max_depth = int(r.integer(value, key, -1, 1 << 20));
-            return std::to_string(*entry.max_depth);
-        }
-        const toml::array& a = r.array(value, key);
-        if (a.size() != 2) throw r.error(value, "'size' must be [width, height]");
-        const auto pixels = [&](const toml::node& node) {
-            return uint32_t(std::max(1.0, std::round(reduction.scale * double(r.integer(node, key, 1, 65536)))));
-        };
-        entry.width = pixels(a[0]);
-        entry.height = pixels(a[1]);
-        return fmt::format("{}x{}", entry.width, entry.height);
+    const std::string found = (folder / file).lexically_normal().string();
+    if (!fs::is_regular_file(found)) throw r.error(path, fmt::format("scene '{}': there is no file {}", scene, found));
+    return found;
+}
+
+constexpr const char* kSweptSceneKeys[] = {"size", "max_depth"};
+
+/// Sets one of kSweptSceneKeys; returns the value as text.
+std::string set_scene_key(const Reader& r, const Reduction& reduction, SceneEntry& entry, const std::string& key,
+                          const toml::node& value) {
+    if (key == "max_depth") {
+        entry.max_depth = int(r.integer(value, key, -1, 1 << 20));
+        return std::to_string(*entry.max_depth);
+    }
+    const toml::array& a = r.array(value, key);
+    if (a.size() != 2) throw r.error(value, "'size' must be [width, height]");
+    const auto pixels = [&](const toml::node& node) {
+        return uint32_t(std::max(1.0, std::round(reduction.scale * double(r.integer(node, key, 1, 65536)))));
     };
-    for (const char* key : {"size", "max_depth"})
-        if (const toml::node* value = t.get(key)) set(scene, key, *value);
-    const bool sized = t.contains("size") || t.at_path("sweep.size");
-    if (reduction.scale != 1 && !sized)
-        throw r.error(t, fmt::format("scene '{}': 'scale' of [reduced] needs a 'size' here", scene.name));
-    scene.reference = reference;
+    entry.width = pixels(a[0]);
+    entry.height = pixels(a[1]);
+    return fmt::format("{}x{}", entry.width, entry.height);
+}
+
+ReferenceEntry read_scene_reference(const Reader& r, const toml::table& t, ReferenceEntry reference,
+                                    const Reduction& reduction) {
     if (const toml::node* own = t.get("reference")) {
         const toml::table& table = r.table(*own, "reference");
         r.check_keys(table, "'reference' of [[scene]]", {"spp", "integrator", "variant", "set"});
-        scene.reference = read_reference(r, table, "'reference' of [[scene]]", reference);
+        reference = read_reference(r, table, "'reference' of [[scene]]", reference);
     }
     if (const toml::node* spp = t.get("reference_spp")) {
         if (t.at_path("reference.spp"))
             throw r.error(*spp, "'reference_spp' and 'reference.spp' say the same: leave one out");
-        scene.reference.spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
+        reference.spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
     }
-    if (reduction.reference_spp) scene.reference.spp = reduction.reference_spp;
+    if (reduction.reference_spp) reference.spp = reduction.reference_spp;
+    return reference;
+}
+
+/// `scene` once for each combination of the values in its 'sweep'.
+std::vector<SceneEntry> swept_scenes(const Reader& r, const toml::table& t, const SceneEntry& scene,
+                                     const Reduction& reduction) {
+    const toml::node* sweep = t.get("sweep");
+    if (!sweep) return {scene};
+    r.check_keys(r.table(*sweep, "sweep"), "'sweep' of [[scene]]", {"size", "max_depth"});
+    for (const char* key : kSweptSceneKeys)
+        if (t.get(key) && sweep->as_table()->get(key))
+            throw r.error(*sweep, fmt::format("'{}' is set and in 'sweep': leave one out", key));
+    const Sweep lists =
+        read_sweep(r, *sweep, "'sweep' of [[scene]]", [&](const std::string& key, const toml::node& value) {
+            SceneEntry ignored;
+            return set_scene_key(r, reduction, ignored, key, value);
+        });
+    std::vector<SceneEntry> scenes;
+    for (const auto& values : combinations(lists)) {
+        scenes.push_back(scene);
+        scenes.back().name = swept_name(scene.base, values);
+        for (const SweepValue& value : values) set_scene_key(r, reduction, scenes.back(), value.key, *value.node);
+    }
+    return scenes;
+}
+
+std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const ReferenceEntry& reference,
+                                   const Reduction& reduction, Names& names) {
+    r.check_keys(t, "[[scene]]",
+                 {"name", "path", "size", "max_depth", "reference_spp", "reference", "lenient", "parameters", "sweep"});
+    SceneEntry scene;
+    scene.line = Reader::line_of(t);
+    scene.name = scene.base = r.name(t, "[[scene]]");
+    scene.path = scene_file(r, r.need(t, "path", "[[scene]]"), scene.name);
+    for (const char* key : kSweptSceneKeys)
+        if (const toml::node* value = t.get(key)) set_scene_key(r, reduction, scene, key, *value);
+    const bool sized = t.contains("size") || t.at_path("sweep.size");
+    if (reduction.scale != 1 && !sized)
+        throw r.error(t, fmt::format("scene '{}': 'scale' of [reduced] needs a 'size' here", scene.name));
+    scene.reference = read_scene_reference(r, t, reference, reduction);
     if (const toml::node* lenient = t.get("lenient")) scene.lenient = r.flag(*lenient, "lenient");
     if (const toml::node* parameters = t.get("parameters"))
         for (const auto& [key, value] : r.table(*parameters, "parameters"))
             scene.parameters.emplace_back(std::string(key.str()), r.plain(value, key.str()));
-
-    std::vector<SceneEntry> scenes;
-    const toml::node* sweep = t.get("sweep");
-    if (!sweep) {
-        scenes.push_back(scene);
-    } else {
-        r.check_keys(r.table(*sweep, "sweep"), "'sweep' of [[scene]]", {"size", "max_depth"});
-        for (const char* key : {"size", "max_depth"})
-            if (t.get(key) && sweep->as_table()->get(key))
-                throw r.error(*sweep, fmt::format("'{}' is set and in 'sweep': leave one out", key));
-        const Sweep lists =
-            read_sweep(r, *sweep, "'sweep' of [[scene]]", [&](const std::string& key, const toml::node& value) {
-                SceneEntry ignored;
-                return set(ignored, key, value);
-            });
-        for (const auto& values : combinations(lists)) {
-            scenes.push_back(scene);
-            scenes.back().name = swept_name(scene.base, values);
-            for (const SweepValue& value : values) set(scenes.back(), value.key, *value.node);
-        }
-    }
+    const std::vector<SceneEntry> scenes = swept_scenes(r, t, scene, reduction);
     for (const SceneEntry& entry : scenes) r.claim(*t.get("name"), entry.name, "[[scene]]", names);
     return scenes;
 }
@@ -274,6 +291,44 @@ void read_budget(const Reader& r, const toml::table& t, ExperimentConfig& config
         }
 }
 
+toml::table parse_toml(const std::string& path) {
+    const std::string content = read_file(path);
+    try {
+        return toml::parse(content, path);
+    } catch (const toml::parse_error& e) {
+        throw input_error(path, int(e.source().begin.line), std::string(e.description()));
+    }
+}
+
+std::string read_backend(const Reader& r, const toml::node& node) {
+    const std::string backend = r.text(node, "backend");
+    try {
+        RenderSettings parsed;
+        apply_setting(parsed, "backend", backend);
+    } catch (const Error& e) {
+        throw r.error(node, e.what());
+    }
+    return backend;
+}
+
+/// The section [reduced]: what it replaces for all scenes, and in `config` its seeds and budgets.
+Reduction read_reduction(const Reader& r, const toml::table& t, ExperimentConfig& config) {
+    r.check_keys(t, "[reduced]", {"scale", "reference_spp", "seeds", "spp", "seconds"});
+    Reduction reduction;
+    if (const toml::node* scale = t.get("scale")) {
+        const auto value = scale->value<double>();
+        if (!scale->is_number() || !value || !(*value > 0) || !(*value <= 1))
+            throw r.error(*scale, "'scale' must be a number above 0, up to 1");
+        reduction.scale = *value;
+    }
+    if (const toml::node* spp = t.get("reference_spp"))
+        reduction.reference_spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
+    if (const toml::node* seeds = t.get("seeds")) read_seeds(r, *seeds, config);
+    read_budget(r, t, config);
+    config.name += "-reduced";
+    return reduction;
+}
+
 }  // namespace
 
 std::vector<Checkpoint> ExperimentConfig::checkpoints() const {
@@ -284,13 +339,7 @@ std::vector<Checkpoint> ExperimentConfig::checkpoints() const {
 }
 
 ExperimentConfig read_experiment(const std::string& path, bool reduced) {
-    const std::string content = read_file(path);
-    toml::table root;
-    try {
-        root = toml::parse(content, path);
-    } catch (const toml::parse_error& e) {
-        throw input_error(path, int(e.source().begin.line), std::string(e.description()));
-    }
+    const toml::table root = parse_toml(path);
     const Reader r{path};
     r.check_keys(root, "the configuration",
                  {"name", "backend", "seeds", "reference", "budget", "scene", "run", "ablation", "reduced"});
@@ -300,18 +349,9 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     };
     ExperimentConfig config;
     config.file = path;
-    Names scene_names, run_names;
     config.name =
         root.contains("name") ? r.name(root, "the configuration") : std::filesystem::path(path).stem().string();
-    if (const toml::node* backend = root.get("backend")) {
-        config.backend = r.text(*backend, "backend");
-        try {
-            RenderSettings parsed;
-            apply_setting(parsed, "backend", config.backend);
-        } catch (const Error& e) {
-            throw r.error(*backend, e.what());
-        }
-    }
+    if (const toml::node* backend = root.get("backend")) config.backend = read_backend(r, *backend);
     read_seeds(r, need("seeds"), config);
     const toml::table& reference = r.table(need("reference"), "reference");
     r.check_keys(reference, "[reference]", {"spp", "seed", "integrator", "variant", "set"});
@@ -323,28 +363,17 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     r.check_keys(budget, "[budget]", {"spp", "seconds"});
     if (!budget.get("spp") && !budget.get("seconds")) throw r.error(budget, "[budget] needs 'spp', 'seconds' or both");
     read_budget(r, budget, config);
-    // Read in any case, so that its mistakes show before somebody needs it.
     Reduction reduction;
-    ExperimentConfig small = config;
     if (const toml::node* node = root.get("reduced")) {
-        const toml::table& t = r.table(*node, "reduced");
-        r.check_keys(t, "[reduced]", {"scale", "reference_spp", "seeds", "spp", "seconds"});
-        if (const toml::node* scale = t.get("scale")) {
-            const auto value = scale->value<double>();
-            if (!scale->is_number() || !value || !(*value > 0) || !(*value <= 1))
-                throw r.error(*scale, "'scale' must be a number above 0, up to 1");
-            reduction.scale = *value;
-        }
-        if (const toml::node* spp = t.get("reference_spp"))
-            reduction.reference_spp = uint64_t(r.integer(*spp, "reference_spp", 2, kMaxSpp));
-        if (const toml::node* seeds = t.get("seeds")) read_seeds(r, *seeds, small);
-        read_budget(r, t, small);
+        // Read in any case, so that its mistakes show before somebody needs it.
+        ExperimentConfig small = config;
+        const Reduction smaller = read_reduction(r, r.table(*node, "reduced"), small);
         if (reduced) config = small;
-        if (reduced) config.name += "-reduced";
+        if (reduced) reduction = smaller;
     } else if (reduced) {
         throw input_error(path, 0, "--reduced: it has no section [reduced] that says what is smaller");
     }
-    if (!reduced) reduction = {};
+    Names scene_names, run_names;
     for (const toml::node& node : r.array(need("scene"), "scene"))
         for (SceneEntry& scene : read_scene(r, r.table(node, "scene"), general, reduction, scene_names))
             config.scenes.push_back(std::move(scene));

@@ -40,6 +40,105 @@ void check_same(const std::string& path, const Attributes& stored, const Referen
         if (text(stored, name) != text(wanted, name)) refuse(name, text(stored, name), text(wanted, name));
 }
 
+void check_settings(const RenderSettings& settings) {
+    const auto& all = general_settings();
+    const bool partial =
+        std::any_of(all.begin(), all.end(), [&](const Setting& s) { return s.partial && !s.is_default(settings); });
+    if (partial || !makes_references(settings.integrator))
+        throw Error(ExitCode::usage,
+                    fmt::format("a reference is made by integrator {} with all that it has (estimator mis, all "
+                                "strategies)",
+                                fmt::join(reference_integrators(), " or ")));
+}
+
+/// A reference that is begun or continued.
+class ReferenceRender {
+public:
+    ReferenceRender(const Scene& scene, const ReferenceRequest& request, const RenderSettings& settings)
+        : scene_(scene), request_(request), settings_(settings), sums_path_(request.path + ".sums") {
+        for (const char* name : kIdentity) identity_[name] = text(attributes_of({}, 0), name);
+    }
+
+    /// What the image file holds; true if that is enough.
+    bool read_image() {
+        if (!std::filesystem::exists(request_.path)) return false;
+        result_.reference = read_reference_exr(request_.path, &result_.attributes);
+        // The seed comes back as an integer or, where it does not fit, as text; so does the wanted one after this
+        // round.
+        check_same(request_.path, result_.attributes, result_.reference, attributes_of({}, 0), scene_);
+        if (result_.reference.samples >= request_.spp) {
+            result_.continued_from = result_.reference.samples;
+            return true;
+        }
+        total_ = to_moments(result_.reference);
+        if (const auto s = result_.attributes.find("seconds"); s != result_.attributes.end() && s->is_number())
+            earlier_seconds_ = s->get<double>();
+        return false;
+    }
+
+    /// Sums that were saved last are as many as those of the image or more; older ones are left over from something
+    /// else.
+    void read_sums() {
+        auto sums = read_state(sums_path_);
+        if (sums && sums->notes["identity"] == identity_ && sums->moments.samples >= total_.samples &&
+            sums->moments.width == scene_.sensor.crop_width && sums->moments.height == scene_.sensor.crop_height) {
+            total_ = std::move(sums->moments);
+            earlier_seconds_ = sums->notes["seconds"].get<double>();
+            result_.reference = to_reference(total_);
+        }
+        result_.continued_from = total_.samples;
+    }
+
+    void render(Renderer& renderer) {
+        RenderPosition position{total_.samples, 0, false};
+        while (position.samples < request_.spp && !position.interrupted) {
+            const uint64_t before = position.samples;
+            // A checkpoint's time ends drive(); it makes at least one sample.
+            const double due = position.seconds + std::max(request_.checkpoint_seconds, 1e-3);
+            position = drive(renderer, position, {request_.spp, due}, request_.interrupt, request_.on_batch);
+            if (position.samples == before) continue;
+            total_.add(renderer.film());
+            result_.stats = renderer.stats();
+            renderer.clear_film();
+            write(earlier_seconds_ + position.seconds);
+        }
+        if (std::error_code ignored; total_.samples >= request_.spp) std::filesystem::remove(sums_path_, ignored);
+        result_.interrupted = position.interrupted;
+    }
+
+    const ReferenceResult& result() const { return result_; }
+
+private:
+    Attributes attributes_of(const RenderStats& stats, double seconds) const {
+        Attributes a = image_attributes(scene_, settings_, stats);
+        a["kind"] = "reference";
+        a["seed"] = request_.settings.seed;
+        a["seconds"] = seconds;
+        if (!request_.settings_text.empty()) a["reference_settings"] = request_.settings_text;
+        return a;
+    }
+
+    void write(double seconds) {
+        result_.reference = to_reference(total_);
+        RenderStats stated = result_.stats;
+        stated.samples = total_.samples;
+        result_.attributes = attributes_of(stated, seconds);
+        if (total_.samples < 2) return;
+        if (total_.samples < request_.spp)
+            write_state(sums_path_, {total_, {{"identity", identity_}, {"seconds", seconds}}});
+        write_reference_exr(request_.path, result_.reference, result_.attributes);
+    }
+
+    const Scene& scene_;
+    const ReferenceRequest& request_;
+    const RenderSettings& settings_;
+    const std::string sums_path_;
+    nlohmann::json identity_;
+    FilmMoments total_;
+    double earlier_seconds_ = 0;
+    ReferenceResult result_;
+};
+
 }  // namespace
 
 uint64_t reference_seed(uint64_t seed) {
@@ -53,79 +152,14 @@ ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& reque
     if (request.spp < 2)
         throw Error(ExitCode::usage, "a reference needs at least 2 samples per pixel: one has no standard error");
     RenderSettings settings = request.settings;
-    const auto& all = general_settings();
-    const bool partial =
-        std::any_of(all.begin(), all.end(), [&](const Setting& s) { return s.partial && !s.is_default(settings); });
-    if (partial || !makes_references(settings.integrator))
-        throw Error(ExitCode::usage,
-                    fmt::format("a reference is made by integrator {} with all that it has (estimator mis, all "
-                                "strategies)",
-                                fmt::join(reference_integrators(), " or ")));
+    check_settings(settings);
     settings.seed = reference_seed(request.settings.seed);
-
-    const auto attributes_of = [&](const RenderStats& stats, double seconds) {
-        Attributes a = image_attributes(scene, settings, stats);
-        a["kind"] = "reference";
-        a["seed"] = request.settings.seed;
-        a["seconds"] = seconds;
-        if (!request.settings_text.empty()) a["reference_settings"] = request.settings_text;
-        return a;
-    };
-
-    ReferenceResult result;
-    FilmMoments total;
-    double earlier_seconds = 0;
-    const std::string sums_path = request.path + ".sums";
-    nlohmann::json identity;
-    for (const char* name : kIdentity) identity[name] = text(attributes_of({}, 0), name);
-    if (std::filesystem::exists(request.path)) {
-        result.reference = read_reference_exr(request.path, &result.attributes);
-        // The seed comes back as an integer or, where it does not fit, as text; so does the wanted one after this
-        // round.
-        check_same(request.path, result.attributes, result.reference, attributes_of({}, 0), scene);
-        if (result.reference.samples >= request.spp) {
-            result.continued_from = result.reference.samples;
-            return result;
-        }
-        total = to_moments(result.reference);
-        if (const auto s = result.attributes.find("seconds"); s != result.attributes.end() && s->is_number())
-            earlier_seconds = s->get<double>();
-    }
-    // Sums that were saved last are as many as those of the image or more; older ones are left over from something
-    // else.
-    if (auto sums = read_state(sums_path);
-        sums && sums->notes["identity"] == identity && sums->moments.samples >= total.samples &&
-        sums->moments.width == scene.sensor.crop_width && sums->moments.height == scene.sensor.crop_height) {
-        total = std::move(sums->moments);
-        earlier_seconds = sums->notes["seconds"].get<double>();
-        result.reference = to_reference(total);
-    }
-    result.continued_from = total.samples;
+    ReferenceRender reference(scene, request, settings);
+    if (reference.read_image()) return reference.result();
+    reference.read_sums();
     check_writable(request.path);
-
-    const std::unique_ptr<Renderer> renderer = hooks.make_renderer(scene, settings);
-    RenderPosition position{total.samples, 0, false};
-    while (position.samples < request.spp && !position.interrupted) {
-        const uint64_t before = position.samples;
-        // A checkpoint's time ends drive(); it makes at least one sample.
-        const double due = position.seconds + std::max(request.checkpoint_seconds, 1e-3);
-        position = drive(*renderer, position, {request.spp, due}, request.interrupt, request.on_batch);
-        if (position.samples == before) continue;
-        total.add(renderer->film());
-        result.stats = renderer->stats();
-        renderer->clear_film();
-        result.reference = to_reference(total);
-        RenderStats stated = result.stats;
-        stated.samples = total.samples;
-        result.attributes = attributes_of(stated, earlier_seconds + position.seconds);
-        if (total.samples < 2) continue;
-        if (total.samples < request.spp)
-            write_state(sums_path, {total, {{"identity", identity}, {"seconds", earlier_seconds + position.seconds}}});
-        write_reference_exr(request.path, result.reference, result.attributes);
-    }
-    if (std::error_code ignored; total.samples >= request.spp) std::filesystem::remove(sums_path, ignored);
-    result.interrupted = position.interrupted;
-    return result;
+    reference.render(*hooks.make_renderer(scene, settings));
+    return reference.result();
 }
 
 }  // namespace ambilux

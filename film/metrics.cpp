@@ -17,20 +17,24 @@ void check_sizes(uint32_t width, uint32_t height, const Image& reference) {
                                              std::to_string(reference.height) + ": render both at the same size");
 }
 
+/// Sums over all pixels and channels of d = value - reference, of the standard errors of the reference and of both
+/// relative to the reference.
+struct ErrorSums {
+    double squares = 0, relative = 0, absolute = 0, noise = 0, relative_noise = 0;
+    double difference = 0, difference_squares = 0;  ///< of pixels: means of three channels
+    double reference = 0;
+    uint64_t non_finite = 0;
+};
+struct PixelError {
+    double error, noise;  ///< relative squares
+};
+
 template <class Value>
-Metrics compare_values(uint32_t width, uint32_t height, const Reference& reference, Value value) {
+ErrorSums sum_errors(const Reference& reference, Value value, std::vector<PixelError>& by_pixel) {
     const Image& mean = reference.mean;
-    check_sizes(width, height, mean);
     const bool errors = reference.standard_error.rgb.size() == mean.rgb.size();
-    double squares = 0, relative = 0, absolute = 0, noise = 0, relative_noise = 0, total = 0, reference_total = 0,
-           pixel_squares = 0;
-    Metrics m;
-    const size_t pixels = size_t(width) * height;
-    struct PixelError {
-        double error, noise;
-    };
-    std::vector<PixelError> by_pixel(pixels);
-    for (size_t p = 0; p < pixels; ++p) {
+    ErrorSums sums;
+    for (size_t p = 0; p < by_pixel.size(); ++p) {
         double pixel = 0;
         PixelError& e = by_pixel[p];
         e = {0, 0};
@@ -39,47 +43,62 @@ Metrics compare_values(uint32_t width, uint32_t height, const Reference& referen
             const double x = value(i), r = mean.rgb[i], d = x - r;
             const double se =
                 errors ? double(reference.standard_error.rgb[i]) : std::numeric_limits<double>::quiet_NaN();
-            m.non_finite += !std::isfinite(x);
-            squares += d * d;
-            relative += d * d / (r * r + 0.01);
-            absolute += std::abs(d) / (std::abs(r) + 0.01);
-            noise += se * se;
-            relative_noise += se * se / (r * r + 0.01);
+            sums.non_finite += !std::isfinite(x);
+            sums.squares += d * d;
+            sums.relative += d * d / (r * r + 0.01);
+            sums.absolute += std::abs(d) / (std::abs(r) + 0.01);
+            sums.noise += se * se;
+            sums.relative_noise += se * se / (r * r + 0.01);
             e.error += d * d / (r * r + 0.01) / 3;
             e.noise += se * se / (r * r + 0.01) / 3;
-            reference_total += r;
+            sums.reference += r;
             pixel += d / 3;
         }
-        total += pixel;
-        pixel_squares += pixel * pixel;
+        sums.difference += pixel;
+        sums.difference_squares += pixel * pixel;
     }
+    return sums;
+}
+
+/// The comparison keeps NaN: max(0, NaN) would be 0.
+double non_negative(double v) { return v < 0 ? 0.0 : v; }
+
+/// Relative error without the pixels of the largest; reorders them.
+void set_trimmed(std::vector<PixelError>& by_pixel, Metrics& m) {
+    const size_t kept = by_pixel.size() - size_t(kTrimmedShare * double(by_pixel.size()));
+    std::nth_element(by_pixel.begin(), by_pixel.begin() + long(kept) - 1, by_pixel.end(),
+                     [](const PixelError& a, const PixelError& b) { return a.error < b.error; });
+    PixelError sum{0, 0};
+    for (size_t p = 0; p < kept; ++p) {
+        sum.error += by_pixel[p].error;
+        sum.noise += by_pixel[p].noise;
+    }
+    m.relmse_trimmed = sum.error / double(kept);
+    m.relmse_trimmed_corrected = non_negative((sum.error - sum.noise) / double(kept));
+}
+
+template <class Value>
+Metrics compare_values(uint32_t width, uint32_t height, const Reference& reference, Value value) {
+    check_sizes(width, height, reference.mean);
+    const size_t pixels = size_t(width) * height;
+    std::vector<PixelError> by_pixel(pixels);
+    const ErrorSums sums = sum_errors(reference, value, by_pixel);
     const double n = 3.0 * double(pixels);
-    m.rmse = std::sqrt(squares / n);
-    m.relmse = relative / n;
-    m.mape = absolute / n;
-    m.reference_noise = std::sqrt(noise / n);
-    // The comparison keeps NaN: max(0, NaN) would be 0.
-    const auto non_negative = [](double v) { return v < 0 ? 0.0 : v; };
-    m.rmse_corrected = std::sqrt(non_negative((squares - noise) / n));
-    m.relmse_corrected = non_negative((relative - relative_noise) / n);
-    const size_t kept = pixels - size_t(kTrimmedShare * double(pixels));
-    if (m.non_finite || !std::isfinite(relative)) {
-        m.relmse_trimmed = m.relmse_trimmed_corrected =
-            std::numeric_limits<double>::quiet_NaN();  // outliers of this kind are not forgiven
-    } else if (pixels) {
-        std::nth_element(by_pixel.begin(), by_pixel.begin() + long(kept) - 1, by_pixel.end(),
-                         [](const PixelError& a, const PixelError& b) { return a.error < b.error; });
-        PixelError sum{0, 0};
-        for (size_t p = 0; p < kept; ++p) {
-            sum.error += by_pixel[p].error;
-            sum.noise += by_pixel[p].noise;
-        }
-        m.relmse_trimmed = sum.error / double(kept);
-        m.relmse_trimmed_corrected = non_negative((sum.error - sum.noise) / double(kept));
-    }
-    m.bias = total / double(pixels);
-    m.relative_bias = total == 0 ? 0 : total / (reference_total / 3);
-    m.bias_z = pixel_squares == 0 ? 0 : total / std::sqrt(pixel_squares);
+    Metrics m;
+    m.non_finite = sums.non_finite;
+    m.rmse = std::sqrt(sums.squares / n);
+    m.relmse = sums.relative / n;
+    m.mape = sums.absolute / n;
+    m.reference_noise = std::sqrt(sums.noise / n);
+    m.rmse_corrected = std::sqrt(non_negative((sums.squares - sums.noise) / n));
+    m.relmse_corrected = non_negative((sums.relative - sums.relative_noise) / n);
+    if (m.non_finite || !std::isfinite(sums.relative))  // outliers of this kind are not forgiven
+        m.relmse_trimmed = m.relmse_trimmed_corrected = std::numeric_limits<double>::quiet_NaN();
+    else if (pixels)
+        set_trimmed(by_pixel, m);
+    m.bias = sums.difference / double(pixels);
+    m.relative_bias = sums.difference == 0 ? 0 : sums.difference / (sums.reference / 3);
+    m.bias_z = sums.difference_squares == 0 ? 0 : sums.difference / std::sqrt(sums.difference_squares);
     return m;
 }
 

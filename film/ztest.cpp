@@ -118,6 +118,144 @@ void check(const Estimate& e, const ZTestOptions& options, const char* name) {
         throw Error(ExitCode::bad_input, fmt::format("image {} is empty or its buffers do not fit its size", name));
 }
 
+/// Tests the blocks of two images, from the whole image to the smallest blocks.
+class BlockTests {
+public:
+    BlockTests(const Estimate& a, const Estimate& b, const ZTestOptions& options)
+        : a_(a), b_(b), options_(options), smallest_(std::max(1u, options.block)) {}
+
+    ZTestResult run() {
+        uint64_t size = smallest_;
+        while (size < std::max(a_.width, a_.height)) size *= 2;
+        Level level = test_level(size, nullptr);
+        while (level.size > smallest_) level = test_level(level.size / 2, &level);
+        conclude();
+        return r_;
+    }
+
+private:
+    struct Events {
+        double per_pixel, expected;  ///< of the image that has fewer
+    };
+    /// Blocks of one size. The largest is the whole image.
+    struct Level {
+        uint64_t size;
+        uint32_t columns, rows;
+        std::vector<Events> events;  ///< by block and channel
+
+        const Events& at(uint32_t column, uint32_t row, uint32_t channel) const {
+            return events[(size_t(row) * columns + column) * 3 + channel];
+        }
+    };
+    struct Block {
+        Rectangle area;
+        uint32_t channel;
+        Side a, b;
+        double z;
+        double pixels() const { return double(uint64_t(area.width) * area.height); }
+        double fewest_events() const { return std::min(a.events, b.events); }
+    };
+
+    Level test_level(uint64_t size, const Level* parent) {
+        Level level{size, uint32_t((a_.width + size - 1) / size), uint32_t((a_.height + size - 1) / size), {}};
+        level.events.reserve(size_t(level.columns) * level.rows * 3);
+        double count[3] = {0, 0, 0};
+        for (uint32_t row = 0; row < level.rows; ++row)
+            for (uint32_t column = 0; column < level.columns; ++column)
+                for (uint32_t c = 0; c < 3; ++c) {
+                    const Block block = measure_block(level, column, row, c);
+                    // The larger block says how many events to expect here. What it expected itself is a bound, so that
+                    // a block that happens to have met none does not overrule those around it.
+                    double expected = kInf;
+                    if (parent) {
+                        const Events& around = parent->at(column / 2, row / 2, c);
+                        expected = std::min(around.per_pixel * block.pixels(), around.expected);
+                    }
+                    level.events.push_back({block.fewest_events() / block.pixels(), expected});
+                    if (!parent) add_whole(block);
+                    if (!is_conclusive(block, expected, !parent)) {
+                        r_.undecided = r_.undecided || !parent;
+                        r_.inconclusive += size == smallest_;
+                        continue;
+                    }
+                    ++r_.tests;
+                    if (size == smallest_) {
+                        r_.chi_square[c] += block.z * block.z;
+                        ++count[c];
+                    }
+                    note_worst(block);
+                }
+        if (size == smallest_) test_smallest(count);
+        return level;
+    }
+
+    Block measure_block(const Level& level, uint32_t column, uint32_t row, uint32_t channel) const {
+        Block block{{uint32_t(column * level.size), uint32_t(row * level.size), 0, 0}, channel, {}, {}, 0};
+        Rectangle& area = block.area;
+        area.width = uint32_t(std::min<uint64_t>(level.size, a_.width - area.x));
+        area.height = uint32_t(std::min<uint64_t>(level.size, a_.height - area.y));
+        block.a = measure(a_, area, channel);
+        block.b = measure(b_, area, channel);
+        block.z = block_z(block.a, block.b, options_);
+        return block;
+    }
+
+    void add_whole(const Block& block) {
+        r_.mean_z[block.channel] = block.z;
+        total_a_ += block.a.mean;
+        total_b_ += block.b.mean;
+        // Channels of a pixel may be fully correlated: deviations add.
+        deviation_ += std::sqrt(block.a.variance + block.b.variance);
+    }
+
+    bool is_conclusive(const Block& block, double expected, bool whole) const {
+        return block.z == 0 || std::isnan(block.a.mean + block.b.mean) ||
+               (block.fewest_events() >= (whole ? 0.25 : 1.0) * options_.min_events &&
+                expected >= 0.5 * options_.min_events);
+    }
+
+    void note_worst(const Block& block) {
+        // Of infinite ones the smallest block is named.
+        if (std::abs(block.z) > std::abs(r_.worst_z) || r_.worst_width == 0 ||
+            (std::isinf(block.z) && std::isinf(r_.worst_z) && r_.worst_width > block.area.width)) {
+            r_.worst_z = block.z;
+            r_.worst_x = block.area.x;
+            r_.worst_y = block.area.y;
+            r_.worst_width = block.area.width;
+            r_.worst_height = block.area.height;
+            r_.worst_channel = block.channel;
+            r_.worst_a = block.a.mean / block.pixels();
+            r_.worst_b = block.b.mean / block.pixels();
+        }
+    }
+
+    /// `count`: conclusive blocks of each channel.
+    void test_smallest(const double (&count)[3]) {
+        for (int c = 0; c < 3; ++c) {
+            r_.chi_square_dof = std::max(r_.chi_square_dof, count[c]);
+            if (count[c] > 0 && a_.batches.empty() && b_.batches.empty())
+                r_.p_chi_square =
+                    std::min(r_.p_chi_square, std::min(1.0, 3 * chi_square_tail(r_.chi_square[c], count[c])));
+        }
+    }
+
+    void conclude() {
+        r_.p_worst = r_.tests ? sidak(2 * normal_tail(std::abs(r_.worst_z)), double(r_.tests)) : 1;
+        r_.relative_difference = total_a_ == total_b_ ? 0 : (total_a_ - total_b_) / total_b_;
+        const double threshold =
+            normal_tail_inverse(0.5 * sidak_level(0.5 * options_.significance, std::max<double>(1, double(r_.tests))));
+        r_.detectable = threshold * deviation_ / std::abs(total_b_);
+        r_.pass = !r_.undecided && r_.p_worst >= 0.5 * options_.significance &&
+                  r_.p_chi_square >= 0.5 * options_.significance;
+    }
+
+    const Estimate &a_, &b_;
+    const ZTestOptions& options_;
+    const uint32_t smallest_;
+    ZTestResult r_;
+    double total_a_ = 0, total_b_ = 0, deviation_ = 0;
+};
+
 }  // namespace
 
 Estimate to_estimate(const FilmMoments& m) {
@@ -174,91 +312,7 @@ ZTestResult z_test(const Estimate& image_a, const Estimate& image_b, const ZTest
         throw Error(ExitCode::bad_input,
                     fmt::format("images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height));
     if (options.same_estimator && a.samples && b.samples) pool(a, b);
-
-    const uint32_t smallest = std::max(1u, options.block);
-    uint64_t size = smallest;
-    while (size < std::max(a.width, a.height)) size *= 2;
-
-    ZTestResult r;
-    double total_a = 0, total_b = 0, deviation = 0;
-    struct Events {
-        double per_pixel, expected;  // of the side that has fewer
-    };
-    std::vector<Events> parents;  // by block of the next larger size and channel
-    uint32_t parent_columns = 0;
-    // From the whole image to the smallest blocks.
-    for (bool whole = true; size >= smallest; size /= 2, whole = false) {
-        const auto columns = uint32_t((a.width + size - 1) / size), rows = uint32_t((a.height + size - 1) / size);
-        std::vector<Events> events(size_t(columns) * rows * 3);
-        double count[3] = {0, 0, 0};
-        for (uint32_t row = 0; row < rows; ++row)
-            for (uint32_t column = 0; column < columns; ++column)
-                for (uint32_t c = 0; c < 3; ++c) {
-                    Rectangle block{uint32_t(column * size), uint32_t(row * size), 0, 0};
-                    block.width = uint32_t(std::min<uint64_t>(size, a.width - block.x));
-                    block.height = uint32_t(std::min<uint64_t>(size, a.height - block.y));
-                    const uint64_t pixels = uint64_t(block.width) * block.height;
-                    const Side side_a = measure(a, block, c), side_b = measure(b, block, c);
-                    const double z = block_z(side_a, side_b, options);
-                    const double fewest = std::min(side_a.events, side_b.events);
-                    // The larger block says how many events to expect here. What it expected itself is a bound, so that
-                    // a block that happens to have met none does not overrule those around it.
-                    double expected = kInf;
-                    if (!whole) {
-                        const Events& parent = parents[(size_t(row / 2) * parent_columns + column / 2) * 3 + c];
-                        expected = std::min(parent.per_pixel * double(pixels), parent.expected);
-                    }
-                    events[(size_t(row) * columns + column) * 3 + c] = {fewest / double(pixels), expected};
-                    if (whole) {
-                        r.mean_z[c] = z;
-                        total_a += side_a.mean;
-                        total_b += side_b.mean;
-                        // Channels of a pixel may be fully correlated: deviations add.
-                        deviation += std::sqrt(side_a.variance + side_b.variance);
-                    }
-                    const bool conclusive =
-                        z == 0 || std::isnan(side_a.mean + side_b.mean) ||
-                        (fewest >= (whole ? 0.25 : 1.0) * options.min_events && expected >= 0.5 * options.min_events);
-                    if (!conclusive) {
-                        r.undecided = r.undecided || whole;
-                        r.inconclusive += size == smallest;
-                        continue;
-                    }
-                    ++r.tests;
-                    if (size == smallest) {
-                        r.chi_square[c] += z * z;
-                        ++count[c];
-                    }
-                    // Of infinite ones the smallest block is named.
-                    if (std::abs(z) > std::abs(r.worst_z) || r.worst_width == 0 ||
-                        (std::isinf(z) && std::isinf(r.worst_z) && r.worst_width > block.width)) {
-                        r.worst_z = z;
-                        r.worst_x = block.x;
-                        r.worst_y = block.y;
-                        r.worst_width = block.width;
-                        r.worst_height = block.height;
-                        r.worst_channel = c;
-                        r.worst_a = side_a.mean / double(pixels);
-                        r.worst_b = side_b.mean / double(pixels);
-                    }
-                }
-        for (int c = 0; c < 3 && size == smallest; ++c) {
-            r.chi_square_dof = std::max(r.chi_square_dof, count[c]);
-            if (count[c] > 0 && a.batches.empty() && b.batches.empty())
-                r.p_chi_square =
-                    std::min(r.p_chi_square, std::min(1.0, 3 * chi_square_tail(r.chi_square[c], count[c])));
-        }
-        parents = std::move(events);
-        parent_columns = columns;
-    }
-
-    r.p_worst = r.tests ? sidak(2 * normal_tail(std::abs(r.worst_z)), double(r.tests)) : 1;
-    r.relative_difference = total_a == total_b ? 0 : (total_a - total_b) / total_b;
-    const double threshold =
-        normal_tail_inverse(0.5 * sidak_level(0.5 * options.significance, std::max<double>(1, double(r.tests))));
-    r.detectable = threshold * deviation / std::abs(total_b);
-    r.pass = !r.undecided && r.p_worst >= 0.5 * options.significance && r.p_chi_square >= 0.5 * options.significance;
-    return r;
+    return BlockTests(a, b, options).run();
 }
 
 std::string ZTestResult::report() const {

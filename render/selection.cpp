@@ -234,6 +234,147 @@ std::vector<double> selection_variances(const Pilot& pilot) {
     return variances;
 }
 
+namespace {
+
+/// One choice: a pilot predicts, what it cannot tell apart is timed, and the best that finds memory is made.
+class Selection {
+public:
+    Selection(const Scene& scene, const RenderSettings& settings, bool cuda, const MakeRenderer& make)
+        : scene_(scene), settings_(settings), cuda_(cuda), make_(make),
+          candidates_(selection_candidates(settings, cuda)), seconds_(candidates_.size(), 0.0) {}
+
+    std::unique_ptr<Renderer> run(SharedAccels& accels, bool cwbvh) {
+        if (cuda_ && settings_.expected_seconds > 0 && settings_.expected_samples == 0)
+            head_start_.emplace(settings_of(settings_, candidates_[0]), make_);
+        std::vector<PilotCandidate> predicted;
+        for (const SelectionCandidate& c : candidates_) predicted.push_back(c.pilot);
+        const Pilot pilot =
+            run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, cuda_ ? kPilotSamplesCuda : kPilotSamplesCpu);
+        if (head_start_) head_start_->stop();
+        variance_ = selection_variances(pilot);
+        for (const SelectionCandidate& c : candidates_) work_.push_back(selection_work(pilot.work, c, cuda_));
+        cost_ = work_;
+        rank();
+        if (const std::optional<size_t> rival = doubtful_rival()) {
+            time(ranked_[0], *rival);
+            rank();
+        }
+
+        choosing_ = seconds_since(start_);
+        std::unique_ptr<Renderer> renderer = take_head_start();
+        const uint32_t ready = renderer ? head_start_->samples() : 0;
+        head_start_.reset();  // and with it the memory of a path tracer that is not wanted
+        size_t chosen = ranked_[0];
+        if (!renderer) renderer = make_best(chosen);
+        return std::make_unique<Chosen>(std::move(renderer), ready, describe(pilot, chosen));
+    }
+
+private:
+    double score(size_t c) const { return variance_[c] * cost_[c]; }
+
+    void rank() {
+        ranked_.resize(candidates_.size());
+        for (size_t i = 0; i < ranked_.size(); ++i) ranked_[i] = i;
+        std::stable_sort(ranked_.begin(), ranked_.end(), [&](size_t a, size_t b) { return score(a) < score(b); });
+    }
+
+    /// The best of another family than the best, if work cannot tell them apart. Times follow from the work to 15 %
+    /// (docs/performance.md), closer than waves tell that are short enough to be timed; but not for variants of other
+    /// schedules.
+    std::optional<size_t> doubtful_rival() const {
+        const bool doubtful = !is_paired(settings_) && !variant_of(settings_).traits.draws;
+        if (!doubtful || settings_.deterministic) return {};
+        const size_t best = ranked_[0];
+        const auto rival = std::find_if(ranked_.begin(), ranked_.end(),
+                                        [&](size_t i) { return family(candidates_[i]) != family(candidates_[best]); });
+        if (rival == ranked_.end() || !(score(*rival) < kDoubt * score(best))) return {};
+        return *rival;
+    }
+
+    /// Replaces work by time for the families of both.
+    void time(size_t best, size_t rival) {
+        for (const size_t i : {best, rival}) {
+            if (i == 0 && head_start_ && head_start_->seconds_per_sample() > 0) {
+                seconds_[i] = head_start_->seconds_per_sample();
+                continue;
+            }
+            seconds_[i] = timed_or_none(candidates_[i]);
+            if (seconds_[i] > 0 || !head_start_) continue;
+            head_start_.reset();  // a small device has no room for two
+            seconds_[i] = timed_or_none(candidates_[i]);
+        }
+        if (!(seconds_[best] > 0 && seconds_[rival] > 0)) return;
+        for (size_t c = 0; c < candidates_.size(); ++c) {
+            const size_t like = family(candidates_[c]) == family(candidates_[rival]) ? rival : best;
+            cost_[c] = seconds_[like] * work_[c] / work_[like];
+            // Families that work has put behind both need not win by the error of its estimate.
+            if (family(candidates_[c]) != family(candidates_[like])) cost_[c] *= kDoubt;
+        }
+    }
+
+    /// 0: the device has no room for it.
+    double timed_or_none(const SelectionCandidate& candidate) const {
+        try {
+            return timed(scene_, settings_of(settings_, candidate), cuda_, make_);
+        } catch (const Error& error) {
+            if (error.code != ExitCode::device) throw;
+            return 0.0;
+        }
+    }
+
+    /// The path tracer, if it is the best and has begun.
+    std::unique_ptr<Renderer> take_head_start() {
+        if (!head_start_ || ranked_[0] != 0) return nullptr;
+        std::unique_ptr<Renderer> renderer = head_start_->take();
+        // Building it is no cost of the choice either: any render does.
+        if (renderer) choosing_ = std::max(0.0, choosing_ - head_start_->build_seconds());
+        return renderer;
+    }
+
+    std::unique_ptr<Renderer> make_best(size_t& chosen) const {
+        for (size_t rank = 0;; ++rank) {
+            chosen = ranked_[rank];
+            try {
+                return make_(settings_of(settings_, candidates_[chosen]));
+            } catch (const Error& error) {
+                // What is next may need less memory.
+                if (error.code != ExitCode::device || rank + 1 == ranked_.size() ||
+                    !std::isfinite(variance_[ranked_[rank + 1]]))
+                    throw;
+            }
+        }
+    }
+
+    SelectionStats describe(const Pilot& pilot, size_t chosen) const {
+        SelectionStats choice;
+        choice.name = candidates_[chosen].name;
+        choice.settings = candidates_[chosen].settings;
+        choice.seconds = choosing_;
+        choice.pilot_samples = pilot.samples;
+        choice.expected_samples = pilot.expected_samples;
+        for (size_t c = 0; c < candidates_.size(); ++c)
+            choice.candidates.push_back({candidates_[c].name, joined(candidates_[c].settings), variance_[c], work_[c],
+                                         seconds_[c], std::isfinite(variance_[c]) ? score(chosen) / score(c) : 0.0});
+        return choice;
+    }
+
+    const Scene& scene_;
+    const RenderSettings& settings_;
+    const bool cuda_;
+    const MakeRenderer& make_;
+    const Clock::time_point start_ = Clock::now();
+    const std::vector<SelectionCandidate> candidates_;
+    std::optional<HeadStart> head_start_;
+    // By candidate.
+    std::vector<double> variance_, work_;
+    std::vector<double> cost_;     ///< of a sample, in any unit; smaller is better in product with the variance
+    std::vector<double> seconds_;  ///< of a sample, where it was timed
+    std::vector<size_t> ranked_;   ///< candidates, the best first
+    double choosing_ = 0;          ///< seconds
+};
+
+}  // namespace
+
 std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda,
                                          SharedAccels& accels, const MakeRenderer& make) {
     // Any render builds this, and wakes the device: it is no cost of the choice.
@@ -243,101 +384,7 @@ std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSetting
         accels.get<CwbvhAccel>();
     else
         accels.get<EmbreeAccel>();
-    const auto start = Clock::now();
-    const std::vector<SelectionCandidate> candidates = selection_candidates(settings, cuda);
-    std::vector<PilotCandidate> predicted;
-    for (const SelectionCandidate& c : candidates) predicted.push_back(c.pilot);
-    std::optional<HeadStart> head_start;
-    if (cuda && settings.expected_seconds > 0 && settings.expected_samples == 0)
-        head_start.emplace(settings_of(settings, candidates[0]), make);
-    const Pilot pilot =
-        run_pilot(scene, settings, cuda, cwbvh, accels, predicted, cuda ? kPilotSamplesCuda : kPilotSamplesCpu);
-    if (head_start) head_start->stop();
-    const std::vector<double> variance = selection_variances(pilot);
-    std::vector<double> cost;  // of a sample, in any unit; smaller is better in product with the variance
-    for (const SelectionCandidate& c : candidates) cost.push_back(selection_work(pilot.work, c, cuda));
-    const std::vector<double> work = cost;
-
-    // The best two families, if they cannot be told apart by work.
-    const auto order = [&] {
-        std::vector<size_t> of(candidates.size());
-        for (size_t i = 0; i < of.size(); ++i) of[i] = i;
-        std::stable_sort(of.begin(), of.end(),
-                         [&](size_t a, size_t b) { return variance[a] * cost[a] < variance[b] * cost[b]; });
-        return of;
-    };
-    std::vector<size_t> ranked = order();
-    std::vector<double> seconds(candidates.size(), 0.0);
-    const size_t best = ranked[0];
-    const auto rival = std::find_if(ranked.begin(), ranked.end(),
-                                    [&](size_t i) { return family(candidates[i]) != family(candidates[best]); });
-    // 0: the device has no room for it.
-    const auto timed_or_none = [&](const SelectionCandidate& candidate) {
-        try {
-            return timed(scene, settings_of(settings, candidate), cuda, make);
-        } catch (const Error& error) {
-            if (error.code != ExitCode::device) throw;
-            return 0.0;
-        }
-    };
-    // Times follow from the work to 15 % (docs/performance.md), closer than waves tell that are short enough to be
-    // timed; but not for variants of other schedules.
-    const bool doubtful = !is_paired(settings) && !variant_of(settings).traits.draws;
-    if (doubtful && !settings.deterministic && rival != ranked.end() &&
-        variance[*rival] * cost[*rival] < kDoubt * variance[best] * cost[best]) {
-        for (const size_t i : {best, *rival}) {
-            if (i == 0 && head_start && head_start->seconds_per_sample() > 0) {
-                seconds[i] = head_start->seconds_per_sample();
-                continue;
-            }
-            seconds[i] = timed_or_none(candidates[i]);
-            if (seconds[i] > 0 || !head_start) continue;
-            head_start.reset();  // a small device has no room for two
-            seconds[i] = timed_or_none(candidates[i]);
-        }
-        for (size_t c = 0; c < candidates.size() && seconds[best] > 0 && seconds[*rival] > 0; ++c) {
-            const size_t like = family(candidates[c]) == family(candidates[*rival]) ? *rival : best;
-            cost[c] = seconds[like] * work[c] / work[like];
-            // Families that work has put behind both need not win by the error of its estimate.
-            if (family(candidates[c]) != family(candidates[like])) cost[c] *= kDoubt;
-        }
-        ranked = order();
-    }
-
-    double choosing = seconds_since(start);
-    std::unique_ptr<Renderer> renderer;
-    uint32_t ready = 0;
-    if (head_start && ranked[0] == 0) {
-        ready = head_start->samples();
-        renderer = head_start->take();
-        // Building it is no cost of the choice either: any render does.
-        if (renderer) choosing = std::max(0.0, choosing - head_start->build_seconds());
-    }
-    head_start.reset();  // and with it the memory of a path tracer that is not wanted
-    size_t chosen = ranked[0];
-    for (size_t rank = 0; !renderer; ++rank) {
-        chosen = ranked[rank];
-        try {
-            renderer = make(settings_of(settings, candidates[chosen]));
-        } catch (const Error& error) {
-            // What is next may need less memory.
-            if (error.code != ExitCode::device || rank + 1 == ranked.size() ||
-                !std::isfinite(variance[ranked[rank + 1]]))
-                throw;
-        }
-    }
-
-    SelectionStats choice;
-    choice.name = candidates[chosen].name;
-    choice.settings = candidates[chosen].settings;
-    choice.seconds = choosing;
-    choice.pilot_samples = pilot.samples;
-    choice.expected_samples = pilot.expected_samples;
-    for (size_t c = 0; c < candidates.size(); ++c)
-        choice.candidates.push_back(
-            {candidates[c].name, joined(candidates[c].settings), variance[c], work[c], seconds[c],
-             std::isfinite(variance[c]) ? variance[chosen] * cost[chosen] / (variance[c] * cost[c]) : 0.0});
-    return std::make_unique<Chosen>(std::move(renderer), ready, std::move(choice));
+    return Selection(scene, settings, cuda, make).run(accels, cwbvh);
 }
 
 }  // namespace ambilux

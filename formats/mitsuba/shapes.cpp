@@ -46,8 +46,12 @@ struct ShapeBuilder {
 
     void add_shape(const Object& object, const Matrix& outer, bool in_instance, bool in_group);
     void add_instance(const Object& object, const Matrix& outer);
+    void read_geometry(Reader& in, Job& job);
+    void read_mesh_file(Reader& in, Job& job);
+    uint32_t add_emitter(const Object& object);
 };
 
+bool is_quadric(const std::string& type) { return type == "sphere" || type == "disk" || type == "cylinder"; }
 bool is_mesh_file(const std::string& type) { return type == "obj" || type == "ply" || type == "serialized"; }
 
 /// Transform of a sphere (center, radius) or cylinder (p0, p1, radius) in its own space.
@@ -86,8 +90,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
         return;
     }
     const std::string& type = object.type;
-    const bool quadric = type == "sphere" || type == "disk" || type == "cylinder";
-    if (!quadric && !is_mesh_file(type) && type != "rectangle" && type != "cube") {
+    if (!is_quadric(type) && !is_mesh_file(type) && type != "rectangle" && type != "cube") {
         builder.refuse(object.where, "shape type '" + type + "' is not supported", "the shape is left out");
         return;
     }
@@ -99,48 +102,58 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     if (!(std::fabs(determinant(job.to_world)) > 0))
         in.fail(in.where("to_world"), "the transform of the shape is singular");
     job.flip = in.boolean("flip_normals", false);
-    if (is_mesh_file(type)) {
-        MeshSource source;
-        const std::string name = in.text("filename", "");
-        if (name.empty()) in.fail(type + " shape has no filename");
-        source.path = builder.document.resolve(name, in.where("filename"));
-        source.type = type;
-        source.flip_v = in.boolean("flip_tex_coords", type == "obj");
-        if (type == "serialized")
-            source.shape_index = int(std::clamp<int64_t>(in.integer("shape_index", 0), -1, 1 << 30));
-        job.face_normals = in.boolean("face_normals", false);
-        if (type == "obj")
-            in.ignore({"collapse"});  // older generation: one shape per group or one for all, which looks the same
-        const std::string key =
-            source.path + "|" + std::to_string(source.flip_v) + "|" + std::to_string(source.shape_index);
-        job.source = add_source(std::move(source), key);
-    } else if (quadric) {
-        job.to_world = job.to_world * local_form(in, type);
-    } else {
-        MeshSource source;
-        source.type = type;
-        source.mesh = type == "rectangle" ? make_rectangle() : make_cube();
-        job.source = add_source(std::move(source), type);
-        job.face_normals = true;
-    }
-
+    read_geometry(in, job);
     const Object* bsdf = in.take("bsdf");
     const Object* emitter = in.take("emitter");
     if (emitter && in_instance)
         builder.refuse(emitter->where, "an emitter inside of a shapegroup is not supported", "the shape does not emit");
-    else if (emitter) {
-        Emitter e = read_emitter(builder, *emitter, true);
-        if (e.type == EmitterType::count) {
-            builder.refuse(emitter->where, "emitter type '" + emitter->type + "' on a shape is not supported",
-                           "the shape does not emit");
-            e.type = EmitterType::area;
-        }
-        job.emitter = uint32_t(builder.scene.emitters.size());
-        builder.scene.emitters.push_back(e);
-    }
+    else if (emitter)
+        job.emitter = add_emitter(*emitter);
     job.material = bsdf ? build_material(builder, *bsdf) : default_material(builder, emitter != nullptr);
     in.finish();
     jobs.push_back(std::move(job));
+}
+
+void ShapeBuilder::read_geometry(Reader& in, Job& job) {
+    if (is_mesh_file(job.type)) {
+        read_mesh_file(in, job);
+    } else if (is_quadric(job.type)) {
+        job.to_world = job.to_world * local_form(in, job.type);
+    } else {
+        MeshSource source;
+        source.type = job.type;
+        source.mesh = job.type == "rectangle" ? make_rectangle() : make_cube();
+        job.source = add_source(std::move(source), job.type);
+        job.face_normals = true;
+    }
+}
+
+void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
+    MeshSource source;
+    const std::string name = in.text("filename", "");
+    if (name.empty()) in.fail(job.type + " shape has no filename");
+    source.path = builder.document.resolve(name, in.where("filename"));
+    source.type = job.type;
+    source.flip_v = in.boolean("flip_tex_coords", job.type == "obj");
+    if (job.type == "serialized")
+        source.shape_index = int(std::clamp<int64_t>(in.integer("shape_index", 0), -1, 1 << 30));
+    job.face_normals = in.boolean("face_normals", false);
+    if (job.type == "obj")
+        in.ignore({"collapse"});  // older generation: one shape per group or one for all, which looks the same
+    const std::string key =
+        source.path + "|" + std::to_string(source.flip_v) + "|" + std::to_string(source.shape_index);
+    job.source = add_source(std::move(source), key);
+}
+
+uint32_t ShapeBuilder::add_emitter(const Object& object) {
+    Emitter e = read_emitter(builder, object, true);
+    if (e.type == EmitterType::count) {
+        builder.refuse(object.where, "emitter type '" + object.type + "' on a shape is not supported",
+                       "the shape does not emit");
+        e.type = EmitterType::area;
+    }
+    builder.scene.emitters.push_back(e);
+    return uint32_t(builder.scene.emitters.size() - 1);
 }
 
 void ShapeBuilder::add_instance(const Object& object, const Matrix& outer) {
@@ -240,16 +253,10 @@ Quadric make_quadric(Builder& builder, const Job& job) {
     return q;
 }
 
-}  // namespace
-
-void build_shapes(Builder& builder, const Object& root) {
-    ShapeBuilder shapes{builder, {}, {}, {}};
-    for (const Child& child : root.children) {
-        if (child.object->tag == "shape") shapes.add_shape(*child.object, {}, false, false);
-    }
-
-    parallel_for(shapes.sources.size(), [&](size_t i) {
-        MeshSource& s = shapes.sources[i];
+/// Reads the files of meshes, on all threads.
+void load_sources(Builder& builder, std::vector<MeshSource>& sources) {
+    parallel_for(sources.size(), [&](size_t i) {
+        MeshSource& s = sources[i];
         if (s.path.empty()) return;
         const std::string bytes = read_file_bytes(s.path);
         s.digest = sha256(bytes);
@@ -260,16 +267,13 @@ void build_shapes(Builder& builder, const Object& root) {
         else
             s.mesh = read_serialized(s.path, bytes, s.shape_index, s.flip_v);
     });
-    for (const MeshSource& s : shapes.sources)
+    for (const MeshSource& s : sources)
         if (!s.path.empty()) builder.file_digests.push_back({s.path, s.digest});
-    parallel_for(shapes.jobs.size(), [&](size_t i) {
-        Job& job = shapes.jobs[i];
-        if (job.source >= 0) transform_mesh(job, shapes.sources[size_t(job.source)].mesh);
-    });
+}
 
-    Scene& scene = builder.scene;
+void reserve_meshes(const std::vector<Job>& jobs, Scene& scene) {
     size_t vertices = 0, triangles = 0;
-    for (const Job& job : shapes.jobs) {
+    for (const Job& job : jobs) {
         vertices += job.world.positions.size();
         triangles += job.world.faces.size();
     }
@@ -277,27 +281,47 @@ void build_shapes(Builder& builder, const Object& root) {
         throw input_error(scene.path, 0, "the scene has too many vertices or triangles");
     scene.vertices.reserve(vertices);
     scene.triangles.reserve(triangles);
+}
+
+void add_mesh(Scene& scene, const Job& job, uint32_t index, Shape& shape) {
+    const Mesh& mesh = job.world;
+    if (job.emitter != kNone && mesh.faces.empty())
+        throw input_error(job.where.file, job.where.line, "the shape emits light but has no area");
+    const uint32_t first = uint32_t(scene.vertices.size());
+    shape.first_primitive = uint32_t(scene.triangles.size());
+    shape.primitive_count = uint32_t(mesh.faces.size());
+    if (!mesh.normals.empty()) shape.flags |= kShapeHasNormals;
+    if (!mesh.uvs.empty()) shape.flags |= kShapeHasUvs;
+    for (size_t v = 0; v < mesh.positions.size(); ++v) {
+        const Vec2f uv = mesh.uvs.empty() ? Vec2f{0, 0} : mesh.uvs[v];
+        scene.vertices.push_back(
+            {mesh.positions[v], uv.x, mesh.normals.empty() ? Vec3f{0, 0, 0} : mesh.normals[v], uv.y});
+    }
+    for (const auto& f : mesh.faces) scene.triangles.push_back({first + f[0], first + f[1], first + f[2], index});
+    scene.degenerate_triangles += job.dropped;
+}
+
+}  // namespace
+
+void build_shapes(Builder& builder, const Object& root) {
+    ShapeBuilder shapes{builder, {}, {}, {}};
+    for (const Child& child : root.children) {
+        if (child.object->tag == "shape") shapes.add_shape(*child.object, {}, false, false);
+    }
+    load_sources(builder, shapes.sources);
+    parallel_for(shapes.jobs.size(), [&](size_t i) {
+        Job& job = shapes.jobs[i];
+        if (job.source >= 0) transform_mesh(job, shapes.sources[size_t(job.source)].mesh);
+    });
+
+    Scene& scene = builder.scene;
+    reserve_meshes(shapes.jobs, scene);
     for (Job& job : shapes.jobs) {
         const uint32_t index = uint32_t(scene.shapes.size());
         Shape shape{job.material, job.emitter, 0, 0, 0, 0};
         if (job.emitter != kNone) scene.emitters[job.emitter].shape = index;
         if (job.source >= 0) {
-            const Mesh& mesh = job.world;
-            if (job.emitter != kNone && mesh.faces.empty())
-                throw input_error(job.where.file, job.where.line, "the shape emits light but has no area");
-            const uint32_t first = uint32_t(scene.vertices.size());
-            shape.first_primitive = uint32_t(scene.triangles.size());
-            shape.primitive_count = uint32_t(mesh.faces.size());
-            if (!mesh.normals.empty()) shape.flags |= kShapeHasNormals;
-            if (!mesh.uvs.empty()) shape.flags |= kShapeHasUvs;
-            for (size_t v = 0; v < mesh.positions.size(); ++v) {
-                const Vec2f uv = mesh.uvs.empty() ? Vec2f{0, 0} : mesh.uvs[v];
-                scene.vertices.push_back(
-                    {mesh.positions[v], uv.x, mesh.normals.empty() ? Vec3f{0, 0, 0} : mesh.normals[v], uv.y});
-            }
-            for (const auto& f : mesh.faces)
-                scene.triangles.push_back({first + f[0], first + f[1], first + f[2], index});
-            scene.degenerate_triangles += job.dropped;
+            add_mesh(scene, job, index, shape);
             job.world = {};
         } else {
             Quadric q = make_quadric(builder, job);

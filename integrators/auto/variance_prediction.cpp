@@ -1,7 +1,9 @@
 #include "integrators/auto/variance_prediction.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "core/parallel.h"
 
@@ -24,12 +26,29 @@ void blur(uint32_t width, uint32_t height, const std::vector<Mean>& of, std::vec
     }
 }
 
-/// The variance of one candidate in every block. False if it cannot find some of the light.
-bool predict(const SecondMoments& moments, const PilotPaths& paths, uint32_t c, uint32_t width, uint32_t height,
-             const std::vector<Mean>& scale, std::vector<double>& variance) {
-    const double samples = double(paths.pixels_per_block) * paths.samples_per_pixel;
-    // Outliers: the brightest contributions that after all samples of the render are in kTrimmedPixels of the pixels.
-    // There they are left out, and elsewhere their light is missing.
+/// The variance of one candidate in every block.
+class Prediction {
+public:
+    Prediction(const SecondMoments& moments, const PilotPaths& paths, uint32_t candidate,
+               const std::vector<Mean>& scale, std::vector<double>& variance)
+        : moments_(moments), paths_(paths), c_(candidate), scale_(scale), variance_(variance),
+          samples_(double(paths.pixels_per_block) * paths.samples_per_pixel) {}
+
+    /// False if it cannot find some of the light.
+    bool predict(uint32_t width, uint32_t height) {
+        add_pixels();
+        add_splats();
+        std::vector<Mean> lost(scale_.size()), smooth(scale_.size());
+        leave_out(outliers(), lost);
+        blur(width, height, lost, smooth);
+        for (uint32_t b = 0; b < scale_.size(); ++b)
+            for (int k = 0; k < 3; ++k)
+                variance_[b] += paths_.expected_samples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale_[b].of[k]) + 0.01));
+        // Without emitters of no extent, eye subpaths can meet whatever there is: zeros are rounding.
+        return !(paths_.delta_emitters && cannot_find_light_);
+    }
+
+private:
     struct Rare {
         double size;
         const PilotEvent* event;
@@ -37,74 +56,92 @@ bool predict(const SecondMoments& moments, const PilotPaths& paths, uint32_t c, 
         float sum;
         std::array<double, 3> scale2;
     };
-    std::vector<Rare> rare;
-    bool cannot_find_light = false;
-    const auto scale2_of = [&](uint32_t b, const auto& seen) {
+
+    template <class Radiance>
+    std::array<double, 3> scale2_of(uint32_t b, const Radiance& seen) const {
         std::array<double, 3> scale2;
-        for (int k = 0; k < 3; ++k) scale2[k] = sqr(std::max(scale[b].of[k], double(seen[k]))) + 0.01;
+        for (int k = 0; k < 3; ++k) scale2[k] = sqr(std::max(scale_[b].of[k], double(seen[k]))) + 0.01;
         return scale2;
-    };
-    const auto add_rare = [&](const PilotEvent& e, uint32_t b, const std::array<double, 3>& scale2, float sum) {
+    }
+
+    void add_rare(const PilotEvent& e, uint32_t b, const std::array<double, 3>& scale2, float sum) {
         if (!(sum > 0.0f && sum < kRareShare * e.total())) return;
         double size = 0;
         for (int k = 0; k < 3; ++k) size = std::max(size, double(e.value[k]) / (double(sum) * std::sqrt(scale2[k])));
-        rare.push_back({size, &e, b, sum, scale2});
-    };
-    for (size_t p = 0; p < paths.pixels.size(); ++p) {
-        const PilotSums& s = paths.pixels[p];
-        const uint32_t b = uint32_t(p / paths.pixels_per_block);
-        const std::array<double, 3> scale2 = scale2_of(b, s.seen);
-        cannot_find_light |= s.cannot_find_light[c];
-        for (int k = 0; k < 3; ++k) variance[b] += s.variance[c][k] / (3.0 * samples * scale2[k]);
-        for (const PilotEvent& e : s.rare) add_rare(e, b, scale2, moments.sum_of(c, e.shares));
-    }
-    for (const PilotSplat* s : paths.splats) {
-        const PilotEvent& e = s->event;
-        const float sum = moments.sum_of(c, e.shares);
-        if (!(sum > 0.0f)) {
-            cannot_find_light = true;
-            continue;
-        }
-        const std::array<double, 3> scale2 = scale2_of(s->block, s->seen ? s->radiance : Rgb{0.0f, 0.0f, 0.0f});
-        const double moment = moments.second_moment(c, e, sum);
-        for (int k = 0; k < 3; ++k)
-            variance[s->block] += moment * sqr(double(e.value[k])) / (3.0 * samples * scale2[k]);
-        add_rare(e, s->block, scale2, sum);
+        rare_.push_back({size, &e, b, sum, scale2});
     }
 
-    std::vector<Mean> lost(scale.size()), smooth(scale.size());
-    // Which are the largest matters, not their order: of what is in question the larger half is taken, or the other
-    // half is left.
-    double share = 0;
-    auto taken = rare.begin();
-    for (auto end = rare.end(); taken != end;) {
-        const auto middle = taken + (end - taken) / 2 + 1;
-        std::nth_element(taken, middle - 1, end, [](const Rare& a, const Rare& b) { return a.size > b.size; });
-        double more = 0;
-        for (auto r = taken; r != middle; ++r)
-            more += double(r->event->coverage) * double(r->sum) / double(r->event->total()) / double(moments.samples);
-        if (share + more <= kTrimmedPixels / paths.expected_samples) {
-            share += more;
-            taken = middle;
-        } else {
-            end = middle - 1;
+    void add_pixels() {
+        for (size_t p = 0; p < paths_.pixels.size(); ++p) {
+            const PilotSums& s = paths_.pixels[p];
+            const uint32_t b = uint32_t(p / paths_.pixels_per_block);
+            const std::array<double, 3> scale2 = scale2_of(b, s.seen);
+            cannot_find_light_ |= s.cannot_find_light[c_];
+            for (int k = 0; k < 3; ++k) variance_[b] += s.variance[c_][k] / (3.0 * samples_ * scale2[k]);
+            for (const PilotEvent& e : s.rare) add_rare(e, b, scale2, moments_.sum_of(c_, e.shares));
         }
     }
-    for (auto r = rare.begin(); r != taken; ++r) {
-        const PilotEvent& e = *r->event;
-        for (int k = 0; k < 3; ++k) {
-            variance[r->block] -=
-                moments.second_moment(c, e, r->sum) * sqr(double(e.value[k])) / (3.0 * samples * r->scale2[k]);
-            lost[r->block].of[k] += double(e.coverage) * double(e.value[k]) / double(e.total()) / samples;
+
+    void add_splats() {
+        for (const PilotSplat* s : paths_.splats) {
+            const PilotEvent& e = s->event;
+            const float sum = moments_.sum_of(c_, e.shares);
+            if (!(sum > 0.0f)) {
+                cannot_find_light_ = true;
+                continue;
+            }
+            const std::array<double, 3> scale2 = scale2_of(s->block, s->seen ? s->radiance : Rgb{0.0f, 0.0f, 0.0f});
+            const double moment = moments_.second_moment(c_, e, sum);
+            for (int k = 0; k < 3; ++k)
+                variance_[s->block] += moment * sqr(double(e.value[k])) / (3.0 * samples_ * scale2[k]);
+            add_rare(e, s->block, scale2, sum);
         }
     }
-    blur(width, height, lost, smooth);
-    for (uint32_t b = 0; b < scale.size(); ++b)
-        for (int k = 0; k < 3; ++k)
-            variance[b] += paths.expected_samples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale[b].of[k]) + 0.01));
-    // Without emitters of no extent, eye subpaths can meet whatever there is: zeros are rounding.
-    return !(paths.delta_emitters && cannot_find_light);
-}
+
+    /// The brightest contributions, which after all samples of the render are in kTrimmedPixels of the pixels. Which
+    /// are the largest matters, not their order: of what is in question the larger half is taken, or the other half is
+    /// left.
+    std::span<const Rare> outliers() {
+        double share = 0;
+        auto taken = rare_.begin();
+        for (auto end = rare_.end(); taken != end;) {
+            const auto middle = taken + (end - taken) / 2 + 1;
+            std::nth_element(taken, middle - 1, end, [](const Rare& a, const Rare& b) { return a.size > b.size; });
+            double more = 0;
+            for (auto r = taken; r != middle; ++r)
+                more +=
+                    double(r->event->coverage) * double(r->sum) / double(r->event->total()) / double(moments_.samples);
+            if (share + more <= kTrimmedPixels / paths_.expected_samples) {
+                share += more;
+                taken = middle;
+            } else {
+                end = middle - 1;
+            }
+        }
+        return {rare_.begin(), taken};
+    }
+
+    /// In their pixels outliers are left out; elsewhere their light is missing.
+    void leave_out(std::span<const Rare> outliers, std::vector<Mean>& lost) {
+        for (const Rare& r : outliers) {
+            const PilotEvent& e = *r.event;
+            for (int k = 0; k < 3; ++k) {
+                variance_[r.block] -=
+                    moments_.second_moment(c_, e, r.sum) * sqr(double(e.value[k])) / (3.0 * samples_ * r.scale2[k]);
+                lost[r.block].of[k] += double(e.coverage) * double(e.value[k]) / double(e.total()) / samples_;
+            }
+        }
+    }
+
+    const SecondMoments& moments_;
+    const PilotPaths& paths_;
+    const uint32_t c_;
+    const std::vector<Mean>& scale_;
+    std::vector<double>& variance_;
+    const double samples_;
+    std::vector<Rare> rare_;
+    bool cannot_find_light_ = false;
+};
 
 }  // namespace
 
@@ -121,7 +158,8 @@ void predict_variances(const SecondMoments& moments, const PilotPaths& paths, Pi
     result.variance.assign(moments.candidates.size(), std::vector<double>(count));
     std::array<bool, kMostCandidates> cannot_find_light{};
     parallel_for(uint32_t(moments.candidates.size()), [&](uint32_t c) {
-        cannot_find_light[c] = !predict(moments, paths, c, result.blocks_x, result.blocks_y, scale, result.variance[c]);
+        cannot_find_light[c] =
+            !Prediction(moments, paths, c, scale, result.variance[c]).predict(result.blocks_x, result.blocks_y);
     });
     result.cannot_find_light.assign(cannot_find_light.begin(),
                                     cannot_find_light.begin() + ptrdiff_t(moments.candidates.size()));
