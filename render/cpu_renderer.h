@@ -89,9 +89,7 @@ public:
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;
-        s.memory_bytes = scene_.memory_bytes() + accel_bytes_ +
-                         (film_.sum.size() + film_.sum_squares.size()) * sizeof(double) +
-                         (splats_.size() + strategies_.size()) * sizeof(int64_t) + film_samples_.size() * sizeof(Lane);
+        s.memory_bytes = s.memory_bytes_predicted = fixed_bytes();
         const Layout* largest = &waves_[0].layout;
         std::vector<StageRecord> total(largest->record_names().size() + 1);
         std::vector<const QueueCounter*> counters;
@@ -99,12 +97,12 @@ public:
             for (size_t r = 0; r + 1 < total.size(); ++r) total[r].add(w.layout.records()[r]);
             counters.push_back(w.layout.counters());
             s.memory_bytes += w.layout.bytes();
+            s.memory_bytes_predicted += w.planned_bytes;
             if (w.layout.bytes() > largest->bytes()) largest = &w.layout;
         }
         total.back() = film_record_;
         std::vector<std::string> names = largest->record_names();
         names.emplace_back(UpdateFilm::kName);
-        s.memory_bytes_predicted = s.memory_bytes;
         fill_stage_stats(names, total, s);
         fill_queue_stats(*largest, counters, s);
         s.features = feature_names(F);
@@ -125,6 +123,7 @@ private:
     /// Queues of one thread. They grow when a wave has more light vertices than any before.
     struct WaveMemory {
         Layout layout;
+        uint64_t planned_bytes = 0;  ///< of the layout, by its dry run
         WaveBytes bytes;
         WaveState* state = nullptr;
         Lane* samples = nullptr;
@@ -167,6 +166,11 @@ private:
         strategies_.resize(strategy_values(policy_.waves.strategy_depth, values / 3));
         strategies_dropped_.resize(strategy_count(policy_.waves.strategy_depth));
     }
+    /// All but the waves.
+    uint64_t fixed_bytes() const {
+        return scene_.memory_bytes() + accel_bytes_ + (film_.sum.size() + film_.sum_squares.size()) * sizeof(double) +
+               (splats_.size() + strategies_.size()) * sizeof(int64_t) + film_samples_.size() * sizeof(Lane);
+    }
     uint64_t planned_kept(double mean, uint64_t subpaths) const {
         return policy_.waves.keeps_light_vertices ? planned_light_vertices(mean, subpaths) : 0;
     }
@@ -183,7 +187,8 @@ private:
         const WaveMemory old = std::exchange(w, {});
         Layout plan;
         lay_out(plan, w, kept);
-        w.bytes = make_wave_bytes(plan.bytes());
+        w.planned_bytes = plan.bytes();
+        w.bytes = make_wave_bytes(w.planned_bytes);
         w.layout = Layout(plan, w.bytes.get());
         lay_out(w.layout, w, kept);
         const std::vector<QueueCounter> counters = w.layout.first_counters();

@@ -1,10 +1,28 @@
 #include "render/statistics.h"
 
 #include <algorithm>
+#include <iterator>
+#include <string_view>
 
 #include "film/fixed_point.h"
 
 namespace ambilux {
+namespace {
+
+/// Stages as the light goes through them (docs/architecture.md). An integrator may have others: they come before
+/// mis_weight.
+constexpr std::string_view kBeforeOthers[] = {"megakernel",     "light_generate",  "light_extend", "light_shade",
+                                              "connect_camera", "generate",        "extend",       "shade",
+                                              "connect",        "connect_vertices"};
+constexpr std::string_view kAfterOthers[] = {"mis_weight", "occlude", "accumulate", "splat", "update_film"};
+
+size_t place_in_schedule(const std::string& stage) {
+    const size_t before = size_t(std::find(std::begin(kBeforeOthers), std::end(kBeforeOthers), stage) - kBeforeOthers);
+    const size_t after = size_t(std::find(std::begin(kAfterOthers), std::end(kAfterOthers), stage) - kAfterOthers);
+    return after < std::size(kAfterOthers) ? std::size(kBeforeOthers) + 1 + after : before;
+}
+
+}  // namespace
 
 void fill_stage_stats(const std::vector<std::string>& names, const std::vector<StageRecord>& records,
                       RenderStats& stats) {
@@ -27,6 +45,10 @@ void fill_stage_stats(const std::vector<std::string>& names, const std::vector<S
         if (stage.name == "extend" || stage.name == "light_extend") stats.rays_extend += r.items;
         if (stage.name == "occlude") stats.rays_occlude += r.items;
     }
+    // Names come in the order in which stages were made.
+    std::stable_sort(stats.stages.begin(), stats.stages.end(), [](const StageStats& a, const StageStats& b) {
+        return place_in_schedule(a.name) < place_in_schedule(b.name);
+    });
 }
 
 void fill_queue_stats(const Layout& layout, const std::vector<const QueueCounter*>& sets, RenderStats& stats) {

@@ -14,7 +14,8 @@ inline double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Fills stages, rays and invalid counts from one record for each name. Stages that did nothing are left out.
+/// Fills stages, rays and invalid counts from one record for each name. Stages that did nothing are left out; the
+/// others stand in the order of a wave: light subpaths, eye subpaths, connections, mis_weight to update_film.
 void fill_stage_stats(const std::vector<std::string>& names, const std::vector<StageRecord>& records,
                       RenderStats& stats);
 
