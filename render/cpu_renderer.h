@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <new>
-#include <optional>
 
 #include "accel/host_tracer.h"
 #include "accel/shared_accels.h"

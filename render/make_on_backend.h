@@ -3,9 +3,9 @@
 #pragma once
 
 #include "accel/shared_accels.h"
+#include "backends/fusion.h"
 #include "integrators/feature_levels.h"
 #include "render/renderer.h"
-#include "stages/stage.h"
 
 namespace ambilux {
 
@@ -35,7 +35,7 @@ const std::vector<CompiledRenderer>& compiled_renderers();
 template <Features F, Fusion kFused, class Make>
 std::unique_ptr<Renderer> with_fusion(const RenderSettings& settings, Make make) {
     if constexpr (F == kAllFeatures)
-        if (settings.fuse == Fuse::none) return make.template operator()<Fusion{}>();
+        if (settings.fuse == Fuse::none) return make.template operator()<kNoFusion>();
     return make.template operator()<kFused>();
 }
 

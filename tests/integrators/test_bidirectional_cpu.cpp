@@ -2,8 +2,6 @@
 // timeout: 300
 // What must not change the image of light tracing and bidirectional path tracing on the CPU and what must; memory that
 // grows; settings.
-#include <tbb/global_control.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -57,27 +55,7 @@ TEST_CASE("G7: one seed is one image, whatever the waves, the batches and the th
         for (const Method& m : kMethods) {
             INFO(name << " " << m.name);
             const RenderSettings settings = settings_of(scene, m);
-            const FilmMoments film = render_scene(scene, settings, 4).film;
-            CHECK(same_image(film, render_scene(scene, settings, 4).film));
-            for (uint32_t wave_size : {64u, 1000u, 100000u}) {
-                INFO("wave_size " << wave_size);
-                RenderSettings s = settings;
-                s.wave_size = wave_size;
-                CHECK(same_image(film, render_scene(scene, s, 4).film));
-            }
-            const std::unique_ptr<Renderer> parts = make_renderer(scene, settings);
-            CHECK(parts->render(0, 1) == 1);
-            CHECK(parts->render(1, 3) == 3);
-            CHECK(same_image(film, parts->film()));
-            parts->clear_film();
-            CHECK(parts->film().samples == 0);
-            CHECK(parts->render(0, 4) == 4);
-            CHECK(same_image(film, parts->film()));
-            for (size_t threads : {1u, 2u}) {
-                const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-                INFO(threads << " threads");
-                CHECK(same_image(film, render_scene(scene, settings, 4).film));
-            }
+            const FilmMoments film = check_one_image(scene, settings, 4, {64, 1000, 100000});
             RenderSettings other = settings;
             other.seed = 6;
             CHECK_FALSE(same_image(film, render_scene(scene, other, 4).film));

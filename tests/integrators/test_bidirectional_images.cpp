@@ -217,29 +217,7 @@ TEST_CASE("B21: t = 1 through perspective and thin lens cameras", "[bidirectiona
 }
 
 TEST_CASE("B15: emitters seen directly, by (1,1) and by hits, one-sided, and hidden", "[bidirectional]") {
-    const std::string up = "<transform name='to_world'><scale value='2'/></transform>",
-                      down = "<transform name='to_world'><scale value='2'/><rotate x='1' angle='180'/></transform>";
-    struct Case {
-        std::string body;
-        bool visible;
-    } cases[] = {
-        {"<shape type='rectangle'>" + up + area_light(kLight) + "</shape>", true},
-        {"<shape type='disk'>" + up + area_light(kLight) + "</shape>", true},
-        {"<shape type='sphere'><point name='center' x='0' y='0' z='-3'/><float name='radius' value='2.5'/>" +
-             area_light(kLight) + "</shape>",
-         true},
-        {"<shape type='cylinder'><float name='radius' value='2'/><point name='p0' x='-2' y='0' z='-2.5'/><point "
-         "name='p1' x='2' y='0' z='-2.5'/>" +
-             area_light(kLight) + "</shape>",
-         true},
-        {"<emitter type='constant'>" + rgb("radiance", kLight) + "</emitter>", true},
-        {"<shape type='rectangle'>" + down + area_light(kLight) + "</shape>", false},
-        {"<shape type='rectangle'><boolean name='flip_normals' value='true'/>" + up + area_light(kLight) + "</shape>",
-         false},
-        {"<shape type='rectangle'><boolean name='flip_normals' value='true'/>" + down + area_light(kLight) + "</shape>",
-         true},
-    };
-    for (const Case& c : cases) {
+    for (const SeenEmitter& c : emitters_seen_from_above(kLight)) {
         const Scene open = scene_from_text(scene_xml(1, orthographic() + c.body));
         Scene hidden = open;
         hidden.integrator.hide_emitters = true;

@@ -365,32 +365,11 @@ TEST_CASE("B15: emitters seen directly are as bright as they are, one-sided, and
         return scene_from_text(
             scene_xml(max_depth, kOrthographic + body, hide ? "<boolean name='hide_emitters' value='true'/>" : ""));
     };
-    const std::string up = "<transform name='to_world'><scale value='2'/></transform>",
-                      down = "<transform name='to_world'><scale value='2'/><rotate x='1' angle='180'/></transform>";
     const std::string two_sided = "<bsdf type='twosided'>" + diffuse({0.5f, 0.5f, 0.5f}) + "</bsdf>";
     const Image bright = constant_image(kSize, kSize, kLight);
-    struct Case {
-        std::string body;
-        bool visible;
-    } cases[] = {
-        {"<shape type='rectangle'>" + up + area_light(kLight) + "</shape>", true},
-        {"<shape type='disk'>" + up + area_light(kLight) + "</shape>", true},
-        {"<shape type='sphere'><point name='center' x='0' y='0' z='-3'/><float name='radius' value='2.5'/>" +
-             area_light(kLight) + "</shape>",
-         true},
-        {"<shape type='cylinder'><float name='radius' value='2'/><point name='p0' x='-2' y='0' z='-2.5'/><point "
-         "name='p1' x='2' y='0' z='-2.5'/>" +
-             area_light(kLight) + "</shape>",
-         true},
-        {"<emitter type='constant'>" + rgb("radiance", kLight) + "</emitter>", true},
-        {"<shape type='rectangle'>" + down + area_light(kLight) + "</shape>", false},
-        {"<shape type='rectangle'>" + down + two_sided + area_light(kLight) + "</shape>", false},
-        {"<shape type='rectangle'><boolean name='flip_normals' value='true'/>" + up + area_light(kLight) + "</shape>",
-         false},
-        {"<shape type='rectangle'><boolean name='flip_normals' value='true'/>" + down + area_light(kLight) + "</shape>",
-         true},
-    };
-    for (const Case& c : cases)
+    std::vector<SeenEmitter> cases = emitters_seen_from_above(kLight);
+    cases.push_back({"<shape type='rectangle'>" + kTurnedDown + two_sided + area_light(kLight) + "</shape>", false});
+    for (const SeenEmitter& c : cases)
         for (const EstimatorCase& e : kEstimators)
             for (int depth : {0, 1, 2, 4}) {
                 INFO(c.body << " " << e.name << " max_depth " << depth);

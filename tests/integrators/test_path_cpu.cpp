@@ -2,8 +2,6 @@
 // timeout: 300
 // What must not change the image of a CPU render and what must: seeds, waves, batches, threads, kernels, tracers,
 // settings, interruption; and what it reports.
-#include <tbb/global_control.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -41,32 +39,10 @@ TEST_CASE("G7: one seed is one image, whatever the waves, the batches and the th
         INFO(name);
         const Scene scene = small_scene(name);
         const RenderSettings settings = settings_of(scene);
-        const FilmMoments film = render_scene(scene, settings, 8).film;
-        CHECK(same_image(film, render_scene(scene, settings, 8).film));
-        for (uint32_t wave_size : {64u, 1000u, 2048u, 100000u}) {
-            INFO("wave_size " << wave_size);
-            RenderSettings s = settings;
-            s.wave_size = wave_size;
-            CHECK(same_image(film, render_scene(scene, s, 8).film));
-        }
+        const FilmMoments film = check_one_image(scene, settings, 8, {64, 1000, 2048, 100000});
         RenderSettings s = settings;
         s.deterministic = true;
         CHECK(same_image(film, render_scene(scene, s, 8).film));
-
-        const std::unique_ptr<Renderer> parts = make_renderer(scene, settings);
-        CHECK(parts->render(0, 3) == 3);
-        CHECK(parts->render(3, 5) == 5);
-        CHECK(same_image(film, parts->film()));
-        parts->clear_film();
-        CHECK(parts->film().samples == 0);
-        CHECK(parts->render(0, 8) == 8);
-        CHECK(same_image(film, parts->film()));
-
-        for (size_t threads : {1u, 2u}) {
-            const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-            INFO(threads << " threads");
-            CHECK(same_image(film, render_scene(scene, settings, 8).film));
-        }
     }
 }
 

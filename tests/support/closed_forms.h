@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "film/ztest.h"
 #include "tests/support/render_scene.h"
@@ -136,6 +137,33 @@ inline std::string diffuse(Rgb reflectance) {
 }
 inline std::string area_light(Rgb radiance) {
     return "<emitter type='area'>" + rgb("radiance", radiance) + "</emitter>";
+}
+
+/// An emitter of the radiance that a test asks for; `visible`: from above.
+struct SeenEmitter {
+    std::string body;
+    bool visible;
+};
+inline const std::string kTurnedUp = "<transform name='to_world'><scale value='2'/></transform>";
+inline const std::string kTurnedDown =
+    "<transform name='to_world'><scale value='2'/><rotate x='1' angle='180'/></transform>";
+inline std::vector<SeenEmitter> emitters_seen_from_above(Rgb radiance) {
+    const std::string light = area_light(radiance) + "</shape>", rectangle = "<shape type='rectangle'>",
+                      flipped = rectangle + "<boolean name='flip_normals' value='true'/>";
+    return {
+        {rectangle + kTurnedUp + light, true},
+        {"<shape type='disk'>" + kTurnedUp + light, true},
+        {"<shape type='sphere'><point name='center' x='0' y='0' z='-3'/><float name='radius' value='2.5'/>" + light,
+         true},
+        {"<shape type='cylinder'><float name='radius' value='2'/><point name='p0' x='-2' y='0' z='-2.5'/><point "
+         "name='p1' x='2' y='0' z='-2.5'/>" +
+             light,
+         true},
+        {"<emitter type='constant'>" + rgb("radiance", radiance) + "</emitter>", true},
+        {rectangle + kTurnedDown + light, false},
+        {flipped + kTurnedUp + light, false},
+        {flipped + kTurnedDown + light, true},
+    };
 }
 
 }  // namespace ambilux
