@@ -11,8 +11,5 @@ constexpr Fusion kNoFusion = {};
 constexpr Fusion kDeviceFusion = {.weigh = true, .connect = true, .occlude = false, .generate = true};
 /// A host traces shadow rays in the stage that made them: nothing waits there for many items.
 constexpr Fusion kHostFusion = {.weigh = true, .connect = true, .occlude = true, .generate = false};
-/// But next event estimation of a path tracer waits for the tables of environments, which it can ask for ahead only as
-/// a stage of its own.
-constexpr Fusion kHostPathFusion = {.weigh = true, .connect = false, .occlude = false, .generate = false};
 
 }  // namespace ambilux

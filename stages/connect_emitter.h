@@ -35,12 +35,6 @@ struct ConnectEmitter {
     StageRecord* record;
 
     const Queue<VertexItem>& items() const { return vertices; }
-    /// What operator() will wait for, so that an executor can ask for it some items ahead.
-    AMBILUX_HD const void* far_memory(uint32_t i) const {
-        if constexpr (!F.has(EmitterType::envmap)) return nullptr;
-        const VertexItem item = vertices.load(i);
-        return emitter_sample_memory<F>(scene, Draws{wave.key(item.path)}.next_event(item.bits().depth()));
-    }
     AMBILUX_HD void operator()(uint32_t i) const {
         const VertexItem item = load_vertex<F>(vertices, i);
         const SubpathEnd<Mis> end = unpack_end<F, Mis>(scene, item);

@@ -41,18 +41,6 @@ AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, Vec3f reference_p
     return lit && s.pdf_sa > 0.0f && s.pdf_sa < kInfinity && max_component(s.radiance) > 0.0f;
 }
 
-/// The far memory that sample_emitter_deferred will read for these `u`, or null if there is none worth asking for
-/// ahead.
-template <Features F>
-AMBILUX_HD const void* emitter_sample_memory(const SceneView& view, Vec4f u) {
-    if constexpr (F.has(EmitterType::envmap)) {
-        if (view.emitter_count == 0) return nullptr;
-        const Emitter& emitter = view.emitters[sample_cdf(view.emitter_cdf, view.emitter_count, u.x)];
-        if (emitter.type == EmitterType::envmap) return envmap_sampled_cell(view, emitter, {u.y, u.z, u.w});
-    }
-    return nullptr;
-}
-
 /// Radiance of a sample of sample_emitter_deferred, in the units of EmitterSample::radiance.
 template <Features F>
 AMBILUX_HD Rgb emitter_sample_radiance(const SceneView& view, const EmitterSample& s) {

@@ -71,7 +71,6 @@ public:
 
 private:
     using Clock = std::chrono::steady_clock;
-    static constexpr uint32_t kPrefetchDistance = 8;  ///< items; 4 to 16 make no difference
 
     /// One place where the stage is called: compilers contract sums of products differently in every copy of a stage,
     /// and images should not depend on the order of queues.
@@ -85,10 +84,6 @@ private:
         const bool gaps = queue.flags && !list;
         const uint32_t n = gaps ? queue.capacity() : items;
         for (uint32_t i = 0; i < n; ++i) {
-            if constexpr (requires { stage.far_memory(i); }) {
-                if (!queue.flags && !list && i + kPrefetchDistance < n)
-                    __builtin_prefetch(stage.far_memory(i + kPrefetchDistance));
-            }
             if (gaps && !claim(queue, i)) continue;
             stage(list ? list[i] : i);
         }

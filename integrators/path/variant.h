@@ -9,7 +9,6 @@ struct PathVariant {
     static constexpr const char* kHelp =
         "unidirectional path tracer: hits of emitters, next event estimation, or both with weights";
     static constexpr VariantTraits kTraits = {.estimators = true, .binary_bvh = true, .finds_all_light = true};
-    static constexpr bool kConnectsOnHost = false;  ///< Fusion: next event estimation is a stage of its own on a host
 };
 
 }  // namespace ambilux

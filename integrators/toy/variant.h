@@ -9,7 +9,6 @@ namespace ambilux {
 struct ToyVariant {
     static constexpr const char* kHelp = "ambient occlusion: how much of the sky the first surface sees; a tutorial";
     static constexpr VariantTraits kTraits = {.weights = false, .culls = false};
-    static constexpr bool kConnectsOnHost = true;  ///< Fusion: shadow rays are traced where they are made
 
     static std::vector<Declaration<ToySettings>> settings();
 };

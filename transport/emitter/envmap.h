@@ -110,17 +110,6 @@ AMBILUX_HD void envmap_sample_direction(const SceneView& view, const Emitter& em
     pdf_sa = envmap_pdf_to_sa(own ? cell.pdf : cell.alias_pdf, sin_theta);
 }
 
-/// The cell that envmap_sample_direction will read for these `u`: in a large map it is a cache miss per sample.
-AMBILUX_HD const void* envmap_sampled_cell(const SceneView& view, const Emitter& emitter, Vec3f u) {
-    const Texture& texture = view.textures[emitter.radiance.texture];
-    const uint32_t row_ticket = ticket_of(u.z);
-    uint32_t y = bucket_of(row_ticket, texture.height);
-    const AliasBucket row = load_environment_row(view, emitter, y);
-    if (row_ticket >= row.threshold) y = row.alias;
-    const uint32_t x = bucket_of(ticket_of(u.x), texture.width);
-    return view.tables + emitter.env_cells + 4 * (uint64_t(y) * texture.width + x);
-}
-
 /// Density per solid angle with which envmap_sample_direction returns unit `wi`.
 AMBILUX_HD float envmap_pdf_direction(const SceneView& view, const Emitter& emitter, Vec3f wi) {
     const Texture& texture = view.textures[emitter.radiance.texture];

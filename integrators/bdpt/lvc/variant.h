@@ -14,7 +14,6 @@ struct LvcVariant {
                                               .strategy_images = true,
                                               .repeats = false,
                                               .finds_all_light = true};
-    static constexpr bool kConnectsOnHost = true;
 };
 
 }  // namespace ambilux

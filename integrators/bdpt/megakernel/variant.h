@@ -9,7 +9,6 @@ struct MegakernelVariant {
     static constexpr const char* kHelp = "one kernel in which subpaths live in registers, to compare with";
     static constexpr VariantTraits kTraits = {
         .strategies = true, .light_subpaths = true, .sorts = false, .compacts = false, .finds_all_light = true};
-    static constexpr bool kConnectsOnHost = true;
 };
 
 }  // namespace ambilux

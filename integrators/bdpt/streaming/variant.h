@@ -14,7 +14,6 @@ struct StreamingVariant {
                                               .compacts = false,
                                               .streams = true,
                                               .finds_all_light = true};
-    static constexpr bool kConnectsOnHost = true;
 };
 
 }  // namespace ambilux

@@ -11,13 +11,11 @@ struct WavefrontVariant {
         "bidirectional path tracer: every eye subpath is connected with a light subpath of its own";
     static constexpr VariantTraits kTraits = {
         .strategies = true, .light_subpaths = true, .strategy_images = true, .finds_all_light = true};
-    static constexpr bool kConnectsOnHost = true;
 };
 
 struct LightVariant {
     static constexpr const char* kHelp = "light tracer: vertices of light subpaths are connected with the camera";
     static constexpr VariantTraits kTraits = {.light_subpaths = true, .strategy_images = true};
-    static constexpr bool kConnectsOnHost = true;
 };
 
 }  // namespace ambilux

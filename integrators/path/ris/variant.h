@@ -12,7 +12,6 @@ struct PathRisVariant {
         "next event estimation by resampling: of several emitter samples one is kept, in proportion to its light "
         "(Talbot et al. 2005)";
     static constexpr VariantTraits kTraits = PathVariant::kTraits;
-    static constexpr bool kConnectsOnHost = PathVariant::kConnectsOnHost;
 
     static std::vector<Declaration<RisSettings>> settings();
 };
