@@ -13,6 +13,7 @@
 #include "experiments/technique_files.h"
 #include "film/exr_io.h"
 #include "film/png_io.h"
+#include "integrators/reachability.h"
 
 namespace ambilux {
 namespace {
@@ -72,6 +73,10 @@ int render(const Options& o) {
     settings.expected_samples = budget.samples;
     settings.expected_seconds = budget.seconds;
     const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
+
+    if (const std::string missing = missing_light(loaded.scene.features, used_settings(settings, renderer->stats()));
+        !missing.empty())
+        log_warning(missing);
 
     RenderPosition position;
     // Choosing is part of the method: its time counts.

@@ -44,7 +44,7 @@ nlohmann::json save(const SelectionStats& c) {
     nlohmann::json candidates = nlohmann::json::array();
     // Infinite variances become null.
     for (const SelectionStats::Candidate& x : c.candidates)
-        candidates.push_back({x.name, x.settings, x.variance, x.work, x.seconds, x.efficiency});
+        candidates.push_back({x.name, x.settings, x.variance, x.work, x.seconds, x.efficiency, x.excluded});
     return {c.name, c.settings, c.seconds, c.pilot_samples, c.expected_samples, candidates};
 }
 
@@ -58,7 +58,7 @@ SelectionStats restore_choice(const nlohmann::json& j) {
     for (const auto& x : j.at(5))
         c.candidates.push_back({x.at(0), x.at(1),
                                 x.at(2).is_null() ? std::numeric_limits<double>::infinity() : x.at(2).get<double>(),
-                                x.at(3), x.at(4), x.at(5)});
+                                x.at(3), x.at(4), x.at(5), x.size() > 6 ? x.at(6) : nlohmann::json("")});
     return c;
 }
 

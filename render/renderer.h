@@ -36,11 +36,11 @@ struct QueueStats {
 struct SelectionStats {
     struct Candidate {
         std::string name, settings;
-        double variance;  ///< of one sample of a pixel, relative to its squared mean; infinite if some light cannot be
-                          ///< found
-        double work;      ///< of one sample, in rays
-        double seconds;   ///< of one sample of all pixels; 0 where it was not measured
-        double efficiency;  ///< 1 / (variance · cost) over that of the choice
+        double variance;       ///< of one sample of a pixel, relative to its squared mean; infinite if it is excluded
+        double work;           ///< of one sample, in rays
+        double seconds;        ///< of one sample of all pixels; 0 where it was not measured
+        double efficiency;     ///< 1 / (variance · cost) over that of the choice
+        std::string excluded;  ///< a path that it cannot find and others do (integrators/reachability.h); else empty
     };
     std::string name;                                           ///< of the choice; empty if there was none
     std::vector<std::pair<std::string, std::string>> settings;  ///< with them the same estimator runs again

@@ -13,6 +13,7 @@
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "core/flag.h"
+#include "integrators/reachability.h"
 #include "integrators/registry.h"
 
 namespace ambilux {
@@ -229,7 +230,7 @@ std::vector<double> selection_variances(const Pilot& pilot) {
     for (size_t c = 0; c < pilot.variance.size(); ++c) {
         double sum = 0;
         for (size_t i = 0; i < kept; ++i) sum += pilot.variance[c][worst[i].second];
-        variances.push_back(pilot.cannot_find_light[c] ? double(kInfinity) : std::max(sum / double(kept), 1e-12));
+        variances.push_back(std::max(sum / double(kept), 1e-12));
     }
     return variances;
 }
@@ -241,10 +242,14 @@ class Selection {
 public:
     Selection(const Scene& scene, const RenderSettings& settings, bool cuda, const MakeRenderer& make)
         : scene_(scene), settings_(settings), cuda_(cuda), make_(make),
-          candidates_(selection_candidates(settings, cuda)), seconds_(candidates_.size(), 0.0) {}
+          candidates_(selection_candidates(settings, cuda)), seconds_(candidates_.size(), 0.0) {
+        for (const SelectionCandidate& c : candidates_)
+            unreachable_.push_back(unreachable_path(scene.features, sampled_strategies(settings_of(settings, c)),
+                                                    kAllStrategies, settings.max_depth));
+    }
 
     std::unique_ptr<Renderer> run(SharedAccels& accels, bool cwbvh) {
-        if (cuda_ && settings_.expected_seconds > 0 && settings_.expected_samples == 0)
+        if (cuda_ && settings_.expected_seconds > 0 && settings_.expected_samples == 0 && unreachable_[0].empty())
             head_start_.emplace(settings_of(settings_, candidates_[0]), make_);
         std::vector<PilotCandidate> predicted;
         for (const SelectionCandidate& c : candidates_) predicted.push_back(c.pilot);
@@ -252,6 +257,8 @@ public:
             run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, cuda_ ? kPilotSamplesCuda : kPilotSamplesCpu);
         if (head_start_) head_start_->stop();
         variance_ = selection_variances(pilot);
+        for (size_t c = 0; c < candidates_.size(); ++c)
+            if (!unreachable_[c].empty()) variance_[c] = double(kInfinity);
         for (const SelectionCandidate& c : candidates_) work_.push_back(selection_work(pilot.work, c, cuda_));
         cost_ = work_;
         rank();
@@ -354,7 +361,8 @@ private:
         choice.expected_samples = pilot.expected_samples;
         for (size_t c = 0; c < candidates_.size(); ++c)
             choice.candidates.push_back({candidates_[c].name, joined(candidates_[c].settings), variance_[c], work_[c],
-                                         seconds_[c], std::isfinite(variance_[c]) ? score(chosen) / score(c) : 0.0});
+                                         seconds_[c], std::isfinite(variance_[c]) ? score(chosen) / score(c) : 0.0,
+                                         unreachable_[c]});
         return choice;
     }
 
@@ -366,6 +374,7 @@ private:
     const std::vector<SelectionCandidate> candidates_;
     std::optional<HeadStart> head_start_;
     // By candidate.
+    std::vector<std::string> unreachable_;  ///< a path that only others find; empty if there is none
     std::vector<double> variance_, work_;
     std::vector<double> cost_;     ///< of a sample, in any unit; smaller is better in product with the variance
     std::vector<double> seconds_;  ///< of a sample, where it was timed

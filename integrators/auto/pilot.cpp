@@ -83,8 +83,6 @@ public:
         pixels_ = std::max(1u, (samples / kPixelSamples + blocks_.count() / 2) / blocks_.count());
         result_.samples = moments_.samples = blocks_.count() * pixels_ * kPixelSamples;
         moments_.filter_energy = filter_energy(view_);
-        delta_emitters_ = std::any_of(scene.emitters.begin(), scene.emitters.end(),
-                                      [](const Emitter& e) { return is_delta(e.type); });
     }
 
     Pilot run() {
@@ -116,8 +114,7 @@ public:
         result_.light_vertices = double(vertices_.size()) / n;
         result_.expected_samples = expected_samples(
             settings_, result_.work, uint64_t(view_.sensor.crop_width) * view_.sensor.crop_height, cuda_);
-        predict_variances(
-            moments_, {pixels, splats_, pixels_, kPixelSamples, delta_emitters_, result_.expected_samples}, result_);
+        predict_variances(moments_, {pixels, splats_, pixels_, kPixelSamples, result_.expected_samples}, result_);
         return result_;
     }
 
@@ -353,7 +350,6 @@ private:
     Rules<PilotMis> rules_{};
     FilmBlocks blocks_;
     uint32_t pixels_ = 0;  ///< of a block
-    bool delta_emitters_ = false;
     std::vector<LightTask> tasks_;
     std::vector<const PilotVertex*> vertices_;  ///< of all tasks
     std::vector<const PilotSplat*> splats_;

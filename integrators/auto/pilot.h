@@ -41,8 +41,7 @@ struct Pilot {
     /// 0.01, mean over pixels and channels; without rare outliers, for which the light that they bring counts as
     /// missing.
     std::vector<std::vector<double>> variance;
-    std::vector<bool> cannot_find_light;  ///< the candidate cannot find some of the light
-    double light_vertices = 0;            ///< mean of a light subpath
+    double light_vertices = 0;  ///< mean of a light subpath
     PilotWork work;
 };
 

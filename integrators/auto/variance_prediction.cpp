@@ -34,8 +34,7 @@ public:
         : moments_(moments), paths_(paths), c_(candidate), scale_(scale), variance_(variance),
           samples_(double(paths.pixels_per_block) * paths.samples_per_pixel) {}
 
-    /// False if it cannot find some of the light.
-    bool predict(uint32_t width, uint32_t height) {
+    void predict(uint32_t width, uint32_t height) {
         add_pixels();
         add_splats();
         std::vector<Mean> lost(scale_.size()), smooth(scale_.size());
@@ -44,8 +43,6 @@ public:
         for (uint32_t b = 0; b < scale_.size(); ++b)
             for (int k = 0; k < 3; ++k)
                 variance_[b] += paths_.expected_samples * sqr(smooth[b].of[k]) / (3.0 * (sqr(scale_[b].of[k]) + 0.01));
-        // Without emitters of no extent, eye subpaths can meet whatever there is: zeros are rounding.
-        return !(paths_.delta_emitters && cannot_find_light_);
     }
 
 private:
@@ -76,7 +73,6 @@ private:
             const PilotSums& s = paths_.pixels[p];
             const uint32_t b = uint32_t(p / paths_.pixels_per_block);
             const std::array<double, 3> scale2 = scale2_of(b, s.seen);
-            cannot_find_light_ |= s.cannot_find_light[c_];
             for (int k = 0; k < 3; ++k) variance_[b] += s.variance[c_][k] / (3.0 * samples_ * scale2[k]);
             for (const PilotEvent& e : s.rare) add_rare(e, b, scale2, moments_.sum_of(c_, e.shares));
         }
@@ -86,10 +82,7 @@ private:
         for (const PilotSplat* s : paths_.splats) {
             const PilotEvent& e = s->event;
             const float sum = moments_.sum_of(c_, e.shares);
-            if (!(sum > 0.0f)) {
-                cannot_find_light_ = true;
-                continue;
-            }
+            if (!(sum > 0.0f)) continue;
             const std::array<double, 3> scale2 = scale2_of(s->block, s->seen ? s->radiance : Rgb{0.0f, 0.0f, 0.0f});
             const double moment = moments_.second_moment(c_, e, sum);
             for (int k = 0; k < 3; ++k)
@@ -140,7 +133,6 @@ private:
     std::vector<double>& variance_;
     const double samples_;
     std::vector<Rare> rare_;
-    bool cannot_find_light_ = false;
 };
 
 }  // namespace
@@ -156,13 +148,9 @@ void predict_variances(const SecondMoments& moments, const PilotPaths& paths, Pi
             block[s->block].of[k] += double(s->event.value[k] * (s->event.coverage / s->event.total())) / samples;
     blur(result.blocks_x, result.blocks_y, block, scale);
     result.variance.assign(moments.candidates.size(), std::vector<double>(count));
-    std::array<bool, kMostCandidates> cannot_find_light{};
     parallel_for(uint32_t(moments.candidates.size()), [&](uint32_t c) {
-        cannot_find_light[c] =
-            !Prediction(moments, paths, c, scale, result.variance[c]).predict(result.blocks_x, result.blocks_y);
+        Prediction(moments, paths, c, scale, result.variance[c]).predict(result.blocks_x, result.blocks_y);
     });
-    result.cannot_find_light.assign(cannot_find_light.begin(),
-                                    cannot_find_light.begin() + ptrdiff_t(moments.candidates.size()));
 }
 
 }  // namespace ambilux

@@ -38,9 +38,8 @@ struct PilotSplat {
 struct PilotSums {
     double mean[3] = {};
     double variance[kMostCandidates][3] = {};
-    double seen[3] = {};                           ///< largest radiance of emitters that the camera sees here
-    bool cannot_find_light[kMostCandidates] = {};  ///< a candidate cannot find some light
-    std::vector<PilotEvent> rare;                  ///< for some candidate
+    double seen[3] = {};           ///< largest radiance of emitters that the camera sees here
+    std::vector<PilotEvent> rare;  ///< for some candidate
 };
 
 /// How the paths that a pilot found would add to the second moments of its candidates.
@@ -70,10 +69,7 @@ struct SecondMoments {
         for (int k = 0; k < 3; ++k) sums.mean[k] += double(e.value[k] * weight);
         for (uint32_t c = 0; c < candidates.size(); ++c) {
             const float sum = sum_of(c, e.shares);
-            if (!(sum > 0.0f)) {
-                sums.cannot_find_light[c] = true;
-                continue;
-            }
+            if (!(sum > 0.0f)) continue;  // it does not find it, or rounding says so (integrators/reachability.h)
             rare |= sum < kRareShare * e.total();
             for (int k = 0; k < 3; ++k) sums.variance[c][k] += second_moment(c, e, sum) * sqr(double(e.value[k]));
         }
@@ -93,11 +89,10 @@ struct PilotPaths {
     const std::vector<PilotSums>& pixels;  ///< block by block
     const std::vector<const PilotSplat*>& splats;
     uint32_t pixels_per_block, samples_per_pixel;
-    bool delta_emitters;      ///< some emitter has no extent
     double expected_samples;  ///< of every pixel, that the render takes
 };
 
-/// Fills Pilot::variance and cannot_find_light from sums over pixels and splats.
+/// Fills Pilot::variance from sums over pixels and splats.
 void predict_variances(const SecondMoments& moments, const PilotPaths& paths, Pilot& result);
 
 }  // namespace ambilux

@@ -1,0 +1,94 @@
+#include "integrators/reachability.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "transport/mis/strategy.h"
+
+namespace ambilux {
+namespace {
+
+/// Two sets of groups differ in a word of at most this many segments, if they differ at all: Ld S D D S E is the
+/// longest that is the shortest of its kind.
+constexpr int kLongestWord = 5;
+
+constexpr uint32_t kDeltaBsdfs = BsdfModels::mask([](auto m) { return decltype(m)::type::delta; });
+constexpr uint32_t kSmoothBsdfs = BsdfModels::mask([](auto m) { return decltype(m)::type::smooth; });
+
+/// A path of `segments`: bit i - 1 of `delta` says that its vertex i, counted from the emitter, is passed by a delta
+/// lobe.
+struct Word {
+    int segments;
+    uint32_t delta;
+    bool delta_emitter;
+
+    bool connectable(int i) const { return !(delta >> (i - 1) & 1u); }
+    std::string text() const {
+        std::string s = delta_emitter ? "Ld" : "L";
+        for (int i = 1; i < segments; ++i) s += connectable(i) ? " D" : " S";
+        return s + " E";
+    }
+};
+
+bool finds(uint32_t strategies, const Word& w) {
+    if (!w.delta_emitter && (strategies & kHitStrategies)) return true;
+    if (w.segments == 1) return !w.delta_emitter && (strategies & kLightStrategies);
+    if ((strategies & kNextEventStrategies) && w.connectable(1)) return true;
+    if ((strategies & kLightStrategies) && w.connectable(w.segments - 1)) return true;
+    for (int i = 1; i + 1 < w.segments; ++i)
+        if ((strategies & kConnectionStrategies) && w.connectable(i) && w.connectable(i + 1)) return true;
+    return false;
+}
+
+/// The shortest word of the scene for which `lost` is true.
+template <class Lost>
+std::string shortest(const Features& f, int max_depth, Lost lost) {
+    const int longest = max_depth < 0 ? kLongestWord : std::min(max_depth, kLongestWord);
+    for (int k = 1; k <= longest; ++k)
+        for (uint32_t delta = 0; delta < 1u << (k - 1); ++delta) {
+            const uint32_t all = (1u << (k - 1)) - 1;
+            if ((delta != 0 && !(f.bsdfs & kDeltaBsdfs)) || (delta != all && !(f.bsdfs & kSmoothBsdfs))) continue;
+            for (const bool delta_emitter : {false, true}) {
+                // No camera sees a delta emitter.
+                if (k == 1 && delta_emitter) continue;
+                const uint32_t emitters = delta_emitter ? detail::kDeltaEmitters : ~detail::kDeltaEmitters;
+                const Word w = {k, delta, delta_emitter};
+                if ((f.emitters & emitters) && lost(w)) return w.text();
+            }
+        }
+    return "";
+}
+
+}  // namespace
+
+std::string unreachable_path(const Features& features, uint32_t strategies, uint32_t reference, int max_depth) {
+    return shortest(features, max_depth, [&](const Word& w) { return finds(reference, w) && !finds(strategies, w); });
+}
+
+std::string unreachable_path(const Features& features, uint32_t strategies, int max_depth) {
+    return shortest(features, max_depth, [&](const Word& w) { return !finds(strategies, w); });
+}
+
+uint32_t sampled_strategies(const RenderSettings& settings) {
+    if (settings.integrator == "light") return kLightStrategies;
+    if (settings.integrator == "bdpt") return settings.strategies;
+    if (settings.integrator != "path") return 0;
+    return settings.estimator == Estimator::naive ? uint32_t(kHitStrategies) : kHitStrategies | kNextEventStrategies;
+}
+
+std::string missing_light(const Features& features, const RenderSettings& settings) {
+    if (settings.singles.on || settings.automatic) return "";
+    const uint32_t strategies = sampled_strategies(settings);
+    if (strategies == 0) return "";  // an integrator that is no estimator of all light
+    std::string lost = unreachable_path(features, strategies, kAllStrategies, settings.max_depth);
+    const bool findable = !lost.empty();
+    if (!findable) lost = unreachable_path(features, strategies, settings.max_depth);
+    if (lost.empty()) return "";
+    return fmt::format(
+        "the image lacks light of paths such as {} (Ld: point, spot or directional emitter, S: delta "
+        "lobe, D: another one, E: camera), which {}",
+        lost, findable ? "these strategies do not find; integrator bdpt finds more" : "no strategy finds");
+}
+
+}  // namespace ambilux
