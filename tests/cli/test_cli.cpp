@@ -202,6 +202,44 @@ TEST_CASE("a render writes image, PNG and statistics") {
     CHECK(quiet.out.empty());
 }
 
+TEST_CASE("light that no strategy in use can find is named, in the warning and beside the candidates of auto") {
+    const test::TempFolder folder;
+    write_file_atomic(folder / "lamp.xml",
+                      "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>"
+                      "<integer name='width' value='8'/><integer name='height' value='8'/></film></sensor>"
+                      "<emitter type='point'><point name='position' x='0' y='2' z='3'/></emitter>"
+                      "<shape type='sphere'><point name='center' x='0' y='0' z='5'/>"
+                      "<bsdf type='dielectric'/></shape><shape type='sphere'>"
+                      "<point name='center' x='0' y='-2' z='5'/></shape></scene>");
+    const auto render_with = [&](std::vector<std::string> more) {
+        std::vector<std::string> all = {"render", folder / "lamp.xml", "--spp", "1", "-o", folder / "a.exr"};
+        all.insert(all.end(), more.begin(), more.end());
+        Outcome o = run(folder, all);
+        INFO(o.err);
+        REQUIRE(o.code == 0);
+        return o;
+    };
+    CHECK(contains(render_with({"-i", "path"}).err, "such as Ld S D E"));
+    CHECK(contains(render_with({"-i", "path"}).err, "integrator bdpt finds more"));
+    // A point lamp seen through glass alone.
+    CHECK(contains(render_with({"-i", "bdpt"}).err, "Ld S E"));
+    CHECK(contains(render_with({"-i", "bdpt"}).err, "no strategy finds"));
+    // The lamp of the Cornell box has extent, and its surfaces are diffuse.
+    CHECK_FALSE(contains(run(folder, render(folder, {"-i", "path", "--spp", "1"})).err, "warning"));
+
+    const json choice =
+        json::parse(render_with({"-i", "bdpt", "--set", "bdpt.auto=true", "--json", "-"}).out)["choice"];
+    int excluded = 0, open = 0;
+    for (const json& c : choice["candidates"]) {
+        INFO(c.dump());
+        ++(c["excluded"].is_null() ? open : excluded);
+        if (c["name"] == "path") CHECK(c["excluded"] == "cannot find paths such as Ld S D E");
+        CHECK(c["variance"].is_number() == c["excluded"].is_null());
+    }
+    CHECK(excluded >= 2);
+    CHECK(open >= 1);
+}
+
 TEST_CASE("G13: every accepted option changes something") {
     const test::TempFolder folder;
     const json base = statistics(folder, {"--spp", "2"});
