@@ -183,6 +183,90 @@ TEST_CASE("a faint emitter keeps a share, black ones alone share equally") {
     CHECK_THROWS_AS(finalize_scene(s, LightPicking::power), Error);
 }
 
+/// How often each of n entries of a cumulative table is picked, over all values of a random float.
+std::vector<uint32_t> count_all_picks(const float* cdf, uint32_t n) {
+    std::vector<uint32_t> picked(n, 0);
+    for (uint32_t k = 0; k < 1u << 24; ++k) ++picked[sample_cdf(cdf, n, uniform_float(k << 8))];
+    return picked;
+}
+
+/// Emitters whose pick probability is not the share of random floats that pick them, or is zero though they shine.
+int wrongly_picked(const Scene& s) {
+    const std::vector<uint32_t> picked = count_all_picks(s.emitter_cdf.data(), uint32_t(s.emitters.size()));
+    int wrong = 0;
+    for (size_t i = 0; i < picked.size(); ++i) {
+        const bool shines = s.emitters[i].radiance.value.x > 0;
+        wrong += double(s.emitters[i].pick_probability) != picked[i] * 0x1p-24 || (picked[i] > 0) != shines;
+    }
+    return wrong;
+}
+
+TEST_CASE("emitters are picked with exactly their pick probability: weak before strong, 1e5 and 1e6 lamps") {
+    for (const LightPicking picking : {LightPicking::power, LightPicking::uniform}) {
+        Scene weak_first = base();
+        for (float intensity : {1.3e-4f, 1e-9f, 1.0f, 0.3f})
+            weak_first.emitters.push_back(emitter(EmitterType::point, splat(intensity)));
+        finalize_scene(weak_first, picking);
+        CHECK(wrongly_picked(weak_first) == 0);
+        for (uint32_t n : {100000u, 1000000u}) {
+            Scene s = base();
+            for (uint32_t i = 0; i < n; ++i) {
+                const Vec4f u = random_floats({7, i, 0, Stream::test}, 0);
+                // Black ones, and six orders of magnitude.
+                s.emitters.push_back(
+                    emitter(EmitterType::point, splat(u.x < 0.05f ? 0.0f : std::pow(10.0f, 6 * u.y))));
+            }
+            finalize_scene(s, picking);
+            INFO(n << " lamps");
+            CHECK(wrongly_picked(s) == 0);
+        }
+    }
+}
+
+TEST_CASE("a million faint emitters together take no more than a small share of the picks") {
+    Scene s = base();
+    s.emitters.push_back(emitter(EmitterType::point, splat(1)));
+    for (int i = 0; i < 1000000; ++i) s.emitters.push_back(emitter(EmitterType::point, splat(1e-20f)));
+    finalize_scene(s, LightPicking::power);
+    CHECK(s.emitters[0].pick_probability > 0.9f);
+    CHECK(wrongly_picked(s) == 0);
+}
+
+TEST_CASE("triangles of a light of 3e6 are picked with exactly the density that is divided by (B13)") {
+    const uint32_t n = 3000000;
+    for (const bool equal : {true, false}) {
+        Scene s = base();
+        const uint32_t mesh = add_triangles(s, {});
+        s.vertices = {{Vec3f{0, 0, 0}}, {Vec3f{1, 0, 0}}, {Vec3f{0, 2, 0}}, {Vec3f{1e-3f, 1e-3f, 0}}};
+        for (uint32_t i = 0; i < n; ++i) s.triangles.push_back({0, 1, equal || i % 2 ? 2u : 3u, mesh});
+        s.shapes[mesh].primitive_count = n;
+        add_area_emitter(s, mesh, {1, 1, 1});
+        finalize_scene(s, LightPicking::power);
+        const float* cdf = s.tables.data() + s.emitters[0].area_cdf;
+        const std::vector<uint32_t> picked = count_all_picks(cdf, n);
+        double worst = 0;
+        for (uint32_t i = 0; i < n; ++i) {
+            const double area = equal || i % 2 ? 1.0 : 0.5 * double(1e-3f);
+            worst = std::max(worst, std::abs(double(cdf[n + 1 + i]) * area / (picked[i] * 0x1p-24) - 1));
+        }
+        INFO("equal " << equal);
+        CHECK(worst < 2e-7);  // the density is a float
+    }
+}
+
+TEST_CASE("a light of more triangles than random floats tell apart is refused with advice") {
+    Scene s = base();
+    s.path = "lamp.xml";
+    const uint32_t mesh = add_triangles(s, {});
+    s.vertices = {{Vec3f{0, 0, 0}}, {Vec3f{1, 0, 0}}, {Vec3f{0, 2, 0}}};
+    s.triangles.assign((1u << 24) + 1, {0, 1, 2, mesh});
+    s.shapes[mesh].primitive_count = uint32_t(s.triangles.size());
+    add_area_emitter(s, mesh, {1, 1, 1});
+    CHECK_THROWS_WITH(finalize_scene(s, LightPicking::power),
+                      "lamp.xml: 16777217 triangles in one light; light sampling tells 16777216 apart: split the mesh "
+                      "into several shapes");
+}
+
 TEST_CASE("bounds hold every surface and the camera; an empty scene has a radius (B9)") {
     Scene empty = base({3, 4, 5});
     empty.environment = 0;
