@@ -79,8 +79,8 @@ size_t differing(const FilmMoments& film, const FilmMoments& expected, double fa
 void check_scaled(const Scene& scene, const Scene& scaled, double factor) {
     for (const Method& m : methods()) {
         INFO(described(m));
-        const RenderResult expected = render_scene(scene, settings_of(scene, m), 8);
-        const RenderResult image = render_scene(scaled, settings_of(scaled, m), 8);
+        const RenderResult expected = render_scene(scene, settings_of(scene, m), 4);
+        const RenderResult image = render_scene(scaled, settings_of(scaled, m), 4);
         CHECK(*std::max_element(expected.film.sum.begin(), expected.film.sum.end()) > 0);
         CHECK(differing(image.film, expected.film, factor) == 0);
         CHECK(image.stats.invalid.total() == 0);
@@ -91,7 +91,7 @@ void check_scaled(const Scene& scene, const Scene& scaled, double factor) {
 
 TEST_CASE("The unit of emission changes no decision: roulette, splats and weights scale to the bit", "[units]") {
     const Scene scene = Room{}.load();
-    for (const int exponent : {-80, -40, -20, 20, 40, 80}) {
+    for (const int exponent : {-80, -20, 80}) {
         INFO("emission 2^" << exponent);
         Room room;
         room.emission = std::ldexp(1.0, exponent);
@@ -101,7 +101,7 @@ TEST_CASE("The unit of emission changes no decision: roulette, splats and weight
 
 TEST_CASE("B33: the unit of length changes no image, from 1e-9 to 1e9, by either heuristic", "[units]") {
     const Scene scene = Room{}.load();
-    for (const int exponent : {-32, -30, 30, 32}) {
+    for (const int exponent : {-32, 32}) {
         INFO("length 2^" << exponent);
         Room room;
         room.scale = std::ldexp(1.0, exponent);
