@@ -6,26 +6,23 @@
 #include "core/half.h"
 #include "core/huge_pages.h"
 #include "formats/finalize.h"
-#include "scene/alias_table.h"
+#include "scene/pick_table.h"
 #include "transport/sensor/filter.h"
 
 namespace ambilux {
 
 namespace {
 
-/// Appends the cumulative table of n weights, normalised: 0 ... 1. Returns their sum. All-zero weights count as equal
-/// ones.
-template <class Weight>
-double append_cdf(std::vector<float>& tables, size_t n, const Weight& weight) {
-    double total = 0;
-    for (size_t i = 0; i < n; ++i) total += weight(i);
-    double sum = 0;
-    tables.push_back(0.0f);
-    for (size_t i = 0; i < n; ++i) {
-        sum += total > 0 ? weight(i) : 1.0;
-        tables.push_back(i + 1 == n ? 1.0f : std::min(float(sum / (total > 0 ? total : double(n))), 1.0f));
-    }
-    return total;
+/// The table by which light sampling picks one of entries with these weights. `what` says in plural what they are,
+/// `advice` what to do when they are too many.
+std::vector<float> checked_pick_table(const Scene& scene, const std::vector<double>& weights, const std::string& what,
+                                      const std::string& advice) {
+    const uint64_t count = count_picks(weights);
+    if (count > kMostPicks)
+        throw input_error(scene.path, 0,
+                          std::to_string(count) + ' ' + what + "; light sampling tells " + std::to_string(kMostPicks) +
+                              " apart: " + advice);
+    return pick_table(weights);
 }
 
 double triangle_area(const Scene& scene, const Triangle& t) {
@@ -64,17 +61,16 @@ void fill_areas(Scene& scene) {
         emitter.area_cdf = kNone;
         if (shape.primitive_count < 2) continue;
         emitter.area_cdf = uint32_t(scene.tables.size());
-        const auto triangle_area_of = [&](size_t i) {
-            return triangle_area(scene, scene.triangles[shape.first_primitive + i]);
-        };
-        append_cdf(scene.tables, shape.primitive_count, triangle_area_of);
-        // From the rounded table, not 1/area of the shape: that is what sampling does, and in meshes of many triangles
-        // the two differ.
-        for (size_t i = 0; i < shape.primitive_count; ++i) {
-            const float* cdf = scene.tables.data() + emitter.area_cdf + i;
-            const double share = double(cdf[1]) - cdf[0];
-            scene.tables.push_back(share > 0 ? float(share / triangle_area_of(i)) : 0.0f);
-        }
+        std::vector<double> areas(shape.primitive_count);
+        for (size_t i = 0; i < areas.size(); ++i)
+            areas[i] = triangle_area(scene, scene.triangles[shape.first_primitive + i]);
+        const std::vector<float> cdf =
+            checked_pick_table(scene, areas, "triangles in one light", "split the mesh into several shapes");
+        scene.tables.insert(scene.tables.end(), cdf.begin(), cdf.end());
+        // From the table, not 1/area of the shape: that is what sampling does, and in meshes of many triangles the two
+        // differ.
+        for (size_t i = 0; i < areas.size(); ++i)
+            scene.tables.push_back(areas[i] > 0 ? float((double(cdf[i + 1]) - cdf[i]) / areas[i]) : 0.0f);
     }
 }
 
@@ -219,53 +215,63 @@ double fill_environment(Scene& scene, Emitter& emitter) {
     return mean;
 }
 
-// Power of an emitter, luminance of watts, one function a model. `disk`: area of the scene seen from far away.
+/// Most light from infinity that a scene takes up. No more passes through the sphere around everything than its disk
+/// has room for, and no more than falls on all surfaces: of a room with one stone far away the sphere alone would make
+/// too much.
+struct Receivers {
+    double disk;        ///< area that stops parallel light
+    double both_sides;  ///< area that light from everywhere falls on
+};
 
-double power(ModelTag<AreaEmitter>, Scene& scene, Emitter& e, double) {
+Receivers receivers_of(const Scene& scene) {
+    const double disk = M_PI * double(scene.bounds_radius) * scene.bounds_radius;
+    double area = 0;
+    for (const Shape& shape : scene.shapes) area += double(shape.area);
+    if (!(area > 0)) return {disk, 4 * disk};
+    return {std::min(disk, area), std::min(4 * disk, 2 * area)};
+}
+
+// Power of an emitter, luminance of watts, one function a model.
+
+double power(ModelTag<AreaEmitter>, Scene& scene, Emitter& e, const Receivers&) {
     return M_PI * scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
 }
-double power(ModelTag<PointEmitter>, Scene& scene, Emitter& e, double) {
+double power(ModelTag<PointEmitter>, Scene& scene, Emitter& e, const Receivers&) {
     return 4 * M_PI * mean_luminance(scene, e.radiance);
 }
 /// Exact for a constant profile up to the beam width and about right for the falloff.
-double power(ModelTag<SpotEmitter>, Scene& scene, Emitter& e, double) {
+double power(ModelTag<SpotEmitter>, Scene& scene, Emitter& e, const Receivers&) {
     return 2 * M_PI * (1 - 0.5 * (double(e.cos_cutoff) + e.cos_beam_width)) * mean_luminance(scene, e.radiance);
 }
-double power(ModelTag<DirectionalEmitter>, Scene& scene, Emitter& e, double disk) {
-    return disk * mean_luminance(scene, e.radiance);
+double power(ModelTag<DirectionalEmitter>, Scene& scene, Emitter& e, const Receivers& to) {
+    return to.disk * mean_luminance(scene, e.radiance);
 }
-double power(ModelTag<ConstantEmitter>, Scene& scene, Emitter& e, double disk) {
-    return disk * 4 * M_PI * mean_luminance(scene, e.radiance);
+double power(ModelTag<ConstantEmitter>, Scene& scene, Emitter& e, const Receivers& to) {
+    return M_PI * to.both_sides * mean_luminance(scene, e.radiance);
 }
-double power(ModelTag<EnvmapEmitter>, Scene& scene, Emitter& e, double disk) {
-    return disk * 4 * M_PI * fill_environment(scene, e);
-}
-
-double emitter_power(Scene& scene, Emitter& e) {
-    const double disk = M_PI * double(scene.bounds_radius) * scene.bounds_radius;
-    return EmitterModels::visit<EmitterModels::kAll>(uint32_t(e.type), 0.0,
-                                                     [&](auto model) { return power(model, scene, e, disk); });
+double power(ModelTag<EnvmapEmitter>, Scene& scene, Emitter& e, const Receivers& to) {
+    return M_PI * to.both_sides * fill_environment(scene, e);
 }
 
 void fill_emitters(Scene& scene, LightPicking picking) {
-    std::vector<double> power;
-    double total = 0;
+    scene.emitter_cdf = {0.0f};
+    if (scene.emitters.empty()) return;
+    const Receivers receivers = receivers_of(scene);
+    std::vector<double> powers;
+    std::vector<bool> infinite;
     for (Emitter& e : scene.emitters) {
-        double p = emitter_power(scene, e);
+        const double p = EmitterModels::visit<EmitterModels::kAll>(
+            uint32_t(e.type), 0.0, [&](auto model) { return power(model, scene, e, receivers); });
         if (!(p >= 0) || !std::isfinite(p))
             throw input_error(scene.path, 0,
-                              "emitter " + std::to_string(power.size()) + " has a power that is not finite");
-        if (picking == LightPicking::uniform && p > 0) p = 1;
-        power.push_back(p);
-        total += p;
+                              "emitter " + std::to_string(powers.size()) + " has a power that is not finite");
+        powers.push_back(p);
+        infinite.push_back(is_infinite(e.type));
     }
-    // No emitter that shines may vanish in the rounding of the table.
-    for (double& p : power)
-        if (p > 0) p = std::max(p, 1e-6 * total);
-    scene.emitter_cdf.clear();
-    append_cdf(scene.emitter_cdf, power.size(), [&](size_t i) { return power[i]; });
-    // The table's own steps, so that density and sampling agree to the last bit.
-    for (size_t i = 0; i < power.size(); ++i)
+    const std::vector<double> weights = picking_weights(std::move(powers), infinite, picking);
+    scene.emitter_cdf =
+        checked_pick_table(scene, weights, "emitters", "make one mesh light of emitters with the same radiance");
+    for (size_t i = 0; i < weights.size(); ++i)
         scene.emitters[i].pick_probability = scene.emitter_cdf[i + 1] - scene.emitter_cdf[i];
 }
 

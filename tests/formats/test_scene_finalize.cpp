@@ -151,8 +151,10 @@ TEST_CASE("power of every emitter type decides the pick probability (B10)") {
     s.emitters.push_back(emitter(EmitterType::constant, {0.5f, 0.5f, 0.5f}));
     s.emitters.push_back(emitter(EmitterType::point, {0, 0, 0}));
     finalize_scene(s, LightPicking::power);
+    // No more light from infinity than falls on the surfaces, which are smaller than the disk of the bounds.
     const double disk = M_PI * double(s.bounds_radius) * s.bounds_radius;
-    const double power[6] = {M_PI * 9 * 2, 4 * M_PI * 5, 2 * M_PI * (1 - 0.65) * 7, disk * 3, disk * 4 * M_PI * 0.5, 0};
+    REQUIRE(disk > 9);
+    const double power[6] = {M_PI * 9 * 2, 4 * M_PI * 5, 2 * M_PI * (1 - 0.65) * 7, 9 * 3, M_PI * 2 * 9 * 0.5, 0};
     double total = 0;
     for (double p : power) total += p;
     REQUIRE(s.emitter_cdf.size() == 7);
@@ -181,6 +183,104 @@ TEST_CASE("a faint emitter keeps a share, black ones alone share equally") {
     CHECK(s.emitters[0].pick_probability == 0.5f);
     s.emitters[0].radiance.value = {kInfinity, 0, 0};
     CHECK_THROWS_AS(finalize_scene(s, LightPicking::power), Error);
+}
+
+/// How often each of n entries of a cumulative table is picked, over all values of a random float.
+std::vector<uint32_t> count_all_picks(const float* cdf, uint32_t n) {
+    std::vector<uint32_t> picked(n, 0);
+    for (uint32_t k = 0; k < 1u << 24; ++k) ++picked[sample_cdf(cdf, n, uniform_float(k << 8))];
+    return picked;
+}
+
+/// Emitters whose pick probability is not the share of random floats that pick them, or is zero though they shine.
+int wrongly_picked(const Scene& s) {
+    const std::vector<uint32_t> picked = count_all_picks(s.emitter_cdf.data(), uint32_t(s.emitters.size()));
+    int wrong = 0;
+    for (size_t i = 0; i < picked.size(); ++i) {
+        const bool shines = s.emitters[i].radiance.value.x > 0;
+        wrong += double(s.emitters[i].pick_probability) != picked[i] * 0x1p-24 || (picked[i] > 0) != shines;
+    }
+    return wrong;
+}
+
+TEST_CASE("finite and infinite emitters get an eighth of the picks at least: a stone far away does not take a room's") {
+    Scene s = base();
+    const uint32_t room = add_triangles(s, {{Vec3f{-1, 0, 0}, {1, 0, 0}, {0, 1, 0}}});
+    add_area_emitter(s, room, {1, 1, 1});
+    add_triangles(s, {{Vec3f{1e4f, 0, 0}, {1e4f + 1, 0, 0}, {1e4f, 1, 0}}});
+    s.environment = uint32_t(s.emitters.size());
+    s.emitters.push_back(emitter(EmitterType::constant, {1, 1, 1}));
+    finalize_scene(s, LightPicking::power);
+    // By areas: the lamp sends pi, the environment at most 2 pi (1 + 0.5).
+    CHECK(s.emitters[0].pick_probability == Approx(1.0 / 4).epsilon(1e-5));
+    s.emitters[1].radiance.value = splat(1e6f);
+    finalize_scene(s, LightPicking::power);
+    CHECK(s.emitters[0].pick_probability == Approx(kLeastGroupShare).epsilon(1e-5));
+}
+
+TEST_CASE("emitters are picked with exactly their pick probability: weak before strong, 1e5 and 1e6 lamps") {
+    for (const LightPicking picking : {LightPicking::power, LightPicking::uniform}) {
+        Scene weak_first = base();
+        for (float intensity : {1.3e-4f, 1e-9f, 1.0f, 0.3f})
+            weak_first.emitters.push_back(emitter(EmitterType::point, splat(intensity)));
+        finalize_scene(weak_first, picking);
+        CHECK(wrongly_picked(weak_first) == 0);
+        for (uint32_t n : {100000u, 1000000u}) {
+            Scene s = base();
+            for (uint32_t i = 0; i < n; ++i) {
+                const Vec4f u = random_floats({7, i, 0, Stream::test}, 0);
+                // Black ones, and six orders of magnitude.
+                s.emitters.push_back(emitter(EmitterType::point, splat(u.x < 0.05f ? 0.0f : std::pow(10.0f, 6 * u.y))));
+            }
+            finalize_scene(s, picking);
+            INFO(n << " lamps");
+            CHECK(wrongly_picked(s) == 0);
+        }
+    }
+}
+
+TEST_CASE("a million faint emitters together take no more than a small share of the picks") {
+    Scene s = base();
+    s.emitters.push_back(emitter(EmitterType::point, splat(1)));
+    for (int i = 0; i < 1000000; ++i) s.emitters.push_back(emitter(EmitterType::point, splat(1e-20f)));
+    finalize_scene(s, LightPicking::power);
+    CHECK(s.emitters[0].pick_probability > 0.9f);
+    CHECK(wrongly_picked(s) == 0);
+}
+
+TEST_CASE("triangles of a light of 3e6 are picked with exactly the density that is divided by (B13)") {
+    const uint32_t n = 3000000;
+    for (const bool equal : {true, false}) {
+        Scene s = base();
+        const uint32_t mesh = add_triangles(s, {});
+        s.vertices = {{Vec3f{0, 0, 0}}, {Vec3f{1, 0, 0}}, {Vec3f{0, 2, 0}}, {Vec3f{1e-3f, 1e-3f, 0}}};
+        for (uint32_t i = 0; i < n; ++i) s.triangles.push_back({0, 1, equal || i % 2 ? 2u : 3u, mesh});
+        s.shapes[mesh].primitive_count = n;
+        add_area_emitter(s, mesh, {1, 1, 1});
+        finalize_scene(s, LightPicking::power);
+        const float* cdf = s.tables.data() + s.emitters[0].area_cdf;
+        const std::vector<uint32_t> picked = count_all_picks(cdf, n);
+        double worst = 0;
+        for (uint32_t i = 0; i < n; ++i) {
+            const double area = equal || i % 2 ? 1.0 : 0.5 * double(1e-3f);
+            worst = std::max(worst, std::abs(double(cdf[n + 1 + i]) * area / (picked[i] * 0x1p-24) - 1));
+        }
+        INFO("equal " << equal);
+        CHECK(worst < 2e-7);  // the density is a float
+    }
+}
+
+TEST_CASE("a light of more triangles than random floats tell apart is refused with advice") {
+    Scene s = base();
+    s.path = "lamp.xml";
+    const uint32_t mesh = add_triangles(s, {});
+    s.vertices = {{Vec3f{0, 0, 0}}, {Vec3f{1, 0, 0}}, {Vec3f{0, 2, 0}}};
+    s.triangles.assign((1u << 24) + 1, {0, 1, 2, mesh});
+    s.shapes[mesh].primitive_count = uint32_t(s.triangles.size());
+    add_area_emitter(s, mesh, {1, 1, 1});
+    CHECK_THROWS_WITH(finalize_scene(s, LightPicking::power),
+                      "lamp.xml: 16777217 triangles in one light; light sampling tells 16777216 apart: split the mesh "
+                      "into several shapes");
 }
 
 TEST_CASE("bounds hold every surface and the camera; an empty scene has a radius (B9)") {

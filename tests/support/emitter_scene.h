@@ -1,5 +1,7 @@
 // Small scenes put together by hand for tests of textures, emitters and sensors, and the statistics those tests share.
-// The tables are filled here, apart from scene/finalize.cpp, so that an error there and one in sampling cannot cancel.
+// Areas, alias tables and what tables are made from are filled in here, apart from formats/finalize.cpp, so that an
+// error there and one in sampling cannot cancel. Cumulative tables are the project's (scene/pick_table.h): only whole
+// tickets make sampling and density one thing.
 #pragma once
 
 #include <algorithm>
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "core/rng.h"
+#include "scene/pick_table.h"
 #include "scene/scene.h"
 #include "transport/emitter.h"
 
@@ -177,14 +180,11 @@ inline Emitter& add_envmap(Scene& s, uint32_t width, uint32_t height, const std:
     return e;
 }
 
-/// Cumulative table of non-negative weights, appended to the tables.
-inline uint32_t append_cdf(Scene& s, const std::vector<double>& weights) {
+/// Table by which one of entries with these weights is picked, appended to the tables.
+inline uint32_t append_pick_table(Scene& s, const std::vector<double>& weights) {
     const uint32_t offset = uint32_t(s.tables.size());
-    double total = 0, sum = 0;
-    for (double w : weights) total += w;
-    s.tables.push_back(0.0f);
-    for (double w : weights) s.tables.push_back(float((sum += w) / total));
-    s.tables.back() = 1.0f;
+    const std::vector<float> cdf = pick_table(weights);
+    s.tables.insert(s.tables.end(), cdf.begin(), cdf.end());
     return offset;
 }
 
@@ -270,7 +270,7 @@ inline void complete(Scene& s, std::vector<double> pick_weights = {}) {
             const SceneView v = view_of(s);
             for (uint32_t k = 0; k < shape.primitive_count; ++k)
                 areas.push_back(triangle_area(v, shape.first_primitive + k));
-            e.area_cdf = append_cdf(s, areas);
+            e.area_cdf = append_pick_table(s, areas);
             for (uint32_t k = 0; k < shape.primitive_count; ++k)
                 s.tables.push_back(float((s.tables[e.area_cdf + k + 1] - s.tables[e.area_cdf + k]) / areas[k]));
         } else if (e.type == EmitterType::envmap) {
@@ -284,14 +284,9 @@ inline void complete(Scene& s, std::vector<double> pick_weights = {}) {
         }
     }
     if (pick_weights.empty()) pick_weights.assign(s.emitters.size(), 1.0);
-    double total = 0, sum = 0;
-    for (double w : pick_weights) total += w;
-    s.emitter_cdf.assign(1, 0.0f);
-    for (size_t i = 0; i < s.emitters.size(); ++i) {
-        s.emitters[i].pick_probability = float(pick_weights[i] / total);
-        s.emitter_cdf.push_back(float((sum += pick_weights[i]) / total));
-    }
-    if (!s.emitters.empty()) s.emitter_cdf.back() = 1.0f;
+    s.emitter_cdf = s.emitters.empty() ? std::vector<float>{0.0f} : pick_table(pick_weights);
+    for (size_t i = 0; i < s.emitters.size(); ++i)
+        s.emitters[i].pick_probability = s.emitter_cdf[i + 1] - s.emitter_cdf[i];
 }
 
 /// Rectangle in the plane through `origin` with edges `ex`, `ey` (normal: ex × ey) as 2 n² triangles of unequal size.
