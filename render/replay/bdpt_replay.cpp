@@ -87,6 +87,8 @@ public:
         return policy_.light_subpaths() ? wave_.width * wave_.height * policy_.waves.light_rounds() : 0;
     }
 
+    bool has_light_subpath(uint32_t number) const override { return exists(number); }
+
     ReplaySubpath light_subpath(uint32_t number, uint32_t sample, bool details,
                                 std::vector<ReplayCandidate>& splats) const override {
         if (!exists(number))

@@ -7,7 +7,7 @@
 
 namespace ambilux {
 
-/// Kernels of fewer features give the same bits, so that replays are compiled once.
+/// Replays are compiled once: kernels of fewer features differ by roundings only.
 constexpr Features kReplayFeatures = kAllFeatures;
 
 template <class Mis>

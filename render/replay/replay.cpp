@@ -19,6 +19,7 @@ public:
 
     ReplaySample sample(const ReplayRequest& request) const override { return replay_->sample(request); }
     uint32_t light_subpaths() const override { return replay_->light_subpaths(); }
+    bool has_light_subpath(uint32_t number) const override { return replay_->has_light_subpath(number); }
     ReplaySubpath light_subpath(uint32_t number, uint32_t sample, bool details,
                                 std::vector<ReplayCandidate>& splats) const override {
         return replay_->light_subpath(number, sample, details, splats);

@@ -26,14 +26,16 @@ public:
     virtual ReplaySample sample(const ReplayRequest& request) const = 0;
     /// Light subpaths of one sample of all pixels; 0 where there are none.
     virtual uint32_t light_subpaths() const { return 0; }
+    /// Numbers below light_subpaths() have gaps where there is no whole number of light subpaths per pixel.
+    virtual bool has_light_subpath(uint32_t) const { return false; }
     /// A light subpath alone and its splats anywhere on the film. Throws Error(usage) if there is none of that number.
     virtual ReplaySubpath light_subpath(uint32_t number, uint32_t sample, bool details,
                                         std::vector<ReplayCandidate>& splats) const = 0;
 };
 
 /// For renders with these settings, bdpt.auto among them excepted. On the CPU the sample of a replay has the bits of
-/// that of a render. Of a render on CUDA (backend=cuda) rays go through the same structure, but compilers round
-/// differently. Throws Error(usage) for integrators that are not known to it. The scene must outlive it.
+/// that of a render whose kernels hold all features (specialise=false), and is equal to others within rounding. Of a
+/// render on CUDA (backend=cuda) rays go through the same structure, but compilers round differently. Throws Error(usage) for integrators that are not known to it. The scene must outlive it.
 std::unique_ptr<Replay> make_replay(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
 
 /// The largest channel of a candidate's contribution or of a sample.
