@@ -31,7 +31,9 @@ std::string trace_command(const SceneOptions& o, const Scene& scene, const Rende
     const Variant& variant = variant_of(used);
     const auto add = [&](const Setting& s) {
         const bool option = std::find(options.begin(), options.end(), s.what.key) != options.end();
-        if (!option && s.applies_to(variant.traits, cuda) && s.text(used) != s.text(plain))
+        // The order of a queue is none unless asked for otherwise; the renderer has put that in the place of auto.
+        const bool unordered = s.what.key == "ordering" && s.text(used) == "none";
+        if (!option && !unordered && s.applies_to(variant.traits, cuda) && s.text(used) != s.text(plain))
             line += fmt::format(" --set {}={}", s.what.key, s.text(used));
     };
     for (const Setting& s : general_settings()) add(s);
@@ -61,14 +63,14 @@ void report_outlier(const Outlier& o, const std::string& command, std::string& t
     text += fmt::format("pixel {},{} sample {}: ({:.6g}, {:.6g}, {:.6g}), {:.6g} above the mean of its other samples\n",
                         p.x, p.y, p.sample, p.value[0], p.value[1], p.value[2], p.excess);
     if (o.largest.fate == ReplayFate::arrived)
-        text += fmt::format("  most of it by {}, {}, {}: ({:.6g}, {:.6g}, {:.6g})\n",
-                            strategy_text(o.largest.strategy), o.largest.kind, ends_of(o.largest),
-                            o.largest.contribution.x, o.largest.contribution.y, o.largest.contribution.z);
+        text += fmt::format("  most of it by {}, {}, {}: ({:.6g}, {:.6g}, {:.6g})\n", strategy_text(o.largest.strategy),
+                            o.largest.kind, ends_of(o.largest), o.largest.contribution.x, o.largest.contribution.y,
+                            o.largest.contribution.z);
     bool differs = false;
     for (int c = 0; c < 3; ++c) differs |= std::abs(o.replayed[c] - p.value[c]) > 1e-3 * std::abs(p.value[c]) + 1e-9;
     if (differs)
-        text += fmt::format("  the replay on the CPU brings ({:.6g}, {:.6g}, {:.6g}){}\n", o.replayed[0],
-                            o.replayed[1], o.replayed[2],
+        text += fmt::format("  the replay on the CPU brings ({:.6g}, {:.6g}, {:.6g}){}\n", o.replayed[0], o.replayed[1],
+                            o.replayed[2],
                             o.complete ? ": paths parted by rounding" : ", without connections from the cache");
     text += fmt::format("  {}\n", command);
     list.push_back({{"pixel", {p.x, p.y}},
@@ -83,7 +85,8 @@ void report_outlier(const Outlier& o, const std::string& command, std::string& t
 
 void report_invalid(const InvalidRecord& r, const std::string& command, std::string& text, nlohmann::json& list) {
     const bool eye = r.light_subpath == kNone;
-    const std::string where = eye ? fmt::format("pixel {},{}", r.x, r.y) : fmt::format("light subpath {}", r.light_subpath);
+    const std::string where =
+        eye ? fmt::format("pixel {},{}", r.x, r.y) : fmt::format("light subpath {}", r.light_subpath);
     text += fmt::format("stage {} dropped a value of {} sample {}{}\n  {}\n", r.stage, where, r.sample,
                         r.candidate.kind[0] ? fmt::format(", {}, {}, {}", strategy_text(r.candidate.strategy),
                                                           r.candidate.kind, ends_of(r.candidate))
@@ -116,9 +119,10 @@ void report_outliers(const SampleWatch& watch, const SceneOptions& options, cons
                        invalid);
     }
     if (!watch.invalid().empty() && invalid.empty())
-        text += fmt::format("stages dropped invalid values in sample {} and perhaps later; the replay on the CPU has "
-                            "none there\n",
-                            watch.invalid()[0].sample);
+        text += fmt::format(
+            "stages dropped invalid values in sample {} and perhaps later; the replay on the CPU has "
+            "none there\n",
+            watch.invalid()[0].sample);
     if (!quiet) std::cout << text << std::flush;
     statistics["outliers"] = outliers;
     statistics["invalid_values"] = invalid;

@@ -28,6 +28,11 @@ void fill_stage_stats(const std::vector<std::string>& names, const std::vector<S
                       RenderStats& stats) {
     for (size_t s = 0; s < names.size(); ++s) {
         const StageRecord& r = records[s];
+        // Stages that run as parts of others have no items of their own, but drop values.
+        if (r.nan + r.inf + r.negative) stats.invalid_by_stage[names[s]] = {r.nan, r.inf, r.negative};
+        stats.invalid.nan += r.nan;
+        stats.invalid.inf += r.inf;
+        stats.invalid.negative += r.negative;
         if (r.launches == 0 && r.items == 0) continue;
         StageStats stage;
         stage.name = names[s];
@@ -38,10 +43,6 @@ void fill_stage_stats(const std::vector<std::string>& names, const std::vector<S
         while (depths > 0 && r.items_by_depth[depths - 1] == 0) --depths;
         stage.items_by_depth.assign(r.items_by_depth, r.items_by_depth + depths);
         stats.stages.push_back(stage);
-        if (r.nan + r.inf + r.negative) stats.invalid_by_stage[stage.name] = {r.nan, r.inf, r.negative};
-        stats.invalid.nan += r.nan;
-        stats.invalid.inf += r.inf;
-        stats.invalid.negative += r.negative;
         if (stage.name == "extend" || stage.name == "light_extend") stats.rays_extend += r.items;
         if (stage.name == "occlude") stats.rays_occlude += r.items;
     }

@@ -92,10 +92,10 @@ public:
     ReplaySubpath light_subpath(uint32_t number, uint32_t sample, bool details,
                                 std::vector<ReplayCandidate>& splats) const override {
         if (!exists(number))
-            throw Error(ExitCode::usage, fmt::format("--light-subpath {}: {}", number,
-                                                     light_subpaths() == 0
-                                                         ? "no strategy of this render needs light subpaths"
-                                                         : "no light subpath of a sample has this number"));
+            throw Error(ExitCode::usage,
+                        fmt::format("--light-subpath {}: {}", number,
+                                    light_subpaths() == 0 ? "no strategy of this render needs light subpaths"
+                                                          : "no light subpath of a sample has this number"));
         ReplayLightRequest request = light(number, sample);
         request.details = details;
         ReplayLight found = replay_light(ctx_, request);
@@ -182,9 +182,8 @@ private:
         const uint32_t first = first_tile(request);
         return caches_.get(first, request.sample, [&] {
             ReplayLightRequest r = for_connections(0, request);
-            return std::shared_ptr<const ReplayVertices>(
-                replay_cache(ctx_, wave_, first, policy_.waves.light_subpaths_per_tile, policy_.waves.light_rounds(),
-                             r));
+            return std::shared_ptr<const ReplayVertices>(replay_cache(
+                ctx_, wave_, first, policy_.waves.light_subpaths_per_tile, policy_.waves.light_rounds(), r));
         });
     }
     uint32_t first_tile(const ReplayRequest& request) const {
@@ -197,8 +196,8 @@ private:
             const bool drawn = pairing_ == ReplayPairing::cache && !request.light_subpath;
             ReplayConnections c = {eye, z, path, lights, lights.source(drawn ? policy_.cache_draws : 0)};
             if (drawn)
-                c.state.light_subpaths = light_subpaths_in(wave_, first_tile(request), wave_.tiles,
-                                                           policy_.waves.light_subpaths_per_tile);
+                c.state.light_subpaths =
+                    light_subpaths_in(wave_, first_tile(request), wave_.tiles, policy_.waves.light_subpaths_per_tile);
             else if (pairing_ == ReplayPairing::cache)
                 c.scale = 1.0f / ctx_.rules.mis.connections;
             if (pairing_ == ReplayPairing::registers)

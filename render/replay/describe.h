@@ -95,8 +95,7 @@ bool replay_step(const ReplayContext<Mis>& ctx, Side side, uint32_t longest, con
     const Subpath<Mis> before = path;
     if (record) record->vertices.push_back(describe_arrival(ctx, side, path, hit));
     const bool goes_on = visit<kReplayFeatures>(ctx.view, ctx.rules, side, longest, hit, path, sink);
-    if (record)
-        describe_departure(ctx, side, longest, hit, sink.draws(), before, goes_on, record->vertices.back());
+    if (record) describe_departure(ctx, side, longest, hit, sink.draws(), before, goes_on, record->vertices.back());
     return goes_on;
 }
 
@@ -150,8 +149,7 @@ inline std::vector<ReplayNumber> camera_densities(const SceneView& view, Vec3f p
     CameraConnection camera;
     if (!connect_to_camera(view.sensor, p, lens_u, camera)) return {};
     const char* name = camera_delta_direction(view.sensor) ? "pdf_camera_area" : "pdf_camera_sa";
-    return {{"distance", camera.camera_distance},
-            {name, BidirectionalMis::camera_pdf(view.sensor, camera.cos_camera)}};
+    return {{"distance", camera.camera_distance}, {name, BidirectionalMis::camera_pdf(view.sensor, camera.cos_camera)}};
 }
 
 }  // namespace ambilux

@@ -72,7 +72,8 @@ struct ReplayLightSink {
             std::string by;
             const size_t before = light.splats.size();
             ConnectCamera<kReplayFeatures, ReplaySplats>{splats, watch.record()}.at(ctx.view, ctx.rules, y, path, 0, d);
-            if (watch.dropped("connect_camera", by)) splats.invalid("connect_camera", Strategy::make(path.depth + 1, 1));
+            if (watch.dropped("connect_camera", by))
+                splats.invalid("connect_camera", Strategy::make(path.depth + 1, 1));
             const Vec4f u = d.lens(path.depth);
             if (request.details && light.splats.size() > before)
                 light.splats.back().densities = camera_densities(ctx.view, y.point.p, {u.x, u.y});
@@ -89,8 +90,7 @@ struct ReplayLightSink {
 };
 
 /// The emission that the subpath begins with, in words.
-inline void describe_start(const ReplayContext<BidirectionalMis>& ctx, const Draws& draws,
-                           ReplaySubpath& subpath) {
+inline void describe_start(const ReplayContext<BidirectionalMis>& ctx, const Draws& draws, ReplaySubpath& subpath) {
     EmissionSample e;
     if (!sample_start<kReplayFeatures>(ctx.view, draws, e)) return;
     subpath.emitter = name_of(ctx.view.emitters[e.emitter].type);

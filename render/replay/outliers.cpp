@@ -70,10 +70,12 @@ std::vector<InvalidRecord> find_invalid(const SampleWatch& watch, const Replay& 
     std::map<std::string, uint32_t> of_stage;
     for (const WatchedInvalid& w : watch.invalid()) {
         InvalidSearch search{replay, w.sample, width, {}, {}};
-        parallel_for(uint32_t(std::min<uint64_t>(pixels, kMostInvalidSubpaths)),
-                     [&](uint32_t pixel) { search.eye_subpath(pixel); }, 64u);
-        parallel_for(std::min(replay.light_subpaths(), kMostInvalidSubpaths),
-                     [&](uint32_t number) { search.light_subpath(number); }, 64u);
+        parallel_for(
+            uint32_t(std::min<uint64_t>(pixels, kMostInvalidSubpaths)),
+            [&](uint32_t pixel) { search.eye_subpath(pixel); }, 64u);
+        parallel_for(
+            std::min(replay.light_subpaths(), kMostInvalidSubpaths),
+            [&](uint32_t number) { search.light_subpath(number); }, 64u);
         std::stable_sort(search.found.begin(), search.found.end(), before);
         for (InvalidRecord& r : search.found)
             if (of_stage[r.stage]++ < per_stage) kept.push_back(std::move(r));

@@ -21,7 +21,8 @@ std::string text_of(const std::vector<ReplayNumber>& numbers) {
 void print_scatter(const ReplayScatter& s, std::string& out) {
     if (!s.sampled) return;
     if (s.delta)
-        out += fmt::format("       scattered by a delta lobe of probability {:.6g} to {}", s.pdf_sa, text_of(s.direction));
+        out +=
+            fmt::format("       scattered by a delta lobe of probability {:.6g} to {}", s.pdf_sa, text_of(s.direction));
     else
         out += fmt::format("       scattered to {}, pdf_sa {:.6g}, pdf_reverse_sa {:.6g}", text_of(s.direction),
                            s.pdf_sa, s.pdf_reverse_sa);
@@ -38,8 +39,8 @@ void print_vertex(const ReplayVertex& v, std::string& out) {
         out += fmt::format("       meets nothing; {}\n", text_of(v.sums));
     } else {
         out += fmt::format("       meets shape {} (primitive {}, material {}, {}{}) after {:.6g} at {}\n", v.shape,
-                           v.prim, v.material, v.bsdf,
-                           v.emitter == kNone ? "" : fmt::format(", emitter {}", v.emitter), v.distance, text_of(v.p));
+                           v.prim, v.material, v.bsdf, v.emitter == kNone ? "" : fmt::format(", emitter {}", v.emitter),
+                           v.distance, text_of(v.p));
         out += fmt::format("       ng {}, ns {}; {}\n", text_of(v.ng), text_of(v.ns), text_of(v.sums));
     }
     print_scatter(v.scatter, out);
@@ -73,8 +74,10 @@ void print_candidate(const ReplayCandidate& c, std::string& out) {
     std::string ends = c.eye_depth ? fmt::format("eye vertex {}", c.eye_depth) : "";
     if (c.light_subpath != kNone)
         ends += fmt::format("{}light subpath {} vertex {}", ends.empty() ? "" : ", ", c.light_subpath, c.light_depth);
-    out += fmt::format("  {:<8} {}, {}: value {}, ratio {:.6g}, weight {:.6g}\n", strategy_text(c.strategy), c.kind,
-                       ends, text_of(c.value), c.ratio, c.weight);
+    out += fmt::format("  {:<8} {}, {}", strategy_text(c.strategy), c.kind, ends);
+    // What a stage drops before it has a weight is not kept.
+    const bool kept = c.fate != ReplayFate::invalid || !is_zero(c.value);
+    out += kept ? fmt::format(": value {}, ratio {:.6g}, weight {:.6g}\n", text_of(c.value), c.ratio, c.weight) : "\n";
     if (!c.densities.empty()) out += fmt::format("           {}\n", text_of(c.densities));
     if (c.tmax > 0)
         out += fmt::format("           shadow ray from {} along {}, {:.6g} long: {}\n", text_of(c.origin),

@@ -36,8 +36,8 @@ struct ReplayScatter {
 /// Where the ray of a subpath of `depth` segments ended.
 struct ReplayVertex {
     uint32_t depth = 0;
-    Vec3f origin{}, direction{};  ///< of the ray
-    Rgb throughput{};             ///< of the ray
+    Vec3f origin{}, direction{};     ///< of the ray
+    Rgb throughput{};                ///< of the ray
     std::vector<ReplayNumber> sums;  ///< of multiple importance sampling, at the vertex; of a miss, of the ray
     bool miss = true;                ///< what follows is of hits only
     float distance = 0;
@@ -85,7 +85,7 @@ struct ReplaySubpath {
     std::string emitter;
     std::vector<ReplayNumber> start_densities;
     std::vector<ReplayVertex> vertices;
-    std::string end;  ///< why there is no first ray; else empty
+    std::string end;         ///< why there is no first ray; else empty
     std::string dropped_by;  ///< stage that dropped an invalid throughput; else empty
 };
 

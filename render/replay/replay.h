@@ -35,7 +35,8 @@ public:
 
 /// For renders with these settings, bdpt.auto among them excepted. On the CPU the sample of a replay has the bits of
 /// that of a render whose kernels hold all features (specialise=false), and is equal to others within rounding. Of a
-/// render on CUDA (backend=cuda) rays go through the same structure, but compilers round differently. Throws Error(usage) for integrators that are not known to it. The scene must outlive it.
+/// render on CUDA (backend=cuda) rays go through the same structure, but compilers round differently. Throws
+/// Error(usage) for integrators that are not known to it. The scene must outlive it.
 std::unique_ptr<Replay> make_replay(const Scene& scene, const RenderSettings& settings, SharedAccels& accels);
 
 /// The largest channel of a candidate's contribution or of a sample.

@@ -21,7 +21,9 @@ json to_json(const std::vector<ReplayNumber>& numbers) {
 
 json to_json(const ReplayScatter& s) {
     if (!s.sampled) return nullptr;
-    json j = {{"direction", triple(s.direction)}, {"delta", s.delta}, {"weight", triple(s.weight)},
+    json j = {{"direction", triple(s.direction)},
+              {"delta", s.delta},
+              {"weight", triple(s.weight)},
               {"eta", number(double(s.eta))}};
     j[s.delta ? "probability" : "pdf_sa"] = number(double(s.pdf_sa));
     if (!s.delta) j["pdf_reverse_sa"] = number(double(s.pdf_reverse_sa));
@@ -34,9 +36,12 @@ json to_json(const ReplayScatter& s) {
 }
 
 json to_json(const ReplayVertex& v) {
-    json j = {{"depth", v.depth},       {"origin", triple(v.origin)},
-              {"direction", triple(v.direction)}, {"throughput", triple(v.throughput)},
-              {"sums", to_json(v.sums)}, {"miss", v.miss},
+    json j = {{"depth", v.depth},
+              {"origin", triple(v.origin)},
+              {"direction", triple(v.direction)},
+              {"throughput", triple(v.throughput)},
+              {"sums", to_json(v.sums)},
+              {"miss", v.miss},
               {"end", v.end.empty() ? json(nullptr) : json(v.end)}};
     if (v.miss) return j;
     j.update({{"distance", number(double(v.distance))},
@@ -73,9 +78,8 @@ json to_json(const ReplayCandidate& c) {
               {"dropped_by", c.dropped_by.empty() ? json(nullptr) : json(c.dropped_by)},
               {"contribution", triple(c.contribution)}};
     if (c.tmax > 0)
-        j["shadow_ray"] = {{"origin", triple(c.origin)},
-                           {"direction", triple(c.direction)},
-                           {"length", number(double(c.tmax))}};
+        j["shadow_ray"] = {
+            {"origin", triple(c.origin)}, {"direction", triple(c.direction)}, {"length", number(double(c.tmax))}};
     if (c.eye_depth == 0) {
         j["film"] = {number(double(c.film.x)), number(double(c.film.y))};
         j["filter"] = number(double(c.filter));
@@ -124,8 +128,7 @@ json replay_json(const ReplaySample& r, const ReplayFilter& filter) {
             {"notes", r.notes}};
 }
 
-json replay_json(const ReplaySubpath& subpath, const std::vector<ReplayCandidate>& splats,
-                 const ReplayFilter& filter) {
+json replay_json(const ReplaySubpath& subpath, const std::vector<ReplayCandidate>& splats, const ReplayFilter& filter) {
     return {{"light_subpath", to_json(subpath)}, {"splats", to_json(splats, filter)}};
 }
 

@@ -112,7 +112,7 @@ TEST_CASE("A replayed sample of the path tracer is the render's, bit by bit with
                 CAPTURE(name, text_of(c), specialise);
                 RenderSettings settings = settings_of(scene, c);
                 settings.specialise = specialise;
-                CHECK(check_samples(scene, settings, 5, 1) > 100);
+                CHECK(check_samples(scene, settings, 5, 1) > 0);
             }
     }
 }
@@ -167,7 +167,7 @@ TEST_CASE("A watched render has the image of one that is not, and names its larg
     }
 }
 
-TEST_CASE("Invalid values are found again: pixel, sample, stage and strategy") {
+TEST_CASE("Invalid values of a stage inside of another are counted, and found again with pixel, sample and strategy") {
     // A lamp so bright that its light, divided by the density of sampling it, is infinite.
     const Scene scene = scene_from_text(R"(<scene version="3.0.0">
         <integrator type="path"><integer name="max_depth" value="2"/></integrator>
@@ -177,7 +177,7 @@ TEST_CASE("Invalid values are found again: pixel, sample, stage and strategy") {
         <shape type="rectangle"><bsdf type="diffuse"/></shape>
         <shape type="rectangle"><transform name="to_world"><scale value="50"/><rotate y="1" angle="180"/>
                 <translate z="5"/></transform>
-            <emitter type="area"><rgb name="radiance" value="3e37"/></emitter></shape></scene>)");
+            <emitter type="area"><rgb name="radiance" value="1e38"/></emitter></shape></scene>)");
     RenderSettings settings = settings_of(scene, {"path", "wavefront", {{"estimator", "nee"}}});
     SampleWatch watch(make_renderer(scene, settings));
     REQUIRE(watch.render(0, 2) == 2);
