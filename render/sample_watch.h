@@ -21,8 +21,8 @@ struct WatchedInvalid {
 };
 
 /// Renders one sample of all pixels at a time and adds up the films on the host, in the same order: the image is that
-/// of the renderer, unless its waves hold several samples that depend on each other (variant lvc on CUDA). Costs 32
-/// bytes per pixel and, on CUDA, a transfer of the film per sample.
+/// of the renderer, unless its waves hold several samples that depend on each other (variant lvc on CUDA). Costs
+/// about 130 bytes per pixel and, on CUDA, a transfer of the film per sample.
 class SampleWatch final : public Renderer {
 public:
     static constexpr size_t kMostInvalid = 8;  ///< samples that invalid() remembers, the first ones
