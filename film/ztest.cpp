@@ -244,9 +244,8 @@ private:
     void conclude() {
         r_.p_worst = r_.tests ? sidak(2 * normal_tail(std::abs(r_.worst_z)), double(r_.tests)) : 1;
         r_.relative_difference = total_a_ == total_b_ ? 0 : (total_a_ - total_b_) / total_b_;
-        const double threshold =
-            student_tail_inverse(0.5 * sidak_level(0.5 * options_.significance, std::max<double>(1, double(r_.tests))),
-                                 dof_);
+        const double threshold = student_tail_inverse(
+            0.5 * sidak_level(0.5 * options_.significance, std::max<double>(1, double(r_.tests))), dof_);
         r_.detectable = threshold * deviation_ / std::abs(total_b_);
         r_.pass = !r_.undecided && r_.p_worst >= 0.5 * options_.significance &&
                   r_.p_chi_square >= 0.5 * options_.significance;

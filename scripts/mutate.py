@@ -86,6 +86,7 @@ class Workspace:
         self.folder, self.source, self.build = folder, folder / "source", folder / "build"
         self.tests = tests
         self.faults = {}
+        self.sources = {n: (ROOT / n).read_text() for n in project_files(*FOLDERS) if n.endswith((".h", ".cpp"))}
 
     # ---- faults and their build ----
 
@@ -105,10 +106,8 @@ class Workspace:
         by_file = {}
         for number, site in self.faults.items():
             by_file.setdefault(site.file, []).append((number, site))
-        for name in project_files(*FOLDERS):
-            if name.endswith((".h", ".cpp")):
-                text = (ROOT / name).read_text()
-                write(self.source / name, mutation_sites.rewrite(text, by_file[name]) if name in by_file else text)
+        for name, text in self.sources.items():
+            write(self.source / name, mutation_sites.rewrite(text, by_file[name]) if name in by_file else text)
         write(self.source / "core/mutation.h", HEADER % (max(self.faults) + 1))
 
     def configure(self):
@@ -135,8 +134,7 @@ class Workspace:
 
     def draw(self, seed, count):
         """Draws faults, without those that do not compile, or reads those of an earlier run."""
-        sources = {n: (ROOT / n).read_text() for n in project_files(*FOLDERS) if n.endswith((".h", ".cpp"))}
-        key = hashlib.sha256(json.dumps([seed, count, sources], sort_keys=True).encode()).hexdigest()
+        key = hashlib.sha256(json.dumps([seed, count, self.sources], sort_keys=True).encode()).hexdigest()
         known = self.folder / "faults.json"
         if known.exists() and (saved := json.loads(known.read_text()))["key"] == key:
             self.faults = {int(k): Site(**s) for k, s in saved["faults"].items()}
@@ -144,8 +142,8 @@ class Workspace:
             return
         for old in ("results.jsonl", "cases.json"):
             (self.folder / old).unlink(missing_ok=True)
-        sites = [s for name in sorted(sources) for s in mutation_sites.sites_of(name, sources[name])]
-        say(f"{len(sites)} places for faults in {len(sources)} files")
+        sites = [s for name in sorted(self.sources) for s in mutation_sites.sites_of(name, self.sources[name])]
+        say(f"{len(sites)} places for faults in {len(self.sources)} files")
         dropped = set()
         self.copy()
         while True:

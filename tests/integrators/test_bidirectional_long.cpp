@@ -81,7 +81,8 @@ public:
     void check(const Method& m, bool hidden, double sees) {
         scene_.integrator.hide_emitters = hidden;
         if (!path_.contains(hidden)) path_[hidden] = render_path(scene_, c_.path);
-        const ZTestResult z = z_test(render_batches(scene_, method_settings(scene_, m, 1), c_.sampled), path_[hidden]);
+        const Estimate image = render_batches(scene_, method_settings(scene_, m, 1), c_.sampled);
+        const ZTestResult z = z_test(image, path_[hidden]);
         const std::string what = std::string(c_.name) + ", " + m.name +
                                  (m.heuristic == MisHeuristic::power ? ", power" : "") +
                                  (m.variant == "wavefront" ? "" : ", " + m.variant);
@@ -91,6 +92,7 @@ public:
         INFO(what << ": " << z.report());
         CHECK(z.pass);
         CHECK(z.detectable < sees);
+        CHECK(sees_bias(image, path_[hidden], sees));
     }
 
 private:

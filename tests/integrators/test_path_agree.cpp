@@ -6,6 +6,7 @@
 
 #include "film/ztest.h"
 #include "formats/finalize.h"
+#include "tests/support/injected_bias.h"
 #include "tests/support/render_scene.h"
 #include "transport/emitter.h"
 
@@ -60,10 +61,12 @@ FilmMoments render_with(const Scene& scene, const Comparison& c, Estimator estim
 }
 
 void check_pair(const char* name, const FilmMoments& a, const FilmMoments& b, double sees) {
-    const ZTestResult z = z_test(to_estimate(a), to_estimate(b));
+    const Estimate x = to_estimate(a), y = to_estimate(b);
+    const ZTestResult z = z_test(x, y);
     INFO(name << " against mis: " << z.report());
     CHECK(z.pass);
     CHECK(z.detectable < sees);
+    CHECK(sees_bias(x, y, sees));
 }
 
 void compare(Scene scene, const Comparison& c) {

@@ -16,9 +16,13 @@ inline Estimate scaled(Estimate e, double factor) {
     return e;
 }
 
-/// Whether the comparison of `a` and `b` fails once `a` is too bright by `relative`, and once it is too dark by it.
+/// Whether the comparison of `a` and `b` fails once `a` as a whole is brighter than `b` by `relative`, and once it is
+/// darker by it. The difference that chance made is taken out first: with it, an image may lie just below the limit on
+/// one side.
 inline bool sees_bias(const Estimate& a, const Estimate& b, double relative, const ZTestOptions& options = {}) {
-    return !z_test(scaled(a, 1 + relative), b, options).pass && !z_test(scaled(a, 1 - relative), b, options).pass;
+    const double level = 1 + z_test(a, b, options).relative_difference;
+    return !z_test(scaled(a, (1 + relative) / level), b, options).pass &&
+           !z_test(scaled(a, (1 - relative) / level), b, options).pass;
 }
 
 }  // namespace ambilux
