@@ -103,7 +103,7 @@ TEST_CASE("B28: sums along a subpath over tiny and huge scenes keep the ratios o
     for (const MisHeuristic h : kHeuristics) {
         const BidirectionalMis mis{h, kAllStrategies, 4096.0f, 1.0f};
         const auto weight = [&](float size) {
-            MisSums y = {0.3f, 0.1f * mis.term(1 / sqr(size))}, z = {mis.term(0.2f), 0.0f};
+            MisSums y = {0.3f, 0.1f * mis.term(sqr(size))}, z = {mis.term(0.2f), 0.0f};
             for (int k = 0; k < 5; ++k)
                 for (MisSums* s : {&y, &z}) {
                     *s = mis.sums_at_hit(*s, sqr(size) * (0.5f + float(k)), 0.4f, false);
@@ -120,6 +120,19 @@ TEST_CASE("B28: sums along a subpath over tiny and huge scenes keep the ratios o
             CHECK(weight(size) == Approx(weight(1)).epsilon(1e-5));
         }
     }
+}
+
+TEST_CASE("next event estimation alone leaves it all that it can find, however thinly") {
+    const UnidirectionalMis nee{Estimator::nee, MisHeuristic::balance, true};
+    struct {
+    } path;
+    for (const float p : magnitudes()) {
+        float ratio = -1;
+        CHECK_FALSE(nee.ratio_to(path, {1.0f}, p, ratio));
+    }
+    float ratio = -1;
+    CHECK(nee.ratio_to(path, {1.0f}, 0.0f, ratio));
+    CHECK(ratio == 0);
 }
 
 TEST_CASE("B27: without a light subpath strategies that need one have no weight, and the others finite ones") {
