@@ -51,7 +51,7 @@ def functions(masked):
         elif c == "}" and stack:
             start, header = stack.pop()
             outermost = not any(h is not None for _, h in stack)
-            if header is not None and outermost and "constexpr" not in header:
+            if header is not None and outermost and not re.search(r"\b(constexpr|requires|concept)\b", header):
                 found.append((start, i, header))
         if c in ";{}":
             previous = i + 1

@@ -81,7 +81,7 @@ inline void check_expectation(const Scene& scene, const RenderSettings& settings
     if (!exact) {
         const ZTestResult pilot = z_test(to_estimate(renderer->film()), exact_estimate(expected), options);
         const double samples = kPilot * std::pow(pilot.detectable / kSeen, 2) * 1.2;
-        const auto n = uint32_t(std::clamp(samples, double(kPilot), 3e4));
+        const auto n = uint32_t(std::clamp(samples, double(kPilot), 4.5e4));
         renderer->clear_film();
         REQUIRE(renderer->render(kPilot, n) == n);
         const Estimate image = to_estimate(renderer->film()), truth = exact_estimate(expected);
