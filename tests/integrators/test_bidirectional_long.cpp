@@ -1,4 +1,5 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// data: tagged
 // labels: long
 // timeout: 3600
 // Every mask of strategies that can sample a scene, both heuristics, every variant and the light tracer against the
@@ -143,7 +144,7 @@ TEST_CASE("Masks of strategies agree with the path tracer on the project's scene
     on_project_scenes(compare_masks);
 }
 
-TEST_CASE("Masks of strategies agree with the path tracer on the published scenes", "[bidirectional]") {
+TEST_CASE("Masks of strategies agree with the path tracer on the published scenes", "[bidirectional][data]") {
     on_published_scenes(compare_masks);
 }
 
@@ -151,6 +152,6 @@ TEST_CASE("Variants agree with the path tracer on the project's scenes", "[bidir
     on_project_scenes(compare_variants);
 }
 
-TEST_CASE("Variants agree with the path tracer on the published scenes", "[bidirectional]") {
+TEST_CASE("Variants agree with the path tracer on the published scenes", "[bidirectional][data]") {
     on_published_scenes(compare_variants);
 }

@@ -1,4 +1,5 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// data: tagged
 // timeout: 300
 // The estimators naive, nee and mis (balance, power) have the same expectation on every scene: z-tests of pairs that
 // share no random numbers.
@@ -92,7 +93,7 @@ TEST_CASE("Estimators agree on the project's scenes", "[path]") {
     }
 }
 
-TEST_CASE("Estimators agree on the published scenes", "[path]") {
+TEST_CASE("Estimators agree on the published scenes", "[path][data]") {
     for (const Comparison& c : kComparisons) {
         if (!c.published) continue;
         INFO(c.name << ", max_depth " << c.max_depth);

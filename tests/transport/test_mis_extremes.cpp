@@ -75,7 +75,8 @@ Connected random_ends(std::mt19937& rng, float decades) {
 double true_ratio(const Connected& c, const BidirectionalMis& mis) {
     const double b = beta(mis.heuristic), k = std::pow(double(mis.connections), b);
     const auto side = [&](MisSums s, float area, float reverse) {
-        return std::pow(double(area), b) * (k * double(s.dvcm) + double(s.dvc) * std::pow(double(reverse), b));
+        return std::pow(double(area), b) *
+               (k * std::pow(double(s.dvcm), b) + std::pow(double(s.dvc) * double(reverse), b));
     };
     return (side(c.y, c.p.y_area, c.p.y_reverse_sa) + side(c.z, c.p.z_area, c.p.z_reverse_sa)) / k;
 }
@@ -86,7 +87,7 @@ TEST_CASE("B28: weights of connections are right where their densities differ by
     std::mt19937 rng(5);
     for (const MisHeuristic h : kHeuristics)
         // A product of three densities must be a float: as far as that goes.
-        for (const float decades : {3.0f, 6.0f, h == MisHeuristic::power ? 7.0f : 12.0f})
+        for (const float decades : {3.0f, 6.0f, 12.0f})
             for (const float connections : {1.0f, 0.01f, 40.0f})
                 for (int i = 0; i < 20000; ++i) {
                     const BidirectionalMis mis{h, kAllStrategies, 1000.0f, connections};
@@ -103,7 +104,7 @@ TEST_CASE("B28: sums along a subpath over tiny and huge scenes keep the ratios o
     for (const MisHeuristic h : kHeuristics) {
         const BidirectionalMis mis{h, kAllStrategies, 4096.0f, 1.0f};
         const auto weight = [&](float size) {
-            MisSums y = {0.3f, 0.1f * mis.term(sqr(size))}, z = {mis.term(0.2f), 0.0f};
+            MisSums y = {0.3f, 0.1f * sqr(size)}, z = {0.2f, 0.0f};
             for (int k = 0; k < 5; ++k)
                 for (MisSums* s : {&y, &z}) {
                     *s = mis.sums_at_hit(*s, sqr(size) * (0.5f + float(k)), 0.4f, false);
@@ -113,7 +114,7 @@ TEST_CASE("B28: sums along a subpath over tiny and huge scenes keep the ratios o
             const float per_area = 0.2f / sqr(size);
             return mis_weight(mis.connection_ratio(y, false, z, false, {per_area, 0.3f, per_area, 0.1f}));
         };
-        for (const float size : {0x1p-12f, 0x1p-6f, 0x1p6f, 0x1p12f}) {
+        for (const float size : {0x1p-30f, 0x1p-12f, 0x1p12f, 0x1p30f}) {
             INFO(Heuristics::kNames[int(h)] << ", size " << size);
             CHECK(weight(1) > 0);
             CHECK(weight(1) < 1);
