@@ -233,17 +233,21 @@ class Workspace:
             say(f"[{done}/{len(numbers)}, {left / 60:.0f} min left] {number} {result['how']} ({result['by']}; {result['seconds']} s): {self.faults[number].describe()}")
 
 
+def flat(text):
+    return " ".join(text.split())
+
+
 def equivalents():
-    """(file, original, mutated) to reason."""
+    """(file, source line, original, mutated) to reason, from lines of these five separated by tabs."""
     path = ROOT / "scripts/mutation_equivalents.txt"
-    lines = [l for l in path.read_text().splitlines() if l and not l.startswith("#")] if path.exists() else []
-    return {tuple(p.strip() for p in l.split(" | ")[:3]): l.split(" | ")[3].strip() for l in lines}
+    lines = [line.split("\t") for line in path.read_text().splitlines() if line and not line.startswith("#")] if path.exists() else []
+    return {tuple(flat(p) for p in line[:4]): line[4].strip() for line in lines}
 
 
 def report(workspace):
     results, known = workspace.results(), equivalents()
-    flat = lambda s: " ".join(s.split())
-    reason = {k: known.get((s.file, flat(s.original), flat(s.mutated))) for k, s in workspace.faults.items()}
+    line = lambda s: workspace.sources[s.file].splitlines()[s.line - 1]
+    reason = {k: known.get((s.file, flat(line(s)), flat(s.original), flat(s.mutated))) for k, s in workspace.faults.items()}
     tried = [k for k in workspace.faults if k in results and not reason[k]]
     survivors = [k for k in tried if not results[k]["killed"]]
     for k in workspace.faults:
@@ -281,7 +285,7 @@ def main():
     workspace.draw(options.seed, options.count)
     if not options.report:
         workspace.compile()
-        results, known = workspace.results(), equivalents()
+        results = workspace.results()
         again = lambda k: k not in results or (options.retry and not results[k]["killed"])
         workspace.run_faults(options.only or [k for k in workspace.faults if again(k)])
     return report(workspace)

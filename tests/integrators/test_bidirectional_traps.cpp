@@ -121,7 +121,7 @@ TEST_CASE("B31: glass panes that each stop one family of strategies leave the im
                 if (which >> k & 1) body += panes[k];
             Scene scene = scene_from_text(scene_xml(6, body));
             scene.integrator.hide_emitters = true;
-            agree(scene, {kAll, variant("lvc", MisHeuristic::power)}, 2048, 1024, 0.1);
+            agree(scene, {kAll, variant("lvc", MisHeuristic::power)}, 3072, 1536, 0.1);
         }
 }
 

@@ -76,6 +76,28 @@ TEST_CASE("a mirror of a metal scatters with certainty, and changes no index") {
     CHECK(s.eta == 1.0f);
 }
 
+TEST_CASE("glass reflects and refracts with the probabilities that it states") {
+    Resolved<Dielectric> parameters{};
+    parameters.specular_reflectance = parameters.specular_transmittance = {1, 1, 1};
+    parameters.ior = 1.5f;
+    for (const float z : {0.9f, 0.3f, -0.8f}) {
+        const Vec3f wi = {std::sqrt(1 - z * z), 0, z};
+        const float r = fresnel_dielectric(z, 1.5f).reflectance;
+        constexpr uint32_t kSteps = 1000;
+        float reflected = 0;
+        for (uint32_t i = 0; i < kSteps; ++i) {
+            BsdfSample s;
+            REQUIRE(bsdf_sample<kAllFeatures>(bsdf_of(parameters), wi, {(float(i) + 0.5f) / kSteps, 0.5f, 0.5f},
+                                              TransportMode::importance, s));
+            const bool reflects = !(s.flags & kScatterTransmission);
+            reflected += reflects;
+            REQUIRE(s.pdf_sa == (reflects ? r : 1 - r));
+            REQUIRE(s.weight.x == Approx(1));
+        }
+        CHECK(std::fabs(reflected - r * kSteps) <= 1);
+    }
+}
+
 TEST_CASE("light at infinity has exact places") {
     Scene s;
     add_emitter(s, EmitterType::directional, splat(1)).direction = {0, 0, -1};
