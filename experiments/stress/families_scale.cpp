@@ -21,12 +21,12 @@ Family emission_scale() {
     return family;
 }
 
-constexpr int kSpaceDecades[] = {0, -10, -8, -6, -4, -2, 2, 4, 6, 8, 9, 10};
+constexpr int kSpaceDecades[] = {0, -10, -9, -8, -6, -4, -2, 2, 4, 6, 8, 9, 10};
 
 /// Scenes of quadrics (cavity), of triangles with direct light (plate), of a cube that emits (furnace).
 template <class Scene>
 Family space_scale(const std::string& name, const std::string& parameter, const Scene& scene,
-                   std::string (*xml)(const Scene&), Answer (*answer)(const Scene&), bool ends_are_quick) {
+                   std::string (*xml)(const Scene&), Answer (*answer)(const Scene&), int quick_decade) {
     Family family{name, parameter, {}};
     for (const int k : kSpaceDecades) {
         Scene scaled = scene;
@@ -34,7 +34,7 @@ Family space_scale(const std::string& name, const std::string& parameter, const 
         Cell cell{name, decade(scaled.frame.scale), scaled.frame.scale, answer(scaled),
                   [scaled, xml] { return SceneFiles{xml(scaled)}; }};
         cell.benign = k == 0;
-        cell.quick = k == 0 || (ends_are_quick && (k == -10 || k == 10));
+        cell.quick = k == 0 || std::abs(k) == quick_decade;
         family.cells.push_back(cell);
     }
     return family;
@@ -64,18 +64,21 @@ Family far_from_origin(const std::string& name, const Scene& scene, std::string 
 }  // namespace
 
 std::vector<Family> scale_families() {
+    Cavity cavity;
+    cavity.max_depth = 8;
     Plate plate;
     Furnace furnace;
+    furnace.max_depth = 6;
     furnace.origin = {0.25, -0.25, 0.25};
     furnace.target = {1, 0.5, 0.25};
-    return {emission_scale(),
-            space_scale<Cavity>("space-scale", "radius of the cavity", {}, cavity_scene, cavity_answer, true),
-            space_scale<Plate>("space-scale-plate", "scale of a floor under a lamp", plate, plain_plate, plate_answer,
-                               true),
-            space_scale<Furnace>("space-scale-furnace", "half side of the cube", furnace, furnace_scene, furnace_answer,
-                                 true),
-            far_from_origin<Plate>("far-from-origin", plate, plain_plate, plate_answer),
-            far_from_origin<Furnace>("far-furnace", furnace, furnace_scene, furnace_answer)};
+    return {
+        emission_scale(),
+        space_scale<Cavity>("space-scale", "radius of the cavity", cavity, cavity_scene, cavity_answer, 10),
+        space_scale<Plate>("space-scale-plate", "scale of a floor under a lamp", plate, plain_plate, plate_answer, 8),
+        space_scale<Furnace>("space-scale-furnace", "half side of the cube", furnace, furnace_scene, furnace_answer,
+                             true),
+        far_from_origin<Plate>("far-from-origin", plate, plain_plate, plate_answer),
+        far_from_origin<Furnace>("far-furnace", furnace, furnace_scene, furnace_answer)};
 }
 
 }  // namespace ambilux::stress

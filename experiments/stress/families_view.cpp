@@ -32,7 +32,7 @@ Family corners() {
     for (const double fov : {60.0, 10.0, 1.0, 0.1, 0.01, 0.001}) {
         Furnace furnace;
         furnace.reflectance = 0.8;
-        furnace.max_depth = 20;
+        furnace.max_depth = 6;
         furnace.fov = fov;
         furnace.target = {1, 1, 1};
         furnace.origin = {0.1, -0.2, 0.3};

@@ -33,19 +33,25 @@ std::vector<double> batch_means(const Batches& b, int box) {
     return means;
 }
 
-/// Sum of d^3 over sum of d^2 to 3/2, of deviations from the mean of their box: the skewness of the mean of all.
-double skewness(const Batches& b) {
-    const uint32_t boxes = b.box_count();
+/// Sums of powers of deviations of batches from the mean of their box.
+struct Powers {
     double squares = 0, cubes = 0;
-    for (uint32_t k = 0; k < boxes; ++k) {
-        const std::vector<double> means = batch_means(b, int(k));
+
+    void add(const std::vector<double>& means) {
         const double m = mean_of(means).value;
         for (const double v : means) {
             squares += (v - m) * (v - m);
             cubes += (v - m) * (v - m) * (v - m);
         }
     }
-    return squares > 0 ? cubes / std::pow(squares, 1.5) : 0;
+    /// Of the mean of all that was added.
+    double skewness() const { return squares > 0 ? cubes / std::pow(squares, 1.5) : 0; }
+};
+
+/// N equal rare hits have a relative error of 1/sqrt(N) and a skewness of as much.
+double events_of(const Mean& mean, double skew) {
+    if (!(mean.error > 0)) return mean.value != 0 ? kInf : 0;
+    return std::min(std::pow(mean.value / mean.error, 2), skew != 0 ? 1 / (skew * skew) : kInf);
 }
 
 /// Normal equivalent of mean - answer. `skew` of the mean.
@@ -78,16 +84,20 @@ double relative_variance(const Mean& mean, double paths) {
 Comparison compare(const Batches& batches, const Mean& answer, bool uniform) {
     Comparison c;
     const Mean mean = mean_of(batches);
-    const double skew = skewness(batches);
-    c.z = z_of(mean, answer, skew);
-    // N equal rare hits have a relative error of 1/sqrt(N) and a skewness of as much.
-    c.events = mean.error > 0 ? std::min(std::pow(mean.value / mean.error, 2), skew != 0 ? 1 / (skew * skew) : kInf)
-                              : (mean.value != 0 ? kInf : 0);
+    Powers all;
+    for (uint32_t k = 0; k < batches.box_count(); ++k) all.add(batch_means(batches, int(k)));
+    c.z = z_of(mean, answer, all.skewness());
+    c.events = events_of(mean, all.skewness());
     double p = 2 * normal_tail(std::abs(c.z));
     if (uniform && batches.box_count() > 1) {
         for (uint32_t k = 0; k < batches.box_count(); ++k) {
-            // Skewness of single boxes is that of all, with as many fewer events.
-            const double z = z_of(mean_of(batch_means(batches, int(k))), answer, skew * std::sqrt(batches.box_count()));
+            const std::vector<double> means = batch_means(batches, int(k));
+            const Mean box = mean_of(means);
+            Powers own;
+            own.add(means);
+            // Boxes that may have missed rare bright samples are left to the mean of all.
+            if (events_of(box, own.skewness()) < kFewEvents) continue;
+            const double z = z_of(box, answer, own.skewness());
             if (std::abs(z) > std::abs(c.box_z)) c.box_z = z;
         }
         p = 2 * std::min(p, sidak(2 * normal_tail(std::abs(c.box_z)), batches.box_count()));

@@ -30,12 +30,12 @@ struct Comparison {
 /// floats of 6e-8 each, sums of samples are floats of as many digits.
 constexpr double kRounding = 2e-5;
 
+/// Fewer events than this say nothing.
+constexpr double kFewEvents = 16;
+
 /// `uniform`: every box has the same answer. Student's t with the degrees of freedom of Welch and Satterthwaite;
 /// skewness by Hall's transformation, where it makes |t| smaller (film/ztest.h).
 Comparison compare(const Batches& batches, const Mean& answer, bool uniform);
-
-/// Fewer events than this say nothing.
-constexpr double kFewEvents = 16;
 
 /// What a row says of a cell.
 enum class Verdict { ok, failed, limit, undecided, invalid, refused };
