@@ -158,7 +158,7 @@ TEST_CASE("Roulette with a cap near one keeps the variance of a furnace of albed
         INFO(described(m));
         RenderSettings s = method_settings(scene, m, 5);
         apply_setting(s, "rr_cap", "0.999");
-        check_image(scene, s, expected, 1024);
+        check_image(scene, s, expected, 4096);
     }
     RenderSettings s = cpu_settings(scene, Estimator::naive);
     apply_setting(s, "rr_cap", "1");
