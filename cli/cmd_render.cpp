@@ -13,7 +13,7 @@
 #include "experiments/technique_files.h"
 #include "film/exr_io.h"
 #include "film/png_io.h"
-#include "integrators/reachability.h"
+#include "integrators/warnings.h"
 
 namespace ambilux {
 namespace {
@@ -44,16 +44,17 @@ void check(const Options& o) {
     }
 }
 
+std::string described(const InvalidCounts& counts) {
+    return fmt::format("{} NaN, {} Inf, {} negative values and {} below the range of floats", counts.nan, counts.inf,
+                       counts.negative, counts.underflow);
+}
+
 /// What --strict objects to; empty if nothing.
 std::string objection(const RenderStats& stats) {
     std::string text;
     for (const auto& [stage, counts] : stats.invalid_by_stage)
-        if (counts.total())
-            text += fmt::format("stage {} dropped {} NaN, {} Inf, {} negative values; ", stage, counts.nan, counts.inf,
-                                counts.negative);
-    if (text.empty() && stats.invalid.total())
-        text += fmt::format("{} NaN, {} Inf, {} negative values were dropped; ", stats.invalid.nan, stats.invalid.inf,
-                            stats.invalid.negative);
+        if (counts.total()) text += fmt::format("stage {} dropped {}; ", stage, described(counts));
+    if (text.empty() && stats.invalid.total()) text += fmt::format("{} were dropped; ", described(stats.invalid));
     for (const QueueStats& q : stats.queues)
         if (q.overflow) text += fmt::format("queue {} of capacity {} lost {} items; ", q.name, q.capacity, q.overflow);
     if (!text.empty()) text.resize(text.size() - 2);
@@ -74,9 +75,8 @@ int render(const Options& o) {
     settings.expected_seconds = budget.seconds;
     const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
 
-    if (const std::string missing = missing_light(loaded.scene.features, used_settings(settings, renderer->stats()));
-        !missing.empty())
-        log_warning(missing);
+    for (const std::string& warning : render_warnings(loaded.scene, used_settings(settings, renderer->stats())))
+        log_warning(warning);
 
     RenderPosition position;
     // Choosing is part of the method: its time counts.

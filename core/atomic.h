@@ -1,6 +1,7 @@
 // Sums that threads of a device add to together. On a host they belong to one thread unless a function says otherwise.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 
 #include "core/vec.h"
@@ -23,6 +24,15 @@ AMBILUX_HD int64_t fetch_add_shared(int64_t* sum, int64_t value) {
         atomicAdd(reinterpret_cast<unsigned long long*>(sum), static_cast<unsigned long long>(value)));
 #else
     return __atomic_fetch_add(sum, value, __ATOMIC_RELAXED);
+#endif
+}
+
+/// Threads of a host may share `sum` too.
+AMBILUX_HD void add_shared(double* sum, double value) {
+#if defined(__CUDA_ARCH__)
+    atomicAdd(sum, value);
+#else
+    std::atomic_ref<double>(*sum).fetch_add(value, std::memory_order_relaxed);
 #endif
 }
 

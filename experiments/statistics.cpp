@@ -12,7 +12,8 @@ namespace ambilux {
 namespace {
 
 nlohmann::json invalid_json(const InvalidCounts& invalid) {
-    return {{"nan", invalid.nan}, {"inf", invalid.inf}, {"negative", invalid.negative}};
+    return {
+        {"nan", invalid.nan}, {"inf", invalid.inf}, {"negative", invalid.negative}, {"underflow", invalid.underflow}};
 }
 
 nlohmann::json to_json(const SettingValue& value) {

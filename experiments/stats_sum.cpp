@@ -26,11 +26,12 @@ void add(InvalidCounts& total, const InvalidCounts& before, const InvalidCounts&
     total.nan += now.nan - before.nan;
     total.inf += now.inf - before.inf;
     total.negative += now.negative - before.negative;
+    total.underflow += now.underflow - before.underflow;
 }
 
-nlohmann::json save(const InvalidCounts& c) { return {c.nan, c.inf, c.negative}; }
+nlohmann::json save(const InvalidCounts& c) { return {c.nan, c.inf, c.negative, c.underflow}; }
 InvalidCounts restore(const nlohmann::json& j) {
-    return {j.at(0).get<uint64_t>(), j.at(1).get<uint64_t>(), j.at(2).get<uint64_t>()};
+    return {j.at(0).get<uint64_t>(), j.at(1).get<uint64_t>(), j.at(2).get<uint64_t>(), j.at(3).get<uint64_t>()};
 }
 
 nlohmann::json save(const RenderSettings& settings) {

@@ -2,8 +2,9 @@
 // image and change nothing in it.
 #pragma once
 
+#include "core/atomic.h"
 #include "core/lane.h"
-#include "film/fixed_point.h"
+#include "core/vec.h"
 #include "transport/mis/strategy.h"
 
 namespace ambilux {
@@ -12,8 +13,8 @@ namespace ambilux {
 constexpr uint32_t kMaxStrategyDepth = 16;
 
 struct StrategyFilm {
-    int64_t* sums = nullptr;      ///< per strategy: raw image, weighted image (kLightUnit). Null: nothing is recorded
-    uint64_t* dropped = nullptr;  ///< per strategy: values that were not finite or too large to be added
+    double* sums = nullptr;       ///< per strategy: raw image, weighted image. Null: nothing is recorded
+    uint64_t* dropped = nullptr;  ///< per strategy: values that were not finite
     Lane* raw = nullptr;          ///< per slot: the unweighted value in flight and its strategy
     uint32_t max_depth = 0;
 
@@ -35,10 +36,15 @@ struct StrategyFilm {
         if (!sums || strategy.segments() > max_depth) return;
         const uint64_t image = uint64_t(pixels) * 3;
         const uint32_t index = strategy_index(strategy);
-        int64_t* at = sums + 2 * index * image + uint64_t(pixel) * 3;
-        const bool finite = is_finite(value) && is_finite(weighted);
-        if (finite && add_light(at, value) && add_light(at + image, weighted)) return;
-        fetch_add_shared(reinterpret_cast<int64_t*>(dropped + index), 1);  // tasks of the host share these counters
+        if (!is_finite(value) || !is_finite(weighted)) {
+            fetch_add_shared(reinterpret_cast<int64_t*>(dropped + index), 1);  // tasks of the host share these counters
+            return;
+        }
+        double* at = sums + 2 * index * image + uint64_t(pixel) * 3;
+        for (int c = 0; c < 3; ++c) {
+            add_shared(at + c, double(value[c]));
+            add_shared(at + image + c, double(weighted[c]));
+        }
     }
 };
 

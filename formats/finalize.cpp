@@ -219,7 +219,7 @@ double fill_environment(Scene& scene, Emitter& emitter) {
 /// has room for, and no more than falls on all surfaces: of a room with one stone far away the sphere alone would make
 /// too much.
 struct Receivers {
-    double disk;  ///< area that stops parallel light
+    double disk;        ///< area that stops parallel light
     double both_sides;  ///< area that light from everywhere falls on
 };
 

@@ -11,6 +11,13 @@ void check_depths(const RenderSettings& settings) {
         throw Error(ExitCode::usage,
                     "max_depth=-1 with rr_depth=-1: without Russian roulette and without a limit paths may never end; "
                     "set one of them");
+    constexpr float kEndingCap = 0.999f;  // 0.999^kMaxDepth = 8e-8
+    if (settings.max_depth < 0 && settings.rr_cap > kEndingCap)
+        throw Error(
+            ExitCode::usage,
+            fmt::format("rr_cap={} with max_depth=-1: subpaths between surfaces that reflect all would not end; "
+                        "rr_cap may be {} at most, or set max_depth",
+                        settings.rr_cap, kEndingCap));
     if (settings.max_depth >= int(kMaxDepth))
         throw Error(ExitCode::usage, fmt::format("max_depth={}: at most {} segments, or -1 for no limit",
                                                  settings.max_depth, kMaxDepth - 1));

@@ -62,7 +62,7 @@ struct FilmBuffers {
     Lane* samples;
     SplatSums splats;
     FilmSums sums;
-    int64_t* strategies = nullptr;  ///< StrategyFilm
+    double* strategies = nullptr;  ///< StrategyFilm
     uint64_t* strategies_dropped = nullptr;
 };
 

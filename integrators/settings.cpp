@@ -87,6 +87,10 @@ std::vector<Setting> main_settings() {
         Is(Of::number("rr_depth", &S::rr_depth, -1, 1 << 14,
                       "Russian roulette starts at this many segments; -1: never. A scene may bring its own"))
             .image_attribute(),
+        Is(Of::number("rr_cap", &S::rr_cap, 0.05f, 1.0f,
+                      "highest probability with which a subpath survives Russian roulette; surfaces that reflect more "
+                      "than its square root need more for a finite variance"))
+            .image_attribute(),
         Is(Of::flag("deterministic", &S::deterministic, "same bits in every run on the same backend"))
             .limit("true", repeats, "a cache's order differs between runs on a CUDA device"),
         Is(Of::choice("accel", &S::accel, {"auto", "embree", "cwbvh", "bvh2"},

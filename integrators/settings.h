@@ -48,6 +48,9 @@ private:
     E value_;
 };
 
+/// Highest probability of survival of Russian roulette unless asked otherwise, as in Mitsuba.
+constexpr float kRouletteCap = 0.95f;
+
 struct RenderSettings {
     std::string integrator = "path", variant = "wavefront";  ///< names of a Variant (registry.h)
     Choice<Backend> backend = Backend::automatic;
@@ -62,6 +65,7 @@ struct RenderSettings {
     uint32_t light_subpaths_per_tile = kTilePixels;  ///< per pixel in multiples of 1/kTilePixels
     int max_depth = -1;                              ///< segments of a path; -1 is unbounded
     int rr_depth = 5;                                ///< Russian roulette starts at this many segments; < 0: never
+    float rr_cap = kRouletteCap;                     ///< its highest probability of survival
     uint64_t seed = 0;
     Choice<AccelKind> accel = AccelKind::automatic;
     uint32_t wave_size = 0;  ///< paths in flight; 0 chooses

@@ -7,17 +7,17 @@
 
 namespace ambilux {
 
-/// Depth (kDepthBits), whether the last scattering was a delta (1 bit), and the product of relative indices (the upper
-/// 16 bits of a float, rounded_eta).
+/// Depth (kDepthBits), whether the last scattering was a delta (1 bit), and Subpath::roulette_scale (the upper 16 bits
+/// of a float, rounded_scale).
 struct SubpathBits {
     uint32_t bits;
 
-    AMBILUX_HD static SubpathBits make(uint32_t depth, bool delta, float eta) {
-        return {depth | (delta ? 1u << kDepthBits : 0u) | (float_bits(eta) & 0xffff0000u)};
+    AMBILUX_HD static SubpathBits make(uint32_t depth, bool delta, float roulette_scale) {
+        return {depth | (delta ? 1u << kDepthBits : 0u) | (float_bits(roulette_scale) & 0xffff0000u)};
     }
     AMBILUX_HD uint32_t depth() const { return bits & kMaxDepth; }
     AMBILUX_HD bool delta() const { return bits >> kDepthBits & 1u; }
-    AMBILUX_HD float eta() const { return bits_float(bits & 0xffff0000u); }
+    AMBILUX_HD float roulette_scale() const { return bits_float(bits & 0xffff0000u); }
 };
 static_assert(kDepthBits + 1 <= 16, "depth and flag share the lower half of a word");
 
@@ -90,12 +90,13 @@ struct SubpathItems<UnidirectionalMis> {
     /// `tmax`: of a camera ray.
     AMBILUX_HD static Ray pack(const Path& p, Side, uint32_t path, float tmax) {
         return {p.origin,     path,
-                p.direction,  SubpathBits::make(p.depth, p.delta, p.eta),
+                p.direction,  SubpathBits::make(p.depth, p.delta, p.roulette_scale),
                 p.throughput, p.depth == 1 ? tmax : p.sums.pdf_sa};
     }
     AMBILUX_HD static Path unpack(const Ray& r) {
-        return {r.origin, r.direction,    r.throughput, {r.pdf_sa_or_tmax},
-                {},       r.bits.depth(), r.bits.eta(), r.bits.delta()};
+        return {
+            r.origin,      r.direction, r.throughput, {r.pdf_sa_or_tmax}, {}, r.bits.depth(), r.bits.roulette_scale(),
+            r.bits.delta()};
     }
     AMBILUX_HD static float tmax(const Ray& r) { return r.bits.depth() == 1 ? r.pdf_sa_or_tmax : kInfinity; }
 };
@@ -109,7 +110,7 @@ struct SubpathItems<BidirectionalMis> {
         Ray r = {p.origin,
                  path,
                  p.direction,
-                 SubpathBits::make(p.depth, p.delta, p.eta),
+                 SubpathBits::make(p.depth, p.delta, p.roulette_scale),
                  p.throughput,
                  tmax,
                  {p.sums.dvcm, p.sums.dvc},
@@ -132,7 +133,7 @@ struct SubpathItems<BidirectionalMis> {
         p.sums = {r.sums_or_start[0], r.sums_or_start[1]};
         p.start = {r.sums_or_start[0], r.sums_or_start[1], r.start[0], r.start[1], bits_float(r.start[0])};
         p.depth = r.bits.depth();
-        p.eta = r.bits.eta();
+        p.roulette_scale = r.bits.roulette_scale();
         p.delta = r.bits.delta();
         return p;
     }

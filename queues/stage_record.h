@@ -12,6 +12,7 @@ constexpr uint32_t kTrackedDepths = 64;
 struct StageRecord {
     uint64_t launches, items, nanoseconds;
     uint64_t nan, inf, negative;  ///< values it dropped
+    uint64_t underflow;           ///< light that became 0 because it is below the range of floats
     uint64_t items_by_depth[kTrackedDepths];
 
     AMBILUX_HD void add(uint64_t new_items, uint32_t depth, uint64_t ns) {
@@ -27,6 +28,7 @@ struct StageRecord {
         nan += other.nan;
         inf += other.inf;
         negative += other.negative;
+        underflow += other.underflow;
         for (uint32_t d = 0; d < kTrackedDepths; ++d) items_by_depth[d] += other.items_by_depth[d];
     }
     /// Items that no launch was made for, or, less than 0, that it has left.

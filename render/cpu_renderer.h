@@ -168,7 +168,7 @@ private:
     /// All but the waves.
     uint64_t fixed_bytes() const {
         return scene_.memory_bytes() + accel_bytes_ + (film_.sum.size() + film_.sum_squares.size()) * sizeof(double) +
-               (splats_.size() + strategies_.size()) * sizeof(int64_t) + film_samples_.size() * sizeof(Lane);
+               (splats_.size() + strategies_.size()) * sizeof(double) + film_samples_.size() * sizeof(Lane);
     }
     uint64_t planned_kept(double mean, uint64_t subpaths) const {
         return policy_.waves.keeps_light_vertices ? planned_light_vertices(mean, subpaths) : 0;
@@ -271,7 +271,7 @@ private:
     std::shared_ptr<const void> accel_;
     std::vector<WaveMemory> waves_;
     std::vector<Lane> film_samples_;
-    std::vector<int64_t> splats_, strategies_;
+    std::vector<double> splats_, strategies_;
     std::vector<uint64_t> strategies_dropped_;
     FilmMoments film_;
     uint64_t accel_bytes_ = 0, samples_ = 0, measured_samples_ = 0;

@@ -154,7 +154,7 @@ private:
         Integrator::lay_out(
             million, policy_,
             {kMillion, uint32_t(planned_light_vertices(mean, policy_.waves.most_light_subpaths(kMillion)))});
-        const uint64_t splat_bytes = !kFilmWide ? 0 : settings.deterministic ? 3 * sizeof(int64_t) : sizeof(Lane);
+        const uint64_t splat_bytes = !kFilmWide ? 0 : settings.deterministic ? 3 * sizeof(double) : sizeof(Lane);
         const uint64_t bytes_per_path = (million.bytes() >> 20) + splat_bytes + sizeof(Lane);
         const uint32_t plateau = streams ? kStreamPlateau : kFilmWide ? kFilmWidePlateau : kWavePlateau;
         const uint32_t size = device_wave_size(scene_, settings, plateau, bytes_per_path, free_device_bytes());

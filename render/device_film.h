@@ -13,10 +13,10 @@ inline FilmBuffers lay_out_film(Layout& layout, const Wave& wave, const WavePoli
     FilmBuffers film{};
     film.sums = {layout.allocate<double>(pixels * 3), layout.allocate<double>(pixels * 3)};
     film.samples = layout.allocate<Lane>(wave.slot_count());
-    if (cells && policy.deterministic) film.splats.fixed = layout.allocate<int64_t>(cells * 3);
+    if (cells && policy.deterministic) film.splats.doubles = layout.allocate<double>(cells * 3);
     if (cells && !policy.deterministic) film.splats.floats = layout.allocate<Lane>(cells);
     if (policy.strategy_depth > 0) {
-        film.strategies = layout.allocate<int64_t>(strategy_values(policy.strategy_depth, pixels));
+        film.strategies = layout.allocate<double>(strategy_values(policy.strategy_depth, pixels));
         film.strategies_dropped = layout.allocate<uint64_t>(strategy_count(policy.strategy_depth));
     }
     return film;

@@ -21,10 +21,11 @@ struct StageStats {
     std::vector<uint64_t> items_by_depth;  ///< index = depth (segments); the last entry gathers all deeper ones
 };
 
-/// Counts of dropped values.
+/// Counts of values that were dropped or lost.
 struct InvalidCounts {
     uint64_t nan = 0, inf = 0, negative = 0;
-    uint64_t total() const { return nan + inf + negative; }
+    uint64_t underflow = 0;  ///< light that became 0 because it is below the range of floats
+    uint64_t total() const { return nan + inf + negative + underflow; }
 };
 
 struct QueueStats {
@@ -73,7 +74,7 @@ struct RenderStats {
 struct StrategyImage {
     uint32_t s, t;
     std::vector<float> raw, weighted;  ///< without and with the weight of multiple importance sampling
-    uint64_t dropped;                  ///< values left out as no numbers or too large for the sums
+    uint64_t dropped;                  ///< values left out as not finite
 };
 
 /// A render in progress. Not thread-safe; `interrupt` may be set from a signal handler.

@@ -4,8 +4,6 @@
 #include <iterator>
 #include <string_view>
 
-#include "film/fixed_point.h"
-
 namespace ambilux {
 namespace {
 
@@ -38,10 +36,12 @@ void fill_stage_stats(const std::vector<std::string>& names, const std::vector<S
         while (depths > 0 && r.items_by_depth[depths - 1] == 0) --depths;
         stage.items_by_depth.assign(r.items_by_depth, r.items_by_depth + depths);
         stats.stages.push_back(stage);
-        if (r.nan + r.inf + r.negative) stats.invalid_by_stage[stage.name] = {r.nan, r.inf, r.negative};
+        const InvalidCounts invalid = {r.nan, r.inf, r.negative, r.underflow};
+        if (invalid.total()) stats.invalid_by_stage[stage.name] = invalid;
         stats.invalid.nan += r.nan;
         stats.invalid.inf += r.inf;
         stats.invalid.negative += r.negative;
+        stats.invalid.underflow += r.underflow;
         if (stage.name == "extend" || stage.name == "light_extend") stats.rays_extend += r.items;
         if (stage.name == "occlude") stats.rays_occlude += r.items;
     }
@@ -64,21 +64,21 @@ void fill_queue_stats(const Layout& layout, const std::vector<const QueueCounter
     }
 }
 
-std::vector<StrategyImage> strategy_images(uint32_t max_depth, uint64_t samples, const std::vector<int64_t>& sums,
+std::vector<StrategyImage> strategy_images(uint32_t max_depth, uint64_t samples, const std::vector<double>& sums,
                                            const std::vector<uint64_t>& dropped) {
     std::vector<StrategyImage> images;
     if (max_depth == 0) return images;
     const size_t values = sums.size() / 2 / strategy_count(max_depth);
-    const double scale = samples ? kLightUnit / double(samples) : 0.0;
+    const double scale = samples ? 1.0 / double(samples) : 0.0;
     for (uint32_t k = 1; k <= max_depth; ++k) {
         for (uint32_t s = 0; s <= k; ++s) {
             const uint32_t index = strategy_index(Strategy::make(s, k + 1 - s));
             StrategyImage image = {s, k + 1 - s, std::vector<float>(values), std::vector<float>(values),
                                    dropped[index]};
-            const int64_t* raw = sums.data() + 2 * index * values;
+            const double* raw = sums.data() + 2 * index * values;
             for (size_t i = 0; i < values; ++i) {
-                image.raw[i] = float(double(raw[i]) * scale);
-                image.weighted[i] = float(double(raw[values + i]) * scale);
+                image.raw[i] = float(raw[i] * scale);
+                image.weighted[i] = float(raw[values + i] * scale);
             }
             images.push_back(std::move(image));
         }

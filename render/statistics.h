@@ -27,7 +27,7 @@ inline uint64_t strategy_values(uint32_t max_depth, uint64_t pixels) {
     return uint64_t(strategy_count(max_depth)) * 2 * pixels * 3;
 }
 /// Means of what they gathered.
-std::vector<StrategyImage> strategy_images(uint32_t max_depth, uint64_t samples, const std::vector<int64_t>& sums,
+std::vector<StrategyImage> strategy_images(uint32_t max_depth, uint64_t samples, const std::vector<double>& sums,
                                            const std::vector<uint64_t>& dropped);
 
 /// Samples of every pixel that take about 0.2 s, from what was measured so far; 1 when nothing was.

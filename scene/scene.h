@@ -21,6 +21,9 @@ struct IntegratorHint {
 
 struct Scene {
     std::string path;  ///< file it came from
+    /// Coordinates of the file that are this scene's (0,0,0). The loader moves scenes that lie far from the origin of
+    /// their file, where floats have lost their digits.
+    std::array<double, 3> origin{};
     std::array<uint8_t, 32>
         content_hash{};                 ///< over the XML and every file it names, and the options that change the image
     std::vector<std::string> warnings;  ///< substitutions made by --lenient, parameters without effect

@@ -9,6 +9,17 @@
 
 namespace ambilux {
 
+/// Light `value` of a strategy times its weight. False if that is nothing, or no radiance; light below the range of
+/// floats is counted, but not where the weight says that other strategies have it.
+AMBILUX_HD bool weighted_light(Rgb value, float ratio, StageRecord* record, Rgb& weighted) {
+    const float weight = mis_weight(ratio);
+    weighted = value * weight;
+    if (!is_valid_radiance(weighted, record)) return false;
+    if (!is_zero(weighted)) return true;
+    if (weight >= 0x1p-24f && !is_zero(value)) add_count(&record->underflow, 1);
+    return false;
+}
+
 /// Emission that eye subpaths met.
 template <class Out>
 struct WeighEmission {
@@ -23,8 +34,8 @@ struct WeighEmission {
     AMBILUX_HD void operator()(uint32_t i) const { push(candidates.load(i)); }
 
     AMBILUX_HD uint32_t push(const EmissionItem& c) const {
-        const Rgb value = c.value * mis_weight(c.ratio);
-        if (!is_valid_radiance(value, record) || is_zero(value)) return 0;
+        Rgb value;
+        if (!weighted_light(c.value, c.ratio, record, value)) return 0;
         strategies.remember(c.path, c.value, c.strategy);
         return contributions.push(Contribution{value, c.path});
     }
@@ -51,8 +62,8 @@ struct WeighCandidates {
     }
     /// False if nothing is left to be tested.
     AMBILUX_HD bool weigh(const CandidateItem& c, ShadowItem& item) const {
-        Rgb value = c.value * mis_weight(c.ratio);
-        if (!is_valid_radiance(value, record) || is_zero(value)) return false;
+        Rgb value;
+        if (!weighted_light(c.value, c.ratio, record, value)) return false;
         if (cull > 0.0f && c.tmax != kTowardsEnvironment) {
             const float factor = cull_factor(cull, value, start_of<Rgb>(samples[c.path]), c.opacity_seed);
             if (factor == 0.0f) return false;
@@ -77,8 +88,7 @@ struct WeighSplats {
     AMBILUX_HD void operator()(uint32_t i) const { push(candidates.load(i)); }
 
     AMBILUX_HD uint32_t push(CandidateItem c) const {
-        c.value *= mis_weight(c.ratio);
-        return is_valid_radiance(c.value, record) && !is_zero(c.value) ? weighted.push(c) : 0;
+        return weighted_light(c.value, c.ratio, record, c.value) ? weighted.push(c) : 0;
     }
 };
 

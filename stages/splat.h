@@ -43,7 +43,7 @@ struct Splat {
                     if (!(weight > 0.0f)) continue;
                     const Rgb value = item.value * weight;
                     const uint32_t pixel = uint32_t(py) * wave.width + uint32_t(px);
-                    if (!sums.add(first + pixel, value, alone)) add_count(&record->inf, 1);
+                    sums.add(first + pixel, value, alone);
                     strategies.add(item.strategy, wave.width * wave.height, pixel, value * (1.0f + item.ratio), value);
                 }
             }

@@ -14,10 +14,12 @@
 namespace ambilux::mitsuba {
 
 struct Builder {
-    Builder(const Document& d, const LoadOptions& o, Scene& s) : document(d), options(o), scene(s) {}
+    Builder(const Document& d, const LoadOptions& o, Vec3d p, Scene& s)
+        : document(d), options(o), to_scene(translation(-p.x, -p.y, -p.z)), scene(s) {}
 
     const Document& document;
     const LoadOptions& options;
+    Matrix to_scene;  ///< from the world of the file to that of the scene (Scene::origin)
     Scene& scene;
     bool validate_only = false;  ///< look at parameters only: nothing is read from images or added to the scene
 
@@ -60,7 +62,7 @@ public:
     int64_t integer(const std::string& name, int64_t fallback);
     double number(const std::string& name, double fallback);
     std::string text(const std::string& name, const std::string& fallback);
-    Vec3f vector(const std::string& name, Vec3f fallback);
+    Vec3d vector(const std::string& name, Vec3d fallback);
     Matrix transform(const std::string& name);
     /// Index of refraction: a number or a name.
     float ior(const std::string& name, const std::string& fallback);

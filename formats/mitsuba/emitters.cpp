@@ -16,7 +16,7 @@ Vec3f to_vec3f(Vec3d v) { return {float(v.x), float(v.y), float(v.z)}; }
 
 Matrix rigid_transform(Builder& builder, Reader& in) {
     bool problem = false;
-    const Matrix m = rigid_part(in.transform("to_world"), problem);
+    const Matrix m = rigid_part(builder.to_scene * in.transform("to_world"), problem);
     if (problem)
         builder.refuse(in.where("to_world"),
                        "the transform of an emitter of type '" + in.object().type + "' must not scale or shear",
@@ -30,10 +30,12 @@ void read_plugin(ModelTag<AreaEmitter>, Builder&, Reader& in, Emitter& e) {
     e.radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
 }
 
-void read_plugin(ModelTag<PointEmitter>, Builder&, Reader& in, Emitter& e) {
+void read_plugin(ModelTag<PointEmitter>, Builder& builder, Reader& in, Emitter& e) {
     if (in.has("position") && in.has("to_world"))
         in.fail(in.where("to_world"), "both 'position' and 'to_world' are given");
-    e.position = in.has("position") ? in.vector("position", {}) : to_vec3f(column(in.transform("to_world"), 3));
+    const Vec3d p = in.vector("position", {});
+    const Matrix to_world = in.has("position") ? translation(p.x, p.y, p.z) : in.transform("to_world");
+    e.position = to_vec3f(column(builder.to_scene * to_world, 3));
     e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
 }
 
@@ -58,10 +60,7 @@ void read_plugin(ModelTag<DirectionalEmitter>, Builder&, Reader& in, Emitter& e)
     if (in.has("direction") && in.has("to_world"))
         in.fail(in.where("to_world"), "both 'direction' and 'to_world' are given");
     Vec3d d = column(in.transform("to_world"), 2);
-    if (in.has("direction")) {
-        const Vec3f v = in.vector("direction", {0, 0, 1});
-        d = {v.x, v.y, v.z};
-    }
+    if (in.has("direction")) d = in.vector("direction", {0, 0, 1});
     const double l = length(d);
     if (!(l > 0)) in.fail(in.where("direction"), "the direction of the emitter is zero");
     e.direction = to_vec3f({d.x / l, d.y / l, d.z / l});

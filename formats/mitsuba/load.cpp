@@ -1,6 +1,7 @@
 #include "formats/load.h"
 #include "core/error.h"
 #include "formats/mitsuba/builder.h"
+#include "formats/mitsuba/origin.h"
 
 namespace ambilux {
 
@@ -37,13 +38,12 @@ void validate_unused(Builder& builder) {
     builder.validate_only = false;
 }
 
-}  // namespace
-
-Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
-    const Document document = parse_document(path, options.parameters);
+/// All but what finalize_scene() adds, in coordinates about `origin`.
+Scene build_scene(const std::string& path, const Document& document, const LoadOptions& options, Vec3d origin) {
     Scene scene;
     scene.path = path;
-    Builder builder(document, options, scene);
+    scene.origin = {origin.x, origin.y, origin.z};
+    Builder builder(document, options, origin, scene);
 
     Reader root(builder, *document.scene);
     const Object* sensor = root.take("sensor");
@@ -59,6 +59,14 @@ Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
     build_shapes(builder, *document.scene);
     validate_unused(builder);
     scene.content_hash = content_hash(builder);
+    return scene;
+}
+
+}  // namespace
+
+Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
+    const Document document = parse_document(path, options.parameters);
+    Scene scene = build_scene(path, document, options, scene_origin(document));
     finalize_scene(scene, options.light_picking);
     return scene;
 }

@@ -57,7 +57,7 @@ std::string Reader::text(const std::string& name, const std::string& fallback) {
     return v ? v->text : fallback;
 }
 
-Vec3f Reader::vector(const std::string& name, Vec3f fallback) {
+Vec3d Reader::vector(const std::string& name, Vec3d fallback) {
     const Value* v = value(name, {ValueKind::vector}, "a point or vector");
     return v ? v->vector : fallback;
 }
@@ -94,7 +94,7 @@ Rgb Reader::color(const std::string& name, Rgb fallback, SpectrumUse use) {
     if (!v) return fallback;
     Rgb rgb = splat(float(v->number));
     if (v->kind == ValueKind::rgb)
-        rgb = v->vector;
+        rgb = v->rgb;
     else if (!v->samples.empty())
         rgb = spectrum_to_rgb(v->samples, use);
     if (!is_finite(rgb)) fail(v->where, "'" + name + "' is not finite");

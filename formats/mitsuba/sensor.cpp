@@ -157,7 +157,7 @@ void build_sensor(Builder& builder, const Object& object) {
     if (!known) builder.refuse(object.where, "sensor type '" + type + "' is not supported", "perspective is used");
 
     const double aspect = double(sensor.film_width) / sensor.film_height;
-    Matrix to_world = in.transform("to_world");
+    Matrix to_world = builder.to_scene * in.transform("to_world");
     if (!(std::fabs(determinant(to_world)) > 0)) in.fail(in.where("to_world"), "the sensor's transform is singular");
     bool problem = false;
     if (is_parallel(sensor.type)) {

@@ -59,12 +59,12 @@ Matrix local_form(Reader& in, const std::string& type) {
     const double radius = type == "disk" ? 1 : in.number("radius", 1);
     if (!(radius > 0)) in.fail(in.where("radius"), "radius must be positive");
     if (type == "sphere") {
-        const Vec3f c = in.vector("center", {0, 0, 0});
+        const Vec3d c = in.vector("center", {0, 0, 0});
         return translation(c.x, c.y, c.z) * scaling(radius, radius, radius);
     }
     if (type == "disk") return {};
-    const Vec3f p0 = in.vector("p0", {0, 0, 0}), p1 = in.vector("p1", {0, 0, 1});
-    const Vec3d axis = {double(p1.x) - p0.x, double(p1.y) - p0.y, double(p1.z) - p0.z};
+    const Vec3d p0 = in.vector("p0", {0, 0, 0}), p1 = in.vector("p1", {0, 0, 1});
+    const Vec3d axis = {p1.x - p0.x, p1.y - p0.y, p1.z - p0.z};
     const double l = length(axis);
     if (!(l > 0)) in.fail("cylinder has no length: p0 equals p1");
     // The frame of core/math.h (and of Mitsuba), in double: it decides where the azimuth starts.
@@ -167,13 +167,25 @@ void ShapeBuilder::add_instance(const Object& object, const Matrix& outer) {
     group_in.finish();
 }
 
+/// Image of a point, rounded once.
+Vec3f point_of(const Matrix& a, Vec3f p) {
+    const auto row = [&](int i) { return float(a.m[i][0] * p.x + a.m[i][1] * p.y + a.m[i][2] * p.z + a.m[i][3]); };
+    return {row(0), row(1), row(2)};
+}
+
+/// Twice the area of a triangle along its normal; in double, since the area of a small triangle may be no float.
+Vec3d area_normal(Vec3f a, Vec3f b, Vec3f c) {
+    const auto from_a = [a](Vec3f p) { return Vec3d{double(p.x) - a.x, double(p.y) - a.y, double(p.z) - a.z}; };
+    return cross(from_a(b), from_a(c));
+}
+
 /// Moves a mesh to world space, orients it and leaves out triangles without area.
 void transform_mesh(Job& job, const Mesh& mesh) {
-    const Affine to_world = to_affine(job.to_world), to_local = to_affine(affine_inverse(job.to_world));
+    const Affine to_local = to_affine(affine_inverse(job.to_world));
     Mesh& out = job.world;
     out.positions.reserve(mesh.positions.size());
     for (Vec3f p : mesh.positions) {
-        out.positions.push_back(to_world.point(p));
+        out.positions.push_back(point_of(job.to_world, p));
         if (!is_finite(out.positions.back()))
             throw input_error(job.where.file, job.where.line, "a vertex of the shape is not finite in world space");
     }
@@ -185,12 +197,12 @@ void transform_mesh(Job& job, const Mesh& mesh) {
         for (auto& face : out.faces) std::swap(face[1], face[2]);
 
     const auto normal_of = [&](const std::array<uint32_t, 3>& f) {
-        return cross(out.positions[f[1]] - out.positions[f[0]], out.positions[f[2]] - out.positions[f[0]]);
+        return area_normal(out.positions[f[0]], out.positions[f[1]], out.positions[f[2]]);
     };
     const size_t all = out.faces.size();
     std::erase_if(out.faces, [&](const auto& f) {
-        const float l2 = length_squared(normal_of(f));
-        return !(l2 >= 1.17549435e-38f && l2 < kInfinity);  // a subnormal square cannot be normalised
+        const double area = length(normal_of(f));
+        return !(area > 0 && std::isfinite(area));
     });
     job.dropped = uint32_t(all - out.faces.size());
 
@@ -208,7 +220,9 @@ void transform_mesh(Job& job, const Mesh& mesh) {
         }
     }
     for (auto& f : out.faces) {
-        const Vec3f ng = normalize(normal_of(f));
+        const Vec3d n = normal_of(f);
+        const double area = length(n);
+        const Vec3f ng = {float(n.x / area), float(n.y / area), float(n.z / area)};
         Vec3f sum = {0, 0, 0};
         for (uint32_t v : f) {
             if (is_zero(out.normals[v])) out.normals[v] = ng;  // the file gives none here
@@ -306,7 +320,7 @@ void add_mesh(Scene& scene, const Job& job, uint32_t index, Shape& shape) {
 void build_shapes(Builder& builder, const Object& root) {
     ShapeBuilder shapes{builder, {}, {}, {}};
     for (const Child& child : root.children) {
-        if (child.object->tag == "shape") shapes.add_shape(*child.object, {}, false, false);
+        if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false, false);
     }
     load_sources(builder, shapes.sources);
     parallel_for(shapes.jobs.size(), [&](size_t i) {

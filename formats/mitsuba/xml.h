@@ -28,7 +28,8 @@ struct Value {
     Where where;
     std::string text;   ///< text
     double number = 0;  ///< number; integer; boolean (0 or 1); spectrum with a single value
-    Vec3f vector{};     ///< vector, rgb
+    Rgb rgb{};
+    Vec3d vector{};
     std::vector<std::pair<double, double>> samples;  ///< spectrum: (wavelength in nm, value), rising
     Matrix transform;
 };

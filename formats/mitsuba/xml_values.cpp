@@ -191,9 +191,9 @@ Value ValueParser::parse_color(const XmlSource& source, const pugi::xml_node& no
     }
     if (c.size() != 3) fail(at, "<" + tag + "> needs one or three numbers, not " + std::to_string(c.size()));
     if (tag == "srgb")
-        value.vector = {srgb_to_linear(c[0]), srgb_to_linear(c[1]), srgb_to_linear(c[2])};
+        value.rgb = {srgb_to_linear(c[0]), srgb_to_linear(c[1]), srgb_to_linear(c[2])};
     else
-        value.vector = {float(c[0]), float(c[1]), float(c[2])};
+        value.rgb = {float(c[0]), float(c[1]), float(c[2])};
     return value;
 }
 
@@ -219,7 +219,7 @@ Value ValueParser::parse_spectrum(const XmlSource& source, const pugi::xml_node&
             const std::vector<double> list = parse_list(text, at, "spectrum");
             if (list.size() == 3 && source.version < 2) {  // three bins are RGB in the older generation
                 value.kind = ValueKind::rgb;
-                value.vector = {float(list[0]), float(list[1]), float(list[2])};
+                value.rgb = {float(list[0]), float(list[1]), float(list[2])};
             } else if (list.size() == 1) {
                 value.number = list[0];
             } else {
@@ -251,7 +251,7 @@ Value ValueParser::parse_value(const XmlSource& source, const pugi::xml_node& no
         allow(source, node, {"name", "x", "y", "z", "value"});
         value.kind = ValueKind::vector;
         const Vec3d v = triple(source, node, 0, false);
-        value.vector = {float(v.x), float(v.y), float(v.z)};
+        value.vector = {v.x, v.y, v.z};
     } else if (tag == "spectrum") {
         allow(source, node, {"name", "value", "filename"});
         value = parse_spectrum(source, node);

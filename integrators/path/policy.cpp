@@ -11,6 +11,7 @@ PathPolicy plan_path(const Scene& scene, const RenderSettings& settings) {
     Rules<UnidirectionalMis>& r = p.rules;
     r.max_depth = segment_limit(settings);
     r.rr_depth = roulette_depth(settings);
+    r.rr_cap = settings.rr_cap;
     r.next_event = !scene.emitters.empty() && settings.estimator != Estimator::naive && r.max_depth >= 2;
     r.mis = {settings.estimator, settings.heuristic, r.next_event};
     r.count_hits =

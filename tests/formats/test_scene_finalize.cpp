@@ -151,8 +151,10 @@ TEST_CASE("power of every emitter type decides the pick probability (B10)") {
     s.emitters.push_back(emitter(EmitterType::constant, {0.5f, 0.5f, 0.5f}));
     s.emitters.push_back(emitter(EmitterType::point, {0, 0, 0}));
     finalize_scene(s, LightPicking::power);
+    // No more light from infinity than falls on the surfaces, which are smaller than the disk of the bounds.
     const double disk = M_PI * double(s.bounds_radius) * s.bounds_radius;
-    const double power[6] = {M_PI * 9 * 2, 4 * M_PI * 5, 2 * M_PI * (1 - 0.65) * 7, disk * 3, disk * 4 * M_PI * 0.5, 0};
+    REQUIRE(disk > 9);
+    const double power[6] = {M_PI * 9 * 2, 4 * M_PI * 5, 2 * M_PI * (1 - 0.65) * 7, 9 * 3, M_PI * 2 * 9 * 0.5, 0};
     double total = 0;
     for (double p : power) total += p;
     REQUIRE(s.emitter_cdf.size() == 7);
@@ -201,6 +203,21 @@ int wrongly_picked(const Scene& s) {
     return wrong;
 }
 
+TEST_CASE("finite and infinite emitters get an eighth of the picks at least: a stone far away does not take a room's") {
+    Scene s = base();
+    const uint32_t room = add_triangles(s, {{Vec3f{-1, 0, 0}, {1, 0, 0}, {0, 1, 0}}});
+    add_area_emitter(s, room, {1, 1, 1});
+    add_triangles(s, {{Vec3f{1e4f, 0, 0}, {1e4f + 1, 0, 0}, {1e4f, 1, 0}}});
+    s.environment = uint32_t(s.emitters.size());
+    s.emitters.push_back(emitter(EmitterType::constant, {1, 1, 1}));
+    finalize_scene(s, LightPicking::power);
+    // By areas: the lamp sends pi, the environment at most 2 pi (1 + 0.5).
+    CHECK(s.emitters[0].pick_probability == Approx(1.0 / 4).epsilon(1e-5));
+    s.emitters[1].radiance.value = splat(1e6f);
+    finalize_scene(s, LightPicking::power);
+    CHECK(s.emitters[0].pick_probability == Approx(kLeastGroupShare).epsilon(1e-5));
+}
+
 TEST_CASE("emitters are picked with exactly their pick probability: weak before strong, 1e5 and 1e6 lamps") {
     for (const LightPicking picking : {LightPicking::power, LightPicking::uniform}) {
         Scene weak_first = base();
@@ -213,8 +230,7 @@ TEST_CASE("emitters are picked with exactly their pick probability: weak before 
             for (uint32_t i = 0; i < n; ++i) {
                 const Vec4f u = random_floats({7, i, 0, Stream::test}, 0);
                 // Black ones, and six orders of magnitude.
-                s.emitters.push_back(
-                    emitter(EmitterType::point, splat(u.x < 0.05f ? 0.0f : std::pow(10.0f, 6 * u.y))));
+                s.emitters.push_back(emitter(EmitterType::point, splat(u.x < 0.05f ? 0.0f : std::pow(10.0f, 6 * u.y))));
             }
             finalize_scene(s, picking);
             INFO(n << " lamps");

@@ -348,25 +348,27 @@ TEST_CASE("G13: variants that an integrator does not have are refused by name") 
     CHECK_THROWS_AS(apply_setting(s, "connections", "257"), Error);
 }
 
-TEST_CASE("Sums of splats: cells of floats hold what fixed point holds, and both can be emptied") {
-    std::vector<int64_t> fixed(6, 0);
+TEST_CASE(
+    "Sums of splats: cells of floats hold what cells of doubles hold, whatever the unit, and both can be emptied") {
+    std::vector<double> doubles(6, 0);
     std::vector<Lane> floats(2, Lane{});
-    const SplatSums kinds[2] = {{fixed.data(), nullptr}, {nullptr, floats.data()}};
-    for (const SplatSums& sums : kinds) {
-        double expected[3] = {};
-        for (int k = 0; k < 100; ++k) {
-            const Rgb value = {0.5f + float(k), 1e-3f * float(k), 1e5f};  // below and above kLargeLight
-            CHECK(sums.add(1, value, false));
-            for (int c = 0; c < 3; ++c) expected[c] += double(value[c]);
+    const SplatSums kinds[2] = {{doubles.data(), nullptr}, {nullptr, floats.data()}};
+    for (const float unit : {1e-30f, 1e-12f, 1.0f, 1e12f, 1e30f})
+        for (const SplatSums& sums : kinds) {
+            double expected[3] = {};
+            for (int k = 0; k < 100; ++k) {
+                const Rgb value = Rgb{0.5f + float(k), 1e-3f * float(k), 1e5f} * unit;
+                sums.add(1, value, false);
+                for (int c = 0; c < 3; ++c) expected[c] += double(value[c]);
+            }
+            double value[3];
+            sums.read(1, value);
+            for (int c = 0; c < 3; ++c)
+                CHECK(value[c] == Approx(expected[c]).epsilon(sums.doubles ? 1e-14 : 100 * 0x1p-24));
+            sums.clear(1);
+            sums.read(1, value);
+            for (int c = 0; c < 3; ++c) CHECK(value[c] == 0);
+            sums.read(0, value);
+            for (int c = 0; c < 3; ++c) CHECK(value[c] == 0);
         }
-        CHECK_FALSE(sums.add(1, {1, 2, 0x1p26f}, true));
-        double value[3];
-        sums.read(1, value);
-        for (int c = 0; c < 3; ++c) CHECK(value[c] == Approx(expected[c]).epsilon(sums.fixed ? 1e-9 : 100 * 0x1p-24));
-        sums.clear(1);
-        sums.read(1, value);
-        for (int c = 0; c < 3; ++c) CHECK(value[c] == 0);
-        sums.read(0, value);
-        for (int c = 0; c < 3; ++c) CHECK(value[c] == 0);
-    }
 }

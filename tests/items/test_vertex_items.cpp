@@ -309,7 +309,7 @@ TEST_CASE("A ray that comes from a queue is the one that went in, with all that 
         const auto back = Items::unpack(ray);
         CHECK((same(back.origin, path.origin) && same(back.direction, path.direction) &&
                same(back.throughput, path.throughput)));
-        CHECK((back.depth == path.depth && back.delta == path.delta && back.eta == path.eta));
+        CHECK((back.depth == path.depth && back.delta == path.delta && back.roulette_scale == path.roulette_scale));
         return back;
     };
     for (const uint32_t depth : {1u, 2u, kMaxDepth})

@@ -323,7 +323,7 @@ TEST_CASE("G4: subpath bits hold every depth, flag and index", "[stages]") {
                 const SubpathBits b = SubpathBits::make(depth, delta, eta);
                 CHECK(b.depth() == depth);
                 CHECK(b.delta() == delta);
-                CHECK(std::abs(b.eta() - eta) <= eta * 0.0079f);  // 7 bits of mantissa
+                CHECK(std::abs(b.roulette_scale() - eta) <= eta * 0.0079f);  // 7 bits of mantissa
             }
     CHECK(kMaxDepth == 16383);
 }

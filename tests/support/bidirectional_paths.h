@@ -609,8 +609,8 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
         }
         double weight = 1.0 / (1.0 + double(ratio));
         if (std::isnan(ratio)) {
-            // A subpath that would have to draw what it all but never draws: floats overflow. No such subpath exists,
-            // and its weight would be nothing.
+            // A subpath that would have to draw what it all but never draws: the inverse of a density is no float. No
+            // such subpath exists, and its weight would be nothing.
             ++tally_.overflows;
             weight = oracle_weight(all, s, mis_.strategies, mis_.heuristic);
             CHECK(weight < 1e-7);

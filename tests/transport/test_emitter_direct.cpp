@@ -1,4 +1,4 @@
-// libs: ambilux_scene
+// libs: ambilux_scene ambilux_core
 // timeout: 120
 // Next event estimation against closed forms: the irradiance of each emitter, alone and together.
 #include "tests/support/catch.h"

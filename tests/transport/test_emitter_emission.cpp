@@ -1,4 +1,4 @@
-// libs: ambilux_scene
+// libs: ambilux_scene ambilux_core
 // timeout: 120
 // Light leaving emitters: its power, and the irradiance it brings, against light sampling from the receiver's side.
 #include "tests/support/catch.h"

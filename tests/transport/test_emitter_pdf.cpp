@@ -1,4 +1,4 @@
-// libs: ambilux_scene
+// libs: ambilux_scene ambilux_core
 // timeout: 120
 // Densities of light sampling: the same whether asked for or sampled, and the ones that samples follow.
 #include "tests/support/catch.h"

@@ -10,12 +10,13 @@ namespace {
 struct CubeHeuristic {
     static constexpr const char* kName = "cube";
     AMBILUX_HD static float term(float ratio) { return ratio * ratio * ratio; }
+    AMBILUX_HD static float norm(float a, float b) { return cbrtf(term(a) + term(b)); }
 };
 using WithCube = HeuristicList<BalanceHeuristic, PowerHeuristic, CubeHeuristic>;
 
 }  // namespace
 
-TEST_CASE("a heuristic of one's own: weights of all strategies sum to one, and terms multiply") {
+TEST_CASE("a heuristic of one's own: weights of all strategies sum to one, and norms are sums of terms") {
     const float densities[] = {0.3f, 2.0f, 0.0f, 1.1f, 7.0f};
     for (uint32_t which = 0; which < 3; ++which) {
         INFO(WithCube::kNames[which]);
@@ -28,6 +29,8 @@ TEST_CASE("a heuristic of one's own: weights of all strategies sum to one, and t
         }
         CHECK(sum == Approx(1.0f));
         CHECK(WithCube::term(which, 0.7f * 1.9f) == Approx(WithCube::term(which, 0.7f) * WithCube::term(which, 1.9f)));
+        CHECK(WithCube::term(which, WithCube::norm(which, 0.7f, 1.9f)) ==
+              Approx(WithCube::term(which, 0.7f) + WithCube::term(which, 1.9f)));
     }
     CHECK(WithCube::kNames[2] == std::string("cube"));
     CHECK(WithCube::term(2, 2.0f) == 8.0f);

@@ -1,4 +1,4 @@
-// libs: ambilux_scene
+// libs: ambilux_scene ambilux_core
 // Sensors: rays against Mitsuba's, filters by their moments, and B21: the camera's importance against the rays it
 // stands for.
 #include "tests/support/catch.h"

@@ -1,4 +1,4 @@
-// libs: ambilux_scene
+// libs: ambilux_scene ambilux_core
 // Texture lookup: texel positions, wrap modes, formats, gradients, and coordinates that no one should use.
 #include "tests/support/catch.h"
 #include "tests/support/emitter_scene.h"

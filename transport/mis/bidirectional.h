@@ -19,7 +19,8 @@
 
 namespace ambilux {
 
-/// What a subpath knows of the strategies that would have sampled its vertices from the other end.
+/// What a subpath knows of the strategies that would have sampled its vertices from the other end: norms of ratios
+/// (heuristic.h).
 struct MisSums {
     float dvcm, dvc;
 };
@@ -55,10 +56,10 @@ struct BidirectionalMis {
     AMBILUX_HD bool has(uint32_t bits) const { return strategies & bits; }
     /// Ratio of densities to the power that the heuristic asks for.
     AMBILUX_HD float term(float ratio) const { return heuristic_term(heuristic, ratio); }
+    AMBILUX_HD float norm(float a, float b) const { return heuristic_norm(heuristic, a, b); }
     AMBILUX_HD float masked(uint32_t bits, float value) const { return has(bits) ? value : 0.0f; }
-    /// Density of connections relative to that of one pair of subpaths, to the power of the heuristic; 0 if they are
-    /// off.
-    AMBILUX_HD float connection_term() const { return masked(kConnectionStrategies, term(connections)); }
+    /// Density of connections relative to that of one pair of subpaths; 0 if they are off.
+    AMBILUX_HD float connection_density() const { return masked(kConnectionStrategies, connections); }
 
     // ---- sums along subpaths ----
 
@@ -73,7 +74,7 @@ struct BidirectionalMis {
     AMBILUX_HD void start_eye(const SceneView& scene, Vec3f d, MisSums& sums, SubpathStart& start) const {
         const Vec3f axis = scene.sensor.to_world.vector({0.0f, 0.0f, 1.0f});
         const float scale = length(axis), cos_camera = dot(d, axis) / scale;
-        sums = {masked(kLightStrategies, term(light_subpaths / camera_pdf(scene.sensor, cos_camera))), 0.0f};
+        sums = {masked(kLightStrategies, light_subpaths / camera_pdf(scene.sensor, cos_camera)), 0.0f};
         start.camera_distance =
             camera_delta_direction(scene.sensor) ? 0.0f : scene.sensor.near_clip * scale / cos_camera;
     }
@@ -101,23 +102,23 @@ struct BidirectionalMis {
     /// came from infinity or from an orthographic camera, where densities of positions do not fall off with distance.
     /// With sums_after_scatter: equations 10 to 12.
     AMBILUX_HD MisSums sums_at_hit(MisSums s, float d2, float cos_in, bool parallel) const {
-        const float inv_cos = term(1.0f / cos_in);
-        return {s.dvcm * inv_cos * (parallel ? 1.0f : term(d2)), s.dvc * inv_cos};
+        const float inv_cos = 1.0f / cos_in;
+        return {s.dvcm * inv_cos * (parallel ? 1.0f : d2), s.dvc * inv_cos};
     }
 
     /// Sums of the ray that leaves a vertex at cosine `cos_out` to the geometric normal. `first`: the vertex is the
     /// first of its subpath that a ray met. For a delta the densities matter by their ratio alone (equation 6).
     AMBILUX_HD MisSums sums_after_scatter(MisSums s, bool first, bool delta, float pdf_forward_sa, float pdf_reverse_sa,
                                           float cos_out) const {
-        if (delta) return {0.0f, term(cos_out * pdf_reverse_sa / pdf_forward_sa) * s.dvc};
-        return {term(1.0f / pdf_forward_sa),
-                term(cos_out / pdf_forward_sa) * (s.dvc * term(pdf_reverse_sa) + connection_dvcm(s, first))};
+        if (delta) return {0.0f, cos_out * pdf_reverse_sa / pdf_forward_sa * s.dvc};
+        return {1.0f / pdf_forward_sa,
+                cos_out / pdf_forward_sa * norm(s.dvc * pdf_reverse_sa, connection_dvcm(s, first))};
     }
 
     /// dvcm where it stands for a strategy with s >= 2 and t >= 2, or one of the end strategies whose mask it holds
     /// already.
     AMBILUX_HD float connection_dvcm(MisSums s, bool first) const {
-        return first ? s.dvcm : connection_term() * s.dvcm;
+        return first ? s.dvcm : connection_density() * s.dvcm;
     }
 
     /// Sums at the first vertex of a light subpath, at `p`, met at cosine `cos_in` (equation 13).
@@ -146,7 +147,7 @@ struct BidirectionalMis {
                 next_event = start.direction * scale;  // samples its direction likewise
                 hit = scale;
         }
-        return {masked(kNextEventStrategies, term(next_event)), masked(kHitStrategies, term(hit))};
+        return {masked(kNextEventStrategies, next_event), masked(kHitStrategies, hit)};
     }
 
     // ---- ratios of the other strategies ----
@@ -163,14 +164,14 @@ struct BidirectionalMis {
         // The other strategy of a path of one segment is (1,1): a light vertex seen by the camera.
         if (path.depth == 1) {
             const float distance = length(light.p - path.origin) + path.start.camera_distance;
-            ratio =
-                sums_at_hit(ray, sqr(distance), cos_light, camera_delta_direction(scene.sensor)).dvcm * term(pdf_pos);
+            const bool parallel = camera_delta_direction(scene.sensor);
+            ratio = term(sums_at_hit(ray, sqr(distance), cos_light, parallel).dvcm * pdf_pos);
             return true;
         }
         const float next_event =
-            masked(kNextEventStrategies, term(pdf_emitter_direct<F>(scene, emitter, path.origin, d, light)));
-        const float emission = term(pdf_pos * pdf_emission_direction<F>(scene, emitter, light.ng, -d) / cos_light);
-        ratio = next_event * ray.dvcm + emission * ray.dvc;
+            masked(kNextEventStrategies, pdf_emitter_direct<F>(scene, emitter, path.origin, d, light));
+        const float emission = pdf_pos * pdf_emission_direction<F>(scene, emitter, light.ng, -d) / cos_light;
+        ratio = term(next_event * ray.dvcm) + term(emission * ray.dvc);
         return true;
     }
 
@@ -184,7 +185,7 @@ struct BidirectionalMis {
         // Light subpaths draw their directions as next event estimation does.
         const float pdf_sa = pdf_environment_direct<F>(scene, path.direction);
         const float emission = pdf_sa * pdf_emission_position<F>(scene, scene.environment, kNone);
-        ratio = masked(kNextEventStrategies, term(pdf_sa)) * ray.dvcm + term(emission) * ray.dvc;
+        ratio = term(masked(kNextEventStrategies, pdf_sa) * ray.dvcm) + term(emission * ray.dvc);
         return true;
     }
 
@@ -209,21 +210,21 @@ struct BidirectionalMis {
             default:  // light subpaths draw the direction as this sample was
                 more *= pdf_emission_position<F>(scene, light.emitter, kNone);
         }
-        return fewer + term(more) * (connection_dvcm(z, first) + z.dvc * term(f.pdf_reverse_sa));
+        return fewer + term(ratio_behind(z, first, more, f.pdf_reverse_sa));
     }
 
     /// One end of a connection, seen from the other: the density of this vertex by sampling there, per area, times what
-    /// follows behind it (equation 7).
+    /// follows behind it (equation 7). A norm.
     AMBILUX_HD float ratio_behind(MisSums s, bool first, float pdf_area, float pdf_reverse_sa) const {
-        return term(pdf_area) * (connection_dvcm(s, first) + s.dvc * term(pdf_reverse_sa));
+        return pdf_area * norm(connection_dvcm(s, first), s.dvc * pdf_reverse_sa);
     }
 
     /// s >= 2, t >= 2, in multiples of the density of connections.
     AMBILUX_HD float connection_ratio(MisSums y, bool y_first, MisSums z, bool z_first,
                                       const ConnectionDensities& p) const {
-        return (ratio_behind(y, y_first, p.y_area, p.y_reverse_sa) +
-                ratio_behind(z, z_first, p.z_area, p.z_reverse_sa)) /
-               connection_term();
+        return (term(ratio_behind(y, y_first, p.y_area, p.y_reverse_sa)) +
+                term(ratio_behind(z, z_first, p.z_area, p.z_reverse_sa))) /
+               term(connection_density());
     }
 
     /// t = 1: a light vertex with sums `y`, connected with the camera. `cos_y`: between its geometric normal and the
@@ -231,8 +232,8 @@ struct BidirectionalMis {
     AMBILUX_HD float camera_ratio(const SceneView& scene, MisSums y, bool first, const CameraConnection& c, float cos_y,
                                   float pdf_reverse_sa) const {
         const float fall_off = camera_delta_direction(scene.sensor) ? 1.0f : 1.0f / sqr(c.camera_distance);
-        return ratio_behind(y, first, camera_pdf(scene.sensor, c.cos_camera) * cos_y * fall_off / light_subpaths,
-                            pdf_reverse_sa);
+        const float pdf_area = camera_pdf(scene.sensor, c.cos_camera) * cos_y * fall_off / light_subpaths;
+        return term(ratio_behind(y, first, pdf_area, pdf_reverse_sa));
     }
 
     /// (1,1): a point sampled on an area emitter with density `pdf_pos` (pick included), connected with the camera

@@ -1,6 +1,7 @@
 // Heuristics of multiple importance sampling (Veach 1997, section 9.2). A weight is 1 / (1 + the sum over the other
-// strategies of (their density / this one's)^beta): a heuristic is the function term(), which must be multiplicative,
-// since sums along subpaths multiply terms of ratios.
+// strategies of (their density / this one's)^beta). A heuristic is two functions: term(ratio) = ratio^beta, and
+// norm(a, b) = (a^beta + b^beta)^(1/beta). Subpaths carry norms, not sums of powers: they have the range of the ratios
+// themselves, where a squared density overflows from lengths of 1e9 on.
 #pragma once
 
 #include "core/math.h"
@@ -10,11 +11,17 @@ namespace ambilux {
 struct BalanceHeuristic {
     static constexpr const char* kName = "balance";
     AMBILUX_HD static float term(float ratio) { return ratio; }
+    AMBILUX_HD static float norm(float a, float b) { return a + b; }
 };
 
 struct PowerHeuristic {
     static constexpr const char* kName = "power";
     AMBILUX_HD static float term(float ratio) { return ratio * ratio; }
+    /// Neither overflows nor underflows where the result does not.
+    AMBILUX_HD static float norm(float a, float b) {
+        const float large = max(a, b), small = min(a, b);
+        return small > 0.0f && large < kInfinity ? large * sqrtf(1.0f + sqr(small / large)) : large;
+    }
 };
 
 /// All heuristics, in the order of MisHeuristic.
@@ -28,6 +35,12 @@ struct HeuristicList {
         (void)((k++ == which && ((result = H::term(ratio)), true)) || ...);
         return result;
     }
+    AMBILUX_HD static float norm(uint32_t which, float a, float b) {
+        float result = 0.0f;
+        uint32_t k = 0;
+        (void)((k++ == which && ((result = H::norm(a, b)), true)) || ...);
+        return result;
+    }
 };
 using Heuristics = HeuristicList<BalanceHeuristic, PowerHeuristic>;
 
@@ -36,6 +49,9 @@ enum class MisHeuristic : uint32_t { balance, power };
 
 AMBILUX_HD float heuristic_term(MisHeuristic heuristic, float ratio) {
     return Heuristics::term(uint32_t(heuristic), ratio);
+}
+AMBILUX_HD float heuristic_norm(MisHeuristic heuristic, float a, float b) {
+    return Heuristics::norm(uint32_t(heuristic), a, b);
 }
 
 /// Weight of a strategy whose others have `ratio`: the sum of the terms of their densities over this one's.

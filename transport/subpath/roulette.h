@@ -6,15 +6,21 @@
 
 namespace ambilux {
 
-/// Product of relative indices with the bits that items keep (16 of a float): every schedule then takes the same
-/// decisions. Any value keeps roulette unbiased.
-AMBILUX_HD float rounded_eta(float eta) { return bits_float(float_bits(eta) & 0xffff0000u); }
+/// Subpath::roulette_scale with the bits that items keep (16 of a float): every schedule then takes the same decisions.
+/// Any value keeps roulette unbiased.
+AMBILUX_HD float rounded_scale(float scale) { return bits_float(float_bits(scale) & 0xffff0000u); }
 
-/// Thins a subpath by its throughput; `u` uniform in [0,1). False if it ends. Radiance is scaled by the squared index
-/// of the medium, which is not loss (Mitsuba's rule).
+/// Subpath::roulette_scale of a light subpath that starts with `flux`: roulette sees what is left of it, so that
+/// neither the unit of emission nor that of length decides.
+AMBILUX_HD float light_roulette_scale(Rgb flux) { return rounded_scale(inverse_sqrt(max_component(flux))); }
+
+/// Thins a subpath by the share of its throughput that is left, at most `cap`; `u` uniform in [0,1). False if it ends.
+/// Radiance is scaled by the squared index of the medium, which is not loss (Mitsuba's rule).
 template <class Mis>
-AMBILUX_HD bool survives(Subpath<Mis>& path, float u) {
-    const float probability = min(max_component(path.throughput) * sqr(path.eta), 0.95f);
+AMBILUX_HD bool survives(Subpath<Mis>& path, float cap, float u) {
+    // Scaled twice, since the square may be no float where the product is.
+    const float left = max_component(path.throughput) * path.roulette_scale * path.roulette_scale;
+    const float probability = min(left, cap);
     if (!(u < probability)) return false;
     path.throughput = path.throughput / probability;
     return true;

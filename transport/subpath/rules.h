@@ -11,6 +11,7 @@ struct Rules {
     Mis mis;
     uint32_t max_depth;      ///< segments of a path; kMaxDepth stands for no limit
     uint32_t rr_depth;       ///< Russian roulette at vertices with at least this many segments
+    float rr_cap;            ///< its highest probability of survival
     bool hide_emitters;      ///< the camera does not see emitters
     bool count_hits;         ///< eye subpaths count the area emitters that they meet
     bool count_environment;  ///< eye subpaths count the environment

@@ -32,10 +32,10 @@ AMBILUX_HD bool scatter(const Rules<Mis>& rules, Side side, const Vertex<Mis>& v
     path.sums = rules.mis.sums_after_scatter(vertex.sums, vertex.first, delta, forward, reverse, cos_out);
     path.origin = offset_ray_origin(vertex.point.p, vertex.offset, vertex.point.ng, s.wo);
     path.direction = s.wo;
-    if (side == Side::eye) path.eta = rounded_eta(path.eta * s.eta);
+    if (side == Side::eye) path.roulette_scale = rounded_scale(path.roulette_scale * s.eta);
     path.delta = delta;
     path.depth = met + 1;
-    return met < rules.rr_depth || survives(path, u.w);
+    return met < rules.rr_depth || survives(path, rules.rr_cap, u.w);
 }
 
 }  // namespace ambilux

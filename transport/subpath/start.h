@@ -3,7 +3,7 @@
 
 #include "transport/emitter/emission.h"
 #include "transport/sensor/camera.h"
-#include "transport/subpath/subpath.h"
+#include "transport/subpath/roulette.h"
 
 namespace ambilux {
 
@@ -16,7 +16,7 @@ AMBILUX_HD Subpath<Mis> first_ray(Vec3f origin, Vec3f direction, Rgb throughput)
     path.direction = direction;
     path.throughput = throughput;
     path.depth = 1;
-    path.eta = 1.0f;
+    path.roulette_scale = 1.0f;
     path.delta = true;
     return path;
 }
@@ -37,6 +37,7 @@ AMBILUX_HD Subpath<Mis> start_light(const Mis& mis, const EmissionSample& e) {
     const float pdf = e.pick * e.pdf_pos * e.pdf_dir;
     Subpath<Mis> path = detail::first_ray<Mis>(e.prim == kNone ? e.p : offset_ray_origin(e.p, e.p_error, e.ng, e.d),
                                                e.d, e.radiance * (e.cos_theta / pdf));
+    path.roulette_scale = light_roulette_scale(path.throughput);
     mis.start_light(e, path.start);
     return path;
 }

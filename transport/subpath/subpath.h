@@ -28,8 +28,9 @@ struct Subpath {
     typename Mis::Sums sums;  ///< of the ray; those of a light subpath begin at its first vertex
     [[no_unique_address]] typename Mis::Start start;  ///< of first rays
     uint32_t depth;                                   ///< segments, this one included
-    float eta;                                        ///< eye: product of the relative indices passed through
-    bool delta;                                       ///< the last scattering was a delta (true for first rays)
+    float roulette_scale;  ///< roulette sees throughput · scale². Eye: product of the relative indices passed through;
+                           ///< light: 1/sqrt of the flux at the start
+    bool delta;            ///< the last scattering was a delta (true for first rays)
 };
 
 /// A surface point met by a subpath.

@@ -44,6 +44,7 @@ BdptPolicy plan_bdpt(const Scene& scene, const RenderSettings& settings) {
     BdptPolicy p{};
     p.rules.max_depth = segment_limit(settings);
     p.rules.rr_depth = roulette_depth(settings);
+    p.rules.rr_cap = settings.rr_cap;
     set_strategies(p.rules, settings);
     set_rules(p.rules, scene);
     const Wave film = shape_wave(scene, settings.seed, kTilePixels, 1);
