@@ -189,9 +189,9 @@ Family shading_normals() {
             family.name, decade(degrees), double(degrees), answer, [degrees, a, reflectance] {
                 const std::vector<Point> tilted(4, Point{std::sin(a), 0, std::cos(a)});
                 const std::string file = "shading-normals_" + decade(degrees) + ".obj";
-                const Plate plate;
+                const std::string camera = orthographic({}, {0, 0, 0.5}, {0, 0, 0}, {0, 1, 0}, 0.5, 1e-3);
                 return SceneFiles{
-                    scene_xml(2, plate_camera(plate) + obj_shape({}, file, "", diffuse(reflectance)) +
+                    scene_xml(2, camera + obj_shape({}, file, "", diffuse(reflectance)) +
                                      rectangle({}, 50, 50, -0.01, false, diffuse(0)) +
                                      "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"1\"/></emitter>"),
                     {{file, obj_text({{-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}}, {1, 2, 3, 1, 3, 4}, tilted)}}};

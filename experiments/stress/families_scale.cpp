@@ -75,8 +75,7 @@ std::vector<Family> scale_families() {
         emission_scale(),
         space_scale<Cavity>("space-scale", "radius of the cavity", cavity, cavity_scene, cavity_answer, 10),
         space_scale<Plate>("space-scale-plate", "scale of a floor under a lamp", plate, plain_plate, plate_answer, 8),
-        space_scale<Furnace>("space-scale-furnace", "half side of the cube", furnace, furnace_scene, furnace_answer,
-                             true),
+        space_scale<Furnace>("space-scale-furnace", "half side of the cube", furnace, furnace_scene, furnace_answer, 8),
         far_from_origin<Plate>("far-from-origin", plate, plain_plate, plate_answer),
         far_from_origin<Furnace>("far-furnace", furnace, furnace_scene, furnace_answer)};
 }
