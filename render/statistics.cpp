@@ -26,6 +26,13 @@ void fill_stage_stats(const std::vector<std::string>& names, const std::vector<S
                       RenderStats& stats) {
     for (size_t s = 0; s < names.size(); ++s) {
         const StageRecord& r = records[s];
+        // A stage that runs as part of another may have no items of its own, but it drops values.
+        const InvalidCounts invalid = {r.nan, r.inf, r.negative, r.underflow};
+        if (invalid.total()) stats.invalid_by_stage[names[s]] = invalid;
+        stats.invalid.nan += r.nan;
+        stats.invalid.inf += r.inf;
+        stats.invalid.negative += r.negative;
+        stats.invalid.underflow += r.underflow;
         if (r.launches == 0 && r.items == 0) continue;
         StageStats stage;
         stage.name = names[s];
@@ -36,12 +43,6 @@ void fill_stage_stats(const std::vector<std::string>& names, const std::vector<S
         while (depths > 0 && r.items_by_depth[depths - 1] == 0) --depths;
         stage.items_by_depth.assign(r.items_by_depth, r.items_by_depth + depths);
         stats.stages.push_back(stage);
-        const InvalidCounts invalid = {r.nan, r.inf, r.negative, r.underflow};
-        if (invalid.total()) stats.invalid_by_stage[stage.name] = invalid;
-        stats.invalid.nan += r.nan;
-        stats.invalid.inf += r.inf;
-        stats.invalid.negative += r.negative;
-        stats.invalid.underflow += r.underflow;
         if (stage.name == "extend" || stage.name == "light_extend") stats.rays_extend += r.items;
         if (stage.name == "occlude") stats.rays_occlude += r.items;
     }
