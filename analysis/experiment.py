@@ -40,7 +40,7 @@ class Row:
     bias: float  # mean(x - r)
     bias_z: float
     rays: int
-    invalid: int  # values dropped: NaN, Inf, negative, below the range of floats
+    invalid: int  # values dropped: NaN, Inf, negative
     # Of newer runners. budget: which kind of checkpoint the row is, "spp" or "seconds".
     budget: str = ""
     relmse_trimmed: float = math.nan  # relMSE without the worst `trimmed_share` of the pixels

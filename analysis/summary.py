@@ -320,7 +320,7 @@ def remarks(experiment, summary):
         place = f"{line.scene}, {line.run}"
         noise = reference_noise(experiment, line.scene)
         if line.invalid:
-            found.append(f"{place}: {line.invalid} values were NaN, Inf, negative or below the range of floats and were dropped")
+            found.append(f"{place}: {line.invalid} values were NaN, Inf or negative and were dropped")
         broken = sum(not math.isfinite(r.error) for r in experiment.select(line.scene, line.run))
         if broken:
             found.append(f"{place}: the error of {broken} checkpoints is NaN or infinite; they are left out of figures and means")

@@ -45,8 +45,7 @@ void check(const Options& o) {
 }
 
 std::string described(const InvalidCounts& counts) {
-    return fmt::format("{} NaN, {} Inf, {} negative values and {} below the range of floats", counts.nan, counts.inf,
-                       counts.negative, counts.underflow);
+    return fmt::format("{} NaN, {} Inf, {} negative values", counts.nan, counts.inf, counts.negative);
 }
 
 /// What --strict objects to; empty if nothing.

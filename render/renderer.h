@@ -24,8 +24,10 @@ struct StageStats {
 /// Counts of values that were dropped or lost.
 struct InvalidCounts {
     uint64_t nan = 0, inf = 0, negative = 0;
-    uint64_t underflow = 0;  ///< light that became 0 because it is below the range of floats
-    uint64_t total() const { return nan + inf + negative + underflow; }
+    /// Contributions that their weight took below the range of floats. No error by themselves: tails of narrow lobes
+    /// are as small.
+    uint64_t underflow = 0;
+    uint64_t total() const { return nan + inf + negative; }
 };
 
 struct QueueStats {

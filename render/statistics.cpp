@@ -28,7 +28,7 @@ void fill_stage_stats(const std::vector<std::string>& names, const std::vector<S
         const StageRecord& r = records[s];
         // A stage that runs as part of another may have no items of its own, but it drops values.
         const InvalidCounts invalid = {r.nan, r.inf, r.negative, r.underflow};
-        if (invalid.total()) stats.invalid_by_stage[names[s]] = invalid;
+        if (invalid.total() + invalid.underflow) stats.invalid_by_stage[names[s]] = invalid;
         stats.invalid.nan += r.nan;
         stats.invalid.inf += r.inf;
         stats.invalid.negative += r.negative;

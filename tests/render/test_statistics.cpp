@@ -18,7 +18,7 @@ TEST_CASE("Values dropped by a stage that runs as part of another count, though 
     CHECK(stats.stages.size() == 1);
     CHECK(stats.invalid.inf == 2);
     CHECK(stats.invalid.underflow == 3);
-    CHECK(stats.invalid.total() == 5);
+    CHECK(stats.invalid.total() == 2);  // what is below the range of floats is no error by itself
     CHECK(stats.invalid_by_stage.size() == 1);
-    CHECK(stats.invalid_by_stage["connect"].total() == 5);
+    CHECK(stats.invalid_by_stage["connect"].underflow == 3);
 }

@@ -53,7 +53,8 @@ inline Estimate render_batches(const Scene& scene, const RenderSettings& setting
     }
     const RenderStats stats = renderer->stats();
     for (const auto& [stage, invalid] : stats.invalid_by_stage) {
-        INFO("invalid values of stage " << stage);
+        INFO("stage " << stage << ": " << invalid.nan << " NaN, " << invalid.inf << " Inf, " << invalid.negative
+                      << " negative, " << invalid.underflow << " below the range of floats");
         CHECK(invalid.total() == 0);
     }
     return to_estimate(batches);
