@@ -28,6 +28,12 @@ double student_tail(double t, double dof) {
     return boost::math::cdf(boost::math::complement(boost::math::students_t_distribution<double, Policy>(dof), t));
 }
 
+double student_tail_inverse(double p, double dof) {
+    if (std::isinf(dof)) return normal_tail_inverse(p);
+    const boost::math::students_t_distribution<double, Policy> t(dof);
+    return boost::math::quantile(boost::math::complement(t, p));
+}
+
 double sidak(double p, double tests) { return p >= 1 ? 1 : -std::expm1(tests * std::log1p(-p)); }
 
 double sidak_level(double alpha, double tests) { return -std::expm1(std::log1p(-alpha) / tests); }

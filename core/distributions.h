@@ -16,6 +16,10 @@ double chi_square_tail(double x, double dof);
 /// P(T > t) of Student's t distribution with `dof` > 0 degrees of freedom (need not be an integer).
 double student_tail(double t, double dof);
 
+/// t with P(T > t) = p, for 0 < p < 1; infinity at 0, NaN without degrees of freedom. Infinitely many are the normal
+/// distribution.
+double student_tail_inverse(double p, double dof);
+
 /// Chance that the smallest of `tests` independent p-values is at most `p` (Sidak 1967): 1-(1-p)^tests.
 double sidak(double p, double tests);
 

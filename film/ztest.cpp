@@ -205,7 +205,9 @@ private:
         total_a_ += block.a.mean;
         total_b_ += block.b.mean;
         // Channels of a pixel may be fully correlated: deviations add.
-        deviation_ += std::sqrt(block.a.variance + block.b.variance);
+        const double variance = block.a.variance + block.b.variance;
+        deviation_ += std::sqrt(variance);
+        if (variance > 0) dof_ = std::min(dof_, variance * variance / (block.a.dof_terms + block.b.dof_terms));
     }
 
     bool is_conclusive(const Block& block, double expected, bool whole) const {
@@ -242,8 +244,8 @@ private:
     void conclude() {
         r_.p_worst = r_.tests ? sidak(2 * normal_tail(std::abs(r_.worst_z)), double(r_.tests)) : 1;
         r_.relative_difference = total_a_ == total_b_ ? 0 : (total_a_ - total_b_) / total_b_;
-        const double threshold =
-            normal_tail_inverse(0.5 * sidak_level(0.5 * options_.significance, std::max<double>(1, double(r_.tests))));
+        const double threshold = student_tail_inverse(
+            0.5 * sidak_level(0.5 * options_.significance, std::max<double>(1, double(r_.tests))), dof_);
         r_.detectable = threshold * deviation_ / std::abs(total_b_);
         r_.pass = !r_.undecided && r_.p_worst >= 0.5 * options_.significance &&
                   r_.p_chi_square >= 0.5 * options_.significance;
@@ -254,6 +256,7 @@ private:
     const uint32_t smallest_;
     ZTestResult r_;
     double total_a_ = 0, total_b_ = 0, deviation_ = 0;
+    double dof_ = kInf;  ///< of the whole image: the fewest of the channels
 };
 
 }  // namespace

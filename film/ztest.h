@@ -52,7 +52,7 @@ struct ZTestResult {
     double mean_z[3] = {0, 0, 0};    ///< whole image, per channel
     double relative_difference = 0;  ///< (mean(a)-mean(b))/mean(b) over all pixels and channels
     double detectable =
-        0;  ///< relative difference of the overall mean that would just have failed: the power of this test
+        0;  ///< relative difference of the overall mean that would just have failed (Student's t): the test's power
     double chi_square[3] = {0, 0, 0};  ///< sum of z² over the smallest blocks, per channel
     double chi_square_dof = 0;         ///< largest count of blocks of a channel
     double p_chi_square = 1;           ///< smallest of the channels' tails, corrected for three

@@ -13,8 +13,8 @@
 #include "backends/cuda_device.h"
 #include "items/subpath_items.h"
 #include "queues/reserved_queue.h"
-#include "tests/support/catch.h"
 #include "tests/support/render_scene.h"
+#include "tests/support/skip.h"
 
 using namespace ambilux;
 
@@ -39,7 +39,7 @@ __global__ void push_some(Queue<Item> queue, uint32_t n, uint32_t keep) {
 
 TEST_CASE("queue on a device: every push arrives once, for any size and divergence") {
     if (!cuda_device_present()) {
-        WARN("no CUDA device: skipped");
+        skip("no CUDA device: skipped");
         return;
     }
     for (const uint32_t n : {1u, 31u, 32u, 33u, 1000u, (1u << 20) + 1}) {
@@ -72,7 +72,7 @@ TEST_CASE("queue on a device: every push arrives once, for any size and divergen
 
 TEST_CASE("G3: a full queue on a device loses items by count, not in silence") {
     if (!cuda_device_present()) {
-        WARN("no CUDA device: skipped");
+        skip("no CUDA device: skipped");
         return;
     }
     DeviceBuffer<Lane> memory(200);
@@ -154,7 +154,7 @@ void check_reserved(uint32_t n, uint32_t keep, uint32_t blocks) {
 
 TEST_CASE("slots reserved ahead: every push arrives once, what is left over is marked and counted") {
     if (!cuda_device_present()) {
-        WARN("no CUDA device: skipped");
+        skip("no CUDA device: skipped");
         return;
     }
     for (const uint32_t n : {1u, 33u, 1000u, (1u << 20) + 1, (1u << 23) + 7, (1u << 25) + 5}) {
@@ -166,7 +166,7 @@ TEST_CASE("slots reserved ahead: every push arrives once, what is left over is m
 
 TEST_CASE("slots reserved ahead: a queue that is too small loses items by count") {
     if (!cuda_device_present()) {
-        WARN("no CUDA device: skipped");
+        skip("no CUDA device: skipped");
         return;
     }
     constexpr uint32_t n = 1u << 22, capacity = 1u << 21;
@@ -217,7 +217,7 @@ struct OwnedOrder {
 
 TEST_CASE("compaction of flags on a device: the places that hold an item, in order, and their number") {
     if (!cuda_device_present()) {
-        WARN("no CUDA device: skipped");
+        skip("no CUDA device: skipped");
         return;
     }
     for (const uint32_t n : {1u, 31u, 32u, 33u, 1000u, (1u << 20) + 1}) {
@@ -244,7 +244,7 @@ TEST_CASE("compaction of flags on a device: the places that hold an item, in ord
 
 TEST_CASE("sorting places on a device: as a stable sort on the host, for any number of bits") {
     if (!cuda_device_present()) {
-        WARN("no CUDA device: skipped");
+        skip("no CUDA device: skipped");
         return;
     }
     for (const uint32_t n : {1u, 31u, 32u, 33u, 1000u, (1u << 20) + 1}) {
@@ -359,7 +359,7 @@ void check_visits(const QueuePolicy& policy, uint32_t n, uint32_t misses, bool s
 
 TEST_CASE("stages of hits on a device: every hit once, and rays that met nothing where they are of use only") {
     if (!cuda_device_present()) {
-        WARN("no CUDA device: skipped");
+        skip("no CUDA device: skipped");
         return;
     }
     const QueuePolicy sorted = {Compaction::atomic, Ordering::material, true};
@@ -401,7 +401,7 @@ struct Mark {
 
 TEST_CASE("turns: every item once, whatever the lengths of runs") {
     if (!cuda_device_present()) {
-        WARN("no CUDA device: skipped");
+        skip("no CUDA device: skipped");
         return;
     }
     for (const uint32_t blocks : {1u, 2u, 33u}) {
@@ -424,7 +424,7 @@ TEST_CASE("turns: every item once, whatever the lengths of runs") {
 
 TEST_CASE("turns: launches go through every item once, one after the other over the same queue or slots") {
     if (!cuda_device_present()) {
-        WARN("no CUDA device: skipped");
+        skip("no CUDA device: skipped");
         return;
     }
     int device = 0, multiprocessors = 0;
@@ -466,7 +466,7 @@ TEST_CASE("turns: launches go through every item once, one after the other over 
 
 TEST_CASE("bench queues on a device: rows of every operation, and what is drained is what was pushed") {
     if (!cuda_device_present()) {
-        WARN("no CUDA device: skipped");
+        skip("no CUDA device: skipped");
         return;
     }
     const Scene scene = project_scene("cornell");

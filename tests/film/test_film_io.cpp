@@ -150,6 +150,18 @@ TEST_CASE("a failed write leaves the old file and nothing else") {
     if (fs::exists("/dev/full")) CHECK(code_of([&] { append_file("/dev/full", "x"); }) == ExitCode::device);
 }
 
+TEST_CASE("moments of two samples go on from a reference, those of one do not") {
+    FilmMoments m{1, 1, 2, {2, 4, 6}, {3, 9, 20}};
+    const FilmMoments back = to_moments(to_reference(m));
+    for (size_t c = 0; c < 3; ++c) {
+        CHECK(back.sum[c] == Approx(m.sum[c]));
+        CHECK(back.sum_squares[c] == Approx(m.sum_squares[c]).epsilon(1e-6));
+    }
+    Reference one = to_reference(m);
+    one.samples = 1;
+    CHECK_THROWS_AS(to_moments(one), Error);
+}
+
 TEST_CASE("PNG: the sRGB curve, clamping and NaN") {
     CHECK(linear_to_srgb(0.0f) == 0.0f);
     CHECK(linear_to_srgb(-1.0f) == 0.0f);
@@ -160,6 +172,11 @@ TEST_CASE("PNG: the sRGB curve, clamping and NaN") {
     const test::TempFolder folder;
     write_png(folder / "a.png", noise(5, 3, 1), 1.0f);
     CHECK(read_file(folder / "a.png").substr(0, 8) == "\x89PNG\r\n\x1a\n");
+    // A stop of exposure is twice the light.
+    Image twice = noise(5, 3, 1);
+    for (float& v : twice.rgb) v *= 2;
+    write_png(folder / "b.png", twice, 0.0f);
+    CHECK(read_file(folder / "a.png") == read_file(folder / "b.png"));
 }
 
 TEST_CASE("metrics: relMSE without the worst pixels") {

@@ -288,3 +288,54 @@ TEST_CASE("Images whose pixels depend on each other are compared by their batche
     CHECK(seen > runs * 9 / 10);
     CHECK_THROWS_AS(to_estimate(std::vector<FilmMoments>(15, walks(1, 1)[0])), Error);
 }
+
+TEST_CASE("What a comparison of few batches says it would see is what it sees: Student's quantiles, not normal ones") {
+    for (const int count : {16, 32}) {
+        INFO(count << " batches");
+        std::mt19937_64 rng(3);
+        std::normal_distribution<double> normal;
+        std::vector<FilmMoments> batches;
+        for (int k = 0; k < count; ++k) {
+            // All pixels share the noise of their batch, so that the whole image has the degrees of freedom of one.
+            FilmMoments m{16, 16, 2, std::vector<double>(3 * 256), std::vector<double>(3 * 256)};
+            const double noise = 0.005 * normal(rng);
+            for (size_t i = 0; i < 3 * 256; ++i) {
+                const double mean = 1 + double(i / 3) / 256 + noise;
+                m.sum[i] = 2 * mean;
+                m.sum_squares[i] = 2 * (mean * mean + 1e-4);
+            }
+            batches.push_back(std::move(m));
+        }
+        const Estimate a = to_estimate(batches);
+        ZTestOptions options;
+        options.block = 16;
+        const auto against = [&](double relative) {
+            Estimate b = a;
+            b.samples = 0;
+            b.batches.clear();
+            for (size_t i = 0; i < b.mean.size(); ++i) b.mean[i] /= 1 + relative, b.variance_of_mean[i] = 0;
+            return z_test(a, b, options);
+        };
+        const double detectable = against(1e-3).detectable;
+        CHECK(against(0.97 * detectable).pass);
+        CHECK_FALSE(against(1.03 * detectable).pass);
+    }
+}
+
+TEST_CASE("what is dark in one half of an image leaves no block of the other half undecided") {
+    // Blocks look at the larger block around them for the events to expect.
+    const auto half = [](uint64_t seed) {
+        std::mt19937_64 rng(seed);
+        FilmMoments m{32, 8, 64, std::vector<double>(3 * 256), std::vector<double>(3 * 256)};
+        for (size_t p = 0; p < 256; ++p)
+            for (int k = 0; k < 64; ++k) {
+                const double v = p % 32 < 16 ? 0 : std::exponential_distribution<double>()(rng);
+                for (size_t c = 0; c < 3; ++c) m.sum[3 * p + c] += v, m.sum_squares[3 * p + c] += v * v;
+            }
+        return to_estimate(m);
+    };
+    const ZTestResult z = z_test(half(1), half(2));
+    INFO(z.report());
+    CHECK(z.pass);
+    CHECK(z.inconclusive == 0);
+}

@@ -1,4 +1,5 @@
 // libs: ambilux_experiments ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// data: tagged
 // timeout: 900
 // bdpt.auto=true: what the pilot predicts is what renders show, and what follows from it.
 #include <algorithm>
@@ -203,7 +204,8 @@ TEST_CASE("the error is predicted for the samples that the render will take") {
 }
 
 TEST_CASE(
-    "speckles that light tracing finds: with few samples the path tracer leaves them out, with many it pays for them") {
+    "speckles that light tracing finds: with few samples the path tracer leaves them out, with many it pays for them",
+    "[data]") {
     const std::optional<Scene> scene = published_scene("veach-mis", 160, 90);
     if (!scene) return;
     for (uint64_t seed = 1; seed <= 4; ++seed) {

@@ -1,4 +1,5 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// data: tagged
 // labels: long
 // timeout: 3600
 // Every mask of strategies that can sample a scene, both heuristics, every variant and the light tracer against the
@@ -81,7 +82,8 @@ public:
     void check(const Method& m, bool hidden, double sees) {
         scene_.integrator.hide_emitters = hidden;
         if (!path_.contains(hidden)) path_[hidden] = render_path(scene_, c_.path);
-        const ZTestResult z = z_test(render_batches(scene_, method_settings(scene_, m, 1), c_.sampled), path_[hidden]);
+        const Estimate image = render_batches(scene_, method_settings(scene_, m, 1), c_.sampled);
+        const ZTestResult z = z_test(image, path_[hidden]);
         const std::string what = std::string(c_.name) + ", " + m.name +
                                  (m.heuristic == MisHeuristic::power ? ", power" : "") +
                                  (m.variant == "wavefront" ? "" : ", " + m.variant);
@@ -91,6 +93,7 @@ public:
         INFO(what << ": " << z.report());
         CHECK(z.pass);
         CHECK(z.detectable < sees);
+        CHECK(sees_bias(image, path_[hidden], sees));
     }
 
 private:
@@ -141,7 +144,7 @@ TEST_CASE("Masks of strategies agree with the path tracer on the project's scene
     on_project_scenes(compare_masks);
 }
 
-TEST_CASE("Masks of strategies agree with the path tracer on the published scenes", "[bidirectional]") {
+TEST_CASE("Masks of strategies agree with the path tracer on the published scenes", "[bidirectional][data]") {
     on_published_scenes(compare_masks);
 }
 
@@ -149,6 +152,6 @@ TEST_CASE("Variants agree with the path tracer on the project's scenes", "[bidir
     on_project_scenes(compare_variants);
 }
 
-TEST_CASE("Variants agree with the path tracer on the published scenes", "[bidirectional]") {
+TEST_CASE("Variants agree with the path tracer on the published scenes", "[bidirectional][data]") {
     on_published_scenes(compare_variants);
 }

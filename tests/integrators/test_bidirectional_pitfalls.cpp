@@ -183,7 +183,7 @@ TEST_CASE("B6: light through refraction is scaled alike by subpaths from either 
     const Scene inside =
         scene_from_text(scene_xml(5, camera("0,0,0.1", "1,0.3,-0.6", 70) + "<shape type='sphere'>" + rough_glass(0.3) +
                                          "</shape>" + floor + lamp(1, 1, 1.5, 0, 1.5)));
-    agree(inside, {kLightTracer}, 2048, 1024, 0.3);
+    agree(inside, {kLightTracer}, 2048, 2048, 0.3);
     agree(inside, {kAll}, 2048, 512, 0.2);
     const Scene lit = scene_from_text(scene_xml(
         5, camera("0,-5,1.5", "0,0,-0.4", 35) + "<shape type='sphere'>" + rough_glass(0.3) + "</shape>" + floor +
@@ -379,7 +379,7 @@ TEST_CASE("B23: a glass ball between a small lamp and a floor: caustics by light
                   "<sensor type='orthographic'><transform name='to_world'><scale value='0.4'/><lookat "
                   "origin='0,0,0.05' target='0,0,0' up='0,1,0'/></transform>" +
                       film(16) + "</sensor>" + ball + kPlane + lamp(0.3, 0.3, 0.5, 0, 2.2, {20, 20, 20})));
-    agree(below, {kLightTracer, kAll, {"hits"}}, 4096, 256, 0.08);
+    agree(below, {kLightTracer, kAll, {"hits"}}, 4096, 512, 0.08);
 }
 
 // ---- geometry ----

@@ -1,4 +1,5 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// data: tagged
 // timeout: 300
 // The estimators naive, nee and mis (balance, power) have the same expectation on every scene: z-tests of pairs that
 // share no random numbers.
@@ -6,6 +7,7 @@
 
 #include "film/ztest.h"
 #include "formats/finalize.h"
+#include "tests/support/injected_bias.h"
 #include "tests/support/render_scene.h"
 #include "transport/emitter.h"
 
@@ -60,10 +62,12 @@ FilmMoments render_with(const Scene& scene, const Comparison& c, Estimator estim
 }
 
 void check_pair(const char* name, const FilmMoments& a, const FilmMoments& b, double sees) {
-    const ZTestResult z = z_test(to_estimate(a), to_estimate(b));
+    const Estimate x = to_estimate(a), y = to_estimate(b);
+    const ZTestResult z = z_test(x, y);
     INFO(name << " against mis: " << z.report());
     CHECK(z.pass);
     CHECK(z.detectable < sees);
+    CHECK(sees_bias(x, y, sees));
 }
 
 void compare(Scene scene, const Comparison& c) {
@@ -89,7 +93,7 @@ TEST_CASE("Estimators agree on the project's scenes", "[path]") {
     }
 }
 
-TEST_CASE("Estimators agree on the published scenes", "[path]") {
+TEST_CASE("Estimators agree on the published scenes", "[path][data]") {
     for (const Comparison& c : kComparisons) {
         if (!c.published) continue;
         INFO(c.name << ", max_depth " << c.max_depth);

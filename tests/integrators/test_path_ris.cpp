@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "film/ztest.h"
+#include "tests/support/injected_bias.h"
 #include "tests/support/render_scene.h"
 
 using namespace ambilux;
@@ -63,10 +64,12 @@ TEST_CASE("ris agrees with the path tracer for any number of candidates", "[path
         for (const char* candidates : {"1", "4", "16"}) {
             const RenderResult r = render_scene(scene, ris_settings(scene, candidates, 12), spp);
             CHECK(r.stats.invalid.total() == 0);
-            const ZTestResult z = z_test(to_estimate(r.film), path);
+            const Estimate image = to_estimate(r.film);
+            const ZTestResult z = z_test(image, path);
             INFO(name << ", " << candidates << " candidates: " << z.report());
             CHECK(z.pass);
             CHECK(z.detectable < 0.03);
+            CHECK(sees_bias(image, path, 0.03));
         }
     }
 }

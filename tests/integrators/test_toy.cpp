@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "film/ztest.h"
+#include "tests/support/injected_bias.h"
 #include "tests/support/render_scene.h"
 
 using namespace ambilux;
@@ -56,10 +57,12 @@ TEST_CASE("a disk above a plane hides its form factor from the point below") {
         "<shape type='disk'><transform name='to_world'><scale value='2'/><translate z='1'/></transform></shape>"
         "</scene>");
     const RenderResult r = render_scene(scene, toy_settings(scene), 1024);
-    const ZTestResult z = z_test(to_estimate(r.film), exact_estimate({16, 16, std::vector<float>(16 * 16 * 3, 0.2f)}));
+    const Estimate image = to_estimate(r.film), truth = exact_estimate({16, 16, std::vector<float>(16 * 16 * 3, 0.2f)});
+    const ZTestResult z = z_test(image, truth);
     INFO(z.report());
     CHECK(z.pass);
     CHECK(z.detectable < 0.05);
+    CHECK(sees_bias(image, truth, 0.05));
 }
 
 TEST_CASE("toy refuses what it has not") {

@@ -10,6 +10,7 @@
 
 #include "film/ztest.h"
 #include "tests/support/closed_forms.h"
+#include "tests/support/injected_bias.h"
 
 namespace ambilux {
 
@@ -96,23 +97,27 @@ inline void check_image(const Scene& scene, const RenderSettings& settings, cons
     double samples = kPilot * std::pow(first.detectable / 0.013, 2) * 2;
     if (first.undecided && std::abs(first.relative_difference) > 1e-3) samples = most;  // too few events to tell
     const uint32_t n = uint32_t(std::clamp(samples, double(kPilot), double(most))) / kBatches * kBatches;
-    const ZTestResult z = z_test(render_batches(scene, settings, n, kPilot), truth, options);
+    const Estimate image = render_batches(scene, settings, n, kPilot);
+    const ZTestResult z = z_test(image, truth, options);
     INFO(n << " samples: " << z.report());
     // Almost without variance: the few subpaths that differ are too few to be tested, and together may matter one in
     // 1000 at most.
-    if (z.undecided)
+    if (z.undecided) {
         CHECK(std::abs(z.relative_difference) < 1e-3);
-    else
+    } else {
         CHECK(z.pass);
+        CHECK(sees_bias(image, truth, 0.02, options));
+    }
     CHECK(z.detectable < 0.02);
 }
 
-/// Fails unless both have the same expectation and a difference of `sees` of the whole would have been noticed.
+/// Fails unless both have the same expectation and a difference of `sees` of the whole is noticed, which is tried.
 inline void check_agreement(const Estimate& a, const Estimate& b, double sees, const ZTestOptions& options = {}) {
     const ZTestResult z = z_test(a, b, options);
     INFO(z.report());
     CHECK(z.pass);
     CHECK(z.detectable < sees);
+    CHECK(sees_bias(a, b, sees, options));
 }
 
 // ---- a plane at z = 0, seen from above in [-1,1]², and its light ----

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "film/ztest.h"
+#include "tests/support/injected_bias.h"
 #include "tests/support/render_scene.h"
 
 namespace ambilux {
@@ -80,17 +81,20 @@ inline void check_expectation(const Scene& scene, const RenderSettings& settings
     if (!exact) {
         const ZTestResult pilot = z_test(to_estimate(renderer->film()), exact_estimate(expected), options);
         const double samples = kPilot * std::pow(pilot.detectable / kSeen, 2) * 1.2;
-        const auto n = uint32_t(std::clamp(samples, double(kPilot), 3e4));
+        const auto n = uint32_t(std::clamp(samples, double(kPilot), 4.5e4));
         renderer->clear_film();
         REQUIRE(renderer->render(kPilot, n) == n);
-        const ZTestResult z = z_test(to_estimate(renderer->film()), exact_estimate(expected), options);
+        const Estimate image = to_estimate(renderer->film()), truth = exact_estimate(expected);
+        const ZTestResult z = z_test(image, truth, options);
         INFO(n << " samples: " << z.report());
         // Almost without variance: the few subpaths that met roulette are too few to be tested, and together may matter
         // one in 1000 at most.
-        if (z.undecided)
+        if (z.undecided) {
             CHECK(std::abs(z.relative_difference) < 1e-3);
-        else
+        } else {
             CHECK(z.pass);
+            CHECK(sees_bias(image, truth, 0.01, options));
+        }
         CHECK(z.detectable < 0.01);
     }
     CHECK(renderer->stats().invalid.total() == 0);

@@ -2,14 +2,14 @@
 #pragma once
 
 #include "render/renderer.h"
-#include "tests/support/catch.h"
+#include "tests/support/skip.h"
 
 namespace ambilux {
 
 /// False, with a warning that the test was skipped, where no device answers.
 inline bool device() {
     if (cuda_available()) return true;
-    WARN("no CUDA device: skipped");
+    skip("no CUDA device: skipped");
     return false;
 }
 

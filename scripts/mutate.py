@@ -1,0 +1,295 @@
+#!/usr/bin/env python3
+"""Do the tests notice faults? Draws faults at random over sources, compiles them all into one copy of the project and runs the tests with one of them at a time.
+
+Usage: scripts/mutate.py [--seed S] [--count N] [--folder DIR] [--tests NAME...] [--retry] [--only ID...] [--report]
+
+A fault is an expression that is another than in the source: an operator replaced, a factor dropped, arguments swapped, a value 1 % too
+large (scripts/mutation_sites.py). The copy, below the folder, holds both and takes the wrong one where AMBILUX_FAULT is the fault's
+number; the project's own sources and builds hold nothing of this. The tests of each fault are those cases that reach it, cheapest first,
+until one fails; a crash or a time-out counts as a failure. Interrupted runs go on where they were. `--retry` gives survivors another try
+after tests have changed. A fault that no test can notice, since it changes nothing that matters, stands with its reason in
+scripts/mutation_equivalents.txt and does not count.
+Exit status: 0 when at least 95 % were noticed.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import mutation_sites
+from mutation_sites import Site
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDERS = ("transport", "stages", "film")
+TEST_FOLDERS = ("transport", "stages", "film", "items", "queues", "scene", "integrators")
+GOAL = 0.95
+HEADER = """// Which fault of a mutation run is on.
+#pragma once
+#include <cstdio>
+#include <cstdlib>
+namespace ambilux {
+struct Mutation {
+    int active = 0;
+    const char* log = nullptr;
+    unsigned char reached[%d] = {};
+    Mutation() {
+        if (const char* fault = std::getenv("AMBILUX_FAULT")) active = std::atoi(fault);
+        log = std::getenv("AMBILUX_FAULT_LOG");
+    }
+    ~Mutation() {
+        std::FILE* file = log ? std::fopen(log, "w") : nullptr;
+        for (int k = 0; file && k < int(sizeof(reached)); ++k)
+            if (reached[k]) std::fprintf(file, "%%d\\n", k);
+        if (file) std::fclose(file);
+    }
+};
+inline Mutation the_mutation;
+inline bool mutated(int k) {
+    if (__builtin_expect(the_mutation.log != nullptr, 0)) the_mutation.reached[k] = 1;
+    return __builtin_expect(k == the_mutation.active, 0);
+}
+}  // namespace ambilux
+"""
+
+
+def run(command, **options):
+    return subprocess.run(command, text=True, capture_output=True, errors="replace", **options)
+
+
+def say(text):
+    print(f"{time.strftime('%H:%M:%S')} {text}", flush=True)
+
+
+def project_files(*folders):
+    return run(["git", "-C", ROOT, "ls-files", "--cached", "--others", "--exclude-standard", *folders]).stdout.split()
+
+
+def write(path, text):
+    """Writes a file whose text changes, so that a build sees no more than what is new."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.exists() or path.read_text(errors="replace") != text:
+        path.write_text(text)
+
+
+class Workspace:
+    """The mutated copy and what is known about it."""
+
+    def __init__(self, folder, tests):
+        self.folder, self.source, self.build = folder, folder / "source", folder / "build"
+        self.tests = tests
+        self.faults = {}
+        self.sources = {n: (ROOT / n).read_text() for n in project_files(*FOLDERS) if n.endswith((".h", ".cpp"))}
+
+    # ---- faults and their build ----
+
+    def copy(self):
+        for name in project_files():
+            if not (ROOT / name).is_file() or name.startswith(FOLDERS) and name.endswith((".h", ".cpp")):
+                continue
+            target = self.source / name
+            if not target.exists() or target.read_bytes() != (ROOT / name).read_bytes():
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(ROOT / name, target)
+        # One set of kernels instead of one a level of features: a fifth of the build.
+        write(self.source / "cmake/registry.cmake", re.sub(r"set\(AMBILUX_LEVELS [^)]*\)", "set(AMBILUX_LEVELS All)", (ROOT / "cmake/registry.cmake").read_text()))
+        write(self.source / "integrators/registry.list", (ROOT / "integrators/registry.list").read_text().replace("Diffuse All", ""))
+
+    def rewrite(self):
+        by_file = {}
+        for number, site in self.faults.items():
+            by_file.setdefault(site.file, []).append((number, site))
+        for name, text in self.sources.items():
+            write(self.source / name, mutation_sites.rewrite(text, by_file[name]) if name in by_file else text)
+        write(self.source / "core/mutation.h", HEADER % (max(self.faults) + 1))
+
+    def configure(self):
+        result = run(["cmake", "-S", self.source, "-B", self.build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DAMBILUX_CUDA=OFF"])
+        if result.returncode:
+            sys.exit(result.stdout + result.stderr)
+
+    def broken(self):
+        """Faults that do not compile, by the compiler's messages about a few files that include all of the others."""
+        commands = json.loads((self.build / "compile_commands.json").read_text())
+        found, lines = set(), set()
+        for entry in commands:
+            if re.search(r"/(bdpt_All|path_All|film/\w+|test_stages|test_bidirectional_stages)\.cpp$", entry["file"]):
+                command = re.sub(r"^\S*ccache ", "", re.sub(r" -o \S+", "", entry["command"])) + " -fsyntax-only -w -fmax-errors=0"
+                errors = run(command, shell=True, cwd=entry["directory"]).stderr
+                lines |= {(os.path.relpath(os.path.normpath(Path(entry["directory"]) / m[1]), self.source), int(m[2]))
+                          for m in re.finditer(r"^(\S+?):(\d+):(?:\d+:)?\s+(?:error|required from)", errors, re.MULTILINE)}
+        for number, site in self.faults.items():
+            # The rewritten file has one line more, the include.
+            found |= {number for file, line in lines if file == site.file and site.line <= line - 1 <= site.last_line}
+        if lines and not found:
+            sys.exit(f"the copy does not compile, and no fault explains it: {sorted(lines)[:5]}")
+        return found
+
+    def draw(self, seed, count):
+        """Draws faults, without those that do not compile, or reads those of an earlier run."""
+        key = hashlib.sha256(json.dumps([seed, count, self.sources], sort_keys=True).encode()).hexdigest()
+        known = self.folder / "faults.json"
+        if known.exists() and (saved := json.loads(known.read_text()))["key"] == key:
+            self.faults = {int(k): Site(**s) for k, s in saved["faults"].items()}
+            self.copy(), self.rewrite(), self.configure()
+            return
+        for old in ("results.jsonl", "cases.json"):
+            (self.folder / old).unlink(missing_ok=True)
+        sites = [s for name in sorted(self.sources) for s in mutation_sites.sites_of(name, self.sources[name])]
+        say(f"{len(sites)} places for faults in {len(self.sources)} files")
+        dropped = set()
+        self.copy()
+        while True:
+            drawn = mutation_sites.draw(sites, count, random.Random(seed), dropped)
+            self.faults = dict(enumerate(drawn, 1))
+            self.rewrite(), self.configure()
+            broken = self.broken()
+            say(f"{count} faults drawn, {len(broken)} of them do not compile")
+            if not broken:
+                break
+            dropped |= {self.faults[k] for k in broken}
+        known.write_text(json.dumps({"key": key, "faults": {k: vars(s) for k, s in self.faults.items()}}, indent=1))
+
+    def compile(self):
+        say("building " + " ".join(self.tests))
+        began = time.time()
+        # Compilers say more about what is unreachable or unused in faults than in sources.
+        result = subprocess.run(["nice", "cmake", "--build", self.build, "-j", str(os.cpu_count()), "--target", *self.tests], stdout=subprocess.DEVNULL)
+        if result.returncode:
+            sys.exit("the build failed")
+        say(f"built in {time.time() - began:.0f} s")
+
+    # ---- running tests ----
+
+    def run_case(self, test, case, fault=0, limit=None, log=None):
+        """'pass', 'fail' or 'time-out', and seconds."""
+        environment = {**os.environ, "AMBILUX_FAULT": str(fault)}
+        environment.pop("AMBILUX_FAULT_LOG", None)
+        if log:
+            environment["AMBILUX_FAULT_LOG"] = str(log)
+        name = re.sub(r'([\\,\["])', r"\\\1", case)
+        began = time.time()
+        try:
+            code = run(["nice", self.build / "tests" / test, name, "-a"], env=environment, timeout=limit, cwd=self.build).returncode
+        except subprocess.TimeoutExpired:
+            return "time-out", time.time() - began
+        return ("pass" if code == 0 else "fail"), time.time() - began
+
+    def baseline(self):
+        """Seconds and reached faults of every case without a fault; cases that fail then are left out."""
+        path = self.folder / "cases.json"
+        cases = json.loads(path.read_text()) if path.exists() else {}
+        for test in self.tests:
+            program = self.build / "tests" / test
+            stamp = hashlib.sha256(program.read_bytes()).hexdigest()
+            if cases.get(test, {}).get("stamp") == stamp:
+                continue
+            known = {"stamp": stamp, "cases": {}}
+            for case in filter(None, map(str.strip, run([program, "--list-test-names-only"]).stdout.splitlines())):
+                log = self.folder / "reached.txt"
+                log.unlink(missing_ok=True)
+                verdict, seconds = self.run_case(test, case, log=log)
+                if verdict == "pass" and log.exists():
+                    known["cases"][case] = {"seconds": seconds, "reached": [int(k) for k in log.read_text().split()]}
+                else:
+                    say(f"left out, since it fails without a fault: {test}: {case}")
+            cases[test] = known
+            path.write_text(json.dumps(cases, indent=1))
+            say(f"{test}: {len(known['cases'])} cases, {sum(c['seconds'] for c in known['cases'].values()):.0f} s")
+        order = [(c["seconds"], test, name, set(c["reached"])) for test in self.tests for name, c in cases[test]["cases"].items()]
+        return sorted(order, key=lambda c: c[:3])
+
+    def try_fault(self, number, cases):
+        reaching = [c for c in cases if number in c[3]]
+        spent = 0
+        for seconds, test, case, _ in reaching:
+            verdict, took = self.run_case(test, case, number, limit=30 + 10 * seconds)
+            spent += took
+            if verdict != "pass":
+                return {"fault": number, "killed": True, "by": f"{test}: {case}", "how": verdict, "seconds": round(spent, 1)}
+        return {"fault": number, "killed": False, "by": f"{len(reaching)} cases reach it", "how": "survived", "seconds": round(spent, 1)}
+
+    def results(self):
+        path = self.folder / "results.jsonl"
+        lines = path.read_text().splitlines() if path.exists() else []
+        return {r["fault"]: r for r in map(json.loads, lines)}
+
+    def run_faults(self, numbers):
+        cases = self.baseline()
+        done, began = 0, time.time()
+        for number in numbers:
+            result = self.try_fault(number, cases)
+            with open(self.folder / "results.jsonl", "a") as f:
+                f.write(json.dumps(result) + "\n")
+            done += 1
+            left = (time.time() - began) / done * (len(numbers) - done)
+            say(f"[{done}/{len(numbers)}, {left / 60:.0f} min left] {number} {result['how']} ({result['by']}; {result['seconds']} s): {self.faults[number].describe()}")
+
+
+def flat(text):
+    return " ".join(text.split())
+
+
+def equivalents():
+    """(file, source line, original, mutated) to reason, from lines of these five separated by tabs."""
+    path = ROOT / "scripts/mutation_equivalents.txt"
+    lines = [line.split("\t") for line in path.read_text().splitlines() if line and not line.startswith("#")] if path.exists() else []
+    return {tuple(flat(p) for p in line[:4]): line[4].strip() for line in lines}
+
+
+def report(workspace):
+    results, known = workspace.results(), equivalents()
+    line = lambda s: workspace.sources[s.file].splitlines()[s.line - 1]
+    reason = {k: known.get((s.file, flat(line(s)), flat(s.original), flat(s.mutated))) for k, s in workspace.faults.items()}
+    tried = [k for k in workspace.faults if k in results and not reason[k]]
+    survivors = [k for k in tried if not results[k]["killed"]]
+    for k in workspace.faults:
+        if reason[k]:
+            print(f"equivalent {k}: {workspace.faults[k].describe()} ({reason[k]})")
+    for k in survivors:
+        print(f"survived {k} ({results[k]['by']}): {workspace.faults[k].describe()}")
+    rate = 1 - len(survivors) / len(tried) if tried else 0
+    print(f"{len(workspace.faults)} faults, {sum(map(bool, reason.values()))} equivalent, {len(tried)} tried: {len(tried) - len(survivors)} killed, {len(survivors)} survived, {100 * rate:.1f} %")
+    return 0 if tried and rate >= GOAL else 1
+
+
+def default_tests():
+    """Tests of the CPU that are neither long nor in need of the whole program."""
+    names = []
+    for name in project_files("tests"):
+        path = ROOT / name
+        if path.match("test_*.cpp") and path.parent.name in TEST_FOLDERS and not re.search(r"^// labels:", path.read_text(), re.MULTILINE):
+            names.append(path.stem)
+    return names
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=80)
+    parser.add_argument("--folder", type=Path, default=ROOT / "build-mutate", help="where the copy, its build and the results lie")
+    parser.add_argument("--tests", nargs="+", help="test programs instead of all that are quick")
+    parser.add_argument("--retry", action="store_true", help="try survivors again")
+    parser.add_argument("--only", type=int, nargs="+", help="numbers of the faults to try")
+    parser.add_argument("--report", action="store_true", help="print what is known and end")
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    workspace = Workspace(options.folder.resolve(), options.tests or default_tests())
+    workspace.draw(options.seed, options.count)
+    if not options.report:
+        workspace.compile()
+        results = workspace.results()
+        again = lambda k: k not in results or (options.retry and not results[k]["killed"])
+        workspace.run_faults(options.only or [k for k in workspace.faults if again(k)])
+    return report(workspace)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
