@@ -241,7 +241,8 @@ double power(ModelTag<PointEmitter>, Scene& scene, Emitter& e, const Receivers&)
 }
 /// Exact for a constant profile up to the beam width and about right for the falloff.
 double power(ModelTag<SpotEmitter>, Scene& scene, Emitter& e, const Receivers&) {
-    return 2 * M_PI * (1 - 0.5 * (double(e.cos_cutoff) + e.cos_beam_width)) * mean_luminance(scene, e.radiance);
+    const auto one_minus_cos = [](double angle) { return 2 * std::sin(angle / 2) * std::sin(angle / 2); };
+    return M_PI * (one_minus_cos(e.cutoff) + one_minus_cos(e.beam_width)) * mean_luminance(scene, e.radiance);
 }
 double power(ModelTag<DirectionalEmitter>, Scene& scene, Emitter& e, const Receivers& to) {
     return to.disk * mean_luminance(scene, e.radiance);

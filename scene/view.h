@@ -105,12 +105,13 @@ struct Emitter {
     uint32_t shape;     ///< area: its shape
     uint32_t area_cdf;  ///< area over triangles: primitive_count+1 floats in tables, and then the density per area on
                         ///< each; kNone for a single primitive
-    float pick_probability;            ///< chance that light sampling picks this emitter
-    ParamRgb radiance;                 ///< area: textured by surface uv; spot: textured by projection
-    Affine to_world, to_local;         ///< spot: +z is the axis; envmap: rotation; point, directional: unused
-    Vec3f position;                    ///< point, spot
-    Vec3f direction;                   ///< directional: direction in which light travels; spot: axis. Unit
-    float cos_cutoff, cos_beam_width;  ///< spot
+    float pick_probability;      ///< chance that light sampling picks this emitter
+    ParamRgb radiance;           ///< area: textured by surface uv; spot: textured by projection
+    Affine to_world, to_local;   ///< spot: +z is the axis; envmap: rotation; point, directional: unused
+    Vec3f position;              ///< point, spot
+    Vec3f direction;             ///< directional: direction in which light travels; spot: axis. Unit
+    float one_minus_cos_cutoff;  ///< spot: of the angle where it ends; a cosine would lose the digits of narrow ones
+    float cutoff, beam_width;    ///< spot: angles to the axis in radians
     // envmap: latitude-longitude image (texture `radiance.texture` of float texels, row 0 is the top, direction +y) and
     // a piecewise-constant density over width by height cells (transport/emitter/envmap.h, scene/alias_table.h)
     uint32_t env_rows;   ///< alias table of the rows: height AliasBuckets in tables, aligned to 8 bytes

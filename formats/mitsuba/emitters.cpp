@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "formats/mitsuba/builder.h"
+#include "transport/emitter/spot.h"
 
 namespace ambilux::mitsuba {
 
@@ -50,8 +51,7 @@ void read_plugin(ModelTag<SpotEmitter>, Builder& builder, Reader& in, Emitter& e
         in.fail(in.where("cutoff_angle"), "cutoff_angle must lie between 0 and 90 degrees");
     if (!(beam >= 0 && beam <= cutoff))
         in.fail(in.where("beam_width"), "beam_width must lie between 0 and cutoff_angle");
-    e.cos_cutoff = float(std::cos(cutoff * (M_PI / 180)));
-    e.cos_beam_width = float(std::cos(beam * (M_PI / 180)));
+    set_spot_angles(e, cutoff * (M_PI / 180), beam * (M_PI / 180));
     e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
     if (const Object* texture = in.take_named("texture")) e.radiance.texture = load_texture(builder, *texture);
 }

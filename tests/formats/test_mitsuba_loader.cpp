@@ -562,8 +562,9 @@ TEST_CASE("emitters: values, frames, one environment") {
         one("<emitter type='spot'><transform name='to_world'><lookat origin='1,1,1' target='1,1,9' "
             "up='0,1,0'/></transform><texture name='texture' type='bitmap'><string name='filename' "
             "value='e.png'/></texture></emitter>");
-    CHECK(e.cos_cutoff == Approx(std::cos(20 * M_PI / 180)));
-    CHECK(e.cos_beam_width == Approx(std::cos(15 * M_PI / 180)));
+    CHECK(e.one_minus_cos_cutoff == Approx(1 - std::cos(20 * M_PI / 180)));
+    CHECK(e.cutoff == Approx(20 * M_PI / 180));
+    CHECK(e.beam_width == Approx(15 * M_PI / 180));
     CHECK(e.radiance.texture == 0);
     check_rgb(e.direction, {0, 0, 1});
     check_rgb(e.to_local.point({1, 1, 2}), {0, 0, 1});

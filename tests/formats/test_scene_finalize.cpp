@@ -165,8 +165,7 @@ TEST_CASE("power of every emitter type decides the pick probability (B10)") {
     add_area_emitter(s, light, {2, 2, 2});
     s.emitters.push_back(emitter(EmitterType::point, {5, 5, 5}));
     Emitter spot = emitter(EmitterType::spot, {7, 7, 7});
-    spot.cos_cutoff = 0.5f;
-    spot.cos_beam_width = 0.8f;
+    set_spot_angles(spot, std::acos(0.5), std::acos(0.8));
     s.emitters.push_back(spot);
     s.emitters.push_back(emitter(EmitterType::directional, {3, 3, 3}));
     s.environment = uint32_t(s.emitters.size());

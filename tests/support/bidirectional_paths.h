@@ -119,6 +119,12 @@ inline std::string area_light(const std::string& shape, const std::string& radia
            rgb("radiance", radiance) + "</emitter></shape>";
 }
 
+inline std::string narrow_spot(double cutoff_degrees, const std::string& from, const std::string& to) {
+    return "<emitter type='spot'>" + rgb("intensity", "1e6") + "<float name='cutoff_angle' value='" +
+           std::to_string(cutoff_degrees) + "'/><transform name='to_world'><lookat origin='" + from + "' target='" +
+           to + "' up='0,0,1'/></transform></emitter>";
+}
+
 inline std::string sensor(const std::string& type, const std::string& parameters, const std::string& scale = "") {
     return "<sensor type='" + type + "'>" + parameters + "<transform name='to_world'>" + scale +
            "<lookat origin='0.3,1.7,4.2' target='0,0.3,0' up='0,1,0'/></transform>" +
@@ -183,6 +189,10 @@ inline std::vector<SceneCase> scene_cases() {
                area_light("<shape type='disk'><transform name='to_world'><scale value='0.4'/><rotate x='1' "
                           "angle='90'/><translate y='2'/></transform>") +
                "<emitter type='constant'>" + rgb("radiance", "1") + "</emitter>")},
+        // Next event estimation meets such spots on paths that light subpaths began.
+        {"narrow spots", 24000,
+         whole(sensor("perspective", perspective) + walls + bodies() + narrow_spot(0.1, "-1,3,1", "-0.3,0,0.2") +
+               narrow_spot(0.02, "1,3,1", "0.3,0,0.6") + narrow_spot(0.01, "0.2,2.5,0.3", "0.45,0,0.4"))},
         {"shell", 24000,
          whole(sensor("perspective", perspective) +
                area_light(

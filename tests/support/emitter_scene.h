@@ -165,8 +165,7 @@ inline Emitter& add_spot(Scene& s, Vec3f position, Vec3f axis, float cutoff_degr
     e.direction = normalize(axis);
     e.to_world = rotation_to(axis, position);
     e.to_local = inverse_orthogonal(e.to_world);
-    e.cos_cutoff = float(std::cos(cutoff_degrees * M_PI / 180));
-    e.cos_beam_width = float(std::cos(beam_degrees * M_PI / 180));
+    set_spot_angles(e, double(cutoff_degrees) * (M_PI / 180), double(beam_degrees) * (M_PI / 180));
     return e;
 }
 
