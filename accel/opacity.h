@@ -4,7 +4,7 @@
 #include "core/rng.h"
 #include "scene/ray.h"
 #include "scene/surface.h"
-#include "transport/texture.h"
+#include "transport/opacity.h"
 
 namespace ambilux {
 
@@ -49,9 +49,10 @@ AMBILUX_HD bool accept_hit(const SceneView& scene, const Ray& ray, uint32_t prim
     } else {
         const Material& material = material_of(scene, prim);
         if (!material.lets_pass()) return true;
-        const ParamFloat& opacity = material.opacity;
-        const Vec2f uv = F.textures && opacity.texture >= 0 ? texture_uv<F>(scene, prim, u, v) : Vec2f{0.0f, 0.0f};
-        return eval_float<F>(scene, opacity, uv) > hash_float(ray.alpha_seed, opacity_id<F>(scene, ray, prim, u, v));
+        const bool textured = F.textures && material.opacity.texture >= 0;
+        const Vec2f uv = textured ? texture_uv<F>(scene, prim, u, v) : Vec2f{0.0f, 0.0f};
+        return surface_opacity<F>(scene, material, uv) >
+               hash_float(ray.alpha_seed, opacity_id<F>(scene, ray, prim, u, v));
     }
 }
 

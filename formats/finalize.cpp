@@ -231,9 +231,17 @@ Receivers receivers_of(const Scene& scene) {
     return {std::min(disk, area), std::min(4 * disk, 2 * area)};
 }
 
+bool is_masked_out(const Scene& scene, const Emitter& e) {
+    if (e.type != EmitterType::area) return false;
+    const ParamFloat& opacity = scene.materials[scene.shapes[e.shape].material].opacity;
+    return opacity.texture < 0 && !(opacity.value > 0);
+}
+
 // Power of an emitter, luminance of watts, one function a model.
 
+/// A mask takes nothing from an emitter, but where its opacity is 0 there is none (transport/emitter/area.h).
 double power(ModelTag<AreaEmitter>, Scene& scene, Emitter& e, const Receivers&) {
+    if (is_masked_out(scene, e)) return 0;
     return M_PI * scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
 }
 double power(ModelTag<PointEmitter>, Scene& scene, Emitter& e, const Receivers&) {
@@ -266,6 +274,9 @@ void fill_emitters(Scene& scene, LightPicking picking) {
         if (!(p >= 0) || !std::isfinite(p))
             throw input_error(scene.path, 0,
                               "emitter " + std::to_string(powers.size()) + " has a power that is not finite");
+        if (is_masked_out(scene, e))
+            scene.warnings.push_back("emitter " + std::to_string(powers.size()) +
+                                     " is behind a mask of opacity 0 and sends no light");
         powers.push_back(p);
         infinite.push_back(is_infinite(e.type));
     }

@@ -46,7 +46,7 @@ struct SubpathRay {
     Rgb throughput;
     float tmax;              ///< of camera rays
     float sums_or_start[2];  ///< MisSums; first ray of a light subpath: SubpathStart::inv_pdf and direction
-    uint32_t start[2];       ///< first rays: camera_distance (eye), prim and emitter (light) of SubpathStart
+    uint32_t start[2];       ///< first rays: camera_distance (eye), prim, emitter and opacity (light) of SubpathStart
 };
 
 /// Where a ray ended: the last lane of a HitItem.
@@ -119,7 +119,7 @@ struct SubpathItems<BidirectionalMis> {
             r.sums_or_start[0] = p.start.inv_pdf;
             r.sums_or_start[1] = p.start.direction;
             r.start[0] = p.start.prim;
-            r.start[1] = p.start.emitter;
+            r.start[1] = p.start.emitter | opacity_step(p.start.opacity) << kTicketBits;
         } else if (p.depth == 1) {
             r.start[0] = float_bits(p.start.camera_distance);
         }
@@ -131,7 +131,12 @@ struct SubpathItems<BidirectionalMis> {
         p.direction = r.direction;
         p.throughput = r.throughput;
         p.sums = {r.sums_or_start[0], r.sums_or_start[1]};
-        p.start = {r.sums_or_start[0], r.sums_or_start[1], r.start[0], r.start[1], bits_float(r.start[0])};
+        p.start = {r.sums_or_start[0],
+                   r.sums_or_start[1],
+                   r.start[0],
+                   r.start[1] & (kTickets - 1),
+                   float(r.start[1] >> kTicketBits) / float(kOpacitySteps),
+                   bits_float(r.start[0])};
         p.depth = r.bits.depth();
         p.roulette_scale = r.bits.roulette_scale();
         p.delta = r.bits.delta();

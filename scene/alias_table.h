@@ -14,7 +14,7 @@
 
 namespace ambilux {
 
-constexpr uint32_t kTickets = 1u << 24;
+constexpr uint32_t kTicketBits = 24, kTickets = 1u << kTicketBits;
 
 /// Bucket of an alias table. Tickets of the bucket below `threshold` stand for the bucket's own index.
 struct AliasBucket {

@@ -95,15 +95,29 @@ AMBILUX_HD float pdf_environment_direct(const SceneView& view, Vec3f wi) {
     return 0.0f;
 }
 
-/// Radiance that emitter `emitter` sends from the surface point `point` along unit `wo`; zero if it is no area emitter.
+/// Radiance that a ray which meets emitter `emitter` at `point` brings, looking back along unit `wo`: of a masked one
+/// over its chance to meet it. Zero if it is no area emitter.
 template <Features F>
 AMBILUX_HD Rgb emitted_radiance(const SceneView& view, uint32_t emitter, const SurfacePoint& point, Vec3f wo) {
     if constexpr (F.has(EmitterType::area)) {
         if (emitter == kNone) return {0, 0, 0};
         const Emitter& e = view.emitters[emitter];
-        if (e.type == EmitterType::area) return area_radiance<F>(view, e, point, wo);
+        if (e.type == EmitterType::area) return area_hit_radiance<F>(view, e, point, wo);
     }
     return {0, 0, 0};
+}
+
+/// Chance, as weights know it, that a ray which met area emitter `emitter` at `point` would do so.
+template <Features F>
+AMBILUX_HD float hit_opacity(const SceneView& view, uint32_t emitter, const SurfacePoint& point) {
+    return weight_opacity(area_opacity<F>(view, view.emitters[emitter], point.uv));
+}
+
+/// Chance, as weights know it, that a ray towards the light sample `s` would meet the emitter there.
+template <Features F>
+AMBILUX_HD float sample_opacity(const SceneView& view, const EmitterSample& s) {
+    const bool area = F.opacity && view.emitters[s.emitter].type == EmitterType::area;
+    return area ? weight_opacity(s.opacity) : 1.0f;
 }
 
 /// Radiance that arrives from unit `wi` where nothing is met; zero without an environment.

@@ -81,9 +81,10 @@ struct PilotMis {
         return each<Ratio>(
             [&](uint32_t m) { return sets[m].camera_ratio(scene, y.of[m], first, c, cos_y, pdf_reverse_sa); });
     }
-    Ratio visible_emitter_ratio(const SceneView& scene, const CameraConnection& c, float cos_light,
-                                float pdf_pos) const {
-        return each<Ratio>([&](uint32_t m) { return sets[m].visible_emitter_ratio(scene, c, cos_light, pdf_pos); });
+    Ratio visible_emitter_ratio(const SceneView& scene, const CameraConnection& c, float cos_light, float pdf_pos,
+                                float opacity) const {
+        return each<Ratio>(
+            [&](uint32_t m) { return sets[m].visible_emitter_ratio(scene, c, cos_light, pdf_pos, opacity); });
     }
 
 private:

@@ -137,6 +137,13 @@ inline OracleDensity scattering_step(const SceneView& scene, const OraclePath::V
 
 }  // namespace oracle
 
+/// Chance that a ray meets the emitter that `prim` belongs to, of one opacity everywhere. Weights know it in steps of
+/// 1/255, upwards.
+inline double emitter_opacity(const SceneView& scene, uint32_t prim) {
+    const ParamFloat& opacity = scene.materials[scene.shapes[scene.shape_of(prim)].material].opacity;
+    return std::ceil(255 * double(opacity.value)) / 255;
+}
+
 /// Densities of all steps. Measures: area; x_0 of an emitter at infinity: solid angle; the camera: 1 (both subpaths
 /// take its lens point alike), and x_(k-1) by the camera at density 1 per pixel. `conditioning`: errors too.
 inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, bool conditioning) {
@@ -224,6 +231,7 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
             q = scattering_step(scene, path.vertices[i + 1], path.to_eye[i + 1], -path.to_eye[i], false, conditioning);
         }
         if (i == 0 && infinite) continue;
+        if (i == 0) q.value *= emitter_opacity(scene, path.light.prim);
         times_cosine(q, normal(i), path.to_eye[i]);
         if (!(i == k - 1 && camera_delta_direction(sensor)))
             over_distance(q, distance2(position(i), position(i + 1)), error(i), error(i + 1));

@@ -160,6 +160,24 @@ inline std::vector<SceneCase> scene_cases() {
         area_light(
             "<shape type='cube'><transform name='to_world'><scale x='0.1' y='0.2' z='0.15'/><rotate x='1' y='1' "
             "angle='30'/><translate x='1.2' y='1.4' z='-0.4'/></transform>");
+    const auto masked_lamp = [](const std::string& shape, const std::string& opacity) {
+        return shape + "<bsdf type='mask'><float name='opacity' value='" + opacity + "'/><bsdf type='diffuse'>" +
+               rgb("reflectance", "0.4") + "</bsdf></bsdf><emitter type='area'>" + rgb("radiance", "3") +
+               "</emitter></shape>";
+    };
+    const std::string masked_lamps =
+        masked_lamp(
+            "<shape type='rectangle'><transform name='to_world'><scale x='0.5' y='0.4'/><rotate x='1' "
+            "angle='90'/><translate y='3.5'/></transform>",
+            "0.3") +
+        masked_lamp(
+            "<shape type='sphere'><point name='center' x='-1' y='1.6' z='0.5'/><float name='radius' "
+            "value='0.3'/>",
+            "0.75") +
+        masked_lamp(
+            "<shape type='disk'><transform name='to_world'><scale value='0.3'/><lookat origin='1.6,1,-1.6' "
+            "target='0.3,1.7,4.2' up='0,1,0'/></transform>",
+            "0.02");
     const std::string perspective = "<float name='fov' value='50'/><float name='near_clip' value='0.3'/>";
     const std::string deltas =
         "<emitter type='point'><point name='position' x='0.3' y='1.4' z='0.4'/>" + rgb("intensity", "2") +
@@ -189,6 +207,7 @@ inline std::vector<SceneCase> scene_cases() {
                area_light("<shape type='disk'><transform name='to_world'><scale value='0.4'/><rotate x='1' "
                           "angle='90'/><translate y='2'/></transform>") +
                "<emitter type='constant'>" + rgb("radiance", "1") + "</emitter>")},
+        {"masked lamps", 24000, whole(sensor("perspective", perspective) + walls + bodies() + masked_lamps)},
         // Next event estimation meets such spots on paths that light subpaths began.
         {"narrow spots", 24000,
          whole(sensor("perspective", perspective) + walls + bodies() + narrow_spot(0.1, "-1,3,1", "-0.3,0,0.2") +
@@ -560,6 +579,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
     start.emitter = path.emitter;
     start.infinite = infinite;
     start.prim = area ? path.light.prim : kNone;
+    start.opacity = area ? float(emitter_opacity(scene_, path.light.prim)) : 1.0f;
     if (!(start.pdf_dir > 0.0f)) return;
     BidirectionalSubpath w = start_light(mis_, start);
     w.origin = start.p;
@@ -604,6 +624,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
             light.wi = -path.to_eye[0];
             light.ng = area ? path.light.ng : path.to_eye[0];
             light.prim = start.prim;
+            light.opacity = start.opacity;
             light.delta = is_delta(e.type);
             light.distance = infinite ? kInfinity : sqrtf(length_squared(position(0) - position(1)));
             light.pdf_sa = area ? pdf_emitter_direct<F>(scene_, path.emitter, position(1), light.wi, path.light)

@@ -1,17 +1,35 @@
-// Area emitter: every point of its shape radiates `radiance` into the hemisphere around the geometric normal.
+// Area emitter: every point of its shape radiates `radiance` into the hemisphere around the geometric normal. A mask
+// takes nothing from it, as in Mitsuba: rays that meet a surface of opacity a with probability a bring 1/a of its
+// light. Where the opacity is 0 there is no surface and no light.
 #pragma once
 
 #include "transport/emitter/sample.h"
-#include "transport/texture.h"
+#include "transport/opacity.h"
 
 namespace ambilux {
 
-/// Radiance that the area emitter sends from `point` along unit `wo`; zero behind the geometric normal (two-sided light
-/// needs two shapes, as in Mitsuba).
+/// Chance that a ray which crosses the area emitter at texture coordinates `uv` meets it.
 template <Features F>
-AMBILUX_HD Rgb area_radiance(const SceneView& view, const Emitter& emitter, const SurfacePoint& point, Vec3f wo) {
+AMBILUX_HD float area_opacity(const SceneView& view, const Emitter& emitter, Vec2f uv) {
+    if constexpr (F.opacity) return surface_opacity<F>(view, view.materials[view.shapes[emitter.shape].material], uv);
+    return 1.0f;
+}
+
+/// Radiance of the emitter at a point with texture coordinates `uv` and opacity `opacity`.
+template <Features F>
+AMBILUX_HD Rgb area_radiance(const SceneView& view, const Emitter& emitter, Vec2f uv, float opacity) {
+    if (F.opacity && !(opacity > 0.0f)) return {0, 0, 0};
+    return eval_rgb<F>(view, emitter.radiance, uv);
+}
+
+/// Radiance that a ray meets at `point` of the area emitter, looking back along unit `wo`, over its chance to meet it
+/// there; zero behind the geometric normal (two-sided light needs two shapes, as in Mitsuba).
+template <Features F>
+AMBILUX_HD Rgb area_hit_radiance(const SceneView& view, const Emitter& emitter, const SurfacePoint& point, Vec3f wo) {
     if (!(dot(point.ng, wo) > 0.0f)) return {0, 0, 0};
-    return eval_rgb<F>(view, emitter.radiance, point.uv);
+    const float opacity = area_opacity<F>(view, emitter, point.uv);
+    const Rgb radiance = area_radiance<F>(view, emitter, point.uv, opacity);
+    return F.opacity ? radiance * (1.0f / hit_chance(opacity)) : radiance;
 }
 
 /// Density per area with which area_sample_point picks a point of primitive `prim`.
@@ -93,12 +111,13 @@ AMBILUX_HD bool area_sample_sphere(const SceneView& view, const Emitter& emitter
     s.p_error = (abs(center) + splat(r)) * gamma_bound(8);
     s.wi = frame.to_world(local);
     s.pdf_sa = emitter.pick_probability * kInv2Pi / cone.one_minus_cos_max;
-    if (F.textures && emitter.radiance.texture >= 0) {
+    Vec2f uv = {0.0f, 0.0f};
+    if (F.textures && (emitter.radiance.texture >= 0 || F.opacity)) {
         const Vec2f c = octahedral_encode(normalize(sphere.to_local.vector(s.ng)));
-        s.radiance = eval_rgb<F>(view, emitter.radiance, surface_at<F>(view, prim, c.x, c.y).uv);
-    } else {
-        s.radiance = emitter.radiance.value;
+        uv = surface_at<F>(view, prim, c.x, c.y).uv;
     }
+    s.opacity = area_opacity<F>(view, emitter, uv);
+    s.radiance = area_radiance<F>(view, emitter, uv, s.opacity);
     return s.distance > 0.0f;
 }
 
@@ -127,7 +146,8 @@ AMBILUX_HD bool area_sample_direct(const SceneView& view, const Emitter& emitter
     s.wi = to_light * (1.0f / s.distance);
     const float cos_light = -dot(point.ng, s.wi);
     if (!(cos_light > 0.0f)) return false;
-    s.radiance = eval_rgb<F>(view, emitter.radiance, point.uv);
+    s.opacity = area_opacity<F>(view, emitter, point.uv);
+    s.radiance = area_radiance<F>(view, emitter, point.uv, s.opacity);
     s.pdf_sa = emitter.pick_probability * area_pdf_position(view, emitter, point.prim) * d2 / cos_light;
     return true;
 }
@@ -168,7 +188,8 @@ struct EmitterFunctions<AreaEmitter> {
         s.ng = point.ng;
         s.d = frame_from_normal(point.ng).to_world(local);
         s.cos_theta = local.z;
-        s.radiance = eval_rgb<F>(view, e.radiance, point.uv);
+        s.opacity = area_opacity<F>(view, e, point.uv);
+        s.radiance = area_radiance<F>(view, e, point.uv, s.opacity);
         s.pdf_pos = area_pdf_position(view, e, point.prim);
         s.pdf_dir = local.z * kInvPi;
     }

@@ -47,6 +47,7 @@ AMBILUX_HD bool sample_emission(const SceneView& view, Vec4f u_position, Vec2f u
     s.delta_position = has_delta_position(e.type);
     s.delta_direction = has_delta_direction(e.type);
     s.cos_theta = 1.0f;
+    s.opacity = 1.0f;
     s.prim = kNone;
     s.pdf_dir = 0.0f;
     s.p_error = {0, 0, 0};

@@ -30,6 +30,7 @@ struct EmitterSample {
     bool delta;    ///< no other strategy can find this light: point, spot, directional
     uint32_t emitter;
     uint32_t prim;  ///< area: the primitive that p lies on; other types leave it alone
+    float opacity;  ///< area: chance that a ray meets the emitter at p; other types leave it alone
 };
 
 /// Light that leaves an emitter (transport/emitter/emission.h).
@@ -45,6 +46,7 @@ struct EmissionSample {
     float pick;       ///< probability of this emitter
     uint32_t emitter;
     uint32_t prim;  ///< area: the primitive that p lies on; otherwise kNone
+    float opacity;  ///< area: chance that a ray meets the emitter at p; otherwise 1
     bool delta_position, delta_direction, infinite;
 };
 

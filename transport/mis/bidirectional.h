@@ -32,6 +32,7 @@ struct SubpathStart {
                             ///< direction per solid angle, pick included
     uint32_t prim;          ///< light: of an area emitter
     uint32_t emitter;       ///< light
+    float opacity;          ///< light: of an area emitter the chance that a ray meets it, as weights know it; else 1
     float camera_distance;  ///< eye: from the camera to the ray's origin
 };
 
@@ -84,6 +85,7 @@ struct BidirectionalMis {
         start.direction = e.infinite ? e.pick * e.pdf_dir : e.cos_theta;
         start.prim = e.prim;
         start.emitter = e.emitter;
+        start.opacity = weight_opacity(e.opacity);
     }
 
     /// Sums where the ray of `path`, with sums `sums`, meets `point`.
@@ -137,7 +139,7 @@ struct BidirectionalMis {
                 light.prim = start.prim;
                 next_event =
                     pdf_emitter_direct<F>(scene, start.emitter, p, -path.direction, light) * start.direction * scale;
-                hit = start.direction * scale;
+                hit = start.direction * scale * start.opacity;
                 break;
             }
             case EmitterType::point:
@@ -159,8 +161,10 @@ struct BidirectionalMis {
                               const SurfacePoint& light, float& ratio) const {
         const Vec3f d = path.direction;
         const float cos_light = -dot(light.ng, d);
-        const float pdf_pos =
-            scene.emitters[emitter].pick_probability * pdf_emission_position<F>(scene, emitter, light.prim);
+        // Densities of the other strategies over the chance that a ray meets a masked emitter.
+        const float inv_opacity = F.opacity ? 1.0f / hit_opacity<F>(scene, emitter, light) : 1.0f;
+        const float pdf_pos = scene.emitters[emitter].pick_probability *
+                              pdf_emission_position<F>(scene, emitter, light.prim) * inv_opacity;
         // The other strategy of a path of one segment is (1,1): a light vertex seen by the camera.
         if (path.depth == 1) {
             const float distance = length(light.p - path.origin) + path.start.camera_distance;
@@ -169,7 +173,7 @@ struct BidirectionalMis {
             return true;
         }
         const float next_event =
-            masked(kNextEventStrategies, pdf_emitter_direct<F>(scene, emitter, path.origin, d, light));
+            masked(kNextEventStrategies, pdf_emitter_direct<F>(scene, emitter, path.origin, d, light)) * inv_opacity;
         const float emission = pdf_pos * pdf_emission_direction<F>(scene, emitter, light.ng, -d) / cos_light;
         ratio = term(next_event * ray.dvcm) + term(emission * ray.dvc);
         return true;
@@ -196,7 +200,8 @@ struct BidirectionalMis {
     AMBILUX_HD float next_event_ratio(const SceneView& scene, MisSums z, bool first, const EmitterSample& light,
                                       const BsdfValue& f, float cos_z) const {
         const Emitter& e = scene.emitters[light.emitter];
-        const float fewer = light.delta ? 0.0f : masked(kHitStrategies, term(f.pdf_sa / light.pdf_sa));
+        const float pdf_hit = f.pdf_sa * sample_opacity<F>(scene, light);
+        const float fewer = light.delta ? 0.0f : masked(kHitStrategies, term(pdf_hit / light.pdf_sa));
         float more = cos_z;  // density of a light subpath to here over that of this sample
         switch (e.type) {
             case EmitterType::area:  // the cosine at the light is in both
@@ -236,13 +241,13 @@ struct BidirectionalMis {
         return term(ratio_behind(y, first, pdf_area, pdf_reverse_sa));
     }
 
-    /// (1,1): a point sampled on an area emitter with density `pdf_pos` (pick included), connected with the camera
-    /// (equation 17).
+    /// (1,1): a point of opacity `opacity` sampled on an area emitter with density `pdf_pos` (pick included), connected
+    /// with the camera (equation 17).
     AMBILUX_HD float visible_emitter_ratio(const SceneView& scene, const CameraConnection& c, float cos_light,
-                                           float pdf_pos) const {
+                                           float pdf_pos, float opacity) const {
         const float fall_off = camera_delta_direction(scene.sensor) ? 1.0f : 1.0f / sqr(c.camera_distance);
-        return masked(kHitStrategies,
-                      term(camera_pdf(scene.sensor, c.cos_camera) * cos_light * fall_off / (light_subpaths * pdf_pos)));
+        const float pdf_hit = camera_pdf(scene.sensor, c.cos_camera) * cos_light * fall_off * weight_opacity(opacity);
+        return masked(kHitStrategies, term(pdf_hit / (light_subpaths * pdf_pos)));
     }
     /// Eye subpaths whose last scattering was this count what their last segment meets.
     AMBILUX_HD static constexpr bool counts_last_segment(bool) { return true; }

@@ -33,9 +33,9 @@ struct UnidirectionalMis {
         return {pdf_forward_sa};
     }
 
-    /// `pdf_other_sa`: of next event estimation for what the ray of `path` met. False if that finds it alone.
-    template <class Path>
-    AMBILUX_HD bool ratio_to(const Path& path, Sums ray, float pdf_other_sa, float& ratio) const {
+    /// `pdf_other_sa`: of next event estimation for what a ray met, over the chance that rays meet it. False if that
+    /// finds it alone.
+    AMBILUX_HD bool ratio_to(Sums ray, float pdf_other_sa, float& ratio) const {
         if (estimator == Estimator::nee && pdf_other_sa > 0.0f) return false;
         ratio = estimator == Estimator::mis ? heuristic_term(heuristic, pdf_other_sa / ray.pdf_sa) : 0.0f;
         if (pdf_other_sa == 0.0f) ratio = 0.0f;
@@ -44,22 +44,24 @@ struct UnidirectionalMis {
     template <Features F, class Path>
     AMBILUX_HD bool hit_ratio(const SceneView& scene, const Path& path, Sums ray, uint32_t emitter,
                               const SurfacePoint& light, float& ratio) const {
-        const bool sampled = next_event && !path.delta;
-        return ratio_to(path, ray,
-                        sampled ? pdf_emitter_direct<F>(scene, emitter, path.origin, path.direction, light) : 0.0f,
-                        ratio);
+        float pdf_other_sa = 0.0f;
+        if (next_event && !path.delta) {
+            pdf_other_sa = pdf_emitter_direct<F>(scene, emitter, path.origin, path.direction, light);
+            if constexpr (F.opacity) pdf_other_sa /= hit_opacity<F>(scene, emitter, light);
+        }
+        return ratio_to(ray, pdf_other_sa, ratio);
     }
     template <Features F, class Path>
     AMBILUX_HD bool escape_ratio(const SceneView& scene, const Path& path, Sums ray, float& ratio) const {
         const bool sampled = next_event && !path.delta;
-        return ratio_to(path, ray, sampled ? pdf_environment_direct<F>(scene, path.direction) : 0.0f, ratio);
+        return ratio_to(ray, sampled ? pdf_environment_direct<F>(scene, path.direction) : 0.0f, ratio);
     }
     template <Features F>
-    AMBILUX_HD float next_event_ratio(const SceneView&, Sums, bool, const EmitterSample& light, const BsdfValue& f,
-                                      float) const {
+    AMBILUX_HD float next_event_ratio(const SceneView& scene, Sums, bool, const EmitterSample& light,
+                                      const BsdfValue& f, float) const {
         // Only BSDF sampling and a hit could find this light too.
         const bool other = estimator == Estimator::mis && !light.delta;
-        return other ? heuristic_term(heuristic, f.pdf_sa / light.pdf_sa) : 0.0f;
+        return other ? heuristic_term(heuristic, f.pdf_sa * sample_opacity<F>(scene, light) / light.pdf_sa) : 0.0f;
     }
     /// The last segment brings emission only, which next event estimation leaves to hits after a delta.
     AMBILUX_HD bool counts_last_segment(bool delta) const { return estimator != Estimator::nee || delta; }

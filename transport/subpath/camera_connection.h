@@ -60,7 +60,7 @@ AMBILUX_HD bool visible_emitter(const SceneView& scene, const Rules<Mis>& rules,
     const float cos_light = dot(e.ng, camera.wi), pdf_pos = e.pick * e.pdf_pos;
     if (!(cos_light > 0.0f)) return false;
     c.value = e.radiance * (cos_light * camera.weight / (pdf_pos * rules.mis.light_subpaths));
-    c.ratio = rules.counted(rules.mis.visible_emitter_ratio(scene, camera, cos_light, pdf_pos));
+    c.ratio = rules.counted(rules.mis.visible_emitter_ratio(scene, camera, cos_light, pdf_pos, e.opacity));
     c.strategy = Strategy::make(1, 1);
     return detail::set_camera_segment(c, camera, offset_ray_origin(e.p, e.p_error, e.ng, camera.wi));
 }
