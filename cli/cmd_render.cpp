@@ -4,6 +4,7 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/outliers.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/log.h"
@@ -25,6 +26,7 @@ struct Options {
     std::optional<uint64_t> spp;
     std::optional<double> time;
     std::optional<float> exposure;
+    uint32_t outliers = 0;
     bool strict = false;
 };
 
@@ -72,7 +74,13 @@ int render(const Options& o) {
         budget.samples = o.spp ? *o.spp : uint64_t(std::max(1, loaded.scene.integrator.spp));
     settings.expected_samples = budget.samples;
     settings.expected_seconds = budget.seconds;
-    const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
+    std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
+    SampleWatch* watch = nullptr;
+    if (o.outliers > 0) {
+        auto watching = std::make_unique<SampleWatch>(std::move(renderer));
+        watch = watching.get();
+        renderer = std::move(watching);
+    }
 
     for (const std::string& warning : render_warnings(loaded.scene, used_settings(settings, renderer->stats())))
         log_warning(warning);
@@ -101,8 +109,15 @@ int render(const Options& o) {
     }
     if (position.samples > 0 && !o.techniques.empty())
         write_technique_images(o.techniques, loaded.scene, settings, stats, renderer->strategy_images());
+    nlohmann::json found = nlohmann::json::object();
+    if (watch && position.samples > 0) {
+        RenderSettings used = used_settings(settings, stats);
+        used.backend = stats.backend;
+        report_outliers(*watch, o.scene, loaded.scene, used, o.outliers, o.json == "-", found);
+    }
     if (!o.json.empty()) {
         nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
+        json.update(found);
         json["interrupted"] = position.interrupted;
         write_json(o.json, json);
     }
@@ -143,6 +158,9 @@ void add_render(CLI::App& app, Run& run) {
             "--technique-images", o->techniques,
             "Folder for raw and weighted images of every strategy (s,t) up to 6 segments, or --set technique_depth=N")
         ->type_name("DIR");
+    command.add_option("--outliers", o->outliers,
+                       "List the N pixels whose largest sample exceeds the mean of their others most, and the first "
+                       "invalid values, with commands that replay them; renders one sample at a time");
     command.add_flag("--strict", o->strict, "Fail (exit code 4) if invalid values or lost queue items were counted");
     command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
     command.callback([o, png, &run] {

@@ -115,6 +115,15 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {{"bench", "queues", kCornell, "--items", "300000000"}, "at most"},
         {{"bench", "queues", kCornell, "--backend", "abacus"}, "auto, cpu, cuda"},
         {{"bench", "queues"}, "SCENE is required"},
+        {{"trace", kCornell, "--pixel", "1,2"}, "--sample is required"},
+        {{"trace", kCornell, "--sample", "0"}, "--pixel X,Y or --light-subpath N"},
+        {{"trace", kCornell, "--sample", "0", "--pixel", "1"}, "write it as X,Y"},
+        {{"trace", kCornell, "--sample", "0", "--pixel", "24,1", "--size", "24x16"}, "24x16 pixels"},
+        {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "--strategy", "s1"}, "s1t3"},
+        {{"trace", kCornell, "--sample", "0", "--light-subpath", "3"}, "has no light subpaths"},
+        {{"trace", kCornell, "--sample", "0", "--light-subpath", "99999999", "-i", "light"}, "99999999"},
+        {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "-i", "toy"}, "there is no replay"},
+        {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "-i", "bdpt", "--set", "bdpt.auto=true"}, "printed"},
     };
     for (const Case& c : cases) {
         const Outcome o = run(folder, c.arguments);
@@ -439,4 +448,36 @@ TEST_CASE("bench queues") {
         run(folder, {"bench", "queues", kCornell, "--backend", "cuda", "--items", "1024", "--repetitions", "1"});
     CHECK((device.code == 0 || device.code == 4));
     if (device.code == 4) CHECK(contains(device.err, "no CUDA device"));
+}
+
+TEST_CASE("Outliers come with a command that replays them") {
+    const test::TempFolder folder;
+    for (const std::vector<std::string>& method :
+         {std::vector<std::string>{}, {"-i", "bdpt"}, {"-i", "bdpt", "--variant", "lvc"}}) {
+        std::vector<std::string> more = {"--spp", "4",          "--backend", "cpu",   "--seed",
+                                         "3",     "--outliers", "2",         "--set", "specialise=false"};
+        more.insert(more.end(), method.begin(), method.end());
+        const json stats = statistics(folder, more);
+        REQUIRE(stats["outliers"].size() == 2);
+        CHECK(stats["invalid_values"].empty());
+        for (const json& o : stats["outliers"]) {
+            std::istringstream words(o["command"].get<std::string>());
+            std::vector<std::string> arguments;
+            for (std::string word; words >> word;) arguments.push_back(word);
+            CAPTURE(o["command"]);
+            REQUIRE(arguments.at(0) == "ambilux");
+            arguments.erase(arguments.begin());
+            const Outcome text = run(folder, arguments);
+            CHECK(text.code == 0);
+            CHECK(contains(text.out, "found by the eye subpath"));
+            arguments.insert(arguments.end(), {"--json", "-"});
+            const Outcome replay = run(folder, arguments);
+            REQUIRE(replay.code == 0);
+            CHECK(json::parse(replay.out)["total"] == o["value"]);
+        }
+    }
+    const Outcome light = run(folder, {"trace", kCornell, "--size", "24x16", "-i", "light", "--light-subpath", "7",
+                                       "--sample", "1", "--strategy", "s2t1", "--json", "-"});
+    REQUIRE(light.code == 0);
+    for (const json& splat : json::parse(light.out)["splats"]) CHECK(splat["s"] == 2);
 }
