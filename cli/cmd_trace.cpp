@@ -5,6 +5,7 @@
 
 #include "cli/commands.h"
 #include "core/error.h"
+#include "render/replay/by_length.h"
 #include "render/replay/print.h"
 #include "render/replay/replay.h"
 
@@ -16,6 +17,7 @@ struct Options {
     RenderOptions render;
     std::string pixel, strategy, json;
     std::optional<uint32_t> sample, light_subpath;
+    bool compare = false;
 };
 
 /// "X,Y" within the image.
@@ -32,21 +34,45 @@ void parse_pixel(const std::string& text, const Sensor& sensor, ReplayRequest& r
                                 sensor.crop_width, sensor.crop_height));
 }
 
+/// Adds what a render brings to the sample.
+void compare(const Scene& scene, const RenderSettings& settings, const ReplayRequest& request, SharedAccels& accels,
+             nlohmann::json& json, std::string& text) {
+    const std::vector<LengthComparison> lengths =
+        compare_by_length(scene, settings, request, accels, [&](const RenderSettings& s, uint32_t sample) {
+            return rendered_film(scene, s, sample);
+        });
+    text += by_length_text(lengths);
+    nlohmann::json& list = json["by_segments"] = nlohmann::json::array();
+    for (const LengthComparison& c : lengths)
+        list.push_back({{"segments", c.segments},
+                        {"rendered", c.rendered},
+                        {"replayed", c.replayed},
+                        {"differs", c.differs}});
+}
+
 int trace(const Options& o) {
     if (o.pixel.empty() && !o.light_subpath)
         throw Error(ExitCode::usage, "trace: --pixel X,Y or --light-subpath N is needed, or both");
-    ReplayFilter filter;
-    if (!o.strategy.empty()) filter.only = parse_strategy(o.strategy);
+    if (o.compare && (o.pixel.empty() || o.light_subpath))
+        throw Error(ExitCode::usage, "--compare: --pixel X,Y is needed, without --light-subpath");
+    ReplayFormat format;
+    if (!o.strategy.empty()) format.only = parse_strategy(o.strategy);
     const LoadedScene loaded = load_scene(o.scene);
+    format.origin = loaded.scene.origin;
     ReplayRequest request;
     if (!o.pixel.empty()) parse_pixel(o.pixel, loaded.scene.sensor, request);
     request.sample = *o.sample;
     request.light_subpath = o.light_subpath;
     SharedAccels accels(loaded.scene);
-    const std::unique_ptr<Replay> replay = make_replay(loaded.scene, o.render.settings(loaded.scene), accels);
+    RenderSettings settings = o.render.settings(loaded.scene);
+    if (settings.backend == Backend::automatic) settings.backend = Backend::cpu;
+    const std::unique_ptr<Replay> replay = make_replay(loaded.scene, settings, accels);
     const auto report = [&](const auto&... seen) {
-        if (!o.json.empty()) write_json(o.json, replay_json(seen..., filter));
-        if (o.json != "-") std::cout << replay_text(seen..., filter) << std::flush;
+        nlohmann::json json = replay_json(seen..., format);
+        std::string text = replay_text(seen..., format);
+        if (o.compare) compare(loaded.scene, settings, request, accels, json, text);
+        if (!o.json.empty()) write_json(o.json, json);
+        if (o.json != "-") std::cout << text << std::flush;
     };
     if (!o.pixel.empty()) {
         report(replay->sample(request));
@@ -71,6 +97,9 @@ void add_trace(CLI::App& app, Run& run) {
     command.add_option("--light-subpath", o->light_subpath,
                        "Light subpath of the sample by its number: shown too, or, without --pixel, alone");
     command.add_option("--strategy", o->strategy, "Show contributions of this strategy only, such as s1t3");
+    command.add_flag("--compare", o->compare,
+                     "Render the sample too, with --backend cuda on the device, and say from how many segments on it "
+                     "differs from the replay");
     command.add_option("--json", o->json, "Write the replay to a file, or - for standard output");
     command.callback([o, &run] { run = [o] { return trace(*o); }; });
 }

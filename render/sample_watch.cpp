@@ -12,7 +12,6 @@ uint32_t SampleWatch::render(uint32_t first, uint32_t count, const volatile bool
         renderer_->clear_film();
         if (renderer_->render(first + done, 1, interrupt) == 0) return done;
         look(first + done, renderer_->film());
-        look_for_invalid(first + done);
     }
     return count;
 }
@@ -37,19 +36,6 @@ void SampleWatch::look(uint32_t sample, const FilmMoments& one) {
         if (film_.samples > 1 && !(most > std::max({l.value[0], l.value[1], l.value[2]}))) continue;
         l = {{value[0], value[1], value[2]}, sample};
     }
-}
-
-void SampleWatch::look_for_invalid(uint32_t sample) {
-    if (invalid_.size() >= kMostInvalid) return;
-    WatchedInvalid found{sample, {}};
-    for (const auto& [stage, counts] : renderer_->stats().invalid_by_stage) {
-        InvalidCounts& before = counted_[stage];
-        const InvalidCounts more = {counts.nan - before.nan, counts.inf - before.inf,
-                                    counts.negative - before.negative};
-        if (more.total()) found.by_stage[stage] = more;
-        before = counts;
-    }
-    if (!found.by_stage.empty()) invalid_.push_back(found);
 }
 
 std::vector<WatchedPixel> SampleWatch::worst(uint32_t count) const {

@@ -1,5 +1,5 @@
-// A render that is looked at sample by sample: which sample of a pixel was its largest, and which samples had invalid
-// values. On either backend without a word of device code, since a film of one sample tells all.
+// A render that is looked at sample by sample: which sample of a pixel was its largest. On either backend without a word
+// of device code, since a film of one sample tells all.
 #pragma once
 
 #include "render/renderer.h"
@@ -14,19 +14,11 @@ struct WatchedPixel {
                         ///< there are none
 };
 
-/// A sample of all pixels in which stages dropped values.
-struct WatchedInvalid {
-    uint32_t sample = 0;
-    std::map<std::string, InvalidCounts> by_stage;
-};
-
 /// Renders one sample of all pixels at a time and adds up the films on the host, in the same order: the image is that
 /// of the renderer, unless its waves hold several samples that depend on each other (variant lvc on CUDA). Costs
 /// about 130 bytes per pixel and, on CUDA, a transfer of the film per sample.
 class SampleWatch final : public Renderer {
 public:
-    static constexpr size_t kMostInvalid = 8;  ///< samples that invalid() remembers, the first ones
-
     explicit SampleWatch(std::unique_ptr<Renderer> renderer) : renderer_(std::move(renderer)) {}
 
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt = nullptr) override;
@@ -38,7 +30,6 @@ public:
 
     /// The `count` pixels whose largest sample exceeds the mean of the others most, the worst first.
     std::vector<WatchedPixel> worst(uint32_t count) const;
-    const std::vector<WatchedInvalid>& invalid() const { return invalid_; }
 
 private:
     struct Largest {
@@ -47,13 +38,10 @@ private:
     };
 
     void look(uint32_t sample, const FilmMoments& one);
-    void look_for_invalid(uint32_t sample);
 
     std::unique_ptr<Renderer> renderer_;
     FilmMoments film_;
     std::vector<Largest> largest_;
-    std::map<std::string, InvalidCounts> counted_;
-    std::vector<WatchedInvalid> invalid_;
 };
 
 }  // namespace ambilux

@@ -39,7 +39,7 @@ public:
         bool pushed = false;
         WeighEmission<LastItem<Contribution>>{{}, {&kept, &pushed}, watch_.record(), {}}.push(
             EmissionItem{c.value, 0, c.ratio, c.strategy, {}});
-        if (watch_.dropped("mis_weight", out.dropped_by)) return void(out.fate = ReplayFate::invalid);
+        if (watch_.dropped("mis_weight", out.drop)) return void(out.fate = ReplayFate::invalid);
         if (pushed) arrive(kept, out);
     }
 
@@ -58,7 +58,7 @@ public:
         c.path = 0;
         const WeighCandidates<LastItem<ShadowItem>> weigh = {{}, {}, watch_.record(), {}, &sample_, ctx_.cull};
         const bool left = weigh.weigh(c, shadow);
-        if (watch_.dropped("mis_weight", out.dropped_by)) return void(out.fate = ReplayFate::invalid);
+        if (watch_.dropped("mis_weight", out.drop)) return void(out.fate = ReplayFate::invalid);
         if (!left) return void(out.fate = is_zero(c.value * out.weight) ? ReplayFate::zero : ReplayFate::culled);
         occlude(shadow, out);
     }
@@ -72,7 +72,7 @@ private:
     }
     bool made(Rgb value, const char* stage, ReplayCandidate& out) {
         if (is_valid_radiance(value, watch_.record())) return true;
-        watch_.dropped(stage, out.dropped_by);
+        watch_.dropped(stage, out.drop);
         out.fate = ReplayFate::invalid;
         return false;
     }
@@ -82,7 +82,7 @@ private:
         const Occlude<kReplayFeatures, HostTracer, LastItem<Contribution>> stage = {
             ctx_.view, ctx_.tracer, {}, {&kept, &pushed}, watch_.record(), {}};
         stage.process(shadow);
-        if (watch_.dropped("occlude", out.dropped_by)) return void(out.fate = ReplayFate::invalid);
+        if (watch_.dropped("occlude", out.drop)) return void(out.fate = ReplayFate::invalid);
         if (!pushed) return void(out.fate = ReplayFate::blocked);
         arrive(kept, out);
     }
@@ -90,7 +90,7 @@ private:
         c.path = 0;
         out.contribution = c.value;
         Accumulate{{}, &sample_, watch_.record(), {}, {}}.push(c);
-        out.fate = watch_.dropped("accumulate", out.dropped_by) ? ReplayFate::invalid : ReplayFate::arrived;
+        out.fate = watch_.dropped("accumulate", out.drop) ? ReplayFate::invalid : ReplayFate::arrived;
     }
 
     const ReplayContext<Mis>& ctx_;
@@ -112,10 +112,10 @@ inline void splat_arrival(const ReplayContext<BidirectionalMis>& ctx, const Cand
     CandidateItem weighted;
     bool pushed = false;
     WeighSplats<LastItem<CandidateItem>>{{}, {&weighted, &pushed}, watch.record()}.push(c);
-    if (watch.dropped("mis_weight", out.dropped_by)) return void(out.fate = ReplayFate::invalid);
+    if (watch.dropped("mis_weight", out.drop)) return void(out.fate = ReplayFate::invalid);
     if (!pushed) return;
     if (!is_valid_ray(c.origin, c.direction, watch.record())) {
-        watch.dropped("occlude", out.dropped_by);
+        watch.dropped("occlude", out.drop);
         return void(out.fate = ReplayFate::invalid);
     }
     const Ray ray = {c.origin, c.tmax, c.direction, c.opacity_seed};

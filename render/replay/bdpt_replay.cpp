@@ -79,7 +79,7 @@ public:
                 out.lights.push_back(light_subpath(*request.light_subpath, request.sample, true, splats));
         }
         if (ctx_.rules.splat && request.splats) gather_splats(request, out);
-        for (int c = 0; c < 3; ++c) out.total[c] = out.splat_sum[c] + double(out.eye_sum[c]);
+        finish(out);
         return out;
     }
 
@@ -256,7 +256,7 @@ private:
                 pixel.add(c);
                 out.splats.push_back(std::move(c));
             }
-        pixel.read(out.splat_sum);
+        std::copy_n(pixel.sum(), 3, out.splat_sum);
     }
 
     uint64_t seed_;

@@ -55,10 +55,10 @@ private:
         CandidateItem item;
         bool pushed = false;
         DropWatch watch;
-        std::string by;
+        ReplayDrop drop;
         push_connection<kReplayFeatures>(ctx.view, ctx.rules, source, state, eye.draws, end, 0, light, place, true,
                                          LastItem<CandidateItem>{&item, &pushed}, watch.record());
-        const bool dropped = watch.dropped("connect_vertices", by);
+        const bool dropped = watch.dropped("connect_vertices", drop);
         if (!pushed && !dropped) return;
         ReplayCandidate& r = eye.add("connection");
         r.light_depth = light.bits().depth();
@@ -70,7 +70,7 @@ private:
         }
         r.strategy = Strategy::make(r.light_depth + 1, end.depth + 1);
         r.fate = ReplayFate::invalid;
-        r.dropped_by = by;
+        r.drop = drop;
     }
 };
 

@@ -3,6 +3,8 @@
 
 #include "accel/host_tracer.h"
 #include "integrators/bdpt/shared/policy.h"
+#include "render/replay/record.h"
+#include "stages/update_film.h"
 #include "stages/stage.h"
 
 namespace ambilux {
@@ -19,23 +21,31 @@ struct ReplayContext {
     bool radiance_first = false;  ///< variant megakernel: the environment's radiance is looked up before the weight
 };
 
-/// Counts what a stage dropped, and remembers the first stage that did.
+/// Sees what a stage drops.
 class DropWatch {
 public:
     StageRecord* record() {
         record_ = {};
         return &record_;
     }
-    /// True if the stage `name` has dropped something since record().
-    bool dropped(const char* name, std::string& by) const {
-        const bool any = record_.nan + record_.inf + record_.negative > 0;
-        if (any && by.empty()) by = name;
-        return any;
+    /// True if the stage `name` has dropped something since record(); `drop` keeps the first.
+    bool dropped(const char* name, ReplayDrop& drop) const {
+        if (record_.nan + record_.inf + record_.negative == 0) return false;
+        if (!drop.happened()) drop = {name, record_.nan ? "NaN" : record_.inf ? "Inf" : "negative"};
+        return true;
     }
 
 private:
     StageRecord record_{};
 };
+
+/// The sum of a sample, as update_film has it.
+inline void finish(ReplaySample& s) {
+    for (int c = 0; c < 3; ++c) s.total[c] = s.splat_sum[c] + double(s.eye_sum[c]);
+    DropWatch watch;
+    const Rgb total = {float(s.total[0]), float(s.total[1]), float(s.total[2])};
+    if (!is_valid_radiance(total, watch.record())) watch.dropped(UpdateFilm::kName, s.drop);
+}
 
 /// Nearest hit of a subpath's ray, as extend has it: a ray that is invalid is a miss, and counted.
 template <class Mis>

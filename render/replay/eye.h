@@ -37,16 +37,16 @@ struct ReplayEye {
     void next_event(const Vertex<Mis>& z, const Subpath<Mis>& path) {
         CandidateItem item;
         DropWatch watch;
-        std::string by;
+        ReplayDrop drop;
         const bool pushed = sample_emitter(ctx, z, path, draws, watch.record(), item);
-        const bool dropped = watch.dropped("connect", by);
+        const bool dropped = watch.dropped("connect", drop);
         if (!pushed && !dropped) return;
         ReplayCandidate& r = add("next event");
         if (details) r.densities = next_event_densities(ctx, z, draws.next_event(path.depth));
         if (pushed) return arrival.light(item, r);
         r.strategy = Strategy::make(1, path.depth + 1);
         r.fate = ReplayFate::invalid;
-        r.dropped_by = by;
+        r.drop = drop;
     }
     ReplayCandidate& add(const char* kind) {
         out.candidates.emplace_back();
@@ -69,7 +69,7 @@ struct ReplayEyeSink {
     bool valid(Rgb throughput) const {
         DropWatch watch;
         if (is_valid_radiance(throughput, watch.record())) return true;
-        watch.dropped("shade", eye.out.eye.dropped_by);
+        watch.dropped("shade", eye.out.eye.drop);
         return false;
     }
 };
@@ -105,7 +105,7 @@ void replay_eye(const ReplayContext<Mis>& ctx, const typename ReplayEye<Mis>::Sa
     do {
         eye.ray = path;
         eye.hit = replay_extend(ctx, path, path.depth == 1 ? camera.tmax : kInfinity, draws, watch.record());
-        watch.dropped("extend", out.eye.dropped_by);
+        watch.dropped("extend", out.eye.drop);
     } while (replay_step(ctx, Side::eye, ctx.rules.longest(Side::eye), eye.hit, path, ReplayEyeSink<Mis>{eye},
                          details ? &out.eye : nullptr));
     out.eye_sum = eye.arrival.sum();

@@ -28,18 +28,14 @@ public:
         c.filter = filter_at(view_, x_, y_, c.film);
         if (c.fate != ReplayFate::arrived) return;
         c.contribution *= c.filter;
-        if (sums().add(0, c.contribution, false)) return;
-        c.fate = ReplayFate::invalid;
-        c.dropped_by = "splat";
+        SplatSums{sum_, nullptr}.add(0, c.contribution, false);
     }
-    void read(double (&sum)[3]) { sums().read(0, sum); }
+    const double* sum() const { return sum_; }
 
 private:
-    SplatSums sums() { return {fixed_, nullptr}; }
-
     const SceneView& view_;
     uint32_t x_, y_;
-    int64_t fixed_[3] = {};
+    double sum_[3] = {};
 };
 
 }  // namespace ambilux

@@ -38,7 +38,7 @@ struct ReplaySplats {
     ReplayLight& light;
 
     uint32_t push(const CandidateItem& c) const {
-        if (!request.matters(c.film)) return 0;
+        if (!request.splats || !request.matters(c.film)) return 0;
         ReplayCandidate out;
         out.kind = "camera";
         out.light_subpath = request.number;
@@ -47,15 +47,15 @@ struct ReplaySplats {
         light.splats.push_back(out);
         return 0;
     }
-    /// `stage` dropped a candidate before it had a weight.
-    void invalid(const char* stage, Strategy strategy) const {
+    /// A candidate was dropped before it had a weight.
+    void invalid(const ReplayDrop& drop, Strategy strategy) const {
         ReplayCandidate out;
         out.kind = "camera";
         out.light_subpath = request.number;
         out.light_depth = strategy.s() - 1;
         out.strategy = strategy;
         out.fate = ReplayFate::invalid;
-        out.dropped_by = stage;
+        out.drop = drop;
         light.splats.push_back(out);
     }
 };
@@ -69,11 +69,11 @@ struct ReplayLightSink {
         const auto& [ctx, request, light] = splats;
         if (ctx.rules.splat && request.splats && ctx.rules.wants(path.depth + 1, 1)) {
             DropWatch watch;
-            std::string by;
+            ReplayDrop drop;
             const size_t before = light.splats.size();
             ConnectCamera<kReplayFeatures, ReplaySplats>{splats, watch.record()}.at(ctx.view, ctx.rules, y, path, 0, d);
-            if (watch.dropped("connect_camera", by))
-                splats.invalid("connect_camera", Strategy::make(path.depth + 1, 1));
+            if (watch.dropped("connect_camera", drop))
+                splats.invalid(drop, Strategy::make(path.depth + 1, 1));
             const Vec4f u = d.lens(path.depth);
             if (request.details && light.splats.size() > before)
                 light.splats.back().densities = camera_densities(ctx.view, y.point.p, {u.x, u.y});
@@ -82,10 +82,10 @@ struct ReplayLightSink {
             light.vertices.push_back(pack_connection_vertex(y, path, kNone));
     }
     bool valid(Rgb throughput) const {
-        if (is_valid_radiance(throughput)) return true;
         DropWatch watch;
-        if (!is_valid_radiance(throughput, watch.record())) splats.light.subpath.dropped_by = "light_shade";
-        return splats.light.subpath.dropped_by.empty();
+        if (is_valid_radiance(throughput, watch.record())) return true;
+        watch.dropped("light_shade", splats.light.subpath.drop);
+        return false;
     }
 };
 
@@ -112,19 +112,28 @@ inline ReplayLight replay_light(const ReplayContext<BidirectionalMis>& ctx, cons
     if (request.details) describe_start(ctx, draws, subpath);
     const ReplaySplats splats = {ctx, request, light};
     DropWatch watch;
-    Subpath<BidirectionalMis> path;
+    Subpath<BidirectionalMis> path{};
     const bool starts =
         start_light_subpath<kReplayFeatures>(ctx.view, ctx.rules, draws, 0, splats, watch.record(), path);
-    if (watch.dropped("light_generate", subpath.dropped_by)) splats.invalid("light_generate", Strategy::make(1, 1));
+    const bool valid = is_valid_radiance(path.throughput);
+    ReplayDrop drop;
+    if (watch.dropped("light_generate", drop)) {
+        if (valid)
+            splats.invalid(drop, Strategy::make(1, 1));
+        else
+            subpath.drop = drop;
+    }
     if (!starts) {
-        subpath.end = ctx.rules.max_depth < 2 ? "max_depth" : "the emitter sample carries no light";
+        subpath.end = !valid                   ? "the flux of the emitter sample is invalid"
+                      : ctx.rules.max_depth < 2 ? "max_depth"
+                                                : "the emitter sample carries no light";
         return light;
     }
     const ReplayLightSink sink = {splats};
     Hit hit;
     do {
         hit = replay_extend(ctx, path, kInfinity, draws, watch.record());
-        watch.dropped("light_extend", subpath.dropped_by);
+        watch.dropped("light_extend", subpath.drop);
     } while (replay_step(ctx, Side::light, request.longest, hit, path, sink, request.details ? &subpath : nullptr));
     return light;
 }

@@ -37,7 +37,7 @@ public:
         out.sample = request.sample;
         out.seed = seed_;
         replay_eye<UnidirectionalMis>(ctx_, sample_emitter_, {}, request.details, out);
-        for (int c = 0; c < 3; ++c) out.total[c] = double(out.eye_sum[c]);
+        finish(out);
         return out;
     }
     ReplaySubpath light_subpath(uint32_t, uint32_t, bool, std::vector<ReplayCandidate>&) const override {

@@ -10,6 +10,12 @@ namespace ambilux {
 namespace {
 
 std::string text_of(Vec3f v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z); }
+/// A scene that was moved has digits of its own behind those of its place.
+std::string place_text(Vec3f p, const ReplayFormat& format) {
+    if (!format.moved()) return text_of(p);
+    const std::array<double, 3> at = format.in_file(p);
+    return fmt::format("({:.13g}, {:.13g}, {:.13g})", at[0], at[1], at[2]);
+}
 std::string text_of(const double (&v)[3]) { return fmt::format("({:.9g}, {:.9g}, {:.9g})", v[0], v[1], v[2]); }
 
 std::string text_of(const std::vector<ReplayNumber>& numbers) {
@@ -32,22 +38,22 @@ void print_scatter(const ReplayScatter& s, std::string& out) {
                            s.roulette.survived ? "survives" : "ends");
 }
 
-void print_vertex(const ReplayVertex& v, std::string& out) {
-    out += fmt::format("  {:>3}  ray from {} along {}, throughput {}\n", v.depth, text_of(v.origin),
+void print_vertex(const ReplayVertex& v, const ReplayFormat& format, std::string& out) {
+    out += fmt::format("  {:>3}  ray from {} along {}, throughput {}\n", v.depth, place_text(v.origin, format),
                        text_of(v.direction), text_of(v.throughput));
     if (v.miss) {
         out += fmt::format("       meets nothing; {}\n", text_of(v.sums));
     } else {
         out += fmt::format("       meets shape {} (primitive {}, material {}, {}{}) after {:.6g} at {}\n", v.shape,
                            v.prim, v.material, v.bsdf, v.emitter == kNone ? "" : fmt::format(", emitter {}", v.emitter),
-                           v.distance, text_of(v.p));
+                           v.distance, place_text(v.p, format));
         out += fmt::format("       ng {}, ns {}; {}\n", text_of(v.ng), text_of(v.ns), text_of(v.sums));
     }
     print_scatter(v.scatter, out);
     if (!v.end.empty()) out += fmt::format("       ends: {}\n", v.end);
 }
 
-void print_subpath(const ReplaySubpath& s, std::string& out) {
+void print_subpath(const ReplaySubpath& s, const ReplayFormat& format, std::string& out) {
     if (s.side == Side::eye)
         out += "eye subpath\n";
     else
@@ -55,9 +61,16 @@ void print_subpath(const ReplaySubpath& s, std::string& out) {
     if (!s.emitter.empty())
         out += fmt::format("    0  starts on emitter of type {}, radiance {}; {}\n", s.emitter, text_of(s.start),
                            text_of(s.start_densities));
-    for (const ReplayVertex& v : s.vertices) print_vertex(v, out);
+    for (const ReplayVertex& v : s.vertices) print_vertex(v, format, out);
     if (!s.end.empty()) out += fmt::format("       no ray: {}\n", s.end);
-    if (!s.dropped_by.empty()) out += fmt::format("       stage {} dropped an invalid value\n", s.dropped_by);
+    if (s.drop.happened())
+        out += fmt::format("       invalid: stage {} dropped a throughput or a ray ({})\n", s.drop.stage, s.drop.what);
+}
+
+void print_origin(const ReplayFormat& format, std::string& out) {
+    if (format.moved())
+        out += fmt::format("positions are those of the file; the scene was moved by ({:.9g}, {:.9g}, {:.9g})\n",
+                           -format.origin[0], -format.origin[1], -format.origin[2]);
 }
 
 std::string fate_text(const ReplayCandidate& c) {
@@ -66,11 +79,11 @@ std::string fate_text(const ReplayCandidate& c) {
         case ReplayFate::blocked: return "blocked";
         case ReplayFate::culled: return "culled before its shadow ray";
         case ReplayFate::zero: return "nothing: value times weight rounds to 0";
-        default: return "invalid: dropped by stage " + c.dropped_by;
+        default: return fmt::format("invalid ({}): dropped by stage {}", c.drop.what, c.drop.stage);
     }
 }
 
-void print_candidate(const ReplayCandidate& c, std::string& out) {
+void print_candidate(const ReplayCandidate& c, const ReplayFormat& format, std::string& out) {
     std::string ends = c.eye_depth ? fmt::format("eye vertex {}", c.eye_depth) : "";
     if (c.light_subpath != kNone)
         ends += fmt::format("{}light subpath {} vertex {}", ends.empty() ? "" : ", ", c.light_subpath, c.light_depth);
@@ -80,7 +93,7 @@ void print_candidate(const ReplayCandidate& c, std::string& out) {
     out += kept ? fmt::format(": value {}, ratio {:.6g}, weight {:.6g}\n", text_of(c.value), c.ratio, c.weight) : "\n";
     if (!c.densities.empty()) out += fmt::format("           {}\n", text_of(c.densities));
     if (c.tmax > 0)
-        out += fmt::format("           shadow ray from {} along {}, {:.6g} long: {}\n", text_of(c.origin),
+        out += fmt::format("           shadow ray from {} along {}, {:.6g} long: {}\n", place_text(c.origin, format),
                            text_of(c.direction), c.tmax,
                            c.fate == ReplayFate::arrived   ? "free"
                            : c.fate == ReplayFate::blocked ? "blocked"
@@ -90,22 +103,22 @@ void print_candidate(const ReplayCandidate& c, std::string& out) {
     out += fmt::format("           {}\n", fate_text(c));
 }
 
-void print_candidates(const char* title, const std::vector<ReplayCandidate>& all, const ReplayFilter& filter,
+void print_candidates(const char* title, const std::vector<ReplayCandidate>& all, const ReplayFormat& format,
                       std::string& out) {
     size_t shown = 0;
     std::string text;
     for (const ReplayCandidate& c : all) {
-        if (!filter.shows(c)) continue;
+        if (!format.shows(c)) continue;
         ++shown;
-        print_candidate(c, text);
+        print_candidate(c, format, text);
     }
     out += fmt::format("{}: {}\n{}", title, shown, text);
 }
 
-/// Sum of what arrived by the strategies of a filter.
-void add_shown(const std::vector<ReplayCandidate>& all, const ReplayFilter& filter, double (&sum)[3]) {
+/// Sum of what arrived by the strategies of a format.
+void add_shown(const std::vector<ReplayCandidate>& all, const ReplayFormat& format, double (&sum)[3]) {
     for (const ReplayCandidate& c : all)
-        if (filter.shows(c) && c.fate == ReplayFate::arrived)
+        if (format.shows(c) && c.fate == ReplayFate::arrived)
             for (int k = 0; k < 3; ++k) sum[k] += double(c.contribution[k]);
 }
 
@@ -130,31 +143,35 @@ Strategy parse_strategy(const std::string& text) {
                             text));
 }
 
-std::string replay_text(const ReplaySample& sample, const ReplayFilter& filter) {
+std::string replay_text(const ReplaySample& sample, const ReplayFormat& format) {
     std::string out = fmt::format("pixel {},{}, sample {}, seed {}\n", sample.x, sample.y, sample.sample, sample.seed);
-    print_subpath(sample.eye, out);
-    for (const ReplaySubpath& s : sample.lights) print_subpath(s, out);
-    print_candidates("found by the eye subpath", sample.candidates, filter, out);
-    if (!sample.splats.empty()) print_candidates("splats of light subpaths", sample.splats, filter, out);
+    print_origin(format, out);
+    print_subpath(sample.eye, format, out);
+    for (const ReplaySubpath& s : sample.lights) print_subpath(s, format, out);
+    print_candidates("found by the eye subpath", sample.candidates, format, out);
+    if (!sample.splats.empty()) print_candidates("splats of light subpaths", sample.splats, format, out);
     for (const std::string& note : sample.notes) out += fmt::format("note: {}\n", note);
-    if (filter.only) {
+    if (format.only) {
         double sum[3] = {};
-        add_shown(sample.candidates, filter, sum);
-        add_shown(sample.splats, filter, sum);
-        out += fmt::format("{:<22}{}\n", "by strategy " + strategy_text(*filter.only), text_of(sum));
+        add_shown(sample.candidates, format, sum);
+        add_shown(sample.splats, format, sum);
+        out += fmt::format("{:<22}{}\n", "by strategy " + strategy_text(*format.only), text_of(sum));
     }
     out += fmt::format("{:<22}{}\n", "by the eye subpath", text_of(sample.eye_sum));
     if (!sample.splats.empty()) out += fmt::format("{:<22}{}\n", "by splats", text_of(sample.splat_sum));
     out += fmt::format("{:<22}{}{}\n", "sample", text_of(sample.total),
                        sample.complete ? "" : " without what the notes say is missing");
+    if (sample.drop.happened())
+        out += fmt::format("invalid ({}): dropped by stage {}\n", sample.drop.what, sample.drop.stage);
     return out;
 }
 
 std::string replay_text(const ReplaySubpath& subpath, const std::vector<ReplayCandidate>& splats,
-                        const ReplayFilter& filter) {
+                        const ReplayFormat& format) {
     std::string out;
-    print_subpath(subpath, out);
-    print_candidates("splats", splats, filter, out);
+    print_origin(format, out);
+    print_subpath(subpath, format, out);
+    print_candidates("splats", splats, format, out);
     return out;
 }
 

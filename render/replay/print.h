@@ -1,6 +1,7 @@
 // Replays for a person and for programs.
 #pragma once
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -14,20 +15,26 @@ std::string strategy_text(Strategy strategy);
 /// Throws Error(usage) unless `text` is of this form.
 Strategy parse_strategy(const std::string& text);
 
-/// Of contributions only those of strategy `only`, if it is given.
-struct ReplayFilter {
-    std::optional<Strategy> only;
+/// What is printed of a replay, and where its scene lies.
+struct ReplayFormat {
+    std::optional<Strategy> only;    ///< contributions of this strategy, if it is given
+    std::array<double, 3> origin{};  ///< Scene::origin: positions are printed in coordinates of the file
+
+    bool moved() const { return origin != std::array<double, 3>{}; }
+    std::array<double, 3> in_file(Vec3f p) const {
+        return {origin[0] + double(p.x), origin[1] + double(p.y), origin[2] + double(p.z)};
+    }
     bool shows(const ReplayCandidate& c) const { return !only || c.strategy.code == only->code; }
 };
 
-std::string replay_text(const ReplaySample& sample, const ReplayFilter& filter);
+std::string replay_text(const ReplaySample& sample, const ReplayFormat& format);
 /// A light subpath alone, with its splats.
 std::string replay_text(const ReplaySubpath& subpath, const std::vector<ReplayCandidate>& splats,
-                        const ReplayFilter& filter);
+                        const ReplayFormat& format);
 
 /// Numbers that are not finite are null; floats read back have the same bits.
-nlohmann::json replay_json(const ReplaySample& sample, const ReplayFilter& filter);
+nlohmann::json replay_json(const ReplaySample& sample, const ReplayFormat& format);
 nlohmann::json replay_json(const ReplaySubpath& subpath, const std::vector<ReplayCandidate>& splats,
-                           const ReplayFilter& filter);
+                           const ReplayFormat& format);
 
 }  // namespace ambilux

@@ -55,7 +55,15 @@ enum class ReplayFate : uint32_t {
     blocked,  ///< its shadow ray met something
     culled,   ///< by Russian roulette before the shadow ray (setting cull)
     zero,     ///< its weight or value rounds to nothing
-    invalid,  ///< dropped and counted by the stage `dropped_by`
+    invalid,  ///< dropped and counted by a stage (ReplayCandidate::drop)
+};
+
+/// A value that a stage dropped because it is no radiance, or no ray.
+struct ReplayDrop {
+    std::string stage;  ///< empty: nothing was dropped
+    std::string what;   ///< NaN, Inf or negative; of a ray NaN stands for both of the first
+
+    bool happened() const { return !stage.empty(); }
 };
 
 /// Light that a strategy found, on its way to a pixel.
@@ -73,7 +81,7 @@ struct ReplayCandidate {
     float filter = 1;             ///< t = 1: value of the pixel's filter there
     Rgb contribution{};           ///< what arrives at the pixel
     ReplayFate fate = ReplayFate::zero;
-    std::string dropped_by;  ///< stage
+    ReplayDrop drop;
 };
 
 /// A subpath and what it met. A light subpath has the number round · pixels + pixel of the slot that it started in
@@ -85,8 +93,8 @@ struct ReplaySubpath {
     std::string emitter;
     std::vector<ReplayNumber> start_densities;
     std::vector<ReplayVertex> vertices;
-    std::string end;         ///< why there is no first ray; else empty
-    std::string dropped_by;  ///< stage that dropped an invalid throughput; else empty
+    std::string end;  ///< why there is no first ray; else empty
+    ReplayDrop drop;  ///< of a throughput or a ray
 };
 
 /// One sample of a pixel.
@@ -99,6 +107,7 @@ struct ReplaySample {
     std::vector<ReplayCandidate> splats;      ///< of light subpaths that reach the pixel
     Rgb eye_sum{};
     double splat_sum[3] = {}, total[3] = {};
+    ReplayDrop drop;       ///< of the whole sample, by update_film
     bool complete = true;  ///< false: a render's sample holds connections that cannot be replayed (`notes` say which)
     std::vector<std::string> notes;
 };

@@ -32,25 +32,27 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Replay> make_replay(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
-    const bool cuda = settings.backend == Backend::cuda;
-    check_settings(settings, variant_of(settings), cuda);
+void check_replay(const RenderSettings& settings) {
+    check_settings(settings, variant_of(settings), settings.backend == Backend::cuda);
     if (settings.automatic)
         throw Error(ExitCode::usage,
                     "bdpt.auto=true: which integrator made the sample is up to a pilot; give the settings that "
                     "`ambilux render` printed as its choice");
+    for (const char* name : {"path", "light", "bdpt"})
+        if (settings.integrator == name) return;
+    throw Error(ExitCode::usage, fmt::format("integrator {}: there is no replay of it; path, light and bdpt have one",
+                                             settings.integrator));
+}
+
+std::unique_ptr<Replay> make_replay(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
+    check_replay(settings);
+    const bool cuda = settings.backend == Backend::cuda;
     const bool device_structure = cuda || settings.accel == AccelKind::cwbvh;
     const auto make = [&](const auto& accel) -> std::unique_ptr<Replay> {
         const HostTracer tracer(accel->tracer());
-        std::unique_ptr<Replay> replay;
-        if (settings.integrator == "path") replay = make_path_replay(scene, settings, tracer);
-        if (settings.integrator == "light" || settings.integrator == "bdpt")
-            replay = make_bdpt_replay(scene, settings, tracer);
-        if (!replay)
-            throw Error(ExitCode::usage,
-                        fmt::format("integrator {}: there is no replay of it; path, light and bdpt have one",
-                                    settings.integrator));
-        return std::make_unique<WithAccel>(accel, std::move(replay));
+        return std::make_unique<WithAccel>(accel, settings.integrator == "path"
+                                                      ? make_path_replay(scene, settings, tracer)
+                                                      : make_bdpt_replay(scene, settings, tracer));
     };
     return device_structure ? make(accels.get<CwbvhAccel>()) : make(accels.get<EmbreeAccel>());
 }

@@ -33,6 +33,9 @@ public:
                                         std::vector<ReplayCandidate>& splats) const = 0;
 };
 
+/// Throws Error(usage) if there are no replays of renders with these settings.
+void check_replay(const RenderSettings& settings);
+
 /// For renders with these settings, bdpt.auto among them excepted. On the CPU the sample of a replay has the bits of
 /// that of a render whose kernels hold all features (specialise=false), and is equal to others within rounding. Of a
 /// render on CUDA (backend=cuda) rays go through the same structure, but compilers round differently. Throws

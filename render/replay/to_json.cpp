@@ -11,12 +11,21 @@ using json = nlohmann::json;
 json number(double v) { return std::isfinite(v) ? json(v) : json(nullptr); }
 json triple(Vec3f v) { return {number(double(v.x)), number(double(v.y)), number(double(v.z))}; }
 json triple(const double (&v)[3]) { return {number(v[0]), number(v[1]), number(v[2])}; }
+json place(Vec3f p, const ReplayFormat& format) {
+    const std::array<double, 3> at = format.in_file(p);
+    return {number(at[0]), number(at[1]), number(at[2])};
+}
 json index(uint32_t i) { return i == kNone ? json(nullptr) : json(i); }
 
 json to_json(const std::vector<ReplayNumber>& numbers) {
     json all = json::object();
     for (const ReplayNumber& n : numbers) all[n.name] = number(n.value);
     return all;
+}
+
+json to_json(const ReplayDrop& d) {
+    if (!d.happened()) return nullptr;
+    return {{"stage", d.stage}, {"what", d.what}};
 }
 
 json to_json(const ReplayScatter& s) {
@@ -35,9 +44,9 @@ json to_json(const ReplayScatter& s) {
     return j;
 }
 
-json to_json(const ReplayVertex& v) {
+json to_json(const ReplayVertex& v, const ReplayFormat& format) {
     json j = {{"depth", v.depth},
-              {"origin", triple(v.origin)},
+              {"origin", place(v.origin, format)},
               {"direction", triple(v.direction)},
               {"throughput", triple(v.throughput)},
               {"sums", to_json(v.sums)},
@@ -45,7 +54,7 @@ json to_json(const ReplayVertex& v) {
               {"end", v.end.empty() ? json(nullptr) : json(v.end)}};
     if (v.miss) return j;
     j.update({{"distance", number(double(v.distance))},
-              {"p", triple(v.p)},
+              {"p", place(v.p, format)},
               {"ng", triple(v.ng)},
               {"ns", triple(v.ns)},
               {"primitive", v.prim},
@@ -63,7 +72,7 @@ const char* name_of(ReplayFate fate) {
     return names[uint32_t(fate)];
 }
 
-json to_json(const ReplayCandidate& c) {
+json to_json(const ReplayCandidate& c, const ReplayFormat& format) {
     json j = {{"kind", c.kind},
               {"s", c.strategy.s()},
               {"t", c.strategy.t()},
@@ -75,11 +84,11 @@ json to_json(const ReplayCandidate& c) {
               {"weight", number(double(c.weight))},
               {"densities", to_json(c.densities)},
               {"fate", name_of(c.fate)},
-              {"dropped_by", c.dropped_by.empty() ? json(nullptr) : json(c.dropped_by)},
+              {"dropped", to_json(c.drop)},
               {"contribution", triple(c.contribution)}};
     if (c.tmax > 0)
         j["shadow_ray"] = {
-            {"origin", triple(c.origin)}, {"direction", triple(c.direction)}, {"length", number(double(c.tmax))}};
+            {"origin", place(c.origin, format)}, {"direction", triple(c.direction)}, {"length", number(double(c.tmax))}};
     if (c.eye_depth == 0) {
         j["film"] = {number(double(c.film.x)), number(double(c.film.y))};
         j["filter"] = number(double(c.filter));
@@ -87,12 +96,12 @@ json to_json(const ReplayCandidate& c) {
     return j;
 }
 
-json to_json(const ReplaySubpath& s) {
+json to_json(const ReplaySubpath& s, const ReplayFormat& format) {
     json vertices = json::array();
-    for (const ReplayVertex& v : s.vertices) vertices.push_back(to_json(v));
+    for (const ReplayVertex& v : s.vertices) vertices.push_back(to_json(v, format));
     json j = {{"number", s.number},
               {"vertices", vertices},
-              {"dropped_by", s.dropped_by.empty() ? json(nullptr) : json(s.dropped_by)}};
+              {"dropped", to_json(s.drop)}};
     if (s.side == Side::eye) return j;
     j.update({{"part", s.part},
               {"emitter", s.emitter.empty() ? json(nullptr) : json(s.emitter)},
@@ -102,34 +111,38 @@ json to_json(const ReplaySubpath& s) {
     return j;
 }
 
-json to_json(const std::vector<ReplayCandidate>& all, const ReplayFilter& filter) {
+json to_json(const std::vector<ReplayCandidate>& all, const ReplayFormat& format) {
     json j = json::array();
     for (const ReplayCandidate& c : all)
-        if (filter.shows(c)) j.push_back(to_json(c));
+        if (format.shows(c)) j.push_back(to_json(c, format));
     return j;
 }
 
 }  // namespace
 
-json replay_json(const ReplaySample& r, const ReplayFilter& filter) {
+json replay_json(const ReplaySample& r, const ReplayFormat& format) {
     json lights = json::array();
-    for (const ReplaySubpath& s : r.lights) lights.push_back(to_json(s));
+    for (const ReplaySubpath& s : r.lights) lights.push_back(to_json(s, format));
     return {{"pixel", {r.x, r.y}},
             {"sample", r.sample},
             {"seed", r.seed},
-            {"eye_subpath", to_json(r.eye)},
+            {"eye_subpath", to_json(r.eye, format)},
             {"light_subpaths", lights},
-            {"candidates", to_json(r.candidates, filter)},
-            {"splats", to_json(r.splats, filter)},
+            {"candidates", to_json(r.candidates, format)},
+            {"splats", to_json(r.splats, format)},
             {"eye", triple(r.eye_sum)},
             {"splat_sum", triple(r.splat_sum)},
             {"total", triple(r.total)},
+            {"dropped", to_json(r.drop)},
+            {"scene_origin", format.origin},
             {"complete", r.complete},
             {"notes", r.notes}};
 }
 
-json replay_json(const ReplaySubpath& subpath, const std::vector<ReplayCandidate>& splats, const ReplayFilter& filter) {
-    return {{"light_subpath", to_json(subpath)}, {"splats", to_json(splats, filter)}};
+json replay_json(const ReplaySubpath& subpath, const std::vector<ReplayCandidate>& splats, const ReplayFormat& format) {
+    return {{"scene_origin", format.origin},
+            {"light_subpath", to_json(subpath, format)},
+            {"splats", to_json(splats, format)}};
 }
 
 }  // namespace ambilux

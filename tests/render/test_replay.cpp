@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/replay/by_length.h"
 #include "render/replay/outliers.h"
+#include "render/replay/print.h"
 #include "render/replay/replay.h"
 #include "tests/support/render_scene.h"
 
@@ -82,24 +84,27 @@ const Config kPaths[] = {
     {"path", "wavefront", {}},
     {"path", "wavefront", {{"estimator", "nee"}}},
     {"path", "wavefront", {{"estimator", "naive"}}},
-    {"path", "wavefront", {{"heuristic", "power"}, {"rr_depth", "1"}}},
+    {"path", "wavefront", {{"heuristic", "power"}, {"rr_depth", "1"}, {"rr_cap", "0.6"}}},
     {"path", "wavefront", {{"cull", "0.3"}}},
     {"path", "wavefront", {{"accel", "cwbvh"}}},
     {"path", "ris", {}},
+    {"path", "ris", {{"heuristic", "power"}, {"rr_depth", "1"}}},
 };
 const Config kBidirectional[] = {
     {"light", "wavefront", {}},
-    {"light", "wavefront", {{"light_paths", "1.5"}}},
+    {"light", "wavefront", {{"light_paths", "1.5"}, {"rr_depth", "1"}}},
     {"bdpt", "wavefront", {}},
-    {"bdpt", "wavefront", {{"heuristic", "power"}, {"rr_depth", "1"}, {"cull", "0.3"}}},
+    {"bdpt", "wavefront", {{"heuristic", "power"}, {"rr_depth", "1"}, {"rr_cap", "0.6"}, {"cull", "0.3"}}},
     {"bdpt", "wavefront", {{"strategies", "next_event+connections"}}},
     {"bdpt", "wavefront", {{"fuse", "none"}}},
     {"bdpt", "lvc", {}},
+    {"bdpt", "lvc", {{"heuristic", "power"}, {"rr_depth", "1"}}},
     {"bdpt", "lvc", {{"connections", "1"}, {"light_paths", "2.25"}}},
     {"bdpt", "lvc", {{"wave_size", "128"}}},
     {"bdpt", "streaming", {}},
+    {"bdpt", "streaming", {{"heuristic", "power"}, {"rr_depth", "1"}, {"cull", "0.3"}}},
     {"bdpt", "megakernel", {}},
-    {"bdpt", "megakernel", {{"heuristic", "power"}}},
+    {"bdpt", "megakernel", {{"heuristic", "power"}, {"rr_depth", "1"}}},
 };
 
 }  // namespace
@@ -142,7 +147,6 @@ TEST_CASE("A watched render has the image of one that is not, and names its larg
         CHECK(film.sum == plain.sum);
         CHECK(film.sum_squares == plain.sum_squares);
         CHECK(film.samples == plain.samples);
-        CHECK(watch.invalid().empty());
 
         // Against all samples of all pixels.
         double most = 0;
@@ -167,34 +171,143 @@ TEST_CASE("A watched render has the image of one that is not, and names its larg
     }
 }
 
-TEST_CASE("Invalid values of a stage inside of another are counted, and found again with pixel, sample and strategy") {
-    // A lamp so bright that its light, divided by the density of sampling it, is infinite.
-    const Scene scene = scene_from_text(R"(<scene version="3.0.0">
+namespace {
+
+/// A wall and a lamp behind the camera, both of the given radiance.
+Scene two_lamps(const std::string& wall, const std::string& lamp) {
+    const auto area = [](const std::string& radiance) {
+        return radiance == "0" ? "" : "<emitter type='area'><rgb name='radiance' value='" + radiance + "'/></emitter>";
+    };
+    return scene_from_text(R"(<scene version="3.0.0">
         <integrator type="path"><integer name="max_depth" value="2"/></integrator>
         <sensor type="perspective"><float name="fov" value="40"/>
             <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
             <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>
-        <shape type="rectangle"><bsdf type="diffuse"/></shape>
+        <shape type="rectangle"><bsdf type="diffuse"/>)" +
+                           area(wall) + R"(</shape>
         <shape type="rectangle"><transform name="to_world"><scale value="50"/><rotate y="1" angle="180"/>
-                <translate z="5"/></transform>
-            <emitter type="area"><rgb name="radiance" value="1e38"/></emitter></shape></scene>)");
-    RenderSettings settings = settings_of(scene, {"path", "wavefront", {{"estimator", "nee"}}});
-    SampleWatch watch(make_renderer(scene, settings));
-    REQUIRE(watch.render(0, 2) == 2);
-    const InvalidCounts counted = watch.stats().invalid_by_stage["connect"];
-    REQUIRE(counted.inf > 0);
-    REQUIRE(watch.invalid().size() == 2);
-    SharedAccels accels(scene);
-    const std::unique_ptr<Replay> replay = make_replay(scene, settings, accels);
-    const std::vector<InvalidRecord> found = find_invalid(watch, *replay, scene, 3);
-    REQUIRE(found.size() == 3);
-    for (const InvalidRecord& r : found) {
-        CHECK(r.stage == "connect");
+                <translate z="5"/></transform>)" +
+                           area(lamp) + "</shape></scene>");
+}
+
+struct InvalidFindings {
+    InvalidWatch watch;
+    SharedAccels accels;
+    std::unique_ptr<Replay> replay;
+    std::vector<InvalidRecord> found;
+
+    /// Renders a batch of three samples.
+    InvalidFindings(const Scene& scene, const RenderSettings& settings, uint32_t per_stage)
+        : watch(make_renderer(scene, settings)), accels(scene), replay(make_replay(scene, settings, accels)) {
+        REQUIRE(watch.render(0, 3) == 3);
+        REQUIRE(watch.batches().size() == 1);
+        CHECK(watch.batches()[0].count == 3);
+        found = find_invalid(watch, *replay, scene, per_stage);
+    }
+};
+
+}  // namespace
+
+TEST_CASE("Invalid values of a stage inside of another are counted, and found again with pixel, sample and strategy") {
+    // A lamp so bright that its light, divided by the density of sampling it, is infinite.
+    const Scene scene = two_lamps("0", "1e38");
+    InvalidFindings f(scene, settings_of(scene, {"path", "wavefront", {{"estimator", "nee"}}}), 3);
+    REQUIRE(f.watch.by_stage().at("connect").inf > 0);
+    REQUIRE(f.found.size() == 3);
+    for (const InvalidRecord& r : f.found) {
+        CHECK(r.drop.stage == "connect");
+        CHECK(r.drop.what == "Inf");
         CHECK(r.candidate.strategy.code == Strategy::make(1, 2).code);
-        const ReplaySample again = replay->sample({r.x, r.y, r.sample, {}, true, true});
+        const ReplaySample again = f.replay->sample({r.x, r.y, r.sample, {}, true, true});
         bool same = false;
-        for (const ReplayCandidate& c : again.candidates) same |= c.dropped_by == "connect";
+        for (const ReplayCandidate& c : again.candidates) same |= c.drop.stage == "connect";
         CHECK(same);
+    }
+}
+
+TEST_CASE("An infinite flux is found by the number of its light subpath") {
+    const Scene scene = two_lamps("0", "1e38");
+    InvalidFindings f(scene, settings_of(scene, {"light", "wavefront", {}}), 2);
+    REQUIRE(f.watch.by_stage().at("light_generate").inf > 0);
+    REQUIRE(f.found.size() == 2);
+    for (const InvalidRecord& r : f.found) {
+        CHECK(r.drop.stage == "light_generate");
+        REQUIRE(r.light_subpath != kNone);
+        std::vector<ReplayCandidate> splats;
+        const ReplaySubpath again = f.replay->light_subpath(r.light_subpath, r.sample, true, splats);
+        CHECK(again.drop.what == "Inf");
+        CHECK(again.end == "the flux of the emitter sample is invalid");
+    }
+}
+
+TEST_CASE("A sample whose sum is infinite, though its parts are not, is found as that of update_film") {
+    const Scene scene = two_lamps("3e38", "3e38");
+    InvalidFindings f(scene, settings_of(scene, {"path", "wavefront", {{"estimator", "naive"}}}), 1);
+    CHECK(f.watch.by_stage().size() == 1);
+    REQUIRE(f.watch.by_stage().at("update_film").inf > 0);
+    REQUIRE(f.found.size() == 1);
+    const InvalidRecord& r = f.found[0];
+    CHECK(f.replay->sample({r.x, r.y, r.sample, {}, true, true}).drop.stage == "update_film");
+}
+
+TEST_CASE("A comparison by segments agrees with a render, and names the number from which on another one differs") {
+    const Scene scene = project_scene("cornell", 24, 16);
+    for (const Config& c : {Config{"path", "wavefront", {}}, Config{"bdpt", "wavefront", {{"max_depth", "5"}}}}) {
+        CAPTURE(text_of(c));
+        const RenderSettings settings = settings_of(scene, c);
+        SharedAccels accels(scene);
+        const ReplayRequest request = {12, 8, 2, {}, true, true};
+        const auto rendered = [&](const RenderSettings& s, uint32_t sample) { return rendered_film(scene, s, sample); };
+        const std::vector<LengthComparison> same = compare_by_length(scene, settings, request, accels, rendered);
+        REQUIRE(same.size() >= 4);
+        double sum = 0;
+        for (const LengthComparison& l : same) {
+            CHECK_FALSE(l.differs);
+            sum += l.rendered[0];
+        }
+        const double all = rendered(settings, request.sample).sum[(8 * 24 + 12) * 3];
+        REQUIRE(all > 0);
+        CHECK(std::abs(sum - all) <= 1e-12 * all);
+        // From three segments on another sample.
+        const auto parted = [&](const RenderSettings& s, uint32_t sample) {
+            return rendered_film(scene, s, s.max_depth >= 3 || s.max_depth < 0 ? sample + 1 : sample);
+        };
+        const std::vector<LengthComparison> other = compare_by_length(scene, settings, request, accels, parted);
+        for (const LengthComparison& l : other)
+            if (l.segments <= 3) CHECK(l.differs == (l.segments == 3));
+        CHECK(by_length_text(other).find("first differ in paths of 3 segments") != std::string::npos);
+        CHECK(by_length_text(same).find("agree") != std::string::npos);
+    }
+}
+
+TEST_CASE("Positions are printed in the coordinates of the file, wherever the loader moved the scene") {
+    const auto scene_at = [](const std::string& x) {
+        return scene_from_text("<scene version='3.0.0'><sensor type='perspective'><transform name='to_world'>"
+                               "<lookat origin='" + x + ",0,4' target='" + x + ",0,0' up='0,1,0'/></transform>"
+                               "<film type='hdrfilm'><integer name='width' value='8'/>"
+                               "<integer name='height' value='8'/></film></sensor>"
+                               "<emitter type='constant'/><shape type='sphere'><point name='center' x='" + x +
+                               "' y='0' z='0'/></shape></scene>");
+    };
+    const auto replayed = [](const Scene& scene, std::string& text) {
+        SharedAccels accels(scene);
+        const RenderSettings settings = settings_of(scene, {"path", "wavefront", {}});
+        const ReplaySample s = make_replay(scene, settings, accels)->sample({4, 4, 0, {}, true, true});
+        const ReplayFormat format = {{}, scene.origin};
+        text = replay_text(s, format);
+        return replay_json(s, format);
+    };
+    std::string text;
+    const nlohmann::json near = replayed(scene_at("0"), text);
+    CHECK(text.find("was moved") == std::string::npos);
+    const nlohmann::json far = replayed(scene_at("1048576"), text);
+    CHECK(text.find("was moved by (-1048576, 0, 0)") != std::string::npos);
+    CHECK(text.find("ray from (1048576, 0, 4)") != std::string::npos);
+    const nlohmann::json &a = near["eye_subpath"]["vertices"][0], &b = far["eye_subpath"]["vertices"][0];
+    REQUIRE(a["miss"] == false);
+    for (const char* place : {"origin", "p"}) {
+        CHECK(b[place][0].get<double>() == a[place][0].get<double>() + 1048576);
+        for (const int c : {1, 2}) CHECK(b[place][c] == a[place][c]);
     }
 }
 

@@ -1,29 +1,43 @@
-#include "cli/outliers.h"
+#include "cli/findings.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <iostream>
 
+#include "core/log.h"
 #include "integrators/registry.h"
 #include "render/replay/print.h"
 
 namespace ambilux {
 namespace {
 
-/// Invalid values that are listed of every stage.
-constexpr uint32_t kInvalidPerStage = 3;
+/// Invalid values that are listed of every stage; with --outliers.
+constexpr uint32_t kInvalidPerStage = 1, kInvalidPerStageAsked = 3;
+
+/// A word as a shell reads it.
+std::string shell_word(const std::string& text) {
+    const auto plain = [](char c) {
+        return std::isalnum(static_cast<unsigned char>(c)) || std::string_view("_-./=,:+@%").find(c) != std::string_view::npos;
+    };
+    if (!text.empty() && std::all_of(text.begin(), text.end(), plain)) return text;
+    std::string quoted = "'";
+    for (const char c : text) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+    return quoted + "'";
+}
 
 /// `ambilux trace SCENE ...` with all options that the sample depends on.
-std::string trace_command(const SceneOptions& o, const Scene& scene, const RenderSettings& used,
-                          const std::string& what) {
-    std::string line = "ambilux trace " + o.path + what;
+std::string trace_command(const FinishedRender& render, const std::string& what) {
+    const SceneOptions& o = render.options;
+    const RenderSettings& used = render.used;
+    std::string line = "ambilux trace " + shell_word(o.path) + what;
     if (!o.size.empty()) line += " --size " + o.size;
     if (o.lenient) line += " --lenient";
-    for (const std::string& p : o.parameters) line += fmt::format(" -D '{}'", p);
+    for (const std::string& p : o.parameters) line += " -D " + shell_word(p);
     if (o.light_picking != "power") line += " --light-picking " + o.light_picking;
-    const RenderSettings plain = RenderOptions{}.settings(scene);
+    const RenderSettings plain = RenderOptions{}.settings(render.scene);
     const std::vector<std::string> options = {"integrator", "variant", "backend", "seed"};
     line += fmt::format(" -i {} --variant {} --backend {} --seed {}", used.integrator, used.variant,
                         setting_text(used, "backend"), used.seed);
@@ -34,7 +48,7 @@ std::string trace_command(const SceneOptions& o, const Scene& scene, const Rende
         // The order of a queue is none unless asked for otherwise; the renderer has put that in the place of auto.
         const bool unordered = s.what.key == "ordering" && s.text(used) == "none";
         if (!option && !unordered && s.applies_to(variant.traits, cuda) && s.text(used) != s.text(plain))
-            line += fmt::format(" --set {}={}", s.what.key, s.text(used));
+            line += " --set " + shell_word(fmt::format("{}={}", s.what.key, s.text(used)));
     };
     for (const Setting& s : general_settings()) add(s);
     for (const Setting& s : variant.own) add(s);
@@ -71,7 +85,8 @@ void report_outlier(const Outlier& o, const std::string& command, std::string& t
     if (differs)
         text += fmt::format("  the replay on the CPU brings ({:.6g}, {:.6g}, {:.6g}){}\n", o.replayed[0], o.replayed[1],
                             o.replayed[2],
-                            o.complete ? ": paths parted by rounding" : ", without connections from the cache");
+                            o.complete ? ": paths parted; trace with --compare says where"
+                                       : ", without connections from the cache");
     text += fmt::format("  {}\n", command);
     list.push_back({{"pixel", {p.x, p.y}},
                     {"sample", p.sample},
@@ -83,16 +98,18 @@ void report_outlier(const Outlier& o, const std::string& command, std::string& t
                     {"command", command}});
 }
 
-void report_invalid(const InvalidRecord& r, const std::string& command, std::string& text, nlohmann::json& list) {
+void report_invalid(const InvalidRecord& r, const std::string& command, nlohmann::json& list) {
     const bool eye = r.light_subpath == kNone;
     const std::string where =
         eye ? fmt::format("pixel {},{}", r.x, r.y) : fmt::format("light subpath {}", r.light_subpath);
-    text += fmt::format("stage {} dropped a value of {} sample {}{}\n  {}\n", r.stage, where, r.sample,
-                        r.candidate.kind[0] ? fmt::format(", {}, {}, {}", strategy_text(r.candidate.strategy),
-                                                          r.candidate.kind, ends_of(r.candidate))
-                                            : ", a ray or throughput",
-                        command);
-    list.push_back({{"stage", r.stage},
+    log_warning(fmt::format("stage {} dropped a value ({}) of {} sample {}{}; to replay it:\n  {}", r.drop.stage,
+                            r.drop.what, where, r.sample,
+                            r.candidate.kind[0] ? fmt::format(", {}, {}, {}", strategy_text(r.candidate.strategy),
+                                                              r.candidate.kind, ends_of(r.candidate))
+                                                : ", a ray, a throughput or the sum",
+                            command));
+    list.push_back({{"stage", r.drop.stage},
+                    {"what", r.drop.what},
                     {"pixel", eye ? nlohmann::json{r.x, r.y} : nlohmann::json(nullptr)},
                     {"light_subpath", eye ? nlohmann::json(nullptr) : nlohmann::json(r.light_subpath)},
                     {"sample", r.sample},
@@ -100,32 +117,45 @@ void report_invalid(const InvalidRecord& r, const std::string& command, std::str
                     {"command", command}});
 }
 
-}  // namespace
-
-void report_outliers(const SampleWatch& watch, const SceneOptions& options, const Scene& scene,
-                     const RenderSettings& used, uint32_t count, bool quiet, nlohmann::json& statistics) {
-    SharedAccels accels(scene);
-    const std::unique_ptr<Replay> replay = make_replay(scene, used, accels);
-    std::string text;
-    nlohmann::json outliers = nlohmann::json::array(), invalid = nlohmann::json::array();
-    for (const Outlier& o : find_outliers(watch, *replay, count)) {
-        const std::string what = fmt::format(" --pixel {},{} --sample {}", o.pixel.x, o.pixel.y, o.pixel.sample);
-        report_outlier(o, trace_command(options, scene, used, what), text, outliers);
-    }
-    for (const InvalidRecord& r : find_invalid(watch, *replay, scene, kInvalidPerStage)) {
+nlohmann::json report_invalid_values(const FinishedRender& render, const Replay& replay, uint32_t per_stage,
+                                     const volatile bool* interrupt) {
+    nlohmann::json list = nlohmann::json::array();
+    std::vector<std::string> missing;
+    for (const auto& [stage, counts] : render.watch.by_stage())
+        if (counts.total()) missing.push_back(stage);
+    if (missing.empty()) return list;
+    for (const InvalidRecord& r : find_invalid(render.watch, replay, render.scene, per_stage, interrupt)) {
         const std::string what = r.light_subpath == kNone ? fmt::format(" --pixel {},{}", r.x, r.y)
                                                           : fmt::format(" --light-subpath {}", r.light_subpath);
-        report_invalid(r, trace_command(options, scene, used, fmt::format("{} --sample {}", what, r.sample)), text,
-                       invalid);
+        report_invalid(r, trace_command(render, fmt::format("{} --sample {}", what, r.sample)), list);
+        missing.erase(std::remove(missing.begin(), missing.end(), r.drop.stage), missing.end());
     }
-    if (!watch.invalid().empty() && invalid.empty())
-        text += fmt::format(
-            "stages dropped invalid values in sample {} and perhaps later; the replay on the CPU has "
-            "none there\n",
-            watch.invalid()[0].sample);
-    if (!quiet) std::cout << text << std::flush;
-    statistics["outliers"] = outliers;
-    statistics["invalid_values"] = invalid;
+    for (const std::string& stage : missing)
+        log_warning(fmt::format("the replay on the CPU did not find the values that stage {} dropped, in the {} first "
+                                "samples that had invalid ones (docs/replay.md)",
+                                stage, kMostInvalidSamples));
+    return list;
+}
+
+}  // namespace
+
+nlohmann::json report_findings(const FinishedRender& render, uint32_t count, bool quiet,
+                               const volatile bool* interrupt) {
+    SharedAccels accels(render.scene);
+    const std::unique_ptr<Replay> replay = make_replay(render.scene, render.used, accels);
+    std::string text;
+    nlohmann::json json = nlohmann::json::object();
+    if (render.samples) {
+        nlohmann::json& outliers = json["outliers"] = nlohmann::json::array();
+        for (const Outlier& o : find_outliers(*render.samples, *replay, count)) {
+            const std::string what = fmt::format(" --pixel {},{} --sample {}", o.pixel.x, o.pixel.y, o.pixel.sample);
+            report_outlier(o, trace_command(render, what), text, outliers);
+        }
+        if (!quiet) std::cout << text << std::flush;
+    }
+    json["invalid_values"] = report_invalid_values(
+        render, *replay, render.samples ? kInvalidPerStageAsked : kInvalidPerStage, interrupt);
+    return json;
 }
 
 }  // namespace ambilux
