@@ -38,16 +38,13 @@ void parse_pixel(const std::string& text, const Sensor& sensor, ReplayRequest& r
 void compare(const Scene& scene, const RenderSettings& settings, const ReplayRequest& request, SharedAccels& accels,
              nlohmann::json& json, std::string& text) {
     const std::vector<LengthComparison> lengths =
-        compare_by_length(scene, settings, request, accels, [&](const RenderSettings& s, uint32_t sample) {
-            return rendered_film(scene, s, sample);
-        });
+        compare_by_length(scene, settings, request, accels,
+                          [&](const RenderSettings& s, uint32_t sample) { return rendered_film(scene, s, sample); });
     text += by_length_text(lengths);
     nlohmann::json& list = json["by_segments"] = nlohmann::json::array();
     for (const LengthComparison& c : lengths)
-        list.push_back({{"segments", c.segments},
-                        {"rendered", c.rendered},
-                        {"replayed", c.replayed},
-                        {"differs", c.differs}});
+        list.push_back(
+            {{"segments", c.segments}, {"rendered", c.rendered}, {"replayed", c.replayed}, {"differs", c.differs}});
 }
 
 int trace(const Options& o) {

@@ -20,7 +20,8 @@ constexpr uint32_t kInvalidPerStage = 1, kInvalidPerStageAsked = 3;
 /// A word as a shell reads it.
 std::string shell_word(const std::string& text) {
     const auto plain = [](char c) {
-        return std::isalnum(static_cast<unsigned char>(c)) || std::string_view("_-./=,:+@%").find(c) != std::string_view::npos;
+        return std::isalnum(static_cast<unsigned char>(c)) ||
+               std::string_view("_-./=,:+@%").find(c) != std::string_view::npos;
     };
     if (!text.empty() && std::all_of(text.begin(), text.end(), plain)) return text;
     std::string quoted = "'";
@@ -77,16 +78,15 @@ void report_outlier(const Outlier& o, const std::string& command, std::string& t
     text += fmt::format("pixel {},{} sample {}: ({:.6g}, {:.6g}, {:.6g}), {:.6g} above the mean of its other samples\n",
                         p.x, p.y, p.sample, p.value[0], p.value[1], p.value[2], p.excess);
     if (o.largest.fate == ReplayFate::arrived)
-        text += fmt::format("  most of it by {}, {}, {}: ({:.6g}, {:.6g}, {:.6g})\n", strategy_text(o.largest.strategy),
-                            o.largest.kind, ends_of(o.largest), o.largest.contribution.x, o.largest.contribution.y,
-                            o.largest.contribution.z);
+        text += fmt::format("  largest contribution: {}, {}, {}: ({:.6g}, {:.6g}, {:.6g})\n",
+                            strategy_text(o.largest.strategy), o.largest.kind, ends_of(o.largest),
+                            o.largest.contribution.x, o.largest.contribution.y, o.largest.contribution.z);
     bool differs = false;
     for (int c = 0; c < 3; ++c) differs |= std::abs(o.replayed[c] - p.value[c]) > 1e-3 * std::abs(p.value[c]) + 1e-9;
     if (differs)
-        text += fmt::format("  the replay on the CPU brings ({:.6g}, {:.6g}, {:.6g}){}\n", o.replayed[0], o.replayed[1],
-                            o.replayed[2],
-                            o.complete ? ": paths parted; trace with --compare says where"
-                                       : ", without connections from the cache");
+        text += fmt::format(
+            "  the replay on the CPU brings ({:.6g}, {:.6g}, {:.6g}){}\n", o.replayed[0], o.replayed[1], o.replayed[2],
+            o.complete ? ": paths parted; trace with --compare says where" : ", without connections from the cache");
     text += fmt::format("  {}\n", command);
     list.push_back({{"pixel", {p.x, p.y}},
                     {"sample", p.sample},
@@ -131,9 +131,10 @@ nlohmann::json report_invalid_values(const FinishedRender& render, const Replay&
         missing.erase(std::remove(missing.begin(), missing.end(), r.drop.stage), missing.end());
     }
     for (const std::string& stage : missing)
-        log_warning(fmt::format("the replay on the CPU did not find the values that stage {} dropped, in the {} first "
-                                "samples that had invalid ones (docs/replay.md)",
-                                stage, kMostInvalidSamples));
+        log_warning(
+            fmt::format("the replay on the CPU did not find the values that stage {} dropped, in the {} first "
+                        "samples that had invalid ones (docs/replay.md)",
+                        stage, kMostInvalidSamples));
     return list;
 }
 
@@ -153,8 +154,8 @@ nlohmann::json report_findings(const FinishedRender& render, uint32_t count, boo
         }
         if (!quiet) std::cout << text << std::flush;
     }
-    json["invalid_values"] = report_invalid_values(
-        render, *replay, render.samples ? kInvalidPerStageAsked : kInvalidPerStage, interrupt);
+    json["invalid_values"] =
+        report_invalid_values(render, *replay, render.samples ? kInvalidPerStageAsked : kInvalidPerStage, interrupt);
     return json;
 }
 

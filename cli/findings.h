@@ -18,6 +18,7 @@ struct FinishedRender {
 
 /// Prints the `count` largest samples to standard output unless `quiet`, and the first invalid values of every stage as
 /// warnings. Returns `outliers` and `invalid_values` for the statistics.
-nlohmann::json report_findings(const FinishedRender& render, uint32_t count, bool quiet, const volatile bool* interrupt);
+nlohmann::json report_findings(const FinishedRender& render, uint32_t count, bool quiet,
+                               const volatile bool* interrupt);
 
 }  // namespace ambilux

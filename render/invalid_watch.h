@@ -29,8 +29,8 @@ public:
     const std::vector<InvalidBatch>& batches() const { return batches_; }
     /// What all samples dropped that were rendered.
     const std::map<std::string, InvalidCounts>& by_stage() const { return counted_; }
-    /// The samples of a batch that drop values, each as a batch of its own, by rendering them again: at most `most`, the
-    /// first ones. The film is of no use any more.
+    /// The samples of a batch that drop values, each as a batch of its own, by rendering them again: at most `most`,
+    /// the first ones. The film is of no use any more.
     std::vector<InvalidBatch> samples(const InvalidBatch& batch, size_t most, const volatile bool* interrupt);
 
 private:

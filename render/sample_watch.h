@@ -1,5 +1,5 @@
-// A render that is looked at sample by sample: which sample of a pixel was its largest. On either backend without a word
-// of device code, since a film of one sample tells all.
+// A render that is looked at sample by sample: which sample of a pixel was its largest. On either backend without a
+// word of device code, since a film of one sample tells all.
 #pragma once
 
 #include "render/renderer.h"

@@ -47,8 +47,7 @@ std::vector<LengthComparison> compare_by_length(const Scene& scene, RenderSettin
                                                 const ReplayRequest& request, SharedAccels& accels,
                                                 const FilmOf& film) {
     const ReplaySample whole = make_replay(scene, settings, accels)->sample(request);
-    if (!whole.complete)
-        throw Error(ExitCode::usage, "--compare: " + (whole.notes.empty() ? "" : whole.notes.back()));
+    if (!whole.complete) throw Error(ExitCode::usage, "--compare: " + (whole.notes.empty() ? "" : whole.notes.back()));
     const int all = settings.max_depth;
     const uint32_t most = all < 0 ? longest_path(whole) + 1 : std::min(uint32_t(all), longest_path(whole) + 1);
     const size_t at = (size_t(request.y) * scene.sensor.crop_width + request.x) * 3;
@@ -68,21 +67,26 @@ std::vector<LengthComparison> compare_by_length(const Scene& scene, RenderSettin
         lengths.push_back(difference(k, before, now));
         before = now;
     }
-    if (int(most) != all) lengths.push_back(difference(most + 1, before, sums(all)));
+    if (int(most) != all) {
+        lengths.push_back(difference(most + 1, before, sums(all)));
+        lengths.back().or_more = true;
+    }
     return lengths;
 }
 
 std::string by_length_text(const std::vector<LengthComparison>& lengths) {
     std::string text = "by segments: rendered, replayed\n";
-    const auto triple = [](const double (&v)[3]) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v[0], v[1], v[2]); };
+    const auto triple = [](const double(&v)[3]) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v[0], v[1], v[2]); };
     for (const LengthComparison& c : lengths)
-        text += fmt::format("  {:>3}  {}, {}{}\n", c.segments, triple(c.rendered), triple(c.replayed),
-                            c.differs ? "  differs" : "");
+        text += fmt::format("  {:>3}{} {}, {}{}\n", c.segments, c.or_more ? '+' : ' ', triple(c.rendered),
+                            triple(c.replayed), c.differs ? "  differs" : "");
     const auto first = std::find_if(lengths.begin(), lengths.end(), [](const auto& c) { return c.differs; });
     if (first == lengths.end()) return text + "the render and its replay agree\n";
-    return text + fmt::format("the render and its replay first differ in paths of {} segments{}: they part at a vertex "
-                              "that such a path has and shorter ones have not, or at an earlier one that brought nothing\n",
-                              first->segments, first->segments > 1 ? ", and agree in shorter ones" : "");
+    return text + fmt::format(
+                      "the render and its replay first differ in paths of {} segments{}{}: they part at the last "
+                      "vertex of such a path, or at an earlier one that brought nothing to shorter paths\n",
+                      first->segments, first->or_more ? " or more" : "",
+                      first->segments > 1 ? ", and agree in shorter ones" : "");
 }
 
 }  // namespace ambilux

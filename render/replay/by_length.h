@@ -11,6 +11,7 @@ namespace ambilux {
 /// What paths of this many segments brought to a sample.
 struct LengthComparison {
     uint32_t segments = 0;
+    bool or_more = false;
     double rendered[3] = {}, replayed[3] = {};
 
     bool differs = false;  ///< by more than roundings of values do
@@ -21,7 +22,7 @@ using FilmOf = std::function<FilmMoments(const RenderSettings& settings, uint32_
 FilmMoments rendered_film(const Scene& scene, const RenderSettings& settings, uint32_t sample);
 
 /// Renders the sample and replays it for each max_depth up to that of `settings` or, if that is less, one segment more
-/// than the longest path that the replay finds. What the highest leaves is in the last entry, of all longer paths.
+/// than the longest path that the replay finds. If there may be longer ones, the last entry is of all of them.
 /// Throws Error(usage) where replays are not complete (ReplaySample::complete).
 std::vector<LengthComparison> compare_by_length(const Scene& scene, RenderSettings settings,
                                                 const ReplayRequest& request, SharedAccels& accels, const FilmOf& film);

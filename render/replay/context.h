@@ -4,8 +4,8 @@
 #include "accel/host_tracer.h"
 #include "integrators/bdpt/shared/policy.h"
 #include "render/replay/record.h"
-#include "stages/update_film.h"
 #include "stages/stage.h"
+#include "stages/update_film.h"
 
 namespace ambilux {
 

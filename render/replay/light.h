@@ -72,8 +72,7 @@ struct ReplayLightSink {
             ReplayDrop drop;
             const size_t before = light.splats.size();
             ConnectCamera<kReplayFeatures, ReplaySplats>{splats, watch.record()}.at(ctx.view, ctx.rules, y, path, 0, d);
-            if (watch.dropped("connect_camera", drop))
-                splats.invalid(drop, Strategy::make(path.depth + 1, 1));
+            if (watch.dropped("connect_camera", drop)) splats.invalid(drop, Strategy::make(path.depth + 1, 1));
             const Vec4f u = d.lens(path.depth);
             if (request.details && light.splats.size() > before)
                 light.splats.back().densities = camera_densities(ctx.view, y.point.p, {u.x, u.y});
@@ -124,7 +123,7 @@ inline ReplayLight replay_light(const ReplayContext<BidirectionalMis>& ctx, cons
             subpath.drop = drop;
     }
     if (!starts) {
-        subpath.end = !valid                   ? "the flux of the emitter sample is invalid"
+        subpath.end = !valid                    ? "the flux of the emitter sample is invalid"
                       : ctx.rules.max_depth < 2 ? "max_depth"
                                                 : "the emitter sample carries no light";
         return light;

@@ -73,8 +73,7 @@ void search_sample(const InvalidBatch& sample, const Replay& replay, const Scene
     const uint32_t lights = std::min(replay.light_subpaths(), kMostInvalidSubpaths);
     InvalidSearch search{replay, sample.first, width, {}, {}};
     const auto share = [&](uint32_t first, uint32_t all, auto look) {
-        if (first < all)
-            parallel_for(std::min(kTogether, all - first), [&](uint32_t i) { look(first + i); }, 64u);
+        if (first < all) parallel_for(std::min(kTogether, all - first), [&](uint32_t i) { look(first + i); }, 64u);
         list.add(search.found);
     };
     for (uint32_t first = 0; first < std::max(eyes, lights) && !is_set(interrupt); first += kTogether) {

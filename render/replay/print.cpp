@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 
 #include "core/error.h"
 
@@ -10,11 +11,15 @@ namespace ambilux {
 namespace {
 
 std::string text_of(Vec3f v) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x, v.y, v.z); }
-/// A scene that was moved has digits of its own behind those of its place.
 std::string place_text(Vec3f p, const ReplayFormat& format) {
-    if (!format.moved()) return text_of(p);
     const std::array<double, 3> at = format.in_file(p);
-    return fmt::format("({:.13g}, {:.13g}, {:.13g})", at[0], at[1], at[2]);
+    std::string text;
+    for (int c = 0; c < 3; ++c) {
+        // The digits of a scene that was moved stand behind those of its place.
+        const bool far = std::abs(format.origin[size_t(c)]) > 16 * std::abs(double(p[c]));
+        text += fmt::format("{}{:.{}g}", c ? ", " : "", at[size_t(c)], far ? 13 : 6);
+    }
+    return "(" + text + ")";
 }
 std::string text_of(const double (&v)[3]) { return fmt::format("({:.9g}, {:.9g}, {:.9g})", v[0], v[1], v[2]); }
 
@@ -69,8 +74,10 @@ void print_subpath(const ReplaySubpath& s, const ReplayFormat& format, std::stri
 
 void print_origin(const ReplayFormat& format, std::string& out) {
     if (format.moved())
-        out += fmt::format("positions are those of the file; the scene was moved by ({:.9g}, {:.9g}, {:.9g})\n",
-                           -format.origin[0], -format.origin[1], -format.origin[2]);
+        out += fmt::format(
+            "positions are those of the file; rounding is that of a scene with its origin at ({:.9g}, "
+            "{:.9g}, {:.9g})\n",
+            format.origin[0], format.origin[1], format.origin[2]);
 }
 
 std::string fate_text(const ReplayCandidate& c) {
@@ -112,7 +119,8 @@ void print_candidates(const char* title, const std::vector<ReplayCandidate>& all
         ++shown;
         print_candidate(c, format, text);
     }
-    out += fmt::format("{}: {}\n{}", title, shown, text);
+    const std::string of = format.only ? fmt::format(" of {}", all.size()) : "";
+    out += fmt::format("{}: {}{}\n{}", title, shown, of, text);
 }
 
 /// Sum of what arrived by the strategies of a format.

@@ -87,8 +87,9 @@ json to_json(const ReplayCandidate& c, const ReplayFormat& format) {
               {"dropped", to_json(c.drop)},
               {"contribution", triple(c.contribution)}};
     if (c.tmax > 0)
-        j["shadow_ray"] = {
-            {"origin", place(c.origin, format)}, {"direction", triple(c.direction)}, {"length", number(double(c.tmax))}};
+        j["shadow_ray"] = {{"origin", place(c.origin, format)},
+                           {"direction", triple(c.direction)},
+                           {"length", number(double(c.tmax))}};
     if (c.eye_depth == 0) {
         j["film"] = {number(double(c.film.x)), number(double(c.film.y))};
         j["filter"] = number(double(c.filter));
@@ -99,9 +100,7 @@ json to_json(const ReplayCandidate& c, const ReplayFormat& format) {
 json to_json(const ReplaySubpath& s, const ReplayFormat& format) {
     json vertices = json::array();
     for (const ReplayVertex& v : s.vertices) vertices.push_back(to_json(v, format));
-    json j = {{"number", s.number},
-              {"vertices", vertices},
-              {"dropped", to_json(s.drop)}};
+    json j = {{"number", s.number}, {"vertices", vertices}, {"dropped", to_json(s.drop)}};
     if (s.side == Side::eye) return j;
     j.update({{"part", s.part},
               {"emitter", s.emitter.empty() ? json(nullptr) : json(s.emitter)},

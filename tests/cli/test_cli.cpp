@@ -488,14 +488,15 @@ TEST_CASE("A render that drops invalid values names the command that replays the
     const test::TempFolder folder;
     // A name that a shell would take apart.
     const std::string scene = folder / "a lamp's.xml";
-    write_file_atomic(scene, "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>"
-                             "<integer name='width' value='8'/><integer name='height' value='8'/></film></sensor>"
-                             "<emitter type='point'><point name='position' x='0' y='0' z='1'/>"
-                             "<rgb name='intensity' value='3e38'/></emitter><shape type='rectangle'>"
-                             "<transform name='to_world'><scale value='9'/><rotate y='1' angle='180'/>"
-                             "<translate z='1.1'/></transform></shape></scene>");
-    const Outcome o =
-        run(folder, {"render", scene, "--spp", "3", "--seed", "5", "-o", folder / "a.exr", "--json", folder / "a.json"});
+    write_file_atomic(scene,
+                      "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>"
+                      "<integer name='width' value='8'/><integer name='height' value='8'/></film></sensor>"
+                      "<emitter type='point'><point name='position' x='0' y='0' z='1'/>"
+                      "<rgb name='intensity' value='3e38'/></emitter><shape type='rectangle'>"
+                      "<transform name='to_world'><scale value='9'/><rotate y='1' angle='180'/>"
+                      "<translate z='1.1'/></transform></shape></scene>");
+    const Outcome o = run(
+        folder, {"render", scene, "--spp", "3", "--seed", "5", "-o", folder / "a.exr", "--json", folder / "a.json"});
     REQUIRE(o.code == 0);
     CHECK(contains(o.err, "stage connect dropped"));
     const json values = json::parse(read_file(folder / "a.json"))["invalid_values"];
