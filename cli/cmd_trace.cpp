@@ -43,8 +43,11 @@ void compare(const Scene& scene, const RenderSettings& settings, const ReplayReq
     text += by_length_text(lengths);
     nlohmann::json& list = json["by_segments"] = nlohmann::json::array();
     for (const LengthComparison& c : lengths)
-        list.push_back(
-            {{"segments", c.segments}, {"rendered", c.rendered}, {"replayed", c.replayed}, {"differs", c.differs}});
+        list.push_back({{"segments", c.segments},
+                        {"or_more", c.or_more},
+                        {"rendered", c.rendered},
+                        {"replayed", c.replayed},
+                        {"differs", c.differs}});
 }
 
 int trace(const Options& o) {
@@ -89,6 +92,8 @@ void add_trace(CLI::App& app, Run& run) {
         "trace", "Replay one sample of a render on the CPU: vertices, densities, weights, contributions");
     o->scene.add_to(command);
     o->render.add_to(command, false);
+    command.get_option("--backend")
+        ->description("Backend of the render, cpu or cuda: for cuda the replay's rays go through the same structure");
     command.add_option("--pixel", o->pixel, "Pixel X,Y of the image, from 0,0 at the top left");
     command.add_option("--sample", o->sample, "Sample of the pixel, from 0")->required();
     command.add_option("--light-subpath", o->light_subpath,

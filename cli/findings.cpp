@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iostream>
 
+#include "core/flag.h"
 #include "core/log.h"
 #include "integrators/registry.h"
 #include "render/replay/print.h"
@@ -106,7 +107,8 @@ void report_invalid(const InvalidRecord& r, const std::string& command, nlohmann
                             r.drop.what, where, r.sample,
                             r.candidate.kind[0] ? fmt::format(", {}, {}, {}", strategy_text(r.candidate.strategy),
                                                               r.candidate.kind, ends_of(r.candidate))
-                                                : ", a ray, a throughput or the sum",
+                            : eye               ? ", a ray, a throughput or the sum"
+                                                : ", a ray or a throughput",
                             command));
     list.push_back({{"stage", r.drop.stage},
                     {"what", r.drop.what},
@@ -124,12 +126,14 @@ nlohmann::json report_invalid_values(const FinishedRender& render, const Replay&
     for (const auto& [stage, counts] : render.watch.by_stage())
         if (counts.total()) missing.push_back(stage);
     if (missing.empty()) return list;
+    log_info("looking for the values that stages dropped, by replaying samples on the CPU (Ctrl-C ends the search)");
     for (const InvalidRecord& r : find_invalid(render.watch, replay, render.scene, per_stage, interrupt)) {
         const std::string what = r.light_subpath == kNone ? fmt::format(" --pixel {},{}", r.x, r.y)
                                                           : fmt::format(" --light-subpath {}", r.light_subpath);
         report_invalid(r, trace_command(render, fmt::format("{} --sample {}", what, r.sample)), list);
         missing.erase(std::remove(missing.begin(), missing.end(), r.drop.stage), missing.end());
     }
+    if (is_set(interrupt)) return list;
     for (const std::string& stage : missing)
         log_warning(
             fmt::format("the replay on the CPU did not find the values that stage {} dropped, in the {} first "

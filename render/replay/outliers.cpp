@@ -39,7 +39,8 @@ struct InvalidSearch {
 };
 
 bool before(const InvalidRecord& a, const InvalidRecord& b) {
-    if (a.light_subpath != b.light_subpath) return a.light_subpath > b.light_subpath;  // eye subpaths first
+    // Eye subpaths have none: they come first.
+    if (a.light_subpath != b.light_subpath) return a.light_subpath + 1 < b.light_subpath + 1;
     return a.y != b.y ? a.y < b.y : a.x < b.x;
 }
 
