@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "cli/commands.h"
+#include "cli/findings.h"
 #include "cli/interrupt.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
@@ -25,6 +26,7 @@ struct Options {
     std::optional<uint64_t> spp;
     std::optional<double> time;
     std::optional<float> exposure;
+    uint32_t outliers = 0;
     bool strict = false;
 };
 
@@ -72,7 +74,16 @@ int render(const Options& o) {
         budget.samples = o.spp ? *o.spp : uint64_t(std::max(1, loaded.scene.integrator.spp));
     settings.expected_samples = budget.samples;
     settings.expected_seconds = budget.seconds;
-    const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
+    auto watched = std::make_unique<InvalidWatch>(make_renderer(loaded.scene, settings));
+    InvalidWatch& watch = *watched;
+    std::unique_ptr<Renderer> renderer = std::move(watched);
+    const SampleWatch* samples = nullptr;
+    if (o.outliers > 0) {
+        check_replay(used_settings(settings, renderer->stats()));
+        auto looked_at = std::make_unique<SampleWatch>(std::move(renderer));
+        samples = looked_at.get();
+        renderer = std::move(looked_at);
+    }
 
     for (const std::string& warning : render_warnings(loaded.scene, used_settings(settings, renderer->stats())))
         log_warning(warning);
@@ -101,8 +112,21 @@ int render(const Options& o) {
     }
     if (position.samples > 0 && !o.techniques.empty())
         write_technique_images(o.techniques, loaded.scene, settings, stats, renderer->strategy_images());
+    if (const std::string text = objection(stats); !o.strict && !text.empty()) log_warning(text);
+    nlohmann::json found = nlohmann::json::object();
+    if (position.samples > 0 && (samples || !watch.batches().empty())) {
+        FinishedRender finished = {o.scene, loaded.scene, used_settings(settings, stats), watch, samples};
+        apply_setting(finished.used, "backend", stats.backend);
+        try {
+            found = report_findings(finished, o.outliers, o.json == "-", interrupt_flag());
+        } catch (const Error& e) {
+            if (samples) throw;
+            log_warning(e.what());
+        }
+    }
     if (!o.json.empty()) {
         nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
+        json.update(found);
         json["interrupted"] = position.interrupted;
         write_json(o.json, json);
     }
@@ -114,13 +138,9 @@ int render(const Options& o) {
     }
     log_info(fmt::format("{}: {} spp in {}, {}", o.output, position.samples, format_duration(position.seconds),
                          stats.device));
-    const std::string text = objection(stats);
-    if (text.empty()) return int(ExitCode::done);
-    if (!o.strict) {
-        log_warning(text);
-        return int(ExitCode::done);
-    }
-    throw Error(ExitCode::device, "--strict: " + text + ". The image was saved");
+    if (const std::string text = objection(stats); o.strict && !text.empty())
+        throw Error(ExitCode::device, "--strict: " + text + ". The image was saved");
+    return int(ExitCode::done);
 }
 
 }  // namespace
@@ -143,6 +163,9 @@ void add_render(CLI::App& app, Run& run) {
             "--technique-images", o->techniques,
             "Folder for raw and weighted images of every strategy (s,t) up to 6 segments, or --set technique_depth=N")
         ->type_name("DIR");
+    command.add_option("--outliers", o->outliers,
+                       "List the N pixels whose largest sample exceeds the mean of their others most, with commands "
+                       "that replay them; renders one sample at a time");
     command.add_flag("--strict", o->strict, "Fail (exit code 4) if invalid values or lost queue items were counted");
     command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
     command.callback([o, png, &run] {

@@ -21,6 +21,7 @@ void add_reference(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_experiment(CLI::App& app, Run& run);
 void add_bench(CLI::App& app, Run& run);
+void add_trace(CLI::App& app, Run& run);
 void add_help(CLI::App& app, Run& run);
 
 /// Options that say which scene is meant.

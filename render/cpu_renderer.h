@@ -15,14 +15,11 @@
 #include "core/flag.h"
 #include "core/parallel.h"
 #include "integrators/integrator.h"
+#include "render/cpu_wave.h"
 #include "render/statistics.h"
 #include "scene/info.h"
 
 namespace ambilux {
-
-/// Paths of one wave: with the surfaces and texels that they meet, about 1 KiB each, they stay in a core's second-level
-/// cache from stage to stage.
-constexpr uint32_t kCpuWaveSize = 512;
 
 template <class Integrator, Features F>
 class CpuRenderer final : public Renderer {
@@ -130,11 +127,8 @@ private:
         OrderMemory order;
     };
 
-    /// Enough tasks that threads end together.
     void shape(const RenderSettings& settings) {
-        const uint32_t tiles = tile_count(shape_wave(scene_, settings.seed, kTilePixels, 1));
-        const uint32_t max_tiles = std::max(1u, tiles / uint32_t(8 * arena_.max_concurrency()));
-        wave_ = shape_wave(scene_, settings.seed, settings.wave_size ? settings.wave_size : kCpuWaveSize, max_tiles);
+        wave_ = cpu_wave(scene_, settings, arena_.max_concurrency());
         if (!kFilmWide) return;
         wave_.samples = 1;  // a sample is complete when all its waves are done
         film_wave_ = wave_;

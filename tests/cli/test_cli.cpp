@@ -115,6 +115,17 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {{"bench", "queues", kCornell, "--items", "300000000"}, "at most"},
         {{"bench", "queues", kCornell, "--backend", "abacus"}, "auto, cpu, cuda"},
         {{"bench", "queues"}, "SCENE is required"},
+        {{"trace", kCornell, "--pixel", "1,2"}, "--sample is required"},
+        {{"trace", kCornell, "--sample", "0"}, "--pixel X,Y or --light-subpath N"},
+        {{"trace", kCornell, "--sample", "0", "--light-subpath", "3", "--compare"}, "--compare: --pixel"},
+        {{"trace", kCornell, "--sample", "0", "--pixel", "1"}, "write it as X,Y"},
+        {{"trace", kCornell, "--sample", "0", "--pixel", "24,1", "--size", "24x16"}, "24x16 pixels"},
+        {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "--strategy", "s1"}, "s1t3"},
+        {{"trace", kCornell, "--sample", "0", "--light-subpath", "3"}, "has no light subpaths"},
+        {{"trace", kCornell, "--sample", "0", "--light-subpath", "99999999", "-i", "light"}, "99999999"},
+        {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "-i", "toy"}, "there is no replay"},
+        {render(folder, {"-i", "toy", "--outliers", "1"}), "there is no replay"},
+        {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "-i", "bdpt", "--set", "bdpt.auto=true"}, "printed"},
     };
     for (const Case& c : cases) {
         const Outcome o = run(folder, c.arguments);
@@ -439,4 +450,70 @@ TEST_CASE("bench queues") {
         run(folder, {"bench", "queues", kCornell, "--backend", "cuda", "--items", "1024", "--repetitions", "1"});
     CHECK((device.code == 0 || device.code == 4));
     if (device.code == 4) CHECK(contains(device.err, "no CUDA device"));
+}
+
+TEST_CASE("Outliers come with a command that replays them") {
+    const test::TempFolder folder;
+    for (const std::vector<std::string>& method :
+         {std::vector<std::string>{}, {"-i", "bdpt"}, {"-i", "bdpt", "--variant", "lvc"}}) {
+        std::vector<std::string> more = {"--spp", "4",          "--backend", "cpu",   "--seed",
+                                         "3",     "--outliers", "2",         "--set", "specialise=false"};
+        more.insert(more.end(), method.begin(), method.end());
+        const json stats = statistics(folder, more);
+        REQUIRE(stats["outliers"].size() == 2);
+        CHECK(stats["invalid_values"].empty());
+        for (const json& o : stats["outliers"]) {
+            std::istringstream words(o["command"].get<std::string>());
+            std::vector<std::string> arguments;
+            for (std::string word; words >> word;) arguments.push_back(word);
+            CAPTURE(o["command"]);
+            REQUIRE(arguments.at(0) == "ambilux");
+            arguments.erase(arguments.begin());
+            const Outcome text = run(folder, arguments);
+            CHECK(text.code == 0);
+            CHECK(contains(text.out, "found by the eye subpath"));
+            arguments.insert(arguments.end(), {"--json", "-"});
+            const Outcome replay = run(folder, arguments);
+            REQUIRE(replay.code == 0);
+            CHECK(json::parse(replay.out)["total"] == o["value"]);
+        }
+    }
+    const Outcome light = run(folder, {"trace", kCornell, "--size", "24x16", "-i", "light", "--light-subpath", "7",
+                                       "--sample", "1", "--strategy", "s2t1", "--json", "-"});
+    REQUIRE(light.code == 0);
+    for (const json& splat : json::parse(light.out)["splats"]) CHECK(splat["s"] == 2);
+}
+
+TEST_CASE("A render that drops invalid values names the command that replays the first of each stage") {
+    const test::TempFolder folder;
+    // A name that a shell would take apart.
+    const std::string scene = folder / "a lamp's.xml";
+    write_file_atomic(scene,
+                      "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>"
+                      "<integer name='width' value='8'/><integer name='height' value='8'/></film></sensor>"
+                      "<emitter type='point'><point name='position' x='0' y='0' z='1'/>"
+                      "<rgb name='intensity' value='3e38'/></emitter><shape type='rectangle'>"
+                      "<transform name='to_world'><scale value='9'/><rotate y='1' angle='180'/>"
+                      "<translate z='1.1'/></transform></shape></scene>");
+    const Outcome o = run(
+        folder, {"render", scene, "--spp", "3", "--seed", "5", "-o", folder / "a.exr", "--json", folder / "a.json"});
+    REQUIRE(o.code == 0);
+    CHECK(contains(o.err, "stage connect dropped"));
+    const json values = json::parse(read_file(folder / "a.json"))["invalid_values"];
+    REQUIRE(values.size() == 1);
+    CHECK(values[0]["stage"] == "connect");
+    CHECK(values[0]["what"] == "Inf");
+    CHECK(values[0]["found"]["strategy"] == "s1t2");
+    const std::string command = values[0]["command"];
+    CHECK(contains(o.err, command));
+    CHECK(contains(command, "--seed 5"));
+    // As a shell reads it.
+    const std::string out = folder / "out.txt";
+    const std::string line = std::string(AMBILUX_PROGRAM) + command.substr(std::string("ambilux").size());
+    REQUIRE(std::system((line + " > '" + out + "'").c_str()) == 0);
+    CHECK(contains(read_file(out), "invalid (Inf): dropped by stage connect"));
+
+    const Outcome strict = run(folder, {"render", scene, "--spp", "1", "--strict", "-o", folder / "a.exr"});
+    CHECK(strict.code == 4);
+    CHECK(contains(strict.err, "ambilux trace"));
 }

@@ -1,0 +1,77 @@
+// Connections of eye vertices with light vertices in a replay, as the variants of bdpt make them.
+#pragma once
+
+#include "render/replay/eye.h"
+#include "render/replay/light_cache.h"
+#include "stages/connect_vertices.h"
+
+namespace ambilux {
+
+/// How an eye vertex of a variant meets light vertices.
+enum class ReplayPairing : uint32_t {
+    none,
+    own_subpath,  ///< wavefront: those of the slot's light subpath, from its end
+    registers,    ///< megakernel: the same, with the eye vertex as it is instead of as items keep it
+    own_vertex,   ///< streaming: those of a light subpath that is made for this eye vertex, from its start
+    cache,        ///< lvc: drawn from those of a wave
+};
+
+/// The eye vertex `z` of a sample, joined with light vertices. `scale`: beyond that of the render's own stage.
+struct ReplayConnections {
+    ReplayEye<BidirectionalMis>& eye;
+    const BidirectionalVertex& vertex;
+    const Subpath<BidirectionalMis>& path;
+    const ReplayVertices& lights;
+    LightVertexSource source;
+    WaveState state{};
+    float scale = 1.0f;
+
+    BidirectionalEnd exact_end() const { return {vertex, path.throughput, path.depth}; }
+    BidirectionalEnd packed_end() const {
+        return unpack_end<kReplayFeatures>(eye.ctx.view, pack_connection_vertex(vertex, path, 0));
+    }
+
+    /// The vertices that a search of the render's stages finds.
+    void searched() const {
+        const LightVertexSearch search = {source, eye.draws.key, path.depth, vertex, eye.ctx.rules.max_depth};
+        uint32_t next = source.first(0), found = search.find(next);
+        if (found == kNone) return;
+        const BidirectionalEnd end = packed_end();
+        for (; found != kNone; found = search.find(next)) pair(end, found);
+    }
+    void all_backwards(const BidirectionalEnd& end) const {
+        for (uint32_t i = lights.size(); i-- > 0;)
+            if (path.depth + source.vertices.items.load_front(i).bits.depth() + 1 <= eye.ctx.rules.max_depth)
+                pair(end, i);
+    }
+    void all_forwards(const BidirectionalEnd& end) const {
+        for (uint32_t i = 0; i < lights.size(); ++i) pair(end, i);
+    }
+
+private:
+    void pair(const BidirectionalEnd& end, uint32_t place) const {
+        const auto& ctx = eye.ctx;
+        const ConnectionVertex light = load_vertex<kReplayFeatures>(source.vertices, place);
+        CandidateItem item;
+        bool pushed = false;
+        DropWatch watch;
+        ReplayDrop drop;
+        push_connection<kReplayFeatures>(ctx.view, ctx.rules, source, state, eye.draws, end, 0, light, place, true,
+                                         LastItem<CandidateItem>{&item, &pushed}, watch.record());
+        const bool dropped = watch.dropped("connect_vertices", drop);
+        if (!pushed && !dropped) return;
+        ReplayCandidate& r = eye.add("connection");
+        r.light_depth = light.bits().depth();
+        r.light_subpath = lights.owner(place);
+        if (eye.details) r.densities = connection_densities(end, unpack_end<kReplayFeatures>(ctx.view, light));
+        if (pushed) {
+            item.value *= scale;
+            return eye.arrival.light(item, r);
+        }
+        r.strategy = Strategy::make(r.light_depth + 1, end.depth + 1);
+        r.fate = ReplayFate::invalid;
+        r.drop = drop;
+    }
+};
+
+}  // namespace ambilux

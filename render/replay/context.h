@@ -1,0 +1,61 @@
+// What all parts of a replay read.
+#pragma once
+
+#include "accel/host_tracer.h"
+#include "integrators/bdpt/shared/policy.h"
+#include "render/replay/record.h"
+#include "stages/stage.h"
+#include "stages/update_film.h"
+
+namespace ambilux {
+
+/// Replays are compiled once: kernels of fewer features differ by roundings only.
+constexpr Features kReplayFeatures = kAllFeatures;
+
+template <class Mis>
+struct ReplayContext {
+    SceneView view;
+    HostTracer tracer;
+    Rules<Mis> rules;
+    float cull = 0;
+    bool radiance_first = false;  ///< variant megakernel: the environment's radiance is looked up before the weight
+};
+
+/// Sees what a stage drops.
+class DropWatch {
+public:
+    StageRecord* record() {
+        record_ = {};
+        return &record_;
+    }
+    /// True if the stage `name` has dropped something since record(); `drop` keeps the first.
+    bool dropped(const char* name, ReplayDrop& drop) const {
+        if (record_.nan + record_.inf + record_.negative == 0) return false;
+        if (!drop.happened()) drop = {name, record_.nan ? "NaN" : record_.inf ? "Inf" : "negative"};
+        return true;
+    }
+
+private:
+    StageRecord record_{};
+};
+
+/// The sum of a sample, as update_film has it.
+inline void finish(ReplaySample& s) {
+    for (int c = 0; c < 3; ++c) s.total[c] = s.splat_sum[c] + double(s.eye_sum[c]);
+    DropWatch watch;
+    const Rgb total = {float(s.total[0]), float(s.total[1]), float(s.total[2])};
+    if (!is_valid_radiance(total, watch.record())) watch.dropped(UpdateFilm::kName, s.drop);
+}
+
+/// Nearest hit of a subpath's ray, as extend has it: a ray that is invalid is a miss, and counted.
+template <class Mis>
+Hit replay_extend(const ReplayContext<Mis>& ctx, const Subpath<Mis>& path, float tmax, const Draws& draws,
+                  StageRecord* record) {
+    Hit hit = {tmax, 0.0f, 0.0f, kNone};
+    if (is_valid_ray(path.origin, path.direction, record))
+        ctx.tracer.template closest<kReplayFeatures>(
+            ctx.view, Ray{path.origin, tmax, path.direction, draws.opacity_seed(path.depth)}, hit);
+    return hit;
+}
+
+}  // namespace ambilux

@@ -1,0 +1,114 @@
+// The eye subpath of a sample again, and all that it finds.
+#pragma once
+
+#include <functional>
+
+#include "render/replay/arrival.h"
+#include "render/replay/describe.h"
+#include "stages/connect_emitter.h"
+#include "stages/generate.h"
+
+namespace ambilux {
+
+/// One eye subpath on its way.
+template <class Mis>
+struct ReplayEye {
+    using At = std::function<void(ReplayEye&, const Vertex<Mis>&, const Subpath<Mis>&)>;
+    /// The stage that samples emitters; false if it pushed no candidate.
+    using SampleEmitter = std::function<bool(const ReplayContext<Mis>&, const Vertex<Mis>&, const Subpath<Mis>&,
+                                             const Draws&, StageRecord*, CandidateItem&)>;
+
+    const ReplayContext<Mis>& ctx;
+    const SampleEmitter& sample_emitter;
+    const At& connect;  ///< may be empty
+    bool details;
+    Draws draws;
+    ReplaySample& out;
+    EyeArrival<Mis> arrival;
+    Subpath<Mis> ray{};  ///< that ended at `hit`
+    Hit hit{};
+
+    /// Emission that the ray met.
+    void found(const Candidate<Mis>& c) {
+        ReplayCandidate& r = add(hit.prim == kNone ? "environment" : "hit");
+        if (details) r.densities = hit_densities(ctx, ray, hit);
+        arrival.emission(c, r);
+    }
+    void next_event(const Vertex<Mis>& z, const Subpath<Mis>& path) {
+        CandidateItem item;
+        DropWatch watch;
+        ReplayDrop drop;
+        const bool pushed = sample_emitter(ctx, z, path, draws, watch.record(), item);
+        const bool dropped = watch.dropped("connect", drop);
+        if (!pushed && !dropped) return;
+        ReplayCandidate& r = add("next event");
+        if (details) r.densities = next_event_densities(ctx, z, draws.next_event(path.depth));
+        if (pushed) return arrival.light(item, r);
+        r.strategy = Strategy::make(1, path.depth + 1);
+        r.fate = ReplayFate::invalid;
+        r.drop = drop;
+    }
+    ReplayCandidate& add(const char* kind) {
+        out.candidates.emplace_back();
+        out.candidates.back().kind = kind;
+        out.candidates.back().eye_depth = ray.depth;
+        return out.candidates.back();
+    }
+};
+
+template <class Mis>
+struct ReplayEyeSink {
+    ReplayEye<Mis>& eye;
+
+    Draws draws() const { return eye.draws; }
+    void add(const Candidate<Mis>& c) const { eye.found(c); }
+    void at(const Vertex<Mis>& z, const Subpath<Mis>& path, const Draws&) const {
+        eye.next_event(z, path);
+        if (eye.connect) eye.connect(eye, z, path);
+    }
+    bool valid(Rgb throughput) const {
+        DropWatch watch;
+        if (is_valid_radiance(throughput, watch.record())) return true;
+        watch.dropped("shade", eye.out.eye.drop);
+        return false;
+    }
+};
+
+/// Next event estimation of a render: NextEvent, or what a variant has in its place.
+template <class Mis, class Stage>
+bool push_next_event(const ReplayContext<Mis>& ctx, const Stage& stage, const Vertex<Mis>& z, const Subpath<Mis>& path,
+                     const Draws& draws) {
+    stage.at(ctx.view, ctx.rules, z, path, 0, draws);
+    return *stage.candidates.pushed;
+}
+template <class Mis>
+bool sample_next_event(const ReplayContext<Mis>& ctx, const Vertex<Mis>& z, const Subpath<Mis>& path,
+                       const Draws& draws, StageRecord* record, CandidateItem& item) {
+    bool pushed = false;
+    const NextEvent<kReplayFeatures, Mis, LastItem<CandidateItem>> stage = {{&item, &pushed}, record, true};
+    return push_next_event(ctx, stage, z, path, draws);
+}
+
+/// The eye subpath of `out`'s pixel and sample; what it brings is in out.eye_sum.
+template <class Mis>
+void replay_eye(const ReplayContext<Mis>& ctx, const typename ReplayEye<Mis>::SampleEmitter& sample_emitter,
+                const typename ReplayEye<Mis>::At& connect, bool details, ReplaySample& out) {
+    if (ctx.rules.max_depth == 0) return;
+    const uint32_t pixel = out.y * ctx.view.sensor.crop_width + out.x;
+    out.eye.side = Side::eye;
+    out.eye.number = pixel;
+    const Draws draws = {{out.seed, pixel, out.sample, Stream::eye}};
+    const CameraSample camera = camera_sample(ctx.view, PathSlot{out.x, out.y, pixel, out.sample, true}, draws);
+    ReplayEye<Mis> eye{ctx, sample_emitter, connect, details, draws, out, EyeArrival<Mis>(ctx)};
+    Subpath<Mis> path = start_eye(ctx.view, ctx.rules.mis, camera);
+    DropWatch watch;
+    do {
+        eye.ray = path;
+        eye.hit = replay_extend(ctx, path, path.depth == 1 ? camera.tmax : kInfinity, draws, watch.record());
+        watch.dropped("extend", out.eye.drop);
+    } while (replay_step(ctx, Side::eye, ctx.rules.longest(Side::eye), eye.hit, path, ReplayEyeSink<Mis>{eye},
+                         details ? &out.eye : nullptr));
+    out.eye_sum = eye.arrival.sum();
+}
+
+}  // namespace ambilux

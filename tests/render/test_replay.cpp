@@ -1,0 +1,320 @@
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// timeout: 300
+// A replay brings the sample that a render made, by every integrator and variant that has one: bit by bit where the
+// render's kernels hold all features as those of replays do, within rounding where they are specialised.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/replay/by_length.h"
+#include "render/replay/outliers.h"
+#include "render/replay/print.h"
+#include "render/replay/replay.h"
+#include "tests/support/render_scene.h"
+
+namespace ambilux {
+namespace {
+
+/// Settings of a render, by text.
+struct Config {
+    std::string integrator, variant;
+    std::vector<std::pair<std::string, std::string>> set;
+};
+
+RenderSettings settings_of(const Scene& scene, const Config& c) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis, 7);
+    s.integrator = c.integrator;
+    s.variant = c.variant;
+    for (const auto& [key, value] : c.set) apply_setting(s, key, value);
+    return s;
+}
+
+std::string text_of(const Config& c) {
+    std::string text = c.integrator + " " + c.variant;
+    for (const auto& [key, value] : c.set) text += " " + key + "=" + value;
+    return text;
+}
+
+/// The image of one sample.
+FilmMoments one_sample(const Scene& scene, const RenderSettings& settings, uint32_t sample) {
+    const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
+    REQUIRE(renderer->render(sample, 1) == 1);
+    CHECK(renderer->stats().invalid.total() == 0);
+    return renderer->film();
+}
+
+size_t brightest(const FilmMoments& film) {
+    size_t at = 0;
+    for (size_t i = 0; i < film.sum.size(); ++i)
+        if (film.sum[i] > film.sum[at]) at = i;
+    return at / 3;
+}
+
+/// Pixels of a film, `step` apart, and the brightest.
+std::vector<uint32_t> pixels_of(const FilmMoments& film, uint32_t step) {
+    std::vector<uint32_t> pixels = {uint32_t(brightest(film))};
+    for (uint32_t p = 0; p < film.width * film.height; p += step) pixels.push_back(p);
+    return pixels;
+}
+
+/// A float more or less in each of some dozens of sums and products, and a unit of splats.
+bool close(double a, double b) { return std::abs(a - b) <= 1e-5 * std::abs(b) + 1e-10; }
+
+/// Every sample of a replay is the render's. Returns how many of them were not black.
+uint32_t check_samples(const Scene& scene, const RenderSettings& settings, uint32_t sample, uint32_t step) {
+    const FilmMoments film = one_sample(scene, settings, sample);
+    SharedAccels accels(scene);
+    const std::unique_ptr<Replay> replay = make_replay(scene, settings, accels);
+    uint32_t lit = 0;
+    for (const uint32_t pixel : pixels_of(film, step)) {
+        const ReplaySample r = replay->sample({pixel % film.width, pixel / film.width, sample, {}, true, true});
+        CAPTURE(pixel, r.total[0], r.total[1], r.total[2], film.sum[pixel * 3], r.eye_sum.x, r.splat_sum[0]);
+        CHECK(r.complete);
+        bool equal = true;
+        for (uint32_t c = 0; c < 3; ++c) {
+            const double rendered = film.sum[pixel * 3 + c];
+            equal = equal && (settings.specialise ? close(r.total[c], rendered) : r.total[c] == rendered);
+        }
+        CHECK(equal);
+        lit += r.total[0] + r.total[1] + r.total[2] > 0;
+    }
+    return lit;
+}
+
+const Config kPaths[] = {
+    {"path", "wavefront", {}},
+    {"path", "wavefront", {{"estimator", "nee"}}},
+    {"path", "wavefront", {{"estimator", "naive"}}},
+    {"path", "wavefront", {{"heuristic", "power"}, {"rr_depth", "1"}, {"rr_cap", "0.6"}}},
+    {"path", "wavefront", {{"cull", "0.3"}}},
+    {"path", "wavefront", {{"accel", "cwbvh"}}},
+    {"path", "ris", {}},
+    {"path", "ris", {{"heuristic", "power"}, {"rr_depth", "1"}}},
+};
+const Config kBidirectional[] = {
+    {"light", "wavefront", {}},
+    {"light", "wavefront", {{"light_paths", "1.5"}, {"rr_depth", "1"}}},
+    {"bdpt", "wavefront", {}},
+    {"bdpt", "wavefront", {{"heuristic", "power"}, {"rr_depth", "1"}, {"rr_cap", "0.6"}, {"cull", "0.3"}}},
+    {"bdpt", "wavefront", {{"strategies", "next_event+connections"}}},
+    {"bdpt", "wavefront", {{"fuse", "none"}}},
+    {"bdpt", "lvc", {}},
+    {"bdpt", "lvc", {{"heuristic", "power"}, {"rr_depth", "1"}}},
+    {"bdpt", "lvc", {{"connections", "1"}, {"light_paths", "2.25"}}},
+    {"bdpt", "lvc", {{"wave_size", "128"}}},
+    {"bdpt", "streaming", {}},
+    {"bdpt", "streaming", {{"heuristic", "power"}, {"rr_depth", "1"}, {"cull", "0.3"}}},
+    {"bdpt", "megakernel", {}},
+    {"bdpt", "megakernel", {{"heuristic", "power"}, {"rr_depth", "1"}}},
+};
+
+}  // namespace
+
+TEST_CASE("A replayed sample of the path tracer is the render's, bit by bit with full kernels") {
+    for (const char* name : {"cornell", "glass", "lights", "materials", "textured", "furnace"}) {
+        const Scene scene = project_scene(name, 37, 29);
+        for (const Config& c : kPaths)
+            for (const bool specialise : {false, true}) {
+                CAPTURE(name, text_of(c), specialise);
+                RenderSettings settings = settings_of(scene, c);
+                settings.specialise = specialise;
+                CHECK(check_samples(scene, settings, 5, 1) > 0);
+            }
+    }
+}
+
+TEST_CASE("A replayed sample of light tracing and of bdpt is the render's, bit by bit with full kernels") {
+    for (const char* name : {"cornell", "glass", "lights", "materials", "textured"}) {
+        const Scene scene = project_scene(name, 37, 29);
+        for (const Config& c : kBidirectional)
+            for (const bool specialise : {false, true}) {
+                CAPTURE(name, text_of(c), specialise);
+                RenderSettings settings = settings_of(scene, c);
+                settings.specialise = specialise;
+                CHECK(check_samples(scene, settings, 3, 97) > 0);
+            }
+    }
+}
+
+TEST_CASE("A watched render has the image of one that is not, and names its largest samples") {
+    const Scene scene = project_scene("glass", 24, 16);
+    for (const char* integrator : {"path", "bdpt"}) {
+        CAPTURE(integrator);
+        RenderSettings settings = settings_of(scene, {integrator, "wavefront", {{"specialise", "false"}}});
+        constexpr uint32_t kSamples = 16;
+        SampleWatch watch(make_renderer(scene, settings));
+        REQUIRE(watch.render(0, kSamples) == kSamples);
+        const FilmMoments film = watch.film(), plain = render_scene(scene, settings, kSamples).film;
+        CHECK(film.sum == plain.sum);
+        CHECK(film.sum_squares == plain.sum_squares);
+        CHECK(film.samples == plain.samples);
+
+        // Against all samples of all pixels.
+        double most = 0;
+        for (uint32_t s = 0; s < kSamples; ++s) {
+            const FilmMoments one = one_sample(scene, settings, s);
+            for (size_t i = 0; i < one.sum.size(); ++i)
+                most = std::max(most, one.sum[i] - (film.sum[i] - one.sum[i]) / (kSamples - 1));
+        }
+        SharedAccels accels(scene);
+        const std::unique_ptr<Replay> replay = make_replay(scene, settings, accels);
+        const std::vector<Outlier> worst = find_outliers(watch, *replay, 3);
+        REQUIRE(worst.size() == 3);
+        CHECK(std::abs(worst[0].pixel.excess - most) <= 1e-12 * most);
+        for (size_t k = 0; k < worst.size(); ++k) {
+            const Outlier& o = worst[k];
+            CAPTURE(k, o.pixel.x, o.pixel.y, o.pixel.sample);
+            if (k > 0) CHECK(o.pixel.excess <= worst[k - 1].pixel.excess);
+            for (int c = 0; c < 3; ++c) CHECK(o.replayed[c] == o.pixel.value[c]);
+            CHECK(o.largest.fate == ReplayFate::arrived);
+            CHECK(double(max_component(o.largest.contribution)) > 0.5 * o.pixel.excess / 16);
+        }
+    }
+}
+
+namespace {
+
+/// A wall and a lamp behind the camera, both of the given radiance.
+Scene two_lamps(const std::string& wall, const std::string& lamp) {
+    const auto area = [](const std::string& radiance) {
+        return radiance == "0" ? "" : "<emitter type='area'><rgb name='radiance' value='" + radiance + "'/></emitter>";
+    };
+    return scene_from_text(R"(<scene version="3.0.0">
+        <integrator type="path"><integer name="max_depth" value="2"/></integrator>
+        <sensor type="perspective"><float name="fov" value="40"/>
+            <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+            <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>
+        <shape type="rectangle"><bsdf type="diffuse"/>)" +
+                           area(wall) + R"(</shape>
+        <shape type="rectangle"><transform name="to_world"><scale value="50"/><rotate y="1" angle="180"/>
+                <translate z="5"/></transform>)" +
+                           area(lamp) + "</shape></scene>");
+}
+
+struct InvalidFindings {
+    InvalidWatch watch;
+    SharedAccels accels;
+    std::unique_ptr<Replay> replay;
+    std::vector<InvalidRecord> found;
+
+    /// Renders a batch of three samples.
+    InvalidFindings(const Scene& scene, const RenderSettings& settings, uint32_t per_stage)
+        : watch(make_renderer(scene, settings)), accels(scene), replay(make_replay(scene, settings, accels)) {
+        REQUIRE(watch.render(0, 3) == 3);
+        REQUIRE(watch.batches().size() == 1);
+        CHECK(watch.batches()[0].count == 3);
+        found = find_invalid(watch, *replay, scene, per_stage);
+    }
+};
+
+}  // namespace
+
+TEST_CASE("Invalid values of a stage inside of another are counted, and found again with pixel, sample and strategy") {
+    // A lamp so bright that its light, divided by the density of sampling it, is infinite.
+    const Scene scene = two_lamps("0", "1e38");
+    InvalidFindings f(scene, settings_of(scene, {"path", "wavefront", {{"estimator", "nee"}}}), 3);
+    REQUIRE(f.watch.by_stage().at("connect").inf > 0);
+    REQUIRE(f.found.size() == 3);
+    for (const InvalidRecord& r : f.found) {
+        CHECK(r.drop.stage == "connect");
+        CHECK(r.drop.what == "Inf");
+        CHECK(r.candidate.strategy.code == Strategy::make(1, 2).code);
+        const ReplaySample again = f.replay->sample({r.x, r.y, r.sample, {}, true, true});
+        bool same = false;
+        for (const ReplayCandidate& c : again.candidates) same |= c.drop.stage == "connect";
+        CHECK(same);
+    }
+}
+
+TEST_CASE("An infinite flux is found by the number of its light subpath") {
+    const Scene scene = two_lamps("0", "1e38");
+    InvalidFindings f(scene, settings_of(scene, {"light", "wavefront", {}}), 2);
+    REQUIRE(f.watch.by_stage().at("light_generate").inf > 0);
+    REQUIRE(f.found.size() == 2);
+    for (const InvalidRecord& r : f.found) {
+        CHECK(r.drop.stage == "light_generate");
+        REQUIRE(r.light_subpath != kNone);
+        std::vector<ReplayCandidate> splats;
+        const ReplaySubpath again = f.replay->light_subpath(r.light_subpath, r.sample, true, splats);
+        CHECK(again.drop.what == "Inf");
+        CHECK(again.end == "the flux of the emitter sample is invalid");
+    }
+}
+
+TEST_CASE("A sample whose sum is infinite, though its parts are not, is found as that of update_film") {
+    const Scene scene = two_lamps("3e38", "3e38");
+    InvalidFindings f(scene, settings_of(scene, {"path", "wavefront", {{"estimator", "naive"}}}), 1);
+    CHECK(f.watch.by_stage().size() == 1);
+    REQUIRE(f.watch.by_stage().at("update_film").inf > 0);
+    REQUIRE(f.found.size() == 1);
+    const InvalidRecord& r = f.found[0];
+    CHECK(f.replay->sample({r.x, r.y, r.sample, {}, true, true}).drop.stage == "update_film");
+}
+
+TEST_CASE("A comparison by segments agrees with a render, and names the number from which on another one differs") {
+    const Scene scene = project_scene("cornell", 24, 16);
+    for (const Config& c : {Config{"path", "wavefront", {}}, Config{"bdpt", "wavefront", {{"max_depth", "5"}}}}) {
+        CAPTURE(text_of(c));
+        const RenderSettings settings = settings_of(scene, c);
+        SharedAccels accels(scene);
+        const ReplayRequest request = {12, 8, 2, {}, true, true};
+        const auto rendered = [&](const RenderSettings& s, uint32_t sample) { return rendered_film(scene, s, sample); };
+        const std::vector<LengthComparison> same = compare_by_length(scene, settings, request, accels, rendered);
+        REQUIRE(same.size() >= 4);
+        double sum = 0;
+        for (const LengthComparison& l : same) {
+            CHECK_FALSE(l.differs);
+            sum += l.rendered[0];
+        }
+        const double all = rendered(settings, request.sample).sum[(8 * 24 + 12) * 3];
+        REQUIRE(all > 0);
+        CHECK(std::abs(sum - all) <= 1e-12 * all);
+        // From three segments on another sample.
+        const auto parted = [&](const RenderSettings& s, uint32_t sample) {
+            return rendered_film(scene, s, s.max_depth >= 3 || s.max_depth < 0 ? sample + 1 : sample);
+        };
+        const std::vector<LengthComparison> other = compare_by_length(scene, settings, request, accels, parted);
+        for (const LengthComparison& l : other)
+            if (l.segments <= 3) CHECK(l.differs == (l.segments == 3));
+        CHECK(by_length_text(other).find("first differ in paths of 3 segments") != std::string::npos);
+        CHECK(by_length_text(same).find("agree") != std::string::npos);
+    }
+}
+
+TEST_CASE("Positions are printed in the coordinates of the file, wherever the loader moved the scene") {
+    const auto scene_at = [](const std::string& x) {
+        return scene_from_text(
+            "<scene version='3.0.0'><sensor type='perspective'><transform name='to_world'>"
+            "<lookat origin='" +
+            x + ",0,4' target='" + x +
+            ",0,0' up='0,1,0'/></transform>"
+            "<film type='hdrfilm'><integer name='width' value='8'/>"
+            "<integer name='height' value='8'/></film></sensor>"
+            "<emitter type='constant'/><shape type='sphere'><point name='center' x='" +
+            x + "' y='0' z='0'/></shape></scene>");
+    };
+    const auto replayed = [](const Scene& scene, std::string& text) {
+        SharedAccels accels(scene);
+        const RenderSettings settings = settings_of(scene, {"path", "wavefront", {}});
+        const ReplaySample s = make_replay(scene, settings, accels)->sample({4, 4, 0, {}, true, true});
+        const ReplayFormat format = {{}, scene.origin};
+        text = replay_text(s, format);
+        return replay_json(s, format);
+    };
+    std::string text;
+    const nlohmann::json near = replayed(scene_at("0"), text);
+    CHECK(text.find("origin at") == std::string::npos);
+    const nlohmann::json far = replayed(scene_at("1048576"), text);
+    CHECK(text.find("origin at (1048576, 0, 0.5)") != std::string::npos);
+    const nlohmann::json &a = near["eye_subpath"]["vertices"][0], &b = far["eye_subpath"]["vertices"][0];
+    REQUIRE(a["miss"] == false);
+    CHECK(text.find(fmt::format(" at ({:.13g}, ", b["p"][0].get<double>())) != std::string::npos);
+    for (const char* place : {"origin", "p"})
+        for (const int c : {0, 1, 2}) {
+            const double from = a[place][c], to = b[place][c];
+            CHECK(std::abs(to - from - (c == 0 ? 1048576 : 0)) < 1e-6);
+        }
+}
+
+}  // namespace ambilux
