@@ -108,8 +108,10 @@ std::vector<ReplayNumber> hit_densities(const ReplayContext<Mis>& ctx, const Sub
     if (hit.prim == kNone) return {{"pdf_next_event_sa", pdf_environment_direct<F>(ctx.view, path.direction)}};
     const SurfacePoint light = surface_at<F>(ctx.view, hit.prim, hit.u, hit.v);
     const uint32_t emitter = ctx.view.shapes[light.shape].emitter;
-    const float pick = ctx.view.emitters[emitter].pick_probability;
-    return {{"pdf_next_event_sa", pdf_emitter_direct<F>(ctx.view, emitter, path.origin, path.direction, light)},
+    const Emitter& e = ctx.view.emitters[emitter];
+    const float pick = e.pick_probability;
+    return {{"opacity", area_opacity<F>(ctx.view, e, light.uv)},
+            {"pdf_next_event_sa", pdf_emitter_direct<F>(ctx.view, emitter, path.origin, path.direction, light)},
             {"pdf_emission_area", pick * pdf_emission_position<F>(ctx.view, emitter, light.prim)},
             {"pdf_emission_sa", pdf_emission_direction<F>(ctx.view, emitter, light.ng, -path.direction)}};
 }
