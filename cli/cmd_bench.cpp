@@ -63,24 +63,24 @@ void check_repetitions(const Options& o) {
 
 int rays(const Options& o) {
     check_repetitions(o);
-    return report(o, bench_rays(load_scene(o.scene).scene, o.backend, o.repetitions, o.opaque));
+    return report(o, bench_rays(load_scene(o.scene, {{"--json", o.json}}).scene, o.backend, o.repetitions, o.opaque));
 }
 
 int queues(const Options& o) {
     check_repetitions(o);
-    return report(o, bench_queues(load_scene(o.scene).scene, o.backend, o.items, o.repetitions));
+    return report(o, bench_queues(load_scene(o.scene, {{"--json", o.json}}).scene, o.backend, o.items, o.repetitions));
 }
 
 int stages(const Options& o) {
     if (o.spp < 1) throw Error(ExitCode::usage, "--spp: at least 1 is needed");
-    const LoadedScene loaded = load_scene(o.scene);
+    const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}});
     RenderSettings settings = o.render.settings(loaded.scene);
     settings.expected_samples = o.spp;
     const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
     RenderPosition position;
     {
         Progress progress("bench stages");
-        position = drive(*renderer, {}, {o.spp, 0}, interrupt_flag(), [&](const RenderPosition& p) {
+        position = drive(*renderer, {}, {o.spp, 0}, save_when_interrupted(), [&](const RenderPosition& p) {
             progress.update(double(p.samples) / o.spp, progress_details(p.samples, p.seconds, renderer->stats()));
         });
     }

@@ -5,6 +5,7 @@
 
 #include "cli/commands.h"
 #include "core/error.h"
+#include "core/outputs.h"
 #include "film/exr_io.h"
 #include "film/metrics.h"
 
@@ -16,6 +17,9 @@ struct Options {
 };
 
 int compare(const Options& o) {
+    const std::vector<Output> outputs = {{"--json", o.json}};
+    check_outputs(outputs);
+    check_not_inputs(outputs, {o.image, o.reference});
     Attributes attributes;
     const Image image = read_exr(o.image, &attributes);
     const Reference reference = read_reference_exr(o.reference);

@@ -26,7 +26,7 @@ void add_experiment(CLI::App& app, Run& run) {
                      "Print what would be done, with an estimate of time and memory, and write nothing");
     command.callback([request, dry, &run] {
         run = [request, dry] {
-            request->interrupt = interrupt_flag();
+            request->on_prepared = [r = request.get()] { r->interrupt = save_when_interrupted(); };
             if (*dry) {
                 std::cout << describe_plan(*request, default_hooks()) << std::flush;
                 return int(ExitCode::done);

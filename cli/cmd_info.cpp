@@ -37,7 +37,7 @@ void print(const nlohmann::json& value, int indent) {
 }
 
 int info(const Options& o) {
-    const LoadedScene loaded = load_scene(o.scene);
+    const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}});
     const RenderSettings settings = o.render.settings(loaded.scene);
     nlohmann::json json = scene_info(loaded.scene);
     // What this scene needs of the renderer is the renderer's own word.

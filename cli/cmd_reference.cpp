@@ -8,6 +8,7 @@
 #include "core/log.h"
 #include "core/progress.h"
 #include "experiments/reference.h"
+#include "experiments/reference_store.h"
 #include "experiments/statistics.h"
 #include "film/png_io.h"
 #include "integrators/setting.h"
@@ -23,7 +24,8 @@ struct Options {
 };
 
 int reference(const Options& o) {
-    const LoadedScene loaded = load_scene(o.scene);
+    if (o.output.empty()) throw Error(ExitCode::usage, "-o: the reference needs a name");
+    const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
     ReferenceRequest request;
     request.path = o.output;
     request.spp = o.spp;
@@ -32,7 +34,13 @@ int reference(const Options& o) {
         if (!find_general_setting(key)->is_default(request.settings))
             throw Error(ExitCode::usage,
                         "a reference is always made by integrator path, estimator mis: leave these settings out");
-    request.interrupt = interrupt_flag();
+    const ReferenceLock lock(o.output, nullptr);
+    Hooks hooks = default_hooks();
+    hooks.make_renderer = [&](const Scene& scene, const RenderSettings& settings) {
+        std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
+        request.interrupt = save_when_interrupted();
+        return renderer;
+    };
 
     ReferenceResult result;
     {
@@ -48,7 +56,7 @@ int reference(const Options& o) {
             progress.update(double(p.samples) / double(o.spp), fmt::format("{} spp", p.samples),
                             rate > 0 ? double(o.spp - p.samples) / rate : INFINITY);
         };
-        result = make_reference(loaded.scene, request, default_hooks());
+        result = make_reference(loaded.scene, request, hooks);
     }
     if (!o.png.empty() && result.reference.samples) write_png(o.png, result.reference.mean);
     double noise = 0;
@@ -88,7 +96,7 @@ void add_reference(CLI::App& app, Run& run) {
     o->scene.add_to(command);
     o->render.add_to(command, true);
     command.add_option("-o,--output", o->output, "Reference to write or to continue (EXR)")->required();
-    command.add_option("--spp", o->spp, "Samples per pixel in total")->required();
+    command.add_option("--spp", o->spp, "Samples per pixel in total")->required()->check(refuse_negative);
     command.add_option("--png", o->png, "Write an sRGB PNG as well");
     command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
     command.callback([o, &run] { run = [o] { return reference(*o); }; });

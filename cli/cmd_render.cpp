@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "cli/commands.h"
@@ -8,6 +9,8 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/log.h"
+#include "core/memory_reserve.h"
+#include "core/outputs.h"
 #include "core/progress.h"
 #include "experiments/drive.h"
 #include "experiments/statistics.h"
@@ -30,16 +33,19 @@ struct Options {
     bool strict = false;
 };
 
+constexpr float kMostStops = 100;
+
 void check(const Options& o) {
     if (o.spp && o.time)
         throw Error(ExitCode::usage, "--spp and --time exclude each other: a render ends by one of them");
     if (o.spp && *o.spp == 0) throw Error(ExitCode::usage, "--spp 0: at least one sample per pixel is needed");
-    if (o.time && !(*o.time > 0)) throw Error(ExitCode::usage, "--time: more than zero seconds are needed");
+    if (o.time && !(*o.time > 0 && std::isfinite(*o.time)))
+        throw Error(ExitCode::usage, "--time: more than zero seconds are needed");
+    if (o.exposure && !(std::fabs(*o.exposure) <= kMostStops))
+        throw Error(ExitCode::usage, fmt::format("--exposure: {} stops at most, up or down", kMostStops));
     if (o.exposure && o.png.empty())
         throw Error(ExitCode::usage, "--exposure changes only the PNG: give --png FILE as well");
-    check_writable(o.output);
-    if (!o.png.empty()) check_writable(o.png);
-    if (!o.json.empty() && o.json != "-") check_writable(o.json);
+    if (o.output.empty()) throw Error(ExitCode::usage, "-o: the image needs a name");
     if (!o.techniques.empty()) {
         make_folders(o.techniques);
         check_writable(o.techniques + "/techniques.json");
@@ -62,9 +68,15 @@ std::string objection(const RenderStats& stats) {
     return text;
 }
 
+/// What writing the image takes: sums of its pixels, the image, and the file twice while it grows.
+size_t bytes_to_save(const Scene& scene) {
+    constexpr size_t kPerPixel = 3 * (2 * sizeof(double) + 3 * sizeof(float)), kRest = 16 << 20;
+    return size_t(scene.sensor.crop_width) * scene.sensor.crop_height * kPerPixel + kRest;
+}
+
 int render(const Options& o) {
     check(o);
-    const LoadedScene loaded = load_scene(o.scene);
+    const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
     RenderSettings settings = o.render.settings(loaded.scene);
     if (!o.techniques.empty() && settings.technique_depth == 0) settings.technique_depth = kDefaultTechniqueDepth;
     Budget budget;
@@ -88,6 +100,8 @@ int render(const Options& o) {
     for (const std::string& warning : render_warnings(loaded.scene, used_settings(settings, renderer->stats())))
         log_warning(warning);
 
+    MemoryReserve reserve(bytes_to_save(loaded.scene));
+    const volatile bool* const interrupt = save_when_interrupted();
     RenderPosition position;
     // Choosing is part of the method: its time counts.
     if (const SelectionStats choice = renderer->stats().choice; !choice.name.empty()) {
@@ -97,13 +111,14 @@ int render(const Options& o) {
     }
     {
         Progress progress("render");
-        position = drive(*renderer, position, budget, interrupt_flag(), [&](const RenderPosition& p) {
+        position = drive(*renderer, position, budget, interrupt, [&](const RenderPosition& p) {
             const double fraction =
                 budget.samples ? double(p.samples) / double(budget.samples) : p.seconds / budget.seconds;
             progress.update(std::min(fraction, 1.0), progress_details(p.samples, p.seconds, renderer->stats()));
         });
     }
 
+    reserve.release();
     RenderStats stats = renderer->stats();
     if (position.samples > 0) {
         const Image image = mean_image(renderer->film());
@@ -118,7 +133,7 @@ int render(const Options& o) {
         FinishedRender finished = {o.scene, loaded.scene, used_settings(settings, stats), watch, samples};
         apply_setting(finished.used, "backend", stats.backend);
         try {
-            found = report_findings(finished, o.outliers, o.json == "-", interrupt_flag());
+            found = report_findings(finished, o.outliers, o.json == "-", interrupt);
         } catch (const Error& e) {
             if (samples) throw;
             log_warning(e.what());
@@ -156,7 +171,7 @@ void add_render(CLI::App& app, Run& run) {
             ->expected(0, 1)
             ->type_name("[FILE]");
     command.add_option("--exposure", o->exposure, "Stops by which the PNG is brightened");
-    command.add_option("--spp", o->spp, "Samples per pixel. Default: the scene's");
+    command.add_option("--spp", o->spp, "Samples per pixel. Default: the scene's")->check(refuse_negative);
     command.add_option("--time", o->time, "Seconds of wall clock to render instead of --spp");
     command
         .add_option(

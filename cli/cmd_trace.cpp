@@ -57,7 +57,7 @@ int trace(const Options& o) {
         throw Error(ExitCode::usage, "--compare: --pixel X,Y is needed, without --light-subpath");
     ReplayFormat format;
     if (!o.strategy.empty()) format.only = parse_strategy(o.strategy);
-    const LoadedScene loaded = load_scene(o.scene);
+    const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}});
     format.origin = loaded.scene.origin;
     ReplayRequest request;
     if (!o.pixel.empty()) parse_pixel(o.pixel, loaded.scene.sensor, request);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/outputs.h"
 #include "experiments/hooks.h"
 #include "formats/load.h"
 
@@ -30,6 +31,7 @@ struct SceneOptions {
     bool lenient = false;
     std::vector<std::string> parameters;  ///< NAME=VALUE
     std::string light_picking = "power";
+    std::vector<std::string> limits;  ///< KEY=VALUE
 
     void add_to(CLI::App& command);
     LoadOptions load_options() const;
@@ -54,8 +56,12 @@ struct LoadedScene {
     Scene scene;
     double seconds = 0;
 };
-/// Loads and reports the substitutions of --lenient as warnings.
-LoadedScene load_scene(const SceneOptions& options);
+/// Loads and reports the substitutions of --lenient as warnings. Fails before that if `outputs` cannot be written, and
+/// after it if one of them is a file of the scene.
+LoadedScene load_scene(const SceneOptions& options, const std::vector<Output>& outputs = {});
+
+/// For options of 64-bit numbers, of which CLI11 takes -1 as the largest.
+std::string refuse_negative(const std::string& text);
 
 /// Writes `json` to a file, or to standard output if `path` is "-".
 void write_json(const std::string& path, const nlohmann::json& json);

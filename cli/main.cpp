@@ -2,6 +2,7 @@
 // (README.md).
 #include <fmt/format.h>
 
+#include <iostream>
 #include <new>
 
 #include "cli/commands.h"
@@ -10,10 +11,24 @@
 #include "core/log.h"
 #include "core/version.h"
 
+namespace {
+
+using namespace ambilux;
+
+/// The exit code, unless what was printed could not be written.
+int flushed(int code) {
+    std::cout.flush();
+    if (std::cout) return code;
+    log_error("cannot write to standard output");
+    return code == int(ExitCode::done) ? int(ExitCode::device) : code;
+}
+
+}  // namespace
+
 // What throws before the first `try` is a mistake of ours.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
-    using namespace ambilux;
+    install_interrupt_handler();
     CLI::App app{"Ambilux: a testbed for bidirectional light transport"};
     app.set_version_flag("--version", fmt::format("ambilux {} ({})", version(), git_revision()));
     app.require_subcommand(1);
@@ -41,12 +56,11 @@ int main(int argc, char** argv) {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {
         const int code = app.exit(e);
-        return code == 0 && argc > 1 ? int(ExitCode::done) : int(ExitCode::usage);
+        return flushed(code == 0 && argc > 1 ? int(ExitCode::done) : int(ExitCode::usage));
     }
     set_quiet(quiet);
-    install_interrupt_handler();
     try {
-        return run();
+        return flushed(run());
     } catch (const Error& e) {
         set_status_line("");
         log_error(e.what());

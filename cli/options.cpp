@@ -36,10 +36,15 @@ void SceneOptions::add_to(CLI::App& command) {
         ->allow_extra_args(false);
     command.add_option("--light-picking", light_picking, "How light sampling chooses an emitter: power or uniform")
         ->capture_default_str();
+    command
+        .add_option("--limits", limits,
+                    "KEY=N: what the scene may ask for at most; defaults are " + limits_text({}) + " (docs/limits.md)")
+        ->allow_extra_args(false);
 }
 
 LoadOptions SceneOptions::load_options() const {
     LoadOptions options;
+    for (const std::string& limit : limits) set_limit(options.limits, limit);
     options.lenient = lenient;
     if (light_picking == "uniform")
         options.light_picking = LightPicking::uniform;
@@ -65,7 +70,7 @@ void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
         command.add_option("--variant", variant, help_of("variant"))->capture_default_str();
     }
     command.add_option("--backend", backend, help_of("backend"))->capture_default_str();
-    command.add_option("--seed", seed, help_of("seed"))->capture_default_str();
+    command.add_option("--seed", seed, help_of("seed"))->check(refuse_negative)->capture_default_str();
     command.add_option("--max-depth", max_depth, help_of("max_depth"));
     command.add_flag("--deterministic", deterministic, help_of("deterministic"));
     command.add_option("--set", set, "KEY=VALUE: any setting of `ambilux help settings`, such as estimator=nee")
@@ -89,11 +94,20 @@ RenderSettings RenderOptions::settings(const Scene& scene) const {
     return s;
 }
 
-LoadedScene load_scene(const SceneOptions& options) {
-    const LoadOptions load = options.load_options();
+std::string refuse_negative(const std::string& text) {
+    return text.starts_with("-") ? "it must not be negative" : "";
+}
+
+LoadedScene load_scene(const SceneOptions& options, const std::vector<Output>& outputs) {
+    check_outputs(outputs);
+    check_not_inputs(outputs, {options.path});
+    LoadOptions load = options.load_options();
+    std::vector<std::string> files;
+    load.files = &files;
     const auto start = std::chrono::steady_clock::now();
     LoadedScene loaded{load_mitsuba(options.path, load), 0};
     loaded.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    check_not_inputs(outputs, files);
     for (const std::string& warning : loaded.scene.warnings) log_warning(warning);
     return loaded;
 }

@@ -11,7 +11,8 @@ find_package(CLI11 REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(OpenSSL 3 REQUIRED COMPONENTS Crypto)
 find_package(Boost 1.74 CONFIG REQUIRED)  # headers alone, for Boost.Math
-find_path(STB_INCLUDE_DIR stb/stb_image.h REQUIRED)
+find_package(PNG 1.6 REQUIRED)
+find_package(JPEG REQUIRED)  # libjpeg-turbo: its colour spaces with alpha are used
 
 find_package(embree 4 QUIET)
 if(NOT embree_FOUND)

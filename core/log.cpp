@@ -3,6 +3,8 @@
 #include <cstdio>
 #include <mutex>
 
+#include "core/printable.h"
+
 namespace ambilux {
 namespace {
 
@@ -13,7 +15,7 @@ std::string status;
 void print(const char* prefix, const std::string& message) {
     const std::lock_guard lock(mutex);
     const char* clear = status.empty() ? "" : "\r\033[K";
-    std::fprintf(stderr, "%s%s%s\n%s", clear, prefix, message.c_str(), status.c_str());
+    std::fprintf(stderr, "%s%s%s\n%s", clear, prefix, printable(message).c_str(), status.c_str());
     std::fflush(stderr);
 }
 

@@ -1,9 +1,6 @@
 #include "experiments/experiment_folder.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -21,23 +18,15 @@ namespace ambilux {
 
 namespace fs = std::filesystem;
 
-FolderLock::FolderLock(const std::string& folder)
-    : fd_(::open((folder + "/.lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666)) {
-    if (fd_ < 0) throw Error(ExitCode::device, "cannot write into the folder " + folder);
-    if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
-        ::close(fd_);
-        throw Error(ExitCode::device,
-                    "another experiment is writing into " + folder + ": wait for it or choose another folder");
-    }
-}
-FolderLock::~FolderLock() { ::close(fd_); }
-
 ExperimentFolder::ExperimentFolder(const std::string& path, const std::string& references, bool resume,
                                    const Prepared& prepared)
     : path_(path), references_(references.empty() ? path + "/references" : references), prepared_(prepared),
       config_(prepared.config), reference_notes_(prepared.scenes.size()) {
     open(resume);
-    lock_.emplace(path_);
+    lock_.emplace(path_ + "/.lock");
+    if (!lock_->try_lock())
+        throw Error(ExitCode::device,
+                    "another experiment is writing into " + path_ + ": wait for it or choose another folder");
     remove_temporary_files();
     read_manifest();
     lines_ = read_results(path_ + "/runs.csv");

@@ -6,21 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "core/file_lock.h"
 #include "experiments/prepare.h"
 
 namespace ambilux {
-
-/// Keeps a second process out of the folder; the system releases it when this one ends, however it does.
-class FolderLock {
-public:
-    explicit FolderLock(const std::string& folder);
-    ~FolderLock();
-    FolderLock(const FolderLock&) = delete;
-    FolderLock& operator=(const FolderLock&) = delete;
-
-private:
-    int fd_;
-};
 
 class ExperimentFolder {
 public:
@@ -57,7 +46,7 @@ private:
     const std::string path_, references_;
     const Prepared& prepared_;
     const ExperimentConfig& config_;
-    std::optional<FolderLock> lock_;
+    std::optional<FileLock> lock_;
     std::vector<std::string> lines_;  ///< of runs.csv
     nlohmann::json manifest_;
     std::vector<nlohmann::json> reference_notes_;  ///< by scene

@@ -1,9 +1,6 @@
 #include "experiments/reference_store.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -71,23 +68,19 @@ ReferencePlace find_reference(const std::string& folder, const ExperimentConfig&
     return place;
 }
 
-ReferenceLock::ReferenceLock(const std::string& path, const volatile bool* interrupt) {
-    const fs::path file(path);
-    const std::string name = (file.parent_path() / fmt::format(".{}.lock", file.filename().string())).string();
-    fd_ = ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (fd_ < 0) throw Error(ExitCode::device, "cannot write into the folder " + file.parent_path().string());
-    bool said = false;
-    while (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
+/// The file beside a reference that is locked, the same by whatever links it is named.
+static std::string lock_file(const std::string& path) {
+    const fs::path file = fs::weakly_canonical(path);
+    return (file.parent_path() / fmt::format(".{}.lock", file.filename().string())).string();
+}
+
+ReferenceLock::ReferenceLock(const std::string& path, const volatile bool* interrupt) : lock_(lock_file(path)) {
+    for (bool said = false; !lock_.try_lock(); said = true) {
         if (is_set(interrupt)) return;
         if (!said) log_info(fmt::format("{} is being made by another process: waiting for it", path));
-        said = true;
         std::this_thread::sleep_for(std::chrono::milliseconds(200));
     }
     held_ = true;
-}
-
-ReferenceLock::~ReferenceLock() {
-    if (fd_ >= 0) ::close(fd_);
 }
 
 }  // namespace ambilux

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "core/file_lock.h"
 #include "experiments/config.h"
 #include "experiments/hooks.h"
 #include "experiments/reference.h"
@@ -33,13 +34,10 @@ class ReferenceLock {
 public:
     /// Waits for another process. `held()` is false if *interrupt became true meanwhile.
     ReferenceLock(const std::string& path, const volatile bool* interrupt);
-    ~ReferenceLock();
-    ReferenceLock(const ReferenceLock&) = delete;
-    ReferenceLock& operator=(const ReferenceLock&) = delete;
     bool held() const { return held_; }
 
 private:
-    int fd_ = -1;
+    FileLock lock_;
     bool held_ = false;
 };
 

@@ -368,7 +368,9 @@ private:
 }  // namespace
 
 ExitCode run_experiment(const ExperimentRequest& request, const Hooks& hooks) {
-    return Experiment(request, hooks).run();
+    Experiment experiment(request, hooks);
+    if (request.on_prepared) request.on_prepared();
+    return experiment.run();
 }
 
 }  // namespace ambilux

@@ -6,7 +6,6 @@
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
-#include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStringAttribute.h>
@@ -17,6 +16,8 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/sha256.h"
+#include "formats/images/exr_file.h"
 
 namespace ambilux {
 namespace {
@@ -78,8 +79,8 @@ void check_image(const std::string& path, const Image& image) {
                     "cannot write " + path + ": the image is empty or its buffer does not fit its size");
 }
 
-/// Writes planes of interleaved RGB floats under the given channel names.
-void write_planes(const std::string& path, uint32_t width, uint32_t height,
+/// A file of planes of interleaved RGB floats under the given channel names.
+std::string encode_planes(const std::string& path, uint32_t width, uint32_t height,
                   const std::vector<std::pair<const float*, std::array<const char*, 3>>>& planes,
                   const Attributes& attributes) {
     StringStream stream;
@@ -100,43 +101,51 @@ void write_planes(const std::string& path, uint32_t width, uint32_t height,
     } catch (const std::exception& e) {
         throw Error(ExitCode::device, "cannot write " + path + ": " + e.what());
     }
-    write_file_atomic(path, stream.bytes);
+    return std::move(stream.bytes);
+}
+
+// A reference ends with the digest of all before it. Readers of EXR files do not look behind the last chunk.
+constexpr std::string_view kChecksumMark = "ambilux sha256 ";
+
+std::string checksum_of(std::string_view bytes) { return std::string(kChecksumMark) + to_hex(sha256(bytes)) + "\n"; }
+
+/// The file without its checksum. A file without one is taken as it is: other programs write none.
+std::string_view without_checksum(std::string_view bytes, const std::string& path) {
+    const size_t size = kChecksumMark.size() + 2 * sizeof(Sha256Digest) + 1;
+    if (bytes.size() < size || !bytes.substr(bytes.size() - size).starts_with(kChecksumMark)) return bytes;
+    const std::string_view content = bytes.substr(0, bytes.size() - size);
+    if (bytes.substr(content.size()) != checksum_of(content))
+        throw input_error(path, 0, "is damaged: its content is not that of its checksum. Remove it, or take a copy");
+    return content;
 }
 
 /// Reads three channels (a missing name repeats the first one) into interleaved floats.
-Image read_planes(Imf::InputFile& file, const std::array<const char*, 3>& names) {
-    const Imath::Box2i window = file.header().dataWindow();
-    const uint64_t width = uint64_t(int64_t(window.max.x) - window.min.x + 1),
-                   height = uint64_t(int64_t(window.max.y) - window.min.y + 1);
-    Image image{uint32_t(width), uint32_t(height), std::vector<float>(width * height * 3)};
+Image read_planes(ExrFile& file, const std::array<const char*, 3>& names) {
+    const size_t row = 3 * sizeof(float) * file.width();
+    Image image{file.width(), file.height(), std::vector<float>(size_t(file.width()) * file.height() * 3)};
     Imf::FrameBuffer frame;
     for (size_t c = 0; c < 3; ++c) {
         if (c > 0 && std::strcmp(names[c], names[0]) == 0) continue;
         // OpenEXR addresses pixels by data-window coordinates: Slice::Make takes the window's origin out of the
         // pointer.
-        frame.insert(names[c], Imf::Slice::Make(Imf::FLOAT, image.rgb.data() + c, window, 3 * sizeof(float),
-                                                3 * sizeof(float) * width));
+        frame.insert(names[c],
+                     Imf::Slice::Make(Imf::FLOAT, image.rgb.data() + c, file.window(), 3 * sizeof(float), row));
     }
-    file.setFrameBuffer(frame);
-    file.readPixels(window.min.y, window.max.y);
+    file.read(frame);
     if (std::strcmp(names[0], names[1]) == 0)
         for (size_t i = 0; i < image.rgb.size(); i += 3) image.rgb[i + 1] = image.rgb[i + 2] = image.rgb[i];
     return image;
 }
 
-bool has_channels(const Imf::InputFile& file, const std::array<const char*, 3>& names) {
-    for (const char* name : names) {
-        const Imf::Channel* channel = file.header().channels().findChannel(name);
-        if (!channel || channel->xSampling != 1 || channel->ySampling != 1) return false;
-    }
-    return true;
+bool has(const ExrFile& file, const std::array<const char*, 3>& names) {
+    return file.has({names[0], names[1], names[2]});
 }
 
 }  // namespace
 
 void write_exr(const std::string& path, const Image& image, const Attributes& attributes) {
     check_image(path, image);
-    write_planes(path, image.width, image.height, {{image.rgb.data(), kMeanChannels}}, attributes);
+    write_file_atomic(path, encode_planes(path, image.width, image.height, {{image.rgb.data(), kMeanChannels}}, attributes));
 }
 
 void write_reference_exr(const std::string& path, const Reference& reference, Attributes attributes) {
@@ -145,39 +154,36 @@ void write_reference_exr(const std::string& path, const Reference& reference, At
     if (reference.mean.rgb.size() != reference.standard_error.rgb.size())
         throw Error(ExitCode::device, "cannot write " + path + ": means and standard errors differ in size");
     attributes["spp"] = reference.samples;
-    write_planes(path, reference.mean.width, reference.mean.height,
-                 {{reference.mean.rgb.data(), kMeanChannels}, {reference.standard_error.rgb.data(), kErrorChannels}},
-                 attributes);
+    std::string bytes = encode_planes(
+        path, reference.mean.width, reference.mean.height,
+        {{reference.mean.rgb.data(), kMeanChannels}, {reference.standard_error.rgb.data(), kErrorChannels}}, attributes);
+    bytes += checksum_of(bytes);
+    write_file_atomic(path, bytes);
 }
 
 Reference read_reference_exr(const std::string& path, Attributes* attributes) {
-    read_file(path);  // for the system's own words if it is missing or unreadable; references are small
-    try {
-        Imf::InputFile file(path.c_str(), 1);
-        Reference reference;
-        if (has_channels(file, kMeanChannels)) {
-            reference.mean = read_planes(file, kMeanChannels);
-        } else if (has_channels(file, {"Y", "Y", "Y"})) {
-            reference.mean = read_planes(file, {"Y", "Y", "Y"});
-        } else {
-            std::string found;
-            for (auto it = file.header().channels().begin(); it != file.header().channels().end(); ++it)
-                found += std::string(" ") + it.name();
-            throw input_error(path, 0, "no channels R, G, B or Y at full resolution; it has:" + found);
-        }
-        if (has_channels(file, kErrorChannels)) reference.standard_error = read_planes(file, kErrorChannels);
-        const Attributes all = header_attributes(file.header());
-        if (const auto spp = all.find("spp"); spp != all.end()) {
-            if (spp->is_number_integer() && spp->get<int64_t>() > 0) reference.samples = spp->get<uint64_t>();
-            if (spp->is_string()) reference.samples = std::strtoull(spp->get<std::string>().c_str(), nullptr, 10);
-        }
-        if (attributes) *attributes = all;
-        return reference;
-    } catch (const Error&) {
-        throw;
-    } catch (const std::exception& e) {
-        throw input_error(path, 0, std::string("not a readable OpenEXR file: ") + e.what());
+    FileBudget budget(path);
+    const std::string bytes = read_input(path);
+    ExrFile file(without_checksum(bytes, path), budget);
+    Reference reference;
+    if (has(file, kMeanChannels)) {
+        reference.mean = read_planes(file, kMeanChannels);
+    } else if (has(file, {"Y", "Y", "Y"})) {
+        reference.mean = read_planes(file, {"Y", "Y", "Y"});
+    } else {
+        std::string found;
+        for (auto it = file.header().channels().begin(); it != file.header().channels().end(); ++it)
+            found += std::string(" ") + it.name();
+        throw input_error(path, 0, "no channels R, G, B or Y at full resolution; it has:" + found);
     }
+    if (has(file, kErrorChannels)) reference.standard_error = read_planes(file, kErrorChannels);
+    const Attributes all = header_attributes(file.header());
+    if (const auto spp = all.find("spp"); spp != all.end()) {
+        if (spp->is_number_integer() && spp->get<int64_t>() > 0) reference.samples = spp->get<uint64_t>();
+        if (spp->is_string()) reference.samples = std::strtoull(spp->get<std::string>().c_str(), nullptr, 10);
+    }
+    if (attributes) *attributes = all;
+    return reference;
 }
 
 Image read_exr(const std::string& path, Attributes* attributes) { return read_reference_exr(path, attributes).mean; }

@@ -16,7 +16,8 @@ using Attributes = nlohmann::json;
 /// Writes R, G, B as 32-bit floats, ZIP compression. Throws Error(device) if the file cannot be written.
 void write_exr(const std::string& path, const Image& image, const Attributes& attributes = Attributes::object());
 
-/// Writes R, G, B and the standard errors of the means se.R, se.G, se.B; adds the attribute spp.
+/// Writes R, G, B and the standard errors of the means se.R, se.G, se.B; adds the attribute spp, and behind the image a
+/// checksum of the file, which read_reference_exr() verifies.
 void write_reference_exr(const std::string& path, const Reference& reference,
                          Attributes attributes = Attributes::object());
 

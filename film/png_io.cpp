@@ -1,19 +1,11 @@
 #include "film/png_io.h"
 
+#include <png.h>
+
 #include <cmath>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
-
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
-#pragma GCC diagnostic ignored "-Wunused-function"
-#pragma GCC diagnostic ignored "-Wshadow"
-#define STB_IMAGE_WRITE_IMPLEMENTATION
-#define STB_IMAGE_WRITE_STATIC
-#define STBI_WRITE_NO_STDIO
-#include <stb/stb_image_write.h>
-#pragma GCC diagnostic pop
 
 namespace ambilux {
 
@@ -28,13 +20,16 @@ void write_png(const std::string& path, const Image& image, float exposure) {
     std::vector<uint8_t> pixels(image.rgb.size());
     for (size_t i = 0; i < pixels.size(); ++i)
         pixels[i] = uint8_t(std::lround(255.0f * linear_to_srgb(scale * image.rgb[i])));
-    std::string bytes;
-    const auto collect = [](void* target, void* data, int size) {
-        static_cast<std::string*>(target)->append(static_cast<char*>(data), size_t(size));
-    };
-    if (!stbi_write_png_to_func(collect, &bytes, int(image.width), int(image.height), 3, pixels.data(),
-                                int(image.width) * 3))
-        throw Error(ExitCode::device, "cannot write " + path + ": PNG encoding failed");
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    png.width = image.width;
+    png.height = image.height;
+    png.format = PNG_FORMAT_RGB;
+    std::string bytes(PNG_IMAGE_PNG_SIZE_MAX(png), '\0');
+    png_alloc_size_t size = bytes.size();
+    if (!png_image_write_to_memory(&png, bytes.data(), &size, 0, pixels.data(), 0, nullptr))
+        throw Error(ExitCode::device, "cannot write " + path + ": " + png.message);
+    bytes.resize(size);
     write_file_atomic(path, bytes);
 }
 

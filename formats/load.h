@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "formats/finalize.h"
+#include "formats/limits.h"
 
 namespace ambilux {
 
@@ -15,6 +16,8 @@ struct LoadOptions {
     uint32_t width = 0, height = 0;  ///< nonzero: replaces the film size (a crop is scaled with it)
     LightPicking light_picking = LightPicking::power;
     std::vector<std::pair<std::string, std::string>> parameters;  ///< values of $parameters, over the file's defaults
+    Limits limits;
+    std::vector<std::string>* files = nullptr;  ///< gets the names of all files that were read
 };
 
 /// Loads a Mitsuba XML scene (formats 0.5, 0.6, 2.x and 3.x). Throws Error(bad_input) with file and line.

@@ -6,12 +6,13 @@
 #include <vector>
 
 #include "core/vec.h"
+#include "formats/limits.h"
 
 namespace ambilux {
 
-/// Image with RGBA texels, row 0 at the top. 8-bit files keep their bytes, as stored (not linearised); all others are
-/// floats. Files with one or two channels are spread to grey; missing alpha is 1.
-struct Image {
+/// RGBA texels of an image file, row 0 at the top. 8-bit files keep their bytes, as stored (not linearised); all others
+/// are floats. Files with one or two channels are spread to grey; missing alpha is 1.
+struct Texels {
     uint32_t width = 0, height = 0;
     bool is_8bit = false;
     bool is_linear = false;      ///< EXR and HDR; otherwise values are sRGB-encoded unless the scene says different
@@ -19,8 +20,9 @@ struct Image {
     std::vector<float> floats;   ///< 4 per texel otherwise
 };
 
-/// Decodes png, jpg, tga, bmp, hdr (stb_image) or exr (OpenEXR: channels R G B A or Y, data window). The format follows
-/// from the content. Throws Error(bad_input) with `path`.
-Image read_image(const std::string& path, std::string_view bytes);
+/// Decodes PNG (libpng), JPEG (libjpeg-turbo), EXR (OpenEXR: channels R G B A or Y, data window), HDR, PNM (P5 and P6),
+/// BMP or TGA. The format follows from the content. Throws Error(bad_input) with `path`, also for what is beyond the
+/// limits, before it is allocated.
+Texels read_image(const std::string& path, std::string_view bytes, const Limits& limits = {});
 
 }  // namespace ambilux

@@ -1,28 +1,9 @@
 #include "formats/meshes/mesh.h"
 
-#include <cstdio>
-#include <memory>
-
 #include "core/error.h"
 #include "core/math.h"
 
 namespace ambilux {
-
-std::string read_file_bytes(const std::string& path) {
-    const std::unique_ptr<FILE, int (*)(FILE*)> file(fopen(path.c_str(), "rb"), fclose);
-    if (!file) throw input_error(path, 0, "cannot open file");
-    std::string bytes;
-    if (fseek(file.get(), 0, SEEK_END) == 0) {
-        const long size = ftell(file.get());
-        if (fseek(file.get(), 0, SEEK_SET) != 0) throw input_error(path, 0, "cannot read file");
-        if (size > 0 && size < (1L << 40)) bytes.resize(size_t(size));
-    }
-    // A directory opens but cannot be read.
-    if (fread(bytes.data(), 1, bytes.size(), file.get()) != bytes.size())
-        throw input_error(path, 0, "cannot read file");
-    if (fgetc(file.get()) != EOF || ferror(file.get())) throw input_error(path, 0, "cannot read file");
-    return bytes;
-}
 
 Mesh make_rectangle() {
     Mesh mesh;
@@ -74,7 +55,17 @@ std::vector<Vec3f> smooth_normals(const Mesh& mesh) {
     return sums;
 }
 
+uint64_t mesh_bytes(uint64_t vertices, uint64_t triangles) {
+    return vertices * (2 * sizeof(Vec3f) + sizeof(Vec2f)) + triangles * sizeof(std::array<uint32_t, 3>);
+}
+
 void check_mesh(const std::string& path, const Mesh& mesh) {
+    if (mesh.faces.empty()) throw input_error(path, 0, "the mesh has no faces");
+    for (const size_t count : {mesh.normals.size(), mesh.uvs.size()})
+        if (count != 0 && count != mesh.positions.size())
+            throw input_error(path, 0,
+                              "normals or texture coordinates are given for " + std::to_string(count) + " of " +
+                                  std::to_string(mesh.positions.size()) + " vertices");
     for (size_t i = 0; i < mesh.positions.size(); ++i)
         if (!is_finite(mesh.positions[i]))
             throw input_error(path, 0, "position of vertex " + std::to_string(i) + " is not finite");

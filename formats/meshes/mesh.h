@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/vec.h"
+#include "formats/limits.h"
 
 namespace ambilux {
 
@@ -17,20 +18,18 @@ struct Mesh {
     std::vector<std::array<uint32_t, 3>> faces;
 };
 
-/// Whole file as bytes; Error(bad_input) that names it if it cannot be read.
-std::string read_file_bytes(const std::string& path);
-
 /// Wavefront OBJ: v, vt, vn and f with positive or negative indices and any number of corners (cut into a fan).
 /// Vertices with the same triple of indices are shared. Other statements are skipped. `flip_v`: v becomes 1-v
-/// (Mitsuba's flip_tex_coords). `path` is for messages.
-Mesh read_obj(const std::string& path, std::string_view text, bool flip_v);
+/// (Mitsuba's flip_tex_coords). `path` is for messages. A file without faces is refused, as by all readers.
+Mesh read_obj(const std::string& path, std::string_view text, bool flip_v, const Limits& limits = {});
 
 /// Stanford PLY, ascii or binary of either byte order. Vertex properties x y z, nx ny nz, and u v (also s t, texture_u
 /// texture_v); faces with three or more corners. Other properties and elements are skipped.
-Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v);
+Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits = {});
 
 /// Mitsuba's .serialized format, version 3 or 4; `shape_index` picks one of the meshes in the file.
-Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_index, bool flip_v);
+Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_index, bool flip_v,
+                     const Limits& limits = {});
 
 /// Two triangles that span [-1,1]² at z = 0, normal +z, uv in [0,1]².
 Mesh make_rectangle();
@@ -42,7 +41,11 @@ Mesh make_cube();
 /// 1998). Vertices without a proper face get (0,0,0).
 std::vector<Vec3f> smooth_normals(const Mesh& mesh);
 
-/// Throws Error(bad_input) if a coordinate is not finite or an index is out of range.
+/// Memory of a mesh of that many vertices and triangles, at most.
+uint64_t mesh_bytes(uint64_t vertices, uint64_t triangles);
+
+/// Throws Error(bad_input) if there is no face, a coordinate is not finite, an index is out of range, or an attribute is
+/// not there for every vertex.
 void check_mesh(const std::string& path, const Mesh& mesh);
 
 }  // namespace ambilux

@@ -2,6 +2,7 @@
 #include <unordered_map>
 
 #include "core/error.h"
+#include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/text_cursor.h"
 
@@ -71,7 +72,8 @@ struct ObjReader {
 
 }  // namespace
 
-Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v) {
+Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits) {
+    FileBudget budget(path, limits);
     ObjReader in{path, TextCursor(bytes), {}, {}, {}};
     std::unordered_map<Corner, uint32_t, CornerHash> vertex_of;
     std::vector<Corner> corners;  ///< of each vertex
@@ -80,6 +82,7 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v) {
     bool some_normals = false, some_uvs = false, lacks_normals = false;
 
     for (; !in.text.done(); in.text.next_line()) {
+        budget.tick();
         const std::string_view keyword = in.text.word();
         if (keyword == "v") {
             const float x = in.coordinate("v"), y = in.coordinate("v"), z = in.coordinate("v");
@@ -104,6 +107,7 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v) {
             }
             if (polygon.size() < 3) in.fail("a face needs at least three corners");
             for (size_t i = 2; i < polygon.size(); ++i) mesh.faces.push_back({polygon[0], polygon[i - 1], polygon[i]});
+            budget.bytes(mesh_bytes(corners.size(), mesh.faces.size()));
         }
     }
 

@@ -1,7 +1,9 @@
 #include <bit>
+#include <cmath>
 #include <cstring>
 
 #include "core/error.h"
+#include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/text_cursor.h"
 
@@ -61,6 +63,9 @@ Role role_named(std::string_view name) {
     return Role::skip;
 }
 
+/// Elements of a file and properties of an element.
+constexpr size_t kMostParts = 1000;
+
 struct PlyReader {
     const std::string& path;
     TextCursor text;
@@ -106,8 +111,11 @@ struct PlyReader {
 
     uint32_t index(Scalar type) {
         const double number = value(type);
-        if (!(number >= 0 && number < 4294967295.0))
-            fail("vertex index " + std::to_string(int64_t(number)) + " is out of range");
+        if (!(number >= 0 && number < 4294967295.0) || number != std::floor(number)) {
+            char shown[32];
+            snprintf(shown, sizeof shown, "%.9g", number);
+            fail(std::string("'") + shown + "' is no index or count");
+        }
         return uint32_t(number);
     }
 };
@@ -137,6 +145,9 @@ std::vector<Element> read_header(PlyReader& in) {
         } else if (keyword == "element") {
             Element element;
             element.name = text.word();
+            for (const Element& earlier : elements)
+                if (earlier.name == element.name) in.fail("element '" + element.name + "' is declared twice");
+            if (elements.size() == kMostParts) in.fail("more than " + std::to_string(kMostParts) + " elements");
             text.skip_blanks();
             if (!text.number(element.count)) in.fail("expected a count for element '" + element.name + "'");
             elements.push_back(element);
@@ -153,6 +164,8 @@ std::vector<Element> read_header(PlyReader& in) {
             }
             if (!scalar_named(type, property.type)) in.fail("unknown type '" + std::string(type) + "'");
             property.name = text.word();
+            if (elements.back().properties.size() == kMostParts)
+                in.fail("more than " + std::to_string(kMostParts) + " properties of an element");
             if (elements.back().name == "vertex" && !property.list) property.role = role_named(property.name);
             elements.back().properties.push_back(property);
         } else if (keyword != "comment" && keyword != "obj_info" && !keyword.empty()) {
@@ -171,65 +184,128 @@ bool has_role(const Element& element, Role role) {
     return false;
 }
 
-}  // namespace
+size_t size_of(Scalar type) {
+    switch (type) {
+        case Scalar::int8:
+        case Scalar::uint8: return 1;
+        case Scalar::int16:
+        case Scalar::uint16: return 2;
+        case Scalar::float64: return 8;
+        default: return 4;
+    }
+}
 
-Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v) {
-    PlyReader in{path, TextCursor(bytes)};
-    const std::vector<Element> elements = read_header(in);
+/// Bytes that an entry takes at least: of text a digit and a blank for each number.
+uint64_t least_size(const Element& element, Encoding encoding) {
+    uint64_t size = 0;
+    for (const Property& p : element.properties)
+        size += encoding == Encoding::ascii ? 2 : size_of(p.list ? p.count_type : p.type);
+    return size;
+}
+
+struct MeshBuilder {
+    PlyReader& in;
+    FileBudget& budget;
+    bool flip_v;
     Mesh mesh;
-    bool has_vertices = false, has_faces = false;
-    for (const Element& element : elements) {
-        // Every entry takes at least one byte, so that a count beyond the file's size is wrong and must not be
-        // allocated.
-        if (element.count > bytes.size())
+    bool has_faces = false;
+
+    void read(const Element& element) {
+        const uint64_t size = least_size(element, in.encoding);
+        // What is larger than the file is wrong and must not be allocated; the last blank may be missing.
+        const uint64_t left = size_t(in.text.end - in.text.at) + 1;
+        if (size > 0 && element.count > left / size)
             in.fail("element '" + element.name + "' claims " + std::to_string(element.count) +
                     " entries, more than the file holds");
-        const bool vertices = element.name == "vertex", faces = element.name == "face";
-        bool normals = false, uvs = false;
-        if (vertices) {
-            has_vertices = true;
-            if (!has_role(element, Role::x) || !has_role(element, Role::y) || !has_role(element, Role::z))
-                in.fail("vertices have no x, y, z");
-            normals = has_role(element, Role::nx) && has_role(element, Role::ny) && has_role(element, Role::nz);
-            uvs = has_role(element, Role::u) && has_role(element, Role::v);
-            mesh.positions.reserve(element.count);
+        if (size == 0) return;
+        if (element.name == "vertex")
+            read_vertices(element);
+        else if (element.name == "face")
+            read_faces(element);
+        else
+            for (uint64_t i = 0; i < element.count; ++i) skip(element);
+    }
+
+private:
+    void skip_list(const Property& p) {
+        for (uint32_t left = in.index(p.count_type); left > 0; --left) in.value(p.type);
+    }
+    void skip(const Element& element) {
+        for (const Property& p : element.properties) {
+            if (p.list)
+                skip_list(p);
+            else
+                in.value(p.type);
         }
+        budget.tick();
+    }
+
+    void read_vertices(const Element& element) {
+        if (!has_role(element, Role::x) || !has_role(element, Role::y) || !has_role(element, Role::z))
+            in.fail("vertices have no x, y, z");
+        const bool normals = has_role(element, Role::nx) && has_role(element, Role::ny) && has_role(element, Role::nz),
+                   uvs = has_role(element, Role::u) && has_role(element, Role::v);
+        budget.bytes(mesh_bytes(element.count, 0));
+        mesh.positions.reserve(element.count);
+        if (normals) mesh.normals.reserve(element.count);
+        if (uvs) mesh.uvs.reserve(element.count);
         for (uint64_t i = 0; i < element.count; ++i) {
             float vertex[9] = {};
-            std::vector<uint32_t> polygon;
-            for (const Property& property : element.properties) {
-                if (property.list) {
-                    const uint32_t count = in.index(property.count_type);
-                    const bool corners =
-                        faces && (property.name == "vertex_indices" || property.name == "vertex_index");
-                    if (corners) has_faces = true;
-                    for (uint32_t k = 0; k < count; ++k) {
-                        if (corners)
-                            polygon.push_back(in.index(property.type));
-                        else
-                            in.value(property.type);
-                    }
-                } else {
-                    vertex[int(property.role)] = float(in.value(property.type));
-                }
+            for (const Property& p : element.properties) {
+                if (p.list)
+                    skip_list(p);
+                else
+                    vertex[int(p.role)] = float(in.value(p.type));
             }
-            if (vertices) {
-                mesh.positions.push_back({vertex[int(Role::x)], vertex[int(Role::y)], vertex[int(Role::z)]});
-                if (normals)
-                    mesh.normals.push_back({vertex[int(Role::nx)], vertex[int(Role::ny)], vertex[int(Role::nz)]});
-                const float v = vertex[int(Role::v)];
-                if (uvs) mesh.uvs.push_back({vertex[int(Role::u)], flip_v ? 1 - v : v});
-            } else if (faces) {
-                if (polygon.size() < 3) in.fail("face " + std::to_string(i) + " has fewer than three corners");
-                for (size_t k = 2; k < polygon.size(); ++k)
-                    mesh.faces.push_back({polygon[0], polygon[k - 1], polygon[k]});
-            }
+            mesh.positions.push_back({vertex[int(Role::x)], vertex[int(Role::y)], vertex[int(Role::z)]});
+            if (normals) mesh.normals.push_back({vertex[int(Role::nx)], vertex[int(Role::ny)], vertex[int(Role::nz)]});
+            const float v = vertex[int(Role::v)];
+            if (uvs) mesh.uvs.push_back({vertex[int(Role::u)], flip_v ? 1 - v : v});
+            budget.tick();
         }
     }
+
+    void read_faces(const Element& element) {
+        budget.bytes(mesh_bytes(mesh.positions.size(), element.count));
+        mesh.faces.reserve(element.count);
+        std::vector<uint32_t> polygon;
+        for (uint64_t i = 0; i < element.count; ++i) {
+            polygon.clear();
+            for (const Property& p : element.properties) {
+                if (p.list && (p.name == "vertex_indices" || p.name == "vertex_index")) {
+                    has_faces = true;
+                    for (uint32_t left = in.index(p.count_type); left > 0; --left) polygon.push_back(in.index(p.type));
+                } else if (p.list) {
+                    skip_list(p);
+                } else {
+                    in.value(p.type);
+                }
+            }
+            if (polygon.size() < 3) in.fail("face " + std::to_string(i) + " has fewer than three corners");
+            for (size_t k = 2; k < polygon.size(); ++k)
+                mesh.faces.push_back({polygon[0], polygon[k - 1], polygon[k]});
+            budget.bytes(mesh_bytes(mesh.positions.size(), mesh.faces.size()));
+            budget.tick();
+        }
+    }
+};
+
+}  // namespace
+
+Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits) {
+    FileBudget budget(path, limits);
+    PlyReader in{path, TextCursor(bytes)};
+    const std::vector<Element> elements = read_header(in);
+    MeshBuilder builder{in, budget, flip_v, {}};
+    bool has_vertices = false;
+    for (const Element& element : elements) {
+        has_vertices |= element.name == "vertex";
+        builder.read(element);
+    }
     if (!has_vertices) in.fail("no element 'vertex'");
-    if (!has_faces) in.fail("no faces with vertex_indices");
-    check_mesh(path, mesh);
-    return mesh;
+    if (!builder.has_faces) in.fail("no faces with vertex_indices");
+    check_mesh(path, builder.mesh);
+    return std::move(builder.mesh);
 }
 
 }  // namespace ambilux

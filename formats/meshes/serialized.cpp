@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
 
 namespace ambilux {
@@ -18,14 +19,16 @@ namespace {
 
 enum Flags : uint32_t { kNormals = 0x0001, kTexcoords = 0x0002, kColors = 0x0008, kDoublePrecision = 0x2000 };
 
+constexpr int kLongestName = 1 << 16;
+
 /// Inflates a stream piece by piece.
 struct Inflater {
     const std::string& path;
+    FileBudget& budget;
+    std::string_view rest;  ///< what zlib, which counts in 32 bits, has not got yet
     z_stream stream{};
 
-    Inflater(const std::string& file, std::string_view bytes) : path(file) {
-        stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-        stream.avail_in = uInt(bytes.size());
+    Inflater(const std::string& file, std::string_view bytes, FileBudget& b) : path(file), budget(b), rest(bytes) {
         if (inflateInit(&stream) != Z_OK) throw input_error(path, 0, "cannot start zlib");
     }
     ~Inflater() { inflateEnd(&stream); }
@@ -34,7 +37,12 @@ struct Inflater {
     void read(void* data, size_t size) {
         auto* out = static_cast<Bytef*>(data);
         while (size > 0) {
-            const uInt chunk = uInt(std::min<size_t>(size, 1u << 30));
+            const uInt chunk = uInt(std::min<size_t>(size, kPiece));
+            if (stream.avail_in == 0 && !rest.empty()) {
+                stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(rest.data()));
+                stream.avail_in = uInt(std::min<size_t>(rest.size(), 1u << 30));
+                rest.remove_prefix(stream.avail_in);
+            }
             stream.next_out = out;
             stream.avail_out = chunk;
             const int status = inflate(&stream, Z_SYNC_FLUSH);
@@ -46,7 +54,9 @@ struct Inflater {
                 throw input_error(
                     path, 0,
                     std::string("mesh data is damaged (zlib: ") + (stream.msg ? stream.msg : "no progress") + ")");
-            if (got == 0 && size > 0) throw input_error(path, 0, "mesh data ends too early");
+            if (got == 0 && size > 0 && rest.empty()) throw input_error(path, 0, "mesh data ends too early");
+            if (budget.expired())
+                budget.fail("reading it takes longer than --limits seconds=" + std::to_string(budget.limits().seconds));
         }
     }
     template <class T>
@@ -55,18 +65,26 @@ struct Inflater {
         read(&v, sizeof v);
         return v;
     }
-    /// `count` floats, which the file may store as doubles.
-    std::vector<float> floats(size_t count, bool doubles) {
-        std::vector<float> values(count);
-        if (!doubles) {
-            read(values.data(), count * sizeof(float));
-            return values;
+    /// `count` values, which grow as the data comes: a count that lies allocates little.
+    template <class T>
+    std::vector<T> values(uint64_t count) {
+        std::vector<T> all;
+        while (all.size() < count) {
+            const size_t begin = all.size(), piece = size_t(std::min<uint64_t>(count - begin, kPiece / sizeof(T)));
+            if (begin + piece > all.capacity()) all.reserve(std::min<uint64_t>(count, 2 * (begin + piece)));
+            all.resize(begin + piece);
+            read(all.data() + begin, piece * sizeof(T));
         }
-        std::vector<double> wide(count);
-        read(wide.data(), count * sizeof(double));
-        for (size_t i = 0; i < count; ++i) values[i] = float(wide[i]);
-        return values;
+        return all;
     }
+    /// `count` floats, which the file may store as doubles.
+    std::vector<float> floats(uint64_t count, bool doubles) {
+        if (!doubles) return values<float>(count);
+        const std::vector<double> wide = values<double>(count);
+        return {wide.begin(), wide.end()};
+    }
+
+    static constexpr size_t kPiece = 16 << 20;
 };
 
 template <class T>
@@ -79,7 +97,9 @@ T load(const std::string& path, std::string_view bytes, size_t offset) {
 
 }  // namespace
 
-Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_index, bool flip_v) {
+Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_index, bool flip_v,
+                     const Limits& limits) {
+    FileBudget budget(path, limits);
     if (load<uint16_t>(path, bytes, 0) != 0x041C) throw input_error(path, 0, "not a Mitsuba serialized mesh");
     const uint16_t version = load<uint16_t>(path, bytes, 2);
     if (version != 3 && version != 4)
@@ -100,14 +120,16 @@ Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_
     }
     if (offset + 4 >= bytes.size() || offset + 4 < offset) throw input_error(path, 0, "the table of meshes is damaged");
 
-    Inflater in(path, bytes.substr(offset + 4));
+    Inflater in(path, bytes.substr(offset + 4), budget);
     const uint32_t flags = in.value<uint32_t>();
     if (version == 4)
-        while (in.value<char>() != 0) {}
+        for (int length = 0; in.value<char>() != 0; ++length)
+            if (length == kLongestName) throw input_error(path, 0, "the name of the mesh does not end");
     const uint64_t vertices = in.value<uint64_t>(), triangles = in.value<uint64_t>();
     // Deflate packs at most 1032:1, so larger claims are wrong and must not be allocated.
     if (vertices > bytes.size() * 1032 / 12 || triangles > bytes.size() * 1032 / 12)
         throw input_error(path, 0, "mesh claims more data than the file holds");
+    budget.bytes(mesh_bytes(vertices, triangles));
 
     const bool doubles = flags & kDoublePrecision;
     const auto vectors = [&] {
@@ -126,8 +148,7 @@ Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_
             mesh.uvs[i] = {values[2 * i], flip_v ? 1 - values[2 * i + 1] : values[2 * i + 1]};
     }
     if (flags & kColors) vectors();
-    mesh.faces.resize(triangles);
-    in.read(mesh.faces.data(), triangles * 12);
+    mesh.faces = in.values<std::array<uint32_t, 3>>(triangles);
     check_mesh(path, mesh);
     return mesh;
 }

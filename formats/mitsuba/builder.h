@@ -34,6 +34,14 @@ struct Builder {
     std::map<std::string, float> rough_reflectance_pool;
     std::set<std::string> reported;
 
+    uint64_t memory = 0;  ///< of meshes and textures
+
+    /// Counts memory that the scene is going to have; Error(bad_input) with `path` if it is too much in all.
+    void take_memory(uint64_t bytes, const std::string& path);
+
+    /// Fails unless all of these are in the range of the tracers (accel/range.h). `what` has them: "the shape".
+    void check_range(const Where& where, const std::string& what, std::initializer_list<Vec3d> points) const;
+
     /// Something we cannot do: an error, or with --lenient a warning that says what is done instead.
     void refuse(const Where& where, const std::string& problem, const std::string& instead);
 };
@@ -45,6 +53,7 @@ struct LoadedImage {
     TexelFormat format = TexelFormat::rgba8;
     uint32_t decode_table = 0;
     Rgb mean{};
+    float largest = 0;  ///< value of any colour; only known of float texels
 };
 
 /// Reads the parameters of one object and keeps track of which were asked for.
@@ -90,12 +99,13 @@ private:
     const Object& object_;
     std::set<const Value*> used_values_;
     std::set<const Child*> used_children_;
+    std::map<std::string, size_t> next_child_;  ///< by tag: where take() looks on
 };
 
 /// Texture object as index into Scene::textures (0 when only validating).
 int32_t load_texture(Builder& builder, const Object& object);
-/// Image as float texels without flip or decoding table, for environment maps.
-int32_t load_environment_image(Builder& builder, const std::string& path);
+/// Image as float texels without flip or decoding table, for environment maps; and the largest of them.
+int32_t load_environment_image(Builder& builder, const std::string& path, float& largest);
 /// Mean colour of a parameter over its texture.
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter);
 

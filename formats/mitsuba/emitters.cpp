@@ -1,4 +1,7 @@
+#include <fmt/format.h>
+
 #include <cmath>
+#include <limits>
 
 #include "formats/mitsuba/builder.h"
 #include "transport/emitter/spot.h"
@@ -25,6 +28,12 @@ Matrix rigid_transform(Builder& builder, Reader& in) {
     return m;
 }
 
+/// Its rotation: what is infinitely far away has no place.
+Matrix without_place(Matrix m) {
+    for (int i = 0; i < 3; ++i) m.m[i][3] = 0;
+    return m;
+}
+
 // One plugin a model: what its XML says.
 
 void read_plugin(ModelTag<AreaEmitter>, Builder&, Reader& in, Emitter& e) {
@@ -36,12 +45,15 @@ void read_plugin(ModelTag<PointEmitter>, Builder& builder, Reader& in, Emitter& 
         in.fail(in.where("to_world"), "both 'position' and 'to_world' are given");
     const Vec3d p = in.vector("position", {});
     const Matrix to_world = in.has("position") ? translation(p.x, p.y, p.z) : in.transform("to_world");
-    e.position = to_vec3f(column(builder.to_scene * to_world, 3));
+    const Vec3d at = column(builder.to_scene * to_world, 3);
+    builder.check_range(in.where(), "the emitter of type 'point'", {at});
+    e.position = to_vec3f(at);
     e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
 }
 
 void read_plugin(ModelTag<SpotEmitter>, Builder& builder, Reader& in, Emitter& e) {
     const Matrix m = rigid_transform(builder, in);
+    builder.check_range(in.where(), "the emitter of type 'spot'", {column(m, 3)});
     e.to_world = to_affine(m);
     e.to_local = to_affine(affine_inverse(m));
     e.position = to_vec3f(column(m, 3));
@@ -72,7 +84,7 @@ void read_plugin(ModelTag<ConstantEmitter>, Builder&, Reader& in, Emitter& e) {
 }
 
 void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter& e) {
-    const Matrix m = rigid_transform(builder, in);
+    const Matrix m = without_place(rigid_transform(builder, in));
     e.to_world = to_affine(m);
     e.to_local = to_affine(affine_inverse(m));
     const std::string name = in.text("filename", "");
@@ -81,7 +93,13 @@ void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter&
     const double scale = in.number("scale", 1);
     if (!(scale >= 0)) in.fail(in.where("scale"), "scale must not be negative");
     in.ignore({"cache"});
-    e.radiance = {splat(float(scale)), load_environment_image(builder, path)};
+    float largest = 0;
+    e.radiance = {splat(float(scale)), load_environment_image(builder, path, largest)};
+    const double most = std::numeric_limits<float>::max();
+    if (!(scale <= most && scale * largest <= most))
+        in.fail(in.where("scale"), fmt::format("scale {:g} makes a radiance of {:g} of the brightest texel; floats end at "
+                                               "{:g}",
+                                               scale, scale * largest, most));
 }
 
 }  // namespace

@@ -59,13 +59,17 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     build_shapes(builder, *document.scene);
     validate_unused(builder);
     scene.content_hash = content_hash(builder);
+    if (options.files) {
+        for (const auto& [file, text] : document.files) options.files->push_back(file);
+        for (const auto& [file, digest] : builder.file_digests) options.files->push_back(file);
+    }
     return scene;
 }
 
 }  // namespace
 
 Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
-    const Document document = parse_document(path, options.parameters);
+    const Document document = parse_document(path, options.parameters, options.limits);
     Scene scene = build_scene(path, document, options, scene_origin(document));
     finalize_scene(scene, options.light_picking);
     return scene;

@@ -1,5 +1,9 @@
-#include <algorithm>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "accel/range.h"
 #include "core/error.h"
 #include "formats/mitsuba/builder.h"
 #include "formats/mitsuba/named_media.h"
@@ -10,6 +14,23 @@ void Builder::refuse(const Where& where, const std::string& problem, const std::
     if (!options.lenient) throw input_error(where.file, where.line, problem);
     const std::string message = where.file + ":" + std::to_string(where.line) + ": " + problem + "; " + instead;
     if (reported.insert(message).second) scene.warnings.push_back(message);
+}
+
+void Builder::take_memory(uint64_t bytes, const std::string& path) {
+    memory += std::min(bytes, UINT64_MAX - memory);
+    if (memory > options.limits.total_bytes)
+        throw input_error(path, 0,
+                          "with it, meshes and textures take more memory than --limits total_bytes=" +
+                              std::to_string(options.limits.total_bytes));
+}
+
+void Builder::check_range(const Where& where, const std::string& what, std::initializer_list<Vec3d> points) const {
+    for (const Vec3d& p : points)
+        for (const double c : {p.x, p.y, p.z})
+            if (!(std::fabs(c) <= double(kMostCoordinate)))
+                throw input_error(where.file, where.line,
+                                  fmt::format("{} reaches to {:g}; rays are traced between -{:g} and {:g}", what, c,
+                                              kMostCoordinate, kMostCoordinate));
 }
 
 void Reader::fail(const std::string& message) const { fail(object_.where, message); }
@@ -122,12 +143,17 @@ ParamFloat Reader::textured_number(const std::string& name, float fallback) {
             fail(where(name), "'" + name + "' must be a number or a texture, not a " + texture->tag);
         return {1, load_texture(builder_, *texture)};
     }
-    return {float(number(name, fallback)), -1};
+    const float value = float(number(name, fallback));
+    if (!std::isfinite(value)) fail(where(name), "'" + name + "' is too large for a float");
+    return {value, -1};
 }
 
 const Object* Reader::take(const std::string& tag) {
-    for (const Child& child : object_.children)
+    // From where the last one of this tag was found: scenes may have a million emitters.
+    for (size_t& i = next_child_[tag]; i < object_.children.size();) {
+        const Child& child = object_.children[i++];
         if (child.object->tag == tag && used_children_.insert(&child).second) return child.object;
+    }
     return nullptr;
 }
 

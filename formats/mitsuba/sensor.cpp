@@ -1,13 +1,29 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "accel/range.h"
 #include "core/error.h"
 #include "formats/meshes/text_cursor.h"
 #include "formats/mitsuba/builder.h"
+#include "transport/subpath/subpath.h"
 
 namespace ambilux::mitsuba {
 
 namespace {
+
+constexpr uint64_t kMostPixels = 0xffffffff;
+/// Tangents of half a field of view: its square is a density, and its inverse too.
+constexpr double kLeastTangent = 1e-9, kMostTangent = 1e9;
+
+/// A length of the sensor; fails outside of the range of the tracers.
+float range_parameter(Reader& in, const char* name, double fallback) {
+    const double value = in.number(name, fallback);
+    if (!(std::fabs(value) <= double(kMostCoordinate)))
+        in.fail(in.where(name), fmt::format("{} is {:g}; it may be {:g} at most", name, value, kMostCoordinate));
+    return float(value);
+}
 
 /// Tangent of half the field of view along x and y. Mitsuba's rule: `fov` with `fov_axis`, or `focal_length` in
 /// millimetres on the diagonal of a 36 x 24 mm film.
@@ -41,6 +57,11 @@ Vec2f field_of_view(Reader& in, double aspect) {
         tx = t * aspect / std::sqrt(aspect * aspect + 1);
     else
         in.fail(in.where("fov_axis"), "unknown fov_axis '" + axis + "'");
+    for (const double tangent : {tx, tx / aspect})
+        if (!(tangent >= kLeastTangent && tangent <= kMostTangent))
+            in.fail(in.where(in.has("fov") ? "fov" : "focal_length"),
+                    fmt::format("the tangent of half the field of view is {:g}; it must lie between {:g} and {:g}",
+                                tangent, kLeastTangent, kMostTangent));
     return {float(tx), float(tx / aspect)};
 }
 
@@ -94,6 +115,9 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
     if (sensor.crop_x + sensor.crop_width > sensor.film_width ||
         sensor.crop_y + sensor.crop_height > sensor.film_height)
         in.fail(in.where("crop_width"), "the crop window is not inside of the film");
+    if (uint64_t(sensor.crop_width) * sensor.crop_height > kMostPixels && !builder.options.width)
+        in.fail(in.where("width"), fmt::format("a film of {}x{} has more pixels than can be numbered ({})",
+                                               sensor.crop_width, sensor.crop_height, kMostPixels));
     read_filter(builder, in, sensor);
     // How files are written and shown; our images are linear and complete.
     in.ignore({"gamma", "banner", "file_format", "pixel_format", "component_format", "attach_log", "compensate",
@@ -129,6 +153,20 @@ void read_sampler(Builder& builder, const Object* object) {
     builder.scene.integrator.spp = int(spp);
     in.ignore({"seed", "scramble", "jitter", "dimension", "strength"});
     in.finish();
+}
+
+/// Fails unless all rays of a perspective sensor can be traced.
+void check_rays(Reader& in, const Sensor& sensor) {
+    const double focus = has_lens(sensor.type) ? sensor.focus_distance : 1, lens = sensor.aperture_radius;
+    const auto slope = [&](float tangent, float offset) { return tangent * (1 + 2 * std::fabs(offset)) + lens / focus; };
+    const double steepest = std::max(slope(sensor.tan_half_fov.x, sensor.principal_offset.x),
+                                     slope(sensor.tan_half_fov.y, sensor.principal_offset.y));
+    if (!(steepest <= kMostTangent))
+        in.fail(fmt::format("rays of the sensor leave its axis by {:g} times their way; {:g} is possible", steepest,
+                            kMostTangent));
+    const double reach = lens + steepest * sensor.near_clip;
+    if (!(reach <= double(kMostCoordinate)))
+        in.fail(fmt::format("rays of the sensor begin up to {:g} from it; {:g} is possible", reach, kMostCoordinate));
 }
 
 /// The sensor of that plugin; perspective, and false, if there is none.
@@ -168,6 +206,8 @@ void build_sensor(Builder& builder, const Object& object) {
         for (int j = 0; j < 3; ++j) {
             lengths[j] = length(column(to_world, j));
             for (int i = 0; i < 3; ++i) to_world.m[i][j] /= lengths[j];
+            if (!(lengths[j] >= double(kLeastExtent) && lengths[j] <= double(kMostCoordinate)))
+                in.fail(in.where("to_world"), fmt::format("the transform scales the film by {:g}", lengths[j]));
         }
         to_world = rigid_part(to_world, problem);
         sensor.tan_half_fov = {float(lengths[0]), float(lengths[1] / aspect)};
@@ -177,22 +217,25 @@ void build_sensor(Builder& builder, const Object& object) {
             builder.refuse(in.where("to_world"), "the sensor's transform must not scale or shear",
                            "scale and shear are left out");
         sensor.tan_half_fov = field_of_view(in, aspect);
-        sensor.principal_offset = {float(in.number("principal_point_offset_x", 0)),
-                                   float(in.number("principal_point_offset_y", 0))};
+        sensor.principal_offset = {range_parameter(in, "principal_point_offset_x", 0),
+                                   range_parameter(in, "principal_point_offset_y", 0)};
     }
+    builder.check_range(in.where("to_world"), "the sensor", {column(to_world, 3)});
     sensor.to_world = to_affine(to_world);
-    sensor.near_clip = float(in.number("near_clip", 1e-2));
+    sensor.near_clip = range_parameter(in, "near_clip", 1e-2);
     sensor.far_clip = float(in.number("far_clip", 1e4));
     if (!(sensor.near_clip > 0 && sensor.near_clip < sensor.far_clip))
         in.fail(in.where("near_clip"), "near_clip must be positive and smaller than far_clip");
     sensor.focus_distance = float(in.number("focus_distance", sensor.far_clip));
     if (has_lens(sensor.type)) {
         if (!in.has("aperture_radius")) in.fail("thinlens has no aperture_radius");
-        sensor.aperture_radius = float(in.number("aperture_radius", 0));
+        sensor.aperture_radius = range_parameter(in, "aperture_radius", 0);
         if (!(sensor.aperture_radius >= 0))
             in.fail(in.where("aperture_radius"), "aperture_radius must not be negative");
         if (!(sensor.focus_distance > 0)) in.fail(in.where("focus_distance"), "focus_distance must be positive");
+        range_parameter(in, "focus_distance", std::min(sensor.far_clip, kMostCoordinate));
     }
+    if (!is_parallel(sensor.type)) check_rays(in, sensor);
     // Nothing moves, so that the shutter has no effect.
     in.ignore({"shutter_open", "shutter_close"});
     if (known || !builder.options.lenient) in.finish();
@@ -218,6 +261,9 @@ void build_integrator(Builder& builder, const Object& object) {
         hint.max_depth = int(std::clamp<int64_t>(in.integer("max_depth", -1), -2, 1 << 30));
         hint.rr_depth = int(std::clamp<int64_t>(in.integer("rr_depth", 5), 0, 1 << 30));
         if (hint.max_depth < -1) in.fail(in.where("max_depth"), "max_depth must be -1 or larger");
+        if (hint.max_depth >= int(kMaxDepth))
+            in.fail(in.where("max_depth"),
+                    fmt::format("max_depth may be {} at most, or -1 for no limit", kMaxDepth - 1));
         if (type != "path") in.ignore({"light_image", "sample_direct", "samples_per_pass"});
     } else {
         builder.refuse(object.where, "integrator type '" + type + "' is not supported", "path is used");

@@ -1,8 +1,12 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "accel/range.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
 #include "formats/mitsuba/builder.h"
 
@@ -111,6 +115,8 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
         job.emitter = add_emitter(*emitter);
     job.material = bsdf ? build_material(builder, *bsdf) : default_material(builder, emitter != nullptr);
     in.finish();
+    if (jobs.size() >= builder.options.limits.shapes)
+        in.fail("the scene has more shapes than --limits shapes=" + std::to_string(builder.options.limits.shapes));
     jobs.push_back(std::move(job));
 }
 
@@ -180,14 +186,15 @@ Vec3d area_normal(Vec3f a, Vec3f b, Vec3f c) {
 }
 
 /// Moves a mesh to world space, orients it and leaves out triangles without area.
-void transform_mesh(Job& job, const Mesh& mesh) {
+void transform_mesh(const Builder& builder, Job& job, const Mesh& mesh) {
     const Affine to_local = to_affine(affine_inverse(job.to_world));
     Mesh& out = job.world;
     out.positions.reserve(mesh.positions.size());
     for (Vec3f p : mesh.positions) {
-        out.positions.push_back(point_of(job.to_world, p));
-        if (!is_finite(out.positions.back()))
-            throw input_error(job.where.file, job.where.line, "a vertex of the shape is not finite in world space");
+        const Vec3f q = point_of(job.to_world, p);
+        out.positions.push_back(q);
+        if (!(max_component(abs(q)) <= kMostCoordinate) || !is_finite(q))
+            builder.check_range(job.where, "the shape of type '" + job.type + "'", {{q.x, q.y, q.z}});
     }
     out.uvs = mesh.uvs;
     // A reflection would turn the outside in: reverse the winding.
@@ -262,24 +269,36 @@ Quadric make_quadric(Builder& builder, const Job& job) {
         m = rigid_part(unit, ignored) * scaling(radius, radius, q.type == PrimitiveType::sphere ? radius : lz);
         q.radius = float(radius);
     }
+    const Vec3d c = column(m, 3), top = column(m, 2);
+    const double reach = q.type == PrimitiveType::cylinder ? q.radius + length(top) : double(q.radius);
+    builder.check_range(job.where, "the shape of type '" + job.type + "'",
+                        {{c.x - reach, c.y - reach, c.z - reach}, {c.x + reach, c.y + reach, c.z + reach}});
+    const double least = std::min({lx, ly, q.type == PrimitiveType::disk ? lx : lz});
+    if (!(least >= double(kLeastExtent)))
+        throw input_error(job.where.file, job.where.line,
+                          fmt::format("the shape of type '{}' is {:g} wide, less than {:g}", job.type, least,
+                                      kLeastExtent));
     q.to_world = to_affine(m);
     q.to_local = to_affine(affine_inverse(m));
     return q;
 }
+
+uint64_t memory_of(const Mesh& mesh) { return mesh_bytes(mesh.positions.size(), mesh.faces.size()); }
 
 /// Reads the files of meshes, on all threads.
 void load_sources(Builder& builder, std::vector<MeshSource>& sources) {
     parallel_for(sources.size(), [&](size_t i) {
         MeshSource& s = sources[i];
         if (s.path.empty()) return;
-        const std::string bytes = read_file_bytes(s.path);
+        const Limits& limits = builder.options.limits;
+        const std::string bytes = read_input(s.path, limits);
         s.digest = sha256(bytes);
         if (s.type == "obj")
-            s.mesh = read_obj(s.path, bytes, s.flip_v);
+            s.mesh = read_obj(s.path, bytes, s.flip_v, limits);
         else if (s.type == "ply")
-            s.mesh = read_ply(s.path, bytes, s.flip_v);
+            s.mesh = read_ply(s.path, bytes, s.flip_v, limits);
         else
-            s.mesh = read_serialized(s.path, bytes, s.shape_index, s.flip_v);
+            s.mesh = read_serialized(s.path, bytes, s.shape_index, s.flip_v, limits);
     });
     for (const MeshSource& s : sources)
         if (!s.path.empty()) builder.file_digests.push_back({s.path, s.digest});
@@ -297,10 +316,14 @@ void reserve_meshes(const std::vector<Job>& jobs, Scene& scene) {
     scene.triangles.reserve(triangles);
 }
 
-void add_mesh(Scene& scene, const Job& job, uint32_t index, Shape& shape) {
+void add_mesh(Builder& builder, const Job& job, uint32_t index, Shape& shape) {
+    Scene& scene = builder.scene;
     const Mesh& mesh = job.world;
     if (job.emitter != kNone && mesh.faces.empty())
         throw input_error(job.where.file, job.where.line, "the shape emits light but has no area");
+    if (mesh.faces.empty())
+        builder.refuse(job.where, "the shape of type '" + job.type + "' has no area: none of its triangles has any",
+                       "it is left out");
     const uint32_t first = uint32_t(scene.vertices.size());
     shape.first_primitive = uint32_t(scene.triangles.size());
     shape.primitive_count = uint32_t(mesh.faces.size());
@@ -323,9 +346,16 @@ void build_shapes(Builder& builder, const Object& root) {
         if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false, false);
     }
     load_sources(builder, shapes.sources);
+    // Shapes get meshes of their own, and so does the scene.
+    for (const MeshSource& s : shapes.sources) builder.take_memory(memory_of(s.mesh), s.path);
+    for (const Job& job : shapes.jobs)
+        if (job.source >= 0) {
+            const Mesh& mesh = shapes.sources[size_t(job.source)].mesh;
+            builder.take_memory(2 * memory_of(mesh), job.where.file + ":" + std::to_string(job.where.line));
+        }
     parallel_for(shapes.jobs.size(), [&](size_t i) {
         Job& job = shapes.jobs[i];
-        if (job.source >= 0) transform_mesh(job, shapes.sources[size_t(job.source)].mesh);
+        if (job.source >= 0) transform_mesh(builder, job, shapes.sources[size_t(job.source)].mesh);
     });
 
     Scene& scene = builder.scene;
@@ -335,7 +365,7 @@ void build_shapes(Builder& builder, const Object& root) {
         Shape shape{job.material, job.emitter, 0, 0, 0, 0};
         if (job.emitter != kNone) scene.emitters[job.emitter].shape = index;
         if (job.source >= 0) {
-            add_mesh(scene, job, index, shape);
+            add_mesh(builder, job, index, shape);
             job.world = {};
         } else {
             Quadric q = make_quadric(builder, job);

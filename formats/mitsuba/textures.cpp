@@ -4,8 +4,8 @@
 
 #include "core/error.h"
 #include "core/half.h"
+#include "formats/file_budget.h"
 #include "formats/images/image_io.h"
-#include "formats/meshes/mesh.h"
 #include "formats/mitsuba/builder.h"
 
 namespace ambilux::mitsuba {
@@ -57,15 +57,16 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
     const auto known = builder.images.find(key);
     if (known != builder.images.end()) return known->second;
 
-    const std::string bytes = read_file_bytes(path);
+    const std::string bytes = read_input(path, builder.options.limits);
     builder.file_digests.push_back({path, sha256(bytes)});
-    const Image image = read_image(path, bytes);
+    const Texels image = read_image(path, bytes, builder.options.limits);
     const double used_gamma = gamma != 0 ? gamma : (image.is_linear ? 1 : -1);
     LoadedImage out;
     out.width = image.width;
     out.height = image.height;
     double mean[3] = {0, 0, 0};
     const size_t count = size_t(image.width) * image.height;
+    builder.take_memory(count * (image.is_8bit && !as_float ? 4 : 16), path);
     if (image.is_8bit && !as_float) {
         out.format = TexelFormat::rgba8;
         out.decode_table = decode_table(builder, used_gamma);
@@ -85,7 +86,7 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
                 throw input_error(path, 0,
                                   "texel (" + std::to_string(i / 4 % image.width) + ", " +
                                       std::to_string(i / 4 / image.width) + ") is not finite");
-            if (i % 4 < 3) mean[i % 4] += texels[i];
+            if (i % 4 < 3) mean[i % 4] += texels[i], out.largest = std::max(out.largest, texels[i]);
         }
         if (as_float && fits_half(texels)) {
             out.format = TexelFormat::rgba16f;
@@ -111,6 +112,7 @@ void read_to_uv(Reader& in, float out[2][3]) {
     for (int j = 0; j < 3; ++j) {
         out[0][j] = float(su * m.m[0][columns[j]] + (j == 2 ? ou : 0));
         out[1][j] = float(sv * m.m[1][columns[j]] + (j == 2 ? ov : 0));
+        if (!std::isfinite(out[0][j]) || !std::isfinite(out[1][j])) in.fail("the transform of the texture is not finite");
     }
 }
 
@@ -163,6 +165,8 @@ int32_t load_texture(Builder& builder, const Object& object) {
         const bool raw = in.boolean("raw", false);
         double gamma = in.number("gamma", 0);
         if (raw) gamma = 1;
+        if (!(gamma >= 0 && gamma <= 100) && gamma != -1)
+            in.fail(in.where("gamma"), "gamma must lie between 0 and 100, or be -1 for sRGB");
         texture.wrap = wrap_mode(builder, in);
         texture.filter = texture_filter(builder, in);
         read_to_uv(in, texture.to_uv);
@@ -193,8 +197,9 @@ int32_t load_texture(Builder& builder, const Object& object) {
     return add_texture(builder, texture, mean);
 }
 
-int32_t load_environment_image(Builder& builder, const std::string& path) {
+int32_t load_environment_image(Builder& builder, const std::string& path, float& largest) {
     const LoadedImage image = load_image(builder, path, 0, true);
+    largest = image.largest;
     Texture texture;
     memset(&texture, 0, sizeof texture);
     texture.type = TextureType::bitmap;

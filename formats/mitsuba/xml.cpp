@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <functional>
 #include <set>
 
 #include "core/error.h"
-#include "formats/meshes/mesh.h"
+#include "formats/file_budget.h"
 #include "formats/meshes/text_cursor.h"
 #include "formats/mitsuba/xml_values.h"
 
@@ -43,12 +42,21 @@ bool is_object_tag(const std::string& tag) {
     return tags.count(tag) > 0;
 }
 
+constexpr int kNewestVersion = 3;
+/// Objects that a shape may be made of, on average.
+constexpr uint64_t kObjectsPerShape = 16;
+
 struct Parser {
     Document& document;
     ValueParser values;
     std::vector<std::string> open_files;  ///< canonical paths of the files being parsed
+    std::map<const Object*, uint64_t> sizes;
 
-    void parse_children(const XmlSource& source, const pugi::xml_node& node, Object& object) {
+    void parse_children(const XmlSource& source, const pugi::xml_node& node, Object& object, uint64_t depth) {
+        if (depth > document.limits.nesting)
+            fail(where(source, node), "elements are nested deeper than --limits nesting=" +
+                                          std::to_string(document.limits.nesting));
+        std::set<std::string> names;
         for (const pugi::xml_node& child : node.children()) {
             if (child.type() != pugi::node_element) continue;
             std::string tag = child.name();
@@ -56,7 +64,7 @@ struct Parser {
             const Where at = where(source, child);
             if (ValueParser::is_value_tag(tag)) {
                 Value value = values.parse_value(source, child, tag);
-                if (object.find(value.name)) fail(at, "parameter '" + value.name + "' is given twice");
+                if (!names.insert(value.name).second) fail(at, "parameter '" + value.name + "' is given twice");
                 object.values.push_back(std::move(value));
             } else if (tag == "ref") {
                 ValueParser::allow(source, child, {"name", "id"});
@@ -68,6 +76,7 @@ struct Parser {
             } else if (tag == "path") {
                 ValueParser::allow(source, child, {"value"});
                 const std::string folder = values.attribute(source, child, "value");
+                check_includes(document.search_folders.size() + 1, at);
                 document.search_folders.push_back(document.resolve(folder, at));
             } else if (tag == "alias") {
                 ValueParser::allow(source, child, {"id", "as"});
@@ -77,9 +86,9 @@ struct Parser {
             } else if (tag == "include") {
                 ValueParser::allow(source, child, {"filename"});
                 if (object.tag != "scene") fail(at, "<include> is only allowed in <scene>");
-                parse_file(document.resolve(values.attribute(source, child, "filename"), at), at);
+                parse_file(document.resolve(values.attribute(source, child, "filename"), at), at, depth + 1);
             } else if (is_object_tag(tag) && tag != "scene") {
-                const Object* nested = parse_object(source, child, tag);
+                const Object* nested = parse_object(source, child, tag, depth + 1);
                 object.children.push_back({values.parameter_name(source, child), at, "", nested});
             } else {
                 fail(at, "unknown element <" + tag + ">");
@@ -94,7 +103,12 @@ struct Parser {
                          std::to_string(it->second->where.line));
     }
 
-    Object* parse_object(const XmlSource& source, const pugi::xml_node& node, const std::string& tag) {
+    void check_includes(size_t count, const Where& at) const {
+        if (count > document.limits.includes)
+            fail(at, "more files or folders than --limits includes=" + std::to_string(document.limits.includes));
+    }
+
+    Object* parse_object(const XmlSource& source, const pugi::xml_node& node, const std::string& tag, uint64_t depth) {
         ValueParser::allow(source, node, {"type", "id", "name"});
         document.storage.push_back(std::make_unique<Object>());
         Object* object = document.storage.back().get();
@@ -106,18 +120,19 @@ struct Parser {
             object->id = values.attribute(source, node, "id");
             add_id(object->id, object, object->where);
         }
-        parse_children(source, node, *object);
+        parse_children(source, node, *object, depth);
         return object;
     }
 
-    void parse_file(const std::string& path, const Where& from) {
+    void parse_file(const std::string& path, const Where& from, uint64_t depth) {
         std::error_code ignored;
         const fs::path canonical = fs::weakly_canonical(path, ignored);
         if (std::find(open_files.begin(), open_files.end(), canonical.string()) != open_files.end())
             fail(from, "circular include of '" + path + "'");
         open_files.push_back(canonical.string());
 
-        const std::string bytes = read_file_bytes(path);
+        check_includes(document.files.size(), from);
+        const std::string bytes = read_input(path, document.limits);
         document.files.push_back({path, bytes});
         XmlSource source;
         source.path = path;
@@ -133,7 +148,9 @@ struct Parser {
         if (root.attribute("version")) {
             const std::string version = root.attribute("version").value();
             TextCursor cursor(version);
-            if (!cursor.number(source.version)) fail(where(source, root), "'" + version + "' is not a version");
+            if (!cursor.number(source.version) || source.version < 0 || source.version > kNewestVersion)
+                fail(where(source, root), "'" + version + "' is no version that is known (0.5 to " +
+                                              std::to_string(kNewestVersion) + ".x)");
         }
         if (!document.scene) {
             document.storage.push_back(std::make_unique<Object>());
@@ -142,7 +159,7 @@ struct Parser {
             document.scene->where = where(source, root);
             document.scene->version = source.version;
         }
-        parse_children(source, root, *document.scene);
+        parse_children(source, root, *document.scene, depth);
         open_files.pop_back();
     }
 
@@ -154,32 +171,44 @@ struct Parser {
                     if (it == document.ids.end()) fail(child.where, "reference to unknown id '" + child.ref + "'");
                     child.object = it->second;
                 }
-        // Objects must not contain themselves.
-        std::map<const Object*, int> state;  // 1: being visited, 2: done
-        const std::function<void(const Object*)> visit = [&](const Object* object) {
-            state[object] = 1;
-            for (const Child& child : object->children) {
-                const int s = state[child.object];
-                if (s == 1) fail(child.where, "circular reference to id '" + child.object->id + "'");
-                if (s == 0) visit(child.object);
-            }
-            state[object] = 2;
-        };
-        visit(document.scene);
+        sizes.clear();
+        measure(*document.scene, 1);
+    }
+
+    /// Objects in `object` and itself, each counted as often as it is referred to. Objects must not contain themselves.
+    uint64_t measure(const Object& object, uint64_t depth) {
+        const auto [entry, is_new] = sizes.try_emplace(&object, 0);
+        if (!is_new) return entry->second;
+        uint64_t& size = entry->second;  // 0 until it is known
+        uint64_t sum = 1;
+        for (const Child& child : object.children) {
+            if (depth >= document.limits.nesting)
+                fail(child.where, "references are nested deeper than --limits nesting=" +
+                                      std::to_string(document.limits.nesting));
+            const uint64_t inner = measure(*child.object, depth + 1);
+            if (inner == 0) fail(child.where, "circular reference to id '" + child.object->id + "'");
+            sum += inner;
+            if (sum / kObjectsPerShape > document.limits.shapes)
+                fail(child.where, "the references of the scene make more objects of it than --limits shapes=" +
+                                      std::to_string(document.limits.shapes) + " would need");
+        }
+        return size = sum;
     }
 };
 
 }  // namespace
 
-Document parse_document(const std::string& path, const std::vector<std::pair<std::string, std::string>>& parameters) {
+Document parse_document(const std::string& path, const std::vector<std::pair<std::string, std::string>>& parameters,
+                        const Limits& limits) {
     Document document;
-    Parser parser{document, ValueParser(document), {}};
+    document.limits = limits;
+    Parser parser{document, ValueParser(document), {}, {}};
     std::set<std::string> given;
     for (const auto& [name, value] : parameters) {
         parser.values.set_parameter(name, value);
         given.insert(name);
     }
-    parser.parse_file(path, {path, 0});
+    parser.parse_file(path, {path, 0}, 1);
     for (const std::string& name : given)
         if (!parser.values.is_used(name)) throw input_error(path, 0, "the scene has no parameter '$" + name + "'");
     parser.resolve_references();

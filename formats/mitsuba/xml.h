@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/vec.h"
+#include "formats/limits.h"
 #include "formats/mitsuba/transform.h"
 
 namespace ambilux::mitsuba {
@@ -62,6 +63,7 @@ struct Document {
     std::map<std::string, const Object*> ids;
     std::vector<std::string> search_folders;                 ///< of <path>, in order
     std::vector<std::pair<std::string, std::string>> files;  ///< path and text of the XML files read
+    Limits limits;
 
     /// Path of a file named in `where.file`: relative to that file's folder, then to the <path> folders, then to the
     /// main file's. Throws Error(bad_input) if there is none.
@@ -70,6 +72,7 @@ struct Document {
 
 /// Parses the file. `parameters` replace <default>s; one that the file does not use is an error. Throws
 /// Error(bad_input) with file and line.
-Document parse_document(const std::string& path, const std::vector<std::pair<std::string, std::string>>& parameters);
+Document parse_document(const std::string& path, const std::vector<std::pair<std::string, std::string>>& parameters,
+                        const Limits& limits = {});
 
 }  // namespace ambilux::mitsuba

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "formats/meshes/mesh.h"
+#include "formats/file_budget.h"
 #include "formats/meshes/text_cursor.h"
 
 namespace ambilux::mitsuba {
@@ -81,7 +81,12 @@ std::string ValueParser::substitute(const std::string& text, const Where& at) {
         if (stop == i + 1) fail(at, "parameter '" + text.substr(i, end - i) + "' has no value and no <default>");
         const std::string name = text.substr(i + 1, stop - i - 1);
         used_.insert(name);
-        out += parameters_[name];
+        const std::string& value = parameters_[name];
+        expanded_ += value.size();
+        if (expanded_ > document_.limits.expansion)
+            fail(at, "parameters expand to more characters than --limits expansion=" +
+                         std::to_string(document_.limits.expansion));
+        out += value;
         i = stop;
     }
     return out;
@@ -204,7 +209,7 @@ Value ValueParser::parse_spectrum(const XmlSource& source, const pugi::xml_node&
     std::string text;
     if (node.attribute("filename")) {
         const std::string path = document_.resolve(attribute(source, node, "filename"), at);
-        const std::string bytes = read_file_bytes(path);
+        const std::string bytes = read_input(path, document_.limits);
         document_.files.push_back({path, bytes});
         TextCursor cursor(bytes);
         for (; !cursor.done(); cursor.next_line()) {

@@ -54,6 +54,7 @@ private:
     Document& document_;
     std::map<std::string, std::string> parameters_;
     std::set<std::string> used_;
+    uint64_t expanded_ = 0;  ///< characters that parameters became
 };
 
 }  // namespace ambilux::mitsuba

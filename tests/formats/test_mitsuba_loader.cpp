@@ -1,4 +1,4 @@
-// libs: ambilux_formats ambilux_accel
+// libs: ambilux_formats ambilux_accel PNG::PNG JPEG::JPEG
 // timeout: 120
 // The Mitsuba loader: what it understands, and what it says about what it does not. Numbers marked "Mitsuba" were read
 // from Mitsuba 3.9.1.
@@ -12,17 +12,10 @@
 #include "formats/load.h"
 #include "scene/info.h"
 #include "tests/support/catch.h"
+#include "tests/support/image_files.h"
 #include "tests/support/temp_folder.h"
 #include "transport/bsdf/precompute.h"
 #include "transport/texture.h"
-
-#define STB_IMAGE_WRITE_IMPLEMENTATION
-#define STB_IMAGE_WRITE_STATIC
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wunused-function"
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
-#include <stb/stb_image_write.h>
-#pragma GCC diagnostic pop
 
 using namespace ambilux;
 
@@ -69,15 +62,7 @@ BsdfRecord bsdf(const std::string& xml, const std::string& version = "3.0.0") {
     return s.bsdfs[s.materials[s.shapes[0].material].front];
 }
 
-std::string png(int w, int h, const std::vector<uint8_t>& rgb) {
-    std::string out;
-    stbi_write_png_to_func(
-        [](void* c, void* data, int size) {
-            static_cast<std::string*>(c)->append(static_cast<char*>(data), size_t(size));
-        },
-        &out, w, h, 3, rgb.data(), w * 3);
-    return out;
-}
+std::string png(int w, int h, const std::vector<uint8_t>& rgb) { return test::png_file(uint32_t(w), uint32_t(h), rgb); }
 
 void check_rgb(Rgb a, Rgb b, double tolerance = 1e-6) {
     for (int i = 0; i < 3; ++i) CHECK(a[i] == Approx(b[i]).margin(tolerance));

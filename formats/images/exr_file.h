@@ -1,0 +1,39 @@
+// OpenEXR files in memory, opened once their header is known to be sound.
+#pragma once
+
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+
+#include <memory>
+#include <string_view>
+
+#include "formats/file_budget.h"
+
+namespace ambilux {
+
+class ExrFile {
+public:
+    /// Checks sizes against the budget and against the length of the file before OpenEXR sees it. Throws
+    /// Error(bad_input).
+    ExrFile(std::string_view bytes, FileBudget& budget);
+    ~ExrFile();
+
+    const Imf::Header& header() const { return file_->header(); }
+    const Imath::Box2i& window() const { return header().dataWindow(); }
+    uint32_t width() const { return uint32_t(int64_t(window().max.x) - window().min.x + 1); }
+    uint32_t height() const { return uint32_t(int64_t(window().max.y) - window().min.y + 1); }
+    /// True if all of these are there at full resolution.
+    bool has(std::initializer_list<const char*> channels) const;
+    /// Reads all rows into `buffer`, which addresses pixels by their place in the window.
+    void read(const Imf::FrameBuffer& buffer);
+
+private:
+    class Stream;
+
+    FileBudget& budget_;
+    std::unique_ptr<Stream> stream_;
+    std::unique_ptr<Imf::InputFile> file_;
+};
+
+}  // namespace ambilux
