@@ -6,6 +6,7 @@
 
 #include "core/atomic_file.h"
 #include "experiments/sweep.h"
+#include "experiments/toml_depth.h"
 #include "experiments/toml_reader.h"
 #include "integrators/registry.h"
 
@@ -292,7 +293,9 @@ void read_budget(const Reader& r, const toml::table& t, ExperimentConfig& config
 }
 
 toml::table parse_toml(const std::string& path) {
-    const std::string content = read_file(path);
+    constexpr uint64_t kMostBytes = 16 << 20;
+    const std::string content = read_file(path, kMostBytes);
+    check_key_depth(path, content);
     try {
         return toml::parse(content, path);
     } catch (const toml::parse_error& e) {

@@ -46,11 +46,17 @@ constexpr int kNewestVersion = 3;
 /// Objects that a shape may be made of, on average.
 constexpr uint64_t kObjectsPerShape = 16;
 
+/// Of an object with all that is in it, each counted as often as it is referred to.
+struct Extent {
+    uint64_t objects;  ///< 0 until it is known
+    uint64_t height;   ///< objects in objects
+};
+
 struct Parser {
     Document& document;
     ValueParser values;
     std::vector<std::string> open_files;  ///< canonical paths of the files being parsed
-    std::map<const Object*, uint64_t> sizes;
+    std::map<const Object*, Extent> extents;
 
     void parse_children(const XmlSource& source, const pugi::xml_node& node, Object& object, uint64_t depth) {
         if (depth > document.limits.nesting)
@@ -171,28 +177,26 @@ struct Parser {
                     if (it == document.ids.end()) fail(child.where, "reference to unknown id '" + child.ref + "'");
                     child.object = it->second;
                 }
-        sizes.clear();
         measure(*document.scene, 1);
     }
 
-    /// Objects in `object` and itself, each counted as often as it is referred to. Objects must not contain themselves.
-    uint64_t measure(const Object& object, uint64_t depth) {
-        const auto [entry, is_new] = sizes.try_emplace(&object, 0);
+    /// Checks what references make of the document: objects must not contain themselves, nor grow without bounds.
+    Extent measure(const Object& object, uint64_t depth) {
+        const auto [entry, is_new] = extents.try_emplace(&object, Extent{0, 0});
         if (!is_new) return entry->second;
-        uint64_t& size = entry->second;  // 0 until it is known
-        uint64_t sum = 1;
+        Extent sum = {1, 1};
         for (const Child& child : object.children) {
-            if (depth >= document.limits.nesting)
+            const Extent inner = depth < document.limits.nesting ? measure(*child.object, depth + 1) : Extent{1, 1};
+            if (inner.objects == 0) fail(child.where, "circular reference to id '" + child.object->id + "'");
+            sum = {sum.objects + inner.objects, std::max(sum.height, inner.height + 1)};
+            if (depth + inner.height > document.limits.nesting)
                 fail(child.where, "references are nested deeper than --limits nesting=" +
                                       std::to_string(document.limits.nesting));
-            const uint64_t inner = measure(*child.object, depth + 1);
-            if (inner == 0) fail(child.where, "circular reference to id '" + child.object->id + "'");
-            sum += inner;
-            if (sum / kObjectsPerShape > document.limits.shapes)
+            if (sum.objects / kObjectsPerShape > document.limits.shapes)
                 fail(child.where, "the references of the scene make more objects of it than --limits shapes=" +
                                       std::to_string(document.limits.shapes) + " would need");
         }
-        return size = sum;
+        return extents[&object] = sum;
     }
 };
 

@@ -1,10 +1,7 @@
 // libs: ambilux_film
 // timeout: 300
 // The built program, as a person or a script meets it: exit codes, messages, files, signals.
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
+#include <csignal>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -13,60 +10,14 @@
 
 #include "core/atomic_file.h"
 #include "film/exr_io.h"
-#include "tests/support/catch.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/program.h"
 
 using namespace ambilux;
+using namespace ambilux::test;
 namespace fs = std::filesystem;
 using nlohmann::json;
 
 namespace {
-
-const std::string kScenes = std::string(AMBILUX_SOURCE_DIR) + "/scenes/";
-const std::string kCornell = kScenes + "cornell.xml";
-
-struct Outcome {
-    int code = -1;
-    std::string out, err;
-};
-
-/// Starts the program with output and messages in files of `folder`.
-pid_t start(const test::TempFolder& folder, const std::vector<std::string>& arguments) {
-    const pid_t child = ::fork();
-    REQUIRE(child >= 0);
-    if (child == 0) {
-        std::vector<char*> argv = {const_cast<char*>(AMBILUX_PROGRAM)};
-        for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
-        argv.push_back(nullptr);
-        if (!std::freopen((folder / ".out").c_str(), "w", stdout) ||
-            !std::freopen((folder / ".err").c_str(), "w", stderr))
-            ::_exit(99);
-        ::execv(AMBILUX_PROGRAM, argv.data());
-        ::_exit(98);
-    }
-    return child;
-}
-
-Outcome finish(const test::TempFolder& folder, pid_t child) {
-    int status = 0;
-    REQUIRE(::waitpid(child, &status, 0) == child);
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), read_file(folder / ".out"),
-            read_file(folder / ".err")};
-}
-
-Outcome run(const test::TempFolder& folder, const std::vector<std::string>& arguments) {
-    return finish(folder, start(folder, arguments));
-}
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
-/// Arguments of a small render of the Cornell box to a.exr, and further ones.
-std::vector<std::string> render(const test::TempFolder& folder, std::vector<std::string> more,
-                                const std::string& output = "a.exr") {
-    std::vector<std::string> all = {"render", kCornell, "--size", "24x16", "-o", folder / output};
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
-}
 
 json statistics(const test::TempFolder& folder, std::vector<std::string> more, const std::string& output = "a.exr") {
     more.insert(more.end(), {"--json", "-"});

@@ -93,6 +93,18 @@ TEST_CASE("an ablation changes one switch of its default at a time") {
                    "e.toml:23: estimator=naive is what the default run has"));
 }
 
+TEST_CASE("keys of many dots are refused; strings and numbers may have as many as they like") {
+    const TempFolder folder;
+    std::string dots, quoted;
+    for (int i = 0; i < 100000; ++i) dots += "a.", quoted += "\"b\" . ";
+    for (const std::string& text : {dots + "a = 1\n", "[" + dots + "a]\n", "x = { " + dots + "a = 1 }\n",
+                                    quoted + "a = 1\n", "s = \"\"\"\n'\n\"\"\" # '\n" + dots + "a = 1\n"})
+        CHECK(contains(error_of([&] { read(folder, kConfig + text); }), "a key has more than 32 dots"));
+    const std::string harmless =
+        "reference_spp = 64\n# " + dots + "\n[scene.parameters]\np = \"" + dots + "\"\nq = '" + dots + "'\n";
+    CHECK(read(folder, changed("size = [9, 5]\n", "size = [9, 5]\n" + harmless)).scenes.size() == 2);
+}
+
 TEST_CASE("budgets of samples and of seconds stand side by side; --reduced replaces what its section says") {
     const TempFolder folder;
     const std::string text = changed("spp = [1, 2, 8, 32]", "spp = [1, 2]\nseconds = [0.5, 1]") +

@@ -127,6 +127,9 @@ TEST_CASE("the reference: a killed and continued one equals the uninterrupted on
         CHECK(contains(error_of([&] { make_reference(scene, other, hooks); }),
                        "part.exr: cannot be continued: its max_depth is -1, asked for is 3"));
         other = part;
+        other.settings.rr_depth = 3;
+        CHECK(contains(error_of([&] { make_reference(scene, other, hooks); }), "its rr_depth is 5, asked for is 3"));
+        other = part;
         other.settings.seed = 1ull << 40;
         CHECK(contains(error_of([&] { make_reference(scene, other, hooks); }),
                        "its seed is 0, asked for is 1099511627776"));

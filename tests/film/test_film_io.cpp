@@ -113,6 +113,27 @@ TEST_CASE("reference EXR: continued in two parts equals the whole") {
     }
 }
 
+TEST_CASE("a reference with any changed bit is refused; images by other programs need no checksum") {
+    const test::TempFolder folder;
+    write_reference_exr(folder / "r.exr", to_reference(simulate(9, 5, 40, 1)), {{"rr_depth", 5}});
+    const std::string bytes = read_file(folder / "r.exr");
+    const auto is_refused = [&](const std::string& content) {
+        folder.write("bad.exr", content);
+        return code_of([&] { read_reference_exr(folder / "bad.exr"); }) == ExitCode::bad_input;
+    };
+    for (size_t at = 0; at < bytes.size(); ++at) {
+        std::string bad = bytes;
+        bad[at] = char(bad[at] ^ (1 << at % 8));
+        // In the words that announce the checksum: then there is none, and the image is whole.
+        const size_t mark = bytes.rfind("ambilux sha256 ");
+        if (at >= mark && at < mark + 15) continue;
+        CAPTURE(at);
+        REQUIRE(is_refused(bad));
+    }
+    CHECK_FALSE(is_refused(bytes));
+    CHECK_FALSE(is_refused(bytes.substr(0, bytes.rfind("ambilux sha256 "))));
+}
+
 TEST_CASE("EXR: bad files are refused by name") {
     const test::TempFolder folder;
     std::string message;

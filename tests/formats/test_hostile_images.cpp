@@ -2,6 +2,7 @@
 // timeout: 120
 // Image files that lie, end early, or ask for more than they hold.
 #include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
 #include <sys/resource.h>
