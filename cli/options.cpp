@@ -94,9 +94,7 @@ RenderSettings RenderOptions::settings(const Scene& scene) const {
     return s;
 }
 
-std::string refuse_negative(const std::string& text) {
-    return text.starts_with("-") ? "it must not be negative" : "";
-}
+std::string refuse_negative(const std::string& text) { return text.starts_with("-") ? "it must not be negative" : ""; }
 
 LoadedScene load_scene(const SceneOptions& options, const std::vector<Output>& outputs) {
     check_outputs(outputs);

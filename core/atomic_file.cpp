@@ -76,7 +76,7 @@ bool write_all(int fd, std::string_view bytes) {
 
 /// Where writing to a path leads.
 struct Target {
-    std::string path;      ///< behind symbolic links
+    std::string path;  ///< behind symbolic links
     bool exists = false;
     bool special = false;  ///< a device, a pipe, a socket: written to, not replaced
     mode_t mode = 0666;
@@ -147,8 +147,9 @@ std::string read_file(const std::string& path, uint64_t most) {
     struct stat info;
     if (file.fd < 0 || ::fstat(file.fd, &info) != 0) throw system_error(ExitCode::bad_input, "cannot read", path);
     if (!S_ISREG(info.st_mode))
-        throw Error(ExitCode::bad_input, "cannot read " + path + ": it is " +
-                                             (S_ISDIR(info.st_mode) ? "a folder" : "no regular file, but a pipe or a device"));
+        throw Error(ExitCode::bad_input,
+                    "cannot read " + path + ": it is " +
+                        (S_ISDIR(info.st_mode) ? "a folder" : "no regular file, but a pipe or a device"));
     if (uint64_t(info.st_size) > most)
         throw Error(ExitCode::bad_input, "cannot read " + path + ": it has " + std::to_string(info.st_size) +
                                              " bytes, and " + std::to_string(most) + " are allowed");

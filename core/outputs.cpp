@@ -29,8 +29,8 @@ void check_outputs(const std::vector<Output>& outputs) {
         check_writable(outputs[i].path);
         for (size_t k = 0; k < i; ++k)
             if (is_file(outputs[k]) && is_same(outputs[i].path, outputs[k].path))
-                throw Error(ExitCode::usage, outputs[k].option + " and " + outputs[i].option +
-                                                 " name the same file, " + outputs[i].path);
+                throw Error(ExitCode::usage, outputs[k].option + " and " + outputs[i].option + " name the same file, " +
+                                                 outputs[i].path);
     }
 }
 
@@ -38,8 +38,7 @@ void check_not_inputs(const std::vector<Output>& outputs, const std::vector<std:
     for (const Output& output : outputs)
         for (const std::string& input : inputs)
             if (is_file(output) && is_same(output.path, input))
-                throw Error(ExitCode::usage, output.option + " " + output.path +
-                                                 " would replace a file that is read" +
+                throw Error(ExitCode::usage, output.option + " " + output.path + " would replace a file that is read" +
                                                  (output.path == input ? "" : ": " + input));
 }
 

@@ -20,8 +20,7 @@ size_t sequence_length(std::string_view text) {
     if (a < 0x80) return 1;
     // U+0080 to U+009F are control characters too.
     if (a >= 0xc2 && a <= 0xdf) return follows(1) && !(a == 0xc2 && b < 0xa0) ? 2 : 0;
-    if (a >= 0xe0 && a <= 0xef)
-        return follows(2) && !(a == 0xe0 && b < 0xa0) && !(a == 0xed && b >= 0xa0) ? 3 : 0;
+    if (a >= 0xe0 && a <= 0xef) return follows(2) && !(a == 0xe0 && b < 0xa0) && !(a == 0xed && b >= 0xa0) ? 3 : 0;
     if (a >= 0xf0 && a <= 0xf4) return follows(3) && !(a == 0xf0 && b < 0x90) && !(a == 0xf4 && b >= 0x90) ? 4 : 0;
     return 0;
 }

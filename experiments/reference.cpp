@@ -15,7 +15,7 @@ namespace ambilux {
 namespace {
 
 /// Attributes that must be equal for samples to be added.
-constexpr const char* kIdentity[] = {"kind",   "scene_hash", "max_depth",         "rr_depth",
+constexpr const char* kIdentity[] = {"kind",   "scene_hash", "max_depth",  "rr_depth",
                                      "rr_cap", "seed",       "integrator", "reference_settings"};
 
 std::string text(const Attributes& attributes, const char* name) {

@@ -17,7 +17,7 @@ struct ExperimentRequest {
                              ///< making them again
     bool resume = false;
     const volatile bool* interrupt = nullptr;
-    std::function<void()> on_prepared;         ///< called once all is checked, before the first render; may be empty
+    std::function<void()> on_prepared = {};    ///< called once all is checked, before the first render; may be empty
     bool reduced = false;                      ///< as the section [reduced] of the configuration says
     double reference_checkpoint_seconds = 30;  ///< how often a reference is saved
 };

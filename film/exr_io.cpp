@@ -81,8 +81,8 @@ void check_image(const std::string& path, const Image& image) {
 
 /// A file of planes of interleaved RGB floats under the given channel names.
 std::string encode_planes(const std::string& path, uint32_t width, uint32_t height,
-                  const std::vector<std::pair<const float*, std::array<const char*, 3>>>& planes,
-                  const Attributes& attributes) {
+                          const std::vector<std::pair<const float*, std::array<const char*, 3>>>& planes,
+                          const Attributes& attributes) {
     StringStream stream;
     try {
         Imf::Header header{int(width), int(height)};
@@ -145,7 +145,8 @@ bool has(const ExrFile& file, const std::array<const char*, 3>& names) {
 
 void write_exr(const std::string& path, const Image& image, const Attributes& attributes) {
     check_image(path, image);
-    write_file_atomic(path, encode_planes(path, image.width, image.height, {{image.rgb.data(), kMeanChannels}}, attributes));
+    write_file_atomic(path,
+                      encode_planes(path, image.width, image.height, {{image.rgb.data(), kMeanChannels}}, attributes));
 }
 
 void write_reference_exr(const std::string& path, const Reference& reference, Attributes attributes) {
@@ -156,7 +157,8 @@ void write_reference_exr(const std::string& path, const Reference& reference, At
     attributes["spp"] = reference.samples;
     std::string bytes = encode_planes(
         path, reference.mean.width, reference.mean.height,
-        {{reference.mean.rgb.data(), kMeanChannels}, {reference.standard_error.rgb.data(), kErrorChannels}}, attributes);
+        {{reference.mean.rgb.data(), kMeanChannels}, {reference.standard_error.rgb.data(), kErrorChannels}},
+        attributes);
     bytes += checksum_of(bytes);
     write_file_atomic(path, bytes);
 }

@@ -11,10 +11,11 @@ FileBudget::FileBudget(std::string path, const Limits& limits)
 void FileBudget::fail(const std::string& message, int line) const { throw input_error(path_, line, message); }
 
 void FileBudget::pixels(uint64_t width, uint64_t height) const {
-    if (width == 0 || height == 0) fail("the image has no pixels: its size is " + std::to_string(width) + "x" + std::to_string(height));
+    if (width == 0 || height == 0)
+        fail("the image has no pixels: its size is " + std::to_string(width) + "x" + std::to_string(height));
     if (height > limits_.pixels / width)
-        fail("an image of " + std::to_string(width) + "x" + std::to_string(height) + " pixels is larger than --limits pixels=" +
-             std::to_string(limits_.pixels));
+        fail("an image of " + std::to_string(width) + "x" + std::to_string(height) +
+             " pixels is larger than --limits pixels=" + std::to_string(limits_.pixels));
 }
 
 void FileBudget::bytes(uint64_t count, uint64_t size) const {

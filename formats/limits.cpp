@@ -14,9 +14,9 @@ struct Named {
 };
 
 constexpr Named kLimits[] = {
-    {"pixels", &Limits::pixels},     {"bytes", &Limits::bytes},         {"total_bytes", &Limits::total_bytes},
-    {"shapes", &Limits::shapes},     {"includes", &Limits::includes},   {"expansion", &Limits::expansion},
-    {"nesting", &Limits::nesting},   {"seconds", &Limits::seconds},
+    {"pixels", &Limits::pixels},   {"bytes", &Limits::bytes},       {"total_bytes", &Limits::total_bytes},
+    {"shapes", &Limits::shapes},   {"includes", &Limits::includes}, {"expansion", &Limits::expansion},
+    {"nesting", &Limits::nesting}, {"seconds", &Limits::seconds},
 };
 
 /// Elements are visited by recursion: more may not fit the stack.
@@ -43,7 +43,8 @@ void set_limit(Limits& limits, const std::string& assignment) {
         if (key != n.name) continue;
         uint64_t value = 0;
         if (at == std::string::npos || !parse_count(assignment.substr(at + 1), value))
-            throw Error(ExitCode::usage, "--limits " + assignment + ": write it as " + key + "=N, N from 1, such as 8G");
+            throw Error(ExitCode::usage,
+                        "--limits " + assignment + ": write it as " + key + "=N, N from 1, such as 8G");
         if (n.value == &Limits::nesting && value > kMostNesting)
             throw Error(ExitCode::usage, "--limits " + assignment + ": at most " + std::to_string(kMostNesting));
         limits.*n.value = value;

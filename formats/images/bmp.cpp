@@ -1,4 +1,5 @@
-// Windows bitmaps without compression: palettes of 1, 4 and 8 bits, colours of 16, 24 and 32 bits, with or without masks.
+// Windows bitmaps without compression: palettes of 1, 4 and 8 bits, colours of 16, 24 and 32 bits, with or without
+// masks.
 #include <array>
 #include <bit>
 

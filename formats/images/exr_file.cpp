@@ -67,8 +67,8 @@ uint64_t most_packed(Imf::Compression compression) {
         case Imf::NO_COMPRESSION: return 1;
         case Imf::RLE_COMPRESSION: return 64;
         case Imf::ZIPS_COMPRESSION:
-        case Imf::ZIP_COMPRESSION: return 1032;       // of deflate
-        case Imf::PXR24_COMPRESSION: return 2 * 1032; // which sees 24 of 32 bits
+        case Imf::ZIP_COMPRESSION: return 1032;        // of deflate
+        case Imf::PXR24_COMPRESSION: return 2 * 1032;  // which sees 24 of 32 bits
         default: return 0;
     }
 }
@@ -150,7 +150,9 @@ void ExrFile::read(const Imf::FrameBuffer& buffer) {
         file_->setFrameBuffer(buffer);
         for (int64_t y = window().min.y; y <= window().max.y; y += int64_t(kMostLines)) {
             file_->readPixels(int(y), int(std::min<int64_t>(y + int64_t(kMostLines) - 1, window().max.y)));
-            if (budget_.expired()) budget_.fail("reading it takes longer than --limits seconds=" + std::to_string(budget_.limits().seconds));
+            if (budget_.expired())
+                budget_.fail("reading it takes longer than --limits seconds=" +
+                             std::to_string(budget_.limits().seconds));
         }
     } catch (const Error&) {
         throw;

@@ -63,7 +63,9 @@ Texels read_hdr(std::string_view bytes, FileBudget& budget) {
     budget.pixels(width, height);
 
     const auto marker = [&](size_t i) { return in.left() > i ? uint8_t(in.bytes[in.at + i]) : 0; };
-    const auto is_packed = [&] { return marker(0) == 2 && marker(1) == 2 && (marker(2) << 8 | marker(3)) == int(width); };
+    const auto is_packed = [&] {
+        return marker(0) == 2 && marker(1) == 2 && (marker(2) << 8 | marker(3)) == int(width);
+    };
     const bool packed = width >= kLeastPacked && width <= kMostPacked && is_packed();
     // A run is at most 127 pixels long and takes two bytes.
     in.need(packed ? height * (4 + 4 * 2 * ((width + 126) / 127)) : height * width * 4);

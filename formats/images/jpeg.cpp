@@ -58,7 +58,8 @@ private:
     static void on_message(j_common_ptr info, int level) {
         if (level >= 0 || of(info).damaged_) return;
         const int code = info->err->msg_code;
-        if (code != JWRN_JPEG_EOF && code != JWRN_HIT_MARKER && code != JWRN_HUFF_BAD_CODE && code != JWRN_ARITH_BAD_CODE)
+        if (code != JWRN_JPEG_EOF && code != JWRN_HIT_MARKER && code != JWRN_HUFF_BAD_CODE &&
+            code != JWRN_ARITH_BAD_CODE)
             return;
         of(info).damaged_ = true;
         info->err->format_message(info, of(info).message_);

@@ -89,7 +89,8 @@ Texels read_png(std::string_view bytes, FileBudget& budget) {
         stored_row = png_get_rowbytes(png, info);
     });
     budget.pixels(width, height);
-    if (stored_row > bytes.size() * kMostPacked / height) budget.fail("the image claims more pixels than the file holds");
+    if (stored_row > bytes.size() * kMostPacked / height)
+        budget.fail("the image claims more pixels than the file holds");
     reader.call([&](png_structp png, png_infop info) {
         png_set_expand(png);
         if (depth == 16) png_set_swap(png);
@@ -100,7 +101,8 @@ Texels read_png(std::string_view bytes, FileBudget& budget) {
         row = png_get_rowbytes(png, info);
     });
     const bool is_8bit = depth != 16;
-    if (row != size_t(width) * 4 * (is_8bit ? 1 : 2)) budget.fail("cannot read PNG image: unexpected layout of its rows");
+    if (row != size_t(width) * 4 * (is_8bit ? 1 : 2))
+        budget.fail("cannot read PNG image: unexpected layout of its rows");
     Texels texels = make_texels(width, height, is_8bit, budget);
     if (is_8bit) {
         read_rows(reader, passes, height, texels.bytes.data(), row, budget);

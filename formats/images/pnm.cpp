@@ -30,7 +30,8 @@ Texels read_pnm(std::string_view bytes, FileBudget& budget) {
     ByteReader in{bytes, budget, 2};
     const uint64_t channels = bytes[1] == '6' ? 3 : 1;
     const uint64_t width = take_number(in), height = take_number(in), highest = take_number(in);
-    if (highest == 0 || highest > 65535) budget.fail("cannot read PNM image: its highest value is not within 1 to 65535");
+    if (highest == 0 || highest > 65535)
+        budget.fail("cannot read PNM image: its highest value is not within 1 to 65535");
     budget.pixels(width, height);
     const uint64_t size = highest > 255 ? 2 : 1;
     in.need(width * height * channels * size);

@@ -44,8 +44,8 @@ std::vector<Vec3f> smooth_normals(const Mesh& mesh);
 /// Memory of a mesh of that many vertices and triangles, at most.
 uint64_t mesh_bytes(uint64_t vertices, uint64_t triangles);
 
-/// Throws Error(bad_input) if there is no face, a coordinate is not finite, an index is out of range, or an attribute is
-/// not there for every vertex.
+/// Throws Error(bad_input) if there is no face, a coordinate is not finite, an index is out of range, or an attribute
+/// is not there for every vertex.
 void check_mesh(const std::string& path, const Mesh& mesh);
 
 }  // namespace ambilux

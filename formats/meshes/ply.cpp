@@ -282,8 +282,7 @@ private:
                 }
             }
             if (polygon.size() < 3) in.fail("face " + std::to_string(i) + " has fewer than three corners");
-            for (size_t k = 2; k < polygon.size(); ++k)
-                mesh.faces.push_back({polygon[0], polygon[k - 1], polygon[k]});
+            for (size_t k = 2; k < polygon.size(); ++k) mesh.faces.push_back({polygon[0], polygon[k - 1], polygon[k]});
             budget.bytes(mesh_bytes(mesh.positions.size(), mesh.faces.size()));
             budget.tick();
         }

@@ -97,9 +97,10 @@ void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter&
     e.radiance = {splat(float(scale)), load_environment_image(builder, path, largest)};
     const double most = std::numeric_limits<float>::max();
     if (!(scale <= most && scale * largest <= most))
-        in.fail(in.where("scale"), fmt::format("scale {:g} makes a radiance of {:g} of the brightest texel; floats end at "
-                                               "{:g}",
-                                               scale, scale * largest, most));
+        in.fail(in.where("scale"),
+                fmt::format("scale {:g} makes a radiance of {:g} of the brightest texel; floats end at "
+                            "{:g}",
+                            scale, scale * largest, most));
 }
 
 }  // namespace

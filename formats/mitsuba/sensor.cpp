@@ -158,7 +158,9 @@ void read_sampler(Builder& builder, const Object* object) {
 /// Fails unless all rays of a perspective sensor can be traced.
 void check_rays(Reader& in, const Sensor& sensor) {
     const double focus = has_lens(sensor.type) ? sensor.focus_distance : 1, lens = sensor.aperture_radius;
-    const auto slope = [&](float tangent, float offset) { return tangent * (1 + 2 * std::fabs(offset)) + lens / focus; };
+    const auto slope = [&](float tangent, float offset) {
+        return tangent * (1 + 2 * std::fabs(offset)) + lens / focus;
+    };
     const double steepest = std::max(slope(sensor.tan_half_fov.x, sensor.principal_offset.x),
                                      slope(sensor.tan_half_fov.y, sensor.principal_offset.y));
     if (!(steepest <= kMostTangent))

@@ -34,6 +34,7 @@ struct Job {
     // Result for meshes.
     Mesh world;
     uint32_t dropped = 0;
+    bool vanished = false;  ///< had area before its transform, and none of it is left
 };
 
 struct ShapeBuilder {
@@ -212,6 +213,9 @@ void transform_mesh(const Builder& builder, Job& job, const Mesh& mesh) {
         return !(area > 0 && std::isfinite(area));
     });
     job.dropped = uint32_t(all - out.faces.size());
+    job.vanished = out.faces.empty() && std::any_of(mesh.faces.begin(), mesh.faces.end(), [&](const auto& f) {
+                       return length(area_normal(mesh.positions[f[0]], mesh.positions[f[1]], mesh.positions[f[2]])) > 0;
+                   });
 
     if (job.face_normals) return;
     if (mesh.normals.empty()) {
@@ -275,9 +279,9 @@ Quadric make_quadric(Builder& builder, const Job& job) {
                         {{c.x - reach, c.y - reach, c.z - reach}, {c.x + reach, c.y + reach, c.z + reach}});
     const double least = std::min({lx, ly, q.type == PrimitiveType::disk ? lx : lz});
     if (!(least >= double(kLeastExtent)))
-        throw input_error(job.where.file, job.where.line,
-                          fmt::format("the shape of type '{}' is {:g} wide, less than {:g}", job.type, least,
-                                      kLeastExtent));
+        throw input_error(
+            job.where.file, job.where.line,
+            fmt::format("the shape of type '{}' is {:g} wide, less than {:g}", job.type, least, kLeastExtent));
     q.to_world = to_affine(m);
     q.to_local = to_affine(affine_inverse(m));
     return q;
@@ -321,8 +325,8 @@ void add_mesh(Builder& builder, const Job& job, uint32_t index, Shape& shape) {
     const Mesh& mesh = job.world;
     if (job.emitter != kNone && mesh.faces.empty())
         throw input_error(job.where.file, job.where.line, "the shape emits light but has no area");
-    if (mesh.faces.empty())
-        builder.refuse(job.where, "the shape of type '" + job.type + "' has no area: none of its triangles has any",
+    if (job.vanished)
+        builder.refuse(job.where, "the shape of type '" + job.type + "' has no area: its transform leaves it none",
                        "it is left out");
     const uint32_t first = uint32_t(scene.vertices.size());
     shape.first_primitive = uint32_t(scene.triangles.size());

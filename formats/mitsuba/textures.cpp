@@ -112,7 +112,8 @@ void read_to_uv(Reader& in, float out[2][3]) {
     for (int j = 0; j < 3; ++j) {
         out[0][j] = float(su * m.m[0][columns[j]] + (j == 2 ? ou : 0));
         out[1][j] = float(sv * m.m[1][columns[j]] + (j == 2 ? ov : 0));
-        if (!std::isfinite(out[0][j]) || !std::isfinite(out[1][j])) in.fail("the transform of the texture is not finite");
+        if (!std::isfinite(out[0][j]) || !std::isfinite(out[1][j]))
+            in.fail("the transform of the texture is not finite");
     }
 }
 

@@ -60,8 +60,8 @@ struct Parser {
 
     void parse_children(const XmlSource& source, const pugi::xml_node& node, Object& object, uint64_t depth) {
         if (depth > document.limits.nesting)
-            fail(where(source, node), "elements are nested deeper than --limits nesting=" +
-                                          std::to_string(document.limits.nesting));
+            fail(where(source, node),
+                 "elements are nested deeper than --limits nesting=" + std::to_string(document.limits.nesting));
         std::set<std::string> names;
         for (const pugi::xml_node& child : node.children()) {
             if (child.type() != pugi::node_element) continue;
@@ -155,8 +155,8 @@ struct Parser {
             const std::string version = root.attribute("version").value();
             TextCursor cursor(version);
             if (!cursor.number(source.version) || source.version < 0 || source.version > kNewestVersion)
-                fail(where(source, root), "'" + version + "' is no version that is known (0.5 to " +
-                                              std::to_string(kNewestVersion) + ".x)");
+                fail(where(source, root),
+                     "'" + version + "' is no version that is known (0.5 to " + std::to_string(kNewestVersion) + ".x)");
         }
         if (!document.scene) {
             document.storage.push_back(std::make_unique<Object>());
@@ -190,8 +190,8 @@ struct Parser {
             if (inner.objects == 0) fail(child.where, "circular reference to id '" + child.object->id + "'");
             sum = {sum.objects + inner.objects, std::max(sum.height, inner.height + 1)};
             if (depth + inner.height > document.limits.nesting)
-                fail(child.where, "references are nested deeper than --limits nesting=" +
-                                      std::to_string(document.limits.nesting));
+                fail(child.where,
+                     "references are nested deeper than --limits nesting=" + std::to_string(document.limits.nesting));
             if (sum.objects / kObjectsPerShape > document.limits.shapes)
                 fail(child.where, "the references of the scene make more objects of it than --limits shapes=" +
                                       std::to_string(document.limits.shapes) + " would need");

@@ -1,9 +1,9 @@
 // libs: ambilux_film
 // timeout: 300
 // The built program, as a person or a script meets it: exit codes, messages, files, signals.
-#include <csignal>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <thread>

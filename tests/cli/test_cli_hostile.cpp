@@ -55,8 +55,9 @@ TEST_CASE("outputs are checked before work begins, and inputs are not written ov
     fs::permissions(locked, fs::perms(0444));
     folder.write("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     const std::string with_mesh =
-        folder.write("mesh.xml", "<scene version='3.0.0'><sensor type='perspective'/><shape type='obj'><string "
-                                 "name='filename' value='m.obj'/></shape></scene>");
+        folder.write("mesh.xml",
+                     "<scene version='3.0.0'><sensor type='perspective'/><shape type='obj'><string "
+                     "name='filename' value='m.obj'/></shape></scene>");
     struct Case {
         std::vector<std::string> arguments;
         int code;
@@ -106,8 +107,12 @@ TEST_CASE("what cannot be printed is an error") {
     const TempFolder folder;
     REQUIRE(run(folder, render(folder, {"--spp", "2"})).code == 0);
     const std::vector<std::vector<std::string>> commands = {
-        {"info", kCornell},    {"info", kCornell, "--json", "-"}, {"compare", folder / "a.exr", folder / "a.exr"},
-        {"render", "--help"},  {"help", "settings"},              {"--version"},
+        {"info", kCornell},
+        {"info", kCornell, "--json", "-"},
+        {"compare", folder / "a.exr", folder / "a.exr"},
+        {"render", "--help"},
+        {"help", "settings"},
+        {"--version"},
     };
     for (const auto& command : commands) {
         CAPTURE(command[0]);
@@ -138,8 +143,9 @@ TEST_CASE("inputs that need not end are refused, and messages show no raw bytes"
     }
     folder.write("m.ply", "ply\nformat ascii 1.0\nelement \x1b[2J\xff 1\nproperty half x\n");
     const std::string scene =
-        folder.write("s.xml", "<scene version='3.0.0'><sensor type='perspective'/><shape type='ply'><string "
-                              "name='filename' value='m.ply'/></shape></scene>");
+        folder.write("s.xml",
+                     "<scene version='3.0.0'><sensor type='perspective'/><shape type='ply'><string "
+                     "name='filename' value='m.ply'/></shape></scene>");
     folder.write("m.ply", "ply\nformat \x1b[2J\xff 1.0\n");
     const Outcome o = run(folder, {"info", scene});
     CHECK(o.code == 3);
@@ -169,7 +175,9 @@ TEST_CASE("signals end loading at once, and without a trace") {
 
 TEST_CASE("SIGHUP saves what a render has, unless nohup ignores it") {
     const TempFolder folder;
-    const auto is_rendering = [&] { return contains(read_file(folder / ".err"), "spp"); };
+    const auto is_rendering = [&] {
+        return fs::exists(folder / ".err") && contains(read_file(folder / ".err"), "spp");
+    };
     pid_t child = start(folder, render(folder, {"--spp", "100000000"}));
     REQUIRE(wait_for(is_rendering));
     ::kill(child, SIGHUP);
@@ -181,7 +189,7 @@ TEST_CASE("SIGHUP saves what a render has, unless nohup ignores it") {
 
     fs::remove(folder / ".err");
     child = start(folder, render(folder, {"--time", "4"}), "", [] { ::signal(SIGHUP, SIG_IGN); });
-    REQUIRE(wait_for([&] { return fs::exists(folder / ".err") && is_rendering(); }));
+    REQUIRE(wait_for(is_rendering));
     ::kill(child, SIGHUP);
     CHECK(finish(folder, child).code == 0);
 }
@@ -212,7 +220,8 @@ TEST_CASE("two processes make one reference one after the other, and one that wa
     FileLock lock(folder / ".r.exr.lock");
     REQUIRE(lock.try_lock());
     const pid_t waiting = start(other, reference(folder, "400"));
-    REQUIRE(wait_for([&] { return contains(read_file(other / ".err"), "waiting for it"); }));
+    REQUIRE(
+        wait_for([&] { return fs::exists(other / ".err") && contains(read_file(other / ".err"), "waiting for it"); }));
     const auto sent = Clock::now();
     ::kill(waiting, SIGTERM);
     CHECK(finish(other, waiting).code == 5);

@@ -143,7 +143,8 @@ TEST_CASE("outputs are distinct files that can be written, and no inputs") {
     fs::create_hard_link(a, folder / "hard");
     check_outputs({{"-o", a}, {"--json", b}, {"--png", ""}, {"--x", "-"}, {"--y", "-"}});
     check_outputs({{"-o", "/dev/null"}, {"--json", "/dev/null"}});
-    for (const std::string& other : {a, folder / "link", folder / "hard", folder / "./a", folder / "../" + folder.path.filename().string() + "/a"})
+    for (const std::string& other :
+         {a, folder / "link", folder / "hard", folder / "./a", folder / "../" + folder.path.filename().string() + "/a"})
         CHECK(contains(error_of(ExitCode::usage, [&] { check_outputs({{"-o", a}, {"--json", other}}); }),
                        "-o and --json name the same file"));
     CHECK(contains(error_of(ExitCode::usage, [&] { check_outputs({{"-o", b}, {"--json", folder / "./b"}}); }),

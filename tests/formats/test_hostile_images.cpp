@@ -34,9 +34,7 @@ std::string error_of(std::string_view bytes, const Limits& limits = {}) {
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
-std::string big_endian(uint32_t value) {
-    return {char(value >> 24), char(value >> 16), char(value >> 8), char(value)};
-}
+std::string big_endian(uint32_t value) { return {char(value >> 24), char(value >> 16), char(value >> 8), char(value)}; }
 
 std::string png_chunk(const std::string& type, const std::string& data) {
     const std::string body = type + data;
@@ -114,10 +112,18 @@ TEST_CASE("a JPEG with impossible Huffman counts is refused") {
 
 TEST_CASE("headers alone are no images, and images of no pixels are none") {
     const std::string cases[] = {
-        test::hdr_header(8, 8),      test::hdr_header(0, 0),        test::hdr_header(0, 8),
-        test::tga_header(2, 8, 8, 24), test::tga_header(10, 8, 8, 24), "P6 8 8 255\n",
-        "P5 8 8 65535\n",            "P5 0 0 255\n",                bmp_header(8, 8, 24),
-        bmp_header(0, 0, 24),        bmp_header(8, INT32_MIN, 24),  png_header(8, 8),
+        test::hdr_header(8, 8),
+        test::hdr_header(0, 0),
+        test::hdr_header(0, 8),
+        test::tga_header(2, 8, 8, 24),
+        test::tga_header(10, 8, 8, 24),
+        "P6 8 8 255\n",
+        "P5 8 8 65535\n",
+        "P5 0 0 255\n",
+        bmp_header(8, 8, 24),
+        bmp_header(0, 0, 24),
+        bmp_header(8, INT32_MIN, 24),
+        png_header(8, 8),
     };
     for (const std::string& file : cases) {
         const std::string message = error_of(file);
@@ -226,7 +232,8 @@ TEST_CASE("every cut and every changed byte of every format is an image or an er
         limits.pixels = 1 << 16;
         for (int i = 0; i < 400; ++i) {
             std::string bad = file;
-            for (uint32_t k = 0; k <= random() % 3; ++k) bad[random() % std::min<size_t>(bad.size(), 400)] = char(random());
+            for (uint32_t k = 0; k <= random() % 3; ++k)
+                bad[random() % std::min<size_t>(bad.size(), 400)] = char(random());
             error_of(bad, limits);
         }
     }

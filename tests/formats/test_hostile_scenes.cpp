@@ -58,6 +58,8 @@ std::string repeat(const std::string& text, size_t count) {
     return all;
 }
 
+std::string file_name(size_t i) { return std::string("i").append(std::to_string(i)).append(".xml"); }
+
 }  // namespace
 
 TEST_CASE("a PLY file with two elements of vertices is refused, and so are fractions as indices") {
@@ -123,12 +125,12 @@ TEST_CASE("nesting ends at the limit: elements, includes, references") {
                    "elements are nested deeper than --limits nesting=256"));
     std::string chain = "<bsdf type='diffuse' id='b0'/>";
     for (size_t i = 1; i < deep; ++i)
-        chain += "<bsdf type='twosided' id='b" + std::to_string(i) + "'><ref id='b" + std::to_string(i - 1) + "'/></bsdf>";
+        chain +=
+            "<bsdf type='twosided' id='b" + std::to_string(i) + "'><ref id='b" + std::to_string(i - 1) + "'/></bsdf>";
     CHECK(contains(body_error(chain), "references are nested deeper than --limits nesting=256"));
     const test::TempFolder folder;
     for (size_t i = 0; i < 300; ++i)
-        folder.write("i" + std::to_string(i) + ".xml",
-                     wrap("<include filename='i" + std::to_string(i + 1) + ".xml'/>"));
+        folder.write(file_name(i), wrap("<include filename='" + file_name(i + 1) + "'/>"));
     folder.write("i300.xml", wrap(""));
     CHECK(contains(error_of(folder, wrap(kSensor + "<include filename='i0.xml'/>")), "--limits nesting=256"));
 }
@@ -136,8 +138,7 @@ TEST_CASE("nesting ends at the limit: elements, includes, references") {
 TEST_CASE("what doubles at every step is refused: includes, parameters, references") {
     const test::TempFolder folder;
     for (size_t i = 0; i < 40; ++i)
-        folder.write("i" + std::to_string(i) + ".xml",
-                     wrap(repeat("<include filename='i" + std::to_string(i + 1) + ".xml'/>", 2)));
+        folder.write(file_name(i), wrap(repeat("<include filename='" + file_name(i + 1) + "'/>", 2)));
     folder.write("i40.xml", wrap(""));
     CHECK(contains(error_of(folder, wrap(kSensor + "<include filename='i0.xml'/>")), "--limits includes=1000"));
 
@@ -181,7 +182,8 @@ TEST_CASE("what cannot be traced is refused by shape, emitter or sensor with its
     const std::pair<std::string, std::string> cases[] = {
         {here + "<shape type='rectangle'>" + moved("1e19") + "</shape>",
          "scene.xml:3: the shape of type 'rectangle' reaches to 1e+19" + range},
-        {here + "<shape type='sphere'>" + moved("1e19") + "</shape>", "scene.xml:3: the shape of type 'sphere' reaches"},
+        {here + "<shape type='sphere'>" + moved("1e19") + "</shape>",
+         "scene.xml:3: the shape of type 'sphere' reaches"},
         {here + "<shape type='cylinder'><point name='p1' x='0' y='0' z='1e20'/></shape>", "type 'cylinder' reaches"},
         {here + "<shape type='disk'><transform name='to_world'><scale value='1e18'/></transform></shape>",
          "type 'disk' reaches"},
@@ -215,7 +217,8 @@ TEST_CASE("what cannot be traced is refused by shape, emitter or sensor with its
         CHECK(contains(message, expected));
     }
     // A scene that lies far away as a whole is moved to the origin.
-    CHECK(body_error("<sensor type='perspective'>" + moved("1e18") + "</sensor><shape type='sphere'><transform "
+    CHECK(body_error("<sensor type='perspective'>" + moved("1e18") +
+                     "</sensor><shape type='sphere'><transform "
                      "name='to_world'><scale value='1e10'/><translate x='1e18'/></transform></shape>") == "no error");
 }
 
@@ -223,8 +226,10 @@ TEST_CASE("values that only doubles hold are refused with their line") {
     const test::TempFolder folder;
     folder.write("e.hdr", test::hdr_header(2, 1) + test::rgbe(4, 4, 4) + test::rgbe(1, 1, 1));
     const auto environment = [&](const std::string& scale) {
-        return error_of(folder, wrap(kSensor + "<emitter type='envmap'><string name='filename' value='e.hdr'/>\n<float "
-                                               "name='scale' value='" + scale + "'/></emitter>"));
+        return error_of(folder, wrap(kSensor +
+                                     "<emitter type='envmap'><string name='filename' value='e.hdr'/>\n<float "
+                                     "name='scale' value='" +
+                                     scale + "'/></emitter>"));
     };
     CHECK(contains(environment("1e38"), "scene.xml:3: scale 1e+38 makes a radiance of 4e+38"));
     CHECK(contains(environment("1e300"), "scene.xml:3: scale 1e+300"));

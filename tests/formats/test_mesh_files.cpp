@@ -357,7 +357,7 @@ TEST_CASE("images: HDR and EXR are linear floats") {
         CHECK(exr.floats[i * 4 + 3] == 1.0f);
     }
     CHECK(contains(error_of([&] { read_image("cut.exr", std::string_view(bytes).substr(0, bytes.size() / 2)); }),
-                   "cut.exr: cannot read EXR image"));
+                   "cut.exr: the file ends too early"));
 }
 
 TEST_CASE("SHA-256: vectors of FIPS 180-4's examples, and any way to cut the input") {

@@ -73,7 +73,8 @@ inline std::string hdr_header(uint64_t width, uint64_t height) {
 inline std::string rgbe(float r, float g, float b) {
     int exponent = 0;
     const float most = std::max(r, std::max(g, b)), scale = std::frexp(most, &exponent) * 256.0f / most;
-    return {char(uint8_t(r * scale)), char(uint8_t(g * scale)), char(uint8_t(b * scale)), char(uint8_t(exponent + 128))};
+    return {char(uint8_t(r * scale)), char(uint8_t(g * scale)), char(uint8_t(b * scale)),
+            char(uint8_t(exponent + 128))};
 }
 
 }  // namespace ambilux::test

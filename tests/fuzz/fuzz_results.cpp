@@ -1,0 +1,7 @@
+#include "experiments/results.h"
+#include "tests/fuzz/target.h"
+
+void ambilux::fuzz::read(std::string_view bytes) {
+    const InputFile file(bytes);
+    read_results(file.path());
+}
