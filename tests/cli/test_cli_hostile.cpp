@@ -219,6 +219,7 @@ TEST_CASE("two processes make one reference one after the other, and one that wa
 
     FileLock lock(folder / ".r.exr.lock");
     REQUIRE(lock.try_lock());
+    fs::remove(other / ".err");
     const pid_t waiting = start(other, reference(folder, "400"));
     REQUIRE(
         wait_for([&] { return fs::exists(other / ".err") && contains(read_file(other / ".err"), "waiting for it"); }));

@@ -129,8 +129,7 @@ TEST_CASE("nesting ends at the limit: elements, includes, references") {
             "<bsdf type='twosided' id='b" + std::to_string(i) + "'><ref id='b" + std::to_string(i - 1) + "'/></bsdf>";
     CHECK(contains(body_error(chain), "references are nested deeper than --limits nesting=256"));
     const test::TempFolder folder;
-    for (size_t i = 0; i < 300; ++i)
-        folder.write(file_name(i), wrap("<include filename='" + file_name(i + 1) + "'/>"));
+    for (size_t i = 0; i < 300; ++i) folder.write(file_name(i), wrap("<include filename='" + file_name(i + 1) + "'/>"));
     folder.write("i300.xml", wrap(""));
     CHECK(contains(error_of(folder, wrap(kSensor + "<include filename='i0.xml'/>")), "--limits nesting=256"));
 }
