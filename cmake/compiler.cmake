@@ -4,6 +4,8 @@ target_include_directories(ambilux_options INTERFACE ${PROJECT_SOURCE_DIR})
 # Compilers contract a*b+c differently in every copy of an inlined function; without that, images do not depend on which stages are inlined where.
 target_compile_options(ambilux_options INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wshadow -fno-math-errno -ffp-contract=off>)
+# Tests of rays join conditions without branches on purpose.
+target_compile_options(ambilux_options INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,Clang>:-Wno-bitwise-instead-of-logical>)
 if(AMBILUX_MARCH)
   target_compile_options(ambilux_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-march=${AMBILUX_MARCH}>)
 endif()

@@ -38,6 +38,10 @@ struct ByteReader {
     void need(uint64_t count) const {
         if (count > left()) budget.fail("the file ends too early");
     }
+    void seek(uint64_t place) {
+        if (place > bytes.size()) budget.fail("the file ends too early");
+        at = place;
+    }
     uint8_t u8() {
         need(1);
         return uint8_t(bytes[at++]);

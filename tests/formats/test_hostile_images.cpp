@@ -132,6 +132,9 @@ TEST_CASE("headers alone are no images, and images of no pixels are none") {
         CHECK(message != "no error");
     }
     CHECK(contains(error_of(test::hdr_header(0, 0)), "the image has no pixels"));
+    std::string palette_outside = bmp_header(2, 2, 4);
+    palette_outside[14] = 113;
+    CHECK(contains(error_of(palette_outside), "the file ends too early"));
     CHECK(contains(error_of(""), "cannot read image"));
 }
 
