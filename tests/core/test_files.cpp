@@ -19,13 +19,21 @@
 #include "core/memory_reserve.h"
 #include "core/outputs.h"
 #include "core/printable.h"
-#include "tests/support/catch.h"
+#include "tests/support/skip.h"
 #include "tests/support/temp_folder.h"
 
 using namespace ambilux;
 namespace fs = std::filesystem;
 
 namespace {
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kSanitized = true;
+#elif defined(__has_feature)
+constexpr bool kSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
+#else
+constexpr bool kSanitized = false;
+#endif
 
 template <class F>
 std::string error_of(ExitCode code, const F& f) {
@@ -178,6 +186,7 @@ TEST_CASE("a lock has one holder, passes on, and leaves no file") {
 }
 
 TEST_CASE("memory that is kept is there when all else is used up") {
+    if (kSanitized) return skip("sanitizers need more addresses than the test allows");
     CHECK(in_child([] {
               constexpr size_t kKept = 64 << 20, kPiece = 1 << 20;
               MemoryReserve reserve(kKept);
