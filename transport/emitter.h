@@ -114,10 +114,8 @@ AMBILUX_HD float hit_opacity(const SceneView& view, uint32_t emitter, const Surf
 }
 
 /// Chance, as weights know it, that a ray towards the light sample `s` would meet the emitter there.
-template <Features F>
 AMBILUX_HD float sample_opacity(const SceneView& view, const EmitterSample& s) {
-    const bool area = F.opacity && view.emitters[s.emitter].type == EmitterType::area;
-    return area ? weight_opacity(s.opacity) : 1.0f;
+    return view.emitters[s.emitter].type == EmitterType::area ? weight_opacity(s.opacity) : 1.0f;
 }
 
 /// Radiance that arrives from unit `wi` where nothing is met; zero without an environment.

@@ -200,8 +200,9 @@ struct BidirectionalMis {
     AMBILUX_HD float next_event_ratio(const SceneView& scene, MisSums z, bool first, const EmitterSample& light,
                                       const BsdfValue& f, float cos_z) const {
         const Emitter& e = scene.emitters[light.emitter];
-        const float pdf_hit = f.pdf_sa * sample_opacity<F>(scene, light);
-        const float fewer = light.delta ? 0.0f : masked(kHitStrategies, term(pdf_hit / light.pdf_sa));
+        float pdf_hit_sa = f.pdf_sa;
+        if constexpr (F.opacity) pdf_hit_sa *= sample_opacity(scene, light);
+        const float fewer = light.delta ? 0.0f : masked(kHitStrategies, term(pdf_hit_sa / light.pdf_sa));
         float more = cos_z;  // density of a light subpath to here over that of this sample
         switch (e.type) {
             case EmitterType::area:  // the cosine at the light is in both
