@@ -8,7 +8,7 @@
 namespace ambilux {
 
 /// Depth (kDepthBits), whether the last scattering was a delta (1 bit), and Subpath::roulette_scale (the upper 16 bits
-/// of a float, rounded_scale).
+/// of a float, rounded_scale). All exactly.
 struct SubpathBits {
     uint32_t bits;
 

@@ -70,7 +70,8 @@ AMBILUX_HD bool sample_emitter_direct(const SceneView& view, Vec3f reference_p, 
 
 /// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` at
 /// `reference_p` by way of area emitter `emitter`, which a ray along `wi` meets at `hit`. Zero for every other type: no
-/// ray meets those.
+/// ray meets those. Relative error: 8 roundings and 4 over the cosine at `hit`; spheres 12 and 8 over that of their
+/// cone.
 template <Features F>
 AMBILUX_HD float pdf_emitter_direct(const SceneView& view, uint32_t emitter, Vec3f reference_p, Vec3f wi,
                                     const SurfacePoint& hit) {

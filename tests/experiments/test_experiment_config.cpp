@@ -7,6 +7,7 @@
 #include "experiments/config.h"
 #include "experiments/dry_run.h"
 #include "tests/support/experiment_fakes.h"
+#include "tests/support/skip.h"
 
 using namespace ambilux;
 using namespace ambilux::test;
@@ -128,7 +129,7 @@ TEST_CASE("the project's configurations are right, also reduced") {
                 };
                 if (!there("veach-bidir") || !there("water-caustic") || !there("veach-ajar") || !there("living-room") ||
                     !there("cornell-box")) {
-                    WARN("skipped: the published scenes are not in AMBILUX_DATA");
+                    skip("skipped: the published scenes are not in AMBILUX_DATA");
                     continue;
                 }
             }

@@ -1,4 +1,5 @@
 // libs: ambilux_formats ambilux_accel
+// data: tagged
 // timeout: 120
 // The Mitsuba loader: what it understands, and what it says about what it does not. Numbers marked "Mitsuba" were read
 // from Mitsuba 3.9.1.
@@ -13,6 +14,7 @@
 #include "scene/info.h"
 #include "tests/support/catch.h"
 #include "tests/support/temp_folder.h"
+#include "tests/support/skip.h"
 #include "transport/bsdf/precompute.h"
 #include "transport/texture.h"
 
@@ -85,13 +87,13 @@ void check_rgb(Rgb a, Rgb b, double tolerance = 1e-6) {
 
 std::string data_folder() {
     const char* folder = std::getenv("AMBILUX_DATA");
-    if (!folder) WARN("AMBILUX_DATA is not set: the published scenes are not loaded");
+    if (!folder) skip("AMBILUX_DATA is not set: the published scenes are not loaded");
     return folder ? folder : "";
 }
 
 }  // namespace
 
-TEST_CASE("published scenes load without a warning, with the triangles their README lists") {
+TEST_CASE("published scenes load without a warning, with the triangles their README lists", "[data]") {
     const std::string data = data_folder();
     if (data.empty()) return;
     struct Expected {
@@ -115,7 +117,7 @@ TEST_CASE("published scenes load without a warning, with the triangles their REA
     }
 }
 
-TEST_CASE("Mitsuba's render tests load, but for what is refused by name") {
+TEST_CASE("Mitsuba's render tests load, but for what is refused by name", "[data]") {
     const std::string data = data_folder();
     if (data.empty()) return;
     const std::string tests = data + "/mitsuba-tests/tests/scenes/";

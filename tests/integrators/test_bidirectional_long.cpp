@@ -28,9 +28,9 @@ struct Comparison {
 
 constexpr Comparison kComparisons[] = {
     {"furnace", false, 48, 32, 0, false, 512, 256, 0.02, 0.06, nullptr},
-    {"textured", false, 48, 32, 0, false, 1024, 256, 0.03, 0.3, nullptr},
+    {"textured", false, 48, 32, 0, false, 4096, 1024, 0.01, 0.03, nullptr},
     {"materials", false, 48, 32, 0, true, 1024, 256, 0.05, 0.1, nullptr},
-    {"lights", false, 48, 32, 0, false, 1024, 256, 0.05, 0.2, nullptr},
+    {"lights", false, 48, 32, 0, false, 4096, 1024, 0.02, 0.05, nullptr},
     {"cornell", false, 48, 32, 0, false, 1024, 256, 0.02, 0.06, nullptr},
     {"glass", false, 48, 32, 0, true, 4096, 512, 0.1, 0.2, nullptr},
     {"cornell-box", true, 48, 32, 5, false, 1024, 256, 0.02, 0.08, nullptr},

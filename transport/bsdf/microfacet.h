@@ -58,7 +58,8 @@ struct MicrofacetDistribution {
     Microfacets type;
     float alpha_u, alpha_v;
 
-    /// Density D(m) of microfacet area per macrosurface area and solid angle; 0 below the horizon.
+    /// Density D(m) of microfacet area per macrosurface area and solid angle; 0 below the horizon. Relative error of 14
+    /// roundings, Beckmann's 6 times its exponent more; of m there are 3 roundings over the roughness besides.
     AMBILUX_HD float d(Vec3f m) const {
         if (!(m.z > 0.0f)) return 0.0f;
         const float norm = 1.0f / (kPi * alpha_u * alpha_v);
@@ -69,7 +70,8 @@ struct MicrofacetDistribution {
     }
 
     /// Projected area of the microfacets that face `v`, per macrosurface area: cos·(1+Λ), v.z >= 0, so that Smith's
-    /// G1 = cos/sigma. Finite and positive down to the horizon (Heitz 2014, section 5.3; Heitz 2018, eq. 2).
+    /// G1 = cos/sigma. Finite and positive down to the horizon (Heitz 2014, section 5.3; Heitz 2018, eq. 2). Relative
+    /// error of 14 roundings.
     AMBILUX_HD float sigma(Vec3f v) const {
         const float t2 = sqr(v.x * alpha_u) + sqr(v.y * alpha_v);
         if (type == Microfacets::ggx) return 0.5f * (v.z + sqrtf(v.z * v.z + t2));
