@@ -1,0 +1,57 @@
+// Whether a measured mean can be the answer.
+#pragma once
+
+#include <string>
+
+#include "experiments/stress/measure.h"
+
+namespace ambilux::stress {
+
+/// A mean as a random variable.
+struct Mean {
+    double value = 0, error = 0;  ///< error: standard error; 0 of a closed form
+    double dof = 0;               ///< degrees of freedom of the error; 0 of a closed form
+};
+
+/// Of all boxes together.
+Mean mean_of(const Batches& batches);
+
+/// Relative variance of the mean of one sample of every pixel, times their number.
+double relative_variance(const Mean& mean, double paths);
+
+struct Comparison {
+    double z = 0;       ///< normal equivalent of the difference of the means, after skewness is taken out
+    double box_z = 0;   ///< of the box that is furthest off; 0 where boxes are not compared
+    double p = 1;       ///< two-sided, of both together: Sidak over the boxes, Bonferroni over the two tests
+    double events = 0;  ///< rough number of random events that the mean rests on
+};
+
+/// Differences up to this share of the answer are put down to rounding: a path of 20 vertices multiplies some hundred
+/// floats of 6e-8 each, sums of samples are floats of as many digits.
+constexpr double kRounding = 2e-5;
+
+/// Fewer events than this say nothing.
+constexpr double kFewEvents = 16;
+
+/// `uniform`: every box has the same answer. Student's t with the degrees of freedom of Welch and Satterthwaite;
+/// skewness by Hall's transformation, where it makes |t| smaller (film/ztest.h).
+Comparison compare(const Batches& batches, const Mean& answer, bool uniform);
+
+/// What a row says of a cell.
+enum class Verdict { ok, failed, limit, undecided, invalid, refused };
+std::string verdict_name(Verdict verdict);
+
+/// Chance that one of all rows fails though each is right: that of five standard deviations.
+constexpr double kSignificance = 5.7330e-7;
+
+struct RowState {
+    Comparison comparison;
+    double mean = 0;
+    bool rare = false;  ///< the method finds the light too rarely (Cell::rare)
+    bool has_limit = false;
+    uint64_t dropped = 0;  ///< invalid and lost values
+};
+/// `rows`: of the whole sweep, for the correction.
+Verdict judge(const RowState& row, double rows);
+
+}  // namespace ambilux::stress
