@@ -1,8 +1,10 @@
 // A cell of the stress sweep: a generated scene, the parameter that makes it hard, and the answer.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "film/image.h"
@@ -23,13 +25,13 @@ struct SceneFiles {
 
 enum class AnswerKind {
     closed_form,  ///< a formula, or an integral of one variable or two in double precision
-    invariance,   ///< the mean of the benign cell of the family, by the same method
+    invariance,   ///< `value` times the mean of the benign cell of the family, by the same method
 };
 
 /// What the mean over all pixels and channels of a cell must be.
 struct Answer {
     AnswerKind kind = AnswerKind::closed_form;
-    double value = 0;      ///< radiance; of a closed form
+    double value = 0;      ///< radiance; of an invariance the factor
     bool uniform = false;  ///< every pixel has this value, not their mean alone
     std::string source;    ///< the formula in one line
 };
@@ -40,14 +42,17 @@ struct Cell {
     double value = 0;   ///< of the parameter
     Answer answer;
     std::function<SceneFiles()> scene;  ///< made when it is needed: some are large
-    bool benign = false;                ///< the others of the family are compared with it
+    bool benign = false;                ///< the others of the family are compared with it; the first of its family
     bool quick = false;                 ///< part of --quick
-    std::string limit = {};             ///< section of docs/numerics.md that says why the image may be wrong
+    std::string limit = {};             ///< heading in docs/numerics.md that says why the image may be wrong
     /// Methods (prefixes of names, separated by blanks) that find the light too rarely to say anything: an image that
-    /// is black is then undecided. Of all others it is wrong.
+    /// is black is then too noisy to judge. Of all others it is wrong.
     std::string rare = {};
     std::string not_mitsuba = {};  ///< why Mitsuba 3 cannot load the scene, or takes it for another
     double effort = 1;             ///< of the usual number of samples
+    std::vector<std::pair<std::string, std::string>> settings = {};  ///< over those of the method
+    uint64_t samples = 0;                                            ///< of every pixel that must be rendered
+    bool device_only = false;                                        ///< takes a host minutes for each method
 
     std::string name() const { return family + "_" + label; }
 };

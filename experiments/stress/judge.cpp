@@ -62,7 +62,7 @@ double z_of(const Mean& mean, const Mean& answer, double skew) {
     if (std::abs(difference) <= rounding) return 0;
     const double variance = mean.error * mean.error + answer.error * answer.error;
     if (variance == 0) return std::copysign(kInf, difference);
-    double t = (std::abs(difference)) / std::sqrt(variance + rounding * rounding);
+    double t = std::abs(difference) / std::sqrt(variance + rounding * rounding);
     // A mean that has missed rare bright samples is dark and takes its error for small.
     const double g = (difference < 0 ? 1 : -1) * skew;
     if (g > 0) t = std::max(0.0, std::min(t, t - g * t * t / 3 + g * g * t * t * t / 27 - g / 6));
@@ -111,18 +111,19 @@ std::string verdict_name(Verdict verdict) {
         case Verdict::ok: return "ok";
         case Verdict::failed: return "failed";
         case Verdict::limit: return "limit";
-        case Verdict::undecided: return "undecided";
+        case Verdict::noisy: return "noisy";
         case Verdict::invalid: return "invalid";
         case Verdict::refused: return "refused";
+        case Verdict::left_out: return "left out";
     }
     return "";
 }
 
 Verdict judge(const RowState& row, double rows) {
     const auto unless_limit = [&](Verdict v) { return row.has_limit ? Verdict::limit : v; };
-    if (row.mean == 0 && row.comparison.z != 0) return row.rare ? Verdict::undecided : unless_limit(Verdict::failed);
+    if (row.mean == 0 && row.comparison.z != 0) return row.rare ? Verdict::noisy : unless_limit(Verdict::failed);
     const bool differs = sidak(row.comparison.p, rows) < kSignificance;
-    if (row.comparison.events < kFewEvents && row.comparison.z != 0) return Verdict::undecided;
+    if (row.comparison.events < kFewEvents && row.comparison.z != 0) return Verdict::noisy;
     if (differs) return unless_limit(Verdict::failed);
     if (row.dropped > 0) return unless_limit(Verdict::invalid);
     return Verdict::ok;

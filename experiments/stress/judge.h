@@ -27,7 +27,7 @@ struct Comparison {
 };
 
 /// Differences up to this share of the answer are put down to rounding: a path of 20 vertices multiplies some hundred
-/// floats of 6e-8 each, sums of samples are floats of as many digits.
+/// floats of 6e-8 each.
 constexpr double kRounding = 2e-5;
 
 /// Fewer events than this say nothing.
@@ -38,7 +38,15 @@ constexpr double kFewEvents = 16;
 Comparison compare(const Batches& batches, const Mean& answer, bool uniform);
 
 /// What a row says of a cell.
-enum class Verdict { ok, failed, limit, undecided, invalid, refused };
+enum class Verdict {
+    ok,
+    failed,   ///< another mean, and no limit that is known
+    limit,    ///< another mean, invalid values or a refusal where docs/numerics.md says so
+    noisy,    ///< too few events to say anything
+    invalid,  ///< the mean may be right, but values were dropped or lost, and counted
+    refused,  ///< the program says that it cannot render this
+    left_out  ///< not rendered: the method cannot find the light, or the cell is for devices
+};
 std::string verdict_name(Verdict verdict);
 
 /// Chance that one of all rows fails though each is right: that of five standard deviations.

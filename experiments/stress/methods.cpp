@@ -25,13 +25,15 @@ const std::vector<Method>& methods() {
     return list;
 }
 
-RenderSettings settings_of(const Method& method, const Scene& scene, const std::string& backend, uint64_t seed) {
+RenderSettings settings_of(const Hooks& hooks, const Method& method, const Cell& cell, const Scene& scene,
+                           const std::string& backend, uint64_t seed) {
     RenderSettings s;
     s.max_depth = scene.integrator.max_depth;
     s.rr_depth = scene.integrator.rr_depth;
     s.seed = seed;
-    apply_setting(s, "backend", backend);
-    for (const auto& [key, value] : method.settings) apply_setting(s, key, value);
+    s.backend = backend;
+    for (const auto& [key, value] : method.settings) hooks.apply_setting(s, key, value);
+    for (const auto& [key, value] : cell.settings) hooks.apply_setting(s, key, value);
     return s;
 }
 

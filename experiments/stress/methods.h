@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "integrators/settings.h"
-#include "scene/scene.h"
+#include "experiments/hooks.h"
+#include "experiments/stress/cell.h"
 
 namespace ambilux::stress {
 
@@ -20,7 +20,8 @@ struct Method {
 const std::vector<Method>& methods();
 
 /// Settings of a render of `scene`, whose depths are those of its file.
-RenderSettings settings_of(const Method& method, const Scene& scene, const std::string& backend, uint64_t seed);
+RenderSettings settings_of(const Hooks& hooks, const Method& method, const Cell& cell, const Scene& scene,
+                           const std::string& backend, uint64_t seed);
 
 /// Whether `text`, prefixes separated by blanks, has one of `name`.
 bool has_prefix_of(const std::string& text, const std::string& name);

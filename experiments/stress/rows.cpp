@@ -7,11 +7,8 @@
 
 namespace ambilux::stress {
 
-const char* const kRowHeader =
-    "cell,family,value,method,backend,verdict,mean,standard_error,expected,expected_error,relative_bias,z,box_z,p,"
-    "events,variance,variance_ratio,paths,invalid,lost,seconds,limit,note";
 const char* const kExpectedHeader =
-    "cell,family,parameter,value,benign,expected,kind,same_as,uniform,region,source,methods,rare,limit,not_mitsuba";
+    "cell,family,parameter,value,benign,expected,kind,same_as,uniform,region,source,rare,limit,not_mitsuba";
 
 namespace {
 
@@ -34,68 +31,87 @@ std::vector<std::string> split(const std::string& line) {
     return parts;
 }
 
-double to_number(const std::string& text) { return std::strtod(text.c_str(), nullptr); }
+void set(std::string& field, const std::string& text) { field = text; }
+void set(double& field, const std::string& text) { field = std::strtod(text.c_str(), nullptr); }
+void set(uint64_t& field, const std::string& text) { field = std::strtoull(text.c_str(), nullptr, 10); }
+void set(Verdict& field, const std::string& text) {
+    for (int v = 0; v <= int(Verdict::left_out); ++v)
+        if (verdict_name(Verdict(v)) == text) field = Verdict(v);
+}
 
-std::optional<Verdict> to_verdict(const std::string& name) {
-    for (const Verdict v :
-         {Verdict::ok, Verdict::failed, Verdict::limit, Verdict::undecided, Verdict::invalid, Verdict::refused})
-        if (verdict_name(v) == name) return v;
-    return std::nullopt;
+std::string text_of(const std::string& field) { return plain(field); }
+std::string text_of(double field) { return fmt::format("{:.10g}", field); }
+std::string text_of(uint64_t field) { return fmt::format("{}", field); }
+std::string text_of(Verdict field) { return verdict_name(field); }
+
+/// All columns in their order: column(name, field). `Row`: const or not.
+template <class R, class Function>
+void for_each_column(R& r, Function&& column) {
+    double bias = r.bias();
+    column("cell", r.cell);
+    column("family", r.family);
+    column("value", r.value);
+    column("method", r.method);
+    column("backend", r.backend);
+    column("verdict", r.verdict);
+    column("mean", r.mean.value);
+    column("standard_error", r.mean.error);
+    column("dof", r.mean.dof);
+    column("expected", r.answer.value);
+    column("expected_error", r.answer.error);
+    column("relative_bias", bias);
+    column("z", r.comparison.z);
+    column("box_z", r.comparison.box_z);
+    column("p", r.comparison.p);
+    column("events", r.comparison.events);
+    column("variance", r.variance);
+    column("variance_ratio", r.variance_ratio);
+    column("first", r.first);
+    column("samples", r.samples);
+    column("paths", r.paths);
+    column("invalid", r.invalid);
+    column("lost", r.lost);
+    column("underflow", r.underflow);
+    column("seconds", r.seconds);
+    column("limit", r.limit);
+    column("note", r.note);
 }
 
 }  // namespace
 
-std::string row_prefix(const std::string& cell, const std::string& method, const std::string& backend) {
-    return fmt::format("{},{},{}", cell, method, backend);
+std::string row_header() {
+    std::string header;
+    const Row row;
+    for_each_column(row,
+                    [&](const char* name, const auto&) { header += (header.empty() ? "" : ",") + std::string(name); });
+    return header;
 }
 
-std::string row_line(const Row& r) {
-    const Comparison& c = r.comparison;
-    const double bias = r.answer.value != 0 ? r.mean.value / r.answer.value - 1 : 0;
-    return fmt::format(
-        "{},{},{:.9g},{},{},{},{:.9g},{:.4g},{:.9g},{:.4g},{:.5g},{:.4g},{:.4g},{:.4g},{:.4g},{:.6g},{:.4g},{:.0f},{},"
-        "{},{:.3f},{},{}",
-        r.cell, r.family, r.value, r.method, r.backend, verdict_name(r.verdict), r.mean.value, r.mean.error,
-        r.answer.value, r.answer.error, bias, c.z, c.box_z, c.p, c.events, r.variance, r.variance_ratio, r.paths,
-        r.invalid, r.lost, r.seconds, r.limit, plain(r.note));
+std::string row_line(const Row& row) {
+    std::string line;
+    for_each_column(row, [&](const char*, const auto& field) { line += text_of(field) + ","; });
+    line.pop_back();
+    return line;
 }
 
 std::optional<Row> parse_row(const std::string& line) {
-    const std::vector<std::string> p = split(line);
-    if (p.size() != 23) return std::nullopt;
-    const std::optional<Verdict> verdict = to_verdict(p[5]);
-    if (!verdict) return std::nullopt;
-    Row r;
-    r.cell = p[0];
-    r.family = p[1];
-    r.value = to_number(p[2]);
-    r.method = p[3];
-    r.backend = p[4];
-    r.verdict = *verdict;
-    r.mean = {to_number(p[6]), to_number(p[7]), double(kBatches - 1)};
-    r.answer = {to_number(p[8]), to_number(p[9]), to_number(p[9]) > 0 ? double(kBatches - 1) : 0.0};
-    r.comparison = {to_number(p[11]), to_number(p[12]), to_number(p[13]), to_number(p[14])};
-    r.variance = to_number(p[15]);
-    r.variance_ratio = to_number(p[16]);
-    r.paths = to_number(p[17]);
-    r.invalid = std::strtoull(p[18].c_str(), nullptr, 10);
-    r.lost = std::strtoull(p[19].c_str(), nullptr, 10);
-    r.seconds = to_number(p[20]);
-    r.limit = p[21];
-    r.note = p[22];
-    return r;
+    const std::vector<std::string> parts = split(line);
+    Row row;
+    size_t column = 0;
+    for_each_column(row, [&](const char*, auto& field) {
+        if (column < parts.size()) set(field, parts[column]);
+        ++column;
+    });
+    return column == parts.size() ? std::optional(row) : std::nullopt;
 }
 
-std::string expected_line(const Family& family, const Cell& cell, const std::vector<std::string>& found) {
+std::string expected_line(const Family& family, const Cell& cell) {
     const bool closed = cell.answer.kind == AnswerKind::closed_form;
-    std::string methods;
-    for (const std::string& m : found) methods += (methods.empty() ? "" : " ") + m;
     const auto benign = std::find_if(family.cells.begin(), family.cells.end(), [](const Cell& c) { return c.benign; });
-    return fmt::format("{},{},{},{:.9g},{},{},{},{},{},mean of all pixels and channels,{},{},{},{},{}", cell.name(),
-                       family.name, plain(family.parameter), cell.value, int(cell.benign),
-                       closed ? fmt::format("{:.12g}", cell.answer.value) : "", closed ? "closed form" : "invariance",
-                       closed || benign == family.cells.end() ? "" : benign->name(), int(cell.answer.uniform),
-                       plain(cell.answer.source), methods, cell.rare, cell.limit, plain(cell.not_mitsuba));
+    return fmt::format("{},{},{},{:.9g},{},{:.12g},{},{},{},mean of all pixels and channels,{},{},{},{}", cell.name(),
+                       family.name, plain(family.parameter), cell.value, int(cell.benign), cell.answer.value,
+                       closed ? "radiance" : "factor", closed ? "" : benign->name(), int(cell.answer.uniform),
+                       plain(cell.answer.source), cell.rare, plain(cell.limit), plain(cell.not_mitsuba));
 }
 
 }  // namespace ambilux::stress

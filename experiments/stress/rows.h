@@ -10,29 +10,30 @@
 
 namespace ambilux::stress {
 
-extern const char* const kRowHeader;
-extern const char* const kExpectedHeader;
-
 struct Row {
     std::string cell, family;
-    double value = 0;
+    double value = 0;  ///< of the parameter
     std::string method, backend;
     Verdict verdict = Verdict::ok;
     Mean mean, answer;
     Comparison comparison;
     double variance = 0;        ///< relative_variance
     double variance_ratio = 0;  ///< over that of the benign cell by the same method; 0: not known
-    double paths = 0, seconds = 0;
-    uint64_t invalid = 0, lost = 0;
+    double first = 0;           ///< Measurement::first
+    double samples = 0, paths = 0, seconds = 0;
+    uint64_t invalid = 0, lost = 0, underflow = 0;
     std::string limit, note;
+
+    /// Relative difference from the answer; 0 without one.
+    double bias() const { return answer.value != 0 ? mean.value / answer.value - 1 : 0; }
 };
 
-std::string row_prefix(const std::string& cell, const std::string& method, const std::string& backend);
+std::string row_header();
 std::string row_line(const Row& row);
 /// The row of a line that row_line made; nothing of another.
 std::optional<Row> parse_row(const std::string& line);
 
-/// `found`: methods that can find the light.
-std::string expected_line(const Family& family, const Cell& cell, const std::vector<std::string>& found);
+extern const char* const kExpectedHeader;
+std::string expected_line(const Family& family, const Cell& cell);
 
 }  // namespace ambilux::stress
