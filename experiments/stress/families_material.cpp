@@ -82,7 +82,7 @@ Family panes() {
             }};
         cell.benign = k == -1;
         cell.quick = k == -1 || k == -3 || k == -6;
-        if (thickness < 4e-5) cell.limit = "thin-panes";
+        if (thickness < 4e-5) cell.limit = "Contact shadows and thin panes";
         family.cells.push_back(cell);
     }
     return family;

@@ -42,20 +42,60 @@ Family space_scale(const std::string& name, const std::string& parameter, const 
 
 std::string plain_plate(const Plate& plate) { return plate_scene(plate); }
 
-/// Coordinates of the scene are multiples of 1/4, so that floats hold them without rounding up to 2^21.
-template <class Scene>
-Family far_from_origin(const std::string& name, const Scene& scene, std::string (*xml)(const Scene&),
-                       Answer (*answer)(const Scene&)) {
-    Family family{name, "distance from the origin over the width of the scene", {}};
+using MovedScene = SceneFiles (*)(const Plate&, Point by);
+
+SceneFiles moved_plate(const Plate& plate, Point) { return {plate_scene(plate)}; }
+SceneFiles anchored_plate(const Plate& plate, Point) {
+    return {plate_scene(plate, plate_floor(plate) + stone({}, {0, 0, -9}))};
+}
+/// The vertices of the floor's file lie where the floor does.
+SceneFiles meshed_plate(const Plate& plate, Point by) {
+    std::vector<Point> corners = {{-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}};
+    for (Point& c : corners) c = {c.x + by.x, c.y + by.y, c.z + by.z};
+    const std::string file = "far-mesh_" + decade(by.x) + ".obj";
+    return {plate_scene(plate, obj_shape({}, file, "", diffuse(plate.reflectance))),
+            {{file, obj_text(corners, {1, 2, 3, 1, 3, 4})}}};
+}
+
+struct Distance {
+    double value;
+    Point by;
+    bool benign, quick;
+};
+
+/// Coordinates of the scenes are multiples of 1/4, so that floats hold them without rounding up to 2^21.
+std::vector<Distance> distances() {
+    std::vector<Distance> list;
     for (const int k : {-1, 4, 8, 12, 14, 16, 18, 20, 21}) {
-        Scene moved = scene;
         const double d = k < 0 ? 0 : std::exp2(k);
-        moved.frame.rigid = translate(d, -d / 2, d / 4);
-        Cell cell{name, decade(d), d, answer(moved), [moved, xml] { return SceneFiles{xml(moved)}; }};
-        cell.benign = k < 0;
-        cell.quick = k < 0 || k == 8 || k == 20;
-        // Half a unit in the last place of the coordinates is 1e-3 of the width.
-        if (k >= 14) cell.limit = "far-from-origin";
+        list.push_back({d, {d, -d / 2, d / 4}, k < 0, k < 0 || k == 8 || k == 20});
+    }
+    return list;
+}
+
+Family far_plates(const std::string& name, const std::string& parameter, MovedScene make, bool limited) {
+    Family family{name, parameter, {}};
+    for (const Distance& d : distances()) {
+        Plate plate;
+        plate.frame.rigid = translate(d.by.x, d.by.y, d.by.z);
+        Cell cell{name, decade(d.value), d.value, plate_answer(plate), [plate, d, make] { return make(plate, d.by); }};
+        cell.benign = d.benign;
+        cell.quick = d.quick;
+        if (limited && d.value >= 256) cell.limit = "Far from the origin";
+        family.cells.push_back(cell);
+    }
+    return family;
+}
+
+Family far_furnaces(const Furnace& furnace) {
+    Family family{"far-furnace", "distance of a cube that emits from the origin", {}};
+    for (const Distance& d : distances()) {
+        Furnace moved = furnace;
+        moved.frame.rigid = translate(d.by.x, d.by.y, d.by.z);
+        Cell cell{family.name, decade(d.value), d.value, furnace_answer(moved),
+                  [moved] { return SceneFiles{furnace_scene(moved)}; }};
+        cell.benign = d.benign;
+        cell.quick = d.quick;
         family.cells.push_back(cell);
     }
     return family;
@@ -76,8 +116,11 @@ std::vector<Family> scale_families() {
         space_scale<Cavity>("space-scale", "radius of the cavity", cavity, cavity_scene, cavity_answer, 10),
         space_scale<Plate>("space-scale-plate", "scale of a floor under a lamp", plate, plain_plate, plate_answer, 8),
         space_scale<Furnace>("space-scale-furnace", "half side of the cube", furnace, furnace_scene, furnace_answer, 8),
-        far_from_origin<Plate>("far-from-origin", plate, plain_plate, plate_answer),
-        far_from_origin<Furnace>("far-furnace", furnace, furnace_scene, furnace_answer)};
+        far_plates("far-plate", "distance of a floor under a lamp from the origin", moved_plate, false),
+        far_plates("far-mesh", "distance from the origin of a floor whose file holds it", meshed_plate, false),
+        far_plates("far-anchored", "distance of a floor under a lamp from the origin, where a stone lies",
+                   anchored_plate, true),
+        far_furnaces(furnace)};
 }
 
 }  // namespace ambilux::stress

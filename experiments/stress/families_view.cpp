@@ -59,7 +59,7 @@ Family gaps() {
         cell.benign = k == 0;
         cell.quick = k == 0 || k == -3 || k == -7;
         // Shapes of half side 2: rays start some 4e-7 of that above them.
-        if (k <= -6) cell.limit = "contact-shadows";
+        if (k <= -6) cell.limit = "Contact shadows and thin panes";
         if (k <= -1) cell.rare = "path-nee path-ris light";
         family.cells.push_back(cell);
     }
@@ -73,7 +73,7 @@ Family films() {
     };
     Family family{"film-size", "pixels", {}};
     for (const Size size : {Size{32, 32, true}, Size{1, 1, true}, Size{2, 3, false}, Size{1024, 1, false},
-                            Size{1, 1024, false}, Size{16384, 1024, false}}) {
+                            Size{1, 1024, false}, Size{2048, 64, false}, Size{16384, 1024, false}}) {
         Furnace furnace;
         furnace.reflectance = 0.5;
         furnace.max_depth = 3;
@@ -83,6 +83,7 @@ Family films() {
                   [furnace] { return SceneFiles{furnace_scene(furnace)}; }};
         cell.benign = size.width == 32;
         cell.quick = size.quick;
+        cell.device_only = pixels > 1 << 20;
         family.cells.push_back(cell);
     }
     return family;

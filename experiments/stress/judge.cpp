@@ -54,11 +54,11 @@ double events_of(const Mean& mean, double skew) {
     return std::min(std::pow(mean.value / mean.error, 2), skew != 0 ? 1 / (skew * skew) : kInf);
 }
 
-/// Normal equivalent of mean - answer. `skew` of the mean.
-double z_of(const Mean& mean, const Mean& answer, double skew) {
+/// Normal equivalent of mean - answer. `skew`: skewness of the mean.
+double z_of(const Mean& mean, const Mean& answer, double relative_rounding, double skew) {
     const double difference = mean.value - answer.value;
     if (!std::isfinite(difference)) return kInf;
-    const double rounding = kRounding * std::max(std::abs(mean.value), std::abs(answer.value));
+    const double rounding = relative_rounding * std::max(std::abs(mean.value), std::abs(answer.value));
     if (std::abs(difference) <= rounding) return 0;
     const double variance = mean.error * mean.error + answer.error * answer.error;
     if (variance == 0) return std::copysign(kInf, difference);
@@ -81,13 +81,14 @@ double relative_variance(const Mean& mean, double paths) {
     return mean.value != 0 ? mean.error * mean.error * paths / (mean.value * mean.value) : 0;
 }
 
-Comparison compare(const Batches& batches, const Mean& answer, bool uniform) {
+Comparison compare(const Batches& batches, const Mean& answer, bool uniform, double rounding) {
     Comparison c;
     const Mean mean = mean_of(batches);
     Powers all;
     for (uint32_t k = 0; k < batches.box_count(); ++k) all.add(batch_means(batches, int(k)));
-    c.z = z_of(mean, answer, all.skewness());
+    c.z = z_of(mean, answer, rounding, all.skewness());
     c.events = events_of(mean, all.skewness());
+    c.bias = answer.value != 0 ? mean.value / answer.value - 1 : 0;
     double p = 2 * normal_tail(std::abs(c.z));
     if (uniform && batches.box_count() > 1) {
         for (uint32_t k = 0; k < batches.box_count(); ++k) {
@@ -97,7 +98,7 @@ Comparison compare(const Batches& batches, const Mean& answer, bool uniform) {
             own.add(means);
             // Boxes that may have missed rare bright samples are left to the mean of all.
             if (events_of(box, own.skewness()) < kFewEvents) continue;
-            const double z = z_of(box, answer, own.skewness());
+            const double z = z_of(box, answer, rounding, own.skewness());
             if (std::abs(z) > std::abs(c.box_z)) c.box_z = z;
         }
         p = 2 * std::min(p, sidak(2 * normal_tail(std::abs(c.box_z)), batches.box_count()));
@@ -120,11 +121,12 @@ std::string verdict_name(Verdict verdict) {
 }
 
 Verdict judge(const RowState& row, double rows) {
+    const Comparison& c = row.comparison;
     const auto unless_limit = [&](Verdict v) { return row.has_limit ? Verdict::limit : v; };
-    if (row.mean == 0 && row.comparison.z != 0) return row.rare ? Verdict::noisy : unless_limit(Verdict::failed);
-    const bool differs = sidak(row.comparison.p, rows) < kSignificance;
-    if (row.comparison.events < kFewEvents && row.comparison.z != 0) return Verdict::noisy;
-    if (differs) return unless_limit(Verdict::failed);
+    if (row.mean == 0 && c.z != 0) return row.rare ? Verdict::noisy : unless_limit(Verdict::failed);
+    if (c.events < kFewEvents && c.z != 0 && !(std::abs(c.bias) <= kNear))
+        return row.rare ? Verdict::noisy : unless_limit(Verdict::noisy);
+    if (c.events >= kFewEvents && sidak(c.p, rows) < kSignificance) return unless_limit(Verdict::failed);
     if (row.dropped > 0) return unless_limit(Verdict::invalid);
     return Verdict::ok;
 }

@@ -24,18 +24,16 @@ struct Comparison {
     double box_z = 0;   ///< of the box that is furthest off; 0 where boxes are not compared
     double p = 1;       ///< two-sided, of both together: Sidak over the boxes, Bonferroni over the two tests
     double events = 0;  ///< rough number of random events that the mean rests on
+    double bias = 0;    ///< relative difference of the means
 };
 
-/// Differences up to this share of the answer are put down to rounding: a path of 20 vertices multiplies some hundred
-/// floats of 6e-8 each.
-constexpr double kRounding = 2e-5;
+/// A mean of fewer events than this may have missed rare bright samples, and then its error is too small as well. It is
+/// right if it lies near the answer, and else says nothing.
+constexpr double kFewEvents = 16, kNear = 0.03;
 
-/// Fewer events than this say nothing.
-constexpr double kFewEvents = 16;
-
-/// `uniform`: every box has the same answer. Student's t with the degrees of freedom of Welch and Satterthwaite;
-/// skewness by Hall's transformation, where it makes |t| smaller (film/ztest.h).
-Comparison compare(const Batches& batches, const Mean& answer, bool uniform);
+/// `uniform`: every box has the same answer. `rounding`: as of Answer. Student's t with the degrees of freedom of Welch
+/// and Satterthwaite; skewness by Hall's transformation, where it makes |t| smaller (film/ztest.h).
+Comparison compare(const Batches& batches, const Mean& answer, bool uniform, double rounding);
 
 /// What a row says of a cell.
 enum class Verdict {

@@ -22,8 +22,8 @@ std::string report(const Summary& summary) {
                                    "verdict", "mean", "expected", "bias", "z", "box z", "invalid, lost, note");
             const std::string dropped = r.invalid + r.lost ? fmt::format("{} {} ", r.invalid, r.lost) : "";
             text += fmt::format("{:<34} {:<16} {:>9} {:>12.6g} {:>12.6g} {:>8.2f}% {:>8.1f} {:>8.1f}  {}{}\n", r.cell,
-                                r.method, verdict_name(r.verdict), r.mean.value, r.answer.value, 100 * r.bias(),
-                                r.comparison.z, r.comparison.box_z, dropped, r.note);
+                                r.method, verdict_name(r.verdict), r.mean.value, r.answer.value,
+                                100 * r.comparison.bias, r.comparison.z, r.comparison.box_z, dropped, r.note);
         }
     for (const Verdict v : order)
         text += fmt::format("{}{} {}", v == order[0] ? "" : ", ", summary.count(v), verdict_name(v));

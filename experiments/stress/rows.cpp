@@ -8,7 +8,7 @@
 namespace ambilux::stress {
 
 const char* const kExpectedHeader =
-    "cell,family,parameter,value,benign,expected,kind,same_as,uniform,region,source,rare,limit,not_mitsuba";
+    "cell,family,parameter,value,benign,expected,kind,same_as,uniform,rounding,region,source,rare,limit,not_mitsuba";
 
 namespace {
 
@@ -47,7 +47,6 @@ std::string text_of(Verdict field) { return verdict_name(field); }
 /// All columns in their order: column(name, field). `Row`: const or not.
 template <class R, class Function>
 void for_each_column(R& r, Function&& column) {
-    double bias = r.bias();
     column("cell", r.cell);
     column("family", r.family);
     column("value", r.value);
@@ -59,7 +58,7 @@ void for_each_column(R& r, Function&& column) {
     column("dof", r.mean.dof);
     column("expected", r.answer.value);
     column("expected_error", r.answer.error);
-    column("relative_bias", bias);
+    column("relative_bias", r.comparison.bias);
     column("z", r.comparison.z);
     column("box_z", r.comparison.box_z);
     column("p", r.comparison.p);
@@ -108,10 +107,11 @@ std::optional<Row> parse_row(const std::string& line) {
 std::string expected_line(const Family& family, const Cell& cell) {
     const bool closed = cell.answer.kind == AnswerKind::closed_form;
     const auto benign = std::find_if(family.cells.begin(), family.cells.end(), [](const Cell& c) { return c.benign; });
-    return fmt::format("{},{},{},{:.9g},{},{:.12g},{},{},{},mean of all pixels and channels,{},{},{},{}", cell.name(),
-                       family.name, plain(family.parameter), cell.value, int(cell.benign), cell.answer.value,
-                       closed ? "radiance" : "factor", closed ? "" : benign->name(), int(cell.answer.uniform),
-                       plain(cell.answer.source), cell.rare, plain(cell.limit), plain(cell.not_mitsuba));
+    return fmt::format("{},{},{},{:.9g},{},{:.12g},{},{},{},{:.3g},mean of all pixels and channels,{},{},{},{}",
+                       cell.name(), family.name, plain(family.parameter), cell.value, int(cell.benign),
+                       cell.answer.value, closed ? "radiance" : "factor", closed ? "" : benign->name(),
+                       int(cell.answer.uniform), cell.answer.rounding, plain(cell.answer.source), cell.rare,
+                       plain(cell.limit), plain(cell.not_mitsuba));
 }
 
 }  // namespace ambilux::stress

@@ -23,9 +23,6 @@ struct Row {
     double samples = 0, paths = 0, seconds = 0;
     uint64_t invalid = 0, lost = 0, underflow = 0;
     std::string limit, note;
-
-    /// Relative difference from the answer; 0 without one.
-    double bias() const { return answer.value != 0 ? mean.value / answer.value - 1 : 0; }
 };
 
 std::string row_header();

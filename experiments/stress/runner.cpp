@@ -164,7 +164,7 @@ private:
         row.variance = relative_variance(row.mean, m.paths);
         // The benign cell of an invariance is its own answer: it is the others that are judged.
         if (cell.answer.kind == AnswerKind::invariance && cell.benign) row.answer = row.mean;
-        row.comparison = compare(m.batches, row.answer, cell.answer.uniform);
+        row.comparison = compare(m.batches, row.answer, cell.answer.uniform, cell.answer.rounding);
         row.verdict = judge({row.comparison, row.mean.value, has_prefix_of(cell.rare, row.method), !cell.limit.empty(),
                              row.invalid + row.lost},
                             rows_in_all_);

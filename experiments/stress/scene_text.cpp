@@ -33,7 +33,6 @@ std::string Frame::place(const std::string& elements) const {
     return "<transform name=\"to_world\">" + elements + mirror + scaled + rigid + "</transform>";
 }
 
-std::string number(double value) { return fmt::format("{:.17g}", value); }
 std::string scale_xyz(double x, double y, double z) {
     return fmt::format("<scale x=\"{:.17g}\" y=\"{:.17g}\" z=\"{:.17g}\"/>", x, y, z);
 }
@@ -46,6 +45,10 @@ std::string rotate(double x, double y, double z, double degrees) {
 
 std::string diffuse(double reflectance) {
     return fmt::format("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"{:.9g}\"/></bsdf>", reflectance);
+}
+std::string radius(double value) { return fmt::format("<float name=\"radius\" value=\"{:.17g}\"/>", value); }
+std::string center(Point p) {
+    return fmt::format("<point name=\"center\" x=\"{:.17g}\" y=\"{:.17g}\" z=\"{:.17g}\"/>", p.x, p.y, p.z);
 }
 std::string area_emitter(double radiance) {
     return fmt::format("<emitter type=\"area\"><rgb name=\"radiance\" value=\"{:.9g}\"/></emitter>", radiance);

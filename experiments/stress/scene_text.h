@@ -19,13 +19,14 @@ struct Frame {
     std::string place(const std::string& elements) const;
 };
 
-/// Numbers in full double precision.
-std::string number(double value);
 std::string scale_xyz(double x, double y, double z);
 std::string translate(double x, double y, double z);
 std::string rotate(double x, double y, double z, double degrees);
 
 std::string diffuse(double reflectance);
+/// A parameter of a shape.
+std::string radius(double value);
+std::string center(Point p);
 std::string area_emitter(double radiance);
 /// A shape of that type with `parameters`, such as a file name, BSDF and emitter, placed by `frame`.
 std::string shape(const std::string& type, const Frame& frame, const std::string& elements, const std::string& inside);

@@ -14,9 +14,8 @@ std::string cavity_scene(const Cavity& c) {
     // Parameters of the sphere and not of its transform: quadrics are scaled by the frame alone.
     const std::string wall = shape("sphere", c.frame, "",
                                    "<boolean name=\"flip_normals\" value=\"true\"/>" + diffuse(c.reflectance)),
-                      lamp = shape("sphere", c.frame, "",
-                                   fmt::format("<float name=\"radius\" value=\"{:.17g}\"/>", c.lamp_radius) +
-                                       diffuse(0) + area_emitter(c.radiance));
+                      lamp =
+                          shape("sphere", c.frame, "", radius(c.lamp_radius) + diffuse(0) + area_emitter(c.radiance));
     const std::string camera = perspective(c.frame, {0.1, 0.2, 0.55}, {0.3, 0.3, 1}, {0, 1, 0}, 50, 1e-3, c.film);
     return scene_xml(c.max_depth, camera + wall + lamp);
 }
@@ -46,12 +45,8 @@ Answer plate_answer(const Plate& p) {
             "rho L F; F: mean form factor of a parallel rectangle (Howell B-4)"};
 }
 
-std::string stone(const Frame& frame, Point c) {
-    return shape("sphere", frame, "",
-                 fmt::format("<point name=\"center\" x=\"{:.17g}\" y=\"{:.17g}\" z=\"{:.17g}\"/><float "
-                             "name=\"radius\" value=\"0.5\"/>",
-                             c.x, c.y, c.z) +
-                     diffuse(0));
+std::string stone(const Frame& frame, Point at) {
+    return shape("sphere", frame, "", center(at) + radius(0.5) + diffuse(0));
 }
 
 std::string obj_text(const std::vector<Point>& vertices, const std::vector<unsigned>& faces,

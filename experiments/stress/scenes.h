@@ -32,7 +32,7 @@ std::string plate_camera(const Plate& plate);
 std::string plate_floor(const Plate& plate);
 
 /// A black sphere of radius 0.5 that the camera never sees.
-std::string stone(const Frame& frame, Point center);
+std::string stone(const Frame& frame, Point at);
 
 /// A triangle mesh in OBJ. Faces count vertices from 1; `normals`, if any, one for each vertex.
 std::string obj_text(const std::vector<Point>& vertices, const std::vector<unsigned>& faces,
