@@ -4,8 +4,10 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/log.h"
+#include "experiments/stress/elsewhere.h"
 #include "experiments/stress/families.h"
 #include "experiments/stress/folder.h"
 #include "experiments/stress/runner.h"
@@ -16,7 +18,7 @@ namespace {
 struct Options {
     stress::Request request;
     bool list = false;
-    std::string export_to;
+    std::string export_to, judge;
 };
 
 int list_families() {
@@ -25,9 +27,12 @@ int list_families() {
     return int(ExitCode::done);
 }
 
+void need_output(const std::string& output, const char* for_what) {
+    if (output.empty()) throw Error(ExitCode::usage, fmt::format("stress: {} needs -o FOLDER", for_what));
+}
+
 int sweep(stress::Request& request) {
-    if (request.output.empty())
-        throw Error(ExitCode::usage, "stress: -o FOLDER is needed, unless --list or --export is given");
+    need_output(request.output, "a sweep");
     request.interrupt = interrupt_flag();
     const stress::Summary summary = stress::run(request, stress::families(), default_hooks());
     std::cout << stress::report(summary) << std::flush;
@@ -39,8 +44,23 @@ int sweep(stress::Request& request) {
     return summary.bad() ? stress::kFailedRows : int(ExitCode::done);
 }
 
+/// Judges what another renderer measured.
+int judge(const Options& o) {
+    need_output(o.request.output, "--judge");
+    stress::Summary summary;
+    summary.rows = stress::judge_elsewhere(o.judge, stress::families());
+    summary.planned = summary.rows.size();
+    make_folders(o.request.output);
+    std::string text = stress::row_header() + "\n";
+    for (const stress::Row& row : summary.rows) text += stress::row_line(row) + "\n";
+    write_file_atomic(o.request.output + "/stress.csv", text);
+    std::cout << stress::report(summary) << std::flush;
+    return int(ExitCode::done);
+}
+
 int stress_command(Options& o) {
     if (o.list) return list_families();
+    if (!o.judge.empty()) return judge(o);
     if (o.export_to.empty()) return sweep(o.request);
     stress::export_cells(o.export_to, stress::chosen_cells(stress::families(), o.request.families, o.request.quick));
     return int(ExitCode::done);
@@ -66,6 +86,9 @@ void add_stress(CLI::App& app, Run& run) {
     command.add_flag("--list", o->list, "Print the families and what they sweep");
     command.add_option("--export", o->export_to,
                        "Write the scenes, in Mitsuba's format, and expected.csv into this folder, and render nothing");
+    command.add_option(
+        "--judge", o->judge,
+        "Judge what another renderer measured on the exported scenes (docs/stress.md), and render nothing");
     command.callback([o, &run] { run = [o] { return stress_command(*o); }; });
 }
 

@@ -78,7 +78,7 @@ std::vector<Family> depth_families() {
                     {0.999, 1000, true}},
                    Ends::roulette),
             depths("depth-rr-cap", "albedo of a furnace of up to 1000 segments, with roulette and rr_cap=0.999",
-                   {{0.5, 20, true}, {0.9, 200, false}, {0.99, 1000, false}, {0.999, 1000, true}}, Ends::kind_roulette),
+                   {{0.5, 20, true}, {0.9, 200, false}, {0.99, 300, true}, {0.999, 1000, false}}, Ends::kind_roulette),
             depths("depth-no-roulette", "albedo of a furnace of up to 1000 segments, without roulette",
                    {{0.5, 20, true}, {0.9, 50, true}, {0.99, 200, false}, {0.999, 1000, false}}, Ends::nothing),
             samples()};

@@ -12,8 +12,6 @@
 namespace ambilux::stress {
 namespace {
 
-/// Paths of the first round, over all batches.
-constexpr double kFirstPaths = 3.2e4;
 /// A round is at most so many times all before it: what a sample costs in small batches says little about large ones.
 constexpr double kGrowth = 8;
 constexpr uint64_t kMaxSamples = std::numeric_limits<uint32_t>::max();
@@ -88,7 +86,7 @@ Measurement measure(const Hooks& hooks, const Scene& scene, const RenderSettings
     if (effort.samples > kMaxSamples) throw Error(ExitCode::usage, "at most 4294967295 samples per pixel are possible");
     const double pixels = double(scene.sensor.crop_width) * scene.sensor.crop_height;
     BoxSums sums(scene.sensor.crop_width, scene.sensor.crop_height);
-    uint64_t count = uint64_t(std::max(1.0, std::round(kFirstPaths / (pixels * sums.batch_count))));
+    uint64_t count = uint64_t(std::max(1.0, std::round(effort.first_paths / (pixels * sums.batch_count))));
     RenderSettings s = settings;
     s.expected_samples = std::max(effort.samples, uint64_t(effort.paths / pixels)) / sums.batch_count + 1;
     const auto start = Clock::now();

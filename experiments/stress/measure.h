@@ -39,6 +39,7 @@ struct Effort {
     double relative_error = 0.002;  ///< standard error of the mean over the mean
     double paths = 4e5;             ///< at most
     double seconds = 1;             ///< at most, but for the first round
+    double first_paths = 3.2e4;     ///< of the first round, over all batches
     uint64_t samples = 0;           ///< of every pixel; if not 0, neither error nor paths end the measurement before
 };
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "experiments/stress/methods.h"
+
 namespace ambilux::stress {
 
 const char* const kExpectedHeader =
@@ -78,11 +80,53 @@ void for_each_column(R& r, Function&& column) {
 
 }  // namespace
 
+Row blank_row(const Cell& cell, const std::string& method, const std::string& backend, const Row* benign) {
+    Row row;
+    row.cell = cell.name();
+    row.family = cell.family;
+    row.value = cell.value;
+    row.method = method;
+    row.backend = backend;
+    row.limit = cell.limit;
+    const double value = cell.answer.value;
+    if (cell.answer.kind == AnswerKind::closed_form)
+        row.answer = {value, 0, 0};
+    else if (benign)
+        row.answer = {value * benign->mean.value, value * benign->mean.error, benign->mean.dof};
+    return row;
+}
+
+void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benign, double rows) {
+    row.mean = mean_of(m.batches);
+    row.first = m.first;
+    row.samples = double(m.samples);
+    row.paths = m.paths;
+    row.seconds = m.seconds;
+    row.invalid = m.invalid;
+    row.lost = m.lost;
+    row.underflow = m.underflow;
+    row.variance = relative_variance(row.mean, m.paths);
+    if (benign && benign->variance > 0) row.variance_ratio = row.variance / benign->variance;
+    // The benign cell of an invariance is its own answer: it is the others that are judged.
+    if (cell.answer.kind == AnswerKind::invariance && cell.benign) row.answer = row.mean;
+    row.comparison = compare(m.batches, row.answer, cell.answer.uniform, cell.answer.rounding);
+    row.verdict = judge({row.comparison, row.mean.value, has_prefix_of(cell.rare, row.method), !cell.limit.empty(),
+                         row.invalid + row.lost},
+                        rows);
+    if (m.samples < cell.samples)
+        row.note = fmt::format("{} of {} samples in the time that it had", m.samples, cell.samples);
+}
+
+void refuse_row(Row& row, const Cell& cell, const std::string& why) {
+    row.note = why;
+    row.verdict = cell.limit.empty() ? Verdict::refused : Verdict::limit;
+}
+
 std::string row_header() {
     std::string header;
     const Row row;
-    for_each_column(row,
-                    [&](const char* name, const auto&) { header += (header.empty() ? "" : ",") + std::string(name); });
+    for_each_column(
+        row, [&](const char* name, const auto&) { header += fmt::format("{}{}", header.empty() ? "" : ",", name); });
     return header;
 }
 

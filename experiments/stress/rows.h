@@ -25,6 +25,13 @@ struct Row {
     std::string limit, note;
 };
 
+/// A row that nothing is known of but its answer. `benign`: of the benign cell by the same method, if there is one.
+Row blank_row(const Cell& cell, const std::string& method, const std::string& backend, const Row* benign);
+/// What was measured, judged. `rows`: of the whole sweep, for the correction.
+void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benign, double rows);
+/// The program said that it cannot render this.
+void refuse_row(Row& row, const Cell& cell, const std::string& why);
+
 std::string row_header();
 std::string row_line(const Row& row);
 /// The row of a line that row_line made; nothing of another.

@@ -100,8 +100,9 @@ private:
     }
 
     Effort effort_of(const Cell& cell) const {
-        Effort effort = request_.quick ? Effort{0.004, 1.3e5, 60, 0} : Effort{0.001, 8e6, 1.5, 0};
+        Effort effort = request_.quick ? Effort{0.004, 1.3e5, 60} : Effort{0.001, 8e6, 1.5};
         effort.paths *= cell.effort;
+        effort.first_paths *= cell.effort;
         effort.samples = cell.samples;
         if (cell.samples) effort.seconds = 60;
         if (request_.seconds > 0) {
@@ -115,19 +116,8 @@ private:
 
     Row run_method(const Family& family, const Cell& cell, const Method& method, const Scene* scene,
                    const std::string& refusal) {
-        Row row;
-        row.cell = cell.name();
-        row.family = family.name;
-        row.value = cell.value;
-        row.method = method.name;
-        row.backend = backend_;
-        row.limit = cell.limit;
         const Row* const benign = cell.benign ? nullptr : find(family.cells.front(), method);
-        if (cell.answer.kind == AnswerKind::closed_form)
-            row.answer = {cell.answer.value, 0, 0};
-        else if (benign)
-            row.answer = {cell.answer.value * benign->mean.value, cell.answer.value * benign->mean.error,
-                          benign->mean.dof};
+        Row row = blank_row(cell, method.name, backend_, benign);
         try {
             if (!scene) throw Error(ExitCode::bad_input, refusal);
             const RenderSettings settings = settings_of(hooks_, method, cell, *scene, backend_, request_.seed);
@@ -138,38 +128,16 @@ private:
             }
             const Measurement m = measure(hooks_, *scene, settings, effort_of(cell), request_.interrupt);
             interrupted_ = m.interrupted;
-            if (!m.interrupted) fill(row, cell, m);
+            if (!m.interrupted) fill_row(row, cell, m, benign, rows_in_all_);
         } catch (const Error& e) {
-            row.note = e.what();
-            row.verdict = cell.limit.empty() ? Verdict::refused : Verdict::limit;
+            refuse_row(row, cell, e.what());
         }
-        if (benign && benign->variance > 0) row.variance_ratio = row.variance / benign->variance;
         return row;
     }
 
     std::string reason_to_leave_out(const Cell& cell, const Scene& scene, const RenderSettings& settings) const {
         if (cell.device_only && backend_ == "cpu") return "for devices: it takes a host minutes";
         return missing_light(scene.features, settings);
-    }
-
-    void fill(Row& row, const Cell& cell, const Measurement& m) const {
-        row.mean = mean_of(m.batches);
-        row.first = m.first;
-        row.samples = double(m.samples);
-        row.paths = m.paths;
-        row.seconds = m.seconds;
-        row.invalid = m.invalid;
-        row.lost = m.lost;
-        row.underflow = m.underflow;
-        row.variance = relative_variance(row.mean, m.paths);
-        // The benign cell of an invariance is its own answer: it is the others that are judged.
-        if (cell.answer.kind == AnswerKind::invariance && cell.benign) row.answer = row.mean;
-        row.comparison = compare(m.batches, row.answer, cell.answer.uniform, cell.answer.rounding);
-        row.verdict = judge({row.comparison, row.mean.value, has_prefix_of(cell.rare, row.method), !cell.limit.empty(),
-                             row.invalid + row.lost},
-                            rows_in_all_);
-        if (m.samples < cell.samples)
-            row.note = fmt::format("{} of {} samples in the time that it had", m.samples, cell.samples);
     }
 
     double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
