@@ -33,9 +33,7 @@ Family depths(const std::string& name, const std::string& parameter, std::initia
         cell.quick = d.quick;
         cell.effort = std::min(1.0, 20.0 / d.segments);
         // Survival is at most 0.95: squares of the throughput grow by albedo²/0.95 at every vertex.
-        if (ends == Ends::roulette && d.albedo > 0.974) {
-            cell.limit = "Roulette cap";
-        }
+        if (ends == Ends::roulette && d.albedo > 0.974) cell.limit = "Roulette cap";
         if (ends == Ends::kind_roulette) {
             cell.settings = {{"rr_cap", "0.999"}};
             cell.not_mitsuba = "its roulette has a fixed cap of 0.95";

@@ -22,6 +22,7 @@ Family masked_emitter() {
                   }};
         cell.benign = opacity == 1;
         cell.quick = opacity == 1 || opacity == 0.5;
+        if (opacity < 1) cell.limit = "Emitters behind a mask";
         family.cells.push_back(cell);
     }
     return family;

@@ -48,9 +48,10 @@ struct Powers {
     double skewness() const { return squares > 0 ? cubes / std::pow(squares, 1.5) : 0; }
 };
 
-/// N equal rare hits have a relative error of 1/sqrt(N) and a skewness of as much.
-double events_of(const Mean& mean, double skew) {
-    if (!(mean.error > 0)) return mean.value != 0 ? kInf : 0;
+/// N equal rare hits have a relative error of 1/sqrt(N) and a skewness of as much. A mean whose error is that of
+/// rounding rests on no chance.
+double events_of(const Mean& mean, double relative_rounding, double skew) {
+    if (!(mean.error > relative_rounding * std::abs(mean.value))) return mean.value != 0 ? kInf : 0;
     return std::min(std::pow(mean.value / mean.error, 2), skew != 0 ? 1 / (skew * skew) : kInf);
 }
 
@@ -87,7 +88,7 @@ Comparison compare(const Batches& batches, const Mean& answer, bool uniform, dou
     Powers all;
     for (uint32_t k = 0; k < batches.box_count(); ++k) all.add(batch_means(batches, int(k)));
     c.z = z_of(mean, answer, rounding, all.skewness());
-    c.events = events_of(mean, all.skewness());
+    c.events = events_of(mean, rounding, all.skewness());
     c.bias = answer.value != 0 ? mean.value / answer.value - 1 : 0;
     double p = 2 * normal_tail(std::abs(c.z));
     if (uniform && batches.box_count() > 1) {
@@ -97,7 +98,7 @@ Comparison compare(const Batches& batches, const Mean& answer, bool uniform, dou
             Powers own;
             own.add(means);
             // Boxes that may have missed rare bright samples are left to the mean of all.
-            if (events_of(box, own.skewness()) < kFewEvents) continue;
+            if (events_of(box, rounding, own.skewness()) < kFewEvents) continue;
             const double z = z_of(box, answer, rounding, own.skewness());
             if (std::abs(z) > std::abs(c.box_z)) c.box_z = z;
         }
@@ -124,9 +125,12 @@ Verdict judge(const RowState& row, double rows) {
     const Comparison& c = row.comparison;
     const auto unless_limit = [&](Verdict v) { return row.has_limit ? Verdict::limit : v; };
     if (row.mean == 0 && c.z != 0) return row.rare ? Verdict::noisy : unless_limit(Verdict::failed);
-    if (c.events < kFewEvents && c.z != 0 && !(std::abs(c.bias) <= kNear))
+    const bool differs = sidak(c.p, rows) < kSignificance;
+    if (c.events >= kFewEvents) {
+        if (differs) return unless_limit(Verdict::failed);
+    } else if (c.z != 0 && (differs || !(std::abs(c.bias) <= kNear))) {
         return row.rare ? Verdict::noisy : unless_limit(Verdict::noisy);
-    if (c.events >= kFewEvents && sidak(c.p, rows) < kSignificance) return unless_limit(Verdict::failed);
+    }
     if (row.dropped > 0) return unless_limit(Verdict::invalid);
     return Verdict::ok;
 }

@@ -100,7 +100,7 @@ private:
     }
 
     Effort effort_of(const Cell& cell) const {
-        Effort effort = request_.quick ? Effort{0.004, 1.3e5, 60} : Effort{0.001, 8e6, 1.5};
+        Effort effort = request_.quick ? Effort{0.004, 1.3e5, 60} : Effort{0.002, 2e6, 0.4};
         effort.paths *= cell.effort;
         effort.first_paths *= cell.effort;
         effort.samples = cell.samples;
