@@ -56,7 +56,11 @@ private:
         if (parts.size() == boxes) parts.emplace_back();
         if (parts.size() != place_count)
             throw error(line, fmt::format("{} columns where there are {}", parts.size(), int(place_count)));
-        const auto [family, c] = find(parts[cell], line);
+        const auto [family, known] = find(parts[cell], line);
+        // Our limits are not theirs.
+        Cell unlimited = *known;
+        unlimited.limit.clear();
+        const Cell* const c = &unlimited;
         const Row* benign = nullptr;
         for (const Row& row : before)
             if (row.cell == family->cells.front().name() && row.method == parts[method] && !c->benign) benign = &row;
