@@ -107,9 +107,9 @@ def backend_differences(sweep):
         elif variance + rounding**2 == 0:
             z, p = math.inf, 0.0
         else:
-            dof = variance**2 / max(1e-300, a["standard_error"] ** 4 / a["dof"] + b["standard_error"] ** 4 / b["dof"])
+            terms = a["standard_error"] ** 4 / a["dof"] + b["standard_error"] ** 4 / b["dof"]
             z = difference / math.sqrt(variance + rounding**2)
-            p = 2 * stats.t.sf(abs(z), max(1, dof))
+            p = 2 * (stats.t.sf(abs(z), variance**2 / terms) if terms > 0 else stats.norm.sf(abs(z)))
         first = (b["first"] / a["first"] - 1) if a["first"] else 0.0
         found.append((method, cell, z, p, first))
     return found

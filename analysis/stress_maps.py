@@ -109,6 +109,11 @@ def variance_of(row):
 
 
 def make_all(sweep):
+    with plt.rc_context(style.STYLE):
+        return make(sweep)
+
+
+def make(sweep):
     pictures = list(state_maps(sweep))
     signed = colors.TwoSlopeNorm(0, -LIMIT_Z, LIMIT_Z)
     pictures += number_maps(sweep, sweep.columns, "stress_z", "Significance of the bias",

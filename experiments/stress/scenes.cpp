@@ -8,7 +8,7 @@
 
 namespace ambilux::stress {
 
-std::string decade(double value) { return fmt::format("{:.6g}", value); }
+std::string decade(double value) { return fmt::format("{:.7g}", value); }
 
 std::string cavity_scene(const Cavity& c) {
     // Parameters of the sphere and not of its transform: quadrics are scaled by the frame alone.
