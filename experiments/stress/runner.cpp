@@ -104,12 +104,12 @@ private:
         effort.paths *= cell.effort;
         effort.first_paths *= cell.effort;
         effort.samples = cell.samples;
-        if (cell.samples) effort.seconds = 60;
+        if (cell.samples) effort.seconds = 15;
         if (request_.seconds > 0) {
             // What is left, in equal parts; a cell whose samples are given may take a few parts more.
             const double part = std::max(0.0, request_.seconds - elapsed()) / double(rows_left_);
             effort.seconds = std::min(effort.seconds, cell.samples ? 20 * part : part);
-            if (!request_.quick) effort.paths = 1e9 * cell.effort;
+            if (!request_.quick) effort.paths = 4e7 * cell.effort;
         }
         return effort;
     }
