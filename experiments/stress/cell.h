@@ -52,7 +52,7 @@ struct Cell {
     /// is black is then too noisy to judge. Of all others it is wrong.
     std::string rare = {};
     std::string not_mitsuba = {};  ///< why Mitsuba 3 cannot load the scene, or takes it for another
-    double effort = 1;             ///< of the usual number of samples
+    double effort = 1;             ///< of the usual number of first samples, and of all those of --quick
     std::vector<std::pair<std::string, std::string>> settings = {};  ///< over those of the method
     uint64_t samples = 0;                                            ///< of every pixel that must be rendered
     bool device_only = false;                                        ///< takes a host minutes for each method

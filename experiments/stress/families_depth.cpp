@@ -25,13 +25,13 @@ Family depths(const std::string& name, const std::string& parameter, std::initia
         furnace.reflectance = d.albedo;
         furnace.max_depth = d.segments;
         furnace.rr_depth = ends == Ends::nothing ? d.segments + 1 : 5;
-        // Connections of paired subpaths grow with the square of their length: few paths say enough.
-        if (d.segments > 100) furnace.film = {4, 4};
+        // Connections of paired subpaths grow with the square of their length: few paths must do.
+        if (d.segments > 20) furnace.film = {8, 4};
         Cell cell{name, decade(d.albedo), d.albedo, furnace_answer(furnace),
                   [furnace] { return SceneFiles{furnace_scene(furnace)}; }};
         cell.benign = family.cells.empty();
         cell.quick = d.quick;
-        cell.effort = std::min(1.0, 20.0 / d.segments);
+        cell.effort = std::min(1.0, std::pow(20.0 / d.segments, 2));
         // Survival is at most 0.95: squares of the throughput grow by albedo²/0.95 at every vertex.
         if (ends == Ends::roulette && d.albedo > 0.974) cell.limit = "Roulette cap";
         if (ends == Ends::kind_roulette) {

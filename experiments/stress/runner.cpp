@@ -100,8 +100,8 @@ private:
     }
 
     Effort effort_of(const Cell& cell) const {
-        Effort effort = request_.quick ? Effort{0.004, 1.3e5, 60} : Effort{0.002, 2e6, 0.4};
-        effort.paths *= cell.effort;
+        // Of the quick sweep all samples are the same on any machine; the other one goes by the clock.
+        Effort effort = request_.quick ? Effort{0.004, 1.3e5 * cell.effort, 60} : Effort{0.002, 2e6, 0.4};
         effort.first_paths *= cell.effort;
         effort.samples = cell.samples;
         if (cell.samples) effort.seconds = 15;
@@ -109,7 +109,7 @@ private:
             // What is left, in equal parts; a cell whose samples are given may take a few parts more.
             const double part = std::max(0.0, request_.seconds - elapsed()) / double(rows_left_);
             effort.seconds = std::min(effort.seconds, cell.samples ? 20 * part : part);
-            if (!request_.quick) effort.paths = 4e7 * cell.effort;
+            if (!request_.quick) effort.paths = 4e7;
         }
         return effort;
     }
