@@ -20,6 +20,7 @@ void add_info(CLI::App& app, Run& run);
 void add_reference(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_experiment(CLI::App& app, Run& run);
+void add_stress(CLI::App& app, Run& run);
 void add_bench(CLI::App& app, Run& run);
 void add_trace(CLI::App& app, Run& run);
 void add_help(CLI::App& app, Run& run);

@@ -46,17 +46,19 @@ std::string result_line(const ResultRow& r) {
         m.relmse_trimmed_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid);
 }
 
-std::vector<std::string> read_results(const std::string& path) {
+std::vector<std::string> read_results(const std::string& path) { return read_rows(path, kResultHeader); }
+
+std::vector<std::string> read_rows(const std::string& path, const std::string& header) {
     std::vector<std::string> lines;
     if (!std::filesystem::exists(path)) return lines;
     const std::string content = read_file(path);
-    const long commas = count_commas(kResultHeader);
+    const long commas = count_commas(header);
     std::set<std::string> seen;
     size_t number = 0;
     for (size_t begin = 0, end; (end = content.find('\n', begin)) != std::string::npos; begin = end + 1) {
         std::string line = content.substr(begin, end - begin);
         if (++number == 1) {
-            if (line != kResultHeader)
+            if (line != header)
                 throw input_error(path, 1, "its columns are not those of this version: choose another output folder");
             continue;
         }

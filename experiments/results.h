@@ -35,5 +35,7 @@ std::string result_prefix(const std::string& scene, const std::string& run, uint
 /// The lines of a results file, without its header. A last line that a killed process left unfinished is dropped; so
 /// are repeated lines. Nothing if the file does not exist. Throws Error(bad_input) if the header is another.
 std::vector<std::string> read_results(const std::string& path);
+/// The same of a file with another header.
+std::vector<std::string> read_rows(const std::string& path, const std::string& header);
 
 }  // namespace ambilux

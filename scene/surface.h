@@ -9,11 +9,11 @@ namespace ambilux {
 /// Point on a surface, world space.
 struct SurfacePoint {
     Vec3f p;
-    Vec3f
-        p_error;  ///< a box of this half size around p meets the surface: bound of the error of each coordinate of p
-                  ///< but for steps along the surface, which 1 - b1 - b2 adds on triangles (2^-23 of the first corner)
-    Vec3f ng;     ///< unit geometric normal; on triangles with vertex normals it lies on their side
-    Vec3f ns;     ///< unit shading normal (interpolated), dot(ns, ng) may be negative only for absurd vertex normals
+    /// A box of this half size around p meets the surface: bound of the error of each coordinate of p but for steps
+    /// along the surface, which 1 - b1 - b2 adds on triangles (2^-23 of the first corner).
+    Vec3f p_error;
+    Vec3f ng;  ///< unit geometric normal; on triangles with vertex normals it lies on their side
+    Vec3f ns;  ///< unit shading normal (interpolated), dot(ns, ng) may be negative only for absurd vertex normals
     Vec3f dpdu, dpdv;  ///< partial derivatives of p by uv; zero or arbitrary tangents where uv do not define them
     Vec2f uv;          ///< texture coordinates as in Mitsuba: triangles without uvs use barycentrics (b1,b2)
     uint32_t prim, shape;

@@ -90,6 +90,7 @@ private:
     const Object& object_;
     std::set<const Value*> used_values_;
     std::set<const Child*> used_children_;
+    std::map<std::string, size_t> next_child_;  ///< by tag: where take() looks on
 };
 
 /// Texture object as index into Scene::textures (0 when only validating).

@@ -66,7 +66,10 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
 
 Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
     const Document document = parse_document(path, options.parameters);
-    Scene scene = build_scene(path, document, options, scene_origin(document));
+    Scene scene = build_scene(path, document, options, {});
+    // Far from the origin floats have rounded it already: it is made again, about its centre in double precision.
+    if (const Vec3d c = far_center(scene); c.x != 0 || c.y != 0 || c.z != 0)
+        scene = build_scene(path, document, options, c);
     finalize_scene(scene, options.light_picking);
     return scene;
 }

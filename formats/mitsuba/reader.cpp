@@ -126,8 +126,11 @@ ParamFloat Reader::textured_number(const std::string& name, float fallback) {
 }
 
 const Object* Reader::take(const std::string& tag) {
-    for (const Child& child : object_.children)
+    // From where the last one of this tag was found: scenes may have a million emitters.
+    for (size_t& i = next_child_[tag]; i < object_.children.size();) {
+        const Child& child = object_.children[i++];
         if (child.object->tag == tag && used_children_.insert(&child).second) return child.object;
+    }
     return nullptr;
 }
 

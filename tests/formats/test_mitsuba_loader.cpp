@@ -3,7 +3,9 @@
 // timeout: 120
 // The Mitsuba loader: what it understands, and what it says about what it does not. Numbers marked "Mitsuba" were read
 // from Mitsuba 3.9.1.
+#include <fmt/format.h>
 #include <algorithm>
+
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -13,8 +15,8 @@
 #include "formats/load.h"
 #include "scene/info.h"
 #include "tests/support/catch.h"
-#include "tests/support/temp_folder.h"
 #include "tests/support/skip.h"
+#include "tests/support/temp_folder.h"
 #include "transport/bsdf/precompute.h"
 #include "transport/texture.h"
 
@@ -269,6 +271,25 @@ TEST_CASE("transforms: later steps apply after earlier ones") {
     check_rgb(s.sensor.to_world.vector({0, 0, 1}), {0, 0, 1});
     check_rgb(s.sensor.to_world.vector({1, 0, 0}), {1, 0, 0});
     check_rgb(s.sensor.to_world.point({0, 0, 0}), {1, 2, 3});
+}
+
+TEST_CASE("a scene far from the origin is moved there, also if only the vertices of its mesh file say so") {
+    const test::TempFolder folder;
+    const auto mesh = [&](double x) {
+        folder.write("m.obj", fmt::format("v {} 0 0\nv {} 0 0\nv {} 1 0\nf 1 2 3\n", x, x + 1, x));
+        const std::string camera = fmt::format(
+            "<sensor type='perspective'><transform name='to_world'><lookat origin='{0},0,2' target='{0},0,0' "
+            "up='0,1,0'/></transform></sensor>",
+            x);
+        return load(camera + "<shape type='obj'><string name='filename' value='m.obj'/></shape>", {}, "3.0.0", &folder);
+    };
+    const Scene near = mesh(4), far = mesh(1048576);
+    CHECK(near.origin == std::array<double, 3>{});
+    CHECK(near.vertices[0].p.x == 4);
+    CHECK(far.origin[0] == 1048576.5);
+    CHECK(far.vertices[0].p.x == -0.5f);
+    CHECK(far.vertices[1].p.x == 0.5f);
+    CHECK(far.sensor.to_world.m[0][3] == -0.5f);
 }
 
 TEST_CASE("sensors: field of view by every rule, film, crop, size override") {

@@ -62,8 +62,8 @@ struct BidirectionalMis {
     /// Density of connections relative to that of one pair of subpaths; 0 if they are off.
     AMBILUX_HD float connection_density() const { return masked(kConnectionStrategies, connections); }
 
-    // ---- sums along subpaths: a relative error of 10 roundings a vertex while all factors are within 1e-36 to 1e37
-    // ----
+    // ---- sums along subpaths ----
+    // Relative error: 10 roundings a vertex while all factors are within 1e-36 to 1e37.
 
     /// Density of the first vertex of an eye subpath per solid angle (perspective, thin lens) or per area of the sensor
     /// plane (orthographic), at density 1 per pixel.
