@@ -33,11 +33,8 @@ int main(int argc, char** argv) {
     const auto named = [&](CLI::App* command) { return argc > 1 && command->check_name(argv[1]); };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(named).empty()) {
         log_error(fmt::format(
-<<<<<<< HEAD
-            "unknown command '{}': render, info, reference, compare, experiment, bench, trace and help are known",
-=======
-            "unknown command '{}': render, info, reference, compare, experiment, stress, bench and help are known",
->>>>>>> stress
+            "unknown command '{}': render, info, reference, compare, experiment, stress, bench, trace and help are "
+            "known",
             argv[1]));
         return int(ExitCode::usage);
     }
