@@ -13,8 +13,8 @@
 #include "formats/load.h"
 #include "scene/info.h"
 #include "tests/support/catch.h"
-#include "tests/support/temp_folder.h"
 #include "tests/support/skip.h"
+#include "tests/support/temp_folder.h"
 #include "transport/bsdf/precompute.h"
 #include "transport/texture.h"
 

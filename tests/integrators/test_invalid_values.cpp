@@ -63,7 +63,8 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::nume
 
 }  // namespace
 
-TEST_CASE("G9: one bad number in emission, reflectance or camera is counted by each stage that meets it, in every variant") {
+TEST_CASE(
+    "G9: one bad number in emission, reflectance or camera is counted by each stage that meets it, in every variant") {
     for (const Variant& v : kVariants)
         for (const Injection& injection : kInjections)
             for (const float value : {kNan, kInf, -1.0f}) {

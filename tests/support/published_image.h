@@ -54,7 +54,8 @@ inline void require_published_image(const std::string& name, int max_depth, uint
     const bool agreed = agrees(image, reference, block, &report);
     INFO(name << ": " << report);
     CHECK(agreed);
-    for (const float factor : {0.98f, 1.02f}) CHECK_FALSE(agrees(brighter_columns(image, block, 1, factor), reference, block));
+    for (const float factor : {0.98f, 1.02f})
+        CHECK_FALSE(agrees(brighter_columns(image, block, 1, factor), reference, block));
     for (const float factor : {0.9f, 1.1f}) {
         Image local = brighter_columns(image, block, 6, factor);
         double before = 0, after = 0;
