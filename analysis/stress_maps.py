@@ -11,7 +11,7 @@ from analysis import style
 from analysis.stress import VERDICTS, backend_differences, measured
 
 # Letters tell states apart without colour.
-STATES = {"failed": ("B", style.COLOURS[1], "biased, and no known limit"), "invalid": ("I", style.COLOURS[3], "invalid or lost values, counted"),
+STATES = {"failed": ("B", style.COLOURS[1], "biased, no known limit"), "invalid": ("I", style.COLOURS[3], "invalid or lost values, counted"),
           "refused": ("R", style.COLOURS[0], "refused with a message"), "limit": ("L", style.COLOURS[5], "off as docs/numerics.md says"),
           "noisy": ("N", "#BBBBBB", "too few events to judge"), "ok": ("", "#D9EFE3", "right"), "left out": ("", "#FFFFFF", "not rendered: finds no such light")}
 ROWS_A_PAGE = 120

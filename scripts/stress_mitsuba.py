@@ -21,6 +21,7 @@ from pathlib import Path
 HEADER = ["cell", "method", "backend", "boxes_x", "boxes_y", "samples", "pixels", "seconds", "invalid", "note", "boxes"]
 METHODS = ("path", "ptracer")
 BATCHES, BOXES = 32, 4  # as in experiments/stress/measure.h
+RESULT = "result: "  # after whatever Mitsuba prints
 
 
 def box_means(image, boxes_x, boxes_y):
@@ -76,7 +77,7 @@ def in_own_process(options, path, method):
     if done.returncode != 0:
         lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
         return refusal(f"exit status {done.returncode}: {lines[-1] if lines else ''}")
-    return done.stdout.rstrip("\n").split("\n")[-1].split(",")
+    return done.stdout.rpartition(RESULT)[2].strip().split(",")
 
 
 def main():
@@ -89,7 +90,7 @@ def main():
     parser.add_argument("--one", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
-        print(",".join(str(x) for x in render(options.scenes, options.one, options.variant, options.paths)))
+        print(RESULT + ",".join(str(x) for x in render(options.scenes, options.one, options.variant, options.paths)))
         return 0
     with open(options.scenes / "expected.csv", encoding="utf-8") as file:
         cells = list(csv.DictReader(file))

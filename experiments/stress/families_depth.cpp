@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -51,7 +49,7 @@ Family samples() {
         furnace.max_depth = 2;
         furnace.film = {1, 1};
         const double count = std::exp2(k);
-        Cell cell{family.name, fmt::format("{:.0f}", count), count, furnace_answer(furnace),
+        Cell cell{family.name, whole(count), count, furnace_answer(furnace),
                   [furnace] { return SceneFiles{furnace_scene(furnace)}; }};
         cell.benign = k == 16;
         cell.quick = k == 16 || k == 33;

@@ -52,7 +52,7 @@ SceneFiles anchored_plate(const Plate& plate, Point) {
 SceneFiles meshed_plate(const Plate& plate, Point by) {
     std::vector<Point> corners = {{-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}};
     for (Point& c : corners) c = {c.x + by.x, c.y + by.y, c.z + by.z};
-    const std::string file = "far-mesh_" + decade(by.x) + ".obj";
+    const std::string file = "far-mesh_" + whole(by.x) + ".obj";
     return {plate_scene(plate, obj_shape({}, file, "", diffuse(plate.reflectance))),
             {{file, obj_text(corners, {1, 2, 3, 1, 3, 4})}}};
 }
@@ -78,7 +78,7 @@ Family far_plates(const std::string& name, const std::string& parameter, MovedSc
     for (const Distance& d : distances()) {
         Plate plate;
         plate.frame.rigid = translate(d.by.x, d.by.y, d.by.z);
-        Cell cell{name, decade(d.value), d.value, plate_answer(plate), [plate, d, make] { return make(plate, d.by); }};
+        Cell cell{name, whole(d.value), d.value, plate_answer(plate), [plate, d, make] { return make(plate, d.by); }};
         cell.benign = d.benign;
         cell.quick = d.quick;
         if (limited && d.value >= 256) cell.limit = "Far from the origin";
@@ -92,7 +92,7 @@ Family far_furnaces(const Furnace& furnace) {
     for (const Distance& d : distances()) {
         Furnace moved = furnace;
         moved.frame.rigid = translate(d.by.x, d.by.y, d.by.z);
-        Cell cell{family.name, decade(d.value), d.value, furnace_answer(moved),
+        Cell cell{family.name, whole(d.value), d.value, furnace_answer(moved),
                   [moved] { return SceneFiles{furnace_scene(moved)}; }};
         cell.benign = d.benign;
         cell.quick = d.quick;

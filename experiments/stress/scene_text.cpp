@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 namespace ambilux::stress {
 namespace {
 
@@ -40,7 +42,10 @@ std::string translate(double x, double y, double z) {
     return fmt::format("<translate x=\"{:.17g}\" y=\"{:.17g}\" z=\"{:.17g}\"/>", x, y, z);
 }
 std::string rotate(double x, double y, double z, double degrees) {
-    return fmt::format("<rotate x=\"{:.17g}\" y=\"{:.17g}\" z=\"{:.17g}\" angle=\"{:.17g}\"/>", x, y, z, degrees);
+    // Mitsuba takes the length of an axis for a scale.
+    const double l = std::sqrt(x * x + y * y + z * z);
+    return fmt::format("<rotate x=\"{:.17g}\" y=\"{:.17g}\" z=\"{:.17g}\" angle=\"{:.17g}\"/>", x / l, y / l, z / l,
+                       degrees);
 }
 
 std::string diffuse(double reflectance) {

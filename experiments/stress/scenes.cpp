@@ -8,7 +8,8 @@
 
 namespace ambilux::stress {
 
-std::string decade(double value) { return fmt::format("{:.7g}", value); }
+std::string decade(double value) { return fmt::format("{:.6g}", value); }
+std::string whole(double value) { return fmt::format("{:.0f}", value); }
 
 std::string cavity_scene(const Cavity& c) {
     // Parameters of the sphere and not of its transform: quadrics are scaled by the frame alone.

@@ -55,5 +55,7 @@ Answer furnace_answer(const Furnace& furnace);
 
 /// "1e-06" of 1e-6; decades are short.
 std::string decade(double value);
+/// "2097152" of a whole number.
+std::string whole(double value);
 
 }  // namespace ambilux::stress
