@@ -62,9 +62,7 @@ AMBILUX_HD float bits_float(FloatBits u) {
 }
 
 /// Bound of the relative error after n rounded operations, n·eps/(1-n·eps) (PBRT 4th ed., 6.8.1).
-constexpr float gamma_bound(int n) {
-    return n * kRoundingUnit / (1.0f - n * kRoundingUnit);
-}
+constexpr float gamma_bound(int n) { return n * kRoundingUnit / (1.0f - n * kRoundingUnit); }
 
 AMBILUX_HD float next_float_up(float v) {
     if (v == kInfinity) return v;

@@ -31,7 +31,7 @@ enum class Backend : uint32_t { automatic, cpu, cuda };
 
 /// Numbers that paths are computed with.
 enum class Precision : uint32_t {
-    single,   ///< floats
+    single,    ///< floats
     in_double  ///< by the renderer's twin (render/twin/twin.h)
 };
 

@@ -37,10 +37,10 @@ template <class T>
 auto fields(T& r) {
     constexpr size_t kCount = field_count<std::remove_const_t<T>>();
     static_assert(kCount >= 1 && kCount <= 18, "a longer record needs a line here");
-#define AMBILUX_FIELDS(count, ...)           \
-    if constexpr (kCount == count) {         \
-        auto& [__VA_ARGS__] = r;             \
-        return std::tie(__VA_ARGS__);        \
+#define AMBILUX_FIELDS(count, ...)    \
+    if constexpr (kCount == count) {  \
+        auto& [__VA_ARGS__] = r;      \
+        return std::tie(__VA_ARGS__); \
     }
     AMBILUX_FIELDS(1, a)
     AMBILUX_FIELDS(2, a, b)

@@ -87,8 +87,7 @@ Affine inverse_of_orthogonal(const Affine& a) {
 
 void derive(Quadric& q) {
     set_orthogonal(q.to_world, q.radius);
-    if (q.type == PrimitiveType::sphere)
-        set_column(q.to_world, 2, normalize(column(q.to_world, 2)) * q.radius);
+    if (q.type == PrimitiveType::sphere) set_column(q.to_world, 2, normalize(column(q.to_world, 2)) * q.radius);
     q.to_local = inverse_of_orthogonal(q.to_world);
 }
 

@@ -69,8 +69,8 @@ public:
         s.rays_extend = counts_.rays_extend;
         s.rays_occlude = counts_.rays_occlude;
         s.invalid = counts_.invalid;
-        s.memory_bytes = s.memory_bytes_predicted = scene_.memory_bytes() + tracer_.memory_bytes() +
-                                                    3 * sizeof(double) * film_.sum.size();
+        s.memory_bytes = s.memory_bytes_predicted =
+            scene_.memory_bytes() + tracer_.memory_bytes() + 3 * sizeof(double) * film_.sum.size();
         s.features = feature_names(ambilux::kAllFeatures);
         return s;
     }
