@@ -32,6 +32,8 @@ int reference(const Options& o) {
         if (!find_general_setting(key)->is_default(request.settings))
             throw Error(ExitCode::usage,
                         "a reference is always made by integrator path, estimator mis: leave these settings out");
+    if (const Setting& precision = *find_general_setting("precision"); !precision.is_default(request.settings))
+        request.settings_text = "precision=" + precision.text(request.settings);
     request.interrupt = interrupt_flag();
 
     ReferenceResult result;

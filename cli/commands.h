@@ -38,7 +38,7 @@ struct SceneOptions {
 
 /// Options that say how it is rendered.
 struct RenderOptions {
-    std::string integrator = "path", variant = "wavefront", backend = "auto";
+    std::string integrator = "path", variant = "wavefront", backend = "auto", precision = "single";
     uint64_t seed = 0;
     std::optional<int> max_depth;
     bool deterministic = false;

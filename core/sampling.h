@@ -1,13 +1,20 @@
 // Warps from the unit square to disks, spheres, hemispheres, cones and triangles (PBRT 4th ed., appendix A.5).
 #pragma once
 
+#include "core/float32.h"
 #include "core/math.h"
 
 namespace ambilux {
 
 /// Sine and cosine of x in [-pi/4, pi/4] by their series, which are below rounding after these terms: absolute error
-/// 1e-7. A general sinf has to reduce its argument first.
+/// 1e-7. A general sinf has to reduce its argument first. In double precision it does so: the terms are those of
+/// floats.
 AMBILUX_HD void sin_cos_octant(float x, float& sine, float& cosine) {
+    if constexpr (!kSinglePrecision) {
+        sine = sinf(x);
+        cosine = cosf(x);
+        return;
+    }
     const float x2 = x * x;
     sine = x + x * x2 * (-1.0f / 6 + x2 * (1.0f / 120 + x2 * (-1.0f / 5040 + x2 * (1.0f / 362880))));
     cosine = 1.0f + x2 * (-0.5f + x2 * (1.0f / 24 + x2 * (-1.0f / 720 + x2 * (1.0f / 40320))));
@@ -71,7 +78,7 @@ AMBILUX_HD Vec2f square_to_triangle(Vec2f u) {
 
 /// Index of the interval that holds `u` in a cumulative table: cdf[0] = 0 ... cdf[n] = 1, non-decreasing.
 /// The result has cdf[i] <= u < cdf[i+1], so an interval of zero width is never returned for u in [0,1).
-AMBILUX_HD uint32_t sample_cdf(const float* cdf, uint32_t n, float u) {
+AMBILUX_HD uint32_t sample_cdf(const float32* cdf, uint32_t n, float u) {
     uint32_t lo = 0, hi = n;
     while (hi - lo > 1) {
         const uint32_t mid = (lo + hi) / 2;

@@ -61,8 +61,9 @@ AMBILUX_HD Vec3f triangle_normal(Vec3f e1, Vec3f e2) {
     const float scale = max(max_component(abs(e1)), max_component(abs(e2)));
     if (!(scale > 0.0f)) return {0.0f, 0.0f, 1.0f};
     // A power of two near 1/scale, so that nothing is rounded.
-    const uint32_t exponent = float_bits(scale) >> 23;
-    const float inv = bits_float((253u - (exponent < 252u ? exponent : 252u)) << 23);
+    constexpr FloatBits kMost = 2 * kExponentBias - 2;
+    const FloatBits exponent = float_bits(scale) >> kFractionBits;
+    const float inv = bits_float((kMost + 1 - (exponent < kMost ? exponent : kMost)) << kFractionBits);
     const Vec3f a = e1 * inv, b = e2 * inv, n = accurate_cross(a, b);
     const float l2 = length_squared(n);
     if (l2 > 0x1p-100f) return n * inverse_sqrt(l2);

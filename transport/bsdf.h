@@ -37,7 +37,7 @@ struct Bsdf {
     BsdfType type;
     BsdfInputs inputs;
     BsdfConstants constants;
-    const float* tables;  ///< SceneView::tables for the models that read them
+    const float32* tables;  ///< SceneView::tables for the models that read them
 
     /// Parameters of the model, which must be `Model`.
     template <class Model>
@@ -47,7 +47,7 @@ struct Bsdf {
 };
 
 template <class Model>
-AMBILUX_HD Bsdf bsdf_of(const Resolved<Model>& parameters, const float* tables = nullptr) {
+AMBILUX_HD Bsdf bsdf_of(const Resolved<Model>& parameters, const float32* tables = nullptr) {
     Bsdf b = {};
     b.type = kBsdfType<Model>;
     b.inputs = inputs_of(parameters);
