@@ -237,5 +237,11 @@ TEST_CASE("What the twin does without is refused by name", "[twin]") {
     CHECK(refused("bdpt", "bdpt.auto", "true"));
     RenderSettings lvc = twin_settings(scene, "bdpt");
     lvc.variant = "lvc";
-    CHECK_THROWS_WITH(make_renderer(scene, lvc), Catch::Matchers::ContainsSubstring("precision=double"));
+    std::string message;
+    try {
+        make_renderer(scene, lvc);
+    } catch (const Error& e) {
+        message = e.what();
+    }
+    CHECK(message.find("precision=double") != std::string::npos);
 }
