@@ -32,7 +32,7 @@ struct SubpathStart {
                             ///< direction per solid angle, pick included
     uint32_t prim;          ///< light: of an area emitter
     uint32_t emitter;       ///< light
-    float opacity;          ///< light: of an area emitter the chance that a ray meets it, as weights know it; else 1
+    uint32_t opacity_step;  ///< light: of an area emitter the chance that a ray meets it (transport/opacity.h)
     float camera_distance;  ///< eye: from the camera to the ray's origin
 };
 
@@ -86,7 +86,7 @@ struct BidirectionalMis {
         start.direction = e.infinite ? e.pick * e.pdf_dir : e.cos_theta;
         start.prim = e.prim;
         start.emitter = e.emitter;
-        start.opacity = weight_opacity(e.opacity);
+        start.opacity_step = opacity_step(e.opacity);
     }
 
     /// Sums where the ray of `path`, with sums `sums`, meets `point`.
@@ -140,7 +140,8 @@ struct BidirectionalMis {
                 light.prim = start.prim;
                 next_event =
                     pdf_emitter_direct<F>(scene, start.emitter, p, -path.direction, light) * start.direction * scale;
-                hit = start.direction * scale * start.opacity;
+                hit = start.direction * scale;
+                if constexpr (F.opacity) hit *= step_opacity(start.opacity_step);
                 break;
             }
             case EmitterType::point:
