@@ -96,7 +96,7 @@ TEST_CASE("Rays of subpaths come back with the bits that went in, whatever they 
                       any_float(numbers),
                       uint32_t(numbers.rng()),
                       numbers.index(kTickets),
-                      weight_opacity(numbers.uniform()),
+                      opacity_step(numbers.uniform()),
                       any_float(numbers)};
         using Items = SubpathItems<BidirectionalMis>;
         const auto b = Items::unpack(Items::pack(path, side, 7, tmax));
@@ -108,7 +108,7 @@ TEST_CASE("Rays of subpaths come back with the bits that went in, whatever they 
             REQUIRE(
                 (same_bits(b.start.inv_pdf, path.start.inv_pdf) && same_bits(b.start.direction, path.start.direction)));
             REQUIRE((b.start.prim == path.start.prim && b.start.emitter == path.start.emitter));
-            REQUIRE(b.start.opacity == path.start.opacity);
+            REQUIRE(b.start.opacity_step == path.start.opacity_step);
         }
     }
 }
