@@ -115,42 +115,57 @@ TEST_CASE("Constants, functions and bits of the copied headers are those of doub
     }
 }
 
-TEST_CASE("Furnaces hold the light of their closed form, by every estimator", "[twin]") {
-    for (const int depth : {1, 4})
-        for (const char* shape : {"sphere", "cube"}) {
-            const Scene scene = furnace(shape, depth);
-            for (const EstimatorCase& e : kEstimators) {
-                INFO(shape << ", depth " << depth << ", " << e.name);
-                RenderSettings s = case_settings(scene, e);
-                s.precision = Precision::in_double;
-                check_expectation(scene, s, furnace_image(depth));
-            }
-            check_expectation(scene, twin_settings(scene, "bdpt"), furnace_image(depth));
+TEST_CASE("Furnaces hold the light of their closed form", "[twin]") {
+    for (const int depth : {1, 4}) {
+        const Scene sphere = furnace("sphere", depth), cube = furnace("cube", depth);
+        for (const EstimatorCase& e : kEstimators) {
+            INFO("depth " << depth << ", " << e.name);
+            RenderSettings s = case_settings(sphere, e);
+            s.precision = Precision::in_double;
+            check_expectation(sphere, s, furnace_image(depth));
         }
+        check_expectation(sphere, twin_settings(sphere, "bdpt"), furnace_image(depth));
+        check_expectation(cube, twin_settings(cube), furnace_image(depth));
+    }
 }
 
 TEST_CASE("A plane under a sphere lamp", "[twin]") {
     const Scene scene = plane_under_sphere(0, 2, 0.5);
-    for (const char* integrator : {"path", "bdpt", "light"}) {
+    for (const char* integrator : {"path", "bdpt"}) {
         INFO(integrator);
         check_expectation(scene, twin_settings(scene, integrator), plane_under_sphere_image(2, 0.5));
     }
 }
 
-TEST_CASE("Images of own scenes are those of the renderers but for rounding", "[twin]") {
+TEST_CASE("At equal seeds images are those of the renderers but for the rounding of floats", "[twin]") {
     for (const char* name : {"cornell", "furnace", "glass", "lights", "materials", "textured"})
-        for (const char* integrator : {"path", "bdpt"}) {
+        for (const char* integrator : {"path", "bdpt", "light"}) {
             INFO(name << ", " << integrator);
             const Scene scene = project_scene(name, 24, 16);
-            const FilmMoments twin = render_scene(scene, twin_settings(scene, integrator, 5), 16).film;
-            const FilmMoments same = render_scene(scene, single(twin_settings(scene, integrator, 5)), 16).film;
-            WARN(name << " " << integrator << " " << relative_difference_of_means(twin, same) << " "
-                      << relative_difference(twin, same));
-            const FilmMoments other = render_scene(scene, single(twin_settings(scene, integrator, 6)), 64).film;
-            const ZTestResult z = z_test(to_estimate(twin), to_estimate(other));
-            INFO(z.report());
-            CHECK(z.pass);
+            const RenderSettings s = twin_settings(scene, integrator, 5);
+            const RenderResult twin = render_scene(scene, s, 16), floats = render_scene(scene, single(s), 16);
+            CHECK(twin.stats.invalid.total() == 0);
+            // A path that decides differently would be worth a hundredth; narrow lobes lose up to 1e-4 in floats.
+            CHECK(relative_difference(twin.film, floats.film) < 2e-3);
+            CHECK(relative_difference_of_means(twin.film, floats.film) < 1e-4);
+            // More than nothing: floats were not compared with themselves.
+            CHECK(relative_difference(twin.film, floats.film) > 1e-9);
         }
+}
+
+TEST_CASE("At other seeds images have the expectation of the renderers", "[twin]") {
+    for (const char* name : {"cornell", "furnace", "lights", "materials", "textured"}) {
+        INFO(name);
+        const Scene scene = project_scene(name, 24, 16);
+        const FilmMoments twin = render_scene(scene, twin_settings(scene, "path", 5), 256).film;
+        const FilmMoments floats = render_scene(scene, single(twin_settings(scene, "path", 6)), 1024).film;
+        // Two images that agree to rounding have no variance to be tested against.
+        ZTestOptions options;
+        options.rounding = 1e-5;
+        const ZTestResult z = z_test(to_estimate(twin), to_estimate(floats), options);
+        INFO(z.report());
+        CHECK(z.pass);
+    }
 }
 
 TEST_CASE("A lamp half a unit above a plane, a million units from the origin, lights it in double precision alone",
