@@ -282,6 +282,23 @@ TEST_CASE("a sweep ends in the time that it is given and says so") {
     CHECK(summary.rows.size() < summary.planned);
 }
 
+TEST_CASE("a measurement whose time is over ends with the batches that it has") {
+    World world;
+    world.sleep_per_sample = 0.01;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 8;
+    Effort effort;
+    effort.first_paths = 32 * 64;
+    effort.seconds = 0.1;
+    const Measurement m = measure(stress_hooks(world), scene, {}, effort, nullptr);
+    const size_t done = m.batches.boxes.size() / m.batches.box_count();
+    CHECK(done >= kLeastBatches);
+    CHECK(done < 32);
+    CHECK(m.samples == done);
+    CHECK(m.first == 0);
+    CHECK(stress::mean_of(m.batches).dof == double(done - 1));
+}
+
 TEST_CASE("unknown families and methods are named") {
     TempFolder folder;
     World world;
