@@ -56,7 +56,7 @@ Family needles() {
     for (const unsigned n : {2u, 20u, 200u, 2000u, 20000u, 200000u}) {
         Plate plate;
         // A ray meets the boxes of thousands.
-        if (n > 2000) plate.film = {16, 8};
+        if (n > 2000) plate.film = {8, 8};
         Cell cell{family.name, decade(n), double(n), plate_answer(plate), [plate, n] {
                       const std::string floor = "needles_floor_" + decade(n) + ".obj",
                                         lamp = "needles_lamp_" + decade(n) + ".obj";

@@ -132,6 +132,17 @@ TEST_CASE("one box that is off fails where all pixels have the same answer") {
     CHECK(verdict(b, {AnswerKind::closed_form, 3, false, ""}) == Verdict::ok);
 }
 
+TEST_CASE("a box that has met none of the rare samples of the others is not judged") {
+    const Answer answer{AnswerKind::closed_form, 3, true, ""};
+    // All boxes have 2.997 for sure, and 0.003 by rare hits; one has met none.
+    Batches b = batches(2.997, 0, 1, 4);
+    for (uint32_t i = 0; i < b.boxes.size(); ++i)
+        if (i % 16 != 9 && random_floats({3, i, 0, Stream::eye}, 0).x < 0.25f) b.boxes[i] += 0.003 * 4;
+    CHECK(verdict(b, answer) == Verdict::ok);
+    // Without chance anywhere there is nothing to wait for.
+    CHECK(verdict(batches(2.99, 0, 1, 4), answer) == Verdict::failed);
+}
+
 TEST_CASE("black, rare, limited and invalid") {
     const Answer answer{AnswerKind::closed_form, 3, false, ""};
     RowState rare, limited, dropped;
