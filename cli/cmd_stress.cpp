@@ -33,6 +33,7 @@ void need_output(const std::string& output, const char* for_what) {
 
 int sweep(stress::Request& request) {
     need_output(request.output, "a sweep");
+    if (request.seconds < 0) throw Error(ExitCode::usage, "--time: more than zero seconds are needed");
     request.interrupt = interrupt_flag();
     const stress::Summary summary = stress::run(request, stress::families(), default_hooks());
     std::cout << stress::report(summary) << std::flush;

@@ -45,6 +45,7 @@ Family mask_before_emitter() {
                   }};
         cell.benign = opacity == 0;
         cell.quick = opacity == 0 || opacity == 0.5;
+        if (opacity > 0.99) cell.rare = "path-naive path-nee path-ris light";
         family.cells.push_back(cell);
     }
     return family;

@@ -41,7 +41,7 @@ Family corners() {
         cell.benign = fov == 60;
         cell.quick = fov == 60 || fov == 0.01;
         // The second moment of next event estimation has no bound where two lamps meet.
-        if (fov < 1) cell.rare = "path-nee path-ris light";
+        if (fov <= 1) cell.rare = "path-nee path-ris light";
         family.cells.push_back(cell);
     }
     return family;
@@ -85,6 +85,7 @@ Family films() {
         cell.benign = size.width == 32;
         cell.quick = size.quick;
         cell.device_only = pixels > 1 << 20;
+        if (size.width == 1 && size.height > 1) cell.rare = "light";  // few connections meet so narrow a film
         family.cells.push_back(cell);
     }
     return family;

@@ -48,10 +48,14 @@ struct Powers {
     double skewness() const { return squares > 0 ? cubes / std::pow(squares, 1.5) : 0; }
 };
 
-/// N equal rare hits have a relative error of 1/sqrt(N) and a skewness of as much. A mean whose error is that of
-/// rounding rests on no chance.
+/// Whether the mean has an error beyond that of rounding.
+bool rests_on_chance(const Mean& mean, double relative_rounding) {
+    return mean.error > relative_rounding * std::abs(mean.value);
+}
+
+/// N equal rare hits have a relative error of 1/sqrt(N) and a skewness of as much.
 double events_of(const Mean& mean, double relative_rounding, double skew) {
-    if (!(mean.error > relative_rounding * std::abs(mean.value))) return mean.value != 0 ? kInf : 0;
+    if (!rests_on_chance(mean, relative_rounding)) return mean.value != 0 ? kInf : 0;
     return std::min(std::pow(mean.value / mean.error, 2), skew != 0 ? 1 / (skew * skew) : kInf);
 }
 
@@ -99,6 +103,7 @@ Comparison compare(const Batches& batches, const Mean& answer, bool uniform, dou
             own.add(means);
             // Boxes that may have missed rare bright samples are left to the mean of all.
             if (events_of(box, rounding, own.skewness()) < kFewEvents) continue;
+            if (rests_on_chance(mean, rounding) && !rests_on_chance(box, rounding)) continue;
             const double z = z_of(box, answer, rounding, own.skewness());
             if (std::abs(z) > std::abs(c.box_z)) c.box_z = z;
         }

@@ -43,9 +43,10 @@ public:
         });
     }
 
-    /// Means, where every batch has `samples` of every pixel.
-    Batches means(uint64_t samples) const {
+    /// Means of the first `count` batches, where each has `samples` of every pixel.
+    Batches means(uint64_t samples, uint32_t count) const {
         Batches result = sums_;
+        result.boxes.resize(size_t(count) * sums_.box_count());
         for (double& v : result.boxes) v /= double(samples);
         return result;
     }
@@ -96,20 +97,25 @@ Measurement measure(const Hooks& hooks, const Scene& scene, const RenderSettings
     uint64_t samples = 0;  // of every batch
     while (count > 0) {
         const double before = elapsed();
-        for (uint32_t b = 0; b < sums.batch_count; ++b) {
+        const auto out_of_time = [&](uint32_t done) {
+            return samples == 0 && done >= kLeastBatches && elapsed() > effort.seconds;
+        };
+        uint32_t done = 0;
+        for (; done < sums.batch_count && !out_of_time(done); ++done) {
             if (renderer->render(uint32_t(m.samples), uint32_t(count), interrupt) < count) {
                 m.interrupted = true;
                 return m;
             }
             m.samples += count;
-            sums.add(b, renderer->film());
+            sums.add(done, renderer->film());
             renderer->clear_film();
         }
         samples += count;
-        m.batches = sums.means(samples);
-        if (samples == count) m.first = mean_of(m.batches).value;
+        m.batches = sums.means(samples, done);
         m.paths = double(m.samples) * pixels;
         m.seconds = elapsed();
+        if (done < sums.batch_count) break;
+        if (samples == count) m.first = mean_of(m.batches).value;
         count = next_round(m, effort, pixels, sums.batch_count, samples, m.seconds - before, count);
     }
     const RenderStats stats = renderer->stats();

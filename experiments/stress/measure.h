@@ -15,6 +15,9 @@ constexpr uint32_t kBoxes = 4;
 /// takes a whole sample of every pixel.
 constexpr uint32_t batches_of(uint64_t pixels) { return pixels > 1u << 20 ? 8 : 32; }
 
+/// A measurement whose time is over in its first round ends with as few.
+constexpr uint32_t kLeastBatches = 8;
+
 /// Means over pixels and channels, of every batch.
 struct Batches {
     std::vector<double> boxes;  ///< batch * boxes of the film + box
@@ -28,7 +31,7 @@ struct Measurement {
     uint64_t samples = 0;            ///< of every pixel
     double paths = 0;                ///< samples of all pixels
     double seconds = 0;              ///< from the making of the renderer to its end, wall clock
-    double first = 0;                ///< mean of the first round: the same samples whatever the backend and effort
+    double first = 0;                ///< mean of the first round, if it is whole: the same samples on every backend
     uint64_t invalid = 0, lost = 0;  ///< values dropped as no radiance; items that found no room in a queue
     uint64_t underflow = 0;          ///< contributions that their weight took to 0
     bool interrupted = false;
@@ -38,7 +41,7 @@ struct Measurement {
 struct Effort {
     double relative_error = 0.002;  ///< standard error of the mean over the mean
     double paths = 4e5;             ///< at most
-    double seconds = 1;             ///< at most, but for the first round
+    double seconds = 1;             ///< at most, but for the first kLeastBatches batches
     double first_paths = 3.2e4;     ///< of the first round, over all batches
     uint64_t samples = 0;           ///< of every pixel; if not 0, neither error nor paths end the measurement before
 };

@@ -37,11 +37,18 @@ std::vector<const Method*> chosen_methods(const std::vector<std::string>& names,
     return chosen;
 }
 
+/// "cpu" or "cuda". Throws Error(usage) for another name, Error(device) without a device.
+std::string backend_of(const std::string& name) {
+    const Choice<Backend> backend(name);
+    if (backend == Backend::automatic) return cuda_available() ? "cuda" : "cpu";
+    if (backend == Backend::cuda && !cuda_available()) throw Error(ExitCode::device, "stress: there is no CUDA device");
+    return name;
+}
+
 class Sweep {
 public:
     Sweep(const Request& request, const std::vector<Family>& all, const Hooks& hooks)
-        : request_(request), hooks_(hooks),
-          backend_(request.backend == "auto" ? (cuda_available() ? "cuda" : "cpu") : request.backend),
+        : request_(request), hooks_(hooks), backend_(backend_of(request.backend)),
           cells_(chosen_cells(all, request.families, request.quick)),
           methods_(chosen_methods(request.methods, request.quick)),
           rows_in_all_(double(chosen_cells(all, {}, request.quick).size() * chosen_methods({}, request.quick).size())),

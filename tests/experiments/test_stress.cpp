@@ -132,6 +132,17 @@ TEST_CASE("one box that is off fails where all pixels have the same answer") {
     CHECK(verdict(b, {AnswerKind::closed_form, 3, false, ""}) == Verdict::ok);
 }
 
+TEST_CASE("a box that has met none of the rare samples of the others is not judged") {
+    const Answer answer{AnswerKind::closed_form, 3, true, ""};
+    // All boxes have 2.997 for sure, and 0.003 by rare hits; one has met none.
+    Batches b = batches(2.997, 0, 1, 4);
+    for (uint32_t i = 0; i < b.boxes.size(); ++i)
+        if (i % 16 != 9 && random_floats({3, i, 0, Stream::eye}, 0).x < 0.25f) b.boxes[i] += 0.003 * 4;
+    CHECK(verdict(b, answer) == Verdict::ok);
+    // Without chance anywhere there is nothing to wait for.
+    CHECK(verdict(batches(2.99, 0, 1, 4), answer) == Verdict::failed);
+}
+
 TEST_CASE("black, rare, limited and invalid") {
     const Answer answer{AnswerKind::closed_form, 3, false, ""};
     RowState rare, limited, dropped;
@@ -280,6 +291,23 @@ TEST_CASE("a sweep ends in the time that it is given and says so") {
     CHECK(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < 5);
     CHECK(summary.interrupted);
     CHECK(summary.rows.size() < summary.planned);
+}
+
+TEST_CASE("a measurement whose time is over ends with the batches that it has") {
+    World world;
+    world.sleep_per_sample = 0.01;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 8;
+    Effort effort;
+    effort.first_paths = 32 * 64;
+    effort.seconds = 0.1;
+    const Measurement m = measure(stress_hooks(world), scene, {}, effort, nullptr);
+    const size_t done = m.batches.boxes.size() / m.batches.box_count();
+    CHECK(done >= kLeastBatches);
+    CHECK(done < 32);
+    CHECK(m.samples == done);
+    CHECK(m.first == 0);
+    CHECK(stress::mean_of(m.batches).dof == double(done - 1));
 }
 
 TEST_CASE("unknown families and methods are named") {
