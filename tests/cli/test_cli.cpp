@@ -520,26 +520,26 @@ TEST_CASE("A render that drops invalid values names the command that replays the
     const Outcome strict = run(folder, {"render", scene, "--spp", "1", "--strict", "-o", folder / "a.exr"});
     CHECK(strict.code == 4);
     CHECK(contains(strict.err, "ambilux trace"));
+}
 
-    TEST_CASE("stress: families are listed, scenes exported, cells rendered and gone on with") {
-        const test::TempFolder folder;
-        const Outcome list = run(folder, {"stress", "--list"});
-        CHECK(list.code == 0);
-        CHECK(contains(list.out, "far-mesh"));
-        const std::string out = folder / "sweep", scenes = folder / "scenes";
-        const std::vector<std::string> one = {"stress",   "--quick",   "--family", "mirrored", "--method",
-                                              "path-mis", "--backend", "cpu",      "-o",       out};
-        const Outcome first = run(folder, one);
-        CHECK(first.code == 0);
-        CHECK(contains(first.out, "3 ok, 0 left out of 3 rows"));
-        CHECK(contains(read_file(out + "/stress.csv"), "mirrored_4,mirrored,4,path-mis,cpu,ok,"));
-        const Outcome again = run(folder, one);
-        CHECK(again.code == 2);
-        CHECK(contains(again.err, "--resume"));
-        REQUIRE(run(folder, {"stress", "--export", scenes, "--family", "mirrored", "--quick"}).code == 0);
-        const std::string expected = read_file(scenes + "/expected.csv");
-        CHECK(std::count(expected.begin(), expected.end(), '\n') == 4);
-        CHECK(run(folder,
-                  {"render", scenes + "/mirrored_4.xml", "-o", folder / "m.exr", "--spp", "1", "--backend", "cpu"})
-                  .code == 0);
-    }
+TEST_CASE("stress: families are listed, scenes exported, cells rendered and gone on with") {
+    const test::TempFolder folder;
+    const Outcome list = run(folder, {"stress", "--list"});
+    CHECK(list.code == 0);
+    CHECK(contains(list.out, "far-mesh"));
+    const std::string out = folder / "sweep", scenes = folder / "scenes";
+    const std::vector<std::string> one = {"stress",   "--quick",   "--family", "mirrored", "--method",
+                                          "path-mis", "--backend", "cpu",      "-o",       out};
+    const Outcome first = run(folder, one);
+    CHECK(first.code == 0);
+    CHECK(contains(first.out, "3 ok, 0 left out of 3 rows"));
+    CHECK(contains(read_file(out + "/stress.csv"), "mirrored_4,mirrored,4,path-mis,cpu,ok,"));
+    const Outcome again = run(folder, one);
+    CHECK(again.code == 2);
+    CHECK(contains(again.err, "--resume"));
+    REQUIRE(run(folder, {"stress", "--export", scenes, "--family", "mirrored", "--quick"}).code == 0);
+    const std::string expected = read_file(scenes + "/expected.csv");
+    CHECK(std::count(expected.begin(), expected.end(), '\n') == 4);
+    CHECK(run(folder, {"render", scenes + "/mirrored_4.xml", "-o", folder / "m.exr", "--spp", "1", "--backend", "cpu"})
+              .code == 0);
+}
