@@ -227,6 +227,21 @@ TEST_CASE("Own structures and Embree agree on closed meshes with rays through ed
     compare_all<kTriangles>(box, 100000, 1.0f, 14);
 }
 
+TEST_CASE("A fan of 20000 needles, whose boxes all overlap, has a tree that traversal stacks hold") {
+    constexpr uint32_t kNeedles = 20000;
+    std::vector<Vec3f> positions = {{0, 0, 0}};
+    std::vector<uint32_t> indices;
+    for (uint32_t i = 0; i <= kNeedles; ++i) {
+        const double angle = 2 * M_PI * i / kNeedles;
+        positions.push_back({float(std::cos(angle)), float(std::sin(angle)), 0});
+        if (i > 0) indices.insert(indices.end(), {0, i, i + 1});
+    }
+    Scene fan;
+    add_mesh(fan, positions, indices);
+    CHECK(bvh2_depth(build_optimised_bvh2(fan.view())) <= kMostBvh2Depth);
+    compare_all<kTriangles>(fan, 2000, 1.0f, 15);
+}
+
 TEST_CASE("Own structures and Embree agree on analytic shapes alone and among triangles (G12)") {
     for (const float scale : {1e-4f, 1.0f, 1e4f}) {
         Scene quadrics;
