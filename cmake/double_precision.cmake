@@ -1,7 +1,7 @@
-# compile_in_double(TARGET NAMESPACE PREFIX HEADER...): copies of the project's headers in which every float is a double,
-# for TARGET to include as PREFIX/HEADER. What was in namespace ambilux is in ambilux::NAMESPACE there. A copy includes
-# copies; other headers of the project keep their floats and have to be named in kept_single below. Lines keep their
-# numbers, and messages of compilers and debuggers name the originals.
+# compile_in_double(TARGET NAMESPACE PREFIX HEADER...): copies of the project's headers in which every float is a
+# double, for TARGET to include as PREFIX/HEADER. What was in namespace ambilux is in ambilux::NAMESPACE there. A copy
+# includes copies; other headers of the project keep their floats and have to be named in kept_single below. Lines keep
+# their numbers, and messages of compilers and debuggers name the originals.
 #
 # As a script it makes the copies: -DSOURCE= -DOUTPUT= -DNAMESPACE= -DPREFIX= -DHEADERS="a|b".
 
@@ -13,8 +13,8 @@ function(compile_in_double target namespace prefix)
   list(JOIN ARGN "|" headers)
   add_custom_command(
     OUTPUT ${copies}
-    COMMAND ${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR} -DOUTPUT=${output} -DNAMESPACE=${namespace} -DPREFIX=${prefix}
-            "-DHEADERS=${headers}" -P ${script}
+    COMMAND ${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR} -DOUTPUT=${output} -DNAMESPACE=${namespace}
+            -DPREFIX=${prefix} "-DHEADERS=${headers}" -P ${script}
     DEPENDS ${originals} ${script}
     COMMENT "Headers in double precision" VERBATIM)
   target_sources(${target} PRIVATE ${copies})

@@ -3,7 +3,7 @@
 // transport/ is compiled a second time with doubles in place of floats (cmake/double_precision.cmake). Paths are
 // sampled one after the other, without queues, stages and fusion, and traced by a tree and tests of the twin's own.
 // Random numbers are the same as those of the renderers, of 24 bits: at equal seeds the two images differ by what
-// rounding does. Only a host runs it, at some hundredth of the renderers' speed.
+// rounding does. Only a host runs it, at a half to a fifth of the renderer's speed.
 #pragma once
 
 #include <memory>

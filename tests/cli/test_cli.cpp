@@ -357,6 +357,23 @@ TEST_CASE("Ctrl-C saves what is done and ends with code 5") {
     }
 }
 
+TEST_CASE("a reference in double precision is continued in double precision alone") {
+    const test::TempFolder folder;
+    const auto reference = [&](const std::string& spp, const std::string& precision) {
+        return run(folder, {"reference", kCornell, "--size", "12x8", "--spp", spp, "-o", folder / "r.exr",
+                            "--precision", precision, "--json", folder / "r.json"});
+    };
+    CHECK(reference("4", "double").code == 0);
+    CHECK(reference("8", "double").code == 0);
+    const json j = json::parse(read_file(folder / "r.json"));
+    CHECK(j["continued_from"] == 4);
+    CHECK(contains(j["device"].get<std::string>(), "double precision"));
+    const Outcome other = reference("16", "single");
+    CHECK(other.code == 3);
+    CHECK(contains(other.err, "precision=double"));
+    CHECK(reference("16", "half").code == 2);
+}
+
 TEST_CASE("a reference is continued, extended, compared with") {
     const test::TempFolder folder;
     const auto reference = [&](const std::string& spp, const std::string& size = "24x16") {
