@@ -68,18 +68,20 @@ Family ior() {
     return family;
 }
 
-Family panes() {
-    Family family{"thin-panes", "thickness of a pane of glass over its width", {}};
+Family panes(const std::string& name, const std::string& parameter, double degrees, const Frame& frame) {
+    Family family{name, parameter, {}};
+    const double a = degrees * M_PI / 180, distance = 2 * std::sqrt(2);
+    const Point eye = {distance * std::sin(a), 0, distance * std::cos(a)};
     for (const int k : {-1, -2, -3, -4, -5, -6, -7}) {
         const double thickness = std::pow(10.0, k);
         const Answer answer{AnswerKind::closed_form, 1, true, "L: a lossless body under a uniform sky"};
-        Cell cell{
-            family.name, decade(thickness), thickness, answer, [thickness] {
-                return SceneFiles{scene_xml(100,
-                                            perspective({}, {2, 0, 2}, {0, 0, 0}, {0, 1, 0}, 10, 1e-2) +
-                                                shape("cube", {}, scale_xyz(1, 1, thickness), glass(0.5)) + kConstant,
-                                            100)};
-            }};
+        Cell cell{family.name, decade(thickness), thickness, answer, [thickness, eye, degrees, frame] {
+                      return SceneFiles{
+                          scene_xml(100,
+                                    perspective(frame, eye, {0, 0, 0}, {0, 1, 0}, degrees > 80 ? 0.1 : 10, 1e-2) +
+                                        shape("cube", frame, scale_xyz(1, 1, thickness), glass(0.5)) + kConstant,
+                                    100)};
+                  }};
         cell.benign = k == -1;
         cell.quick = k == -1 || k == -3 || k == -6;
         if (thickness < 4e-5) cell.limit = "Contact shadows and thin panes";
@@ -90,6 +92,12 @@ Family panes() {
 
 }  // namespace
 
-std::vector<Family> material_families() { return {roughness(), ior(), panes()}; }
+std::vector<Family> material_families() {
+    Frame away;
+    away.rigid = rotate(1, 2, 3, 37) + translate(1, -1, 1);
+    return {
+        roughness(), ior(), panes("thin-panes", "thickness of a pane of glass over its width", 45, {}),
+        panes("thin-panes-grazing", "the same, seen at 89 degrees, one length off the origin and turned", 89, away)};
+}
 
 }  // namespace ambilux::stress

@@ -48,11 +48,12 @@ Family corners() {
 }
 
 /// A lamp that covers a floor at a small height: what leaves the floor must not start behind the lamp.
-Family gaps() {
-    Family family{"gap", "height of a lamp over a floor, over half the lamp's side", {}};
+Family gaps(const std::string& name, const std::string& parameter, const std::string& rigid) {
+    Family family{name, parameter, {}};
     for (const int k : {0, -1, -2, -3, -4, -5, -6, -7, -8}) {
         Plate plate;
         plate.height = std::pow(10.0, k);
+        plate.frame.rigid = rigid;
         plate.seen = plate.height / 2;
         plate.lamp_half = 1;
         Cell cell{family.name, decade(plate.height), plate.height, plate_answer(plate),
@@ -93,6 +94,11 @@ Family films() {
 
 }  // namespace
 
-std::vector<Family> view_families() { return {grazing_view(), corners(), gaps(), films()}; }
+std::vector<Family> view_families() {
+    return {
+        grazing_view(), corners(), gaps("gap", "height of a lamp over a floor, over half the lamp's side", ""),
+        gaps("gap-away", "the same, one length off the origin and turned", rotate(1, 2, 3, 37) + translate(1, -1, 1)),
+        films()};
+}
 
 }  // namespace ambilux::stress
