@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from analysis import experiment as experiments
-from analysis import figures, pyramid, report, summary, tables
+from analysis import figures, flip_maps, pyramid, remarks, report, summary, tables
 
 
 def write(path, text):
@@ -29,8 +29,8 @@ def analyse(results, out, insets=None, full_size=False):
     """Reads the experiment folder `results` and writes everything into the folder `out`. Returns (remarks, figures.Made)."""
     data = experiments.load(results)
     out.mkdir(parents=True, exist_ok=True)
-    lines = summary.lines(data)
-    remarks = summary.remarks(data, lines)
+    lines = summary.lines(data, flip_maps.of_runs(data))
+    said = remarks.remarks(data, lines)
     write(out / "table.csv", tables.to_csv(lines))
     write(out / "table.tex", tables.to_latex(data, lines))
     write(out / "tests.tex", tables.tests_to_latex(lines))
@@ -39,10 +39,10 @@ def analyse(results, out, insets=None, full_size=False):
         rows = strategy_rows(data)
         if rows:
             write(out / "strategy_variance.csv", tables.variances_to_csv(rows))
-        write(out / "report.html", report.render(data, lines, remarks, made, out, full_size))
+        write(out / "report.html", report.render(data, lines, said, made, out, full_size))
     except experiments.InputError as e:
         made.broken.append(f"report.html: {e}")
-    return remarks, made
+    return said, made
 
 
 def parse_inset(text):
@@ -69,11 +69,11 @@ def main(arguments=None):
     for scene, inset in options.inset:
         insets.setdefault(scene, []).append(inset)
     try:
-        remarks, made = analyse(options.results, options.output, insets, options.full_size)
+        said, made = analyse(options.results, options.output, insets, options.full_size)
     except experiments.InputError as e:
         print(f"error: {e}", file=sys.stderr)
         return 3
-    for remark in remarks:
+    for remark in said:
         print(f"note: {remark}", file=sys.stderr)
     for name, reason in made.missing:
         print(f"not made: {name}: {reason}", file=sys.stderr)

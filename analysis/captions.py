@@ -2,7 +2,7 @@
 
 import textwrap
 
-from analysis import summary
+from analysis import remarks
 
 
 def listed(values):
@@ -53,7 +53,7 @@ def data_behind(experiment, scenes, runs):
     versions, machine = m.get("versions") or {}, m.get("machine") or {}
     devices = ", ".join(d for d in m.get("devices") or [] if d)
     driver = f", driver {machine['driver']}" if machine.get("driver") else ""
-    config, clocks = m.get("config"), summary.clock_text(experiment)
+    config, clocks = m.get("config"), remarks.clock_text(experiment)
     return [line for line in (
         f"Experiment: {experiment.name}, {m.get('date', 'date unknown')}",
         "Scenes: " + "; ".join(scene_facts(experiment, s) for s in scenes),

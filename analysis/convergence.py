@@ -5,7 +5,7 @@ import math
 import matplotlib.pyplot as plt
 import numpy as np
 
-from analysis import style, summary
+from analysis import remarks, style, summary
 
 AXES = {"seconds": "time (s)", "spp": "samples per pixel"}
 NAMES = {"rmse": "RMSE", "relmse": "relMSE", "relmse_trimmed": "trimmed relMSE"}
@@ -69,12 +69,12 @@ def draw(experiment, x, measure):
 def make(experiment):
     """Yields a figure for each error and axis."""
     for measure in summary.recorded(experiment):
-        trimmed = f"Without the worst {summary.trimmed_share(experiment)} of the pixels of each image, which is no estimate of relMSE. " if measure == "relmse_trimmed" else ""
+        trimmed = f"Without the worst {remarks.trimmed_share(experiment)} of the pixels of each image, which is no estimate of relMSE. " if measure == "relmse_trimmed" else ""
         for x, against in (("seconds", "render time"), ("spp", "samples per pixel")):
             yield style.Picture(
                 f"convergence_{'time' if x == 'seconds' else 'spp'}" + ("" if measure == "rmse" else f"_{measure}"), draw(experiment, x, measure),
                 f"{NAMES[measure]} against {against}",
-                "Lines: geometric mean over seeds; bands: its 95 % confidence interval (Student's on the logarithms; none with one seed). The noise of the "
+                "Lines: arithmetic mean over seeds (RMSE: root of the mean of squares), all pixels; bands: its 95 % interval over seeds, none where few seeds or few pixels do not support one. The noise of the "
                 f"reference is subtracted where it is known. {trimmed}Dashed: the slope of independent samples. Points: checkpoints in "
                 + (("seconds" if x == "seconds" else "samples") if experiment.budget(x) else "the one unit that the experiment has") + ".",
                 experiment.runs, experiment.scenes)

@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from analysis import comparison, hdr_data, images, style
+from analysis.experiment import InputError
 
 try:
     import flip_evaluator
@@ -32,6 +33,21 @@ def of_files(image, reference, factor=1):
     pair = [hdr_data.shrink(p, factor) for p in (images.read_exr(image), images.read_exr(reference))]
     values, mean = flip(*pair)
     return (np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8), mean
+
+
+def of_runs(experiment):
+    """{(scene, run): (mean over pixels, median over pixels)}, means over the images of all seeds; {} without the package. Broken files are told by the figures."""
+    out = {}
+    for scene in experiment.scenes if flip_evaluator is not None else ():
+        reference = experiment.reference(scene)
+        for run in experiment.runs if reference else ():
+            try:
+                found = [of_files(path, reference) for _, path in experiment.files("images", scene, run, ".exr")]
+            except (InputError, ValueError):
+                continue
+            if found:
+                out[scene, run] = (float(np.mean([mean for _, mean in found])), float(np.mean([np.median(values) / 255 for values, _ in found])))
+    return out
 
 
 def draw(scene, shape, columns):

@@ -99,6 +99,11 @@ def label_log_axis(axis, limits):
     axis.set_minor_formatter(NullFormatter())
 
 
+def across(count, width):
+    """Panels beside each other in a figure for a "page" (None: as many as panels() takes) or a "column"."""
+    return {"page": None, "column": 1}[width] if count > 1 else 1
+
+
 def panels(count, height, columns=None, widest=2.35):
     """Figure and `count` axes in rows of up to three; those left over are hidden. `height`: inches of a row."""
     columns = columns or (2 if count == 4 else min(3, count))
