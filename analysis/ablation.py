@@ -18,6 +18,10 @@ def label(run, base):
     return short if settings and name == experiments.settings_of(base)[0] else run
 
 
+def label_lines(runs, base):
+    return [style.wrap(label(run, base), 26) for run in runs]
+
+
 def ratio_ticks(low, high):
     """Ticks of a logarithmic axis of ratios, few enough to read: 1 is one of them."""
     decades = math.log10(high / low)
@@ -50,8 +54,8 @@ def draw_bars(axes, experiment, scene, bars, first, biased):
         axes.text(1.02, i, (style.short_number(r.value) if r.trusted else "?") + dagger, transform=axes.get_yaxis_transform(), va="center", ha="left", fontsize=7)
     axes.axvline(1, color="black", lw=0.8, zorder=4)
     axes.set_ylim(len(bars) - 0.4, -0.6)
-    names = [style.wrap(label(run, experiment.base), 24) for run, _ in bars]
-    axes.set_yticks(range(len(bars)), names if first else [""] * len(bars))
+    names = label_lines([run for run, _ in bars], experiment.base)
+    axes.set_yticks(range(len(bars)), names if first else [""] * len(bars), fontsize=style.row_height(names, 0)[1])
     axes.tick_params(axis="y", length=0)
     axes.xaxis.set_major_locator(FixedLocator(ratio_ticks(*axes.get_xlim())))
     axes.xaxis.set_major_formatter(FuncFormatter(style.plain_number))
@@ -67,7 +71,8 @@ def draw(experiment, width="page"):
     found = summary.lines(experiment)
     biased, ratios = verdicts.biased(found), {(line.scene, line.run): line.ratio for line in found}
     with plt.rc_context(style.STYLE):
-        figure, axes, columns = style.panels(len(experiment.scenes), 0.55 + 0.24 * len(experiment.others), style.across(len(experiment.scenes), width))
+        height, _ = style.row_height(label_lines(experiment.others, experiment.base), 0.24)
+        figure, axes, columns = style.panels(len(experiment.scenes), 0.55 + height * len(experiment.others), style.across(len(experiment.scenes), width))
         for i, (one, scene) in enumerate(zip(axes, experiment.scenes)):
             draw_bars(one, experiment, scene, [(run, ratios.get((scene, run))) for run in experiment.others], i % columns == 0, biased)
     return figure
@@ -134,19 +139,23 @@ def draw_sweep(experiment, entries, key, first=0, width="column"):
         figure, axes = plt.subplots(figsize=(style.COLUMN if width == "column" else style.PAGE, 2.3), layout="constrained")
         for i, scene in enumerate(scenes):
             x = numbers if numeric else [n + 0.7 * ((i + 0.5) / len(scenes) - 0.5) for n in range(len(entries))]
-            found = [(at, r) for at, r in zip(x, sweep_ratios(experiment, scene, entries, first)) if r and math.isfinite(r.value)]
+            found = [(at, r, n == first) for n, (at, r) in enumerate(zip(x, sweep_ratios(experiment, scene, entries, first))) if r and math.isfinite(r.value)]
             if not found:
                 continue
             looks = style.line_style(i) | ({} if numeric else {"ls": "none"})
-            axes.plot([at for at, _ in found], [r.value for _, r in found], label=scene, **looks)
-            for at, r in found:
+            axes.plot([at for at, *_ in found], [r.value for _, r, _ in found], label=scene, **looks)
+            for at, r, is_first in found:
+                if is_first:
+                    continue  # over itself: 1
                 if r.trusted:
                     axes.plot([at, at], [r.low, r.high], color=style.colour(i), lw=1, solid_capstyle="butt")
                 else:
                     axes.plot(at, r.value, marker="o", ms=7, mfc="none", mec=style.colour(i), mew=0.6)
         axes.axhline(1, color="0.4", lw=0.8, zorder=1)
         axes.set_yscale("log")
-        style.label_log_axis(axes.yaxis, axes.get_ylim())
+        axes.yaxis.set_major_locator(FixedLocator(ratio_ticks(*axes.get_ylim())))
+        axes.yaxis.set_major_formatter(FuncFormatter(style.plain_number))
+        axes.yaxis.set_minor_locator(NullLocator())
         if numeric:
             axes.set_xscale("log", base=2)
         names = [value + ("\n(default)" if run == experiment.base and experiments.settings_of(run)[1] == {} else "") for value, run in entries]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from analysis import ablation, captions, comparison, convergence, error_maps, flip_maps, pyramid, stage_times, style
+from analysis import ablation, captions, comparison, convergence, error_maps, flip_maps, overview, pyramid, stage_times, style
 from analysis.experiment import InputError
 
 
@@ -17,6 +17,7 @@ class Made:
 
 def plan(experiment, insets):
     """(name, function without arguments that yields Pictures) of all that there could be."""
+    yield "overview", lambda: overview.make(experiment)
     yield "convergence", lambda: convergence.make(experiment)
     yield "ablation", lambda: ablation.make(experiment)
     yield "sweeps", lambda: ablation.make_sweeps(experiment)

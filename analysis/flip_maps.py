@@ -17,7 +17,7 @@ try:
 except ImportError:
     flip_evaluator = None
 
-PER_FIGURE = 5
+ACROSS = 6
 
 
 def flip(image, reference):
@@ -52,14 +52,20 @@ def of_runs(experiment):
 
 def draw(scene, shape, columns):
     height, width = shape
-    cell = min(2.2, (style.PAGE - 0.6) / len(columns))
+    across = style.balanced(len(columns), ACROSS)
+    rows = -(-len(columns) // across)
+    cell = min(2.2, (style.PAGE - 0.6) / across)
+    lines = max(style.fit(run, cell, 8.5).count("\n") + 2 for run, *_ in columns)
     with plt.rc_context(style.STYLE):
-        figure, grid = plt.subplots(1, len(columns), figsize=(cell * len(columns) + 0.6, cell * height / width + 0.45), squeeze=False, layout="constrained")
-        for axes, (run, values, mean) in zip(grid[0], columns):
+        figure, grid = plt.subplots(rows, across, figsize=(cell * across + 0.6, rows * (cell * height / width + 0.08 + 0.13 * lines)), squeeze=False, layout="constrained")
+        for axes in grid.flat:
+            axes.set_axis_off()
+        for axes, (run, values, mean) in zip(grid.flat, columns):
             drawn = axes.imshow(values / 255, cmap=style.ERROR_COLOURS, vmin=0, vmax=1, interpolation="nearest")
-            axes.set_title(style.wrap(run) + f"\nmean {mean:.3f}")
+            axes.set_title(style.fit(run, cell, 8.5) + f"\nmean {mean:.3f}, median {np.median(values) / 255:.3f}" if cell > 1.6 else style.fit(run, cell, 8.5) + f"\nmean {mean:.3f}")
+            axes.set_axis_on()
             comparison.bare(axes)
-        figure.colorbar(drawn, ax=list(grid[0]), label="HDR-FLIP", fraction=0.05, aspect=14)
+        figure.colorbar(drawn, ax=list(grid.flat), label="HDR-FLIP", fraction=0.05, aspect=14)
     return figure
 
 
@@ -69,10 +75,8 @@ def make(experiment, scene):
         raise style.NotMade("the package flip-evaluator is not installed (pip install flip-evaluator)")
     reference, shown = comparison.load(experiment, scene)
     columns = [(run, *of_files(experiment.image(scene, run)[1], experiment.reference(scene))) for run, _, _ in shown]
-    for part in range(0, len(columns), PER_FIGURE):
-        some = columns[part:part + PER_FIGURE]
-        yield style.Picture(
-            f"flip_{scene}" + (f"_{part // PER_FIGURE + 1}" if part else ""), draw(scene, reference.shape[:2], some), f"FLIP of {scene}",
-            "HDR-FLIP (Andersson et al. 2021) between the image of the lowest seed at the last checkpoint and the reference, 67 pixels per degree; 0: no visible "
-            f"difference. Means: {'; '.join(f'{run} {mean:.4f}' for run, _, mean in some)}.",
-            [c[0] for c in some], [scene])
+    yield style.Picture(
+        style.file_name("flip", scene), draw(scene, reference.shape[:2], columns), f"FLIP of {scene}",
+        "HDR-FLIP (Andersson et al. 2021) between the image of the lowest seed at the last checkpoint and the reference, 67 pixels per degree; 0: no visible "
+        f"difference. Means: {'; '.join(f'{run} {mean:.4f}' for run, _, mean in columns)}.",
+        [c[0] for c in columns], [scene])

@@ -48,7 +48,7 @@ def read(folder):
 def label(s, t, share=None):
     """`share`: of the light of all pictures; told in per cent."""
     percent = None if share is None else 100 * share
-    return f"s = {s}, t = {t}" + ("" if percent is None else ": 0" if percent == 0 else ": <0.1 %" if percent < 0.1 else f": {percent:.0f} %" if percent >= 9.95 else f": {percent:.1f} %")
+    return f"({s},{t})" + ("" if percent is None else " 0" if percent == 0 else " <0.1 %" if percent < 0.1 else f" {percent:.0f} %" if percent >= 9.95 else f" {percent:.1f} %")
 
 
 def row_factor(row_images):

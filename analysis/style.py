@@ -2,7 +2,6 @@
 
 import math
 import re
-import textwrap
 from dataclasses import dataclass
 
 import matplotlib
@@ -62,13 +61,39 @@ def line_style(i):
 
 
 def wrap(text, width=18):
-    """Long names on several lines, for titles of narrow panels."""
+    """Long names on several lines, for titles of narrow panels: a bracket on a line of its own, breaks behind + , = and spaces, elsewhere only where a part is longer than a line."""
     head, bracket, rest = text.partition("[")  # lvc[connections=4]
     if len(text) > width and head and bracket:
-        return wrap(head, width) + "\n" + wrap(bracket + rest, max(width, len(rest) + 1))
-    # Lists such as hits+next_event break behind a plus: a vertical tab is white space to textwrap, and is taken out again.
-    parts = textwrap.wrap(text.replace("+", "+\v"), width, break_long_words=True, replace_whitespace=False)
-    return "\n".join(parts).replace("\v", "") or text
+        return wrap(head, width) + "\n" + wrap(bracket + rest, width)
+    lines = [""]
+    for part in re.findall(r"[^+,= ]+[+,=]*|[+,= ]+", text):
+        while part:
+            if len(lines[-1]) + len(part.rstrip()) <= width:
+                lines[-1] += part
+                break
+            if len(part) <= width or lines[-1].strip():
+                lines.append("")
+                part = part.lstrip()
+            if len(part) > width and not lines[-1]:
+                at = part.rfind("_", 0, width) + 1 or width
+                lines[-1], part = part[:at], part[at:]
+    return "\n".join(line.strip() for line in lines if line.strip()) or text
+
+
+def fit(text, inches, points=8):
+    """wrap to a width in inches of a font of `points`."""
+    return wrap(text, max(5, int(inches * 72 / (0.6 * points))))
+
+
+def row_height(names, least):
+    """(inches of a row of bars whose labels are `names`, font size of the labels): labels of several lines do not run into each other."""
+    lines = max((name.count("\n") + 1 for name in names), default=1)
+    return (least, 7) if lines < 3 else (max(least, 0.1 * lines + 0.04), 6)
+
+
+def balanced(count, most):
+    """Columns of a grid of `count` cells, `most` beside each other, so that its rows are as even as they can be: 6 of at most 5 are 3 and 3."""
+    return math.ceil(count / math.ceil(count / most))
 
 
 def short_number(x, digits=3):

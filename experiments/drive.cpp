@@ -15,8 +15,8 @@ RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& 
     if (budget.samples == 0 && !(budget.seconds > 0))
         throw Error(ExitCode::usage, "a render needs a number of samples or a time");
     if (budget.samples > kMaxSamples) throw Error(ExitCode::usage, "at most 4294967295 samples per pixel are possible");
-    double per_sample = 0;
-    uint64_t last_count = 0;
+    double& per_sample = position.per_sample;
+    uint64_t& last_count = position.last_count;
     while (!position.interrupted) {
         if (is_set(interrupt)) {
             position.interrupted = true;

@@ -9,6 +9,7 @@
 #include "core/atomic_file.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "experiments/batches.h"
 #include "experiments/drive.h"
 #include "experiments/experiment_folder.h"
 #include "experiments/prepare.h"
@@ -180,14 +181,17 @@ private:
                         {},
                         {},
                         {}};
-        task.state.notes = {{"seconds", 0.0}, {"done", nlohmann::json::array()}, {"rows", nlohmann::json::array()}};
+        task.state.notes = {{"seconds", 0.0},
+                            {"done", nlohmann::json::array()},
+                            {"rows", nlohmann::json::array()},
+                            {"batches", nlohmann::json::array()}};
         return task;
     }
 
     /// One render through all of its checkpoints; false if interrupted.
     bool render(size_t index, const RunEntry& run, uint64_t seed) {
         RenderTask task = make_task(index, run, seed);
-        if (folder_.rows(task.prefix) == checkpoints_.size() && !fs::exists(task.state_path)) {
+        if (folder_.runs().count(task.prefix) == checkpoints_.size() && !fs::exists(task.state_path)) {
             work_.skip(task.work);
             return true;
         }
@@ -200,8 +204,9 @@ private:
         if (run.techniques) {
             write_technique_images(folder_.file("techniques", task.scene, task.name), task.scene.scene, task.settings,
                                    task.stated(), renderer->strategy_images());
-            for (const auto& line : task.state.notes["rows"]) folder_.add_row(line.get<std::string>());
+            for (const auto& line : task.state.notes["rows"]) folder_.runs().add(line.get<std::string>());
         }
+        for (const auto& line : task.state.notes["batches"]) folder_.batches().add(line.get<std::string>());
         std::error_code ignored;
         fs::remove(task.state_path, ignored);
         return true;
@@ -218,10 +223,13 @@ private:
         } else if (auto saved = read_state(task.state_path)) {
             state = std::move(*saved);
             task.total = restore_stats(state.notes["stats"]);
-            for (const auto& line : state.notes["rows"]) folder_.add_row(line.get<std::string>());
+            for (const auto& line : state.notes["rows"]) folder_.runs().add(line.get<std::string>());
         }
         // Rows whose state is lost are made anew.
-        if (state.notes["rows"].empty()) folder_.remove_rows(task.prefix);
+        if (state.notes["rows"].empty()) {
+            folder_.runs().remove(task.prefix);
+            folder_.batches().remove(task.prefix);
+        }
         const auto& done = state.notes["done"];
         for (size_t k = 0; k < checkpoints_.size(); ++k)
             if (std::find(done.begin(), done.end(), k) == done.end()) task.pending.push_back(k);
@@ -250,15 +258,17 @@ private:
         work_.begin(task.work, work_after(task.scene, position));
         RenderStats counted = renderer.stats();
         while (!task.pending.empty()) {
-            const Budget budget = next_budget(task.pending);
-            const uint64_t before = position.samples;
+            const Budget budget = next_budget(task.pending, position);
+            const RenderPosition before = position;
             position = drive_showing(task, renderer, position, budget);
             add_part(task.total, counted, renderer.stats());
             state.notes["seconds"] = position.seconds;
-            // The film restarts at each checkpoint, so that a resumed render adds the same numbers in the same order as
-            // an uninterrupted one.
-            if (position.samples > before) {
-                state.moments.add(renderer.film());
+            // The film restarts at each checkpoint and with each batch, so that a resumed render adds the same numbers
+            // in the same order as an uninterrupted one.
+            if (position.samples > before.samples) {
+                const FilmMoments film = renderer.film();
+                if (!position.interrupted) record_batch(task, film, position.seconds - before.seconds);
+                state.moments.add(film);
                 renderer.clear_film();
             }
             counted = renderer.stats();  // a renderer may or may not restart its counters with its film
@@ -272,15 +282,25 @@ private:
         return true;
     }
 
-    /// Until the first of the pending checkpoints.
-    Budget next_budget(const std::vector<size_t>& pending) const {
+    /// Until the first of the pending checkpoints, or the end of a batch if that comes sooner by half a batch or more.
+    Budget next_budget(const std::vector<size_t>& pending, const RenderPosition& at) const {
         Budget budget;
         for (const size_t k : pending) {
             const Checkpoint& c = checkpoints_[k];
             if (c.samples) budget.samples = budget.samples ? std::min(budget.samples, c.samples) : c.samples;
             if (c.seconds > 0) budget.seconds = budget.seconds > 0 ? std::min(budget.seconds, c.seconds) : c.seconds;
         }
-        return budget;
+        return batch_end(config_, at, budget);
+    }
+
+    void record_batch(RenderTask& task, const FilmMoments& film, double seconds) const {
+        nlohmann::json& lines = task.state.notes["batches"];
+        BatchRow b = measure_batch(film, references_made_[task.scene_index].image, seconds);
+        b.scene = task.scene.entry->name;
+        b.run = task.run.name;
+        b.seed = task.settings.seed;
+        b.batch = lines.size();
+        lines.push_back(batch_line(b));
     }
 
     RenderPosition drive_showing(const RenderTask& task, Renderer& renderer, const RenderPosition& from,
@@ -313,8 +333,9 @@ private:
             }
         std::erase_if(task.pending, reached);
         if (task.run.techniques) return;  // its rows wait until all of its files are there
+        if (lines.empty()) return;
         write_state(task.state_path, task.state);
-        for (const std::string& line : lines) folder_.add_row(line);
+        for (const std::string& line : lines) folder_.runs().add(line);
     }
 
     ResultRow row(const RenderTask& task, size_t k) const {
@@ -324,9 +345,11 @@ private:
         r.seed = task.settings.seed;
         r.checkpoint = k;
         r.budget = checkpoints_[k].samples ? "spp" : "seconds";
-        r.integrator = task.settings.integrator;
-        r.variant = task.settings.variant;
-        r.estimator = setting_text(task.settings, "estimator");
+        const RenderSettings used = used_settings(task.settings, task.total);
+        r.integrator = used.integrator;
+        r.variant = used.variant;
+        r.estimator = setting_text(used, "estimator");
+        r.method = method_text(used);
         r.backend = task.total.backend;
         r.spp = task.state.moments.samples;
         r.time = task.state.notes["seconds"].get<double>();

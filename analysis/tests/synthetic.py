@@ -21,6 +21,10 @@ def picture(width=48, height=36):
     return np.stack([0.2 + x, 0.3 + 0.5 * y, 0.6 * np.exp(-8 * ((x - 0.6) ** 2 + (y - 0.5) ** 2))], axis=-1)
 
 
+def quoted(name):
+    return f'"{name}"' if "," in name else name
+
+
 STAGES = (("extend", 0.5), ("shade", 0.29), ("connect", 0.2), ("update_film", 0.01))  # shares of the time
 
 
@@ -59,7 +63,7 @@ def add_batches(folder, scenes, runs, seeds, spp, batches):
             for seed in seeds:
                 for batch in range(batches):
                     mse = error**2 / spp * (1 + 0.05 * rng.normal())
-                    rows.append(f'{scene},"{run}",{seed},{batch},{spp:.0f},{milliseconds * spp / 1000:.9g},{mse:.9g},{4 * mse:.9g}')
+                    rows.append(f'{scene},{quoted(run)},{seed},{batch},{spp:.0f},{milliseconds * spp / 1000:.9g},{mse:.9g},{4 * mse:.9g}')
     (folder / "batches.csv").write_text("\n".join(rows) + "\n")
 
 
@@ -82,7 +86,7 @@ def make(folder, scenes=("box", "glass"), runs=(("naive", 2.0, 1.0), ("nee", 0.7
                 for k, spp in enumerate([*checkpoints, *of_seconds]):
                     corrected = error * luck / np.sqrt(spp)
                     rmse = np.hypot(corrected, reference_noise)
-                    rows.append(f"{scene},{run},{seed},{k},path,wavefront,{run},cpu,{spp},{milliseconds * spp / 1000:.6f},{rmse:.9g},{corrected:.9g},"
+                    rows.append(f"{scene},{quoted(run)},{seed},{k},path,wavefront,{quoted(run)},cpu,{spp},{milliseconds * spp / 1000:.6f},{rmse:.9g},{corrected:.9g},"
                                 f"{reference_noise:.9g},{4 * rmse**2:.9g},{4 * corrected**2:.9g},{rmse:.9g},0.0001,0.5,{spp * 10000},0"
                                 + (f",{'spp' if k < len(checkpoints) else 'seconds'},{4 * rmse**2 / outliers:.9g},{4 * corrected**2 / outliers:.9g}" if seconds else ""))
                 noise = error / np.sqrt(checkpoints[-1]) * rng.normal(size=picture().shape)

@@ -30,7 +30,7 @@ def output(folder, tmp_path_factory):
     return out
 
 
-NAMES = {"convergence_time", "convergence_spp", "convergence_time_relmse", "convergence_spp_relmse", "ablation", "sweep_lvc_connections", "stage_times",
+NAMES = {"overview", "convergence_time", "convergence_spp", "convergence_time_relmse", "convergence_spp_relmse", "ablation", "sweep_lvc_connections", "stage_times",
          "comparison_box", "errors_box", "flip_box", "techniques_weighted_box_lvc-connections-1", "techniques_raw_box_lvc-connections-1",
          "strategy_variance_box_lvc-connections-1"}
 
@@ -237,9 +237,9 @@ def test_weighted_strategies_tell_their_share_of_the_light():
     picture = synthetic.picture()
     figure, _ = pyramid.draw({(0, 2): 3 * picture, (1, 1): picture, (0, 3): 0 * picture, (1, 2): 1e-4 * picture, (2, 1): 0.2 * picture}, "weighted")
     titles = [a.get_title() for a in figure.axes if a.get_title()]
-    assert titles == ["s = 0, t = 2: 71 %", "s = 1, t = 1: 24 %", "s = 0, t = 3: 0", "s = 1, t = 2: <0.1 %", "s = 2, t = 1: 4.8 %"]
+    assert titles == ["(0,2) 71 %", "(1,1) 24 %", "(0,3) 0", "(1,2) <0.1 %", "(2,1) 4.8 %"]
     figure, _ = pyramid.draw({(0, 2): picture, (1, 1): picture}, "raw")
-    assert [a.get_title() for a in figure.axes] == ["s = 0, t = 2", "s = 1, t = 1"]
+    assert [a.get_title() for a in figure.axes] == ["(0,2)", "(1,1)"]
 
 
 def test_flip_is_zero_for_equal_images_and_grows_with_the_error():

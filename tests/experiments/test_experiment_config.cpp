@@ -114,6 +114,11 @@ TEST_CASE("budgets of samples and of seconds stand side by side; --reduced repla
     CHECK(small.scenes[1].reference.spp == 10);
     CHECK(contains(error_of([&] { read(folder, text, true); }),
                    "e.toml:8: scene 'a': 'scale' of [reduced] needs a 'size' here"));
+    CHECK(config.metric == "relmse");
+    CHECK(read(folder, "metric = \"mse\"\n" + text).metric == "mse");
+    CHECK(contains(resolved_toml(read(folder, "metric = \"mse\"\n" + text)), "metric = 'mse'"));
+    CHECK(contains(error_of([&] { read(folder, "metric = \"ssim\"\n" + text); }),
+                   "e.toml:1: metric 'ssim': must be relmse or mse"));
     CHECK(contains(error_of([&] { read(folder, kConfig, true); }), "e.toml: --reduced: it has no section [reduced]"));
 }
 
