@@ -63,12 +63,12 @@ def averaging(experiment, scene, run, metric):
     return heavy_tails.averaging(variances(batches, metric), wholes(experiment, scene, run, batches, metric)) if batches else math.nan
 
 
-def judged(signed, over, doubt):
-    """heavy_tails.estimate of [(sign, Work)], or a doubt where errors are not positive."""
+def judged(signed, over, doubt, for_test=False):
+    """heavy_tails.estimate of [(sign, Work)], or a doubt where errors are not positive. for_test: its p alone is wanted, which needs no resamples."""
     units = min(len(w.rows) for _, w in signed)
     if units == 0 or any(not np.isfinite(w.rows).all() or not (w.rows.mean(axis=0) > 0).all() for _, w in signed):
         return heavy_tails.unknown(math.nan, over, units, "errors below the reference's noise" if units else "no results")
-    resample = over == "batches" or units >= heavy_tails.FEWEST_RESAMPLED_SEEDS
+    resample = not for_test and (over == "batches" or units >= heavy_tails.FEWEST_RESAMPLED_SEEDS)
     return heavy_tails.estimate([(sign, w.rows) for sign, w in signed], over, doubt, resample)
 
 
@@ -77,9 +77,9 @@ def efficiency(work):
     return judged([(-1, work)], work.over, work.doubt)
 
 
-def ratio(work, base, name):
+def ratio(work, base, name, for_test=False):
     """Judged of the efficiency over that of `base`, another Work over the same kind of units; `name`: of the base, for its doubt."""
-    return judged([(-1, work), (1, base)], work.over, work.doubt or (base.doubt and f"{name}: {base.doubt}"))
+    return judged([(-1, work), (1, base)], work.over, work.doubt or (base.doubt and f"{name}: {base.doubt}"), for_test)
 
 
 def mean_over_seeds(values, few=()):

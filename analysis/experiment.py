@@ -100,6 +100,7 @@ class Experiment:
     base: str  # the run that others are compared with: `default` of [ablation] in the configuration, else the first
     metric: str = "relmse"  # the error that leads: `metric` of the configuration
     batches: list = field(default_factory=list)
+    kept: dict = field(default_factory=dict)  # what was made of them, for use by several figures
 
     @property
     def name(self):

@@ -8,7 +8,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLo
 from analysis import ablation, convergence, efficiency, style, summary
 
 SIZE = (10.0, 5.63)  # inches: 16 to 9
-MOST_SCENES = 3  # with a panel of their own
+MOST_SCENES = 2  # with a panel of their own
 LARGER = {"font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10, "legend.fontsize": 9, "xtick.labelsize": 9, "ytick.labelsize": 9}
 
 
@@ -22,7 +22,7 @@ def draw_ratios(axes, experiment, lines):
             if line.scene != scene or line.run not in shown or r is None or not math.isfinite(r.value):
                 continue
             y = shown.index(line.run) + (i - (len(experiment.scenes) - 1) / 2) * height
-            axes.plot(r.value, y, ls="none", marker=style.MARKERS[i % len(style.MARKERS)], ms=5, mec=style.colour(i), mfc=style.colour(i) if r.trusted else "none",
+            axes.plot(r.value, y, ls="none", marker=style.marker(i), ms=5, mec=style.colour(i), mfc=style.colour(i) if r.trusted else "none",
                       label=scene)
             if r.trusted:
                 axes.plot([r.low, r.high], [y, y], color=style.colour(i), lw=1.2)
@@ -38,9 +38,6 @@ def draw_ratios(axes, experiment, lines):
     axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.grid(True, axis="x", color="0.92", lw=0.6)
     axes.set_title(f"1 / ({efficiency.NAMES[experiment.metric]} · time) over that of {experiment.base}", loc="left")
-    handles, labels = convergence.entries_of([axes], experiment.scenes)
-    if len(experiment.scenes) > 1 and labels:
-        axes.legend(handles, labels, loc="upper center", bbox_to_anchor=(0.4, -0.12), ncols=min(4, len(labels)), frameon=False)
 
 
 def draw(experiment):
@@ -63,7 +60,11 @@ def draw(experiment):
                 axes.set_xlabel("")
         handles, labels = convergence.entries_of(panels, told)
         left.legend(handles, [style.wrap(label, 26) for label in labels], loc="outside lower center", ncols=2, frameon=False)
-        draw_ratios(right.subplots(), experiment, lines)
+        axes = right.subplots()
+        draw_ratios(axes, experiment, lines)
+        handles, labels = convergence.entries_of([axes], experiment.scenes)
+        if len(experiment.scenes) > 1 and labels:
+            right.legend(handles, [style.wrap(label, 26) for label in labels], loc="outside lower center", ncols=2, frameon=False)
         seeds = sorted({r.seed for r in experiment.rows})
         figure.suptitle(f"{experiment.name}: {len(experiment.scenes)} scene{'s' if len(experiment.scenes) > 1 else ''}, {len(experiment.runs)} methods, {len(seeds)} seeds", fontsize=12, x=0.01, ha="left")
     return figure

@@ -55,9 +55,14 @@ def colour(i):
     return COLOURS[i % len(COLOURS)]
 
 
+def marker(i):
+    """Past seven of them, each colour has another one than before."""
+    return MARKERS[(i + i // len(COLOURS)) % len(MARKERS)]
+
+
 def line_style(i):
-    """Keywords for run number i. Past seven runs colours repeat and dashes tell them apart."""
-    return {"color": colour(i), "marker": MARKERS[i % len(MARKERS)], "ls": DASHES[i // len(COLOURS) % len(DASHES)], "ms": 3, "lw": 1.2}
+    """Keywords for run number i. Past seven runs colours repeat and dashes and markers tell them apart."""
+    return {"color": colour(i), "marker": marker(i), "ls": DASHES[i // len(COLOURS) % len(DASHES)], "ms": 3, "lw": 1.2}
 
 
 def wrap(text, width=18):

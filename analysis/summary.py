@@ -1,7 +1,7 @@
 """From rows to what figures and tables show: curves over checkpoints and one line per (scene, run)."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -150,12 +150,12 @@ def works(experiment, scene, run, checkpoint):
             efficiency.of_seeds(experiment.select(scene, run, checkpoint), experiment.metric))
 
 
-def ratios(of_run, of_base, name):
+def ratios(of_run, of_base, name, for_test=False):
     """(ratio of efficiencies over batches, over seeds) of two pairs of works; None for what either lacks."""
-    return [efficiency.ratio(a, b, name) if a is not None and b is not None and len(a.rows) and len(b.rows) else None for a, b in zip(of_run, of_base)]
+    return [efficiency.ratio(a, b, name, for_test) if a is not None and b is not None and len(a.rows) and len(b.rows) else None for a, b in zip(of_run, of_base)]
 
 
-def line(experiment, scene, run, checkpoint, flip):
+def line(experiment, scene, run, checkpoint):
     """The Line of a run with results at the checkpoint."""
     rows = experiment.select(scene, run, checkpoint)
     slope_spp, slope_seeds = slope(experiment, scene, run)
@@ -167,7 +167,7 @@ def line(experiment, scene, run, checkpoint, flip):
         scene=scene, run=run, seeds=len(rows), spp=mean_or_nan([r.spp for r in rows]), seconds=mean_or_nan([r.time for r in rows]),
         rmse=mean_error(rows, "rmse"), relmse=relmse, trimmed=trimmed,
         few_pixels=relmse.value / trimmed.value if trimmed.value > 0 else math.nan,
-        mape=mean_or_nan([r.mape for r in rows]), flip=flip[0], flip_median=flip[1],
+        mape=mean_or_nan([r.mape for r in rows]), flip=math.nan, flip_median=math.nan,
         rays_per_second=float(sum(r.rays for r in rows) / sum(r.time for r in rows)),
         work_seeds=of_seeds, work_batches=of_batches, averaging=efficiency.averaging(experiment, scene, run, experiment.metric),
         ratio_seeds=ratio_seeds, ratio_batches=ratio_batches,
@@ -179,9 +179,12 @@ def line(experiment, scene, run, checkpoint, flip):
 
 def lines(experiment, flips=None):
     """One Line per (scene, run), in the order of the configuration. flips: {(scene, run): (mean, median)} of HDR-FLIP."""
-    last = {scene: experiment.last_common_checkpoint(scene) for scene in experiment.scenes}
-    return [line(experiment, scene, run, last[scene], (flips or {}).get((scene, run), (math.nan, math.nan)))
-            for scene in experiment.scenes if last[scene] is not None for run in experiment.runs if experiment.select(scene, run, last[scene])]
+    if "lines" not in experiment.kept:
+        last = {scene: experiment.last_common_checkpoint(scene) for scene in experiment.scenes}
+        experiment.kept["lines"] = [line(experiment, scene, run, last[scene]) for scene in experiment.scenes if last[scene] is not None for run in experiment.runs
+                                    if experiment.select(scene, run, last[scene])]
+    found = experiment.kept["lines"]
+    return [replace(x, flip=flips[x.scene, x.run][0], flip_median=flips[x.scene, x.run][1]) if (x.scene, x.run) in flips else x for x in found] if flips else found
 
 
 def rows_used(experiment):
