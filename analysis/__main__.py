@@ -1,4 +1,4 @@
-"""python -m analysis RESULTS -o OUT: see docs/experiments.md.
+"""python -m analysis RESULTS -o OUT, python -m analysis pack RESULTS -o FILE.zip: see docs/experiments.md.
 
 Writes figures (.pdf, .png, .caption.txt), tables (.csv, .tex) and report.html into OUT. Exit codes: 0 done, 2 usage, 3 bad input (what does not depend on it
 is made all the same).
@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from analysis import experiment as experiments
-from analysis import figures, flip_maps, pyramid, remarks, report, summary, tables
+from analysis import figures, flip_maps, pack, pyramid, remarks, report, summary, tables
 
 
 def write(path, text):
@@ -58,6 +58,9 @@ def parse_inset(text):
 
 
 def main(arguments=None):
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments[:1] == ["pack"]:
+        return pack.main(arguments[1:])
     parser = argparse.ArgumentParser(prog="python -m analysis", description="Figures, tables and a report of an experiment.")
     parser.add_argument("results", type=Path, help="folder that `ambilux experiment` wrote")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to; may be the same")

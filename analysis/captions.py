@@ -62,7 +62,9 @@ def data_behind(experiment, scenes, runs):
         f"Device: {devices or 'unknown'} ({machine.get('cpu', 'unknown processor')}{driver})",
         f"Clocks: {clocks}" if clocks else None,
         f"Revision: ambilux {versions.get('ambilux', '?')}, git {versions.get('git_revision', 'unknown')}",
-        f"Command: ambilux experiment {config} -o {experiment.folder.name}" if config else None,
+        *(f"Command: {command}" for command in m.get("commands") or []),
+        # Of older versions, which did not record how they were called.
+        f"Configuration: {config}" if config and not m.get("commands") else None,
         f"Command: python -m analysis {experiment.folder.name} -o FIGURES",
     ) if line]
 

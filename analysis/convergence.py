@@ -85,7 +85,9 @@ def draw(experiment, x="seconds", measure="rmse", scenes=None, width="page"):
                     label_axis(one, experiment, measure)
             style.legend_below(figure, *entries_of(axes, experiment.runs))
             return figure
-        figure, grid = plt.subplots(len(scenes), len(groups), figsize=(style.PAGE, 2.1 * len(scenes) + 0.16 * max(map(len, groups)) + 0.3), squeeze=False, layout="constrained",
+        names = {run: style.fit(run, style.PAGE / len(groups) - 0.6, 7) for run in experiment.runs}
+        lines = max(sum(names[run].count("\n") + 1 for run in group) for group in groups)
+        figure, grid = plt.subplots(len(scenes), len(groups), figsize=(style.PAGE, 2.1 * len(scenes) + 0.15 * (lines + 2) + 0.45), squeeze=False, layout="constrained",
                                     sharey="row", sharex="row")
         for row, scene in zip(grid, scenes):
             for one, group in zip(row, groups):
@@ -93,8 +95,7 @@ def draw(experiment, x="seconds", measure="rmse", scenes=None, width="page"):
             label_axis(row[0], experiment, measure)
         for column, group in enumerate(groups):
             handles, labels = entries_of(grid[:, column], group)
-            labels = [style.fit(label, style.PAGE / len(groups) - 0.7, 7.5) for label in labels]
-            grid[-1][column].legend(handles, labels, loc="upper center", bbox_to_anchor=(0.5, -0.24), frameon=False)
+            grid[-1][column].legend(handles, [names.get(label, label) for label in labels], loc="upper center", bbox_to_anchor=(0.5, -0.24), frameon=False, fontsize=7)
     return figure
 
 

@@ -2,7 +2,7 @@
 
 import math
 
-from analysis import summary, verdicts
+from analysis import fairness, summary, verdicts
 
 FEW_PIXELS = 2.0  # relMSE over relMSE without the worst pixels, from which on these hold more than half of it
 SLOW_CLOCK = 1.1  # ratio of clocks at start and end of an experiment that is told
@@ -38,6 +38,17 @@ def method_remarks(experiment):
             if len(found) > 1:
                 told = "; ".join(f"{method} (seed{'s' if len(seeds) > 1 else ''} {', '.join(map(str, seeds))})" for method, seeds in found.items())
                 yield f"{scene}, {run}: seeds ran different methods, so that their mean is of a mixture: {told}"
+
+
+def same_remarks(lines):
+    """Runs that are the base run's estimator: what their time says."""
+    for line in lines:
+        r = line.ratio_time
+        if r is None:
+            continue
+        said = (f"{'faster' if r.value > 1 else 'slower'} by {r.value:.3g} in time per sample" if verdicts.differs(line, lines)
+                else "no effect on time per sample found" + (f" (ratio {r.value:.3g} [{r.low:.3g}, {r.high:.3g}])" if r.trusted else f" ({r.doubt})"))
+        yield f"{line.scene}, {line.run}: the same images at equal seeds as the run it is compared with; {said}"
 
 
 def doubt_remarks(lines):
@@ -85,7 +96,7 @@ def clock_remarks(experiment):
 def remarks(experiment, lines):
     """Sentences that a reader must know before believing the figures: gaps, dropped values, bias, references that are too noisy, pixels that decide
     relMSE, clocks that changed."""
-    found = list(clock_remarks(experiment))
+    found = [*clock_remarks(experiment), *fairness.remarks(experiment)]
     for scene in experiment.scenes:
         every = {(s, c) for run in experiment.runs for s in experiment.seeds(scene, run) for c in experiment.checkpoints(scene, run)}
         if not every:
@@ -114,4 +125,4 @@ def remarks(experiment, lines):
                          "samples without bias: look for bias, rare bright samples, or samples that are not independent")
         if not line.rmse.value >= noise and not math.isnan(noise):
             found.append(f"{place}: the error is below the noise of the reference ({noise:.2g}) and so uncertain; a longer reference helps")
-    return found + list(method_remarks(experiment)) + list(doubt_remarks(lines)) + list(trimmed_remarks(experiment, lines))
+    return found + list(method_remarks(experiment)) + list(same_remarks(lines)) + list(doubt_remarks(lines)) + list(trimmed_remarks(experiment, lines))

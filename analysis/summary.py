@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from analysis import bias, efficiency, equal_error, heavy_tails, statistics
+from analysis import bias, efficiency, equal_error, heavy_tails, same_estimator, statistics
 
 # What a row offers as its error, by the name that the report and the command line use, and what it is called on an axis.
 MEASURES = {"rmse": "error", "relmse": "relative_error", "relmse_trimmed": "trimmed_error"}
@@ -49,6 +49,8 @@ class Line:
     averaging: float                     # heavy_tails.averaging; NaN without batches
     ratio_seeds: heavy_tails.Judged | None    # of efficiencies, over the base run's
     ratio_batches: heavy_tails.Judged | None
+    time_per_sample: float               # seconds of a sample of every pixel, mean over seeds
+    ratio_time: heavy_tails.Judged | None  # of times per sample, if the run is the base run's estimator (same_estimator.py)
     speedup: equal_error.Speedup | None  # over the base run at equal RMSE, over all checkpoints
     slope: statistics.Estimate | None       # of log RMSE against log spp
     slope_time: statistics.Estimate | None  # of log RMSE against log seconds
@@ -73,8 +75,8 @@ class Line:
 
     @cached_property
     def ratio(self):
-        """What the table shows first; None without a base run."""
-        return efficiency.lead(self.ratio_batches, self.ratio_seeds)
+        """What the table shows first; None without a base run. Of one and the same estimator the ratio of times is that of efficiencies, without the noise of errors."""
+        return self.ratio_time if self.ratio_time is not None else efficiency.lead(self.ratio_batches, self.ratio_seeds)
 
 
 def positive(values):
@@ -171,6 +173,9 @@ def line(experiment, scene, run, checkpoint):
         rays_per_second=float(sum(r.rays for r in rows) / sum(r.time for r in rows)),
         work_seeds=of_seeds, work_batches=of_batches, averaging=efficiency.averaging(experiment, scene, run, experiment.metric),
         ratio_seeds=ratio_seeds, ratio_batches=ratio_batches,
+        time_per_sample=mean_or_nan(list(same_estimator.seconds_per_sample(experiment, scene, run).values())),
+        ratio_time=(same_estimator.time_ratio(experiment, scene, run, experiment.base)
+                    if run != experiment.base and same_estimator.same(experiment, scene, run, experiment.base) else None),
         speedup=speedup(experiment, scene, run) if experiment.select(scene, experiment.base, checkpoint) else None,
         slope=slope_spp, slope_time=slope(experiment, scene, run, "seconds")[0], slope_seeds=slope_seeds,
         bias=bias.bias_test([r.bias for r in rows], reference_error, [r.bias_z for r in rows]),

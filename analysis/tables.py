@@ -11,7 +11,8 @@ from analysis import efficiency, remarks, verdicts
 CAPTION = (
     "Each run at the last checkpoint that all runs of the scene have reached, of those in seconds if the experiment has both kinds: equal time. All errors are of all pixels and arithmetic "
     "means over seeds (RMSE: root of the mean of squares), with the noise of the reference subtracted where it is known; time is inside the renderer. "
-    "Efficiency is 1 / ({metric} · time), and its ratio that over {base}'s; brackets are 95 % intervals over {units}; where data cannot support one, words say why and there is no ratio. "
+    "Efficiency is 1 / ({metric} · time), and its ratio that over {base}'s; brackets are 95 % intervals over {units}; where data cannot support one, words say why and there is no ratio. An equals sign: the run makes {base}'s images at equal seeds, so that the ratio is that of times per "
+    "sample, over pairs of seeds. "
     "Bold: the best of a scene, if it is above every other by more than chance (1 % over all statements of the table). "
     "Time to equal RMSE is that of {base} over the run's, from mean errors; > and < are bounds, since a time lies outside of what was measured by more than a factor of 4; a dagger marks runs whose "
     "mean, or {base}'s, is off by more than chance allows. The slope is that of log RMSE against log samples, fitted for each seed; ±"
@@ -42,7 +43,9 @@ def ratio_text(line, base):
     """A ratio of efficiencies with its interval, or why there is none."""
     if line.run == base:
         return "1"
-    return "–" if line.ratio is None else line.ratio.doubt or interval(line.ratio)
+    if line.ratio is None:
+        return "–"
+    return line.ratio.doubt or interval(line.ratio) + (" =" if line.ratio is line.ratio_time else "")
 
 
 def speedup_text(line, base, biased):
@@ -102,7 +105,7 @@ def cells(line, base, biased, shown):
 
 def caption(experiment, lines):
     over = {line.ratio.over for line in lines if line.ratio is not None and line.ratio.trusted}
-    units = " and ".join({"batches": "batches of passes of all seeds", "seeds": "seeds"}[o] for o in sorted(over)) or "seeds"
+    units = " and ".join({"batches": "batches of passes of all seeds", "seeds": "seeds", "pairs of seeds": "pairs of seeds"}[o] for o in sorted(over)) or "seeds"
     return (CAPTION.format(base=experiment.base, metric=efficiency.NAMES[experiment.metric], units=units)
             + (TRIMMED_CAPTION.format(share=remarks.trimmed_share(experiment)) if "trimmed relMSE" in headings(experiment, lines) else ""))
 
@@ -111,10 +114,10 @@ PARTS = ("", "_low", "_high", "_units", "_doubt")  # of a Judged
 ESTIMATES = {
     "relmse": lambda x: x.relmse, "rmse": lambda x: x.rmse, "relmse_trimmed": lambda x: x.trimmed,
     "efficiency_batches": lambda x: x.efficiency_batches, "efficiency_seeds": lambda x: x.efficiency_seeds,
-    "ratio_batches": lambda x: x.ratio_batches, "ratio_seeds": lambda x: x.ratio_seeds,
+    "ratio_batches": lambda x: x.ratio_batches, "ratio_seeds": lambda x: x.ratio_seeds, "ratio_time": lambda x: x.ratio_time,
 }
 FITS = {"slope": lambda x: x.slope, "slope_time": lambda x: x.slope_time, "bias": lambda x: x.bias and x.bias.estimate}
-PLAIN = ("scene", "run", "seeds", "spp", "seconds", "mape", "flip", "flip_median", "rays_per_second", "averaging", "bias_z", "invalid", "few_pixels")
+PLAIN = ("scene", "run", "seeds", "spp", "seconds", "time_per_sample", "mape", "flip", "flip_median", "rays_per_second", "averaging", "bias_z", "invalid", "few_pixels")
 
 
 def csv_columns():

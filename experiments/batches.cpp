@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "film/metrics.h"
 
@@ -19,6 +20,17 @@ Budget batch_end(const ExperimentConfig& config, const RenderPosition& at, const
         if (double(next) <= double(budget.samples) - 0.5 * step) budget.samples = next;
     }
     return budget;
+}
+
+std::vector<std::pair<size_t, size_t>> render_order(size_t scenes, size_t runs, uint64_t seed, bool random) {
+    std::vector<std::pair<size_t, size_t>> order;
+    for (size_t i = 0; i < scenes; ++i)
+        for (size_t k = 0; k < runs; ++k) order.emplace_back(i, k);
+    if (!random) return order;
+    // Fisher and Yates; the same on every machine, so that a resumed experiment goes on in its order.
+    std::mt19937_64 generator(seed);
+    for (size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[generator() % i]);
+    return order;
 }
 
 BatchRow measure_batch(const FilmMoments& film, const Reference& reference, double seconds) {

@@ -11,7 +11,6 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
-#include "core/version.h"
 #include "experiments/machine.h"
 #include "experiments/statistics.h"
 #include "film/metrics.h"
@@ -90,7 +89,10 @@ void ExperimentFolder::remove_temporary_files() const {
 void ExperimentFolder::read_manifest() {
     const std::string path = path_ + "/manifest.json";
     if (!fs::exists(path)) {
-        manifest_ = {{"date", utc_now()}, {"resumed", nlohmann::json::array()}, {"clocks", nlohmann::json::array()}};
+        manifest_ = {{"date", utc_now()},
+                     {"resumed", nlohmann::json::array()},
+                     {"clocks", nlohmann::json::array()},
+                     {"commands", {command_line()}}};
         return;
     }
     manifest_ = nlohmann::json::parse(read_file(path), nullptr, false);
@@ -101,6 +103,7 @@ void ExperimentFolder::read_manifest() {
                 throw input_error(scene.entry->path, 0,
                                   "has changed since the experiment began: choose another folder");
     manifest_["resumed"].push_back(utc_now());
+    manifest_["commands"].push_back(command_line());
 }
 
 void ExperimentFolder::add_clocks(const std::string& when) {
@@ -142,7 +145,8 @@ void ExperimentFolder::write_manifest(bool finished) {
     manifest_["format"] = kFormat;
     manifest_["name"] = config_.name;
     manifest_["config"] = config_.file;
-    manifest_["versions"] = {{"ambilux", version()}, {"git_revision", git_revision()}, {"compiler", compiler()}};
+    manifest_["versions"] = describe_versions();
+    manifest_["order"] = config_.random_order ? "random" : "listed";
     manifest_["machine"] = describe_machine();
     manifest_["devices"] = prepared_.devices;
     manifest_["backends"] = prepared_.backends;

@@ -15,7 +15,7 @@ const char* const kResultHeader =
     "scene,run,seed,checkpoint,budget,integrator,variant,estimator,backend,spp,time,rmse,rmse_corrected,reference_"
     "noise,relmse,relmse_corrected,relmse_trimmed,"
     "relmse_trimmed_corrected,mape,bias,bias_z,rays,invalid,method";
-const char* const kBatchHeader = "scene,run,seed,batch,spp,time,mse,relmse";
+const char* const kBatchHeader = "scene,run,seed,batch,spp,time,mse,relmse,other_cores";
 
 namespace {
 
@@ -48,8 +48,8 @@ std::string result_line(const ResultRow& r) {
 }
 
 std::string batch_line(const BatchRow& r) {
-    return fmt::format("{}{},{},{:.9g},{:.9g},{:.9g}", result_prefix(r.scene, r.run, r.seed), r.batch, r.spp, r.time,
-                       r.mse, r.relmse);
+    return fmt::format("{}{},{},{:.9g},{:.9g},{:.9g},{:.3g}", result_prefix(r.scene, r.run, r.seed), r.batch, r.spp,
+                       r.time, r.mse, r.relmse, r.other_cores);
 }
 
 std::vector<std::string> read_results(const std::string& path, const char* header) {

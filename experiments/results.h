@@ -30,6 +30,7 @@ struct BatchRow {
     size_t batch = 0;
     uint64_t spp = 0;
     double time = 0;
+    double other_cores = 0;      ///< cores that other processes held meanwhile
     double mse = 0, relmse = 0;  ///< of the batch's own image, corrected for the reference's noise where that is known
 };
 

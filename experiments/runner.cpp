@@ -12,6 +12,8 @@
 #include "experiments/batches.h"
 #include "experiments/drive.h"
 #include "experiments/experiment_folder.h"
+#include "experiments/load.h"
+#include "experiments/machine.h"
 #include "experiments/prepare.h"
 #include "experiments/reference_store.h"
 #include "experiments/results.h"
@@ -70,9 +72,9 @@ public:
             if (!make_scene_reference(i)) return stopped();
         folder_.write_manifest(false);
         for (const uint64_t seed : config_.seeds)
-            for (size_t i = 0; i < prepared_.scenes.size(); ++i)
-                for (const RunEntry& run : config_.runs)
-                    if (!render(i, run, seed)) return stopped();
+            for (const auto& [scene, run] :
+                 render_order(prepared_.scenes.size(), config_.runs.size(), seed, config_.random_order))
+                if (!render(scene, config_.runs[run], seed)) return stopped();
         folder_.remove_states();
         folder_.add_clocks("end");
         folder_.write_manifest(true);
@@ -146,25 +148,9 @@ private:
             log_warning(fmt::format("reference of {}: {} invalid values dropped", scene.entry->name,
                                     result.stats.invalid.total()));
         write_png(folder_.file("images", scene, "reference.png"), made.image.mean);
-        folder_.describe_reference(index, describe(made, result.attributes));
+        folder_.describe_reference(index, describe_reference(made.place, made.image, result.attributes, folder_.path(),
+                                                             config_.reference_seed));
         return true;
-    }
-
-    nlohmann::json describe(const SceneReference& made, const Attributes& attributes) const {
-        double noise = 0;
-        for (const float se : made.image.standard_error.rgb) noise += double(se) * double(se);
-        const fs::path absolute = fs::absolute(made.place.path).lexically_normal();
-        const fs::path inside = absolute.lexically_relative(fs::absolute(folder_.path()).lexically_normal());
-        const bool is_inside = !inside.empty() && *inside.begin() != "..";
-        return {{"file", (is_inside ? inside : absolute).string()},
-                {"spp", made.image.samples},
-                {"seed", config_.reference_seed},
-                {"integrator", made.place.settings.integrator},
-                {"settings", made.place.settings_text},
-                {"noise", std::sqrt(noise / double(made.image.standard_error.rgb.size()))},
-                {"seconds", attributes.value("seconds", 0.0)},
-                {"backend", attributes.value("backend", "")},
-                {"git_revision", attributes.value("git_revision", "")}};
     }
 
     RenderTask make_task(size_t index, const RunEntry& run, uint64_t seed) const {
@@ -198,7 +184,16 @@ private:
         restore(task);
         task.settings = settings_for(config_, task.scene, run, seed, hooks_);
         const std::unique_ptr<Renderer> renderer = hooks_.make_renderer(task.scene.scene, settings_to_make(task));
-        if (!pass_checkpoints(task, *renderer)) return false;
+        const bool cuda = prepared_.backends.contains("cuda");
+        const LoadReading load = read_load();
+        const bool whole = pass_checkpoints(task, *renderer);
+        nlohmann::json machine = load_json(load, read_load());
+        machine["clocks"] = describe_clocks("after", cuda);
+        task.state.notes["machine"].push_back(machine);
+        if (!whole) {
+            if (task.state.moments.samples && !run.techniques) write_state(task.state_path, task.state);
+            return false;
+        }
         work_.end(task.work);
         finish(task);
         if (run.techniques) {
@@ -260,23 +255,23 @@ private:
         while (!task.pending.empty()) {
             const Budget budget = next_budget(task.pending, position);
             const RenderPosition before = position;
+            const LoadReading load = read_load();
             position = drive_showing(task, renderer, position, budget);
+            const LoadReading after = read_load();
             add_part(task.total, counted, renderer.stats());
             state.notes["seconds"] = position.seconds;
             // The film restarts at each checkpoint and with each batch, so that a resumed render adds the same numbers
             // in the same order as an uninterrupted one.
             if (position.samples > before.samples) {
                 const FilmMoments film = renderer.film();
-                if (!position.interrupted) record_batch(task, film, position.seconds - before.seconds);
+                if (!position.interrupted)
+                    record_batch(task, film, position.seconds - before.seconds, other_cores(load, after));
                 state.moments.add(film);
                 renderer.clear_film();
             }
             counted = renderer.stats();  // a renderer may or may not restart its counters with its film
             state.notes["stats"] = save_stats(task.total);
-            if (position.interrupted) {
-                if (state.moments.samples && !task.run.techniques) write_state(task.state_path, state);
-                return false;
-            }
+            if (position.interrupted) return false;
             record_checkpoints(task, position, budget);
         }
         return true;
@@ -293,13 +288,14 @@ private:
         return batch_end(config_, at, budget);
     }
 
-    void record_batch(RenderTask& task, const FilmMoments& film, double seconds) const {
+    void record_batch(RenderTask& task, const FilmMoments& film, double seconds, double others) const {
         nlohmann::json& lines = task.state.notes["batches"];
         BatchRow b = measure_batch(film, references_made_[task.scene_index].image, seconds);
         b.scene = task.scene.entry->name;
         b.run = task.run.name;
         b.seed = task.settings.seed;
         b.batch = lines.size();
+        b.other_cores = others;
         lines.push_back(batch_line(b));
     }
 
@@ -372,7 +368,8 @@ private:
         if (task.total.invalid.total())
             log_warning(fmt::format("{} {}: {} invalid values dropped", task.scene.entry->name, task.name,
                                     task.total.invalid.total()));
-        const nlohmann::json json = stats_json(task.scene.scene, task.settings, task.stated(), task.scene.load_seconds);
+        nlohmann::json json = stats_json(task.scene.scene, task.settings, task.stated(), task.scene.load_seconds);
+        json["machine"] = task.state.notes["machine"];
         write_file_atomic(folder_.file("stats", task.scene, task.name + ".json"),
                           json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
     }

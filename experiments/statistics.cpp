@@ -146,6 +146,10 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& asked, con
                              {"git_revision", git_revision()}};
     const RenderSettings settings = used_settings(asked, stats);
     attributes["method"] = method_text(settings);
+    attributes["settings"] = settings_json(settings).dump();
+    std::string kernels;
+    for (const std::string& f : stats.features) kernels += (kernels.empty() ? "" : " ") + f;
+    attributes["features"] = kernels;
     const Variant* const variant = find_variant(settings.integrator, settings.variant);
     const VariantTraits traits = variant ? variant->traits : VariantTraits{};
     const auto add = [&](const Setting& s) {

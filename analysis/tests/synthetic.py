@@ -97,7 +97,7 @@ def make(folder, scenes=("box", "glass"), runs=(("naive", 2.0, 1.0), ("nee", 0.7
         add_batches(folder, scenes, runs, seeds, checkpoints[-1] / batches, batches)
     manifest = {"name": "synthetic", "date": "2026-01-01T00:00:00Z", "versions": {"ambilux": "0.1.0", "git_revision": "0123456"},
                 "machine": {"cpu": "a processor <&>"}, "devices": [], "backends": ["cpu"], "seeds": list(seeds), "checkpoints": {"spp": list(checkpoints)},
-                "config": "experiments/synthetic.toml",
+                "config": "experiments/synthetic.toml", "commands": ["ambilux experiment experiments/synthetic.toml -o run"],
                 "scenes": [{"name": s, "size": [48, 36], "max_depth": 5, "hash": "f00d" * 16, "reference": {"file": f"references/{s}-abc.exr", "noise": reference_noise}} for s in scenes],
                 "runs": [{"name": r[0], "settings": {}} for r in runs]}
     (folder / "manifest.json").write_text(json.dumps(manifest))

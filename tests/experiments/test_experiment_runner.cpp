@@ -6,6 +6,7 @@
 #include "backends/cuda_device.h"
 #include "core/log.h"
 #include "experiments/batches.h"
+#include "experiments/load.h"
 #include "experiments/machine.h"
 #include "experiments/reference.h"
 #include "experiments/state.h"
@@ -200,6 +201,9 @@ TEST_CASE("an experiment leaves the files that docs/experiments.md lists") {
     const auto stats = nlohmann::json::parse(read_file(folder / "out/stats/a/good_2.json"));
     CHECK(stats["spp"] == 32);
     CHECK(stats["rays"]["extend"] == 32 * 16 * 12);
+    REQUIRE(stats["machine"].size() == 1);
+    CHECK(stats["machine"][0]["other_cores"].get<double>() >= 0);
+    CHECK(contains(manifest["commands"][0].get<std::string>(), "test_experiment_runner"));
     Attributes attributes;
     read_exr(folder / "out/images/a/good_2.exr", &attributes);
     CHECK(attributes["spp"] == 32);
@@ -391,12 +395,46 @@ TEST_CASE("a render is recorded in batches of whole passes, which end at checkpo
         std::istringstream in(line);
         std::vector<std::string> cells;
         for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
-        REQUIRE(cells.size() == 8);
+        REQUIRE(cells.size() == 9);
         samples += cells[1] == "good" ? std::stoull(cells[4]) : 0;
         variance += cells[1] == "good" ? std::stod(cells[6]) * std::stod(cells[4]) / (4 * 17) : 0;
     }
     CHECK(samples == 2 * 2 * 32);
     CHECK(variance == Approx(14.0 / 3).epsilon(0.15));
+}
+
+TEST_CASE("runs and scenes come in an order that the seed decides, all of them once") {
+    const auto listed = render_order(2, 3, 7, false);
+    CHECK(listed == std::vector<std::pair<size_t, size_t>>{{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1}, {1, 2}});
+    auto random = render_order(2, 30, 7, true);
+    CHECK(random == render_order(2, 30, 7, true));
+    CHECK(random != render_order(2, 30, 8, true));
+    std::sort(random.begin(), random.end());
+    CHECK(random == render_order(2, 30, 7, false));
+}
+
+TEST_CASE("what others take of the machine is told from what this process takes") {
+    LoadReading reading;
+    parse_cpu_line("cpu  100 20 30 4000 50 6 7 80 9 0", 100, reading);
+    CHECK(reading.busy == Approx(1.63));
+    CHECK(reading.steal == Approx(0.8));
+    LoadReading before, after;
+    after.wall = 2;
+    after.busy = 5;
+    after.own = 3;
+    after.steal = 1;
+    CHECK(other_cores(before, after) == Approx(1.5));
+    after.own = 9;  // clocks of different grain
+    CHECK(other_cores(before, after) == 0.0);
+    CHECK(load_json(before, after)["own_cores"] == 4.5);
+    const LoadReading now = read_load();
+    CHECK(now.wall > 0);
+    CHECK(now.own > 0);
+    CHECK(now.busy >= 0);
+    CHECK(contains(command_line(), "test_experiment_runner"));
+    const nlohmann::json versions = describe_versions();
+    for (const char* key : {"ambilux", "git_revision", "compiler", "flags", "embree", "tbb"})
+        CHECK_FALSE(versions[key].get<std::string>().empty());
 }
 
 TEST_CASE("a damaged state costs the render, not the experiment") {
