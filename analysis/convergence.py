@@ -87,15 +87,22 @@ def draw(experiment, x="seconds", measure="rmse", scenes=None, width="page"):
             return figure
         names = {run: style.fit(run, style.PAGE / len(groups) - 0.6, 7) for run in experiment.runs}
         lines = max(sum(names[run].count("\n") + 1 for run in group) for group in groups)
-        figure, grid = plt.subplots(len(scenes), len(groups), figsize=(style.PAGE, 2.1 * len(scenes) + 0.15 * (lines + 2) + 0.45), squeeze=False, layout="constrained",
-                                    sharey="row", sharex="row")
-        for row, scene in zip(grid, scenes):
-            for one, group in zip(row, groups):
-                draw_panel(one, experiment, scene, x, measure, group)
-            label_axis(row[0], experiment, measure)
-        for column, group in enumerate(groups):
-            handles, labels = entries_of(grid[:, column], group)
-            grid[-1][column].legend(handles, [names.get(label, label) for label in labels], loc="upper center", bbox_to_anchor=(0.5, -0.24), frameon=False, fontsize=7)
+        room = 0.125 * lines + 0.05 * max(map(len, groups)) + 0.35  # inches of the legends, which stand in a row of their own
+        figure = plt.figure(figsize=(style.PAGE, 2.1 * len(scenes) + room), layout="constrained")
+        rows = figure.add_gridspec(len(scenes) + 1, len(groups), height_ratios=[2.1] * len(scenes) + [room])
+        grid = []
+        for i, scene in enumerate(scenes):
+            grid.append([])
+            for k, group in enumerate(groups):
+                first = grid[i][0] if k else None
+                grid[i].append(figure.add_subplot(rows[i, k], sharex=first, sharey=first))
+                draw_panel(grid[i][k], experiment, scene, x, measure, group)
+            label_axis(grid[i][0], experiment, measure)
+        for k, group in enumerate(groups):
+            handles, labels = entries_of([row[k] for row in grid], group)
+            below = figure.add_subplot(rows[-1, k])
+            below.set_axis_off()
+            below.legend(handles, [names.get(label, label) for label in labels], loc="upper center", frameon=False, fontsize=7, borderaxespad=0)
     return figure
 
 

@@ -83,6 +83,7 @@ class Batch:
     time: float
     mse: float
     relmse: float
+    other_cores: float = math.nan  # that other processes held meanwhile
 
 
 def columns(kind, optional):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from analysis import ablation, captions, comparison, convergence, error_maps, flip_maps, overview, pyramid, stage_times, style
+from analysis import ablation, captions, comparison, convergence, error_maps, flip_maps, occupancy, overview, pyramid, stage_times, style
 from analysis.experiment import InputError
 
 
@@ -25,6 +25,7 @@ def plan(experiment, insets):
     for scene in experiment.scenes:
         yield f"comparison_{scene}", lambda scene=scene: comparison.make(experiment, scene, insets.get(scene))
         yield f"errors_{scene}", lambda scene=scene: error_maps.make(experiment, scene)
+        yield f"occupancy_{scene}", lambda scene=scene: occupancy.make(experiment, scene)
         yield f"flip_{scene}", lambda scene=scene: flip_maps.make(experiment, scene)
     recorded = [(s, r) for s in experiment.scenes for r in experiment.runs if experiment.techniques(s, r)]
     if not recorded:

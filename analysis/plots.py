@@ -13,13 +13,14 @@ from analysis import comparison as _comparison
 from analysis import convergence as _convergence
 from analysis import error_maps as _error_maps
 from analysis import flip_maps as _flip_maps
+from analysis import occupancy as _occupancy
 from analysis import overview as _overview
 from analysis import pyramid as _pyramid
 from analysis import stage_times as _stage_times
 from analysis.experiment import load
 from analysis.style import NotMade, save
 
-__all__ = ["NotMade", "ablation", "comparison", "convergence", "errors", "flip", "load", "overview", "save", "stage_times", "strategies", "strategy_variance", "sweep"]
+__all__ = ["NotMade", "ablation", "comparison", "convergence", "errors", "flip", "load", "occupancy", "overview", "save", "stage_times", "strategies", "strategy_variance", "sweep"]
 
 
 def _first(pictures):
@@ -48,6 +49,11 @@ def sweep(data, name, key, width="column"):
 def stage_times(data, width="page"):
     """Time of each stage per pixel and sample."""
     return _stage_times.draw(data, _stage_times.table(data), _stage_times.UNITS, width)
+
+
+def occupancy(data, scene):
+    """What is alive at each depth, and how full queues are."""
+    return _occupancy.draw(data, scene)
 
 
 def comparison(data, scene, insets=None):

@@ -26,6 +26,11 @@ def per_sample(stats, path=""):
         raise experiments.InputError(f"{path}: lacks or misuses {e}: stage times need size, spp and stages [{{name, seconds}}]") from None
 
 
+def fused(experiment, scenes, runs):
+    """Names of stages that had items and no time of their own: they ran inside others."""
+    return sorted({s["name"] for scene in scenes for run in runs for stats in experiment.stats(scene, run) for s in stats["stages"] if s.get("items") and not s["seconds"] > 0})
+
+
 def mean_over_seeds(experiment, scene, run):
     """{stage: mean of per_sample over seeds}, in the order of the first file; {} without stages."""
     renders = [t for _, path in experiment.files("stats", scene, run, ".json") if (t := per_sample(experiments.read_json(path), path))]
@@ -90,8 +95,10 @@ def table(experiment):
 def make(experiment):
     """Yields the figure."""
     found = table(experiment)
+    inside = fused(experiment, experiment.scenes, experiment.runs)
+    hidden = f" No clock of their own have {', '.join(inside)}: they run inside the stages before them, whose bars hold their time." if inside else ""
     yield style.Picture(
         "stage_times", draw(experiment, found, UNITS), "Time of the stages",
         "Mean over seeds of each stage's time per pixel and sample, as the renderer measured it. On the CPU backend it is summed over worker threads, so that a bar "
-        f"divided by their number is near the wall clock's. Stages below {100 * SMALL:g} % of every bar are drawn as one.",
+        f"divided by their number is near the wall clock's. Stages below {100 * SMALL:g} % of every bar are drawn as one.{hidden}",
         list(dict.fromkeys(run for _, run in found)), list(dict.fromkeys(scene for scene, _ in found)))

@@ -1,11 +1,12 @@
 """Figures with few and many methods, long names, one and many scenes: nothing overlaps, one scale for all, the same colours in every figure."""
 
 import itertools
+import json
 
 import numpy as np
 import pytest
 
-from analysis import ablation, comparison, convergence, error_maps, experiment, flip_maps, overview, plots, stage_times, style
+from analysis import ablation, comparison, convergence, error_maps, experiment, flip_maps, occupancy, overview, plots, stage_times, style
 from analysis.tests import synthetic
 
 NAMES = ("path", "bdpt", "lvc[connections=1]", "lvc[connections=3]", "lvc[connections=8]", "bdpt.auto", "bdpt[strategies=hits+next_event+connections]", "streaming", "megakernel",
@@ -63,12 +64,13 @@ def test_six_runs_stand_in_one_figure_at_one_scale(six):
 
 def test_fourteen_runs_are_told_apart(many):
     figure = convergence.draw(many, "seconds", "relmse")
-    assert len(figure.axes) == 2
-    for axes in figure.axes:
+    panels = [axes for axes in figure.axes if axes.lines]
+    assert len(panels) == 2
+    for axes in panels:
         told = [(line.get_color(), line.get_marker()) for line in axes.lines if not line.get_label().startswith(("_", "slope"))]
         assert len(told) == 7 == len(set(told))
         assert sum(line.get_color() == "0.8" for line in axes.lines) == 7  # the others, as background
-    assert figure.axes[0].get_ylim() == figure.axes[1].get_ylim()
+    assert panels[0].get_ylim() == panels[1].get_ylim()
 
 
 def test_many_scenes_take_several_figures(tmp_path):
@@ -122,3 +124,28 @@ def test_wrapping_leaves_no_part_longer_than_a_line():
         assert max(map(len, style.wrap(name, 12).split("\n"))) <= 12
         assert style.wrap(name, 12).replace("\n", "") == name
     assert np.allclose([len(style.fit("lvc[connections=1]", 0.5).split("\n"))], [4])
+
+
+def test_occupancy_by_depth_and_queue(six):
+    scene = six.scenes[0]
+    with pytest.raises(style.NotMade, match="no items_by_depth"):
+        occupancy.draw(six, scene)
+    stats = {"stages": [{"name": "generate", "items": 10, "items_by_depth": [10]}, {"name": "extend", "items": 15, "items_by_depth": [0, 10, 5]}],
+             "queues": [{"name": "rays", "capacity": 8, "peak": 6}]}
+    assert list(occupancy.alive(stats)["extend"]) == [0, 1, 0.5] and occupancy.peaks(stats) == {"rays": 0.75}
+    assert list(occupancy.mean_of([{"a": np.array([1.0, 1.0])}, {"a": np.array([1.0])}])["a"]) == [1, 0.5]
+    for path in (six.folder / "stats" / scene).iterdir():
+        path.write_text(json.dumps(json.loads(path.read_text()) | stats))
+    figure = occupancy.draw(six, scene)
+    figure.draw_without_rendering()
+    assert len([a for a in figure.axes if a.lines]) == 6 and not overlap(texts_of(figure, headings))
+
+
+def test_stages_without_a_clock_are_named(tmp_path):
+    data = load(tmp_path / "r", 2)
+    path = data.folder / "stats" / "box" / "path_1.json"
+    stats = json.loads(path.read_text())
+    stats["stages"].append({"name": "occlude", "items": 7, "launches": 1, "seconds": 0.0})
+    path.write_text(json.dumps(stats))
+    (picture,) = stage_times.make(data)
+    assert "No clock of their own have occlude" in picture.caption
