@@ -35,6 +35,13 @@ def of_seeds(rows, metric):
     return Work(np.array(good).reshape(-1, 2), "seeds", heavy_tails.doubt_of_seeds([e for e, _ in good], few_pixels(rows)))
 
 
+def batches_of(experiment, scene, run):
+    """{seed: batches}, without those that are short of half the usual number of samples, such as before an early checkpoint: their tails are heavier."""
+    every = experiment.batches_of(scene, run)
+    usual = np.median([b.spp for of_seed in every.values() for b in of_seed]) if every else 0
+    return {seed: kept for seed, of_seed in every.items() if (kept := [b for b in of_seed if b.spp >= usual / 2])}
+
+
 def variances(batches, metric):
     """For each seed its batches' error * samples: estimates of one sample's error, whatever the batch's size."""
     return [[getattr(b, metric) * b.spp for b in of_seed] for of_seed in batches.values()]
@@ -48,7 +55,7 @@ def wholes(experiment, scene, run, batches, metric):
 
 def of_batches(experiment, scene, run, metric):
     """Work of a run's batches: (error of one sample, seconds of one sample) of each; None without batches."""
-    batches = experiment.batches_of(scene, run)
+    batches = batches_of(experiment, scene, run)
     if not batches:
         return None
     values = variances(batches, metric)
@@ -59,7 +66,7 @@ def of_batches(experiment, scene, run, metric):
 
 def averaging(experiment, scene, run, metric):
     """heavy_tails.averaging of a run's batches; NaN without."""
-    batches = experiment.batches_of(scene, run)
+    batches = batches_of(experiment, scene, run)
     return heavy_tails.averaging(variances(batches, metric), wholes(experiment, scene, run, batches, metric)) if batches else math.nan
 
 

@@ -26,9 +26,9 @@ struct Budget {
 
 /// Adds samples to `position` until the budget is used up or *interrupt becomes true. Clocks and signals are looked at
 /// after batches of about 0.2 s. A time budget is met to within half a sample of every pixel: the last batches are
-/// sized by the measured time of a sample (pitfall G14), which a position brings along from an earlier call. At least
-/// one sample is made. `on_batch` sees the position after each batch. Throws Error(device) if the renderer makes no
-/// progress, Error(usage) past 2^32 - 1 samples.
+/// sized by the measured time of a sample (pitfall G14), which a position brings along from an earlier call; with
+/// it, a call that has no time for half a sample makes none, and else at least one. `on_batch` sees the position after
+/// each batch. Throws Error(device) if the renderer makes no progress, Error(usage) past 2^32 - 1 samples.
 RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& budget,
                      const volatile bool* interrupt = nullptr,
                      const std::function<void(const RenderPosition&)>& on_batch = {});

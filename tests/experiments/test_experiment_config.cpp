@@ -48,7 +48,7 @@ TEST_CASE("a sweep is one line and gives the product of its values, in the order
     CHECK(run.swept == Settings{{"rr_depth", "2"}, {"connections", "4"}});
     CHECK(run.settings ==
           Settings{{"integrator", "path"}, {"estimator", "mis"}, {"rr_depth", "2"}, {"connections", "4"}});
-    CHECK(run.lines.back() == 21);
+    CHECK(run.lines.back() == 22);
 
     SECTION("what is written to the results is a configuration that gives the same") {
         const std::string resolved = resolved_toml(config);

@@ -143,10 +143,10 @@ TEST_CASE("statistics name every setting as used and as asked for, images those 
     RenderSettings lvc;
     lvc.integrator = "bdpt";
     lvc.variant = "lvc";
-    apply_setting(lvc, "draws", "16");
+    apply_setting(lvc, "connections", "16");
     apply_setting(lvc, "light_paths", "0.25");
     CHECK(method_text(lvc).starts_with("bdpt lvc "));
-    CHECK(method_text(lvc).find(" draws=16") != std::string::npos);
+    CHECK(method_text(lvc).find(" connections=16") != std::string::npos);
     CHECK(method_text(lvc).find(" light_paths=0.25") != std::string::npos);
     RenderSettings path;
     path.integrator = "path";
