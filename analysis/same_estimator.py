@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from analysis import heavy_tails, statistics
 
 EQUAL = 1e-4  # relative difference of recorded errors that rounding may make: another order of sums, another backend
@@ -33,7 +31,5 @@ def time_ratio(experiment, scene, run, base):
     seeds = sorted(own.keys() & other.keys())
     if len(seeds) < 2:
         return heavy_tails.unknown(math.nan if not seeds else other[seeds[0]] / own[seeds[0]], OVER, len(seeds), f"{len(seeds)} seed{'s' if len(seeds) != 1 else ''}")
-    logs = np.log([other[s] / own[s] for s in seeds])
-    e = statistics.mean_estimate(logs)
-    p = statistics.two_sided_p(e.value, e.error, 0.0, len(seeds))
-    return heavy_tails.Judged(math.exp(e.value), math.exp(e.low), math.exp(e.high), p, OVER, len(seeds))
+    e = statistics.ratio_of_pairs([other[s] for s in seeds], [own[s] for s in seeds])
+    return heavy_tails.Judged(e.value, e.low, e.high, statistics.two_sided_p(math.log(e.value), e.error, 0.0, len(seeds)), OVER, len(seeds))

@@ -79,11 +79,6 @@ class Line:
         return self.ratio_time if self.ratio_time is not None else efficiency.lead(self.ratio_batches, self.ratio_seeds)
 
 
-def positive(values):
-    values = np.asarray(values, dtype=float)
-    return values[np.isfinite(values) & (values > 0)]
-
-
 def mean_or_nan(values):
     """Arithmetic mean of the finite values; NaN without one."""
     good = [v for v in values if math.isfinite(v)]

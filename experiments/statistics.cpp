@@ -76,7 +76,8 @@ std::string method_text(const RenderSettings& used) {
             (always || s.text(used) != s.text(plain)))
             text += " " + s.what.key + "=" + s.text(used);
     };
-    for (const Setting& s : general_settings()) add(s, s.place == InExperiment::run_key);
+    // How many connections a vertex makes is part of a method's name in the literature, its default included.
+    for (const Setting& s : general_settings()) add(s, s.place == InExperiment::run_key || s.what.key == "connections");
     if (variant)
         for (const Setting& s : variant->own) add(s, true);
     return text;

@@ -148,6 +148,10 @@ TEST_CASE("statistics name every setting as used and as asked for, images those 
     CHECK(method_text(lvc).starts_with("bdpt lvc "));
     CHECK(method_text(lvc).find(" connections=16") != std::string::npos);
     CHECK(method_text(lvc).find(" light_paths=0.25") != std::string::npos);
+    RenderSettings plain;
+    plain.integrator = "bdpt";
+    plain.variant = "lvc";
+    CHECK(method_text(plain) == "bdpt lvc connections=3");
     RenderSettings path;
     path.integrator = "path";
     path.variant = "wavefront";
