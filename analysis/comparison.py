@@ -75,7 +75,8 @@ def draw(experiment, scene, reference, shown, insets):
     gap, big_width, map_height, numbers = 0.03, rows * unit * width / height, unit * height / width, 0.46
     maps = [images.relative_error(image, reference) for _, _, image in shown]
     highest = images.highest_of(maps)
-    headings = [style.fit(run, unit, 7.5) for run, _, _ in shown]
+    points = 7.5 if unit > 0.9 else 6.5
+    headings = [style.fit(run, unit, points) for run, _, _ in shown]
     title = 0.08 + 0.12 * (max(h.count("\n") for h in headings) + 1)
     block = title + rows * unit + 0.02 + map_height + numbers
     head = 0.22 + rows * unit + 0.1 if below else 0.0
@@ -92,7 +93,7 @@ def draw(experiment, scene, reference, shown, insets):
                 axes.imshow(images.tone_map(image[iy:iy + size, ix:ix + size], factor), interpolation="nearest")
                 bare(axes, colour)
                 if row == 0:
-                    axes.set_title(heading, pad=3, fontsize=7.5)
+                    axes.set_title(heading, pad=3, fontsize=points)
 
         top = 0.22 if below else title
         big = place(0, top, big_width, rows * unit)
