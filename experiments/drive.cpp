@@ -34,7 +34,9 @@ RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& 
             const double left = budget.seconds - position.seconds;
             if (left <= 0 && position.samples > 0) break;
             if (per_sample > 0) {
-                if (left < 0.5 * per_sample) break;
+                // One call of a few samples that the system delayed is no measure.
+                const double mean = position.samples ? position.seconds / double(position.samples) : per_sample;
+                if (left < 0.5 * std::min(per_sample, mean)) break;
                 count = std::min(count, std::max<uint64_t>(1, uint64_t(left / per_sample)));
             }
         }
