@@ -71,7 +71,7 @@ SweepFolder::~SweepFolder() {
 
 void SweepFolder::read() {
     std::string text = row_header() + "\n";
-    for (const std::string& line : read_rows(csv_, row_header()))
+    for (const std::string& line : read_results(csv_, row_header().c_str()))
         if (const std::optional<Row> row = parse_row(line)) {
             rows_[key_of(row->cell, row->method, row->backend)] = *row;
             text += line + "\n";

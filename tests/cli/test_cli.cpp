@@ -387,6 +387,18 @@ TEST_CASE("a reference is continued, extended, compared with") {
     const Reference r = read_reference_exr(folder / "r.exr");
     CHECK(r.samples == 48);
     CHECK(r.standard_error.rgb.size() == 24 * 16 * 3);
+    // By another integrator too, whose settings are part of its identity.
+    const auto by_bdpt = [&](const std::string& variant) {
+        return run(folder, {"reference", kCornell, "--size", "24x16", "--spp", "4", "-i", "bdpt", "--variant", variant,
+                            "-o", folder / "b.exr"});
+    };
+    CHECK(by_bdpt("lvc").code == 0);
+    Attributes made;
+    read_reference_exr(folder / "b.exr", &made);
+    CHECK(made["integrator"] == "bdpt");
+    CHECK(contains(made["reference_settings"].get<std::string>(), "variant=lvc"));
+    CHECK(contains(by_bdpt("wavefront").err, "reference_settings"));
+    CHECK(run(folder, {"reference", kCornell, "--spp", "4", "-i", "light", "-o", folder / "l.exr"}).code == 2);
     const Outcome other = reference("64", "16x16");
     CHECK(other.code == 3);
     CHECK(contains(other.err, "its size is 24x16, asked for is 16x16"));

@@ -72,7 +72,7 @@ Request stress_request(const TempFolder& folder, const std::string& output, bool
 /// Lines of stress.csv without the seconds.
 std::vector<std::string> lines_of(const std::string& folder) {
     std::vector<std::string> lines;
-    for (const std::string& line : read_rows(folder + "/stress.csv", row_header())) {
+    for (const std::string& line : read_results(folder + "/stress.csv", row_header().c_str())) {
         Row row = *parse_row(line);
         row.seconds = 0;
         lines.push_back(row_line(row));
