@@ -2,9 +2,10 @@
 
 import html
 
-from analysis.report import figure, minus, page_file
+from analysis.report import figure, page_file
 from analysis.stress import VERDICTS, backend_differences, disagreeing, limits, measured
 from analysis.stress_maps import STATES
+from analysis.tables import minus
 
 CSS = """
 table.map { border: 0; font-size: .72em; margin-bottom: 1em; } table.map td, table.map th { padding: 0 .3em; text-align: center; border: 1px solid #e4e4e4; }
