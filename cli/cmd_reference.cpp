@@ -100,9 +100,9 @@ int reference(const Options& o) {
 
 void add_reference(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    CLI::App& command = *app.add_subcommand(
-        "reference",
-        "Ground truth with its standard error, by the path tracer or with -i bdpt; continues an existing file");
+    CLI::App& command = *app.add_subcommand("reference",
+                                            "Ground truth with its standard error, by the path tracer or with --set "
+                                            "integrator=bdpt; continues an existing file");
     o->scene.add_to(command);
     o->render.add_to(command, true);
     command.add_option("-o,--output", o->output, "Reference to write or to continue (EXR)")->required();

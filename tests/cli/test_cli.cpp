@@ -389,8 +389,8 @@ TEST_CASE("a reference is continued, extended, compared with") {
     CHECK(r.standard_error.rgb.size() == 24 * 16 * 3);
     // By another integrator too, whose settings are part of its identity.
     const auto by_bdpt = [&](const std::string& variant) {
-        return run(folder, {"reference", kCornell, "--size", "24x16", "--spp", "4", "-i", "bdpt", "--variant", variant,
-                            "-o", folder / "b.exr"});
+        return run(folder, {"reference", kCornell, "--size", "24x16", "--spp", "4", "--set", "integrator=bdpt", "--set",
+                            "variant=" + variant, "-o", folder / "b.exr"});
     };
     CHECK(by_bdpt("lvc").code == 0);
     Attributes made;
@@ -398,7 +398,9 @@ TEST_CASE("a reference is continued, extended, compared with") {
     CHECK(made["integrator"] == "bdpt");
     CHECK(contains(made["reference_settings"].get<std::string>(), "variant=lvc"));
     CHECK(contains(by_bdpt("wavefront").err, "reference_settings"));
-    CHECK(run(folder, {"reference", kCornell, "--spp", "4", "-i", "light", "-o", folder / "l.exr"}).code == 2);
+    CHECK(
+        run(folder, {"reference", kCornell, "--spp", "4", "--set", "integrator=light", "-o", folder / "l.exr"}).code ==
+        2);
     const Outcome other = reference("64", "16x16");
     CHECK(other.code == 3);
     CHECK(contains(other.err, "its size is 24x16, asked for is 16x16"));
