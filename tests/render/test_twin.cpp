@@ -236,27 +236,24 @@ TEST_CASE("The twin repeats its image bit by bit, in parts too", "[twin]") {
 
 TEST_CASE("What the twin does without is refused by name", "[twin]") {
     const Scene scene = project_scene("cornell", 8, 8);
-    const auto refused = [&](const std::string& integrator, const std::string& key, const std::string& value) {
+    const auto refused = [&](const std::string& integrator, const std::string& key, const std::string& value,
+                             const std::string& named) {
         RenderSettings s = twin_settings(scene, integrator);
         apply_setting(s, key, value);
         try {
             make_renderer(scene, s);
         } catch (const Error& e) {
-            return e.code == ExitCode::usage && std::string(e.what()).find(key + "=") != std::string::npos;
+            return e.code == ExitCode::usage && std::string(e.what()).find(named + "=") != std::string::npos;
         }
         return false;
     };
-    CHECK(refused("path", "cull", "0.5"));
-    CHECK(refused("bdpt", "technique_depth", "3"));
-    CHECK(refused("bdpt", "light_paths", "0.5"));
-    CHECK(refused("bdpt", "bdpt.auto", "true"));
-    RenderSettings lvc = twin_settings(scene, "bdpt");
-    lvc.variant = "lvc";
-    std::string message;
-    try {
-        make_renderer(scene, lvc);
-    } catch (const Error& e) {
-        message = e.what();
-    }
-    CHECK(message.find("precision=double") != std::string::npos);
+    CHECK(refused("path", "cull", "0.5", "cull"));
+    CHECK(refused("bdpt", "technique_depth", "3", "technique_depth"));
+    CHECK(refused("bdpt", "light_paths", "0.5", "light_paths"));
+    CHECK(refused("bdpt", "bdpt.auto", "true", "bdpt.auto"));
+    for (const char* variant : {"lvc", "streaming", "megakernel"})
+        CHECK(refused("bdpt", "variant", variant, "precision"));
+    CHECK(refused("path", "variant", "ris", "precision"));
+    CHECK(refused("path", "backend", "cuda", "precision"));
+    CHECK(refused("toy", "seed", "1", "precision"));
 }
