@@ -18,7 +18,7 @@ import time
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
-HEADER = ["cell", "method", "backend", "boxes_x", "boxes_y", "samples", "pixels", "seconds", "invalid", "note", "boxes"]
+HEADER = ["cell", "method", "backend", "boxes_x", "boxes_y", "samples", "pixels", "seconds", "invalid", "state", "note", "boxes"]
 METHODS = ("path", "ptracer")
 BATCHES, BOXES = 32, 4  # as in experiments/stress/measure.h
 RESULT = "result: "  # after whatever Mitsuba prints
@@ -60,12 +60,12 @@ def render(path, method, variant, paths):
         means, bad = box_means(image, boxes_x, boxes_y)
         values += means
         invalid += bad
-    return [boxes_x, boxes_y, spp * BATCHES, width * height, f"{time.monotonic() - start:.3f}", invalid, "", " ".join(f"{v:.9g}" for v in values)]
+    return [boxes_x, boxes_y, spp * BATCHES, width * height, f"{time.monotonic() - start:.3f}", invalid, "", "", " ".join(f"{v:.9g}" for v in values)]
 
 
-def refusal(note):
+def nothing(state, note):
     clean = " ".join(note.replace(",", ";").replace('"', "'").split())
-    return [1, 1, 0, 1, 0, 0, clean[:300] or "no message", ""]
+    return [1, 1, 0, 1, 0, 0, state, clean[:300] or "no message", ""]
 
 
 def in_own_process(options, path, method):
@@ -73,10 +73,10 @@ def in_own_process(options, path, method):
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=options.limit, check=False)
     except subprocess.TimeoutExpired:
-        return refusal(f"not finished in {options.limit} s")
+        return nothing("left out", f"not finished in {options.limit:g} s")
     if done.returncode != 0:
         lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
-        return refusal(f"exit status {done.returncode}: {lines[-1] if lines else ''}")
+        return nothing("refused", f"exit status {done.returncode}: {lines[-1] if lines else ''}")
     return done.stdout.rpartition(RESULT)[2].strip().split(",")
 
 
@@ -104,7 +104,7 @@ def main():
     for i, (cell, method) in enumerate(jobs):
         print(f"{i + 1} of {len(jobs)}: {cell['cell']} {method}", file=sys.stderr)
         why = cell["not_mitsuba"]
-        line = refusal("not rendered: " + why) if why else in_own_process(options, options.scenes / f"{cell['cell']}.xml", method)
+        line = nothing("left out", why) if why else in_own_process(options, options.scenes / f"{cell['cell']}.xml", method)
         with open(options.output, "a", encoding="utf-8") as file:
             file.write(",".join([cell["cell"], method, "mitsuba", *map(str, line)]) + "\n")
             file.flush()

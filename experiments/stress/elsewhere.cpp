@@ -8,12 +8,27 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "experiments/stress/methods.h"
 
 namespace ambilux::stress {
 namespace {
 
-constexpr const char* kHeader = "cell,method,backend,boxes_x,boxes_y,samples,pixels,seconds,invalid,note,boxes";
-enum Place { cell, method, backend, boxes_x, boxes_y, samples, pixels, seconds, invalid, note, boxes, place_count };
+constexpr const char* kHeader = "cell,method,backend,boxes_x,boxes_y,samples,pixels,seconds,invalid,state,note,boxes";
+enum Place {
+    cell,
+    method,
+    backend,
+    boxes_x,
+    boxes_y,
+    samples,
+    pixels,
+    seconds,
+    invalid,
+    state,
+    note,
+    boxes,
+    place_count
+};
 
 class Table {
 public:
@@ -57,16 +72,25 @@ private:
         if (parts.size() != place_count)
             throw error(line, fmt::format("{} columns where there are {}", parts.size(), int(place_count)));
         const auto [family, known] = find(parts[cell], line);
-        // Our limits are not theirs.
-        Cell unlimited = *known;
-        unlimited.limit.clear();
-        const Cell* const c = &unlimited;
+        // Our limits are not theirs; what our light tracer finds rarely theirs does, under another name.
+        Cell theirs = *known;
+        theirs.limit.clear();
+        if (has_prefix_of(theirs.rare, "light")) theirs.rare += " ptracer";
+        const Cell* const c = &theirs;
         const Row* benign = nullptr;
         for (const Row& row : before)
-            if (row.cell == family->cells.front().name() && row.method == parts[method] && !c->benign) benign = &row;
+            if (row.cell == family->cells.front().name() && row.method == parts[method] && row.samples > 0)
+                benign = &row;
+        if (c->benign) benign = nullptr;
         Row row = blank_row(*c, parts[method], parts[backend], benign);
         if (parts[boxes].empty()) {
-            refuse_row(row, *c, parts[note]);
+            if (parts[state] != "refused" && parts[state] != "left out")
+                throw error(
+                    line, fmt::format("no means, and the state '{}' instead of 'refused' or 'left out'", parts[state]));
+            if (parts[state] == "refused")
+                refuse_row(row, *c, parts[note]);
+            else
+                leave_out(row, parts[note]);
             return row;
         }
         Measurement m;

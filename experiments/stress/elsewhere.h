@@ -8,9 +8,9 @@
 
 namespace ambilux::stress {
 
-/// Rows of a table with the columns cell, method, backend, boxes_x, boxes_y, samples, pixels, seconds, invalid, note
-/// and boxes: means over pixels and channels of every batch and box, batch * boxes + box, separated by blanks. A line
-/// with a note and without boxes is a refusal. Throws Error(bad_input) with file and line.
+/// Rows of a table with the columns cell, method, backend, boxes_x, boxes_y, samples, pixels, seconds, invalid, state,
+/// note and boxes: means over pixels and channels of every batch and box, batch * boxes + box, separated by blanks. A
+/// line without boxes has the state "refused" or "left out". Throws Error(bad_input) with file and line.
 std::vector<Row> judge_elsewhere(const std::string& path, const std::vector<Family>& all);
 
 }  // namespace ambilux::stress

@@ -63,6 +63,7 @@ Family ior() {
                   }};
         cell.benign = excess == 0.5;
         cell.quick = excess == 0.5 || excess == 1e-6;
+        cell.rare = "light";
         family.cells.push_back(cell);
     }
     return family;
@@ -84,6 +85,7 @@ Family panes(const std::string& name, const std::string& parameter, double degre
                   }};
         cell.benign = k == -1;
         cell.quick = k == -1 || k == -3 || k == -6;
+        cell.rare = "light";
         if (thickness < 4e-5) cell.limit = "Contact shadows and thin panes";
         family.cells.push_back(cell);
     }

@@ -96,6 +96,11 @@ Row blank_row(const Cell& cell, const std::string& method, const std::string& ba
     return row;
 }
 
+void leave_out(Row& row, const std::string& why) {
+    row.note = why;
+    row.verdict = Verdict::left_out;
+}
+
 void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benign, double rows) {
     row.mean = mean_of(m.batches);
     row.first = m.first;
@@ -107,8 +112,13 @@ void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benig
     row.underflow = m.underflow;
     row.variance = relative_variance(row.mean, m.paths);
     if (benign && benign->variance > 0) row.variance_ratio = row.variance / benign->variance;
-    // The benign cell of an invariance is its own answer: it is the others that are judged.
-    if (cell.answer.kind == AnswerKind::invariance && cell.benign) row.answer = row.mean;
+    if (cell.answer.kind == AnswerKind::invariance && !benign) {
+        // The benign cell of an invariance is its own answer: it is the others that are judged.
+        if (cell.benign)
+            row.answer = row.mean;
+        else
+            return leave_out(row, "the benign cell, which is the answer, has no mean");
+    }
     row.comparison = compare(m.batches, row.answer, cell.answer.uniform, cell.answer.rounding);
     row.verdict = judge({row.comparison, row.mean.value, has_prefix_of(cell.rare, row.method), !cell.limit.empty(),
                          row.invalid + row.lost},

@@ -29,6 +29,8 @@ struct Row {
 Row blank_row(const Cell& cell, const std::string& method, const std::string& backend, const Row* benign);
 /// What was measured, judged. `rows`: of the whole sweep, for the correction.
 void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benign, double rows);
+/// Not rendered, or nothing to compare with.
+void leave_out(Row& row, const std::string& why);
 /// The program said that it cannot render this.
 void refuse_row(Row& row, const Cell& cell, const std::string& why);
 

@@ -123,14 +123,14 @@ private:
 
     Row run_method(const Family& family, const Cell& cell, const Method& method, const Scene* scene,
                    const std::string& refusal) {
-        const Row* const benign = cell.benign ? nullptr : find(family.cells.front(), method);
+        const Row* benign = cell.benign ? nullptr : find(family.cells.front(), method);
+        if (benign && benign->samples == 0) benign = nullptr;
         Row row = blank_row(cell, method.name, backend_, benign);
         try {
             if (!scene) throw Error(ExitCode::bad_input, refusal);
             const RenderSettings settings = settings_of(hooks_, method, cell, *scene, backend_, request_.seed);
-            row.note = reason_to_leave_out(cell, *scene, settings);
-            if (!row.note.empty()) {
-                row.verdict = Verdict::left_out;
+            if (const std::string why = reason_to_leave_out(cell, *scene, settings); !why.empty()) {
+                leave_out(row, why);
                 return row;
             }
             const Measurement m = measure(hooks_, *scene, settings, effort_of(cell), request_.interrupt);

@@ -250,6 +250,12 @@ TEST_CASE("an invariance is judged by the benign cell") {
     CHECK(summary.rows[1].verdict == Verdict::ok);
     CHECK(summary.rows[2].verdict == Verdict::failed);
     CHECK(summary.rows[1].answer.error > 0);
+    // Without the benign cell's mean there is nothing to compare with.
+    Row alone = blank_row(family.cells[1], "bdpt", "cpu", nullptr);
+    Measurement m;
+    m.batches = batches(1, 0.01);
+    fill_row(alone, family.cells[1], m, nullptr, 1);
+    CHECK(alone.verdict == Verdict::left_out);
     CHECK(summary.rows[2].answer.value == Approx(6).epsilon(0.05));
 }
 
@@ -338,16 +344,16 @@ TEST_CASE("more samples than a renderer counts are refused") {
 
 TEST_CASE("what other renderers measured is judged alike") {
     TempFolder folder;
-    const std::string header = "cell,method,backend,boxes_x,boxes_y,samples,pixels,seconds,invalid,note,boxes\n";
+    const std::string header = "cell,method,backend,boxes_x,boxes_y,samples,pixels,seconds,invalid,state,note,boxes\n";
     std::string good, bad;
     for (const double v : batches(2, 0.01).boxes) {
         good += fmt::format("{} ", v);
         bad += fmt::format("{} ", v * 1.1);
     }
     const std::vector<Family> families = {fake_family("a", 2)};
-    const std::string path = folder.write("m.csv", header + "a_0,path,other,1,1,320,16,0.5,0,," + good +
-                                                       "\na_1,path,other,1,1,320,16,0.5,0,," + bad +
-                                                       "\na_2,path,other,1,1,0,1,0,0,unknown plugin,\n");
+    const std::string path = folder.write("m.csv", header + "a_0,path,other,1,1,320,16,0.5,0,,," + good +
+                                                       "\na_1,path,other,1,1,320,16,0.5,0,,," + bad +
+                                                       "\na_2,path,other,1,1,0,1,0,0,refused,unknown plugin,\n");
     const std::vector<Row> rows = judge_elsewhere(path, families);
     REQUIRE(rows.size() == 3);
     CHECK(rows[0].verdict == Verdict::ok);
@@ -357,9 +363,10 @@ TEST_CASE("what other renderers measured is judged alike") {
     CHECK(rows[2].verdict == Verdict::refused);
     CHECK(rows[2].note == "unknown plugin");
     for (const auto& [line, what] : std::vector<std::pair<std::string, std::string>>{
-             {"b_0,path,other,1,1,320,16,0.5,0,,1 2", "there is no cell 'b_0'"},
-             {"a_0,path,other,1,1,320,16,0.5,0,,1 two", "'two' is no number"},
-             {"a_0,path,other,2,2,320,16,0.5,0,,1 2 3", "3 means are no two batches of 4 boxes"},
+             {"b_0,path,other,1,1,320,16,0.5,0,,,1 2", "there is no cell 'b_0'"},
+             {"a_0,path,other,1,1,320,16,0.5,0,,,1 two", "'two' is no number"},
+             {"a_0,path,other,2,2,320,16,0.5,0,,,1 2 3", "3 means are no two batches of 4 boxes"},
+             {"a_0,path,other,1,1,320,16,0.5,0,black,,", "no means, and the state 'black'"},
              {"a_0,path,other,1,1,320", "6 columns"}}) {
         folder.write("m.csv", header + line + "\n");
         const std::string message = error_of([&] { judge_elsewhere(path, families); });
