@@ -81,10 +81,16 @@ size_t ResultTable::count(const std::string& prefix) const {
         std::count_if(lines_.begin(), lines_.end(), [&](const std::string& line) { return line.starts_with(prefix); }));
 }
 
-void ResultTable::add(const std::string& line) {
-    if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return;
-    append_file(path_, line + "\n");
-    lines_.push_back(line);
+void ResultTable::add(const std::string& line) { add(std::vector<std::string>{line}); }
+
+void ResultTable::add(const std::vector<std::string>& lines) {
+    std::string text;
+    for (const std::string& line : lines) {
+        if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) continue;
+        text += line + "\n";
+        lines_.push_back(line);
+    }
+    if (!text.empty()) append_file(path_, text);
 }
 
 void ResultTable::remove(const std::string& prefix) {

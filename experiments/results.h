@@ -60,6 +60,8 @@ public:
     size_t count(const std::string& prefix) const;
     /// Appends a line unless the file has it.
     void add(const std::string& line);
+    /// The same for several at once: a process that is killed leaves all or none.
+    void add(const std::vector<std::string>& lines);
     void remove(const std::string& prefix);
 
 private:

@@ -199,9 +199,9 @@ private:
         if (run.techniques) {
             write_technique_images(folder_.file("techniques", task.scene, task.name), task.scene.scene, task.settings,
                                    task.stated(), renderer->strategy_images());
-            for (const auto& line : task.state.notes["rows"]) folder_.runs().add(line.get<std::string>());
+            folder_.runs().add(task.state.notes["rows"].get<std::vector<std::string>>());
         }
-        for (const auto& line : task.state.notes["batches"]) folder_.batches().add(line.get<std::string>());
+        folder_.batches().add(task.state.notes["batches"].get<std::vector<std::string>>());
         std::error_code ignored;
         fs::remove(task.state_path, ignored);
         return true;
