@@ -338,6 +338,31 @@ void optimise_bvh2(Bvh2& bvh, int passes) {
         if (reinserter.pass(kShare) == 0.0) break;
 }
 
+uint32_t bvh2_depth(const Bvh2& bvh) {
+    struct Task {
+        uint32_t node, depth;
+    };
+    uint32_t deepest = 0;
+    std::vector<Task> tasks;
+    if (bvh.root != kNone) tasks.push_back({bvh.root, 1});
+    while (!tasks.empty()) {
+        const Task task = tasks.back();
+        tasks.pop_back();
+        deepest = std::max(deepest, task.depth);
+        const Bvh2Node& n = bvh.nodes[task.node];
+        if (n.is_leaf()) continue;
+        tasks.push_back({n.left, task.depth + 1});
+        tasks.push_back({n.right, task.depth + 1});
+    }
+    return deepest;
+}
+
+Bvh2 build_optimised_bvh2(const SceneView& scene) {
+    Bvh2 bvh = build_bvh2(scene);
+    optimise_bvh2(bvh, kReinsertionPasses);
+    return bvh2_depth(bvh) > kMostBvh2Depth ? build_bvh2(scene) : bvh;
+}
+
 double bvh2_cost(const Bvh2& bvh) {
     if (bvh.root == kNone) return 0.0;
     double sum = 0.0;

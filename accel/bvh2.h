@@ -39,6 +39,15 @@ void optimise_bvh2(Bvh2& bvh, int passes);
 /// scenes, by 1 % more in 16 passes.
 constexpr int kReinsertionPasses = 6;
 
+/// Nodes from the root to the deepest leaf, both counted; 0 of an empty tree.
+uint32_t bvh2_depth(const Bvh2& bvh);
+/// Most of it that traversal stacks have room for; the builder stays below 64.
+constexpr uint32_t kMostBvh2Depth = 96;
+
+/// The tree that rays are traced through: optimised, unless that makes it too deep. Among thousands of needles whose
+/// boxes all overlap, reinsertion would chain one after the other.
+Bvh2 build_optimised_bvh2(const SceneView& scene);
+
 /// Sum of half areas of inner nodes over that of the root.
 double bvh2_cost(const Bvh2& bvh);
 

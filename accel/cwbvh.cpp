@@ -272,9 +272,7 @@ CwbvhArrays collapse_bvh2(const SceneView& scene, const Bvh2& bvh) { return Coll
 CwbvhAccel::CwbvhAccel(const Scene& scene) {
     const auto start = std::chrono::steady_clock::now();
     const SceneView view = scene.view();
-    Bvh2 bvh = build_bvh2(view);
-    optimise_bvh2(bvh, kReinsertionPasses);
-    arrays_ = collapse_bvh2(view, bvh);
+    arrays_ = collapse_bvh2(view, build_optimised_bvh2(view));
     build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -104,14 +104,13 @@ private:
 
 }  // namespace
 
+static_assert(kMostBvh2Depth <= uint32_t(kPairStackSize));
 PairArrays pair_bvh2(const SceneView& scene, const Bvh2& bvh) { return Pairer(scene, bvh).run(); }
 
 PairAccel::PairAccel(const Scene& scene) {
     const auto start = std::chrono::steady_clock::now();
     const SceneView view = scene.view();
-    Bvh2 bvh = build_bvh2(view);
-    optimise_bvh2(bvh, kReinsertionPasses);
-    arrays_ = pair_bvh2(view, bvh);
+    arrays_ = pair_bvh2(view, build_optimised_bvh2(view));
     build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -1,4 +1,4 @@
-"""python -m analysis RESULTS -o OUT: see docs/experiments.md.
+"""python -m analysis RESULTS -o OUT, python -m analysis pack RESULTS -o FILE.zip: see docs/experiments.md.
 
 Writes figures (.pdf, .png, .caption.txt), tables (.csv, .tex) and report.html into OUT. Exit codes: 0 done, 2 usage, 3 bad input (what does not depend on it
 is made all the same).
@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from analysis import experiment as experiments
-from analysis import figures, pyramid, report, summary, tables
+from analysis import figures, flip_maps, pack, pyramid, remarks, report, summary, tables
 
 
 def write(path, text):
@@ -29,8 +29,8 @@ def analyse(results, out, insets=None, full_size=False):
     """Reads the experiment folder `results` and writes everything into the folder `out`. Returns (remarks, figures.Made)."""
     data = experiments.load(results)
     out.mkdir(parents=True, exist_ok=True)
-    lines = summary.lines(data)
-    remarks = summary.remarks(data, lines)
+    lines = summary.lines(data, flip_maps.of_runs(data))
+    said = remarks.remarks(data, lines)
     write(out / "table.csv", tables.to_csv(lines))
     write(out / "table.tex", tables.to_latex(data, lines))
     write(out / "tests.tex", tables.tests_to_latex(lines))
@@ -39,10 +39,10 @@ def analyse(results, out, insets=None, full_size=False):
         rows = strategy_rows(data)
         if rows:
             write(out / "strategy_variance.csv", tables.variances_to_csv(rows))
-        write(out / "report.html", report.render(data, lines, remarks, made, out, full_size))
+        write(out / "report.html", report.render(data, lines, said, made, out, full_size))
     except experiments.InputError as e:
         made.broken.append(f"report.html: {e}")
-    return remarks, made
+    return said, made
 
 
 def parse_inset(text):
@@ -58,6 +58,9 @@ def parse_inset(text):
 
 
 def main(arguments=None):
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments[:1] == ["pack"]:
+        return pack.main(arguments[1:])
     parser = argparse.ArgumentParser(prog="python -m analysis", description="Figures, tables and a report of an experiment.")
     parser.add_argument("results", type=Path, help="folder that `ambilux experiment` wrote")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to; may be the same")
@@ -69,11 +72,11 @@ def main(arguments=None):
     for scene, inset in options.inset:
         insets.setdefault(scene, []).append(inset)
     try:
-        remarks, made = analyse(options.results, options.output, insets, options.full_size)
+        said, made = analyse(options.results, options.output, insets, options.full_size)
     except experiments.InputError as e:
         print(f"error: {e}", file=sys.stderr)
         return 3
-    for remark in remarks:
+    for remark in said:
         print(f"note: {remark}", file=sys.stderr)
     for name, reason in made.missing:
         print(f"not made: {name}: {reason}", file=sys.stderr)

@@ -2,7 +2,7 @@
 
 import textwrap
 
-from analysis import summary
+from analysis import remarks
 
 
 def listed(values):
@@ -53,7 +53,7 @@ def data_behind(experiment, scenes, runs):
     versions, machine = m.get("versions") or {}, m.get("machine") or {}
     devices = ", ".join(d for d in m.get("devices") or [] if d)
     driver = f", driver {machine['driver']}" if machine.get("driver") else ""
-    config, clocks = m.get("config"), summary.clock_text(experiment)
+    config, clocks = m.get("config"), remarks.clock_text(experiment)
     return [line for line in (
         f"Experiment: {experiment.name}, {m.get('date', 'date unknown')}",
         "Scenes: " + "; ".join(scene_facts(experiment, s) for s in scenes),
@@ -62,7 +62,9 @@ def data_behind(experiment, scenes, runs):
         f"Device: {devices or 'unknown'} ({machine.get('cpu', 'unknown processor')}{driver})",
         f"Clocks: {clocks}" if clocks else None,
         f"Revision: ambilux {versions.get('ambilux', '?')}, git {versions.get('git_revision', 'unknown')}",
-        f"Command: ambilux experiment {config} -o {experiment.folder.name}" if config else None,
+        *(f"Command: {command}" for command in m.get("commands") or []),
+        # Of older versions, which did not record how they were called.
+        f"Configuration: {config}" if config and not m.get("commands") else None,
         f"Command: python -m analysis {experiment.folder.name} -o FIGURES",
     ) if line]
 

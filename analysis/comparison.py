@@ -12,7 +12,8 @@ from matplotlib.patches import Rectangle
 
 from analysis import images, style
 
-RUNS_PER_FIGURE = 5
+BESIDE = 6  # runs beside the reference; more stand below it
+ACROSS = 7
 INSETS = 2
 INSET_COLOURS = (style.COLOURS[1], style.COLOURS[4])  # vermilion and sky blue: told apart in grey too
 
@@ -60,54 +61,63 @@ def numbers_below(experiment, scene, run, seed):
     if not rows:
         return ""
     last = rows[-1]
-    return f"RMSE {style.short_number(last.error)}\nrelMSE {style.short_number(last.relative_error)}\n{last.spp} spp, {style.short_number(last.time)} s"
+    return f"relMSE {style.short_number(last.relative_error)}\nRMSE {style.short_number(last.error)}\n{last.spp} spp\n{style.short_number(last.time)} s"
 
 
 def draw(experiment, scene, reference, shown, insets):
-    """`shown`: [(run, seed, image)]. A row of error maps below the insets."""
+    """`shown`: [(run, seed, image)]: two insets of each, its error map and its numbers, beside the reference or, of more than BESIDE runs, in even rows below it.
+    One exposure and one colour scale for all."""
     height, width = reference.shape[:2]
-    factor = images.exposure(reference)
-    rows, columns = len(insets), len(shown) + 1
-    unit = style.PAGE / (columns + rows * width / height + 0.15)  # inches of an inset: the reference is as high as all insets
+    factor, rows = images.exposure(reference), len(insets)
+    below = len(shown) > BESIDE
+    across = style.balanced(len(shown), ACROSS) if below else len(shown) + 1
+    unit = style.PAGE / ACROSS if below else style.PAGE / (across + rows * width / height + 0.15)  # inches of an inset; the reference is as high as all of them
+    gap, big_width, map_height, numbers = 0.03, rows * unit * width / height, unit * height / width, 0.46
+    maps = [images.relative_error(image, reference) for _, _, image in shown]
+    highest = images.highest_of(maps)
+    points = 7.5 if unit > 0.9 else 6.5
+    headings = [style.fit(run, unit, points) for run, _, _ in shown]
+    title = 0.08 + 0.12 * (max(h.count("\n") for h in headings) + 1)
+    block = title + rows * unit + 0.02 + map_height + numbers
+    head = 0.22 + rows * unit + 0.1 if below else 0.0
+    total = head + block * (-(-len(shown) // across)) if below else block + (0.25 if map_height < 0.25 else 0)
     with plt.rc_context(style.STYLE):
-        map_height = unit * height / width
-        top = 0.1 + 0.11 * max(style.wrap(run, 16).count("\n") + 1 for run, _, _ in shown)
-        figure = plt.figure(figsize=(style.PAGE, top + rows * unit + max(map_height, 0.3) + 0.46))
-        total = figure.get_figheight()
+        figure = plt.figure(figsize=(style.PAGE, total))
 
         def place(x, y, w, h):  # inches from the top left
             return figure.add_axes((x / style.PAGE, 1 - (y + h) / total, w / style.PAGE, h / total))
 
-        gap = 0.03
-        big_width = rows * unit * width / height
+        def put_insets(image, heading, x, y):
+            for row, ((ix, iy, size), colour) in enumerate(zip(insets, INSET_COLOURS)):
+                axes = place(x, y + row * unit, unit - gap, unit - gap)
+                axes.imshow(images.tone_map(image[iy:iy + size, ix:ix + size], factor), interpolation="nearest")
+                bare(axes, colour)
+                if row == 0:
+                    axes.set_title(heading, pad=3, fontsize=points)
+
+        top = 0.22 if below else title
         big = place(0, top, big_width, rows * unit)
         big.imshow(images.tone_map(reference, factor), interpolation="nearest")
-        big.set_title(f"{scene}, reference", pad=3)
+        big.set_title(style.fit(f"{scene}, reference", big_width, 8.5), pad=3)
         bare(big)
         for (x, y, size), colour in zip(insets, INSET_COLOURS):
             big.add_patch(Rectangle((x - 0.5, y - 0.5), size, size, fill=False, lw=1.2, ec=colour))
         left = big_width + 0.1
-        maps = [images.relative_error(image, reference) for _, _, image in shown]
-        highest = images.highest_of(maps)
-        every = [(run, seed, image) for run, seed, image in shown] + [("reference", None, reference)]
-        for column, (run, seed, image) in enumerate(every):
-            x = left + column * unit
-            for row, ((ix, iy, size), colour) in enumerate(zip(insets, INSET_COLOURS)):
-                axes = place(x, top + row * unit, unit - gap, unit - gap)
-                axes.imshow(images.tone_map(image[iy:iy + size, ix:ix + size], factor), interpolation="nearest")
-                bare(axes, colour)
-                if row == 0:
-                    axes.set_title(style.wrap(run, 16), pad=3, fontsize=7.5)
-            if seed is None:
-                continue
-            axes = place(x, top + rows * unit + 0.02, unit - gap, map_height)
-            axes.imshow(maps[column], cmap=style.ERROR_COLOURS, vmin=0, vmax=highest, interpolation="nearest")
+        put_insets(reference, "reference", left, top)
+        for i, (run, seed, image) in enumerate(shown):
+            x = i % across * unit if below else left + (i + 1) * unit
+            y = head + (i // across) * block + title if below else top
+            put_insets(image, headings[i], x, y)
+            axes = place(x, y + rows * unit + 0.02, unit - gap, map_height)
+            axes.imshow(maps[i], cmap=style.ERROR_COLOURS, vmin=0, vmax=highest, interpolation="nearest")
             bare(axes)
-            axes.set_xlabel(numbers_below(experiment, scene, run, seed), fontsize=6.5, labelpad=3)
-        bar = place(big_width * 0.25, top + rows * unit + 0.02 + map_height / 2, big_width * 0.6, 0.09)
+            axes.set_xlabel(numbers_below(experiment, scene, run, seed), fontsize=6, labelpad=2)
+        room = style.PAGE - left - unit if below else big_width
+        bar = (place(left + unit + 0.15 * room, top + 0.45 * rows * unit, 0.7 * room, 0.09) if below
+               else place(big_width * 0.2, top + rows * unit + 0.02 + max(map_height / 2, 0.2), big_width * 0.6, 0.09))
         figure.colorbar(ScalarMappable(Normalize(0, highest), style.ERROR_COLOURS), cax=bar, orientation="horizontal", extend="max")
         bar.tick_params(labelsize=6.5)
-        bar.set_title("relative error |x − r| / (|r| + 0.01)", fontsize=7, pad=3)
+        bar.set_title(style.fit("relative error |x − r| / (|r| + 0.01)", 1.2 * room, 7), fontsize=7, pad=3)
     return figure
 
 
@@ -128,11 +138,9 @@ def make(experiment, scene, insets=None):
     reference, shown = load(experiment, scene)
     chosen = insets or choose_insets(reference, [image for _, _, image in shown])
     how = "chosen by hand" if insets else "chosen where the runs' errors differ most from each other and the reference has contrast"
-    for part in range(0, len(shown), RUNS_PER_FIGURE):
-        some = shown[part:part + RUNS_PER_FIGURE]
-        yield style.Picture(
-            f"comparison_{scene}" + (f"_{part // RUNS_PER_FIGURE + 1}" if part else ""), draw(experiment, scene, reference, some, chosen), f"Comparison on {scene}",
-            f"Insets (pixels x, y, size: {'; '.join(', '.join(map(str, i)) for i in chosen)}; {how}) and error maps of the images at the last checkpoint, seeds "
-            f"{', '.join(f'{seed} ({run})' for run, seed, _ in some)}. Shown at {style.short_number(images.exposure(reference))} times the radiance, sRGB. One colour "
-            "scale for all maps; the brightest 1 % are cut. The figures are the runner's, for the image shown, with the noise of the reference subtracted where known.",
-            [run for run, _, _ in some], [scene])
+    yield style.Picture(
+        style.file_name("comparison", scene), draw(experiment, scene, reference, shown, chosen), f"Comparison on {scene}",
+        f"Insets (pixels x, y, size: {'; '.join(', '.join(map(str, i)) for i in chosen)}; {how}) and error maps of the images at the last checkpoint, seeds "
+        f"{', '.join(f'{seed} ({run})' for run, seed, _ in shown)}. Shown at {style.short_number(images.exposure(reference))} times the radiance, sRGB. One colour "
+        "scale for all maps; the brightest 1 % are cut. The figures are the runner's, for the image shown, with the noise of the reference subtracted where known.",
+        [run for run, _, _ in shown], [scene])

@@ -1,11 +1,11 @@
-"""Speed-up at equal error: how many times sooner one run reaches the error that another one reaches."""
+"""Time to equal error: how many times sooner one run's mean error reaches the level that another one's reaches."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.statistics import Estimate, ratio_of_pairs
+FAR = 4.0  # a time that lies further outside of what was measured is no number
 
 
 def clean(budgets, errors):
@@ -38,25 +38,28 @@ def budget_at_error(budgets, errors, target):
 
 @dataclass(frozen=True)
 class Speedup:
-    """Times `base` / times `run` to the error `target`: > 1 means that the run is faster."""
+    """Times `base` / times `run` to the error `target`: > 1 means that the run is faster. sign: "" for a number, ">" or "<" for a bound, since a time
+    lies outside of what was measured by more than FAR."""
 
-    estimate: Estimate
+    value: float
+    sign: str
     target: float
-    extrapolated: float  # greatest factor by which a seed's time lies outside of what was measured; 1: all lie inside
-    pairs: int
+    extrapolated: float
 
 
-def speedup(base, run, confidence=0.95):
-    """Speed-up of `run` over `base` at equal error, from {seed: (budgets, errors)} of each. None without a common seed.
+def speedup(base, run):
+    """Speed-up of `run` over `base` at equal error, from curves (budgets, RMSE) of mean errors. None without points.
 
-    target e* = the greatest last error of all seeds of both, so that each of them has reached it. With T(e*) of budget_at_error for each
-    seed, ratio_of_pairs(T_base, T_run): the geometric mean of the ratios, with Student's interval on their logarithms.
+    The target is the greater of both last errors, so that both have reached it. One that was below it at its first checkpoint already may have been so for
+    long: by more than a factor of FAR nothing is claimed, and the ratio with its first checkpoint is a bound.
     """
-    last = {s: tuple(clean(*series[s])[1][-1:] for series in (base, run)) for s in base.keys() & run.keys()}
-    seeds = sorted(s for s, (a, b) in last.items() if len(a) and len(b))
-    if not seeds:
+    (base_x, base_y), (run_x, run_y) = clean(*base), clean(*run)
+    if not len(base_x) or not len(run_x):
         return None
-    target = max(float(e[0]) for s in seeds for e in last[s])
-    times = [[budget_at_error(*series[s], target) for s in seeds] for series in (base, run)]
-    ratio = ratio_of_pairs(*[[t for t, _ in of_run] for of_run in times], confidence)
-    return Speedup(ratio, target, max(factor for of_run in times for _, factor in of_run), len(seeds))
+    target = max(float(base_y[-1]), float(run_y[-1]))
+    (base_time, base_factor), (run_time, run_factor) = budget_at_error(base_x, base_y, target), budget_at_error(run_x, run_y, target)
+    if run_factor > FAR:
+        return Speedup(base_time / float(run_x[0]), ">", target, run_factor)
+    if base_factor > FAR:
+        return Speedup(float(base_x[0]) / run_time, "<", target, base_factor)
+    return Speedup(base_time / run_time, "", target, max(base_factor, run_factor))

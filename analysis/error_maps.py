@@ -6,7 +6,7 @@ import numpy as np
 from analysis import comparison, images, style
 
 BLOCK = 4  # pixels: of the signed map
-PER_FIGURE = 5
+ACROSS = 6
 
 
 def mean_image(experiment, scene, run, reference):
@@ -19,22 +19,29 @@ def mean_image(experiment, scene, run, reference):
 
 
 def draw(scene, reference, columns):
-    """`columns`: [(run, error map, signed map, seeds)]. Two rows, each with one scale."""
+    """`columns`: [(run, error map, signed map, seeds)]. Pairs of rows, errors above; one scale for all errors and one for all signed maps."""
     height, width = reference.shape[:2]
     highest = images.highest_of([c[1] for c in columns])
     signed = images.highest_of([np.abs(c[2]) for c in columns], 98)
-    across = len(columns)
-    cell = min(2.2, (style.PAGE - 0.75) / across)
+    across = style.balanced(len(columns), ACROSS)
+    blocks = -(-len(columns) // across)
+    cell = min(2.2, (style.PAGE - 0.1) / across)
+    lines = max(style.fit(run, cell, 8.5).count("\n") + 1 for run, *_ in columns)
     with plt.rc_context(style.STYLE):
-        figure, grid = plt.subplots(2, across, figsize=(cell * across + 0.75, 2 * cell * height / width + 0.55), squeeze=False, layout="constrained")
-        for column, (run, error, difference, _) in enumerate(columns):
-            top = grid[0][column].imshow(error, cmap=style.ERROR_COLOURS, vmin=0, vmax=highest, interpolation="nearest")
-            bottom = grid[1][column].imshow(difference, cmap=style.SIGNED_COLOURS, vmin=-signed, vmax=signed, interpolation="nearest")
-            grid[0][column].set_title(style.wrap(run))
-            for axes in grid[:, column]:
+        figure, grid = plt.subplots(2 * blocks, across, figsize=(max(cell * across, style.COLUMN), blocks * (2 * cell * height / width + 0.12 + 0.13 * lines) + 1.0), squeeze=False,
+                                    layout="constrained")
+        for axes in grid.flat:
+            axes.set_axis_off()
+        for i, (run, error, difference, _) in enumerate(columns):
+            above, below = grid[2 * (i // across)][i % across], grid[2 * (i // across) + 1][i % across]
+            top = above.imshow(error, cmap=style.ERROR_COLOURS, vmin=0, vmax=highest, interpolation="nearest")
+            bottom = below.imshow(difference, cmap=style.SIGNED_COLOURS, vmin=-signed, vmax=signed, interpolation="nearest")
+            above.set_title(style.fit(run, cell, 8.5))
+            for axes in above, below:
+                axes.set_axis_on()
                 comparison.bare(axes)
-        figure.colorbar(top, ax=list(grid[0]), extend="max", label="relative error", fraction=0.05, aspect=14)
-        figure.colorbar(bottom, ax=list(grid[1]), extend="both", label="signed", fraction=0.05, aspect=14)
+        figure.colorbar(bottom, ax=list(grid.flat), location="bottom", extend="both", label="signed relative error (x − r) / (|r| + 0.01), mean over seeds", shrink=0.6, aspect=40)
+        figure.colorbar(top, ax=list(grid.flat), location="bottom", extend="max", label="relative error |x − r| / (|r| + 0.01)", shrink=0.6, aspect=40)
     return figure
 
 
@@ -46,14 +53,12 @@ def make(experiment, scene):
         mean, seeds = mean_image(experiment, scene, run, reference)
         difference = images.signed_error(images_blocks(mean), images_blocks(reference))
         columns.append((run, images.relative_error(image, reference), difference, seeds))
-    for part in range(0, len(columns), PER_FIGURE):
-        some = columns[part:part + PER_FIGURE]
-        yield style.Picture(
-            f"errors_{scene}" + (f"_{part // PER_FIGURE + 1}" if part else ""), draw(scene, reference, some), f"Error maps of {scene}",
-            "Above: |x − r| / (|r| + 0.01), mean of the channels, of one seed's image at the last checkpoint. Below: (x − r) / (|r| + 0.01) of the mean over seeds "
-            f"({', '.join(f'{run}: {seeds}' for run, _, _, seeds in some)}), over blocks of {BLOCK}x{BLOCK} pixels; purple is too bright, orange too dark. Without "
-            "bias it is patternless noise. The brightest 1 % (above) and 2 % (below) are cut.",
-            [c[0] for c in some], [scene])
+    yield style.Picture(
+        style.file_name("errors", scene), draw(scene, reference, columns), f"Error maps of {scene}",
+        "Above: |x − r| / (|r| + 0.01), mean of the channels, of one seed's image at the last checkpoint. Below: (x − r) / (|r| + 0.01) of the mean over seeds "
+        f"({', '.join(f'{run}: {seeds}' for run, _, _, seeds in columns)}), over blocks of {BLOCK}x{BLOCK} pixels; purple is too bright, orange too dark. Without "
+        "bias it is patternless noise. The brightest 1 % (above) and 2 % (below) are cut.",
+        [c[0] for c in columns], [scene])
 
 
 def images_blocks(image):

@@ -8,12 +8,14 @@ import json
 import math
 import re
 import tomllib
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 
-TEXT = ("scene", "run", "budget")
+TEXT = ("scene", "run", "budget", "method")
 KINDS = ("spp", "seconds", "")  # of checkpoints; the last one: not recorded
-INTEGERS = ("seed", "checkpoint", "spp", "rays", "invalid")
+INTEGERS = ("seed", "checkpoint", "batch", "spp", "rays", "invalid")
+FORMAT = 2  # of the folder, as its manifest states it; folders without a number are of format 1 and are read too
+METRICS = ("relmse", "mse")  # what `metric` of a configuration can name
 
 
 class InputError(Exception):
@@ -45,6 +47,7 @@ class Row:
     budget: str = ""
     relmse_trimmed: float = math.nan  # relMSE without the worst `trimmed_share` of the pixels
     relmse_trimmed_corrected: float = math.nan
+    method: str = ""  # what ran: integrator, variant and settings, those that bdpt.auto chose included
 
     @property
     def error(self):
@@ -62,8 +65,30 @@ class Row:
         return self.relmse_trimmed if math.isnan(self.relmse_trimmed_corrected) else self.relmse_trimmed_corrected
 
 
-REQUIRED = tuple(f.name for f in fields(Row) if f.default is MISSING)
-OPTIONAL = tuple(f.name for f in fields(Row) if f.default is not MISSING)
+    @property
+    def mse(self):
+        return self.error**2
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Whole passes of one render, apart from its others: independent samples of one method. Errors are of the batch's own image, corrected for the
+    reference's noise where that is known."""
+
+    scene: str
+    run: str
+    seed: int
+    batch: int
+    spp: int
+    time: float
+    mse: float
+    relmse: float
+    other_cores: float = math.nan  # that other processes held meanwhile
+
+
+def columns(kind, optional):
+    """Names of the fields of a dataclass with or without a default."""
+    return tuple(f.name for f in fields(kind) if (f.default is MISSING) != optional)
 
 
 @dataclass
@@ -74,6 +99,9 @@ class Experiment:
     scenes: list  # names in the order of the configuration
     runs: list
     base: str  # the run that others are compared with: `default` of [ablation] in the configuration, else the first
+    metric: str = "relmse"  # the error that leads: `metric` of the configuration
+    batches: list = field(default_factory=list)
+    kept: dict = field(default_factory=dict)  # what was made of them, for use by several figures
 
     @property
     def name(self):
@@ -95,6 +123,9 @@ class Experiment:
         self._of_run = {}
         for r in sorted(self.rows, key=lambda r: (r.seed, r.checkpoint)):
             self._of_run.setdefault((r.scene, r.run), []).append(r)
+        self._batches = {}
+        for b in sorted(self.batches, key=lambda b: (b.seed, b.batch)):
+            self._batches.setdefault((b.scene, b.run), {}).setdefault(b.seed, []).append(b)
         self.budgets = {r.budget for r in self.rows}
 
     def budget(self, kind):
@@ -107,6 +138,18 @@ class Experiment:
     def select(self, scene, run, checkpoint=None, budget=None):
         """Rows of one run in one scene, by seed and checkpoint; of one kind of checkpoints if `budget` names it."""
         return [r for r in self._of_run.get((scene, run), ()) if checkpoint in (None, r.checkpoint) and budget in (None, r.budget)]
+
+    def batches_of(self, scene, run):
+        """{seed: its batches in order}."""
+        return self._batches.get((scene, run), {})
+
+    def methods(self, scene, run):
+        """{what ran: seeds}, of the runs that say it. More than one where bdpt.auto chose differently."""
+        out = {}
+        for r in self.select(scene, run):
+            if r.method:
+                out.setdefault(r.method, set()).add(r.seed)
+        return {method: sorted(seeds) for method, seeds in out.items()}
 
     def seeds(self, scene, run):
         return sorted({r.seed for r in self.select(scene, run)})
@@ -168,18 +211,19 @@ def parse_number(text, column, place):
         raise InputError(f"{place}: column '{column}' holds '{text}', which is no number") from None
 
 
-def read_rows(path, scenes, runs):
-    """Reads runs.csv. Further columns are ignored; a missing one, a bad number, a repeated row or an unknown name is an InputError."""
+def read_table(path, kind, key, scenes, runs):
+    """Reads a table of rows `kind`. Further columns are ignored; a missing one, a bad number, a repeated `key` or an unknown name is an InputError."""
     rows, seen = [], {}
     try:
         content = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as e:
         raise InputError(f"{path}: cannot be read: {e}") from None
     reader = csv.DictReader(content.splitlines(keepends=True))
-    missing = [c for c in REQUIRED if c not in (reader.fieldnames or ())]
+    required = columns(kind, False)
+    missing = [c for c in required if c not in (reader.fieldnames or ())]
     if missing:
         raise InputError(f"{path}:1: lacks the column{'s' if len(missing) > 1 else ''} {', '.join(missing)}")
-    known_columns = [*REQUIRED, *(c for c in OPTIONAL if c in reader.fieldnames)]
+    known_columns = [*required, *(c for c in columns(kind, True) if c in reader.fieldnames)]
     for record in reader:
         place = f"{path}:{reader.line_num}"
         cells = sum(v is not None for k, v in record.items() if k is not None) + len(record.get(None) or ())
@@ -189,8 +233,8 @@ def read_rows(path, scenes, runs):
         if cells < whole:
             raise InputError(f"{place}: ends in column '{reader.fieldnames[cells - 1]}', {cells} cells where the header names {whole}: a half-written row. "
                              "`ambilux experiment ... --resume` completes it; without that line the rest can be analysed")
-        row = Row(**{c: record[c] if c in TEXT else parse_number(record[c], c, place) for c in known_columns})
-        if row.budget not in KINDS:
+        row = kind(**{c: record[c] if c in TEXT else parse_number(record[c], c, place) for c in known_columns})
+        if getattr(row, "budget", "") not in KINDS:
             raise InputError(f"{place}: column 'budget' holds '{row.budget}', which is neither 'spp' nor 'seconds'")
         for column, name, known in (("scene", row.scene, scenes), ("run", row.run, runs)):
             if name not in known:
@@ -198,31 +242,39 @@ def read_rows(path, scenes, runs):
         for column in ("spp", "time"):
             if not getattr(row, column) > 0:
                 raise InputError(f"{place}: column '{column}' holds '{record[column]}', which must be positive")
-        key = (row.scene, row.run, row.seed, row.checkpoint)
-        if key in seen:
-            raise InputError(f"{place}: repeats line {seen[key]} (scene {row.scene}, run {row.run}, seed {row.seed}, checkpoint {row.checkpoint})")
-        seen[key] = reader.line_num
+        own = tuple(getattr(row, c) for c in key)
+        if own in seen:
+            raise InputError(f"{place}: repeats line {seen[own]} ({', '.join(f'{c} {v}' for c, v in zip(key, own))})")
+        seen[own] = reader.line_num
         rows.append(row)
-    if not rows:
-        raise InputError(f"{path}: holds no results yet")
-    if not content.endswith("\n"):
+    if rows and not content.endswith("\n"):
         raise InputError(f"{path}:{reader.line_num}: column '{reader.fieldnames[-1]}': the line does not end: a half-written row. "
                          "`ambilux experiment ... --resume` completes it")
     return rows
 
 
-def read_base(path, runs):
-    """The run that [ablation] of the resolved configuration names as the default, else the first."""
+def read_rows(path, scenes, runs):
+    """Reads runs.csv."""
+    rows = read_table(path, Row, ("scene", "run", "seed", "checkpoint"), scenes, runs)
+    if not rows:
+        raise InputError(f"{path}: holds no results yet")
+    return rows
+
+
+def read_config(path, runs):
+    """(run that others are compared with, metric that leads) of the resolved configuration: `default` of [ablation], else the first run; `metric`, else relmse."""
     if not path.is_file():
-        return runs[0]
+        return runs[0], METRICS[0]
     try:
         config = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, OSError, UnicodeDecodeError) as e:
         raise InputError(f"{path}: {e}") from None
-    base = (config.get("ablation") or {}).get("default", runs[0])
+    base, metric = (config.get("ablation") or {}).get("default", runs[0]), config.get("metric", METRICS[0])
     if base not in runs:
         raise InputError(f"{path}: [ablation] default = '{base}' is not a run of manifest.json")
-    return base
+    if metric not in METRICS:
+        raise InputError(f"{path}: metric = '{metric}' is neither {' nor '.join(METRICS)}")
+    return base, metric
 
 
 def load(folder):
@@ -241,5 +293,10 @@ def load(folder):
         raise InputError(f"{folder / 'manifest.json'}: lacks the lists 'scenes' and 'runs' of objects with a 'name'") from None
     if not scenes or not runs:
         raise InputError(f"{folder / 'manifest.json'}: the list '{'runs' if scenes else 'scenes'}' is empty")
+    version = manifest.get("format", 1)
+    if version not in range(1, FORMAT + 1):
+        raise InputError(f"{folder / 'manifest.json'}: 'format' is {version}; this version reads formats 1 to {FORMAT}")
     rows = read_rows(folder / "runs.csv", scenes, runs)
-    return Experiment(folder, manifest, rows, scenes, runs, read_base(folder / "config.resolved.toml", runs))
+    path = folder / "batches.csv"
+    batches = read_table(path, Batch, ("scene", "run", "seed", "batch"), scenes, runs) if path.is_file() else []
+    return Experiment(folder, manifest, rows, scenes, runs, *read_config(folder / "config.resolved.toml", runs), batches)

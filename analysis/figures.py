@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from analysis import ablation, captions, comparison, convergence, error_maps, flip_maps, pyramid, stage_times, style
+from analysis import ablation, captions, comparison, convergence, error_maps, flip_maps, occupancy, overview, pyramid, stage_times, style
 from analysis.experiment import InputError
 
 
@@ -17,6 +17,7 @@ class Made:
 
 def plan(experiment, insets):
     """(name, function without arguments that yields Pictures) of all that there could be."""
+    yield "overview", lambda: overview.make(experiment)
     yield "convergence", lambda: convergence.make(experiment)
     yield "ablation", lambda: ablation.make(experiment)
     yield "sweeps", lambda: ablation.make_sweeps(experiment)
@@ -24,6 +25,7 @@ def plan(experiment, insets):
     for scene in experiment.scenes:
         yield f"comparison_{scene}", lambda scene=scene: comparison.make(experiment, scene, insets.get(scene))
         yield f"errors_{scene}", lambda scene=scene: error_maps.make(experiment, scene)
+        yield f"occupancy_{scene}", lambda scene=scene: occupancy.make(experiment, scene)
         yield f"flip_{scene}", lambda scene=scene: flip_maps.make(experiment, scene)
     recorded = [(s, r) for s in experiment.scenes for r in experiment.runs if experiment.techniques(s, r)]
     if not recorded:

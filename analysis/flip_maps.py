@@ -10,13 +10,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from analysis import comparison, hdr_data, images, style
+from analysis.experiment import InputError
 
 try:
     import flip_evaluator
 except ImportError:
     flip_evaluator = None
 
-PER_FIGURE = 5
+ACROSS = 6
 
 
 def flip(image, reference):
@@ -34,16 +35,37 @@ def of_files(image, reference, factor=1):
     return (np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8), mean
 
 
+def of_runs(experiment):
+    """{(scene, run): (mean over pixels, median over pixels)}, means over the images of all seeds; {} without the package. Broken files are told by the figures."""
+    out = {}
+    for scene in experiment.scenes if flip_evaluator is not None else ():
+        reference = experiment.reference(scene)
+        for run in experiment.runs if reference else ():
+            try:
+                found = [of_files(path, reference) for _, path in experiment.files("images", scene, run, ".exr")]
+            except (InputError, ValueError):
+                continue
+            if found:
+                out[scene, run] = (float(np.mean([mean for _, mean in found])), float(np.mean([np.median(values) / 255 for values, _ in found])))
+    return out
+
+
 def draw(scene, shape, columns):
     height, width = shape
-    cell = min(2.2, (style.PAGE - 0.6) / len(columns))
+    across = style.balanced(len(columns), ACROSS)
+    rows = -(-len(columns) // across)
+    cell = min(2.2, (style.PAGE - 0.6) / across)
+    lines = max(style.fit(run, cell, 8.5).count("\n") + 2 for run, *_ in columns)
     with plt.rc_context(style.STYLE):
-        figure, grid = plt.subplots(1, len(columns), figsize=(cell * len(columns) + 0.6, cell * height / width + 0.45), squeeze=False, layout="constrained")
-        for axes, (run, values, mean) in zip(grid[0], columns):
+        figure, grid = plt.subplots(rows, across, figsize=(cell * across + 0.6, rows * (cell * height / width + 0.08 + 0.13 * lines)), squeeze=False, layout="constrained")
+        for axes in grid.flat:
+            axes.set_axis_off()
+        for axes, (run, values, mean) in zip(grid.flat, columns):
             drawn = axes.imshow(values / 255, cmap=style.ERROR_COLOURS, vmin=0, vmax=1, interpolation="nearest")
-            axes.set_title(style.wrap(run) + f"\nmean {mean:.3f}")
+            axes.set_title(style.fit(run, cell, 8.5) + f"\nmean {mean:.3f}, median {np.median(values) / 255:.3f}" if cell > 1.6 else style.fit(run, cell, 8.5) + f"\nmean {mean:.3f}")
+            axes.set_axis_on()
             comparison.bare(axes)
-        figure.colorbar(drawn, ax=list(grid[0]), label="HDR-FLIP", fraction=0.05, aspect=14)
+        figure.colorbar(drawn, ax=list(grid.flat), label="HDR-FLIP", fraction=0.05, aspect=14)
     return figure
 
 
@@ -53,10 +75,8 @@ def make(experiment, scene):
         raise style.NotMade("the package flip-evaluator is not installed (pip install flip-evaluator)")
     reference, shown = comparison.load(experiment, scene)
     columns = [(run, *of_files(experiment.image(scene, run)[1], experiment.reference(scene))) for run, _, _ in shown]
-    for part in range(0, len(columns), PER_FIGURE):
-        some = columns[part:part + PER_FIGURE]
-        yield style.Picture(
-            f"flip_{scene}" + (f"_{part // PER_FIGURE + 1}" if part else ""), draw(scene, reference.shape[:2], some), f"FLIP of {scene}",
-            "HDR-FLIP (Andersson et al. 2021) between the image of the lowest seed at the last checkpoint and the reference, 67 pixels per degree; 0: no visible "
-            f"difference. Means: {'; '.join(f'{run} {mean:.4f}' for run, _, mean in some)}.",
-            [c[0] for c in some], [scene])
+    yield style.Picture(
+        style.file_name("flip", scene), draw(scene, reference.shape[:2], columns), f"FLIP of {scene}",
+        "HDR-FLIP (Andersson et al. 2021) between the image of the lowest seed at the last checkpoint and the reference, 67 pixels per degree; 0: no visible "
+        f"difference. Means: {'; '.join(f'{run} {mean:.4f}' for run, _, mean in columns)}.",
+        [c[0] for c in columns], [scene])

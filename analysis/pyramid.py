@@ -48,7 +48,7 @@ def read(folder):
 def label(s, t, share=None):
     """`share`: of the light of all pictures; told in per cent."""
     percent = None if share is None else 100 * share
-    return f"s = {s}, t = {t}" + ("" if percent is None else ": 0" if percent == 0 else ": <0.1 %" if percent < 0.1 else f": {percent:.0f} %" if percent >= 9.95 else f": {percent:.1f} %")
+    return f"({s},{t})" + ("" if percent is None else " 0" if percent == 0 else " <0.1 %" if percent < 0.1 else f" {percent:.0f} %" if percent >= 9.95 else f" {percent:.1f} %")
 
 
 def row_factor(row_images):
@@ -131,13 +131,11 @@ def variances(experiment, scene, run):
     folders = [read(folder) for _, folder in experiment.techniques(scene, run)]
     if len(folders) < 2:
         return []
-    if len({f.spp for f in folders}) > 1:
-        raise experiments.InputError(f"{folders[0].folder.parent}: the seeds of {run} have different spp: {sorted({f.spp for f in folders})}")
     out = []
     for st in sorted({st for f in folders for st in f.entries}, key=lambda st: (sum(st), st[0])):
-        paths = [f.entries[st]["weighted"] for f in folders if "weighted" in f.entries.get(st, {})]
-        if len(paths) > 1:
-            out.append((*st, strategy_variance.strategy_variance([images.read_exr(p) for p in paths], folders[0].spp), len(paths)))
+        found = [(f.entries[st]["weighted"], f.spp) for f in folders if "weighted" in f.entries.get(st, {})]
+        if len(found) > 1:
+            out.append((*st, strategy_variance.strategy_variance([images.read_exr(p) for p, _ in found], [spp for _, spp in found]), len(found)))
     total = sum(e.value for _, _, e, _ in out)
     return [(s, t, e, e.value / total if total > 0 else math.nan, n) for s, t, e, n in out]
 

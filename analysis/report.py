@@ -10,7 +10,8 @@ from pathlib import Path
 from matplotlib import colormaps
 from PIL import Image
 
-from analysis import captions, convergence, flip_maps, hdr_data, images, style, summary, tables
+from analysis import captions, convergence, flip_maps, hdr_data, images, style, summary, tables, verdicts
+from analysis import remarks as remarks_of
 
 PAGE = Path(__file__).parent / "page"
 INTERACTIVE = ("convergence_", "comparison_", "errors_", "flip_")  # figures that the page shows in a way of its own
@@ -101,7 +102,7 @@ def reference_table(experiment):
     """How each scene's reference was made, and what is known of the clocks."""
     rows = "".join(f"<tr><td>{html.escape(scene)}</td><td>{html.escape(captions.reference_facts(experiment.scene_entry(scene).get('reference') or {}) or 'not recorded')}</td></tr>"
                    for scene in experiment.scenes)
-    clocks = summary.clock_text(experiment)
+    clocks = remarks_of.clock_text(experiment)
     return ('<table class="said"><thead><tr><th>scene</th><th>reference</th></tr></thead><tbody>' + rows + "</tbody></table>"
             + (f'<p class="note">Clocks: {html.escape(clocks)}.</p>' if clocks else ""))
 
@@ -115,14 +116,9 @@ def figure(out, name, title, caption):
             f"<code>{html.escape(name)}.pdf</code></figcaption></figure>")
 
 
-def minus(text):
-    """Hyphens before numbers as minus signs."""
-    return re.sub(r"(?<![\w)])-(?=\d)|(?<=e)-(?=\d)", "−", text)
-
-
 def verdict_table(lines):
-    rows = [f"<tr><td>{html.escape(scene)}</td><td>{html.escape(run)}</td><td>{html.escape(minus(slope))}</td><td>{html.escape(minus(bias))}</td></tr>"
-            for (scene, run), (slope, bias) in summary.verdicts(lines).items()]
+    rows = [f"<tr><td>{html.escape(scene)}</td><td>{html.escape(run)}</td><td>{html.escape(tables.minus(slope))}</td><td>{html.escape(tables.minus(bias))}</td></tr>"
+            for (scene, run), (slope, bias) in verdicts.verdicts(lines).items()]
     return ('<table class="said"><thead><tr><th>scene</th><th>run</th><th>convergence</th><th>bias</th></tr></thead><tbody>' + "".join(rows) + "</tbody></table>")
 
 
@@ -137,19 +133,19 @@ def render(experiment, lines, remarks, made, out, full_size=False):
             '<nav><a href="#images">Images</a><a href="#convergence">Convergence</a><a href="#table">Table</a><a href="#references">References</a><a href="#figures">Figures</a>'
             '<a href="#manifest">Manifest</a></nav>']
     if remarks:
-        body += ['<div class="remarks"><b>Before you believe the figures</b><ul>', *(f"<li>{html.escape(minus(r))}</li>" for r in remarks), "</ul></div>"]
+        body += ['<div class="remarks"><b>Before you believe the figures</b><ul>', *(f"<li>{html.escape(tables.minus(r))}</li>" for r in remarks), "</ul></div>"]
     body += ['<h2 id="images">Images</h2>', '<p class="note">Of the lowest seed, at the end of the run. Wheel: zoom; drag: pan; double click: twice as large. '
              "With an image focused: 1–9 or ← → change it, f flips to the one before.</p>"]
     body += [scene_section(scene, found) for scene, found in scenes.items()]
     body += ['<h2 id="convergence">Convergence</h2>', '<div class="plot"></div>',
-             '<p class="note">Lines: geometric mean over seeds; bands: its 95 % confidence interval. The noise of the reference is subtracted where it is known. '
+             '<p class="note">Lines: arithmetic mean over seeds (RMSE: root of the mean of squares); bands: its 95 % interval over seeds, where the data support one. The noise of the reference is subtracted where it is known. '
              f"{html.escape(summary.rows_used(experiment))}</p>",
              '<h2 id="table">Table</h2>', f'<div class="wide">{tables.to_html(experiment, lines)}</div>',
              f'<p class="note">{html.escape(tables.caption(experiment, lines))} '
              "Bias |z|: the greatest over seeds of the standardised difference between the image's mean and the reference's.</p>",
              f'<div class="wide">{verdict_table(lines)}</div>',
              '<p class="note">Slope of log RMSE against log samples, over checkpoints in samples (over all, if the experiment has one kind) above the noise of the '
-             "reference. Bias: mean over seeds of the difference of means at the checkpoint of the table, its interval with the noise of the reference. A departure is claimed where chance alone makes one in less than 1 % of such tables.</p>"]
+             "reference. Bias: mean over seeds of the difference of means at the checkpoint of the table, its interval with the noise of the reference. A departure is claimed where chance alone makes one, or any other statement of the tables, in less than 1 % of such reports.</p>"]
     body += ['<h2 id="references">References</h2>', f'<div class="wide">{reference_table(experiment)}</div>']
     body.append('<h2 id="figures">Figures</h2>')
     body += [figure(out, *entry) for entry in made.pictures if not entry[0].startswith(INTERACTIVE)]

@@ -34,27 +34,6 @@ def mean_estimate(values, confidence=0.95):
     return Estimate(mean, error, mean - half, mean + half)
 
 
-def geometric_mean(values):
-    """exp(mean(log x)) of positive values: the mean for a logarithmic axis, where one outlying seed does not hide the others."""
-    values = np.asarray(values, dtype=float)
-    if len(values) == 0 or not (values > 0).all():
-        raise ValueError("geometric_mean: needs positive values")
-    return float(np.exp(np.log(values).mean()))
-
-
-def geometric_estimate(values, confidence=0.95):
-    """Geometric mean of independent positive values with its confidence interval: mean_estimate of the logarithms, raised to e.
-
-    Covers the geometric mean of the distribution, exactly if the logarithms are normal (Land 1971, Ann. Math. Stat. 42, on why that is not
-    the arithmetic mean). `error` is the standard error of the logarithm, about the relative error of the value.
-    """
-    values = np.asarray(values, dtype=float)
-    if len(values) == 0 or not (values > 0).all():
-        raise ValueError("geometric_estimate: needs positive values")
-    d = mean_estimate(np.log(values), confidence)
-    return Estimate(math.exp(d.value), d.error, math.exp(d.low), math.exp(d.high))
-
-
 def ratio_of_pairs(a, b, confidence=0.95):
     """Geometric mean of a_i / b_i with its confidence interval, for positive pairs (same seed).
 

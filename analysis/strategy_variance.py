@@ -9,33 +9,35 @@ from analysis.statistics import Estimate
 
 
 def variance_of_one_sample(images, spp):
-    """Variance of one sample per pixel, mean over pixels and channels, from n >= 2 independent images, shape (n, ...), of `spp` samples each.
+    """Variance of one sample per pixel, mean over pixels and channels, from n >= 2 independent images, shape (n, ...). spp: samples of each, or one number for all.
 
-    V = spp * mean_pixels( sum_i (x_i - mean x)^2 / (n-1) ): the unbiased sample variance of images, times spp because an image is a mean of
-    spp samples. Needs no reference, and holds no bias.
+    V = mean_pixels( sum_i w_i (x_i - m)^2 / (n-1) ) with w_i = spp_i and m = sum w_i x_i / sum w_i: an image is a mean of spp_i samples, so that its
+    variance is V / spp_i, and this is the unbiased estimate from values of known weights (e.g. Cochran 1977, section 10.7). Needs no reference, and holds no bias.
     """
     x = np.asarray(images, dtype=float).reshape(len(images), -1)
     if len(x) < 2:
         raise ValueError("variance_of_one_sample: needs two images")
-    return float(spp * x.var(axis=0, ddof=1).mean())
+    w = np.broadcast_to(np.asarray(spp, dtype=float), len(x))[:, None]
+    mean = (w * x).sum(axis=0) / w.sum()
+    return float((w * (x - mean) ** 2).sum(axis=0).mean() / (len(x) - 1))
 
 
 def strategy_variance(images, spp, confidence=0.95):
     """variance_of_one_sample with its standard error and interval.
 
     Leave-one-out jackknife over seeds (Efron and Stein 1981, Ann. Stat. 9(3)): V_(i) without image i, pseudo-values n V - (n-1) V_(i), their
-    mean (which is V itself, V being a quadratic statistic) and Student's interval of it. Seeds are independent, pixels may share light paths
+    mean (which is V itself for equal spp, V being a quadratic statistic) and Student's interval of it. Seeds are independent, pixels may share light paths
     (t = 1 splats), therefore nothing is counted over pixels. Needs three images for an interval; two give the value alone, one gives NaN.
     The variances of strategies do not add up to the variance of their sum: strategies share subpaths within a sample.
     """
     x = np.asarray(images, dtype=float).reshape(len(images), -1)
-    n = len(x)
+    n, w = len(x), np.broadcast_to(np.asarray(spp, dtype=float), len(x))
     if n < 2:
         return Estimate(math.nan, math.nan, math.nan, math.nan)
     value = variance_of_one_sample(x, spp)
     if n == 2:
         return Estimate(value, math.nan, math.nan, math.nan)
-    pseudo = np.array([n * value - (n - 1) * variance_of_one_sample(np.delete(x, i, axis=0), spp) for i in range(n)])
+    pseudo = np.array([n * value - (n - 1) * variance_of_one_sample(np.delete(x, i, axis=0), np.delete(w, i)) for i in range(n)])
     error = float(pseudo.std(ddof=1)) / math.sqrt(n)
     half = float(student.ppf(0.5 + confidence / 2, n - 1)) * error
     return Estimate(value, error, max(0.0, value - half), value + half)

@@ -2,7 +2,6 @@
 
 import math
 import re
-import textwrap
 from dataclasses import dataclass
 
 import matplotlib
@@ -56,19 +55,50 @@ def colour(i):
     return COLOURS[i % len(COLOURS)]
 
 
+def marker(i):
+    """Past seven of them, each colour has another one than before."""
+    return MARKERS[(i + i // len(COLOURS)) % len(MARKERS)]
+
+
 def line_style(i):
-    """Keywords for run number i. Past seven runs colours repeat and dashes tell them apart."""
-    return {"color": colour(i), "marker": MARKERS[i % len(MARKERS)], "ls": DASHES[i // len(COLOURS) % len(DASHES)], "ms": 3, "lw": 1.2}
+    """Keywords for run number i. Past seven runs colours repeat and dashes and markers tell them apart."""
+    return {"color": colour(i), "marker": marker(i), "ls": DASHES[i // len(COLOURS) % len(DASHES)], "ms": 3, "lw": 1.2}
 
 
 def wrap(text, width=18):
-    """Long names on several lines, for titles of narrow panels."""
+    """Long names on several lines, for titles of narrow panels: a bracket on a line of its own, breaks behind + , = and spaces, elsewhere only where a part is longer than a line."""
     head, bracket, rest = text.partition("[")  # lvc[connections=4]
     if len(text) > width and head and bracket:
-        return wrap(head, width) + "\n" + wrap(bracket + rest, max(width, len(rest) + 1))
-    # Lists such as hits+next_event break behind a plus: a vertical tab is white space to textwrap, and is taken out again.
-    parts = textwrap.wrap(text.replace("+", "+\v"), width, break_long_words=True, replace_whitespace=False)
-    return "\n".join(parts).replace("\v", "") or text
+        return wrap(head, width) + "\n" + wrap(bracket + rest, width)
+    lines = [""]
+    for part in re.findall(r"[^+,= ]+[+,=]*|[+,= ]+", text):
+        while part:
+            if len(lines[-1]) + len(part.rstrip()) <= width:
+                lines[-1] += part
+                break
+            if len(part) <= width or lines[-1].strip():
+                lines.append("")
+                part = part.lstrip()
+            if len(part) > width and not lines[-1]:
+                at = part.rfind("_", 0, width) + 1 or width
+                lines[-1], part = part[:at], part[at:]
+    return "\n".join(line.strip() for line in lines if line.strip()) or text
+
+
+def fit(text, inches, points=8):
+    """wrap to a width in inches of a font of `points`."""
+    return wrap(text, max(5, int(inches * 72 / (0.6 * points))))
+
+
+def row_height(names, least):
+    """(inches of a row of bars whose labels are `names`, font size of the labels): labels of several lines do not run into each other."""
+    lines = max((name.count("\n") + 1 for name in names), default=1)
+    return (least, 7) if lines < 3 else (max(least, 0.1 * lines + 0.04), 6)
+
+
+def balanced(count, most):
+    """Columns of a grid of `count` cells, `most` beside each other, so that its rows are as even as they can be: 6 of at most 5 are 3 and 3."""
+    return math.ceil(count / math.ceil(count / most))
 
 
 def short_number(x, digits=3):
@@ -97,6 +127,11 @@ def label_log_axis(axis, limits):
     axis.set_major_locator(LogLocator(10, subs=(1.0, *between)))
     axis.set_major_formatter(FuncFormatter(plain_number))
     axis.set_minor_formatter(NullFormatter())
+
+
+def across(count, width):
+    """Panels beside each other in a figure for a "page" (None: as many as panels() takes) or a "column"."""
+    return {"page": None, "column": 1}[width] if count > 1 else 1
 
 
 def panels(count, height, columns=None, widest=2.35):

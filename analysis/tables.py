@@ -6,17 +6,19 @@ import io
 import math
 import re
 
-from analysis import summary
+from analysis import efficiency, remarks, verdicts
 
 CAPTION = (
-    "Each run at the last checkpoint that all runs of the scene have reached, of those in seconds if the experiment has both kinds. RMSE, relMSE and efficiency are geometric means over seeds, with "
-    "the noise of the reference subtracted where it is known (RMSE weighs bright pixels, relMSE all alike, and methods may rank differently by "
-    "them); time is the arithmetic mean, inside the renderer. Efficiency is 1 / (relMSE · time). The speed-up over {base} is the ratio of times"
-    " to equal RMSE, with a 95 % interval from pairs of equal seeds; a star marks times extrapolated by more than a factor of 4, a dagger that "
-    "the mean of one of both runs is off by more than chance allows. The slope is that of log RMSE against log samples, fitted for each seed; ±"
+    "Each run at the last checkpoint that all runs of the scene have reached, of those in seconds if the experiment has both kinds: equal time. All errors are of all pixels and arithmetic "
+    "means over seeds (RMSE: root of the mean of squares), with the noise of the reference subtracted where it is known; time is inside the renderer. "
+    "Efficiency is 1 / ({metric} · time), and its ratio that over {base}'s; brackets are 95 % intervals over {units}; where data cannot support one, words say why and there is no ratio. An equals sign: the run makes {base}'s images at equal seeds, so that the ratio is that of times per "
+    "sample, over pairs of seeds. "
+    "Bold: the best of a scene, if it is above every other by more than chance (1 % over all statements of the table). "
+    "Time to equal RMSE is that of {base} over the run's, from mean errors; > and < are bounds, since a time lies outside of what was measured by more than a factor of 4; a dagger marks runs whose "
+    "mean, or {base}'s, is off by more than chance allows. The slope is that of log RMSE against log samples, fitted for each seed; ±"
     " is the standard error of the mean over seeds (with one seed that of the fit, which is then too small)."
 )
-TRIMMED_CAPTION = (" Trimmed relMSE leaves out the worst {share} of the pixels; ×N is relMSE over it, mean over seeds. It is no estimate of relMSE: a method that finds light only "
+TRIMMED_CAPTION = (" Trimmed relMSE leaves out the worst {share} of the pixels; ×N is relMSE over it. It is no estimate of relMSE: a method that finds light only "
                    "in rare outliers looks better by it than it is.")
 
 
@@ -33,15 +35,25 @@ def number(x, digits=3):
 
 
 def interval(e):
+    """A value with its interval; alone where that is not stated."""
     return number(e.value) if math.isnan(e.low) else f"{number(e.value)} [{number(e.low, 2)}, {number(e.high, 2)}]"
 
 
-def speedup_text(line, base, biased):
+def ratio_text(line, base):
+    """A ratio of efficiencies with its interval, or why there is none."""
     if line.run == base:
         return "1"
-    if line.speedup is None:
+    if line.ratio is None:
         return "–"
-    return interval(line.speedup.estimate) + summary.marks(line.speedup, (line.scene, line.run) in biased or (line.scene, base) in biased)
+    return line.ratio.doubt or interval(line.ratio) + (" =" if line.ratio is line.ratio_time else "")
+
+
+def speedup_text(line, base, biased):
+    s = line.speedup
+    if line.run == base or s is None:
+        return "1" if line.run == base else "–"
+    dagger = "†" if (line.scene, line.run) in biased or (line.scene, base) in biased else ""
+    return (f"{s.sign} " if s.sign else "") + number(s.value, 2) + dagger
 
 
 def slope_text(line):
@@ -52,25 +64,38 @@ def slope_text(line):
 
 
 def trimmed_text(line):
-    return number(line.trimmed.value) + (f" (×{number(line.few_pixels.value, 2)})" if line.few_pixels else "")
+    return number(line.trimmed.value) + (f" (×{number(line.few_pixels, 2)})" if line.few_pixels > 0 else "")
 
 
-# What a person reads: heading and text of a line, which also takes base and summary.biased.
+def methods_text(line):
+    """What ran; where seeds differ, each with its seeds."""
+    if len(line.methods) < 2:
+        return next(iter(line.methods), "–")
+    return "; ".join(f"{method} (seed{'s' if len(seeds) > 1 else ''} {', '.join(map(str, seeds))})" for method, seeds in line.methods.items())
+
+
+# What a person reads: heading and text of a line, which also takes base and verdicts.biased.
 COLUMNS = {
     "scene": lambda line, *_: line.scene, "run": lambda line, *_: line.run, "seeds": lambda line, *_: str(line.seeds), "spp": lambda line, *_: number(line.spp),
-    "time (s)": lambda line, *_: number(line.seconds), "RMSE": lambda line, *_: number(line.rmse.value), "relMSE": lambda line, *_: number(line.relmse.value),
-    "trimmed relMSE": lambda line, *_: trimmed_text(line), "efficiency": lambda line, *_: number(line.efficiency.value), "speed-up [95 %]": speedup_text,
-    "slope": lambda line, *_: slope_text(line),
+    "time (s)": lambda line, *_: number(line.seconds), "relMSE": lambda line, *_: interval(line.relmse), "RMSE": lambda line, *_: interval(line.rmse),
+    "efficiency": lambda line, *_: number(line.efficiency.value), "ratio [95 %]": lambda line, base, _: ratio_text(line, base),
+    "MAPE": lambda line, *_: number(line.mape), "FLIP": lambda line, *_: number(line.flip), "FLIP median": lambda line, *_: number(line.flip_median),
+    "trimmed relMSE": lambda line, *_: trimmed_text(line), "time to equal RMSE": speedup_text, "slope": lambda line, *_: slope_text(line),
+    "method actually used": lambda line, *_: methods_text(line),
+}
+OPTIONAL = {
+    "trimmed relMSE": lambda line: not math.isnan(line.trimmed.value), "FLIP": lambda line: not math.isnan(line.flip),
+    "FLIP median": lambda line: not math.isnan(line.flip_median), "method actually used": lambda line: len(line.methods) > 1,
 }
 
 
-def has_trimmed(lines):
-    return any(not math.isnan(line.trimmed.value) for line in lines)
-
-
-def headings(lines):
-    """Those of COLUMNS for which there are numbers."""
-    return [h for h in COLUMNS if h != "trimmed relMSE" or has_trimmed(lines)]
+def headings(experiment, lines):
+    """Those of COLUMNS for which there are numbers, the error of the metric that leads before the others."""
+    shown = [h for h in COLUMNS if h not in OPTIONAL or any(OPTIONAL[h](line) for line in lines)]
+    if experiment.metric == "mse":
+        at = shown.index("relMSE")
+        shown[at:at + 2] = ["RMSE", "relMSE"]
+    return shown
 
 
 def cells(line, base, biased, shown):
@@ -79,28 +104,45 @@ def cells(line, base, biased, shown):
 
 
 def caption(experiment, lines):
-    return CAPTION.format(base=experiment.base) + (TRIMMED_CAPTION.format(share=summary.trimmed_share(experiment)) if has_trimmed(lines) else "")
+    over = {line.ratio.over for line in lines if line.ratio is not None and line.ratio.trusted}
+    units = " and ".join({"batches": "batches of passes of all seeds", "seeds": "seeds", "pairs of seeds": "pairs of seeds"}[o] for o in sorted(over)) or "seeds"
+    return (CAPTION.format(base=experiment.base, metric=efficiency.NAMES[experiment.metric], units=units)
+            + (TRIMMED_CAPTION.format(share=remarks.trimmed_share(experiment)) if "trimmed relMSE" in headings(experiment, lines) else ""))
+
+
+PARTS = ("", "_low", "_high", "_units", "_doubt")  # of a Judged
+ESTIMATES = {
+    "relmse": lambda x: x.relmse, "rmse": lambda x: x.rmse, "relmse_trimmed": lambda x: x.trimmed,
+    "efficiency_batches": lambda x: x.efficiency_batches, "efficiency_seeds": lambda x: x.efficiency_seeds,
+    "ratio_batches": lambda x: x.ratio_batches, "ratio_seeds": lambda x: x.ratio_seeds, "ratio_time": lambda x: x.ratio_time,
+}
+FITS = {"slope": lambda x: x.slope, "slope_time": lambda x: x.slope_time, "bias": lambda x: x.bias and x.bias.estimate}
+PLAIN = ("scene", "run", "seeds", "spp", "seconds", "time_per_sample", "mape", "flip", "flip_median", "rays_per_second", "averaging", "bias_z", "invalid", "few_pixels")
+
+
+def csv_columns():
+    """Names of the columns of table.csv."""
+    return [*PLAIN[:-1], "relmse_over_trimmed", *(f"{e}{part}" for e in ESTIMATES for part in PARTS), *(f"{e}{part}" for e in FITS for part in ("", "_error", "_low", "_high")),
+            "ratio_p", "differs", "best", "speedup", "speedup_bound", "speedup_at_rmse", "speedup_extrapolated", "bias_p", "method_actually_used"]
 
 
 def to_csv(lines):
-    """All numbers in full precision, for further work. Of each estimate: value, standard error (of the logarithm, but for slope and bias), ends of the interval."""
-    columns = ("scene", "run", "seeds", "spp", "seconds", "mape", "rays_per_second", "bias_z", "invalid")
-    estimates = {
-        "rmse": lambda x: x.rmse, "relmse": lambda x: x.relmse, "relmse_trimmed": lambda x: x.trimmed, "relmse_over_trimmed": lambda x: x.few_pixels,
-        "efficiency": lambda x: x.efficiency, "efficiency_ratio": lambda x: x.gain,
-        "speedup": lambda x: x.speedup and x.speedup.estimate, "slope": lambda x: x.slope, "slope_time": lambda x: x.slope_time,
-        "bias": lambda x: x.bias and x.bias.estimate,
-    }
+    """All numbers in full precision, for further work. Columns: docs/experiments.md."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*columns, *(f"{e}{part}" for e in estimates for part in ("", "_error", "_low", "_high")), "speedup_at_rmse", "speedup_extrapolated", "bias_p"])
+    writer.writerow(csv_columns())
     for line in lines:
-        row = [getattr(line, c) for c in columns]
-        for get in estimates.values():
+        row = [getattr(line, c) for c in PLAIN]
+        for get in ESTIMATES.values():
+            e = get(line)
+            row += [e.value, e.low, e.high, e.units, e.doubt] if e else [math.nan] * 3 + [0, "not recorded"]
+        for get in FITS.values():
             e = get(line)
             row += [e.value, e.error, e.low, e.high] if e else [math.nan] * 4
-        row += [line.speedup.target, line.speedup.extrapolated] if line.speedup else [math.nan] * 2
-        row.append(line.bias.p if line.bias else math.nan)
+        s = line.speedup
+        row += [line.ratio.p if line.ratio else math.nan, int(verdicts.differs(line, lines)), int(line is verdicts.best(lines, line.scene))]
+        row += [s.value, s.sign or "=", s.target, s.extrapolated] if s else [math.nan, "", math.nan, math.nan]
+        row += [line.bias.p if line.bias else math.nan, methods_text(line)]
         writer.writerow([f"{v:.9g}" if isinstance(v, float) else v for v in row])
     return out.getvalue()
 
@@ -117,7 +159,7 @@ def variances_to_csv(rows):
 
 def latex_escape(text):
     special = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"} | {c: "\\" + c for c in "&%$#_{}"}
-    symbols = {"±": r"$\pm$", "–": "--", "−": "$-$", "·": r"$\cdot$", "†": r"$^\dagger$", "≥": r"$\geq$", "×": r"$\times$"}
+    symbols = {"±": r"$\pm$", "–": "--", "−": "$-$", "·": r"$\cdot$", "†": r"$^\dagger$", "≥": r"$\geq$", "×": r"$\times$", "<": "$<$", ">": "$>$", "|": r"$|$"}
     return "".join(special.get(c) or symbols.get(c) or c for c in text)
 
 
@@ -130,29 +172,24 @@ def latex_number(text):
 
 
 def to_latex(experiment, lines):
-    """A tabular for \\usepackage{booktabs}; scenes are separated by \\midrule, the best efficiency of each scene is bold."""
-    shown = headings(lines)
+    """A tabular for \\usepackage{booktabs}; scenes are separated by \\midrule; a run that is best by more than chance is bold."""
+    shown = headings(experiment, lines)
     out = [r"% Needs \usepackage{booktabs}. " + latex_escape(caption(experiment, lines)), r"\begin{tabular}{ll" + "r" * (len(shown) - 2) + "}", r"\toprule",
            " & ".join(latex_escape(h) for h in shown) + r" \\"]
-    scene, biased = None, summary.biased(lines)
+    scene, biased = None, verdicts.biased(lines)
+    bold = {scene: verdicts.best(lines, scene) for scene in experiment.scenes}
     for line in lines:
         row = cells(line, experiment.base, biased, shown)
-        row = [latex_escape(c) for c in row[:2]] + [latex_number(c) for c in row[2:]]
+        row = [latex_escape(c) for c in row[:2]] + [latex_text(c) for c in row[2:]]
         if line.scene != scene:
             out.append(r"\midrule")
         else:
             row[0] = ""
         scene = line.scene
-        if line is best(lines, scene):
+        if line is bold.get(scene):
             row[shown.index("efficiency")] = rf"\textbf{{{row[shown.index('efficiency')]}}}"
         out.append(" & ".join(row) + r" \\")
     return "\n".join([*out, r"\bottomrule", r"\end{tabular}", ""])
-
-
-def best(lines, scene):
-    """The most efficient line of a scene; None if it has only one."""
-    rows = [line for line in lines if line.scene == scene and math.isfinite(line.efficiency.value)]
-    return max(rows, key=lambda line: line.efficiency.value) if len(rows) > 1 else None
 
 
 TEST_HEADINGS = ("scene", "run", "slope [95 %]", "bias [95 %]", "p of the bias", "greatest |z|")
@@ -182,20 +219,29 @@ def tests_to_latex(lines):
     return "\n".join([*out, r"\bottomrule", r"\end{tabular}", ""])
 
 
+NUMBER = re.compile(r"(?<![\w.])([-+]?\d[\d.]*(?:e[-+]\d+)?)(?!\w)")
+
+
 def latex_text(cell):
-    """latex_number of every number of a cell such as "-1.2e-05 [-2.0e-05, 1.0e-06]"."""
-    return re.sub(r"[-+]?\d[\d.]*(?:e[-+]\d+)?", lambda m: latex_number(m[0].lstrip("+")), cell).replace("–", "--")
+    """latex_number of every number of a cell such as "-1.2e-05 [-2.0e-05, 1.0e-06]", latex_escape of the rest."""
+    return "".join(latex_number(part.lstrip("+")) if i % 2 else latex_escape(part) for i, part in enumerate(NUMBER.split(cell)))
+
+
+def minus(text):
+    """Hyphens before numbers as minus signs."""
+    return re.sub(r"(?<![\w)])-(?=\d)|(?<=e)-(?=\d)", "−", text)
 
 
 def to_html(experiment, lines):
-    shown = headings(lines)
+    shown = headings(experiment, lines)
     head = "".join(f"<th>{html.escape(h)}</th>" for h in (*shown, "Mrays/s", "bias |z|"))
     out = [f"<table><thead><tr>{head}</tr></thead><tbody>"]
-    scene, biased = None, summary.biased(lines)
+    scene, biased = None, verdicts.biased(lines)
+    bold = {scene: verdicts.best(lines, scene) for scene in experiment.scenes}
     for line in lines:
-        row = [html.escape(c).replace("-", "−") if i > 1 else html.escape(c) for i, c in enumerate(cells(line, experiment.base, biased, shown))]
+        row = [html.escape(minus(c) if i > 1 else c) for i, c in enumerate(cells(line, experiment.base, biased, shown))]
         row += [number(line.rays_per_second / 1e6), f"{line.bias_z:.1f}"]
-        if line is best(lines, line.scene):
+        if line is bold.get(line.scene):
             row[shown.index("efficiency")] = f"<b>{row[shown.index('efficiency')]}</b>"
         kind = ' class="first"' if line.scene != scene else ""
         scene = line.scene

@@ -23,6 +23,21 @@ struct Options {
     uint64_t spp = 0;
 };
 
+/// The settings that make a reference another one than the path tracer's; empty for it. Part of its identity.
+std::string making(const RenderSettings& settings) {
+    const bool path = settings.integrator == "path";
+    std::string text;
+    const auto add = [&](const std::string& key, const std::string& value) {
+        text += (text.empty() ? "" : " ") + key + "=" + value;
+    };
+    for (const Setting& s : general_settings())
+        if (s.place != InExperiment::experiment && !s.is_default(settings) && (!path || s.what.key == "precision"))
+            add(s.what.key, s.text(settings));
+    if (!path)
+        for (const auto& [key, value] : settings.own) add(key, value);
+    return text;
+}
+
 int reference(const Options& o) {
     if (o.output.empty()) throw Error(ExitCode::usage, "-o: the reference needs a name");
     const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
@@ -30,10 +45,12 @@ int reference(const Options& o) {
     request.path = o.output;
     request.spp = o.spp;
     request.settings = o.render.settings(loaded.scene);
-    for (const char* key : {"integrator", "variant", "estimator"})
-        if (!find_general_setting(key)->is_default(request.settings))
+    for (const char* key : {"variant", "estimator"})
+        if (request.settings.integrator == "path" && !find_general_setting(key)->is_default(request.settings))
             throw Error(ExitCode::usage,
-                        "a reference is always made by integrator path, estimator mis: leave these settings out");
+                        "a reference by integrator path is made by its first variant with estimator mis: leave these "
+                        "settings out");
+    request.settings_text = making(request.settings);
     const ReferenceLock lock(o.output, nullptr);
     Hooks hooks = default_hooks();
     hooks.make_renderer = [&](const Scene& scene, const RenderSettings& settings) {
@@ -91,8 +108,9 @@ int reference(const Options& o) {
 
 void add_reference(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    CLI::App& command = *app.add_subcommand(
-        "reference", "Ground truth with its standard error, by the path tracer; continues an existing file");
+    CLI::App& command = *app.add_subcommand("reference",
+                                            "Ground truth with its standard error, by the path tracer or with --set "
+                                            "integrator=bdpt; continues an existing file");
     o->scene.add_to(command);
     o->render.add_to(command, true);
     command.add_option("-o,--output", o->output, "Reference to write or to continue (EXR)")->required();

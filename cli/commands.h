@@ -21,6 +21,7 @@ void add_info(CLI::App& app, Run& run);
 void add_reference(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_experiment(CLI::App& app, Run& run);
+void add_stress(CLI::App& app, Run& run);
 void add_bench(CLI::App& app, Run& run);
 void add_trace(CLI::App& app, Run& run);
 void add_help(CLI::App& app, Run& run);
@@ -39,7 +40,7 @@ struct SceneOptions {
 
 /// Options that say how it is rendered.
 struct RenderOptions {
-    std::string integrator = "path", variant = "wavefront", backend = "auto";
+    std::string integrator = "path", variant = "wavefront", backend = "auto", precision = "single";
     uint64_t seed = 0;
     std::optional<int> max_depth;
     bool deterministic = false;

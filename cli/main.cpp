@@ -41,13 +41,15 @@ int main(int argc, char** argv) {
     add_reference(app, run);
     add_compare(app, run);
     add_experiment(app, run);
+    add_stress(app, run);
     add_bench(app, run);
     add_trace(app, run);
     add_help(app, run);
     const auto named = [&](CLI::App* command) { return argc > 1 && command->check_name(argv[1]); };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(named).empty()) {
         log_error(fmt::format(
-            "unknown command '{}': render, info, reference, compare, experiment, bench, trace and help are known",
+            "unknown command '{}': render, info, reference, compare, experiment, stress, bench, trace and help are "
+            "known",
             argv[1]));
         return int(ExitCode::usage);
     }

@@ -344,8 +344,9 @@ std::vector<Checkpoint> ExperimentConfig::checkpoints() const {
 ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     const toml::table root = parse_toml(path);
     const Reader r{path};
-    r.check_keys(root, "the configuration",
-                 {"name", "backend", "seeds", "reference", "budget", "scene", "run", "ablation", "reduced"});
+    r.check_keys(
+        root, "the configuration",
+        {"name", "metric", "order", "backend", "seeds", "reference", "budget", "scene", "run", "ablation", "reduced"});
     const auto need = [&](std::string_view key) -> const toml::node& {
         if (const toml::node* node = root.get(key)) return *node;
         throw input_error(path, 0, fmt::format("lacks the key '{}'", key));
@@ -355,6 +356,17 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     config.name =
         root.contains("name") ? r.name(root, "the configuration") : std::filesystem::path(path).stem().string();
     if (const toml::node* backend = root.get("backend")) config.backend = read_backend(r, *backend);
+    if (const toml::node* metric = root.get("metric")) {
+        config.metric = r.text(*metric, "metric");
+        if (config.metric != "relmse" && config.metric != "mse")
+            throw r.error(*metric, fmt::format("metric '{}': must be relmse or mse", config.metric));
+    }
+    if (const toml::node* order = root.get("order")) {
+        const std::string text = r.text(*order, "order");
+        if (text != "random" && text != "listed")
+            throw r.error(*order, fmt::format("order '{}': must be random or listed", text));
+        config.random_order = text == "random";
+    }
     read_seeds(r, need("seeds"), config);
     const toml::table& reference = r.table(need("reference"), "reference");
     r.check_keys(reference, "[reference]", {"spp", "seed", "integrator", "variant", "set"});

@@ -60,6 +60,8 @@ struct ExperimentConfig {
     std::vector<uint64_t> spp;     ///< checkpoints, rising
     std::vector<double> seconds;   ///< checkpoints in seconds of render time, rising. One of both is set, or both
     std::string ablation_default;  ///< run that an ablation compares with; empty: no ablation
+    bool random_order = true;  ///< of runs and scenes within a seed, so that a machine that changes treats all alike
+    std::string metric = "relmse";  ///< error that leads the report: "relmse" or "mse"
 
     /// All checkpoints, those in samples first. Their places in this list are the column `checkpoint` of runs.csv.
     std::vector<Checkpoint> checkpoints() const;

@@ -15,8 +15,8 @@ RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& 
     if (budget.samples == 0 && !(budget.seconds > 0))
         throw Error(ExitCode::usage, "a render needs a number of samples or a time");
     if (budget.samples > kMaxSamples) throw Error(ExitCode::usage, "at most 4294967295 samples per pixel are possible");
-    double per_sample = 0;
-    uint64_t last_count = 0;
+    double& per_sample = position.per_sample;
+    uint64_t& last_count = position.last_count;
     while (!position.interrupted) {
         if (is_set(interrupt)) {
             position.interrupted = true;
@@ -34,7 +34,9 @@ RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& 
             const double left = budget.seconds - position.seconds;
             if (left <= 0 && position.samples > 0) break;
             if (per_sample > 0) {
-                if (left < 0.5 * per_sample) break;
+                // One call of a few samples that the system delayed is no measure.
+                const double mean = position.samples ? position.seconds / double(position.samples) : per_sample;
+                if (left < 0.5 * std::min(per_sample, mean)) break;
                 count = std::min(count, std::max<uint64_t>(1, uint64_t(left / per_sample)));
             }
         }

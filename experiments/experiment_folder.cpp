@@ -8,9 +8,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
-#include "core/version.h"
 #include "experiments/machine.h"
-#include "experiments/results.h"
 #include "experiments/statistics.h"
 #include "film/metrics.h"
 
@@ -18,19 +16,27 @@ namespace ambilux {
 
 namespace fs = std::filesystem;
 
+namespace {
+/// Of a folder; the analysis refuses those that it does not know.
+constexpr int kFormat = 2;
+}  // namespace
+
+FolderLock::FolderLock(const std::string& folder) : lock_(folder + "/.lock") {
+    if (!lock_.try_lock())
+        throw Error(ExitCode::device,
+                    "another experiment is writing into " + folder + ": wait for it or choose another folder");
+}
+
 ExperimentFolder::ExperimentFolder(const std::string& path, const std::string& references, bool resume,
                                    const Prepared& prepared)
     : path_(path), references_(references.empty() ? path + "/references" : references), prepared_(prepared),
       config_(prepared.config), reference_notes_(prepared.scenes.size()) {
     open(resume);
-    lock_.emplace(path_ + "/.lock");
-    if (!lock_->try_lock())
-        throw Error(ExitCode::device,
-                    "another experiment is writing into " + path_ + ": wait for it or choose another folder");
+    lock_.emplace(path_);
     remove_temporary_files();
     read_manifest();
-    lines_ = read_results(path_ + "/runs.csv");
-    write_rows();
+    runs_.emplace(path_ + "/runs.csv", kResultHeader);
+    batches_.emplace(path_ + "/batches.csv", kBatchHeader);
 }
 
 void ExperimentFolder::open(bool resume) const {
@@ -71,32 +77,14 @@ void ExperimentFolder::remove_temporary_files() const {
     for (const fs::path& temporary : found) fs::remove(temporary, ignored);
 }
 
-size_t ExperimentFolder::rows(const std::string& prefix) const {
-    return size_t(
-        std::count_if(lines_.begin(), lines_.end(), [&](const std::string& line) { return line.starts_with(prefix); }));
-}
-
-void ExperimentFolder::add_row(const std::string& line) {
-    if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return;
-    append_file(path_ + "/runs.csv", line + "\n");
-    lines_.push_back(line);
-}
-
-void ExperimentFolder::remove_rows(const std::string& prefix) {
-    if (std::erase_if(lines_, [&](const std::string& line) { return line.starts_with(prefix); }) > 0) write_rows();
-}
-
-void ExperimentFolder::write_rows() const {
-    std::string text = std::string(kResultHeader) + "\n";
-    for (const std::string& line : lines_) text += line + "\n";
-    write_file_atomic(path_ + "/runs.csv", text);
-}
-
 /// Scenes must be those of the earlier part.
 void ExperimentFolder::read_manifest() {
     const std::string path = path_ + "/manifest.json";
     if (!fs::exists(path)) {
-        manifest_ = {{"date", utc_now()}, {"resumed", nlohmann::json::array()}, {"clocks", nlohmann::json::array()}};
+        manifest_ = {{"date", utc_now()},
+                     {"resumed", nlohmann::json::array()},
+                     {"clocks", nlohmann::json::array()},
+                     {"commands", {command_line()}}};
         return;
     }
     manifest_ = nlohmann::json::parse(read_file(path), nullptr, false);
@@ -107,6 +95,7 @@ void ExperimentFolder::read_manifest() {
                 throw input_error(scene.entry->path, 0,
                                   "has changed since the experiment began: choose another folder");
     manifest_["resumed"].push_back(utc_now());
+    manifest_["commands"].push_back(command_line());
 }
 
 void ExperimentFolder::add_clocks(const std::string& when) {
@@ -145,9 +134,11 @@ nlohmann::json ExperimentFolder::describe_runs() const {
 }
 
 void ExperimentFolder::write_manifest(bool finished) {
+    manifest_["format"] = kFormat;
     manifest_["name"] = config_.name;
     manifest_["config"] = config_.file;
-    manifest_["versions"] = {{"ambilux", version()}, {"git_revision", git_revision()}, {"compiler", compiler()}};
+    manifest_["versions"] = describe_versions();
+    manifest_["order"] = config_.random_order ? "random" : "listed";
     manifest_["machine"] = describe_machine();
     manifest_["devices"] = prepared_.devices;
     manifest_["backends"] = prepared_.backends;

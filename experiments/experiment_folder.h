@@ -8,8 +8,18 @@
 
 #include "core/file_lock.h"
 #include "experiments/prepare.h"
+#include "experiments/results.h"
 
 namespace ambilux {
+
+/// Keeps a second process out of the folder. Throws Error(device) if one is in it.
+class FolderLock {
+public:
+    explicit FolderLock(const std::string& folder);
+
+private:
+    FileLock lock_;
+};
 
 class ExperimentFolder {
 public:
@@ -22,11 +32,8 @@ public:
     std::string file(const std::string& folder, const LoadedEntry& scene, const std::string& name) const;
     void remove_states() const;
 
-    /// Rows of runs.csv that begin with `prefix`.
-    size_t rows(const std::string& prefix) const;
-    /// Appends a row unless the file has it.
-    void add_row(const std::string& line);
-    void remove_rows(const std::string& prefix);
+    ResultTable& runs() { return *runs_; }
+    ResultTable& batches() { return *batches_; }
 
     void add_clocks(const std::string& when);
     /// That an earlier part of the experiment wrote here.
@@ -39,15 +46,14 @@ private:
     void open(bool resume) const;
     void remove_temporary_files() const;
     void read_manifest();
-    void write_rows() const;
     nlohmann::json describe_scenes() const;
     nlohmann::json describe_runs() const;
 
     const std::string path_, references_;
     const Prepared& prepared_;
     const ExperimentConfig& config_;
-    std::optional<FileLock> lock_;
-    std::vector<std::string> lines_;  ///< of runs.csv
+    std::optional<FolderLock> lock_;
+    std::optional<ResultTable> runs_, batches_;
     nlohmann::json manifest_;
     std::vector<nlohmann::json> reference_notes_;  ///< by scene
 };

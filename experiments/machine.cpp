@@ -1,6 +1,7 @@
 #include "experiments/machine.h"
 
 #include <sys/utsname.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -11,12 +12,18 @@
 #include <thread>
 
 #include "backends/cuda_device.h"
+#include "core/version.h"
 
 namespace ambilux {
 
 nlohmann::json describe_machine() {
-    nlohmann::json machine = {
-        {"cpu", nullptr}, {"cores", std::thread::hardware_concurrency()}, {"system", nullptr}, {"driver", nullptr}};
+    nlohmann::json machine = {{"cpu", nullptr},
+                              {"cores", std::thread::hardware_concurrency()},
+                              {"memory_bytes", nullptr},
+                              {"system", nullptr},
+                              {"driver", nullptr}};
+    if (const long pages = ::sysconf(_SC_PHYS_PAGES), size = ::sysconf(_SC_PAGESIZE); pages > 0 && size > 0)
+        machine["memory_bytes"] = uint64_t(pages) * uint64_t(size);
     std::ifstream cpu("/proc/cpuinfo");
     for (std::string line; std::getline(cpu, line);)
         if (line.starts_with("model name")) {
@@ -50,9 +57,9 @@ nlohmann::json parse_gpu_clocks(const std::string& lines) {
     return gpus;
 }
 
-nlohmann::json describe_clocks(const std::string& when, bool cuda) {
-    nlohmann::json clocks = {{"when", when}, {"date", utc_now()}, {"cpu_mhz", nullptr}, {"gpu", nullptr}};
-    double lowest = 0, highest = 0, sum = 0;
+CpuMhz cpu_mhz() {
+    CpuMhz found;
+    double sum = 0;
     int cores = 0;
     std::ifstream cpu("/proc/cpuinfo");
     for (std::string line; std::getline(cpu, line);) {
@@ -62,12 +69,38 @@ nlohmann::json describe_clocks(const std::string& when, bool cuda) {
         if (at == std::string::npos ||
             std::from_chars(line.data() + at + 2, line.data() + line.size(), mhz).ec != std::errc())
             continue;
-        lowest = cores ? std::min(lowest, mhz) : mhz;
-        highest = std::max(highest, mhz);
+        found.lowest = cores ? std::min(found.lowest, mhz) : mhz;
+        found.highest = std::max(found.highest, mhz);
         sum += mhz;
         ++cores;
     }
-    if (cores) clocks["cpu_mhz"] = {{"lowest", lowest}, {"mean", sum / cores}, {"highest", highest}};
+    if (cores) found.mean = sum / cores;
+    return found;
+}
+
+nlohmann::json describe_versions() {
+    nlohmann::json versions = {{"ambilux", version()},           {"git_revision", git_revision()},
+                               {"compiler", compiler()},         {"flags", AMBILUX_BUILD_FLAGS},
+                               {"embree", AMBILUX_EMBREE},       {"tbb", AMBILUX_TBB},
+                               {"cuda", nlohmann::json(nullptr)}};
+    if (const std::string cuda = AMBILUX_CUDA; !cuda.empty()) versions["cuda"] = cuda;
+    return versions;
+}
+
+std::string command_line() {
+    std::ifstream in("/proc/self/cmdline", std::ios::binary);
+    std::string line, argument;
+    while (std::getline(in, argument, '\0')) {
+        const bool plain = argument.find_first_of(" \t\n\"'$\\*?") == std::string::npos && !argument.empty();
+        line += (line.empty() ? "" : " ") + (plain ? argument : "'" + argument + "'");
+    }
+    return line;
+}
+
+nlohmann::json describe_clocks(const std::string& when, bool cuda) {
+    nlohmann::json clocks = {{"when", when}, {"date", utc_now()}, {"cpu_mhz", nullptr}, {"gpu", nullptr}};
+    if (const CpuMhz mhz = cpu_mhz(); mhz.mean > 0)
+        clocks["cpu_mhz"] = {{"lowest", mhz.lowest}, {"mean", mhz.mean}, {"highest", mhz.highest}};
     const std::string id = cuda ? cuda_device_bus_id() : "";
     if (id.empty()) return clocks;
     // A driver in trouble may not answer, hence the limit.

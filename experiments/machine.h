@@ -6,13 +6,25 @@
 
 namespace ambilux {
 
-/// cpu (model), cores, system, driver (of NVIDIA devices; null without), read from /proc.
+/// cpu (model), cores, memory_bytes, system, driver (of NVIDIA devices; null without), read from /proc.
 nlohmann::json describe_machine();
+
+struct CpuMhz {
+    double lowest = 0, mean = 0, highest = 0;  ///< over cores; 0: unknown
+};
+/// From /proc/cpuinfo.
+CpuMhz cpu_mhz();
 
 /// What the clocks run at now, as {when, cpu_mhz {lowest, mean, highest}, gpu [{sm_mhz, memory_mhz, celsius}]}: figures
 /// of a machine that was throttled or shared can be told. From /proc/cpuinfo and nvidia-smi; null where those do not
 /// say. `cuda`: a device renders, whose clocks they are; else null. A GPU without work shows its idle clocks.
 nlohmann::json describe_clocks(const std::string& when, bool cuda);
+
+/// What the program and its libraries are: ambilux, git_revision, compiler, flags, embree, tbb, cuda (null without).
+nlohmann::json describe_versions();
+
+/// How this process was called.
+std::string command_line();
 
 /// The "gpu" list from nvidia-smi's lines "1980, 2619, 41"; what is no number becomes null.
 nlohmann::json parse_gpu_clocks(const std::string& lines);

@@ -95,7 +95,7 @@ public:
         while (position.samples < request_.spp && !position.interrupted) {
             const uint64_t before = position.samples;
             // A checkpoint's time ends drive(); it makes at least one sample.
-            const double due = position.seconds + std::max(request_.checkpoint_seconds, 1e-3);
+            const double due = position.seconds + std::max({request_.checkpoint_seconds, 1e-3, position.per_sample});
             position = drive(renderer, position, {request_.spp, due}, request_.interrupt, request_.on_batch);
             if (position.samples == before) continue;
             total_.add(renderer.film());

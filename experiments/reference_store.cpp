@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <thread>
 #include <vector>
@@ -81,6 +82,25 @@ ReferenceLock::ReferenceLock(const std::string& path, const volatile bool* inter
         std::this_thread::sleep_for(std::chrono::milliseconds(200));
     }
     held_ = true;
+}
+
+nlohmann::json describe_reference(const ReferencePlace& place, const Reference& image, const Attributes& attributes,
+                                  const std::string& folder, uint64_t seed) {
+    namespace fs = std::filesystem;
+    double noise = 0;
+    for (const float se : image.standard_error.rgb) noise += double(se) * double(se);
+    const fs::path absolute = fs::absolute(place.path).lexically_normal();
+    const fs::path inside = absolute.lexically_relative(fs::absolute(folder).lexically_normal());
+    const bool is_inside = !inside.empty() && *inside.begin() != "..";
+    return {{"file", (is_inside ? inside : absolute).string()},
+            {"spp", image.samples},
+            {"seed", seed},
+            {"integrator", place.settings.integrator},
+            {"settings", place.settings_text},
+            {"noise", std::sqrt(noise / double(image.standard_error.rgb.size()))},
+            {"seconds", attributes.value("seconds", 0.0)},
+            {"backend", attributes.value("backend", "")},
+            {"git_revision", attributes.value("git_revision", "")}};
 }
 
 }  // namespace ambilux

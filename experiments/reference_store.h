@@ -41,4 +41,8 @@ private:
     bool held_ = false;
 };
 
+/// What a manifest says of a reference. `folder`: of the experiment; files inside it are named relative to it.
+nlohmann::json describe_reference(const ReferencePlace& place, const Reference& image, const Attributes& attributes,
+                                  const std::string& folder, uint64_t seed);
+
 }  // namespace ambilux

@@ -27,6 +27,8 @@ std::string resolved_toml(const ExperimentConfig& config) {
     };
     toml::table root;
     root.insert("name", config.name);
+    root.insert("metric", config.metric);
+    root.insert("order", config.random_order ? "random" : "listed");
     root.insert("backend", config.backend);
     toml::array seeds, scenes, runs, spp, seconds;
     for (const uint64_t seed : config.seeds) seeds.push_back(int64_t(seed));

@@ -9,8 +9,11 @@
 #include "core/atomic_file.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "experiments/batches.h"
 #include "experiments/drive.h"
 #include "experiments/experiment_folder.h"
+#include "experiments/load.h"
+#include "experiments/machine.h"
 #include "experiments/prepare.h"
 #include "experiments/reference_store.h"
 #include "experiments/results.h"
@@ -69,9 +72,9 @@ public:
             if (!make_scene_reference(i)) return stopped();
         folder_.write_manifest(false);
         for (const uint64_t seed : config_.seeds)
-            for (size_t i = 0; i < prepared_.scenes.size(); ++i)
-                for (const RunEntry& run : config_.runs)
-                    if (!render(i, run, seed)) return stopped();
+            for (const auto& [scene, run] :
+                 render_order(prepared_.scenes.size(), config_.runs.size(), seed, config_.random_order))
+                if (!render(scene, config_.runs[run], seed)) return stopped();
         folder_.remove_states();
         folder_.add_clocks("end");
         folder_.write_manifest(true);
@@ -145,25 +148,9 @@ private:
             log_warning(fmt::format("reference of {}: {} invalid values dropped", scene.entry->name,
                                     result.stats.invalid.total()));
         write_png(folder_.file("images", scene, "reference.png"), made.image.mean);
-        folder_.describe_reference(index, describe(made, result.attributes));
+        folder_.describe_reference(index, describe_reference(made.place, made.image, result.attributes, folder_.path(),
+                                                             config_.reference_seed));
         return true;
-    }
-
-    nlohmann::json describe(const SceneReference& made, const Attributes& attributes) const {
-        double noise = 0;
-        for (const float se : made.image.standard_error.rgb) noise += double(se) * double(se);
-        const fs::path absolute = fs::absolute(made.place.path).lexically_normal();
-        const fs::path inside = absolute.lexically_relative(fs::absolute(folder_.path()).lexically_normal());
-        const bool is_inside = !inside.empty() && *inside.begin() != "..";
-        return {{"file", (is_inside ? inside : absolute).string()},
-                {"spp", made.image.samples},
-                {"seed", config_.reference_seed},
-                {"integrator", made.place.settings.integrator},
-                {"settings", made.place.settings_text},
-                {"noise", std::sqrt(noise / double(made.image.standard_error.rgb.size()))},
-                {"seconds", attributes.value("seconds", 0.0)},
-                {"backend", attributes.value("backend", "")},
-                {"git_revision", attributes.value("git_revision", "")}};
     }
 
     RenderTask make_task(size_t index, const RunEntry& run, uint64_t seed) const {
@@ -180,28 +167,41 @@ private:
                         {},
                         {},
                         {}};
-        task.state.notes = {{"seconds", 0.0}, {"done", nlohmann::json::array()}, {"rows", nlohmann::json::array()}};
+        task.state.notes = {{"seconds", 0.0},
+                            {"done", nlohmann::json::array()},
+                            {"rows", nlohmann::json::array()},
+                            {"batches", nlohmann::json::array()}};
         return task;
     }
 
     /// One render through all of its checkpoints; false if interrupted.
     bool render(size_t index, const RunEntry& run, uint64_t seed) {
         RenderTask task = make_task(index, run, seed);
-        if (folder_.rows(task.prefix) == checkpoints_.size() && !fs::exists(task.state_path)) {
+        if (folder_.runs().count(task.prefix) == checkpoints_.size() && !fs::exists(task.state_path)) {
             work_.skip(task.work);
             return true;
         }
         restore(task);
         task.settings = settings_for(config_, task.scene, run, seed, hooks_);
         const std::unique_ptr<Renderer> renderer = hooks_.make_renderer(task.scene.scene, settings_to_make(task));
-        if (!pass_checkpoints(task, *renderer)) return false;
+        const bool cuda = prepared_.backends.contains("cuda");
+        const LoadReading load = read_load();
+        const bool whole = pass_checkpoints(task, *renderer);
+        nlohmann::json machine = load_json(load, read_load());
+        machine["clocks"] = describe_clocks("after", cuda);
+        task.state.notes["machine"].push_back(machine);
+        if (!whole) {
+            if (task.state.moments.samples && !run.techniques) write_state(task.state_path, task.state);
+            return false;
+        }
         work_.end(task.work);
         finish(task);
         if (run.techniques) {
             write_technique_images(folder_.file("techniques", task.scene, task.name), task.scene.scene, task.settings,
                                    task.stated(), renderer->strategy_images());
-            for (const auto& line : task.state.notes["rows"]) folder_.add_row(line.get<std::string>());
+            folder_.runs().add(task.state.notes["rows"].get<std::vector<std::string>>());
         }
+        folder_.batches().add(task.state.notes["batches"].get<std::vector<std::string>>());
         std::error_code ignored;
         fs::remove(task.state_path, ignored);
         return true;
@@ -218,10 +218,13 @@ private:
         } else if (auto saved = read_state(task.state_path)) {
             state = std::move(*saved);
             task.total = restore_stats(state.notes["stats"]);
-            for (const auto& line : state.notes["rows"]) folder_.add_row(line.get<std::string>());
+            for (const auto& line : state.notes["rows"]) folder_.runs().add(line.get<std::string>());
         }
         // Rows whose state is lost are made anew.
-        if (state.notes["rows"].empty()) folder_.remove_rows(task.prefix);
+        if (state.notes["rows"].empty()) {
+            folder_.runs().remove(task.prefix);
+            folder_.batches().remove(task.prefix);
+        }
         const auto& done = state.notes["done"];
         for (size_t k = 0; k < checkpoints_.size(); ++k)
             if (std::find(done.begin(), done.end(), k) == done.end()) task.pending.push_back(k);
@@ -250,37 +253,50 @@ private:
         work_.begin(task.work, work_after(task.scene, position));
         RenderStats counted = renderer.stats();
         while (!task.pending.empty()) {
-            const Budget budget = next_budget(task.pending);
-            const uint64_t before = position.samples;
+            const Budget budget = next_budget(task.pending, position);
+            const RenderPosition before = position;
+            const LoadReading load = read_load();
             position = drive_showing(task, renderer, position, budget);
+            const LoadReading after = read_load();
             add_part(task.total, counted, renderer.stats());
             state.notes["seconds"] = position.seconds;
-            // The film restarts at each checkpoint, so that a resumed render adds the same numbers in the same order as
-            // an uninterrupted one.
-            if (position.samples > before) {
-                state.moments.add(renderer.film());
+            // The film restarts at each checkpoint and with each batch, so that a resumed render adds the same numbers
+            // in the same order as an uninterrupted one.
+            if (position.samples > before.samples) {
+                const FilmMoments film = renderer.film();
+                if (!position.interrupted)
+                    record_batch(task, film, position.seconds - before.seconds, other_cores(load, after));
+                state.moments.add(film);
                 renderer.clear_film();
             }
             counted = renderer.stats();  // a renderer may or may not restart its counters with its film
             state.notes["stats"] = save_stats(task.total);
-            if (position.interrupted) {
-                if (state.moments.samples && !task.run.techniques) write_state(task.state_path, state);
-                return false;
-            }
+            if (position.interrupted) return false;
             record_checkpoints(task, position, budget);
         }
         return true;
     }
 
-    /// Until the first of the pending checkpoints.
-    Budget next_budget(const std::vector<size_t>& pending) const {
+    /// Until the first of the pending checkpoints, or the end of a batch if that comes sooner by half a batch or more.
+    Budget next_budget(const std::vector<size_t>& pending, const RenderPosition& at) const {
         Budget budget;
         for (const size_t k : pending) {
             const Checkpoint& c = checkpoints_[k];
             if (c.samples) budget.samples = budget.samples ? std::min(budget.samples, c.samples) : c.samples;
             if (c.seconds > 0) budget.seconds = budget.seconds > 0 ? std::min(budget.seconds, c.seconds) : c.seconds;
         }
-        return budget;
+        return batch_end(config_, at, budget);
+    }
+
+    void record_batch(RenderTask& task, const FilmMoments& film, double seconds, double others) const {
+        nlohmann::json& lines = task.state.notes["batches"];
+        BatchRow b = measure_batch(film, references_made_[task.scene_index].image, seconds);
+        b.scene = task.scene.entry->name;
+        b.run = task.run.name;
+        b.seed = task.settings.seed;
+        b.batch = lines.size();
+        b.other_cores = others;
+        lines.push_back(batch_line(b));
     }
 
     RenderPosition drive_showing(const RenderTask& task, Renderer& renderer, const RenderPosition& from,
@@ -313,8 +329,9 @@ private:
             }
         std::erase_if(task.pending, reached);
         if (task.run.techniques) return;  // its rows wait until all of its files are there
+        if (lines.empty()) return;
         write_state(task.state_path, task.state);
-        for (const std::string& line : lines) folder_.add_row(line);
+        for (const std::string& line : lines) folder_.runs().add(line);
     }
 
     ResultRow row(const RenderTask& task, size_t k) const {
@@ -324,9 +341,11 @@ private:
         r.seed = task.settings.seed;
         r.checkpoint = k;
         r.budget = checkpoints_[k].samples ? "spp" : "seconds";
-        r.integrator = task.settings.integrator;
-        r.variant = task.settings.variant;
-        r.estimator = setting_text(task.settings, "estimator");
+        const RenderSettings used = used_settings(task.settings, task.total);
+        r.integrator = used.integrator;
+        r.variant = used.variant;
+        r.estimator = setting_text(used, "estimator");
+        r.method = method_text(used);
         r.backend = task.total.backend;
         r.spp = task.state.moments.samples;
         r.time = task.state.notes["seconds"].get<double>();
@@ -349,7 +368,8 @@ private:
         if (task.total.invalid.total())
             log_warning(fmt::format("{} {}: {} invalid values dropped", task.scene.entry->name, task.name,
                                     task.total.invalid.total()));
-        const nlohmann::json json = stats_json(task.scene.scene, task.settings, task.stated(), task.scene.load_seconds);
+        nlohmann::json json = stats_json(task.scene.scene, task.settings, task.stated(), task.scene.load_seconds);
+        json["machine"] = task.state.notes["machine"];
         write_file_atomic(folder_.file("stats", task.scene, task.name + ".json"),
                           json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
     }

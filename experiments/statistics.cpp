@@ -63,6 +63,26 @@ RenderSettings used_settings(const RenderSettings& asked, const RenderStats& sta
     return used;
 }
 
+std::string method_text(const RenderSettings& used) {
+    const Variant* const variant = find_variant(used.integrator, used.variant);
+    const VariantTraits traits = variant ? variant->traits : VariantTraits{};
+    RenderSettings plain;
+    plain.integrator = used.integrator;
+    plain.variant = used.variant;
+    std::string text = used.integrator + (used.variant.empty() ? "" : " " + used.variant);
+    const auto add = [&](const Setting& s, bool always) {
+        if (s.place != InExperiment::experiment && s.in_images && s.what.key != "integrator" &&
+            s.what.key != "variant" && s.applies_to(traits, used.backend == Backend::cuda) &&
+            (always || s.text(used) != s.text(plain)))
+            text += " " + s.what.key + "=" + s.text(used);
+    };
+    // How many connections a vertex makes is part of a method's name in the literature, its default included.
+    for (const Setting& s : general_settings()) add(s, s.place == InExperiment::run_key || s.what.key == "connections");
+    if (variant)
+        for (const Setting& s : variant->own) add(s, true);
+    return text;
+}
+
 nlohmann::json settings_json(const RenderSettings& settings) {
     nlohmann::json json = nlohmann::json::object();
     for (const Setting& s : general_settings())
@@ -87,9 +107,11 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const
     invalid["by_stage"] = nlohmann::json::object();
     for (const auto& [stage, counts] : stats.invalid_by_stage) invalid["by_stage"][stage] = invalid_json(counts);
     const double rays = double(stats.rays_extend) + double(stats.rays_occlude);
-    nlohmann::json json = settings_json(used_settings(asked, stats));
+    const RenderSettings used = used_settings(asked, stats);
+    nlohmann::json json = settings_json(used);
     json.update(
         {{"asked", settings_json(asked)},
+         {"method", method_text(used)},
          {"scene", scene.path},
          {"scene_hash", scene_hash(scene)},
          {"warnings", scene.warnings},
@@ -124,6 +146,11 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& asked, con
                              {"software", fmt::format("ambilux {}", version())},
                              {"git_revision", git_revision()}};
     const RenderSettings settings = used_settings(asked, stats);
+    attributes["method"] = method_text(settings);
+    attributes["settings"] = settings_json(settings).dump();
+    std::string kernels;
+    for (const std::string& f : stats.features) kernels += (kernels.empty() ? "" : " ") + f;
+    attributes["features"] = kernels;
     const Variant* const variant = find_variant(settings.integrator, settings.variant);
     const VariantTraits traits = variant ? variant->traits : VariantTraits{};
     const auto add = [&](const Setting& s) {

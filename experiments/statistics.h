@@ -15,6 +15,10 @@ std::string scene_hash(const Scene& scene);
 /// The settings that a render ran with: bdpt.auto replaces some of those asked for, the renderer those left open.
 RenderSettings used_settings(const RenderSettings& asked, const RenderStats& stats);
 
+/// What ran, in a line: integrator, variant, what the variant has of its own, and all that changes the estimator from
+/// its default, such as "bdpt lvc connections=16 light_paths=0.25".
+std::string method_text(const RenderSettings& used);
+
 /// All settings by key (integrators/settings.cpp), and those of the variant's own.
 nlohmann::json settings_json(const RenderSettings& settings);
 

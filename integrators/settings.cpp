@@ -60,6 +60,7 @@ bool sorts(const VariantTraits& v, bool) { return v.sorts; }
 bool compacts(const VariantTraits& v, bool) { return v.compacts; }
 bool repeats(const VariantTraits& v, bool cuda) { return v.repeats || !cuda; }
 bool has_binary_bvh(const VariantTraits& v, bool cuda) { return v.binary_bvh && cuda; }
+bool has_twin(const VariantTraits& v, bool cuda) { return v.in_double && !cuda; }
 bool on_cpu(const VariantTraits&, bool cuda) { return !cuda; }
 bool on_cuda(const VariantTraits&, bool cuda) { return cuda; }
 
@@ -77,6 +78,11 @@ std::vector<Setting> main_settings() {
             .image_attribute(),
         Is(Of::choice("backend", &S::backend, {"auto", "cpu", "cuda"},
                       "where it runs; auto takes a CUDA device if there is one")),
+        Is(Of::choice("precision", &S::precision, {"single", "double"},
+                      "numbers that paths are computed with; double: a plain loop on the CPU, slow, as a reference for "
+                      "rounding"))
+            .limit("double", has_twin, "it has no twin in double precision")
+            .image_attribute(),
         Is(Of::number("seed", &S::seed, uint64_t(0), ~uint64_t(0), "seed of all random numbers"))
             .not_in_runs("the experiment (seeds)")
             .image_attribute(),

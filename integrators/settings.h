@@ -29,6 +29,12 @@ enum class CacheDraws : uint32_t {
 /// Where a render runs.
 enum class Backend : uint32_t { automatic, cpu, cuda };
 
+/// Numbers that paths are computed with.
+enum class Precision : uint32_t {
+    single,    ///< floats
+    in_double  ///< by the renderer's twin (render/twin/twin.h)
+};
+
 /// The structure that rays are traced through: of a host Embree's (automatic) or the one built for CUDA, of a device
 /// the latter (automatic) or a binary BVH to compare with.
 enum class AccelKind : uint32_t { automatic, embree, cwbvh, bvh2 };
@@ -54,6 +60,7 @@ constexpr float kRouletteCap = 0.95f;
 struct RenderSettings {
     std::string integrator = "path", variant = "wavefront";  ///< names of a Variant (registry.h)
     Choice<Backend> backend = Backend::automatic;
+    Precision precision = Precision::single;
     Estimator estimator = Estimator::mis;
     MisHeuristic heuristic = MisHeuristic::balance;
     uint32_t strategies = kAllStrategies;  ///< StrategyBits

@@ -17,6 +17,7 @@ struct VariantTraits {
     bool repeats = true;           ///< on a device too, bits repeat with deterministic=true
     bool binary_bvh = false;       ///< has kernels for accel=bvh2
     bool streams = false;          ///< a wave holds more paths than it has slots
+    bool in_double = false;        ///< has a twin in double precision (render/twin/twin.h)
     bool finds_all_light = false;  ///< with its default settings: may make references
 };
 

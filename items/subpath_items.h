@@ -8,7 +8,7 @@
 namespace ambilux {
 
 /// Depth (kDepthBits), whether the last scattering was a delta (1 bit), and Subpath::roulette_scale (the upper 16 bits
-/// of a float, rounded_scale).
+/// of a float, rounded_scale). All exactly.
 struct SubpathBits {
     uint32_t bits;
 
@@ -119,7 +119,7 @@ struct SubpathItems<BidirectionalMis> {
             r.sums_or_start[0] = p.start.inv_pdf;
             r.sums_or_start[1] = p.start.direction;
             r.start[0] = p.start.prim;
-            r.start[1] = p.start.emitter | opacity_step(p.start.opacity) << kTicketBits;
+            r.start[1] = p.start.emitter | p.start.opacity_step << kTicketBits;
         } else if (p.depth == 1) {
             r.start[0] = float_bits(p.start.camera_distance);
         }
@@ -131,12 +131,8 @@ struct SubpathItems<BidirectionalMis> {
         p.direction = r.direction;
         p.throughput = r.throughput;
         p.sums = {r.sums_or_start[0], r.sums_or_start[1]};
-        p.start = {r.sums_or_start[0],
-                   r.sums_or_start[1],
-                   r.start[0],
-                   r.start[1] & (kTickets - 1),
-                   float(r.start[1] >> kTicketBits) / float(kOpacitySteps),
-                   bits_float(r.start[0])};
+        p.start = {r.sums_or_start[0],          r.sums_or_start[1],        r.start[0],
+                   r.start[1] & (kTickets - 1), r.start[1] >> kTicketBits, bits_float(r.start[0])};
         p.depth = r.bits.depth();
         p.roulette_scale = r.bits.roulette_scale();
         p.delta = r.bits.delta();

@@ -57,7 +57,7 @@ struct ConnectionVertexFront {
 };
 
 /// A vertex to be connected with one of the other subpath, in few bytes: kernels that do so wait for memory. Directions
-/// are octahedral maps in whole floats, exact within rounding.
+/// are octahedral maps in whole floats, right to 5e-7.
 struct ConnectionVertex {
     static constexpr uint32_t kPairedLanes = 6;
     static constexpr uint32_t kDiffuseLanes = 4;  ///< what there is of a diffuse one

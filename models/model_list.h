@@ -107,14 +107,15 @@ public:
     template <class Struct>
     AMBILUX_HD void set(const Struct& s) {
         static_assert((std::is_same_v<Struct, Structs> || ...));
-        static_assert(std::is_trivially_copyable_v<Struct> && (std::is_empty_v<Struct> || alignof(Struct) == 4));
+        static_assert(std::is_trivially_copyable_v<Struct> &&
+                      (std::is_empty_v<Struct> || alignof(Struct) % sizeof(Word) == 0));
         if constexpr (!std::is_empty_v<Struct>) memcpy(words_, &s, sizeof s);
     }
 
 private:
     using Word __attribute__((may_alias)) = uint32_t;
 
-    Word words_[std::max({sizeof(Structs)...}) / 4] = {};
+    alignas(Word) alignas(Structs...) Word words_[std::max({sizeof(Structs)...}) / 4] = {};
 };
 
 }  // namespace ambilux

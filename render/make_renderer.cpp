@@ -5,6 +5,7 @@
 #include "integrators/registry.h"
 #include "render/make_on_backend.h"
 #include "render/selection.h"
+#include "render/twin/twin.h"
 
 namespace ambilux {
 namespace {
@@ -47,9 +48,11 @@ std::unique_ptr<Renderer> make_on(bool cuda, const Scene& scene, const RenderSet
 
 std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
     const Variant& variant = variant_of(settings);
-    const bool open = settings.backend == Backend::automatic && settings.accel != AccelKind::embree;
+    const bool in_double = settings.precision == Precision::in_double;
+    const bool open = settings.backend == Backend::automatic && settings.accel != AccelKind::embree && !in_double;
     const bool cuda = settings.backend == Backend::cuda || (open && cuda_available());
     check_settings(settings, variant, cuda);
+    if (in_double) return make_twin(scene, settings);
     if (settings.automatic)
         return make_automatic(scene, settings, cuda, accels,
                               [&](const RenderSettings& chosen) { return make_from(scene, chosen, accels); });

@@ -1,6 +1,7 @@
 // The scene as kernels see it: plain records in flat arrays, the same on the host and on a device.
 #pragma once
 
+#include "core/float32.h"
 #include "core/math.h"
 #include "models/features.h"
 #include "models/sensor_list.h"
@@ -94,7 +95,7 @@ struct Material {
 /// load serves sampling and density.
 struct EnvironmentCell {
     uint32_t threshold, alias;  ///< as in AliasBucket; the alias is a column
-    float pdf, alias_pdf;       ///< of the bucket's own cell and of the alias, per unit square of (u,v), the row's
+    float32 pdf, alias_pdf;     ///< of the bucket's own cell and of the alias, per unit square of (u,v), the row's
                                 ///< probability included
 };
 
@@ -157,8 +158,8 @@ struct SceneView {
     const uint8_t* texels;
     const uint16_t* sort_keys;  ///< per primitive: its material, kMostSortKeys - 1 at most
     const Emitter* emitters;
-    const float* emitter_cdf;  ///< emitter_count+1 floats: cumulative pick_probability
-    const float* tables;
+    const float32* emitter_cdf;  ///< emitter_count+1 floats: cumulative pick_probability
+    const float32* tables;
     uint32_t vertex_count, triangle_count, quadric_count, shape_count, material_count, bsdf_count, texture_count,
         emitter_count;
     uint32_t environment;  ///< index of the constant or envmap emitter, or kNone

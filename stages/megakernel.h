@@ -166,6 +166,10 @@ private:
             ray = {s.path.origin, s.tmax, s.path.direction, 0};
             if constexpr (F.opacity) ray.alpha_seed = draws(s).opacity_seed(s.path.depth);
         }
+        StageRecord* const tracing = s.testing               ? records.occlude
+                                     : s.side == Side::light ? records.light_extend
+                                                             : records.extend;
+        if (!is_valid_ray(ray.o, ray.d, tracing)) return s.testing;  // its light does not arrive
         return tracer.template trace<F>(scene, ray, s.testing, hit);
     }
 

@@ -9,14 +9,13 @@
 
 namespace ambilux {
 
-/// Light `value` of a strategy times its weight. False if that is nothing, or no radiance; light below the range of
-/// floats is counted, but not where the weight says that other strategies have it.
+/// Light `value`, not zero, of a strategy times its weight. False if that is nothing, or no radiance; light below the
+/// range of floats is counted, but not where the weight says that other strategies have it.
 AMBILUX_HD bool weighted_light(Rgb value, float ratio, StageRecord* record, Rgb& weighted) {
-    const float weight = mis_weight(ratio);
-    weighted = value * weight;
+    weighted = value * mis_weight(ratio);
     if (!is_valid_radiance(weighted, record)) return false;
     if (!is_zero(weighted)) return true;
-    if (weight >= 0x1p-24f && !is_zero(value)) add_count(&record->underflow, 1);
+    if (ratio <= 0x1p24f) add_count(&record->underflow, 1);
     return false;
 }
 

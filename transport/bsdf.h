@@ -37,7 +37,7 @@ struct Bsdf {
     BsdfType type;
     BsdfInputs inputs;
     BsdfConstants constants;
-    const float* tables;  ///< SceneView::tables for the models that read them
+    const float32* tables;  ///< SceneView::tables for the models that read them
 
     /// Parameters of the model, which must be `Model`.
     template <class Model>
@@ -47,7 +47,7 @@ struct Bsdf {
 };
 
 template <class Model>
-AMBILUX_HD Bsdf bsdf_of(const Resolved<Model>& parameters, const float* tables = nullptr) {
+AMBILUX_HD Bsdf bsdf_of(const Resolved<Model>& parameters, const float32* tables = nullptr) {
     Bsdf b = {};
     b.type = kBsdfType<Model>;
     b.inputs = inputs_of(parameters);
@@ -150,7 +150,7 @@ AMBILUX_HD_APART SampleOrNone bsdf_sample_apart(Bsdf b, Vec3f wi, Vec3f u, Trans
 }  // namespace detail
 
 /// f(wi,wo)·|cos(wo)| of the smooth lobes, and the densities of both directions per solid angle over them, the chance
-/// of choosing them included; 0 where sides do not fit.
+/// of choosing them included; 0 where sides do not fit. Finite and not negative for cosines of 0 and from 1e-30 on.
 template <Features F>
 AMBILUX_HD BsdfValue bsdf_evaluate(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
     if constexpr (F.bsdfs == bit(BsdfType::diffuse)) {
@@ -170,7 +170,8 @@ AMBILUX_HD float bsdf_pdf(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode)
     return bsdf_evaluate<F>(b, wi, wo, mode).pdf_sa;
 }
 
-/// Draws wo from uniform u in [0,1)³ (x: lobe). False when nothing is scattered; `out` is then unspecified.
+/// Draws wo from uniform u in [0,1)³ (x: lobe). False when nothing is scattered; `out` is then unspecified. Densities
+/// of smooth lobes are those of bsdf_evaluate bit for bit, the weight is its value over pdf_sa to 4 roundings.
 template <Features F>
 AMBILUX_HD bool bsdf_sample(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) {
     if constexpr (F.bsdfs == bit(BsdfType::diffuse)) {

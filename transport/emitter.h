@@ -70,7 +70,8 @@ AMBILUX_HD bool sample_emitter_direct(const SceneView& view, Vec3f reference_p, 
 
 /// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` at
 /// `reference_p` by way of area emitter `emitter`, which a ray along `wi` meets at `hit`. Zero for every other type: no
-/// ray meets those.
+/// ray meets those. Relative error: 8 roundings and 4 over the cosine at `hit`; spheres 12 and 8 over that of their
+/// cone.
 template <Features F>
 AMBILUX_HD float pdf_emitter_direct(const SceneView& view, uint32_t emitter, Vec3f reference_p, Vec3f wi,
                                     const SurfacePoint& hit) {
@@ -114,10 +115,8 @@ AMBILUX_HD float hit_opacity(const SceneView& view, uint32_t emitter, const Surf
 }
 
 /// Chance, as weights know it, that a ray towards the light sample `s` would meet the emitter there.
-template <Features F>
 AMBILUX_HD float sample_opacity(const SceneView& view, const EmitterSample& s) {
-    const bool area = F.opacity && view.emitters[s.emitter].type == EmitterType::area;
-    return area ? weight_opacity(s.opacity) : 1.0f;
+    return view.emitters[s.emitter].type == EmitterType::area ? weight_opacity(s.opacity) : 1.0f;
 }
 
 /// Radiance that arrives from unit `wi` where nothing is met; zero without an environment.

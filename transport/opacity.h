@@ -20,6 +20,7 @@ constexpr uint32_t kOpacitySteps = 255;
 AMBILUX_HD uint32_t opacity_step(float opacity) {
     return uint32_t(clamp(ceilf(opacity * float(kOpacitySteps)), 1.0f, float(kOpacitySteps)));
 }
-AMBILUX_HD float weight_opacity(float opacity) { return float(opacity_step(opacity)) / float(kOpacitySteps); }
+AMBILUX_HD float step_opacity(uint32_t step) { return float(step) / float(kOpacitySteps); }
+AMBILUX_HD float weight_opacity(float opacity) { return step_opacity(opacity_step(opacity)); }
 
 }  // namespace ambilux

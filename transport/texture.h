@@ -17,17 +17,19 @@ AMBILUX_HD Rgb load_texel(const SceneView& view, const Texture& texture, uint32_
     const uint64_t index = uint64_t(y) * texture.width + x;
     // One aligned copy per texel, so that a device reads it in a single vector load.
     if (texture.format == TexelFormat::rgba32f) {
-        Vec4f texel;
+        struct {
+            float32 x, y, z, w;
+        } texel;
         memcpy(&texel, __builtin_assume_aligned(view.texels + texture.offset + index * 16, 16), 16);
         return {texel.x, texel.y, texel.z};
     }
     if (texture.format == TexelFormat::rgba16f) {
-        const Vec4f texel = load_half4(view.texels + texture.offset + index * 8);
+        const auto texel = load_half4(view.texels + texture.offset + index * 8);
         return {texel.x, texel.y, texel.z};
     }
     uint32_t texel;
     memcpy(&texel, __builtin_assume_aligned(view.texels + texture.offset + index * 4, 4), 4);
-    const float* decode = view.tables + texture.decode_table;
+    const float32* decode = view.tables + texture.decode_table;
     return {decode[texel & 255u], decode[texel >> 8 & 255u], decode[texel >> 16 & 255u]};
 }
 

@@ -34,7 +34,7 @@ class Plot {
     this.data = data;  // {runs: [names], colours, measures: {rmse: "RMSE", ...}, scenes: {name: {noise, curves: {rmse: {seconds: {run: {seconds, spp, error, low, high, seeds}}, spp: ...}, ...}}}}
     this.scene = Object.keys(data.scenes)[0];
     this.x = "seconds";
-    this.y = "rmse";
+    this.y = Object.keys(data.measures)[0];  // that of the metric that leads
     this.hidden = new Set();
     this.build();
     this.draw();

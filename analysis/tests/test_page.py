@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis import __main__ as program
-from analysis import experiment, figures, hdr_data, images, report, summary
+from analysis import experiment, figures, hdr_data, images, remarks, report, summary
 from analysis.tests import synthetic
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -29,7 +29,7 @@ def page_file(folder, tmp_path_factory):
     out = tmp_path_factory.mktemp("out")
     data = experiment.load(folder)
     lines = summary.lines(data)
-    program.write(out / "report.html", report.render(data, lines, summary.remarks(data, lines), figures.Made(missing=[("x", "</script><i>")]), out))
+    program.write(out / "report.html", report.render(data, lines, remarks.remarks(data, lines), figures.Made(missing=[("x", "</script><i>")]), out))
     return out / "report.html"
 
 

@@ -32,3 +32,14 @@ def test_value_is_the_mean_of_pseudo_values_and_few_seeds_are_told():
     assert sv.strategy_variance(x, 2).value == pytest.approx(2 * x.var(axis=0, ddof=1).mean())
     assert math.isnan(sv.strategy_variance(x[:2], 2).error)
     assert math.isnan(sv.strategy_variance(x[:1], 2).value)
+
+
+def test_seeds_of_different_numbers_of_samples_weigh_by_them():
+    """As with a budget in seconds: unbiased whatever the numbers, while their plain variance is not."""
+    rng, spp = np.random.default_rng(4), np.array([4, 9, 30])
+    images = [[rng.normal(1.0, 2.0 / np.sqrt(n), size=50) for n in spp] for _ in range(400)]
+    found = [sv.variance_of_one_sample(i, spp) for i in images]
+    # 50 pixels, 2 degrees of freedom: relative variance 2 / 100, over 400 trials.
+    assert np.mean(found) == pytest.approx(4.0, abs=4 * 4.0 * np.sqrt(0.02 / 400))
+    same = np.array(images[0])
+    assert sv.variance_of_one_sample(same, [8, 8, 8]) == pytest.approx(8 * same.var(axis=0, ddof=1).mean())

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "core/sha256.h"
 #include "formats/load.h"
 #include "formats/mitsuba/spectrum.h"
@@ -38,6 +40,12 @@ struct Builder {
 
     /// Counts memory that the scene is going to have; Error(bad_input) with `path` if it is too much in all.
     void take_memory(uint64_t bytes, const std::string& path);
+
+    /// Where fail_unless_moved() leaves its first error, for a scene that may yet be moved; null: it throws.
+    std::optional<Error>* outside = nullptr;
+
+    /// For what is wrong only so far from the origin. Safe to use from many threads.
+    void fail_unless_moved(const Error& error) const;
 
     /// Fails unless all of these are in the range of the tracers (accel/range.h). `what` has them: "the shape".
     void check_range(const Where& where, const std::string& what, std::initializer_list<Vec3d> points) const;

@@ -38,12 +38,14 @@ void validate_unused(Builder& builder) {
     builder.validate_only = false;
 }
 
-/// All but what finalize_scene() adds, in coordinates about `origin`.
-Scene build_scene(const std::string& path, const Document& document, const LoadOptions& options, Vec3d origin) {
+/// All but what finalize_scene() adds, in coordinates about `origin`. `outside`: Builder::outside.
+Scene build_scene(const std::string& path, const Document& document, const LoadOptions& options, Vec3d origin,
+                  std::optional<Error>* outside) {
     Scene scene;
     scene.path = path;
     scene.origin = {origin.x, origin.y, origin.z};
     Builder builder(document, options, origin, scene);
+    builder.outside = outside;
 
     Reader root(builder, *document.scene);
     const Object* sensor = root.take("sensor");
@@ -70,7 +72,13 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
 
 Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
     const Document document = parse_document(path, options.parameters, options.limits);
-    Scene scene = build_scene(path, document, options, scene_origin(document));
+    std::optional<Error> outside;
+    Scene scene = build_scene(path, document, options, {}, &outside);
+    // Far from the origin floats have rounded it already: it is made again, about its centre in double precision.
+    if (const Vec3d c = far_center(scene); c.x != 0 || c.y != 0 || c.z != 0)
+        scene = build_scene(path, document, options, c, nullptr);
+    else if (outside)
+        throw Error(*outside);
     finalize_scene(scene, options.light_picking);
     return scene;
 }

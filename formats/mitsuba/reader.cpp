@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <mutex>
 
 #include "accel/range.h"
 #include "core/error.h"
@@ -24,13 +26,24 @@ void Builder::take_memory(uint64_t bytes, const std::string& path) {
                               std::to_string(options.limits.total_bytes));
 }
 
+void Builder::fail_unless_moved(const Error& error) const {
+    if (!outside) throw error;
+    static std::mutex mutex;
+    const std::lock_guard lock(mutex);
+    if (!*outside) outside->emplace(error);
+}
+
 void Builder::check_range(const Where& where, const std::string& what, std::initializer_list<Vec3d> points) const {
     for (const Vec3d& p : points)
-        for (const double c : {p.x, p.y, p.z})
-            if (!(std::fabs(c) <= double(kMostCoordinate)))
-                throw input_error(where.file, where.line,
-                                  fmt::format("{} reaches to {:g}; rays are traced between -{:g} and {:g}", what, c,
-                                              kMostCoordinate, kMostCoordinate));
+        for (const double c : {p.x, p.y, p.z}) {
+            if (std::fabs(c) <= double(kMostCoordinate)) continue;
+            const Error error = input_error(where.file, where.line,
+                                            fmt::format("{} reaches to {:g}; rays are traced between -{:g} and {:g}",
+                                                        what, c, kMostCoordinate, kMostCoordinate));
+            // What is no float cannot be moved either.
+            if (!(std::fabs(c) <= double(std::numeric_limits<float>::max()))) throw error;
+            return fail_unless_moved(error);
+        }
 }
 
 void Reader::fail(const std::string& message) const { fail(object_.where, message); }

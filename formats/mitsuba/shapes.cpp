@@ -324,10 +324,12 @@ void add_mesh(Builder& builder, const Job& job, uint32_t index, Shape& shape) {
     Scene& scene = builder.scene;
     const Mesh& mesh = job.world;
     if (job.emitter != kNone && mesh.faces.empty())
-        throw input_error(job.where.file, job.where.line, "the shape emits light but has no area");
-    if (job.vanished)
-        builder.refuse(job.where, "the shape of type '" + job.type + "' has no area: its transform leaves it none",
-                       "it is left out");
+        builder.fail_unless_moved(input_error(job.where.file, job.where.line, "the shape emits light but has no area"));
+    const std::string problem = "the shape of type '" + job.type + "' has no area: its transform leaves it none";
+    if (job.vanished && builder.options.lenient)
+        builder.refuse(job.where, problem, "it is left out");
+    else if (job.vanished)
+        builder.fail_unless_moved(input_error(job.where.file, job.where.line, problem));
     const uint32_t first = uint32_t(scene.vertices.size());
     shape.first_primitive = uint32_t(scene.triangles.size());
     shape.primitive_count = uint32_t(mesh.faces.size());

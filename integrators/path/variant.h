@@ -8,7 +8,8 @@ namespace ambilux {
 struct PathVariant {
     static constexpr const char* kHelp =
         "unidirectional path tracer: hits of emitters, next event estimation, or both with weights";
-    static constexpr VariantTraits kTraits = {.estimators = true, .binary_bvh = true, .finds_all_light = true};
+    static constexpr VariantTraits kTraits = {
+        .estimators = true, .binary_bvh = true, .in_double = true, .finds_all_light = true};
 };
 
 }  // namespace ambilux

@@ -45,8 +45,8 @@ template <class Model>
 struct InputCount {
     using Values = typename Model::template Inputs<Rgb, float>;
     using Parameters = typename Model::template Inputs<ParamRgb, ParamFloat>;
-    static constexpr uint32_t words = std::is_empty_v<Values> ? 0 : sizeof(Values) / 4,
-                              all = std::is_empty_v<Values> ? 0 : sizeof(Parameters) / 4 - words,
+    static constexpr uint32_t words = std::is_empty_v<Values> ? 0 : sizeof(Values) / sizeof(float),
+                              all = std::is_empty_v<Values> ? 0 : sizeof(Parameters) / sizeof(float) - words,
                               colors = (words - all) / 2, numbers = all - colors;
 };
 

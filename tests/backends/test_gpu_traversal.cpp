@@ -23,7 +23,7 @@ namespace {
 
 bool no_device() {
     if (cuda_device_present()) return false;
-    WARN("skipped: no CUDA device");
+    skip("no CUDA device: skipped");
     return true;
 }
 

@@ -37,6 +37,10 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
     };
     const std::vector<Case> cases = {
         {{"frobnicate"}, "unknown command 'frobnicate': render, info"},
+        {{"stress"}, "a sweep needs -o FOLDER"},
+        {{"stress", "--backend", "abacus", "-o", folder / "s"}, "abacus"},
+        {{"stress", "--time", "-1", "-o", folder / "s"}, "more than zero seconds"},
+        {{"stress", "--family", "dragons", "-o", folder / "s"}, "--family dragons: known are emission-scale"},
         {{"render", kCornell}, "--output is required"},
         {{"render", "-o", "x.exr"}, "SCENE is required"},
         {render(folder, {"--frob"}), "--frob"},
@@ -304,6 +308,23 @@ TEST_CASE("Ctrl-C saves what is done and ends with code 5") {
     }
 }
 
+TEST_CASE("a reference in double precision is continued in double precision alone") {
+    const test::TempFolder folder;
+    const auto reference = [&](const std::string& spp, const std::string& precision) {
+        return run(folder, {"reference", kCornell, "--size", "12x8", "--spp", spp, "-o", folder / "r.exr",
+                            "--precision", precision, "--json", folder / "r.json"});
+    };
+    CHECK(reference("4", "double").code == 0);
+    CHECK(reference("8", "double").code == 0);
+    const json j = json::parse(read_file(folder / "r.json"));
+    CHECK(j["continued_from"] == 4);
+    CHECK(contains(j["device"].get<std::string>(), "double precision"));
+    const Outcome other = reference("16", "single");
+    CHECK(other.code == 3);
+    CHECK(contains(other.err, "precision=double"));
+    CHECK(reference("16", "half").code == 2);
+}
+
 TEST_CASE("a reference is continued, extended, compared with") {
     const test::TempFolder folder;
     const auto reference = [&](const std::string& spp, const std::string& size = "24x16") {
@@ -317,6 +338,20 @@ TEST_CASE("a reference is continued, extended, compared with") {
     const Reference r = read_reference_exr(folder / "r.exr");
     CHECK(r.samples == 48);
     CHECK(r.standard_error.rgb.size() == 24 * 16 * 3);
+    // By another integrator too, whose settings are part of its identity.
+    const auto by_bdpt = [&](const std::string& variant) {
+        return run(folder, {"reference", kCornell, "--size", "24x16", "--spp", "4", "--set", "integrator=bdpt", "--set",
+                            "variant=" + variant, "-o", folder / "b.exr"});
+    };
+    CHECK(by_bdpt("lvc").code == 0);
+    Attributes made;
+    read_reference_exr(folder / "b.exr", &made);
+    CHECK(made["integrator"] == "bdpt");
+    CHECK(contains(made["reference_settings"].get<std::string>(), "variant=lvc"));
+    CHECK(contains(by_bdpt("wavefront").err, "reference_settings"));
+    CHECK(
+        run(folder, {"reference", kCornell, "--spp", "4", "--set", "integrator=light", "-o", folder / "l.exr"}).code ==
+        2);
     const Outcome other = reference("64", "16x16");
     CHECK(other.code == 3);
     CHECK(contains(other.err, "its size is 24x16, asked for is 16x16"));
@@ -467,4 +502,26 @@ TEST_CASE("A render that drops invalid values names the command that replays the
     const Outcome strict = run(folder, {"render", scene, "--spp", "1", "--strict", "-o", folder / "a.exr"});
     CHECK(strict.code == 4);
     CHECK(contains(strict.err, "ambilux trace"));
+}
+
+TEST_CASE("stress: families are listed, scenes exported, cells rendered and gone on with") {
+    const test::TempFolder folder;
+    const Outcome list = run(folder, {"stress", "--list"});
+    CHECK(list.code == 0);
+    CHECK(contains(list.out, "far-mesh"));
+    const std::string out = folder / "sweep", scenes = folder / "scenes";
+    const std::vector<std::string> one = {"stress",   "--quick",   "--family", "mirrored", "--method",
+                                          "path-mis", "--backend", "cpu",      "-o",       out};
+    const Outcome first = run(folder, one);
+    CHECK(first.code == 0);
+    CHECK(contains(first.out, "3 ok, 0 left out of 3 rows"));
+    CHECK(contains(read_file(out + "/stress.csv"), "mirrored_4,mirrored,4,path-mis,cpu,ok,"));
+    const Outcome again = run(folder, one);
+    CHECK(again.code == 2);
+    CHECK(contains(again.err, "--resume"));
+    REQUIRE(run(folder, {"stress", "--export", scenes, "--family", "mirrored", "--quick"}).code == 0);
+    const std::string expected = read_file(scenes + "/expected.csv");
+    CHECK(std::count(expected.begin(), expected.end(), '\n') == 4);
+    CHECK(run(folder, {"render", scenes + "/mirrored_4.xml", "-o", folder / "m.exr", "--spp", "1", "--backend", "cpu"})
+              .code == 0);
 }

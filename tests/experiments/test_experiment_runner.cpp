@@ -5,6 +5,8 @@
 
 #include "backends/cuda_device.h"
 #include "core/log.h"
+#include "experiments/batches.h"
+#include "experiments/load.h"
 #include "experiments/machine.h"
 #include "experiments/reference.h"
 #include "experiments/state.h"
@@ -195,12 +197,16 @@ TEST_CASE("an experiment leaves the files that docs/experiments.md lists") {
     CHECK_FALSE(fs::exists(folder.path / "out/state"));
     const auto manifest = nlohmann::json::parse(read_file(folder / "out/manifest.json"));
     CHECK(manifest["finished"].is_string());
+    CHECK(manifest["format"] == 2);
     CHECK(manifest["devices"][0] == "fake device");
     CHECK(manifest["scenes"][1]["size"] == nlohmann::json({9, 5}));
     CHECK(fs::exists(folder.path / "out" / manifest["scenes"][0]["reference"]["file"].get<std::string>()));
     const auto stats = nlohmann::json::parse(read_file(folder / "out/stats/a/good_2.json"));
     CHECK(stats["spp"] == 32);
     CHECK(stats["rays"]["extend"] == 32 * 16 * 12);
+    REQUIRE(stats["machine"].size() == 1);
+    CHECK(stats["machine"][0]["other_cores"].get<double>() >= 0);
+    CHECK(contains(manifest["commands"][0].get<std::string>(), "test_experiment_runner"));
     Attributes attributes;
     read_exr(folder / "out/images/a/good_2.exr", &attributes);
     CHECK(attributes["spp"] == 32);
@@ -330,8 +336,8 @@ TEST_CASE("a resumed render goes on with what its first part chose, and choosing
     };
     auto r = request(folder, "out");
     r.interrupt = &world.flag;
-    // The references take 2·134 calls, the run "good" 13, of whose number the first of "chosen" on scene a is one more.
-    world.stop_at = 2 * 134 + 13 + 8;
+    // The references take 2·134 calls, the run "good" 17, of whose number the first of "chosen" on scene a is one more.
+    world.stop_at = 2 * 134 + 17 + 8;
     REQUIRE(run_experiment(r, hooks) == ExitCode::interrupted);
     REQUIRE(made.back().automatic);
     const uint32_t first = uint32_t(made.size());
@@ -350,6 +356,88 @@ TEST_CASE("a resumed render goes on with what its first part chose, and choosing
     const auto stats = nlohmann::json::parse(read_file(folder / "out/stats/a/chosen_1.json"));
     CHECK(stats["choice"]["settings"]["connections"] == std::to_string(first));
     CHECK(stats["choice"]["seconds"] == 1000.0);
+    // What ran is in the rows and in the statistics, and not what was asked for.
+    for (const auto& row : table(folder / "out/runs.csv"))
+        if (row[column("run")] == "chosen" && row[column("scene")] == "a") {
+            CHECK(row[column("method")] == stats["method"]);
+            CHECK(row[column("method")].starts_with("bdpt "));
+        }
+}
+
+TEST_CASE("a render is recorded in batches of whole passes, which end at checkpoints or between them") {
+    ExperimentConfig config;
+    config.spp = {1, 2, 8, 32};
+    const auto next = [&](uint64_t at, uint64_t checkpoint) {
+        return batch_end(config, {at, 0, false}, {checkpoint, 0}).samples;
+    };
+    CHECK(next(0, 1) == 1);
+    CHECK(next(2, 8) == 4);
+    CHECK(next(6, 8) == 8);
+    CHECK(next(30, 32) == 32);
+    config.spp.clear();
+    config.seconds = {0.1, 1.6};
+    const auto later = [&](double at, double checkpoint) {
+        return batch_end(config, {5, at, false}, {0, checkpoint}).seconds;
+    };
+    CHECK(later(0.0, 0.1) == Approx(0.1));
+    CHECK(later(0.27, 1.6) == Approx(0.4));
+    CHECK(later(0.22, 1.6) == Approx(0.3));
+    CHECK(later(1.54, 1.6) == Approx(1.6));
+    CHECK(later(1.7, 0) == Approx(1.8));  // past the last checkpoint in seconds, before one in samples
+
+    const TempFolder folder;
+    write_inputs(folder);
+    World world;
+    REQUIRE(run_experiment(request(folder, "out"), fake_hooks(world)) == ExitCode::done);
+    const auto lines = read_results(folder / "out/batches.csv", kBatchHeader);
+    REQUIRE(lines.size() == 8 * 17);
+    // Parts add up to the whole, and each estimates the same variance of one sample: 14/3.
+    uint64_t samples = 0;
+    double variance = 0;
+    for (const std::string& line : lines) {
+        std::istringstream in(line);
+        std::vector<std::string> cells;
+        for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
+        REQUIRE(cells.size() == 9);
+        samples += cells[1] == "good" ? std::stoull(cells[4]) : 0;
+        variance += cells[1] == "good" ? std::stod(cells[6]) * std::stod(cells[4]) / (4 * 17) : 0;
+    }
+    CHECK(samples == 2 * 2 * 32);
+    CHECK(variance == Approx(14.0 / 3).epsilon(0.15));
+}
+
+TEST_CASE("runs and scenes come in an order that the seed decides, all of them once") {
+    const auto listed = render_order(2, 3, 7, false);
+    CHECK(listed == std::vector<std::pair<size_t, size_t>>{{0, 0}, {0, 1}, {0, 2}, {1, 0}, {1, 1}, {1, 2}});
+    auto random = render_order(2, 30, 7, true);
+    CHECK(random == render_order(2, 30, 7, true));
+    CHECK(random != render_order(2, 30, 8, true));
+    std::sort(random.begin(), random.end());
+    CHECK(random == render_order(2, 30, 7, false));
+}
+
+TEST_CASE("what others take of the machine is told from what this process takes") {
+    LoadReading reading;
+    parse_cpu_line("cpu  100 20 30 4000 50 6 7 80 9 0", 100, reading);
+    CHECK(reading.busy == Approx(1.63));
+    CHECK(reading.steal == Approx(0.8));
+    LoadReading before, after;
+    after.wall = 2;
+    after.busy = 5;
+    after.own = 3;
+    after.steal = 1;
+    CHECK(other_cores(before, after) == Approx(1.5));
+    after.own = 9;  // clocks of different grain
+    CHECK(other_cores(before, after) == 0.0);
+    CHECK(load_json(before, after)["own_cores"] == 4.5);
+    const LoadReading now = read_load();
+    CHECK(now.wall > 0);
+    CHECK(now.own > 0);
+    CHECK(now.busy >= 0);
+    CHECK(contains(command_line(), "test_experiment_runner"));
+    const nlohmann::json versions = describe_versions();
+    for (const char* key : {"ambilux", "git_revision", "compiler", "flags", "embree", "tbb"})
+        CHECK_FALSE(versions[key].get<std::string>().empty());
 }
 
 TEST_CASE("a damaged state costs the render, not the experiment") {

@@ -27,7 +27,7 @@ std::string refusal(const std::function<void()>& f) {
 std::string another(const Setting& s) {
     const std::string standard = s.default_text();
     for (const char* value : {"true", "false", "light", "lvc", "cpu", "nee", "power", "hits", "coherent", "cwbvh",
-                              "none", "select", "0.25", "2", "1"}) {
+                              "none", "select", "double", "0.25", "2", "1"}) {
         RenderSettings settings;
         try {
             s.what.set(settings, value);
@@ -139,6 +139,24 @@ TEST_CASE("statistics name every setting as used and as asked for, images those 
     }
     const Attributes attributes = image_attributes(scene, asked, r.stats);
     CHECK(attributes.at("integrator") == json["integrator"]);
+    CHECK(attributes.at("method") == json["method"]);
+    RenderSettings lvc;
+    lvc.integrator = "bdpt";
+    lvc.variant = "lvc";
+    apply_setting(lvc, "connections", "16");
+    apply_setting(lvc, "light_paths", "0.25");
+    CHECK(method_text(lvc).starts_with("bdpt lvc "));
+    CHECK(method_text(lvc).find(" connections=16") != std::string::npos);
+    CHECK(method_text(lvc).find(" light_paths=0.25") != std::string::npos);
+    RenderSettings plain;
+    plain.integrator = "bdpt";
+    plain.variant = "lvc";
+    CHECK(method_text(plain) == "bdpt lvc connections=3");
+    RenderSettings path;
+    path.integrator = "path";
+    path.variant = "wavefront";
+    CHECK(method_text(path).find("estimator=mis") != std::string::npos);
+    CHECK(method_text(path).find("seed") == std::string::npos);
     CHECK(attributes.contains("choice"));
     CHECK(attributes.contains("estimator") == (json["integrator"] == "path"));
 }

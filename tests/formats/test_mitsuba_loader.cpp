@@ -1,8 +1,11 @@
 // libs: ambilux_formats ambilux_accel PNG::PNG JPEG::JPEG
+// data: tagged
 // timeout: 120
 // The Mitsuba loader: what it understands, and what it says about what it does not. Numbers marked "Mitsuba" were read
 // from Mitsuba 3.9.1.
+#include <fmt/format.h>
 #include <algorithm>
+
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +16,7 @@
 #include "scene/info.h"
 #include "tests/support/catch.h"
 #include "tests/support/image_files.h"
+#include "tests/support/skip.h"
 #include "tests/support/temp_folder.h"
 #include "transport/bsdf/precompute.h"
 #include "transport/texture.h"
@@ -70,13 +74,13 @@ void check_rgb(Rgb a, Rgb b, double tolerance = 1e-6) {
 
 std::string data_folder() {
     const char* folder = std::getenv("AMBILUX_DATA");
-    if (!folder) WARN("AMBILUX_DATA is not set: the published scenes are not loaded");
+    if (!folder) skip("AMBILUX_DATA is not set: the published scenes are not loaded");
     return folder ? folder : "";
 }
 
 }  // namespace
 
-TEST_CASE("published scenes load without a warning, with the triangles their README lists") {
+TEST_CASE("published scenes load without a warning, with the triangles their README lists", "[data]") {
     const std::string data = data_folder();
     if (data.empty()) return;
     struct Expected {
@@ -100,7 +104,7 @@ TEST_CASE("published scenes load without a warning, with the triangles their REA
     }
 }
 
-TEST_CASE("Mitsuba's render tests load, but for what is refused by name") {
+TEST_CASE("Mitsuba's render tests load, but for what is refused by name", "[data]") {
     const std::string data = data_folder();
     if (data.empty()) return;
     const std::string tests = data + "/mitsuba-tests/tests/scenes/";
@@ -252,6 +256,25 @@ TEST_CASE("transforms: later steps apply after earlier ones") {
     check_rgb(s.sensor.to_world.vector({0, 0, 1}), {0, 0, 1});
     check_rgb(s.sensor.to_world.vector({1, 0, 0}), {1, 0, 0});
     check_rgb(s.sensor.to_world.point({0, 0, 0}), {1, 2, 3});
+}
+
+TEST_CASE("a scene far from the origin is moved there, also if only the vertices of its mesh file say so") {
+    const test::TempFolder folder;
+    const auto mesh = [&](double x) {
+        folder.write("m.obj", fmt::format("v {} 0 0\nv {} 0 0\nv {} 1 0\nf 1 2 3\n", x, x + 1, x));
+        const std::string camera = fmt::format(
+            "<sensor type='perspective'><transform name='to_world'><lookat origin='{0},0,2' target='{0},0,0' "
+            "up='0,1,0'/></transform></sensor>",
+            x);
+        return load(camera + "<shape type='obj'><string name='filename' value='m.obj'/></shape>", {}, "3.0.0", &folder);
+    };
+    const Scene near = mesh(4), far = mesh(1048576);
+    CHECK(near.origin == std::array<double, 3>{});
+    CHECK(near.vertices[0].p.x == 4);
+    CHECK(far.origin[0] == 1048576.5);
+    CHECK(far.vertices[0].p.x == -0.5f);
+    CHECK(far.vertices[1].p.x == 0.5f);
+    CHECK(far.sensor.to_world.m[0][3] == -0.5f);
 }
 
 TEST_CASE("sensors: field of view by every rule, film, crop, size override") {

@@ -320,14 +320,14 @@ TEST_CASE("A ray that comes from a queue is the one that went in, with all that 
             if (depth > 1) CHECK(back.sums.pdf_sa == 10);
             for (const Side side : {Side::eye, Side::light}) {
                 BidirectionalSubpath path = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11}, {}, depth, 1.5f, delta};
-                path.start = {12, 13, 14, 15, 16};
+                path.start = {12, 13, 14, 15, 77, 16};
                 const BidirectionalSubpath b = check(BidirectionalMis{}, side, path, 100.0f);
                 // First rays of light subpaths have no sums yet; others have no start.
                 if (side == Side::eye || depth > 1) CHECK((b.sums.dvcm == 10 && b.sums.dvc == 11));
                 if (side == Side::eye && depth == 1) CHECK(b.start.camera_distance == 16);
                 if (side == Side::light && depth == 1)
                     CHECK((b.start.inv_pdf == 12 && b.start.direction == 13 && b.start.prim == 14 &&
-                           b.start.emitter == 15));
+                           b.start.emitter == 15 && b.start.opacity_step == 77));
             }
         }
 }

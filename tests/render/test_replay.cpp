@@ -306,7 +306,7 @@ TEST_CASE("Positions are printed in the coordinates of the file, wherever the lo
     const nlohmann::json near = replayed(scene_at("0"), text);
     CHECK(text.find("origin at") == std::string::npos);
     const nlohmann::json far = replayed(scene_at("1048576"), text);
-    CHECK(text.find("origin at (1048576, 0, 0.5)") != std::string::npos);
+    CHECK(text.find("origin at (1048576, ") != std::string::npos);
     const nlohmann::json &a = near["eye_subpath"]["vertices"][0], &b = far["eye_subpath"]["vertices"][0];
     REQUIRE(a["miss"] == false);
     CHECK(text.find(fmt::format(" at ({:.13g}, ", b["p"][0].get<double>())) != std::string::npos);

@@ -140,8 +140,7 @@ inline OracleDensity scattering_step(const SceneView& scene, const OraclePath::V
 /// Chance that a ray meets the emitter that `prim` belongs to, of one opacity everywhere. Weights know it in steps of
 /// 1/255, upwards.
 inline double emitter_opacity(const SceneView& scene, uint32_t prim) {
-    const ParamFloat& opacity = scene.materials[scene.shapes[scene.shape_of(prim)].material].opacity;
-    return std::ceil(255 * double(opacity.value)) / 255;
+    return std::ceil(255 * double(scene.materials[scene.shapes[scene.shape_of(prim)].material].opacity.value)) / 255;
 }
 
 /// Densities of all steps. Measures: area; x_0 of an emitter at infinity: solid angle; the camera: 1 (both subpaths

@@ -579,7 +579,8 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
     start.emitter = path.emitter;
     start.infinite = infinite;
     start.prim = area ? path.light.prim : kNone;
-    start.opacity = area ? float(emitter_opacity(scene_, path.light.prim)) : 1.0f;
+    start.opacity =
+        area ? scene_.materials[scene_.shapes[scene_.shape_of(path.light.prim)].material].opacity.value : 1.0f;
     if (!(start.pdf_dir > 0.0f)) return;
     BidirectionalSubpath w = start_light(mis_, start);
     w.origin = start.p;

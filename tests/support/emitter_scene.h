@@ -57,6 +57,7 @@ inline SceneView view_of(const Scene& s) {
     v.triangles = s.triangles.data();
     v.quadrics = s.quadrics.data();
     v.shapes = s.shapes.data();
+    v.materials = s.materials.data();
     v.textures = s.textures.data();
     v.texels = s.texels.data();
     v.emitters = s.emitters.data();
@@ -254,6 +255,7 @@ inline float triangle_area(const SceneView& view, uint32_t prim) {
 /// Fills areas, tables and pick probabilities (uniform, or in proportion to `pick_weights`).
 inline void complete(Scene& s, std::vector<double> pick_weights = {}) {
     s.bounds_radius = 10.0f;
+    if (s.materials.empty()) s.materials.push_back({0, 0, 0, {1.0f, -1}});  // opaque
     for (Shape& shape : s.shapes) {
         if (shape.first_primitive >= s.triangles.size()) continue;
         double area = 0;

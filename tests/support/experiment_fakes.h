@@ -144,6 +144,7 @@ inline Hooks fake_hooks(World& world) {
 
 constexpr const char* kConfig = R"(name = "fake"
 seeds = [1, 2]
+order = "listed"
 [reference]
 spp = 400
 [budget]

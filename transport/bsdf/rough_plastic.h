@@ -10,13 +10,13 @@ namespace ambilux {
 
 template <>
 struct BsdfAt<RoughPlastic> : Resolved<RoughPlastic> {
-    const float* tables;  ///< SceneView::tables
+    const float32* tables;  ///< SceneView::tables
 
     AMBILUX_HD MicrofacetDistribution microfacets() const {
         return microfacet_distribution(distribution, alpha, alpha);
     }
     AMBILUX_HD float transmittance(float cosine) const {
-        const float* table = tables + transmittance_table;
+        const float32* table = tables + transmittance_table;
         const float x = min(cosine, 1.0f) * float(kTransmittanceTableSize - 1);
         const uint32_t i = x < float(kTransmittanceTableSize - 2) ? uint32_t(x) : kTransmittanceTableSize - 2;
         return lerp(table[i], table[i + 1], x - float(i));

@@ -24,7 +24,7 @@ AMBILUX_HD float pdf_emission_position(const SceneView& view, uint32_t emitter, 
 }
 
 /// Density per solid angle with which sample_emission sends light along unit `d` from a point with emitting normal `ng`
-/// (area emitters), given emitter and point; 1 for delta directions.
+/// (area emitters), given emitter and point; 1 for delta directions. Of a sampled direction: pdf_dir to 2^-20 / pi.
 template <Features F>
 AMBILUX_HD float pdf_emission_direction(const SceneView& view, uint32_t emitter, Vec3f ng, Vec3f d) {
     const Emitter& e = view.emitters[emitter];

@@ -32,7 +32,7 @@ struct SubpathStart {
                             ///< direction per solid angle, pick included
     uint32_t prim;          ///< light: of an area emitter
     uint32_t emitter;       ///< light
-    float opacity;          ///< light: of an area emitter the chance that a ray meets it, as weights know it; else 1
+    uint32_t opacity_step;  ///< light: of an area emitter the chance that a ray meets it (transport/opacity.h)
     float camera_distance;  ///< eye: from the camera to the ray's origin
 };
 
@@ -63,6 +63,7 @@ struct BidirectionalMis {
     AMBILUX_HD float connection_density() const { return masked(kConnectionStrategies, connections); }
 
     // ---- sums along subpaths ----
+    // Relative error: 10 roundings a vertex while all factors are within 1e-36 to 1e37.
 
     /// Density of the first vertex of an eye subpath per solid angle (perspective, thin lens) or per area of the sensor
     /// plane (orthographic), at density 1 per pixel.
@@ -85,7 +86,7 @@ struct BidirectionalMis {
         start.direction = e.infinite ? e.pick * e.pdf_dir : e.cos_theta;
         start.prim = e.prim;
         start.emitter = e.emitter;
-        start.opacity = weight_opacity(e.opacity);
+        start.opacity_step = opacity_step(e.opacity);
     }
 
     /// Sums where the ray of `path`, with sums `sums`, meets `point`.
@@ -139,7 +140,8 @@ struct BidirectionalMis {
                 light.prim = start.prim;
                 next_event =
                     pdf_emitter_direct<F>(scene, start.emitter, p, -path.direction, light) * start.direction * scale;
-                hit = start.direction * scale * start.opacity;
+                hit = start.direction * scale;
+                if constexpr (F.opacity) hit *= step_opacity(start.opacity_step);
                 break;
             }
             case EmitterType::point:
@@ -200,8 +202,9 @@ struct BidirectionalMis {
     AMBILUX_HD float next_event_ratio(const SceneView& scene, MisSums z, bool first, const EmitterSample& light,
                                       const BsdfValue& f, float cos_z) const {
         const Emitter& e = scene.emitters[light.emitter];
-        const float pdf_hit = f.pdf_sa * sample_opacity<F>(scene, light);
-        const float fewer = light.delta ? 0.0f : masked(kHitStrategies, term(pdf_hit / light.pdf_sa));
+        float pdf_hit_sa = f.pdf_sa;
+        if constexpr (F.opacity) pdf_hit_sa *= sample_opacity(scene, light);
+        const float fewer = light.delta ? 0.0f : masked(kHitStrategies, term(pdf_hit_sa / light.pdf_sa));
         float more = cos_z;  // density of a light subpath to here over that of this sample
         switch (e.type) {
             case EmitterType::area:  // the cosine at the light is in both

@@ -57,11 +57,13 @@ struct UnidirectionalMis {
         return ratio_to(ray, sampled ? pdf_environment_direct<F>(scene, path.direction) : 0.0f, ratio);
     }
     template <Features F>
-    AMBILUX_HD float next_event_ratio(const SceneView& scene, Sums, bool, const EmitterSample& light,
+    AMBILUX_HD float next_event_ratio([[maybe_unused]] const SceneView& scene, Sums, bool, const EmitterSample& light,
                                       const BsdfValue& f, float) const {
         // Only BSDF sampling and a hit could find this light too.
         const bool other = estimator == Estimator::mis && !light.delta;
-        return other ? heuristic_term(heuristic, f.pdf_sa * sample_opacity<F>(scene, light) / light.pdf_sa) : 0.0f;
+        float pdf_hit_sa = f.pdf_sa;
+        if constexpr (F.opacity) pdf_hit_sa *= sample_opacity(scene, light);
+        return other ? heuristic_term(heuristic, pdf_hit_sa / light.pdf_sa) : 0.0f;
     }
     /// The last segment brings emission only, which next event estimation leaves to hits after a delta.
     AMBILUX_HD bool counts_last_segment(bool delta) const { return estimator != Estimator::nee || delta; }

@@ -12,14 +12,14 @@ namespace ambilux {
 namespace detail {
 
 /// The inverse cumulative table, linear between its entries.
-AMBILUX_HD float sample_filter_table(const float* table, float u) {
+AMBILUX_HD float sample_filter_table(const float32* table, float u) {
     const float x = u * float(kFilterTableSize);
     const uint32_t i = x < float(kFilterTableSize) ? uint32_t(x) : kFilterTableSize - 1;
     return lerp(table[i], table[i + 1], x - float(i));
 }
 
 /// Which of kFilterTableSize equal parts of the filter's width holds the offset `x`.
-AMBILUX_HD uint32_t filter_part(const float* table, float x) {
+AMBILUX_HD uint32_t filter_part(const float32* table, float x) {
     const float part = (x - table[0]) * table[kFilterTableSize + 1];
     return part < float(kFilterTableSize - 1) ? uint32_t(part) : kFilterTableSize - 1;
 }
@@ -27,7 +27,7 @@ AMBILUX_HD uint32_t filter_part(const float* table, float x) {
 /// Density per pixel of sample_filter_table at offset `x`. The guide says from which entry on to look for that which
 /// holds x (Chen and Asmussen 1974, "On Generating Random Variates from an Empirical Distribution"): a step or two
 /// instead of ten of a binary search.
-AMBILUX_HD float filter_table_pdf(const float* table, float x) {
+AMBILUX_HD float filter_table_pdf(const float32* table, float x) {
     if (!(x >= table[0] && x < table[kFilterTableSize])) return 0.0f;
     uint32_t i = uint32_t(table[kFilterTableSize + 2 + filter_part(table, x)]);
     float from = table[i], to = table[i + 1];
@@ -42,14 +42,14 @@ AMBILUX_HD float filter_table_pdf(const float* table, float x) {
 
 /// Completes the table whose kFilterTableSize+1 offsets are the last of `tables`: appends the parts per pixel, and for
 /// each part the last entry below it, or the first of all.
-inline void append_filter_guide(std::vector<float>& tables) {
+inline void append_filter_guide(std::vector<float32>& tables) {
     const size_t first = tables.size() - (kFilterTableSize + 1);
-    tables.push_back(float(kFilterTableSize) / (tables.back() - tables[first]));
+    tables.push_back(float32(kFilterTableSize) / (tables.back() - tables[first]));
     uint32_t entry = 0;
     for (uint32_t part = 0; part < kFilterTableSize; ++part) {
         while (entry < kFilterTableSize && detail::filter_part(tables.data() + first, tables[first + entry + 1]) < part)
             ++entry;
-        tables.push_back(float(entry));
+        tables.push_back(float32(entry));
     }
 }
 

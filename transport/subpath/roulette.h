@@ -7,8 +7,11 @@
 namespace ambilux {
 
 /// Subpath::roulette_scale with the bits that items keep (16 of a float): every schedule then takes the same decisions.
-/// Any value keeps roulette unbiased.
-AMBILUX_HD float rounded_scale(float scale) { return bits_float(float_bits(scale) & 0xffff0000u); }
+/// Less than 2^-7 below; any value keeps roulette unbiased.
+AMBILUX_HD float rounded_scale(float scale) {
+    constexpr uint32_t kKept = 7;  // of the fraction
+    return bits_float(float_bits(scale) & ~FloatBits(0) << (kFractionBits - kKept));
+}
 
 /// Subpath::roulette_scale of a light subpath that starts with `flux`: roulette sees what is left of it, so that
 /// neither the unit of emission nor that of length decides.

@@ -88,7 +88,6 @@ AMBILUX_HD uint32_t connection_ray(uint32_t depth, uint32_t light) { return dept
 /// True if `v` can be radiance: finite, neither negative nor -0. One comparison: the bits of such floats are below
 /// those of infinity.
 AMBILUX_HD bool is_valid_radiance(Rgb v) {
-    constexpr uint32_t kInfinityBits = 0x7f800000u;
     return (float_bits(v.x) < kInfinityBits) & (float_bits(v.y) < kInfinityBits) & (float_bits(v.z) < kInfinityBits);
 }
 

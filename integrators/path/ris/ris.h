@@ -70,6 +70,8 @@ private:
                 !may_scatter(v.scattering, x.light.wi))
                 continue;
             x.f = scatter_evaluate<F>(v.scattering, x.light.wi, TransportMode::radiance);
+            if (is_zero(x.f.value) || !is_valid_radiance(x.f.value * (x.light.radiance / x.light.pdf_sa), record))
+                continue;
             const float target = luminance(x.f.value * x.light.radiance), weight = target / x.light.pdf_sa;
             if (weight > 0.0f && weight < kInfinity) reservoir.show(x, target, weight);
         }

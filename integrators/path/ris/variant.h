@@ -11,7 +11,11 @@ struct PathRisVariant {
     static constexpr const char* kHelp =
         "next event estimation by resampling: of several emitter samples one is kept, in proportion to its light "
         "(Talbot et al. 2005)";
-    static constexpr VariantTraits kTraits = PathVariant::kTraits;
+    static constexpr VariantTraits kTraits = [] {
+        VariantTraits traits = PathVariant::kTraits;
+        traits.in_double = false;
+        return traits;
+    }();
 
     static std::vector<Declaration<RisSettings>> settings();
 };

@@ -1,0 +1,61 @@
+"""Was the machine the same for all runs? Remarks on renders whose times are not to be trusted, from what the runner recorded around each."""
+
+from analysis import experiment as experiments
+
+BUSY = 0.1  # share of the machine's cores that others may hold
+SPREAD = 1.15  # greatest time per sample of a run's seeds over the least
+SLOW = 1.05  # greatest mean clock of a render over the least
+
+
+def machines(experiment, scene, run):
+    """{seed: [what the runner recorded of each part of the render]}; {} of older versions."""
+    out = {}
+    for seed, path in experiment.files("stats", scene, run, ".json"):
+        parts = experiments.read_json(path).get("machine")
+        if isinstance(parts, list) and parts:
+            out[seed] = parts
+    return out
+
+
+def share_of_others(parts):
+    """Cores that others held, over all cores, mean over the time of the parts."""
+    seconds = sum(p.get("seconds", 0) for p in parts)
+    return sum(p.get("seconds", 0) * p.get("other_cores", 0) / max(1, p.get("cores", 1)) for p in parts) / seconds if seconds > 0 else 0.0
+
+
+def clocks_of(parts):
+    """Mean of the recorded MHz, None without."""
+    found = [v for p in parts for v in (p.get("cpu_mhz") or {}).values() if v]
+    return sum(found) / len(found) if found else None
+
+
+def listed(places, most=5):
+    return ", ".join(places[:most]) + (f" and {len(places) - most} more" if len(places) > most else "")
+
+
+def remarks(experiment):
+    """Sentences that name renders on a busy machine, seeds whose time per sample differs too much, and clocks that moved."""
+    busy, spread, clocks, silent = [], [], {}, 0
+    for scene in experiment.scenes:
+        for run in experiment.runs:
+            last = {r.seed: r.time / r.spp for r in sorted(experiment.select(scene, run), key=lambda r: r.spp)}
+            if len(last) > 1 and max(last.values()) > SPREAD * min(last.values()):
+                spread.append(f"{scene} {run} {max(last.values()) / min(last.values()):.2f}")
+            found = machines(experiment, scene, run)
+            silent += not found
+            for seed, parts in found.items():
+                share = share_of_others(parts)
+                if share > BUSY:
+                    busy.append((share, f"{scene} {run} seed {seed} ({100 * share:.0f} %)"))
+                if (mhz := clocks_of(parts)) is not None:
+                    clocks[f"{scene} {run} seed {seed}"] = mhz
+    if busy:
+        yield (f"other processes held more than {100 * BUSY:.0f} % of the cores during {len(busy)} renders, whose times are not to be trusted: "
+               + listed([place for _, place in sorted(busy, reverse=True)]))
+    if spread:
+        yield f"time per sample differs between seeds by more than a factor of {SPREAD:g}; repeat these runs on a quiet machine: {listed(spread)}"
+    if clocks and max(clocks.values()) > SLOW * min(clocks.values()):
+        low, high = min(clocks, key=clocks.get), max(clocks, key=clocks.get)
+        yield f"clocks of the CPU moved: {clocks[low]:.0f} MHz at {low}, {clocks[high]:.0f} at {high}"
+    if silent == len(experiment.scenes) * len(experiment.runs):
+        yield "what else ran on the machine was not recorded (an older version): a busy machine would not show"

@@ -1,0 +1,128 @@
+"""Sentences that a reader must know before believing the figures: gaps, dropped values, bias, references that are too noisy, pixels that decide, clocks."""
+
+import math
+
+from analysis import fairness, summary, verdicts
+
+FEW_PIXELS = 2.0  # relMSE over relMSE without the worst pixels, from which on these hold more than half of it
+SLOW_CLOCK = 1.1  # ratio of clocks at start and end of an experiment that is told
+
+
+def trimmed_share(experiment):
+    """Text such as "0.1 %" of the pixels that trimmed relMSE leaves out."""
+    share = experiment.manifest.get("trimmed_share")
+    return f"{100 * share:g} %" if share else "few"
+
+
+def trimmed_remarks(experiment, lines):
+    """Scenes on which a handful of pixels decides relMSE, with the ratios, and whether they decide which run is best."""
+    for scene in experiment.scenes:
+        known = [line for line in lines if line.scene == scene and line.few_pixels > 0]
+        few = [line for line in known if line.few_pixels >= FEW_PIXELS]
+        if not few:
+            continue
+        whole, trimmed = (min(known, key=lambda line: getattr(line, m).value).run for m in ("relmse", "trimmed"))
+        better = f"; without them {trimmed} has the least error, with them {whole}" if whole != trimmed else ""
+        few.sort(key=lambda line: -line.few_pixels)
+        told = ", ".join(f"{line.run} {line.few_pixels:.3g}" for line in few[:4])
+        more = f" and {len(few) - 4} more, down to {few[-1].few_pixels:.3g}" if len(few) > 4 else ""
+        yield (f"{scene}: the worst {trimmed_share(experiment)} of the pixels hold more than half of relMSE, which is so many times the trimmed one: {told}{more}"
+               f"{better}; state both")
+
+
+def method_remarks(experiment):
+    """Runs whose seeds did not run the same method."""
+    for scene in experiment.scenes:
+        for run in experiment.runs:
+            found = experiment.methods(scene, run)
+            if len(found) > 1:
+                told = "; ".join(f"{method} (seed{'s' if len(seeds) > 1 else ''} {', '.join(map(str, seeds))})" for method, seeds in found.items())
+                yield f"{scene}, {run}: seeds ran different methods, so that their mean is of a mixture: {told}"
+
+
+def same_remarks(lines):
+    """Runs that are the base run's estimator: what their time says."""
+    for line in lines:
+        r = line.ratio_time
+        if r is None:
+            continue
+        said = (f"{'faster' if r.value > 1 else 'slower'} by {r.value:.3g} in time per sample" if verdicts.differs(line, lines)
+                else "no effect on time per sample found" + (f" (ratio {r.value:.3g} [{r.low:.3g}, {r.high:.3g}])" if r.trusted else f" ({r.doubt})"))
+        yield f"{line.scene}, {line.run}: the same images at equal seeds as the run it is compared with; {said}"
+
+
+def doubt_remarks(lines):
+    """Intervals that the table does not state, by reason."""
+    reasons = {}
+    for line in lines:
+        if line.efficiency is not None and line.efficiency.doubt:
+            reasons.setdefault(line.efficiency.doubt, []).append(f"{line.scene} {line.run}")
+    for doubt, places in reasons.items():
+        more = f" and {len(places) - 6} more" if len(places) > 6 else ""
+        yield f"no interval is stated for {', '.join(places[:6])}{more}: {doubt}"
+
+
+def clock_readings(experiment):
+    """[(when, {name: MHz})] of the manifest: "CPU" is the mean over cores, "GPU 0" the SM clock of the first GPU."""
+    out = []
+    for entry in experiment.manifest.get("clocks") or []:
+        mhz = {"CPU": (entry.get("cpu_mhz") or {}).get("mean")} | {f"GPU {i}": gpu.get("sm_mhz") for i, gpu in enumerate(entry.get("gpu") or [])}
+        out.append((entry.get("when", "?"), {name: value for name, value in mhz.items() if value}))
+    return out
+
+
+def clock_text(experiment):
+    """"CPU 2596 MHz at start, 2600 at end; GPU 0 (SM) 345 MHz at start, 1980 at end", or None."""
+    readings = clock_readings(experiment)
+    names = list(dict.fromkeys(name for _, mhz in readings for name in mhz))
+    def told(name):
+        values = [f"{mhz[name]:.0f} MHz ({when})" for when, mhz in readings if name in mhz]
+        return f"{name}{' SM' if name.startswith('GPU') else ''} " + ", ".join(values)
+    return "; ".join(told(name) for name in names) or None
+
+
+def clock_remarks(experiment):
+    """Clocks that were another at the end than at the start."""
+    readings = clock_readings(experiment)
+    if len(readings) < 2:
+        return
+    (first, a), (last, b) = readings[0], readings[-1]
+    for name in a.keys() & b.keys():
+        if max(a[name], b[name]) > SLOW_CLOCK * min(a[name], b[name]):
+            idle = " (an idle GPU shows low clocks before its first work)" if name.startswith("GPU") else ""
+            yield (f"{name}: {a[name]:.0f} MHz at {first}, {b[name]:.0f} at {last}{idle}; times of early and late renders may not compare")
+
+
+def remarks(experiment, lines):
+    """Sentences that a reader must know before believing the figures: gaps, dropped values, bias, references that are too noisy, pixels that decide
+    relMSE, clocks that changed."""
+    found = [*clock_remarks(experiment), *fairness.remarks(experiment)]
+    for scene in experiment.scenes:
+        every = {(s, c) for run in experiment.runs for s in experiment.seeds(scene, run) for c in experiment.checkpoints(scene, run)}
+        if not every:
+            found.append(f"{scene}: no results yet")
+            continue
+        for run in experiment.runs:
+            have = {(r.seed, r.checkpoint) for r in experiment.select(scene, run)}
+            if len(have) < len(every):
+                found.append(f"{scene}, {run}: {len(have)} of {len(every)} checkpoints recorded; figures and table use what is there")
+    threshold = verdicts.bias_threshold(verdicts.family(lines))
+    for line in lines:
+        place = f"{line.scene}, {line.run}"
+        noise = summary.reference_noise(experiment, line.scene)
+        if line.invalid:
+            found.append(f"{place}: {line.invalid} values were NaN, Inf or negative and were dropped")
+        broken = sum(not math.isfinite(r.error) for r in experiment.select(line.scene, line.run))
+        if broken:
+            found.append(f"{place}: the error of {broken} checkpoints is NaN or infinite; they are left out of figures and means")
+        if line.bias_z > threshold:
+            found.append(f"{place}: the mean differs from the reference's by |z| = {line.bias_z:.1f}; chance stays below {threshold:.1f} (1 % over all statements)")
+        elif line.bias and line.bias.p < verdicts.limit(lines):
+            found.append(f"{place}: the mean over seeds differs from the reference's by {line.bias.estimate.value:+.2e} ± {line.bias.estimate.error:.1e}, "
+                         "noise of the reference included; chance does that in less than 1 % over all statements")
+        if verdicts.slope_p(line) < verdicts.limit(lines):
+            found.append(f"{place}: the error falls with slope {line.slope.value:.3f} ± {line.slope.error:.3f} of samples, which is not the −1/2 of independent "
+                         "samples without bias: look for bias, rare bright samples, or samples that are not independent")
+        if not line.rmse.value >= noise and not math.isnan(noise):
+            found.append(f"{place}: the error is below the noise of the reference ({noise:.2g}) and so uncertain; a longer reference helps")
+    return found + list(method_remarks(experiment)) + list(same_remarks(lines)) + list(doubt_remarks(lines)) + list(trimmed_remarks(experiment, lines))

@@ -1,0 +1,35 @@
+"""A busy machine is noticed, a quiet one is not accused."""
+
+import json
+
+from analysis import experiment, fairness
+from analysis.tests import synthetic
+
+
+def recorded(folder, others, mhz=lambda seed: 3000.0):
+    for path in (folder / "stats" / "box").iterdir():
+        stats, seed = json.loads(path.read_text()), int(path.stem.rsplit("_", 1)[1])
+        stats["machine"] = [{"seconds": 1.0, "cores": 4, "other_cores": others(path.stem), "cpu_mhz": {"before": mhz(seed), "after": None}},
+                            {"seconds": 3.0, "cores": 4, "other_cores": 0.0, "cpu_mhz": {"before": None, "after": mhz(seed)}}]
+        path.write_text(json.dumps(stats))
+    return experiment.load(folder)
+
+
+def test_quiet_machines_get_no_remark(tmp_path):
+    folder = synthetic.make(tmp_path / "r", scenes=("box",))
+    (said,) = fairness.remarks(experiment.load(folder))
+    assert said.startswith("what else ran on the machine was not recorded")
+    assert list(fairness.remarks(recorded(folder, lambda name: 0.2))) == []
+
+
+def test_busy_renders_slow_seeds_and_moving_clocks_are_named(tmp_path):
+    folder = synthetic.make(tmp_path / "r", scenes=("box",))
+    rows = [line.split(",") for line in (folder / "runs.csv").read_text().splitlines()]
+    for cells in rows[1:]:
+        if cells[1:3] == ["nee", "2"]:
+            cells[9] = f"{2 * float(cells[9]):.9g}"
+    (folder / "runs.csv").write_text("\n".join(map(",".join, rows)) + "\n")
+    busy, spread, clocks = fairness.remarks(recorded(folder, lambda name: 4.0 if name == "nee_2" else 0.0, lambda seed: 3000.0 if seed < 3 else 2000.0))
+    assert "during 1 renders" in busy and busy.endswith("box nee seed 2 (25 %)")
+    assert spread.endswith("box nee 2.00") and "factor of 1.15" in spread
+    assert "2000 MHz at" in clocks and "seed 3" in clocks and "3000 at" in clocks

@@ -1,0 +1,179 @@
+#include "experiments/stress/runner.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "core/error.h"
+#include "core/flag.h"
+#include "core/progress.h"
+#include "experiments/stress/folder.h"
+#include "integrators/reachability.h"
+
+namespace ambilux::stress {
+namespace {
+
+using CellList = std::vector<std::pair<const Family*, const Cell*>>;
+
+/// Entries of `all` with one of `names`, or all of them. Throws Error(usage) for a name that none has.
+template <class T>
+std::vector<const T*> named(const std::vector<T>& all, const std::vector<std::string>& names, const char* option) {
+    std::vector<const T*> chosen;
+    for (const std::string& name : names)
+        if (std::none_of(all.begin(), all.end(), [&](const T& x) { return x.name == name; })) {
+            std::string known;
+            for (const T& x : all) known += (known.empty() ? "" : ", ") + x.name;
+            throw Error(ExitCode::usage, fmt::format("{} {}: known are {}", option, name, known));
+        }
+    for (const T& x : all)
+        if (names.empty() || std::find(names.begin(), names.end(), x.name) != names.end()) chosen.push_back(&x);
+    return chosen;
+}
+
+std::vector<const Method*> chosen_methods(const std::vector<std::string>& names, bool quick) {
+    std::vector<const Method*> chosen = named(methods(), names, "--method");
+    std::erase_if(chosen, [&](const Method* m) { return quick && !m->quick; });
+    return chosen;
+}
+
+/// "cpu" or "cuda". Throws Error(usage) for another name, Error(device) without a device.
+std::string backend_of(const std::string& name) {
+    const Choice<Backend> backend(name);
+    if (backend == Backend::automatic) return cuda_available() ? "cuda" : "cpu";
+    if (backend == Backend::cuda && !cuda_available()) throw Error(ExitCode::device, "stress: there is no CUDA device");
+    return name;
+}
+
+class Sweep {
+public:
+    Sweep(const Request& request, const std::vector<Family>& all, const Hooks& hooks)
+        : request_(request), hooks_(hooks), backend_(backend_of(request.backend)),
+          cells_(chosen_cells(all, request.families, request.quick)),
+          methods_(chosen_methods(request.methods, request.quick)),
+          rows_in_all_(double(chosen_cells(all, {}, request.quick).size() * chosen_methods({}, request.quick).size())),
+          folder_(request.output, fmt::format("quick={} seed={}", int(request.quick), request.seed), request.resume) {
+        for (const auto& [family, cell] : cells_)
+            for (const Method* method : methods_) rows_left_ += find(*cell, *method) == nullptr;
+        rows_to_do_ = rows_left_;
+    }
+
+    Summary run() {
+        for (const auto& [family, cell] : cells_) {
+            run_cell(*family, *cell);
+            if (interrupted_) break;
+        }
+        progress_.finish();
+        Summary summary{{}, cells_.size() * methods_.size(), interrupted_};
+        for (const auto& [family, cell] : cells_)
+            for (const Method* method : methods_)
+                if (const Row* row = find(*cell, *method)) summary.rows.push_back(*row);
+        return summary;
+    }
+
+private:
+    const Row* find(const Cell& cell, const Method& method) const {
+        return folder_.find(cell.name(), method.name, backend_);
+    }
+
+    void run_cell(const Family& family, const Cell& cell) {
+        std::optional<Scene> scene;
+        std::string refusal;
+        for (const Method* method : methods_) {
+            if (find(cell, *method)) continue;
+            interrupted_ =
+                interrupted_ || is_set(request_.interrupt) || (request_.seconds > 0 && elapsed() > request_.seconds);
+            if (interrupted_) break;
+            progress_.update(
+                1 - double(rows_left_) / double(rows_to_do_),
+                fmt::format("{} of {} rows, {} {}", rows_to_do_ - rows_left_, rows_to_do_, cell.name(), method->name));
+            if (!scene && refusal.empty()) try {
+                    scene = load(cell);
+                } catch (const Error& e) {
+                    refusal = e.what();
+                }
+            const Row row = run_method(family, cell, *method, scene ? &*scene : nullptr, refusal);
+            if (interrupted_) break;
+            folder_.add(row);
+            --rows_left_;
+        }
+    }
+
+    Scene load(const Cell& cell) {
+        const std::string path = write_scene(folder_.scenes(), cell);
+        Scene scene = hooks_.load_scene(path, {});
+        folder_.clear_scenes();
+        return scene;
+    }
+
+    Effort effort_of(const Cell& cell) const {
+        // Of the quick sweep all samples are the same on any machine; the other one goes by the clock.
+        Effort effort = request_.quick ? Effort{0.004, 1.3e5 * cell.effort, 60} : Effort{0.002, 2e6, 0.4};
+        effort.first_paths *= cell.effort;
+        effort.samples = cell.samples;
+        if (cell.samples) effort.seconds = 15;
+        if (request_.seconds > 0) {
+            // What is left, in equal parts; a cell whose samples are given may take a few parts more.
+            const double part = std::max(0.0, request_.seconds - elapsed()) / double(rows_left_);
+            effort.seconds = std::min(effort.seconds, cell.samples ? 20 * part : part);
+            if (!request_.quick) effort.paths = 4e7;
+        }
+        return effort;
+    }
+
+    Row run_method(const Family& family, const Cell& cell, const Method& method, const Scene* scene,
+                   const std::string& refusal) {
+        const Row* benign = cell.benign ? nullptr : find(family.cells.front(), method);
+        if (benign && benign->samples == 0) benign = nullptr;
+        Row row = blank_row(cell, method.name, backend_, benign);
+        try {
+            if (!scene) throw Error(ExitCode::bad_input, refusal);
+            const RenderSettings settings = settings_of(hooks_, method, cell, *scene, backend_, request_.seed);
+            if (const std::string why = reason_to_leave_out(cell, *scene, settings); !why.empty()) {
+                leave_out(row, why);
+                return row;
+            }
+            const Measurement m = measure(hooks_, *scene, settings, effort_of(cell), request_.interrupt);
+            interrupted_ = m.interrupted;
+            if (!m.interrupted) fill_row(row, cell, m, benign, rows_in_all_);
+        } catch (const Error& e) {
+            refuse_row(row, cell, e.what());
+        }
+        return row;
+    }
+
+    std::string reason_to_leave_out(const Cell& cell, const Scene& scene, const RenderSettings& settings) const {
+        if (cell.device_only && backend_ == "cpu") return "for devices: it takes a host minutes";
+        return missing_light(scene.features, settings);
+    }
+
+    double elapsed() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+    const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+    const Request& request_;
+    const Hooks& hooks_;
+    const std::string backend_;
+    const CellList cells_;
+    const std::vector<const Method*> methods_;
+    const double rows_in_all_;  ///< of all families and methods: the correction is the same whatever is chosen
+    SweepFolder folder_;
+    size_t rows_left_ = 0, rows_to_do_ = 0;
+    Progress progress_{"stress"};
+    bool interrupted_ = false;
+};
+
+}  // namespace
+
+CellList chosen_cells(const std::vector<Family>& all, const std::vector<std::string>& names, bool quick) {
+    CellList cells;
+    for (const Family* family : named(all, names, "--family"))
+        for (const Cell& cell : family->cells)
+            if (!quick || cell.quick) cells.emplace_back(family, &cell);
+    return cells;
+}
+
+Summary run(const Request& request, const std::vector<Family>& all, const Hooks& hooks) {
+    return Sweep(request, all, hooks).run();
+}
+
+}  // namespace ambilux::stress

@@ -1,0 +1,259 @@
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// timeout: 600
+// The twin in double precision: closed forms, the same expectation as the renderers, and what it can do that floats
+// cannot.
+#include "core/error.h"
+#include "render/twin/path_sample.h"
+#include "render/twin/scene.h"
+#include "tests/support/closed_forms.h"
+
+using namespace ambilux;
+
+namespace {
+
+RenderSettings twin_settings(const Scene& scene, const std::string& integrator = "path", uint64_t seed = 1) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
+    s.precision = Precision::in_double;
+    s.integrator = integrator;
+    return s;
+}
+
+RenderSettings single(RenderSettings s) {
+    s.precision = Precision::single;
+    return s;
+}
+
+/// Sums of squares of differences over those of `a`.
+double relative_difference(const FilmMoments& a, const FilmMoments& b) {
+    double difference = 0, size = 0;
+    for (size_t i = 0; i < a.sum.size(); ++i) {
+        difference += (a.sum[i] - b.sum[i]) * (a.sum[i] - b.sum[i]);
+        size += a.sum[i] * a.sum[i];
+    }
+    return std::sqrt(difference / size);
+}
+
+double relative_difference_of_means(const FilmMoments& a, const FilmMoments& b) {
+    double sum_a = 0, sum_b = 0;
+    for (size_t i = 0; i < a.sum.size(); ++i) sum_a += a.sum[i], sum_b += b.sum[i];
+    return std::abs(sum_a - sum_b) / sum_a;
+}
+
+constexpr Rgb kLight = {3, 5, 2}, kAlbedo = {0.8f, 0.5f, 0.2f};
+
+/// A sphere that radiates inwards: kLight (1 + a + ... + a^(depth-1)) everywhere.
+Scene furnace(const std::string& shape, int max_depth) {
+    return scene_from_text(scene_xml(
+        max_depth,
+        "<sensor type='perspective'><float name='fov' value='80'/><float name='near_clip' value='1e-4'/>"
+        "<transform name='to_world'><lookat origin='0.2,-0.1,0.3' target='-0.4,0.3,-0.7' up='0,1,0'/>"
+        "</transform>" +
+            square_film(8) + "</sensor><shape type='" + shape + "'><boolean name='flip_normals' value='true'/>" +
+            diffuse(kAlbedo) + area_light(kLight) + "</shape>"));
+}
+
+Image furnace_image(int depth) {
+    Rgb sum;
+    for (int c = 0; c < 3; ++c) {
+        const double a = double(kAlbedo[c]);
+        sum[c] = float(double(kLight[c]) * (1 - std::pow(a, depth)) / (1 - a));
+    }
+    return constant_image(8, 8, sum);
+}
+
+/// A plane seen by an orthographic camera of [-1,1]² under a sphere lamp, all of it `at` = (x,y,z) on from the origin,
+/// where a small black disk lies, so that the loader leaves the rest where it is.
+Scene plane_under_sphere(double at, double height, double radius, const std::string& blocker = "") {
+    const std::string there = std::to_string(at);
+    const auto moved = [&](const std::string& before, double z = 0) {
+        return "<transform name='to_world'>" + before + "<translate x='" + there + "' y='" + there + "' z='" +
+               std::to_string(at + z) + "'/></transform>";
+    };
+    const std::string far_disk = "<shape type='disk'><transform name='to_world'><scale value='0.5'/></transform>" +
+                                 diffuse({0, 0, 0}) + "</shape>";
+    return scene_from_text(scene_xml(
+        2, "<sensor type='orthographic'>" + moved("<rotate x='1' angle='180'/>", 0.125) + square_film(16) +
+               "</sensor><shape type='rectangle'>" + moved("<scale value='1.5'/>") + diffuse(kAlbedo) +
+               "</shape><shape type='sphere'>" + moved("<scale value='" + std::to_string(radius) + "'/>", height) +
+               area_light(kLight) + "</shape>" + blocker + (at == 0 ? "" : far_disk)));
+}
+
+/// pi (r/d)² cos.
+Image plane_under_sphere_image(double height, double radius) {
+    return image_of(16, 16, kLight * kAlbedo, [=](double x, double y) {
+        const double px = -1 + x / 8, py = 1 - y / 8, d2 = px * px + py * py + height * height;
+        return radius * radius * height / (d2 * std::sqrt(d2));
+    });
+}
+
+}  // namespace
+
+TEST_CASE("Constants, functions and bits of the copied headers are those of doubles", "[twin]") {
+    static_assert(std::is_same_v<decltype(twin::Vec3f::x), double>);
+    static_assert(std::is_same_v<decltype(twin::SceneView::tables), const float*>);
+    static_assert(twin::kPi == M_PI && twin::kInvPi == M_1_PI);
+    static_assert(twin::kRoundingUnit == 0x1p-53 && kRoundingUnit == 0x1p-24f);
+    static_assert(twin::kOneMinusEpsilon == 1 - 0x1p-53 && kOneMinusEpsilon == 0x1.fffffep-1f);
+    CHECK(twin::next_float_up(1.0) == 1 + 0x1p-52);
+    CHECK(twin::float_bits(twin::kInfinity) == twin::kInfinityBits);
+    CHECK(float_bits(kInfinity) == kInfinityBits);
+    CHECK(twin::is_valid_radiance({1e300, 0.0, 1e-300}));
+    for (const double wrong : {-1.0, -0.0, double(kInfinity), std::nan("")})
+        CHECK(!twin::is_valid_radiance({1.0, wrong, 1.0}));
+    for (const double x : {-0.7, -0.3, 0.0, 1e-3, 0.6}) {
+        double sine, cosine;
+        twin::sin_cos_octant(x, sine, cosine);
+        CHECK(sine == std::sin(x));
+        CHECK(cosine == std::cos(x));
+        CHECK(std::abs(twin::inverse_erf(std::erf(4 * x)) - 4 * x) < 1e-11);
+    }
+    for (const double scale : {1e-150, 1.0, 1e150}) {
+        const twin::Vec3f n = twin::detail::triangle_normal({scale, 0, 0}, {scale, scale, scale});
+        CHECK(n.x == 0);
+        CHECK(std::abs(n.y + M_SQRT1_2) < 1e-15);
+        CHECK(std::abs(n.z - M_SQRT1_2) < 1e-15);
+    }
+}
+
+TEST_CASE("Furnaces hold the light of their closed form", "[twin]") {
+    for (const int depth : {1, 4}) {
+        const Scene sphere = furnace("sphere", depth), cube = furnace("cube", depth);
+        for (const EstimatorCase& e : kEstimators) {
+            INFO("depth " << depth << ", " << e.name);
+            RenderSettings s = case_settings(sphere, e);
+            s.precision = Precision::in_double;
+            check_expectation(sphere, s, furnace_image(depth));
+        }
+        check_expectation(sphere, twin_settings(sphere, "bdpt"), furnace_image(depth));
+        check_expectation(cube, twin_settings(cube), furnace_image(depth));
+    }
+}
+
+TEST_CASE("A plane under a sphere lamp", "[twin]") {
+    const Scene scene = plane_under_sphere(0, 2, 0.5);
+    for (const char* integrator : {"path", "bdpt"}) {
+        INFO(integrator);
+        check_expectation(scene, twin_settings(scene, integrator), plane_under_sphere_image(2, 0.5));
+    }
+}
+
+TEST_CASE("At equal seeds images are those of the renderers but for the rounding of floats", "[twin]") {
+    for (const char* name : {"cornell", "furnace", "glass", "lights", "materials", "textured"})
+        for (const char* integrator : {"path", "bdpt", "light"}) {
+            INFO(name << ", " << integrator);
+            const Scene scene = project_scene(name, 24, 16);
+            const RenderSettings s = twin_settings(scene, integrator, 5);
+            const RenderResult twin = render_scene(scene, s, 16), floats = render_scene(scene, single(s), 16);
+            CHECK(twin.stats.invalid.total() == 0);
+            // A path that decides differently would be worth a hundredth; narrow lobes lose up to 1e-4 in floats.
+            CHECK(relative_difference(twin.film, floats.film) < 2e-3);
+            CHECK(relative_difference_of_means(twin.film, floats.film) < 1e-4);
+            // More than nothing: floats were not compared with themselves.
+            CHECK(relative_difference(twin.film, floats.film) > 1e-9);
+        }
+}
+
+TEST_CASE("At other seeds images have the expectation of the renderers", "[twin]") {
+    for (const char* name : {"cornell", "furnace", "lights", "materials", "textured"}) {
+        INFO(name);
+        const Scene scene = project_scene(name, 24, 16);
+        const FilmMoments twin = render_scene(scene, twin_settings(scene, "path", 5), 256).film;
+        const FilmMoments floats = render_scene(scene, single(twin_settings(scene, "path", 6)), 1024).film;
+        // Two images that agree to rounding have no variance to be tested against.
+        ZTestOptions options;
+        options.rounding = 1e-5;
+        const ZTestResult z = z_test(to_estimate(twin), to_estimate(floats), options);
+        INFO(z.report());
+        CHECK(z.pass);
+    }
+}
+
+TEST_CASE("A lamp half a unit above a plane, a million units from the origin, lights it in double precision alone",
+          "[twin]") {
+    const double at = 1e6, height = 0.5, radius = 0.25;
+    const Scene scene = plane_under_sphere(at, height, radius);
+    REQUIRE(scene.origin == std::array<double, 3>{});  // where floats have steps of 1/16
+    const Image expected = plane_under_sphere_image(height, radius);
+    for (const char* integrator : {"path", "bdpt"})
+        check_expectation(scene, twin_settings(scene, integrator), expected);
+    const FilmMoments floats = render_scene(scene, single(twin_settings(scene)), 256).film;
+    CHECK(!z_test(to_estimate(floats), exact_estimate(expected)).pass);
+}
+
+TEST_CASE("Directions of long subpaths are unit, and their vertices on their surfaces, within the rounding of doubles",
+          "[twin]") {
+    const Scene scene = scene_from_text(scene_xml(
+        -1, "<sensor type='perspective'>" + square_film(4) +
+                "</sensor><shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='roughconductor'>"
+                "<float name='alpha' value='0.1'/><string name='material' value='none'/></bsdf></shape>"
+                "<shape type='sphere'><float name='radius' value='0.3'/><bsdf type='dielectric'/></shape>"));
+    const twin::DoubleScene in_double(scene);
+    const twin::SceneView view = in_double.view();
+    const twin::Tracer tracer(view);
+    twin::Rules<twin::UnidirectionalMis> rules{};
+    rules.max_depth = rules.rr_depth = twin::kMaxDepth;
+    uint32_t longest = 0;
+    double worst_length = 0, worst_distance = 0;
+    for (uint32_t index = 0; index < 100; ++index) {
+        const twin::Draws draws = {{7, index, 0, twin::Stream::test}};
+        twin::Subpath<twin::UnidirectionalMis> path{};
+        path.origin = {0.5, 0.1, 0.2};
+        path.direction = twin::square_to_sphere({draws.camera().x, draws.camera().y});
+        path.throughput = {1, 1, 1};
+        path.roulette_scale = 1;
+        for (path.depth = 1; path.depth < 1000;) {
+            const twin::Hit hit = tracer.closest({path.origin, twin::kInfinity, path.direction, 0});
+            REQUIRE(hit.prim != twin::kNone);
+            const twin::SurfacePoint point = twin::surface_at<twin::kAllFeatures>(view, hit.prim, hit.u, hit.v);
+            const double radius = hit.prim == 0 ? 1.0 : double(0.3f);
+            worst_distance = std::max(worst_distance, std::abs(twin::length(point.p) - radius));
+            const auto vertex = twin::vertex_at<twin::kAllFeatures>(view, rules.mis, twin::Side::eye, path, point);
+            if (!twin::scatter<twin::kAllFeatures>(rules, twin::Side::eye, vertex,
+                                                   draws.scatter(twin::Side::eye, path.depth), path))
+                break;
+            worst_length = std::max(worst_length, std::abs(twin::length(path.direction) - 1) / path.depth);
+        }
+        longest = std::max(longest, path.depth);
+    }
+    CHECK(longest > 100);
+    CHECK(worst_length < 1e-15);  // per vertex
+    CHECK(worst_distance < 1e-15);
+}
+
+TEST_CASE("The twin repeats its image bit by bit, in parts too", "[twin]") {
+    const Scene scene = project_scene("glass", 24, 16);
+    const RenderSettings s = twin_settings(scene, "bdpt");
+    const FilmMoments whole = render_scene(scene, s, 4).film;
+    const std::unique_ptr<Renderer> renderer = make_renderer(scene, s);
+    REQUIRE(renderer->render(0, 1) == 1);
+    REQUIRE(renderer->render(1, 3) == 3);
+    CHECK(renderer->film().sum == whole.sum);
+    CHECK(renderer->film().sum_squares == whole.sum_squares);
+    CHECK(renderer->film().samples == 4);
+    const volatile bool stop = true;
+    CHECK(renderer->render(4, 3, &stop) == 0);
+}
+
+TEST_CASE("What the twin does without is refused by name", "[twin]") {
+    const Scene scene = project_scene("cornell", 8, 8);
+    const auto refused = [&](const std::string& integrator, const std::string& key, const std::string& value,
+                             const std::string& named) {
+        RenderSettings s = twin_settings(scene, integrator);
+        apply_setting(s, key, value);
+        try {
+            make_renderer(scene, s);
+        } catch (const Error& e) {
+            return e.code == ExitCode::usage && std::string(e.what()).find(named + "=") != std::string::npos;
+        }
+        return false;
+    };
+    CHECK(refused("path", "cull", "0.5", "cull"));
+    CHECK(refused("bdpt", "technique_depth", "3", "technique_depth"));
+    CHECK(refused("bdpt", "light_paths", "0.5", "light_paths"));
+    CHECK(refused("bdpt", "bdpt.auto", "true", "bdpt.auto"));
+    for (const char* variant : {"lvc", "streaming", "megakernel"})
+        CHECK(refused("bdpt", "variant", variant, "precision"));
+    CHECK(refused("path", "variant", "ris", "precision"));
+    CHECK(refused("path", "backend", "cuda", "precision"));
+    CHECK(refused("toy", "seed", "1", "precision"));
+}
