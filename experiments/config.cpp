@@ -88,7 +88,9 @@ std::string scene_file(const Reader& r, const toml::node& path, const std::strin
         file = fs::absolute(place).string() + file.substr(data.size());
     }
     const std::string found = (folder / file).lexically_normal().string();
-    if (!fs::is_regular_file(found)) throw r.error(path, fmt::format("scene '{}': there is no file {}", scene, found));
+    std::error_code ignored;  // such as a name that is too long
+    if (!fs::is_regular_file(found, ignored))
+        throw r.error(path, fmt::format("scene '{}': there is no file {}", scene, found));
     return found;
 }
 

@@ -106,6 +106,13 @@ TEST_CASE("keys of many dots are refused; strings and numbers may have as many a
     CHECK(read(folder, changed("size = [9, 5]\n", "size = [9, 5]\n" + harmless)).scenes.size() == 2);
 }
 
+TEST_CASE("a scene whose name no file can have is not there") {
+    const TempFolder folder;
+    const std::string name(5000, 'x');
+    CHECK(contains(error_of([&] { read(folder, changed("path = \"b.xml\"", "path = \"" + name + "\"")); }),
+                   "e.toml:13: scene 'b': there is no file"));
+}
+
 TEST_CASE("budgets of samples and of seconds stand side by side; --reduced replaces what its section says") {
     const TempFolder folder;
     const std::string text = changed("spp = [1, 2, 8, 32]", "spp = [1, 2]\nseconds = [0.5, 1]") +

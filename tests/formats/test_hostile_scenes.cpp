@@ -219,10 +219,11 @@ TEST_CASE("what cannot be traced is refused by shape, emitter or sensor with its
     CHECK(body_error("<sensor type='perspective'>" + moved("1e18") +
                      "</sensor><shape type='sphere'><transform "
                      "name='to_world'><scale value='1e10'/><translate x='1e18'/></transform></shape>") == "no error");
-    // Floats leave nothing of it where it is, but enough where it is moved to.
+    // Floats leave nothing of the rectangle where it is, but enough where it is moved to.
     CHECK(body_error("<sensor type='perspective'>" + moved("1e9") +
-                     "</sensor><shape type='rectangle'><transform "
-                     "name='to_world'><translate x='1e9'/></transform></shape>") == "no error");
+                     "</sensor><shape type='sphere'><float "
+                     "name='radius' value='1e6'/>" +
+                     moved("1e9") + "</shape><shape type='rectangle'>" + moved("1e9") + "</shape>") == "no error");
 }
 
 TEST_CASE("values that only doubles hold are refused with their line") {
