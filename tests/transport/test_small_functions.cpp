@@ -153,7 +153,7 @@ TEST_CASE("light subpaths start beside the lamp's surface, on the side that it s
     add_area(s, add_rectangle(s, {-1, -1, 2}, {0, 2, 0}, {2, 0, 0}, 5), splat(3));
     complete(s);
     for (uint32_t i = 0; i < 1000; ++i) {
-        EmissionSample e;
+        EmissionSample e{};
         const Vec4f a = random(6, i), b = random(6, i, 1);
         REQUIRE(sample_emission<kAllFeatures>(view_of(s), a, {b.x, b.y}, e));
         const BidirectionalMis mis{MisHeuristic::balance, kAllStrategies, 1.0f, 1.0f};
