@@ -13,7 +13,9 @@ Budget batch_end(const ExperimentConfig& config, const RenderPosition& at, const
     const auto end = [](double now, double step) { return (std::floor(now / step + 0.5) + 1) * step; };
     if (!config.seconds.empty()) {
         const double step = config.seconds.back() / kBatches, next = end(at.seconds, step);
-        if (budget.seconds == 0 || next <= budget.seconds - 0.5 * step) budget.seconds = next;
+        // A batch for which half a sample is too long would never begin.
+        const bool has_room = next - at.seconds >= 0.5 * at.per_sample;
+        if (has_room && (budget.seconds == 0 || next <= budget.seconds - 0.5 * step)) budget.seconds = next;
     } else {
         const double step = std::max(1.0, double(config.spp.back()) / kBatches);
         const auto next = uint64_t(std::llround(end(double(at.samples), step)));

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "core/atomic_file.h"
+#include "experiments/peers/peer_entry.h"
 #include "experiments/sweep.h"
 #include "experiments/toml_depth.h"
 #include "experiments/toml_reader.h"
@@ -196,8 +197,13 @@ RunEntry swept(const Reader& r, RunEntry run, const std::vector<SweepValue>& val
 }
 
 std::vector<RunEntry> read_run(const Reader& r, const toml::table& t, Names& names) {
+    if (is_peer_run(r, t)) {
+        RunEntry peer = read_peer_run(r, t);
+        r.claim(*t.get("name"), peer.name, "[[run]]", names);
+        return {peer};
+    }
     std::vector<std::string> keys = keys_of_runs();
-    keys.insert(keys.begin(), "name");
+    keys.insert(keys.begin(), {"name", "renderer"});
     keys.insert(keys.end(), {"set", "sweep", "techniques"});
     r.check_keys(t, "[[run]]", keys);
     RunEntry run;
@@ -245,6 +251,9 @@ void read_ablation(const Reader& r, const toml::table& t, ExperimentConfig& conf
     const toml::node* switches = t.get("switches");
     if (!switches) return;
     const RunEntry base = *found;
+    if (!base.renderer.empty())
+        throw r.error(*switches, fmt::format("'switches' change a run of this program, and '{}' is one of {}", base.name,
+                                             base.renderer));
     if (!base.swept.empty())
         throw r.error(*switches,
                       fmt::format("'switches' change a run of its own, and '{}' comes from a sweep", base.name));
@@ -348,7 +357,8 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     const Reader r{path};
     r.check_keys(
         root, "the configuration",
-        {"name", "metric", "order", "backend", "seeds", "reference", "budget", "scene", "run", "ablation", "reduced"});
+        {"name", "metric", "order", "backend", "filter", "agreement_spp", "seeds", "reference", "budget", "scene",
+         "run", "ablation", "reduced"});
     const auto need = [&](std::string_view key) -> const toml::node& {
         if (const toml::node* node = root.get(key)) return *node;
         throw input_error(path, 0, fmt::format("lacks the key '{}'", key));
@@ -369,6 +379,8 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
             throw r.error(*order, fmt::format("order '{}': must be random or listed", text));
         config.random_order = text == "random";
     }
+    if (const toml::node* spp = root.get("agreement_spp"))
+        config.agreement_spp = uint64_t(r.integer(*spp, "agreement_spp", 256, kMaxSpp));
     read_seeds(r, need("seeds"), config);
     const toml::table& reference = r.table(need("reference"), "reference");
     r.check_keys(reference, "[reference]", {"spp", "seed", "integrator", "variant", "set"});
@@ -390,10 +402,18 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     } else if (reduced) {
         throw input_error(path, 0, "--reduced: it has no section [reduced] that says what is smaller");
     }
+    bool box_filter = false;
+    if (const toml::node* filter = root.get("filter")) {
+        const std::string text = r.text(*filter, "filter");
+        if (text != "scene" && text != "box")
+            throw r.error(*filter, fmt::format("filter '{}': must be scene or box", text));
+        box_filter = text == "box";
+    }
     Names scene_names, run_names;
     for (const toml::node& node : r.array(need("scene"), "scene"))
         for (SceneEntry& scene : read_scene(r, r.table(node, "scene"), general, reduction, scene_names))
             config.scenes.push_back(std::move(scene));
+    for (SceneEntry& scene : config.scenes) scene.box_filter = box_filter;
     for (const toml::node& node : r.array(need("run"), "run"))
         for (RunEntry& run : read_run(r, r.table(node, "run"), run_names)) config.runs.push_back(std::move(run));
     if (const toml::node* ablation = root.get("ablation"))

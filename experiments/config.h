@@ -21,6 +21,7 @@ struct RunEntry {
     Settings swept;      ///< what the bracket says
     int techniques = 0;  ///< longest paths whose single strategies get images; 0: none
     int techniques_line = 0;
+    std::string renderer;  ///< a kind of peer (experiments/peers); empty: this program
 };
 
 /// How a scene's ground truth is made.
@@ -38,6 +39,7 @@ struct SceneEntry {
     std::optional<int> max_depth;    ///< none: the scene's own
     ReferenceEntry reference;        ///< the experiment's, or what the scene replaces of it
     bool lenient = false;
+    bool box_filter = false;  ///< in the place of the scene's own
     Settings parameters;
     int line = 0;
 };
@@ -61,6 +63,7 @@ struct ExperimentConfig {
     std::vector<double> seconds;   ///< checkpoints in seconds of render time, rising. One of both is set, or both
     std::string ablation_default;  ///< run that an ablation compares with; empty: no ablation
     bool random_order = true;  ///< of runs and scenes within a seed, so that a machine that changes treats all alike
+    uint64_t agreement_spp = 1024;  ///< of a peer's image that is compared with the reference before it is timed
     std::string metric = "relmse";  ///< error that leads the report: "relmse" or "mse"
 
     /// All checkpoints, those in samples first. Their places in this list are the column `checkpoint` of runs.csv.

@@ -17,6 +17,7 @@ RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& 
     if (budget.samples > kMaxSamples) throw Error(ExitCode::usage, "at most 4294967295 samples per pixel are possible");
     double& per_sample = position.per_sample;
     uint64_t& last_count = position.last_count;
+    const auto* const self_timed = dynamic_cast<const SelfTimed*>(&renderer);
     while (!position.interrupted) {
         if (is_set(interrupt)) {
             position.interrupted = true;
@@ -44,7 +45,8 @@ RenderPosition drive(Renderer& renderer, RenderPosition position, const Budget& 
         if (count == 0) break;
         const auto start = std::chrono::steady_clock::now();
         const uint32_t done = renderer.render(uint32_t(position.samples), uint32_t(count), interrupt);
-        const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
+                     seconds = self_timed && done > 0 ? self_timed->last_seconds() : wall;
         position.samples += done;
         position.seconds += seconds;
         if (done < count) {

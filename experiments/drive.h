@@ -7,8 +7,16 @@
 
 namespace ambilux {
 
-/// Where a render stands. `seconds` is wall clock inside Renderer::render, so that progress output, metrics and file
-/// writing do not count.
+/// A renderer that says what its last call of render() cost: one in another process, where handing images over does not
+/// count.
+class SelfTimed {
+public:
+    virtual ~SelfTimed() = default;
+    virtual double last_seconds() const = 0;
+};
+
+/// Where a render stands. `seconds` is wall clock inside Renderer::render, or what a SelfTimed renderer says, so that
+/// progress output, metrics and file writing do not count.
 struct RenderPosition {
     uint64_t samples = 0;  ///< per pixel
     double seconds = 0;

@@ -44,7 +44,7 @@ Pilot measure(const Scene& scene, const RenderSettings& settings, const volatile
 }
 
 std::string settings_text(const RunEntry& run) {
-    std::string text;
+    std::string text = run.renderer;
     for (const auto& [key, value] : run.settings) text += (text.empty() ? "" : " ") + key + "=" + value;
     if (run.techniques) text += fmt::format(" techniques={}", run.techniques);
     return text;
@@ -159,6 +159,7 @@ private:
 
     /// Without sample budgets the time is known; the renderer still says how much memory it takes.
     void measure_render(const LoadedEntry& scene, const RunEntry& run) {
+        if (!run.renderer.empty()) return;  // a peer costs what the others do, for want of better
         const RenderSettings settings = settings_for(config_, scene, run, config_.seeds[0], hooks_);
         const std::string what = fmt::format("run {} on {}", run.name, scene.entry->name);
         if (config_.spp.empty()) {

@@ -122,6 +122,7 @@ nlohmann::json ExperimentFolder::describe_runs() const {
         nlohmann::json settings = nlohmann::json::object();
         for (const auto& [key, value] : run.settings) settings[key] = value;
         nlohmann::json entry = {{"name", run.name}, {"settings", settings}};
+        if (!run.renderer.empty()) entry["renderer"] = run.renderer;
         if (!run.swept.empty()) {
             nlohmann::json swept = nlohmann::json::object();
             for (const auto& [key, value] : run.swept) swept[key] = value;

@@ -1,11 +1,14 @@
 #include "experiments/load.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 #include <thread>
 
@@ -16,10 +19,41 @@ namespace {
 
 double seconds_of(const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); }
 
+/// CPU seconds of the processes that a process has started, those they started included. Those that have ended are in
+/// their parent's counts.
+double child_seconds(pid_t parent, int depth = 0) {
+    constexpr int kMostGenerations = 8;
+    double seconds = 0;
+    std::error_code ignored;
+    for (const auto& task : std::filesystem::directory_iterator(fmt::format("/proc/{}/task", parent), ignored)) {
+        std::ifstream children(task.path() / "children");
+        for (pid_t child = 0; children >> child;) {
+            std::ifstream stat(fmt::format("/proc/{}/stat", child));
+            std::string text((std::istreambuf_iterator<char>(stat)), std::istreambuf_iterator<char>());
+            seconds += parse_stat_seconds(text, double(::sysconf(_SC_CLK_TCK)));
+            if (depth < kMostGenerations) seconds += child_seconds(child, depth + 1);
+        }
+    }
+    return seconds;
+}
+
 /// Null for 0, which stands for unknown.
 nlohmann::json known(double value) { return value > 0 ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
 }  // namespace
+
+double parse_stat_seconds(const std::string& text, double per_second) {
+    // pid (name) state ppid pgrp session tty tpgid flags minflt cminflt majflt cmajflt utime stime cutime cstime
+    // (proc(5)); the name may hold anything, but no bracket follows it.
+    const size_t end = text.rfind(')');
+    if (end == std::string::npos) return 0;
+    std::istringstream in(text.substr(end + 1));
+    std::string skipped;
+    for (int i = 0; i < 11; ++i) in >> skipped;
+    double ticks = 0, sum = 0;
+    for (int i = 0; i < 4 && in >> ticks; ++i) sum += ticks;
+    return sum / per_second;
+}
 
 void parse_cpu_line(const std::string& line, double per_second, LoadReading& reading) {
     std::istringstream in(line);
@@ -41,8 +75,10 @@ LoadReading read_load() {
         std::getline(stat, line);
         parse_cpu_line(line, double(::sysconf(_SC_CLK_TCK)), r);
     }
-    if (rusage usage; ::getrusage(RUSAGE_SELF, &usage) == 0)
-        r.own = seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime);
+    for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN})
+        if (rusage usage; ::getrusage(who, &usage) == 0)
+            r.own += seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime);
+    r.own += child_seconds(::getpid());
     std::ifstream("/proc/loadavg") >> r.load;
     r.mhz = cpu_mhz().mean;
     return r;

@@ -10,7 +10,7 @@ namespace ambilux {
 struct LoadReading {
     double wall = 0;   ///< seconds, of a steady clock
     double busy = 0;   ///< CPU seconds of all processes, all cores
-    double own = 0;    ///< of this process
+    double own = 0;    ///< of this process and those that it started
     double steal = 0;  ///< that a host of virtual machines gave to others
     double load = 0;   ///< processes that ran or waited, mean of a minute
     double mhz = 0;    ///< mean over cores; 0: unknown
@@ -21,6 +21,9 @@ LoadReading read_load();
 
 /// "cpu  123 4 56 ..." of /proc/stat: sets busy and steal. Ticks of `per_second`.
 void parse_cpu_line(const std::string& line, double per_second, LoadReading& reading);
+
+/// CPU seconds in a line of /proc/PID/stat, those of its ended children included; 0 if it is none.
+double parse_stat_seconds(const std::string& text, double per_second);
 
 /// CPU seconds of other processes, stolen ones included, per second of wall clock: cores that others held. Not below 0.
 double other_cores(const LoadReading& before, const LoadReading& after);

@@ -8,10 +8,19 @@
 
 #include "core/error.h"
 #include "core/log.h"
+#include "core/sha256.h"
 #include "experiments/reference_store.h"
 
 namespace ambilux {
 namespace {
+
+/// The content is another then: references of the scene with its own filter are not this scene's.
+void use_box_filter(Scene& scene) {
+    if (scene.sensor.filter == FilterType::box && scene.sensor.filter_radius == 0.5f) return;
+    scene.sensor.filter = FilterType::box;
+    scene.sensor.filter_radius = 0.5f;
+    scene.content_hash = sha256(to_hex(scene.content_hash) + " filter=box");
+}
 
 LoadedEntry load_entry(const ExperimentConfig& config, const SceneEntry& entry, const Hooks& hooks) {
     try {
@@ -24,6 +33,7 @@ LoadedEntry load_entry(const ExperimentConfig& config, const SceneEntry& entry, 
         LoadedEntry loaded;
         loaded.entry = &entry;
         loaded.scene = hooks.load_scene(entry.path, options);
+        if (entry.box_filter) use_box_filter(loaded.scene);
         loaded.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         RenderSettings probe;
         loaded.max_depth = entry.max_depth.value_or(loaded.scene.integrator.max_depth);
@@ -71,7 +81,9 @@ RenderSettings settings_for(const ExperimentConfig& config, const LoadedEntry& s
             throw input_error(config.file, line, fmt::format("run '{}': {}", run.name, e.what()));
         }
     };
-    for (size_t i = 0; i < run.settings.size(); ++i) apply(run.settings[i].first, run.settings[i].second, run.lines[i]);
+    for (size_t i = 0; i < run.settings.size(); ++i)
+        if (run.renderer.empty() || run.settings[i].first == "rr_depth")  // the others are the peer's own
+            apply(run.settings[i].first, run.settings[i].second, run.lines[i]);
     if (run.techniques) apply("technique_depth", std::to_string(run.techniques), run.techniques_line);
     s.seed = seed;
     return s;
@@ -86,6 +98,7 @@ Prepared prepare_experiment(const std::string& path, bool reduced, const Hooks& 
     for (const LoadedEntry& scene : p.scenes) {
         std::set<std::tuple<std::string, std::string, Backend>> tried;
         for (const RunEntry& run : p.config.runs) {
+            if (!run.renderer.empty()) continue;  // tried when it is examined: what is not there is no mistake
             const RenderSettings settings = settings_for(p.config, scene, run, 0, hooks);
             if (&scene != &p.scenes[0] &&
                 !tried.insert({settings.integrator, settings.variant, settings.backend}).second)

@@ -14,11 +14,12 @@
 #include "experiments/experiment_folder.h"
 #include "experiments/load.h"
 #include "experiments/machine.h"
+#include "experiments/peers/peer_runs.h"
 #include "experiments/prepare.h"
 #include "experiments/reference_store.h"
 #include "experiments/results.h"
+#include "experiments/run_maker.h"
 #include "experiments/state.h"
-#include "experiments/statistics.h"
 #include "experiments/stats_sum.h"
 #include "experiments/technique_files.h"
 #include "experiments/work_estimate.h"
@@ -46,6 +47,8 @@ struct RenderTask {
     RenderStats total;            ///< of all parts
     std::vector<size_t> pending;  ///< checkpoints that are not reached
 
+    RenderOf what() const { return {scene, run, settings}; }
+
     /// Statistics of all parts.
     RenderStats stated() const {
         RenderStats stats = total;
@@ -60,7 +63,8 @@ public:
     Experiment(const ExperimentRequest& request, const Hooks& hooks)
         : request_(request), hooks_(hooks), prepared_(prepare_experiment(request.config, request.reduced, hooks)),
           config_(prepared_.config), checkpoints_(config_.checkpoints()),
-          folder_(request.output, request.references, request.resume, prepared_) {}
+          folder_(request.output, request.references, request.resume, prepared_), own_(config_, hooks_),
+          peers_(request.output, config_, request.interrupt) {}
 
     ExitCode run() {
         folder_.add_clocks(folder_.is_resumed() ? "resumed" : "start");
@@ -69,7 +73,7 @@ public:
         Progress progress("experiment " + config_.name);
         progress_ = &progress;
         for (size_t i = 0; i < prepared_.scenes.size(); ++i)
-            if (!make_scene_reference(i)) return stopped();
+            if (!make_scene_reference(i) || !examine_peers(i)) return stopped();
         folder_.write_manifest(false);
         for (const uint64_t seed : config_.seeds)
             for (const auto& [scene, run] :
@@ -153,6 +157,20 @@ private:
         return true;
     }
 
+    /// Only peers whose images agree with the reference are timed.
+    bool examine_peers(size_t index) {
+        const LoadedEntry& scene = prepared_.scenes[index];
+        for (const RunEntry& run : config_.runs) {
+            if (run.renderer.empty()) continue;
+            show(fmt::format("agreement of {} on {}", run.name, scene.entry->name));
+            const RenderSettings settings = settings_for(config_, scene, run, 0, hooks_);
+            if (!peers_.examine({scene, run, settings}, references_made_[index].image)) return false;
+        }
+        return true;
+    }
+
+    RunMaker& maker(const RunEntry& run) { return run.renderer.empty() ? static_cast<RunMaker&>(own_) : peers_; }
+
     RenderTask make_task(size_t index, const RunEntry& run, uint64_t seed) const {
         const LoadedEntry& scene = prepared_.scenes[index];
         const std::string name = fmt::format("{}_{}", run.name, seed);
@@ -176,6 +194,10 @@ private:
 
     /// One render through all of its checkpoints; false if interrupted.
     bool render(size_t index, const RunEntry& run, uint64_t seed) {
+        if (!run.renderer.empty() && !peers_.agrees(prepared_.scenes[index], run)) {
+            work_.skip(kind(prepared_.scenes[index], &run));
+            return true;
+        }
         RenderTask task = make_task(index, run, seed);
         if (folder_.runs().count(task.prefix) == checkpoints_.size() && !fs::exists(task.state_path)) {
             work_.skip(task.work);
@@ -183,7 +205,7 @@ private:
         }
         restore(task);
         task.settings = settings_for(config_, task.scene, run, seed, hooks_);
-        const std::unique_ptr<Renderer> renderer = hooks_.make_renderer(task.scene.scene, settings_to_make(task));
+        const std::unique_ptr<Renderer> renderer = maker(run).make(task.what(), task.total);
         const bool cuda = prepared_.backends.contains("cuda");
         const LoadReading load = read_load();
         const bool whole = pass_checkpoints(task, *renderer);
@@ -228,20 +250,6 @@ private:
         const auto& done = state.notes["done"];
         for (size_t k = 0; k < checkpoints_.size(); ++k)
             if (std::find(done.begin(), done.end(), k) == done.end()) task.pending.push_back(k);
-    }
-
-    /// The settings, with what the first part chose, even if this machine is another or busier.
-    RenderSettings settings_to_make(const RenderTask& task) const {
-        RenderSettings made = task.settings;
-        if (made.automatic && !task.total.choice.name.empty()) {
-            made.automatic = false;
-            for (const auto& [key, value] : task.total.choice.settings) hooks_.apply_setting(made, key, value);
-        }
-        for (const Checkpoint& c : checkpoints_) {
-            made.expected_samples = std::max(made.expected_samples, c.samples);
-            made.expected_seconds = std::max(made.expected_seconds, c.seconds);
-        }
-        return made;
     }
 
     /// Renders from checkpoint to checkpoint; false if interrupted.
@@ -334,18 +342,18 @@ private:
         for (const std::string& line : lines) folder_.runs().add(line);
     }
 
-    ResultRow row(const RenderTask& task, size_t k) const {
+    ResultRow row(const RenderTask& task, size_t k) {
         ResultRow r;
         r.scene = task.scene.entry->name;
         r.run = task.run.name;
         r.seed = task.settings.seed;
         r.checkpoint = k;
         r.budget = checkpoints_[k].samples ? "spp" : "seconds";
-        const RenderSettings used = used_settings(task.settings, task.total);
-        r.integrator = used.integrator;
-        r.variant = used.variant;
-        r.estimator = setting_text(used, "estimator");
-        r.method = method_text(used);
+        const MethodNames names = maker(task.run).names(task.what(), task.total);
+        r.integrator = names.integrator;
+        r.variant = names.variant;
+        r.estimator = names.estimator;
+        r.method = names.method;
         r.backend = task.total.backend;
         r.spp = task.state.moments.samples;
         r.time = task.state.notes["seconds"].get<double>();
@@ -357,18 +365,18 @@ private:
 
     /// The image at the last checkpoint of the list: where there are checkpoints in seconds, all images have had the
     /// same time.
-    void write_images(const RenderTask& task) const {
+    void write_images(const RenderTask& task) {
         const Image image = mean_image(task.state.moments);
         write_exr(folder_.file("images", task.scene, task.name + ".exr"), image,
-                  image_attributes(task.scene.scene, task.settings, task.stated()));
+                  maker(task.run).attributes(task.what(), task.stated()));
         write_png(folder_.file("images", task.scene, task.name + ".png"), image);
     }
 
-    void finish(const RenderTask& task) const {
+    void finish(const RenderTask& task) {
         if (task.total.invalid.total())
             log_warning(fmt::format("{} {}: {} invalid values dropped", task.scene.entry->name, task.name,
                                     task.total.invalid.total()));
-        nlohmann::json json = stats_json(task.scene.scene, task.settings, task.stated(), task.scene.load_seconds);
+        nlohmann::json json = maker(task.run).statistics(task.what(), task.stated());
         json["machine"] = task.state.notes["machine"];
         write_file_atomic(folder_.file("stats", task.scene, task.name + ".json"),
                           json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
@@ -380,6 +388,8 @@ private:
     const ExperimentConfig& config_;
     const std::vector<Checkpoint> checkpoints_;
     ExperimentFolder folder_;
+    OwnRuns own_;
+    PeerRuns peers_;
     std::vector<SceneReference> references_made_ = std::vector<SceneReference>(prepared_.scenes.size());
     WorkEstimate work_;
     Progress* progress_ = nullptr;

@@ -1,0 +1,33 @@
+// Whether a peer's image has the expectation of our reference: without it there is no time to compare.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "experiments/peers/peer.h"
+#include "film/ztest.h"
+
+namespace ambilux {
+
+/// Independent parts of a peer's image, whose scatter tells its variance.
+constexpr int kAgreementParts = 16;
+
+/// No run has it: seeds of a configuration are not negative.
+constexpr uint64_t kAgreementSeed = ~uint64_t(0);
+
+struct Agreement {
+    bool interrupted = false;
+    ZTestResult test;
+    Image image;
+    uint64_t samples = 0;
+    double seconds = 0;
+};
+
+/// Renders `samples` per pixel (a multiple of the parts is used) and compares block means (z_test, its level and its
+/// thresholds from the variances of both images).
+Agreement measure_agreement(PeerRenderer& peer, uint64_t samples, const Reference& reference,
+                            const volatile bool* interrupt);
+
+/// pass, samples, seconds, relative_difference, detectable, worst {z, p, x, y, width, height, channel}.
+nlohmann::json to_json(const Agreement& agreement);
+
+}  // namespace ambilux

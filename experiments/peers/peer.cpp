@@ -1,0 +1,22 @@
+#include "experiments/peers/peer.h"
+
+#include "experiments/peers/command_peer.h"
+#include "experiments/peers/python_peer.h"
+
+namespace ambilux {
+
+const std::vector<PeerKind>& peer_kinds() {
+    static const std::vector<PeerKind> kinds = {
+        {"mitsuba", {"path", "ptracer"}, {"scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"}, false, start_python_peer},
+        {"command", {}, {}, true, start_command_peer},
+    };
+    return kinds;
+}
+
+const PeerKind* find_peer_kind(const std::string& name) {
+    for (const PeerKind& kind : peer_kinds())
+        if (kind.name == name) return &kind;
+    return nullptr;
+}
+
+}  // namespace ambilux

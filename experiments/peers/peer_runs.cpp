@@ -1,0 +1,181 @@
+#include "experiments/peers/peer_runs.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "core/version.h"
+#include "experiments/statistics.h"
+#include "film/png_io.h"
+
+namespace ambilux {
+namespace {
+
+std::string setting_of(const RunEntry& run, const std::string& key) {
+    for (const auto& [name, value] : run.settings)
+        if (name == key) return value;
+    return "";
+}
+
+nlohmann::json to_json(const PeerDescription& d) {
+    return {{"version", d.version},
+            {"device", d.device},
+            {"backend", d.backend},
+            {"load_seconds", d.load_seconds},
+            {"compile_seconds", d.compile_seconds},
+            {"changes", d.changes},
+            {"differences", d.differences}};
+}
+
+}  // namespace
+
+PeerRuns::PeerRuns(const std::string& folder, const ExperimentConfig& config, const volatile bool* interrupt)
+    : folder_(folder), config_(config), interrupt_(interrupt) {
+    const std::string path = folder_ + "/peers.json";
+    if (!std::filesystem::exists(path)) return;
+    const nlohmann::json earlier = nlohmann::json::parse(read_file(path), nullptr, false);
+    if (!earlier.is_array()) throw input_error(path, 0, "is damaged: remove it");
+    for (const nlohmann::json& entry : earlier)
+        if (entry.value("state", "") == "agrees" || entry.value("state", "") == "differs") found_.push_back(entry);
+}
+
+const nlohmann::json* PeerRuns::find(const LoadedEntry& scene, const RunEntry& run) const {
+    for (const nlohmann::json& entry : found_)
+        if (entry.value("scene", "") == scene.entry->name && entry.value("run", "") == run.name) return &entry;
+    return nullptr;
+}
+
+bool PeerRuns::agrees(const LoadedEntry& scene, const RunEntry& run) const {
+    const nlohmann::json* entry = find(scene, run);
+    return entry && entry->value("state", "") == "agrees";
+}
+
+bool PeerRuns::examine(const RenderOf& render, const Reference& reference) {
+    if (find(render.scene, render.run)) return true;
+    nlohmann::json entry = {{"scene", render.scene.entry->name},
+                            {"run", render.run.name},
+                            {"renderer", render.run.renderer},
+                            {"reason", nullptr}};
+    try {
+        entry.update(find_state(render, reference));
+    } catch (const PeerRefusal& e) {
+        entry["state"] = e.missing ? "missing" : "refused";
+        entry["reason"] = e.what();
+    } catch (const Error& e) {
+        if (e.code != ExitCode::interrupted) throw;
+        return false;
+    }
+    const std::string state = entry["state"].get<std::string>();
+    if (state == "differs")
+        entry["reason"] = fmt::format("its image of {} samples differs from the reference",
+                                      entry["agreement"]["samples"].get<uint64_t>());
+    if (state != "agrees")
+        log_warning(fmt::format("{} {}: {} is not timed: {}", render.scene.entry->name, render.run.name,
+                                render.run.renderer, entry["reason"].get<std::string>()));
+    found_.push_back(entry);
+    write();
+    return true;
+}
+
+nlohmann::json PeerRuns::find_state(const RenderOf& render, const Reference& reference) const {
+    const std::unique_ptr<PeerRenderer> peer = start(render);
+    peer->set_seed(kAgreementSeed);
+    nlohmann::json entry = to_json(peer->description());
+    const Agreement agreement = measure_agreement(*peer, config_.agreement_spp, reference, interrupt_);
+    if (agreement.interrupted) throw Error(ExitCode::interrupted, "interrupted");
+    const std::string image = fmt::format("images/{}/{}_agreement", render.scene.entry->name, render.run.name);
+    write_exr(folder_ + "/" + image + ".exr", agreement.image);
+    write_png(folder_ + "/" + image + ".png", agreement.image);
+    entry["agreement"] = ambilux::to_json(agreement);
+    entry["image"] = image + ".exr";
+    entry["state"] = agreement.test.pass ? "agrees" : "differs";
+    return entry;
+}
+
+std::unique_ptr<PeerRenderer> PeerRuns::start(const RenderOf& render) const {
+    if (render.scene.scene.sensor.filter != FilterType::box)
+        throw PeerRefusal(false, "the filter of the scene is not box: write filter = \"box\" in the configuration");
+    PeerJob job;
+    job.run = &render.run;
+    job.scene = &render.scene.scene;
+    job.scene_name = render.scene.entry->name;
+    job.scene_path = render.scene.entry->path;
+    job.parameters = render.scene.entry->parameters;
+    job.max_depth = render.settings.max_depth;
+    job.rr_depth = render.settings.rr_depth;
+    job.folder = fmt::format("{}/peers/{}/{}", std::filesystem::absolute(folder_).string(), render.scene.entry->name,
+                             render.run.name);
+    job.interrupt = interrupt_;
+    make_folders(job.folder);
+    return find_peer_kind(render.run.renderer)->start(job);
+}
+
+std::unique_ptr<Renderer> PeerRuns::make(const RenderOf& render, const RenderStats&) {
+    try {
+        std::unique_ptr<PeerRenderer> peer = start(render);
+        peer->set_seed(render.settings.seed);
+        return peer;
+    } catch (const PeerRefusal& e) {
+        throw Error(ExitCode::device, fmt::format("{} {}: {}", render.scene.entry->name, render.run.name, e.what()));
+    }
+}
+
+MethodNames PeerRuns::names(const RenderOf& render, const RenderStats&) const {
+    const nlohmann::json* entry = find(render.scene, render.run);
+    MethodNames names{setting_of(render.run, "integrator"), setting_of(render.run, "variant"), "",
+                      entry ? entry->value("version", "") : render.run.renderer};
+    if (names.integrator.empty()) names.integrator = render.run.renderer;
+    else names.method += " " + names.integrator;
+    if (!names.variant.empty()) names.method += " " + names.variant;
+    return names;
+}
+
+nlohmann::json PeerRuns::statistics(const RenderOf& render, const RenderStats& stats) const {
+    const Scene& scene = render.scene.scene;
+    const nlohmann::json* entry = find(render.scene, render.run);
+    nlohmann::json stages = nlohmann::json::array();
+    for (const StageStats& s : stats.stages)
+        stages.push_back({{"name", s.name}, {"launches", s.launches}, {"items", s.items}, {"seconds", s.seconds}});
+    return {{"method", names(render, stats).method},
+            {"renderer", render.run.renderer},
+            {"peer", entry ? *entry : nlohmann::json(nullptr)},
+            {"scene", scene.path},
+            {"scene_hash", scene_hash(scene)},
+            {"backend", stats.backend},
+            {"device", stats.device},
+            {"size", {scene.sensor.crop_width, scene.sensor.crop_height}},
+            {"spp", stats.samples},
+            {"max_depth", render.settings.max_depth},
+            {"rr_depth", render.settings.rr_depth},
+            {"seed", render.settings.seed},
+            {"seconds",
+             {{"load", entry ? entry->value("load_seconds", 0.0) : 0.0},
+              {"build", stats.build_seconds},
+              {"render", stats.render_seconds}}},
+            {"stages", stages},
+            {"invalid",
+             {{"nan", stats.invalid.nan}, {"inf", stats.invalid.inf}, {"negative", stats.invalid.negative}}},
+            {"version", version()},
+            {"git_revision", git_revision()}};
+}
+
+Attributes PeerRuns::attributes(const RenderOf& render, const RenderStats& stats) const {
+    return {{"method", names(render, stats).method},
+            {"renderer", render.run.renderer},
+            {"scene", render.scene.scene.path},
+            {"scene_hash", scene_hash(render.scene.scene)},
+            {"spp", stats.samples},
+            {"seed", render.settings.seed},
+            {"max_depth", render.settings.max_depth},
+            {"rr_depth", render.settings.rr_depth},
+            {"backend", stats.backend},
+            {"device", stats.device},
+            {"seconds", stats.render_seconds}};
+}
+
+void PeerRuns::write() const { write_file_atomic(folder_ + "/peers.json", found_.dump(2) + "\n"); }
+
+}  // namespace ambilux

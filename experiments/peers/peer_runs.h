@@ -1,0 +1,41 @@
+// Runs of other renderers in an experiment: who takes part, and why not the others.
+#pragma once
+
+#include <map>
+
+#include "experiments/peers/agreement.h"
+#include "experiments/run_maker.h"
+
+namespace ambilux {
+
+/// Keeps peers.json of the experiment's folder: for each scene and run of a peer its state, "agrees", "differs",
+/// "missing" (not installed) or "refused", with the reason, what the conversion changed, in what it differs, times to
+/// load and to compile, and the agreement. Only what agrees is timed.
+class PeerRuns : public RunMaker {
+public:
+    /// With what an earlier part found. Reasons of absence are forgotten: it may be there now.
+    PeerRuns(const std::string& folder, const ExperimentConfig& config, const volatile bool* interrupt);
+
+    /// Finds the state of a run on a scene unless it is known; false if interrupted.
+    bool examine(const RenderOf& render, const Reference& reference);
+    /// That it is to be rendered.
+    bool agrees(const LoadedEntry& scene, const RunEntry& run) const;
+
+    std::unique_ptr<Renderer> make(const RenderOf& render, const RenderStats& earlier) override;
+    MethodNames names(const RenderOf& render, const RenderStats& stats) const override;
+    nlohmann::json statistics(const RenderOf& render, const RenderStats& stats) const override;
+    Attributes attributes(const RenderOf& render, const RenderStats& stats) const override;
+
+private:
+    std::unique_ptr<PeerRenderer> start(const RenderOf& render) const;
+    nlohmann::json find_state(const RenderOf& render, const Reference& reference) const;
+    const nlohmann::json* find(const LoadedEntry& scene, const RunEntry& run) const;
+    void write() const;
+
+    const std::string folder_;
+    const ExperimentConfig& config_;
+    const volatile bool* interrupt_;
+    nlohmann::json found_ = nlohmann::json::array();
+};
+
+}  // namespace ambilux
