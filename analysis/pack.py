@@ -25,7 +25,7 @@ def sha256(path):
 def members(data, images):
     """(name in the archive, path) of what is packed: results, and references that lie inside. Figures are left out: they are made again."""
     folder = data.folder
-    names = ["config.resolved.toml", "manifest.json", "runs.csv", "batches.csv"]
+    names = ["config.resolved.toml", "manifest.json", "runs.csv", "batches.csv", "peers.json"]
     found = [(name, folder / name) for name in names if (folder / name).is_file()]
     for place in ("stats", "images", "techniques", "references"):
         found += [(p.relative_to(folder).as_posix(), p) for p in sorted((folder / place).rglob("*")) if p.is_file() and p.name not in LEFT_OUT]

@@ -2,7 +2,7 @@
 
 import math
 
-from analysis import fairness, summary, verdicts
+from analysis import fairness, peers, summary, verdicts
 
 FEW_PIXELS = 2.0  # relMSE over relMSE without the worst pixels, from which on these hold more than half of it
 SLOW_CLOCK = 1.1  # ratio of clocks at start and end of an experiment that is told
@@ -96,7 +96,7 @@ def clock_remarks(experiment):
 def remarks(experiment, lines):
     """Sentences that a reader must know before believing the figures: gaps, dropped values, bias, references that are too noisy, pixels that decide
     relMSE, clocks that changed."""
-    found = [*clock_remarks(experiment), *fairness.remarks(experiment)]
+    found = [*clock_remarks(experiment), *fairness.remarks(experiment), *peers.remarks(experiment)]
     for scene in experiment.scenes:
         every = {(s, c) for run in experiment.runs for s in experiment.seeds(scene, run) for c in experiment.checkpoints(scene, run)}
         if not every:
@@ -104,7 +104,7 @@ def remarks(experiment, lines):
             continue
         for run in experiment.runs:
             have = {(r.seed, r.checkpoint) for r in experiment.select(scene, run)}
-            if len(have) < len(every):
+            if len(have) < len(every) and (have or not peers.is_left_out(experiment, scene, run)):
                 found.append(f"{scene}, {run}: {len(have)} of {len(every)} checkpoints recorded; figures and table use what is there")
     threshold = verdicts.bias_threshold(verdicts.family(lines))
     for line in lines:

@@ -10,7 +10,7 @@ from pathlib import Path
 from matplotlib import colormaps
 from PIL import Image
 
-from analysis import captions, convergence, flip_maps, hdr_data, images, style, summary, tables, verdicts
+from analysis import captions, convergence, flip_maps, hdr_data, images, peers, style, summary, tables, verdicts
 from analysis import remarks as remarks_of
 
 PAGE = Path(__file__).parent / "page"
@@ -147,6 +147,8 @@ def render(experiment, lines, remarks, made, out, full_size=False):
              '<p class="note">Slope of log RMSE against log samples, over checkpoints in samples (over all, if the experiment has one kind) above the noise of the '
              "reference. Bias: mean over seeds of the difference of means at the checkpoint of the table, its interval with the noise of the reference. A departure is claimed where chance alone makes one, or any other statement of the tables, in less than 1 % of such reports.</p>"]
     body += ['<h2 id="references">References</h2>', f'<div class="wide">{reference_table(experiment)}</div>']
+    if peers.entries(experiment):
+        body += ['<h2 id="peers">Other renderers</h2>', f'<div class="wide">{peers.to_html(experiment)}</div>', f'<p class="note">{html.escape(peers.NOTE)}</p>']
     body.append('<h2 id="figures">Figures</h2>')
     body += [figure(out, *entry) for entry in made.pictures if not entry[0].startswith(INTERACTIVE)]
     others = [n for n, _, _ in made.pictures if n.startswith(INTERACTIVE)]

@@ -23,7 +23,8 @@ std::string resolved_toml(const ExperimentConfig& config) {
     };
     const auto insert_settings = [](toml::table& t, const RunEntry& run) {
         toml::table set;
-        for (const auto& [key, value] : run.settings) (is_key_of_runs(key) || key == "command" ? t : set).insert_or_assign(key, value);
+        for (const auto& [key, value] : run.settings)
+            (is_key_of_runs(key) || key == "command" ? t : set).insert_or_assign(key, value);
         if (!set.empty()) t.insert("set", set);
     };
     toml::table root;
@@ -31,8 +32,8 @@ std::string resolved_toml(const ExperimentConfig& config) {
     root.insert("metric", config.metric);
     root.insert("order", config.random_order ? "random" : "listed");
     root.insert("backend", config.backend);
-    const bool has_peers = std::any_of(config.runs.begin(), config.runs.end(),
-                                       [](const RunEntry& run) { return !run.renderer.empty(); });
+    const bool has_peers =
+        std::any_of(config.runs.begin(), config.runs.end(), [](const RunEntry& run) { return !run.renderer.empty(); });
     if (has_peers) root.insert("agreement_spp", int64_t(config.agreement_spp));
     if (config.scenes[0].box_filter) root.insert("filter", "box");
     toml::array seeds, scenes, runs, spp, seconds;

@@ -21,9 +21,7 @@ namespace {
 
 constexpr int kLookMilliseconds = 20;
 
-Error system_error(const std::string& what) {
-    return {ExitCode::device, what + ": " + std::strerror(errno)};
-}
+Error system_error(const std::string& what) { return {ExitCode::device, what + ": " + std::strerror(errno)}; }
 
 /// What the new process does before it becomes the program; only calls that are safe behind a fork.
 [[noreturn]] void become(char* const* argv, int socket, int log) {
@@ -38,8 +36,7 @@ Error system_error(const std::string& what) {
 
 }  // namespace
 
-ChildProcess::ChildProcess(const std::vector<std::string>& command, const std::string& log_path)
-    : log_path_(log_path) {
+ChildProcess::ChildProcess(const std::vector<std::string>& command, const std::string& log_path) : log_path_(log_path) {
     std::vector<char*> argv;
     for (const std::string& word : command) argv.push_back(const_cast<char*>(word.c_str()));
     argv.push_back(nullptr);

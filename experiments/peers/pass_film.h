@@ -19,7 +19,8 @@ public:
     void clear();
     const FilmMoments& moments() const { return moments_; }
     double last_seconds() const { return last_seconds_; }
-    /// Samples for about 0.2 s, from the last pass: powers of two, so that kernels made for a number of samples are few.
+    /// Samples for about 0.2 s, from the last pass: powers of two, so that kernels made for a number of samples are
+    /// few.
     uint32_t preferred_batch() const;
     /// A stage named after what was asked for, samples and invalid values.
     void state(RenderStats& stats) const;

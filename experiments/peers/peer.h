@@ -25,10 +25,10 @@ struct PeerJob {
 
 /// What a peer says of itself once it has loaded the scene.
 struct PeerDescription {
-    std::string version;                 ///< "mitsuba 3.9.1"
-    std::string device, backend;         ///< as in RenderStats
-    double load_seconds = 0;             ///< program, conversion and scene
-    double compile_seconds = 0;          ///< of kernels; no part of any render's time
+    std::string version;                   ///< "mitsuba 3.9.1"
+    std::string device, backend;           ///< as in RenderStats
+    double load_seconds = 0;               ///< program, conversion and scene
+    double compile_seconds = 0;            ///< of kernels; no part of any render's time
     std::vector<std::string> changes;      ///< what the conversion of the scene changed
     std::vector<std::string> differences;  ///< in what the render differs from ours though the image should not
 };

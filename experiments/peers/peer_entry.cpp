@@ -26,8 +26,8 @@ void add_choice(const TomlReader& r, const toml::table& t, RunEntry& run, const 
     const toml::node* node = t.get(key);
     const std::string value = node ? r.text(*node, key) : choices[0];
     if (std::find(choices.begin(), choices.end(), value) == choices.end())
-        throw r.error(*node, fmt::format("{} '{}' of {}: must be one of {}", key, value, run.renderer,
-                                         fmt::join(choices, ", ")));
+        throw r.error(
+            *node, fmt::format("{} '{}' of {}: must be one of {}", key, value, run.renderer, fmt::join(choices, ", ")));
     add(run, key, value, node ? TomlReader::line_of(*node) : run.line);
 }
 

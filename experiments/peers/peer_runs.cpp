@@ -127,8 +127,10 @@ MethodNames PeerRuns::names(const RenderOf& render, const RenderStats&) const {
     const nlohmann::json* entry = find(render.scene, render.run);
     MethodNames names{setting_of(render.run, "integrator"), setting_of(render.run, "variant"), "",
                       entry ? entry->value("version", "") : render.run.renderer};
-    if (names.integrator.empty()) names.integrator = render.run.renderer;
-    else names.method += " " + names.integrator;
+    if (names.integrator.empty())
+        names.integrator = render.run.renderer;
+    else
+        names.method += " " + names.integrator;
     if (!names.variant.empty()) names.method += " " + names.variant;
     return names;
 }
@@ -156,8 +158,7 @@ nlohmann::json PeerRuns::statistics(const RenderOf& render, const RenderStats& s
               {"build", stats.build_seconds},
               {"render", stats.render_seconds}}},
             {"stages", stages},
-            {"invalid",
-             {{"nan", stats.invalid.nan}, {"inf", stats.invalid.inf}, {"negative", stats.invalid.negative}}},
+            {"invalid", {{"nan", stats.invalid.nan}, {"inf", stats.invalid.inf}, {"negative", stats.invalid.negative}}},
             {"version", version()},
             {"git_revision", git_revision()}};
 }

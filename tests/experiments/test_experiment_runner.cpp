@@ -383,7 +383,9 @@ TEST_CASE("a render is recorded in batches of whole passes, which end at checkpo
     CHECK(later(0.27, 1.6) == Approx(0.4));
     CHECK(later(0.22, 1.6) == Approx(0.3));
     CHECK(later(1.54, 1.6) == Approx(1.6));
-    CHECK(later(1.7, 0) == Approx(1.8));  // past the last checkpoint in seconds, before one in samples
+    CHECK(later(1.7, 0) == Approx(1.8));          // past the last checkpoint in seconds, before one in samples
+    RenderPosition slow{5, 0.27, false, 0.3, 1};  // half a sample is longer than what is left of the batch
+    CHECK(batch_end(config, slow, {0, 1.6}).seconds == Approx(1.6));
 
     const TempFolder folder;
     write_inputs(folder);
