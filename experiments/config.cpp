@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "core/atomic_file.h"
+#include "core/log.h"
 #include "experiments/config_runs.h"
 #include "experiments/sweep.h"
 #include "experiments/toml_depth.h"
@@ -69,6 +70,20 @@ std::string scene_file(const Reader& r, const toml::node& path, const std::strin
     return found;
 }
 
+/// A scene with `optional = true` that is not there; says so.
+bool is_left_out(const Reader& r, const toml::table& t) {
+    const toml::node* optional = t.get("optional");
+    if (!optional || !r.flag(*optional, "optional")) return false;
+    const std::string name = r.name(t, "[[scene]]");
+    try {
+        scene_file(r, r.need(t, "path", "[[scene]]"), name);
+        return false;
+    } catch (const Error& e) {
+        log_warning(fmt::format("left out: {}", e.what()));
+        return true;
+    }
+}
+
 constexpr const char* kSweptSceneKeys[] = {"size", "max_depth"};
 
 /// Sets one of kSweptSceneKeys; returns the value as text.
@@ -130,7 +145,8 @@ std::vector<SceneEntry> swept_scenes(const Reader& r, const toml::table& t, cons
 std::vector<SceneEntry> read_scene(const Reader& r, const toml::table& t, const ReferenceEntry& reference,
                                    const Reduction& reduction, Names& names) {
     r.check_keys(t, "[[scene]]",
-                 {"name", "path", "size", "max_depth", "reference_spp", "reference", "lenient", "parameters", "sweep"});
+                 {"name", "path", "size", "max_depth", "reference_spp", "reference", "lenient", "optional",
+                  "parameters", "sweep"});
     SceneEntry scene;
     scene.line = Reader::line_of(t);
     scene.name = scene.base = r.name(t, "[[scene]]");
@@ -291,9 +307,12 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
         box_filter = text == "box";
     }
     Names scene_names, run_names;
-    for (const toml::node& node : r.array(need("scene"), "scene"))
+    for (const toml::node& node : r.array(need("scene"), "scene")) {
+        if (is_left_out(r, r.table(node, "scene"))) continue;
         for (SceneEntry& scene : read_scene(r, r.table(node, "scene"), general, reduction, scene_names))
             config.scenes.push_back(std::move(scene));
+    }
+    if (config.scenes.empty()) throw input_error(path, 0, "none of its scenes is there; all of them are optional");
     for (SceneEntry& scene : config.scenes) scene.box_filter = box_filter;
     for (const toml::node& node : r.array(need("run"), "run"))
         for (RunEntry& run : read_run(r, r.table(node, "run"), run_names)) config.runs.push_back(std::move(run));

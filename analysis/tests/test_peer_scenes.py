@@ -1,13 +1,17 @@
 """Conversion of scenes for other renderers (scripts/peers), which needs none of them installed."""
 
+import math
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "scripts" / "peers"))
+import luxcore_scene  # noqa: E402
 import mitsuba_scene  # noqa: E402
+from peer_protocol import Refused  # noqa: E402
 
 OLD = """<scene version="0.6.0"><default name="w" value="7"/><integrator type="bdpt"/>
 <sensor type="perspective"><film type="ldrfilm"><integer name="width" value="$w"/><float name="gamma" value="2.2"/><rfilter type="tent"/></film></sensor>
@@ -69,3 +73,68 @@ def test_what_cannot_be_divided_is_an_error(tmp_path):
     text = OLD.replace('<rgb name="eta" value="2, 3, 4"/>', '<string name="material" value="Au"/>')
     with pytest.raises(ValueError, match="ext_eta"):
         convert(tmp_path, text)
+
+
+def lux(tmp_path, shapes, sensor='<sensor type="perspective"><float name="fov" value="90"/></sensor>', size=(64, 32)):
+    root, _ = convert(tmp_path, f'<scene version="3.0.0">{sensor}{shapes}</scene>')
+    changes = mitsuba_scene.Changes()
+    properties, meshes = luxcore_scene.convert(root, size, changes)
+    return properties, meshes, changes.texts()
+
+
+def normals(mesh):
+    points, triangles, _ = mesh
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    return np.cross(b - a, c - a) / 2
+
+
+@pytest.mark.parametrize(("shape", "area", "outward"), [("rectangle", 4, False), ("cube", 24, True), ("disk", math.pi, False), ("sphere", 4 * math.pi, True)])
+def test_meshes_have_area_and_orientation_of_the_shape(tmp_path, shape, area, outward):
+    for transform, factor in (("", 1), ('<transform name="to_world"><scale x="-2" y="2" z="2"/></transform>', 4)):
+        _, meshes, _ = lux(tmp_path, f'<shape type="{shape}">{transform}</shape>')
+        n = normals(meshes["shape0"])
+        assert np.linalg.norm(n, axis=1).sum() == pytest.approx(area * factor, rel=1e-4)
+        points, triangles, _ = meshes["shape0"]
+        centers = points[triangles].mean(axis=1)
+        assert ((n * centers).sum(axis=1) > -1e-9).all() if outward else (n[:, 2] > 0).all()
+
+
+def test_normals_at_corners_point_as_the_triangles_do(tmp_path):
+    _, meshes, _ = lux(tmp_path, '<shape type="sphere"><boolean name="flip_normals" value="true"/><point name="center" x="1" y="2" z="3"/></shape>')
+    points, triangles, corners = meshes["shape0"]
+    n = normals(meshes["shape0"])
+    assert ((n * (points[triangles].mean(axis=1) - [1, 2, 3])).sum(axis=1) < 1e-9).all()
+    assert ((corners * (points - [1, 2, 3])).sum(axis=1) < 0).all()
+
+
+def test_transformations_are_applied_in_the_order_of_the_file(tmp_path):
+    shape = '<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/><translate y="-1"/><scale value="2"/></transform></shape>'
+    _, meshes, _ = lux(tmp_path, shape)
+    points, _, _ = meshes["shape0"]
+    assert points[:, 1] == pytest.approx(-2) and sorted(points[:, 0]) == pytest.approx([-2, -2, 2, 2])
+    assert normals(meshes["shape0"])[0] / 8 == pytest.approx([0, 1, 0], abs=1e-9)
+
+
+def test_the_field_of_view_is_that_of_the_shorter_side(tmp_path):
+    properties, _, _ = lux(tmp_path, '<shape type="cube"/>')
+    assert properties["scene.camera.fieldofview"] == pytest.approx(2 * math.degrees(math.atan(0.5)))
+    assert properties["scene.camera.screenwindow"][:2] == [-2, 2]
+
+
+def test_materials_and_lights_that_mean_the_same(tmp_path):
+    shapes = ('<bsdf type="dielectric" id="g"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/></bsdf><shape type="cube"><ref id="g"/></shape>'
+              '<shape type="rectangle"><bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.1, 0.2, 0.3"/></bsdf></bsdf>'
+              '<emitter type="area"><rgb name="radiance" value="4"/></emitter></shape><emitter type="constant"><rgb name="radiance" value="1, 2, 3"/></emitter>')
+    properties, _, changes = lux(tmp_path, shapes)
+    assert properties["scene.materials.shape0.type"] == "glass" and properties["scene.materials.shape0.interiorior"] == 1.5
+    assert properties["scene.materials.shape1.kd"] == [0.1, 0.2, 0.3] and properties["scene.materials.shape1.emission"] == [4, 4, 4]
+    assert properties["scene.lights.sky.gain"] == [1, 2, 3] and changes == []
+
+
+@pytest.mark.parametrize(("shapes", "reason"), [
+    ('<shape type="cube"><bsdf type="roughconductor"/></shape>', "bsdf roughconductor"), ('<emitter type="point"/>', "emitter point"),
+    ('<shape type="cylinder"/>', "shape cylinder"),
+    ('<shape type="cube"><bsdf type="diffuse"><texture type="bitmap" name="reflectance"/></bsdf></shape>', "reflectance of diffuse is a texture bitmap")])
+def test_what_is_not_the_same_is_refused_by_name(tmp_path, shapes, reason):
+    with pytest.raises(Refused, match=reason):
+        lux(tmp_path, shapes)

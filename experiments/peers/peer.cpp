@@ -8,6 +8,7 @@ namespace ambilux {
 const std::vector<PeerKind>& peer_kinds() {
     static const std::vector<PeerKind> kinds = {
         {"mitsuba", {"path", "ptracer"}, {"scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"}, false, start_python_peer},
+        {"luxcore", {"PATHCPU", "BIDIRCPU"}, {}, false, start_python_peer},
         {"command", {}, {}, true, start_command_peer},
     };
     return kinds;

@@ -70,8 +70,9 @@ public:
             throw;
         }
         if (answer.contains("refused")) throw PeerRefusal(false, answer["refused"].get<std::string>());
-        film_.add(read_pass(), count, answer.at("seconds").get<double>());
-        return count;
+        const auto done = answer.value("samples", count);  // some end only after a little more than asked for
+        film_.add(read_pass(), done, answer.at("seconds").get<double>());
+        return done;
     }
 
     FilmMoments film() override { return film_.moments(); }

@@ -1,7 +1,7 @@
 """How an experiment talks to a peer: one JSON object a line on standard input and output, images in a file.
 
 A script calls serve(start). start(job) loads the scene and returns (what it is, render); render(seed, samples) returns an image of
-height x width x 3 floats and the seconds that rendering took. What the peer itself prints goes to standard error.
+height x width x 3 floats, the seconds that rendering took and, if they are others than asked for, the samples. What the peer itself prints goes to standard error.
 """
 
 import json
@@ -45,10 +45,10 @@ def serve(start):
     for line in sys.stdin:
         request = json.loads(line)
         try:
-            image, seconds = render(request["seed"], request["samples"])
+            image, seconds, *samples = render(request["seed"], request["samples"])
         except Exception as error:
             answer(refused=clean(error))
             continue
         with open(os.path.join(job["folder"], "pass.f32"), "wb") as file:
             file.write(image.astype("<f4", copy=False).tobytes())
-        answer(seconds=seconds)
+        answer(seconds=seconds, samples=samples[0] if samples else request["samples"])

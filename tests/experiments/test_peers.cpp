@@ -159,6 +159,20 @@ TEST_CASE("wrong runs of peers are refused with their line") {
     CHECK(contains(resolved, "renderer = 'mitsuba'"));
 }
 
+TEST_CASE("a scene that is optional and not there is left out, and one of them must be there") {
+    const TempFolder folder;
+    const std::string extra = "[[scene]]\nname = \"far\"\npath = \"none.xml\"\noptional = true\n";
+    folder.write("e.toml", config_of(extra));
+    CHECK(read_experiment(folder / "e.toml").scenes.size() == 1);
+    folder.write("e.toml", config_of("[[scene]]\nname = \"far\"\npath = \"none.xml\"\n"));
+    CHECK(contains(error_of([&] { read_experiment(folder / "e.toml"); }), "there is no file"));
+    std::string text = config_of("");
+    text.replace(text.find("cornell.xml"), 7, "nowhere");
+    text.insert(text.find("size = "), "optional = true\n");
+    folder.write("e.toml", text);
+    CHECK(contains(error_of([&] { read_experiment(folder / "e.toml"); }), "none of its scenes is there"));
+}
+
 TEST_CASE("placeholders are filled in once and quoted for the shell") {
     CHECK(fill_command("a {x} {y} {z}", {{"x", "it's {y}"}, {"y", "2"}}) == "a 'it'\\''s {y}' '2' {z}");
     CHECK(check_command("{output}{spp}{seed}").empty());

@@ -1,0 +1,41 @@
+// What the runner keeps of a scene and of a render in progress.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "experiments/reference_store.h"
+#include "experiments/run_maker.h"
+#include "experiments/state.h"
+
+namespace ambilux {
+
+/// The ground truth of a scene.
+struct SceneReference {
+    ReferencePlace place;
+    Reference image;
+};
+
+/// One render on its way through the checkpoints.
+struct RenderTask {
+    size_t scene_index;
+    const LoadedEntry& scene;
+    const RunEntry& run;
+    RenderSettings settings;
+    std::string name, work, prefix, state_path;
+    RenderState state;            ///< up to the last checkpoint
+    RenderStats total;            ///< of all parts
+    std::vector<size_t> pending;  ///< checkpoints that are not reached
+
+    RenderOf what() const { return {scene, run, settings}; }
+
+    /// Statistics of all parts.
+    RenderStats stated() const {
+        RenderStats stats = total;
+        stats.samples = state.moments.samples;
+        stats.render_seconds = state.notes["seconds"].get<double>();
+        return stats;
+    }
+};
+
+}  // namespace ambilux
