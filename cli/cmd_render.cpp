@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "cli/aovs.h"
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/interrupt.h"
@@ -29,6 +30,7 @@ struct Options {
     std::optional<uint64_t> spp;
     std::optional<double> time;
     std::optional<float> exposure;
+    std::vector<std::string> aovs;
     uint32_t outliers = 0;
     bool strict = false;
 };
@@ -46,6 +48,7 @@ void check(const Options& o) {
     if (o.exposure && o.png.empty())
         throw Error(ExitCode::usage, "--exposure changes only the PNG: give --png FILE as well");
     if (o.output.empty()) throw Error(ExitCode::usage, "-o: the image needs a name");
+    check_aovs(o.aovs);
     if (!o.techniques.empty()) {
         make_folders(o.techniques);
         check_writable(o.techniques + "/techniques.json");
@@ -122,7 +125,8 @@ int render(const Options& o) {
     RenderStats stats = renderer->stats();
     if (position.samples > 0) {
         const Image image = mean_image(renderer->film());
-        write_exr(o.output, image, image_attributes(loaded.scene, settings, stats));
+        write_exr(o.output, image, image_attributes(loaded.scene, settings, stats),
+                  make_aovs(loaded.scene, settings, renderer->film(), o.aovs));
         if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
     }
     if (position.samples > 0 && !o.techniques.empty())
@@ -178,6 +182,11 @@ void add_render(CLI::App& app, Run& run) {
             "--technique-images", o->techniques,
             "Folder for raw and weighted images of every strategy (s,t) up to 6 segments, or --set technique_depth=N")
         ->type_name("DIR");
+    command
+        .add_option("--aov", o->aovs,
+                    "Layers that the image gets besides: " + fmt::format("{}", fmt::join(known_aovs(), ", ")))
+        ->delimiter(',')
+        ->type_name("NAME,...");
     command.add_option("--outliers", o->outliers,
                        "List the N pixels whose largest sample exceeds the mean of their others most, with commands "
                        "that replay them; renders one sample at a time");

@@ -223,9 +223,15 @@ std::string read_backend(const Reader& r, const toml::node& node) {
     return backend;
 }
 
+/// Fewer have no variance worth the name (ZTestOptions::min_samples).
+uint64_t read_agreement_spp(const Reader& r, const toml::node& node) {
+    return uint64_t(r.integer(node, "agreement_spp", 256, kMaxSpp));
+}
+
 /// The section [reduced]: what it replaces for all scenes, and in `config` its seeds and budgets.
 Reduction read_reduction(const Reader& r, const toml::table& t, ExperimentConfig& config) {
-    r.check_keys(t, "[reduced]", {"scale", "reference_spp", "seeds", "spp", "seconds"});
+    r.check_keys(t, "[reduced]", {"scale", "reference_spp", "agreement_spp", "seeds", "spp", "seconds"});
+    if (const toml::node* spp = t.get("agreement_spp")) config.agreement_spp = read_agreement_spp(r, *spp);
     Reduction reduction;
     if (const toml::node* scale = t.get("scale")) {
         const auto value = scale->value<double>();
@@ -276,8 +282,7 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
             throw r.error(*order, fmt::format("order '{}': must be random or listed", text));
         config.random_order = text == "random";
     }
-    if (const toml::node* spp = root.get("agreement_spp"))
-        config.agreement_spp = uint64_t(r.integer(*spp, "agreement_spp", 256, kMaxSpp));
+    if (const toml::node* spp = root.get("agreement_spp")) config.agreement_spp = read_agreement_spp(r, *spp);
     read_seeds(r, need("seeds"), config);
     const toml::table& reference = r.table(need("reference"), "reference");
     r.check_keys(reference, "[reference]", {"spp", "seed", "integrator", "variant", "set"});

@@ -79,9 +79,19 @@ void check_image(const std::string& path, const Image& image) {
                     "cannot write " + path + ": the image is empty or its buffer does not fit its size");
 }
 
-/// A file of planes of interleaved RGB floats under the given channel names.
-std::string encode_planes(const std::string& path, uint32_t width, uint32_t height,
-                          const std::vector<std::pair<const float*, std::array<const char*, 3>>>& planes,
+/// Interleaved floats, as many a pixel as there are names.
+struct Plane {
+    const float* data;
+    std::vector<std::string> names;
+
+    Plane(const float* values, const std::array<const char*, 3>& channels)
+        : data(values), names(channels.begin(), channels.end()) {}
+    explicit Plane(const Layer& layer) : data(layer.values.data()) {
+        for (const std::string& channel : layer.channels) names.push_back(layer.name + "." + channel);
+    }
+};
+
+std::string encode_planes(const std::string& path, uint32_t width, uint32_t height, const std::vector<Plane>& planes,
                           const Attributes& attributes) {
     StringStream stream;
     try {
@@ -90,10 +100,11 @@ std::string encode_planes(const std::string& path, uint32_t width, uint32_t heig
         insert_attributes(header, attributes);
         Imf::FrameBuffer frame;
         for (const auto& [data, names] : planes)
-            for (size_t c = 0; c < 3; ++c) {
+            for (size_t c = 0; c < names.size(); ++c) {
+                const size_t stride = names.size() * sizeof(float);
                 header.channels().insert(names[c], Imf::Channel(Imf::FLOAT));
                 frame.insert(names[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(data + c)),
-                                                  3 * sizeof(float), 3 * sizeof(float) * width));
+                                                  stride, stride * width));
             }
         Imf::OutputFile file(stream, header);
         file.setFrameBuffer(frame);
@@ -143,10 +154,16 @@ bool has(const ExrFile& file, const std::array<const char*, 3>& names) {
 
 }  // namespace
 
-void write_exr(const std::string& path, const Image& image, const Attributes& attributes) {
+void write_exr(const std::string& path, const Image& image, const Attributes& attributes,
+               const std::vector<Layer>& layers) {
     check_image(path, image);
-    write_file_atomic(path,
-                      encode_planes(path, image.width, image.height, {{image.rgb.data(), kMeanChannels}}, attributes));
+    std::vector<Plane> planes = {{image.rgb.data(), kMeanChannels}};
+    for (const Layer& layer : layers) {
+        if (layer.values.size() != size_t(image.width) * image.height * layer.channels.size())
+            throw Error(ExitCode::device, "cannot write " + path + ": layer " + layer.name + " has another size");
+        planes.emplace_back(layer);
+    }
+    write_file_atomic(path, encode_planes(path, image.width, image.height, planes, attributes));
 }
 
 void write_reference_exr(const std::string& path, const Reference& reference, Attributes attributes) {

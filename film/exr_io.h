@@ -5,6 +5,7 @@
 #include <string>
 
 #include "film/image.h"
+#include "film/layer.h"
 
 namespace ambilux {
 
@@ -13,8 +14,10 @@ namespace ambilux {
 /// variant, estimator, spp, seed, max_depth, backend, device, seconds, git_revision.
 using Attributes = nlohmann::json;
 
-/// Writes R, G, B as 32-bit floats, ZIP compression. Throws Error(device) if the file cannot be written.
-void write_exr(const std::string& path, const Image& image, const Attributes& attributes = Attributes::object());
+/// Writes R, G, B and the channels of `layers` as 32-bit floats, ZIP compression. Throws Error(device) if the file
+/// cannot be written.
+void write_exr(const std::string& path, const Image& image, const Attributes& attributes = Attributes::object(),
+               const std::vector<Layer>& layers = {});
 
 /// Writes R, G, B and the standard errors of the means se.R, se.G, se.B; adds the attribute spp, and behind the image a
 /// checksum of the file, which read_reference_exr() verifies.
