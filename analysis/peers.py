@@ -4,7 +4,7 @@ import html
 
 from analysis.experiment import InputError, read_json
 
-STATES = {"agrees": "agrees", "differs": "differs: not timed", "missing": "not installed", "refused": "refused"}
+STATES = {"agrees": "agrees", "differs": "differs: not timed", "undecided": "undecided: not timed", "missing": "not installed", "refused": "refused"}
 NOTE = ("Agreement: block means of the renderer's image against those of the reference, on all scales, with thresholds from the variances of both (film/ztest.h); "
         "p is the chance that images of equal expectation differ as much. Only what agrees is timed. Detectable: the relative difference of the means that would just have failed. "
         "Times to load and to compile are in no render's time.")

@@ -69,6 +69,13 @@ def test_the_projects_scenes_need_few_changes(tmp_path):
         assert convert(tmp_path, text)[1] == expected
 
 
+def test_bump_and_normal_maps_have_no_newer_flags(tmp_path):
+    text = '<scene version="3.0.0"><sensor type="perspective"/><bsdf type="bumpmap"><boolean name="use_shadowing_function" value="true"/></bsdf></scene>'
+    root, changes = convert(tmp_path, text)
+    assert {e.get("name"): e.get("value") for e in root.find("bsdf")} == {"flip_invalid_normals": "false", "use_shadowing_function": "false"}
+    assert len(changes) == 1
+
+
 def test_what_cannot_be_divided_is_an_error(tmp_path):
     text = OLD.replace('<rgb name="eta" value="2, 3, 4"/>', '<string name="material" value="Au"/>')
     with pytest.raises(ValueError, match="ext_eta"):

@@ -11,7 +11,7 @@ namespace ambilux {
 /// Independent parts of a peer's image, whose scatter tells its variance.
 constexpr int kAgreementParts = 16;
 
-/// No run has it: seeds of a configuration are not negative.
+/// No run has it or the one below: seeds of a configuration are below 2^63.
 constexpr uint64_t kAgreementSeed = ~uint64_t(0);
 
 struct Agreement {

@@ -69,9 +69,11 @@ bool PeerRuns::examine(const RenderOf& render, const Reference& reference) {
         return false;
     }
     const std::string state = entry["state"].get<std::string>();
-    if (state == "differs")
-        entry["reason"] = fmt::format("its image of {} samples differs from the reference",
-                                      entry["agreement"]["samples"].get<uint64_t>());
+    if (state == "differs" || state == "undecided")
+        entry["reason"] = fmt::format(
+            "its image of {} samples {}", entry["agreement"]["samples"].get<uint64_t>(),
+            state == "differs" ? "differs from the reference"
+                               : "has met too few events to be compared with the reference: raise agreement_spp");
     if (state != "agrees")
         log_warning(fmt::format("{} {}: {} is not timed: {}", render.scene.entry->name, render.run.name,
                                 render.run.renderer, entry["reason"].get<std::string>()));
@@ -84,14 +86,19 @@ nlohmann::json PeerRuns::find_state(const RenderOf& render, const Reference& ref
     const std::unique_ptr<PeerRenderer> peer = start(render);
     peer->set_seed(kAgreementSeed);
     nlohmann::json entry = to_json(peer->description());
-    const Agreement agreement = measure_agreement(*peer, config_.agreement_spp, reference, interrupt_);
+    Agreement agreement = measure_agreement(*peer, config_.agreement_spp, reference, interrupt_);
+    if (!agreement.interrupted && !agreement.test.pass) {
+        // Few samples of a heavy tail look like another image, or like nothing. More of them, drawn anew, decide.
+        peer->set_seed(kAgreementSeed - 1);
+        agreement = measure_agreement(*peer, 4 * config_.agreement_spp, reference, interrupt_);
+    }
     if (agreement.interrupted) throw Error(ExitCode::interrupted, "interrupted");
     const std::string image = fmt::format("images/{}/{}_agreement", render.scene.entry->name, render.run.name);
     write_exr(folder_ + "/" + image + ".exr", agreement.image);
     write_png(folder_ + "/" + image + ".png", agreement.image);
     entry["agreement"] = ambilux::to_json(agreement);
     entry["image"] = image + ".exr";
-    entry["state"] = agreement.test.pass ? "agrees" : "differs";
+    entry["state"] = agreement.test.pass ? "agrees" : agreement.test.undecided ? "undecided" : "differs";
     return entry;
 }
 

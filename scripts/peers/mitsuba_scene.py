@@ -144,6 +144,18 @@ def rough_diffuse(root, changes):
             changes.add("roughdiffuse is diffuse, since Mitsuba 3 has no other: another image unless alpha is 0")
 
 
+def bump_flags(root, changes):
+    """Newer than the formats: they turn normals that face away, and darken. Older versions and this program do neither."""
+    for e in root.iter("bsdf"):
+        if e.get("type") not in ("bumpmap", "normalmap"):
+            continue
+        for flag in ("flip_invalid_normals", "use_shadowing_function"):
+            for stated in children(e, flag):
+                e.remove(stated)
+            xml.SubElement(e, "boolean", {"name": flag, "value": "false"})
+        changes.add(f"flip_invalid_normals and use_shadowing_function of {e.get('type')} are off")
+
+
 def unused_flags(root, changes):
     """Flags of old formats that say nothing in format 3."""
     for e in root.iter("bsdf"):
@@ -229,6 +241,7 @@ def convert(job):
     bitmaps(root, old, changes)
     conductors(root, changes)
     rough_diffuse(root, changes)
+    bump_flags(root, changes)
     unused_flags(root, changes)
     film_of(root, job, changes)
     integrator_of(root, job, changes)

@@ -76,6 +76,7 @@ TEST_CASE("a peer that agrees is timed, one that does not is reported and not ti
     CHECK(same["agreement"]["samples"] == 256);
     CHECK(std::abs(same["agreement"]["relative_difference"].get<double>()) < 0.1);
     CHECK(shallow["state"] == "differs");
+    CHECK(shallow["agreement"]["samples"] == 1024);  // four times as many decide
     CHECK(shallow["agreement"]["relative_difference"].get<double>() < -0.05);
     CHECK(none["state"] == "missing");
     CHECK(contains(none["reason"], "no-such-program"));
