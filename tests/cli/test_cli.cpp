@@ -168,6 +168,21 @@ TEST_CASE("a render writes image, PNG and statistics") {
     CHECK(quiet.out.empty());
 }
 
+TEST_CASE("--aov adds layers to the image and leaves it as it is") {
+    const TempFolder folder;
+    REQUIRE(run(folder, render(folder, {"--spp", "4"}, "plain.exr")).code == 0);
+    REQUIRE(run(folder, render(folder, {"--spp", "4", "--aov", "albedo,variance,depth"})).code == 0);
+    CHECK(read_exr(folder / "a.exr").rgb == read_exr(folder / "plain.exr").rgb);
+    const std::string bytes = read_file(folder / "a.exr");
+    for (const char* channel : {"albedo.R", "albedo.B", "variance.G", "depth.Z"}) CHECK(contains(bytes, channel));
+    CHECK_FALSE(contains(bytes, "normal.X"));
+    const Outcome unknown = run(folder, render(folder, {"--aov", "albedo,colour"}));
+    CHECK(unknown.code == 2);
+    CHECK(
+        contains(unknown.err, "--aov colour: not known; known are albedo, normal, depth, position, samples, variance"));
+    CHECK(run(folder, render(folder, {"--aov", "depth,depth"})).code == 2);
+}
+
 TEST_CASE("light that no strategy in use can find is named, in the warning and beside the candidates of auto") {
     const test::TempFolder folder;
     write_file_atomic(folder / "lamp.xml",
