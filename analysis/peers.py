@@ -4,7 +4,8 @@ import html
 
 from analysis.experiment import InputError, read_json
 
-STATES = {"agrees": "agrees", "differs": "differs: not timed", "undecided": "undecided: not timed", "missing": "not installed", "refused": "refused"}
+TIMED = ("agrees", "untested")
+STATES = {"agrees": "agrees", "untested": "not tested", "differs": "differs: not timed", "undecided": "undecided: not timed", "missing": "not installed", "refused": "refused"}
 NOTE = ("Agreement: block means of the renderer's image against those of the reference, on all scales, with thresholds from the variances of both (film/ztest.h); "
         "p is the chance that images of equal expectation differ as much. Only what agrees is timed. Detectable: the relative difference of the means that would just have failed. "
         "Times to load and to compile are in no render's time.")
@@ -23,7 +24,7 @@ def entries(experiment):
 
 
 def is_left_out(experiment, scene, run):
-    return any(e["scene"] == scene and e["run"] == run and e["state"] != "agrees" for e in entries(experiment))
+    return any(e["scene"] == scene and e["run"] == run and e["state"] not in TIMED for e in entries(experiment))
 
 
 def difference(entry):
@@ -41,13 +42,13 @@ def remarks(experiment):
     for e in entries(experiment):
         if e["state"] == "differs":
             yield f"{e['scene']}, {e['run']}: its image does not agree with the reference ({difference(e)}), so that its time is not compared; the difference is the result"
-        elif e["state"] != "agrees":
+        elif e["state"] not in TIMED:
             absent.setdefault((e["run"], STATES[e["state"]], e.get("reason") or "no reason given"), []).append(e["scene"])
     for (run, state, reason), scenes in absent.items():
         yield f"{run}: {state} on {', '.join(scenes)} ({reason})"
     told = {}
     for e in entries(experiment):
-        for text in e.get("differences") or () if e["state"] == "agrees" else ():
+        for text in e.get("differences") or () if e["state"] in TIMED else ():
             told.setdefault((e["run"], text), []).append(e["scene"])
     for (run, text), scenes in told.items():
         yield f"{run}: {text}" + ("" if len(scenes) == len(experiment.scenes) else f" ({', '.join(scenes)})")

@@ -3,6 +3,7 @@
 #include <sstream>
 
 #include "experiments/config.h"
+#include "experiments/peers/peer.h"
 #include "integrators/setting.h"
 
 namespace ambilux {
@@ -21,10 +22,24 @@ std::string resolved_toml(const ExperimentConfig& config) {
         for (const auto& [key, value] : pairs) t.insert_or_assign(key, value);
         return t;
     };
-    const auto insert_settings = [](toml::table& t, const RunEntry& run) {
+    const auto list_of = [](const std::string& text) {
+        std::istringstream in(text);
+        toml::array list;
+        for (double value = 0; in >> value;) list.push_back(value);
+        return list;
+    };
+    const auto insert_settings = [&](toml::table& t, const RunEntry& run) {
         toml::table set;
-        for (const auto& [key, value] : run.settings)
-            (is_key_of_runs(key) || key == "command" ? t : set).insert_or_assign(key, value);
+        const PeerKind* const peer = find_peer_kind(run.renderer);
+        const auto is_in = [](const std::vector<std::string>& keys, const std::string& key) {
+            return std::find(keys.begin(), keys.end(), key) != keys.end();
+        };
+        for (const auto& [key, value] : run.settings) {
+            if (peer && is_in(peer->lists, key))
+                t.insert_or_assign(key, list_of(value));
+            else
+                (is_key_of_runs(key) || (peer && is_in(peer->texts, key)) ? t : set).insert_or_assign(key, value);
+        }
         if (!set.empty()) t.insert("set", set);
     };
     toml::table root;

@@ -24,8 +24,8 @@ std::string quoted(const std::string& word) {
     return out + "'";
 }
 
-std::string command_of(const RunEntry& run) {
-    for (const auto& [key, value] : run.settings)
+std::string command_of(const Settings& settings) {
+    for (const auto& [key, value] : settings)
         if (key == "command") return value;
     return "";
 }
@@ -35,7 +35,7 @@ double now() { return std::chrono::duration<double>(std::chrono::steady_clock::n
 class CommandPeer : public PeerRenderer {
 public:
     explicit CommandPeer(const PeerJob& job)
-        : command_(command_of(*job.run)), folder_(job.folder),
+        : command_(command_of(job.run->settings)), folder_(job.folder),
           film_(job.scene->sensor.crop_width, job.scene->sensor.crop_height) {
         values_ = {{"scene", job.scene_path},
                    {"name", job.scene_name},
@@ -120,10 +120,11 @@ private:
 
 }  // namespace
 
-std::string check_command(const std::string& command) {
+std::string check_command(const Settings& settings) {
+    const std::string command = command_of(settings);
     for (const char* name : kNeeded)
         if (command.find(fmt::format("{{{}}}", name)) == std::string::npos)
-            return fmt::format("lacks the placeholder {{{}}}: it must have {{{}}}, and can have {{{}}}", name,
+            return fmt::format("'command' lacks the placeholder {{{}}}: it must have {{{}}}, and can have {{{}}}", name,
                                fmt::join(kNeeded, "}, {"), fmt::join(kPossible, "}, {"));
     return "";
 }

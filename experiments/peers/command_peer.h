@@ -6,8 +6,9 @@
 namespace ambilux {
 
 /// Placeholders of a command: {output}, {spp} and {seed} must be there; {scene} (path of the scene's file), {name} (of
-/// the scene), {width}, {height} and {depth} (segments, -1: no bound) may be. Empty, or what is wrong with `command`.
-std::string check_command(const std::string& command);
+/// the scene), {width}, {height} and {depth} (segments, -1: no bound) may be. Empty, or what is wrong with the setting
+/// `command`.
+std::string check_command(const Settings& settings);
 
 /// `command` with `values` in the place of the placeholders, quoted for a shell.
 std::string fill_command(const std::string& command, const Settings& values);

@@ -7,12 +7,20 @@
 namespace ambilux {
 
 void PassFilm::add(const Image& image, uint32_t count, double seconds) {
+    Image kept = image;
+    for (float& v : kept.rgb) {
+        invalid_.negative += v < 0 && std::isfinite(v);
+        if (v < 0 && std::isfinite(v)) v = 0;
+    }
+    add_signed(kept, count, seconds);
+}
+
+void PassFilm::add_signed(const Image& image, uint32_t count, double seconds) {
     for (size_t i = 0; i < image.rgb.size(); ++i) {
         double v = image.rgb[i];
         invalid_.nan += std::isnan(v);
         invalid_.inf += std::isinf(v);
-        invalid_.negative += v < 0;
-        if (!(std::isfinite(v) && v >= 0)) v = 0;
+        if (!std::isfinite(v)) v = 0;
         moments_.sum[i] += v * count;
         moments_.sum_squares[i] += v * v * count;
     }

@@ -16,6 +16,8 @@ public:
     }
     /// `image`: mean of `count` samples per pixel. Values that are not finite or negative count as 0 and are counted.
     void add(const Image& image, uint32_t count, double seconds);
+    /// The same of values that may be negative, since only sums of passes are radiance.
+    void add_signed(const Image& image, uint32_t count, double seconds);
     void clear();
     const FilmMoments& moments() const { return moments_; }
     double last_seconds() const { return last_seconds_; }

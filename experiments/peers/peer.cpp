@@ -1,15 +1,24 @@
 #include "experiments/peers/peer.h"
 
 #include "experiments/peers/command_peer.h"
+#include "experiments/peers/image_peer.h"
 #include "experiments/peers/python_peer.h"
 
 namespace ambilux {
 
 const std::vector<PeerKind>& peer_kinds() {
     static const std::vector<PeerKind> kinds = {
-        {"mitsuba", {"path", "ptracer"}, {"scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"}, false, start_python_peer},
-        {"luxcore", {"PATHCPU", "BIDIRCPU"}, {}, false, start_python_peer},
-        {"command", {}, {}, true, start_command_peer},
+        {"mitsuba",
+         {"path", "ptracer"},
+         {"scalar_rgb", "llvm_ad_rgb", "cuda_ad_rgb"},
+         {},
+         {},
+         nullptr,
+         true,
+         start_python_peer},
+        {"luxcore", {"PATHCPU", "BIDIRCPU"}, {}, {}, {}, nullptr, true, start_python_peer},
+        {"command", {}, {}, {"command"}, {}, check_command, true, start_command_peer},
+        {"images", {}, {}, {"files"}, {"samples", "seconds"}, check_images, false, start_image_peer},
     };
     return kinds;
 }

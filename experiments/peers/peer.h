@@ -51,7 +51,9 @@ public:
 struct PeerKind {
     std::string name;                                ///< value of the key `renderer`
     std::vector<std::string> integrators, variants;  ///< that a run can name; the first is the default. Empty: none
-    bool needs_command = false;
+    std::vector<std::string> texts, lists;           ///< further keys, all needed: strings, and lists of numbers
+    std::string (*check)(const Settings&);           ///< what is wrong with them; empty if nothing. May be null
+    bool tested;  ///< that its agreement is measured: it can render as many samples as that needs
     std::unique_ptr<PeerRenderer> (*start)(const PeerJob&);  ///< throws PeerRefusal, Error(interrupted)
 };
 

@@ -1,6 +1,7 @@
 #include "experiments/peers/peer_entry.h"
 
-#include "experiments/peers/command_peer.h"
+#include <filesystem>
+
 #include "experiments/peers/peer.h"
 
 namespace ambilux {
@@ -31,6 +32,12 @@ void add_choice(const TomlReader& r, const toml::table& t, RunEntry& run, const 
     add(run, key, value, node ? TomlReader::line_of(*node) : run.line);
 }
 
+/// Names of files are relative to the configuration.
+std::string place_of(const TomlReader& r, const std::string& key, const std::string& text) {
+    namespace fs = std::filesystem;
+    return key == "files" ? (fs::absolute(r.file).parent_path() / text).lexically_normal().string() : text;
+}
+
 }  // namespace
 
 bool is_peer_run(const TomlReader& r, const toml::table& run) {
@@ -52,17 +59,24 @@ RunEntry read_peer_run(const TomlReader& r, const toml::table& t) {
     std::vector<std::string> keys = {"name", "renderer", "set"};
     if (!kind.integrators.empty()) keys.emplace_back("integrator");
     if (!kind.variants.empty()) keys.emplace_back("variant");
-    if (kind.needs_command) keys.emplace_back("command");
+    keys.insert(keys.end(), kind.texts.begin(), kind.texts.end());
+    keys.insert(keys.end(), kind.lists.begin(), kind.lists.end());
     r.check_keys(t, fmt::format("[[run]] of {}", run.renderer), keys);
     add_choice(r, t, run, "integrator", kind.integrators);
     add_choice(r, t, run, "variant", kind.variants);
-    if (kind.needs_command) {
-        const toml::node& node = r.need(t, "command", "[[run]]");
-        const std::string command = r.text(node, "command");
-        if (const std::string wrong = check_command(command); !wrong.empty())
-            throw r.error(node, fmt::format("command of run '{}' {}", run.name, wrong));
-        add(run, "command", command, TomlReader::line_of(node));
+    for (const std::string& key : kind.texts) {
+        const toml::node& node = r.need(t, key, "[[run]]");
+        add(run, key, place_of(r, key, r.text(node, key)), TomlReader::line_of(node));
     }
+    for (const std::string& key : kind.lists) {
+        const toml::node& node = r.need(t, key, "[[run]]");
+        std::vector<std::string> values;
+        for (const toml::node& value : r.array(node, key)) values.push_back(r.plain(value, key));
+        add(run, key, fmt::format("{}", fmt::join(values, " ")), TomlReader::line_of(node));
+    }
+    if (kind.check)
+        if (const std::string wrong = kind.check(run.settings); !wrong.empty())
+            throw r.error(t, fmt::format("run '{}': {}", run.name, wrong));
     if (const toml::node* set = t.get("set")) {
         const toml::table& table = r.table(*set, "set");
         r.check_keys(table, fmt::format("'set' of {}", run.renderer), {"rr_depth"});

@@ -39,7 +39,7 @@ PeerRuns::PeerRuns(const std::string& folder, const ExperimentConfig& config, co
     const nlohmann::json earlier = nlohmann::json::parse(read_file(path), nullptr, false);
     if (!earlier.is_array()) throw input_error(path, 0, "is damaged: remove it");
     for (const nlohmann::json& entry : earlier)
-        if (entry.value("state", "") == "agrees" || entry.value("state", "") == "differs") found_.push_back(entry);
+        if (entry.value("state", "") != "missing" && entry.value("state", "") != "refused") found_.push_back(entry);
 }
 
 const nlohmann::json* PeerRuns::find(const LoadedEntry& scene, const RunEntry& run) const {
@@ -50,7 +50,7 @@ const nlohmann::json* PeerRuns::find(const LoadedEntry& scene, const RunEntry& r
 
 bool PeerRuns::agrees(const LoadedEntry& scene, const RunEntry& run) const {
     const nlohmann::json* entry = find(scene, run);
-    return entry && entry->value("state", "") == "agrees";
+    return entry && (entry->value("state", "") == "agrees" || entry->value("state", "") == "untested");
 }
 
 bool PeerRuns::examine(const RenderOf& render, const Reference& reference) {
@@ -74,7 +74,7 @@ bool PeerRuns::examine(const RenderOf& render, const Reference& reference) {
             "its image of {} samples {}", entry["agreement"]["samples"].get<uint64_t>(),
             state == "differs" ? "differs from the reference"
                                : "has met too few events to be compared with the reference: raise agreement_spp");
-    if (state != "agrees")
+    if (state != "agrees" && state != "untested")
         log_warning(fmt::format("{} {}: {} is not timed: {}", render.scene.entry->name, render.run.name,
                                 render.run.renderer, entry["reason"].get<std::string>()));
     found_.push_back(entry);
@@ -86,6 +86,8 @@ nlohmann::json PeerRuns::find_state(const RenderOf& render, const Reference& ref
     const std::unique_ptr<PeerRenderer> peer = start(render);
     peer->set_seed(kAgreementSeed);
     nlohmann::json entry = to_json(peer->description());
+    entry["state"] = "untested";
+    if (!find_peer_kind(render.run.renderer)->tested) return entry;
     Agreement agreement = measure_agreement(*peer, config_.agreement_spp, reference, interrupt_);
     if (!agreement.interrupted && !agreement.test.pass) {
         // Few samples of a heavy tail look like another image, or like nothing. More of them, drawn anew, decide.

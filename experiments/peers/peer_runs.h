@@ -9,8 +9,9 @@
 namespace ambilux {
 
 /// Keeps peers.json of the experiment's folder: for each scene and run of a peer its state, "agrees", "differs",
-/// "undecided" (too few samples to tell), "missing" (not installed) or "refused", with the reason, what the conversion
-/// changed, in what it differs, times to load and to compile, and the agreement. Only what agrees is timed.
+/// "undecided" (too few samples to tell), "untested" (images made elsewhere), "missing" (not installed) or "refused",
+/// with the reason, what the conversion changed, in what it differs, times to load and to compile, and the agreement.
+/// Only what agrees, or cannot be tested, is timed.
 class PeerRuns : public RunMaker {
 public:
     /// With what an earlier part found. Reasons of absence are forgotten: it may be there now.

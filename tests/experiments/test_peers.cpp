@@ -7,6 +7,7 @@
 #include "experiments/load.h"
 #include "experiments/peers/child_process.h"
 #include "experiments/peers/command_peer.h"
+#include "experiments/peers/image_peer.h"
 #include "experiments/peers/pass_film.h"
 #include "film/exr_io.h"
 #include "tests/support/experiment_fakes.h"
@@ -176,7 +177,39 @@ TEST_CASE("a scene that is optional and not there is left out, and one of them m
 
 TEST_CASE("placeholders are filled in once and quoted for the shell") {
     CHECK(fill_command("a {x} {y} {z}", {{"x", "it's {y}"}, {"y", "2"}}) == "a 'it'\\''s {y}' '2' {z}");
-    CHECK(check_command("{output}{spp}{seed}").empty());
+    CHECK(check_command({{"command", "{output}{spp}{seed}"}}).empty());
+}
+
+TEST_CASE("images made elsewhere take part at their times") {
+    const TempFolder folder;
+    const auto image = [&](int number, float value) {
+        write_exr(folder / ("i_1_" + std::to_string(number) + ".exr"), {16, 16, std::vector<float>(768, value)});
+    };
+    image(1, 4);
+    image(2, 2);
+    const std::string theirs =
+        "[[run]]\nname = \"theirs\"\nrenderer = \"images\"\nfiles = \"i_{seed}_{number}.exr\"\n"
+        "samples = [10, 40]\nseconds = [0.25, 0.5]\n";
+    const std::string output = run(folder, config_of(theirs, "seconds = [0.25, 0.5]"));
+    CHECK(entry_of(output, "theirs")["state"] == "untested");
+    std::vector<std::pair<std::string, double>> found;
+    for (const auto& row : table(output + "/runs.csv"))
+        if (row[1] == "theirs") found.emplace_back(row[column("spp")], std::stod(row[column("time")]));
+    REQUIRE(found.size() == 2);
+    CHECK(found[0] == std::pair<std::string, double>{"10", 0.25});
+    CHECK(found[1] == std::pair<std::string, double>{"40", 0.5});
+    for (const float v : read_exr(output + "/images/box/theirs_1.exr").rgb) REQUIRE(v == Approx(2));
+
+    folder.write("r.toml", resolved_toml(read_experiment(folder / "e.toml")));
+    CHECK(resolved_toml(read_experiment(folder / "r.toml")) == read_file(folder / "r.toml"));
+    const auto wrong = [&](const std::string& from, const std::string& to) {
+        std::string text = theirs;
+        return refusal(folder, text.replace(text.find(from), from.size(), to));
+    };
+    CHECK(contains(wrong("{number}", "x"), "lacks the placeholder {number}"));
+    CHECK(contains(wrong("[10, 40]", "[10]"), "lists of equal length"));
+    CHECK(contains(wrong("[10, 40]", "[10, 5]"), "must rise"));
+    CHECK(contains(wrong("[10, 40]", "[1.5, 5]"), "integers"));
 }
 
 TEST_CASE("passes are averaged by their samples, and what is no radiance is dropped and counted") {
