@@ -40,9 +40,15 @@ public:
         if (!std::getline(in, line) || line != kHeader) throw error(1, fmt::format("the header is not {}", kHeader));
         std::vector<std::string> lines;
         while (std::getline(in, line)) lines.push_back(line);
-        std::vector<Row> rows;
-        for (size_t i = 0; i < lines.size(); ++i)
-            rows.push_back(row_of(lines[i], int(i) + 2, rows, double(lines.size())));
+        std::vector<Row> rows(lines.size());
+        // Benign cells first, wherever they stand: others are compared with them.
+        for (const bool benign : {true, false})
+            for (size_t i = 0; i < lines.size(); ++i) {
+                const int number = int(i) + 2;
+                const std::vector<std::string> parts = parts_of(lines[i], number);
+                const auto [family, c] = find(parts[cell], number);
+                if (c->benign == benign) rows[i] = row_of(parts, number, *family, *c, rows);
+            }
         return rows;
     }
 
@@ -64,31 +70,34 @@ private:
         throw error(line, fmt::format("there is no cell '{}'", name));
     }
 
-    Row row_of(const std::string& text, int line, const std::vector<Row>& before, double count) const {
+    std::vector<std::string> parts_of(const std::string& text, int line) const {
         std::vector<std::string> parts;
         std::istringstream in(text);
         for (std::string part; std::getline(in, part, ',');) parts.push_back(part);
         if (parts.size() == boxes) parts.emplace_back();
         if (parts.size() != place_count)
             throw error(line, fmt::format("{} columns where there are {}", parts.size(), int(place_count)));
-        const auto [family, known] = find(parts[cell], line);
+        return parts;
+    }
+
+    /// `rows`: of all lines, blank where they are not made yet.
+    Row row_of(const std::vector<std::string>& parts, int line, const Family& family, const Cell& known,
+               const std::vector<Row>& rows) const {
         // Our limits are not theirs; what our light tracer finds rarely theirs does, under another name.
-        Cell theirs = *known;
-        theirs.limit.clear();
-        if (has_prefix_of(theirs.rare, "light")) theirs.rare += " ptracer";
-        const Cell* const c = &theirs;
+        Cell c = known;
+        c.limit.clear();
+        if (has_prefix_of(c.rare, "light")) c.rare += " ptracer";
         const Row* benign = nullptr;
-        for (const Row& row : before)
-            if (row.cell == family->cells.front().name() && row.method == parts[method] && row.samples > 0)
+        for (const Row& row : rows)
+            if (!c.benign && row.cell == family.cells.front().name() && row.method == parts[method] && row.samples > 0)
                 benign = &row;
-        if (c->benign) benign = nullptr;
-        Row row = blank_row(*c, parts[method], parts[backend], benign);
+        Row row = blank_row(c, parts[method], parts[backend], benign);
         if (parts[boxes].empty()) {
             if (parts[state] != "refused" && parts[state] != "left out")
                 throw error(
                     line, fmt::format("no means, and the state '{}' instead of 'refused' or 'left out'", parts[state]));
             if (parts[state] == "refused")
-                refuse_row(row, *c, parts[note]);
+                refuse_row(row, c, parts[note]);
             else
                 leave_out(row, parts[note]);
             return row;
@@ -106,7 +115,7 @@ private:
         m.paths = double(m.samples) * number(parts[pixels], line);
         m.seconds = number(parts[seconds], line);
         m.invalid = uint64_t(number(parts[invalid], line));
-        fill_row(row, *c, m, benign, count);
+        fill_row(row, c, m, benign, double(rows.size()));
         if (row.note.empty()) row.note = parts[note];
         return row;
     }

@@ -40,6 +40,7 @@ Family light_size() {
         cell.benign = radius == 0.3;
         cell.quick = cell.benign || radius == 1e-3 || radius == 1e-6 || radius == 0;
         if (radius < 0.1) cell.rare = "path-naive";
+        if (radius > 0 && radius <= 1e-5) cell.limit = "Small lamps";
         family.cells.push_back(cell);
     }
     return family;

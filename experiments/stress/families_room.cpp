@@ -59,7 +59,7 @@ SceneFiles room_files(const Room& room) {
 /// `factor`: of the image over that of the benign room.
 Cell room_cell(const std::string& family, double value, double factor, const Room& room) {
     return {family,
-            decade(value),
+            family == "room-far" ? whole(value) : decade(value),
             value,
             {AnswerKind::invariance, factor, false, "the benign room times the factor"},
             [room] { return room_files(room); }};

@@ -351,15 +351,16 @@ TEST_CASE("what other renderers measured is judged alike") {
         bad += fmt::format("{} ", v * 1.1);
     }
     const std::vector<Family> families = {fake_family("a", 2)};
-    const std::string path = folder.write("m.csv", header + "a_0,path,other,1,1,320,16,0.5,0,,," + good +
-                                                       "\na_1,path,other,1,1,320,16,0.5,0,,," + bad +
+    // The benign cell stands behind what is compared with it.
+    const std::string path = folder.write("m.csv", header + "a_1,path,other,1,1,320,16,0.5,0,,," + bad +
+                                                       "\na_0,path,other,1,1,320,16,0.5,0,,," + good +
                                                        "\na_2,path,other,1,1,0,1,0,0,refused,unknown plugin,\n");
     const std::vector<Row> rows = judge_elsewhere(path, families);
     REQUIRE(rows.size() == 3);
-    CHECK(rows[0].verdict == Verdict::ok);
-    CHECK(rows[0].paths == 320 * 16);
-    CHECK(rows[1].verdict == Verdict::failed);
-    CHECK(rows[1].variance_ratio == Approx(1));
+    CHECK(rows[0].verdict == Verdict::failed);
+    CHECK(rows[0].variance_ratio == Approx(1));
+    CHECK(rows[1].verdict == Verdict::ok);
+    CHECK(rows[1].paths == 320 * 16);
     CHECK(rows[2].verdict == Verdict::refused);
     CHECK(rows[2].note == "unknown plugin");
     for (const auto& [line, what] : std::vector<std::pair<std::string, std::string>>{
