@@ -19,8 +19,7 @@ RenderSettings default_settings(const Scene& scene) {
 Budget render_budget(std::optional<uint64_t> spp, std::optional<double> time, const Scene& scene,
                      const std::string& prefix) {
     const auto refuse = [&](const std::string& message) { throw Error(ExitCode::usage, prefix + message); };
-    if (spp && time)
-        refuse(fmt::format("spp and {}time exclude each other: a render ends by one of them", prefix));
+    if (spp && time) refuse(fmt::format("spp and {}time exclude each other: a render ends by one of them", prefix));
     if (spp && *spp == 0) refuse("spp 0: at least one sample per pixel is needed");
     if (time && !(*time > 0 && std::isfinite(*time))) refuse("time: more than zero seconds are needed");
     if (time) return {0, *time};
