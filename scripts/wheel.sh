@@ -7,7 +7,7 @@
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 scripts/setup.sh
 most_mb=60
-work="$root/build-wheel"
+work="$root/build-wheel/package"
 rm -rf "$work/out" "$work/licences"
 mkdir -p "$work/out" "$work/licences" dist
 if [[ ! -x $work/tools/bin/auditwheel ]]; then
@@ -17,7 +17,7 @@ fi
 tools="$work/tools/bin"
 
 CMAKE_BUILD_PARALLEL_LEVEL=$(jobs) python3 -m pip wheel --quiet --disable-pip-version-check --no-deps . -w "$work/out" \
-  -Cbuild-dir="$work/cmake"
+  -Cbuild-dir="$root/build-wheel"
 built=("$work"/out/ambilux-*.whl)
 PATH="$tools:$PATH" "$tools/auditwheel" repair --exclude 'libcuda.so.*' -w "$work/out/repaired" "${built[0]}"
 repaired=("$work"/out/repaired/*.whl)
@@ -25,7 +25,7 @@ repaired=("$work"/out/repaired/*.whl)
 # Licences of the packages that bundled libraries came from.
 "$tools/wheel" unpack -d "$work/out" "${repaired[0]}" >/dev/null
 unpacked=("$work"/out/ambilux-*/)
-module=("$work"/cmake/python/ambilux/_core*.so)
+module=("$root"/build-wheel/python/ambilux/_core*.so)
 while read -r name arrow path _; do
   [[ $arrow == '=>' && -n $(compgen -G "${unpacked[0]}ambilux.libs/${name%%.so*}-*.so*") ]] || continue
   package=$(dpkg -S "$(realpath "$path")" | cut -d: -f1)
