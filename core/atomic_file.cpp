@@ -145,7 +145,7 @@ std::string read_file(const std::string& path, uint64_t most) {
     // Opening a pipe would wait for its writer.
     const File file(path, O_RDONLY | O_NONBLOCK);
     struct stat info;
-    const auto fail = [&](const std::string& why) { throw input_error(path, 0, "cannot be read: " + why); };
+    const auto fail = [&](const std::string& why) { throw input_error(path, 0, why); };
     if (file.fd < 0 || ::fstat(file.fd, &info) != 0) fail(std::strerror(errno));
     if (!S_ISREG(info.st_mode))
         fail(S_ISDIR(info.st_mode) ? "it is a folder" : "it is no regular file, but a pipe or a device");

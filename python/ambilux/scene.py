@@ -103,7 +103,7 @@ def load(path: str | os.PathLike[str], *, size: tuple[int, int] | None = None, l
     (40, 30)
     >>> ambilux.load("missing.xml")
     Traceback (most recent call last):
-    ambilux.errors.SceneError: missing.xml: cannot be read: No such file or directory
+    ambilux.errors.SceneError: missing.xml: No such file or directory
     """
     scene = Scene.__new__(Scene)
     scene._load(os.fspath(path), None, defines, size, lenient, light_picking, limits)
