@@ -79,6 +79,7 @@ nlohmann::json scene_info(const Scene& scene) {
           {"hide_emitters", scene.integrator.hide_emitters}}},
         {"features", feature_names(scene.features)},
         {"warnings", scene.warnings},
+        {"notes", scene.notes},
     };
 }
 

@@ -41,6 +41,11 @@ Mesh make_cube();
 /// 1998). Vertices without a proper face get (0,0,0).
 std::vector<Vec3f> smooth_normals(const Mesh& mesh);
 
+/// The mesh without normals, its vertices divided so that smooth_normals() does not smooth over edges of more than
+/// `degrees` between the normals of faces: of the faces around a point (position and uv), in their order, each that has
+/// no vertex yet gets one, together with all whose normals lie within the angle (Mitsuba 0.6, maxSmoothAngle).
+Mesh split_at_edges(const std::string& path, const Mesh& mesh, double degrees);
+
 /// Memory of a mesh of that many vertices and triangles, at most.
 uint64_t mesh_bytes(uint64_t vertices, uint64_t triangles);
 

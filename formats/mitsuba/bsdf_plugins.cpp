@@ -166,6 +166,13 @@ BsdfRecord diffuse_record(float reflectance) {
     return bsdf_record(p);
 }
 
+BsdfRecord clear_pane_record() {
+    Textured<ThinDielectric> p{};
+    p.ior = 1;
+    p.specular_reflectance = p.specular_transmittance = {splat(1), -1};
+    return bsdf_record(p);
+}
+
 BsdfRecord read_bsdf(Builder& builder, const Object& object) {
     BsdfRecord record;
     bool known = false;

@@ -42,8 +42,10 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
             const bool bump = object->type == "bumpmap";
             const Object* texture = in.take("texture");
             if (!texture) in.fail(object->type + " has no texture");
-            (bump ? adapters.bump_map : adapters.normal_map) = load_texture(builder, *texture);
-            if (bump) adapters.bump_scale = float(in.number("scale", 1));
+            const ScaledTexture scaled = load_scaled_texture(builder, *texture);
+            (bump ? adapters.bump_map : adapters.normal_map) = scaled.texture;
+            if (bump) adapters.bump_scale = float(in.number("scale", 1)) * luminance(scaled.scale);
+            if (!bump && !(scaled.scale == splat(1))) in.fail("the texture of a normalmap must not be scaled");
         } else {
             return object;
         }
@@ -64,9 +66,22 @@ uint32_t add_record(Builder& builder, const Object& object, const Adapters& adap
     return uint32_t(builder.scene.bsdfs.size() - 1);
 }
 
+/// Lets all light pass: a mask of opacity 0, which rays do not see. A shape that emits must be seen: there it is a pane
+/// without a boundary.
+uint32_t null_material(Builder& builder, const Object& object, bool emits) {
+    Reader(builder, object).finish();
+    uint32_t& known = builder.null_materials[emits];
+    if (builder.validate_only || known != kNone) return known;
+    builder.scene.bsdfs.push_back(emits ? clear_pane_record() : diffuse_record(0));
+    const uint32_t record = uint32_t(builder.scene.bsdfs.size() - 1);
+    builder.scene.materials.push_back({record, record, 0, {emits ? 1.0f : 0.0f, -1}});
+    return known = uint32_t(builder.scene.materials.size() - 1);
+}
+
 }  // namespace
 
-uint32_t build_material(Builder& builder, const Object& bsdf) {
+uint32_t build_material(Builder& builder, const Object& bsdf, bool emits) {
+    if (bsdf.tag == "bsdf" && bsdf.type == "null") return null_material(builder, bsdf, emits);
     const auto known = builder.materials.find(&bsdf);
     if (known != builder.materials.end()) return known->second;
     if (bsdf.tag != "bsdf") Reader(builder, bsdf).fail("expected a bsdf, not a " + bsdf.tag);

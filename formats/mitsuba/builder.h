@@ -32,6 +32,7 @@ struct Builder {
     std::vector<Rgb> texture_means;                                  ///< per texture
     std::map<const Object*, uint32_t> materials;
     uint32_t default_materials[2] = {kNone, kNone};  ///< of shapes without and with an emitter
+    uint32_t null_materials[2] = {kNone, kNone};     ///< the same of BSDF null
     std::map<std::string, uint32_t> table_pool;      ///< contents' name -> offset in Scene::tables
     std::map<std::string, float> rough_reflectance_pool;
     std::set<std::string> reported;
@@ -49,6 +50,9 @@ struct Builder {
 
     /// Fails unless all of these are in the range of the tracers (accel/range.h). `what` has them: "the shape".
     void check_range(const Where& where, const std::string& what, std::initializer_list<Vec3d> points) const;
+
+    /// Something we do in our own way, with the image that the file asks for; each text is said once.
+    void note(const Where& where, const std::string& text);
 
     /// Something we cannot do: an error, or with --lenient a warning that says what is done instead.
     void refuse(const Where& where, const std::string& problem, const std::string& instead);
@@ -112,13 +116,19 @@ private:
 
 /// Texture object as index into Scene::textures (0 when only validating).
 int32_t load_texture(Builder& builder, const Object& object);
+/// A texture inside of textures of type `scale`, and their factors.
+struct ScaledTexture {
+    int32_t texture;
+    Rgb scale;
+};
+ScaledTexture load_scaled_texture(Builder& builder, const Object& object);
 /// Image as float texels without flip or decoding table, for environment maps; and the largest of them.
 int32_t load_environment_image(Builder& builder, const std::string& path, float& largest);
 /// Mean colour of a parameter over its texture.
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter);
 
-/// BSDF object with its adapters as index into Scene::materials.
-uint32_t build_material(Builder& builder, const Object& bsdf);
+/// BSDF object with its adapters as index into Scene::materials. `emits`: for a shape with an emitter.
+uint32_t build_material(Builder& builder, const Object& bsdf, bool emits = false);
 /// Diffuse material for shapes without a BSDF: reflectance 0.5, on emitters 0.
 uint32_t default_material(Builder& builder, bool emitter);
 
