@@ -24,6 +24,7 @@ std::vector<std::string> feature_names(const Features& f) {
     if (f.textures) names.push_back("textures");
     if (f.bumps) names.push_back("bumps");
     if (f.opacity) names.push_back("opacity");
+    if (f.blends) names.push_back("blends");
     return names;
 }
 

@@ -124,6 +124,8 @@ struct ScaledTexture {
 ScaledTexture load_scaled_texture(Builder& builder, const Object& object);
 /// Image as float texels without flip or decoding table, for environment maps; and the largest of them.
 int32_t load_environment_image(Builder& builder, const std::string& path, float& largest);
+/// The same of RGBA texels that are at hand.
+int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels);
 /// Mean colour of a parameter over its texture.
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter);
 
@@ -138,6 +140,10 @@ void build_shapes(Builder& builder, const Object& scene);
 void build_emitter(Builder& builder, const Object& object);
 /// An emitter that is part of a shape or not; of type `count` if none of these has that name.
 Emitter read_emitter(Builder& builder, const Object& object, bool on_shape);
+
+/// Emitters sky, sun and sunsky as environment maps. `rotation`: of the emitter.
+bool is_sky(const std::string& type);
+Emitter read_sky(Builder& builder, Reader& in, const Matrix& rotation);
 
 void build_sensor(Builder& builder, const Object& object);
 void build_integrator(Builder& builder, const Object& object);

@@ -114,6 +114,13 @@ Emitter read_emitter(Builder& builder, const Object& object, bool on_shape) {
     e.type = EmitterType::count;
     e.shape = e.area_cdf = kNone;
     e.to_world = e.to_local = to_affine(Matrix{});
+    if (!on_shape && is_sky(object.type)) {
+        Reader in(builder, object);
+        e = read_sky(builder, in, without_place(rigid_transform(builder, in)));
+        check_sampling_weight(builder, in);
+        in.finish();
+        return e;
+    }
     EmitterModels::for_each([&](auto model) {
         using Model = typename decltype(model)::type;
         if (object.type != Model::plugin || Model::surface != on_shape) return;
@@ -134,7 +141,7 @@ void build_emitter(Builder& builder, const Object& object) {
     }
     if (is_environment(e.type)) {
         if (builder.scene.environment != kNone)
-            Reader(builder, object).fail("only one constant or envmap emitter is possible");
+            Reader(builder, object).fail("only one constant, envmap or sky emitter is possible");
         builder.scene.environment = uint32_t(builder.scene.emitters.size());
     }
     builder.scene.emitters.push_back(e);

@@ -49,6 +49,18 @@ bool fits_half(const std::vector<float>& texels) {
     return true;
 }
 
+/// Appends RGBA texels, as halves where that is allowed and loses nothing.
+uint64_t append_floats(Scene& scene, const std::vector<float>& texels, bool allow_half, TexelFormat& format) {
+    if (!allow_half || !fits_half(texels)) {
+        format = TexelFormat::rgba32f;
+        return append_texels(scene, texels.data(), texels.size() * sizeof(float));
+    }
+    format = TexelFormat::rgba16f;
+    std::vector<uint16_t> halves(texels.size());
+    for (size_t i = 0; i < texels.size(); ++i) halves[i] = uint16_t(float_to_half(i % 4 == 3 ? 1.0f : texels[i]));
+    return append_texels(scene, halves.data(), halves.size() * sizeof halves[0]);
+}
+
 /// Makes all colours equal to one channel.
 void spread_channel(Texels& image, size_t channel) {
     const auto spread = [&](auto& texels) {
@@ -89,7 +101,6 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
         for (size_t i = 0; i < count; ++i)
             for (int c = 0; c < 3; ++c) mean[c] += table[image.bytes[4 * i + c]];
     } else {
-        out.format = TexelFormat::rgba32f;
         std::vector<float> texels(count * 4);
         for (size_t i = 0; i < texels.size(); ++i) {
             const float stored = image.is_8bit ? float(image.bytes[i]) / 255.0f : image.floats[i];
@@ -100,15 +111,7 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
                                       std::to_string(i / 4 / image.width) + ") is not finite");
             if (i % 4 < 3) mean[i % 4] += texels[i], out.largest = std::max(out.largest, texels[i]);
         }
-        if (as_float && fits_half(texels)) {
-            out.format = TexelFormat::rgba16f;
-            std::vector<uint16_t> halves(texels.size());
-            for (size_t i = 0; i < texels.size(); ++i)
-                halves[i] = uint16_t(float_to_half(i % 4 == 3 ? 1.0f : texels[i]));
-            out.offset = append_texels(builder.scene, halves.data(), halves.size() * sizeof halves[0]);
-        } else {
-            out.offset = append_texels(builder.scene, texels.data(), texels.size() * sizeof(float));
-        }
+        out.offset = append_floats(builder.scene, texels, as_float, out.format);
     }
     out.mean = {float(mean[0] / double(count)), float(mean[1] / double(count)), float(mean[2] / double(count))};
     builder.images[key] = out;
@@ -279,9 +282,9 @@ int32_t load_texture(Builder& builder, const Object& object) {
     return add_texture(builder, texture, mean);
 }
 
-int32_t load_environment_image(Builder& builder, const std::string& path, float& largest) {
-    const LoadedImage image = load_image(builder, path, 0, true);
-    largest = image.largest;
+namespace {
+
+int32_t add_environment(Builder& builder, const LoadedImage& image) {
     Texture texture;
     memset(&texture, 0, sizeof texture);
     texture.type = TextureType::bitmap;
@@ -293,6 +296,22 @@ int32_t load_environment_image(Builder& builder, const std::string& path, float&
     texture.offset = image.offset;
     texture.to_uv[0][0] = texture.to_uv[1][1] = 1;
     return add_texture(builder, texture, image.mean);
+}
+
+}  // namespace
+
+int32_t load_environment_image(Builder& builder, const std::string& path, float& largest) {
+    const LoadedImage image = load_image(builder, path, 0, true);
+    largest = image.largest;
+    return add_environment(builder, image);
+}
+
+int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels) {
+    LoadedImage image;
+    image.width = width;
+    image.height = height;
+    image.offset = append_floats(builder.scene, texels, true, image.format);
+    return add_environment(builder, image);
 }
 
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter) {

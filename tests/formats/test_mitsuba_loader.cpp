@@ -565,10 +565,10 @@ TEST_CASE("emitters: values, frames, one environment") {
     CHECK(area.emitters[0].shape == 0);
     CHECK(area.emitters[0].pick_probability == 1.0f);
     CHECK(contains(error_of("<emitter type='constant'/>\n<emitter type='constant'/>"),
-                   ":3: only one constant or envmap"));
+                   ":3: only one constant, envmap or sky"));
     CHECK(contains(error_of("<emitter type='point'><rgb name='intensity' value='-1'/></emitter>"),
                    "'intensity' is negative"));
-    CHECK(contains(error_of("<emitter type='sky'/>"), "emitter type 'sky' is not supported"));
+    CHECK(contains(error_of("<emitter type='projector'/>"), "emitter type 'projector' is not supported"));
 }
 
 TEST_CASE("environment maps are stored as halves unless that loses something") {
