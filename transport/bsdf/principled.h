@@ -103,10 +103,11 @@ struct BsdfAt<Principled> : Resolved<Principled> {
                        p.specular * main.pdf_sa + rest * (wo.z * kInvPi),
                        p.specular * main.pdf_reverse_sa + rest * (wi.z * kInvPi)};
         if (clearcoat > 0.0f) {
-            const float d = coating().d(m.z), f = 0.04f + 0.96f * schlick_weight(cos_m);
+            const float d = coating().d(min(m.z, 1.0f)), f = 0.04f + 0.96f * schlick_weight(cos_m);
             const float g = ClearcoatDistribution::g1(wi.z) * ClearcoatDistribution::g1(wo.z);
             v.value += splat(0.25f * clearcoat * f * d * g * wo.z);
             const float density = p.clearcoat * (d * m.z / (4.0f * cos_m));
+            if (!(density < kInfinity)) return no_scattering();  // both graze from opposite sides
             v.pdf_sa += density;
             v.pdf_reverse_sa += density;
         }
