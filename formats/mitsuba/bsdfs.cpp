@@ -238,6 +238,10 @@ uint32_t build_material(Builder& builder, const Object& bsdf, bool emits) {
     return builder.validate_only ? 0 : builder.materials[&bsdf] = index;
 }
 
+uint32_t build_own_material(Builder& builder, const Object& bsdf) {
+    return MaterialBuilder{builder}.build(bsdf, {}, Place::outside);
+}
+
 uint32_t default_material(Builder& builder, bool emitter) {
     uint32_t& known = builder.default_materials[emitter];
     if (known != kNone) return known;

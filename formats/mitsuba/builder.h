@@ -37,6 +37,9 @@ struct Builder {
     std::map<std::string, float> rough_reflectance_pool;
     std::set<std::string> reported;
 
+    /// Textures of the mesh whose BSDF is being built, by the names of its attributes; null: none.
+    const std::map<std::string, int32_t>* attribute_textures = nullptr;
+
     uint64_t memory = 0;  ///< of meshes and textures
 
     /// Counts memory that the scene is going to have; Error(bad_input) with `path` if it is too much in all.
@@ -126,11 +129,15 @@ ScaledTexture load_scaled_texture(Builder& builder, const Object& object);
 int32_t load_environment_image(Builder& builder, const std::string& path, float& largest);
 /// The same of RGBA texels that are at hand.
 int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels);
+/// Texture of float texels that bilinear lookups find at texel centres.
+int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels, Rgb mean);
 /// Mean colour of a parameter over its texture.
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter);
 
 /// BSDF object with its adapters as index into Scene::materials. `emits`: for a shape with an emitter.
 uint32_t build_material(Builder& builder, const Object& bsdf, bool emits = false);
+/// The same for one shape alone: with Builder::attribute_textures.
+uint32_t build_own_material(Builder& builder, const Object& bsdf);
 /// Diffuse material for shapes without a BSDF: reflectance 0.5, on emitters 0.
 uint32_t default_material(Builder& builder, bool emitter);
 

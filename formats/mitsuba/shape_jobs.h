@@ -33,6 +33,15 @@ struct Job {
 /// Moves a mesh to world space, orients it and leaves out triangles without area.
 void transform_mesh(const Builder& builder, Job& job, const Mesh& mesh);
 
+/// True if a texture of the BSDF takes its values from the mesh. Fails if others do not, since they would need
+/// coordinates of their own.
+bool has_mesh_attributes(const Object& bsdf);
+
+/// The mesh with vertices and coordinates of its own for every triangle, so that `textures`, one for every attribute,
+/// have its values between them: blocks of 2x2 texels, in which a bilinear lookup is linear.
+Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh& mesh,
+                          std::map<std::string, int32_t>& textures);
+
 /// Sphere, disk or cylinder.
 Quadric make_quadric(Builder& builder, const Job& job);
 

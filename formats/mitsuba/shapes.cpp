@@ -29,6 +29,7 @@ struct ShapeBuilder {
     void read_geometry(Reader& in, Job& job);
     void read_mesh_file(Reader& in, Job& job);
     uint32_t add_emitter(const Object& object);
+    uint32_t material_of_attributes(Job& job, const Object& bsdf);
 };
 
 bool is_quadric(const std::string& type) { return type == "sphere" || type == "disk" || type == "cylinder"; }
@@ -87,20 +88,41 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     if (!(std::fabs(determinant(job.to_world)) > 0))
         in.fail(in.where("to_world"), "the transform of the shape is singular");
     job.flip = in.boolean("flip_normals", false);
-    read_geometry(in, job);
     const Object* bsdf = in.take("bsdf");
+    const bool attributes = bsdf && has_mesh_attributes(*bsdf);
+    if (attributes && type != "ply") in.fail("mesh attributes are read from ply files only");
+    read_geometry(in, job);
     const Object* emitter = in.take("emitter");
     if (emitter && in_instance)
         builder.refuse(emitter->where, "an emitter inside of a shapegroup is not supported", "the shape does not emit");
     else if (emitter)
         job.emitter = add_emitter(*emitter);
-    job.material =
-        bsdf ? build_material(builder, *bsdf, emitter != nullptr) : default_material(builder, emitter != nullptr);
+    if (attributes)
+        job.material = material_of_attributes(job, *bsdf);
+    else
+        job.material =
+            bsdf ? build_material(builder, *bsdf, emitter != nullptr) : default_material(builder, emitter != nullptr);
     in.ignore({"silhouette_sampling_weight", "shutter_open", "shutter_close"});
     in.finish();
     if (jobs.size() >= builder.options.limits.shapes)
         in.fail("the scene has more shapes than --limits shapes=" + std::to_string(builder.options.limits.shapes));
     jobs.push_back(std::move(job));
+}
+
+/// Reads the mesh now, and gives the shape a copy of it that its textures are made for.
+uint32_t ShapeBuilder::material_of_attributes(Job& job, const Object& bsdf) {
+    MeshSource source = sources[size_t(job.source)];
+    const std::string bytes = read_input(source.path, builder.options.limits);
+    builder.file_digests.push_back({source.path, sha256(bytes)});
+    const Mesh mesh = read_ply(source.path, bytes, source.flip_v, builder.options.limits, true);
+    std::map<std::string, int32_t> textures;
+    source.mesh = with_attribute_atlas(builder, source.path, mesh, textures);
+    source.path.clear();
+    job.source = add_source(std::move(source), "attributes " + std::to_string(jobs.size()));
+    builder.attribute_textures = &textures;
+    const uint32_t material = build_own_material(builder, bsdf);
+    builder.attribute_textures = nullptr;
+    return material;
 }
 
 void ShapeBuilder::read_geometry(Reader& in, Job& job) {

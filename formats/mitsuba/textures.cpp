@@ -269,6 +269,14 @@ int32_t load_texture(Builder& builder, const Object& object) {
         texture.color0 = texture.color1 = mean = raw_value(in);
         in.finish();
         if (builder.validate_only) return 0;
+    } else if (object.type == "mesh_attribute" || object.type == "vertexcolors") {
+        const std::string name = object.type == "vertexcolors" ? "vertex_color" : in.text("name", "");
+        if (in.number("scale", 1) != 1) in.fail(in.where("scale"), "a scale of mesh_attribute is not supported");
+        in.finish();
+        if (builder.validate_only) return 0;
+        const auto* known = builder.attribute_textures;
+        if (!known || !known->count(name)) in.fail("the shape has no attribute '" + name + "'");
+        return known->at(name);
     } else if (object.type == "gridtexture") {
         read_grid(builder, in, texture, mean);
         in.finish();
@@ -284,7 +292,7 @@ int32_t load_texture(Builder& builder, const Object& object) {
 
 namespace {
 
-int32_t add_environment(Builder& builder, const LoadedImage& image) {
+int32_t add_plain_texture(Builder& builder, const LoadedImage& image) {
     Texture texture;
     memset(&texture, 0, sizeof texture);
     texture.type = TextureType::bitmap;
@@ -303,7 +311,16 @@ int32_t add_environment(Builder& builder, const LoadedImage& image) {
 int32_t load_environment_image(Builder& builder, const std::string& path, float& largest) {
     const LoadedImage image = load_image(builder, path, 0, true);
     largest = image.largest;
-    return add_environment(builder, image);
+    return add_plain_texture(builder, image);
+}
+
+int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels, Rgb mean) {
+    LoadedImage image;
+    image.width = width;
+    image.height = height;
+    image.mean = mean;
+    image.offset = append_floats(builder.scene, texels, false, image.format);
+    return add_plain_texture(builder, image);
 }
 
 int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels) {
@@ -311,7 +328,7 @@ int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height,
     image.width = width;
     image.height = height;
     image.offset = append_floats(builder.scene, texels, true, image.format);
-    return add_environment(builder, image);
+    return add_plain_texture(builder, image);
 }
 
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter) {

@@ -1,12 +1,14 @@
 // Scenes written as text in a test.
 #pragma once
 
+#include <algorithm>
 #include <string>
 
 #include "core/error.h"
 #include "formats/load.h"
 #include "tests/support/catch.h"
 #include "tests/support/temp_folder.h"
+#include "transport/texture.h"
 
 namespace ambilux::test {
 
@@ -36,6 +38,28 @@ inline std::string error_of(const std::string& body, const LoadOptions& options 
         return e.what();
     }
     return "no error";
+}
+
+inline bool has_note(const Scene& s, const std::string& part) {
+    return std::any_of(s.notes.begin(), s.notes.end(), [&](const std::string& n) { return contains(n, part); });
+}
+
+inline Scene load_quietly(const std::string& body, const std::string& version = "3.0.0",
+                          const TempFolder* folder = nullptr) {
+    INFO(body);
+    const Scene s = load(body, {}, version, folder);
+    CHECK(s.warnings.empty());
+    return s;
+}
+
+/// Of the diffuse BSDF of a shape.
+inline Rgb reflectance(const Scene& s, size_t shape, Vec2f uv) {
+    const BsdfRecord& record = s.bsdfs[s.materials[s.shapes[shape].material].front];
+    return eval_rgb<kAllFeatures>(s.view(), record.as<Diffuse>().reflectance, uv);
+}
+
+inline void check_rgb(Rgb a, Rgb b, double tolerance = 1e-5) {
+    for (int i = 0; i < 3; ++i) CHECK(a[i] == Approx(b[i]).margin(tolerance));
 }
 
 }  // namespace ambilux::test
