@@ -51,6 +51,13 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
             const ScaledTexture scaled = load_scaled_texture(builder, *texture);
             (bump ? adapters.bump_map : adapters.normal_map) = scaled.texture;
             if (bump) adapters.bump_scale = float(in.number("scale", 1)) * luminance(scaled.scale);
+            for (const char* name : {"flip_invalid_normals", "use_shadowing_function"})
+                if (in.boolean(name, false))
+                    builder.refuse(in.where(name), std::string("'") + name + "' is not supported", "it is ignored");
+            if (object->version >= 3)
+                builder.note(in.where(),
+                             "bumps and normal maps are those of Mitsuba 3.5 and before, without "
+                             "flip_invalid_normals and use_shadowing_function");
             if (!bump && !(scaled.scale == splat(1))) in.fail("the texture of a normalmap must not be scaled");
         } else {
             return object;

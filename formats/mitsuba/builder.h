@@ -117,14 +117,16 @@ private:
     std::map<std::string, size_t> next_child_;  ///< by tag: where take() looks on
 };
 
+/// What a texture is read for.
+enum class TextureUse { color, number };
 /// Texture object as index into Scene::textures (0 when only validating).
-int32_t load_texture(Builder& builder, const Object& object);
+int32_t load_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
 /// A texture inside of textures of type `scale`, and their factors.
 struct ScaledTexture {
     int32_t texture;
     Rgb scale;
 };
-ScaledTexture load_scaled_texture(Builder& builder, const Object& object);
+ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
 /// Image as float texels without flip or decoding table, for environment maps; and the largest of them.
 int32_t load_environment_image(Builder& builder, const std::string& path, float& largest);
 /// The same of RGBA texels that are at hand.

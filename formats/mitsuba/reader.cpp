@@ -160,7 +160,7 @@ ParamFloat Reader::textured_number(const std::string& name, float fallback) {
     if (const Object* texture = take_named(name)) {
         if (texture->tag != "texture")
             fail(where(name), "'" + name + "' must be a number or a texture, not a " + texture->tag);
-        const ScaledTexture scaled = load_scaled_texture(builder_, *texture);
+        const ScaledTexture scaled = load_scaled_texture(builder_, *texture, TextureUse::number);
         if (scaled.scale.x != scaled.scale.y || scaled.scale.x != scaled.scale.z)
             fail(texture->where, "a number cannot come from a texture that is scaled by a colour");
         return {scaled.scale.x, scaled.texture};

@@ -210,7 +210,7 @@ void read_grid(Builder& builder, Reader& in, Texture& texture, Rgb& mean) {
 
 }  // namespace
 
-ScaledTexture load_scaled_texture(Builder& builder, const Object& object) {
+ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use) {
     Rgb scale = splat(1);
     const Object* inner = &object;
     while (inner->type == "scale") {
@@ -221,10 +221,10 @@ ScaledTexture load_scaled_texture(Builder& builder, const Object& object) {
         in.finish();
         inner = nested;
     }
-    return {load_texture(builder, *inner), scale};
+    return {load_texture(builder, *inner, use), scale};
 }
 
-int32_t load_texture(Builder& builder, const Object& object) {
+int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
     Reader in(builder, object);
     Texture texture;
     memset(&texture, 0, sizeof texture);  // padding too, because the record is its own key
@@ -263,6 +263,10 @@ int32_t load_texture(Builder& builder, const Object& object) {
         read_to_uv(in, texture.to_uv);
         in.finish();
         if (builder.validate_only) return 0;
+        if (use == TextureUse::number && object.version >= 3) {
+            std::swap(texture.color0, texture.color1);
+            builder.note(object.where, "a checkerboard of numbers has its colours exchanged, as in Mitsuba 3");
+        }
         mean = (texture.color0 + texture.color1) * 0.5f;
     } else if (object.type == "rawconstant") {
         texture.type = TextureType::checkerboard;

@@ -158,6 +158,32 @@ TEST_CASE("textures: scale, rawconstant, gridtexture, channel") {
     CHECK(contains(error_of(textured("<texture name='reflectance' type='scale'/>")), "has no nested texture"));
 }
 
+TEST_CASE("checkerboards of numbers have their colours exchanged in format 3") {
+    const std::string mask =
+        "<shape type='rectangle'><bsdf type='mask'><texture name='opacity' type='checkerboard'><rgb "
+        "name='color0' value='1'/><rgb name='color1' value='0'/></texture><bsdf type='diffuse'/>"
+        "</bsdf></shape>";
+    const auto opacity = [](const Scene& s) {
+        return eval_float<kAllFeatures>(s.view(), s.materials[s.shapes[0].material].opacity, {0.25f, 0.25f});
+    };
+    const Scene newer = load_quietly(mask);
+    CHECK(opacity(newer) == 0);
+    CHECK(has_note(newer, "colours exchanged"));
+    CHECK(opacity(load_quietly(mask, "0.6.0")) == 1);
+}
+
+TEST_CASE("bump and normal maps: what newer versions of Mitsuba add to them is not silently left out") {
+    const auto bumped = [](const std::string& xml) {
+        return "<shape type='rectangle'><bsdf type='bumpmap'>" + xml +
+               "<texture type='checkerboard'/><bsdf type='diffuse'/></bsdf></shape>";
+    };
+    CHECK(has_note(load_quietly(bumped("")), "without flip_invalid_normals"));
+    CHECK(load_quietly(bumped(""), "0.6.0").notes.empty());
+    load_quietly(bumped("<boolean name='use_shadowing_function' value='false'/>"));
+    CHECK(contains(error_of(bumped("<boolean name='use_shadowing_function' value='true'/>")),
+                   "'use_shadowing_function' is not supported"));
+}
+
 TEST_CASE("null is a surface that rays do not see, unless it emits") {
     const Scene s = load_quietly(
         "<shape type='sphere'><bsdf type='null'/></shape><shape type='rectangle'><bsdf "

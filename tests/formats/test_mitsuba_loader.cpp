@@ -78,11 +78,11 @@ TEST_CASE("Mitsuba's render tests load, but for what is refused by name", "[data
     const std::string data = data_folder();
     if (data.empty()) return;
     const std::string tests = data + "/mitsuba-tests/tests/scenes/";
-    for (const char* name : {"bsdf_spheres/test_arealight_path", "bsdf_spheres/test_constant_path",
-                             "bsdf_spheres/test_pointlight_path", "floating_sphere/test_directional_direct",
-                             "instancing/test_instancing_path", "orthographic_sensor/test_orthographic_path",
-                             "spot_light/test_spot_direct", "texture_interp/test_texture_interp_direct",
-                             "mesh_attributes/test_mesh_attributes_3_vertex_direct"}) {
+    for (const char* name :
+         {"bsdf_spheres/test_arealight_path", "bsdf_spheres/test_constant_path", "bsdf_spheres/test_pointlight_path",
+          "floating_sphere/test_directional_direct", "instancing/test_instancing_path",
+          "orthographic_sensor/test_orthographic_path", "spot_light/test_spot_direct",
+          "texture_interp/test_texture_interp_direct", "mesh_attributes/test_mesh_attributes_3_vertex_direct"}) {
         INFO(name);
         const Scene s = load_mitsuba(tests + name + ".xml");
         CHECK(s.warnings.empty());
