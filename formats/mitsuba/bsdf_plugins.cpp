@@ -3,6 +3,7 @@
 #include "formats/mitsuba/bsdf_plugins.h"
 #include "formats/mitsuba/named_media.h"
 #include "formats/mitsuba/principled.h"
+#include "transport/bsdf/microfacet.h"
 #include "transport/bsdf/precompute.h"
 
 namespace ambilux::mitsuba {
@@ -31,7 +32,7 @@ void read_roughness(Builder& builder, Reader& in, Parameters& p) {
         p.alpha_u = p.alpha_v = in.textured_number("alpha", 0.1f);
     }
     for (const ParamFloat& alpha : {p.alpha_u, p.alpha_v})
-        if (!(alpha.value > 0)) in.fail(in.where(anisotropic ? "alpha_u" : "alpha"), "roughness must be positive");
+        if (!(alpha.value >= 0)) in.fail(in.where(anisotropic ? "alpha_u" : "alpha"), "roughness must not be negative");
     p.sample_visible = in.boolean("sample_visible", true);
 }
 
@@ -155,7 +156,8 @@ void read_plugin(Builder& builder, Reader& in, Textured<RoughPlastic>& p) {
     p.distribution = distribution(builder, in);
     p.sample_visible = in.boolean("sample_visible", true);
     p.alpha = {float(in.number("alpha", 0.1)), -1};
-    if (!(p.alpha.value > 0)) in.fail(in.where("alpha"), "roughness must be positive");
+    if (!(p.alpha.value >= 0)) in.fail(in.where("alpha"), "roughness must not be negative");
+    p.alpha.value = std::max(p.alpha.value, kMinAlpha);
     if (!builder.validate_only) precompute_rough_plastic(builder, p);
 }
 
@@ -190,7 +192,7 @@ void read_plugin(Builder& builder, Reader& in, Textured<Ward>& p) {
     p.alpha_u = in.textured_number("alpha_u", 0.1f);
     p.alpha_v = in.textured_number("alpha_v", 0.1f);
     for (const ParamFloat& alpha : {p.alpha_u, p.alpha_v})
-        if (!(alpha.value > 0)) in.fail("roughness must be positive");
+        if (!(alpha.value >= 0)) in.fail("roughness must not be negative");
 }
 
 void read_plugin(Builder&, Reader& in, Textured<DiffuseTransmitter>& p) {

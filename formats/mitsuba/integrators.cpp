@@ -75,8 +75,7 @@ void build_integrator(Builder& builder, const Object& object) {
         return;
     }
     hint.hide_emitters = in.boolean("hide_emitters", false);
-    if (in.boolean("strict_normals", false))
-        builder.refuse(in.where("strict_normals"), "strict_normals is not supported", "it is ignored");
+    in.boolean("strict_normals", false);  // ours always are (transport/surface_scattering.h, sides_agree)
     for (const char* name : kSteering) in.ignore({name});
     // Of the others all values are about how they do it.
     if (!full) in.finish();

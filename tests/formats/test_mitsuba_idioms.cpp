@@ -69,6 +69,11 @@ TEST_CASE("integrators of the same equation are the path tracer") {
         CHECK(s.integrator.max_depth == 5);
     }
     CHECK(load_quietly("<integrator type='ptracer'/>").integrator.type == "light");
+    // Bitterli's files ask for what is always so.
+    load_quietly(
+        "<integrator type='path'><integer name='maxDepth' value='65'/><boolean name='strictNormals' "
+        "value='true'/></integrator>",
+        "0.5.0");
     CHECK(contains(error_of("<integrator type='aov'/>"), "aov has no nested integrator"));
 }
 

@@ -190,3 +190,14 @@ TEST_CASE("mesh attributes are linear between vertices, constant on faces") {
                            "type='mesh_attribute'/></bsdf></shape>"),
                    "mesh attributes are read from ply files only"));
 }
+
+TEST_CASE("roughness of 0 is taken, as in Mitsuba; what is negative is not") {
+    const auto rough = [](const std::string& type, const char* alpha) {
+        return "<shape type='rectangle'><bsdf type='" + type + "'><float name='alpha' value='" + alpha +
+               "'/></bsdf></shape>";
+    };
+    for (const char* type : {"roughconductor", "roughdielectric", "roughplastic"}) {
+        load_quietly(rough(type, "0"));
+        CHECK(contains(error_of(rough(type, "-0.1")), "roughness must not be negative"));
+    }
+}
