@@ -12,12 +12,18 @@ namespace {
 constexpr Rgb kFirst = {0.8f, 0.1f, 0.6f}, kSecond = {0.2f, 0.5f, 0.6f};
 
 /// Closed body that radiates 1 inwards, of a blend with this weight of the second material; three segments.
-Scene furnace(const std::string& weight) {
-    return scene_from_text(scene_xml(
-        4, "<sensor type='perspective'><float name='fov' value='80'/><float name='near_clip' value='1e-4'/>" +
-               square_film(8) +
-               "</sensor><shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='blendbsdf'>" +
-               weight + diffuse(kFirst) + diffuse(kSecond) + "</bsdf>" + area_light({1, 1, 1}) + "</shape>"));
+Scene furnace(float weight) {
+    std::string body =
+        "<sensor type='perspective'><float name='fov' value='80'/><float name='near_clip' value='1e-4'/>";
+    body += square_film(8);
+    body += "</sensor><shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='blendbsdf'>";
+    body += "<float name='weight' value='" + std::to_string(weight) + "'/>";
+    body += diffuse(kFirst);
+    body += diffuse(kSecond);
+    body += "</bsdf>";
+    body += area_light({1, 1, 1});
+    body += "</shape>";
+    return scene_from_text(scene_xml(4, body));
 }
 
 Image expected(float weight) {
@@ -32,7 +38,7 @@ Image expected(float weight) {
 }  // namespace
 
 TEST_CASE("a furnace of a blend has the albedo of the sum, in the path tracer and bidirectionally") {
-    const Scene scene = furnace("<float name='weight' value='0.3'/>");
+    const Scene scene = furnace(0.3f);
     CHECK(scene.features.blends);
     check_expectation(scene, cpu_settings(scene, Estimator::mis), expected(0.3f));
     check_expectation(scene, cpu_settings(scene, Estimator::naive), expected(0.3f));
