@@ -1,5 +1,7 @@
 #include "experiments/machine.h"
 
+#include <fmt/format.h>
+
 #include <sys/utsname.h>
 #include <unistd.h>
 
@@ -92,7 +94,8 @@ std::string command_line() {
     std::string line, argument;
     while (std::getline(in, argument, '\0')) {
         const bool plain = argument.find_first_of(" \t\n\"'$\\*?") == std::string::npos && !argument.empty();
-        line += (line.empty() ? "" : " ") + (plain ? argument : "'" + argument + "'");
+        if (!line.empty()) line += ' ';
+        line += plain ? argument : fmt::format("'{}'", argument);
     }
     return line;
 }

@@ -36,7 +36,7 @@ public:
         : request_(request), hooks_(hooks), prepared_(prepare_experiment(request.config, request.reduced, hooks)),
           config_(prepared_.config), checkpoints_(config_.checkpoints()),
           folder_(request.output, request.references, request.resume, prepared_), own_(config_, hooks_),
-          peers_(request.output, config_, request.interrupt) {}
+          peers_(request, config_) {}
 
     ExitCode run() {
         folder_.add_clocks(folder_.is_resumed() ? "resumed" : "start");

@@ -25,6 +25,9 @@ Error system_error(const std::string& what) { return {ExitCode::device, what + "
 
 /// What the new process does before it becomes the program; only calls that are safe behind a fork.
 [[noreturn]] void become(char* const* argv, int socket, int log) {
+    // Ignored signals stay ignored in a new program; this one ignores them.
+    ::signal(SIGPIPE, SIG_DFL);
+    ::signal(SIGXFSZ, SIG_DFL);
     ::setpgid(0, 0);  // Ctrl-C is for this program, which then ends the other
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     ::dup2(socket, STDIN_FILENO);

@@ -9,8 +9,7 @@
 #include "core/error.h"
 #include "core/flag.h"
 #include "experiments/peers/child_process.h"
-#include "experiments/peers/pass_film.h"
-#include "film/exr_io.h"
+#include "experiments/peers/pass_peer.h"
 
 namespace ambilux {
 namespace {
@@ -18,25 +17,18 @@ namespace {
 constexpr const char* kNeeded[] = {"output", "spp", "seed"};
 constexpr const char* kPossible[] = {"scene", "name", "width", "height", "depth"};
 
-std::string quoted(const std::string& word) {
+std::string shell_word(const std::string& word) {
     std::string out = "'";
     for (const char c : word) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
     return out + "'";
 }
 
-std::string command_of(const Settings& settings) {
-    for (const auto& [key, value] : settings)
-        if (key == "command") return value;
-    return "";
-}
-
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-class CommandPeer : public PeerRenderer {
+class CommandPeer : public PassPeer {
 public:
     explicit CommandPeer(const PeerJob& job)
-        : command_(command_of(job.run->settings)), folder_(job.folder),
-          film_(job.scene->sensor.crop_width, job.scene->sensor.crop_height) {
+        : PassPeer(job), command_(setting_value(job.run->settings, "command")), folder_(job.folder) {
         values_ = {{"scene", job.scene_path},
                    {"name", job.scene_name},
                    {"width", std::to_string(film_.moments().width)},
@@ -54,23 +46,11 @@ public:
         film_.clear();
     }
 
-    const PeerDescription& description() const override { return description_; }
-    void set_seed(uint64_t seed) override { seed_ = seed; }
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
         return run_once(first, count, interrupt) < 0 ? 0 : count;
     }
-    FilmMoments film() override { return film_.moments(); }
-    void clear_film() override { film_.clear(); }
-    double last_seconds() const override { return film_.last_seconds(); }
     /// Not fewer than 16, since starting the program is part of what a pass costs.
     uint32_t preferred_batch() const override { return std::max(16u, film_.preferred_batch()); }
-    RenderStats stats() override {
-        RenderStats s;
-        s.backend = description_.backend;
-        s.device = description_.device;
-        film_.state(s);
-        return s;
-    }
 
 private:
     /// Seconds of the whole process; negative if interrupted.
@@ -96,15 +76,7 @@ private:
         const double whole = now() - start;
         if (status != 0)
             throw PeerRefusal(status == 127, fmt::format("exit status {}: {}", status, child.last_words()));
-        Image image;
-        try {
-            image = read_exr(output);
-        } catch (const Error& e) {
-            throw PeerRefusal(false, e.what());
-        }
-        if (image.width != film_.moments().width || image.height != film_.moments().height)
-            throw PeerRefusal(false, fmt::format("an image of {}x{} pixels, asked for were {}x{}", image.width,
-                                                 image.height, film_.moments().width, film_.moments().height));
+        const Image image = read_image(output, false);
         states_time_ = stated > 0;
         film_.add(image, count, states_time_ ? stated : whole);
         return whole;
@@ -112,16 +84,13 @@ private:
 
     const std::string command_, folder_;
     Settings values_;
-    PassFilm film_;
-    PeerDescription description_;
-    uint64_t seed_ = 0;
     bool states_time_ = false;
 };
 
 }  // namespace
 
 std::string check_command(const Settings& settings) {
-    const std::string command = command_of(settings);
+    const std::string command = setting_value(settings, "command");
     for (const char* name : kNeeded)
         if (command.find(fmt::format("{{{}}}", name)) == std::string::npos)
             return fmt::format("'command' lacks the placeholder {{{}}}: it must have {{{}}}, and can have {{{}}}", name,
@@ -130,20 +99,9 @@ std::string check_command(const Settings& settings) {
 }
 
 std::string fill_command(const std::string& command, const Settings& values) {
-    std::string out;
-    for (size_t i = 0; i < command.size();) {
-        bool found = false;
-        for (const auto& [key, value] : values) {
-            const std::string placeholder = "{" + key + "}";
-            if (command.compare(i, placeholder.size(), placeholder) != 0) continue;
-            out += quoted(value);
-            i += placeholder.size();
-            found = true;
-            break;
-        }
-        if (!found) out += command[i++];
-    }
-    return out;
+    Settings words = values;
+    for (auto& [key, value] : words) value = shell_word(value);
+    return fill_placeholders(command, words);
 }
 
 std::unique_ptr<PeerRenderer> start_command_peer(const PeerJob& job) { return std::make_unique<CommandPeer>(job); }

@@ -5,18 +5,10 @@
 #include <cmath>
 #include <sstream>
 
-#include "core/error.h"
-#include "experiments/peers/pass_film.h"
-#include "film/exr_io.h"
+#include "experiments/peers/pass_peer.h"
 
 namespace ambilux {
 namespace {
-
-std::string value_of(const Settings& settings, const std::string& key) {
-    for (const auto& [name, value] : settings)
-        if (name == key) return value;
-    return "";
-}
 
 std::vector<double> numbers(const std::string& text) {
     std::istringstream in(text);
@@ -34,19 +26,12 @@ bool rises(const std::vector<double>& values) {
     return true;
 }
 
-std::string filled(std::string text, const std::string& placeholder, const std::string& value) {
-    for (size_t at = 0; (at = text.find(placeholder, at)) != std::string::npos; at += value.size())
-        text.replace(at, placeholder.size(), value);
-    return text;
-}
-
-class ImagePeer : public PeerRenderer {
+class ImagePeer : public PassPeer {
 public:
     explicit ImagePeer(const PeerJob& job)
-        : files_(filled(value_of(job.run->settings, "files"), "{name}", job.scene_name)),
-          samples_(numbers(value_of(job.run->settings, "samples"))),
-          seconds_(numbers(value_of(job.run->settings, "seconds"))),
-          film_(job.scene->sensor.crop_width, job.scene->sensor.crop_height) {
+        : PassPeer(job), files_(setting_value(job.run->settings, "files")), name_(job.scene_name),
+          samples_(numbers(setting_value(job.run->settings, "samples"))),
+          seconds_(numbers(setting_value(job.run->settings, "seconds"))) {
         description_.version = "images";
         description_.device = "not stated";
         description_.backend = "images";
@@ -54,9 +39,6 @@ public:
             "images made elsewhere: that they agree with the reference was not tested, times are "
             "as stated"};
     }
-
-    const PeerDescription& description() const override { return description_; }
-    void set_seed(uint64_t seed) override { seed_ = seed; }
 
     /// Up to the next image, however many samples that is.
     uint32_t render(uint32_t first, uint32_t, const volatile bool*) override {
@@ -76,50 +58,26 @@ public:
         return uint32_t(own);
     }
 
-    FilmMoments film() override { return film_.moments(); }
-    void clear_film() override { film_.clear(); }
-    double last_seconds() const override { return film_.last_seconds(); }
     uint32_t preferred_batch() const override { return 1; }
-    RenderStats stats() override {
-        RenderStats s;
-        s.backend = description_.backend;
-        s.device = description_.device;
-        film_.state(s);
-        return s;
-    }
 
 private:
     Image read(size_t i) const {
-        const std::string path =
-            filled(filled(files_, "{seed}", std::to_string(seed_)), "{number}", std::to_string(i + 1));
-        Image image;
-        try {
-            image = read_exr(path);
-        } catch (const Error& e) {
-            throw PeerRefusal(true, e.what());
-        }
-        const FilmMoments& m = film_.moments();
-        if (image.width != m.width || image.height != m.height)
-            throw PeerRefusal(false, fmt::format("{}: {}x{} pixels, the scene has {}x{}", path, image.width,
-                                                 image.height, m.width, m.height));
-        return image;
+        const Settings values = {{"name", name_}, {"seed", std::to_string(seed_)}, {"number", std::to_string(i + 1)}};
+        return read_image(fill_placeholders(files_, values), true);
     }
 
-    const std::string files_;
+    const std::string files_, name_;
     const std::vector<double> samples_, seconds_;
-    PassFilm film_;
-    PeerDescription description_;
-    uint64_t seed_ = 0;
 };
 
 }  // namespace
 
 std::string check_images(const Settings& settings) {
-    const std::string files = value_of(settings, "files");
+    const std::string files = setting_value(settings, "files");
     for (const char* name : {"{number}", "{seed}"})
         if (files.find(name) == std::string::npos) return fmt::format("'files' lacks the placeholder {}", name);
-    const std::vector<double> samples = numbers(value_of(settings, "samples")),
-                              seconds = numbers(value_of(settings, "seconds"));
+    const std::vector<double> samples = numbers(setting_value(settings, "samples")),
+                              seconds = numbers(setting_value(settings, "seconds"));
     if (samples.empty() || samples.size() != seconds.size())
         return "'samples' and 'seconds' must be lists of equal length, a number for each image";
     if (!rises(samples) || !rises(seconds)) return "'samples' and 'seconds' must rise";

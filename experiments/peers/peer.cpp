@@ -6,6 +6,12 @@
 
 namespace ambilux {
 
+std::string setting_value(const Settings& settings, const std::string& key) {
+    for (const auto& [name, value] : settings)
+        if (name == key) return value;
+    return "";
+}
+
 const std::vector<PeerKind>& peer_kinds() {
     static const std::vector<PeerKind> kinds = {
         {"mitsuba",

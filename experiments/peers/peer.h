@@ -57,6 +57,9 @@ struct PeerKind {
     std::unique_ptr<PeerRenderer> (*start)(const PeerJob&);  ///< throws PeerRefusal, Error(interrupted)
 };
 
+/// Empty if there is none of that key.
+std::string setting_value(const Settings& settings, const std::string& key);
+
 const std::vector<PeerKind>& peer_kinds();
 /// Null if there is none of that name.
 const PeerKind* find_peer_kind(const std::string& name);

@@ -14,12 +14,6 @@
 namespace ambilux {
 namespace {
 
-std::string setting_of(const RunEntry& run, const std::string& key) {
-    for (const auto& [name, value] : run.settings)
-        if (name == key) return value;
-    return "";
-}
-
 nlohmann::json to_json(const PeerDescription& d) {
     return {{"version", d.version},
             {"device", d.device},
@@ -32,9 +26,9 @@ nlohmann::json to_json(const PeerDescription& d) {
 
 }  // namespace
 
-PeerRuns::PeerRuns(const std::string& folder, const ExperimentConfig& config, const volatile bool* interrupt)
-    : folder_(folder), config_(config), interrupt_(interrupt) {
-    const std::string path = folder_ + "/peers.json";
+PeerRuns::PeerRuns(const ExperimentRequest& request, const ExperimentConfig& config)
+    : request_(request), config_(config) {
+    const std::string path = request.output + "/peers.json";
     if (!std::filesystem::exists(path)) return;
     const nlohmann::json earlier = nlohmann::json::parse(read_file(path), nullptr, false);
     if (!earlier.is_array()) throw input_error(path, 0, "is damaged: remove it");
@@ -88,16 +82,16 @@ nlohmann::json PeerRuns::find_state(const RenderOf& render, const Reference& ref
     nlohmann::json entry = to_json(peer->description());
     entry["state"] = "untested";
     if (!find_peer_kind(render.run.renderer)->tested) return entry;
-    Agreement agreement = measure_agreement(*peer, config_.agreement_spp, reference, interrupt_);
+    Agreement agreement = measure_agreement(*peer, config_.agreement_spp, reference, request_.interrupt);
     if (!agreement.interrupted && !agreement.test.pass) {
         // Few samples of a heavy tail look like another image, or like nothing. More of them, drawn anew, decide.
         peer->set_seed(kAgreementSeed - 1);
-        agreement = measure_agreement(*peer, 4 * config_.agreement_spp, reference, interrupt_);
+        agreement = measure_agreement(*peer, 4 * config_.agreement_spp, reference, request_.interrupt);
     }
     if (agreement.interrupted) throw Error(ExitCode::interrupted, "interrupted");
     const std::string image = fmt::format("images/{}/{}_agreement", render.scene.entry->name, render.run.name);
-    write_exr(folder_ + "/" + image + ".exr", agreement.image);
-    write_png(folder_ + "/" + image + ".png", agreement.image);
+    write_exr(request_.output + "/" + image + ".exr", agreement.image);
+    write_png(request_.output + "/" + image + ".png", agreement.image);
     entry["agreement"] = ambilux::to_json(agreement);
     entry["image"] = image + ".exr";
     entry["state"] = agreement.test.pass ? "agrees" : agreement.test.undecided ? "undecided" : "differs";
@@ -115,9 +109,9 @@ std::unique_ptr<PeerRenderer> PeerRuns::start(const RenderOf& render) const {
     job.parameters = render.scene.entry->parameters;
     job.max_depth = render.settings.max_depth;
     job.rr_depth = render.settings.rr_depth;
-    job.folder = fmt::format("{}/peers/{}/{}", std::filesystem::absolute(folder_).string(), render.scene.entry->name,
-                             render.run.name);
-    job.interrupt = interrupt_;
+    job.folder = fmt::format("{}/peers/{}/{}", std::filesystem::absolute(request_.output).string(),
+                             render.scene.entry->name, render.run.name);
+    job.interrupt = request_.interrupt;
     make_folders(job.folder);
     return find_peer_kind(render.run.renderer)->start(job);
 }
@@ -134,8 +128,8 @@ std::unique_ptr<Renderer> PeerRuns::make(const RenderOf& render, const RenderSta
 
 MethodNames PeerRuns::names(const RenderOf& render, const RenderStats&) const {
     const nlohmann::json* entry = find(render.scene, render.run);
-    MethodNames names{setting_of(render.run, "integrator"), setting_of(render.run, "variant"), "",
-                      entry ? entry->value("version", "") : render.run.renderer};
+    MethodNames names{setting_value(render.run.settings, "integrator"), setting_value(render.run.settings, "variant"),
+                      "", entry ? entry->value("version", "") : render.run.renderer};
     if (names.integrator.empty())
         names.integrator = render.run.renderer;
     else
@@ -186,6 +180,6 @@ Attributes PeerRuns::attributes(const RenderOf& render, const RenderStats& stats
             {"seconds", stats.render_seconds}};
 }
 
-void PeerRuns::write() const { write_file_atomic(folder_ + "/peers.json", found_.dump(2) + "\n"); }
+void PeerRuns::write() const { write_file_atomic(request_.output + "/peers.json", found_.dump(2) + "\n"); }
 
 }  // namespace ambilux

@@ -5,6 +5,7 @@
 
 #include "experiments/peers/agreement.h"
 #include "experiments/run_maker.h"
+#include "experiments/runner.h"
 
 namespace ambilux {
 
@@ -15,7 +16,7 @@ namespace ambilux {
 class PeerRuns : public RunMaker {
 public:
     /// With what an earlier part found. Reasons of absence are forgotten: it may be there now.
-    PeerRuns(const std::string& folder, const ExperimentConfig& config, const volatile bool* interrupt);
+    PeerRuns(const ExperimentRequest& request, const ExperimentConfig& config);
 
     /// Finds the state of a run on a scene unless it is known; false if interrupted.
     bool examine(const RenderOf& render, const Reference& reference);
@@ -33,9 +34,8 @@ private:
     const nlohmann::json* find(const LoadedEntry& scene, const RunEntry& run) const;
     void write() const;
 
-    const std::string folder_;
+    const ExperimentRequest& request_;  ///< its `interrupt` is set when all is prepared
     const ExperimentConfig& config_;
-    const volatile bool* interrupt_;
     nlohmann::json found_ = nlohmann::json::array();
 };
 

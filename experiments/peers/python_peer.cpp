@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "core/flag.h"
 #include "experiments/peers/child_process.h"
-#include "experiments/peers/pass_film.h"
+#include "experiments/peers/pass_peer.h"
 #include "experiments/peers/peer_scripts.h"
 
 namespace ambilux {
@@ -45,20 +45,16 @@ PeerDescription read_description(const nlohmann::json& ready) {
     return d;
 }
 
-class PythonPeer : public PeerRenderer {
+class PythonPeer : public PassPeer {
 public:
     explicit PythonPeer(const PeerJob& job)
-        : name_(job.run->renderer), folder_(job.folder),
-          film_(job.scene->sensor.crop_width, job.scene->sensor.crop_height),
+        : PassPeer(job), name_(job.run->renderer), folder_(job.folder),
           child_(write_scripts(job), job.folder + "/log.txt") {
         const nlohmann::json answer = receive(job.interrupt);
         if (answer.contains("missing")) throw PeerRefusal(true, answer["missing"].get<std::string>());
         if (answer.contains("refused")) throw PeerRefusal(false, answer["refused"].get<std::string>());
         description_ = read_description(answer.at("ready"));
     }
-
-    const PeerDescription& description() const override { return description_; }
-    void set_seed(uint64_t seed) override { seed_ = seed; }
 
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
         child_.send(nlohmann::json{{"seed", pass_seed(seed_, first)}, {"samples", count}}.dump());
@@ -73,19 +69,6 @@ public:
         const auto done = answer.value("samples", count);  // some end only after a little more than asked for
         film_.add(read_pass(), done, answer.at("seconds").get<double>());
         return done;
-    }
-
-    FilmMoments film() override { return film_.moments(); }
-    void clear_film() override { film_.clear(); }
-    double last_seconds() const override { return film_.last_seconds(); }
-    uint32_t preferred_batch() const override { return film_.preferred_batch(); }
-    RenderStats stats() override {
-        RenderStats s;
-        s.backend = description_.backend;
-        s.device = description_.device;
-        s.build_seconds = description_.compile_seconds;
-        film_.state(s);
-        return s;
     }
 
 private:
@@ -118,10 +101,7 @@ private:
     }
 
     const std::string name_, folder_;
-    PassFilm film_;
     ChildProcess child_;
-    PeerDescription description_;
-    uint64_t seed_ = 0;
 };
 
 }  // namespace

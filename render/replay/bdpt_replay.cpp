@@ -56,11 +56,7 @@ public:
     }
 
     ReplaySample sample(const ReplayRequest& request) const override {
-        ReplaySample out;
-        out.x = request.x;
-        out.y = request.y;
-        out.sample = request.sample;
-        out.seed = seed_;
+        ReplaySample out = blank_sample(request, seed_);
         const uint32_t pixel = request.y * wave_.width + request.x;
         Eye::At connect;
         std::shared_ptr<const ReplayVertices> lights;

@@ -3,7 +3,7 @@
 
 #include "accel/host_tracer.h"
 #include "integrators/bdpt/shared/policy.h"
-#include "render/replay/record.h"
+#include "render/replay/replay.h"
 #include "stages/stage.h"
 #include "stages/update_film.h"
 
@@ -38,6 +38,16 @@ public:
 private:
     StageRecord record_{};
 };
+
+/// Of the requested sample, nothing yet.
+inline ReplaySample blank_sample(const ReplayRequest& request, uint64_t seed) {
+    ReplaySample s;
+    s.x = request.x;
+    s.y = request.y;
+    s.sample = request.sample;
+    s.seed = seed;
+    return s;
+}
 
 /// The sum of a sample, as update_film has it.
 inline void finish(ReplaySample& s) {

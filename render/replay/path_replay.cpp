@@ -31,11 +31,7 @@ public:
     }
 
     ReplaySample sample(const ReplayRequest& request) const override {
-        ReplaySample out;
-        out.x = request.x;
-        out.y = request.y;
-        out.sample = request.sample;
-        out.seed = seed_;
+        ReplaySample out = blank_sample(request, seed_);
         replay_eye<UnidirectionalMis>(ctx_, sample_emitter_, {}, request.details, out);
         finish(out);
         return out;

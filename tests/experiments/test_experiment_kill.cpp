@@ -2,18 +2,14 @@
 // timeout: 300
 // The built program, killed with SIGKILL at random moments and resumed, leaves what an uninterrupted run leaves.
 #include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <random>
 #include <thread>
 
-#include "core/atomic_file.h"
 #include "experiments/results.h"
 #include "film/exr_io.h"
-#include "tests/support/catch.h"
-#include "tests/support/temp_folder.h"
+#include "tests/support/program.h"
 
 using namespace ambilux;
 namespace fs = std::filesystem;
@@ -58,27 +54,6 @@ techniques = 3
 )";
 }
 
-pid_t start(const std::vector<std::string>& arguments, const std::string& messages) {
-    const pid_t child = ::fork();
-    REQUIRE(child >= 0);
-    if (child == 0) {
-        std::vector<char*> argv = {const_cast<char*>(AMBILUX_PROGRAM)};
-        for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
-        argv.push_back(nullptr);
-        if (!std::freopen(messages.c_str(), "w", stderr) || !std::freopen("/dev/null", "w", stdout)) ::_exit(99);
-        ::execv(AMBILUX_PROGRAM, argv.data());
-        ::_exit(98);
-    }
-    return child;
-}
-
-/// The exit code, or minus the signal.
-int finish(pid_t child) {
-    int status = 0;
-    REQUIRE(::waitpid(child, &status, 0) == child);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-}
-
 /// Rows without the column `time`, which is the 11th; names may hold commas in quotes.
 std::vector<std::string> timeless(const std::string& path) {
     std::vector<std::string> rows = read_results(path);
@@ -110,9 +85,12 @@ std::vector<std::string> files_of(const fs::path& folder) {
 TEST_CASE("kill -9 at random moments, resumed each time: the same rows, images and counts") {
     const test::TempFolder folder;
     const std::string file = folder.write("e.toml", config()), whole = (folder.path / "whole").string(),
-                      killed = (folder.path / "killed").string(), messages = (folder.path / "messages").string();
+                      killed = (folder.path / "killed").string();
+    const auto begin = [&](const std::vector<std::string>& arguments) {
+        return test::start(folder, arguments, "/dev/null");
+    };
     const auto begun = std::chrono::steady_clock::now();
-    REQUIRE(finish(start({"experiment", file, "-o", whole}, messages)) == 0);
+    REQUIRE(test::finish(folder, begin({"experiment", file, "-o", whole})).code == 0);
     const double duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     const auto expected = timeless(whole + "/runs.csv");
     REQUIRE(expected.size() == 2 * 2 * 7 * 4);
@@ -123,12 +101,12 @@ TEST_CASE("kill -9 at random moments, resumed each time: the same rows, images a
     int kills = 0;
     size_t rows = 0;
     for (int attempt = 0; attempt < 8; ++attempt) {
-        const pid_t child = start({"experiment", file, "-o", killed, "--resume"}, messages);
+        const pid_t child = begin({"experiment", file, "-o", killed, "--resume"});
         std::this_thread::sleep_for(
             std::chrono::duration<double>(std::uniform_real_distribution<double>(0.02, 0.5)(random) * duration));
         ::kill(child, SIGKILL);
-        const int code = finish(child);
-        INFO(read_file(messages));
+        const auto [code, out, err] = test::finish(folder, child);
+        INFO(err);
         REQUIRE((code == -SIGKILL || code == 0));
         kills += code != 0;
         const size_t now = fs::exists(killed + "/runs.csv") ? read_results(killed + "/runs.csv").size() : 0;
@@ -138,9 +116,9 @@ TEST_CASE("kill -9 at random moments, resumed each time: the same rows, images a
         rows = now;
     }
     CHECK(kills >= 1);
-    const int code = finish(start({"experiment", file, "-o", killed, "--resume"}, messages));
-    INFO(read_file(messages));
-    REQUIRE(code == 0);
+    const test::Outcome last = test::finish(folder, begin({"experiment", file, "-o", killed, "--resume"}));
+    INFO(last.err);
+    REQUIRE(last.code == 0);
 
     CHECK(bool(timeless(killed + "/runs.csv") == expected));
     const auto files = files_of(whole);

@@ -1,8 +1,11 @@
 // libs: ambilux_experiments
 // timeout: 120
 // Other renderers as runs of an experiment. The built program itself stands for one: it must agree with itself.
+#include <csignal>
 #include <cstdlib>
+#include <thread>
 
+#include "core/flag.h"
 #include "experiments/drive.h"
 #include "experiments/load.h"
 #include "experiments/peers/child_process.h"
@@ -175,6 +178,25 @@ TEST_CASE("a scene that is optional and not there is left out, and one of them m
     CHECK(contains(error_of([&] { read_experiment(folder / "e.toml"); }), "none of its scenes is there"));
 }
 
+TEST_CASE("an interrupt that is known only once all is prepared ends a peer at work") {
+    const TempFolder folder;
+    folder.write("e.toml", config_of("[[run]]\nname = \"slow\"\nrenderer = \"command\"\n"
+                                     "command = \"sleep 5; true {output} {spp} {seed}\"\n"));
+    volatile bool stop = false;
+    ExperimentRequest asked = request(folder, "out");
+    asked.on_prepared = [&] { asked.interrupt = &stop; };
+    std::thread user([&] {
+        while (!fs::exists(folder / "out/peers/box/slow/log.txt"))
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        set_flag(&stop);
+    });
+    const ExitCode code = run_experiment(asked, default_hooks());
+    user.join();
+    CHECK(code == ExitCode::interrupted);
+    // It did not come to a result.
+    CHECK_FALSE(fs::exists(folder / "out/peers.json"));
+}
+
 TEST_CASE("placeholders are filled in once and quoted for the shell") {
     CHECK(fill_command("a {x} {y} {z}", {{"x", "it's {y}"}, {"y", "2"}}) == "a 'it'\\''s {y}' '2' {z}");
     CHECK(check_command({{"command", "{output}{spp}{seed}"}}).empty());
@@ -249,6 +271,15 @@ TEST_CASE("a process is talked to in lines, its time is ours, and it ends with i
         CHECK(read_load().own > before.own);
         volatile bool stop = true;
         CHECK_FALSE(child.read_line(&stop));
+    }
+    {
+        // What this program ignores, programs that it starts do not.
+        const auto before_it = ::signal(SIGPIPE, SIG_IGN);
+        ChildProcess writer({"/bin/sh", "-c", "(while :; do echo y; done; echo stuck) 2>&1 | head -n 1"},
+                            folder / "log");
+        CHECK(writer.read_line(nullptr) == "y");
+        CHECK(writer.wait(nullptr) == 0);
+        ::signal(SIGPIPE, before_it);
     }
     REQUIRE(pid > 0);
     CHECK(::kill(pid, 0) != 0);

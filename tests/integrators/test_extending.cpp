@@ -1,5 +1,7 @@
 // libs: ambilux_core
 // docs/extending.md quotes files that are compiled and tested: what it shows is what they say.
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <sstream>
 
@@ -31,8 +33,8 @@ TEST_CASE("files that docs/extending.md names are there") {
     const std::string page = read_file(AMBILUX_SOURCE_DIR "/docs/extending.md");
     for (const char* folder : {"integrators/", "transport/", "stages/", "queues/", "models/", "formats/", "film/",
                                "tests/", "backends/", "scene/", "cmake/", "render/"})
-        for (size_t at = page.find("`" + std::string(folder)); at != std::string::npos;
-             at = page.find("`" + std::string(folder), at + 1)) {
+        for (size_t at = page.find(fmt::format("`{}", folder)); at != std::string::npos;
+             at = page.find(fmt::format("`{}", folder), at + 1)) {
             const std::string name = page.substr(at + 1, page.find('`', at + 1) - at - 1);
             if (name.find("NAME") != std::string::npos || name.find(' ') != std::string::npos) continue;
             INFO(name);
