@@ -11,7 +11,6 @@
 #include "experiments/reference_store.h"
 #include "experiments/statistics.h"
 #include "film/png_io.h"
-#include "integrators/setting.h"
 
 namespace ambilux {
 namespace {
@@ -23,34 +22,10 @@ struct Options {
     uint64_t spp = 0;
 };
 
-/// The settings that make a reference another one than the path tracer's; empty for it. Part of its identity.
-std::string making(const RenderSettings& settings) {
-    const bool path = settings.integrator == "path";
-    std::string text;
-    const auto add = [&](const std::string& key, const std::string& value) {
-        text += (text.empty() ? "" : " ") + key + "=" + value;
-    };
-    for (const Setting& s : general_settings())
-        if (s.place != InExperiment::experiment && !s.is_default(settings) && (!path || s.what.key == "precision"))
-            add(s.what.key, s.text(settings));
-    if (!path)
-        for (const auto& [key, value] : settings.own) add(key, value);
-    return text;
-}
-
 int reference(const Options& o) {
     if (o.output.empty()) throw Error(ExitCode::usage, "-o: the reference needs a name");
     const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
-    ReferenceRequest request;
-    request.path = o.output;
-    request.spp = o.spp;
-    request.settings = o.render.settings(loaded.scene);
-    for (const char* key : {"variant", "estimator"})
-        if (request.settings.integrator == "path" && !find_general_setting(key)->is_default(request.settings))
-            throw Error(ExitCode::usage,
-                        "a reference by integrator path is made by its first variant with estimator mis: leave these "
-                        "settings out");
-    request.settings_text = making(request.settings);
+    ReferenceRequest request = reference_request(o.output, o.spp, o.render.settings(loaded.scene));
     const ReferenceLock lock(o.output, nullptr);
     Hooks hooks = default_hooks();
     hooks.make_renderer = [&](const Scene& scene, const RenderSettings& settings) {

@@ -13,7 +13,7 @@
 #include "core/memory_reserve.h"
 #include "core/outputs.h"
 #include "core/progress.h"
-#include "experiments/drive.h"
+#include "experiments/render_plan.h"
 #include "experiments/statistics.h"
 #include "experiments/technique_files.h"
 #include "film/exr_io.h"
@@ -38,11 +38,7 @@ struct Options {
 constexpr float kMostStops = 100;
 
 void check(const Options& o) {
-    if (o.spp && o.time)
-        throw Error(ExitCode::usage, "--spp and --time exclude each other: a render ends by one of them");
-    if (o.spp && *o.spp == 0) throw Error(ExitCode::usage, "--spp 0: at least one sample per pixel is needed");
-    if (o.time && !(*o.time > 0 && std::isfinite(*o.time)))
-        throw Error(ExitCode::usage, "--time: more than zero seconds are needed");
+    render_budget(o.spp, o.time, {}, "--");
     if (o.exposure && !(std::fabs(*o.exposure) <= kMostStops))
         throw Error(ExitCode::usage, fmt::format("--exposure: {} stops at most, up or down", kMostStops));
     if (o.exposure && o.png.empty())
@@ -53,22 +49,6 @@ void check(const Options& o) {
         make_folders(o.techniques);
         check_writable(o.techniques + "/techniques.json");
     }
-}
-
-std::string described(const InvalidCounts& counts) {
-    return fmt::format("{} NaN, {} Inf, {} negative values", counts.nan, counts.inf, counts.negative);
-}
-
-/// What --strict objects to; empty if nothing.
-std::string objection(const RenderStats& stats) {
-    std::string text;
-    for (const auto& [stage, counts] : stats.invalid_by_stage)
-        if (counts.total()) text += fmt::format("stage {} dropped {}; ", stage, described(counts));
-    if (text.empty() && stats.invalid.total()) text += fmt::format("{} were dropped; ", described(stats.invalid));
-    for (const QueueStats& q : stats.queues)
-        if (q.overflow) text += fmt::format("queue {} of capacity {} lost {} items; ", q.name, q.capacity, q.overflow);
-    if (!text.empty()) text.resize(text.size() - 2);
-    return text;
 }
 
 /// What writing the image takes: sums of its pixels, the image, and the file twice while it grows.
@@ -82,13 +62,8 @@ int render(const Options& o) {
     const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
     RenderSettings settings = o.render.settings(loaded.scene);
     if (!o.techniques.empty() && settings.technique_depth == 0) settings.technique_depth = kDefaultTechniqueDepth;
-    Budget budget;
-    if (o.time)
-        budget.seconds = *o.time;
-    else
-        budget.samples = o.spp ? *o.spp : uint64_t(std::max(1, loaded.scene.integrator.spp));
-    settings.expected_samples = budget.samples;
-    settings.expected_seconds = budget.seconds;
+    const Budget budget = render_budget(o.spp, o.time, loaded.scene, "--");
+    expect(settings, budget);
     auto watched = std::make_unique<InvalidWatch>(make_renderer(loaded.scene, settings));
     InvalidWatch& watch = *watched;
     std::unique_ptr<Renderer> renderer = std::move(watched);
@@ -105,13 +80,10 @@ int render(const Options& o) {
 
     MemoryReserve reserve(bytes_to_save(loaded.scene));
     const volatile bool* const interrupt = save_when_interrupted();
-    RenderPosition position;
-    // Choosing is part of the method: its time counts.
-    if (const SelectionStats choice = renderer->stats().choice; !choice.name.empty()) {
-        position.seconds = choice.seconds;
+    RenderPosition position = first_position(*renderer);
+    if (const SelectionStats choice = renderer->stats().choice; !choice.name.empty())
         log_info(fmt::format("bdpt.auto: {}, after {}. To repeat it: {}", choice.name, format_duration(choice.seconds),
                              choice_line(choice)));
-    }
     {
         Progress progress("render");
         position = drive(*renderer, position, budget, interrupt, [&](const RenderPosition& p) {
@@ -131,7 +103,7 @@ int render(const Options& o) {
     }
     if (position.samples > 0 && !o.techniques.empty())
         write_technique_images(o.techniques, loaded.scene, settings, stats, renderer->strategy_images());
-    if (const std::string text = objection(stats); !o.strict && !text.empty()) log_warning(text);
+    if (const std::string text = lost_values(stats); !o.strict && !text.empty()) log_warning(text);
     nlohmann::json found = nlohmann::json::object();
     if (position.samples > 0 && (samples || !watch.batches().empty())) {
         FinishedRender finished = {o.scene, loaded.scene, used_settings(settings, stats), watch, samples};
@@ -157,7 +129,7 @@ int render(const Options& o) {
     }
     log_info(fmt::format("{}: {} spp in {}, {}", o.output, position.samples, format_duration(position.seconds),
                          stats.device));
-    if (const std::string text = objection(stats); o.strict && !text.empty())
+    if (const std::string text = lost_values(stats); o.strict && !text.empty())
         throw Error(ExitCode::device, "--strict: " + text + ". The image was saved");
     return int(ExitCode::done);
 }

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "experiments/render_plan.h"
 #include "formats/load.h"
 #include "integrators/registry.h"
 
@@ -79,9 +80,7 @@ void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
 }
 
 RenderSettings RenderOptions::settings(const Scene& scene) const {
-    RenderSettings s;
-    s.max_depth = scene.integrator.max_depth;
-    s.rr_depth = scene.integrator.rr_depth;
+    RenderSettings s = default_settings(scene);
     apply_setting(s, "integrator", integrator);
     apply_setting(s, "variant", variant);
     apply_setting(s, "backend", backend);

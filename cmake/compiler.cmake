@@ -1,6 +1,6 @@
 # One interface target that carries include paths and flags for all of the project.
 add_library(ambilux_options INTERFACE)
-target_include_directories(ambilux_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_include_directories(ambilux_options INTERFACE $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
 # Compilers contract a*b+c differently in every copy of an inlined function; without that, images do not depend on which stages are inlined where.
 target_compile_options(ambilux_options INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wshadow -fno-math-errno -ffp-contract=off>)

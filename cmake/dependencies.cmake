@@ -20,11 +20,13 @@ if(NOT embree_FOUND)
 endif()
 message(STATUS "Embree ${embree_VERSION}")
 
-find_package(Catch2 3 QUIET)
-if(NOT Catch2_FOUND)
-  find_package(Catch2 2 REQUIRED)
+if(AMBILUX_TESTS)
+  find_package(Catch2 3 QUIET)
+  if(NOT Catch2_FOUND)
+    find_package(Catch2 2 REQUIRED)
+  endif()
+  message(STATUS "Catch2 ${Catch2_VERSION}")
 endif()
-message(STATUS "Catch2 ${Catch2_VERSION}")
 
 # CUDA is optional.
 set(AMBILUX_HAS_CUDA OFF)

@@ -145,20 +145,18 @@ std::string read_file(const std::string& path, uint64_t most) {
     // Opening a pipe would wait for its writer.
     const File file(path, O_RDONLY | O_NONBLOCK);
     struct stat info;
-    if (file.fd < 0 || ::fstat(file.fd, &info) != 0) throw system_error(ExitCode::bad_input, "cannot read", path);
+    const auto fail = [&](const std::string& why) { throw input_error(path, 0, why); };
+    if (file.fd < 0 || ::fstat(file.fd, &info) != 0) fail(std::strerror(errno));
     if (!S_ISREG(info.st_mode))
-        throw Error(ExitCode::bad_input,
-                    "cannot read " + path + ": it is " +
-                        (S_ISDIR(info.st_mode) ? "a folder" : "no regular file, but a pipe or a device"));
+        fail(S_ISDIR(info.st_mode) ? "it is a folder" : "it is no regular file, but a pipe or a device");
     if (uint64_t(info.st_size) > most)
-        throw Error(ExitCode::bad_input, "cannot read " + path + ": it has " + std::to_string(info.st_size) +
-                                             " bytes, and " + std::to_string(most) + " are allowed");
+        fail("it has " + std::to_string(info.st_size) + " bytes, and " + std::to_string(most) + " are allowed");
     std::string content(size_t(info.st_size), '\0');
     size_t got = 0;
     while (got < content.size()) {
         const ssize_t n = ::read(file.fd, content.data() + got, content.size() - got);
         if (n < 0 && errno == EINTR) continue;
-        if (n < 0) throw system_error(ExitCode::bad_input, "cannot read", path);
+        if (n < 0) fail(std::strerror(errno));
         if (n == 0) break;  // it became shorter meanwhile
         got += size_t(n);
     }

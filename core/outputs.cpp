@@ -26,6 +26,8 @@ bool is_same(const std::string& a, const std::string& b) {
 void check_outputs(const std::vector<Output>& outputs) {
     for (size_t i = 0; i < outputs.size(); ++i) {
         if (!is_file(outputs[i])) continue;
+        if (const fs::path folder = fs::path(outputs[i].path).parent_path(); !folder.empty())
+            make_folders(folder.string());
         check_writable(outputs[i].path);
         for (size_t k = 0; k < i; ++k)
             if (is_file(outputs[k]) && is_same(outputs[i].path, outputs[k].path))

@@ -11,8 +11,8 @@ struct Output {
     std::string path;    ///< "" or "-": none
 };
 
-/// Fails before any work if an output cannot be written, or two of them are the same file. Throws Error(usage) or
-/// Error(device).
+/// Makes the folders of the outputs that are missing. Fails before any work if an output cannot be written, or two of
+/// them are the same file. Throws Error(usage) or Error(device).
 void check_outputs(const std::vector<Output>& outputs);
 
 /// Fails if an output is one of the files that were read. Throws Error(usage).

@@ -10,6 +10,7 @@
 #include "experiments/state.h"
 #include "experiments/statistics.h"
 #include "integrators/registry.h"
+#include "integrators/setting.h"
 
 namespace ambilux {
 namespace {
@@ -50,6 +51,21 @@ void check_settings(const RenderSettings& settings) {
                     fmt::format("a reference is made by integrator {} with all that it has (estimator mis, all "
                                 "strategies)",
                                 fmt::join(reference_integrators(), " or ")));
+}
+
+/// The settings that make a reference another one than the path tracer's; empty for it. Part of its identity.
+std::string making(const RenderSettings& settings) {
+    const bool path = settings.integrator == "path";
+    std::string text;
+    const auto add = [&](const std::string& key, const std::string& value) {
+        text += (text.empty() ? "" : " ") + key + "=" + value;
+    };
+    for (const Setting& s : general_settings())
+        if (s.place != InExperiment::experiment && !s.is_default(settings) && (!path || s.what.key == "precision"))
+            add(s.what.key, s.text(settings));
+    if (!path)
+        for (const auto& [key, value] : settings.own) add(key, value);
+    return text;
 }
 
 /// A reference that is begun or continued.
@@ -147,6 +163,20 @@ uint64_t reference_seed(uint64_t seed) {
     z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
     z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
     return z ^ (z >> 31);
+}
+
+ReferenceRequest reference_request(const std::string& path, uint64_t spp, const RenderSettings& settings) {
+    for (const char* key : {"variant", "estimator"})
+        if (settings.integrator == "path" && !find_general_setting(key)->is_default(settings))
+            throw Error(ExitCode::usage,
+                        "a reference by integrator path is made by its first variant with estimator mis: leave these "
+                        "settings out");
+    ReferenceRequest request;
+    request.path = path;
+    request.spp = spp;
+    request.settings = settings;
+    request.settings_text = making(settings);
+    return request;
 }
 
 ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& request, const Hooks& hooks) {

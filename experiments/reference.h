@@ -26,6 +26,9 @@ struct ReferenceRequest {
     std::function<void(const RenderPosition&)> on_batch;
 };
 
+/// A reference by given settings, which are part of its identity. Throws Error(usage) for those that it cannot have.
+ReferenceRequest reference_request(const std::string& path, uint64_t spp, const RenderSettings& settings);
+
 struct ReferenceResult {
     Reference reference;
     Attributes attributes;

@@ -23,4 +23,7 @@ struct LoadOptions {
 /// Loads a Mitsuba XML scene (formats 0.5, 0.6, 2.x and 3.x). Throws Error(bad_input) with file and line.
 Scene load_mitsuba(const std::string& path, const LoadOptions& options = {});
 
+/// The same of a text, as if it stood in a file at `path`: that is where the files that it names are looked for.
+Scene load_mitsuba_text(const std::string& text, const std::string& path, const LoadOptions& options = {});
+
 }  // namespace ambilux

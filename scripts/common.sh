@@ -28,5 +28,15 @@ configure_and_build() {
   cmake --build "$build" -j "$(jobs)" "${targets[@]}"
 }
 
+# Kernels take most of the time of a build: they are built where a device can run them, or with AMBILUX_CUDA=ON.
+cuda_where_it_runs() {
+  local cuda=${AMBILUX_CUDA:-}
+  if [[ -z $cuda ]]; then
+    cuda=OFF
+    nvidia-smi -L >/dev/null 2>&1 && cuda=AUTO
+  fi
+  echo "$cuda"
+}
+
 # Path of the built program.
 ambilux_program() { echo "$build/cli/ambilux"; }

@@ -1,11 +1,24 @@
 #!/usr/bin/env bash
 # Sets up, builds, runs experiments/demo.toml on the project's own scenes and makes out/demo/report.html. A run that
 # was interrupted goes on where it stopped; delete out/demo to start over.
+# An installed package ambilux with its analysis (pip install ".[analysis]") is used as it is: nothing is built then.
+# CUDA kernels are built when a device is there, or with AMBILUX_CUDA=ON.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
-scripts/setup.sh
-configure_and_build ambilux
+installed=$(cd / && command -v python3 || true)
+if [[ -n $installed ]] && (cd / && "$installed" -c 'import ambilux, analysis, scipy, matplotlib, OpenEXR, PIL') 2>/dev/null; then
+  say "demo: with the installed package ambilux"
+  python=$installed
+  program=("$python" -m ambilux.cli)
+else
+  scripts/setup.sh
+  # A folder of its own: that of scripts/test.sh may hold kernels.
+  build="${AMBILUX_BUILD_DIR:-$root/build-demo}"
+  AMBILUX_CMAKE_ARGS="-DAMBILUX_CUDA=$(cuda_where_it_runs) -DAMBILUX_PYTHON=OFF -DAMBILUX_TESTS=OFF ${AMBILUX_CMAKE_ARGS:-}"
+  configure_and_build ambilux
+  program=("$(ambilux_program)")
+fi
 start=$SECONDS
-"$(ambilux_program)" experiment experiments/demo.toml -o out/demo --resume
+"${program[@]}" experiment experiments/demo.toml -o out/demo --resume
 say "demo: the experiment took $((SECONDS - start)) s"
 "$python" -m analysis out/demo -o out/demo
 echo "report: $root/out/demo/report.html"

@@ -17,6 +17,9 @@ for tool in "${!tools[@]}"; do
 done
 # ensurepip is what Debian leaves out of python3 and ships in python3-venv.
 python3 -c 'import venv, ensurepip' 2>/dev/null || missing+=(python3-venv)
+# Headers, for the Python module.
+python3 -c 'import os, sys, sysconfig; sys.exit(not os.path.exists(sysconfig.get_path("include") + "/Python.h"))' ||
+  missing+=(python3-dev)
 
 if command -v dpkg-query >/dev/null; then
   for package in "${libraries[@]}"; do

@@ -21,5 +21,11 @@ status=0
 ctest --test-dir "$build" --output-on-failure --no-tests=error -j "$(nproc)" \
   --output-junit "$results/ctest.xml" --test-output-size-passed 65536 "${selection[@]}" "$@" </dev/null || status=$?
 "$python" -m pytest -q -p no:cacheprovider analysis --junitxml "$results/pytest.xml" </dev/null || status=$?
-"$python" scripts/count_tests.py "$results/ctest.xml" "$results/pytest.xml" || status=1
+python_tests=()
+if [[ -d $build/python/ambilux ]]; then
+  python_tests=("$results/python.xml")
+  PYTHONPATH="$build/python:$root" "$python" -m pytest -q -p no:cacheprovider python --junitxml "${python_tests[0]}" </dev/null ||
+    status=$?
+fi
+"$python" scripts/count_tests.py "$results/ctest.xml" "$results/pytest.xml" "${python_tests[@]}" || status=1
 exit "$status"

@@ -68,10 +68,7 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     return scene;
 }
 
-}  // namespace
-
-Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
-    const Document document = parse_document(path, options.parameters, options.limits);
+Scene scene_of(const std::string& path, const Document& document, const LoadOptions& options) {
     std::optional<Error> outside;
     Scene scene = build_scene(path, document, options, {}, &outside);
     // Far from the origin floats have rounded it already: it is made again, about its centre in double precision.
@@ -81,6 +78,16 @@ Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
         throw Error(*outside);
     finalize_scene(scene, options.light_picking);
     return scene;
+}
+
+}  // namespace
+
+Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
+    return scene_of(path, parse_document(path, options.parameters, options.limits), options);
+}
+
+Scene load_mitsuba_text(const std::string& text, const std::string& path, const LoadOptions& options) {
+    return scene_of(path, parse_document(path, options.parameters, options.limits, &text), options);
 }
 
 }  // namespace ambilux

@@ -138,7 +138,11 @@ struct Parser {
         open_files.push_back(canonical.string());
 
         check_includes(document.files.size(), from);
-        const std::string bytes = read_input(path, document.limits);
+        parse_text(path, read_input(path, document.limits), depth);
+        open_files.pop_back();
+    }
+
+    void parse_text(const std::string& path, const std::string& bytes, uint64_t depth) {
         document.files.push_back({path, bytes});
         XmlSource source;
         source.path = path;
@@ -166,7 +170,6 @@ struct Parser {
             document.scene->version = source.version;
         }
         parse_children(source, root, *document.scene, depth);
-        open_files.pop_back();
     }
 
     void resolve_references() {
@@ -203,7 +206,7 @@ struct Parser {
 }  // namespace
 
 Document parse_document(const std::string& path, const std::vector<std::pair<std::string, std::string>>& parameters,
-                        const Limits& limits) {
+                        const Limits& limits, const std::string* text) {
     Document document;
     document.limits = limits;
     Parser parser{document, ValueParser(document), {}, {}};
@@ -212,7 +215,10 @@ Document parse_document(const std::string& path, const std::vector<std::pair<std
         parser.values.set_parameter(name, value);
         given.insert(name);
     }
-    parser.parse_file(path, {path, 0}, 1);
+    if (text)
+        parser.parse_text(path, *text, 1);
+    else
+        parser.parse_file(path, {path, 0}, 1);
     for (const std::string& name : given)
         if (!parser.values.is_used(name)) throw input_error(path, 0, "the scene has no parameter '$" + name + "'");
     parser.resolve_references();

@@ -70,9 +70,9 @@ struct Document {
     std::string resolve(const std::string& name, const Where& where) const;
 };
 
-/// Parses the file. `parameters` replace <default>s; one that the file does not use is an error. Throws
-/// Error(bad_input) with file and line.
+/// Parses the file, or `text` as if the file held it. `parameters` replace <default>s; one that the file does not use
+/// is an error. Throws Error(bad_input) with file and line.
 Document parse_document(const std::string& path, const std::vector<std::pair<std::string, std::string>>& parameters,
-                        const Limits& limits = {});
+                        const Limits& limits = {}, const std::string* text = nullptr);
 
 }  // namespace ambilux::mitsuba

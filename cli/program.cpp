@@ -1,0 +1,78 @@
+#include "cli/program.h"
+
+#include <fmt/format.h>
+
+#include <iostream>
+#include <new>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "core/error.h"
+#include "core/log.h"
+#include "core/version.h"
+
+namespace ambilux {
+namespace {
+
+/// The exit code, unless what was printed could not be written.
+int flushed(int code) {
+    std::cout.flush();
+    if (std::cout) return code;
+    log_error("cannot write to standard output");
+    return code == int(ExitCode::done) ? int(ExitCode::device) : code;
+}
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv) {
+    install_interrupt_handler();
+    CLI::App app{"Ambilux: a testbed for bidirectional light transport"};
+    app.set_version_flag("--version", fmt::format("ambilux {} ({})", version(), git_revision()));
+    app.require_subcommand(1);
+    app.fallthrough();
+    bool quiet = false;
+    app.add_flag("--quiet", quiet, "No progress and no messages but errors");
+    Run run;
+    add_render(app, run);
+    add_info(app, run);
+    add_reference(app, run);
+    add_compare(app, run);
+    add_experiment(app, run);
+    add_stress(app, run);
+    add_bench(app, run);
+    add_trace(app, run);
+    add_help(app, run);
+    const auto named = [&](CLI::App* command) { return argc > 1 && command->check_name(argv[1]); };
+    if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(named).empty()) {
+        log_error(fmt::format(
+            "unknown command '{}': render, info, reference, compare, experiment, stress, bench, trace and help are "
+            "known",
+            argv[1]));
+        return int(ExitCode::usage);
+    }
+    try {
+        if (argc == 1) throw CLI::CallForHelp();
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& e) {
+        const int code = app.exit(e);
+        return flushed(code == 0 && argc > 1 ? int(ExitCode::done) : int(ExitCode::usage));
+    }
+    set_quiet(quiet);
+    try {
+        return flushed(run());
+    } catch (const Error& e) {
+        set_status_line("");
+        log_error(e.what());
+        return int(e.code);
+    } catch (const std::bad_alloc&) {
+        set_status_line("");
+        log_error("out of memory: try a smaller --size");
+        return int(ExitCode::device);
+    } catch (const std::exception& e) {
+        set_status_line("");
+        log_error(fmt::format("unexpected: {}", e.what()));
+        return int(ExitCode::device);
+    }
+}
+
+}  // namespace ambilux

@@ -1,0 +1,9 @@
+// The program: reads the command line, runs one command, turns errors into messages and exit codes (README.md).
+#pragma once
+
+namespace ambilux {
+
+/// Returns the exit code. Changes what signals do (cli/interrupt.h).
+int run_program(int argc, const char* const* argv);
+
+}  // namespace ambilux

@@ -1,0 +1,176 @@
+"""Scenes as dictionaries of the form that mitsuba.load_dict takes, turned into the XML that the reader of scene files knows.
+
+An element stands in one line, so that the line of an error names its key.
+"""
+
+from __future__ import annotations
+
+import numbers
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+from ambilux.errors import SceneError
+
+TAGS = {
+    "bsdf": "diffuse roughdiffuse dielectric thindielectric roughdielectric conductor roughconductor plastic roughplastic twosided mask bumpmap normalmap blendbsdf "
+            "principled phong null",
+    "emitter": "area point spot directional constant envmap sunsky sun sky projector directionalarea",
+    "film": "hdrfilm ldrfilm specfilm",
+    "integrator": "path direct volpath ptracer bdpt aov moment volpathmis",
+    "rfilter": "box gaussian tent mitchell catmullrom lanczos",
+    "sampler": "independent stratified multijitter orthogonal ldsampler sobol halton",
+    "sensor": "perspective thinlens orthographic",
+    "shape": "sphere rectangle disk cube cylinder obj ply serialized shapegroup instance hair",
+    "texture": "bitmap checkerboard scale",
+}
+TAG_OF = {name: tag for tag, names in TAGS.items() for name in names.split()}
+COLOURS = ("rgb", "srgb", "spectrum")
+
+
+class Lines:
+    """XML, and the path of keys of every line."""
+
+    def __init__(self) -> None:
+        self.text: list[str] = []
+        self.paths: list[str] = []
+
+    def add(self, text: str, path: str) -> None:
+        self.text.append(text)
+        self.paths.append(path)
+
+
+def fail(path: str, message: str) -> None:
+    raise SceneError(f"{path or 'the dictionary'}: {message}", key=path)
+
+
+def number_list(value: Any) -> list[float] | None:
+    """Of a sequence or array of numbers; None of anything else."""
+    if isinstance(value, (str, bytes, Mapping)):
+        return None
+    try:
+        flat = [x for row in value for x in (row if hasattr(row, "__len__") else [row])]
+    except TypeError:
+        return None
+    return [float(x) for x in flat] if all(isinstance(x, numbers.Real) for x in flat) else None
+
+
+def joined(values: list[float]) -> str:
+    return " ".join(repr(v) for v in values)
+
+
+def element(tag: str, end: str = "/", **attributes: str) -> str:
+    return f"<{tag}{''.join(f' {k}={attribute(v)}' for k, v in attributes.items())}{end}>"
+
+
+def attribute(text: str) -> str:
+    # A line break would end the element's line; tabs and breaks are references in XML.
+    return quoteattr(text, {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
+
+
+def transform_steps(value: Any, path: str) -> Iterator[str]:
+    """A matrix, one step such as {"translate": [0, 1, 0]}, or a list of these, applied in their order."""
+    matrix = number_list(getattr(value, "matrix", value))
+    if matrix is not None:
+        if len(matrix) not in (9, 16):
+            fail(path, f"a transform has 16 or 9 numbers, not {len(matrix)}")
+        yield element("matrix", value=joined(matrix))
+        return
+    for step in [value] if isinstance(value, Mapping) else value:
+        if not isinstance(step, Mapping):
+            yield from transform_steps(step, path)
+            continue
+        for name, argument in step.items():
+            if name == "look_at":
+                yield element("lookat", **{k: joined(number_list(v) or []) for k, v in argument.items()})
+            elif name == "rotate":
+                if not isinstance(argument, Mapping) or set(argument) != {"axis", "angle"}:
+                    fail(f"{path}.rotate", "write it as {'axis': [x, y, z], 'angle': degrees}")
+                yield element("rotate", value=joined(number_list(argument["axis"]) or []), angle=repr(float(argument["angle"])))
+            elif name in ("translate", "scale"):
+                value_of = [float(argument)] if isinstance(argument, numbers.Real) else number_list(argument)
+                yield element(name, value=joined(value_of or []))
+            else:
+                fail(f"{path}.{name}", "translate, scale, rotate and look_at are the steps of a transform")
+
+
+def add_colour(lines: Lines, name: str, value: Mapping[str, Any], path: str) -> None:
+    content = value.get("value")
+    extra = set(value) - {"type", "value", "filename"}
+    if extra:
+        fail(f"{path}.{sorted(extra)[0]}", f"unknown key of {value['type']}: value is known")
+    if "filename" in value:
+        lines.add(element(value["type"], name=name, filename=str(value["filename"])), path)
+    elif isinstance(content, str):
+        lines.add(element(value["type"], name=name, value=content), path)
+    elif isinstance(content, numbers.Real):
+        lines.add(element(value["type"], name=name, value=repr(float(content))), path)
+    elif value["type"] == "spectrum" and content is not None and all(len(pair) == 2 for pair in content):
+        lines.add(element("spectrum", name=name, value=", ".join(f"{float(w)!r}:{float(v)!r}" for w, v in content)), path)
+    elif (values := number_list(content)) is not None:
+        lines.add(element(value["type"], name=name, value=joined(values)), path)
+    else:
+        fail(path, f"a {value['type']} has a value: numbers")
+
+
+def add_value(lines: Lines, name: str, value: Any, path: str) -> None:
+    if isinstance(value, Mapping) and value.get("type") in COLOURS:
+        add_colour(lines, name, value, path)
+    elif isinstance(value, Mapping) and value.get("type") == "ref":
+        lines.add(element("ref", name=name, id=str(value.get("id", ""))), path)
+    elif name.startswith("to_") or hasattr(value, "matrix"):
+        steps = "".join(transform_steps(value, path))
+        lines.add(element("transform", "", name=name) + steps + "</transform>", path)
+    elif isinstance(value, Mapping):
+        add_object(lines, name, value, path)
+    elif isinstance(value, bool):
+        lines.add(element("boolean", name=name, value=str(value).lower()), path)
+    elif isinstance(value, numbers.Integral):
+        lines.add(element("integer", name=name, value=str(int(value))), path)
+    elif isinstance(value, numbers.Real):
+        lines.add(element("float", name=name, value=repr(float(value))), path)
+    elif (values := number_list(value)) is not None:
+        if len(values) != 3:
+            fail(path, f"a point or vector has three numbers, not {len(values)}")
+        lines.add(element("point", name=name, value=joined(values)), path)
+    elif isinstance(value, str) or hasattr(value, "__fspath__"):
+        lines.add(element("string", name=name, value=str(value)), path)
+    else:
+        fail(path, f"a {type(value).__name__} means nothing in a scene")
+
+
+def add_object(lines: Lines, name: str, value: Mapping[str, Any], path: str) -> None:
+    kind = value.get("type")
+    if not isinstance(kind, str):
+        fail(path, "an object has a type")
+    tag = TAG_OF.get(kind)
+    if tag is None:
+        fail(f"{path}.type", f"unknown type '{kind}'")
+    attributes = {"type": kind}
+    depth = path.count(".")
+    if depth == 0 or "id" in value:
+        attributes["id"] = str(value.get("id", name))
+    # Names of objects matter where they are parameters, such as textures and BSDFs inside of others.
+    if depth and re.fullmatch(r"[a-z_]\w*", name) and tag in ("texture", "bsdf"):
+        attributes["name"] = name
+    lines.add(element(tag, "", **attributes), path)
+    for key, inner in value.items():
+        if key not in ("type", "id"):
+            add_value(lines, str(key), inner, f"{path}.{key}")
+    lines.add(f"</{tag}>", path)
+
+
+def to_xml(scene: Mapping[str, Any]) -> Lines:
+    """The scene as XML of format 3."""
+    if not isinstance(scene, Mapping) or scene.get("type") != "scene":
+        fail("type", "a scene is a dictionary with 'type': 'scene'")
+    lines = Lines()
+    lines.add('<scene version="3.0.0">', "type")
+    for key, value in scene.items():
+        if key != "type":
+            if not isinstance(value, Mapping):
+                fail(str(key), "a scene holds objects, which are dictionaries")
+            add_object(lines, str(key), value, str(key))
+    lines.add("</scene>", "type")
+    return lines

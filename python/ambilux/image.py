@@ -1,0 +1,124 @@
+"""Images as arrays, their files, and their error."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ambilux import _core
+from ambilux.errors import UsageError
+
+
+class Image:
+    """Linear Rec.709 radiance: `rgb`, float32 of height x width x 3, row by row from the top left.
+
+    NumPy, PyTorch and others see the same memory, without a copy: numpy.asarray(image), torch.from_dlpack(image).
+
+    >>> image = ambilux.render(scene, spp=4)
+    >>> numpy.shares_memory(numpy.from_dlpack(image), image.rgb)
+    True
+    """
+
+    def __init__(self, rgb: Any, stderr: Any = None, samples: int = 0, stats: dict[str, Any] | None = None, attributes: dict[str, Any] | None = None):
+        self.rgb = pixels(rgb)
+        #: Standard error of every value; None where it is not known.
+        self.stderr = None if stderr is None else pixels(stderr)
+        #: Per pixel; 0 if it is not known.
+        self.samples = samples
+        #: Of the render, as `ambilux render --json` writes them.
+        self.stats = stats or {}
+        #: What made the image, for the header of its file.
+        self.attributes = attributes or {}
+
+    @classmethod
+    def _of(cls, core: _core.Pixels, **more: Any) -> Image:
+        return cls(core.rgb, core.stderr if core.samples > 1 else None, core.samples, **more)
+
+    @property
+    def variance(self) -> np.ndarray | None:
+        """Of one sample of every value; None where it is not known."""
+        return None if self.stderr is None else self.stderr**2 * np.float32(self.samples)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.rgb.shape
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        if dtype is not None and np.dtype(dtype) != self.rgb.dtype:
+            if copy is False:
+                raise ValueError(f"an image is of float32; as {np.dtype(dtype)} it is copied")
+            return self.rgb.astype(dtype)
+        return self.rgb.copy() if copy else self.rgb
+
+    def __dlpack__(self, **options: Any) -> Any:
+        return self.rgb.__dlpack__(**options)
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        return self.rgb.__dlpack_device__()
+
+    def __repr__(self) -> str:
+        return f"<ambilux.Image {self.shape[1]}x{self.shape[0]}, {self.samples} spp>"
+
+    def _repr_png_(self) -> bytes:
+        with tempfile.TemporaryDirectory() as folder:
+            self.save(os.path.join(folder, "image.png"))
+            return Path(folder, "image.png").read_bytes()
+
+    def save(self, path: str | os.PathLike[str], *, exposure: float = 0.0, stderr: bool = False) -> None:
+        """Writes an EXR file, with `stderr` one that `compare` takes as reference, or a PNG `exposure` stops brighter."""
+        name = os.fspath(path)
+        os.makedirs(os.path.dirname(name) or ".", exist_ok=True)
+        if name.lower().endswith(".png"):
+            _core.write_png(name, self.rgb, exposure)
+        elif name.lower().endswith(".exr"):
+            if stderr and self.stderr is None:
+                raise UsageError("the image has no standard errors")
+            _core.write_image(name, self.rgb, self.stderr if stderr else None, self.samples, json.dumps(self.attributes))
+        else:
+            raise UsageError(f"{name}: .exr and .png are known")
+
+
+def pixels(value: Any) -> np.ndarray:
+    array = np.ascontiguousarray(value, dtype=np.float32)
+    if array.ndim != 3 or array.shape[2] != 3:
+        raise UsageError(f"an image has the shape (height, width, 3), not {array.shape}")
+    return array
+
+
+def read(path: str | os.PathLike[str]) -> Image:
+    """Reads an EXR file; a reference with its standard errors."""
+    core, attributes = _core.read_image(os.fspath(path))
+    stated = json.loads(attributes)
+    image = Image(core.rgb, core.stderr, core.samples, attributes=stated)
+    if not image.samples and isinstance(stated.get("spp"), int):
+        image.samples = stated["spp"]
+    return image
+
+
+def as_image(value: Any) -> Image:
+    if isinstance(value, Image):
+        return value
+    if isinstance(value, (str, os.PathLike)):
+        return read(value)
+    return Image(value)
+
+
+def compare(image: Any, reference: Any) -> dict[str, float | None]:
+    """Error of an image against a reference: the figures of `ambilux compare --json`, None where they are not known.
+
+    Both may be images, arrays or names of EXR files. Do not take images of equal seeds: what they share is no error of either.
+
+    >>> one, other = (ambilux.render(scene, spp=4, seed=seed) for seed in (1, 2))
+    >>> metrics = ambilux.compare(one, other)
+    >>> metrics["rmse_corrected"] <= metrics["rmse"], abs(metrics["bias_z"]) < 5
+    (True, True)
+    """
+    one, other = as_image(image), as_image(reference)
+    if one.shape != other.shape:
+        raise UsageError(f"the image is {one.shape[1]}x{one.shape[0]}, the reference {other.shape[1]}x{other.shape[0]}")
+    return json.loads(_core.compare(one.rgb, other.rgb, other.stderr, other.samples))

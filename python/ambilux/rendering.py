@@ -1,0 +1,122 @@
+"""Renders: at once, step by step, and references."""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ambilux import _core
+from ambilux.errors import AmbiluxWarning, UsageError
+from ambilux.image import Image
+from ambilux.scene import Scene, load, setting_text
+
+
+def scene_of(scene: Scene | str | os.PathLike[str], size: tuple[int, int] | None) -> Scene:
+    if not isinstance(scene, Scene):
+        return load(scene, size=size)
+    return scene if size is None or tuple(size) == scene.size else scene.resized(size)
+
+
+def assignments(settings: Mapping[str, Any] | None, **named: Any) -> list[tuple[str, str]]:
+    """Settings in the order in which they are set; `settings` has the last word."""
+    given = {k: v for k, v in named.items() if v is not None}
+    return [(k, setting_text(v)) for k, v in [*given.items(), *(settings or {}).items()]]
+
+
+def count(name: str, value: int | None) -> int | None:
+    if value is not None and (isinstance(value, bool) or int(value) != value or value < 0):
+        raise UsageError(f"{name} {value}: a whole number that is not negative is needed")
+    return None if value is None else int(value)
+
+
+def begin(scene: Scene, settings: list[tuple[str, str]], spp: int | None, time: float | None) -> _core.Render:
+    core = _core.Render(scene._core, settings, count("spp", spp), time)
+    for text in core.warnings:
+        warnings.warn(text, AmbiluxWarning, stacklevel=4)
+    return core
+
+
+def finished(core: _core.Render) -> Image:
+    if lost := core.lost():
+        warnings.warn(lost, AmbiluxWarning, stacklevel=3)
+    return image_of(core)
+
+
+def image_of(core: _core.Render) -> Image:
+    return Image._of(core.pixels(), stats=json.loads(core.stats()), attributes=json.loads(core.attributes()))
+
+
+def render(scene: Scene | str | os.PathLike[str], integrator: str = "path", variant: str | None = None, *, spp: int | None = None, time: float | None = None,
+           seed: int | None = None, size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
+           settings: Mapping[str, Any] | None = None) -> Image:
+    """Renders `spp` samples per pixel, or for `time` seconds; with neither as many as the scene asks for.
+
+    `settings` are those of `ambilux help settings`. Other threads run meanwhile. An interrupt (KeyboardInterrupt) ends it within a second.
+
+    >>> image = ambilux.render(scene, "bdpt", spp=2, seed=1, settings={"strategies": ["hits", "next_event"]})
+    >>> image.samples, image.stats["integrator"], image.variance.shape == image.shape
+    (2, 'bdpt', True)
+    """
+    core = begin(scene_of(scene, size),
+                 assignments(settings, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend), spp, time)
+    core.advance(0)
+    return finished(core)
+
+
+@dataclass(frozen=True)
+class Step:
+    """Where a render stands."""
+
+    image: Image
+    samples: int  #: per pixel
+    seconds: float  #: of wall clock inside the renderer
+
+    @property
+    def stats(self) -> dict[str, Any]:
+        return self.image.stats
+
+    @property
+    def variance(self) -> Any:
+        return self.image.variance
+
+
+def progressive(scene: Scene | str | os.PathLike[str], integrator: str = "path", variant: str | None = None, *, spp: int | None = None,
+                time: float | None = None, every: float = 0.5, seed: int | None = None, size: tuple[int, int] | None = None, max_depth: int | None = None,
+                backend: str | None = None, settings: Mapping[str, Any] | None = None) -> Iterator[Step]:
+    """The same render, with the image so far about `every` seconds and at the end.
+
+    >>> steps = list(ambilux.progressive(scene, spp=64, every=0.01))
+    >>> steps[-1].samples, all(a.samples < b.samples for a, b in zip(steps, steps[1:]))
+    (64, True)
+    """
+    if not every > 0:
+        raise UsageError(f"every {every}: more than zero seconds are needed")
+    core = begin(scene_of(scene, size),
+                 assignments(settings, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend), spp, time)
+    return steps_of(core, every)
+
+
+def steps_of(core: _core.Render, every: float) -> Iterator[Step]:
+    shown, more = 0, True
+    while more:
+        more = core.advance(every)
+        if core.samples > shown:
+            shown = core.samples
+            image = image_of(core) if more else finished(core)
+            yield Step(image, core.samples, core.seconds)
+
+
+def reference(scene: Scene | str | os.PathLike[str], path: str | os.PathLike[str], *, spp: int, seed: int | None = None,
+              size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
+              settings: Mapping[str, Any] | None = None) -> Image:
+    """Ground truth with its standard error, in the file at `path`, which is continued if it exists. An interrupt saves what is finished."""
+    name = os.fspath(path)
+    os.makedirs(os.path.dirname(name) or ".", exist_ok=True)
+    samples = count("spp", spp)
+    core, attributes = _core.reference(scene_of(scene, size)._core, name, samples,
+                                       assignments(settings, seed=seed, max_depth=max_depth, backend=backend))
+    return Image._of(core, attributes=json.loads(attributes))

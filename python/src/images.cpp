@@ -1,0 +1,82 @@
+// Images as arrays that NumPy sees without a copy, their files, and their comparison.
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+
+#include <cstring>
+#include <optional>
+
+#include "film/exr_io.h"
+#include "film/metrics.h"
+#include "film/png_io.h"
+#include "python/src/bindings.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace ambilux {
+namespace {
+
+using Pixels = nb::ndarray<nb::numpy, float, nb::ndim<3>>;
+using PixelsIn = nb::ndarray<const float, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+
+/// A view of `image`, which `owner` keeps alive.
+Pixels view(Image& image, nb::handle owner) {
+    return Pixels(image.rgb.data(), {size_t(image.height), size_t(image.width), 3}, owner);
+}
+
+Image copied(const PixelsIn& pixels) {
+    const float* const first = pixels.data();
+    return {uint32_t(pixels.shape(1)), uint32_t(pixels.shape(0)), {first, first + pixels.size()}};
+}
+
+std::pair<Reference, std::string> read_image(const std::string& path) {
+    Attributes attributes;
+    Reference reference = read_reference_exr(path, &attributes);
+    return {std::move(reference), json_text(attributes)};
+}
+
+void write_image(const std::string& path, const PixelsIn& rgb, std::optional<PixelsIn> standard_error, uint64_t samples,
+                 const std::string& attributes) {
+    const Attributes stated = nlohmann::json::parse(attributes);
+    if (standard_error)
+        write_reference_exr(path, {copied(rgb), copied(*standard_error), samples}, stated);
+    else
+        write_exr(path, copied(rgb), stated);
+}
+
+std::string compare(const PixelsIn& image, const PixelsIn& mean, std::optional<PixelsIn> standard_error,
+                    uint64_t samples) {
+    Reference reference{copied(mean), {}, samples};
+    if (standard_error) reference.standard_error = copied(*standard_error);
+    return json_text(to_json(compare_images(copied(image), reference)));
+}
+
+}  // namespace
+
+void bind_images(nb::module_& m) {
+    nb::class_<Reference>(m, "Pixels", "Means of pixels and their standard errors.")
+        .def_prop_ro(
+            "rgb", [](nb::handle_t<Reference> self) { return view(nb::cast<Reference&>(self).mean, self); },
+            nb::rv_policy::reference)
+        .def_prop_ro(
+            "stderr",
+            [](nb::handle_t<Reference> self) -> std::optional<Pixels> {
+                Image& image = nb::cast<Reference&>(self).standard_error;
+                if (image.rgb.empty()) return std::nullopt;
+                return view(image, self);
+            },
+            nb::rv_policy::reference)
+        .def_ro("samples", &Reference::samples);
+    m.def("read_image", &read_image, "path"_a, "Pixels of an EXR file, and its attributes.");
+    m.def("write_image", &write_image, "path"_a, "rgb"_a, "stderr"_a.none(), "samples"_a, "attributes"_a,
+          "Writes an EXR file: a reference if `stderr` is given.");
+    m.def(
+        "write_png",
+        [](const std::string& path, const PixelsIn& rgb, float exposure) { write_png(path, copied(rgb), exposure); },
+        "path"_a, "rgb"_a, "exposure"_a);
+    m.def("compare", &compare, "image"_a, "mean"_a, "stderr"_a.none(), "samples"_a);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,183 @@
+// Scenes, renders step by step, references and experiments.
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/unique_ptr.h>
+#include <nanobind/stl/vector.h>
+
+#include <chrono>
+#include <memory>
+
+#include "core/error.h"
+#include "core/log.h"
+#include "core/outputs.h"
+#include "experiments/reference_store.h"
+#include "experiments/render_plan.h"
+#include "experiments/runner.h"
+#include "experiments/statistics.h"
+#include "formats/load.h"
+#include "integrators/warnings.h"
+#include "python/src/bindings.h"
+#include "scene/info.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace ambilux {
+namespace {
+
+using Assignments = std::vector<std::pair<std::string, std::string>>;
+
+struct LoadedScene {
+    Scene scene;
+    std::vector<std::string> files;
+    double seconds = 0;
+};
+using SharedScene = std::shared_ptr<LoadedScene>;
+
+/// `text`, if given, is what a file at `path` would hold.
+SharedScene load(const std::string& path, std::optional<std::string> text, const Assignments& parameters,
+                 std::pair<uint32_t, uint32_t> size, bool lenient, bool uniform_picking,
+                 const std::vector<std::string>& limits) {
+    auto loaded = std::make_shared<LoadedScene>();
+    LoadOptions options;
+    options.parameters = parameters;
+    options.width = size.first;
+    options.height = size.second;
+    options.lenient = lenient;
+    options.light_picking = uniform_picking ? LightPicking::uniform : LightPicking::power;
+    options.files = &loaded->files;
+    for (const std::string& limit : limits) set_limit(options.limits, limit);
+    run_unlocked([&](const volatile bool*) {
+        const auto start = std::chrono::steady_clock::now();
+        loaded->scene = text ? load_mitsuba_text(*text, path, options) : load_mitsuba(path, options);
+        loaded->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    });
+    return loaded;
+}
+
+RenderSettings settings_of(const Scene& scene, const Assignments& assignments) {
+    RenderSettings settings = default_settings(scene);
+    for (const auto& [key, value] : assignments) apply_setting(settings, key, value);
+    return settings;
+}
+
+/// A render that goes on step by step.
+class Render {
+public:
+    Render(SharedScene scene, const Assignments& assignments, std::optional<uint64_t> spp, std::optional<double> time)
+        : scene_(std::move(scene)), settings_(settings_of(scene_->scene, assignments)),
+          budget_(render_budget(spp, time, scene_->scene, "")) {
+        expect(settings_, budget_);
+        run_unlocked([&](const volatile bool*) { renderer_ = make_renderer(scene_->scene, settings_); });
+        position_ = first_position(*renderer_);
+    }
+
+    std::vector<std::string> warnings() const {
+        return render_warnings(scene_->scene, used_settings(settings_, renderer_->stats()));
+    }
+
+    /// Renders for about `seconds`, or with 0 to the end. Returns false at the end.
+    bool advance(double seconds) {
+        bool ended = false;
+        run_unlocked([&](const volatile bool* interrupt) {
+            Budget part = budget_;
+            const bool shorter = seconds > 0 && (budget_.seconds == 0 || position_.seconds + seconds < budget_.seconds);
+            // A batch of its own is the least that a step makes.
+            if (shorter) part.seconds = position_.seconds + std::max(seconds, position_.per_sample);
+            const uint64_t before = position_.samples;
+            position_ = drive(*renderer_, position_, part, interrupt);
+            position_.interrupted = false;
+            ended =
+                !shorter || position_.samples == before || (budget_.samples && position_.samples >= budget_.samples);
+        });
+        return !ended;
+    }
+
+    Reference pixels() { return to_reference(renderer_->film()); }
+    uint64_t samples() const { return position_.samples; }
+    double seconds() const { return position_.seconds; }
+    std::string stats() const {
+        return json_text(stats_json(scene_->scene, settings_, renderer_->stats(), scene_->seconds));
+    }
+    std::string attributes() const { return json_text(image_attributes(scene_->scene, settings_, renderer_->stats())); }
+    std::string lost() const { return lost_values(renderer_->stats()); }
+
+private:
+    SharedScene scene_;
+    RenderSettings settings_;
+    Budget budget_;
+    std::unique_ptr<Renderer> renderer_;
+    RenderPosition position_;
+};
+
+std::pair<Reference, std::string> reference(const SharedScene& scene, const std::string& path, uint64_t spp,
+                                            const Assignments& assignments) {
+    const std::vector<Output> outputs = {{"path", path}};
+    check_outputs(outputs);
+    check_not_inputs(outputs, scene->files);
+    ReferenceRequest request = reference_request(path, spp, settings_of(scene->scene, assignments));
+    ReferenceResult result;
+    run_unlocked([&](const volatile bool* interrupt) {
+        const ReferenceLock lock(path, interrupt);
+        if (!lock.held()) return;
+        request.interrupt = interrupt;
+        result = make_reference(scene->scene, request, default_hooks());
+    });
+    return {std::move(result.reference), json_text(result.attributes)};
+}
+
+void experiment(const std::string& config, const std::string& output, const std::string& references, bool resume,
+                bool reduced, bool quiet) {
+    const bool before = is_quiet();
+    set_quiet(quiet);
+    ExperimentRequest request;
+    request.config = config;
+    request.output = output;
+    request.references = references;
+    request.resume = resume;
+    request.reduced = reduced;
+    const auto restore = [&] { set_quiet(before); };
+    try {
+        run_unlocked([&](const volatile bool* interrupt) {
+            request.interrupt = interrupt;
+            run_experiment(request, default_hooks());
+        });
+    } catch (...) {
+        restore();
+        throw;
+    }
+    restore();
+}
+
+}  // namespace
+
+void bind_renders(nb::module_& m) {
+    nb::class_<LoadedScene>(m, "Scene")
+        .def_prop_ro("path", [](const LoadedScene& s) { return s.scene.path; })
+        .def_prop_ro(
+            "size",
+            [](const LoadedScene& s) { return std::pair(s.scene.sensor.crop_width, s.scene.sensor.crop_height); })
+        .def_prop_ro("warnings", [](const LoadedScene& s) { return s.scene.warnings; })
+        .def_prop_ro("hash", [](const LoadedScene& s) { return scene_hash(s.scene); })
+        .def_ro("seconds", &LoadedScene::seconds)
+        .def("info", [](const LoadedScene& s) { return json_text(scene_info(s.scene)); });
+    m.def("load", &load, "path"_a, "text"_a.none(), "parameters"_a, "size"_a, "lenient"_a, "uniform_picking"_a,
+          "limits"_a);
+    nb::class_<Render>(m, "Render")
+        .def(nb::init<SharedScene, const Assignments&, std::optional<uint64_t>, std::optional<double>>(), "scene"_a,
+             "settings"_a, "spp"_a.none(), "time"_a.none())
+        .def("advance", &Render::advance, "seconds"_a)
+        .def("pixels", &Render::pixels)
+        .def("stats", &Render::stats)
+        .def("attributes", &Render::attributes)
+        .def("lost", &Render::lost)
+        .def_prop_ro("warnings", &Render::warnings)
+        .def_prop_ro("samples", &Render::samples)
+        .def_prop_ro("seconds", &Render::seconds);
+    m.def("reference", &reference, "scene"_a, "path"_a, "spp"_a, "settings"_a);
+    m.def("experiment", &experiment, "config"_a, "output"_a, "references"_a, "resume"_a, "reduced"_a, "quiet"_a);
+}
+
+}  // namespace ambilux

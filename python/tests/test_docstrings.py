@@ -1,0 +1,40 @@
+"""Examples in docstrings and in docs/python.md give what they say."""
+
+import doctest
+import importlib
+from pathlib import Path
+
+import ambilux
+import numpy
+import pytest
+from conftest import SCENES
+
+MODULES = ("ambilux", "ambilux.scene", "ambilux.image", "ambilux.rendering")
+
+
+def names(scene):
+    return {"ambilux": ambilux, "numpy": numpy, "SCENES": SCENES, "scene": scene}
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_of(name, scene):
+    module = importlib.import_module(name)
+    tests = doctest.DocTestFinder(exclude_empty=True).find(module, name, extraglobs=names(scene))
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
+    for test in tests:
+        runner.run(test)
+    assert runner.tries > 0 and runner.failures == 0
+
+
+def test_examples_of_the_page(scene, tmp_path, monkeypatch):
+    page = Path(__file__).parents[2] / "docs" / "python.md"
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scenes").symlink_to(SCENES)
+    (tmp_path / "experiments").symlink_to(SCENES.parent / "experiments")
+    result = doctest.testfile(str(page), module_relative=False, optionflags=doctest.ELLIPSIS)
+    assert result.attempted > 5 and result.failed == 0
+
+
+def test_everything_public_has_a_docstring():
+    for name in set(ambilux.__all__) - {"__version__", "git_revision"}:
+        assert getattr(ambilux, name).__doc__, name

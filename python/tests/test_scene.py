@@ -1,0 +1,107 @@
+"""Scenes from files and dictionaries, and what is wrong with them."""
+
+import copy
+
+import ambilux
+import numpy as np
+import pytest
+from conftest import BALL, SCENES
+
+
+def changed(path, value):
+    description = copy.deepcopy(BALL)
+    place = description
+    *keys, last = path.split(".")
+    for key in keys:
+        place = place[key]
+    place[last] = value
+    return description
+
+
+def test_parameters_and_size():
+    scene = ambilux.load(SCENES / "glass.xml", resx=40, resy=20)
+    assert scene.size == (40, 20)
+    assert scene.resized((10, 5)).size == (10, 5)
+    assert scene.info["film"]["width"] == 40 if "film" in scene.info else scene.info
+
+
+def test_errors_name_file_and_line(tmp_path):
+    path = tmp_path / "bad.xml"
+    path.write_text('<scene version="3.0.0">\n<sensor type="perspective">\n<float name="nonsense" value="1"/>\n</sensor>\n</scene>\n')
+    with pytest.raises(ambilux.SceneError, match="nonsense") as e:
+        ambilux.load(path)
+    assert (e.value.file, e.value.line) == (str(path), 3)
+    with pytest.raises(ambilux.SceneError, match="no parameter") as e:
+        ambilux.load(SCENES / "glass.xml", no_such=1)
+    assert e.value.file == str(SCENES / "glass.xml") and e.value.line == 0
+    with pytest.raises(ambilux.SceneError, match="limits"):
+        ambilux.load(SCENES / "glass.xml", limits={"nesting": 1})
+
+
+def test_usage_errors_are_value_errors():
+    for arguments in ({"size": (0, 4)}, {"light_picking": "best"}, {"limits": {"pixels": "many"}}):
+        with pytest.raises(ValueError):
+            ambilux.load(SCENES / "cornell.xml", **arguments)
+
+
+def test_a_dictionary_is_the_scene_of_its_xml(tmp_path):
+    path = tmp_path / "ball.xml"
+    path.write_text("""<scene version="3.0.0">
+        <sensor type="perspective"><float name="fov" value="40"/>
+        <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+        <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/><rfilter type="box"/></film></sensor>
+        <shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="0.5 0.4 0.3"/></bsdf></shape>
+        <emitter type="constant"><rgb name="radiance" value="2"/></emitter></scene>""")
+    images = [ambilux.render(s, spp=4, backend="cpu").rgb for s in (ambilux.Scene(BALL), ambilux.load(path))]
+    np.testing.assert_array_equal(*images)
+
+
+def test_transforms_apply_in_their_order():
+    matrix = np.diag([0.5, 0.5, 0.5, 1.0])
+    matrix[:3, 3] = [1, 0, 0]
+    ways = [matrix, matrix.tolist(), [{"scale": 0.5}, {"translate": [1, 0, 0]}], {"scale": [0.5, 0.5, 0.5], "translate": [1, 0, 0]}]
+    images = [ambilux.render(ambilux.Scene(changed("ball.to_world", way)), spp=1, backend="cpu").rgb for way in ways]
+    for image in images[1:]:
+        np.testing.assert_array_equal(images[0], image)
+    other = ambilux.render(ambilux.Scene(changed("ball.to_world", ways[2][::-1])), spp=1, backend="cpu").rgb
+    assert np.any(other != images[0])
+
+
+def test_objects_are_shared_by_references_and_files_are_found(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    description = changed("red", {"type": "diffuse", "reflectance": {"type": "rgb", "value": "#ff0000"}})
+    description["mesh"] = {"type": "obj", "filename": "a.obj", "bsdf": {"type": "ref", "id": "red"}}
+    assert ambilux.Scene(description, folder=tmp_path).size == (16, 12)
+    with pytest.raises(ambilux.SceneError, match="a.obj") as e:
+        ambilux.Scene(description)
+    assert e.value.key == "mesh.filename"
+
+
+@pytest.mark.parametrize("path, value, key, text", [
+    ("ball.bsdf.reflectance", {"type": "rgb", "value": [1, 2]}, "ball.bsdf.reflectance", "three numbers"),
+    ("ball.bsdf.nonsense", 3, "ball.bsdf.nonsense", "unknown parameter"),
+    ("ball.radius", "x", "ball.radius", "must be a number"),
+    ("ball.center", [1, 2], "ball.center", "three numbers"),
+    ("ball.to_world", {"shear": 1}, "ball.to_world.shear", "steps of a transform"),
+    ("ball.type", "sfere", "ball.type", "unknown type 'sfere'"),
+    ("ball.bsdf", {"type": "ref", "id": "green"}, "ball.bsdf", "unknown id 'green'"),
+    ("ball.bsdf", object(), "ball.bsdf", "means nothing"),
+    ("ball", 3, "ball", "holds objects"),
+    ("type", "film", "type", "'type': 'scene'"),
+])
+def test_errors_of_dictionaries_name_the_keys(path, value, key, text):
+    with pytest.raises(ambilux.SceneError, match=text) as e:
+        ambilux.Scene(changed(path, value))
+    assert e.value.key == key and str(e.value).startswith(key)
+
+
+def test_text_cannot_break_out_of_a_dictionary():
+    nasty = 'a"/><shape type="cube"/>\n<&$'
+    with pytest.raises(ambilux.SceneError) as e:
+        ambilux.Scene(changed("ball.bsdf.reflectance", {"type": "bitmap", "filename": nasty}))
+    assert e.value.key == "ball.bsdf.reflectance.filename"
+
+
+def test_what_is_replaced_is_a_warning():
+    with pytest.warns(ambilux.AmbiluxWarning, match="nonsense"):
+        ambilux.Scene(changed("ball.nonsense", 1), lenient=True)
