@@ -1,5 +1,6 @@
 #include "formats/load.h"
 #include "core/error.h"
+#include "core/scoped_seconds.h"
 #include "formats/mitsuba/builder.h"
 #include "formats/mitsuba/origin.h"
 
@@ -69,7 +70,7 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     return scene;
 }
 
-Scene scene_of(const std::string& path, const Document& document, const LoadOptions& options) {
+Scene place_scene(const std::string& path, const Document& document, const LoadOptions& options) {
     std::optional<Error> outside;
     Scene scene = build_scene(path, document, options, {}, &outside);
     // Far from the origin floats have rounded it already: it is made again, about its centre in double precision.
@@ -77,18 +78,34 @@ Scene scene_of(const std::string& path, const Document& document, const LoadOpti
         scene = build_scene(path, document, options, c, nullptr);
     else if (outside)
         throw Error(*outside);
-    finalize_scene(scene, options.light_picking);
+    return scene;
+}
+
+/// Of a file or, if there is one, of a text.
+Scene scene_of(const std::string& path, const LoadOptions& options, const std::string* text) {
+    LoadTimes times;
+    const auto timed = [](double& sum, auto&& f) {
+        const ScopedSeconds clock(&sum);
+        return f();
+    };
+    LoadOptions timed_options = options;
+    timed_options.times = &times;
+    const Document document =
+        timed(times.read, [&] { return parse_document(path, options.parameters, options.limits, text); });
+    const double before = times.read;
+    Scene scene = timed(times.place, [&] { return place_scene(path, document, timed_options); });
+    times.place -= times.read - before;
+    timed(times.finish, [&] { finalize_scene(scene, options.light_picking); });
+    if (options.times) *options.times = times;
     return scene;
 }
 
 }  // namespace
 
-Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
-    return scene_of(path, parse_document(path, options.parameters, options.limits), options);
-}
+Scene load_mitsuba(const std::string& path, const LoadOptions& options) { return scene_of(path, options, nullptr); }
 
 Scene load_mitsuba_text(const std::string& text, const std::string& path, const LoadOptions& options) {
-    return scene_of(path, parse_document(path, options.parameters, options.limits, &text), options);
+    return scene_of(path, options, &text);
 }
 
 }  // namespace ambilux
