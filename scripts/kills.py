@@ -33,9 +33,9 @@ IN_A_ROW = 5
 CORNELL = ROOT / "scenes/cornell.xml"
 EXPERIMENT = f"""seeds = [1, 2]
 [reference]
-spp = 256
+spp = 128
 [budget]
-spp = [1, 3, 9, 40]
+spp = [1, 3, 9]
 [[scene]]
 name = "cornell"
 path = "{CORNELL}"
@@ -64,7 +64,7 @@ class Render:
     """Has no state: what is saved is an image of fewer samples, and the next one starts anew."""
 
     def command(self, program, folder):
-        return [program, "render", CORNELL, "--size", "48x32", "--spp", "3000", "-o", folder / "a.exr", "--json", folder / "a.json"]
+        return [program, "render", CORNELL, "--size", "48x32", "--spp", "800", "-o", folder / "a.exr", "--json", folder / "a.json"]
 
     def progress(self, folder, said):
         if (folder / "a.exr").exists():
@@ -79,7 +79,7 @@ class Render:
 
 class Reference:
     def command(self, program, folder):
-        return [program, "reference", CORNELL, "--size", "48x32", "--spp", "3000", "-o", folder / "ref.exr"]
+        return [program, "reference", CORNELL, "--size", "48x32", "--spp", "800", "-o", folder / "ref.exr"]
 
     def progress(self, folder, _):
         if not (folder / "ref.exr").exists():
