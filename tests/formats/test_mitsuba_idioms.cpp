@@ -177,16 +177,25 @@ TEST_CASE("checkerboards of numbers have their colours exchanged in format 3") {
     CHECK(opacity(load_quietly(mask, "0.6.0")) == 1);
 }
 
-TEST_CASE("bump and normal maps: what newer versions of Mitsuba add to them is not silently left out") {
-    const auto bumped = [](const std::string& xml) {
-        return "<shape type='rectangle'><bsdf type='bumpmap'>" + xml +
-               "<texture type='checkerboard'/><bsdf type='diffuse'/></bsdf></shape>";
+TEST_CASE("bump and normal maps: rules of Mitsuba 3.7 are on in format 3 unless the file says otherwise") {
+    const auto rules = [](const std::string& xml, const std::string& version) {
+        const Scene s = load_quietly("<shape type='rectangle'><bsdf type='bumpmap'>" + xml +
+                                         "<texture type='checkerboard'/><bsdf type='diffuse'/></bsdf></shape>",
+                                     version);
+        CHECK(s.notes.empty());
+        CHECK(s.features.map_rules == (s.bsdfs[0].map_rules != 0));
+        return s.bsdfs[0].map_rules;
     };
-    CHECK(has_note(load_quietly(bumped("")), "without flip_invalid_normals"));
-    CHECK(load_quietly(bumped(""), "0.6.0").notes.empty());
-    load_quietly(bumped("<boolean name='use_shadowing_function' value='false'/>"));
-    CHECK(contains(error_of(bumped("<boolean name='use_shadowing_function' value='true'/>")),
-                   "'use_shadowing_function' is not supported"));
+    const auto flag = [](const std::string& name, const std::string& value) {
+        return "<boolean name='" + name + "' value='" + value + "'/>";
+    };
+    const std::string turn = "flip_invalid_normals", shadow = "use_shadowing_function";
+    CHECK(rules("", "3.0.0") == (kTurnNormals | kShadowBumps));
+    CHECK(rules("", "2.1.0") == 0);
+    CHECK(rules("", "0.6.0") == 0);
+    CHECK(rules(flag(turn, "false"), "3.0.0") == kShadowBumps);
+    CHECK(rules(flag(shadow, "false"), "3.0.0") == kTurnNormals);
+    CHECK(rules(flag(turn, "true"), "2.1.0") == kTurnNormals);
 }
 
 TEST_CASE("null is a surface that rays do not see, unless it emits") {
