@@ -32,6 +32,9 @@ CoatPlace read_coat(Builder& builder, Reader& in) {
             builder.refuse(in.where("distribution"), "microfacet distribution '" + name + "' is not supported",
                            "beckmann is used");
         in.ignore({"sample_visible"});
+        builder.note(in.where(),
+                     "what lies below a roughcoating is as bright as below a smooth one; Mitsuba 0.6 has it darker by "
+                     "cos/cos' of the viewing direction before and behind the boundary");
     }
     if (builder.validate_only) return place;
     // Of the light that enters, what the layer lets pass twice stands against all that is reflected (Mitsuba 0.6).

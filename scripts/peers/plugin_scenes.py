@@ -179,8 +179,11 @@ def catalogue():
         f'<shape type="instance"><ref id="g"/><transform name="to_world"><scale value="0.4"/><rotate z="1" angle="{40 * i}"/>'
         f'<translate x="{i}" z="1"/></transform></shape>' for i in (-1, 0, 1)))
     s["merge"] = shape(f'<shape type="merge">{file("obj", "mesh.obj")}{GREY}</shape></shape>')
-    s["sdfgrid"] = shape(f"""<shape type="sdfgrid">{string("filename", "torus.vol")}{string("normals", "smooth")}
-<transform name="to_world"><scale value="2.2"/><rotate x="1" angle="60"/><translate x="-1.1" z="0.3"/></transform>{GREY}</shape>""")
+    # Mitsuba loses parts of a grid that its own transform turns, and says so.
+    for kind in ("smooth", "analytic"):
+        grid = f'<shape type="sdfgrid">{string("filename", "torus.vol")}{string("normals", kind)}{GREY}</shape>'
+        s[f"sdfgrid {kind}"] = shape(f"""<shape type="shapegroup" id="g">{grid}</shape><shape type="instance"><ref id="g"/>
+<transform name="to_world"><translate x="-0.5" y="-0.5" z="-0.5"/><scale value="2.4"/><rotate x="1" angle="50"/><translate z="1.1"/></transform></shape>""")
     for kind in ("bsplinecurve", "linearcurve"):
         s[kind] = shape(f'<shape type="{kind}">{string("filename", "curves.txt")}{bsdf("twosided", GREY)}</shape>')
 
@@ -263,5 +266,6 @@ def write_files(folder, write_image):
     (folder / "torus.vol").write_bytes(b"VOL" + struct.pack("<BiiiiI6f", 3, 1, n, n, n, 1, 0, 0, 0, 1, 1, 1) + struct.pack(f"<{n ** 3}f", *grid))
     with open(folder / "curves.txt", "w", encoding="ascii") as out:
         for i in range(7):
-            points = [(i / 3 - 1, 0.4 * math.sin(2.0 * k + i), 0.2 + 0.35 * k, 0.12 + 0.05 * math.cos(k)) for k in range(7)]
+            # Ends are narrow: into open ones Mitsuba looks as if there were nothing.
+            points = [(i / 3 - 1, 0.4 * math.sin(2.0 * k + i), 0.2 + 0.35 * k, 0.003 + 0.14 * math.sin(math.pi * k / 6)**2) for k in range(7)]
             out.write("".join(" ".join(f"{x:.6f}" for x in p) + "\n" for p in points) + "\n")

@@ -46,7 +46,7 @@ TEST_CASE("sdfgrid: a ball has its radius, normals and area, and is closed") {
             REQUIRE(std::fabs(length(r) - 0.3) < 3.0 / (24 * 24) / (8 * 0.3));
             REQUIRE(dot(normalize(r), normalize(mesh.normals[i])) > (normals == GridNormals::smooth ? 0.999f : 0.99f));
         }
-        CHECK(area(mesh) == Approx(4 * M_PI * 0.09).epsilon(5e-3));
+        CHECK(area(mesh) == Approx(4 * M_PI * 0.09).epsilon(8e-3));  // twice that of the radius
         if (normals == GridNormals::smooth) CHECK(mesh.faces.size() == 2 * mesh.positions.size() - 4);  // Euler
     }
 }
