@@ -267,5 +267,5 @@ def write_files(folder, write_image):
     with open(folder / "curves.txt", "w", encoding="ascii") as out:
         for i in range(7):
             # Ends are narrow: into open ones Mitsuba looks as if there were nothing.
-            points = [(i / 3 - 1, 0.4 * math.sin(2.0 * k + i), 0.2 + 0.35 * k, 0.003 + 0.14 * math.sin(math.pi * k / 6)**2) for k in range(7)]
+            points = [(i / 3 - 1, 0.4 * math.sin(2.0 * k + i), 0.1 + 0.3 * k, 0.003 + 0.14 * max(0, math.sin(math.pi * (k - 1) / 6))**2) for k in range(9)]
             out.write("".join(" ".join(f"{x:.6f}" for x in p) + "\n" for p in points) + "\n")

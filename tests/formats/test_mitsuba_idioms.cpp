@@ -198,6 +198,25 @@ TEST_CASE("bump and normal maps: rules of Mitsuba 3.7 are on in format 3 unless 
     CHECK(rules(flag(turn, "true"), "2.1.0") == kTurnNormals);
 }
 
+TEST_CASE("a spectrum that is the same everywhere is no white as a light in format 3, and grey as a reflectance") {
+    const auto light = [](const std::string& value, const std::string& version) {
+        return load_quietly("<emitter type='constant'>" + value + "</emitter>", version).emitters[0].radiance.value;
+    };
+    const std::string two = "<spectrum name='radiance' value='2'/>";
+    check_rgb(light(two, "3.0.0"), {2.40958f, 1.89658f, 1.81783f}, 1e-4);  // from Mitsuba 3.9
+    check_rgb(light(two, "0.6.0"), splat(2));
+    check_rgb(light("<spectrum name='radiance' type='d65'/>", "3.0.0"), splat(1));
+    check_rgb(light("<float name='radiance' value='2'/>", "3.0.0"), splat(2));
+    const Scene s = load_quietly(
+        "<shape type='rectangle'><bsdf type='diffuse'><spectrum name='reflectance' "
+        "value='0.5'/></bsdf></shape>");
+    check_rgb(reflectance(s, 0, {0, 0}), splat(0.5f));
+}
+
+TEST_CASE("what stands behind the end of the scene is not left out silently") {
+    CHECK(contains(error_of("</scene><scene version='3.0.0'>"), "behind the end of the scene"));
+}
+
 TEST_CASE("null is a surface that rays do not see, unless it emits") {
     const Scene s = load_quietly(
         "<shape type='sphere'><bsdf type='null'/></shape><shape type='rectangle'><bsdf "

@@ -437,7 +437,7 @@ TEST_CASE("spectra become colours as in Mitsuba's RGB mode") {
     check_rgb(emission("400:0, 500:8, 600:15.6, 700:18.4"), {20.7108f, 10.8546f, 2.77115f}, 2e-3);  // all from Mitsuba
     check_rgb(emission("400:1, 700:1"), {1.19969f, 0.94952f, 0.903443f}, 2e-4);
     check_rgb(emission("360:1 830:1"), {1.20488f, 0.948228f, 0.909267f}, 2e-4);
-    check_rgb(emission("2.5"), {2.5f, 2.5f, 2.5f});
+    check_rgb(emission("2.5"), {3.01198f, 2.37073f, 2.27229f}, 1e-4);
     const auto reflectance = [](const std::string& list) {
         return parameters<Diffuse>(
                    bsdf("<bsdf type='diffuse'><spectrum name='reflectance' value='" + list + "'/></bsdf>"))
