@@ -95,6 +95,14 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     if (!(std::fabs(determinant(job.to_world)) > 0))
         in.fail(in.where("to_world"), "the transform of the shape is singular");
     job.flip = in.boolean("flip_normals", false);
+    job.reverse = determinant(job.to_world) < 0;
+    if (object.version >= 2 && (is_mesh_file(type) || type == "sphere")) {
+        // In Mitsuba 3 a mirrored mesh keeps the order of its corners, whose outside so turns in, and so does that of a
+        // sphere. An instance keeps it.
+        const bool mirrored = determinant(in.transform("to_world")) < 0;
+        job.reverse = job.reverse != mirrored;
+        if (type == "sphere") job.flip = job.flip != mirrored;
+    }
     const Object* bsdf = in.take("bsdf");
     const bool attributes = bsdf && has_mesh_attributes(*bsdf);
     if (attributes && type != "ply") in.fail("mesh attributes are read from ply files only");

@@ -115,7 +115,6 @@ def catalogue():
         "clearcoat": 0.8, "clearcoat_gloss": 0.3, "specular": 0.6}.items())))
     s["principled glass"] = sphere(bsdf("principled", base + number("roughness", 0.5) + number("spec_trans", 0.6) + number("eta", 1.4)))
     s["principled textures"] = panel(bsdf("principled", bitmap("base_color") + numbers_checker("roughness", 0.2, 0.7)))
-    s["principledthin"] = panel(bsdf("principledthin", base + number("roughness", 0.4) + number("spec_trans", 0.5) + number("diff_trans", 0.8)))
     two = bsdf("diffuse", rgb("reflectance", "0.8, 0.1, 0.1")) + bsdf("roughconductor", METAL + number("alpha", 0.2))
     s["blendbsdf"] = sphere(bsdf("blendbsdf", number("weight", 0.3) + two))
     s["blendbsdf texture"] = panel(bsdf("blendbsdf", bitmap("weight", "heights.png", yes("raw")) + two))
@@ -149,6 +148,7 @@ def catalogue():
     s["area textured"] = lit(LIGHT.replace(rgb("radiance", "6, 5, 4"), bitmap("radiance", more=yes("raw"))))
     s["area sphere"] = lit(f"""<shape type="sphere"><point name="center" x="-1.5" y="-1" z="2.5"/><float name="radius" value="0.5"/>
 <emitter type="area">{rgb("radiance", "9, 8, 7")}</emitter></shape>""")
+    s["spectrum of one number"] = lit(DIM.replace(rgb("radiance", "0.3, 0.35, 0.4"), '<spectrum name="radiance" value="0.4"/>'))
     s["point"] = lit(f'<emitter type="point"><point name="position" x="1" y="-2" z="3"/>{rgb("intensity", "9, 8, 7")}</emitter>')
     aim = '<transform name="to_world"><lookat origin="1, -2, 4" target="0, 0, 0" up="0, 0, 1"/></transform>'
     s["spot"] = lit(f'<emitter type="spot">{aim}{rgb("intensity", "40, 30, 20")}{number("cutoff_angle", 30)}</emitter>')
@@ -168,6 +168,10 @@ def catalogue():
     s["sun"] = lit(f'<emitter type="sunsky">{SUN}{number("sky_scale", 0)}{number("sun_scale", 0.1)}</emitter>')
 
     up = '<transform name="to_world"><rotate z="1" angle="30"/><rotate x="1" angle="50"/><translate z="1.3"/></transform>'
+    mirror = '<transform name="to_world"><scale x="-1"/><rotate x="1" angle="60"/><translate z="1.3"/></transform>'
+    for kind in ("rectangle", "cube", "disk", "sphere"):
+        s[f"{kind} mirrored"] = shape(f'<shape type="{kind}">{mirror}{DIFFUSE_TILES}</shape>')
+    s["obj mirrored"] = shape(f'<shape type="obj">{string("filename", "mesh.obj")}{mirror}{DIFFUSE_TILES}</shape>')
     for kind in ("rectangle", "cube", "disk", "cylinder"):
         s[kind] = shape(f'<shape type="{kind}">{up}{bsdf("twosided", DIFFUSE_TILES)}</shape>')
     s["sphere"] = shape(f'<shape type="sphere">{up}{DIFFUSE_TILES}</shape>')
@@ -253,7 +257,8 @@ def write_files(folder, write_image):
     write_image(folder / "heights.png", [[[h, h, h] for h in row] for row in wave], True)
     tilt = [[(0.55 * math.sin(0.7 * x), 0.5 * math.cos(0.9 * y)) for x in range(16)] for y in range(16)]
     write_image(folder / "normals.png", [[[0.5 + a / 2, 0.5 + b / 2, 0.5 + math.sqrt(1 - a * a - b * b) / 2] for a, b in row] for row in tilt], True)
-    sky = [[[(4.0 if 5 <= x <= 7 and 3 <= y <= 4 else 0.3) * (0.5 + hash01(x, y, c)) for c in range(3)] for x in range(24)] for y in range(12)]
+    # Values that halves hold exactly: ours keeps environment maps as halves, which rounds others by up to 2^-12.
+    sky = [[[round((4.0 if 5 <= x <= 7 and 3 <= y <= 4 else 0.3) * (0.5 + hash01(x, y, c)) * 256) / 256 for c in range(3)] for x in range(24)] for y in range(12)]
     write_image(folder / "env.exr", sky, False)
 
     n = 24

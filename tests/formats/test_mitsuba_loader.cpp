@@ -607,7 +607,7 @@ TEST_CASE("analytic shapes and instances") {
     CHECK(instanced.quadrics[1].radius == Approx(2));
 }
 
-TEST_CASE("mirrored meshes keep their outside (B12)") {
+TEST_CASE("mirrored meshes keep their outside; in format 3 those without vertex normals turn it in (B12)") {
     const test::TempFolder folder;
     // A tetrahedron, outside by winding; with and without vertex normals, the normals once right and once against the
     // winding.
@@ -627,19 +627,26 @@ TEST_CASE("mirrored meshes keep their outside (B12)") {
     folder.write("plain.obj", plain);
     folder.write("with.obj", with);
     folder.write("against.obj", against);
-    for (const std::string file : {"plain", "with", "against"})
+    for (const auto& [file, version] : {std::pair<std::string, std::string>{"plain", "3.0.0"},
+                                        {"plain", "0.6.0"},
+                                        {"with", "3.0.0"},
+                                        {"with", "0.6.0"},
+                                        {"against", "3.0.0"}})
         for (const std::string scale : {"x='1'", "x='-1'", "x='-2' y='-3' z='-0.5'", "x='-2' y='-3' z='0.5'"})
             for (const bool flip : {false, true})
                 for (const bool face_normals : {false, true}) {
                     if (file == "against" && face_normals) continue;  // then the winding alone counts
-                    INFO(file << " " << scale << " " << flip << " " << face_normals);
+                    INFO(file << " " << version << " " << scale << " " << flip << " " << face_normals);
+                    // One or three axes negative mirror; vertex normals that are used keep the outside.
+                    const bool mirrors = scale == "x='-1'" || scale == "x='-2' y='-3' z='-0.5'",
+                               turns = mirrors && version == "3.0.0" && (file == "plain" || face_normals);
                     const Scene s =
                         load("<shape type='obj'><string name='filename' value='" + file +
                                  ".obj'/><boolean name='flip_normals' value='" + (flip ? "true" : "false") +
                                  "'/><boolean name='face_normals' value='" + (face_normals ? "true" : "false") +
                                  "'/><transform name='to_world'><scale " + scale +
                                  "/><translate value='3 4 5'/></transform></shape>",
-                             {}, "3.0.0", &folder);
+                             {}, version, &folder);
                     REQUIRE(s.triangles.size() == 4);
                     CHECK(bool(s.shapes[0].flags & kShapeHasNormals) == !face_normals);
                     Vec3f middle = {0, 0, 0};
@@ -647,7 +654,7 @@ TEST_CASE("mirrored meshes keep their outside (B12)") {
                         for (uint32_t v : {t.v0, t.v1, t.v2}) middle += s.vertices[v].p * (1.0f / 12);
                     for (const Triangle& t : s.triangles) {
                         const Vec3f a = s.vertices[t.v0].p, ng = cross(s.vertices[t.v1].p - a, s.vertices[t.v2].p - a);
-                        CHECK((dot(ng, a - middle) > 0) == !flip);
+                        CHECK((dot(ng, a - middle) > 0) == (flip == turns));
                         if (face_normals) continue;
                         const Vec3f sum = s.vertices[t.v0].n + s.vertices[t.v1].n + s.vertices[t.v2].n;
                         CHECK(dot(ng, sum) > 0);
