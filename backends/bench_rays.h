@@ -11,7 +11,7 @@
 namespace ambilux {
 
 /// Traces the batches of backends/ray_batches.h `repetitions` times each, after 3 runs that do not count.
-/// `backend`: cpu (Embree), cuda (CWBVH), cuda-bvh2 (a binary BVH), cpu-cwbvh and cpu-bvh2 (the same on the host), or
+/// `backend`: cpu (Embree), cpu-single (without packets), cuda (CWBVH), cuda-bvh2 (a binary BVH), cpu-cwbvh and cpu-bvh2 (the same on the host), or
 /// auto, which is cuda where there is a device and else cpu. On the CPU, batches have 512 x 512 paths, on CUDA 2048 x
 /// 2048. `opaque`: surfaces of partial opacity stop every ray, and bounces start from them. Result: backend, opaque,
 /// device, accel, build_seconds, accel_bytes, repetitions, and rows of batch, count (rays), hit (fraction of rays),
