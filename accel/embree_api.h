@@ -55,38 +55,38 @@ template <uint32_t kWidth>
 struct EmbreePacket;
 
 #if RTC_VERSION_MAJOR >= 4
-#define AMBILUX_EMBREE_PACKET(N)                                                                                     \
-    template <>                                                                                                      \
-    struct EmbreePacket<N> {                                                                                         \
-        using Ray = RTCRay##N;                                                                                       \
-        using RayHit = RTCRayHit##N;                                                                                 \
-        static void intersect(const int* valid, RTCScene scene, EmbreeQueryContext* context, bool coherent,          \
-                              RayHit* rays) {                                                                        \
-            RTCIntersectArguments args = embree_intersect_arguments(context, coherent);                              \
-            rtcIntersect##N(valid, scene, rays, &args);                                                              \
-        }                                                                                                            \
-        static void occluded(const int* valid, RTCScene scene, EmbreeQueryContext* context, bool coherent,           \
-                             Ray* rays) {                                                                            \
-            RTCOccludedArguments args = embree_occluded_arguments(context, coherent);                                \
-            rtcOccluded##N(valid, scene, rays, &args);                                                               \
-        }                                                                                                            \
+#define AMBILUX_EMBREE_PACKET(N)                                                                            \
+    template <>                                                                                             \
+    struct EmbreePacket<N> {                                                                                \
+        using Ray = RTCRay##N;                                                                              \
+        using RayHit = RTCRayHit##N;                                                                        \
+        static void intersect(const int* valid, RTCScene scene, EmbreeQueryContext* context, bool coherent, \
+                              RayHit* rays) {                                                               \
+            RTCIntersectArguments args = embree_intersect_arguments(context, coherent);                     \
+            rtcIntersect##N(valid, scene, rays, &args);                                                     \
+        }                                                                                                   \
+        static void occluded(const int* valid, RTCScene scene, EmbreeQueryContext* context, bool coherent,  \
+                             Ray* rays) {                                                                   \
+            RTCOccludedArguments args = embree_occluded_arguments(context, coherent);                       \
+            rtcOccluded##N(valid, scene, rays, &args);                                                      \
+        }                                                                                                   \
     };
 #else
-#define AMBILUX_EMBREE_PACKET(N)                                                                                     \
-    template <>                                                                                                      \
-    struct EmbreePacket<N> {                                                                                         \
-        using Ray = RTCRay##N;                                                                                       \
-        using RayHit = RTCRayHit##N;                                                                                 \
-        static void intersect(const int* valid, RTCScene scene, EmbreeQueryContext* context, bool coherent,          \
-                              RayHit* rays) {                                                                        \
-            embree_set_coherent(context, coherent);                                                                  \
-            rtcIntersect##N(valid, scene, context, rays);                                                            \
-        }                                                                                                            \
-        static void occluded(const int* valid, RTCScene scene, EmbreeQueryContext* context, bool coherent,           \
-                             Ray* rays) {                                                                            \
-            embree_set_coherent(context, coherent);                                                                  \
-            rtcOccluded##N(valid, scene, context, rays);                                                             \
-        }                                                                                                            \
+#define AMBILUX_EMBREE_PACKET(N)                                                                            \
+    template <>                                                                                             \
+    struct EmbreePacket<N> {                                                                                \
+        using Ray = RTCRay##N;                                                                              \
+        using RayHit = RTCRayHit##N;                                                                        \
+        static void intersect(const int* valid, RTCScene scene, EmbreeQueryContext* context, bool coherent, \
+                              RayHit* rays) {                                                               \
+            embree_set_coherent(context, coherent);                                                         \
+            rtcIntersect##N(valid, scene, context, rays);                                                   \
+        }                                                                                                   \
+        static void occluded(const int* valid, RTCScene scene, EmbreeQueryContext* context, bool coherent,  \
+                             Ray* rays) {                                                                   \
+            embree_set_coherent(context, coherent);                                                         \
+            rtcOccluded##N(valid, scene, context, rays);                                                    \
+        }                                                                                                   \
     };
 #endif
 AMBILUX_EMBREE_PACKET(8)

@@ -38,8 +38,9 @@ AMBILUX_HD bool is_valid_ray(Vec3f origin, Vec3f direction, StageRecord* record)
 struct Fusion {
     bool weigh = false;    ///< mis_weight, and accumulate
     bool connect = false;  ///< connect_emitter and connect_camera, in the stage that makes the vertex
-    bool occlude = false;  ///< for bdpt connect_vertices, in the stage that makes the eye vertex, and shadow rays
-                           ///< whenever there are many: on a host, which goes through queues while they are in its cache
+    bool occlude =
+        false;  ///< for bdpt connect_vertices, in the stage that makes the eye vertex, and shadow rays
+                ///< whenever there are many: on a host, which goes through queues while they are in its cache
     bool generate = false;  ///< camera rays, in extend
 };
 

@@ -55,7 +55,8 @@ struct SplatSide {
     SplatSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave, const SplatQueues& q,
               const FilmBuffers& film, const BdptPolicy& p, Lane* raw) {
         occlude = {scene, tracer, q.weighted, {q.splats}, layout.record(OccludeStage::kName)};
-        weigh = {q.candidates, choose<K.occlude>(Gathered<OccludeStage>{occlude, wave.state, q.weighted.capacity()}, q.weighted),
+        weigh = {q.candidates,
+                 choose<K.occlude>(Gathered<OccludeStage>{occlude, wave.state, q.weighted.capacity()}, q.weighted),
                  layout.record(WeighStage::kName)};
         StageRecord* const connects = layout.record(connect_camera.kName);
         connect_camera = {scene, wave, p.rules, q.vertices, {candidates(), connects}, connects};
