@@ -10,6 +10,28 @@
 
 namespace ambilux {
 
+// The machine's width of packets is 16 only where it has these. Nothing is contracted, so that the bits are those of
+// the scalar code; what is not inlined here is compiled for all processors.
+#if defined(__x86_64__)
+__attribute__((target("avx512f,avx512dq,avx512bw,avx512vl,prefer-vector-width=512")))
+#endif
+void detail::cross_triangles(const RTCRay16& r, TriangleLanes& lanes) {
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC ivdep
+#endif
+    for (uint32_t k = 0; k < lanes.kWidth; ++k) {
+        const Vec3f o = {r.org_x[k], r.org_y[k], r.org_z[k]}, d = {r.dir_x[k], r.dir_y[k], r.dir_z[k]};
+        const Vec3f v0 = {lanes.v0[0][k], lanes.v0[1][k], lanes.v0[2][k]};
+        const Vec3f v1 = {lanes.v1[0][k], lanes.v1[1][k], lanes.v1[2][k]};
+        const Vec3f v2 = {lanes.v2[0][k], lanes.v2[1][k], lanes.v2[2][k]};
+        const TriangleEdges edges = triangle_edges(o, make_ray_shear(d), v0, v1, v2);
+        const Vec3f n = accurate_cross(v1 - v0, v2 - v0);
+        const TriangleCrossing c = edges.crossing(rounded_divide(height_over_plane(v0 - o, n), fused_dot(d, n)));
+        lanes.t[k] = c.t, lanes.u[k] = c.u, lanes.v[k] = c.v;
+        lanes.inside[k] = edges.inside;
+    }
+}
+
 struct EmbreeAccel::UserData {
     SceneView view;
     std::string error;
@@ -122,7 +144,11 @@ void occlude_quadric(const RTCOccludedFunctionNArguments* args) {
 
 /// Packets as wide as the processor's vectors, if this build of Embree has them: 16 where it has AVX-512.
 uint32_t packet_width(RTCDevice device) {
-    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) return 16;
+#if defined(__x86_64__)
+    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) && __builtin_cpu_supports("avx512f") &&
+        __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
+        return 16;
+#endif
     return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8 : 1;
 }
 

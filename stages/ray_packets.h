@@ -40,13 +40,23 @@ public:
     /// Traces what is left.
     void trace() {
         constexpr Features F = Stage::kFeatures;
+        constexpr bool kTogether =
+            requires(bool* blocked) { stage_.tracer.template occluded<F>(stage_.scene, rays_, 1u, true, blocked); };
         if constexpr (Stage::kAnyHit) {
             bool blocked[kMostPacketRays];
-            stage_.tracer.template occluded<F>(stage_.scene, rays_, count_, coherent_, blocked);
+            if constexpr (kTogether)
+                stage_.tracer.template occluded<F>(stage_.scene, rays_, count_, coherent_, blocked);
+            else
+                for (uint32_t k = 0; k < count_; ++k)
+                    blocked[k] = stage_.tracer.template occluded<F>(stage_.scene, rays_[k]);
             for (uint32_t k = 0; k < count_; ++k) stage_.finish(places_[k], kept_[k], blocked[k]);
         } else {
             Hit hits[kMostPacketRays];
-            stage_.tracer.template closest<F>(stage_.scene, rays_, count_, coherent_, hits);
+            if constexpr (kTogether)
+                stage_.tracer.template closest<F>(stage_.scene, rays_, count_, coherent_, hits);
+            else
+                for (uint32_t k = 0; k < count_; ++k)
+                    stage_.tracer.template closest<F>(stage_.scene, rays_[k], hits[k]);
             for (uint32_t k = 0; k < count_; ++k) stage_.finish(places_[k], hits[k]);
         }
         count_ = 0;
