@@ -71,8 +71,8 @@ struct EyeSide {
                    choose<K.weigh>(accumulate, q.shadow_contributions),
                    layout.record(OccludeStage::kName),
                    strategies};
-        // What comes of a candidate's strategy is kept for one of a path at a time.
-        const uint32_t gathered = strategies.sums ? 1 : q.shadows.capacity();
+        // One by one where a path keeps what came of its last candidate, or what it has brought decides about the next.
+        const uint32_t gathered = strategies.sums || waves.cull > 0.0f ? 1 : q.shadows.capacity();
         weigh = {q.candidates, choose<K.occlude>(Gathered<OccludeStage>{occlude, wave.state, gathered}, q.shadows),
                  weighs,       strategies,
                  film.samples, waves.cull};
