@@ -42,12 +42,16 @@ public:
     }
     template <class Stage>
     void trace(const Stage& stage) {
-        if constexpr (requires { Stage::kAnyHit; }) {
-            RayPackets<Stage> packets(stage);
-            run_in_order<MortonOrder>(stage, [&](uint32_t i) { packets.add(i); }, [&] { packets.trace(); });
-        } else {
+        if constexpr (requires { Stage::kAnyHit; })
+            trace_packets<MortonOrder>(stage, false);
+        else
             run_in_order<MortonOrder>(stage, stage, [] {});
-        }
+    }
+    /// What is left of a gathered queue (stages/ray_packets.h), in its order: a path may have several rays there, and
+    /// what they bring is added one after the other.
+    template <class Stage>
+    void trace_gathered(const Stage& stage) {
+        trace_packets<void>(stage, false);
     }
     template <class Stage>
     void extend(const Stage& stage) {
@@ -58,8 +62,7 @@ public:
     template <class Stage>
     void extend_coherent(const Stage& stage) {
         if (!stage.hits.flags) stage.hits.counter->count = stage.rays.counter->size();
-        RayPackets<Stage> packets(stage, true);
-        run_in_order<void>(stage, [&](uint32_t i) { packets.add(i); }, [&] { packets.trace(); });
+        trace_packets<void>(stage, true);
     }
     template <class Item, class Body>
     void repeat_while(const Queue<Item>& queue, Body body) {
@@ -79,6 +82,11 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
 
+    template <class Order, class Stage>
+    void trace_packets(const Stage& stage, bool coherent) {
+        RayPackets<Stage> packets(stage, coherent);
+        run_in_order<Order>(stage, [&](uint32_t i) { packets.add(i); }, [&] { packets.trace(); });
+    }
     /// Calls each(i) for the items of `stage`, and end() after them. One place where a stage is called: it is inlined
     /// there as a whole.
     template <class Order, class Stage, class Each, class End>

@@ -100,7 +100,10 @@ void run_emission([[maybe_unused]] Executor& exec, [[maybe_unused]] const EyeSid
 template <class Executor, Features F, class Tracer, Fusion K>
 void run_candidates(Executor& exec, const EyeSide<F, Tracer, K>& eye, bool several) {
     if constexpr (!K.weigh) exec.run(eye.weigh);
-    exec.trace(eye.occlude.with_atomic_add(several));
+    if constexpr (K.occlude)
+        exec.trace_gathered(eye.occlude);
+    else
+        exec.trace(eye.occlude.with_atomic_add(several));
     if constexpr (!K.weigh) {
         Accumulate accumulate = eye.accumulate;
         accumulate.needs_atomic_add = several;

@@ -74,7 +74,10 @@ struct SplatSide {
 template <class Executor, Features F, class Tracer, Fusion K>
 void run_splats(Executor& exec, const SplatSide<F, Tracer, K>& splats) {
     if constexpr (!K.weigh) exec.run(splats.weigh);
-    exec.trace(splats.occlude);
+    if constexpr (K.occlude)
+        exec.trace_gathered(splats.occlude);
+    else
+        exec.trace(splats.occlude);
 }
 
 /// Light subpaths of a wave whose vertices are kept for its eye subpaths.
