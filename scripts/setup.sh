@@ -16,7 +16,7 @@ fi
 declare -A tools=([g++]=g++ [cmake]=cmake [ninja]=ninja-build [git]=git)
 libraries=(
   libembree-dev libtbb-dev libopenexr-dev libimath-dev libpng-dev libjpeg-dev libpugixml-dev zlib1g-dev libboost-dev libssl-dev
-  libcli11-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libtomlplusplus-dev
+  libcli11-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libtomlplusplus-dev libcpp-httplib-dev
 )
 requirements=(requirements.txt)
 if [[ $whole ]]; then
