@@ -42,10 +42,10 @@ std::string body_of(const Picture& picture) {
 bool is_own(const httplib::Request& request, const std::string& host, int port) {
     const std::string end = fmt::format(":{}", port), given = request.get_header_value("Host");
     const std::string origin = request.get_header_value("Origin");
-    const auto known = [&](const std::string& name) {
-        return name == host + end || name == "localhost" + end || name == "127.0.0.1" + end;
-    };
-    return known(given) && (origin.empty() || origin == "http://" + given);
+    // One that others may look at has names that are not known here.
+    const bool local = host == "127.0.0.1" || host == "localhost";
+    const bool named = !local || given == "localhost" + end || given == "127.0.0.1" + end;
+    return named && (origin.empty() || origin == "http://" + given);
 }
 
 void answer(Session& session, httplib::Server& server) {
@@ -94,8 +94,11 @@ void serve(Session& session, const Address& address, const volatile bool* interr
            const std::function<void(const std::string& url)>& started) {
     httplib::Server server;
     server.set_payload_max_length(kLargestRequest);
-    // Without it a second program may share the port with the first one.
-    server.set_socket_options([](int) {});
+    // The library's own options let a second program listen at the same port.
+    server.set_socket_options([](socket_t s) {
+        const int yes = 1;
+        setsockopt(s, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+    });
     const int port = address.port ? address.port : server.bind_to_any_port(address.host.c_str());
     if (port < 0 || (address.port && !server.bind_to_port(address.host.c_str(), port)))
         throw Error(

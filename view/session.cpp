@@ -152,7 +152,7 @@ void Session::work() {
         try {
             if (anew) restart(wish);
             if (renderer_ && samples_ < options_.most_samples) render_some();
-        } catch (const Error& e) {
+        } catch (const std::exception& e) {  // of memory too
             problem_ = e.what();
             renderer_.reset();
         }
