@@ -104,7 +104,7 @@ LoadedScene load_scene(const SceneOptions& options, const std::vector<Output>& o
     std::vector<std::string> files;
     load.files = &files;
     const auto start = std::chrono::steady_clock::now();
-    LoadedScene loaded{load_mitsuba(options.path, load), 0};
+    LoadedScene loaded{load_scene_file(options.path, load), 0};
     loaded.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     check_not_inputs(outputs, files);
     for (const std::string& warning : loaded.scene.warnings) log_warning(warning);

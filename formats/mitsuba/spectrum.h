@@ -19,4 +19,7 @@ enum class SpectrumUse {
 /// are clipped at 0 (reflectance also at 1).
 Rgb spectrum_to_rgb(const std::vector<std::pair<double, double>>& samples, SpectrumUse use);
 
+/// Planck's law in W/(m² sr nm), every 5 nm of the visible range.
+std::vector<std::pair<double, double>> planck(double kelvin, double scale);
+
 }  // namespace ambilux::mitsuba
