@@ -29,7 +29,8 @@ static std::string help_of(const std::string& key) {
 }
 
 void SceneOptions::add_to(CLI::App& command) {
-    command.add_option("SCENE", path, "Mitsuba scene description (XML)")->required();
+    command.add_option("SCENE", path, "Scene: Mitsuba XML, pbrt-v4 (.pbrt, .pbrt.gz) or glTF 2.0 (.gltf, .glb)")
+        ->required();
     command.add_option("--size", size, "Film size WxH instead of the scene's");
     command.add_flag("--lenient", lenient,
                      "Replace what is not known and list each substitution, instead of refusing the scene");

@@ -94,7 +94,9 @@ Object& filter(SceneMaker& scene, const Options& options) {
         p.type = "gaussian";
         return p;
     }();
-    const Parameters& in = options.filter ? *options.filter : plain;
+    Parameters absent = plain;
+    absent.where = scene.document.scene->where;
+    const Parameters& in = options.filter ? *options.filter : absent;
     const bool is_tent = in.type == "triangle", is_box = in.type == "box";
     Object& out = add_object(scene.document, "rfilter", is_tent ? "tent" : is_box ? "box" : "gaussian", in.where);
     const double fallback = is_box ? 0.5 : is_tent ? 2 : in.type == "sinc" ? 4 : in.type == "mitchell" ? 2 : 1.5;
