@@ -1,6 +1,7 @@
 #include "formats/load.h"
 
 #include "core/error.h"
+#include "formats/gltf/load.h"
 
 namespace ambilux {
 
@@ -19,10 +20,11 @@ bool ends_with(const std::string& path, std::string_view ending) {
 
 Scene load_scene_file(const std::string& path, const LoadOptions& options) {
     const bool pbrt = ends_with(path, ".pbrt") || ends_with(path, ".pbrt.gz");
-    if (!pbrt) return load_mitsuba(path, options);
+    const bool gltf = ends_with(path, ".gltf") || ends_with(path, ".glb");
+    if (!pbrt && !gltf) return load_mitsuba(path, options);
     if (!options.parameters.empty())
         throw input_error(path, 0, "the scene has no parameter '$" + options.parameters[0].first + "'");
-    return load_pbrt(path, options);
+    return pbrt ? load_pbrt(path, options) : load_gltf(path, options);
 }
 
 }  // namespace ambilux

@@ -15,7 +15,7 @@ void Report::List::add(const Where& where, const std::string& text) {
 std::vector<std::string> Report::List::lines() const {
     std::vector<std::string> lines;
     for (const Entry& e : entries)
-        lines.push_back(e.where.file + ":" + std::to_string(e.where.line) + ": " + e.text +
+        lines.push_back(e.where.file + (e.where.line ? ":" + std::to_string(e.where.line) : "") + ": " + e.text +
                         (e.count > 1 ? " (" + std::to_string(e.count) + " times)" : ""));
     return lines;
 }

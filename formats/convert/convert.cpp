@@ -38,7 +38,13 @@ void add_film(Writer& w, xml_node sensor) {
     }
     add_text(film, "pixel_format", "rgb");
     switch (s.filter) {
-        case FilterType::box: add_number(add_object(film, "rfilter", "box"), "radius", s.filter_radius); break;
+        case FilterType::box: {
+            xml_node filter = add_object(film, "rfilter", "box");
+            if (s.filter_radius == 0.5f) break;
+            add_number(filter, "radius", s.filter_radius);
+            w.note("Mitsuba 3 has no box filters but of radius 0.5");
+            break;
+        }
         case FilterType::tent: add_number(add_object(film, "rfilter", "tent"), "radius", s.filter_radius); break;
         case FilterType::gaussian:
             add_number(add_object(film, "rfilter", "gaussian"), "stddev", s.filter_radius / 4);

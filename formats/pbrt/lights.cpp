@@ -3,6 +3,7 @@
 
 #include "formats/pbrt/environment.h"
 #include "formats/pbrt/scene.h"
+#include "formats/spot_falloff.h"
 
 namespace ambilux::pbrt {
 
@@ -53,30 +54,6 @@ void add_distant(SceneMaker& scene, const Described& light) {
     add_child(*scene.document.scene, object);
 }
 
-/// A texture over the square around the cone that falls off smoothly in the cosine, as pbrt's spots do.
-std::string falloff_image(SceneMaker& scene, double cone, double inner, const Where& where) {
-    constexpr int kRing = 48, kMost = 2048;  // texels
-    const double edge = std::tan(cone), ring = 1 - std::tan(inner) / edge;
-    const int n = std::clamp(int(std::ceil(2 * kRing / ring)), 64, kMost);
-    scene.report.note(where,
-                      "the falloff of a spot, smooth in pbrt and linear in Mitsuba, is a texture of up to 2048 "
-                      "texels a side");
-    const std::string name =
-        where.file + ":" + std::to_string(where.line) + "#" + std::to_string(scene.document.images.size());
-    Texels& image = scene.document.images[name];
-    image.width = image.height = uint32_t(n);
-    image.is_linear = true;
-    const double c0 = std::cos(cone), c1 = std::cos(inner);
-    for (int y = 0; y < n; ++y)
-        for (int x = 0; x < n; ++x) {
-            const double a = edge * (2 * (x + 0.5) / n - 1), b = edge * (2 * (y + 0.5) / n - 1);
-            const double t = std::clamp((1 / std::sqrt(1 + a * a + b * b) - c0) / (c1 - c0), 0.0, 1.0);
-            const float value = float(t * t * (3 - 2 * t));
-            image.floats.insert(image.floats.end(), {value, value, value, 1.0f});
-        }
-    return name;
-}
-
 void add_spot(SceneMaker& scene, const Described& light) {
     const Parameters& in = light.in;
     Object& object = add_object(scene.document, "emitter", "spot", in.where);
@@ -97,11 +74,8 @@ void add_spot(SceneMaker& scene, const Described& light) {
     const double of_one = 2 * M_PI * ((1 - std::cos(inner)) + (std::cos(inner) - std::cos(outer)) / 2);
     set_rgb(object, "intensity", emission(scene, light, "I").scaled(power_factor(light, "power", of_one)));
     if (delta > 0) {
-        Object& texture = add_object(scene.document, "texture", "bitmap", in.where);
-        set_text(texture, "image", falloff_image(scene, outer, inner, in.where));
-        set_boolean(texture, "raw", true);
-        set_text(texture, "wrap_mode", "clamp");
-        add_child(object, texture, "texture");
+        scene.report.note(in.where, kSpotNote);
+        add_spot_falloff(scene.document, object, outer, inner, [](double t) { return t * t * (3 - 2 * t); });
     }
     add_child(*scene.document.scene, object);
 }
