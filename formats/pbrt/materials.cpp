@@ -295,22 +295,19 @@ UvMap uv_map(Surface surface) {
 }
 
 SceneMaker::Surfaced surface_material(SceneMaker& scene, const Shared& material, Surface surface) {
-    static const Described plain = [] {
+    static const Shared plain = [] {
         Described d;
         d.in.directive = "Material";
         d.in.type = "diffuse";
-        return d;
+        return std::make_shared<const Described>(std::move(d));
     }();
-    const Described& described = material ? *material : plain;
-    const auto known = scene.materials.find({&described, surface});
+    const Shared& described = material ? material : plain;
+    const auto known = scene.materials.find({described, surface});
     if (known != scene.materials.end()) return known->second;
-    if (scene.materials.size() > scene.document.limits.shapes)
-        fail(described.in.where, "more materials than --limits shapes=" + std::to_string(scene.document.limits.shapes));
-    // A mix of itself would come back here.
-    const auto place = scene.materials.insert({{&described, surface}, {nullptr, false}}).first;
-    const SceneMaker::Surfaced made = MaterialMaker(scene, described, surface).make();
-    place->second = made;
-    return made;
+    // A mix of itself comes back to it without a BSDF.
+    scene.materials[{described, surface}] = {nullptr, false};
+    const SceneMaker::Surfaced made = MaterialMaker(scene, *described, surface).make();
+    return scene.materials[{described, surface}] = made;
 }
 
 }  // namespace ambilux::pbrt

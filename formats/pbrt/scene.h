@@ -49,7 +49,7 @@ struct SceneMaker {
         const Object* bsdf;
         bool transmits;
     };
-    std::map<std::pair<const Described*, Surface>, Surfaced> materials;
+    std::map<std::pair<Shared, Surface>, Surfaced> materials;  ///< keeps them, so that no address comes twice
 
     const SpectrumReader& spectra() const { return textures.spectra(); }
 };
