@@ -27,7 +27,7 @@ public:
     MaterialMaker(SceneMaker& scene, const Described& material, Surface surface)
         : scene_(scene), in_(material.in), space_(material.space), surface_(surface), uv_(uv_map(surface)) {}
 
-    SceneMaker::Surfaced make() {
+    const Object* make() {
         const std::string& type = in_.type;
         if (type == "interface" || type.empty() || type == "none") return finish(bsdf("null"), true);
         if (type == "diffuse") return finish(diffuse(), false);
@@ -54,7 +54,7 @@ private:
     }
 
     /// With maps and, unless light passes, for both sides.
-    SceneMaker::Surfaced finish(Object& object, bool transmits) {
+    const Object* finish(Object& object, bool transmits) {
         const Object* out = &object;
         const std::string map = in_.text("normalmap", "");
         const Parameter* bumps = in_.find("displacement");
@@ -74,15 +74,20 @@ private:
             out = &outer;
         } else if (bumps) {
             Object& outer = bsdf("bumpmap");
-            add_child(outer, textures().object(textures().number(in_, "displacement", 0), uv_));
+            Texture heights = textures().number(in_, "displacement", 0);
+            if (heights.kind == Texture::Kind::image) {
+                set_number(outer, "scale", heights.color.x);
+                heights.color = splat(1);
+            }
+            add_child(outer, textures().object(heights, uv_));
             add_child(outer, object);
             out = &outer;
         }
         in_.finish(scene_.report);
-        if (transmits) return {out, true};
+        if (transmits) return out;
         Object& both = bsdf("twosided");
         add_child(both, *out);
-        return {&both, false};
+        return &both;
     }
 
     Roughness roughness(const std::string& prefix, double fallback) {
@@ -106,10 +111,10 @@ private:
                            "rough surfaces have masking and shadowing uncorrelated, as in Mitsuba; pbrt "
                            "correlates them by height");
         if (isotropic) {
-            const double u = alpha(r.u.color.x), v = alpha(r.v.color.x);
+            const double u = alpha(textures().mean(r.u)), v = alpha(textures().mean(r.v));
             if (!r.u.is_constant() || !r.v.is_constant() || u != v)
-                scene_.report.refuse(in_.where, "a coating must have one roughness, that is a number",
-                                     "a mean of it is used");
+                scene_.report.note(in_.where,
+                                   "a coating has the mean of its roughness everywhere and in all directions");
             return set_number(object, "alpha", std::sqrt(std::max(u * v, 1e-6)));
         }
         const bool textured = !r.u.is_constant() || !r.v.is_constant();
@@ -192,9 +197,9 @@ private:
     }
 
     Object& coated_conductor() {
-        const Roughness coat = roughness("interface.", 0), r = roughness("conductor.", 0);
+        roughness("interface.", 0);  // the coating is taken for smooth
+        const Roughness r = roughness("conductor.", 0);
         check_layers();
-        (void)coat;
         Object& object = bsdf(r.is_smooth() ? "conductor" : "roughconductor");
         if (!r.is_smooth()) set_roughness(object, r);
         std::optional<Texture> colored;
@@ -260,7 +265,7 @@ private:
         return blend;
     }
 
-    SceneMaker::Surfaced mix() {
+    const Object* mix() {
         const Parameter* names = in_.find("materials");
         if (!names || names->strings.size() != 2) fail(in_.where, "a mix needs the names of two materials");
         Object& blend = bsdf("blendbsdf");
@@ -269,12 +274,12 @@ private:
         for (const std::string& name : names->strings) {
             const auto it = scene_.named_materials.find(name);
             if (it == scene_.named_materials.end()) fail(names->where, "unknown material '" + name + "'");
-            const Object* part = surface_material(scene_, it->second, surface_).bsdf;
+            const Object* part = surface_material(scene_, it->second, surface_);
             if (!part) fail(names->where, "material '" + name + "' is a mix of itself");
             add_child(blend, *part);
         }
         in_.finish(scene_.report);
-        return {&blend, true};
+        return &blend;
     }
 
     SceneMaker& scene_;
@@ -294,7 +299,7 @@ UvMap uv_map(Surface surface) {
     }
 }
 
-SceneMaker::Surfaced surface_material(SceneMaker& scene, const Shared& material, Surface surface) {
+const Object* surface_material(SceneMaker& scene, const Shared& material, Surface surface) {
     static const Shared plain = [] {
         Described d;
         d.in.directive = "Material";
@@ -305,8 +310,8 @@ SceneMaker::Surfaced surface_material(SceneMaker& scene, const Shared& material,
     const auto known = scene.materials.find({described, surface});
     if (known != scene.materials.end()) return known->second;
     // A mix of itself comes back to it without a BSDF.
-    scene.materials[{described, surface}] = {nullptr, false};
-    const SceneMaker::Surfaced made = MaterialMaker(scene, *described, surface).make();
+    scene.materials[{described, surface}] = nullptr;
+    const Object* made = MaterialMaker(scene, *described, surface).make();
     return scene.materials[{described, surface}] = made;
 }
 

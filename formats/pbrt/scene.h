@@ -45,11 +45,8 @@ struct SceneMaker {
     double exposure = 1;  ///< imaging ratio of the film
     uint64_t shape_count = 0;
 
-    struct Surfaced {
-        const Object* bsdf;
-        bool transmits;
-    };
-    std::map<std::pair<Shared, Surface>, Surfaced> materials;  ///< keeps them, so that no address comes twice
+    /// BSDFs of materials; keeps the materials, so that no address comes twice.
+    std::map<std::pair<Shared, Surface>, const Object*> materials;
 
     const SpectrumReader& spectra() const { return textures.spectra(); }
 };
@@ -67,7 +64,7 @@ void add_light(SceneMaker& scene, const Described& light);
 const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area);
 
 /// BSDF of a material, two-sided unless it transmits light; null material: diffuse.
-SceneMaker::Surfaced surface_material(SceneMaker& scene, const Shared& material, Surface surface);
+const Object* surface_material(SceneMaker& scene, const Shared& material, Surface surface);
 UvMap uv_map(Surface surface);
 
 }  // namespace ambilux::pbrt

@@ -234,7 +234,7 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
     if (++scene.shape_count > scene.document.limits.shapes)
         fail(in.where,
              "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
-    const Object* bsdf = surface_material(scene, scene.state.material, surface_of(type)).bsdf;
+    const Object* bsdf = surface_material(scene, scene.state.material, surface_of(type));
     const Placed placed = quadric ? add_quadric(scene, in) : add_mesh(scene, in, *bsdf);
     Object& shape = *placed.object;
     const UvMap uv = uv_map(placed.surface);

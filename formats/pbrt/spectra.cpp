@@ -52,11 +52,12 @@ Matrix to_xyz(const Primaries& p) {
     return m;
 }
 
+/// Index at the Fraunhofer line d, 587.6 nm, by the data sheets of Schott. What pbrt calls F5, F10 and F11 is SF5, SF10
+/// and SF11.
 constexpr std::pair<const char*, double> kGlasses[] = {
-    // Index at the Fraunhofer line d, 587.6 nm, by the data sheets of Schott.
-    {"glass-BK7", 1.5168},  {"glass-BAF10", 1.6700}, {"glass-FK51A", 1.4866}, {"glass-LASF9", 1.8503},
-    {"glass-F5", 1.6034},   {"glass-F10", 1.6228},   {"glass-F11", 1.6206},   {"glass-SF5", 1.6727},
-    {"glass-SF10", 1.7283}, {"glass-SF11", 1.7847},
+    {"glass-BK7", 1.5168}, {"glass-BAF10", 1.6700}, {"glass-FK51A", 1.4866}, {"glass-LASF9", 1.8503},
+    {"glass-F5", 1.6727},  {"glass-SF5", 1.6727},   {"glass-F10", 1.7283},   {"glass-SF10", 1.7283},
+    {"glass-F11", 1.7847}, {"glass-SF11", 1.7847},
 };
 
 /// False if it is the name of no glass.

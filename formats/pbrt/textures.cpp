@@ -127,7 +127,7 @@ Texture Textures::image_texture(bool is_float, const Parameters& in) {
     out.filter = filter == "point" ? "nearest" : "bilinear";
     in.ignore({"maxanisotropy"});  // of filters that need differentials
     const float scale = float(in.number("scale", 1));
-    if (!(scale >= 0)) fail(in.where_of("scale"), "the scale of a texture must not be negative");
+    if (!is_float && !(scale >= 0)) fail(in.where_of("scale"), "the scale of a colour must not be negative");
     out.color = splat(scale);
     if (!in.boolean("invert", false)) return out;
     return fold(in, {out}, [](const std::vector<Rgb>& c) { return max(splat(1) - c[0], splat(0)); });
@@ -300,7 +300,18 @@ void Textures::set_number(Object& object, const std::string& name, const Texture
 
 void Textures::set_color(Object& object, const std::string& name, const Texture& texture, const UvMap& uv) {
     if (texture.is_constant()) return mitsuba::set_rgb(object, name, texture.color);
-    mitsuba::add_child(object, this->object(texture, uv), name);
+    const bool beyond = texture.kind == Texture::Kind::image && max_component(texture.color) > 1;
+    const ColorMap clip = [](Rgb c) { return min(c, splat(1)); };
+    mitsuba::add_child(object, this->object(texture, uv, beyond ? clip : ColorMap{}), name);
+}
+
+double Textures::mean(const Texture& texture) const {
+    if (texture.is_constant()) return texture.color.x;
+    if (texture.kind == Texture::Kind::checkerboard) return 0.5 * (double(texture.color.x) + texture.odd.x);
+    load_texels(*texture.image);
+    double sum = 0;
+    for (const Rgb& c : texture.image->texels) sum += c.x;
+    return texture.color.x * sum / double(texture.image->texels.size());
 }
 
 }  // namespace ambilux::pbrt

@@ -60,7 +60,10 @@ public:
     /// Sets a parameter of `object`. `uv`: from coordinates of the shape to pbrt's (u,v). Numbers pass `map` first.
     void set_number(Object& object, const std::string& name, const Texture& texture, const UvMap& uv,
                     const std::function<double(double)>& map = {});
+    /// Reflectances are clipped at 1, as in pbrt.
     void set_color(Object& object, const std::string& name, const Texture& texture, const UvMap& uv);
+    /// Of all texels or cells.
+    double mean(const Texture& texture) const;
     /// The texture as an object of its own.
     const Object& object(const Texture& texture, const UvMap& uv, const ColorMap& map = {});
 

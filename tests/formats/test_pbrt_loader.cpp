@@ -202,6 +202,30 @@ TEST_CASE("textures: t runs upwards, constants and images fold, checkerboards ha
     check_rgb(at(checker, {0.6f, 0.5f}), {0.1f, 0.2f, 0.3f});
 }
 
+TEST_CASE("factors of textures: reflectances end at 1, heights may be negative, coatings have a mean roughness") {
+    const TempFolder folder;
+    folder.write("t.png", png_file(2, 1, {255, 255, 255, 0, 0, 0}));
+    const std::string
+        image = "\"imagemap\" \"string filename\" \"t.png\" \"string filter\" \"point\" \"string encoding\" \"linear\"",
+        quad =
+            "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 1 1 0] \"point2 uv\" [0 0 1 0 1 1] \"integer indices\" "
+            "[0 1 2]";
+    const Scene s =
+        load_pbrt_world("Texture \"t\" \"spectrum\" " + image + " \"float scale\" 3 Texture \"b\" \"float\" " + image +
+                            " \"float scale\" -2\n"
+                            "Texture \"r\" \"float\" " +
+                            image +
+                            " \"float scale\" .5\n"
+                            "Material \"diffuse\" \"texture reflectance\" \"t\" \"texture displacement\" \"b\" " +
+                            quad + " Material \"coateddiffuse\" \"texture roughness\" \"r\" " + quad,
+                        {}, &folder);
+    check_rgb(reflectance(s, 0, {0.25f, 0.5f}), splat(1));
+    CHECK(bsdf(s).bump_map >= 0);
+    CHECK(bsdf(s).bump_scale == -2);
+    CHECK(bsdf(s, 1).as<RoughPlastic>().alpha.value == Approx(0.5f));
+    CHECK(has_note(s, "mean of its roughness"));
+}
+
 TEST_CASE("environment maps keep their directions") {
     const TempFolder folder;
     constexpr int n = 64;
