@@ -69,7 +69,7 @@ Object& camera(SceneMaker& scene, const Options& options, double aspect) {
     // Scale of the world to that of the camera is nothing to a pinhole.
     if (!parallel) {
         const double scale = std::cbrt(std::fabs(determinant(to_world)));
-        if (lens > 0 && std::fabs(scale - 1) > 1e-6)
+        if (lens > 0 && std::fabs(scale - 1) > 1e-3)
             scene.report.refuse(in.where, "a lens on a camera that is scaled is not supported",
                                 "its size is left as it is");
         for (int i = 0; i < 3; ++i)
@@ -190,7 +190,7 @@ void add_integrator(SceneMaker& scene, const Options& options, const Where& wher
     // pbrt counts scattering, Mitsuba segments.
     set_integer(out, "max_depth", depth + 1);
     if (in.boolean("regularize", false))
-        scene.report.refuse(in.where_of("regularize"), "regularization is not supported", "it is left out");
+        scene.report.note(in.where_of("regularize"), "regularization, a bias against noise, is left out");
     for (const Parameter& p : in.list) p.used = true;  // how the others do it
     add_child(*scene.document.scene, out);
 }
