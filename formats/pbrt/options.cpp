@@ -63,8 +63,8 @@ Object& camera(SceneMaker& scene, const Options& options, double aspect) {
         if (!(fov > 0 && fov < 180)) fail(in.where_of("fov"), "fov must lie between 0 and 180 degrees");
         set_number(sensor, "fov", 2 * (180 / M_PI) * std::atan(w.half_width() * std::tan(fov * (M_PI / 360))));
         set_text(sensor, "fov_axis", "x");
-        if (x != 0) set_number(sensor, "principal_point_offset_x", -x / (2 * w.half_width()));
-        if (y != 0) set_number(sensor, "principal_point_offset_y", y / (2 * w.half_height()));
+        if (x != 0) set_number(sensor, "principal_point_offset_x", x / (2 * w.half_width()));
+        if (y != 0) set_number(sensor, "principal_point_offset_y", -y / (2 * w.half_height()));
     }
     // Scale of the world to that of the camera is nothing to a pinhole.
     if (!parallel) {

@@ -202,6 +202,22 @@ TEST_CASE("textures: t runs upwards, constants and images fold, checkerboards ha
     check_rgb(at(checker, {0.6f, 0.5f}), {0.1f, 0.2f, 0.3f});
 }
 
+TEST_CASE("images lie on spheres, disks and cylinders as pbrt has them") {
+    const TempFolder folder;
+    folder.write("t.png", png_file(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}));
+    const Scene s = load_pbrt_world(
+        "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.png\" \"string filter\" \"point\" Material "
+        "\"diffuse\" \"texture reflectance\" \"t\" Shape \"sphere\" Shape \"disk\" Shape \"cylinder\"",
+        {}, &folder);
+    // Coordinates of shapes are Mitsuba's: azimuth and angle to +z; radius and azimuth; azimuth and height.
+    check_rgb(reflectance(s, 0, {0.25f, 0.1f}), {1, 0, 0});  // the top of the image is the pole +z
+    check_rgb(reflectance(s, 0, {0.75f, 0.9f}), {1, 1, 1});
+    check_rgb(reflectance(s, 1, {0.25f, 0.1f}), {1, 0, 0});  // and the centre of the disk, where pbrt's v is 1
+    check_rgb(reflectance(s, 1, {0.75f, 0.6f}), {1, 1, 1});
+    check_rgb(reflectance(s, 2, {0.25f, 0.9f}), {1, 0, 0});
+    check_rgb(reflectance(s, 2, {0.75f, 0.1f}), {1, 1, 1});
+}
+
 TEST_CASE("factors of textures: reflectances end at 1, heights may be negative, coatings have a mean roughness") {
     const TempFolder folder;
     folder.write("t.png", png_file(2, 1, {255, 255, 255, 0, 0, 0}));

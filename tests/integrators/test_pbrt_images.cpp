@@ -251,6 +251,32 @@ TEST_CASE("a scene in both formats has one image, and so has what it is converte
     CHECK(difference < 1e-4 * sum);
 }
 
+TEST_CASE("a part of the screen is what the crop of the whole screen is") {
+    const TempFolder folder;
+    folder.write("floor.ply", kPly);
+    const auto scene = [&](const std::string& camera, const std::string& film) {
+        std::string text = kPbrt;
+        const auto exchange = [&](const std::string& from, const std::string& to) {
+            text.replace(text.find(from), from.size(), to);
+        };
+        exchange("Camera \"perspective\" \"float fov\" 35", "Camera " + camera);
+        exchange("\"integer xresolution\" 48 \"integer yresolution\" 32", film);
+        return load_pbrt_text(text, {}, &folder);
+    };
+    const std::string whole = "\"integer xresolution\" 48 \"integer yresolution\" 32 \"float cropwindow\" [.5 1 0 .5]",
+                      part = "\"integer xresolution\" 24 \"integer yresolution\" 16";
+    for (const std::string& type : {std::string("\"perspective\" \"float fov\" 35"), std::string("\"orthographic\"")}) {
+        INFO(type);
+        const std::string wide = type[1] == 'o' ? " \"float screenwindow\" [-4.5 4.5 -3 3]"
+                                                : " \"float screenwindow\" [-1.5 1.5 -1 1]",
+                          corner = type[1] == 'o' ? " \"float screenwindow\" [0 4.5 0 3]"
+                                                  : " \"float screenwindow\" [0 1.5 0 1]";
+        const ZTestResult z = compared(scene(type + wide, whole), scene(type + corner, part), 128);
+        INFO(z.report());
+        CHECK(z.pass);
+    }
+}
+
 TEST_CASE("scenes of the project are the same after conversion") {
     const TempFolder folder;
     for (const char* name : {"cornell", "glass", "lights", "materials", "textured"}) {
