@@ -55,7 +55,7 @@ def render(scene: Scene | str | os.PathLike[str], integrator: str = "path", vari
            settings: Mapping[str, Any] | None = None) -> Image:
     """Renders `spp` samples per pixel, or for `time` seconds; with neither as many as the scene asks for.
 
-    `settings` are those of `ambilux help settings`. Other threads run meanwhile. An interrupt (KeyboardInterrupt) ends it within a second.
+    `settings` are those of `ambilux help settings`. Other threads run meanwhile. An interrupt (KeyboardInterrupt) ends it after the sample per pixel in work.
 
     >>> image = ambilux.render(scene, "bdpt", spp=2, seed=1, settings={"strategies": ["hits", "next_event"]})
     >>> image.samples, image.stats["integrator"], image.variance.shape == image.shape
@@ -114,9 +114,6 @@ def reference(scene: Scene | str | os.PathLike[str], path: str | os.PathLike[str
               size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
               settings: Mapping[str, Any] | None = None) -> Image:
     """Ground truth with its standard error, in the file at `path`, which is continued if it exists. An interrupt saves what is finished."""
-    name = os.fspath(path)
-    os.makedirs(os.path.dirname(name) or ".", exist_ok=True)
-    samples = count("spp", spp)
-    core, attributes = _core.reference(scene_of(scene, size)._core, name, samples,
+    core, attributes = _core.reference(scene_of(scene, size)._core, os.fspath(path), count("spp", spp),
                                        assignments(settings, seed=seed, max_depth=max_depth, backend=backend))
     return Image._of(core, attributes=json.loads(attributes))

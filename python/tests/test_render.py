@@ -1,5 +1,6 @@
 """Renders, their arrays, interrupts and threads."""
 
+import json
 import os
 import signal
 import subprocess
@@ -89,10 +90,10 @@ def cpu_seconds(pid):
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def test_an_interrupt_ends_a_render_within_a_second():
+def test_an_interrupt_ends_a_render_after_the_sample_in_work():
     code = textwrap.dedent("""
         import sys, time, ambilux
-        scene = ambilux.load(sys.argv[1], size=(320, 240))
+        scene = ambilux.load(sys.argv[1], size=(640, 480))
         print("ready", flush=True)
         try:
             ambilux.render(scene, integrator="bdpt", spp=100000, backend="cpu")
@@ -153,7 +154,6 @@ def test_reference_and_compare_are_those_of_the_program(scene, tmp_path):
     image = ambilux.render(scene, spp=4, backend="cpu")
     image.save(out)
     metrics = ambilux.compare(image, truth)
-    import json
     of_program = json.loads(program("compare", out, path, "--json", "-").stdout)
     for name, value in metrics.items():
         assert value == pytest.approx(of_program[name], rel=1e-6), name
@@ -197,4 +197,3 @@ def test_the_program_and_its_version():
     done = program("--version")
     assert done.returncode == 0 and done.stdout.startswith(f"ambilux {ambilux.__version__} ")
     assert program("render").returncode == 2
-    assert os.fspath(SCENES)
