@@ -108,6 +108,7 @@ LoadedScene load_scene(const SceneOptions& options, const std::vector<Output>& o
     loaded.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     check_not_inputs(outputs, files);
     for (const std::string& warning : loaded.scene.warnings) log_warning(warning);
+    for (const std::string& note : loaded.scene.notes) log_info("note: " + note);
     return loaded;
 }
 

@@ -323,6 +323,20 @@ void fill_sort_keys(Scene& scene) {
         scene.sort_keys[prim] = uint16_t(std::min(scene.shapes[view.shape_of(prim)].material, kMostSortKeys - 1));
 }
 
+/// What a material needs, and all that it is blended of.
+void add_features(const Scene& scene, const Material& m, Features& f) {
+    for (uint32_t index : {m.front, m.back}) {
+        const BsdfRecord& b = scene.bsdfs[index];
+        f.bsdfs |= bit(b.type);
+        f.textures |= is_textured(b);
+        f.bumps |= b.normal_map >= 0 || b.bump_map >= 0;
+    }
+    if (m.first == kNone) return;
+    f.blends = true;
+    f.textures |= m.second_weight.texture >= 0;
+    for (uint32_t part : {m.first, m.second}) add_features(scene, scene.materials[part], f);
+}
+
 void fill_features(Scene& scene) {
     Features f;
     const auto use = [&](int32_t texture) { f.textures |= texture >= 0; };
@@ -331,12 +345,7 @@ void fill_features(Scene& scene) {
         const Material& m = scene.materials[shape.material];
         use(m.opacity.texture);
         f.opacity |= m.lets_pass();
-        for (uint32_t index : {m.front, m.back}) {
-            const BsdfRecord& b = scene.bsdfs[index];
-            f.bsdfs |= bit(b.type);
-            f.textures |= is_textured(b);
-            f.bumps |= b.normal_map >= 0 || b.bump_map >= 0;
-        }
+        add_features(scene, m, f);
         const uint32_t first = shape.first_primitive;
         f.primitives |= bit(first < scene.triangles.size() ? PrimitiveType::triangle
                                                            : scene.quadrics[first - scene.triangles.size()].type);

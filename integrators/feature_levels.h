@@ -19,13 +19,22 @@ constexpr Features kUntexturedFeatures = {
     false,
     false};
 
-/// Every BSDF, texture and emitter, on triangles that are neither bumped nor holed.
-constexpr Features kTriangleFeatures = {
-    kAllFeatures.bsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false, false};
+/// BSDFs of the levels below the last one. The others are seldom used and would make their kernels larger.
+constexpr uint32_t kCommonBsdfs = bit(BsdfType::diffuse) | bit(BsdfType::rough_diffuse) | bit(BsdfType::conductor) |
+                                  bit(BsdfType::rough_conductor) | bit(BsdfType::dielectric) |
+                                  bit(BsdfType::thin_dielectric) | bit(BsdfType::rough_dielectric) |
+                                  bit(BsdfType::plastic) | bit(BsdfType::rough_plastic);
+
+/// Every common BSDF, texture and emitter, on triangles that are neither bumped nor holed.
+constexpr Features kTriangleFeatures = {kCommonBsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false,
+                                        false};
 
 /// The same with holes.
-constexpr Features kMaskedFeatures = {
-    kAllFeatures.bsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false, true};
+constexpr Features kMaskedFeatures = {kCommonBsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false,
+                                      true};
+
+/// All but the rarer BSDFs and blends.
+constexpr Features kCommonFeatures = {kCommonBsdfs, kAllFeatures.emitters, kAllFeatures.primitives, true, true, true};
 
 /// Calls f.template operator()<F>() with the smallest level F that covers `needed`; with the full set if `specialise`
 /// is false.
@@ -35,6 +44,7 @@ decltype(auto) with_feature_level(const Features& needed, bool specialise, Funct
     if (specialise && kUntexturedFeatures.covers(needed)) return f.template operator()<kUntexturedFeatures>();
     if (specialise && kTriangleFeatures.covers(needed)) return f.template operator()<kTriangleFeatures>();
     if (specialise && kMaskedFeatures.covers(needed)) return f.template operator()<kMaskedFeatures>();
+    if (specialise && kCommonFeatures.covers(needed)) return f.template operator()<kCommonFeatures>();
     return f.template operator()<kAllFeatures>();
 }
 

@@ -4,24 +4,32 @@
 #include "models/bsdf/conductor.h"
 #include "models/bsdf/dielectric.h"
 #include "models/bsdf/diffuse.h"
+#include "models/bsdf/diffuse_transmitter.h"
+#include "models/bsdf/phong.h"
 #include "models/bsdf/plastic.h"
+#include "models/bsdf/principled.h"
 #include "models/bsdf/rough_conductor.h"
 #include "models/bsdf/rough_dielectric.h"
 #include "models/bsdf/rough_diffuse.h"
 #include "models/bsdf/rough_plastic.h"
 #include "models/bsdf/thin_dielectric.h"
+#include "models/bsdf/ward.h"
 
 /// X(model, name): the struct and the name in messages and files.
-#define AMBILUX_BSDFS(X)                 \
-    X(Diffuse, diffuse)                  \
-    X(RoughDiffuse, rough_diffuse)       \
-    X(Conductor, conductor)              \
-    X(RoughConductor, rough_conductor)   \
-    X(Dielectric, dielectric)            \
-    X(ThinDielectric, thin_dielectric)   \
-    X(RoughDielectric, rough_dielectric) \
-    X(Plastic, plastic)                  \
-    X(RoughPlastic, rough_plastic)
+#define AMBILUX_BSDFS(X)                       \
+    X(Diffuse, diffuse)                        \
+    X(RoughDiffuse, rough_diffuse)             \
+    X(Conductor, conductor)                    \
+    X(RoughConductor, rough_conductor)         \
+    X(Dielectric, dielectric)                  \
+    X(ThinDielectric, thin_dielectric)         \
+    X(RoughDielectric, rough_dielectric)       \
+    X(Plastic, plastic)                        \
+    X(RoughPlastic, rough_plastic)             \
+    X(Phong, phong)                            \
+    X(Ward, ward)                              \
+    X(DiffuseTransmitter, diffuse_transmitter) \
+    X(Principled, principled)
 
 namespace ambilux {
 

@@ -18,6 +18,7 @@ struct Features {
     bool textures = false;    ///< any parameter comes from a texture
     bool bumps = false;       ///< any bump or normal map
     bool opacity = false;     ///< any surface that lets rays pass at random
+    bool blends = false;      ///< any surface of two materials
 
     constexpr bool has(BsdfType t) const { return bsdfs >> uint32_t(t) & 1u; }
     constexpr bool has(EmitterType t) const { return emitters >> uint32_t(t) & 1u; }
@@ -29,7 +30,8 @@ struct Features {
     /// True if kernels built for *this can render a scene that needs `other`.
     constexpr bool covers(const Features& other) const {
         return !(other.bsdfs & ~bsdfs) && !(other.emitters & ~emitters) && !(other.primitives & ~primitives) &&
-               (textures || !other.textures) && (bumps || !other.bumps) && (opacity || !other.opacity);
+               (textures || !other.textures) && (bumps || !other.bumps) && (opacity || !other.opacity) &&
+               (blends || !other.blends);
     }
     constexpr bool operator==(const Features&) const = default;
 };
@@ -39,6 +41,6 @@ constexpr uint32_t bit(EmitterType t) { return 1u << uint32_t(t); }
 constexpr uint32_t bit(PrimitiveType t) { return 1u << uint32_t(t); }
 
 constexpr Features kAllFeatures = {
-    BsdfModels::kAll, EmitterModels::kAll, (1u << uint32_t(PrimitiveType::count)) - 1, true, true, true};
+    BsdfModels::kAll, EmitterModels::kAll, (1u << uint32_t(PrimitiveType::count)) - 1, true, true, true, true};
 
 }  // namespace ambilux

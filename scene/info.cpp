@@ -24,6 +24,7 @@ std::vector<std::string> feature_names(const Features& f) {
     if (f.textures) names.push_back("textures");
     if (f.bumps) names.push_back("bumps");
     if (f.opacity) names.push_back("opacity");
+    if (f.blends) names.push_back("blends");
     return names;
 }
 
@@ -79,6 +80,7 @@ nlohmann::json scene_info(const Scene& scene) {
           {"hide_emitters", scene.integrator.hide_emitters}}},
         {"features", feature_names(scene.features)},
         {"warnings", scene.warnings},
+        {"notes", scene.notes},
     };
 }
 

@@ -11,7 +11,8 @@ namespace ambilux {
 
 const char* name_of(FilterType type);
 
-/// Names of the features, in a fixed order: bsdf types, emitter types, primitive types, then textures, bumps, opacity.
+/// Names of the features, in a fixed order: bsdf types, emitter types, primitive types, then textures, bumps, opacity,
+/// blends.
 std::vector<std::string> feature_names(const Features& features);
 
 /// Counts per type, triangles, memory, sensor, film, integrator hint, features, warnings.

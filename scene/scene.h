@@ -27,6 +27,7 @@ struct Scene {
     std::array<uint8_t, 32>
         content_hash{};                 ///< over the XML and every file it names, and the options that change the image
     std::vector<std::string> warnings;  ///< substitutions made by --lenient, parameters without effect
+    std::vector<std::string> notes;     ///< what is done in another way than the file says, with the same image
     uint64_t degenerate_triangles = 0;  ///< triangles without area that the loader left out
     IntegratorHint integrator;
 

@@ -84,6 +84,10 @@ struct Material {
     uint32_t front, back;
     uint32_t two_sided;
     ParamFloat opacity;  ///< mask: chance that a ray meets the surface
+    /// Blend: places of the materials that it is made of, or kNone. Points are of the second one with a chance of
+    /// `second_weight`; `front` and `back` then stand for what the materials can do (transport/blend.h).
+    uint32_t first = kNone, second = kNone;
+    ParamFloat second_weight = {0, -1};
 
     /// False if every ray meets it.
     AMBILUX_HD bool lets_pass() const { return opacity.texture >= 0 || !(opacity.value >= 1.0f); }

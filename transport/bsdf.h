@@ -21,13 +21,17 @@
 #include "transport/bsdf/conductor.h"
 #include "transport/bsdf/dielectric.h"
 #include "transport/bsdf/diffuse.h"
+#include "transport/bsdf/diffuse_transmitter.h"
+#include "transport/bsdf/phong.h"
 #include "transport/bsdf/plastic.h"
+#include "transport/bsdf/principled.h"
 #include "transport/bsdf/rough_conductor.h"
 #include "transport/bsdf/rough_dielectric.h"
 #include "transport/bsdf/rough_diffuse.h"
 #include "transport/bsdf/rough_plastic.h"
 #include "transport/bsdf/sample.h"
 #include "transport/bsdf/thin_dielectric.h"
+#include "transport/bsdf/ward.h"
 #include "transport/texture.h"
 
 namespace ambilux {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "scene/surface.h"
+#include "transport/blend.h"
 #include "transport/bsdf.h"
 
 namespace ambilux {
@@ -48,7 +49,7 @@ AMBILUX_HD Vec3f perturbed_normal(const SceneView& scene, const BsdfRecord& reco
 /// is that of the geometric normal: where the shading normal disagrees, nothing is scattered at all.
 template <Features F>
 AMBILUX_HD Scattering make_scattering(const SceneView& scene, const SurfacePoint& point, Vec3f wi_world) {
-    const Material& material = scene.materials[scene.shapes[point.shape].material];
+    const Material& material = material_at<F>(scene, point);
     const bool flip = material.two_sided != 0 && dot(point.ng, wi_world) < 0.0f;
     const uint32_t index = flip ? material.back : material.front;
     const BsdfRecord& record = scene.bsdfs[index];

@@ -11,11 +11,21 @@
 
 namespace ambilux {
 
+/// Colours or numbers (then all three are the same) of the vertices or triangles of a mesh, by Mitsuba's names:
+/// vertex_color, face_weight.
+struct MeshAttribute {
+    std::string name;
+    bool per_face = false;
+    uint32_t channels = 0;  ///< in the file
+    std::vector<Rgb> values;
+};
+
 /// Indexed triangles. `normals` and `uvs` hold one entry per vertex, or none at all. Normals need not be unit.
 struct Mesh {
     std::vector<Vec3f> positions, normals;
     std::vector<Vec2f> uvs;
     std::vector<std::array<uint32_t, 3>> faces;
+    std::vector<MeshAttribute> attributes;
 };
 
 /// Wavefront OBJ: v, vt, vn and f with positive or negative indices and any number of corners (cut into a fan).
@@ -24,8 +34,10 @@ struct Mesh {
 Mesh read_obj(const std::string& path, std::string_view text, bool flip_v, const Limits& limits = {});
 
 /// Stanford PLY, ascii or binary of either byte order. Vertex properties x y z, nx ny nz, and u v (also s t, texture_u
-/// texture_v); faces with three or more corners. Other properties and elements are skipped.
-Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits = {});
+/// texture_v); faces with three or more corners. Properties NAME_0 to NAME_2, or r, g, b of NAME color, are attributes,
+/// which are kept if `attributes` says so. Other properties and elements are skipped.
+Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits = {},
+              bool attributes = false);
 
 /// Mitsuba's .serialized format, version 3 or 4; `shape_index` picks one of the meshes in the file.
 Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_index, bool flip_v,
@@ -40,6 +52,11 @@ Mesh make_cube();
 /// Vertex normals as means of the adjacent faces' normals, weighted by the angle at the vertex (Thürmer and Wüthrich
 /// 1998). Vertices without a proper face get (0,0,0).
 std::vector<Vec3f> smooth_normals(const Mesh& mesh);
+
+/// The mesh without normals, its vertices divided so that smooth_normals() does not smooth over edges of more than
+/// `degrees` between the normals of faces: of the faces around a point (position and uv), in their order, each that has
+/// no vertex yet gets one, together with all whose normals lie within the angle (Mitsuba 0.6, maxSmoothAngle).
+Mesh split_at_edges(const std::string& path, const Mesh& mesh, double degrees);
 
 /// Memory of a mesh of that many vertices and triangles, at most.
 uint64_t mesh_bytes(uint64_t vertices, uint64_t triangles);

@@ -23,6 +23,8 @@ struct Property {
     bool list = false;
     Scalar count_type = Scalar::uint8;
     Role role = Role::skip;
+    int attribute = -1;    ///< place in Mesh::attributes
+    uint32_t channel = 0;  ///< of it
 };
 
 struct Element {
@@ -61,6 +63,22 @@ Role role_named(std::string_view name) {
     if (name == "u" || name == "s" || name == "texture_u") return Role::u;
     if (name == "v" || name == "t" || name == "texture_v") return Role::v;
     return Role::skip;
+}
+
+/// Name and channel of an attribute; false for what is none.
+bool attribute_named(const std::string& property, const char* prefix, std::string& name, uint32_t& channel) {
+    for (uint32_t c = 0; c < 3; ++c)
+        if (property == std::string(1, "rgb"[c])) {
+            name = std::string(prefix) + "color";
+            channel = c;
+            return true;
+        }
+    const size_t n = property.size();
+    if (n < 3 || property[n - 2] != '_' || property[n - 1] < '0' || property[n - 1] > '2') return false;
+    channel = uint32_t(property[n - 1] - '0');
+    name = property.substr(0, n - 2);
+    if (!name.starts_with(prefix)) name.insert(0, prefix);
+    return true;
 }
 
 /// Elements of a file and properties of an element.
@@ -206,11 +224,11 @@ uint64_t least_size(const Element& element, Encoding encoding) {
 struct MeshBuilder {
     PlyReader& in;
     FileBudget& budget;
-    bool flip_v;
+    bool flip_v, keep_attributes;
     Mesh mesh;
     bool has_faces = false;
 
-    void read(const Element& element) {
+    void read(Element element) {
         const uint64_t size = least_size(element, in.encoding);
         // What is larger than the file is wrong and must not be allocated; the last blank may be missing.
         const uint64_t left = size_t(in.text.end - in.text.at) + 1;
@@ -218,6 +236,7 @@ struct MeshBuilder {
             in.fail("element '" + element.name + "' claims " + std::to_string(element.count) +
                     " entries, more than the file holds");
         if (size == 0) return;
+        if (keep_attributes && (element.name == "vertex" || element.name == "face")) declare_attributes(element);
         if (element.name == "vertex")
             read_vertices(element);
         else if (element.name == "face")
@@ -227,6 +246,34 @@ struct MeshBuilder {
     }
 
 private:
+    void declare_attributes(Element& element) {
+        const bool per_face = element.name == "face";
+        for (Property& p : element.properties) {
+            std::string name;
+            if (p.list || p.role != Role::skip ||
+                !attribute_named(p.name, per_face ? "face_" : "vertex_", name, p.channel))
+                continue;
+            size_t i = 0;
+            while (i < mesh.attributes.size() && mesh.attributes[i].name != name) ++i;
+            if (i == mesh.attributes.size()) mesh.attributes.push_back({name, per_face, 0, {}});
+            p.attribute = int(i);
+            mesh.attributes[i].channels = std::max(mesh.attributes[i].channels, p.channel + 1);
+        }
+        budget.bytes(element.count * mesh.attributes.size() * sizeof(Rgb));
+    }
+
+    /// Value of a property of entry `i`, kept if it is one of an attribute.
+    float property_value(const Property& p, size_t i) {
+        const float value = float(in.value(p.type));
+        if (p.attribute < 0) return value;
+        MeshAttribute& a = mesh.attributes[size_t(p.attribute)];
+        a.values.resize(std::max(a.values.size(), i + 1));
+        if (!std::isfinite(value)) in.fail("attribute '" + a.name + "' is not finite");
+        a.values[i][int(p.channel)] = value;
+        if (a.channels == 1) a.values[i] = {value, value, value};
+        return value;
+    }
+
     void skip_list(const Property& p) {
         for (uint32_t left = in.index(p.count_type); left > 0; --left) in.value(p.type);
     }
@@ -255,7 +302,7 @@ private:
                 if (p.list)
                     skip_list(p);
                 else
-                    vertex[int(p.role)] = float(in.value(p.type));
+                    vertex[int(p.role)] = property_value(p, i);
             }
             mesh.positions.push_back({vertex[int(Role::x)], vertex[int(Role::y)], vertex[int(Role::z)]});
             if (normals) mesh.normals.push_back({vertex[int(Role::nx)], vertex[int(Role::ny)], vertex[int(Role::nz)]});
@@ -271,6 +318,7 @@ private:
         std::vector<uint32_t> polygon;
         for (uint64_t i = 0; i < element.count; ++i) {
             polygon.clear();
+            const size_t first = mesh.faces.size();
             for (const Property& p : element.properties) {
                 if (p.list && (p.name == "vertex_indices" || p.name == "vertex_index")) {
                     has_faces = true;
@@ -278,11 +326,13 @@ private:
                 } else if (p.list) {
                     skip_list(p);
                 } else {
-                    in.value(p.type);
+                    property_value(p, first);
                 }
             }
             if (polygon.size() < 3) in.fail("face " + std::to_string(i) + " has fewer than three corners");
             for (size_t k = 2; k < polygon.size(); ++k) mesh.faces.push_back({polygon[0], polygon[k - 1], polygon[k]});
+            for (MeshAttribute& a : mesh.attributes)
+                if (a.per_face && first < a.values.size()) a.values.resize(mesh.faces.size(), Rgb(a.values[first]));
             budget.bytes(mesh_bytes(mesh.positions.size(), mesh.faces.size()));
             budget.tick();
         }
@@ -291,11 +341,11 @@ private:
 
 }  // namespace
 
-Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits) {
+Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits, bool attributes) {
     FileBudget budget(path, limits);
     PlyReader in{path, TextCursor(bytes)};
     const std::vector<Element> elements = read_header(in);
-    MeshBuilder builder{in, budget, flip_v, {}};
+    MeshBuilder builder{in, budget, flip_v, attributes, {}};
     bool has_vertices = false;
     for (const Element& element : elements) {
         has_vertices |= element.name == "vertex";

@@ -2,6 +2,8 @@
 
 #include "formats/mitsuba/bsdf_plugins.h"
 #include "formats/mitsuba/named_media.h"
+#include "formats/mitsuba/principled.h"
+#include "transport/bsdf/microfacet.h"
 #include "transport/bsdf/precompute.h"
 
 namespace ambilux::mitsuba {
@@ -30,7 +32,7 @@ void read_roughness(Builder& builder, Reader& in, Parameters& p) {
         p.alpha_u = p.alpha_v = in.textured_number("alpha", 0.1f);
     }
     for (const ParamFloat& alpha : {p.alpha_u, p.alpha_v})
-        if (!(alpha.value > 0)) in.fail(in.where(anisotropic ? "alpha_u" : "alpha"), "roughness must be positive");
+        if (!(alpha.value >= 0)) in.fail(in.where(anisotropic ? "alpha_u" : "alpha"), "roughness must not be negative");
     p.sample_visible = in.boolean("sample_visible", true);
 }
 
@@ -154,15 +156,63 @@ void read_plugin(Builder& builder, Reader& in, Textured<RoughPlastic>& p) {
     p.distribution = distribution(builder, in);
     p.sample_visible = in.boolean("sample_visible", true);
     p.alpha = {float(in.number("alpha", 0.1)), -1};
-    if (!(p.alpha.value > 0)) in.fail(in.where("alpha"), "roughness must be positive");
+    if (!(p.alpha.value >= 0)) in.fail(in.where("alpha"), "roughness must not be negative");
+    p.alpha.value = std::max(p.alpha.value, kMinAlpha);
     if (!builder.validate_only) precompute_rough_plastic(builder, p);
 }
+
+/// A diffuse part and a lobe, which may not give back more than all light together: both are scaled then, as Mitsuba
+/// 0.6 does. Returns the lobe's share in sampling.
+float read_diffuse_and_lobe(Builder& builder, Reader& in, ParamRgb& diffuse, ParamRgb& lobe) {
+    diffuse = in.textured_color("diffuse_reflectance", splat(0.5f), SpectrumUse::reflectance);
+    lobe = in.textured_color("specular_reflectance", splat(0.2f), SpectrumUse::reflectance);
+    const float most = max_component(diffuse.value + lobe.value);
+    if (most > 1 && diffuse.texture < 0 && lobe.texture < 0) {
+        builder.note(in.where(), "the reflectances of '" + in.object().type + "' sum to more than 1 and are scaled");
+        diffuse.value *= 0.99f / most;
+        lobe.value *= 0.99f / most;
+    }
+    return specular_weight(builder, lobe, diffuse);
+}
+
+void read_plugin(Builder& builder, Reader& in, Textured<Phong>& p) {
+    p.specular_sampling_weight = read_diffuse_and_lobe(builder, in, p.reflectance, p.specular_reflectance);
+    p.exponent = in.textured_number("exponent", 30);
+    if (!(p.exponent.value >= 0)) in.fail(in.where("exponent"), "the exponent must not be negative");
+}
+
+void read_plugin(Builder& builder, Reader& in, Textured<Ward>& p) {
+    p.specular_sampling_weight = read_diffuse_and_lobe(builder, in, p.reflectance, p.specular_reflectance);
+    const std::string variant = in.text("variant", "balanced");
+    p.variant = variant == "ward"        ? WardVariant::ward
+                : variant == "ward-duer" ? WardVariant::duer
+                                         : WardVariant::balanced;
+    if (variant != "ward" && variant != "ward-duer" && variant != "balanced")
+        builder.refuse(in.where("variant"), "variant '" + variant + "' of ward is not known", "balanced is used");
+    p.alpha_u = in.textured_number("alpha_u", 0.1f);
+    p.alpha_v = in.textured_number("alpha_v", 0.1f);
+    for (const ParamFloat& alpha : {p.alpha_u, p.alpha_v})
+        if (!(alpha.value >= 0)) in.fail("roughness must not be negative");
+}
+
+void read_plugin(Builder&, Reader& in, Textured<DiffuseTransmitter>& p) {
+    p.transmittance = in.textured_color("transmittance", splat(0.5f), SpectrumUse::reflectance);
+}
+
+void read_plugin(Builder&, Reader& in, Textured<Principled>& p) { p = read_principled(in).opaque; }
 
 }  // namespace
 
 BsdfRecord diffuse_record(float reflectance) {
     Textured<Diffuse> p{};
     p.reflectance = {splat(reflectance), -1};
+    return bsdf_record(p);
+}
+
+BsdfRecord clear_pane_record() {
+    Textured<ThinDielectric> p{};
+    p.ior = 1;
+    p.specular_reflectance = p.specular_transmittance = {splat(1), -1};
     return bsdf_record(p);
 }
 

@@ -9,5 +9,7 @@ namespace ambilux::mitsuba {
 BsdfRecord read_bsdf(Builder& builder, const Object& object);
 /// That of a diffuse surface.
 BsdfRecord diffuse_record(float reflectance);
+/// A thin plate of index 1, which changes nothing.
+BsdfRecord clear_pane_record();
 
 }  // namespace ambilux::mitsuba

@@ -1,4 +1,6 @@
 #include "formats/mitsuba/bsdf_plugins.h"
+#include "formats/mitsuba/principled.h"
+#include "formats/mitsuba/xml_values.h"
 
 namespace ambilux::mitsuba {
 
@@ -14,6 +16,9 @@ struct Adapters {
     bool has_map() const { return normal_map >= 0 || bump_map >= 0; }
 };
 
+/// What a BSDF is inside of.
+enum class Place { outside, part, two_sided };
+
 const Object& nested_bsdf(Reader& in) {
     const Object* nested = in.take("bsdf");
     if (!nested) in.fail(in.object().type + " has no nested BSDF");
@@ -21,12 +26,13 @@ const Object& nested_bsdf(Reader& in) {
 }
 
 /// Strips masks and maps off `object`; returns what is inside of them.
-const Object* strip(Builder& builder, const Object* object, Adapters& adapters, bool in_two_sided) {
+const Object* strip(Builder& builder, const Object* object, Adapters& adapters, Place place) {
     for (;;) {
         Reader in(builder, *object);
         if (object->type == "mask") {
-            if (in_two_sided)
+            if (place == Place::two_sided)
                 in.fail("a mask inside of twosided is not supported: put the twosided inside of the mask");
+            if (place == Place::part) in.fail("a mask inside of a blend is not supported");
             if (adapters.has_opacity) in.fail("a mask inside of a mask is not supported");
             adapters.has_opacity = true;
             const Value* opacity = object->find("opacity");
@@ -42,8 +48,17 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
             const bool bump = object->type == "bumpmap";
             const Object* texture = in.take("texture");
             if (!texture) in.fail(object->type + " has no texture");
-            (bump ? adapters.bump_map : adapters.normal_map) = load_texture(builder, *texture);
-            if (bump) adapters.bump_scale = float(in.number("scale", 1));
+            const ScaledTexture scaled = load_scaled_texture(builder, *texture);
+            (bump ? adapters.bump_map : adapters.normal_map) = scaled.texture;
+            if (bump) adapters.bump_scale = float(in.number("scale", 1)) * luminance(scaled.scale);
+            for (const char* name : {"flip_invalid_normals", "use_shadowing_function"})
+                if (in.boolean(name, false))
+                    builder.refuse(in.where(name), std::string("'") + name + "' is not supported", "it is ignored");
+            if (object->version >= 3)
+                builder.note(in.where(),
+                             "bumps and normal maps are those of Mitsuba 3.5 and before, without "
+                             "flip_invalid_normals and use_shadowing_function");
+            if (!bump && !(scaled.scale == splat(1))) in.fail("the texture of a normalmap must not be scaled");
         } else {
             return object;
         }
@@ -52,8 +67,7 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
     }
 }
 
-uint32_t add_record(Builder& builder, const Object& object, const Adapters& adapters, bool two_sided) {
-    BsdfRecord r = read_bsdf(builder, object);
+uint32_t add_record(Builder& builder, BsdfRecord r, const Object& object, const Adapters& adapters, bool two_sided) {
     if (two_sided && bsdf_transmits(r.type))
         Reader(builder, object).fail("a BSDF that transmits light cannot be inside of twosided");
     r.normal_map = adapters.normal_map;
@@ -64,37 +78,175 @@ uint32_t add_record(Builder& builder, const Object& object, const Adapters& adap
     return uint32_t(builder.scene.bsdfs.size() - 1);
 }
 
-}  // namespace
+/// Lets all light pass: a mask of opacity 0, which rays do not see. A shape that emits must be seen: there it is a pane
+/// without a boundary.
+uint32_t null_material(Builder& builder, const Object& object, bool emits) {
+    Reader(builder, object).finish();
+    uint32_t& known = builder.null_materials[emits];
+    if (builder.validate_only || known != kNone) return known;
+    builder.scene.bsdfs.push_back(emits ? clear_pane_record() : diffuse_record(0));
+    const uint32_t record = uint32_t(builder.scene.bsdfs.size() - 1);
+    builder.scene.materials.push_back({record, record, 0, {emits ? 1.0f : 0.0f, -1}});
+    return known = uint32_t(builder.scene.materials.size() - 1);
+}
 
-uint32_t build_material(Builder& builder, const Object& bsdf) {
-    const auto known = builder.materials.find(&bsdf);
-    if (known != builder.materials.end()) return known->second;
-    if (bsdf.tag != "bsdf") Reader(builder, bsdf).fail("expected a bsdf, not a " + bsdf.tag);
+struct MaterialBuilder {
+    Builder& builder;
 
-    Adapters outer;
-    const Object* inner = strip(builder, &bsdf, outer, false);
-    Material material;
-    material.opacity = outer.opacity;
-    material.two_sided = inner->type == "twosided";
-    if (material.two_sided) {
-        Reader in(builder, *inner);
+    uint32_t add(Material material, const Adapters& adapters) {
+        material.opacity = adapters.opacity;
+        if (builder.validate_only) return 0;
+        builder.scene.materials.push_back(material);
+        return uint32_t(builder.scene.materials.size() - 1);
+    }
+
+    /// Material of a BSDF that is inside of `outer`.
+    uint32_t build(const Object& object, Adapters outer, Place place) {
+        const Object& inner = *strip(builder, &object, outer, place);
+        const bool two_sided = place == Place::two_sided;
+        if (inner.type == "twosided") {
+            if (two_sided) Reader(builder, inner).fail("twosided inside of twosided");
+            return build_two_sided(inner, outer);
+        }
+        if (inner.type == "blendbsdf") return build_blend(inner, outer, place);
+        if (inner.type == "mixturebsdf") return build_mixture(inner, outer, place);
+        if (inner.type == "principled") return build_principled(inner, outer, two_sided);
+        const uint32_t record = add_record(builder, read_bsdf(builder, inner), inner, outer, two_sided);
+        return add({record, record, two_sided, {}}, outer);
+    }
+
+    uint32_t build_two_sided(const Object& object, const Adapters& outer) {
+        Reader in(builder, object);
         const Object& first = nested_bsdf(in);
         const Object* second = in.take("bsdf");
         in.finish();
-        const auto side = [&](const Object& object) {
+        if (!second) {
+            const uint32_t index = build(first, outer, Place::two_sided);
+            if (!builder.validate_only) builder.scene.materials[index].opacity = outer.opacity;
+            return index;
+        }
+        const auto side = [&](const Object& side_object) {
             Adapters adapters = outer;
-            const Object* leaf = strip(builder, &object, adapters, true);
+            const Object* leaf = strip(builder, &side_object, adapters, Place::two_sided);
             if (leaf->type == "twosided") Reader(builder, *leaf).fail("twosided inside of twosided");
-            return add_record(builder, *leaf, adapters, true);
+            if (leaf->type == "blendbsdf" || leaf->type == "mixturebsdf")
+                Reader(builder, *leaf).fail("a blend on one side of a twosided with two BSDFs is not supported");
+            return add_record(builder, read_bsdf(builder, *leaf), *leaf, adapters, true);
         };
-        material.front = side(first);
-        material.back = second ? side(*second) : material.front;
-    } else {
-        material.front = material.back = add_record(builder, *inner, outer, false);
+        const uint32_t front = side(first);
+        return add({front, side(*second), 1, {}}, outer);
     }
-    if (builder.validate_only) return 0;
-    builder.scene.materials.push_back(material);
-    return builder.materials[&bsdf] = uint32_t(builder.scene.materials.size() - 1);
+
+    /// Points are of `second` with a chance of `weight`.
+    uint32_t blend(uint32_t first, uint32_t second, ParamFloat weight, const Adapters& outer) {
+        if (builder.validate_only) return 0;
+        const auto& all = builder.scene.materials;
+        const auto transmits = [&](uint32_t m) { return bsdf_transmits(builder.scene.bsdfs[all[m].front].type); };
+        const uint32_t most = all[transmits(first) ? first : second].front;
+        Material material{most, most, 0, {}};
+        material.first = first;
+        material.second = second;
+        material.second_weight = weight;
+        return add(material, outer);
+    }
+
+    static Adapters without_opacity(Adapters adapters) {
+        adapters.opacity = {1, -1};
+        return adapters;
+    }
+    static Place part_of(Place place) { return place == Place::two_sided ? place : Place::part; }
+
+    uint32_t build_blend(const Object& object, const Adapters& outer, Place place) {
+        Reader in(builder, object);
+        const ParamFloat weight = in.textured_number("weight", 0.5f);
+        if (weight.texture < 0 && !(weight.value >= 0 && weight.value <= 1))
+            in.fail(in.where("weight"), "the weight of a blend must lie between 0 and 1");
+        const Object& first = nested_bsdf(in);
+        const Object* second = in.take("bsdf");
+        if (!second) in.fail("blendbsdf needs two nested BSDFs");
+        in.finish();
+        const bool first_null = first.type == "null", second_null = second->type == "null";
+        if (first_null || second_null) {  // a mask
+            if (place != Place::outside || outer.has_opacity || first_null == second_null)
+                in.fail("a blend with null inside of other adapters is not supported");
+            Adapters mask = outer;
+            mask.opacity = first_null ? weight : ParamFloat{1 - weight.value, -1};
+            mask.has_opacity = true;
+            if (second_null && weight.texture >= 0)
+                in.fail("a blend with null as its second BSDF needs a number as its weight");
+            return build(first_null ? *second : first, mask, Place::part);
+        }
+        const uint32_t a = build(first, without_opacity(outer), part_of(place)),
+                       b = build(*second, without_opacity(outer), part_of(place));
+        return blend(a, b, weight, outer);
+    }
+
+    uint32_t build_mixture(const Object& object, const Adapters& outer, Place place) {
+        Reader in(builder, object);
+        const std::string text = in.text("weights", "");
+        const std::vector<double> weights = parse_list(text, in.where("weights"), "weights");
+        std::vector<uint32_t> parts;
+        while (const Object* nested = in.take("bsdf"))
+            parts.push_back(build(*nested, without_opacity(outer), part_of(place)));
+        in.finish();
+        if (parts.empty() || parts.size() != weights.size())
+            in.fail(in.where("weights"), "mixturebsdf has " + std::to_string(parts.size()) + " BSDFs and " +
+                                             std::to_string(weights.size()) + " weights");
+        double sum = 0;
+        for (double w : weights) {
+            if (!(w >= 0)) in.fail(in.where("weights"), "weights must not be negative");
+            sum += w;
+        }
+        if (!(sum > 0 && sum <= 1 + 1e-6))
+            in.fail(in.where("weights"), "the weights must be positive and sum to 1 at most");
+        // From the last one on; what is missing to 1 is black.
+        uint32_t rest = sum < 1 - 1e-6 ? black() : parts.back();
+        double rest_weight = sum < 1 - 1e-6 ? 1 - sum : weights.back();
+        for (size_t i = sum < 1 - 1e-6 ? parts.size() : parts.size() - 1; i-- > 0;) {
+            const double both = rest_weight + weights[i];
+            rest = blend(parts[i], rest, {float(both > 0 ? rest_weight / both : 0), -1},
+                         i == 0 ? outer : without_opacity(outer));
+            rest_weight = both;
+        }
+        return rest;
+    }
+
+    uint32_t black() {
+        if (builder.validate_only) return 0;
+        builder.scene.bsdfs.push_back(diffuse_record(0));
+        const uint32_t record = uint32_t(builder.scene.bsdfs.size() - 1);
+        return add({record, record, 0, {}}, {});
+    }
+
+    uint32_t build_principled(const Object& object, const Adapters& outer, bool two_sided) {
+        Reader in(builder, object);
+        const PrincipledParts parts = read_principled(in);
+        in.finish();
+        if (parts.glass_weight > 0 && two_sided) in.fail("a BSDF that transmits light cannot be inside of twosided");
+        const auto leaf = [&](const BsdfRecord& record, const Adapters& adapters) {
+            const uint32_t index = add_record(builder, record, object, adapters, two_sided);
+            return add({index, index, two_sided, {}}, adapters);
+        };
+        if (parts.glass_weight == 0) return leaf(bsdf_record(parts.opaque), outer);
+        if (parts.glass_weight == 1) return leaf(bsdf_record(parts.glass), outer);
+        return blend(leaf(bsdf_record(parts.opaque), without_opacity(outer)),
+                     leaf(bsdf_record(parts.glass), without_opacity(outer)), {parts.glass_weight, -1}, outer);
+    }
+};
+
+}  // namespace
+
+uint32_t build_material(Builder& builder, const Object& bsdf, bool emits) {
+    if (bsdf.tag == "bsdf" && bsdf.type == "null") return null_material(builder, bsdf, emits);
+    const auto known = builder.materials.find(&bsdf);
+    if (known != builder.materials.end()) return known->second;
+    if (bsdf.tag != "bsdf") Reader(builder, bsdf).fail("expected a bsdf, not a " + bsdf.tag);
+    const uint32_t index = MaterialBuilder{builder}.build(bsdf, {}, Place::outside);
+    return builder.validate_only ? 0 : builder.materials[&bsdf] = index;
+}
+
+uint32_t build_own_material(Builder& builder, const Object& bsdf) {
+    return MaterialBuilder{builder}.build(bsdf, {}, Place::outside);
 }
 
 uint32_t default_material(Builder& builder, bool emitter) {

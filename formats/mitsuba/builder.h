@@ -32,9 +32,13 @@ struct Builder {
     std::vector<Rgb> texture_means;                                  ///< per texture
     std::map<const Object*, uint32_t> materials;
     uint32_t default_materials[2] = {kNone, kNone};  ///< of shapes without and with an emitter
+    uint32_t null_materials[2] = {kNone, kNone};     ///< the same of BSDF null
     std::map<std::string, uint32_t> table_pool;      ///< contents' name -> offset in Scene::tables
     std::map<std::string, float> rough_reflectance_pool;
     std::set<std::string> reported;
+
+    /// Textures of the mesh whose BSDF is being built, by the names of its attributes; null: none.
+    const std::map<std::string, int32_t>* attribute_textures = nullptr;
 
     uint64_t memory = 0;  ///< of meshes and textures
 
@@ -49,6 +53,9 @@ struct Builder {
 
     /// Fails unless all of these are in the range of the tracers (accel/range.h). `what` has them: "the shape".
     void check_range(const Where& where, const std::string& what, std::initializer_list<Vec3d> points) const;
+
+    /// Something we do in our own way, with the image that the file asks for; each text is said once.
+    void note(const Where& where, const std::string& text);
 
     /// Something we cannot do: an error, or with --lenient a warning that says what is done instead.
     void refuse(const Where& where, const std::string& problem, const std::string& instead);
@@ -110,15 +117,29 @@ private:
     std::map<std::string, size_t> next_child_;  ///< by tag: where take() looks on
 };
 
+/// What a texture is read for.
+enum class TextureUse { color, number };
 /// Texture object as index into Scene::textures (0 when only validating).
-int32_t load_texture(Builder& builder, const Object& object);
+int32_t load_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
+/// A texture inside of textures of type `scale`, and their factors.
+struct ScaledTexture {
+    int32_t texture;
+    Rgb scale;
+};
+ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
 /// Image as float texels without flip or decoding table, for environment maps; and the largest of them.
 int32_t load_environment_image(Builder& builder, const std::string& path, float& largest);
+/// The same of RGBA texels that are at hand.
+int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels);
+/// Texture of float texels that bilinear lookups find at texel centres.
+int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels, Rgb mean);
 /// Mean colour of a parameter over its texture.
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter);
 
-/// BSDF object with its adapters as index into Scene::materials.
-uint32_t build_material(Builder& builder, const Object& bsdf);
+/// BSDF object with its adapters as index into Scene::materials. `emits`: for a shape with an emitter.
+uint32_t build_material(Builder& builder, const Object& bsdf, bool emits = false);
+/// The same for one shape alone: with Builder::attribute_textures.
+uint32_t build_own_material(Builder& builder, const Object& bsdf);
 /// Diffuse material for shapes without a BSDF: reflectance 0.5, on emitters 0.
 uint32_t default_material(Builder& builder, bool emitter);
 
@@ -128,6 +149,10 @@ void build_shapes(Builder& builder, const Object& scene);
 void build_emitter(Builder& builder, const Object& object);
 /// An emitter that is part of a shape or not; of type `count` if none of these has that name.
 Emitter read_emitter(Builder& builder, const Object& object, bool on_shape);
+
+/// Emitters sky, sun and sunsky as environment maps. `rotation`: of the emitter.
+bool is_sky(const std::string& type);
+Emitter read_sky(Builder& builder, Reader& in, const Matrix& rotation);
 
 void build_sensor(Builder& builder, const Object& object);
 void build_integrator(Builder& builder, const Object& object);

@@ -12,8 +12,12 @@ namespace {
 
 /// Weights that only steer another renderer's sampling: ours has its own rule.
 void check_sampling_weight(Builder& builder, Reader& in) {
-    if (in.number("sampling_weight", 1) != 1)
-        builder.refuse(in.where("sampling_weight"), "sampling weights of emitters are not supported", "it is ignored");
+    const double weight = in.number("sampling_weight", 1);
+    if (weight == 0)
+        builder.refuse(in.where("sampling_weight"), "an emitter with a sampling weight of 0 is not supported",
+                       "it is sampled");
+    else if (weight != 1)
+        builder.note(in.where("sampling_weight"), "sampling weights of emitters are left to --light-picking");
 }
 
 Vec3f to_vec3f(Vec3d v) { return {float(v.x), float(v.y), float(v.z)}; }
@@ -92,7 +96,7 @@ void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter&
     const std::string path = builder.document.resolve(name, in.where("filename"));
     const double scale = in.number("scale", 1);
     if (!(scale >= 0)) in.fail(in.where("scale"), "scale must not be negative");
-    in.ignore({"cache"});
+    in.ignore({"cache", "mis_compensation"});
     float largest = 0;
     e.radiance = {splat(float(scale)), load_environment_image(builder, path, largest)};
     const double most = std::numeric_limits<float>::max();
@@ -110,6 +114,13 @@ Emitter read_emitter(Builder& builder, const Object& object, bool on_shape) {
     e.type = EmitterType::count;
     e.shape = e.area_cdf = kNone;
     e.to_world = e.to_local = to_affine(Matrix{});
+    if (!on_shape && is_sky(object.type)) {
+        Reader in(builder, object);
+        e = read_sky(builder, in, without_place(rigid_transform(builder, in)));
+        check_sampling_weight(builder, in);
+        in.finish();
+        return e;
+    }
     EmitterModels::for_each([&](auto model) {
         using Model = typename decltype(model)::type;
         if (object.type != Model::plugin || Model::surface != on_shape) return;
@@ -130,7 +141,7 @@ void build_emitter(Builder& builder, const Object& object) {
     }
     if (is_environment(e.type)) {
         if (builder.scene.environment != kNone)
-            Reader(builder, object).fail("only one constant or envmap emitter is possible");
+            Reader(builder, object).fail("only one constant, envmap or sky emitter is possible");
         builder.scene.environment = uint32_t(builder.scene.emitters.size());
     }
     builder.scene.emitters.push_back(e);

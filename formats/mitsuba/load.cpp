@@ -53,9 +53,10 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     if (!sensor) throw input_error(path, 0, "the scene has no sensor");
     build_sensor(builder, *sensor);
     if (integrator) build_integrator(builder, *integrator);
-    while (root.take("bsdf")) {}
-    while (root.take("texture")) {}
-    while (root.take("shape")) {}
+    if (const Object* other = root.take("sensor")) builder.note(other->where, "the first of several sensors is used");
+    // What others refer to, used or not.
+    for (const char* tag : {"sensor", "bsdf", "texture", "shape", "film", "sampler", "rfilter"})
+        while (root.take(tag)) {}
     while (const Object* emitter = root.take("emitter")) build_emitter(builder, *emitter);
     root.finish();
     build_shapes(builder, *document.scene);

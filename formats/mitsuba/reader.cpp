@@ -18,6 +18,11 @@ void Builder::refuse(const Where& where, const std::string& problem, const std::
     if (reported.insert(message).second) scene.warnings.push_back(message);
 }
 
+void Builder::note(const Where& where, const std::string& text) {
+    if (reported.insert(text).second)
+        scene.notes.push_back(where.file + ":" + std::to_string(where.line) + ": " + text);
+}
+
 void Builder::take_memory(uint64_t bytes, const std::string& path) {
     memory += std::min(bytes, UINT64_MAX - memory);
     if (memory > options.limits.total_bytes)
@@ -145,7 +150,8 @@ ParamRgb Reader::textured_color(const std::string& name, Rgb fallback, SpectrumU
     if (const Object* texture = take_named(name)) {
         if (texture->tag != "texture")
             fail(where(name), "'" + name + "' must be a colour or a texture, not a " + texture->tag);
-        return {{1, 1, 1}, load_texture(builder_, *texture)};
+        const ScaledTexture scaled = load_scaled_texture(builder_, *texture);
+        return {scaled.scale, scaled.texture};
     }
     return {color(name, fallback, use), -1};
 }
@@ -154,7 +160,10 @@ ParamFloat Reader::textured_number(const std::string& name, float fallback) {
     if (const Object* texture = take_named(name)) {
         if (texture->tag != "texture")
             fail(where(name), "'" + name + "' must be a number or a texture, not a " + texture->tag);
-        return {1, load_texture(builder_, *texture)};
+        const ScaledTexture scaled = load_scaled_texture(builder_, *texture, TextureUse::number);
+        if (scaled.scale.x != scaled.scale.y || scaled.scale.x != scaled.scale.z)
+            fail(texture->where, "a number cannot come from a texture that is scaled by a colour");
+        return {scaled.scale.x, scaled.texture};
     }
     const float value = float(number(name, fallback));
     if (!std::isfinite(value)) fail(where(name), "'" + name + "' is too large for a float");

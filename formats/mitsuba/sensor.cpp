@@ -79,6 +79,12 @@ void read_filter(Builder& builder, Reader& film, Sensor& sensor) {
         sensor.filter_radius = float(in.number("radius", 1));
     } else if (object->type == "gaussian") {
         sensor.filter_radius = float(4 * in.number("stddev", 0.5));
+    } else if (object->type == "mitchell" || object->type == "catmullrom" || object->type == "lanczos") {
+        // Filters are sampled, which needs them to be nowhere negative.
+        builder.note(object->where, "reconstruction filter '" + object->type +
+                                        "' has negative lobes; a gaussian with a standard deviation of 0.5 is used");
+        in.ignore({"b", "c", "a", "lobes"});
+        return in.finish();
     } else {
         builder.refuse(object->where, "reconstruction filter '" + object->type + "' is not supported",
                        "gaussian is used");
@@ -105,7 +111,10 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
     }();
     Reader in(builder, object ? *object : default_film);
     const std::string& type = in.object().type;
-    if (type != "hdrfilm") builder.refuse(in.where(), "film type '" + type + "' is not supported", "hdrfilm is used");
+    const bool known = type == "hdrfilm" || type == "tiledhdrfilm" || type == "ldrfilm" || type == "mfilm";
+    if (!known) builder.refuse(in.where(), "film type '" + type + "' is not supported", "hdrfilm is used");
+    if (known && type != "hdrfilm")
+        builder.note(in.where(), "a film of type '" + type + "' gets linear values, as hdrfilm does");
     sensor.film_width = size_parameter(in, "width", 768, 1);
     sensor.film_height = size_parameter(in, "height", 576, 1);
     sensor.crop_x = size_parameter(in, "crop_offset_x", 0, 0);
@@ -120,10 +129,29 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
                                                sensor.crop_width, sensor.crop_height, kMostPixels));
     read_filter(builder, in, sensor);
     // How files are written and shown; our images are linear and complete.
-    in.ignore({"gamma", "banner", "file_format", "pixel_format", "component_format", "attach_log", "compensate",
-               "high_quality_edges", "sample_border", "exposure", "key", "burn", "tonemap_method", "label", "digits",
-               "variable"});
-    if (type == "hdrfilm" || !builder.options.lenient) in.finish();
+    in.ignore({"gamma",
+               "banner",
+               "file_format",
+               "pixel_format",
+               "component_format",
+               "attach_log",
+               "compensate",
+               "high_quality_edges",
+               "sample_border",
+               "exposure",
+               "key",
+               "burn",
+               "tonemap_method",
+               "label",
+               "digits",
+               "variable",
+               "tonemap",
+               "fps",
+               "cache",
+               "reinhard_key",
+               "mode",
+               "filename"});
+    if (known || !builder.options.lenient) in.finish();
 
     const uint32_t w = builder.options.width ? builder.options.width : sensor.film_width;
     const uint32_t h = builder.options.height ? builder.options.height : sensor.film_height;
@@ -147,12 +175,12 @@ void read_sampler(Builder& builder, const Object* object) {
                                                 "ldsampler",   "halton",     "hammersley",  "sobol"};
     // Every sampler has the same expected image; ours is independent.
     if (!known.count(object->type))
-        builder.refuse(object->where, "sampler type '" + object->type + "' is not supported", "independent is used");
+        builder.note(object->where, "sampler type '" + object->type + "' is not known; samples are independent");
     const int64_t spp = in.integer("sample_count", 4);
     if (spp < 1 || spp > 1000000000) in.fail(in.where("sample_count"), "sample_count must be positive");
     builder.scene.integrator.spp = int(spp);
     in.ignore({"seed", "scramble", "jitter", "dimension", "strength"});
-    in.finish();
+    if (known.count(object->type)) in.finish();
 }
 
 /// Fails unless all rays of a perspective sensor can be traced.
@@ -241,42 +269,6 @@ void build_sensor(Builder& builder, const Object& object) {
     // Nothing moves, so that the shutter has no effect.
     in.ignore({"shutter_open", "shutter_close"});
     if (known || !builder.options.lenient) in.finish();
-}
-
-void build_integrator(Builder& builder, const Object& object) {
-    Reader in(builder, object);
-    IntegratorHint& hint = builder.scene.integrator;
-    const std::string& type = object.type;
-    if (type == "moment") {  // adds second moments to what is inside
-        const Object* nested = in.take("integrator");
-        if (!nested) in.fail("moment has no nested integrator");
-        in.finish();
-        build_integrator(builder, *nested);
-        return;
-    }
-    if (type == "direct") {
-        hint.type = "path";
-        hint.max_depth = 2;
-        in.ignore({"shading_samples", "emitter_samples", "bsdf_samples", "luminaire_samples"});
-    } else if (type == "path" || type == "ptracer" || type == "bdpt") {
-        hint.type = type == "ptracer" ? "light" : type;
-        hint.max_depth = int(std::clamp<int64_t>(in.integer("max_depth", -1), -2, 1 << 30));
-        hint.rr_depth = int(std::clamp<int64_t>(in.integer("rr_depth", 5), 0, 1 << 30));
-        if (hint.max_depth < -1) in.fail(in.where("max_depth"), "max_depth must be -1 or larger");
-        if (hint.max_depth >= int(kMaxDepth))
-            in.fail(in.where("max_depth"),
-                    fmt::format("max_depth may be {} at most, or -1 for no limit", kMaxDepth - 1));
-        if (type != "path") in.ignore({"light_image", "sample_direct", "samples_per_pass"});
-    } else {
-        builder.refuse(object.where, "integrator type '" + type + "' is not supported", "path is used");
-        hint.type = "path";
-        return;
-    }
-    hint.hide_emitters = in.boolean("hide_emitters", false);
-    if (in.boolean("strict_normals", false))
-        builder.refuse(in.where("strict_normals"), "strict_normals is not supported", "it is ignored");
-    in.ignore({"samples_per_pass", "block_size", "timeout"});
-    in.finish();
 }
 
 }  // namespace ambilux::mitsuba

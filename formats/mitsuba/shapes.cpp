@@ -1,41 +1,16 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
-#include "accel/range.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
 #include "formats/mitsuba/builder.h"
+#include "formats/mitsuba/shape_jobs.h"
 
 namespace ambilux::mitsuba {
 
 namespace {
-
-/// A mesh file read with certain settings; shared by all shapes that name it.
-struct MeshSource {
-    std::string path, type;
-    bool flip_v = false;
-    int shape_index = 0;
-    Mesh mesh;
-    Sha256Digest digest{};
-};
-
-/// A shape on its way into the scene.
-struct Job {
-    Where where;
-    std::string type;
-    Matrix to_world;
-    uint32_t material = 0, emitter = kNone;
-    int source = -1;  ///< meshes: index into the sources
-    bool flip = false, face_normals = false;
-    // Result for meshes.
-    Mesh world;
-    uint32_t dropped = 0;
-    bool vanished = false;  ///< had area before its transform, and none of it is left
-};
 
 struct ShapeBuilder {
     Builder& builder;
@@ -54,6 +29,7 @@ struct ShapeBuilder {
     void read_geometry(Reader& in, Job& job);
     void read_mesh_file(Reader& in, Job& job);
     uint32_t add_emitter(const Object& object);
+    uint32_t material_of_attributes(Job& job, const Object& bsdf);
 };
 
 bool is_quadric(const std::string& type) { return type == "sphere" || type == "disk" || type == "cylinder"; }
@@ -94,6 +70,11 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
         add_instance(object, outer);
         return;
     }
+    if (object.type == "merge") {  // one mesh of those inside, which looks the same
+        while (const Object* shape = in.take("shape")) add_shape(*shape, outer, in_instance, in_group);
+        in.finish();
+        return;
+    }
     const std::string& type = object.type;
     if (!is_quadric(type) && !is_mesh_file(type) && type != "rectangle" && type != "cube") {
         builder.refuse(object.where, "shape type '" + type + "' is not supported", "the shape is left out");
@@ -107,18 +88,41 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     if (!(std::fabs(determinant(job.to_world)) > 0))
         in.fail(in.where("to_world"), "the transform of the shape is singular");
     job.flip = in.boolean("flip_normals", false);
-    read_geometry(in, job);
     const Object* bsdf = in.take("bsdf");
+    const bool attributes = bsdf && has_mesh_attributes(*bsdf);
+    if (attributes && type != "ply") in.fail("mesh attributes are read from ply files only");
+    read_geometry(in, job);
     const Object* emitter = in.take("emitter");
     if (emitter && in_instance)
         builder.refuse(emitter->where, "an emitter inside of a shapegroup is not supported", "the shape does not emit");
     else if (emitter)
         job.emitter = add_emitter(*emitter);
-    job.material = bsdf ? build_material(builder, *bsdf) : default_material(builder, emitter != nullptr);
+    if (attributes)
+        job.material = material_of_attributes(job, *bsdf);
+    else
+        job.material =
+            bsdf ? build_material(builder, *bsdf, emitter != nullptr) : default_material(builder, emitter != nullptr);
+    in.ignore({"silhouette_sampling_weight", "shutter_open", "shutter_close"});
     in.finish();
     if (jobs.size() >= builder.options.limits.shapes)
         in.fail("the scene has more shapes than --limits shapes=" + std::to_string(builder.options.limits.shapes));
     jobs.push_back(std::move(job));
+}
+
+/// Reads the mesh now, and gives the shape a copy of it that its textures are made for.
+uint32_t ShapeBuilder::material_of_attributes(Job& job, const Object& bsdf) {
+    MeshSource source = sources[size_t(job.source)];
+    const std::string bytes = read_input(source.path, builder.options.limits);
+    builder.file_digests.push_back({source.path, sha256(bytes)});
+    const Mesh mesh = read_ply(source.path, bytes, source.flip_v, builder.options.limits, true);
+    std::map<std::string, int32_t> textures;
+    source.mesh = with_attribute_atlas(builder, source.path, mesh, textures);
+    source.path.clear();
+    job.source = add_source(std::move(source), "attributes " + std::to_string(jobs.size()));
+    builder.attribute_textures = &textures;
+    const uint32_t material = build_own_material(builder, bsdf);
+    builder.attribute_textures = nullptr;
+    return material;
 }
 
 void ShapeBuilder::read_geometry(Reader& in, Job& job) {
@@ -145,8 +149,11 @@ void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
     if (job.type == "serialized")
         source.shape_index = int(std::clamp<int64_t>(in.integer("shape_index", 0), -1, 1 << 30));
     job.face_normals = in.boolean("face_normals", false);
+    job.smooth_angle = in.number("max_smooth_angle", -1);
+    if (in.has("max_smooth_angle") && !(job.smooth_angle >= 0 && job.smooth_angle <= 180))
+        in.fail(in.where("max_smooth_angle"), "max_smooth_angle must lie between 0 and 180 degrees");
     if (job.type == "obj")
-        in.ignore({"collapse"});  // older generation: one shape per group or one for all, which looks the same
+        in.ignore({"collapse", "load_materials"});  // older generation: one shape per group or for all looks the same
     const std::string key =
         source.path + "|" + std::to_string(source.flip_v) + "|" + std::to_string(source.shape_index);
     job.source = add_source(std::move(source), key);
@@ -172,119 +179,6 @@ void ShapeBuilder::add_instance(const Object& object, const Matrix& outer) {
     Reader group_in(builder, *group);
     while (const Object* shape = group_in.take("shape")) add_shape(*shape, to_world, true, true);
     group_in.finish();
-}
-
-/// Image of a point, rounded once.
-Vec3f point_of(const Matrix& a, Vec3f p) {
-    const auto row = [&](int i) { return float(a.m[i][0] * p.x + a.m[i][1] * p.y + a.m[i][2] * p.z + a.m[i][3]); };
-    return {row(0), row(1), row(2)};
-}
-
-/// Twice the area of a triangle along its normal; in double, since the area of a small triangle may be no float.
-Vec3d area_normal(Vec3f a, Vec3f b, Vec3f c) {
-    const auto from_a = [a](Vec3f p) { return Vec3d{double(p.x) - a.x, double(p.y) - a.y, double(p.z) - a.z}; };
-    return cross(from_a(b), from_a(c));
-}
-
-/// Moves a mesh to world space, orients it and leaves out triangles without area.
-void transform_mesh(const Builder& builder, Job& job, const Mesh& mesh) {
-    const Affine to_local = to_affine(affine_inverse(job.to_world));
-    Mesh& out = job.world;
-    out.positions.reserve(mesh.positions.size());
-    for (Vec3f p : mesh.positions) {
-        const Vec3f q = point_of(job.to_world, p);
-        out.positions.push_back(q);
-        if (!(max_component(abs(q)) <= kMostCoordinate) || !is_finite(q))
-            builder.check_range(job.where, "the shape of type '" + job.type + "'", {{q.x, q.y, q.z}});
-    }
-    out.uvs = mesh.uvs;
-    // A reflection would turn the outside in: reverse the winding.
-    const bool reverse = (determinant(job.to_world) < 0) != job.flip;
-    out.faces = mesh.faces;
-    if (reverse)
-        for (auto& face : out.faces) std::swap(face[1], face[2]);
-
-    const auto normal_of = [&](const std::array<uint32_t, 3>& f) {
-        return area_normal(out.positions[f[0]], out.positions[f[1]], out.positions[f[2]]);
-    };
-    const size_t all = out.faces.size();
-    std::erase_if(out.faces, [&](const auto& f) {
-        const double area = length(normal_of(f));
-        return !(area > 0 && std::isfinite(area));
-    });
-    job.dropped = uint32_t(all - out.faces.size());
-    job.vanished = out.faces.empty() && std::any_of(mesh.faces.begin(), mesh.faces.end(), [&](const auto& f) {
-                       return length(area_normal(mesh.positions[f[0]], mesh.positions[f[1]], mesh.positions[f[2]])) > 0;
-                   });
-
-    if (job.face_normals) return;
-    if (mesh.normals.empty()) {
-        out.normals = smooth_normals(out);
-    } else {
-        const float sign = job.flip ? -1.0f : 1.0f;
-        for (Vec3f n : mesh.normals) {
-            const Vec3f w = to_local.transposed_vector(n) * sign;
-            // Scaled by its largest entry first, because tiny or huge transforms leave the range of a square.
-            const float largest = max_component(abs(w));
-            out.normals.push_back(largest > 0 && largest < kInfinity ? normalize(w * (1.0f / largest))
-                                                                     : Vec3f{0, 0, 0});
-        }
-    }
-    for (auto& f : out.faces) {
-        const Vec3d n = normal_of(f);
-        const double area = length(n);
-        const Vec3f ng = {float(n.x / area), float(n.y / area), float(n.z / area)};
-        Vec3f sum = {0, 0, 0};
-        for (uint32_t v : f) {
-            if (is_zero(out.normals[v])) out.normals[v] = ng;  // the file gives none here
-            sum += out.normals[v];
-        }
-        // The geometric normal lies on the side of the vertex normals (B12).
-        if (dot(ng, sum) < 0) std::swap(f[1], f[2]);
-    }
-}
-
-Quadric make_quadric(Builder& builder, const Job& job) {
-    Quadric q{};
-    q.type = job.type == "sphere" ? PrimitiveType::sphere
-                                  : (job.type == "disk" ? PrimitiveType::disk : PrimitiveType::cylinder);
-    q.flip = job.flip;
-    Matrix m = job.to_world;
-    const Vec3d x = column(m, 0), y = column(m, 1), z = column(m, 2);
-    const double lx = length(x), ly = length(y), lz = length(z);
-    if (q.type == PrimitiveType::disk) {
-        // Any affine map of a disk is fine: an ellipse. The radius bounds it.
-        q.radius = float(std::sqrt(lx * lx + ly * ly));
-        if (is_orthogonal(m, 1e-6)) q.radius = float(std::max(lx, ly));
-    } else {
-        const double radius = q.type == PrimitiveType::sphere ? (lx + ly + lz) / 3 : (lx + ly) / 2;
-        const bool uniform = is_orthogonal(m, 1e-3) && std::fabs(lx - radius) < 1e-3 * radius &&
-                             std::fabs(ly - radius) < 1e-3 * radius &&
-                             (q.type == PrimitiveType::cylinder || std::fabs(lz - radius) < 1e-3 * radius);
-        if (!uniform)
-            builder.refuse(job.where, "a " + job.type + " with shear or non-uniform scale is not supported",
-                           "the mean scale is used");
-        // Make the axes exactly orthogonal and the scale exactly uniform, so that every formula sees the same shape.
-        bool ignored = false;
-        Matrix unit = m;
-        const double lengths[3] = {lx, ly, lz};
-        for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) unit.m[i][j] /= lengths[j];
-        m = rigid_part(unit, ignored) * scaling(radius, radius, q.type == PrimitiveType::sphere ? radius : lz);
-        q.radius = float(radius);
-    }
-    const Vec3d c = column(m, 3), top = column(m, 2);
-    const double reach = q.type == PrimitiveType::cylinder ? q.radius + length(top) : double(q.radius);
-    builder.check_range(job.where, "the shape of type '" + job.type + "'",
-                        {{c.x - reach, c.y - reach, c.z - reach}, {c.x + reach, c.y + reach, c.z + reach}});
-    const double least = std::min({lx, ly, q.type == PrimitiveType::disk ? lx : lz});
-    if (!(least >= double(kLeastExtent)))
-        throw input_error(
-            job.where.file, job.where.line,
-            fmt::format("the shape of type '{}' is {:g} wide, less than {:g}", job.type, least, kLeastExtent));
-    q.to_world = to_affine(m);
-    q.to_local = to_affine(affine_inverse(m));
-    return q;
 }
 
 uint64_t memory_of(const Mesh& mesh) { return mesh_bytes(mesh.positions.size(), mesh.faces.size()); }
@@ -357,7 +251,8 @@ void build_shapes(Builder& builder, const Object& root) {
     for (const Job& job : shapes.jobs)
         if (job.source >= 0) {
             const Mesh& mesh = shapes.sources[size_t(job.source)].mesh;
-            builder.take_memory(2 * memory_of(mesh), job.where.file + ":" + std::to_string(job.where.line));
+            const uint64_t split = job.smooth_angle >= 0 ? mesh_bytes(3 * mesh.faces.size(), mesh.faces.size()) : 0;
+            builder.take_memory(2 * (memory_of(mesh) + split), job.where.file + ":" + std::to_string(job.where.line));
         }
     parallel_for(shapes.jobs.size(), [&](size_t i) {
         Job& job = shapes.jobs[i];

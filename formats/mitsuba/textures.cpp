@@ -49,17 +49,41 @@ bool fits_half(const std::vector<float>& texels) {
     return true;
 }
 
+/// Appends RGBA texels, as halves where that is allowed and loses nothing.
+uint64_t append_floats(Scene& scene, const std::vector<float>& texels, bool allow_half, TexelFormat& format) {
+    if (!allow_half || !fits_half(texels)) {
+        format = TexelFormat::rgba32f;
+        return append_texels(scene, texels.data(), texels.size() * sizeof(float));
+    }
+    format = TexelFormat::rgba16f;
+    std::vector<uint16_t> halves(texels.size());
+    for (size_t i = 0; i < texels.size(); ++i) halves[i] = uint16_t(float_to_half(i % 4 == 3 ? 1.0f : texels[i]));
+    return append_texels(scene, halves.data(), halves.size() * sizeof halves[0]);
+}
+
+/// Makes all colours equal to one channel.
+void spread_channel(Texels& image, size_t channel) {
+    const auto spread = [&](auto& texels) {
+        for (size_t i = 0; i + 3 < texels.size(); i += 4)
+            for (size_t c = 0; c < 3; ++c) texels[i + c] = texels[i + channel];
+    };
+    spread(image.bytes), spread(image.floats);
+}
+
 /// Puts the image's texels into the scene, once per file and decoding. `gamma` 0 takes what the file format implies;
 /// `as_float` stores floats (environment maps), as halves where nothing is lost by that; alpha, which no one reads
 /// there, is 1 then.
-LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float) {
-    const std::string key = path + "|" + std::to_string(gamma) + (as_float ? "|float" : "");
+/// `channel` 0 to 3 puts that one of red, green, blue and alpha into all colours; alpha is linear.
+LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, int channel = -1) {
+    const std::string key = path + "|" + std::to_string(gamma) + (as_float ? "|float" : "") + std::to_string(channel);
     const auto known = builder.images.find(key);
     if (known != builder.images.end()) return known->second;
 
     const std::string bytes = read_input(path, builder.options.limits);
     builder.file_digests.push_back({path, sha256(bytes)});
-    const Texels image = read_image(path, bytes, builder.options.limits);
+    Texels image = read_image(path, bytes, builder.options.limits);
+    if (channel >= 0) spread_channel(image, size_t(channel));
+    if (channel == 3) gamma = 1;
     const double used_gamma = gamma != 0 ? gamma : (image.is_linear ? 1 : -1);
     LoadedImage out;
     out.width = image.width;
@@ -70,14 +94,13 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
     if (image.is_8bit && !as_float) {
         out.format = TexelFormat::rgba8;
         out.decode_table = decode_table(builder, used_gamma);
-        const auto [it, added] = builder.texel_pool.try_emplace(path, 0);
+        const auto [it, added] = builder.texel_pool.try_emplace(path + "|" + std::to_string(channel), 0);
         if (added) it->second = append_texels(builder.scene, image.bytes.data(), image.bytes.size());
         out.offset = it->second;
         const float* table = builder.scene.tables.data() + out.decode_table;
         for (size_t i = 0; i < count; ++i)
             for (int c = 0; c < 3; ++c) mean[c] += table[image.bytes[4 * i + c]];
     } else {
-        out.format = TexelFormat::rgba32f;
         std::vector<float> texels(count * 4);
         for (size_t i = 0; i < texels.size(); ++i) {
             const float stored = image.is_8bit ? float(image.bytes[i]) / 255.0f : image.floats[i];
@@ -88,15 +111,7 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
                                       std::to_string(i / 4 / image.width) + ") is not finite");
             if (i % 4 < 3) mean[i % 4] += texels[i], out.largest = std::max(out.largest, texels[i]);
         }
-        if (as_float && fits_half(texels)) {
-            out.format = TexelFormat::rgba16f;
-            std::vector<uint16_t> halves(texels.size());
-            for (size_t i = 0; i < texels.size(); ++i)
-                halves[i] = uint16_t(float_to_half(i % 4 == 3 ? 1.0f : texels[i]));
-            out.offset = append_texels(builder.scene, halves.data(), halves.size() * sizeof halves[0]);
-        } else {
-            out.offset = append_texels(builder.scene, texels.data(), texels.size() * sizeof(float));
-        }
+        out.offset = append_floats(builder.scene, texels, as_float, out.format);
     }
     out.mean = {float(mean[0] / double(count)), float(mean[1] / double(count)), float(mean[2] / double(count))};
     builder.images[key] = out;
@@ -151,9 +166,65 @@ int32_t add_texture(Builder& builder, const Texture& texture, Rgb mean) {
     return it->second;
 }
 
+/// Value of a rawconstant: a number or three of them, which need be no colour.
+Rgb raw_value(Reader& in) {
+    const Value* value = in.object().find("value");
+    if (!value) in.fail("rawconstant has no value");
+    if (value->kind != ValueKind::vector) return in.color("value", {}, SpectrumUse::unbounded);
+    const Vec3d v = in.vector("value", {});
+    return {float(v.x), float(v.y), float(v.z)};
+}
+
+/// Grid of lines on a ground: a bitmap of one period, as fine as the lines need.
+void read_grid(Builder& builder, Reader& in, Texture& texture, Rgb& mean) {
+    constexpr uint32_t kMost = 1024;
+    const Rgb ground = in.color("color0", splat(0.2f), SpectrumUse::reflectance),
+              line = in.color("color1", splat(0.4f), SpectrumUse::reflectance);
+    const double width = in.number("line_width", 0.01);
+    if (!(width > 0 && width < 0.5)) in.fail(in.where("line_width"), "line_width must lie between 0 and 0.5");
+    read_to_uv(in, texture.to_uv);
+    if (builder.validate_only) return;
+    // The first number of texels of which whole ones are as wide as a line, or the best one.
+    uint32_t n = 2;
+    for (uint32_t k = 2; k <= kMost; ++k) {
+        const auto error = [&](uint32_t m) { return std::fabs(width - std::max(std::round(width * m), 1.0) / m); };
+        if (error(k) < 0.999 * error(n) && error(n) > 1e-9) n = k;
+    }
+    const uint32_t lines = uint32_t(std::max(std::round(width * n), 1.0));
+    std::vector<float> texels;
+    const auto is_line = [&](uint32_t i) { return i < lines || i >= n - lines; };
+    for (uint32_t y = 0; y < n; ++y)
+        for (uint32_t x = 0; x < n; ++x) {
+            const Rgb c = is_line(x) || is_line(y) ? line : ground;
+            mean += c * (1.0f / (float(n) * float(n)));
+            texels.insert(texels.end(), {c.x, c.y, c.z, 1.0f});
+        }
+    builder.take_memory(texels.size() * sizeof(float), in.where().file);
+    texture.type = TextureType::bitmap;
+    texture.format = TexelFormat::rgba32f;
+    texture.wrap = WrapMode::repeat;
+    texture.filter = TextureFilter::nearest;
+    texture.width = texture.height = n;
+    texture.offset = append_texels(builder.scene, texels.data(), texels.size() * sizeof(float));
+}
+
 }  // namespace
 
-int32_t load_texture(Builder& builder, const Object& object) {
+ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use) {
+    Rgb scale = splat(1);
+    const Object* inner = &object;
+    while (inner->type == "scale") {
+        Reader in(builder, *inner);
+        scale = scale * in.color("scale", splat(1), SpectrumUse::unbounded);
+        const Object* nested = in.take("texture");
+        if (!nested) in.fail("a texture of type 'scale' has no nested texture");
+        in.finish();
+        inner = nested;
+    }
+    return {load_texture(builder, *inner, use), scale};
+}
+
+int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
     Reader in(builder, object);
     Texture texture;
     memset(&texture, 0, sizeof texture);  // padding too, because the record is its own key
@@ -168,13 +239,17 @@ int32_t load_texture(Builder& builder, const Object& object) {
         if (raw) gamma = 1;
         if (!(gamma >= 0 && gamma <= 100) && gamma != -1)
             in.fail(in.where("gamma"), "gamma must lie between 0 and 100, or be -1 for sRGB");
+        const std::string channel = in.text("channel", "");
+        if (channel.size() > 1 || std::string("rgba").find(channel) == std::string::npos)
+            in.fail(in.where("channel"), "'" + channel + "' is no channel: r, g, b or a");
         texture.wrap = wrap_mode(builder, in);
         texture.filter = texture_filter(builder, in);
         read_to_uv(in, texture.to_uv);
         in.ignore({"format", "accel", "max_anisotropy", "cache"});  // storage and prefiltering of other renderers
         in.finish();
         if (builder.validate_only) return 0;
-        const LoadedImage image = load_image(builder, path, gamma, false);
+        const LoadedImage image =
+            load_image(builder, path, gamma, false, channel.empty() ? -1 : int(std::string("rgba").find(channel)));
         texture.format = image.format;
         texture.width = image.width;
         texture.height = image.height;
@@ -188,7 +263,28 @@ int32_t load_texture(Builder& builder, const Object& object) {
         read_to_uv(in, texture.to_uv);
         in.finish();
         if (builder.validate_only) return 0;
+        if (use == TextureUse::number && object.version >= 3) {
+            std::swap(texture.color0, texture.color1);
+            builder.note(object.where, "a checkerboard of numbers has its colours exchanged, as in Mitsuba 3");
+        }
         mean = (texture.color0 + texture.color1) * 0.5f;
+    } else if (object.type == "rawconstant") {
+        texture.type = TextureType::checkerboard;
+        texture.color0 = texture.color1 = mean = raw_value(in);
+        in.finish();
+        if (builder.validate_only) return 0;
+    } else if (object.type == "mesh_attribute" || object.type == "vertexcolors") {
+        const std::string name = object.type == "vertexcolors" ? "vertex_color" : in.text("name", "");
+        if (in.number("scale", 1) != 1) in.fail(in.where("scale"), "a scale of mesh_attribute is not supported");
+        in.finish();
+        if (builder.validate_only) return 0;
+        const auto* known = builder.attribute_textures;
+        if (!known || !known->count(name)) in.fail("the shape has no attribute '" + name + "'");
+        return known->at(name);
+    } else if (object.type == "gridtexture") {
+        read_grid(builder, in, texture, mean);
+        in.finish();
+        if (builder.validate_only) return 0;
     } else {
         builder.refuse(object.where, "texture type '" + object.type + "' is not supported", "a grey of 0.5 is used");
         if (builder.validate_only) return 0;
@@ -198,9 +294,9 @@ int32_t load_texture(Builder& builder, const Object& object) {
     return add_texture(builder, texture, mean);
 }
 
-int32_t load_environment_image(Builder& builder, const std::string& path, float& largest) {
-    const LoadedImage image = load_image(builder, path, 0, true);
-    largest = image.largest;
+namespace {
+
+int32_t add_plain_texture(Builder& builder, const LoadedImage& image) {
     Texture texture;
     memset(&texture, 0, sizeof texture);
     texture.type = TextureType::bitmap;
@@ -212,6 +308,31 @@ int32_t load_environment_image(Builder& builder, const std::string& path, float&
     texture.offset = image.offset;
     texture.to_uv[0][0] = texture.to_uv[1][1] = 1;
     return add_texture(builder, texture, image.mean);
+}
+
+}  // namespace
+
+int32_t load_environment_image(Builder& builder, const std::string& path, float& largest) {
+    const LoadedImage image = load_image(builder, path, 0, true);
+    largest = image.largest;
+    return add_plain_texture(builder, image);
+}
+
+int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels, Rgb mean) {
+    LoadedImage image;
+    image.width = width;
+    image.height = height;
+    image.mean = mean;
+    image.offset = append_floats(builder.scene, texels, false, image.format);
+    return add_plain_texture(builder, image);
+}
+
+int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels) {
+    LoadedImage image;
+    image.width = width;
+    image.height = height;
+    image.offset = append_floats(builder.scene, texels, true, image.format);
+    return add_plain_texture(builder, image);
 }
 
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter) {

@@ -66,7 +66,9 @@ struct Parser {
         for (const pugi::xml_node& child : node.children()) {
             if (child.type() != pugi::node_element) continue;
             std::string tag = child.name();
-            if (tag == "lookAt") tag = "lookat";
+            // Names of format 0.3.
+            if (tag == "luminaire") tag = "emitter";
+            if (tag == "camera") tag = "sensor";
             const Where at = where(source, child);
             if (ValueParser::is_value_tag(tag)) {
                 Value value = values.parse_value(source, child, tag);

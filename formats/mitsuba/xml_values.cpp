@@ -27,6 +27,25 @@ std::string lower_case(std::string text) {
     return text;
 }
 
+/// Up vector of a <lookat> without one: the second tangent of Duff et al. 2017 about the view direction, as Mitsuba 3.
+Vec3d any_up(Vec3d d) {
+    const double l = length(d), x = d.x / l, y = d.y / l, z = d.z / l;
+    const double sign = std::copysign(1.0, z), a = -1 / (sign + z);
+    return {1 + sign * x * x * a, sign * x * y * a, -sign * x};
+}
+
+float srgb_to_linear(double v) { return float(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4)); }
+
+}  // namespace
+
+Where where(const XmlSource& source, ptrdiff_t offset) {
+    const auto it = std::lower_bound(source.line_ends.begin(), source.line_ends.end(), offset);
+    return {source.path, int(it - source.line_ends.begin()) + 1};
+}
+Where where(const XmlSource& source, const pugi::xml_node& node) { return where(source, node.offset_debug()); }
+
+void fail(const Where& where, const std::string& message) { throw input_error(where.file, where.line, message); }
+
 double parse_number(const std::string& text, const Where& where, const std::string& what) {
     TextCursor cursor(text);
     cursor.skip_space();
@@ -37,7 +56,6 @@ double parse_number(const std::string& text, const Where& where, const std::stri
     return value;
 }
 
-/// Numbers separated by commas or blanks.
 std::vector<double> parse_list(const std::string& text, const Where& where, const std::string& what) {
     std::vector<double> values;
     std::string token;
@@ -54,18 +72,6 @@ std::vector<double> parse_list(const std::string& text, const Where& where, cons
     flush();
     return values;
 }
-
-float srgb_to_linear(double v) { return float(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4)); }
-
-}  // namespace
-
-Where where(const XmlSource& source, ptrdiff_t offset) {
-    const auto it = std::lower_bound(source.line_ends.begin(), source.line_ends.end(), offset);
-    return {source.path, int(it - source.line_ends.begin()) + 1};
-}
-Where where(const XmlSource& source, const pugi::xml_node& node) { return where(source, node.offset_debug()); }
-
-void fail(const Where& where, const std::string& message) { throw input_error(where.file, where.line, message); }
 
 std::string ValueParser::substitute(const std::string& text, const Where& at) {
     std::string out;
@@ -154,14 +160,15 @@ Matrix ValueParser::parse_transform(const XmlSource& source, const pugi::xml_nod
             Vec3d v[3] = {};
             const char* names[3] = {"origin", "target", "up"};
             for (int i = 0; i < 3; ++i) {
+                if (i == 2 && !step.attribute("up")) continue;
                 const std::vector<double> list = parse_list(attribute(source, step, names[i]), at, names[i]);
                 if (list.size() != 3) fail(at, std::string("'") + names[i] + "' of <lookat> needs three numbers");
                 v[i] = {list[0], list[1], list[2]};
             }
+            if (!(length(v[2]) > 0)) v[2] = any_up({v[1].x - v[0].x, v[1].y - v[0].y, v[1].z - v[0].z});
             bool valid = true;
             m = look_at(v[0], v[1], v[2], valid);
-            if (!valid)
-                fail(at, "<lookat> is degenerate: target equals origin, or up is zero or along the view direction");
+            if (!valid) fail(at, "<lookat> is degenerate: target equals origin, or up is along the view direction");
         } else if (tag == "matrix") {
             allow(source, step, {"value"});
             const std::vector<double> v = parse_list(attribute(source, step, "value"), at, "matrix");
@@ -257,9 +264,17 @@ Value ValueParser::parse_value(const XmlSource& source, const pugi::xml_node& no
         value.kind = ValueKind::vector;
         const Vec3d v = triple(source, node, 0, false);
         value.vector = {v.x, v.y, v.z};
+    } else if (tag == "spectrum" && node.attribute("type")) {
+        value = parse_spectrum_plugin(source, node);
     } else if (tag == "spectrum") {
-        allow(source, node, {"name", "value", "filename"});
+        allow(source, node, {"name", "value", "filename", "intent"});
         value = parse_spectrum(source, node);
+    } else if (tag == "blackbody") {
+        allow(source, node, {"name", "temperature", "scale"});
+        value = parse_blackbody(source, node);
+    } else if (tag == "rgb" || tag == "srgb") {
+        allow(source, node, {"name", "value", "intent"});  // the use of the colour tells the intent
+        value = parse_color(source, node, tag);
     } else {
         allow(source, node, {"name", "value"});
         if (tag == "boolean") {
@@ -275,11 +290,9 @@ Value ValueParser::parse_value(const XmlSource& source, const pugi::xml_node& no
         } else if (tag == "float") {
             value.kind = ValueKind::number;
             value.number = parse_number(text(), at, tag);
-        } else if (tag == "string") {
+        } else {
             value.kind = ValueKind::text;
             value.text = text();
-        } else {
-            value = parse_color(source, node, tag);
         }
     }
     value.name = parameter_name(source, node);
@@ -289,8 +302,8 @@ Value ValueParser::parse_value(const XmlSource& source, const pugi::xml_node& no
 }
 
 bool ValueParser::is_value_tag(const std::string& tag) {
-    static const std::set<std::string> tags = {"boolean", "integer", "float", "string",   "point",
-                                               "vector",  "rgb",     "srgb",  "spectrum", "transform"};
+    static const std::set<std::string> tags = {"boolean", "integer", "float",    "string",    "point",    "vector",
+                                               "rgb",     "srgb",    "spectrum", "transform", "blackbody"};
     return tags.contains(tag);
 }
 

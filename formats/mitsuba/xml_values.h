@@ -23,6 +23,10 @@ Where where(const XmlSource& source, const pugi::xml_node& node);
 
 [[noreturn]] void fail(const Where& where, const std::string& message);
 
+double parse_number(const std::string& text, const Where& where, const std::string& what);
+/// Numbers separated by commas or blanks.
+std::vector<double> parse_list(const std::string& text, const Where& where, const std::string& what);
+
 class ValueParser {
 public:
     explicit ValueParser(Document& document) : document_(document) {}
@@ -50,6 +54,8 @@ private:
     Matrix parse_transform(const XmlSource& source, const pugi::xml_node& node);
     Value parse_color(const XmlSource& source, const pugi::xml_node& node, const std::string& tag);
     Value parse_spectrum(const XmlSource& source, const pugi::xml_node& node);
+    Value parse_spectrum_plugin(const XmlSource& source, const pugi::xml_node& node);
+    Value parse_blackbody(const XmlSource& source, const pugi::xml_node& node);
 
     Document& document_;
     std::map<std::string, std::string> parameters_;

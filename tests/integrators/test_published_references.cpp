@@ -78,7 +78,6 @@ TEST_CASE("Mitsuba render tests: texture filters and wrap modes") {
 }
 
 TEST_CASE("Mitsuba render tests that need what Ambilux lacks are refused by name") {
-    require_refusal("mesh_attributes/test_mesh_attributes_3_vertex_direct.xml", "'mesh_attribute'");
     require_refusal("various_shapes/test_various_shapes_path.xml", "'sdfgrid'");
 }
 

@@ -127,6 +127,45 @@ inline Bsdf plastic(float ior, bool nonlinear, Rgb diffuse) {
     return bsdf_of(p);
 }
 
+inline Bsdf phong(float exponent, Rgb diffuse, Rgb specular) {
+    Resolved<Phong> p = white<Phong>();
+    p.reflectance = diffuse;
+    p.specular_reflectance = specular;
+    p.exponent = exponent;
+    p.specular_sampling_weight = 0.4f;
+    return bsdf_of(p);
+}
+inline Bsdf ward(WardVariant variant, float alpha_u, float alpha_v, Rgb diffuse, Rgb specular) {
+    Resolved<Ward> p = white<Ward>();
+    p.reflectance = diffuse;
+    p.specular_reflectance = specular;
+    p.alpha_u = alpha_u;
+    p.alpha_v = alpha_v;
+    p.variant = variant;
+    p.specular_sampling_weight = 0.4f;
+    return bsdf_of(p);
+}
+/// Without coating and sheen.
+inline Bsdf principled(float roughness, float metallic, float anisotropic = 0) {
+    Resolved<Principled> p = white<Principled>();
+    p.base_color = {0.8f, 0.5f, 0.1f};
+    p.roughness = roughness;
+    p.metallic = metallic;
+    p.aspect = std::sqrt(1 - 0.9f * anisotropic);
+    p.clearcoat_alpha = 0.1f;
+    return bsdf_of(p);
+}
+inline Bsdf principled_with_all(float roughness, float metallic) {
+    return edited<Principled>(principled(roughness, metallic, 0.5f), [](auto& p) {
+        p.specular_tint = 0.3f;
+        p.sheen = 0.6f;
+        p.sheen_tint = 32768;
+        p.flatness = 13107;
+        p.clearcoat = 0.8f;
+        p.clearcoat_alpha = 0.05f;
+    });
+}
+
 /// Every BSDF type over roughness 0.01 to 1, isotropic and not, both distributions and both ways to sample them, ior
 /// below and above 1.
 inline std::vector<BsdfCase> bsdf_cases() {
@@ -135,6 +174,19 @@ inline std::vector<BsdfCase> bsdf_cases() {
     add("diffuse", bsdf_of(Resolved<Diffuse>{{{0.9f, 0.5f, 0.0f}}, {}}));
     for (float alpha : {0.2f, 1.0f})
         add("rough_diffuse " + std::to_string(alpha), bsdf_of(Resolved<RoughDiffuse>{{{0.9f, 0.5f, 0.1f}, alpha}, {}}));
+    for (float exponent : {0.0f, 5.0f, 200.0f})
+        add("phong " + std::to_string(exponent), phong(exponent, {0.5f, 0.3f, 0.0f}, {0.4f, 0.5f, 0.9f}));
+    for (WardVariant variant : {WardVariant::ward, WardVariant::duer, WardVariant::balanced})
+        for (auto [au, av] : {std::pair{0.1f, 0.1f}, {0.5f, 0.5f}, {0.05f, 0.3f}})
+            add("ward " + std::to_string(int(variant)) + " " + std::to_string(au) + " " + std::to_string(av),
+                ward(variant, au, av, {0.5f, 0.3f, 0.0f}, {0.4f, 0.5f, 0.9f}));
+    add("diffuse_transmitter", bsdf_of(Resolved<DiffuseTransmitter>{{{0.9f, 0.5f, 0.0f}}, {}}));
+    for (float metallic : {0.0f, 0.4f, 1.0f})
+        for (float roughness : {0.15f, 0.5f, 1.0f}) {
+            const std::string suffix = std::to_string(metallic) + " " + std::to_string(roughness);
+            add("principled " + suffix, principled(roughness, metallic));
+            add("principled with all " + suffix, principled_with_all(roughness, metallic));
+        }
     add("conductor", conductor({0.2f, 0.92f, 1.1f}, {3.9f, 2.45f, 2.14f}));
     for (float ior : {1.5f, 0.75f}) {
         const std::string suffix = " ior " + std::to_string(ior);

@@ -51,9 +51,12 @@ struct BsdfAt<RoughDielectric> : Resolved<RoughDielectric> {
         const float density_o = sample_visible ? d * cos_o / sigma_o : sampled_microfacets(wo).d(m) * m.z;
         // D·G/cos(wi)·|cos(wo)| per |i·m|, with G1 = cos/sigma.
         const float lobe = d * min(o.z / sigma_o, 1.0f) / sigma_i;
-        if (reflects)
-            return {specular_reflectance * (f * lobe * 0.25f), f * density_i / (4.0f * cos_o),
-                    f * density_o / (4.0f * cos_i)};
+        if (reflects) {
+            const float pdf_sa = f * density_i / (4.0f * cos_o), pdf_reverse_sa = f * density_o / (4.0f * cos_i);
+            // The latter leaves the range of floats where both directions graze from opposite sides.
+            if (!(pdf_reverse_sa < kInfinity)) return no_scattering();
+            return {specular_reflectance * (f * lobe * 0.25f), pdf_sa, pdf_reverse_sa};
+        }
         // Equation 17, by the index below over that above for either direction.
         const float inv = 1.0f / sqr((above ? i_dot_m : o_dot_m) + ior * (above ? o_dot_m : i_dot_m)), ior2 = ior * ior;
         const float jacobian_o = cos_o * inv * (above ? ior2 : 1.0f), jacobian_i = cos_i * inv * (above ? 1.0f : ior2);

@@ -57,6 +57,7 @@ AMBILUX_LEVEL(kDiffuseFeatures)
 AMBILUX_LEVEL(kUntexturedFeatures)
 AMBILUX_LEVEL(kTriangleFeatures)
 AMBILUX_LEVEL(kMaskedFeatures)
+AMBILUX_LEVEL(kCommonFeatures)
 AMBILUX_LEVEL(kAllFeatures)
 #undef AMBILUX_LEVEL
 

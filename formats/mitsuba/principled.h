@@ -1,0 +1,17 @@
+// The principled BSDF of Mitsuba 3 as what it is made of.
+#pragma once
+
+#include "formats/mitsuba/builder.h"
+
+namespace ambilux::mitsuba {
+
+/// With the weight (1 - metallic)·spec_trans it is rough glass, else opaque: terms of the principled BSDF are linear in
+/// their weights, so that the sum is the same BSDF.
+struct PrincipledParts {
+    Textured<Principled> opaque;
+    Textured<RoughDielectric> glass;
+    float glass_weight = 0;
+};
+PrincipledParts read_principled(Reader& in);
+
+}  // namespace ambilux::mitsuba

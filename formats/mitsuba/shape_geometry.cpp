@@ -1,0 +1,131 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "accel/range.h"
+#include "core/error.h"
+#include "formats/mitsuba/shape_jobs.h"
+
+namespace ambilux::mitsuba {
+
+namespace {
+
+/// Image of a point, rounded once.
+Vec3f point_of(const Matrix& a, Vec3f p) {
+    const auto row = [&](int i) { return float(a.m[i][0] * p.x + a.m[i][1] * p.y + a.m[i][2] * p.z + a.m[i][3]); };
+    return {row(0), row(1), row(2)};
+}
+
+/// Twice the area of a triangle along its normal; in double, since the area of a small triangle may be no float.
+Vec3d area_normal(Vec3f a, Vec3f b, Vec3f c) {
+    const auto from_a = [a](Vec3f p) { return Vec3d{double(p.x) - a.x, double(p.y) - a.y, double(p.z) - a.z}; };
+    return cross(from_a(b), from_a(c));
+}
+
+}  // namespace
+
+void transform_mesh(const Builder& builder, Job& job, const Mesh& source) {
+    const bool split = job.smooth_angle >= 0 && !job.face_normals;
+    const Mesh smooth = split ? split_at_edges(job.where.file, source, job.smooth_angle) : Mesh{};
+    const Mesh& mesh = split ? smooth : source;
+    const Affine to_local = to_affine(affine_inverse(job.to_world));
+    Mesh& out = job.world;
+    out.positions.reserve(mesh.positions.size());
+    for (Vec3f p : mesh.positions) {
+        const Vec3f q = point_of(job.to_world, p);
+        out.positions.push_back(q);
+        if (!(max_component(abs(q)) <= kMostCoordinate) || !is_finite(q))
+            builder.check_range(job.where, "the shape of type '" + job.type + "'", {{q.x, q.y, q.z}});
+    }
+    out.uvs = mesh.uvs;
+    // A reflection would turn the outside in: reverse the winding.
+    const bool reverse = (determinant(job.to_world) < 0) != job.flip;
+    out.faces = mesh.faces;
+    if (reverse)
+        for (auto& face : out.faces) std::swap(face[1], face[2]);
+
+    const auto normal_of = [&](const std::array<uint32_t, 3>& f) {
+        return area_normal(out.positions[f[0]], out.positions[f[1]], out.positions[f[2]]);
+    };
+    const size_t all = out.faces.size();
+    std::erase_if(out.faces, [&](const auto& f) {
+        const double area = length(normal_of(f));
+        return !(area > 0 && std::isfinite(area));
+    });
+    job.dropped = uint32_t(all - out.faces.size());
+    job.vanished = out.faces.empty() && std::any_of(mesh.faces.begin(), mesh.faces.end(), [&](const auto& f) {
+                       return length(area_normal(mesh.positions[f[0]], mesh.positions[f[1]], mesh.positions[f[2]])) > 0;
+                   });
+
+    if (job.face_normals) return;
+    if (mesh.normals.empty()) {
+        out.normals = smooth_normals(out);
+    } else {
+        const float sign = job.flip ? -1.0f : 1.0f;
+        for (Vec3f n : mesh.normals) {
+            const Vec3f w = to_local.transposed_vector(n) * sign;
+            // Scaled by its largest entry first, because tiny or huge transforms leave the range of a square.
+            const float largest = max_component(abs(w));
+            out.normals.push_back(largest > 0 && largest < kInfinity ? normalize(w * (1.0f / largest))
+                                                                     : Vec3f{0, 0, 0});
+        }
+    }
+    for (auto& f : out.faces) {
+        const Vec3d n = normal_of(f);
+        const double area = length(n);
+        const Vec3f ng = {float(n.x / area), float(n.y / area), float(n.z / area)};
+        Vec3f sum = {0, 0, 0};
+        for (uint32_t v : f) {
+            if (is_zero(out.normals[v])) out.normals[v] = ng;  // the file gives none here
+            sum += out.normals[v];
+        }
+        // The geometric normal lies on the side of the vertex normals (B12).
+        if (dot(ng, sum) < 0) std::swap(f[1], f[2]);
+    }
+}
+
+Quadric make_quadric(Builder& builder, const Job& job) {
+    Quadric q{};
+    q.type = job.type == "sphere" ? PrimitiveType::sphere
+                                  : (job.type == "disk" ? PrimitiveType::disk : PrimitiveType::cylinder);
+    q.flip = job.flip;
+    Matrix m = job.to_world;
+    const Vec3d x = column(m, 0), y = column(m, 1), z = column(m, 2);
+    const double lx = length(x), ly = length(y), lz = length(z);
+    if (q.type == PrimitiveType::disk) {
+        // Any affine map of a disk is fine: an ellipse. The radius bounds it.
+        q.radius = float(std::sqrt(lx * lx + ly * ly));
+        if (is_orthogonal(m, 1e-6)) q.radius = float(std::max(lx, ly));
+    } else {
+        const double radius = q.type == PrimitiveType::sphere ? (lx + ly + lz) / 3 : (lx + ly) / 2;
+        const bool uniform = is_orthogonal(m, 1e-3) && std::fabs(lx - radius) < 1e-3 * radius &&
+                             std::fabs(ly - radius) < 1e-3 * radius &&
+                             (q.type == PrimitiveType::cylinder || std::fabs(lz - radius) < 1e-3 * radius);
+        if (!uniform)
+            builder.refuse(job.where, "a " + job.type + " with shear or non-uniform scale is not supported",
+                           "the mean scale is used");
+        // Make the axes exactly orthogonal and the scale exactly uniform, so that every formula sees the same shape.
+        bool ignored = false;
+        Matrix unit = m;
+        const double lengths[3] = {lx, ly, lz};
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) unit.m[i][j] /= lengths[j];
+        m = rigid_part(unit, ignored) * scaling(radius, radius, q.type == PrimitiveType::sphere ? radius : lz);
+        q.radius = float(radius);
+    }
+    const Vec3d c = column(m, 3), top = column(m, 2);
+    const double reach = q.type == PrimitiveType::cylinder ? q.radius + length(top) : double(q.radius);
+    builder.check_range(job.where, "the shape of type '" + job.type + "'",
+                        {{c.x - reach, c.y - reach, c.z - reach}, {c.x + reach, c.y + reach, c.z + reach}});
+    const double least = std::min({lx, ly, q.type == PrimitiveType::disk ? lx : lz});
+    if (!(least >= double(kLeastExtent)))
+        throw input_error(
+            job.where.file, job.where.line,
+            fmt::format("the shape of type '{}' is {:g} wide, less than {:g}", job.type, least, kLeastExtent));
+    q.to_world = to_affine(m);
+    q.to_local = to_affine(affine_inverse(m));
+    return q;
+}
+
+}  // namespace ambilux::mitsuba

@@ -1,0 +1,203 @@
+// libs: ambilux_formats ambilux_accel
+// timeout: 120
+// BSDFs that are made of others, those of the older generation, and textures from meshes.
+#include <cmath>
+
+#include "core/math.h"
+#include "scene/surface.h"
+#include "tests/support/mitsuba_text.h"
+#include "transport/blend.h"
+
+using namespace ambilux;
+using namespace ambilux::test;
+
+TEST_CASE("phong, ward and difftrans with their defaults") {
+    const auto record = [](const std::string& xml) {
+        const Scene s = load_quietly("<shape type='rectangle'>" + xml + "</shape>", "0.6.0");
+        return s.bsdfs[s.materials[s.shapes[0].material].front];
+    };
+    const auto phong = record("<bsdf type='phong'/>").as<Phong>();
+    check_rgb(phong.reflectance.value, splat(0.5f));
+    check_rgb(phong.specular_reflectance.value, splat(0.2f));
+    CHECK(phong.exponent.value == 30);
+    CHECK(phong.specular_sampling_weight == Approx(0.2 / 0.7));
+    const auto ward = record("<bsdf type='ward'><float name='alphaU' value='0.2'/></bsdf>").as<Ward>();
+    CHECK(ward.variant == WardVariant::balanced);
+    CHECK(ward.alpha_u.value == 0.2f);
+    CHECK(ward.alpha_v.value == 0.1f);
+    check_rgb(record("<bsdf type='difftrans'/>").as<DiffuseTransmitter>().transmittance.value, splat(0.5f));
+    const Scene bright = load_quietly(
+        "<shape type='rectangle'><bsdf type='phong'><rgb name='diffuse_reflectance' "
+        "value='0.9'/><rgb name='specular_reflectance' value='0.3'/></bsdf></shape>");
+    CHECK(has_note(bright, "sum to more than 1"));
+    const auto scaled = bright.bsdfs[bright.materials[bright.shapes[0].material].front].as<Phong>();
+    CHECK(scaled.reflectance.value.x + scaled.specular_reflectance.value.x == Approx(0.99));
+}
+
+TEST_CASE("blends: what they are made of, with weights; null makes a mask of it") {
+    const std::string red = "<bsdf type='diffuse'><rgb name='reflectance' value='1,0,0'/></bsdf>",
+                      blue = "<bsdf type='diffuse'><rgb name='reflectance' value='0,0,1'/></bsdf>",
+                      weight = "<float name='weight' value='0.25'/>";
+    const auto load_blend = [&](const std::string& xml) {
+        return load_quietly("<shape type='rectangle'>" + xml + "</shape>");
+    };
+    const auto material_of_shape = [](const Scene& s) { return s.materials[s.shapes[0].material]; };
+    const auto color = [](const Scene& s, uint32_t material) {
+        return s.bsdfs[s.materials[material].front].as<Diffuse>().reflectance.value;
+    };
+    const Scene s = load_blend("<bsdf type='blendbsdf'>" + weight + red + blue + "</bsdf>");
+    CHECK(s.features.blends);
+    CHECK(material_of_shape(s).second_weight.value == 0.25f);
+    check_rgb(color(s, material_of_shape(s).first), {1, 0, 0});
+    check_rgb(color(s, material_of_shape(s).second), {0, 0, 1});
+    CHECK(!load_blend(red).features.blends);
+
+    // Two sides, a mask and a bump go around it.
+    const Scene sides = load_blend(
+        "<bsdf type='mask'><float name='opacity' value='0.5'/><bsdf type='twosided'><bsdf "
+        "type='blendbsdf'>" +
+        weight + red + blue + "</bsdf></bsdf></bsdf>");
+    CHECK(material_of_shape(sides).opacity.value == 0.5f);
+    CHECK(sides.materials[material_of_shape(sides).first].two_sided == 1);
+    CHECK(sides.materials[material_of_shape(sides).second].opacity.value == 1);
+
+    // 0.2, 0.3, and 0.5 that are missing.
+    const Scene mixture =
+        load_blend("<bsdf type='mixturebsdf'><string name='weights' value='0.2, 0.3'/>" + red + blue + "</bsdf>");
+    const Material& m = material_of_shape(mixture);
+    check_rgb(color(mixture, m.first), {1, 0, 0});
+    CHECK(m.second_weight.value == Approx(0.8));
+    const Material& rest = mixture.materials[m.second];
+    check_rgb(color(mixture, rest.first), {0, 0, 1});
+    check_rgb(color(mixture, rest.second), {0, 0, 0});
+    CHECK(rest.second_weight.value == Approx(0.625));
+
+    const Scene glass = load_blend("<bsdf type='blendbsdf'>" + weight + red + "<bsdf type='dielectric'/></bsdf>");
+    CHECK(glass.bsdfs[material_of_shape(glass).front].type == BsdfType::dielectric);
+    const Scene mask = load_blend("<bsdf type='blendbsdf'>" + weight + "<bsdf type='null'/>" + red + "</bsdf>");
+    CHECK(!mask.features.blends);
+    CHECK(material_of_shape(mask).opacity.value == 0.25f);
+    const auto refused = [&](const std::string& xml) {
+        return error_of("<shape type='rectangle'>" + xml + "</shape>");
+    };
+    CHECK(contains(refused("<bsdf type='blendbsdf'>" + red + "</bsdf>"), "blendbsdf needs two nested BSDFs"));
+    CHECK(contains(refused("<bsdf type='mixturebsdf'><string name='weights' value='0.2'/>" + red + blue + "</bsdf>"),
+                   "mixturebsdf has 2 BSDFs and 1 weights"));
+    CHECK(
+        contains(refused("<bsdf type='mixturebsdf'><string name='weights' value='0.6,0.6'/>" + red + blue + "</bsdf>"),
+                 "sum to 1 at most"));
+    CHECK(contains(refused("<bsdf type='blendbsdf'><bsdf type='mask'>" + red + "</bsdf>" + red + "</bsdf>"),
+                   "a mask inside of a blend"));
+}
+
+TEST_CASE("principled: parameters, and transmission as a blend with rough glass") {
+    const auto load_principled = [](const std::string& xml) {
+        return load_quietly("<shape type='rectangle'><bsdf type='principled'>" + xml + "</bsdf></shape>");
+    };
+    const auto number = [](const char* name, const char* value) {
+        return "<float name='" + std::string(name) + "' value='" + value + "'/>";
+    };
+    const auto opaque = [](const Scene& s, uint32_t material) {
+        return s.bsdfs[s.materials[material].front].as<Principled>();
+    };
+    const Scene plain = load_principled("");
+    const auto p = opaque(plain, plain.shapes[0].material);
+    CHECK(p.ior == 1.5f);
+    CHECK(p.roughness.value == 0.5f);
+    CHECK(p.clearcoat_alpha == 0.1f);
+    // 8 % times the share of 0.5 is the reflectance of 1.5.
+    const Scene half = load_principled(number("specular", "0.5"));
+    CHECK(opaque(half, half.shapes[0].material).ior == Approx(1.5));
+
+    const Scene s = load_principled(number("metallic", "0.25") + number("spec_trans", "0.4") +
+                                    number("clearcoat", "0.5") + number("sheen", "0.3") + number("roughness", "0.6") +
+                                    "<rgb name='base_color' value='0.25,0.49,1'/>");
+    const Material& m = s.materials[s.shapes[0].material];
+    CHECK(m.second_weight.value == Approx(0.3));
+    const auto rest = opaque(s, m.first);
+    CHECK(rest.metallic.value == Approx(0.25 / 0.7));
+    CHECK(rest.clearcoat == Approx(0.5 / 0.7));
+    CHECK(rest.sheen == Approx(0.3 / 0.6));
+    const auto glass = s.bsdfs[s.materials[m.second].front].as<RoughDielectric>();
+    check_rgb(glass.specular_transmittance.value, {0.5f, 0.7f, 1});
+    CHECK(glass.alpha_u.value == Approx(0.36));
+    CHECK(contains(
+        error_of("<shape type='rectangle'><bsdf type='principled'>" + number("roughness", "2") + "</bsdf></shape>"),
+        "'roughness' must lie between 0 and 1"));
+    CHECK(contains(error_of("<shape type='rectangle'><bsdf type='twosided'><bsdf type='principled'>" +
+                            number("spec_trans", "0.5") + "</bsdf></bsdf></shape>"),
+                   "transmits light cannot be inside of twosided"));
+}
+
+TEST_CASE("points of a blend are of its parts by their weights, always the same ones") {
+    const Scene s = load_quietly(
+        "<shape type='rectangle'><bsdf type='blendbsdf'><float name='weight' value='0.3'/>"
+        "<bsdf type='diffuse'/><bsdf type='conductor'/></bsdf></shape>");
+    const SceneView view = s.view();
+    constexpr int kPoints = 40000;
+    int second = 0;
+    for (int i = 0; i < kPoints; ++i) {
+        // Neighbouring floats, so that the hash has little to work with.
+        SurfacePoint point{};
+        point.p = {1.0f + float(i % 200) * 0x1p-23f, 2.0f + float(i / 200) * 0x1p-22f, 0.0f};
+        const Material& m = material_at<kAllFeatures>(view, point);
+        CHECK(&m == &material_at<kAllFeatures>(view, point));
+        second += s.bsdfs[m.front].type == BsdfType::conductor;
+    }
+    const double expected = 0.3 * kPoints, deviation = std::sqrt(0.3 * 0.7 * kPoints);
+    CHECK(std::fabs(second - expected) < 4 * deviation);
+}
+
+TEST_CASE("mesh attributes are linear between vertices, constant on faces") {
+    const TempFolder folder;
+    folder.write("m.ply",
+                 "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+                 "property float r\nproperty float g\nproperty float b\nproperty float w_0\nelement face 2\n"
+                 "property list uchar int vertex_indices\nproperty float tone_0\nproperty float tone_1\n"
+                 "property float tone_2\nend_header\n"
+                 "0 0 0 1 0 0 0.2\n1 0 0 0 1 0 0.4\n1 1 0 0 0 1 0.6\n0 1 0 1 1 0 0.8\n"
+                 "3 0 1 2 0.1 0.2 0.3\n3 0 2 3 0.4 0.5 0.6\n");
+    const auto shape = [&](const std::string& name) {
+        return load_quietly(
+            "<shape type='ply'><string name='filename' value='m.ply'/><bsdf type='diffuse'><texture "
+            "name='reflectance' type='mesh_attribute'><string name='name' value='" +
+                name + "'/></texture></bsdf></shape>",
+            "3.0.0", &folder);
+    };
+    const auto at = [](const Scene& s, uint32_t prim, float u, float v) {
+        const SurfacePoint point = surface_at<kAllFeatures>(s.view(), prim, u, v);
+        return reflectance(s, 0, point.uv);
+    };
+    const Scene color = shape("vertex_color"), weight = shape("vertex_w"), tone = shape("face_tone");
+    check_rgb(at(color, 0, 0.25f, 0.5f), {0.25f, 0.25f, 0.5f}, 1e-4);
+    check_rgb(at(color, 1, 0.125f, 0.5f), {0.875f, 0.5f, 0.125f}, 1e-4);
+    check_rgb(at(weight, 1, 0.5f, 0.25f), splat(0.25f * 0.2f + 0.5f * 0.6f + 0.25f * 0.8f), 1e-5);
+    check_rgb(at(tone, 0, 0.3f, 0.3f), {0.1f, 0.2f, 0.3f});
+    check_rgb(at(tone, 1, 0.3f, 0.3f), {0.4f, 0.5f, 0.6f});
+    // Nowhere negative, on edges neither.
+    for (int i = 0; i <= 1000; ++i) {
+        const float u = float(i) / 1000;
+        for (uint32_t prim : {0u, 1u})
+            for (const Vec2f& b : {Vec2f{u, 0}, {0, u}, {u, 1 - u}})
+                CHECK(min_component(at(color, prim, b.x, b.y)) >= 0);
+    }
+    const auto refused = [&](const std::string& xml) { return error_of(xml, {}, "3.0.0", &folder); };
+    CHECK(contains(refused("<shape type='ply'><string name='filename' value='m.ply'/><bsdf type='diffuse'>\n<texture "
+                           "name='reflectance' type='mesh_attribute'><string name='name' value='vertex_x'/></texture>"
+                           "</bsdf></shape>"),
+                   ":3: the shape has no attribute 'vertex_x'"));
+    CHECK(contains(refused("<shape type='cube'><bsdf type='diffuse'><texture name='reflectance' "
+                           "type='mesh_attribute'/></bsdf></shape>"),
+                   "mesh attributes are read from ply files only"));
+}
+
+TEST_CASE("roughness of 0 is taken, as in Mitsuba; what is negative is not") {
+    const auto rough = [](const std::string& type, const char* alpha) {
+        return "<shape type='rectangle'><bsdf type='" + type + "'><float name='alpha' value='" + alpha +
+               "'/></bsdf></shape>";
+    };
+    for (const char* type : {"roughconductor", "roughdielectric", "roughplastic"}) {
+        load_quietly(rough(type, "0"));
+        CHECK(contains(error_of(rough(type, "-0.1")), "roughness must not be negative"));
+    }
+}
