@@ -17,12 +17,12 @@ constexpr Features kOpaqueTriangles = {0, 0, bit(PrimitiveType::triangle), false
 constexpr Features kMaskedTriangles = {0, 0, bit(PrimitiveType::triangle), true, false, true};
 
 constexpr Features kOpaqueShapes = {0, 0, kAllFeatures.primitives, false, false, false};
+constexpr Features kMaskedShapes = {0, 0, kAllFeatures.primitives, true, false, true};
 
-/// f(FeatureSet) with the least of kOpaqueTriangles, kMaskedTriangles, kOpaqueShapes and kAllFeatures that tracing rays
-/// through a scene of `features` needs.
+/// f(FeatureSet) with the least of the four above that tracing rays through a scene of `features` needs.
 template <class Function>
 auto with_traversal_features(const Features& features, Function f) {
-    if (features.has_quadrics() && features.opacity) return f(FeatureSet<kAllFeatures>{});
+    if (features.has_quadrics() && features.opacity) return f(FeatureSet<kMaskedShapes>{});
     if (features.has_quadrics()) return f(FeatureSet<kOpaqueShapes>{});
     if (features.opacity) return f(FeatureSet<kMaskedTriangles>{});
     return f(FeatureSet<kOpaqueTriangles>{});

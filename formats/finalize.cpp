@@ -252,6 +252,10 @@ double power(ModelTag<SpotEmitter>, Scene& scene, Emitter& e, const Receivers&) 
     const auto one_minus_cos = [](double angle) { return 2 * std::sin(angle / 2) * std::sin(angle / 2); };
     return M_PI * (one_minus_cos(e.cutoff) + one_minus_cos(e.beam_width)) * mean_luminance(scene, e.radiance);
 }
+/// Of the plane z = 1.
+double power(ModelTag<ProjectorEmitter>, Scene& scene, Emitter& e, const Receivers&) {
+    return 4.0 * e.cutoff * e.beam_width * mean_luminance(scene, e.radiance);
+}
 double power(ModelTag<DirectionalEmitter>, Scene& scene, Emitter& e, const Receivers& to) {
     return to.disk * mean_luminance(scene, e.radiance);
 }
@@ -330,6 +334,8 @@ void add_features(const Scene& scene, const Material& m, Features& f) {
         f.bsdfs |= bit(b.type);
         f.textures |= is_textured(b);
         f.bumps |= b.normal_map >= 0 || b.bump_map >= 0;
+        f.map_rules |= b.map_rules != 0;
+        f.coats |= b.coat != kNone;
     }
     if (m.first == kNone) return;
     f.blends = true;

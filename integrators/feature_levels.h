@@ -25,16 +25,18 @@ constexpr uint32_t kCommonBsdfs = bit(BsdfType::diffuse) | bit(BsdfType::rough_d
                                   bit(BsdfType::thin_dielectric) | bit(BsdfType::rough_dielectric) |
                                   bit(BsdfType::plastic) | bit(BsdfType::rough_plastic);
 
+/// Emitters of these levels.
+constexpr uint32_t kCommonEmitters = kAllFeatures.emitters & ~bit(EmitterType::projector);
+
 /// Every common BSDF, texture and emitter, on triangles that are neither bumped nor holed.
-constexpr Features kTriangleFeatures = {kCommonBsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false,
-                                        false};
+constexpr Features kTriangleFeatures = {kCommonBsdfs, kCommonEmitters, bit(PrimitiveType::triangle),
+                                        true,         false,           false};
 
 /// The same with holes.
-constexpr Features kMaskedFeatures = {kCommonBsdfs, kAllFeatures.emitters, bit(PrimitiveType::triangle), true, false,
-                                      true};
+constexpr Features kMaskedFeatures = {kCommonBsdfs, kCommonEmitters, bit(PrimitiveType::triangle), true, false, true};
 
-/// All but the rarer BSDFs and blends.
-constexpr Features kCommonFeatures = {kCommonBsdfs, kAllFeatures.emitters, kAllFeatures.primitives, true, true, true};
+/// All but the rarer BSDFs and emitters, blends, coatings and rules of maps.
+constexpr Features kCommonFeatures = {kCommonBsdfs, kCommonEmitters, kAllFeatures.primitives, true, true, true};
 
 /// Calls f.template operator()<F>() with the smallest level F that covers `needed`; with the full set if `specialise`
 /// is false.

@@ -48,7 +48,8 @@ std::string shortest(const Features& f, int max_depth, Lost lost) {
     for (int k = 1; k <= longest; ++k)
         for (uint32_t delta = 0; delta < 1u << (k - 1); ++delta) {
             const uint32_t all = (1u << (k - 1)) - 1;
-            if ((delta != 0 && !(f.bsdfs & kDeltaBsdfs)) || (delta != all && !(f.bsdfs & kSmoothBsdfs))) continue;
+            if ((delta != 0 && !(f.bsdfs & kDeltaBsdfs) && !f.coats) || (delta != all && !(f.bsdfs & kSmoothBsdfs)))
+                continue;
             for (const bool delta_emitter : {false, true}) {
                 // No camera sees a delta emitter.
                 if (k == 1 && delta_emitter) continue;

@@ -18,7 +18,7 @@ struct VertexBits {
     AMBILUX_HD static VertexBits make(uint32_t depth, const Vertex<Mis>& v) {
         const Scattering& s = v.scattering;
         uint32_t word = depth | (float_bits(v.offset) + 0xffffu) >> 16 << kOffsetBit;
-        if (s.bsdf.type == BsdfType::diffuse) word |= kDiffuse;
+        if (s.plain_diffuse()) word |= kDiffuse;
         if (bsdf_transmits(s.bsdf.type)) word |= kThrough;
         if (dot(s.ng, s.wi_world) > 0.0f) word |= kAbove;
         return VertexBits{word};
@@ -26,7 +26,7 @@ struct VertexBits {
 
     AMBILUX_HD uint32_t depth() const { return bits & kMaxDepth; }
     AMBILUX_HD float offset() const { return bits_float(bits >> kOffsetBit << 16); }
-    /// True if kernels of features F know or can tell that its BSDF is diffuse.
+    /// True if kernels of features F know or can tell that it is Scattering::plain_diffuse().
     template <Features F>
     AMBILUX_HD bool diffuse() const {
         if constexpr (!F.several_bsdfs())
@@ -65,10 +65,10 @@ struct ConnectionVertex {
     ConnectionVertexFront front;
     Rgb throughput;  ///< of a diffuse vertex: times its reflectance
     float dvcm;
-    Vec2f d, n;  ///< of the ray that met it; frame.n
-    Vec3f tangent;
-    uint32_t record;  ///< ScatteringParts
-    Rgb color0;       ///< BsdfInputs, where there are textures
+    Vec2f d, n;     ///< of the ray that met it; frame.n
+    Vec3f tangent;  ///< ScatteringParts
+    uint32_t record;
+    Rgb color0;  ///< BsdfInputs, where there are textures
     float number0;
     Rgb color1;
     float number1;
@@ -171,7 +171,7 @@ AMBILUX_HD ConnectionVertex pack_connection_vertex(const BidirectionalVertex& v,
                                                    uint32_t link) {
     const ScatteringParts s = parts_of(v.scattering);
     Rgb throughput = path.throughput;
-    if (v.scattering.bsdf.type == BsdfType::diffuse) throughput *= s.inputs.colors[0];
+    if (v.scattering.plain_diffuse()) throughput *= s.inputs.colors[0];
     return {{v.point.p, VertexBits::make(path.depth, v), octahedral_encode(s.ng), link, v.sums.dvc},
             throughput,
             v.sums.dvcm,

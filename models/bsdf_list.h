@@ -69,9 +69,17 @@ AMBILUX_HD constexpr bool bsdf_is_smooth(BsdfType type) {
     return !BsdfModels::contains<detail::kDeltaOnlyBsdfs>(uint32_t(type));
 }
 
-/// Parameters of one BSDF as a scene has them, and the maps that change its frame.
+/// What bump and normal maps do besides (transport/map_rules.h).
+enum MapRules : uint32_t {
+    kTurnNormals = 1,  ///< turn normals that face away from where light goes
+    kShadowBumps = 2,  ///< darken light that grazes them
+};
+
+/// Parameters of one BSDF as a scene has them, the maps that change its frame and the coating above it.
 struct BsdfRecord {
     BsdfType type = BsdfType::diffuse;
+    uint32_t map_rules = 0;   ///< MapRules
+    uint32_t coat = kNone;    ///< place of a Coat in SceneView::tables (transport/bsdf/coating.h)
     int32_t normal_map = -1;  ///< texture of tangent-space normals, or -1
     int32_t bump_map = -1;    ///< texture of heights, or -1
     float bump_scale = 1;

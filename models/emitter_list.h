@@ -27,6 +27,10 @@ struct SpotEmitter {
     static constexpr const char* plugin = "spot";
     static constexpr bool surface = false, delta_position = true, delta_direction = false, infinite = false;
 };
+struct ProjectorEmitter {
+    static constexpr const char* plugin = "projector";
+    static constexpr bool surface = false, delta_position = true, delta_direction = false, infinite = false;
+};
 struct DirectionalEmitter {
     static constexpr const char* plugin = "directional";
     static constexpr bool surface = false, delta_position = false, delta_direction = true, infinite = true;
@@ -49,7 +53,8 @@ struct EnvmapEmitter {
     X(SpotEmitter, spot)               \
     X(DirectionalEmitter, directional) \
     X(ConstantEmitter, constant)       \
-    X(EnvmapEmitter, envmap)
+    X(EnvmapEmitter, envmap)           \
+    X(ProjectorEmitter, projector)
 
 namespace ambilux {
 

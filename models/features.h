@@ -19,6 +19,8 @@ struct Features {
     bool bumps = false;       ///< any bump or normal map
     bool opacity = false;     ///< any surface that lets rays pass at random
     bool blends = false;      ///< any surface of two materials
+    bool coats = false;       ///< any coating
+    bool map_rules = false;   ///< any map with MapRules
 
     constexpr bool has(BsdfType t) const { return bsdfs >> uint32_t(t) & 1u; }
     constexpr bool has(EmitterType t) const { return emitters >> uint32_t(t) & 1u; }
@@ -31,7 +33,7 @@ struct Features {
     constexpr bool covers(const Features& other) const {
         return !(other.bsdfs & ~bsdfs) && !(other.emitters & ~emitters) && !(other.primitives & ~primitives) &&
                (textures || !other.textures) && (bumps || !other.bumps) && (opacity || !other.opacity) &&
-               (blends || !other.blends);
+               (blends || !other.blends) && (coats || !other.coats) && (map_rules || !other.map_rules);
     }
     constexpr bool operator==(const Features&) const = default;
 };
@@ -40,7 +42,14 @@ constexpr uint32_t bit(BsdfType t) { return 1u << uint32_t(t); }
 constexpr uint32_t bit(EmitterType t) { return 1u << uint32_t(t); }
 constexpr uint32_t bit(PrimitiveType t) { return 1u << uint32_t(t); }
 
-constexpr Features kAllFeatures = {
-    BsdfModels::kAll, EmitterModels::kAll, (1u << uint32_t(PrimitiveType::count)) - 1, true, true, true, true};
+constexpr Features kAllFeatures = {BsdfModels::kAll,
+                                   EmitterModels::kAll,
+                                   (1u << uint32_t(PrimitiveType::count)) - 1,
+                                   true,
+                                   true,
+                                   true,
+                                   true,
+                                   true,
+                                   true};
 
 }  // namespace ambilux

@@ -25,6 +25,8 @@ std::vector<std::string> feature_names(const Features& f) {
     if (f.bumps) names.push_back("bumps");
     if (f.opacity) names.push_back("opacity");
     if (f.blends) names.push_back("blends");
+    if (f.coats) names.push_back("coatings");
+    if (f.map_rules) names.push_back("rules of maps");
     return names;
 }
 

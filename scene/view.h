@@ -104,19 +104,20 @@ struct EnvironmentCell {
 };
 
 /// Emitter. `radiance` holds, in this order of types: radiance, intensity (W/sr), intensity, perpendicular irradiance,
-/// radiance, radiance scale.
+/// radiance, radiance scale, intensity along the axis.
 struct Emitter {
     EmitterType type;
     uint32_t shape;     ///< area: its shape
     uint32_t area_cdf;  ///< area over triangles: primitive_count+1 floats in tables, and then the density per area on
                         ///< each; kNone for a single primitive
     float pick_probability;      ///< chance that light sampling picks this emitter
-    ParamRgb radiance;           ///< area: textured by surface uv; spot: textured by projection
-    Affine to_world, to_local;   ///< spot: +z is the axis; envmap: rotation; point, directional: unused
-    Vec3f position;              ///< point, spot
+    ParamRgb radiance;           ///< area: textured by surface uv; spot, projector: textured by projection
+    Affine to_world, to_local;   ///< spot, projector: +z is the axis; envmap: rotation; point, directional: unused
+    Vec3f position;              ///< point, spot, projector
     Vec3f direction;             ///< directional: direction in which light travels; spot: axis. Unit
     float one_minus_cos_cutoff;  ///< spot: of the angle where it ends; a cosine would lose the digits of narrow ones
     float cutoff, beam_width;    ///< spot: angles to the axis in radians
+                                 ///< projector: tangents of half the field of view along x and y
     // envmap: latitude-longitude image (texture `radiance.texture` of float texels, row 0 is the top, direction +y) and
     // a piecewise-constant density over width by height cells (transport/emitter/envmap.h, scene/alias_table.h)
     uint32_t env_rows;   ///< alias table of the rows: height AliasBuckets in tables, aligned to 8 bytes

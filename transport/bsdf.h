@@ -18,6 +18,7 @@
 #include <bit>
 
 #include "scene/view.h"
+#include "transport/bsdf/coating.h"
 #include "transport/bsdf/conductor.h"
 #include "transport/bsdf/dielectric.h"
 #include "transport/bsdf/diffuse.h"
@@ -42,6 +43,7 @@ struct Bsdf {
     BsdfInputs inputs;
     BsdfConstants constants;
     const float32* tables;  ///< SceneView::tables for the models that read them
+    const float32* coat;    ///< the Coat above it, or null
 
     /// Parameters of the model, which must be `Model`.
     template <class Model>
@@ -91,6 +93,7 @@ AMBILUX_HD Bsdf make_bsdf(const SceneView& scene, const BsdfRecord& record, cons
     Bsdf b = {};
     b.type = F.several_bsdfs() ? record.type : BsdfType(std::countr_zero(F.bsdfs));
     if constexpr (F.bsdfs & detail::kTabulatedBsdfs) b.tables = scene.tables;
+    if constexpr (F.coats) b.coat = record.coat != kNone ? scene.tables + record.coat : nullptr;
     visit_bsdf<F>(b.type, false, [&](auto model) {
         using Model = typename decltype(model)::type;
         const Textured<Model>& parameters = record.as<Model>();
@@ -127,8 +130,9 @@ AMBILUX_HD Result with_bsdf(const Bsdf& b, Result otherwise, Op op) {
 
 namespace detail {
 
+/// Without its coating.
 template <Features F>
-AMBILUX_HD_APART BsdfValue bsdf_evaluate_apart(Bsdf b, Vec3f wi, Vec3f wo, TransportMode mode) {
+AMBILUX_HD BsdfValue evaluate_base(const Bsdf& b, Vec3f wi, Vec3f wo, TransportMode mode) {
     return with_bsdf<F>(b, no_scattering(), [&](const auto& bsdf) -> BsdfValue {
         constexpr bool kSmooth = requires { bsdf.evaluate(wi, wo, mode); };
         static_assert(kSmooth == std::remove_cvref_t<decltype(bsdf)>::Model::smooth, "smooth ones have evaluate");
@@ -139,6 +143,20 @@ AMBILUX_HD_APART BsdfValue bsdf_evaluate_apart(Bsdf b, Vec3f wi, Vec3f wo, Trans
     });
 }
 
+template <Features F>
+AMBILUX_HD_APART BsdfValue bsdf_evaluate_apart(Bsdf b, Vec3f wi, Vec3f wo, TransportMode mode) {
+    if constexpr (F.coats)
+        if (b.coat)
+            return coated_evaluate(Coat{b.coat}, wi, wo,
+                                   [&](Vec3f in, Vec3f out) { return evaluate_base<F>(b, in, out, mode); });
+    return evaluate_base<F>(b, wi, wo, mode);
+}
+
+template <Features F>
+AMBILUX_HD bool sample_base(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode, BsdfSample& out) {
+    return with_bsdf<F>(b, false, [&](const auto& bsdf) { return bsdf.sample(wi, u, mode, out); });
+}
+
 struct SampleOrNone {
     BsdfSample sample;
     bool some;
@@ -147,7 +165,15 @@ struct SampleOrNone {
 template <Features F>
 AMBILUX_HD_APART SampleOrNone bsdf_sample_apart(Bsdf b, Vec3f wi, Vec3f u, TransportMode mode) {
     SampleOrNone s;
-    s.some = with_bsdf<F>(b, false, [&](const auto& bsdf) { return bsdf.sample(wi, u, mode, s.sample); });
+    if constexpr (F.coats)
+        if (b.coat) {
+            s.some = coated_sample(
+                Coat{b.coat}, wi, u, [&](Vec3f in, Vec3f wo) { return evaluate_base<F>(b, in, wo, mode); },
+                [&](Vec3f in, Vec3f rest, BsdfSample& below) { return sample_base<F>(b, in, rest, mode, below); },
+                s.sample);
+            return s;
+        }
+    s.some = sample_base<F>(b, wi, u, mode, s.sample);
     return s;
 }
 

@@ -7,6 +7,7 @@
 #include "transport/emitter/directional.h"
 #include "transport/emitter/envmap.h"
 #include "transport/emitter/point.h"
+#include "transport/emitter/projector.h"
 #include "transport/emitter/spot.h"
 
 namespace ambilux {

@@ -7,6 +7,7 @@
 #include <cuda_runtime.h>
 
 #include <optional>
+#include <stdexcept>
 #include <type_traits>
 
 #include "backends/cuda/device_memory.h"
@@ -163,6 +164,8 @@ private:
                 if constexpr (kPairs)
                     if (pairs_) return f(set, *pairs_);
                 f(set, stage.tracer);
+            } else {
+                throw std::logic_error("no kernel traces rays of this scene: its level of features is too small");
             }
         });
     }

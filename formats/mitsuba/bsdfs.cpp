@@ -1,4 +1,5 @@
 #include "formats/mitsuba/bsdf_plugins.h"
+#include "formats/mitsuba/coatings.h"
 #include "formats/mitsuba/principled.h"
 #include "formats/mitsuba/xml_values.h"
 
@@ -12,6 +13,8 @@ struct Adapters {
     bool has_opacity = false;
     int32_t normal_map = -1, bump_map = -1;
     float bump_scale = 1;
+    uint32_t map_rules = 0;
+    std::optional<CoatPlace> coat;
 
     bool has_map() const { return normal_map >= 0 || bump_map >= 0; }
 };
@@ -29,7 +32,12 @@ const Object& nested_bsdf(Reader& in) {
 const Object* strip(Builder& builder, const Object* object, Adapters& adapters, Place place) {
     for (;;) {
         Reader in(builder, *object);
-        if (object->type == "mask") {
+        if (is_coating(object->type)) {
+            if (adapters.coat) in.fail("a coating inside of a coating is not supported");
+            adapters.coat = read_coat(builder, in);
+        } else if (object->type == "mask") {
+            if (adapters.coat)
+                in.fail("a mask inside of a coating is not supported: put the coating inside of the mask");
             if (place == Place::two_sided)
                 in.fail("a mask inside of twosided is not supported: put the twosided inside of the mask");
             if (place == Place::part) in.fail("a mask inside of a blend is not supported");
@@ -44,6 +52,8 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
             if (adapters.opacity.value < 0 || adapters.opacity.value > 1)
                 in.fail(in.where("opacity"), "opacity must lie between 0 and 1");
         } else if (object->type == "bumpmap" || object->type == "normalmap") {
+            if (adapters.coat)
+                in.fail("a map inside of a coating is not supported: put the coating inside of the " + object->type);
             if (adapters.has_map()) in.fail("more than one bumpmap or normalmap on a surface is not supported");
             const bool bump = object->type == "bumpmap";
             const Object* texture = in.take("texture");
@@ -51,13 +61,9 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
             const ScaledTexture scaled = load_scaled_texture(builder, *texture);
             (bump ? adapters.bump_map : adapters.normal_map) = scaled.texture;
             if (bump) adapters.bump_scale = float(in.number("scale", 1)) * luminance(scaled.scale);
-            for (const char* name : {"flip_invalid_normals", "use_shadowing_function"})
-                if (in.boolean(name, false))
-                    builder.refuse(in.where(name), std::string("'") + name + "' is not supported", "it is ignored");
-            if (object->version >= 3)
-                builder.note(in.where(),
-                             "bumps and normal maps are those of Mitsuba 3.5 and before, without "
-                             "flip_invalid_normals and use_shadowing_function");
+            const bool by_default = object->version >= 3;  // Mitsuba 3.7 and later
+            if (in.boolean("flip_invalid_normals", by_default)) adapters.map_rules |= kTurnNormals;
+            if (in.boolean("use_shadowing_function", by_default)) adapters.map_rules |= kShadowBumps;
             if (!bump && !(scaled.scale == splat(1))) in.fail("the texture of a normalmap must not be scaled");
         } else {
             return object;
@@ -70,6 +76,12 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
 uint32_t add_record(Builder& builder, BsdfRecord r, const Object& object, const Adapters& adapters, bool two_sided) {
     if (two_sided && bsdf_transmits(r.type))
         Reader(builder, object).fail("a BSDF that transmits light cannot be inside of twosided");
+    if (adapters.coat && bsdf_transmits(r.type))
+        Reader(builder, object).fail("a coating over a BSDF that transmits light is not supported");
+    if (adapters.coat && adapters.coat->rough && !bsdf_is_smooth(r.type))
+        Reader(builder, object).fail("a rough coating over a BSDF of deltas alone is not supported");
+    if (adapters.coat) r.coat = adapters.coat->table;
+    r.map_rules = adapters.map_rules;
     r.normal_map = adapters.normal_map;
     r.bump_map = adapters.bump_map;
     r.bump_scale = adapters.bump_scale;
@@ -167,7 +179,7 @@ struct MaterialBuilder {
         in.finish();
         const bool first_null = first.type == "null", second_null = second->type == "null";
         if (first_null || second_null) {  // a mask
-            if (place != Place::outside || outer.has_opacity || first_null == second_null)
+            if (place != Place::outside || outer.has_opacity || outer.coat || first_null == second_null)
                 in.fail("a blend with null inside of other adapters is not supported");
             Adapters mask = outer;
             mask.opacity = first_null ? weight : ParamFloat{1 - weight.value, -1};

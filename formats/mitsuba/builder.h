@@ -154,6 +154,9 @@ Emitter read_emitter(Builder& builder, const Object& object, bool on_shape);
 bool is_sky(const std::string& type);
 Emitter read_sky(Builder& builder, Reader& in, const Matrix& rotation);
 
+/// Tangent of half the field of view along x and y. Mitsuba's rule: `fov` with `fov_axis`, or `focal_length` in
+/// millimetres on the diagonal of a 36 x 24 mm film.
+Vec2f field_of_view(Reader& in, double aspect);
 void build_sensor(Builder& builder, const Object& object);
 void build_integrator(Builder& builder, const Object& object);
 

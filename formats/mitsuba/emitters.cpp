@@ -72,6 +72,25 @@ void read_plugin(ModelTag<SpotEmitter>, Builder& builder, Reader& in, Emitter& e
     if (const Object* texture = in.take_named("texture")) e.radiance.texture = load_texture(builder, *texture);
 }
 
+void read_plugin(ModelTag<ProjectorEmitter>, Builder& builder, Reader& in, Emitter& e) {
+    const Matrix m = rigid_transform(builder, in);
+    builder.check_range(in.where(), "the emitter of type 'projector'", {column(m, 3)});
+    e.to_world = to_affine(m);
+    e.to_local = to_affine(affine_inverse(m));
+    e.position = to_vec3f(column(m, 3));
+    e.direction = to_vec3f(column(m, 2));
+    e.radiance = in.textured_color("irradiance", {1, 1, 1}, SpectrumUse::emission);
+    e.radiance.value = e.radiance.value * float(M_PI * in.number("scale", 1));  // Mitsuba's convention
+    double aspect = 1;
+    if (e.radiance.texture >= 0 && !builder.validate_only) {
+        const Texture& t = builder.scene.textures[size_t(e.radiance.texture)];
+        if (t.type == TextureType::bitmap) aspect = double(t.width) / t.height;
+    }
+    const Vec2f tangents = field_of_view(in, aspect);
+    e.cutoff = tangents.x;
+    e.beam_width = tangents.y;
+}
+
 void read_plugin(ModelTag<DirectionalEmitter>, Builder&, Reader& in, Emitter& e) {
     if (in.has("direction") && in.has("to_world"))
         in.fail(in.where("to_world"), "both 'direction' and 'to_world' are given");

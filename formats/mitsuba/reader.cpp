@@ -136,6 +136,8 @@ Rgb Reader::color(const std::string& name, Rgb fallback, SpectrumUse use) {
         rgb = v->rgb;
     else if (!v->samples.empty())
         rgb = spectrum_to_rgb(v->samples, use);
+    else if (v->equal_energy && use == SpectrumUse::emission)
+        rgb *= kEqualEnergy;  // as Mitsuba 3; its D65 is white
     if (!is_finite(rgb)) fail(v->where, "'" + name + "' is not finite");
     if (min_component(rgb) < 0) fail(v->where, "'" + name + "' is negative");
     if (use == SpectrumUse::reflectance && max_component(rgb) > 1) {

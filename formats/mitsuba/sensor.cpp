@@ -11,22 +11,9 @@
 
 namespace ambilux::mitsuba {
 
-namespace {
-
-constexpr uint64_t kMostPixels = 0xffffffff;
 /// Tangents of half a field of view: its square is a density, and its inverse too.
-constexpr double kLeastTangent = 1e-9, kMostTangent = 1e9;
+static constexpr double kLeastTangent = 1e-9, kMostTangent = 1e9;
 
-/// A length of the sensor; fails outside of the range of the tracers.
-float range_parameter(Reader& in, const char* name, double fallback) {
-    const double value = in.number(name, fallback);
-    if (!(std::fabs(value) <= double(kMostCoordinate)))
-        in.fail(in.where(name), fmt::format("{} is {:g}; it may be {:g} at most", name, value, kMostCoordinate));
-    return float(value);
-}
-
-/// Tangent of half the field of view along x and y. Mitsuba's rule: `fov` with `fov_axis`, or `focal_length` in
-/// millimetres on the diagonal of a 36 x 24 mm film.
 Vec2f field_of_view(Reader& in, double aspect) {
     if (in.has("fov") && in.has("focal_length"))
         in.fail(in.where("focal_length"), "both 'fov' and 'focal_length' are given");
@@ -63,6 +50,18 @@ Vec2f field_of_view(Reader& in, double aspect) {
                     fmt::format("the tangent of half the field of view is {:g}; it must lie between {:g} and {:g}",
                                 tangent, kLeastTangent, kMostTangent));
     return {float(tx), float(tx / aspect)};
+}
+
+namespace {
+
+constexpr uint64_t kMostPixels = 0xffffffff;
+
+/// A length of the sensor; fails outside of the range of the tracers.
+float range_parameter(Reader& in, const char* name, double fallback) {
+    const double value = in.number(name, fallback);
+    if (!(std::fabs(value) <= double(kMostCoordinate)))
+        in.fail(in.where(name), fmt::format("{} is {:g}; it may be {:g} at most", name, value, kMostCoordinate));
+    return float(value);
 }
 
 void read_filter(Builder& builder, Reader& film, Sensor& sensor) {

@@ -39,8 +39,7 @@ void transform_mesh(const Builder& builder, Job& job, const Mesh& source) {
             builder.check_range(job.where, "the shape of type '" + job.type + "'", {{q.x, q.y, q.z}});
     }
     out.uvs = mesh.uvs;
-    // A reflection would turn the outside in: reverse the winding.
-    const bool reverse = (determinant(job.to_world) < 0) != job.flip;
+    const bool reverse = job.reverse != job.flip;
     out.faces = mesh.faces;
     if (reverse)
         for (auto& face : out.faces) std::swap(face[1], face[2]);

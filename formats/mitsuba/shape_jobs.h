@@ -23,6 +23,7 @@ struct Job {
     uint32_t material = 0, emitter = kNone;
     int source = -1;  ///< meshes: index into the sources
     bool flip = false, face_normals = false;
+    bool reverse = false;      ///< meshes: the order of corners, so that the outside stays outside of a mirror
     double smooth_angle = -1;  ///< not negative: vertex normals are made anew, but not over sharper edges; degrees
     // Result for meshes.
     Mesh world;

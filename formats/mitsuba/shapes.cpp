@@ -4,7 +4,9 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "formats/file_budget.h"
+#include "formats/meshes/curves.h"
 #include "formats/meshes/mesh.h"
+#include "formats/meshes/sdf_grid.h"
 #include "formats/mitsuba/builder.h"
 #include "formats/mitsuba/shape_jobs.h"
 
@@ -28,11 +30,16 @@ struct ShapeBuilder {
     void add_instance(const Object& object, const Matrix& outer);
     void read_geometry(Reader& in, Job& job);
     void read_mesh_file(Reader& in, Job& job);
+    void read_tessellated(Reader& in, Job& job, const Matrix& outer);
     uint32_t add_emitter(const Object& object);
     uint32_t material_of_attributes(Job& job, const Object& bsdf);
 };
 
 bool is_quadric(const std::string& type) { return type == "sphere" || type == "disk" || type == "cylinder"; }
+/// Made of triangles when they are read, because they are no primitives of ours.
+bool is_tessellated(const std::string& type) {
+    return type == "sdfgrid" || type == "linearcurve" || type == "bsplinecurve";
+}
 bool is_mesh_file(const std::string& type) { return type == "obj" || type == "ply" || type == "serialized"; }
 
 /// Transform of a sphere (center, radius) or cylinder (p0, p1, radius) in its own space.
@@ -76,7 +83,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
         return;
     }
     const std::string& type = object.type;
-    if (!is_quadric(type) && !is_mesh_file(type) && type != "rectangle" && type != "cube") {
+    if (!is_quadric(type) && !is_mesh_file(type) && !is_tessellated(type) && type != "rectangle" && type != "cube") {
         builder.refuse(object.where, "shape type '" + type + "' is not supported", "the shape is left out");
         return;
     }
@@ -88,10 +95,21 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     if (!(std::fabs(determinant(job.to_world)) > 0))
         in.fail(in.where("to_world"), "the transform of the shape is singular");
     job.flip = in.boolean("flip_normals", false);
+    job.reverse = determinant(job.to_world) < 0;
+    if (object.version >= 2 && (is_mesh_file(type) || type == "sphere")) {
+        // In Mitsuba 3 a mirrored mesh keeps the order of its corners, whose outside so turns in, and so does that of a
+        // sphere. An instance keeps it.
+        const bool mirrored = determinant(in.transform("to_world")) < 0;
+        job.reverse = job.reverse != mirrored;
+        if (type == "sphere") job.flip = job.flip != mirrored;
+    }
     const Object* bsdf = in.take("bsdf");
     const bool attributes = bsdf && has_mesh_attributes(*bsdf);
     if (attributes && type != "ply") in.fail("mesh attributes are read from ply files only");
-    read_geometry(in, job);
+    if (is_tessellated(type))
+        read_tessellated(in, job, outer);
+    else
+        read_geometry(in, job);
     const Object* emitter = in.take("emitter");
     if (emitter && in_instance)
         builder.refuse(emitter->where, "an emitter inside of a shapegroup is not supported", "the shape does not emit");
@@ -156,6 +174,46 @@ void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
         in.ignore({"collapse", "load_materials"});  // older generation: one shape per group or for all looks the same
     const std::string key =
         source.path + "|" + std::to_string(source.flip_v) + "|" + std::to_string(source.shape_index);
+    job.source = add_source(std::move(source), key);
+}
+
+void ShapeBuilder::read_tessellated(Reader& in, Job& job, const Matrix& outer) {
+    const std::string name = in.text("filename", "");
+    if (name.empty()) in.fail(job.type + " shape has no filename");
+    const std::string path = builder.document.resolve(name, in.where("filename"));
+    const bool grid = job.type == "sdfgrid";
+    const std::string normals = grid ? in.text("normals", "smooth") : "";
+    if (grid && normals != "smooth" && normals != "analytic")
+        in.fail(in.where("normals"), "'" + normals + "' are no normals of an sdfgrid: smooth or analytic");
+    // Radii of curves do not follow the shape's own transform, its points do.
+    const Matrix placed = grid ? Matrix{} : in.transform("to_world");
+    if (!grid) job.to_world = outer;
+    std::string key = path + "|" + job.type + normals;
+    for (const auto& row : placed.m)
+        for (double m : row) (key += '|') += std::to_string(float_bits(float(m)));
+    if (const auto known = source_by_key.find(key); known != source_by_key.end()) {
+        job.source = known->second;
+        return;
+    }
+    const Limits& limits = builder.options.limits;
+    const std::string bytes = read_input(path, limits);
+    builder.file_digests.push_back({path, sha256(bytes)});
+    MeshSource source;
+    source.type = job.type;
+    if (grid) {
+        source.mesh = mesh_of_grid(path, read_distance_grid(path, bytes, limits),
+                                   normals == "smooth" ? GridNormals::smooth : GridNormals::analytic);
+    } else {
+        std::vector<Curve> curves = read_curves(path, bytes, limits);
+        for (Curve& curve : curves)
+            for (CurvePoint& c : curve) {
+                const Vec3d p = column(placed * translation(c.p[0], c.p[1], c.p[2]), 3);
+                c.p[0] = p.x, c.p[1] = p.y, c.p[2] = p.z;
+            }
+        source.mesh = job.type == "linearcurve" ? mesh_of_linear_curves(curves) : mesh_of_bspline_curves(path, curves);
+    }
+    builder.note(in.where(), "shapes of type '" + job.type +
+                                 "' are triangles: " + std::to_string(source.mesh.faces.size()) + " of them here");
     job.source = add_source(std::move(source), key);
 }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/parallel.h"
 #include "formats/mitsuba/builder.h"
 #include "formats/mitsuba/sky.h"
 
@@ -9,8 +10,8 @@ namespace ambilux::mitsuba {
 
 namespace {
 
-/// Widths of images: the sky is smooth, the sun is half a degree wide.
-constexpr uint32_t kSkyWidth = 512, kSunWidth = 2048;
+/// Sizes of images. The sky is smooth but ends at the horizon, where a row is a ramp; the sun is half a degree wide.
+constexpr uint32_t kSkyWidth = 512, kSkyHeight = 2048, kSunWidth = 2048, kSunHeight = 2048;
 constexpr double kSunDegrees = 0.5358;
 
 /// What an emitter asks for, in the frame of our environment maps: +y is up, azimuth 0 is -z and grows towards +x.
@@ -128,10 +129,10 @@ struct Image {
 void add_sky(Image& image, const SkySettings& s) {
     const double elevation = std::asin(std::min(s.sun.y, 1.0));
     const Sky sky(s.turbidity, s.albedo, elevation);
-    for (uint32_t y = 0; y < image.height; ++y) {
+    parallel_for(image.height, [&](uint32_t y) {
         double zenith = M_PI * y / (image.height - 1) / s.stretch, fade = 1;
         if (!(std::cos(zenith) > 0)) {
-            if (!s.extend) continue;
+            if (!s.extend) return;
             zenith = M_PI / 2 - 1e-4;
         }
         if (s.extend) {  // Mitsuba 0.6: fades out towards the nadir
@@ -143,7 +144,7 @@ void add_sky(Image& image, const SkySettings& s) {
             const double angle = std::acos(std::clamp(dot(d, s.sun), -1.0, 1.0));
             image.add(x, y, sky.radiance(std::cos(zenith), angle) * float(s.sky_scale * fade));
         }
-    }
+    });
 }
 
 /// A disk about the sun, scaled so that the map has exactly its irradiance, whatever texels are.
@@ -188,8 +189,8 @@ Emitter read_sky(Builder& builder, Reader& in, const Matrix& rotation) {
     if (settings.sun_scale > 0 && !newer)
         builder.note(in.where(), "the sun is that of Hosek and Wilkie 2013, not that of Preetham et al. 1999");
 
-    Image image{settings.sun_scale > 0 ? kSunWidth : kSkyWidth, 0, {}};
-    image.height = image.width / 2;
+    const bool sun = settings.sun_scale > 0;
+    Image image{sun ? kSunWidth : kSkyWidth, sun ? kSunHeight : kSkyHeight, {}};
     builder.take_memory(uint64_t(image.width) * image.height * 4 * sizeof(float), in.where().file);
     image.texels.assign(size_t(image.width) * image.height * 4, 0.0f);
     if (settings.sky_scale > 0) add_sky(image, settings);

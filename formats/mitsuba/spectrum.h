@@ -19,4 +19,7 @@ enum class SpectrumUse {
 /// are clipped at 0 (reflectance also at 1).
 Rgb spectrum_to_rgb(const std::vector<std::pair<double, double>>& samples, SpectrumUse use);
 
+/// A light that is 1 at all wavelengths (XYZ of 1, 1, 1).
+constexpr Rgb kEqualEnergy = {1.204794f, 0.948291f, 0.908916f};
+
 }  // namespace ambilux::mitsuba

@@ -156,6 +156,9 @@ struct Parser {
         const pugi::xml_node root = xml.document_element();
         if (!root || std::string(root.name()) != "scene")
             fail(where(source, root ? root.offset_debug() : 0), "the outermost element is not <scene>");
+        for (pugi::xml_node next = root.next_sibling(); next; next = next.next_sibling())
+            if (next.type() == pugi::node_element)
+                fail(where(source, next), std::string("<") + next.name() + "> stands behind the end of the scene");
         ValueParser::allow(source, root, {"version", "type", "id"});
         if (root.attribute("version")) {
             const std::string version = root.attribute("version").value();

@@ -32,6 +32,7 @@ struct Value {
     Rgb rgb{};
     Vec3d vector{};
     std::vector<std::pair<double, double>> samples;  ///< spectrum: (wavelength in nm, value), rising
+    bool equal_energy = false;  ///< spectrum: `number` at all wavelengths, which is no white as a light
     Matrix transform;
 };
 

@@ -234,6 +234,7 @@ Value ValueParser::parse_spectrum(const XmlSource& source, const pugi::xml_node&
                 value.rgb = {float(list[0]), float(list[1]), float(list[2])};
             } else if (list.size() == 1) {
                 value.number = list[0];
+                value.equal_energy = source.version >= 2;
             } else {
                 fail(at, "<spectrum> needs one number or a list of wavelength:value");
             }

@@ -41,6 +41,8 @@ void convert(const ambilux::BsdfRecord& from, BsdfRecord& to) {
     to.normal_map = from.normal_map;
     to.bump_map = from.bump_map;
     to.bump_scale = from.bump_scale;
+    to.map_rules = from.map_rules;
+    to.coat = from.coat;
     [&]<uint32_t... I>(std::integer_sequence<uint32_t, I...>) {
         ((uint32_t(from.type) == I ? convert_parameters<I>(from, to) : void()), ...);
     }(std::make_integer_sequence<uint32_t, BsdfModels::count>());
@@ -93,7 +95,7 @@ void derive(Quadric& q) {
 
 void derive(Emitter& e) {
     if (e.type == EmitterType::spot || e.type == EmitterType::directional) e.direction = normalize(e.direction);
-    if (e.type != EmitterType::spot && e.type != EmitterType::envmap) return;
+    if (e.type != EmitterType::spot && e.type != EmitterType::projector && e.type != EmitterType::envmap) return;
     set_orthogonal(e.to_world);
     e.to_local = inverse_of_orthogonal(e.to_world);
 }

@@ -145,15 +145,14 @@ def rough_diffuse(root, changes):
 
 
 def bump_flags(root, changes):
-    """Newer than the formats: they turn normals that face away, and darken. Older versions and this program do neither."""
+    """Newer than the old formats: they turn normals that face away, and darken."""
     for e in root.iter("bsdf"):
         if e.get("type") not in ("bumpmap", "normalmap"):
             continue
         for flag in ("flip_invalid_normals", "use_shadowing_function"):
-            for stated in children(e, flag):
-                e.remove(stated)
-            xml.SubElement(e, "boolean", {"name": flag, "value": "false"})
-        changes.add(f"flip_invalid_normals and use_shadowing_function of {e.get('type')} are off")
+            if not children(e, flag):
+                xml.SubElement(e, "boolean", {"name": flag, "value": "false"})
+                changes.add(f"{flag} of {e.get('type')} is off")
 
 
 def unused_flags(root, changes):
@@ -241,7 +240,8 @@ def convert(job):
     bitmaps(root, old, changes)
     conductors(root, changes)
     rough_diffuse(root, changes)
-    bump_flags(root, changes)
+    if int(version.split(".")[0]) < 3:
+        bump_flags(root, changes)
     unused_flags(root, changes)
     film_of(root, job, changes)
     integrator_of(root, job, changes)

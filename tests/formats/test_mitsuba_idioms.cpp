@@ -177,16 +177,44 @@ TEST_CASE("checkerboards of numbers have their colours exchanged in format 3") {
     CHECK(opacity(load_quietly(mask, "0.6.0")) == 1);
 }
 
-TEST_CASE("bump and normal maps: what newer versions of Mitsuba add to them is not silently left out") {
-    const auto bumped = [](const std::string& xml) {
-        return "<shape type='rectangle'><bsdf type='bumpmap'>" + xml +
-               "<texture type='checkerboard'/><bsdf type='diffuse'/></bsdf></shape>";
+TEST_CASE("bump and normal maps: rules of Mitsuba 3.7 are on in format 3 unless the file says otherwise") {
+    const auto rules = [](const std::string& xml, const std::string& version) {
+        const Scene s = load_quietly("<shape type='rectangle'><bsdf type='bumpmap'>" + xml +
+                                         "<texture type='checkerboard'/><bsdf type='diffuse'/></bsdf></shape>",
+                                     version);
+        CHECK(s.notes.empty());
+        CHECK(s.features.map_rules == (s.bsdfs[0].map_rules != 0));
+        return s.bsdfs[0].map_rules;
     };
-    CHECK(has_note(load_quietly(bumped("")), "without flip_invalid_normals"));
-    CHECK(load_quietly(bumped(""), "0.6.0").notes.empty());
-    load_quietly(bumped("<boolean name='use_shadowing_function' value='false'/>"));
-    CHECK(contains(error_of(bumped("<boolean name='use_shadowing_function' value='true'/>")),
-                   "'use_shadowing_function' is not supported"));
+    const auto flag = [](const std::string& name, const std::string& value) {
+        return "<boolean name='" + name + "' value='" + value + "'/>";
+    };
+    const std::string turn = "flip_invalid_normals", shadow = "use_shadowing_function";
+    CHECK(rules("", "3.0.0") == (kTurnNormals | kShadowBumps));
+    CHECK(rules("", "2.1.0") == 0);
+    CHECK(rules("", "0.6.0") == 0);
+    CHECK(rules(flag(turn, "false"), "3.0.0") == kShadowBumps);
+    CHECK(rules(flag(shadow, "false"), "3.0.0") == kTurnNormals);
+    CHECK(rules(flag(turn, "true"), "2.1.0") == kTurnNormals);
+}
+
+TEST_CASE("a spectrum that is the same everywhere is no white as a light in format 3, and grey as a reflectance") {
+    const auto light = [](const std::string& value, const std::string& version) {
+        return load_quietly("<emitter type='constant'>" + value + "</emitter>", version).emitters[0].radiance.value;
+    };
+    const std::string two = "<spectrum name='radiance' value='2'/>";
+    check_rgb(light(two, "3.0.0"), {2.40958f, 1.89658f, 1.81783f}, 1e-4);  // from Mitsuba 3.9
+    check_rgb(light(two, "0.6.0"), splat(2));
+    check_rgb(light("<spectrum name='radiance' type='d65'/>", "3.0.0"), splat(1));
+    check_rgb(light("<float name='radiance' value='2'/>", "3.0.0"), splat(2));
+    const Scene s = load_quietly(
+        "<shape type='rectangle'><bsdf type='diffuse'><spectrum name='reflectance' "
+        "value='0.5'/></bsdf></shape>");
+    check_rgb(reflectance(s, 0, {0, 0}), splat(0.5f));
+}
+
+TEST_CASE("what stands behind the end of the scene is not left out silently") {
+    CHECK(contains(error_of("</scene><scene version='3.0.0'>"), "behind the end of the scene"));
 }
 
 TEST_CASE("null is a surface that rays do not see, unless it emits") {

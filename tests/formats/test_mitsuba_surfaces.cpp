@@ -7,6 +7,7 @@
 #include "scene/surface.h"
 #include "tests/support/mitsuba_text.h"
 #include "transport/blend.h"
+#include "transport/bsdf/coating.h"
 
 using namespace ambilux;
 using namespace ambilux::test;
@@ -200,4 +201,51 @@ TEST_CASE("roughness of 0 is taken, as in Mitsuba; what is negative is not") {
         load_quietly(rough(type, "0"));
         CHECK(contains(error_of(rough(type, "-0.1")), "roughness must not be negative"));
     }
+}
+
+TEST_CASE("coatings lie over the BSDF inside, blends and two sides included") {
+    const auto materials = [](const std::string& xml) {
+        return load_quietly("<shape type='rectangle'>" + xml + "</shape>", "0.6.0");
+    };
+    const std::string layer = "<float name='thickness' value='2'/><rgb name='sigmaA' value='0.1 0.2 0.3'/>",
+                      base = "<bsdf type='diffuse'/>";
+    const Scene smooth = materials("<bsdf type='coating'>" + layer + base + "</bsdf>");
+    REQUIRE(smooth.features.coats);
+    const Coat coat{smooth.tables.data() + smooth.bsdfs[smooth.materials[smooth.shapes[0].material].front].coat};
+    CHECK(coat.ior() == Approx(1.5046 / 1.000277));
+    CHECK_FALSE(coat.rough());
+    CHECK(coat.absorption().y == Approx(0.4));
+    CHECK(coat.reflectance() == splat(1));
+    const Scene rough = materials("<bsdf type='twosided'><bsdf type='roughcoating'>" + layer +
+                                  "<float name='alpha' value='0.3'/><bsdf type='blendbsdf'>" + base +
+                                  "<bsdf type='ward'/></bsdf></bsdf></bsdf>");
+    for (const BsdfRecord& b : rough.bsdfs) {
+        REQUIRE(b.coat != kNone);
+        CHECK(Coat{rough.tables.data() + b.coat}.alpha() == 0.3f);
+    }
+    CHECK(rough.features.blends);
+    const auto error = [](const std::string& type, const std::string& inner) {
+        return error_of("<shape type='rectangle'><bsdf type='" + type + "'>" + inner + "</bsdf></shape>", {}, "0.6.0");
+    };
+    CHECK(contains(error("coating", "<bsdf type='dielectric'/>"), "transmits light"));
+    CHECK(contains(error("roughcoating", "<bsdf type='conductor'/>"), "deltas alone"));
+    CHECK(contains(error("coating", "<bsdf type='coating'>" + base + "</bsdf>"), "coating inside of a coating"));
+    CHECK(contains(error("coating", "<bsdf type='bumpmap'><texture type='checkerboard'/>" + base + "</bsdf>"),
+                   "put the coating inside of the bumpmap"));
+    CHECK(contains(error("coating", "<float name='intIOR' value='1.000277'/>" + base), "must differ"));
+    CHECK(contains(error("coating", ""), "no nested BSDF"));
+}
+
+TEST_CASE("projector: fields of view by the texture's shape") {
+    const std::string at = "<transform name='to_world'><lookat origin='0,0,3' target='0,0,0' up='0,1,0'/></transform>";
+    const Scene s = load_quietly("<emitter type='projector'>" + at +
+                                 "<float name='fov' value='90'/><rgb name='irradiance' value='2'/><float name='scale' "
+                                 "value='3'/></emitter>");
+    const Emitter& e = s.emitters[0];
+    CHECK(e.type == EmitterType::projector);
+    CHECK(e.cutoff == Approx(1));
+    CHECK(e.beam_width == Approx(1));
+    CHECK(e.radiance.value.x == Approx(6 * M_PI));
+    CHECK(e.position.z == 3);
+    CHECK(s.features.emitters == bit(EmitterType::projector));
 }

@@ -301,8 +301,10 @@ TEST_CASE("B12: mirrored lamps with and without vertex normals shine to the same
                                      "x='1' angle='180'/><translate z='2.4'/></transform>" +
                                      kWhite +
                                      "</shape><shape type='obj'><string name='filename' value='t.obj'/>"
-                                     "<transform name='to_world'><scale x='" +
-                                     std::string(mirrored ? "-1" : "1") +
+                                     // Without vertex normals a mirror turns the lamp upwards.
+                                     "<boolean name='flip_normals' value='" +
+                                     std::string(mirrored && !normals ? "true" : "false") +
+                                     "'/><transform name='to_world'><scale x='" + std::string(mirrored ? "-1" : "1") +
                                      "'/><rotate x='1' angle='180'/><translate z='1.2'/></transform>" +
                                      (two_sided ? "<bsdf type='twosided'>" + body + "</bsdf>" : body) +
                                      area_light(kLight) + "</shape>");

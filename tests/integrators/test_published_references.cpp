@@ -1,7 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 900
 // Renders of published scenes against the images that were published with them, made by other renderers.
-#include "core/error.h"
 #include "film/ztest.h"
 #include "formats/load.h"
 #include "tests/support/published_image.h"
@@ -36,20 +35,6 @@ void require_mitsuba_test(const std::string& folder, const std::string& name, co
     CHECK(z.pass);
 }
 
-/// Requires that the loader refuses the scene and says what it does not know.
-void require_refusal(const std::string& file_name, const std::string& what) {
-    const auto file = published_file(kTests + file_name);
-    if (!file) return;
-    try {
-        load_mitsuba(*file);
-        FAIL(file_name << " was loaded");
-    } catch (const Error& e) {
-        INFO(e.what());
-        CHECK(std::string(e.what()).find(what) != std::string::npos);
-        CHECK(std::string(e.what()).find(file_name) != std::string::npos);
-    }
-}
-
 }  // namespace
 
 TEST_CASE("Mitsuba render tests: spheres of many BSDFs under an area light") {
@@ -77,8 +62,12 @@ TEST_CASE("Mitsuba render tests: texture filters and wrap modes") {
     require_mitsuba_test("texture_interp", "test_texture_interp", "direct");
 }
 
-TEST_CASE("Mitsuba render tests that need what Ambilux lacks are refused by name") {
-    require_refusal("various_shapes/test_various_shapes_path.xml", "'sdfgrid'");
+TEST_CASE("Mitsuba render tests: colours at the vertices of a mesh") {
+    require_mitsuba_test("mesh_attributes", "test_mesh_attributes_3_vertex", "direct");
+}
+// Its sdfgrid is triangles here.
+TEST_CASE("Mitsuba render tests: all kinds of shapes") {
+    require_mitsuba_test("various_shapes", "test_various_shapes", "path");
 }
 
 // Large blocks, few samples; test_published_references_long.cpp has blocks of 16 pixels. The published veach-mis shows

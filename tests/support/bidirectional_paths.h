@@ -60,6 +60,8 @@ inline std::string bodies() {
         "<bsdf type='roughconductor'><string name='material' value='Cu'/><string name='distribution' "
         "value='ggx'/><float name='alpha_u' value='0.08'/><float name='alpha_v' value='0.35'/></bsdf>";
     const std::string glass = "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>";
+    const std::string plain_map =
+        "<boolean name='flip_invalid_normals' value='false'/><boolean name='use_shadowing_function' value='false'/>";
     std::string s;
     s += "<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' "
          "angle='-90'/></transform><bsdf type='diffuse'>" +
@@ -89,17 +91,19 @@ inline std::string bodies() {
                      "<bsdf type='roughplastic'>" + rgb("diffuse_reflectance", "0.5,0.4,0.1") +
                          "<float name='alpha' value='0.15'/><boolean name='nonlinear' value='true'/></bsdf>");
     s += bsdf_sphere(-1.5f, 1.0f,
-                     "<bsdf type='bumpmap'><texture name='arbitrary' type='bitmap'><boolean name='raw' value='true'/>" +
+                     "<bsdf type='bumpmap'>" + plain_map +
+                         "<texture name='arbitrary' type='bitmap'><boolean name='raw' value='true'/>" +
                          asset("waves.png") + "</texture><float name='scale' value='0.2'/><bsdf type='diffuse'>" +
                          rgb("reflectance", "0.5,0.35,0.6") + "</bsdf></bsdf>");
     s += bsdf_sphere(
         -0.7f, 1.0f,
-        "<bsdf type='normalmap'><texture name='normalmap' type='bitmap'><boolean name='raw' value='true'/>" +
-            asset("dimples.png") +
+        "<bsdf type='normalmap'>" + plain_map +
+            "<texture name='normalmap' type='bitmap'><boolean name='raw' value='true'/>" + asset("dimples.png") +
             "</texture><bsdf type='roughconductor'><string name='material' value='Ag'/><float name='alpha' "
             "value='0.2'/></bsdf></bsdf>");
     s += bsdf_sphere(0.1f, 1.0f,
-                     "<bsdf type='bumpmap'><texture name='arbitrary' type='bitmap'><boolean name='raw' value='true'/>" +
+                     "<bsdf type='bumpmap'>" + plain_map +
+                         "<texture name='arbitrary' type='bitmap'><boolean name='raw' value='true'/>" +
                          asset("waves.png") + "</texture><float name='scale' value='0.1'/>" + glass + "</bsdf>");
     // Interpolated normals, from both sides.
     s += "<shape type='obj'>" + asset("torus.obj") +

@@ -27,7 +27,9 @@ void edit_parameters(Bsdf& b, Op op) {
     BsdfModels::visit<BsdfModels::kAll>(uint32_t(b.type), false, [&](auto model) {
         auto parameters = b.as<typename decltype(model)::type>();
         op(parameters);
+        const float32* coat = b.coat;
         b = bsdf_of(parameters, b.tables);
+        b.coat = coat;
         return true;
     });
 }
@@ -64,6 +66,19 @@ inline const float* cached_table(Microfacets m, float alpha, float ior) {
     auto [it, fresh] = tables.try_emplace({int(m), alpha, ior});
     if (fresh) rough_transmittance_table(m, alpha, ior, it->second.data());
     return it->second.data();
+}
+
+/// `b` under a coating that lives as long as the test; smooth for alpha 0.
+inline Bsdf coated(Bsdf b, float ior, float alpha, Rgb absorption) {
+    static std::vector<std::vector<float>> coats;
+    std::vector<float> coat = {ior, alpha, 1, 0.6f, 0.9f, 1, 0.8f, absorption.x, absorption.y, absorption.z, 0, 0};
+    if (alpha > 0) {
+        const float* table = cached_table(Microfacets::ggx, alpha, ior);
+        coat.insert(coat.end(), table, table + kTransmittanceTableSize);
+    }
+    coats.push_back(std::move(coat));
+    b.coat = coats.back().data();
+    return b;
 }
 
 /// All colours 1, index 1.5.
@@ -187,6 +202,13 @@ inline std::vector<BsdfCase> bsdf_cases() {
             add("principled " + suffix, principled(roughness, metallic));
             add("principled with all " + suffix, principled_with_all(roughness, metallic));
         }
+    for (float alpha : {0.0f, 0.2f}) {
+        const std::string suffix = " " + std::to_string(alpha);
+        add("coated diffuse" + suffix,
+            coated(bsdf_of(Resolved<Diffuse>{{{0.9f, 0.5f, 0.0f}}, {}}), 1.5f, alpha, {0.1f, 0.0f, 0.5f}));
+        add("coated rough conductor" + suffix,
+            coated(rough_conductor(Microfacets::ggx, true, 0.3f, 0.3f), 1.3f, alpha, {0, 0, 0}));
+    }
     add("conductor", conductor({0.2f, 0.92f, 1.1f}, {3.9f, 2.45f, 2.14f}));
     for (float ior : {1.5f, 0.75f}) {
         const std::string suffix = " ior " + std::to_string(ior);

@@ -371,3 +371,123 @@ TEST_CASE("B4: directions exactly in the geometric or shading plane scatter noth
     }
     CHECK(invalid == 0);
 }
+
+namespace {
+
+/// A record with rules and a normal map that tilts its normal by `degrees`.
+void set_mapped(OneSurface& surface, BsdfRecord record, uint32_t rules, float degrees) {
+    record.map_rules = rules;
+    record.normal_map = 0;
+    surface.bsdfs[0] = record;
+    const float tilt = degrees_to_radians(degrees);
+    surface.set_texture(
+        1, [&](float, float) { return Rgb{0.5f + 0.5f * std::sin(tilt), 0.5f, 0.5f + 0.5f * std::cos(tilt)}; });
+}
+
+}  // namespace
+
+TEST_CASE("rules of maps: both modes use one function, and their densities are each other's ways back") {
+    OneSurface surface;
+    int compared = 0, turned_pairs = 0;
+    for (const BsdfRecord& record : records())
+        for (uint32_t rules : {1u, 2u, 3u}) {
+            set_mapped(surface, record, rules, 50);
+            for (uint32_t i = 0; i < 4000; ++i) {
+                const SurfacePoint p = random_point(i, 20);
+                const Vec3f camera = random_direction(31, i), light = random_direction(32, i);
+                const Scattering eye = make_scattering<F>(surface.scene(), p, camera),
+                                 from = make_scattering<F>(surface.scene(), p, light);
+                const BsdfValue radiance = scatter_evaluate<F>(eye, light, TransportMode::radiance),
+                                importance = scatter_evaluate<F>(from, camera, TransportMode::importance);
+                REQUIRE(is_zero(radiance.value) == is_zero(importance.value));
+                if (is_zero(radiance.value)) continue;
+                const float eta2 = importance.value.x * std::fabs(dot(p.ng, light)) /
+                                   (radiance.value.x * std::fabs(dot(p.ng, camera)));
+                const bool through = dot(p.ng, light) * dot(p.ng, camera) < 0;
+                if (!through) REQUIRE(eta2 == Approx(1).epsilon(2e-3));
+                REQUIRE(radiance.pdf_sa == Approx(importance.pdf_reverse_sa).epsilon(2e-3));
+                REQUIRE(radiance.pdf_reverse_sa == Approx(importance.pdf_sa).epsilon(2e-3));
+                ++compared;
+                turned_pairs += turns_for(eye, camera);
+            }
+        }
+    CHECK(compared > 5000);
+    CHECK(turned_pairs > 100);
+}
+
+TEST_CASE("rules of maps: a sample's weight is value over density, and all that is scattered is sampled, both modes") {
+    OneSurface surface;
+    for (const BsdfRecord& record : {records()[0], records()[1]})
+        for (TransportMode mode : kModes) {
+            set_mapped(surface, record, kTurnNormals | kShadowBumps, 50);
+            const SurfacePoint p = point_with({0, 0, 1}, {0, 0, 1});
+            for (float cosine : {0.9f, 0.3f, 0.1f})
+                for (float side : {-1.0f, 1.0f}) {
+                    const Vec3f wi = {side * std::sqrt(1 - cosine * cosine), 0, cosine};
+                    const Scattering s = make_scattering<F>(surface.scene(), p, wi);
+                    double sampled = 0, sampled2 = 0, seen = 0, seen2 = 0, mass = 0, mass2 = 0;
+                    const uint32_t n = 40000;
+                    for (uint32_t i = 0; i < n; ++i) {
+                        ScatterSample out;
+                        if (scatter_sample<F>(s, uniform3(41, i), mode, out)) {
+                            const BsdfValue v = scatter_evaluate<F>(s, out.wo, mode);
+                            if (v.value.x > 1e-6f) {
+                                REQUIRE(out.weight.x == Approx(v.value.x / v.pdf_sa).epsilon(1e-3));
+                                REQUIRE(out.pdf_sa == Approx(v.pdf_sa).epsilon(1e-3));
+                            }
+                            sampled += out.weight.x, sampled2 += sqr(double(out.weight.x));
+                        }
+                        const BsdfValue v = scatter_evaluate<F>(s, random_direction(42, i), mode);
+                        const double x = v.value.x * 4 * M_PI, m = is_zero(v.value) ? 0 : v.pdf_sa * 4 * M_PI;
+                        seen += x, seen2 += x * x, mass += m, mass2 += m * m;
+                    }
+                    const auto error = [&](double sum, double squares) {
+                        return std::sqrt(std::max(squares / n - sum / n * sum / n, 0.0) / n);
+                    };
+                    INFO(name_of(record.type) << " mode " << int(mode) << " cosine " << side * cosine);
+                    CHECK(std::fabs(sampled - seen) / n <
+                          4.5 * std::hypot(error(sampled, sampled2), error(seen, seen2)) + 1e-6);
+                    CHECK(mass / n < 1 + 4.5 * error(mass, mass2));
+                }
+        }
+}
+
+TEST_CASE("rules of maps: the normal turns towards the camera, and bumps shadow by the published term") {
+    OneSurface surface;
+    set_mapped(surface, records()[0], kTurnNormals | kShadowBumps, 50);
+    const SurfacePoint p = point_with({0, 0, 1}, {0, 0, 1});
+    const float t = degrees_to_radians(50);
+    // From behind the normal, as seen without the rule.
+    const Vec3f camera = normalize(Vec3f{-2, 0, 0.5f}), light = normalize(Vec3f{-0.5f, 0.3f, 1});
+    const Scattering s = make_scattering<F>(surface.scene(), p, camera);
+    CHECK(dot(s.frame.n, camera) < 0);
+    const Vec3f turned_n = {-std::sin(t), 0, std::cos(t)};
+    const float tan2 = (1 - sqr(light.z)) / sqr(light.z), alpha2 = min(0.125f * sqr(std::tan(t)), 1.0f);
+    const float shadow = 2 / (1 + std::sqrt(1 + alpha2 * tan2));
+    const BsdfValue v = scatter_evaluate<F>(s, light, TransportMode::radiance);
+    CHECK(v.value.x == Approx(0.9 / M_PI * dot(turned_n, light) * shadow).epsilon(1e-4));
+    set_mapped(surface, records()[0], 0, 50);
+    CHECK(is_zero(scatter_eval<F>(make_scattering<F>(surface.scene(), p, camera), light, TransportMode::radiance)));
+}
+
+TEST_CASE("rules of maps: what is left of a vertex in a queue makes the same vertex") {
+    OneSurface surface;
+    for (const BsdfRecord& record : records()) {
+        set_mapped(surface, record, kTurnNormals | kShadowBumps, 40);
+        for (uint32_t two_sided : {0u, 1u}) {
+            surface.material.two_sided = two_sided;
+            for (uint32_t i = 0; i < 2000; ++i) {
+                const SurfacePoint p = random_point(i, 30);
+                const Vec3f w = random_direction(51, i);
+                const Scattering a = make_scattering<F>(surface.scene(), p, w),
+                                 b = scattering_of<F>(surface.scene(), parts_of(a), w);
+                REQUIRE(a.map_rules == b.map_rules);
+                REQUIRE(length(a.base - b.base) < 2e-6f);
+                if (std::fabs(dot(frame_from_normal(b.base).s, a.frame.n)) > 0.99f) continue;
+                REQUIRE(length(a.frame.s - b.frame.s) < 2e-5f);
+                REQUIRE(length(a.frame.t - b.frame.t) < 2e-5f);
+            }
+        }
+        surface.material.two_sided = 0;
+    }
+}

@@ -145,6 +145,7 @@ struct BidirectionalMis {
                 break;
             }
             case EmitterType::point:
+            case EmitterType::projector:
             case EmitterType::spot: next_event = e.pick_probability * length_squared(p - path.origin) * scale; break;
             case EmitterType::directional: next_event = e.pick_probability * scale; break;
             default:
@@ -212,6 +213,7 @@ struct BidirectionalMis {
                         light.pdf_sa;
                 break;
             case EmitterType::point:
+            case EmitterType::projector:
             case EmitterType::spot:
                 more *= pdf_emission_direction<F>(scene, light.emitter, light.ng, -light.wi) / sqr(light.distance);
                 break;

@@ -16,6 +16,17 @@ AMBILUX_HD float delta_reverse_pdf(const Scattering& s, Vec3f wo, float eta) {
     return fabsf(s.wi.z) / (max(fabsf(dot(s.frame.n, wo)), 1e-7f) * sqr(eta));
 }
 
+/// The same in the frame that a delta was drawn in.
+template <Features F>
+AMBILUX_HD float delta_reverse_pdf(const Scattering& s, const ScatterSample& drawn, TransportMode mode) {
+    if constexpr (F.map_rules)
+        if (s.map_rules) {
+            const bool turn = turns_for(s, mode == TransportMode::radiance ? s.wi_world : drawn.wo);
+            return delta_reverse_pdf(in_frame(s, turn), drawn.wo, drawn.eta);
+        }
+    return delta_reverse_pdf(s, drawn.wo, drawn.eta);
+}
+
 /// Scatters `path` at `vertex` with `u`: xyz for the BSDF, w for Russian roulette. False if the subpath ends.
 template <Features F, class Mis>
 AMBILUX_HD bool scatter(const Rules<Mis>& rules, Side side, const Vertex<Mis>& vertex, Vec4f u, Subpath<Mis>& path) {
@@ -28,7 +39,7 @@ AMBILUX_HD bool scatter(const Rules<Mis>& rules, Side side, const Vertex<Mis>& v
     if (is_zero(path.throughput)) return false;
     const float cos_out = fabsf(dot(vertex.point.ng, s.wo));
     const float forward = delta ? 1.0f : s.pdf_sa;
-    const float reverse = delta ? delta_reverse_pdf(vertex.scattering, s.wo, s.eta) : s.pdf_reverse_sa;
+    const float reverse = delta ? delta_reverse_pdf<F>(vertex.scattering, s, transport_mode(side)) : s.pdf_reverse_sa;
     path.sums = rules.mis.sums_after_scatter(vertex.sums, vertex.first, delta, forward, reverse, cos_out);
     path.origin = offset_ray_origin(vertex.point.p, vertex.offset, vertex.point.ng, s.wo);
     path.direction = s.wo;
