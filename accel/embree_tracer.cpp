@@ -10,6 +10,28 @@
 
 namespace ambilux {
 
+// The machine's width of packets is 16 only where it has these. Nothing is contracted, so that the bits are those of
+// the scalar code; what is not inlined here is compiled for all processors.
+#if defined(__x86_64__)
+__attribute__((target("avx512f,avx512dq,avx512bw,avx512vl,prefer-vector-width=512")))
+#endif
+void detail::cross_triangles(const RTCRay16& r, TriangleLanes& lanes) {
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC ivdep
+#endif
+    for (uint32_t k = 0; k < lanes.kWidth; ++k) {
+        const Vec3f o = {r.org_x[k], r.org_y[k], r.org_z[k]}, d = {r.dir_x[k], r.dir_y[k], r.dir_z[k]};
+        const Vec3f v0 = {lanes.v0[0][k], lanes.v0[1][k], lanes.v0[2][k]};
+        const Vec3f v1 = {lanes.v1[0][k], lanes.v1[1][k], lanes.v1[2][k]};
+        const Vec3f v2 = {lanes.v2[0][k], lanes.v2[1][k], lanes.v2[2][k]};
+        const TriangleEdges edges = triangle_edges(o, make_ray_shear(d), v0, v1, v2);
+        const Vec3f n = accurate_cross(v1 - v0, v2 - v0);
+        const TriangleCrossing c = edges.crossing(rounded_divide(height_over_plane(v0 - o, n), fused_dot(d, n)));
+        lanes.t[k] = c.t, lanes.u[k] = c.u, lanes.v[k] = c.v;
+        lanes.inside[k] = edges.inside;
+    }
+}
+
 struct EmbreeAccel::UserData {
     SceneView view;
     std::string error;
@@ -31,25 +53,38 @@ const detail::EmbreeRayContext& ray_context(EmbreeQueryContext* base) {
     return *reinterpret_cast<detail::EmbreeRayContext*>(base);
 }
 
-/// Rejects hits on surfaces that let this ray pass.
+/// The ray of lane `i`, of one or of a packet.
+const Ray& ray_of(const detail::EmbreeRayContext& context, RTCRayN* rays, unsigned n, unsigned i) {
+    return context.rays[RTCRayN_id(rays, n, i)];
+}
+
+/// True if the ray of lane `i` meets the triangle: not one that lets it pass.
+bool accepts(const RTCFilterFunctionNArguments* args, const detail::EmbreeRayContext& context, unsigned i) {
+    return !context.opacity ||
+           accept_hit<kAllFeatures>(*context.scene, ray_of(context, args->ray, args->N, i),
+                                    RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
+                                    RTCHitN_v(args->hit, args->N, i));
+}
+
+/// Rejects hits on surfaces that let their ray pass.
 void filter_triangle(const RTCFilterFunctionNArguments* args) {
     const auto& context = ray_context(args->context);
-    if (!context.opacity || args->valid[0] != -1) return;
-    const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);  // N == 1: the layout is that of a single hit
-    if (!accept_hit<kAllFeatures>(*context.scene, *context.ray, hit->primID, hit->u, hit->v)) args->valid[0] = 0;
+    for (unsigned i = 0; i < args->N; ++i)
+        if (args->valid[i] == -1 && !accepts(args, context, i)) args->valid[i] = 0;
 }
 
 /// The same, and the triangle on whose plane the ray starts.
 void filter_occluder(const RTCFilterFunctionNArguments* args) {
-    if (args->valid[0] != -1) return;
     const auto& context = ray_context(args->context);
-    const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
     const SceneView& view = *context.scene;
-    const Triangle tri = view.triangles[hit->primID];
-    if (detail::starts_on(context.ray->o, view.vertices[tri.v0].p, view.vertices[tri.v1].p, view.vertices[tri.v2].p))
-        args->valid[0] = 0;
-    else
-        filter_triangle(args);
+    for (unsigned i = 0; i < args->N; ++i) {
+        if (args->valid[i] != -1) continue;
+        const Triangle tri = view.triangles[RTCHitN_primID(args->hit, args->N, i)];
+        if (detail::starts_on(ray_of(context, args->ray, args->N, i).o, view.vertices[tri.v0].p,
+                              view.vertices[tri.v1].p, view.vertices[tri.v2].p) ||
+            !accepts(args, context, i))
+            args->valid[i] = 0;
+    }
 }
 
 void bound_quadric(const RTCBoundsFunctionArguments* args) {
@@ -60,9 +95,8 @@ void bound_quadric(const RTCBoundsFunctionArguments* args) {
 }
 
 /// First crossing that the ray does not pass; `upper` is exclusive.
-bool first_crossing(const detail::EmbreeRayContext& context, const SceneView& view, uint32_t index, float upper,
-                    float& t, float& u, float& v) {
-    const Ray& ray = *context.ray;
+bool first_crossing(const detail::EmbreeRayContext& context, const SceneView& view, const Ray& ray, uint32_t index,
+                    float upper, float& t, float& u, float& v) {
     const QuadricCrossings hits = quadric_crossings<kAllFeatures>(view.quadrics[index], ray.o, ray.d, upper);
     for (int i = 0; i < hits.count; ++i) {
         if (context.opacity &&
@@ -75,29 +109,47 @@ bool first_crossing(const detail::EmbreeRayContext& context, const SceneView& vi
 }
 
 void intersect_quadric(const RTCIntersectFunctionNArguments* args) {
-    if (args->valid[0] != -1) return;
     const auto& view = *static_cast<const SceneView*>(args->geometryUserPtr);
-    auto* query = reinterpret_cast<RTCRayHit*>(args->rayhit);
-    float t, u, v;
-    // Against the ray's tmax while nothing is hit, so that the bound is exclusive as for triangles.
     const auto& context = ray_context(args->context);
-    const float upper = query->hit.geomID == RTC_INVALID_GEOMETRY_ID ? context.ray->tmax : query->ray.tfar;
-    if (!first_crossing(context, view, args->primID, upper, t, u, v)) return;
-    query->ray.tfar = t;
-    query->hit.u = u;
-    query->hit.v = v;
-    query->hit.primID = args->primID;
-    query->hit.geomID = args->geomID;
-    query->hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    const unsigned n = args->N;
+    RTCRayN* rays = RTCRayHitN_RayN(args->rayhit, n);
+    RTCHitN* hits = RTCRayHitN_HitN(args->rayhit, n);
+    for (unsigned i = 0; i < n; ++i) {
+        if (args->valid[i] != -1) continue;
+        const Ray& ray = ray_of(context, rays, n, i);
+        // Against the ray's tmax while nothing is hit, so that the bound is exclusive as for triangles.
+        const float upper = RTCHitN_geomID(hits, n, i) == RTC_INVALID_GEOMETRY_ID ? ray.tmax : RTCRayN_tfar(rays, n, i);
+        float t, u, v;
+        if (!first_crossing(context, view, ray, args->primID, upper, t, u, v)) continue;
+        RTCRayN_tfar(rays, n, i) = t;
+        RTCHitN_u(hits, n, i) = u;
+        RTCHitN_v(hits, n, i) = v;
+        RTCHitN_primID(hits, n, i) = args->primID;
+        RTCHitN_geomID(hits, n, i) = args->geomID;
+        RTCHitN_instID(hits, n, i, 0) = RTC_INVALID_GEOMETRY_ID;
+    }
 }
 
 void occlude_quadric(const RTCOccludedFunctionNArguments* args) {
-    if (args->valid[0] != -1) return;
     const auto& view = *static_cast<const SceneView*>(args->geometryUserPtr);
     const auto& context = ray_context(args->context);
-    float t, u, v;
-    if (first_crossing(context, view, args->primID, context.ray->tmax, t, u, v))
-        reinterpret_cast<RTCRay*>(args->ray)->tfar = -kInfinity;
+    for (unsigned i = 0; i < args->N; ++i) {
+        if (args->valid[i] != -1) continue;
+        const Ray& ray = ray_of(context, args->ray, args->N, i);
+        float t, u, v;
+        if (first_crossing(context, view, ray, args->primID, ray.tmax, t, u, v))
+            RTCRayN_tfar(args->ray, args->N, i) = -kInfinity;
+    }
+}
+
+/// Packets as wide as the processor's vectors, if this build of Embree has them: 16 where it has AVX-512.
+uint32_t packet_width(RTCDevice device) {
+#if defined(__x86_64__)
+    if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) && __builtin_cpu_supports("avx512f") &&
+        __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
+        return 16;
+#endif
+    return rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? 8 : 1;
 }
 
 void attach(RTCScene scene, RTCGeometry geometry, unsigned int id) {
@@ -117,6 +169,7 @@ EmbreeAccel::EmbreeAccel(const Scene& scene)
     device_ = rtcNewDevice(nullptr);
     if (!device_) throw_embree_error(nullptr, "making a device");
     rtcSetDeviceMemoryMonitorFunction(device_, count_bytes, bytes_.get());
+    width_ = packet_width(device_);
     scene_ = rtcNewScene(device_);
     rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
@@ -149,7 +202,7 @@ EmbreeAccel::EmbreeAccel(const Scene& scene)
 
 EmbreeAccel::EmbreeAccel(EmbreeAccel&& other) noexcept
     : bytes_(std::move(other.bytes_)), user_(std::move(other.user_)), device_(other.device_), scene_(other.scene_),
-      triangle_count_(other.triangle_count_), build_seconds_(other.build_seconds_) {
+      triangle_count_(other.triangle_count_), width_(other.width_), build_seconds_(other.build_seconds_) {
     other.device_ = nullptr;
     other.scene_ = nullptr;
 }

@@ -26,6 +26,17 @@ struct HostTracer {
         if (__builtin_expect(use_cwbvh, 0)) return cwbvh_occluded<F>(scene, ray);
         return embree.occluded<F>(scene, ray);
     }
+    /// The same of `count` rays, kMostPacketRays at most (EmbreeTracer).
+    template <Features F>
+    void closest(const SceneView& scene, const Ray* rays, uint32_t count, bool coherent, Hit* hits) const {
+        if (__builtin_expect(!use_cwbvh, 1)) return embree.closest<F>(scene, rays, count, coherent, hits);
+        for (uint32_t k = 0; k < count; ++k) cwbvh_closest<F>(scene, rays[k], hits[k]);
+    }
+    template <Features F>
+    void occluded(const SceneView& scene, const Ray* rays, uint32_t count, bool coherent, bool* blocked) const {
+        if (__builtin_expect(!use_cwbvh, 1)) return embree.occluded<F>(scene, rays, count, coherent, blocked);
+        for (uint32_t k = 0; k < count; ++k) blocked[k] = cwbvh_occluded<F>(scene, rays[k]);
+    }
     /// Either of them; with `any_hit`, `hit` is not set.
     template <Features F>
     bool trace(const SceneView& scene, const Ray& ray, bool any_hit, Hit& hit) const {

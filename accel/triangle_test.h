@@ -43,14 +43,18 @@ AMBILUX_HD float height_over_plane(Vec3f a, Vec3f n) {
     return fabsf(height) > gamma_bound(6) * detail::fused_dot(abs(a), abs(n)) ? height : 0.0f;
 }
 
-/// True if the ray o + t d crosses triangle (v0,v1,v2) at 0 < t < tmax. A ray through an edge or a vertex meets at
-/// least one of the triangles that share it: each edge function has the exact sign for its projected end points, and
-/// zero counts as inside. An origin that lies on the triangle's plane within the rounding of the distance does not meet
-/// it. `normal()`: accurate_cross(v1 - v0, v2 - v0). Errors (tests/accel/test_intersection_bounds.cpp): 9 roundings of
-/// the height over the plane and of t times the slope, as sums of magnitudes; 10 of the products of an edge function.
-template <class Normal>
-AMBILUX_HD bool intersect_triangle(Vec3f o, Vec3f d, const RayShear& shear, Vec3f v0, Vec3f v1, Vec3f v2, float tmax,
-                                   TriangleCrossing& hit, Normal normal) {
+/// Where a ray is to the edges of a triangle.
+struct TriangleEdges {
+    float v, w, det;
+    bool inside;  ///< or on an edge, and the triangle is not seen from its side
+
+    AMBILUX_HD TriangleCrossing crossing(float t) const {
+        const float r = rounded_divide(1.0f, det);
+        return {t, v * r, w * r};
+    }
+};
+
+AMBILUX_HD TriangleEdges triangle_edges(Vec3f o, const RayShear& shear, Vec3f v0, Vec3f v1, Vec3f v2) {
     const Vec3f a = v0 - o, b = v1 - o, c = v2 - o;
     const float ax = detail::fused_dot(a, shear.x), ay = detail::fused_dot(a, shear.y);
     const float bx = detail::fused_dot(b, shear.x), by = detail::fused_dot(b, shear.y);
@@ -59,18 +63,29 @@ AMBILUX_HD bool intersect_triangle(Vec3f o, Vec3f d, const RayShear& shear, Vec3
     const float v = detail::difference_of_products(ax, cy, ay, cx);
     const float w = detail::difference_of_products(bx, ay, by, ax);
     const float det = u + v + w;
-    // One branch for both: lanes of a warp rarely agree about any of them. The determinant must have a reciprocal.
-    if (((min(u, min(v, w)) < 0.0f) & (max(u, max(v, w)) > 0.0f)) | !(fabsf(det) >= 0x1p-126f)) return false;
+    // The determinant must have a reciprocal.
+    return {v, w, det, !(((min(u, min(v, w)) < 0.0f) & (max(u, max(v, w)) > 0.0f)) | !(fabsf(det) >= 0x1p-126f))};
+}
+
+/// True if the ray o + t d crosses triangle (v0,v1,v2) at 0 < t < tmax. A ray through an edge or a vertex meets at
+/// least one of the triangles that share it: each edge function has the exact sign for its projected end points, and
+/// zero counts as inside. An origin that lies on the triangle's plane within the rounding of the distance does not meet
+/// it. `normal()`: accurate_cross(v1 - v0, v2 - v0). Errors (tests/accel/test_intersection_bounds.cpp): 9 roundings of
+/// the height over the plane and of t times the slope, as sums of magnitudes; 10 of the products of an edge function.
+template <class Normal>
+AMBILUX_HD bool intersect_triangle(Vec3f o, Vec3f d, const RayShear& shear, Vec3f v0, Vec3f v1, Vec3f v2, float tmax,
+                                   TriangleCrossing& hit, Normal normal) {
+    const Vec3f a = v0 - o;
+    const TriangleEdges edges = triangle_edges(o, shear, v0, v1, v2);
+    // One branch for both: lanes of a warp rarely agree about any of them.
+    if (!edges.inside) return false;
     // Distance along the ray from the plane. Unlike the interpolated depth it is exactly zero for origins on an
     // axis-aligned triangle.
     const Vec3f n = normal();
     const float height = height_over_plane(a, n);
     const float t = rounded_divide(height, detail::fused_dot(d, n));  // not a number for two zeros
     if (!(t > 0.0f && t < tmax)) return false;
-    const float r = rounded_divide(1.0f, det);
-    hit.t = t;
-    hit.u = v * r;
-    hit.v = w * r;
+    hit = edges.crossing(t);
     return true;
 }
 

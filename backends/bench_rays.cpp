@@ -33,13 +33,24 @@ nlohmann::json row(const RayBatch& batch, const KernelTiming& timing) {
 template <Features F, class Tracer>
 KernelTiming time_on_host(const SceneView& scene, const Tracer& tracer, const RayBatch& batch,
                           const std::string& kernel, int repetitions) {
+    constexpr bool kPackets = std::is_same_v<Tracer, EmbreeTracer>;
     const size_t count = batch.rays.size();
     std::vector<Hit> hits(batch.any_hit ? 0 : count);
     std::vector<uint8_t> blocked(batch.any_hit ? count : 0);
     std::vector<double> seconds;
     for (int i = 0; i < kWarmUps + repetitions; ++i) {
         const auto start = std::chrono::steady_clock::now();
-        if (batch.any_hit)
+        if constexpr (kPackets)
+            detail::for_all((count + kMostPacketRays - 1) / kMostPacketRays, [&](size_t p) {
+                const size_t k = p * kMostPacketRays;
+                const uint32_t n = uint32_t(std::min<size_t>(count - k, kMostPacketRays));
+                bool any[kMostPacketRays];
+                if (!batch.any_hit)
+                    return tracer.template closest<F>(scene, &batch.rays[k], n, batch.coherent, &hits[k]);
+                tracer.template occluded<F>(scene, &batch.rays[k], n, false, any);
+                std::copy(any, any + n, blocked.begin() + ptrdiff_t(k));
+            });
+        else if (batch.any_hit)
             detail::for_all(count, [&](size_t k) { blocked[k] = tracer.template occluded<F>(scene, batch.rays[k]); });
         else
             detail::for_all(count, [&](size_t k) { tracer.template closest<F>(scene, batch.rays[k], hits[k]); });
@@ -62,11 +73,13 @@ nlohmann::json rows_on_host(const Scene& scene, const Tracer& tracer, const std:
 }
 
 template <class Accel>
-nlohmann::json bench_on_host(const Scene& scene, const std::string& accel_name, int repetitions) {
+nlohmann::json bench_on_host(const Scene& scene, const std::string& accel_name, int repetitions, bool single = false) {
     const Accel accel(scene);
-    const nlohmann::json rows = with_traversal_features(scene.features, [&](auto set) {
-        return rows_on_host<set.value>(scene, accel.tracer(), accel_name, repetitions);
-    });
+    auto tracer = accel.tracer();
+    if constexpr (std::is_same_v<Accel, EmbreeAccel>)
+        if (single) tracer.width = 1;
+    const nlohmann::json rows = with_traversal_features(
+        scene.features, [&](auto set) { return rows_on_host<set.value>(scene, tracer, accel_name, repetitions); });
     return {{"device", "cpu, " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads"},
             {"accel", accel_name},
             {"build_seconds", accel.build_seconds()},
@@ -115,6 +128,8 @@ nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int re
     nlohmann::json json;
     if (chosen == "cpu")
         json = bench_on_host<EmbreeAccel>(scene, "embree", repetitions);
+    else if (chosen == "cpu-single")
+        json = bench_on_host<EmbreeAccel>(scene, "embree", repetitions, true);
     else if (chosen == "cpu-cwbvh")
         json = bench_on_host<CwbvhAccel>(scene, "cwbvh", repetitions);
     else if (chosen == "cuda")
@@ -125,7 +140,7 @@ nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int re
         json = bench_on_device<PairAccel>(scene, "bvh2", repetitions);
     else
         throw Error(ExitCode::usage, "bench rays: backend '" + backend +
-                                         "' is not one of auto, cpu, cpu-cwbvh, cpu-bvh2, cuda, cuda-bvh2");
+                                         "' is not one of auto, cpu, cpu-single, cpu-cwbvh, cpu-bvh2, cuda, cuda-bvh2");
     json["backend"] = chosen;
     json["opaque"] = opaque;
     json["repetitions"] = repetitions;

@@ -11,13 +11,13 @@
 namespace ambilux {
 
 /// Traces the batches of backends/ray_batches.h `repetitions` times each, after 3 runs that do not count.
-/// `backend`: cpu (Embree), cuda (CWBVH), cuda-bvh2 (a binary BVH), cpu-cwbvh and cpu-bvh2 (the same on the host), or
-/// auto, which is cuda where there is a device and else cpu. On the CPU, batches have 512 x 512 paths, on CUDA 2048 x
-/// 2048. `opaque`: surfaces of partial opacity stop every ray, and bounces start from them. Result: backend, opaque,
-/// device, accel, build_seconds, accel_bytes, repetitions, and rows of batch, count (rays), hit (fraction of rays),
-/// kernel, tuning and mrays_per_s (median; CUDA events, or the clock over all threads). On CUDA the first row of each
-/// batch is what renders use. Throws Error(usage) for another backend or no repetitions, Error(device) for cuda without
-/// a device.
+/// `backend`: cpu (Embree), cpu-single (without packets), cuda (CWBVH), cuda-bvh2 (a binary BVH), cpu-cwbvh and
+/// cpu-bvh2 (the same on the host), or auto, which is cuda where there is a device and else cpu. On the CPU, batches
+/// have 512 x 512 paths, on CUDA 2048 x 2048. `opaque`: surfaces of partial opacity stop every ray, and bounces start
+/// from them. Result: backend, opaque, device, accel, build_seconds, accel_bytes, repetitions, and rows of batch, count
+/// (rays), hit (fraction of rays), kernel, tuning and mrays_per_s (median; CUDA events, or the clock over all threads).
+/// On CUDA the first row of each batch is what renders use. Throws Error(usage) for another backend or no repetitions,
+/// Error(device) for cuda without a device.
 nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int repetitions, bool opaque = false);
 
 /// The middle of `seconds`, which must not be empty; of an even number the mean of the middle two.

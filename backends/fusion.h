@@ -9,7 +9,7 @@ namespace ambilux {
 constexpr Fusion kNoFusion = {};
 /// A device traces shadow rays in persistent kernels, and camera rays as soon as they are made.
 constexpr Fusion kDeviceFusion = {.weigh = true, .connect = true, .occlude = false, .generate = true};
-/// A host traces shadow rays in the stage that made them: nothing waits there for many items.
+/// A host traces shadow rays whenever there are many, and camera rays from a queue.
 constexpr Fusion kHostFusion = {.weigh = true, .connect = true, .occlude = true, .generate = false};
 
 }  // namespace ambilux

@@ -9,7 +9,7 @@
 //   skipped(scene, policy, features)    names of what this render does without
 // An executor has, for a stage with items() and a record:
 //   run(stage)            over its items, which are then gone
-//   trace(stage)          the same for rays in no order
+//   trace(stage)          the same for rays in no order; trace_gathered(stage): in the order of their queue
 //   extend(stage)         rays become hits where they lie; extend_coherent for neighbouring rays that stay together
 //   run_slots(stage, n)   over n slots for each sample of the wave; with a last argument 1, over n slots once
 //   run_paths(stage, n)   a stage that claims its slots by itself

@@ -39,22 +39,9 @@ struct Fusion {
     bool weigh = false;    ///< mis_weight, and accumulate
     bool connect = false;  ///< connect_emitter and connect_camera, in the stage that makes the vertex
     bool occlude =
-        false;  ///< shadow rays, and for bdpt connect_vertices: on a host, where nothing waits for many items
+        false;  ///< for bdpt connect_vertices, in the stage that makes the eye vertex, and shadow rays
+                ///< whenever there are many: on a host, which goes through queues while they are in its cache
     bool generate = false;  ///< camera rays, in extend
-};
-
-/// A stage that has each item at once, in place of a queue.
-template <class Stage>
-struct InPlace {
-    Stage stage;
-    const WaveState* state;
-
-    template <class Item>
-    AMBILUX_HD uint32_t push(const Item& item) const {
-        stage.record->count_item(state->depth);
-        stage.process(item);
-        return 0;
-    }
 };
 
 /// `a` or `b`, of different types.

@@ -9,6 +9,7 @@
 #include "queues/order.h"
 #include "queues/overflow.h"
 #include "stages/order_keys.h"
+#include "stages/ray_packets.h"
 #include "stages/stage.h"
 
 namespace ambilux {
@@ -37,11 +38,20 @@ public:
     }
     template <class Stage>
     void run(const Stage& stage) {
-        run_in_order<MaterialOrder>(stage);
+        run_in_order<MaterialOrder>(stage, stage, [] {});
     }
     template <class Stage>
     void trace(const Stage& stage) {
-        run_in_order<MortonOrder>(stage);
+        if constexpr (requires { Stage::kAnyHit; })
+            trace_packets<MortonOrder>(stage, false);
+        else
+            run_in_order<MortonOrder>(stage, stage, [] {});
+    }
+    /// What is left of a gathered queue (stages/ray_packets.h), in its order: a path may have several rays there, and
+    /// what they bring is added one after the other.
+    template <class Stage>
+    void trace_gathered(const Stage& stage) {
+        trace_packets<void>(stage, false);
     }
     template <class Stage>
     void extend(const Stage& stage) {
@@ -52,7 +62,7 @@ public:
     template <class Stage>
     void extend_coherent(const Stage& stage) {
         if (!stage.hits.flags) stage.hits.counter->count = stage.rays.counter->size();
-        run_in_order<void>(stage);
+        trace_packets<void>(stage, true);
     }
     template <class Item, class Body>
     void repeat_while(const Queue<Item>& queue, Body body) {
@@ -72,10 +82,15 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
 
-    /// One place where the stage is called: compilers contract sums of products differently in every copy of a stage,
-    /// and images should not depend on the order of queues.
     template <class Order, class Stage>
-    void run_in_order(const Stage& stage) {
+    void trace_packets(const Stage& stage, bool coherent) {
+        RayPackets<Stage> packets(stage, coherent);
+        run_in_order<Order>(stage, [&](uint32_t i) { packets.add(i); }, [&] { packets.trace(); });
+    }
+    /// Calls each(i) for the items of `stage`, and end() after them. One place where a stage is called: it is inlined
+    /// there as a whole.
+    template <class Order, class Stage, class Each, class End>
+    void run_in_order(const Stage& stage, const Each& each, const End& end) {
         const auto& queue = stage.items();
         const uint32_t items = queue.counter->size();
         if (items == 0) return;
@@ -85,8 +100,9 @@ private:
         const uint32_t n = gaps ? queue.capacity() : items;
         for (uint32_t i = 0; i < n; ++i) {
             if (gaps && !claim(queue, i)) continue;
-            stage(list ? list[i] : i);
+            each(list ? list[i] : i);
         }
+        end();
         queue.counter->finish();
         record(stage, items, start);
     }

@@ -6,6 +6,7 @@
 #include "stages/accumulate.h"
 #include "stages/mis_weight.h"
 #include "stages/occlude.h"
+#include "stages/ray_packets.h"
 
 namespace ambilux {
 
@@ -32,7 +33,7 @@ struct EyeQueues {
         q.emission = layout.queue<EmissionItem>("emission", emits, by_path);
         q.emission_contributions = layout.queue<Contribution>("emission_contributions", emits, by_path);
         q.candidates = layout.queue<CandidateItem>("candidates", K.weigh ? 0 : connects, by_path);
-        q.shadows = layout.queue<ShadowItem>("shadows", K.occlude ? 0 : connects, by_path);
+        q.shadows = layout.queue<ShadowItem>("shadows", connects, by_path && !K.occlude);
         q.shadow_contributions = layout.queue<Contribution>("shadow_contributions", K.weigh ? 0 : connects, by_path);
         q.raw = layout.allocate<Lane>(waves.strategy_depth ? paths : 0);
         return q;
@@ -45,7 +46,7 @@ struct EyeSide {
     using Contributions = std::conditional_t<K.weigh, Accumulate, Queue<Contribution>>;
     using EmissionStage = WeighEmission<Contributions>;
     using OccludeStage = Occlude<F, Tracer, Contributions>;
-    using Shadows = std::conditional_t<K.occlude, InPlace<OccludeStage>, Queue<ShadowItem>>;
+    using Shadows = std::conditional_t<K.occlude, Gathered<OccludeStage>, Queue<ShadowItem>>;
     using WeighStage = WeighCandidates<Shadows>;
     using Emission = std::conditional_t<K.weigh, EmissionStage, Queue<EmissionItem>>;
     using Candidates = std::conditional_t<K.weigh, WeighStage, Queue<CandidateItem>>;
@@ -70,7 +71,9 @@ struct EyeSide {
                    choose<K.weigh>(accumulate, q.shadow_contributions),
                    layout.record(OccludeStage::kName),
                    strategies};
-        weigh = {q.candidates, choose<K.occlude>(InPlace<OccludeStage>{occlude, wave.state}, q.shadows),
+        // One by one where a path keeps what came of its last candidate, or what it has brought decides about the next.
+        const uint32_t gathered = strategies.sums || waves.cull > 0.0f ? 1 : q.shadows.capacity();
+        weigh = {q.candidates, choose<K.occlude>(Gathered<OccludeStage>{occlude, wave.state, gathered}, q.shadows),
                  weighs,       strategies,
                  film.samples, waves.cull};
     }
@@ -97,7 +100,10 @@ void run_emission([[maybe_unused]] Executor& exec, [[maybe_unused]] const EyeSid
 template <class Executor, Features F, class Tracer, Fusion K>
 void run_candidates(Executor& exec, const EyeSide<F, Tracer, K>& eye, bool several) {
     if constexpr (!K.weigh) exec.run(eye.weigh);
-    if constexpr (!K.occlude) exec.trace(eye.occlude.with_atomic_add(several));
+    if constexpr (K.occlude)
+        exec.trace_gathered(eye.occlude);
+    else
+        exec.trace(eye.occlude.with_atomic_add(several));
     if constexpr (!K.weigh) {
         Accumulate accumulate = eye.accumulate;
         accumulate.needs_atomic_add = several;

@@ -177,11 +177,11 @@ TEST_CASE("Batches are a function of the seed") {
 TEST_CASE("bench rays reports complete rows on the CPU, and all structures find the same") {
     const Scene scene = cornell();
     std::map<std::string, double> hit;
-    for (const std::string backend : {"cpu", "cpu-cwbvh", "cpu-bvh2"}) {
+    for (const std::string backend : {"cpu", "cpu-single", "cpu-cwbvh", "cpu-bvh2"}) {
         INFO(backend);
         const nlohmann::json json = bench_rays(scene, backend, 1);
         CHECK(json.at("backend") == backend);
-        CHECK(json.at("accel") == (backend == "cpu" ? "embree" : backend.substr(4)));
+        CHECK(json.at("accel") == (backend == "cpu" || backend == "cpu-single" ? "embree" : backend.substr(4)));
         CHECK_FALSE(json.at("device").get<std::string>().empty());
         CHECK(json.at("build_seconds") > 0.0);
         CHECK(json.at("accel_bytes") > 1000);

@@ -9,6 +9,7 @@
 #include "stages/light_vertex.h"
 #include "stages/mis_weight.h"
 #include "stages/occlude.h"
+#include "stages/ray_packets.h"
 #include "stages/splat.h"
 
 namespace ambilux {
@@ -29,7 +30,7 @@ struct SplatQueues {
         SplatQueues q;
         q.vertices = layout.queue<VertexItem>("camera_vertices", K.connect ? 0 : n, by_path, VertexItem::lanes<F>());
         q.candidates = layout.queue<CandidateItem>("splat_candidates", K.weigh ? 0 : n, by_path);
-        q.weighted = layout.queue<CandidateItem>("weighted_splats", K.occlude ? 0 : n, by_path);
+        q.weighted = layout.queue<CandidateItem>("weighted_splats", n, by_path && !K.occlude);
         q.splats =
             layout.queue<SplatItem>("splats", p.rules.splat ? uint32_t(std::min<uint64_t>(kept, 0xfffffff0u)) : 0);
         return q;
@@ -40,7 +41,7 @@ struct SplatQueues {
 template <Features F, class Tracer, Fusion K>
 struct SplatSide {
     using OccludeStage = OccludeSplats<F, Tracer>;
-    using Weighted = std::conditional_t<K.occlude, InPlace<OccludeStage>, Queue<CandidateItem>>;
+    using Weighted = std::conditional_t<K.occlude, Gathered<OccludeStage>, Queue<CandidateItem>>;
     using WeighStage = WeighSplats<Weighted>;
     using Candidates = std::conditional_t<K.weigh, WeighStage, Queue<CandidateItem>>;
     using Connect = ConnectCamera<F, Candidates>;
@@ -54,7 +55,8 @@ struct SplatSide {
     SplatSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave, const SplatQueues& q,
               const FilmBuffers& film, const BdptPolicy& p, Lane* raw) {
         occlude = {scene, tracer, q.weighted, {q.splats}, layout.record(OccludeStage::kName)};
-        weigh = {q.candidates, choose<K.occlude>(InPlace<OccludeStage>{occlude, wave.state}, q.weighted),
+        weigh = {q.candidates,
+                 choose<K.occlude>(Gathered<OccludeStage>{occlude, wave.state, q.weighted.capacity()}, q.weighted),
                  layout.record(WeighStage::kName)};
         StageRecord* const connects = layout.record(connect_camera.kName);
         connect_camera = {scene, wave, p.rules, q.vertices, {candidates(), connects}, connects};
@@ -72,7 +74,10 @@ struct SplatSide {
 template <class Executor, Features F, class Tracer, Fusion K>
 void run_splats(Executor& exec, const SplatSide<F, Tracer, K>& splats) {
     if constexpr (!K.weigh) exec.run(splats.weigh);
-    if constexpr (!K.occlude) exec.trace(splats.occlude);
+    if constexpr (K.occlude)
+        exec.trace_gathered(splats.occlude);
+    else
+        exec.trace(splats.occlude);
 }
 
 /// Light subpaths of a wave whose vertices are kept for its eye subpaths.

@@ -136,7 +136,7 @@ void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K>& s) {
     repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several) {
         run_emission(exec, s.eye);
         if constexpr (!K.connect) exec.run(s.connect_emitter);
-        if (rules.next_event) run_candidates(exec, s.eye, several);
+        if (rules.next_event || K.occlude) run_candidates(exec, s.eye, several);
         if constexpr (!K.occlude) {
             if (!rules.connect) return;
             run_connections(exec, s, several);

@@ -61,7 +61,7 @@ private:
     AMBILUX_HD bool resample(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v,
                              const Subpath<Mis>& path, const Draws& draws, Candidate<Mis>& c) const {
         if (!rules.next_event) return false;
-        Reservoir reservoir;
+        Reservoir reservoir{};
         reservoir.u = draws.next_event(path.depth).x;
         for (uint32_t i = 0; i < settings.candidates; ++i) {
             LightCandidate x;
