@@ -18,6 +18,7 @@ namespace ambilux {
 using Run = std::function<int()>;
 void add_render(CLI::App& app, Run& run);
 void add_info(CLI::App& app, Run& run);
+void add_convert(CLI::App& app, Run& run);
 void add_reference(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_experiment(CLI::App& app, Run& run);

@@ -29,7 +29,8 @@ static std::string help_of(const std::string& key) {
 }
 
 void SceneOptions::add_to(CLI::App& command) {
-    command.add_option("SCENE", path, "Mitsuba scene description (XML)")->required();
+    command.add_option("SCENE", path, "Scene: Mitsuba XML, pbrt-v4 (.pbrt, .pbrt.gz) or glTF 2.0 (.gltf, .glb)")
+        ->required();
     command.add_option("--size", size, "Film size WxH instead of the scene's");
     command.add_flag("--lenient", lenient,
                      "Replace what is not known and list each substitution, instead of refusing the scene");
@@ -104,7 +105,7 @@ LoadedScene load_scene(const SceneOptions& options, const std::vector<Output>& o
     std::vector<std::string> files;
     load.files = &files;
     const auto start = std::chrono::steady_clock::now();
-    LoadedScene loaded{load_mitsuba(options.path, load), 0};
+    LoadedScene loaded{load_scene_file(options.path, load), 0};
     loaded.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     check_not_inputs(outputs, files);
     for (const std::string& warning : loaded.scene.warnings) log_warning(warning);

@@ -35,6 +35,7 @@ int run_program(int argc, const char* const* argv) {
     Run run;
     add_render(app, run);
     add_info(app, run);
+    add_convert(app, run);
     add_reference(app, run);
     add_compare(app, run);
     add_experiment(app, run);
@@ -44,10 +45,11 @@ int run_program(int argc, const char* const* argv) {
     add_help(app, run);
     const auto named = [&](CLI::App* command) { return argc > 1 && command->check_name(argv[1]); };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(named).empty()) {
-        log_error(fmt::format(
-            "unknown command '{}': render, info, reference, compare, experiment, stress, bench, trace and help are "
-            "known",
-            argv[1]));
+        log_error(
+            fmt::format("unknown command '{}': render, info, convert, reference, compare, experiment, stress, bench, "
+                        "trace and help are "
+                        "known",
+                        argv[1]));
         return int(ExitCode::usage);
     }
     try {

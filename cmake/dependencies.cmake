@@ -3,6 +3,7 @@ find_package(Threads REQUIRED)
 find_package(TBB REQUIRED)
 find_package(OpenEXR REQUIRED)
 find_package(pugixml REQUIRED)
+find_library(AMBILUX_TINYGLTF tinygltf REQUIRED)  # its packages name their CMake target in different ways
 find_package(fmt REQUIRED)
 find_package(spdlog REQUIRED)
 find_package(nlohmann_json REQUIRED)

@@ -5,7 +5,6 @@
 #include <OpenEXR/ImfFloatAttribute.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStringAttribute.h>
@@ -18,26 +17,10 @@
 #include "core/error.h"
 #include "core/sha256.h"
 #include "formats/images/exr_file.h"
+#include "formats/images/exr_stream.h"
 
 namespace ambilux {
 namespace {
-
-/// Collects the file in memory, so that it reaches the disk in one atomic step.
-class StringStream : public Imf::OStream {
-public:
-    StringStream() : Imf::OStream("memory") {}
-    void write(const char c[], int n) override {
-        if (position_ + size_t(n) > bytes.size()) bytes.resize(position_ + size_t(n));
-        std::memcpy(bytes.data() + position_, c, size_t(n));
-        position_ += size_t(n);
-    }
-    uint64_t tellp() override { return position_; }
-    void seekp(uint64_t position) override { position_ = size_t(position); }
-    std::string bytes;
-
-private:
-    size_t position_ = 0;
-};
 
 void insert_attributes(Imf::Header& header, const Attributes& attributes) {
     for (const auto& [name, value] : attributes.items()) {
@@ -93,7 +76,7 @@ struct Plane {
 
 std::string encode_planes(const std::string& path, uint32_t width, uint32_t height, const std::vector<Plane>& planes,
                           const Attributes& attributes) {
-    StringStream stream;
+    ExrStream stream;
     try {
         Imf::Header header{int(width), int(height)};
         header.compression() = Imf::ZIP_COMPRESSION;

@@ -20,10 +20,18 @@ struct LoadOptions {
     std::vector<std::string>* files = nullptr;  ///< gets the names of all files that were read
 };
 
+/// Loads a scene of any format, by the ending of the file: .pbrt and .pbrt.gz (pbrt-v4), .gltf and .glb (glTF 2.0),
+/// else Mitsuba XML. Throws Error(bad_input) with file and line.
+Scene load_scene_file(const std::string& path, const LoadOptions& options = {});
+
 /// Loads a Mitsuba XML scene (formats 0.5, 0.6, 2.x and 3.x). Throws Error(bad_input) with file and line.
 Scene load_mitsuba(const std::string& path, const LoadOptions& options = {});
 
-/// The same of a text, as if it stood in a file at `path`: that is where the files that it names are looked for.
+/// Loads a scene of pbrt-v4. Throws Error(bad_input) with file and line.
+Scene load_pbrt(const std::string& path, const LoadOptions& options = {});
+
+/// The same as load_mitsuba of a text, as if it stood in a file at `path`: that is where the files that it names are
+/// looked for.
 Scene load_mitsuba_text(const std::string& text, const std::string& path, const LoadOptions& options = {});
 
 }  // namespace ambilux

@@ -10,8 +10,8 @@
 #include "core/error.h"
 #include "core/sha256.h"
 #include "formats/load.h"
+#include "formats/mitsuba/document.h"
 #include "formats/mitsuba/spectrum.h"
-#include "formats/mitsuba/xml.h"
 
 namespace ambilux::mitsuba {
 
@@ -129,6 +129,8 @@ struct ScaledTexture {
 ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
 /// Image as float texels without flip or decoding table, for environment maps; and the largest of them.
 int32_t load_environment_image(Builder& builder, const std::string& path, float& largest);
+/// The same of an image of the document.
+int32_t add_environment_image(Builder& builder, const std::string& name, const Texels& image, float& largest);
 /// The same of RGBA texels that are at hand.
 int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels);
 /// Texture of float texels that bilinear lookups find at texel centres.

@@ -110,14 +110,18 @@ void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter&
     const Matrix m = without_place(rigid_transform(builder, in));
     e.to_world = to_affine(m);
     e.to_local = to_affine(affine_inverse(m));
-    const std::string name = in.text("filename", "");
-    if (name.empty()) in.fail("envmap has no filename");
-    const std::string path = builder.document.resolve(name, in.where("filename"));
+    const auto given = builder.document.images.find(in.object().find("image") ? in.text("image", "") : "");
+    const bool is_given = given != builder.document.images.end();
+    const std::string name = is_given ? "" : in.text("filename", "");
+    if (name.empty() && !is_given) in.fail("envmap has no filename");
     const double scale = in.number("scale", 1);
     if (!(scale >= 0)) in.fail(in.where("scale"), "scale must not be negative");
     in.ignore({"cache", "mis_compensation"});
     float largest = 0;
-    e.radiance = {splat(float(scale)), load_environment_image(builder, path, largest)};
+    const int32_t texture =
+        is_given ? add_environment_image(builder, given->first, given->second, largest)
+                 : load_environment_image(builder, builder.document.resolve(name, in.where("filename")), largest);
+    e.radiance = {splat(float(scale)), texture};
     const double most = std::numeric_limits<float>::max();
     if (!(scale <= most && scale * largest <= most))
         in.fail(in.where("scale"),

@@ -2,6 +2,7 @@
 #include "core/error.h"
 #include "formats/mitsuba/builder.h"
 #include "formats/mitsuba/origin.h"
+#include "formats/mitsuba/xml.h"
 
 namespace ambilux {
 
@@ -46,6 +47,9 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     scene.origin = {origin.x, origin.y, origin.z};
     Builder builder(document, options, origin, scene);
     builder.outside = outside;
+    scene.warnings = document.warnings;
+    scene.notes = document.notes;
+    builder.file_digests = document.file_digests;
 
     Reader root(builder, *document.scene);
     const Object* sensor = root.take("sensor");
@@ -69,7 +73,9 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     return scene;
 }
 
-Scene scene_of(const std::string& path, const Document& document, const LoadOptions& options) {
+}  // namespace
+
+Scene mitsuba::load_document(const std::string& path, const Document& document, const LoadOptions& options) {
     std::optional<Error> outside;
     Scene scene = build_scene(path, document, options, {}, &outside);
     // Far from the origin floats have rounded it already: it is made again, about its centre in double precision.
@@ -81,14 +87,12 @@ Scene scene_of(const std::string& path, const Document& document, const LoadOpti
     return scene;
 }
 
-}  // namespace
-
 Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
-    return scene_of(path, parse_document(path, options.parameters, options.limits), options);
+    return load_document(path, parse_document(path, options.parameters, options.limits), options);
 }
 
 Scene load_mitsuba_text(const std::string& text, const std::string& path, const LoadOptions& options) {
-    return scene_of(path, parse_document(path, options.parameters, options.limits, &text), options);
+    return load_document(path, parse_document(path, options.parameters, options.limits, &text), options);
 }
 
 }  // namespace ambilux

@@ -57,7 +57,7 @@ void transform_mesh(const Builder& builder, Job& job, const Mesh& source) {
                        return length(area_normal(mesh.positions[f[0]], mesh.positions[f[1]], mesh.positions[f[2]])) > 0;
                    });
 
-    if (job.face_normals) return;
+    if (job.face_normals || (mesh.normals.empty() && !builder.document.smooth_normals)) return;
     if (mesh.normals.empty()) {
         out.normals = smooth_normals(out);
     } else {

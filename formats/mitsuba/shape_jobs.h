@@ -6,13 +6,16 @@
 
 namespace ambilux::mitsuba {
 
-/// A mesh file read with certain settings; shared by all shapes that name it.
+/// A mesh file read with certain settings, or a mesh of the document; shared by all shapes that name it.
 struct MeshSource {
     std::string path, type;
     bool flip_v = false;
     int shape_index = 0;
     Mesh mesh;
+    const Mesh* given = nullptr;  ///< of the document, instead of `mesh`
     Sha256Digest digest{};
+
+    const Mesh& content() const { return given ? *given : mesh; }
 };
 
 /// A shape on its way into the scene.

@@ -5,6 +5,7 @@
 #include "core/parallel.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/curves.h"
+#include "formats/gzip.h"
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/sdf_grid.h"
 #include "formats/mitsuba/builder.h"
@@ -83,7 +84,9 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
         return;
     }
     const std::string& type = object.type;
-    if (!is_quadric(type) && !is_mesh_file(type) && !is_tessellated(type) && type != "rectangle" && type != "cube") {
+    const bool given = type == "mesh" && !builder.document.meshes.empty();
+    if (!is_quadric(type) && !is_mesh_file(type) && !is_tessellated(type) && type != "rectangle" && type != "cube" &&
+        !given) {
         builder.refuse(object.where, "shape type '" + type + "' is not supported", "the shape is left out");
         return;
     }
@@ -148,6 +151,14 @@ void ShapeBuilder::read_geometry(Reader& in, Job& job) {
         read_mesh_file(in, job);
     } else if (is_quadric(job.type)) {
         job.to_world = job.to_world * local_form(in, job.type);
+    } else if (job.type == "mesh") {
+        const std::string name = in.text("name", "");
+        const auto mesh = builder.document.meshes.find(name);
+        if (mesh == builder.document.meshes.end()) in.fail("the document has no mesh '" + name + "'");
+        MeshSource source;
+        source.type = job.type;
+        source.given = &mesh->second;
+        job.source = add_source(std::move(source), "mesh " + name);
     } else {
         MeshSource source;
         source.type = job.type;
@@ -247,7 +258,7 @@ void load_sources(Builder& builder, std::vector<MeshSource>& sources) {
         MeshSource& s = sources[i];
         if (s.path.empty()) return;
         const Limits& limits = builder.options.limits;
-        const std::string bytes = read_input(s.path, limits);
+        const std::string bytes = gunzip_if_packed(s.path, read_input(s.path, limits), limits);
         s.digest = sha256(bytes);
         if (s.type == "obj")
             s.mesh = read_obj(s.path, bytes, s.flip_v, limits);
@@ -305,16 +316,16 @@ void build_shapes(Builder& builder, const Object& root) {
     }
     load_sources(builder, shapes.sources);
     // Shapes get meshes of their own, and so does the scene.
-    for (const MeshSource& s : shapes.sources) builder.take_memory(memory_of(s.mesh), s.path);
+    for (const MeshSource& s : shapes.sources) builder.take_memory(memory_of(s.content()), s.path);
     for (const Job& job : shapes.jobs)
         if (job.source >= 0) {
-            const Mesh& mesh = shapes.sources[size_t(job.source)].mesh;
+            const Mesh& mesh = shapes.sources[size_t(job.source)].content();
             const uint64_t split = job.smooth_angle >= 0 ? mesh_bytes(3 * mesh.faces.size(), mesh.faces.size()) : 0;
             builder.take_memory(2 * (memory_of(mesh) + split), job.where.file + ":" + std::to_string(job.where.line));
         }
     parallel_for(shapes.jobs.size(), [&](size_t i) {
         Job& job = shapes.jobs[i];
-        if (job.source >= 0) transform_mesh(builder, job, shapes.sources[size_t(job.source)].mesh);
+        if (job.source >= 0) transform_mesh(builder, job, shapes.sources[size_t(job.source)].content());
     });
 
     Scene& scene = builder.scene;

@@ -1,6 +1,7 @@
 #include "formats/mitsuba/spectrum.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace ambilux::mitsuba {
 
@@ -98,6 +99,16 @@ Rgb spectrum_to_rgb(const std::vector<std::pair<double, double>>& samples, Spect
         rgb[i] = float(use == SpectrumUse::reflectance ? std::min(c, 1.0) : c);
     }
     return rgb;
+}
+
+std::vector<std::pair<double, double>> planck(double kelvin, double scale) {
+    constexpr double c = 299792458, h = 6.62607015e-34, k = 1.380649e-23;
+    std::vector<std::pair<double, double>> samples;
+    for (double nm = 360; nm <= 830; nm += 5) {
+        const double m = nm * 1e-9;
+        samples.push_back({nm, scale * 1e-9 * 2 * h * c * c / (std::pow(m, 5) * std::expm1(h * c / (m * k * kelvin)))});
+    }
+    return samples;
 }
 
 }  // namespace ambilux::mitsuba

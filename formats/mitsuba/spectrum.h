@@ -21,5 +21,7 @@ Rgb spectrum_to_rgb(const std::vector<std::pair<double, double>>& samples, Spect
 
 /// A light that is 1 at all wavelengths (XYZ of 1, 1, 1).
 constexpr Rgb kEqualEnergy = {1.204794f, 0.948291f, 0.908916f};
+/// Planck's law in W/(m² sr nm), every 5 nm of the visible range.
+std::vector<std::pair<double, double>> planck(double kelvin, double scale);
 
 }  // namespace ambilux::mitsuba

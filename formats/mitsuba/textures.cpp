@@ -74,15 +74,24 @@ void spread_channel(Texels& image, size_t channel) {
 /// `as_float` stores floats (environment maps), as halves where nothing is lost by that; alpha, which no one reads
 /// there, is 1 then.
 /// `channel` 0 to 3 puts that one of red, green, blue and alpha into all colours; alpha is linear.
-LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, int channel = -1) {
-    const std::string key = path + "|" + std::to_string(gamma) + (as_float ? "|float" : "") + std::to_string(channel);
+/// `given`: of the document, not of a file.
+LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, int channel = -1,
+                       const Texels* given = nullptr) {
+    const std::string key = (given ? "given|" : "") + path + "|" + std::to_string(gamma) + (as_float ? "|float" : "") +
+                            std::to_string(channel);
     const auto known = builder.images.find(key);
     if (known != builder.images.end()) return known->second;
 
-    const std::string bytes = read_input(path, builder.options.limits);
-    builder.file_digests.push_back({path, sha256(bytes)});
-    Texels image = read_image(path, bytes, builder.options.limits);
-    if (channel >= 0) spread_channel(image, size_t(channel));
+    Texels own;
+    if (!given) {
+        const std::string bytes = read_input(path, builder.options.limits);
+        builder.file_digests.push_back({path, sha256(bytes)});
+        own = read_image(path, bytes, builder.options.limits);
+    } else if (channel >= 0) {
+        own = *given;
+    }
+    const Texels& image = given && channel < 0 ? *given : own;
+    if (channel >= 0) spread_channel(own, size_t(channel));
     if (channel == 3) gamma = 1;
     const double used_gamma = gamma != 0 ? gamma : (image.is_linear ? 1 : -1);
     LoadedImage out;
@@ -94,7 +103,8 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
     if (image.is_8bit && !as_float) {
         out.format = TexelFormat::rgba8;
         out.decode_table = decode_table(builder, used_gamma);
-        const auto [it, added] = builder.texel_pool.try_emplace(path + "|" + std::to_string(channel), 0);
+        const auto [it, added] =
+            builder.texel_pool.try_emplace((given ? "given|" : "") + path + "|" + std::to_string(channel), 0);
         if (added) it->second = append_texels(builder.scene, image.bytes.data(), image.bytes.size());
         out.offset = it->second;
         const float* table = builder.scene.tables.data() + out.decode_table;
@@ -116,6 +126,14 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
     out.mean = {float(mean[0] / double(count)), float(mean[1] / double(count)), float(mean[2] / double(count))};
     builder.images[key] = out;
     return out;
+}
+
+/// The image of the document that the object names, if it does.
+const Texels* given_image(Builder& builder, Reader& in) {
+    if (builder.document.images.empty() || !in.has("image")) return nullptr;
+    const auto image = builder.document.images.find(in.text("image", ""));
+    if (image == builder.document.images.end()) in.fail("the document has no image of that name");
+    return &image->second;
 }
 
 /// uv transform: `to_uv` of the newer format, scale and offset of the older one.
@@ -231,9 +249,10 @@ int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
     Rgb mean{};
     if (object.type == "bitmap") {
         texture.type = TextureType::bitmap;
-        const std::string name = in.text("filename", "");
+        const Texels* given = given_image(builder, in);
+        const std::string name = in.text(given ? "image" : "filename", "");
         if (name.empty()) in.fail("bitmap texture has no filename");
-        const std::string path = builder.document.resolve(name, in.where("filename"));
+        const std::string path = given ? name : builder.document.resolve(name, in.where("filename"));
         const bool raw = in.boolean("raw", false);
         double gamma = in.number("gamma", 0);
         if (raw) gamma = 1;
@@ -248,8 +267,8 @@ int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
         in.ignore({"format", "accel", "max_anisotropy", "cache"});  // storage and prefiltering of other renderers
         in.finish();
         if (builder.validate_only) return 0;
-        const LoadedImage image =
-            load_image(builder, path, gamma, false, channel.empty() ? -1 : int(std::string("rgba").find(channel)));
+        const LoadedImage image = load_image(builder, path, gamma, false,
+                                             channel.empty() ? -1 : int(std::string("rgba").find(channel)), given);
         texture.format = image.format;
         texture.width = image.width;
         texture.height = image.height;
@@ -314,6 +333,12 @@ int32_t add_plain_texture(Builder& builder, const LoadedImage& image) {
 
 int32_t load_environment_image(Builder& builder, const std::string& path, float& largest) {
     const LoadedImage image = load_image(builder, path, 0, true);
+    largest = image.largest;
+    return add_plain_texture(builder, image);
+}
+
+int32_t add_environment_image(Builder& builder, const std::string& name, const Texels& texels, float& largest) {
+    const LoadedImage image = load_image(builder, name, 1, true, -1, &texels);
     largest = image.largest;
     return add_plain_texture(builder, image);
 }

@@ -13,26 +13,6 @@ namespace ambilux::mitsuba {
 
 namespace fs = std::filesystem;
 
-const Value* Object::find(const std::string& name) const {
-    for (const Value& value : values)
-        if (value.name == name) return &value;
-    return nullptr;
-}
-
-std::string Document::resolve(const std::string& name, const Where& where) const {
-    std::error_code ignored;
-    const fs::path path(name);
-    if (path.is_absolute() && fs::exists(path, ignored)) return name;
-    std::vector<fs::path> folders = {fs::path(where.file).parent_path()};
-    folders.insert(folders.end(), search_folders.begin(), search_folders.end());
-    if (!files.empty()) folders.push_back(fs::path(files[0].first).parent_path());
-    for (const fs::path& folder : folders) {
-        const fs::path candidate = folder / path;
-        if (fs::exists(candidate, ignored)) return candidate.string();
-    }
-    throw input_error(where.file, where.line, "file '" + name + "' does not exist");
-}
-
 namespace {
 
 bool is_object_tag(const std::string& tag) {

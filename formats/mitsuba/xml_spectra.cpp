@@ -1,21 +1,11 @@
 // Spectra that are objects: <spectrum type="..."> of format 3 and <blackbody> of the older generation.
 #include <cmath>
 
+#include "formats/mitsuba/spectrum.h"
 #include "formats/mitsuba/xml_values.h"
 
 namespace ambilux::mitsuba {
 namespace {
-
-/// Planck's law in W/(m² sr nm), every 5 nm of the visible range.
-std::vector<std::pair<double, double>> planck(double kelvin, double scale) {
-    constexpr double c = 299792458, h = 6.62607015e-34, k = 1.380649e-23;
-    std::vector<std::pair<double, double>> samples;
-    for (double nm = 360; nm <= 830; nm += 5) {
-        const double m = nm * 1e-9;
-        samples.push_back({nm, scale * 1e-9 * 2 * h * c * c / (std::pow(m, 5) * std::expm1(h * c / (m * k * kelvin)))});
-    }
-    return samples;
-}
 
 double positive(const Value& value) {
     if (!(value.number > 0 && std::isfinite(value.number)))

@@ -97,7 +97,8 @@ class Scene:
 
 def load(path: str | os.PathLike[str], *, size: tuple[int, int] | None = None, lenient: bool = False, light_picking: str = "power",
          limits: Mapping[str, int | str] | None = None, **defines: Any) -> Scene:
-    """Reads a Mitsuba scene (XML). `defines` are values of its $parameters; the others are options of `ambilux render`.
+    """Reads a scene: Mitsuba XML, pbrt-v4 (.pbrt, .pbrt.gz) or glTF 2.0 (.gltf, .glb). `defines` are values of $parameters of Mitsuba scenes; the others are options
+    of `ambilux render`.
 
     >>> ambilux.load(SCENES / "cornell.xml", resx=40, resy=30).size
     (40, 30)

@@ -51,7 +51,7 @@ SharedScene load(const std::string& path, std::optional<std::string> text, const
     for (const std::string& limit : limits) set_limit(options.limits, limit);
     run_unlocked([&](const volatile bool*) {
         const auto start = std::chrono::steady_clock::now();
-        loaded->scene = text ? load_mitsuba_text(*text, path, options) : load_mitsuba(path, options);
+        loaded->scene = text ? load_mitsuba_text(*text, path, options) : load_scene_file(path, options);
         loaded->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     });
     return loaded;

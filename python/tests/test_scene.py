@@ -25,6 +25,19 @@ def test_parameters_and_size():
     assert scene.info["film"]["width"] == 40 if "film" in scene.info else scene.info
 
 
+def test_pbrt_and_gltf_are_told_by_their_endings(tmp_path):
+    path = tmp_path / "a.pbrt"
+    path.write_text('Film "rgb" "integer xresolution" 8 "integer yresolution" 4\nWorldBegin\nShape "sphere"\n')
+    scene = ambilux.load(path)
+    assert scene.size == (8, 4)
+    path.write_text('WorldBegin\nShape "torus"\n')
+    with pytest.raises(ambilux.SceneError, match="a.pbrt:2: shape 'torus' is not supported"):
+        ambilux.load(path)
+    (tmp_path / "b.gltf").write_text("{}")
+    with pytest.raises(ambilux.SceneError, match="no sound glTF"):
+        ambilux.load(tmp_path / "b.gltf")
+
+
 def test_errors_name_file_and_line(tmp_path):
     path = tmp_path / "bad.xml"
     path.write_text('<scene version="3.0.0">\n<sensor type="perspective">\n<float name="nonsense" value="1"/>\n</sensor>\n</scene>\n')

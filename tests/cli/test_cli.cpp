@@ -41,6 +41,8 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {{"stress", "--backend", "abacus", "-o", folder / "s"}, "abacus"},
         {{"stress", "--time", "-1", "-o", folder / "s"}, "more than zero seconds"},
         {{"stress", "--family", "dragons", "-o", folder / "s"}, "--family dragons: known are emission-scale"},
+        {{"convert", kCornell, folder / "x.pbrt"}, "names end in .xml"},
+        {{"convert", kCornell}, "OUT is required"},
         {{"render", kCornell}, "--output is required"},
         {{"render", "-o", "x.exr"}, "SCENE is required"},
         {render(folder, {"--frob"}), "--frob"},
@@ -412,6 +414,28 @@ TEST_CASE("an experiment, killed and resumed") {
     const Outcome bad = run(folder, {"experiment", folder / "bad.toml", "-o", folder / "out2"});
     CHECK(bad.code == 3);
     CHECK(contains(bad.err, "bad.toml:2: unknown key 'referense'"));
+}
+
+TEST_CASE("scenes of all formats are converted, and the result renders") {
+    const test::TempFolder folder;
+    const std::string pbrt = folder.write(
+        "a.pbrt",
+        "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8 LookAt 0 0 -5 0 0 0 0 1 0 Camera "
+        "\"perspective\" WorldBegin LightSource \"infinite\" Shape \"sphere\" Shape \"trianglemesh\" \"point3 P\" "
+        "[0 0 3 1 0 3 0 1 3] \"integer indices\" [0 1 2]");
+    for (const std::string& scene : {kCornell, pbrt}) {
+        const std::string out = folder / "new/out.xml";
+        const Outcome converted = run(folder, {"convert", scene, out});
+        INFO(converted.err);
+        REQUIRE(converted.code == 0);
+        CHECK(run(folder, {"render", out, "-o", folder / "x.exr", "--size", "8x6", "--spp", "1", "--backend", "cpu"})
+                  .code == 0);
+        CHECK(run(folder, {"convert", out, out}).code == 2);
+    }
+    const Outcome broken = run(folder, {"info", folder.write("b.pbrt", "WorldBegin\nShape \"torus\"")});
+    CHECK(broken.code == 3);
+    CHECK(contains(broken.err, "b.pbrt:2: shape 'torus' is not supported"));
+    CHECK(run(folder, {"info", folder.write("b.gltf", "{}")}).code == 3);
 }
 
 TEST_CASE("info and bench stages") {

@@ -1,0 +1,154 @@
+#include "formats/convert/writer.h"
+
+namespace ambilux::convert {
+
+namespace {
+
+void add_ior(xml_node node, float ior) {
+    add_number(node, "int_ior", ior);
+    add_number(node, "ext_ior", 1);
+}
+
+template <class P>
+void add_roughness(Writer& w, xml_node node, const P& p) {
+    add_text(node, "distribution", p.distribution == Microfacets::ggx ? "ggx" : "beckmann");
+    if (!p.sample_visible) add_boolean(node, "sample_visible", false);
+    add_textured_number(w, node, "alpha_u", p.alpha_u);
+    add_textured_number(w, node, "alpha_v", p.alpha_v);
+}
+
+template <class P>
+void add_metal(Writer& w, xml_node node, const P& p) {
+    add_rgb(node, "eta", p.eta);
+    add_rgb(node, "k", p.k);
+    add_color(w, node, "specular_reflectance", p.specular_reflectance, true);
+}
+
+template <class P>
+void add_glass(Writer& w, xml_node node, const P& p) {
+    add_ior(node, p.ior);
+    add_color(w, node, "specular_reflectance", p.specular_reflectance, true);
+    add_color(w, node, "specular_transmittance", p.specular_transmittance, true);
+}
+
+template <class P>
+void add_coating(Writer& w, xml_node node, const P& p) {
+    add_ior(node, p.ior);
+    add_color(w, node, "diffuse_reflectance", p.reflectance);
+    add_color(w, node, "specular_reflectance", p.specular_reflectance, true);
+    add_boolean(node, "nonlinear", p.nonlinear);
+}
+
+template <class P>
+void add_lobes(Writer& w, xml_node node, const P& p) {
+    add_color(w, node, "diffuse_reflectance", p.reflectance);
+    add_color(w, node, "specular_reflectance", p.specular_reflectance);
+    w.note(std::string("Mitsuba 3 has no BSDF '") + P::Model::plugin + "'");
+}
+
+// One function a model.
+
+void add_parameters(Writer& w, xml_node node, const Textured<Diffuse>& p) {
+    add_color(w, node, "reflectance", p.reflectance);
+}
+void add_parameters(Writer& w, xml_node node, const Textured<RoughDiffuse>& p) {
+    add_color(w, node, "reflectance", p.reflectance);
+    add_textured_number(w, node, "alpha", p.alpha);
+    w.note("Mitsuba 3 has no BSDF 'roughdiffuse'");
+}
+void add_parameters(Writer& w, xml_node node, const Textured<Conductor>& p) { add_metal(w, node, p); }
+void add_parameters(Writer& w, xml_node node, const Textured<RoughConductor>& p) {
+    add_metal(w, node, p);
+    add_roughness(w, node, p);
+}
+void add_parameters(Writer& w, xml_node node, const Textured<Dielectric>& p) { add_glass(w, node, p); }
+void add_parameters(Writer& w, xml_node node, const Textured<ThinDielectric>& p) { add_glass(w, node, p); }
+void add_parameters(Writer& w, xml_node node, const Textured<RoughDielectric>& p) {
+    add_glass(w, node, p);
+    add_roughness(w, node, p);
+}
+void add_parameters(Writer& w, xml_node node, const Textured<Plastic>& p) { add_coating(w, node, p); }
+void add_parameters(Writer& w, xml_node node, const Textured<RoughPlastic>& p) {
+    add_coating(w, node, p);
+    add_text(node, "distribution", p.distribution == Microfacets::ggx ? "ggx" : "beckmann");
+    if (!p.sample_visible) add_boolean(node, "sample_visible", false);
+    add_number(node, "alpha", p.alpha.value);
+}
+void add_parameters(Writer& w, xml_node node, const Textured<Phong>& p) {
+    add_lobes(w, node, p);
+    add_textured_number(w, node, "exponent", p.exponent);
+}
+void add_parameters(Writer& w, xml_node node, const Textured<Ward>& p) {
+    add_lobes(w, node, p);
+    constexpr const char* variants[] = {"ward", "ward-duer", "balanced"};
+    add_text(node, "variant", variants[uint32_t(p.variant)]);
+    add_textured_number(w, node, "alpha_u", p.alpha_u);
+    add_textured_number(w, node, "alpha_v", p.alpha_v);
+}
+void add_parameters(Writer& w, xml_node node, const Textured<DiffuseTransmitter>& p) {
+    add_color(w, node, "transmittance", p.transmittance);
+    w.note("Mitsuba 3 has no BSDF 'difftrans'");
+}
+void add_parameters(Writer& w, xml_node node, const Textured<Principled>& p) {
+    add_color(w, node, "base_color", p.base_color);
+    add_textured_number(w, node, "roughness", p.roughness);
+    add_textured_number(w, node, "metallic", p.metallic);
+    const auto unless_zero = [&](const char* name, double value) {
+        if (value > 1e-7) add_number(node, name, value < 1 ? value : 1);
+    };
+    add_number(node, "eta", p.ior);
+    unless_zero("anisotropic", (1 - double(p.aspect) * p.aspect) / 0.9);
+    unless_zero("spec_tint", p.specular_tint);
+    unless_zero("sheen", p.sheen);
+    unless_zero("sheen_tint", p.sheen_tint / 65535.0);
+    unless_zero("flatness", p.flatness / 65535.0);
+    unless_zero("clearcoat", p.clearcoat);
+    if (p.clearcoat > 0) unless_zero("clearcoat_gloss", (0.1 - double(p.clearcoat_alpha)) / (0.1 - 0.001));
+}
+
+/// With its bumps or normals around it.
+void add_bsdf(Writer& w, xml_node parent, uint32_t index) {
+    const BsdfRecord& record = w.scene.bsdfs[index];
+    if (record.bump_map >= 0) {
+        parent = add_object(parent, "bsdf", "bumpmap");
+        add_texture(w, parent, nullptr, record.bump_map, splat(1), true);
+        add_number(parent, "scale", record.bump_scale);
+    } else if (record.normal_map >= 0) {
+        parent = add_object(parent, "bsdf", "normalmap");
+        add_texture(w, parent, "normalmap", record.normal_map, splat(1), false);
+    }
+    if (record.bump_map >= 0 || record.normal_map >= 0)
+        w.note("bumps and normal maps of Mitsuba 3.6 and later differ: see docs/scenes.md");
+    BsdfModels::for_each([&](auto model) {
+        using Model = typename decltype(model)::type;
+        if (record.type != kBsdfType<Model>) return;
+        xml_node node = add_object(parent, "bsdf", Model::plugin);
+        add_parameters(w, node, record.as<Model>());
+    });
+}
+
+}  // namespace
+
+void add_material(Writer& w, xml_node parent, uint32_t index, const std::string& id) {
+    const Material& m = w.scene.materials[index];
+    const xml_node root = parent;
+    if (m.lets_pass()) {
+        parent = add_object(parent, "bsdf", "mask");
+        add_textured_number(w, parent, "opacity", m.opacity);
+    }
+    if (m.first != kNone) {
+        parent = add_object(parent, "bsdf", "blendbsdf");
+        add_textured_number(w, parent, "weight", m.second_weight);
+        add_material(w, parent, m.first);
+        add_material(w, parent, m.second);
+    } else if (m.two_sided) {
+        parent = add_object(parent, "bsdf", "twosided");
+        add_bsdf(w, parent, m.front);
+        if (m.back != m.front) add_bsdf(w, parent, m.back);
+    } else {
+        add_bsdf(w, parent, m.front);
+    }
+    if (!id.empty()) root.last_child().append_attribute("id") = id.c_str();
+}
+
+}  // namespace ambilux::convert

@@ -1,0 +1,152 @@
+#include "formats/convert/convert.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <sstream>
+
+#include "core/atomic_file.h"
+#include "formats/convert/writer.h"
+
+namespace ambilux {
+namespace convert {
+namespace {
+
+double degrees(double radians) { return radians * (180 / M_PI); }
+
+void add_integrator(Writer& w, xml_node root) {
+    const IntegratorHint& hint = w.scene.integrator;
+    if (hint.type == "bdpt") w.note("Mitsuba 3 has no bidirectional integrator: path stands for it");
+    xml_node node = add_object(root, "integrator", hint.type == "light" ? "ptracer" : "path");
+    add_integer(node, "max_depth", hint.max_depth);
+    add_integer(node, "rr_depth", hint.rr_depth);
+    if (hint.hide_emitters) add_boolean(node, "hide_emitters", true);
+}
+
+void add_film(Writer& w, xml_node sensor) {
+    const Sensor& s = w.scene.sensor;
+    xml_node film = add_object(sensor, "film", "hdrfilm");
+    add_integer(film, "width", s.film_width);
+    add_integer(film, "height", s.film_height);
+    if (s.crop_width != s.film_width || s.crop_height != s.film_height) {
+        add_integer(film, "crop_offset_x", s.crop_x);
+        add_integer(film, "crop_offset_y", s.crop_y);
+        add_integer(film, "crop_width", s.crop_width);
+        add_integer(film, "crop_height", s.crop_height);
+    }
+    add_text(film, "pixel_format", "rgb");
+    switch (s.filter) {
+        case FilterType::box: {
+            xml_node filter = add_object(film, "rfilter", "box");
+            if (s.filter_radius == 0.5f) break;
+            add_number(filter, "radius", s.filter_radius);
+            w.note("Mitsuba 3 has no box filters but of radius 0.5");
+            break;
+        }
+        case FilterType::tent: add_number(add_object(film, "rfilter", "tent"), "radius", s.filter_radius); break;
+        case FilterType::gaussian:
+            add_number(add_object(film, "rfilter", "gaussian"), "stddev", s.filter_radius / 4);
+            break;
+    }
+}
+
+/// The map with its columns scaled.
+Affine scaled(Affine a, double x, double y) {
+    for (auto& row : a.m) row[0] = float(row[0] * x), row[1] = float(row[1] * y);
+    return a;
+}
+
+}  // namespace
+
+void add_sensor(Writer& w, xml_node root) {
+    const Sensor& s = w.scene.sensor;
+    const bool parallel = is_parallel(s.type);
+    xml_node node = add_object(root, "sensor",
+                               parallel           ? "orthographic"
+                               : has_lens(s.type) ? "thinlens"
+                                                  : "perspective");
+    if (parallel) {
+        const double aspect = double(s.film_width) / s.film_height;
+        add_transform(node, "to_world", scaled(s.to_world, s.tan_half_fov.x, s.tan_half_fov.y * aspect));
+    } else {
+        add_transform(node, "to_world", s.to_world);
+        add_number(node, "fov", degrees(2 * std::atan(double(s.tan_half_fov.x))));
+        add_text(node, "fov_axis", "x");
+        if (s.principal_offset.x != 0) add_number(node, "principal_point_offset_x", s.principal_offset.x);
+        if (s.principal_offset.y != 0) add_number(node, "principal_point_offset_y", s.principal_offset.y);
+    }
+    add_number(node, "near_clip", s.near_clip);
+    add_number(node, "far_clip", s.far_clip);
+    if (has_lens(s.type)) {
+        add_number(node, "aperture_radius", s.aperture_radius);
+        add_number(node, "focus_distance", s.focus_distance);
+    }
+    add_film(w, node);
+    add_integer(add_object(node, "sampler", "independent"), "sample_count", w.scene.integrator.spp);
+}
+
+void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
+    switch (e.type) {
+        case EmitterType::area: return add_color(w, add_object(parent, "emitter", "area"), "radiance", e.radiance);
+        case EmitterType::constant: {
+            return add_color(w, add_object(parent, "emitter", "constant"), "radiance", e.radiance);
+        }
+        case EmitterType::point: {
+            xml_node node = add_object(parent, "emitter", "point");
+            add_vector(node, "point", "position", e.position);
+            return add_color(w, node, "intensity", e.radiance);
+        }
+        case EmitterType::directional: {
+            xml_node node = add_object(parent, "emitter", "directional");
+            add_vector(node, "vector", "direction", e.direction);
+            return add_color(w, node, "irradiance", e.radiance);
+        }
+        case EmitterType::spot: {
+            xml_node node = add_object(parent, "emitter", "spot");
+            add_transform(node, "to_world", e.to_world);
+            add_number(node, "cutoff_angle", degrees(e.cutoff));
+            add_number(node, "beam_width", degrees(e.beam_width));
+            add_rgb(node, "intensity", e.radiance.texture >= 0 ? splat(1) : e.radiance.value);
+            if (e.radiance.texture >= 0) add_texture(w, node, "texture", e.radiance.texture, e.radiance.value, false);
+            return;
+        }
+        default: {
+            xml_node node = add_object(parent, "emitter", "envmap");
+            add_text(node, "filename", float_image(w, w.scene.textures[size_t(e.radiance.texture)], splat(1)));
+            add_number(node, "scale", e.radiance.value.x);
+            add_transform(node, "to_world", e.to_world);
+        }
+    }
+}
+
+}  // namespace convert
+
+std::vector<std::string> write_mitsuba(const Scene& scene, const std::string& path) {
+    namespace fs = std::filesystem;
+    const std::string stem = fs::path(path).stem().string() + "_files";
+    convert::Writer w{scene, (fs::path(path).parent_path() / stem).string(), stem, {}, {}, {}};
+    make_folders(w.folder);
+    if (scene.origin != std::array<double, 3>{})
+        w.note(fmt::format("coordinates count from ({}, {}, {}) of the original", scene.origin[0], scene.origin[1],
+                           scene.origin[2]));
+    pugi::xml_document document;
+    pugi::xml_node root = document.append_child("scene");
+    root.append_attribute("version") = "3.0.0";
+    convert::add_integrator(w, root);
+    convert::add_sensor(w, root);
+    std::set<uint32_t> materials;
+    for (const Shape& shape : scene.shapes)
+        if (shape.primitive_count && materials.insert(shape.material).second)
+            convert::add_material(w, root, shape.material, fmt::format("material{}", shape.material));
+    for (const Emitter& e : scene.emitters)
+        if (e.type != EmitterType::area) convert::add_emitter(w, root, e);
+    convert::add_shapes(w, root);
+    std::ostringstream text;
+    document.save(text, "    ");
+    write_file_atomic(path, text.str());
+    return w.notes;
+}
+
+}  // namespace ambilux

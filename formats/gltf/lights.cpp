@@ -1,0 +1,113 @@
+// Lights and cameras.
+#include <algorithm>
+#include <cmath>
+
+#include "formats/gltf/model.h"
+#include "formats/spot_falloff.h"
+
+namespace ambilux::gltf {
+
+using namespace mitsuba;
+
+namespace {
+
+constexpr int64_t kHeight = 720;  // of the image, which glTF does not tell
+constexpr double kFov = 40;       // of the default camera, degrees
+
+Vec3d negated(Vec3d v) { return {-v.x, -v.y, -v.z}; }
+
+/// Mitsuba's cameras and spots look along +z with x to the left, glTF's along -z with x to the right.
+Matrix turned(Matrix m) {
+    for (int j = 0; j < 3; ++j) {
+        const double l = length(column(m, j));
+        for (int i = 0; i < 3; ++i) m.m[i][j] /= l > 0 ? l : 1;
+    }
+    return m * scaling(-1, 1, -1);
+}
+
+Object& sensor(Context& context, const char* type, const Matrix& to_world, double aspect) {
+    Object& film = add_object(context.document, "film", "hdrfilm", context.where);
+    set_integer(film, "width", std::clamp<int64_t>(std::llround(aspect * kHeight), 1, 65536));
+    set_integer(film, "height", kHeight);
+    Object& out = add_object(context.document, "sensor", type, context.where);
+    set_transform(out, "to_world", to_world);
+    add_child(out, film);
+    return out;
+}
+
+void set_clips(Object& sensor, double near, double far) {
+    set_number(sensor, "near_clip", near > 0 ? near : 1e-5);
+    set_number(sensor, "far_clip", far > near && far > 0 ? far : 1e10);
+}
+
+}  // namespace
+
+void add_light(Context& context, const tinygltf::Light& light, const Matrix& to_world) {
+    const Rgb color =
+        light.color.size() < 3 ? splat(1) : Rgb{float(light.color[0]), float(light.color[1]), float(light.color[2])};
+    const Rgb value = color * float(light.intensity);
+    context.emits = true;
+    if (light.range > 0)
+        context.note("the range of lights is left out: their light falls off with the squared distance");
+    if (light.type == "directional") {
+        Object& out = add_object(context.document, "emitter", "directional", context.where);
+        set_vector(out, "direction", negated(column(to_world, 2)));
+        set_rgb(out, "irradiance", value);
+        return add_child(*context.document.scene, out);
+    }
+    if (light.type == "point") {
+        Object& out = add_object(context.document, "emitter", "point", context.where);
+        set_vector(out, "position", column(to_world, 3));
+        set_rgb(out, "intensity", value);
+        return add_child(*context.document.scene, out);
+    }
+    if (light.type != "spot") context.fail("light '" + light.name + "' is of the unknown type '" + light.type + "'");
+    Object& out = add_object(context.document, "emitter", "spot", context.where);
+    const double outer = light.spot.outerConeAngle, inner = light.spot.innerConeAngle;
+    if (!(inner >= 0 && inner <= outer && outer < M_PI / 2))
+        context.fail("the cone of light '" + light.name + "' must be less than pi/2 and hold its inner cone");
+    set_transform(out, "to_world", turned(to_world));
+    set_number(out, "cutoff_angle", outer * (180 / M_PI));
+    set_number(out, "beam_width", outer * (180 / M_PI));
+    set_rgb(out, "intensity", value);
+    if (inner < outer) {
+        context.note(kSpotNote);
+        add_spot_falloff(context.document, out, outer, inner, [](double t) { return t * t; });
+    }
+    add_child(*context.document.scene, out);
+}
+
+Object& add_camera(Context& context, const tinygltf::Camera& camera, Matrix to_world) {
+    to_world = turned(to_world);
+    if (camera.type == "orthographic") {
+        const auto& o = camera.orthographic;
+        if (!(o.xmag != 0 && o.ymag != 0))
+            context.fail("camera '" + camera.name + "' sees nothing: a magnification of 0");
+        Object& out = sensor(context, "orthographic", to_world * scaling(std::fabs(o.xmag), std::fabs(o.xmag), 1),
+                             std::fabs(o.xmag / o.ymag));
+        set_clips(out, o.znear, o.zfar);
+        return out;
+    }
+    const auto& p = camera.perspective;
+    if (!(p.yfov > 0 && p.yfov < M_PI)) context.fail("yfov of camera '" + camera.name + "' must lie between 0 and pi");
+    Object& out = sensor(context, "perspective", to_world, p.aspectRatio > 0 ? p.aspectRatio : 16.0 / 9);
+    set_number(out, "fov", p.yfov * (180 / M_PI));
+    set_text(out, "fov_axis", "y");
+    set_clips(out, p.znear, p.zfar);
+    return out;
+}
+
+Object& add_default_camera(Context& context, Vec3f lower, Vec3f upper) {
+    context.note("the file has no camera: one that looks along -z at all of it is used");
+    const Vec3f c = (lower + upper) * 0.5f, half = (upper - lower) * 0.5f;
+    const double radius = std::max(double(length(half)), 1e-6);
+    Object& out =
+        sensor(context, "perspective",
+               translation(c.x, c.y, c.z + radius / std::sin(kFov * (M_PI / 360))) * scaling(-1, 1, -1), 16.0 / 9);
+    set_number(out, "fov", kFov);
+    set_text(out, "fov_axis", "y");
+    set_clips(out, radius * 1e-3, radius * 1e3);
+    return out;
+}
+
+}  // namespace ambilux::gltf

@@ -1,0 +1,144 @@
+#include "formats/gltf/load.h"
+
+#include <cmath>
+
+#include "core/math.h"
+#include "formats/gltf/model.h"
+
+namespace ambilux {
+namespace gltf {
+namespace {
+
+using namespace mitsuba;
+
+class SceneMaker {
+public:
+    explicit SceneMaker(Context& context) : c_(context) {}
+
+    void make() {
+        const tinygltf::Model& model = c_.model;
+        if (model.scenes.empty()) c_.fail("it has no scene");
+        const size_t index = model.defaultScene < 0 ? 0 : size_t(model.defaultScene);
+        if (index >= model.scenes.size()) c_.fail("there is no scene " + std::to_string(index));
+        if (model.scenes.size() > 1) c_.note("one of several scenes is used: the default one");
+        for (const int node : model.scenes[index].nodes) visit(node, {}, 1);
+        Object& sensor = sensor_ ? *sensor_ : add_default_camera(c_, lower_, upper_);
+        add_child(*c_.document.scene, sensor);
+        add_child(*c_.document.scene, add_object(c_.document, "integrator", "path", c_.where));
+        if (c_.emits) return;
+        c_.note("the file has no light: an environment of radiance 1 is used");
+        Object& sky = add_object(c_.document, "emitter", "constant", c_.where);
+        set_rgb(sky, "radiance", splat(1));
+        add_child(*c_.document.scene, sky);
+    }
+
+private:
+    Matrix local(const tinygltf::Node& node) const {
+        Matrix m;
+        if (node.matrix.size() == 16) {
+            for (int i = 0; i < 16; ++i) m.m[i % 4][i / 4] = node.matrix[size_t(i)];
+        } else {
+            const auto value = [](const std::vector<double>& v, size_t i, double fallback) {
+                return i < v.size() ? v[i] : fallback;
+            };
+            const auto &t = node.translation, &r = node.rotation, &s = node.scale;
+            const double x = value(r, 0, 0), y = value(r, 1, 0), z = value(r, 2, 0), w = value(r, 3, 1);
+            const double n = 2 / (x * x + y * y + z * z + w * w);
+            Matrix q;
+            const double rows[3][3] = {{1 - n * (y * y + z * z), n * (x * y - z * w), n * (x * z + y * w)},
+                                       {n * (x * y + z * w), 1 - n * (x * x + z * z), n * (y * z - x * w)},
+                                       {n * (x * z - y * w), n * (y * z + x * w), 1 - n * (x * x + y * y)}};
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j) q.m[i][j] = rows[i][j];
+            m = translation(value(t, 0, 0), value(t, 1, 0), value(t, 2, 0)) * q *
+                scaling(value(s, 0, 1), value(s, 1, 1), value(s, 2, 1));
+        }
+        if (!is_affine(m)) c_.fail("the transform of node '" + node.name + "' is not affine and finite");
+        return m;
+    }
+
+    void visit(int index, const Matrix& outer, uint64_t depth) {
+        const Limits& limits = c_.document.limits;
+        if (index < 0 || size_t(index) >= c_.model.nodes.size()) c_.fail("there is no node " + std::to_string(index));
+        if (depth > limits.nesting)
+            c_.fail("nodes are nested deeper than --limits nesting=" + std::to_string(limits.nesting));
+        if (++visited_ > limits.shapes)
+            c_.fail("it has more nodes than --limits shapes=" + std::to_string(limits.shapes));
+        const tinygltf::Node& node = c_.model.nodes[size_t(index)];
+        const Matrix to_world = outer * local(node);
+        if (node.extensions.contains("EXT_mesh_gpu_instancing"))
+            c_.refuse("node '" + node.name + "': extension 'EXT_mesh_gpu_instancing' is not supported",
+                      "it is left out");
+        if (node.mesh >= 0) add_mesh(node.mesh, to_world);
+        if (node.camera >= 0 && sensor_) c_.note("the first of several cameras is used");
+        if (node.camera >= 0 && !sensor_) {
+            if (size_t(node.camera) >= c_.model.cameras.size())
+                c_.fail("there is no camera " + std::to_string(node.camera));
+            sensor_ = &add_camera(c_, c_.model.cameras[size_t(node.camera)], to_world);
+        }
+        if (const tinygltf::Value* light = extension(node.extensions, "KHR_lights_punctual")) {
+            const double i = number(light, "light", -1);
+            if (!(i >= 0 && i < double(c_.model.lights.size())))
+                c_.fail("node '" + node.name + "' names a light that is not there");
+            add_light(c_, c_.model.lights[size_t(i)], to_world);
+        }
+        for (const int child : node.children) visit(child, to_world, depth + 1);
+    }
+
+    void add_mesh(int index, const Matrix& to_world) {
+        if (size_t(index) >= c_.model.meshes.size()) c_.fail("there is no mesh " + std::to_string(index));
+        const tinygltf::Mesh& mesh = c_.model.meshes[size_t(index)];
+        for (size_t i = 0; i < mesh.primitives.size(); ++i) {
+            const tinygltf::Primitive& primitive = mesh.primitives[i];
+            const std::string what = "mesh " + std::to_string(index) +
+                                     (mesh.name.empty() ? "" : " '" + mesh.name + "'") + ", primitive " +
+                                     std::to_string(i);
+            if (primitive.mode >= 0 && primitive.mode < TINYGLTF_MODE_TRIANGLES) {
+                c_.refuse(what + ": points and lines are not supported", "they are left out");
+                continue;
+            }
+            const Context::Surface s = surface(c_, primitive.material);
+            const std::string name = c_.where.file + ", " + what;
+            const auto [place, is_new] = c_.document.meshes.try_emplace(name);
+            if (is_new) place->second = primitive_mesh(c_, primitive, s.tex_coord, what);
+            Object& shape = add_object(c_.document, "shape", "mesh", c_.where);
+            set_text(shape, "name", name);
+            set_transform(shape, "to_world", to_world);
+            add_child(shape, *s.bsdf);
+            if (s.emitter) add_child(shape, *s.emitter);
+            add_child(*c_.document.scene, shape);
+            grow(place->second, to_world);
+        }
+    }
+
+    void grow(const Mesh& mesh, const Matrix& m) {
+        const Affine a = to_affine(m);
+        for (const Vec3f& p : mesh.positions) {
+            const Vec3f q = a.point(p);
+            lower_ = min(lower_, q), upper_ = max(upper_, q);
+        }
+    }
+
+    Context& c_;
+    Object* sensor_ = nullptr;
+    uint64_t visited_ = 0;
+    Vec3f lower_ = splat(kInfinity), upper_ = splat(-kInfinity);
+};
+
+}  // namespace
+}  // namespace gltf
+
+Scene load_gltf(const std::string& path, const LoadOptions& options) {
+    mitsuba::Document document;
+    document.limits = options.limits;
+    document.smooth_normals = false;
+    document.scene = &mitsuba::add_object(document, "scene", "", {path, 0});
+    Report report(options.lenient);
+    gltf::Context context{document, report, {path, 0}, {}, {}, {}, {}, false};
+    gltf::read_model(context, path);
+    gltf::SceneMaker(context).make();
+    report.write(document);
+    return mitsuba::load_document(path, document, options);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,60 @@
+// What the parts of the glTF reader share.
+#pragma once
+
+#include <tiny_gltf.h>
+
+#include <map>
+
+#include "formats/report.h"
+
+namespace ambilux::gltf {
+
+using mitsuba::Document;
+using mitsuba::Matrix;
+using mitsuba::Object;
+using mitsuba::Where;
+
+struct Context {
+    Document& document;
+    Report& report;
+    Where where;  ///< the file; glTF has no lines
+    tinygltf::Model model;
+    std::vector<std::string> image_bytes;  ///< of each image, as in its file
+    std::map<int, std::string> images;     ///< in the document, by image
+    struct Surface {
+        const Object* bsdf = nullptr;
+        const Object* emitter = nullptr;
+        int tex_coord = 0;  ///< set of texture coordinates that all its textures use
+    };
+    std::map<int, Surface> materials;
+    bool emits = false;
+
+    [[noreturn]] void fail(const std::string& message) const;
+    void note(const std::string& text) { report.note(where, text); }
+    void refuse(const std::string& problem, const std::string& instead) { report.refuse(where, problem, instead); }
+};
+
+/// Reads the file with its buffers and images. Sets what a Context needs of them.
+void read_model(Context& context, const std::string& path);
+
+/// All values of an accessor, `components` of each element, normalized integers as shares of 1. Checked against the
+/// buffers. `what` is for messages.
+std::vector<double> accessor_values(const Context& context, int accessor, int components, const std::string& what);
+
+/// Triangles of a primitive, with the set of texture coordinates that its material wants.
+Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int tex_coord, const std::string& what);
+
+/// Material -1 is the default.
+Context::Surface surface(Context& context, int material);
+
+/// Numbers in extensions of objects.
+const tinygltf::Value* extension(const tinygltf::ExtensionMap& extensions, const char* name);
+double number(const tinygltf::Value* object, const char* name, double fallback);
+
+/// Emitters and the camera of a node.
+void add_light(Context& context, const tinygltf::Light& light, const Matrix& to_world);
+Object& add_camera(Context& context, const tinygltf::Camera& camera, Matrix to_world);
+/// A camera that sees the box.
+Object& add_default_camera(Context& context, Vec3f lower, Vec3f upper);
+
+}  // namespace ambilux::gltf

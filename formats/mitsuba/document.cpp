@@ -1,0 +1,79 @@
+#include "formats/mitsuba/document.h"
+
+#include <filesystem>
+
+#include "core/error.h"
+
+namespace ambilux::mitsuba {
+
+namespace fs = std::filesystem;
+
+const Value* Object::find(const std::string& name) const {
+    for (const Value& value : values)
+        if (value.name == name) return &value;
+    return nullptr;
+}
+
+std::string Document::resolve(const std::string& name, const Where& where) const {
+    std::error_code ignored;
+    const fs::path path(name);
+    if (path.is_absolute() && fs::exists(path, ignored)) return name;
+    std::vector<fs::path> folders = {fs::path(where.file).parent_path()};
+    folders.insert(folders.end(), search_folders.begin(), search_folders.end());
+    if (!files.empty()) folders.push_back(fs::path(files[0].first).parent_path());
+    for (const fs::path& folder : folders) {
+        const fs::path candidate = folder / path;
+        if (fs::exists(candidate, ignored)) return candidate.string();
+    }
+    throw input_error(where.file, where.line, "file '" + name + "' does not exist");
+}
+
+namespace {
+
+Value& add_value(Object& object, const std::string& name, ValueKind kind) {
+    Value& value = object.values.emplace_back();
+    value.name = name;
+    value.kind = kind;
+    value.where = object.where;
+    return value;
+}
+
+}  // namespace
+
+Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where) {
+    document.storage.push_back(std::make_unique<Object>());
+    Object& object = *document.storage.back();
+    object.tag = tag;
+    object.type = type;
+    object.where = where;
+    object.version = 2;
+    return object;
+}
+
+void add_child(Object& parent, const Object& child, const std::string& name) {
+    parent.children.push_back({name, child.where, "", &child});
+}
+
+void set_boolean(Object& object, const std::string& name, bool value) {
+    add_value(object, name, ValueKind::boolean).number = value;
+}
+void set_integer(Object& object, const std::string& name, int64_t value) {
+    add_value(object, name, ValueKind::integer).number = double(value);
+}
+void set_number(Object& object, const std::string& name, double value) {
+    add_value(object, name, ValueKind::number).number = value;
+}
+void set_text(Object& object, const std::string& name, const std::string& value) {
+    add_value(object, name, ValueKind::text).text = value;
+}
+void set_rgb(Object& object, const std::string& name, Rgb value) {
+    add_value(object, name, ValueKind::rgb).rgb = value;
+}
+void set_vector(Object& object, const std::string& name, Vec3d value) {
+    add_value(object, name, ValueKind::vector).vector = value;
+}
+void set_transform(Object& object, const std::string& name, const Matrix& value) {
+    add_value(object, name, ValueKind::transform).transform = value;
+}
+
+}  // namespace ambilux::mitsuba

@@ -1,0 +1,94 @@
+#include "formats/pbrt/environment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/math.h"
+#include "core/parallel.h"
+#include "formats/file_budget.h"
+
+namespace ambilux::pbrt {
+
+namespace {
+
+/// Equal-area octahedral map (Clarberg 2008): unit direction to [0,1]².
+std::pair<double, double> square_of(double x, double y, double z) {
+    const double r = std::sqrt(std::max(0.0, 1 - std::fabs(z)));
+    double v = std::atan2(std::fabs(y), std::fabs(x)) * (2 / M_PI) * r, u = r - v;
+    if (z < 0) {
+        std::swap(u, v);
+        u = 1 - u, v = 1 - v;
+    }
+    return {(std::copysign(u, x) + 1) / 2, (std::copysign(v, y) + 1) / 2};
+}
+
+/// Its inverse.
+mitsuba::Vec3d direction_of(double s, double t) {
+    const double u = 2 * s - 1, v = 2 * t - 1, a = std::fabs(u), b = std::fabs(v), distance = 1 - (a + b),
+                 r = 1 - std::fabs(distance), phi = (r == 0 ? 1 : (b - a) / r + 1) * M_PI / 4,
+                 z = std::copysign(1 - r * r, distance), sine = r * std::sqrt(std::max(0.0, 2 - r * r));
+    return {std::copysign(std::cos(phi), u) * sine, std::copysign(std::sin(phi), v) * sine, z};
+}
+
+}  // namespace
+
+Environment read_environment(mitsuba::Document& document, const std::string& path, const Where& where) {
+    const std::string bytes = read_input(path, document.limits);
+    document.file_digests.push_back({path, sha256(bytes)});
+    const Texels texels = read_image(path, bytes, document.limits);
+    if (texels.width != texels.height)
+        fail(where, "the image of an infinite light is " + std::to_string(texels.width) + "x" +
+                        std::to_string(texels.height) + "; an equal-area octahedral map is square");
+    const size_t n = texels.width;
+    std::vector<Rgb> colors(n * n);
+    for (size_t i = 0; i < n * n; ++i)
+        for (int c = 0; c < 3; ++c) {
+            double v = texels.is_8bit ? texels.bytes[4 * i + size_t(c)] / 255.0 : texels.floats[4 * i + size_t(c)];
+            if (!texels.is_linear) v = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+            if (!std::isfinite(v)) fail({path, 0}, "a texel is not finite");
+            colors[i][c] = float(std::max(v, 0.0));
+        }
+
+    Environment out{path + "#latitude-longitude", 0};
+    for (size_t y = 0; y < n; ++y)
+        for (size_t x = 0; x < n; ++x) {
+            const double z = direction_of((double(x) + 0.5) / double(n), (double(y) + 0.5) / double(n)).z;
+            if (z > 0) out.illuminance += double(luminance(colors[y * n + x])) * z * 4 * M_PI / double(n * n);
+        }
+    // pbrt weighs the hemisphere by 2π/n².
+    out.illuminance /= 2;
+
+    const size_t width = 2 * n, height = std::max<size_t>(n, 2);
+    FileBudget(path, document.limits).bytes(width * height, 16);
+    Texels& image = document.images[out.image];
+    image = {};
+    image.width = uint32_t(width), image.height = uint32_t(height);
+    image.is_linear = true;
+    image.floats.resize(width * height * 4);
+    constexpr int kSub = 4;
+    parallel_for(height, [&](size_t y) {
+        for (size_t x = 0; x < width; ++x) {
+            double sum[3] = {0, 0, 0}, weight = 0;
+            for (int j = 0; j < kSub; ++j) {
+                // Rows lie on the latitudes from pole to pole.
+                const double row = double(y) - 0.5 + (j + 0.5) / kSub;
+                const double theta = std::clamp(row / double(height - 1), 0.0, 1.0) * M_PI;
+                const double sine = std::sin(theta);
+                for (int i = 0; i < kSub; ++i) {
+                    const double phi = (double(x) + (i + 0.5) / kSub) / double(width) * 2 * M_PI;
+                    const auto [s, t] = square_of(std::sin(phi) * sine, std::cos(theta), -std::cos(phi) * sine);
+                    const size_t u = std::min(size_t(s * double(n)), n - 1), v = std::min(size_t(t * double(n)), n - 1);
+                    const double w = std::max(sine, 1e-6);
+                    for (int c = 0; c < 3; ++c) sum[c] += w * double(colors[v * n + u][c]);
+                    weight += w;
+                }
+            }
+            float* texel = image.floats.data() + (y * width + x) * 4;
+            for (int c = 0; c < 3; ++c) texel[c] = float(sum[c] / weight);
+            texel[3] = 1;
+        }
+    });
+    return out;
+}
+
+}  // namespace ambilux::pbrt

@@ -1,0 +1,70 @@
+// What the directives of a pbrt file build up. One file per kind of directive; this is what they share.
+#pragma once
+
+#include <optional>
+
+#include "formats/pbrt/textures.h"
+
+namespace ambilux::pbrt {
+
+using mitsuba::Document;
+using mitsuba::Matrix;
+
+/// Parameters and the colour space that held where they stood.
+struct Described {
+    Parameters in;
+    ColorSpace space = ColorSpace::srgb;
+};
+using Shared = std::shared_ptr<const Described>;
+
+/// What AttributeBegin keeps and AttributeEnd brings back.
+struct State {
+    Matrix ctm;
+    bool reverse_orientation = false;
+    ColorSpace space = ColorSpace::srgb;
+    Shared material;                                           ///< null: diffuse
+    Shared area_light;                                         ///< null: none
+    std::map<std::string, std::vector<Parameter>> attributes;  ///< of directive Attribute, by what they are for
+};
+
+/// What shapes can be put on: where their coordinates differ from those of Mitsuba's shape.
+enum class Surface { mesh, sphere, disk, cylinder };
+
+struct SceneMaker {
+    SceneMaker(Document& d, Report& r, std::string f)
+        : document(d), report(r), folder(std::move(f)), textures({folder, d, r}, d, r) {}
+
+    Document& document;
+    Report& report;
+    std::string folder;  ///< of the main file
+    Textures textures;
+    State state;
+    std::map<std::string, Shared> named_materials;
+    std::map<std::string, Object*> objects;  ///< shape groups of ObjectBegin
+    Object* open_object = nullptr;
+    double exposure = 1;  ///< imaging ratio of the film
+    uint64_t shape_count = 0;
+
+    /// BSDFs of materials; keeps the materials, so that no address comes twice.
+    std::map<std::pair<Shared, Surface>, const Object*> materials;
+
+    const SpectrumReader& spectra() const { return textures.spectra(); }
+};
+
+/// Camera, film, filter, sampler and integrator, which stand before WorldBegin.
+struct Options {
+    std::optional<Parameters> camera, film, filter, sampler, integrator;
+    Matrix camera_to_world;
+};
+void add_options(SceneMaker& scene, const Options& options);
+
+void add_shape(SceneMaker& scene, const Parameters& in);
+void add_light(SceneMaker& scene, const Described& light);
+/// The emitter of a shape. `area`: of the shape as pbrt measures it for the parameter power; 0: not known.
+const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area);
+
+/// BSDF of a material, two-sided unless it transmits light; null material: diffuse.
+const Object* surface_material(SceneMaker& scene, const Shared& material, Surface surface);
+UvMap uv_map(Surface surface);
+
+}  // namespace ambilux::pbrt

@@ -1,0 +1,265 @@
+#include <algorithm>
+#include <cmath>
+
+#include "formats/meshes/loop_subdivision.h"
+#include "formats/pbrt/scene.h"
+
+namespace ambilux::pbrt {
+
+using namespace mitsuba;
+
+namespace {
+
+/// Cells a side of a bilinear patch that is no parallelogram.
+constexpr uint32_t kPatchCells = 8;
+
+std::vector<Vec3f> triples(const Parameters& in, const char* name, size_t vertices = 0) {
+    const std::vector<double>& numbers = in.numbers(name, 3);
+    if (vertices && !numbers.empty() && numbers.size() != 3 * vertices)
+        fail(in.where_of(name), std::string("'") + name + "' is given for " + std::to_string(numbers.size() / 3) +
+                                    " of " + std::to_string(vertices) + " vertices");
+    std::vector<Vec3f> out(numbers.size() / 3);
+    for (size_t i = 0; i < out.size(); ++i)
+        out[i] = {float(numbers[3 * i]), float(numbers[3 * i + 1]), float(numbers[3 * i + 2])};
+    return out;
+}
+
+std::vector<uint32_t> indices_of(const Parameters& in, size_t corners, size_t vertices) {
+    std::vector<uint32_t> out;
+    for (double i : in.numbers("indices", corners)) {
+        if (!(i >= 0 && i < double(vertices)))
+            fail(in.where_of("indices"),
+                 "index " + std::to_string(int64_t(i)) + " of " + std::to_string(vertices) + " vertices");
+        out.push_back(uint32_t(i));
+    }
+    if (out.empty() && vertices == corners)
+        for (uint32_t i = 0; i < corners; ++i) out.push_back(i);
+    if (out.empty()) fail(in.where, in.type + " has no indices");
+    return out;
+}
+
+Mesh vertices_of(const Parameters& in) {
+    Mesh mesh;
+    mesh.positions = triples(in, "P");
+    if (mesh.positions.empty()) fail(in.where, in.type + " has no vertices 'P'");
+    mesh.normals = triples(in, "N", mesh.positions.size());
+    const char* name = in.find("uv") ? "uv" : "st";
+    const std::vector<double>& uvs = in.numbers(name, 2);
+    if (!uvs.empty() && uvs.size() != 2 * mesh.positions.size())
+        fail(in.where_of(name), "texture coordinates are given for " + std::to_string(uvs.size() / 2) + " of " +
+                                    std::to_string(mesh.positions.size()) + " vertices");
+    for (size_t i = 0; i < uvs.size(); i += 2) mesh.uvs.push_back({float(uvs[i]), float(uvs[i + 1])});
+    return mesh;
+}
+
+Mesh triangle_mesh(const Parameters& in) {
+    Mesh mesh = vertices_of(in);
+    in.ignore({"S"});  // tangents, which our BSDFs take from texture coordinates
+    const std::vector<uint32_t> indices = indices_of(in, 3, mesh.positions.size());
+    for (size_t i = 0; i < indices.size(); i += 3) mesh.faces.push_back({indices[i], indices[i + 1], indices[i + 2]});
+    return mesh;
+}
+
+/// Every triangle gets vertices of its own with pbrt's default coordinates.
+Mesh with_default_uvs(const Mesh& mesh) {
+    Mesh out;
+    constexpr Vec2f uvs[3] = {{0, 0}, {1, 0}, {1, 1}};
+    for (const auto& face : mesh.faces) {
+        const uint32_t first = uint32_t(out.positions.size());
+        for (int i = 0; i < 3; ++i) {
+            out.positions.push_back(mesh.positions[face[size_t(i)]]);
+            if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[face[size_t(i)]]);
+            out.uvs.push_back(uvs[i]);
+        }
+        out.faces.push_back({first, first + 1, first + 2});
+    }
+    return out;
+}
+
+Mesh bilinear_mesh(SceneMaker& scene, const Parameters& in) {
+    const Mesh corners = vertices_of(in);
+    const std::vector<uint32_t> indices = indices_of(in, 4, corners.positions.size());
+    FileBudget budget(in.where.file, scene.document.limits);
+    Mesh out;
+    for (size_t first = 0; first < indices.size(); first += 4) {
+        const uint32_t* q = indices.data() + first;  // at (u,v) = 00, 10, 01, 11
+        const auto& p = corners.positions;
+        const Vec3f twist = p[q[0]] + p[q[3]] - p[q[1]] - p[q[2]];
+        const bool flat = length(twist) <= 1e-6f * length(p[q[3]] - p[q[0]]);
+        const uint32_t n = flat && corners.normals.empty() ? 1 : kPatchCells;
+        if (!flat)
+            scene.report.note(in.where, "bilinear patches that are no parallelograms are 8x8 cells of two triangles");
+        const uint32_t base = uint32_t(out.positions.size());
+        budget.bytes(base + uint64_t(n + 1) * (n + 1), sizeof(Vec3f));
+        for (uint32_t j = 0; j <= n; ++j)
+            for (uint32_t i = 0; i <= n; ++i) {
+                const float u = float(i) / float(n), v = float(j) / float(n);
+                const float w[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
+                Vec3f position{}, normal{};
+                Vec2f uv{};
+                for (int k = 0; k < 4; ++k) {
+                    position += p[q[k]] * w[k];
+                    if (!corners.normals.empty()) normal += corners.normals[q[k]] * w[k];
+                    if (!corners.uvs.empty()) uv.x += corners.uvs[q[k]].x * w[k], uv.y += corners.uvs[q[k]].y * w[k];
+                }
+                out.positions.push_back(position);
+                if (!corners.normals.empty()) out.normals.push_back(normal);
+                out.uvs.push_back(corners.uvs.empty() ? Vec2f{u, v} : uv);
+            }
+        for (uint32_t j = 0; j < n; ++j)
+            for (uint32_t i = 0; i < n; ++i) {
+                const uint32_t a = base + j * (n + 1) + i, b = a + 1, c = a + n + 1, d = c + 1;
+                out.faces.push_back({a, b, d});
+                out.faces.push_back({a, d, c});
+            }
+    }
+    return out;
+}
+
+Mesh loop_subdivision(SceneMaker& scene, const Parameters& in) {
+    Mesh mesh = triangle_mesh(in);
+    const int64_t levels = in.integer("levels", 3);
+    if (levels < 0 || levels > 12) fail(in.where_of("levels"), "levels must lie between 0 and 12");
+    scene.report.note(in.where,
+                      "a loopsubdiv is refined as often as it says, and its vertices moved to the limit surface");
+    return subdivide_loop(in.where.file + ":" + std::to_string(in.where.line), mesh, int(levels),
+                          scene.document.limits);
+}
+
+bool has_texture(const Object& object, int depth = 0) {
+    for (const Child& child : object.children)
+        if (child.object->tag == "texture" || (depth < 16 && has_texture(*child.object, depth + 1))) return true;
+    return false;
+}
+
+/// Area of the triangles in the world if all have the same, else 0: pbrt gives its power to each.
+double triangle_area(const Mesh& mesh, const Matrix& m) {
+    const auto row = [&m](int i, Vec3f p) {
+        return m.m[i][0] * double(p.x) + m.m[i][1] * double(p.y) + m.m[i][2] * double(p.z);
+    };
+    double first = 0;
+    for (const auto& f : mesh.faces) {
+        const Vec3f &a = mesh.positions[f[0]], &b = mesh.positions[f[1]], &c = mesh.positions[f[2]];
+        const auto edge = [&](Vec3f p) {
+            return Vec3d{row(0, p) - row(0, a), row(1, p) - row(1, a), row(2, p) - row(2, a)};
+        };
+        const double area = length(cross(edge(b), edge(c))) / 2;
+        if (first == 0) first = area;
+        if (std::fabs(area - first) > 1e-4 * first) return 0;
+    }
+    return first;
+}
+
+struct Placed {
+    Object* object = nullptr;
+    Surface surface = Surface::mesh;
+    Matrix local;
+    double area = 0;
+};
+
+/// Refuses parts of quadrics.
+void whole(SceneMaker& scene, const Parameters& in, const char* name, double value) {
+    if (std::fabs(in.number(name, value) - value) > 1e-6 * std::max(std::fabs(value), 1.0))
+        scene.report.refuse(in.where_of(name), "a " + in.type + " that is cut by '" + name + "' is not supported",
+                            "it is whole");
+}
+
+Placed add_quadric(SceneMaker& scene, const Parameters& in) {
+    Placed out;
+    out.object = &add_object(scene.document, "shape", in.type, in.where);
+    const double radius = in.number("radius", 1);
+    if (!(radius > 0)) fail(in.where_of("radius"), "radius must be positive");
+    whole(scene, in, "phimax", 360);
+    if (in.type == "sphere") {
+        out.surface = Surface::sphere;
+        if (in.number("zmin", -radius) > -radius) whole(scene, in, "zmin", -radius);
+        if (in.number("zmax", radius) < radius) whole(scene, in, "zmax", radius);
+        out.local = scaling(radius, radius, radius);
+        out.area = 4 * M_PI * radius * radius;
+    } else if (in.type == "disk") {
+        out.surface = Surface::disk;
+        whole(scene, in, "innerradius", 0);
+        out.local = translation(0, 0, in.number("height", 0)) * scaling(radius, radius, 1);
+        out.area = M_PI * radius * radius;
+    } else {
+        out.surface = Surface::cylinder;
+        const double low = in.number("zmin", -1), high = in.number("zmax", 1);
+        const double bottom = std::min(low, high), top = std::max(low, high);
+        if (!(top > bottom)) fail(in.where, "a cylinder needs a length: zmin equals zmax");
+        out.local = translation(0, 0, bottom) * scaling(radius, radius, top - bottom);
+        out.area = 2 * M_PI * radius * (top - bottom);
+    }
+    return out;
+}
+
+Placed add_mesh(SceneMaker& scene, const Parameters& in, const Object& material) {
+    Placed out;
+    if (in.type == "plymesh") {
+        out.object = &add_object(scene.document, "shape", "ply", in.where);
+        set_text(*out.object, "filename", resolve(scene.folder, in.text("filename", ""), in.where_of("filename")));
+        if (in.find("displacement"))
+            scene.report.refuse(in.where_of("displacement"), "displacement of meshes is not supported",
+                                "it is left out");
+        in.ignore({"displacement", "edgelength"});
+        return out;
+    }
+    Mesh mesh = in.type == "trianglemesh"   ? triangle_mesh(in)
+                : in.type == "bilinearmesh" ? bilinear_mesh(scene, in)
+                                            : loop_subdivision(scene, in);
+    if (mesh.uvs.empty() && has_texture(material)) mesh = with_default_uvs(mesh);
+    check_mesh(in.where.file + ":" + std::to_string(in.where.line), mesh);
+    out.area = triangle_area(mesh, scene.state.ctm);
+    out.object = &add_object(scene.document, "shape", "mesh", in.where);
+    const std::string name =
+        in.where.file + ":" + std::to_string(in.where.line) + "#" + std::to_string(scene.document.meshes.size());
+    scene.document.meshes[name] = std::move(mesh);
+    set_text(*out.object, "name", name);
+    return out;
+}
+
+Surface surface_of(const std::string& type) {
+    return type == "sphere"     ? Surface::sphere
+           : type == "disk"     ? Surface::disk
+           : type == "cylinder" ? Surface::cylinder
+                                : Surface::mesh;
+}
+
+}  // namespace
+
+void add_shape(SceneMaker& scene, const Parameters& in) {
+    const std::string& type = in.type;
+    const bool quadric = surface_of(type) != Surface::mesh;
+    if (!quadric && type != "trianglemesh" && type != "plymesh" && type != "bilinearmesh" && type != "loopsubdiv")
+        return scene.report.refuse(in.where, "shape '" + type + "' is not supported", "it is left out");
+    if (++scene.shape_count > scene.document.limits.shapes)
+        fail(in.where,
+             "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
+    const Object* bsdf = surface_material(scene, scene.state.material, surface_of(type));
+    const Placed placed = quadric ? add_quadric(scene, in) : add_mesh(scene, in, *bsdf);
+    Object& shape = *placed.object;
+    const UvMap uv = uv_map(placed.surface);
+    set_transform(shape, "to_world", scene.state.ctm * placed.local);
+    if (scene.state.reverse_orientation) set_boolean(shape, "flip_normals", true);
+    const Parameter* alpha = in.find("alpha");
+    if (alpha) {
+        const Texture opacity = scene.textures.number(in, "alpha", 1);
+        if (opacity.is_constant() && opacity.color.x <= 0 && scene.state.area_light)
+            scene.report.refuse(alpha->where, "a light of alpha 0, which shines unseen, is not supported",
+                                "it is seen");
+        else if (!opacity.is_constant() || opacity.color.x < 1) {
+            Object& mask = add_object(scene.document, "bsdf", "mask", alpha->where);
+            scene.textures.set_number(mask, "opacity", opacity, uv);
+            add_child(mask, *bsdf);
+            bsdf = &mask;
+        }
+    }
+    add_child(shape, *bsdf);
+    if (scene.state.area_light && scene.open_object)
+        scene.report.note(in.where, "shapes of an object do not shine, as in pbrt");
+    else if (scene.state.area_light)
+        add_child(shape, area_emitter(scene, *scene.state.area_light, uv, placed.area));
+    in.finish(scene.report);
+    add_child(scene.open_object ? *scene.open_object : *scene.document.scene, shape);
+}
+
+}  // namespace ambilux::pbrt

@@ -1,0 +1,317 @@
+#include "formats/pbrt/textures.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ambilux::pbrt {
+
+UvMap operator*(const UvMap& a, const UvMap& b) {
+    UvMap c;
+    for (int i = 0; i < 2; ++i) {
+        for (int j = 0; j < 3; ++j) c.m[i][j] = a.m[i][0] * b.m[0][j] + a.m[i][1] * b.m[1][j];
+        c.m[i][2] += a.m[i][2];
+    }
+    return c;
+}
+
+void Textures::define(const std::string& name, bool is_float, const Parameters& in, ColorSpace space) {
+    auto& known = is_float ? numbers_ : colors_;
+    if (known.contains(name)) fail(in.where, "texture '" + name + "' is defined twice");
+    const Texture texture = build(is_float, in, space);
+    in.finish(report_);
+    known[name] = texture;
+}
+
+const Texture& Textures::named(const Parameter& p, bool is_float) const {
+    if (p.strings.size() != 1) fail(p.where, "'" + p.name + "' must be the name of one texture");
+    const auto& known = is_float ? numbers_ : colors_;
+    const auto it = known.find(p.strings[0]);
+    if (it == known.end())
+        fail(p.where, "no texture of type " + std::string(is_float ? "float" : "spectrum") + " is known by the name '" +
+                          p.strings[0] + "'");
+    return it->second;
+}
+
+Texture Textures::number(const Parameters& in, const std::string& name, double fallback) const {
+    const Parameter* p = in.find(name);
+    if (p && p->is_texture()) return named(*p, true);
+    Texture texture;
+    texture.where = in.where_of(name);
+    texture.color = splat(float(in.number(name, fallback)));
+    return texture;
+}
+
+Texture Textures::color(const Parameters& in, const std::string& name, Rgb fallback, ColorUse use,
+                        ColorSpace space) const {
+    const Parameter* p = in.find(name);
+    if (p && p->is_texture()) return named(*p, false);
+    Texture texture;
+    texture.where = in.where_of(name);
+    texture.color = p ? spectra_.color(*p, use, space) : fallback;
+    return texture;
+}
+
+UvMap Textures::mapping(const Parameters& in) const {
+    const std::string kind = in.text("mapping", "uv");
+    if (kind != "uv")
+        report_.refuse(in.where_of("mapping"), "texture mapping '" + kind + "' is not supported", "uv is used");
+    if (kind != "uv") in.ignore({"v1", "v2"});
+    UvMap map;
+    map.m[0][0] = in.number("uscale", 1), map.m[0][2] = in.number("udelta", 0);
+    map.m[1][1] = in.number("vscale", 1), map.m[1][2] = in.number("vdelta", 0);
+    return map;
+}
+
+Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
+    const auto part = [&](const char* name, double fallback) {
+        return is_float ? number(in, name, fallback)
+                        : color(in, name, splat(float(fallback)), ColorUse::reflectance, space);
+    };
+    Texture out;
+    out.where = in.where;
+    if (in.type == "constant") {
+        out.color = part("value", 1).color;
+    } else if (in.type == "scale") {
+        const Texture tex = part("tex", 1), scale = number(in, "scale", 1);
+        if (scale.is_constant() && tex.kind == Texture::Kind::image)
+            out = tex, out.color *= scale.color;
+        else
+            out = fold(in, {tex, scale}, [](const std::vector<Rgb>& c) { return c[0] * c[1]; });
+    } else if (in.type == "mix") {
+        out = fold(in, {part("tex1", 0), part("tex2", 1), number(in, "amount", 0.5)},
+                   [](const std::vector<Rgb>& c) { return c[0] * (splat(1) - c[2]) + c[1] * c[2]; });
+    } else if (in.type == "checkerboard") {
+        if (in.integer("dimension", 2) != 2)
+            report_.refuse(in.where_of("dimension"), "a checkerboard of three dimensions is not supported",
+                           "it has two");
+        const Texture even = part("tex1", 1), odd = part("tex2", 0);
+        out.kind = Texture::Kind::checkerboard;
+        out.mapping = mapping(in);
+        out.color = even.color, out.odd = odd.color;
+        if (!even.is_constant() || !odd.is_constant())
+            report_.refuse(in.where, "a checkerboard of textures is not supported", "a checkerboard of greys is used");
+        if (!even.is_constant()) out.color = splat(1);
+        if (!odd.is_constant()) out.odd = splat(0);
+    } else if (in.type == "imagemap") {
+        out = image_texture(is_float, in);
+    } else {
+        report_.refuse(in.where, "texture type '" + in.type + "' is not supported", "a grey of 0.5 is used");
+        out.color = splat(0.5f);
+        for (const Parameter& p : in.list) p.used = true;
+    }
+    return out;
+}
+
+Texture Textures::image_texture(bool is_float, const Parameters& in) {
+    Texture out;
+    out.kind = Texture::Kind::image;
+    out.where = in.where;
+    const std::string path = resolve(spectra_.folder, in.text("filename", ""), in.where_of("filename"));
+    const std::string encoding = in.text("encoding", "");
+    double gamma = 0;  // of files that are not PNG, what their format implies
+    if (path.ends_with(".png") || path.ends_with(".PNG")) {
+        gamma = encoding.empty() || encoding == "sRGB" ? -1 : encoding == "linear" ? 1 : 0;
+        if (gamma == 0 && !(encoding.starts_with("gamma ") && parse_number(encoding.substr(6), gamma) && gamma > 0))
+            fail(in.where_of("encoding"), "unknown encoding '" + encoding + "'");
+    }
+    out.image = image_file(path, gamma, is_float);
+    out.mapping = mapping(in);
+    out.wrap = in.text("wrap", "repeat");
+    if (out.wrap != "repeat" && out.wrap != "clamp") {
+        report_.refuse(in.where_of("wrap"), "wrap mode '" + out.wrap + "' is not supported", "repeat is used");
+        out.wrap = "repeat";
+    }
+    const std::string filter = in.text("filter", "bilinear");
+    if (filter != "point" && filter != "bilinear" && filter != "trilinear" && filter != "EWA" && filter != "ewa")
+        fail(in.where_of("filter"), "unknown texture filter '" + filter + "'");
+    out.filter = filter == "point" ? "nearest" : "bilinear";
+    in.ignore({"maxanisotropy"});  // of filters that need differentials
+    const float scale = float(in.number("scale", 1));
+    if (!is_float && !(scale >= 0)) fail(in.where_of("scale"), "the scale of a colour must not be negative");
+    out.color = splat(scale);
+    if (!in.boolean("invert", false)) return out;
+    return fold(in, {out}, [](const std::vector<Rgb>& c) { return max(splat(1) - c[0], splat(0)); });
+}
+
+std::shared_ptr<TextureImage> Textures::image_file(const std::string& path, double gamma, bool is_number) {
+    auto& known = images_[path + "|" + std::to_string(gamma) + (is_number ? "|number" : "")];
+    if (known) return known;
+    known = std::make_shared<TextureImage>();
+    known->path = path;
+    known->gamma = gamma;
+    known->is_number = is_number;
+    // Whether a file holds numbers as they are asked for is seen in it only.
+    if (is_number) load_texels(*known);
+    return known;
+}
+
+void Textures::load_texels(TextureImage& image) const {
+    if (!image.texels.empty()) return;
+    const std::string bytes = read_input(image.path, document_.limits);
+    document_.file_digests.push_back({image.path, sha256(bytes)});
+    const Texels texels = read_image(image.path, bytes, document_.limits);
+    FileBudget(image.path, document_.limits).bytes(uint64_t(texels.width) * texels.height, sizeof(Rgb));
+    image.width = texels.width, image.height = texels.height;
+    const double gamma = image.gamma != 0 ? image.gamma : texels.is_linear ? 1 : -1;
+    const auto decode = [gamma](double v) {
+        if (gamma == 1) return v;
+        if (gamma == -1) return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+        return std::pow(v, gamma);
+    };
+    double table[256];
+    for (int i = 0; i < 256; ++i) table[i] = decode(i / 255.0);
+    const auto value = [&](size_t i) {
+        return float(texels.is_8bit ? table[texels.bytes[i]] : decode(texels.floats[i]));
+    };
+    const size_t count = size_t(texels.width) * texels.height;
+    bool has_alpha = false, is_grey = true;
+    image.texels.resize(count);
+    for (size_t i = 0; i < count; ++i) {
+        Rgb& c = image.texels[i];
+        c = {value(4 * i), value(4 * i + 1), value(4 * i + 2)};
+        if (!is_finite(c)) fail({image.path, 0}, "texel " + std::to_string(i) + " is not finite");
+        has_alpha |= value(4 * i + 3) != 1;
+        is_grey &= c.x == c.y && c.x == c.z;
+    }
+    if (!image.is_number) return;
+    image.is_file = is_grey && !has_alpha;
+    for (size_t i = 0; i < count; ++i) {
+        const Rgb c = image.texels[i];
+        image.texels[i] = splat(has_alpha ? value(4 * i + 3) : (c.x + c.y + c.z) / 3);
+    }
+}
+
+Texture Textures::fold(const Parameters& in, const std::vector<Texture>& parts,
+                       const std::function<Rgb(const std::vector<Rgb>&)>& f) {
+    Texture out;
+    // The kind of the first that is no constant, whose coordinates all others must have.
+    const Texture* model = nullptr;
+    bool fits = true;
+    for (const Texture& part : parts) {
+        if (part.is_constant()) continue;
+        if (part.kind == Texture::Kind::image) load_texels(*part.image);
+        if (!model) model = &part;
+        fits &= part.kind == model->kind && part.mapping == model->mapping && part.wrap == model->wrap &&
+                part.filter == model->filter;
+        if (fits && model->image)
+            fits = part.image->width == model->image->width && part.image->height == model->image->height;
+    }
+    if (!fits)
+        report_.refuse(
+            in.where,
+            "a texture of type '" + in.type + "' of textures of different kinds, sizes or coordinates is not supported",
+            "constants are put in for them");
+    std::vector<Rgb> values(parts.size());
+    const auto combine = [&](const std::function<Rgb(const Texture&)>& value) {
+        for (size_t i = 0; i < parts.size(); ++i)
+            values[i] = parts[i].is_constant() || !fits ? parts[i].color : value(parts[i]);
+        return f(values);
+    };
+    if (model && fits) out = *model;
+    out.where = in.where;
+    if (out.kind != Texture::Kind::image) {
+        out.color = combine([](const Texture& t) { return t.color; });
+        out.odd = combine([](const Texture& t) { return t.odd; });
+        return out;
+    }
+    out.image = std::make_shared<TextureImage>();
+    out.image->is_file = false;
+    out.image->width = model->image->width, out.image->height = model->image->height;
+    for (size_t i = 0; i < model->image->texels.size(); ++i)
+        out.image->texels.push_back(combine([i](const Texture& t) { return t.color * t.image->texels[i]; }));
+    out.color = splat(1);
+    return out;
+}
+
+std::string Textures::bake(const Texture& texture, const ColorMap& map) {
+    load_texels(*texture.image);
+    const TextureImage& image = *texture.image;
+    FileBudget budget(texture.where.file, document_.limits);
+    baked_bytes_ += image.texels.size() * 16;
+    budget.bytes(image.texels.size(), 16);
+    if (baked_bytes_ > document_.limits.total_bytes)
+        fail(texture.where, "with it, textures take more memory than --limits total_bytes=" +
+                                std::to_string(document_.limits.total_bytes));
+    const std::string name =
+        texture.where.file + ":" + std::to_string(texture.where.line) + "#" + std::to_string(document_.images.size());
+    Texels& out = document_.images[name];
+    out.width = image.width, out.height = image.height;
+    out.is_linear = true;
+    out.floats.reserve(image.texels.size() * 4);
+    for (const Rgb& texel : image.texels) {
+        Rgb c = texture.color * texel;
+        if (map) c = map(c);
+        out.floats.insert(out.floats.end(), {c.x, c.y, c.z, 1.0f});
+    }
+    return name;
+}
+
+const Object& Textures::object(const Texture& texture, const UvMap& uv, const ColorMap& map) {
+    using namespace mitsuba;
+    UvMap to_uv = texture.mapping * uv;
+    Object* object = nullptr;
+    Rgb factor = splat(1);
+    if (texture.kind == Texture::Kind::image) {
+        // Images lie upside down in pbrt's (s,t).
+        to_uv = UvMap{{{1, 0, 0}, {0, -1, 1}}} * to_uv;
+        object = &add_object(document_, "texture", "bitmap", texture.where);
+        if (texture.image->is_file && !map) {
+            set_text(*object, "filename", texture.image->path);
+            mitsuba::set_number(*object, "gamma", texture.image->gamma);
+            factor = texture.color;
+        } else {
+            set_text(*object, "image", bake(texture, map));
+            set_boolean(*object, "raw", true);
+        }
+        set_text(*object, "wrap_mode", texture.wrap);
+        set_text(*object, "filter_type", texture.filter);
+    } else {
+        const auto mapped = [&](Rgb c) { return map ? map(c) : c; };
+        const Rgb even = mapped(texture.color), odd = texture.is_constant() ? even : mapped(texture.odd);
+        const float most = std::max({1.0f, max_component(even), max_component(odd)});
+        factor = splat(most);
+        // A period of two cells of size 1 is the unit square of a checkerboard.
+        to_uv = UvMap{{{0.5, 0, 0}, {0, 0.5, 0}}} * to_uv;
+        object = &add_object(document_, "texture", "checkerboard", texture.where);
+        set_rgb(*object, "color0", even / most);
+        set_rgb(*object, "color1", odd / most);
+    }
+    Matrix m;
+    const int columns[3] = {0, 1, 3};
+    for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 3; ++j) m.m[i][columns[j]] = to_uv.m[i][j];
+    set_transform(*object, "to_uv", m);
+    if (factor == splat(1)) return *object;
+    Object& scaled = add_object(document_, "texture", "scale", texture.where);
+    set_rgb(scaled, "scale", factor);
+    add_child(scaled, *object);
+    return scaled;
+}
+
+void Textures::set_number(Object& object, const std::string& name, const Texture& texture, const UvMap& uv,
+                          const std::function<double(double)>& map) {
+    if (texture.is_constant()) {
+        const double value = texture.color.x;
+        return mitsuba::set_number(object, name, map ? map(value) : value);
+    }
+    const ColorMap each = [&](Rgb c) { return splat(float(map(c.x))); };
+    mitsuba::add_child(object, this->object(texture, uv, map ? each : ColorMap{}), name);
+}
+
+void Textures::set_color(Object& object, const std::string& name, const Texture& texture, const UvMap& uv) {
+    if (texture.is_constant()) return mitsuba::set_rgb(object, name, texture.color);
+    const bool beyond = texture.kind == Texture::Kind::image && max_component(texture.color) > 1;
+    const ColorMap clip = [](Rgb c) { return min(c, splat(1)); };
+    mitsuba::add_child(object, this->object(texture, uv, beyond ? clip : ColorMap{}), name);
+}
+
+double Textures::mean(const Texture& texture) const {
+    if (texture.is_constant()) return texture.color.x;
+    if (texture.kind == Texture::Kind::checkerboard) return 0.5 * (double(texture.color.x) + texture.odd.x);
+    load_texels(*texture.image);
+    double sum = 0;
+    for (const Rgb& c : texture.image->texels) sum += c.x;
+    return texture.color.x * sum / double(texture.image->texels.size());
+}
+
+}  // namespace ambilux::pbrt

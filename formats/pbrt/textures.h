@@ -1,0 +1,89 @@
+// Textures of pbrt: folded into constants, checkerboards and images, which are what a Document can hold.
+#pragma once
+
+#include <functional>
+
+#include "formats/pbrt/spectra.h"
+
+namespace ambilux::pbrt {
+
+using mitsuba::Object;
+
+/// Affine map of the plane, by rows.
+struct UvMap {
+    double m[2][3] = {{1, 0, 0}, {0, 1, 0}};
+    bool operator==(const UvMap&) const = default;
+};
+/// `a` after `b`.
+UvMap operator*(const UvMap& a, const UvMap& b);
+
+/// Linear colours, row 0 at the top: of a file, read when they are needed, or made here.
+struct TextureImage {
+    std::string path;        ///< of the file, or empty
+    double gamma = 0;        ///< of the file's values: 0 as its format has it, -1 sRGB, or a power
+    bool is_number = false;  ///< texels are grey: alpha of files that have it, else the mean of the colours
+    bool is_file = true;     ///< a lookup in the file gives the texels
+    uint32_t width = 0, height = 0;
+    std::vector<Rgb> texels;
+};
+
+/// A texture whose inner textures are folded into it.
+struct Texture {
+    enum class Kind { constant, checkerboard, image };
+    Kind kind = Kind::constant;
+    Where where;
+    Rgb color = {1, 1, 1};  ///< constant; of the cells with an even sum; factor of the image
+    Rgb odd{};              ///< of the other cells
+    UvMap mapping;          ///< from pbrt's (u,v) to its (s,t)
+    std::string wrap = "repeat", filter = "bilinear";
+    std::shared_ptr<TextureImage> image;
+
+    bool is_constant() const { return kind == Kind::constant; }
+};
+
+using ColorMap = std::function<Rgb(Rgb)>;
+
+class Textures {
+public:
+    Textures(SpectrumReader spectra, mitsuba::Document& document, Report& report)
+        : spectra_(spectra), document_(document), report_(report) {}
+
+    const SpectrumReader& spectra() const { return spectra_; }
+
+    /// Directive Texture.
+    void define(const std::string& name, bool is_float, const Parameters& in, ColorSpace space);
+
+    /// Parameters that are numbers or textures of them, colours or textures of them.
+    Texture number(const Parameters& in, const std::string& name, double fallback) const;
+    Texture color(const Parameters& in, const std::string& name, Rgb fallback, ColorUse use, ColorSpace space) const;
+
+    /// Sets a parameter of `object`. `uv`: from coordinates of the shape to pbrt's (u,v). Numbers pass `map` first.
+    void set_number(Object& object, const std::string& name, const Texture& texture, const UvMap& uv,
+                    const std::function<double(double)>& map = {});
+    /// Reflectances are clipped at 1, as in pbrt.
+    void set_color(Object& object, const std::string& name, const Texture& texture, const UvMap& uv);
+    /// Of all texels or cells.
+    double mean(const Texture& texture) const;
+    /// The texture as an object of its own.
+    const Object& object(const Texture& texture, const UvMap& uv, const ColorMap& map = {});
+
+private:
+    Texture build(bool is_float, const Parameters& in, ColorSpace space);
+    Texture image_texture(bool is_float, const Parameters& in);
+    Texture fold(const Parameters& in, const std::vector<Texture>& parts,
+                 const std::function<Rgb(const std::vector<Rgb>&)>& f);
+    UvMap mapping(const Parameters& in) const;
+    const Texture& named(const Parameter& p, bool is_float) const;
+    std::shared_ptr<TextureImage> image_file(const std::string& path, double gamma, bool is_number);
+    void load_texels(TextureImage& image) const;
+    std::string bake(const Texture& texture, const ColorMap& map);
+
+    SpectrumReader spectra_;
+    mitsuba::Document& document_;
+    Report& report_;
+    std::map<std::string, Texture> colors_, numbers_;
+    std::map<std::string, std::shared_ptr<TextureImage>> images_;
+    uint64_t baked_bytes_ = 0;
+};
+
+}  // namespace ambilux::pbrt

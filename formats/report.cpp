@@ -1,0 +1,35 @@
+#include "formats/report.h"
+
+#include "core/error.h"
+
+namespace ambilux {
+
+using mitsuba::Where;
+
+void Report::List::add(const Where& where, const std::string& text) {
+    const auto [place, is_new] = places.try_emplace(text, entries.size());
+    if (is_new) entries.push_back({text, where, 0});
+    ++entries[place->second].count;
+}
+
+std::vector<std::string> Report::List::lines() const {
+    std::vector<std::string> lines;
+    for (const Entry& e : entries)
+        lines.push_back(e.where.file + (e.where.line ? ":" + std::to_string(e.where.line) : "") + ": " + e.text +
+                        (e.count > 1 ? " (" + std::to_string(e.count) + " times)" : ""));
+    return lines;
+}
+
+void Report::note(const Where& where, const std::string& text) { notes_.add(where, text); }
+
+void Report::refuse(const Where& where, const std::string& problem, const std::string& instead) {
+    if (!lenient_) throw input_error(where.file, where.line, problem);
+    warnings_.add(where, problem + "; " + instead);
+}
+
+void Report::write(mitsuba::Document& document) const {
+    document.notes = notes_.lines();
+    document.warnings = warnings_.lines();
+}
+
+}  // namespace ambilux

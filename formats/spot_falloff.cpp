@@ -1,0 +1,32 @@
+#include "formats/spot_falloff.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ambilux {
+
+void add_spot_falloff(mitsuba::Document& document, mitsuba::Object& spot, double outer, double inner,
+                      const std::function<double(double)>& profile) {
+    constexpr int kRing = 48, kLeast = 64, kMost = 2048;  // texels
+    const double edge = std::tan(outer), ring = 1 - std::tan(inner) / edge;
+    const int n = std::clamp(int(std::min(std::ceil(2 * kRing / ring), 1e6)), kLeast, kMost);
+    const std::string name = "spot " + std::to_string(document.images.size());
+    Texels& image = document.images[name];
+    image.width = image.height = uint32_t(n);
+    image.is_linear = true;
+    const double c0 = std::cos(outer), c1 = std::cos(inner);
+    for (int y = 0; y < n; ++y)
+        for (int x = 0; x < n; ++x) {
+            const double a = edge * (2 * (x + 0.5) / n - 1), b = edge * (2 * (y + 0.5) / n - 1);
+            const float value =
+                float(profile(std::clamp((1 / std::sqrt(1 + a * a + b * b) - c0) / (c1 - c0), 0.0, 1.0)));
+            image.floats.insert(image.floats.end(), {value, value, value, 1.0f});
+        }
+    mitsuba::Object& texture = mitsuba::add_object(document, "texture", "bitmap", spot.where);
+    mitsuba::set_text(texture, "image", name);
+    mitsuba::set_boolean(texture, "raw", true);
+    mitsuba::set_text(texture, "wrap_mode", "clamp");
+    mitsuba::add_child(spot, texture, "texture");
+}
+
+}  // namespace ambilux

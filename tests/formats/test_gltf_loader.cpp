@@ -1,0 +1,284 @@
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel PNG::PNG JPEG::JPEG
+// timeout: 120
+// What glTF scenes become, what is refused, files that lie, and the image of the same scene in Mitsuba's XML.
+#include "formats/gltf/load.h"
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "formats/convert/convert.h"
+#include "tests/support/closed_forms.h"
+#include "tests/support/image_files.h"
+#include "tests/support/mitsuba_text.h"
+
+using namespace ambilux;
+using test::check_rgb;
+using test::contains;
+using test::has_note;
+using test::png_file;
+using test::TempFolder;
+using Json = nlohmann::json;
+
+namespace {
+
+std::string base64(const std::string& bytes) {
+    const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string out;
+    for (size_t i = 0; i < bytes.size(); i += 3) {
+        uint32_t v = 0;
+        const size_t n = std::min<size_t>(3, bytes.size() - i);
+        for (size_t j = 0; j < 3; ++j) v = v << 8 | (j < n ? uint8_t(bytes[i + j]) : 0u);
+        for (size_t j = 0; j < 4; ++j) out += j <= n ? digits[v >> (18 - 6 * j) & 63] : '=';
+    }
+    return out;
+}
+
+std::string uri(const std::string& type, const std::string& bytes) {
+    return "data:" + type + ";base64," + base64(bytes);
+}
+
+/// Two triangles of [-1,1]² at z = 0, with normals and texture coordinates whose v runs downwards.
+std::string quad_bytes() {
+    const float values[] = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0, 0, 0, 1, 0,
+                            0,  1,  0, 0, 1,  0, 0, 1, 0, 1,  1, 1, 1, 0, 0, 0};
+    const uint16_t indices[] = {0, 1, 2, 0, 2, 3};
+    std::string bytes(reinterpret_cast<const char*>(values), sizeof values);
+    return bytes.append(reinterpret_cast<const char*>(indices), sizeof indices);
+}
+
+/// A camera at z = 3 and the quad of material 0.
+Json quad_scene() {
+    Json j = Json::parse(R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+        "nodes": [{"mesh": 0}, {"camera": 0, "translation": [0, 0, 3]}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.9, "aspectRatio": 1.5, "znear": 0.01}}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.6, 0.7, 1], "metallicFactor": 0.25, "roughnessFactor": 0.5}}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}, "indices": 3, "material": 0}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
+                      {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC3"},
+                      {"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2"},
+                      {"bufferView": 3, "componentType": 5123, "count": 6, "type": "SCALAR"}],
+        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 48},
+                        {"buffer": 0, "byteOffset": 96, "byteLength": 32}, {"buffer": 0, "byteOffset": 128, "byteLength": 12}],
+        "buffers": [{"byteLength": 140}]})");
+    j["buffers"][0]["uri"] = uri("application/octet-stream", quad_bytes());
+    return j;
+}
+
+Scene load(const Json& j, const LoadOptions& options = {}, const TempFolder* folder = nullptr) {
+    const TempFolder own;
+    return load_gltf((folder ? *folder : own).write("scene.gltf", j.dump()), options);
+}
+
+std::string error_of(const Json& j, const LoadOptions& options = {}) {
+    try {
+        load(j, options);
+    } catch (const Error& e) {
+        CHECK(e.code == ExitCode::bad_input);
+        return e.what();
+    }
+    return "no error";
+}
+
+const BsdfRecord& bsdf(const Scene& s) { return s.bsdfs[s.materials[s.shapes[0].material].front]; }
+
+void add_image(Json& j, const std::string& png) {
+    j["images"] = {{{"uri", uri("image/png", png)}}};
+    j["textures"] = {{{"source", 0}}};
+}
+
+Json with_light(Json j, const Json& light, const Json& node = Json::object()) {
+    j["extensionsUsed"] = {"KHR_lights_punctual"};
+    j["extensions"]["KHR_lights_punctual"]["lights"] = {light};
+    Json n = node;
+    n["extensions"]["KHR_lights_punctual"]["light"] = 0;
+    j["nodes"].push_back(n);
+    j["scenes"][0]["nodes"].push_back(j["nodes"].size() - 1);
+    return j;
+}
+
+}  // namespace
+
+TEST_CASE("a mesh, its material and the camera") {
+    const Scene s = load(quad_scene());
+    REQUIRE(s.triangles.size() == 2);
+    CHECK((s.shapes[0].flags & (kShapeHasNormals | kShapeHasUvs)) == (kShapeHasNormals | kShapeHasUvs));
+    const auto& p = bsdf(s).as<Principled>();
+    check_rgb(p.base_color.value, {0.5f, 0.6f, 0.7f});
+    CHECK(p.metallic.value == 0.25f);
+    CHECK(p.roughness.value == 0.5f);
+    CHECK(p.ior == 1.5f);
+    CHECK(s.sensor.tan_half_fov.y == Approx(std::tan(0.45)));
+    CHECK(s.sensor.film_width == 1080);
+    check_rgb(s.sensor.to_world.vector({0, 0, 1}), {0, 0, -1});
+    check_rgb(s.sensor.to_world.vector({1, 0, 0}), {-1, 0, 0});
+    CHECK(has_note(s, "no light"));
+}
+
+TEST_CASE("nodes place their meshes: products of matrices, quaternions and scales") {
+    Json j = quad_scene();
+    j["nodes"][0] = {{"children", {2}}, {"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1}}};
+    j["nodes"].push_back({{"mesh", 0}, {"rotation", {0, 0, std::sqrt(0.5), std::sqrt(0.5)}}, {"scale", {2, 1, 1}}});
+    const Scene s = load(j);
+    check_rgb(s.vertices[1].p, {6, 2, 0});  // (1,-1,0): scaled (2,-1,0), turned (1,2,0), moved
+    j["nodes"].push_back({{"mesh", 0}, {"scale", {-1, 1, 1}}});
+    j["scenes"][0]["nodes"].push_back(3);
+    const Scene mirrored = load(j);
+    REQUIRE(mirrored.shapes.size() == 2);
+    const Triangle& t = mirrored.triangles[2];
+    const auto& v = mirrored.vertices;
+    CHECK(cross(v[t.v1].p - v[t.v0].p, v[t.v2].p - v[t.v0].p).z > 0);
+}
+
+TEST_CASE("textures: colours are decoded, metal is blue, roughness green, rows run downwards") {
+    Json j = quad_scene();
+    add_image(j, png_file(2, 1, {255, 128, 64, 0, 255, 0}));
+    Json& pbr = j["materials"][0]["pbrMetallicRoughness"];
+    pbr = {{"baseColorTexture", {{"index", 0}}}, {"metallicRoughnessTexture", {{"index", 0}}}, {"metallicFactor", 0.5}};
+    j["samplers"] = {{{"magFilter", 9728}, {"wrapS", 33071}, {"wrapT", 33071}}};
+    j["textures"][0]["sampler"] = 0;
+    const Scene s = load(j);
+    const auto& p = bsdf(s).as<Principled>();
+    const SceneView view = s.view();
+    check_rgb(eval_rgb<kAllFeatures>(view, p.base_color, {0.25f, 0.5f}), {1, 0.21586f, 0.05127f}, 1e-4);
+    CHECK(eval_float<kAllFeatures>(view, p.roughness, {0.25f, 0.5f}) == Approx(128 / 255.0f));
+    CHECK(eval_float<kAllFeatures>(view, p.metallic, {0.25f, 0.5f}) == Approx(0.5f * 64 / 255));
+    CHECK(s.textures[size_t(p.base_color.texture)].wrap == WrapMode::clamp);
+    pbr["baseColorTexture"]["extensions"]["KHR_texture_transform"] = {{"offset", {0.5, 0}}};
+    const Scene moved = load(j);
+    check_rgb(eval_rgb<kAllFeatures>(moved.view(), bsdf(moved).as<Principled>().base_color, {0.25f, 0.5f}), {0, 1, 0},
+              1e-4);
+}
+
+TEST_CASE("alpha, emission, glass and panes") {
+    Json j = quad_scene();
+    Json& m = j["materials"][0];
+    m["alphaMode"] = "BLEND";
+    m["pbrMetallicRoughness"]["baseColorFactor"] = {0.5, 0.6, 0.7, 0.25};
+    CHECK(load(j).materials[load(j).shapes[0].material].opacity.value == 0.25f);
+    m["alphaMode"] = "MASK";
+    CHECK(load(j).materials[load(j).shapes[0].material].opacity.value == 0);
+    m["alphaMode"] = "OPAQUE";
+    m["emissiveFactor"] = {1, 0.5, 0.25};
+    m["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = 4;
+    const Scene lit = load(j);
+    REQUIRE(lit.emitters.size() == 1);
+    check_rgb(lit.emitters[0].radiance.value, {4, 2, 1});
+    m.erase("emissiveFactor");
+    m["extensions"] = {{"KHR_materials_transmission", {{"transmissionFactor", 1.0}}}};
+    m["pbrMetallicRoughness"] = {
+        {"metallicFactor", 0}, {"roughnessFactor", 0.5}, {"baseColorFactor", {0.9, 0.8, 0.7, 1}}};
+    const Scene pane = load(j);
+    CHECK(bsdf(pane).type == BsdfType::thin_dielectric);
+    check_rgb(bsdf(pane).as<ThinDielectric>().specular_transmittance.value, {0.9f, 0.8f, 0.7f});
+    m["extensions"]["KHR_materials_volume"] = {{"thicknessFactor", 1.0}};
+    m["extensions"]["KHR_materials_ior"] = {{"ior", 1.33}};
+    const Scene glass = load(j);
+    CHECK(bsdf(glass).type == BsdfType::rough_dielectric);
+    CHECK(bsdf(glass).as<RoughDielectric>().alpha_u.value == 0.25f);
+    CHECK(bsdf(glass).as<RoughDielectric>().ior == Approx(1.33f));
+}
+
+TEST_CASE("lights along -z of their nodes") {
+    const Json turn = {{"translation", {0, 0, 2}}, {"rotation", {0, std::sqrt(0.5), 0, std::sqrt(0.5)}}};
+    const Scene sun =
+        load(with_light(quad_scene(), {{"type", "directional"}, {"intensity", 3}, {"color", {1, 0.5, 0.25}}}, turn));
+    check_rgb(sun.emitters[0].direction, {-1, 0, 0});
+    check_rgb(sun.emitters[0].radiance.value, {3, 1.5f, 0.75f});
+    const Scene spot = load(with_light(
+        quad_scene(),
+        {{"type", "spot"}, {"intensity", 3}, {"spot", {{"innerConeAngle", 0.2}, {"outerConeAngle", 0.5}}}}, turn));
+    check_rgb(spot.emitters[0].direction, {-1, 0, 0});
+    CHECK(spot.emitters[0].cutoff == Approx(0.5f));
+    const Scene point = load(with_light(quad_scene(), {{"type", "point"}, {"intensity", 5}}, turn));
+    check_rgb(point.emitters[0].position, {0, 0, 2});
+}
+
+TEST_CASE("binary files and files beside") {
+    const TempFolder folder;
+    Json j = quad_scene();
+    j["buffers"][0]["uri"] = "quad.bin";
+    folder.write("quad.bin", quad_bytes());
+    const Scene beside = load(j, {}, &folder);
+    CHECK(beside.triangles.size() == 2);
+    j["buffers"][0].erase("uri");
+    std::string text = j.dump(), data = quad_bytes();
+    while (text.size() % 4) text += ' ';
+    const auto word = [](uint32_t v) { return std::string(reinterpret_cast<const char*>(&v), 4); };
+    const std::string glb = "glTF" + word(2) + word(uint32_t(28 + text.size() + data.size())) +
+                            word(uint32_t(text.size())) + "JSON" + text + word(uint32_t(data.size())) +
+                            std::string("BIN\0", 4) + data;
+    const std::string path = folder.write("scene.glb", glb);
+    CHECK(load_scene_file(path).triangles.size() == 2);
+    for (size_t n = 0; n < glb.size(); n += 7)
+        CHECK_THROWS_AS(load_scene_file(folder.write("cut.glb", glb.substr(0, n))), Error);
+}
+
+TEST_CASE("what is not known is refused by name") {
+    std::vector<std::pair<std::string, Json>> cases;
+    const auto add = [&](const std::string& problem) -> Json& {
+        return cases.emplace_back(problem, quad_scene()).second;
+    };
+    add("extension 'KHR_draco_mesh_compression' is not supported")["extensionsRequired"] = {
+        "KHR_draco_mesh_compression"};
+    add("extension 'KHR_materials_sheen' is not supported")["materials"][0]["extensions"]["KHR_materials_sheen"] = {
+        {"sheenRoughnessFactor", 1}};
+    add("points and lines")["meshes"][0]["primitives"][0]["mode"] = 1;
+    add("colours of vertices")["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 0;
+    for (const auto& [problem, j] : cases) {
+        INFO(problem);
+        CHECK(contains(error_of(j), "scene.gltf: "));
+        CHECK(contains(error_of(j), problem));
+        LoadOptions lenient;
+        lenient.lenient = true;
+        if (problem != "points and lines") CHECK(load(j, lenient).warnings.size() == 1);
+    }
+}
+
+TEST_CASE("files that lie are refused") {
+    const auto changed = [](auto change) {
+        Json j = quad_scene();
+        change(j);
+        return error_of(j);
+    };
+    CHECK(contains(changed([](Json& j) { j["accessors"][0]["count"] = 5; }), "beyond its buffer"));
+    CHECK(contains(changed([](Json& j) { j["accessors"][0]["count"] = 4000000000u; }), "beyond its buffer"));
+    CHECK(contains(changed([](Json& j) { j["accessors"][0]["byteOffset"] = 4000000000u; }), "beyond its buffer"));
+    CHECK(contains(changed([](Json& j) { j["bufferViews"][0]["byteOffset"] = 4000000000u; }), "beyond its buffer"));
+    CHECK(contains(changed([](Json& j) { j["accessors"][0]["type"] = "SCALAR"; }), "wrong type"));
+    CHECK(contains(changed([](Json& j) { j["meshes"][0]["primitives"][0]["material"] = 7; }), "no material 7"));
+    CHECK(contains(changed([](Json& j) { j["nodes"][0]["mesh"] = 7; }), "no mesh 7"));
+    CHECK(contains(changed([](Json& j) { j["nodes"][0]["children"] = {0}; }), "--limits nesting"));
+    CHECK(contains(changed([](Json& j) { j["scenes"][0]["nodes"] = {9}; }), "no node 9"));
+    CHECK(contains(changed([](Json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 3; }),
+                   "no texture 3"));
+    CHECK(changed([](Json& j) { j["asset"].erase("version"); }) != "no error");
+    // Whatever a file is cut off at.
+    const TempFolder folder;
+    const std::string text = quad_scene().dump();
+    for (size_t n = 0; n < text.size(); n += 13)
+        CHECK_THROWS_AS(load_gltf(folder.write("cut.gltf", text.substr(0, n))), Error);
+}
+
+TEST_CASE("the same scene in Mitsuba's XML has the same image") {
+    const TempFolder folder;
+    Json j = with_light(quad_scene(), {{"type", "point"}, {"intensity", 20}}, {{"translation", {1, 1, 2}}});
+    LoadOptions size;
+    size.width = 36, size.height = 24;
+    const Scene a = load(j, size);
+    const Scene b = load_mitsuba(
+        folder.write("scene.xml",
+                     R"(<scene version='3.0.0'><sensor type='perspective'><float name='fov' value='51.56620156177409'/>
+<string name='fov_axis' value='y'/><float name='near_clip' value='0.01'/><transform name='to_world'><lookat origin='0,0,3' target='0,0,0' up='0,1,0'/></transform>
+<film type='hdrfilm'/></sensor><emitter type='point'><point name='position' x='1' y='1' z='2'/><rgb name='intensity' value='20'/></emitter>
+<shape type='rectangle'><bsdf type='twosided'><bsdf type='principled'><rgb name='base_color' value='.5 .6 .7'/><float name='roughness' value='.5'/>
+<float name='metallic' value='.25'/><float name='eta' value='1.5'/></bsdf></bsdf></shape></scene>)"),
+        size);
+    const auto film = [](const Scene& s) { return render_scene(s, cpu_settings(s, Estimator::mis), 16).film; };
+    const FilmMoments x = film(a), y = film(b);
+    double difference = 0, sum = 0;
+    for (size_t i = 0; i < x.sum.size(); ++i) difference += std::abs(x.mean(i) - y.mean(i)), sum += x.mean(i);
+    CHECK(sum > 0);
+    CHECK(difference < 1e-4 * sum);
+    write_mitsuba(a, folder / "converted.xml");
+    CHECK(load_mitsuba(folder / "converted.xml").features == a.features);
+}

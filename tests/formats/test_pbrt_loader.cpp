@@ -1,0 +1,422 @@
+// libs: ambilux_formats ZLIB::ZLIB PNG::PNG JPEG::JPEG
+// timeout: 60
+// What pbrt scenes become, what is refused and how, and files that lie.
+#include <zlib.h>
+
+#include <cmath>
+
+#include "formats/images/image_write.h"
+#include "formats/meshes/loop_subdivision.h"
+#include "tests/support/image_files.h"
+#include "tests/support/mitsuba_text.h"
+#include "tests/support/pbrt_text.h"
+#include "transport/emitter/envmap.h"
+
+using namespace ambilux;
+using namespace ambilux::test;
+
+namespace {
+
+const std::string kTriangle = "Shape \"trianglemesh\" \"point3 P\" [0 0 0  1 0 0  0 1 0] \"integer indices\" [0 1 2]\n";
+const std::string kSphere = "Shape \"sphere\"\n";
+
+const BsdfRecord& bsdf(const Scene& s, size_t shape = 0) {
+    return s.bsdfs[s.materials[s.shapes[shape].material].front];
+}
+
+Scene with_material(const std::string& material) { return load_pbrt_world("Material " + material + "\n" + kSphere); }
+
+std::string world_error(const std::string& world, const LoadOptions& options = {}) {
+    return pbrt_error("WorldBegin\n" + world + "\n", options);
+}
+
+std::string gzip(const std::string& bytes) {
+    z_stream stream{};
+    REQUIRE(deflateInit2(&stream, 9, Z_DEFLATED, 16 + MAX_WBITS, 8, Z_DEFAULT_STRATEGY) == Z_OK);
+    std::string out(bytes.size() + 1000, '\0');
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+    stream.avail_in = uInt(bytes.size());
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = uInt(out.size());
+    REQUIRE(deflate(&stream, Z_FINISH) == Z_STREAM_END);
+    out.resize(stream.total_out);
+    deflateEnd(&stream);
+    return out;
+}
+
+}  // namespace
+
+TEST_CASE("transforms apply from the last to the first, and attributes come back") {
+    const Scene s = load_pbrt_world("Translate 1 2 3 Scale 2 2 2 AttributeBegin Rotate 90 0 0 1 Translate 1 0 0\n" +
+                                    kTriangle + "CoordinateSystem \"there\" AttributeEnd\n" + kTriangle +
+                                    "Identity ConcatTransform [1 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1]\n" + kTriangle +
+                                    "CoordSysTransform \"there\"\n" + kTriangle);
+    REQUIRE(s.shapes.size() == 4);
+    const Vec3f expected[4] = {{1, 4, 3}, {1, 2, 3}, {5, 6, 7}, {1, 4, 3}};
+    for (size_t i = 0; i < 4; ++i) check_rgb(s.vertices[3 * i].p, expected[i]);
+}
+
+TEST_CASE("ReverseOrientation and mirrors leave normals as pbrt has them") {
+    const auto normal = [](const std::string& before) {
+        const Scene s = load_pbrt_world(before + kTriangle);
+        const Triangle& t = s.triangles[0];
+        return normalize(cross(s.vertices[t.v1].p - s.vertices[t.v0].p, s.vertices[t.v2].p - s.vertices[t.v0].p));
+    };
+    check_rgb(normal(""), {0, 0, 1});
+    check_rgb(normal("ReverseOrientation "), {0, 0, -1});
+    check_rgb(normal("Scale -1 1 1 "), {0, 0, 1});
+    check_rgb(normal("Scale 1 1 -1 "), {0, 0, -1});
+}
+
+TEST_CASE("meshes without normals are flat") {
+    const Scene s = load_pbrt_world(
+        "Shape \"trianglemesh\" \"point3 P\" [0 0 0  1 0 0  0 1 0  0 0 1] \"integer indices\" [0 1 2 0 1 3]");
+    CHECK(!(s.shapes[0].flags & kShapeHasNormals));
+}
+
+TEST_CASE("materials become the models that they are") {
+    const auto type = [](const std::string& material) { return bsdf(with_material(material)).type; };
+    CHECK(type("\"diffuse\"") == BsdfType::diffuse);
+    CHECK(type("\"coateddiffuse\"") == BsdfType::plastic);
+    CHECK(type("\"coateddiffuse\" \"float roughness\" .1") == BsdfType::rough_plastic);
+    CHECK(type("\"conductor\"") == BsdfType::conductor);
+    CHECK(type("\"conductor\" \"float roughness\" .1") == BsdfType::rough_conductor);
+    CHECK(type("\"coatedconductor\"") == BsdfType::conductor);
+    CHECK(type("\"dielectric\"") == BsdfType::dielectric);
+    CHECK(type("\"dielectric\" \"float uroughness\" .1 \"float vroughness\" .2") == BsdfType::rough_dielectric);
+    CHECK(type("\"thindielectric\"") == BsdfType::thin_dielectric);
+    CHECK(with_material("\"diffuse\"").materials[0].two_sided == 1);
+
+    const Scene rough =
+        with_material("\"dielectric\" \"float uroughness\" .04 \"float vroughness\" .09 \"float eta\" 1.3");
+    const auto& p = bsdf(rough).as<RoughDielectric>();
+    CHECK(p.alpha_u.value == Approx(0.2f));
+    CHECK(p.alpha_v.value == Approx(0.3f));
+    CHECK(p.ior == Approx(1.3f));
+    CHECK(p.distribution == Microfacets::ggx);
+    const Scene plain = with_material("\"conductor\" \"float roughness\" .04 \"bool remaproughness\" false");
+    CHECK(bsdf(plain).as<RoughConductor>().alpha_u.value == Approx(0.04f));
+
+    const Scene gold = with_material("\"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"spectrum k\" \"metal-Au-k\"");
+    check_rgb(bsdf(gold).as<Conductor>().eta, {0.143036f, 0.375307f, 1.44205f});
+    const Scene grey = with_material("\"conductor\" \"rgb reflectance\" [.5 .5 .5]");
+    check_rgb(bsdf(grey).as<Conductor>().k, splat(2));  // k² = 4 R/(1-R)
+    CHECK(has_note(with_material("\"coateddiffuse\""), "coateddiffuse is approximated by plastic"));
+    CHECK(has_note(with_material("\"coatedconductor\""), "coatedconductor is approximated by conductor"));
+}
+
+TEST_CASE("a mix and a diffuse transmission are blends whose sum is what was asked for") {
+    const Scene s = load_pbrt_world(
+        "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" MakeNamedMaterial \"b\" \"string type\" \"dielectric\"\n"
+        "Material \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" .3\n" +
+        kSphere + "Material \"diffusetransmission\" \"rgb reflectance\" [.1 .2 .3] \"rgb transmittance\" [.4 .1 .2]\n" +
+        kSphere);
+    const Material& mix = s.materials[s.shapes[0].material];
+    CHECK(mix.second_weight.value == Approx(0.3f));
+    CHECK(s.bsdfs[s.materials[mix.second].front].type == BsdfType::dielectric);
+    const Material& both = s.materials[s.shapes[1].material];
+    const float w = both.second_weight.value;
+    check_rgb(s.bsdfs[s.materials[both.first].front].as<Diffuse>().reflectance.value * (1 - w), {0.1f, 0.2f, 0.3f});
+    check_rgb(s.bsdfs[s.materials[both.second].front].as<DiffuseTransmitter>().transmittance.value * w,
+              {0.4f, 0.1f, 0.2f});
+}
+
+TEST_CASE("colours: spaces, black bodies, spectra and what lights make of them") {
+    const auto light = [](const std::string& parameters, const std::string& before = "") {
+        const Scene s = load_pbrt_world(before + "LightSource \"point\" " + parameters);
+        return s.emitters[0].radiance.value;
+    };
+    check_rgb(light("\"rgb I\" [1 2 3] \"float scale\" 2"), {2, 4, 6});
+    CHECK(luminance(light("\"blackbody I\" 3000 \"float scale\" 5")) == Approx(5));
+    CHECK(luminance(light("\"spectrum I\" [300 7 900 7]")) == Approx(1));
+    check_rgb(light("\"spectrum I\" \"stdillum-D65\""), splat(1));
+    const Rgb warm = light("\"blackbody I\" 3000");
+    CHECK(warm.x > warm.y);
+    CHECK(warm.y > warm.z);
+    // White stays white, and the red of a wider gamut is redder than ours (ITU-R BT.2087).
+    check_rgb(light("\"rgb I\" [1 1 1]", "ColorSpace \"rec2020\" "), splat(1), 1e-4);
+    check_rgb(light("\"rgb I\" [1 1 1]", "ColorSpace \"dci-p3\" "), splat(1), 1e-4);
+    check_rgb(light("\"rgb I\" [1 0 0]", "ColorSpace \"rec2020\" "), {1.6605f, 0, 0}, 1e-3);
+    const Rgb half = light("\"rgb I\" [1 .5 .25]", "ColorSpace \"dci-p3\" ");
+    check_rgb(half, {1.1125f, 0.4790f, 0.2155f}, 2e-3);
+    CHECK(light("\"float power\" 10").x == Approx(10 / (4 * M_PI)));
+}
+
+TEST_CASE("the film's exposure scales lights") {
+    const auto value = [](const std::string& options) {
+        return load_pbrt_text(options + " WorldBegin LightSource \"distant\"").emitters[0].radiance.value.x;
+    };
+    CHECK(value("") == 1);
+    CHECK(value("Film \"rgb\" \"float iso\" 200") == 2);
+    CHECK(value("Film \"rgb\" \"float iso\" 200 Camera \"perspective\" \"float shutterclose\" .25") == 0.5f);
+}
+
+TEST_CASE("cameras: the field of view is that of the shorter side, x points to the right") {
+    const Scene s = load_pbrt_text(
+        "Film \"rgb\" \"integer xresolution\" 200 \"integer yresolution\" 100 LookAt 1 2 3  1 2 10 "
+        " 0 1 0 Camera \"perspective\" \"float fov\" 90 Integrator \"path\" \"integer maxdepth\" 4 WorldBegin");
+    CHECK(s.sensor.tan_half_fov.x == Approx(2));
+    CHECK(s.sensor.tan_half_fov.y == Approx(1));
+    CHECK(s.integrator.max_depth == 5);
+    // Left in the image is -x in pbrt's left-handed view along +z.
+    check_rgb(s.sensor.to_world.vector({1, 0, 0}), {-1, 0, 0});
+    check_rgb(s.sensor.to_world.vector({0, 0, 1}), {0, 0, 1});
+    check_rgb(s.sensor.to_world.point({0, 0, 0}), {1, 2, 3});
+    const Scene o = load_pbrt_text(
+        "Film \"rgb\" \"integer xresolution\" 200 \"integer yresolution\" 100 Camera \"orthographic\" "
+        "\"float screenwindow\" [-4 4 -2 2] WorldBegin");
+    CHECK(o.sensor.tan_half_fov.x == Approx(4));
+    CHECK(o.sensor.tan_half_fov.y == Approx(2));
+}
+
+TEST_CASE("textures: t runs upwards, constants and images fold, checkerboards have cells of size 1") {
+    const TempFolder folder;
+    // Rows from the top: red green / blue white.
+    folder.write("t.png", png_file(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}));
+    const std::string
+        image = "Texture \"i\" \"spectrum\" \"imagemap\" \"string filename\" \"t.png\" \"string filter\" \"point\"\n",
+        quad =
+            "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 1 1 0 0 1 0] \"point2 uv\" [0 0 1 0 1 1 0 1] "
+            "\"integer indices\" [0 1 2 0 2 3]\n";
+    const auto at = [&](const std::string& textures, Vec2f uv) {
+        const Scene s = load_pbrt_world(
+            image + textures + "Material \"diffuse\" \"texture reflectance\" \"t\"\n" + quad, {}, &folder);
+        return reflectance(s, 0, uv);
+    };
+    const std::string
+        scaled = "Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"i\" \"float scale\" .5\n",
+        mixed = "Texture \"t\" \"spectrum\" \"mix\" \"texture tex1\" \"i\" \"rgb tex2\" [1 1 1] \"float amount\" .25\n",
+        inverted =
+            "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.png\" \"bool invert\" true \"string "
+            "filter\" \"point\"\n",
+        checker =
+            "Texture \"t\" \"spectrum\" \"checkerboard\" \"float uscale\" 4 \"rgb tex1\" [.1 .2 .3] \"rgb tex2\" [.4 "
+            ".5 .6]\n";
+    check_rgb(at(scaled, {0.25f, 0.75f}), {0.5f, 0, 0});
+    check_rgb(at(scaled, {0.75f, 0.75f}), {0, 0.5f, 0});
+    check_rgb(at(scaled, {0.25f, 0.25f}), {0, 0, 0.5f});
+    check_rgb(at(mixed, {0.25f, 0.75f}), {1, 0.25f, 0.25f});
+    check_rgb(at(inverted, {0.25f, 0.75f}), {0, 1, 1});
+    check_rgb(at(checker, {0.1f, 0.5f}), {0.1f, 0.2f, 0.3f});
+    check_rgb(at(checker, {0.3f, 0.5f}), {0.4f, 0.5f, 0.6f});
+    check_rgb(at(checker, {0.6f, 0.5f}), {0.1f, 0.2f, 0.3f});
+}
+
+TEST_CASE("images lie on spheres, disks and cylinders as pbrt has them") {
+    const TempFolder folder;
+    folder.write("t.png", png_file(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}));
+    const Scene s = load_pbrt_world(
+        "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.png\" \"string filter\" \"point\" Material "
+        "\"diffuse\" \"texture reflectance\" \"t\" Shape \"sphere\" Shape \"disk\" Shape \"cylinder\"",
+        {}, &folder);
+    // Coordinates of shapes are Mitsuba's: azimuth and angle to +z; radius and azimuth; azimuth and height.
+    check_rgb(reflectance(s, 0, {0.25f, 0.1f}), {1, 0, 0});  // the top of the image is the pole +z
+    check_rgb(reflectance(s, 0, {0.75f, 0.9f}), {1, 1, 1});
+    check_rgb(reflectance(s, 1, {0.25f, 0.1f}), {1, 0, 0});  // and the centre of the disk, where pbrt's v is 1
+    check_rgb(reflectance(s, 1, {0.75f, 0.6f}), {1, 1, 1});
+    check_rgb(reflectance(s, 2, {0.25f, 0.9f}), {1, 0, 0});
+    check_rgb(reflectance(s, 2, {0.75f, 0.1f}), {1, 1, 1});
+}
+
+TEST_CASE("factors of textures: reflectances end at 1, heights may be negative, coatings have a mean roughness") {
+    const TempFolder folder;
+    folder.write("t.png", png_file(2, 1, {255, 255, 255, 0, 0, 0}));
+    const std::string
+        image = "\"imagemap\" \"string filename\" \"t.png\" \"string filter\" \"point\" \"string encoding\" \"linear\"",
+        quad =
+            "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 1 1 0] \"point2 uv\" [0 0 1 0 1 1] \"integer indices\" "
+            "[0 1 2]";
+    const Scene s =
+        load_pbrt_world("Texture \"t\" \"spectrum\" " + image + " \"float scale\" 3 Texture \"b\" \"float\" " + image +
+                            " \"float scale\" -2\n"
+                            "Texture \"r\" \"float\" " +
+                            image +
+                            " \"float scale\" .5\n"
+                            "Material \"diffuse\" \"texture reflectance\" \"t\" \"texture displacement\" \"b\" " +
+                            quad + " Material \"coateddiffuse\" \"texture roughness\" \"r\" " + quad,
+                        {}, &folder);
+    check_rgb(reflectance(s, 0, {0.25f, 0.5f}), splat(1));
+    CHECK(bsdf(s).bump_map >= 0);
+    CHECK(bsdf(s).bump_scale == -2);
+    CHECK(bsdf(s, 1).as<RoughPlastic>().alpha.value == Approx(0.5f));
+    CHECK(has_note(s, "mean of its roughness"));
+}
+
+TEST_CASE("environment maps keep their directions") {
+    const TempFolder folder;
+    constexpr int n = 64;
+    // A direction's colour says where it points. The inverse of the equal-area octahedral map (Clarberg 2008), as an
+    // area-preserving map by its cells: found by search, apart from the reader's formula.
+    std::vector<float> texels;
+    for (int y = 0; y < n; ++y)
+        for (int x = 0; x < n; ++x) {
+            const double u = 2 * (x + 0.5) / n - 1, v = 2 * (y + 0.5) / n - 1, d = 1 - std::fabs(u) - std::fabs(v);
+            const double r = 1 - std::fabs(d), z = d < 0 ? -(1 - r * r) : 1 - r * r;
+            const double phi = ((std::fabs(v) - std::fabs(u)) / r + 1) * M_PI / 4, sine = std::sqrt(1 - z * z);
+            for (double c : {std::copysign(std::cos(phi), u) * sine, std::copysign(std::sin(phi), v) * sine, z})
+                texels.push_back(float(c + 1));
+        }
+    write_float_image(folder / "e.exr", n, n, texels);
+    const Scene s = load_pbrt_world(
+        "Rotate 90 0 0 1 LightSource \"infinite\" \"string filename\" \"e.exr\" \"float scale\" 2", {}, &folder);
+    const Emitter& e = s.emitters[0];
+    for (const Vec3f d : {Vec3f{1, 2, 3}, Vec3f{-3, 1, 1}, Vec3f{0.1f, -1, 0.2f}, Vec3f{1, 1, -4}, Vec3f{-1, -2, -1}}) {
+        const Vec3f w = normalize(d);
+        // What shines from the light's x is seen along the world's y.
+        const Vec3f local = {w.y, -w.x, w.z};
+        check_rgb(envmap_radiance(s.view(), e, w), (local + splat(1)) * 2, 0.1);
+    }
+}
+
+TEST_CASE("objects are flattened with both transforms") {
+    const Scene s = load_pbrt_world("ObjectBegin \"o\" Translate 1 0 0\n" + kTriangle +
+                                    "ObjectEnd Scale 2 2 2 ObjectInstance \"o\" Translate 0 5 0 ObjectInstance \"o\"");
+    REQUIRE(s.shapes.size() == 2);
+    check_rgb(s.vertices[0].p, {2, 0, 0});
+    check_rgb(s.vertices[3].p, {2, 10, 0});
+}
+
+TEST_CASE("includes, packed files and attributes for all that follows") {
+    const TempFolder folder;
+    folder.write("sub/inner.pbrt.gz", gzip("Translate 1 0 0 Shape \"sphere\""));
+    folder.write(
+        "m.ply.gz",
+        gzip("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+             "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"));
+    const Scene s = load_pbrt_world(
+        "Attribute \"shape\" \"float radius\" .25 Import \"sub/inner.pbrt.gz\" Include \"sub/inner.pbrt.gz\" "
+        "Shape \"sphere\" Shape \"plymesh\" \"string filename\" \"m.ply.gz\"",
+        {}, &folder);
+    REQUIRE(s.quadrics.size() == 3);
+    CHECK(s.quadrics[0].radius == 0.25f);
+    CHECK(s.quadrics[1].to_world.m[0][3] == 1);  // what an import moves stays in it
+    CHECK(s.quadrics[2].to_world.m[0][3] == 1);
+    CHECK(s.triangles.size() == 1);
+}
+
+TEST_CASE("patches and subdivision surfaces are tessellated") {
+    const Scene flat = load_pbrt_world("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 1 0 2 1 0]");
+    CHECK(flat.triangles.size() == 2);
+    const Scene bent = load_pbrt_world("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]");
+    CHECK(bent.triangles.size() == 128);
+    CHECK(has_note(bent, "bilinear patches"));
+    // The limit of an octahedron is round, to what Loop's surface is.
+    const Scene round = load_pbrt_world(
+        "Shape \"loopsubdiv\" \"integer levels\" 4 \"point3 P\" [1 0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1] \"integer "
+        "indices\" "
+        "[0 2 4 2 1 4 1 3 4 3 0 4 2 0 5 1 2 5 3 1 5 0 3 5]");
+    CHECK(round.triangles.size() == 8 * 256);
+    float least = 10, most = 0;
+    for (const MeshVertex& v : round.vertices) least = std::min(least, length(v.p)), most = std::max(most, length(v.p));
+    CHECK(most / least < 1.25f);
+    // Refinement leaves a vertex on the limit surface: half of itself and an eighth of each of its four neighbours.
+    check_rgb(round.vertices[0].p, {0.5f, 0, 0});
+    // Loop's surface of a regular plane mesh is the plane mesh: its boundary and the inner vertices stay in it.
+    Mesh plane;
+    for (int i = 0; i < 9; ++i) plane.positions.push_back({float(i % 3), float(i / 3), 2});
+    for (uint32_t i : {0u, 1u, 3u, 4u}) plane.faces.insert(plane.faces.end(), {{i, i + 1, i + 4}, {i, i + 4, i + 3}});
+    for (Vec3f p : subdivide_loop("plane", plane, 2, {}).positions) CHECK(p.z == Approx(2));
+}
+
+TEST_CASE("what is not known is refused by name, file and line") {
+    const std::vector<std::pair<std::string, std::string>> cases = {
+        {"Shape \"curve\"", "shape 'curve' is not supported"},
+        {"LightSource \"goniometric\"", "light 'goniometric' is not supported"},
+        {"Material \"hair\" Shape \"sphere\"", "material 'hair' is not supported"},
+        {"Material \"subsurface\" Shape \"sphere\"", "material 'subsurface' is not supported"},
+        {"Texture \"t\" \"float\" \"fbm\"", "texture type 'fbm' is not supported"},
+        {"Shape \"sphere\" \"float radius\" 1 \"float size\" 2", "unknown parameter 'size' of Shape 'sphere'"},
+        {"Shape \"sphere\" \"float zmin\" 0", "cut by 'zmin'"},
+        {"MakeNamedMedium \"m\" \"string type\" \"homogeneous\"", "media are not supported"},
+        {"AreaLightSource \"diffuse\" \"bool twosided\" true Shape \"sphere\"", "two sides"},
+        {"LightSource \"infinite\" \"point3 portal\" [0 0 0 1 0 0 1 1 0 0 1 0]", "portals"},
+    };
+    for (const auto& [world, problem] : cases) {
+        INFO(world);
+        const std::string error = world_error("\n" + world);
+        CHECK(contains(error, "scene.pbrt:3: "));
+        CHECK(contains(error, problem));
+        LoadOptions lenient;
+        lenient.lenient = true;
+        const Scene s = load_pbrt_world(world, lenient);
+        REQUIRE(s.warnings.size() == 1);
+        CHECK(contains(s.warnings[0], problem));
+    }
+    CHECK(contains(pbrt_error("Camera \"realistic\" WorldBegin"), "scene.pbrt:1: camera 'realistic' is not supported"));
+}
+
+TEST_CASE("errors say where") {
+    const std::vector<std::pair<std::string, std::string>> cases = {
+        {"Frobnicate", "unknown directive 'Frobnicate'"},
+        {"Shape sphere", "must be a string in quotes"},
+        {"Shape \"sphere", "the string that begins here has no end"},
+        {"Shape \"sphere\" \"radius\" 1", "is no parameter"},
+        {"Shape \"sphere\" \"double radius\" 1", "unknown type 'double'"},
+        {"Shape \"sphere\" \"float radius\" [1", "has no end"},
+        {"Shape \"sphere\" \"float radius\"", "has no value"},
+        {"Shape \"sphere\" \"float radius\" \"1\"", "is no value of type float"},
+        {"Shape \"sphere\" \"float radius\" [1 2]", "must be one number"},
+        {"Shape \"sphere\" \"float radius\" -1", "radius must be positive"},
+        {"Shape \"sphere\" \"float radius\" 1 \"float radius\" 1", "is given twice"},
+        {"Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 3]",
+         "index 3 of 3 vertices"},
+        {"Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1] \"integer indices\" [0 1 2]", "no multiple of 3"},
+        {"Translate 1 2 x", "must be a number, not 'x'"},
+        {"Scale 0 1 1 Shape \"sphere\"", "singular"},
+        {"AttributeEnd", "AttributeEnd without AttributeBegin"},
+        {"AttributeBegin", "AttributeBegin has no end"},
+        {"ObjectBegin \"a\"", "ObjectBegin has no end"},
+        {"ObjectInstance \"a\"", "unknown object 'a'"},
+        {"NamedMaterial \"a\"", "unknown material 'a'"},
+        {"CoordSysTransform \"a\"", "unknown coordinate system 'a'"},
+        {"ColorSpace \"a\"", "unknown colour space 'a'"},
+        {"Include \"none.pbrt\"", "file 'none.pbrt' does not exist"},
+        {"Include \"scene.pbrt\"", "circular include"},
+        {"Material \"diffuse\" \"texture reflectance\" \"t\" Shape \"sphere\"",
+         "no texture of type spectrum is known by the name 't'"},
+        {"Material \"diffuse\" \"rgb reflectance\" [1 -1 0] Shape \"sphere\"", "is negative"},
+        {"MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"m\" \"m\"] NamedMaterial \"m\" Shape "
+         "\"sphere\"",
+         "a mix of itself"},
+        {"Transform [1 0 0 0 0 1 0 0 0 0 1 0 0 0 0]", "must be a number"},
+        {"LightSource \"spot\" \"float coneangle\" 95", "between 0 and 90"},
+        {"LightSource \"point\" \"spectrum I\" [400 1]", "two pairs"},
+        {"Film \"rgb\"", "must stand before WorldBegin"},
+    };
+    for (const auto& [world, problem] : cases) {
+        INFO(world);
+        const std::string error = world_error(world);
+        CHECK(contains(error, "scene.pbrt:"));
+        CHECK(contains(error, problem));
+    }
+    CHECK(contains(pbrt_error("Shape \"sphere\""), "Shape must stand behind WorldBegin"));
+    CHECK(contains(pbrt_error(""), "has no WorldBegin"));
+}
+
+TEST_CASE("files that nest, unpack or repeat stay within the limits") {
+    const TempFolder folder;
+    LoadOptions options;
+    options.limits.nesting = 20;
+    options.limits.includes = 50;
+    options.limits.shapes = 100;
+    options.limits.bytes = 1 << 20;
+    std::string deep = "WorldBegin ", many = "WorldBegin ObjectBegin \"o\" ";
+    for (int i = 0; i < 30; ++i) deep += "AttributeBegin ";
+    CHECK(contains(pbrt_error(deep, options), "nested deeper than --limits nesting=20"));
+    for (int i = 0; i < 20; ++i) many += "Shape \"sphere\" ";
+    many += "ObjectEnd ";
+    for (int i = 0; i < 20; ++i) many += "ObjectInstance \"o\" ";
+    CHECK(contains(pbrt_error(many, options), "--limits shapes=100"));
+    folder.write("bomb.pbrt.gz", gzip(std::string(2 << 20, ' ')));
+    CHECK(contains(pbrt_error("Include \"bomb.pbrt.gz\"", options, &folder), "--limits bytes"));
+    folder.write("cut.pbrt.gz", gzip(std::string(1000, 'x') + "abc").substr(0, 20));
+    CHECK(contains(pbrt_error("Include \"cut.pbrt.gz\"", options, &folder), "gzip file is cut off"));
+    std::string includes;
+    folder.write("one.pbrt", "");
+    for (int i = 0; i < 60; ++i) includes += "Include \"one.pbrt\" ";
+    CHECK(contains(pbrt_error(includes, options, &folder), "--limits includes=50"));
+    // Whatever a file is cut off at, it is refused or complete.
+    const std::string text =
+        "WorldBegin AttributeBegin Material \"diffuse\" \"rgb reflectance\" [.5 .5 .5] " + kTriangle + "AttributeEnd";
+    for (size_t n = 0; n < text.size(); ++n) CHECK(pbrt_error(text.substr(0, n), options) != "");
+}

@@ -1,0 +1,298 @@
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// timeout: 200
+// Images of pbrt scenes: lights and materials with closed forms, the same scene in Mitsuba's XML, and both after
+// conversion.
+#include "formats/convert/convert.h"
+#include "formats/images/image_write.h"
+#include "tests/support/closed_forms.h"
+#include "tests/support/mitsuba_text.h"
+#include "tests/support/pbrt_text.h"
+
+using namespace ambilux;
+using test::load_pbrt_text;
+using test::TempFolder;
+
+namespace {
+
+constexpr uint32_t kSize = 16;
+constexpr Rgb kAlbedo = {0.5f, 0.7f, 0.3f};
+
+/// A plane at z = 0 from above: [-1,1]², x to the right and y upwards.
+std::string plane_under(const std::string& lights,
+                        const std::string& material = "\"diffuse\" \"rgb reflectance\" [.5 .7 .3]",
+                        const std::string& film = "") {
+    return "Scale -1 1 1 LookAt 0 0 .1  0 0 0  0 1 0 Camera \"orthographic\" Film \"rgb\" \"integer xresolution\" 16 "
+           "\"integer yresolution\" 16 " +
+           film + " PixelFilter \"box\" Integrator \"path\" \"integer maxdepth\" 1 WorldBegin\n" + lights +
+           "\nMaterial " + material +
+           " Shape \"trianglemesh\" \"point3 P\" [-1.5 -1.5 0 1.5 -1.5 0 1.5 1.5 0 -1.5 1.5 0] \"integer indices\" [0 "
+           "1 2 0 2 3]";
+}
+
+double plane_x(double film_x) { return -1 + 2 * film_x / kSize; }
+double plane_y(double film_y) { return 1 - 2 * film_y / kSize; }
+
+template <class Function>
+void check_plane(const std::string& scene, Rgb color, Function irradiance, const TempFolder* folder = nullptr) {
+    const Image expected =
+        image_of(kSize, kSize, color, [&](double x, double y) { return irradiance(plane_x(x), plane_y(y)) / M_PI; });
+    const Scene s = load_pbrt_text(scene, {}, folder);
+    check_expectation(s, cpu_settings(s, Estimator::nee), expected);
+}
+
+/// Cosine over squared distance at (x,y,0) of a point above.
+double from_point(double x, double y, double px, double py, double pz) {
+    const double d2 = (px - x) * (px - x) + (py - y) * (py - y) + pz * pz;
+    return pz / (d2 * std::sqrt(d2));
+}
+
+/// Both scenes with the same samples.
+ZTestResult compared(const Scene& a, const Scene& b, uint32_t spp) {
+    ZTestOptions options;
+    options.block = 4;
+    options.rounding = 1e-4;
+    const auto film = [&](const Scene& s, uint64_t seed) {
+        return to_estimate(render_scene(s, cpu_settings(s, Estimator::mis, seed), spp).film);
+    };
+    return z_test(film(a, 1), film(b, 2), options);
+}
+
+const std::string kPly =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty float "
+    "u\nproperty float v\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n-4 0 -4 0 0\n4 0 -4 1 "
+    "0\n4 0 4 1 1\n-4 0 4 0 1\n3 0 2 1\n3 0 3 2\n";
+
+const std::string kPbrt = R"(
+Scale -1 1 1
+LookAt 0 3 8  0 1 0  0 1 0
+Camera "perspective" "float fov" 35
+Film "rgb" "integer xresolution" 48 "integer yresolution" 32
+PixelFilter "box"
+Integrator "path" "integer maxdepth" 5
+WorldBegin
+LightSource "infinite" "rgb L" [.3 .4 .5]
+AttributeBegin
+AreaLightSource "diffuse" "rgb L" [9 8 6]
+Translate 1 5 1
+Shape "sphere" "float radius" .7
+AttributeEnd
+AttributeBegin
+Texture "c" "spectrum" "checkerboard" "float uscale" 6 "float vscale" 6 "rgb tex1" [.8 .7 .6] "rgb tex2" [.2 .3 .4]
+Material "diffuse" "texture reflectance" "c"
+Shape "plymesh" "string filename" "floor.ply"
+AttributeEnd
+AttributeBegin
+Translate -1.5 1 0
+Material "coateddiffuse" "rgb reflectance" [.6 .2 .2] "float roughness" 0
+Shape "sphere"
+AttributeEnd
+AttributeBegin
+Translate 1.2 .8 -.5
+Material "conductor" "spectrum eta" "metal-Cu-eta" "spectrum k" "metal-Cu-k" "float roughness" .09
+Shape "sphere" "float radius" .8
+AttributeEnd
+AttributeBegin
+Translate .2 .5 1.5
+Material "dielectric" "float eta" 1.4
+Shape "sphere" "float radius" .5
+AttributeEnd
+)";
+
+const std::string kXml = R"(<scene version='3.0.0'>
+<integrator type='path'><integer name='max_depth' value='6'/></integrator>
+<sensor type='perspective'><float name='fov' value='35'/><string name='fov_axis' value='smaller'/>
+<transform name='to_world'><lookat origin='0,3,8' target='0,1,0' up='0,1,0'/></transform>
+<film type='hdrfilm'><integer name='width' value='48'/><integer name='height' value='32'/><rfilter type='box'/></film></sensor>
+<emitter type='constant'><rgb name='radiance' value='.3 .4 .5'/></emitter>
+<shape type='sphere'><point name='center' x='1' y='5' z='1'/><float name='radius' value='.7'/>
+<bsdf type='diffuse'><rgb name='reflectance' value='.5'/></bsdf>
+<emitter type='area'><rgb name='radiance' value='9 8 6'/></emitter></shape>
+<shape type='ply'><string name='filename' value='floor.ply'/><boolean name='face_normals' value='true'/>
+<bsdf type='twosided'><bsdf type='diffuse'><texture type='checkerboard' name='reflectance'>
+<rgb name='color0' value='.8 .7 .6'/><rgb name='color1' value='.2 .3 .4'/>
+<transform name='to_uv'><scale x='3' y='3'/></transform></texture></bsdf></bsdf></shape>
+<shape type='sphere'><point name='center' x='-1.5' y='1' z='0'/><bsdf type='plastic'><rgb name='diffuse_reflectance' value='.6 .2 .2'/>
+<float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/><boolean name='nonlinear' value='true'/></bsdf></shape>
+<shape type='sphere'><point name='center' x='1.2' y='.8' z='-.5'/><float name='radius' value='.8'/>
+<bsdf type='roughconductor'><string name='material' value='Cu'/><string name='distribution' value='ggx'/><float name='alpha' value='.3'/></bsdf></shape>
+<shape type='sphere'><point name='center' x='.2' y='.5' z='1.5'/><float name='radius' value='.5'/>
+<bsdf type='dielectric'><float name='int_ior' value='1.4'/><float name='ext_ior' value='1'/></bsdf></shape>
+</scene>)";
+
+}  // namespace
+
+TEST_CASE("point lights: intensity, power, scale, exposure") {
+    const auto e = [](double x, double y) { return from_point(x, y, 0.3, -0.2, 1.5); };
+    const std::string from = " \"point3 from\" [.3 -.2 1.5]";
+    check_plane(plane_under("LightSource \"point\" \"rgb I\" [2 3 4]" + from), kAlbedo * Rgb{2, 3, 4}, e);
+    check_plane(plane_under("LightSource \"point\" \"float power\" 50" + from), kAlbedo * float(50 / (4 * M_PI)), e);
+    check_plane(
+        plane_under("Translate .3 -.2 0 LightSource \"point\" \"float scale\" 3 \"point3 from\" [0 0 1.5] Identity",
+                    "\"diffuse\" \"rgb reflectance\" [.5 .7 .3]", "\"float iso\" 400"),
+        kAlbedo * 12, e);
+}
+
+TEST_CASE("spots fall off smoothly in the cosine") {
+    const double outer = std::cos(30 * M_PI / 180), inner = std::cos(22 * M_PI / 180);
+    check_plane(plane_under("LightSource \"spot\" \"rgb I\" [2 3 4] \"point3 from\" [0 0 2] \"point3 to\" [.1 0 0] "
+                            "\"float coneangle\" 30 \"float conedeltaangle\" 8"),
+                kAlbedo * Rgb{2, 3, 4}, [&](double x, double y) {
+                    const double d = std::sqrt(x * x + y * y + 4), a = std::sqrt(0.01 + 4);
+                    const double cosine = (0.1 * x + 4) / (a * d);
+                    const double t = std::clamp((cosine - outer) / (inner - outer), 0.0, 1.0);
+                    return t * t * (3 - 2 * t) * from_point(x, y, 0, 0, 2);
+                });
+}
+
+TEST_CASE("distant and infinite lights") {
+    const double cosine = 2 / std::sqrt(5.0);
+    check_plane(plane_under("LightSource \"distant\" \"rgb L\" [2 3 4] \"point3 from\" [1 0 2] \"point3 to\" [0 0 0]"),
+                kAlbedo * Rgb{2, 3, 4}, [&](double, double) { return cosine; });
+    check_plane(
+        plane_under("LightSource \"distant\" \"float illuminance\" 7 \"point3 from\" [0 0 1] \"point3 to\" [0 0 0]"),
+        kAlbedo, [](double, double) { return 7; });
+    check_plane(plane_under("LightSource \"infinite\" \"rgb L\" [2 3 4]"), kAlbedo * Rgb{2, 3, 4},
+                [](double, double) { return M_PI; });
+    check_plane(plane_under("LightSource \"infinite\" \"float illuminance\" 5"), kAlbedo,
+                [](double, double) { return 5; });
+}
+
+TEST_CASE("an environment map that shines from above") {
+    const TempFolder folder;
+    constexpr int n = 64;
+    std::vector<float> texels;
+    for (int y = 0; y < n; ++y)
+        for (int x = 0; x < n; ++x) {
+            // Directions of positive z fill the diamond in the middle of the square.
+            const bool up = std::abs(2 * (x + 0.5) / n - 1) + std::abs(2 * (y + 0.5) / n - 1) < 1;
+            texels.insert(texels.end(), {up ? 2.0f : 0.0f, up ? 3.0f : 0.0f, up ? 4.0f : 0.0f});
+        }
+    write_float_image(folder / "sky.exr", n, n, texels);
+    check_plane(
+        plane_under("LightSource \"infinite\" \"string filename\" \"sky.exr\" \"float scale\" .5"),
+        kAlbedo * Rgb{1, 1.5f, 2}, [](double, double) { return M_PI; }, &folder);
+}
+
+TEST_CASE("area lights shine along their normal, and alpha lets light pass") {
+    const std::string quad =
+        "AreaLightSource \"diffuse\" \"rgb L\" [2 3 4] Translate 0 0 2 Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 -1 "
+        "1 0 1 1 0 "
+        "1 -1 0] \"integer indices\" [0 1 2 0 2 3]";
+    // The centre of a square of half side a at distance h, by the form factor of its four quarters.
+    const auto irradiance = [](double x, double y) {
+        const double h = 2;
+        double sum = 0;
+        for (double sx : {-1.0, 1.0})
+            for (double sy : {-1.0, 1.0}) {
+                const double a = (1 - sx * x) / h, b = (1 - sy * y) / h;
+                sum += a / std::sqrt(1 + a * a) * std::atan(b / std::sqrt(1 + a * a)) +
+                       b / std::sqrt(1 + b * b) * std::atan(a / std::sqrt(1 + b * b));
+            }
+        return sum / 2;  // times π over 2π
+    };
+    check_plane(plane_under("AttributeBegin " + quad + " AttributeEnd"), kAlbedo * Rgb{2, 3, 4}, irradiance);
+    const Scene turned = load_pbrt_text(plane_under("AttributeBegin ReverseOrientation " + quad + " AttributeEnd"));
+    check_black(render_scene(turned, cpu_settings(turned, Estimator::nee), 16));
+    const std::string veil =
+        "AttributeBegin Translate 0 0 1 Material \"diffuse\" \"rgb reflectance\" [0 0 0] Shape \"disk\" \"float "
+        "radius\" 50 "
+        "\"float alpha\" .25 AttributeEnd ";
+    check_plane(plane_under("LightSource \"distant\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0] " + veil),
+                kAlbedo * 0.75f, [](double, double) { return 1; });
+}
+
+TEST_CASE("diffuse transmission lets through and gives back what it says") {
+    const std::string material =
+        "\"diffusetransmission\" \"rgb reflectance\" [.1 .2 .3] \"rgb transmittance\" [.4 .3 .1]";
+    const auto one = [](double, double) { return 1.0; };
+    check_plane(plane_under("LightSource \"distant\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0]", material),
+                {0.1f, 0.2f, 0.3f}, one);
+    check_plane(plane_under("LightSource \"distant\" \"point3 from\" [0 0 -1] \"point3 to\" [0 0 0]", material),
+                {0.4f, 0.3f, 0.1f}, one);
+}
+
+TEST_CASE("a furnace of every material that keeps all light") {
+    for (const char* material : {"\"diffuse\" \"rgb reflectance\" [1 1 1]", "\"dielectric\"", "\"thindielectric\"",
+                                 "\"conductor\" \"rgb reflectance\" [1 1 1]"}) {
+        INFO(material);
+        const Scene s = load_pbrt_text(
+            "LookAt 0 0 -5 0 0 0 0 1 0 Camera \"perspective\" \"float fov\" 20 Film \"rgb\" \"integer xresolution\" 8 "
+            "\"integer yresolution\" 8 PixelFilter \"box\" Integrator \"path\" \"integer maxdepth\" 60 WorldBegin "
+            "LightSource "
+            "\"infinite\" Material " +
+            std::string(material) + " Shape \"sphere\"");
+        // Metals of pbrt give back 0.9999 at most.
+        const FilmMoments film = render_scene(s, cpu_settings(s, Estimator::mis), 64).film;
+        for (size_t i = 0; i < film.sum.size(); ++i) CHECK(film.mean(i) == Approx(1).margin(0.35));
+        double mean = 0;
+        for (size_t i = 0; i < film.sum.size(); ++i) mean += film.mean(i) / double(film.sum.size());
+        CHECK(mean == Approx(1).margin(0.02));
+    }
+}
+
+TEST_CASE("a scene in both formats has one image, and so has what it is converted to") {
+    const TempFolder folder;
+    folder.write("floor.ply", kPly);
+    const Scene pbrt = load_pbrt_text(kPbrt, {}, &folder), xml = load_mitsuba(folder.write("scene.xml", kXml));
+    const ZTestResult z = compared(pbrt, xml, 256);
+    INFO(z.report());
+    CHECK(z.pass);
+    CHECK(z.detectable < 0.02);
+
+    // The same samples of what is written and read again: equal up to the rounding of transforms.
+    CHECK(write_mitsuba(pbrt, folder / "out/converted.xml").empty());
+    const Scene converted = load_mitsuba(folder / "out/converted.xml");
+    CHECK(converted.triangles.size() == pbrt.triangles.size());
+    CHECK(converted.features == pbrt.features);
+    const auto film = [](const Scene& s) { return render_scene(s, cpu_settings(s, Estimator::mis), 64).film; };
+    const FilmMoments a = film(pbrt), b = film(converted);
+    double difference = 0, sum = 0;
+    for (size_t i = 0; i < a.sum.size(); ++i) difference += std::abs(a.mean(i) - b.mean(i)), sum += a.mean(i);
+    CHECK(difference < 1e-4 * sum);
+}
+
+TEST_CASE("a part of the screen is what the crop of the whole screen is") {
+    const TempFolder folder;
+    folder.write("floor.ply", kPly);
+    const auto scene = [&](const std::string& camera, const std::string& film) {
+        std::string text = kPbrt;
+        const auto exchange = [&](const std::string& from, const std::string& to) {
+            text.replace(text.find(from), from.size(), to);
+        };
+        exchange("Camera \"perspective\" \"float fov\" 35", "Camera " + camera);
+        exchange("\"integer xresolution\" 48 \"integer yresolution\" 32", film);
+        return load_pbrt_text(text, {}, &folder);
+    };
+    const std::string whole = "\"integer xresolution\" 48 \"integer yresolution\" 32 \"float cropwindow\" [.5 1 0 .5]",
+                      part = "\"integer xresolution\" 24 \"integer yresolution\" 16";
+    for (const std::string& type : {std::string("\"perspective\" \"float fov\" 35"), std::string("\"orthographic\"")}) {
+        INFO(type);
+        const std::string wide = type[1] == 'o' ? " \"float screenwindow\" [-4.5 4.5 -3 3]"
+                                                : " \"float screenwindow\" [-1.5 1.5 -1 1]",
+                          corner = type[1] == 'o' ? " \"float screenwindow\" [0 4.5 0 3]"
+                                                  : " \"float screenwindow\" [0 1.5 0 1]";
+        const ZTestResult z = compared(scene(type + wide, whole), scene(type + corner, part), 128);
+        INFO(z.report());
+        CHECK(z.pass);
+    }
+}
+
+TEST_CASE("scenes of the project are the same after conversion") {
+    const TempFolder folder;
+    for (const char* name : {"cornell", "glass", "lights", "materials", "textured"}) {
+        INFO(name);
+        const Scene scene = project_scene(name, 48, 27);
+        const std::string out = folder / (std::string(name) + ".xml");
+        write_mitsuba(scene, out);
+        const Scene again = load_mitsuba(out);
+        CHECK(again.warnings.empty());
+        CHECK(again.features == scene.features);
+        CHECK(again.triangles.size() == scene.triangles.size());
+        CHECK(again.emitters.size() == scene.emitters.size());
+        const auto film = [](const Scene& s) { return render_scene(s, cpu_settings(s, Estimator::mis), 16).film; };
+        const FilmMoments a = film(scene), b = film(again);
+        double difference = 0, sum = 0;
+        for (size_t i = 0; i < a.sum.size(); ++i) difference += std::abs(a.mean(i) - b.mean(i)), sum += a.mean(i);
+        CHECK(difference < 1e-4 * sum);
+    }
+}
