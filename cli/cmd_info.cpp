@@ -50,7 +50,11 @@ int info(const Options& o) {
                        {"skipped", stats.skipped},
                        {"accel", stats.accel},
                        {"memory_bytes", stats.memory_bytes}};
-    json["seconds"] = {{"load", loaded.seconds}, {"build", stats.build_seconds}};
+    json["seconds"] = {{"load", loaded.seconds},
+                       {"read", loaded.times.read},
+                       {"place", loaded.times.place},
+                       {"finish", loaded.times.finish},
+                       {"build", stats.build_seconds}};
     if (!o.json.empty()) write_json(o.json, json);
     if (o.json != "-") print(json, 0);
     return int(ExitCode::done);

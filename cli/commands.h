@@ -57,6 +57,7 @@ struct RenderOptions {
 struct LoadedScene {
     Scene scene;
     double seconds = 0;
+    LoadTimes times = {};
 };
 /// Loads and reports the substitutions of --lenient as warnings. Fails before that if `outputs` cannot be written, and
 /// after it if one of them is a file of the scene.

@@ -104,9 +104,12 @@ LoadedScene load_scene(const SceneOptions& options, const std::vector<Output>& o
     LoadOptions load = options.load_options();
     std::vector<std::string> files;
     load.files = &files;
+    LoadTimes times;
+    load.times = &times;
     const auto start = std::chrono::steady_clock::now();
     LoadedScene loaded{load_scene_file(options.path, load), 0};
     loaded.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    loaded.times = times;
     check_not_inputs(outputs, files);
     for (const std::string& warning : loaded.scene.warnings) log_warning(warning);
     for (const std::string& note : loaded.scene.notes) log_info("note: " + note);

@@ -25,8 +25,8 @@ public:
     /// True once the time is over. Looks at the clock.
     bool expired() const;
     /// Called again and again while reading; throws once the time is over.
-    void tick() {
-        if ((++ticks_ & 1023) == 0) check_time();
+    void tick(uint64_t entries = 1) {
+        if ((ticks_ += entries) >= 1024) ticks_ = 0, check_time();
     }
 
 private:

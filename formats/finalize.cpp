@@ -98,9 +98,10 @@ void fill_bounds(Scene& scene) {
         grow(c - splat(r), c + splat(r));
     }
     const Vec3f center = (lo + hi) * 0.5f;
-    float radius = length(camera - center);
+    float squared = length_squared(camera - center);
     for (const Triangle& t : scene.triangles)
-        for (uint32_t v : {t.v0, t.v1, t.v2}) radius = max(radius, length(scene.vertices[v].p - center));
+        for (uint32_t v : {t.v0, t.v1, t.v2}) squared = max(squared, length_squared(scene.vertices[v].p - center));
+    float radius = sqrtf(squared);
     for (const Quadric& q : scene.quadrics) {
         Vec3f c;
         const float r = quadric_ball(q, c);

@@ -10,6 +10,13 @@
 
 namespace ambilux {
 
+/// Where loading spends its time, in seconds of the wall clock.
+struct LoadTimes {
+    double read = 0;    ///< files: text, meshes and images, with their fingerprints and checks
+    double place = 0;   ///< shapes, materials and emitters of what was read, in the coordinates of the scene
+    double finish = 0;  ///< finalize_scene(): areas, bounds and tables
+};
+
 /// Options of the loader.
 struct LoadOptions {
     bool lenient = false;            ///< replace what is not known, and list each substitution, instead of refusing it
@@ -18,6 +25,7 @@ struct LoadOptions {
     std::vector<std::pair<std::string, std::string>> parameters;  ///< values of $parameters, over the file's defaults
     Limits limits;
     std::vector<std::string>* files = nullptr;  ///< gets the names of all files that were read
+    LoadTimes* times = nullptr;                 ///< how long the parts took is added
 };
 
 /// Loads a scene of any format, by the ending of the file: .pbrt and .pbrt.gz (pbrt-v4), .gltf and .glb (glTF 2.0),

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs what building, testing and the analysis need and is not there yet: Debian 12 or Ubuntu 24.04 packages, and
 # a Python environment in .venv. Prints nothing when all is there. Safe to run again.
+# --fuzz: also what scripts/fuzz.sh needs.
 # Exit code 4: something is missing and could not be installed; the message says what, and which command installs it.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
@@ -10,6 +11,11 @@ libraries=(
   libembree-dev libtbb-dev libopenexr-dev libimath-dev libpng-dev libjpeg-dev libpugixml-dev libtinygltf-dev zlib1g-dev libboost-dev libssl-dev
   catch2 libcli11-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libtomlplusplus-dev
 )
+
+if [[ ${1:-} == --fuzz ]]; then
+  tools[clang++-19]=clang-19
+  libraries+=(libclang-rt-19-dev)
+fi
 
 missing=()
 for tool in "${!tools[@]}"; do

@@ -100,16 +100,21 @@ Measurement measure(const Hooks& hooks, const Scene& scene, const RenderSettings
         const auto out_of_time = [&](uint32_t done) {
             return samples == 0 && done >= kLeastBatches && elapsed() > effort.seconds;
         };
+        // A round that takes far longer than those before it promised is given up, and what they measured stands.
+        const auto too_slow = [&] { return samples > 0 && elapsed() > 2 * effort.seconds; };
+        uint64_t rendered = m.samples;
         uint32_t done = 0;
-        for (; done < sums.batch_count && !out_of_time(done); ++done) {
-            if (renderer->render(uint32_t(m.samples), uint32_t(count), interrupt) < count) {
+        for (; done < sums.batch_count && !out_of_time(done) && !too_slow(); ++done) {
+            if (renderer->render(uint32_t(rendered), uint32_t(count), interrupt) < count) {
                 m.interrupted = true;
                 return m;
             }
-            m.samples += count;
+            rendered += count;
             sums.add(done, renderer->film());
             renderer->clear_film();
         }
+        if (samples > 0 && done < sums.batch_count) break;
+        m.samples = rendered;
         samples += count;
         m.batches = sums.means(samples, done);
         m.paths = double(m.samples) * pixels;

@@ -1,13 +1,18 @@
 #include "experiments/stress/runner.h"
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <mutex>
+#include <thread>
 
 #include "core/error.h"
 #include "core/flag.h"
 #include "core/progress.h"
+#include "experiments/stress/deadline.h"
 #include "experiments/stress/folder.h"
 #include "integrators/reachability.h"
 
@@ -45,6 +50,14 @@ std::string backend_of(const std::string& name) {
     return name;
 }
 
+/// Rows that are rendered at the same time. Most films are so small that one thread renders them: of two cores one
+/// would be idle.
+unsigned rows_at_once(const Request& request, const std::string& backend, size_t rows) {
+    if (request.rows_at_once > 0) return request.rows_at_once;
+    if (backend != "cpu") return 1;
+    return unsigned(std::clamp<size_t>(std::thread::hardware_concurrency(), 1, std::max<size_t>(rows, 1)));
+}
+
 class Sweep {
 public:
     Sweep(const Request& request, const std::vector<Family>& all, const Hooks& hooks)
@@ -56,9 +69,14 @@ public:
         for (const auto& [family, cell] : cells_)
             for (const Method* method : methods_) rows_left_ += find(*cell, *method) == nullptr;
         rows_to_do_ = rows_left_;
+        workers_ = rows_at_once(request, backend_, methods_.size());
     }
 
     Summary run() {
+        // The threads of all rows together are as many as cores.
+        const tbb::global_control threads(
+            tbb::global_control::max_allowed_parallelism,
+            std::max(1u, std::max(std::thread::hardware_concurrency(), workers_) - workers_ + 1));
         for (const auto& [family, cell] : cells_) {
             run_cell(*family, *cell);
             if (interrupted_) break;
@@ -72,31 +90,62 @@ public:
     }
 
 private:
+    /// Rows stay where they are while others are added.
     const Row* find(const Cell& cell, const Method& method) const {
+        const std::lock_guard lock(mutex_);
         return folder_.find(cell.name(), method.name, backend_);
     }
 
     void run_cell(const Family& family, const Cell& cell) {
+        std::vector<const Method*> left;
+        for (const Method* method : methods_)
+            if (!find(cell, *method)) left.push_back(method);
+        if (left.empty() || out_of_time()) return;
         std::optional<Scene> scene;
         std::string refusal;
-        for (const Method* method : methods_) {
-            if (find(cell, *method)) continue;
-            interrupted_ =
-                interrupted_ || is_set(request_.interrupt) || (request_.seconds > 0 && elapsed() > request_.seconds);
-            if (interrupted_) break;
+        try {
+            scene = load(cell);
+        } catch (const Error& e) {
+            refusal = e.what();
+        }
+        std::atomic<size_t> next = 0;
+        std::exception_ptr failure;
+        const auto work = [&] {
+            try {
+                for (size_t i = next++; i < left.size() && !out_of_time(); i = next++)
+                    add_row(family, cell, *left[i], scene ? &*scene : nullptr, refusal);
+            } catch (...) {
+                const std::lock_guard lock(mutex_);
+                failure = std::current_exception();
+                interrupted_ = true;
+            }
+        };
+        {
+            std::vector<std::jthread> others;
+            for (unsigned i = 1; i < std::min<size_t>(workers_, left.size()); ++i) others.emplace_back(work);
+            work();
+        }
+        if (failure) std::rethrow_exception(failure);
+    }
+
+    bool out_of_time() {
+        if (is_set(deadline_.flag())) interrupted_ = true;
+        return interrupted_;
+    }
+
+    void add_row(const Family& family, const Cell& cell, const Method& method, const Scene* scene,
+                 const std::string& refusal) {
+        {
+            const std::lock_guard lock(mutex_);
             progress_.update(
                 1 - double(rows_left_) / double(rows_to_do_),
-                fmt::format("{} of {} rows, {} {}", rows_to_do_ - rows_left_, rows_to_do_, cell.name(), method->name));
-            if (!scene && refusal.empty()) try {
-                    scene = load(cell);
-                } catch (const Error& e) {
-                    refusal = e.what();
-                }
-            const Row row = run_method(family, cell, *method, scene ? &*scene : nullptr, refusal);
-            if (interrupted_) break;
-            folder_.add(row);
-            --rows_left_;
+                fmt::format("{} of {} rows, {} {}", rows_to_do_ - rows_left_, rows_to_do_, cell.name(), method.name));
         }
+        const std::optional<Row> row = run_method(family, cell, method, scene, refusal);
+        if (!row) return;
+        const std::lock_guard lock(mutex_);
+        folder_.add(*row);
+        --rows_left_;
     }
 
     Scene load(const Cell& cell) {
@@ -114,15 +163,22 @@ private:
         if (cell.samples) effort.seconds = 15;
         if (request_.seconds > 0) {
             // What is left, in equal parts; a cell whose samples are given may take a few parts more.
-            const double part = std::max(0.0, request_.seconds - elapsed()) / double(rows_left_);
-            effort.seconds = std::min(effort.seconds, cell.samples ? 20 * part : part);
+            const double left = std::max(0.0, request_.seconds - elapsed()),
+                         part = std::min(left, left * workers_ / double(rows_left()));
+            effort.seconds = std::min(effort.seconds, cell.samples ? std::min(left, 20 * part) : part);
             if (!request_.quick) effort.paths = 4e7;
         }
         return effort;
     }
 
-    Row run_method(const Family& family, const Cell& cell, const Method& method, const Scene* scene,
-                   const std::string& refusal) {
+    size_t rows_left() const {
+        const std::lock_guard lock(mutex_);
+        return rows_left_;
+    }
+
+    /// Nothing if it was interrupted.
+    std::optional<Row> run_method(const Family& family, const Cell& cell, const Method& method, const Scene* scene,
+                                  const std::string& refusal) {
         const Row* benign = cell.benign ? nullptr : find(family.cells.front(), method);
         if (benign && benign->samples == 0) benign = nullptr;
         Row row = blank_row(cell, method.name, backend_, benign);
@@ -133,9 +189,9 @@ private:
                 leave_out(row, why);
                 return row;
             }
-            const Measurement m = measure(hooks_, *scene, settings, effort_of(cell), request_.interrupt);
-            interrupted_ = m.interrupted;
-            if (!m.interrupted) fill_row(row, cell, m, benign, rows_in_all_);
+            const Measurement m = measure(hooks_, *scene, settings, effort_of(cell), deadline_.flag());
+            if (m.interrupted) return {};
+            fill_row(row, cell, m, benign, rows_in_all_);
         } catch (const Error& e) {
             refuse_row(row, cell, e.what());
         }
@@ -156,10 +212,13 @@ private:
     const CellList cells_;
     const std::vector<const Method*> methods_;
     const double rows_in_all_;  ///< of all families and methods: the correction is the same whatever is chosen
+    unsigned workers_ = 1;
+    mutable std::mutex mutex_;  ///< of what follows
     SweepFolder folder_;
     size_t rows_left_ = 0, rows_to_do_ = 0;
     Progress progress_{"stress"};
-    bool interrupted_ = false;
+    std::atomic<bool> interrupted_ = false;
+    Deadline deadline_{request_.interrupt, request_.seconds};  ///< the last: it begins when all else is there
 };
 
 }  // namespace

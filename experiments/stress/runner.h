@@ -18,7 +18,8 @@ struct Request {
     std::vector<std::string> families, methods;  ///< names; empty: all
     bool quick = false, resume = false;
     uint64_t seed = 1;
-    double seconds = 0;  ///< that the whole sweep may take; 0: as long as its efforts ask for
+    double seconds = 0;         ///< that the whole sweep may take; 0: as long as its efforts ask for
+    unsigned rows_at_once = 0;  ///< 0: on a host one a core, on a device one
     const volatile bool* interrupt = nullptr;
 };
 

@@ -133,11 +133,14 @@ Scene load_gltf(const std::string& path, const LoadOptions& options) {
     document.limits = options.limits;
     document.smooth_normals = false;
     document.scene = &mitsuba::add_object(document, "scene", "", {path, 0});
-    Report report(options.lenient);
-    gltf::Context context{document, report, {path, 0}, {}, {}, {}, {}, false};
-    gltf::read_model(context, path);
-    gltf::SceneMaker(context).make();
-    report.write(document);
+    {
+        const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
+        Report report(options.lenient);
+        gltf::Context context{document, report, {path, 0}, {}, {}, {}, {}, false};
+        gltf::read_model(context, path);
+        gltf::SceneMaker(context).make();
+        report.write(document);
+    }
     return mitsuba::load_document(path, document, options);
 }
 

@@ -43,14 +43,38 @@ bool read_whole_file(std::vector<unsigned char>* out, std::string* error, const 
 
 bool write_nothing(std::string*, const std::string&, const std::vector<unsigned char>&, void*) { return false; }
 
-/// Keeps the bytes: our readers decode them when they are needed.
-bool keep_image(tinygltf::Image*, const int index, std::string*, std::string*, int, int, const unsigned char* bytes,
+/// Keeps the bytes of a file or a data URI: our readers decode them when they are needed. Those of a buffer come
+/// unchecked: image_views() takes them.
+bool keep_image(tinygltf::Image* image, const int index, std::string*, std::string*, int, int, const unsigned char* bytes,
                 int size, void* user) {
     auto& all = static_cast<Files*>(user)->context.image_bytes;
     if (index < 0 || size < 0) return false;
+    if (image->bufferView >= 0) return true;
     if (all.size() <= size_t(index)) all.resize(size_t(index) + 1);
     all[size_t(index)].assign(reinterpret_cast<const char*>(bytes), size_t(size));
     return true;
+}
+
+/// The bytes of a view, which lie inside of its buffer. Throws Error(bad_input).
+std::pair<const unsigned char*, uint64_t> view_bytes(const Context& context, int index, const std::string& what) {
+    const tinygltf::Model& model = context.model;
+    if (index < 0 || size_t(index) >= model.bufferViews.size()) context.fail(what + ": its buffer view does not exist");
+    const tinygltf::BufferView& view = model.bufferViews[size_t(index)];
+    if (view.buffer < 0 || size_t(view.buffer) >= model.buffers.size())
+        context.fail(what + ": its buffer does not exist");
+    const std::vector<unsigned char>& data = model.buffers[size_t(view.buffer)].data;
+    if (view.byteOffset > data.size() || view.byteLength > data.size() - view.byteOffset)
+        context.fail(what + ": its buffer view reaches beyond the buffer");
+    return {data.data() + view.byteOffset, view.byteLength};
+}
+
+void image_views(Context& context) {
+    for (size_t i = 0; i < context.model.images.size(); ++i) {
+        const int view = context.model.images[i].bufferView;
+        if (view < 0) continue;
+        const auto [bytes, size] = view_bytes(context, view, "image " + std::to_string(i));
+        context.image_bytes[i].assign(bytes, bytes + size);
+    }
 }
 
 }  // namespace
@@ -80,6 +104,7 @@ void read_model(Context& context, const std::string& path) {
     std::replace(error.begin(), error.end(), '\n', ' ');
     if (!read) context.fail("it is no sound glTF 2.0: " + (error.empty() ? "unknown reason" : error));
     context.image_bytes.resize(context.model.images.size());
+    image_views(context);
     static const std::set<std::string> known = {"KHR_lights_punctual",        "KHR_materials_emissive_strength",
                                                 "KHR_materials_transmission", "KHR_materials_volume",
                                                 "KHR_materials_ior",          "KHR_materials_clearcoat",
@@ -95,19 +120,14 @@ std::vector<double> accessor_values(const Context& context, int index, int compo
     if (index < 0 || size_t(index) >= model.accessors.size()) fail("there is no accessor " + std::to_string(index));
     const tinygltf::Accessor& a = model.accessors[size_t(index)];
     if (a.sparse.isSparse) fail("sparse accessors are not supported");
-    if (a.bufferView < 0 || size_t(a.bufferView) >= model.bufferViews.size()) fail("its accessor has no buffer");
-    const tinygltf::BufferView& view = model.bufferViews[size_t(a.bufferView)];
-    if (view.buffer < 0 || size_t(view.buffer) >= model.buffers.size()) fail("its buffer does not exist");
-    const std::vector<unsigned char>& data = model.buffers[size_t(view.buffer)].data;
+    const auto [bytes, length] = view_bytes(context, a.bufferView, what);
     const int size = tinygltf::GetComponentSizeInBytes(uint32_t(a.componentType)),
               count = tinygltf::GetNumComponentsInType(uint32_t(a.type));
     if (size <= 0 || count < components || a.componentType == TINYGLTF_COMPONENT_TYPE_DOUBLE)
         fail("its accessor has the wrong type");
-    const uint64_t element = uint64_t(size) * uint64_t(count), stride = view.byteStride ? view.byteStride : element;
-    const uint64_t most = data.size();
-    if (stride < element || stride > 4096 || a.count > most || view.byteOffset > most ||
-        view.byteLength > most - view.byteOffset || a.byteOffset > view.byteLength ||
-        (a.count > 0 && (a.count - 1) * stride + element > view.byteLength - a.byteOffset))
+    const uint64_t element = uint64_t(size) * uint64_t(count), given = model.bufferViews[size_t(a.bufferView)].byteStride, stride = given ? given : element;
+    if (stride < element || stride > 4096 || a.count > length || a.byteOffset > length ||
+        (a.count > 0 && (a.count - 1) * stride + element > length - a.byteOffset))
         fail("its accessor reaches beyond its buffer");
     FileBudget(context.where.file, context.document.limits)
         .bytes(uint64_t(a.count) * uint64_t(components), sizeof(double));
@@ -125,7 +145,7 @@ std::vector<double> accessor_values(const Context& context, int index, int compo
             default: return as(uint32_t{});
         }
     };
-    const unsigned char* begin = data.data() + view.byteOffset + a.byteOffset;
+    const unsigned char* begin = bytes + a.byteOffset;
     for (size_t i = 0; i < a.count; ++i)
         for (int c = 0; c < components; ++c) out.push_back(value(begin + i * stride + size_t(c) * size_t(size)));
     return out;

@@ -1,7 +1,10 @@
 #include "formats/meshes/mesh.h"
 
+#include <algorithm>
+
 #include "core/error.h"
 #include "core/math.h"
+#include "core/parallel.h"
 
 namespace ambilux {
 
@@ -39,16 +42,28 @@ Mesh make_cube() {
 }
 
 std::vector<Vec3f> smooth_normals(const Mesh& mesh) {
-    std::vector<Vec3f> sums(mesh.positions.size(), Vec3f{0, 0, 0});
-    for (const auto& face : mesh.faces) {
+    using Parts = std::array<Vec3f, 3>;  // what a face adds to its vertices
+    const auto parts_of = [&](const std::array<uint32_t, 3>& face) {
         const Vec3f p[3] = {mesh.positions[face[0]], mesh.positions[face[1]], mesh.positions[face[2]]};
         const Vec3f n = cross(p[1] - p[0], p[2] - p[0]);
-        if (!(length_squared(n) > 0)) continue;
+        Parts parts{};
+        if (!(length_squared(n) > 0)) return parts;
         const Vec3f unit = normalize(n);
-        for (int i = 0; i < 3; ++i) {
+        for (size_t i = 0; i < 3; ++i) {
             const Vec3f a = p[(i + 1) % 3] - p[i], b = p[(i + 2) % 3] - p[i];
-            sums[face[i]] += unit * atan2f(length(cross(a, b)), dot(a, b));
+            parts[i] = unit * atan2f(length(cross(a, b)), dot(a, b));
         }
+        return parts;
+    };
+    std::vector<Vec3f> sums(mesh.positions.size(), Vec3f{0, 0, 0});
+    // Block by block: all threads compute, one adds, in the order of the faces.
+    constexpr size_t kBlock = 65536;
+    std::vector<Parts> block(std::min(kBlock, mesh.faces.size()));
+    for (size_t first = 0; first < mesh.faces.size(); first += kBlock) {
+        const size_t count = std::min(kBlock, mesh.faces.size() - first);
+        parallel_for(count, [&](size_t i) { block[i] = parts_of(mesh.faces[first + i]); }, size_t(1024));
+        for (size_t i = 0; i < count; ++i)
+            for (size_t k = 0; k < 3; ++k) sums[mesh.faces[first + i][k]] += block[i][k];
     }
     for (Vec3f& n : sums)
         if (length_squared(n) > 0) n = normalize(n);

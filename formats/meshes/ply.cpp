@@ -1,37 +1,17 @@
-#include <bit>
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "core/error.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
+#include "formats/meshes/ply_blocks.h"
 #include "formats/meshes/text_cursor.h"
 
 namespace ambilux {
 
 namespace {
 
-enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
-enum class Encoding { ascii, little_endian, big_endian };
-
-/// What a property of the vertex element means to us.
-enum class Role { skip, x, y, z, nx, ny, nz, u, v };
-
-struct Property {
-    std::string name;
-    Scalar type;
-    bool list = false;
-    Scalar count_type = Scalar::uint8;
-    Role role = Role::skip;
-    int attribute = -1;    ///< place in Mesh::attributes
-    uint32_t channel = 0;  ///< of it
-};
-
-struct Element {
-    std::string name;
-    uint64_t count = 0;
-    std::vector<Property> properties;
-};
+using namespace ply;
 
 bool scalar_named(std::string_view name, Scalar& type) {
     struct Name {
@@ -96,13 +76,8 @@ struct PlyReader {
     template <class T>
     double binary() {
         if (size_t(text.end - text.at) < sizeof(T)) fail("file ends too early");
-        unsigned char bytes[sizeof(T)];
-        memcpy(bytes, text.at, sizeof(T));
+        const T value = load<T>(text.at, is_swapped(encoding));
         text.at += sizeof(T);
-        if ((encoding == Encoding::big_endian) == (std::endian::native == std::endian::little))
-            for (size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(bytes[i], bytes[sizeof(T) - 1 - i]);
-        T value;
-        memcpy(&value, bytes, sizeof(T));
         return double(value);
     }
 
@@ -114,17 +89,7 @@ struct PlyReader {
             if (!text.number(number)) fail("expected a number");
             return number;
         }
-        switch (type) {
-            case Scalar::int8: return binary<int8_t>();
-            case Scalar::uint8: return binary<uint8_t>();
-            case Scalar::int16: return binary<int16_t>();
-            case Scalar::uint16: return binary<uint16_t>();
-            case Scalar::int32: return binary<int32_t>();
-            case Scalar::uint32: return binary<uint32_t>();
-            case Scalar::float32: return binary<float>();
-            case Scalar::float64: return binary<double>();
-        }
-        return 0;
+        return with_type(type, [&](auto tag) { return binary<decltype(tag)>(); });
     }
 
     uint32_t index(Scalar type) {
@@ -202,17 +167,6 @@ bool has_role(const Element& element, Role role) {
     return false;
 }
 
-size_t size_of(Scalar type) {
-    switch (type) {
-        case Scalar::int8:
-        case Scalar::uint8: return 1;
-        case Scalar::int16:
-        case Scalar::uint16: return 2;
-        case Scalar::float64: return 8;
-        default: return 4;
-    }
-}
-
 /// Bytes that an entry takes at least: of text a digit and a blank for each number.
 uint64_t least_size(const Element& element, Encoding encoding) {
     uint64_t size = 0;
@@ -242,7 +196,7 @@ struct MeshBuilder {
         else if (element.name == "face")
             read_faces(element);
         else
-            for (uint64_t i = 0; i < element.count; ++i) skip(element);
+            skip(element);
     }
 
 private:
@@ -278,13 +232,26 @@ private:
         for (uint32_t left = in.index(p.count_type); left > 0; --left) in.value(p.type);
     }
     void skip(const Element& element) {
-        for (const Property& p : element.properties) {
-            if (p.list)
-                skip_list(p);
-            else
-                in.value(p.type);
+        if (has_fixed_size(element)) {
+            in.text.at += element.count * fixed_size(element);
+            return;
         }
-        budget.tick();
+        for (uint64_t i = 0; i < element.count; ++i) {
+            for (const Property& p : element.properties) {
+                if (p.list)
+                    skip_list(p);
+                else
+                    in.value(p.type);
+            }
+            budget.tick();
+        }
+    }
+
+    /// True if all entries lie in the file, one as long as the other.
+    bool has_fixed_size(const Element& element) const {
+        if (in.encoding == Encoding::ascii || has_lists(element)) return false;
+        if (element.count > size_t(in.text.end - in.text.at) / fixed_size(element)) in.fail("file ends too early");
+        return true;
     }
 
     void read_vertices(const Element& element) {
@@ -293,9 +260,10 @@ private:
         const bool normals = has_role(element, Role::nx) && has_role(element, Role::ny) && has_role(element, Role::nz),
                    uvs = has_role(element, Role::u) && has_role(element, Role::v);
         budget.bytes(mesh_bytes(element.count, 0));
-        mesh.positions.reserve(element.count);
-        if (normals) mesh.normals.reserve(element.count);
-        if (uvs) mesh.uvs.reserve(element.count);
+        mesh.positions.resize(element.count);
+        if (normals) mesh.normals.resize(element.count);
+        if (uvs) mesh.uvs.resize(element.count);
+        if (has_fixed_size(element)) return read_vertex_columns(element);
         for (uint64_t i = 0; i < element.count; ++i) {
             float vertex[9] = {};
             for (const Property& p : element.properties) {
@@ -304,11 +272,48 @@ private:
                 else
                     vertex[int(p.role)] = property_value(p, i);
             }
-            mesh.positions.push_back({vertex[int(Role::x)], vertex[int(Role::y)], vertex[int(Role::z)]});
-            if (normals) mesh.normals.push_back({vertex[int(Role::nx)], vertex[int(Role::ny)], vertex[int(Role::nz)]});
+            mesh.positions[i] = {vertex[int(Role::x)], vertex[int(Role::y)], vertex[int(Role::z)]};
+            if (normals) mesh.normals[i] = {vertex[int(Role::nx)], vertex[int(Role::ny)], vertex[int(Role::nz)]};
             const float v = vertex[int(Role::v)];
-            if (uvs) mesh.uvs.push_back({vertex[int(Role::u)], flip_v ? 1 - v : v});
+            if (uvs) mesh.uvs[i] = {vertex[int(Role::u)], flip_v ? 1 - v : v};
             budget.tick();
+        }
+    }
+
+    /// Where the values of a property go, and how many floats apart; null if they are not kept.
+    std::pair<float*, size_t> target_of(const Property& p) {
+        if (p.attribute >= 0) return {&mesh.attributes[size_t(p.attribute)].values[0][int(p.channel)], 3};
+        if (p.role >= Role::u) return {mesh.uvs.empty() ? nullptr : &mesh.uvs[0].x + (p.role == Role::v), 2};
+        if (p.role >= Role::nx)
+            return {mesh.normals.empty() ? nullptr : &mesh.normals[0].x + (int(p.role) - int(Role::nx)), 3};
+        return {p.role == Role::skip ? nullptr : &mesh.positions[0].x + (int(p.role) - int(Role::x)), 3};
+    }
+
+    void read_vertex_columns(const Element& element) {
+        for (const Property& p : element.properties)
+            if (p.attribute >= 0) mesh.attributes[size_t(p.attribute)].values.resize(element.count);
+        const size_t stride = fixed_size(element);
+        for (uint64_t first = 0; first < element.count; first += kBlock) {
+            const uint64_t count = std::min(kBlock, element.count - first);
+            const char* from = in.text.at;
+            for (const Property& p : element.properties) {
+                if (const auto [to, step] = target_of(p); to)
+                    copy_column(p.type, is_swapped(in.encoding), from, stride, count, to + first * step, step);
+                from += size_of(p.type);
+            }
+            if (flip_v && !mesh.uvs.empty())
+                for (uint64_t i = first; i < first + count; ++i) mesh.uvs[i].y = 1 - mesh.uvs[i].y;
+            in.text.at += count * stride;
+            budget.tick(count);
+        }
+        for (MeshAttribute& a : mesh.attributes)
+            if (!a.per_face) finish_attribute(a);
+    }
+
+    void finish_attribute(MeshAttribute& a) const {
+        for (Rgb& value : a.values) {
+            if (a.channels == 1) value = {value.x, value.x, value.x};
+            if (!is_finite(value)) in.fail("attribute '" + a.name + "' is not finite");
         }
     }
 
@@ -316,13 +321,24 @@ private:
         budget.bytes(mesh_bytes(mesh.positions.size(), element.count));
         mesh.faces.reserve(element.count);
         std::vector<uint32_t> polygon;
+        const FaceLayout layout = in.encoding == Encoding::ascii ? FaceLayout{} : face_layout(element);
         for (uint64_t i = 0; i < element.count; ++i) {
-            polygon.clear();
+            if (layout.valid) {
+                const uint64_t read = read_small_faces(layout, is_swapped(in.encoding), in.text.at, in.text.end,
+                                                       std::min(kBlock, element.count - i), mesh.faces);
+                budget.bytes(mesh_bytes(mesh.positions.size(), mesh.faces.size()));
+                budget.tick(read);
+                has_faces |= read > 0;
+                if ((i += read) == element.count) break;
+            }
             const size_t first = mesh.faces.size();
+            polygon.clear();
             for (const Property& p : element.properties) {
                 if (p.list && (p.name == "vertex_indices" || p.name == "vertex_index")) {
                     has_faces = true;
-                    for (uint32_t left = in.index(p.count_type); left > 0; --left) polygon.push_back(in.index(p.type));
+                    uint32_t left = in.index(p.count_type);
+                    budget.bytes(mesh_bytes(mesh.positions.size(), mesh.faces.size() + left));
+                    for (; left > 0; --left) polygon.push_back(in.index(p.type));
                 } else if (p.list) {
                     skip_list(p);
                 } else {

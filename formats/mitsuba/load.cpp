@@ -1,5 +1,6 @@
 #include "formats/load.h"
 #include "core/error.h"
+#include "core/scoped_seconds.h"
 #include "formats/mitsuba/builder.h"
 #include "formats/mitsuba/origin.h"
 #include "formats/mitsuba/xml.h"
@@ -73,9 +74,7 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     return scene;
 }
 
-}  // namespace
-
-Scene mitsuba::load_document(const std::string& path, const Document& document, const LoadOptions& options) {
+Scene place_scene(const std::string& path, const Document& document, const LoadOptions& options) {
     std::optional<Error> outside;
     Scene scene = build_scene(path, document, options, {}, &outside);
     // Far from the origin floats have rounded it already: it is made again, about its centre in double precision.
@@ -83,16 +82,46 @@ Scene mitsuba::load_document(const std::string& path, const Document& document, 
         scene = build_scene(path, document, options, c, nullptr);
     else if (outside)
         throw Error(*outside);
-    finalize_scene(scene, options.light_picking);
     return scene;
 }
 
-Scene load_mitsuba(const std::string& path, const LoadOptions& options) {
-    return load_document(path, parse_document(path, options.parameters, options.limits), options);
+/// Of a file or, if there is one, of a text.
+Scene scene_of(const std::string& path, const LoadOptions& options, const std::string* text) {
+    const auto read = [&] {
+        const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
+        return parse_document(path, options.parameters, options.limits, text);
+    };
+    return load_document(path, read(), options);
 }
 
+}  // namespace
+
+Scene mitsuba::load_document(const std::string& path, const Document& document, const LoadOptions& options) {
+    LoadTimes times;
+    LoadOptions timed_options = options;
+    timed_options.times = &times;
+    const auto placed = [&] {
+        const ScopedSeconds clock(&times.place);
+        return place_scene(path, document, timed_options);
+    };
+    Scene scene = placed();
+    times.place -= times.read;
+    {
+        const ScopedSeconds clock(&times.finish);
+        finalize_scene(scene, options.light_picking);
+    }
+    if (options.times) {
+        options.times->read += times.read;
+        options.times->place += times.place;
+        options.times->finish += times.finish;
+    }
+    return scene;
+}
+
+Scene load_mitsuba(const std::string& path, const LoadOptions& options) { return scene_of(path, options, nullptr); }
+
 Scene load_mitsuba_text(const std::string& text, const std::string& path, const LoadOptions& options) {
-    return load_document(path, parse_document(path, options.parameters, options.limits, &text), options);
+    return scene_of(path, options, &text);
 }
 
 }  // namespace ambilux

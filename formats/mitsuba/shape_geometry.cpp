@@ -5,11 +5,15 @@
 
 #include "accel/range.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "formats/mitsuba/shape_jobs.h"
 
 namespace ambilux::mitsuba {
 
 namespace {
+
+/// Vertices that are worth a task of their own.
+constexpr size_t kGrain = 4096;
 
 /// Image of a point, rounded once.
 Vec3f point_of(const Matrix& a, Vec3f p) {
@@ -31,13 +35,12 @@ void transform_mesh(const Builder& builder, Job& job, const Mesh& source) {
     const Mesh& mesh = split ? smooth : source;
     const Affine to_local = to_affine(affine_inverse(job.to_world));
     Mesh& out = job.world;
-    out.positions.reserve(mesh.positions.size());
-    for (Vec3f p : mesh.positions) {
-        const Vec3f q = point_of(job.to_world, p);
-        out.positions.push_back(q);
+    out.positions.resize(mesh.positions.size());
+    parallel_for(
+        mesh.positions.size(), [&](size_t i) { out.positions[i] = point_of(job.to_world, mesh.positions[i]); }, kGrain);
+    for (const Vec3f& q : out.positions)
         if (!(max_component(abs(q)) <= kMostCoordinate) || !is_finite(q))
             builder.check_range(job.where, "the shape of type '" + job.type + "'", {{q.x, q.y, q.z}});
-    }
     out.uvs = mesh.uvs;
     const bool reverse = job.reverse != job.flip;
     out.faces = mesh.faces;
@@ -62,13 +65,14 @@ void transform_mesh(const Builder& builder, Job& job, const Mesh& source) {
         out.normals = smooth_normals(out);
     } else {
         const float sign = job.flip ? -1.0f : 1.0f;
-        for (Vec3f n : mesh.normals) {
-            const Vec3f w = to_local.transposed_vector(n) * sign;
+        const auto normal_at = [&](size_t i) {
+            const Vec3f w = to_local.transposed_vector(mesh.normals[i]) * sign;
             // Scaled by its largest entry first, because tiny or huge transforms leave the range of a square.
             const float largest = max_component(abs(w));
-            out.normals.push_back(largest > 0 && largest < kInfinity ? normalize(w * (1.0f / largest))
-                                                                     : Vec3f{0, 0, 0});
-        }
+            return largest > 0 && largest < kInfinity ? normalize(w * (1.0f / largest)) : Vec3f{0, 0, 0};
+        };
+        out.normals.resize(mesh.normals.size());
+        parallel_for(mesh.normals.size(), [&](size_t i) { out.normals[i] = normal_at(i); }, kGrain);
     }
     for (auto& f : out.faces) {
         const Vec3d n = normal_of(f);

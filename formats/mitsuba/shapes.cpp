@@ -3,6 +3,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/scoped_seconds.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/curves.h"
 #include "formats/gzip.h"
@@ -133,9 +134,13 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
 /// Reads the mesh now, and gives the shape a copy of it that its textures are made for.
 uint32_t ShapeBuilder::material_of_attributes(Job& job, const Object& bsdf) {
     MeshSource source = sources[size_t(job.source)];
-    const std::string bytes = read_input(source.path, builder.options.limits);
-    builder.file_digests.push_back({source.path, sha256(bytes)});
-    const Mesh mesh = read_ply(source.path, bytes, source.flip_v, builder.options.limits, true);
+    Mesh mesh;
+    {
+        const ScopedSeconds clock(&builder.options.times->read);
+        const std::string bytes = read_input(source.path, builder.options.limits);
+        builder.file_digests.push_back({source.path, sha256(bytes)});
+        mesh = read_ply(source.path, bytes, source.flip_v, builder.options.limits, true);
+    }
     std::map<std::string, int32_t> textures;
     source.mesh = with_attribute_atlas(builder, source.path, mesh, textures);
     source.path.clear();
@@ -254,18 +259,23 @@ uint64_t memory_of(const Mesh& mesh) { return mesh_bytes(mesh.positions.size(), 
 
 /// Reads the files of meshes, on all threads.
 void load_sources(Builder& builder, std::vector<MeshSource>& sources) {
+    const ScopedSeconds clock(&builder.options.times->read);
     parallel_for(sources.size(), [&](size_t i) {
         MeshSource& s = sources[i];
         if (s.path.empty()) return;
         const Limits& limits = builder.options.limits;
         const std::string bytes = gunzip_if_packed(s.path, read_input(s.path, limits), limits);
-        s.digest = sha256(bytes);
-        if (s.type == "obj")
-            s.mesh = read_obj(s.path, bytes, s.flip_v, limits);
-        else if (s.type == "ply")
-            s.mesh = read_ply(s.path, bytes, s.flip_v, limits);
-        else
-            s.mesh = read_serialized(s.path, bytes, s.shape_index, s.flip_v, limits);
+        const auto read = [&] {
+            if (s.type == "obj") return read_obj(s.path, bytes, s.flip_v, limits);
+            if (s.type == "ply") return read_ply(s.path, bytes, s.flip_v, limits);
+            return read_serialized(s.path, bytes, s.shape_index, s.flip_v, limits);
+        };
+        parallel_for(2, [&](int task) {
+            if (task == 0)
+                s.digest = sha256(bytes);
+            else
+                s.mesh = read();
+        });
     });
     for (const MeshSource& s : sources)
         if (!s.path.empty()) builder.file_digests.push_back({s.path, s.digest});

@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "core/half.h"
+#include "core/scoped_seconds.h"
 #include "formats/file_budget.h"
 #include "formats/images/image_io.h"
 #include "formats/mitsuba/builder.h"
@@ -82,6 +83,7 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
     const auto known = builder.images.find(key);
     if (known != builder.images.end()) return known->second;
 
+    const ScopedSeconds clock(&builder.options.times->read);
     Texels own;
     if (!given) {
         const std::string bytes = read_input(path, builder.options.limits);

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/scoped_seconds.h"
 #include "formats/gzip.h"
 #include "formats/pbrt/scene.h"
 
@@ -377,12 +378,15 @@ Scene load_pbrt(const std::string& path, const LoadOptions& options) {
     document.limits = options.limits;
     document.smooth_normals = false;
     document.scene = &mitsuba::add_object(document, "scene", "", {path, 1});
-    Report report(options.lenient);
-    pbrt::SceneMaker scene(document, report, fs::path(path).parent_path().string());
-    pbrt::Parser parser(scene);
-    parser.parse_file(path, {path, 0}, 1);
-    parser.finish();
-    report.write(document);
+    {
+        const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
+        Report report(options.lenient);
+        pbrt::SceneMaker scene(document, report, fs::path(path).parent_path().string());
+        pbrt::Parser parser(scene);
+        parser.parse_file(path, {path, 0}, 1);
+        parser.finish();
+        report.write(document);
+    }
     return mitsuba::load_document(path, document, options);
 }
 

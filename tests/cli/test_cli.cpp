@@ -445,6 +445,16 @@ TEST_CASE("info and bench stages") {
     const json j = json::parse(info.out);
     CHECK(j["kernels"]["features"].is_array());
     CHECK(j["kernels"]["skipped"].is_array());
+    // Loading by its parts, and the tree apart from them.
+    const json seconds = j["seconds"];
+    double parts = 0;
+    for (const char* part : {"read", "place", "finish"}) {
+        CHECK(seconds[part].get<double>() >= 0);
+        parts += seconds[part].get<double>();
+    }
+    CHECK(parts > 0);
+    CHECK(parts <= seconds["load"].get<double>());
+    CHECK(seconds["build"].get<double>() > 0);
     CHECK(contains(run(folder, {"info", kCornell}).out, "kernels:"));
     const Outcome bench =
         run(folder, {"bench", "stages", kCornell, "--size", "24x16", "--spp", "2", "--json", folder / "b.json"});

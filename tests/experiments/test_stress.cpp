@@ -3,8 +3,11 @@
 // The stress sweep: its answers, its judge, its rows, and that it goes on where it was stopped.
 #include <fmt/format.h>
 
+#include <atomic>
 #include <cmath>
+#include <mutex>
 #include <set>
+#include <thread>
 
 #include "experiments/stress/answers.h"
 #include "experiments/stress/elsewhere.h"
@@ -66,6 +69,7 @@ Request stress_request(const TempFolder& folder, const std::string& output, bool
     r.backend = "cpu";
     r.quick = true;
     r.resume = resume;
+    r.rows_at_once = 1;  // the fakes count in plain numbers
     return r;
 }
 
@@ -283,6 +287,59 @@ TEST_CASE("a sweep that was stopped goes on to the rows of one that was not") {
     Request other = stress_request(folder, "parts", true);
     other.seed = 2;
     CHECK(contains(error_of([&] { stress::run(other, families, stress_hooks(rest)); }), "sweep.txt:1"));
+}
+
+TEST_CASE("rows that are rendered at the same time are those that are rendered one by one") {
+    TempFolder folder;
+    World world;
+    std::mutex mutex;
+    std::atomic<int> now = 0, most = 0;
+    /// One call at a time, each long enough that the other thread is there.
+    struct Locked : Renderer {
+        std::unique_ptr<Renderer> inner;
+        std::mutex& mutex;
+        std::atomic<int>&now, &most;
+        Locked(std::unique_ptr<Renderer> r, std::mutex& m, std::atomic<int>& n, std::atomic<int>& max)
+            : inner(std::move(r)), mutex(m), now(n), most(max) {}
+        uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+            most = std::max<int>(most, ++now);
+            std::this_thread::sleep_for(std::chrono::microseconds(200));
+            const std::lock_guard lock(mutex);
+            --now;
+            return inner->render(first, count, interrupt);
+        }
+        FilmMoments film() override { return inner->film(); }
+        void clear_film() override { inner->clear_film(); }
+        RenderStats stats() override { return inner->stats(); }
+        uint32_t preferred_batch() const override { return inner->preferred_batch(); }
+    };
+    Hooks hooks = stress_hooks(world);
+    hooks.make_renderer = [&, make = hooks.make_renderer](const Scene& scene, const RenderSettings& settings) {
+        const std::lock_guard lock(mutex);
+        return std::make_unique<Locked>(make(scene, settings), mutex, now, most);
+    };
+    const std::vector<Family> families = {fake_family("a", 2), fake_family("b", 2)};
+    Request one = stress_request(folder, "one"), three = stress_request(folder, "three");
+    three.rows_at_once = 3;
+    const Summary expected = stress::run(one, families, hooks);
+    CHECK(most == 1);
+    const Summary found = stress::run(three, families, hooks);
+    CHECK(most > 1);
+    CHECK(found.rows.size() == expected.rows.size());
+    std::vector<std::string> a = lines_of(folder / "one"), b = lines_of(folder / "three");
+    std::sort(a.begin(), a.end()), std::sort(b.begin(), b.end());
+    CHECK(a == b);
+}
+
+TEST_CASE("a row that outlasts the time of a sweep ends with it") {
+    TempFolder folder;
+    World world;
+    world.sleep_per_sample = 0.05;  // 8 batches, which a row has at least, take 2 s and more
+    Request request = stress_request(folder, "out");
+    request.seconds = 0.3;
+    const auto start = std::chrono::steady_clock::now();
+    CHECK(stress::run(request, {fake_family("a", 2)}, stress_hooks(world)).interrupted);
+    CHECK(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < 1.5);
 }
 
 TEST_CASE("a sweep ends in the time that it is given and says so") {

@@ -152,6 +152,95 @@ TEST_CASE("PLY: ascii and both byte orders give the same mesh") {
     }
 }
 
+TEST_CASE("PLY: blocks of entries of a fixed size are the same as entries one by one") {
+    // More entries than a block; an unknown element of a fixed size; all kinds of numbers; faces of 3 to 20 corners.
+    const size_t vertices = 3000;
+    const auto corners_of = [](size_t face) { return face % 7 == 3 ? 4 : (face == 1500 ? 20 : 3); };
+    const std::string properties =
+        "element vertex " + std::to_string(vertices) +
+        "\nproperty double x\nproperty float y\nproperty short z\nproperty uchar u\n"
+        "property float v\nproperty float vertex_weight_0\nproperty uchar r\nproperty uchar g\n"
+        "property uchar b\nelement extra 5\nproperty int a\nproperty double b\nelement face " +
+        std::to_string(vertices) +
+        "\nproperty uchar mark\nproperty list ushort uint vertex_index\nproperty short end\n"
+        "end_header\n";
+    std::string ascii = "ply\nformat ascii 1.0\n" + properties;
+    for (size_t i = 0; i < vertices; ++i)
+        ascii += std::to_string(0.25 * double(i)) + " " + std::to_string(-0.5 * double(i)) + " " + std::to_string(i) +
+                 " " + std::to_string(i % 2) + " 0.75 0.5 " + std::to_string(i % 256) + " 2 3\n";
+    ascii += "1 2\n3 4\n5 6\n7 8\n9 10\n";
+    for (size_t i = 0; i < vertices; ++i) {
+        ascii += "9 ";
+        ascii += std::to_string(corners_of(i));
+        for (int k = 0; k < corners_of(i); ++k) {
+            ascii += ' ';
+            ascii += std::to_string((i + size_t(k)) % vertices);
+        }
+        ascii += " -1\n";
+    }
+    const Mesh expected = read_ply("a.ply", ascii, true, {}, true);
+    for (const bool big : {false, true}) {
+        std::string binary =
+            std::string("ply\nformat binary_") + (big ? "big" : "little") + "_endian 1.0\n" + properties;
+        for (size_t i = 0; i < vertices; ++i) {
+            put(binary, 0.25 * double(i), big), put(binary, -0.5f * float(i), big), put(binary, int16_t(i), big);
+            put(binary, uint8_t(i % 2)), put(binary, 0.75f, big), put(binary, 0.5f, big);
+            put(binary, uint8_t(i % 256)), put(binary, uint8_t(2)), put(binary, uint8_t(3));
+        }
+        binary.append(5 * 12, 'x');
+        const size_t faces_at = binary.size();
+        for (size_t i = 0; i < vertices; ++i) {
+            put(binary, uint8_t(9)), put(binary, uint16_t(corners_of(i)), big);
+            for (int k = 0; k < corners_of(i); ++k) put(binary, uint32_t((i + size_t(k)) % vertices), big);
+            put(binary, int16_t(-1), big);
+        }
+        const Mesh mesh = read_ply("b.ply", binary, true, {}, true);
+        CHECK(bool(mesh.positions == expected.positions));
+        CHECK(bool(mesh.faces == expected.faces));
+        REQUIRE(mesh.uvs.size() == vertices);
+        CHECK(mesh.uvs[2999].y == 0.25f);
+        CHECK(mesh.uvs[2999].x == 1);
+        REQUIRE(mesh.attributes.size() == 2);
+        for (size_t a = 0; a < 2; ++a) CHECK(bool(mesh.attributes[a].values == expected.attributes[a].values));
+        // Without attributes, the same.
+        CHECK(bool(read_ply("b.ply", binary, true).faces == expected.faces));
+        // Cut anywhere, in the vertices, the unknown element or the faces, it is refused.
+        const size_t header = binary.find("end_header\n") + 11;
+        for (const size_t size : {header, header + 17, faces_at - 60, faces_at - 1, faces_at + 1, faces_at + 40007,
+                                  binary.size() - 3, binary.size() - 1}) {
+            const std::string message =
+                error_of([&] { read_ply("b.ply", std::string_view(binary).substr(0, size), false); });
+            CAPTURE(size, message);
+            CHECK((contains(message, "b.ply: file ends too early") || contains(message, "more than the file holds")));
+        }
+        // A number that is no index, in the second face, and one that is the index of no vertex.
+        const size_t index_at = faces_at + 17 + 3;
+        for (const auto& [value, message] :
+             {std::pair{UINT32_MAX, "'4.2949673e+09' is no index"}, {5000u, "face 1 refers to vertex 5000 of 3000"}}) {
+            std::string wrong = binary, bytes;
+            put(bytes, value, big);
+            wrong.replace(index_at, 4, bytes);
+            CHECK(contains(error_of([&] { read_ply("b.ply", wrong, false); }), message));
+        }
+        // Too many for the limit of memory.
+        Limits limits;
+        limits.bytes = 50000;
+        CHECK(contains(error_of([&] { read_ply("b.ply", binary, false, limits); }), "--limits bytes"));
+    }
+    for (const char* type : {"char", "short", "int"}) {
+        std::string negative = std::string(
+                                   "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
+                                   "property float y\nproperty float z\nelement face 1\nproperty list char ") +
+                               type + " vertex_indices\nend_header\n";
+        for (int i = 0; i < 9; ++i) put(negative, float(i));
+        put(negative, int8_t(3));
+        negative.append(12, '\xff');
+        CHECK(contains(error_of([&] { read_ply("n.ply", negative, false); }), "'-1' is no index"));
+        negative[negative.size() - 13] = char(-3);
+        CHECK(contains(error_of([&] { read_ply("n.ply", negative, false); }), "'-3' is no index or count"));
+    }
+}
+
 TEST_CASE("PLY: mistakes") {
     const auto message = [](const std::string& text) { return error_of([&] { read_ply("m.ply", text, false); }); };
     const std::string vertices = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";

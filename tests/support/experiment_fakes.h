@@ -13,6 +13,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/flag.h"
 #include "core/rng.h"
 #include "experiments/results.h"
 #include "experiments/runner.h"
@@ -50,8 +51,8 @@ public:
         if (++world_.calls == world_.kill_at) ::raise(SIGKILL);
         uint32_t done = 0;
         for (; done < count; ++done) {
-            if (world_.calls == world_.stop_at && done == 1) world_.flag = true;
-            if (interrupt && *interrupt) break;
+            if (world_.calls == world_.stop_at && done == 1) set_flag(&world_.flag);
+            if (is_set(interrupt)) break;
             if (world_.sleep_per_sample > 0)
                 std::this_thread::sleep_for(std::chrono::duration<double>(world_.sleep_per_sample));
             for (uint32_t p = 0; p < film_.width * film_.height; ++p) {
