@@ -1,5 +1,8 @@
 """Makes every figure that the results support, and says which ones they do not support, and why."""
 
+import multiprocessing
+import os
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 
 from analysis import ablation, captions, comparison, convergence, error_maps, flip_maps, occupancy, overview, pyramid, stage_times, style
@@ -37,18 +40,44 @@ def plan(experiment, insets):
         yield f"strategy_variance_{scene}_{run}", lambda scene=scene, run=run: pyramid.make_variance(experiment, scene, run)
 
 
+def make_one(name, make, experiment, out, write):
+    made = Made()
+    try:
+        for picture in make():
+            style.save(picture.figure, out / picture.name)
+            write(out / f"{picture.name}.caption.txt", captions.text(experiment, picture))
+            made.pictures.append((picture.name, picture.title, picture.caption))
+    except style.NotMade as e:
+        made.missing.append((name, str(e)))
+    except InputError as e:
+        made.broken.append((name, str(e)))
+    return made
+
+
+def in_processes(work, count):
+    """[work(0), work(1), ...], on all processors. Processes are forks of this one: they know what it has read and computed, and `work` may be anything
+    that does not start threads of OpenMP, which do not outlive a fork."""
+    global forked
+    processes = min(count, len(os.sched_getaffinity(0)))
+    if processes < 2:
+        return [work(i) for i in range(count)]
+    forked = work
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("fork")) as pool:
+        return list(pool.map(do_forked, range(count)))
+
+
+def do_forked(i):
+    return forked(i)
+
+
 def make_all(experiment, out, write, insets):
     """Writes NAME.pdf, NAME.png and NAME.caption.txt of every figure into the folder `out`; `write` puts text into a file. Bad input of one figure
     does not keep the others from being made."""
+    figures = list(plan(experiment, insets))
     made = Made()
-    for name, make in plan(experiment, insets):
-        try:
-            for picture in make():
-                style.save(picture.figure, out / picture.name)
-                write(out / f"{picture.name}.caption.txt", captions.text(experiment, picture))
-                made.pictures.append((picture.name, picture.title, picture.caption))
-        except style.NotMade as e:
-            made.missing.append((name, str(e)))
-        except InputError as e:
-            made.broken.append(f"{name}: {e}" if str(e) not in "".join(made.broken) else f"{name}: the same")
+    for one in in_processes(lambda i: make_one(*figures[i], experiment, out, write), len(figures)):
+        made.pictures += one.pictures
+        made.missing += one.missing
+        for name, message in one.broken:
+            made.broken.append(f"{name}: {message}" if message not in "".join(made.broken) else f"{name}: the same")
     return made

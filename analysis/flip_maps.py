@@ -4,6 +4,7 @@ HDR-FLIP (Andersson, Nilsson, Shirley and Akenine-Möller 2021, "Visualizing err
 papers) by its authors' program, package flip-evaluator, with its default viewing conditions (67 pixels per degree) and exposures.
 """
 
+import os
 from functools import lru_cache
 
 import matplotlib.pyplot as plt
@@ -12,6 +13,8 @@ import numpy as np
 from analysis import comparison, hdr_data, images, style
 from analysis.experiment import InputError
 
+# Threads of OpenMP that wait do not keep others from running; read when the library is loaded.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 try:
     import flip_evaluator
 except ImportError:
@@ -27,9 +30,13 @@ def flip(image, reference):
     return np.asarray(values, dtype=np.float32).reshape(reference.shape[:2]), float(mean)
 
 
-@lru_cache(maxsize=256)
 def of_files(image, reference, factor=1):
     """flip of two files, shrunk by hdr_data.shrink, the map in 8 bits. Kept, because a figure and the page want the same."""
+    return kept(image, reference, factor)
+
+
+@lru_cache(maxsize=256)
+def kept(image, reference, factor):
     pair = [hdr_data.shrink(p, factor) for p in (images.read_exr(image), images.read_exr(reference))]
     values, mean = flip(*pair)
     return (np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8), mean

@@ -174,5 +174,6 @@ def save(figure, path_without_suffix):
     """Writes PDF and PNG and closes the figure. The same data give the same bytes: no dates in the files."""
     with plt.rc_context(STYLE):
         figure.savefig(f"{path_without_suffix}.pdf", metadata={"CreationDate": None}, dpi=300)
+        figure.set_layout_engine("none")  # what the first file has laid out holds for the second
         figure.savefig(f"{path_without_suffix}.png", dpi=DPI)
     plt.close(figure)

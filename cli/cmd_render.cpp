@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 
@@ -7,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/interrupt.h"
+#include "cli/tev.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/log.h"
@@ -26,7 +28,7 @@ namespace {
 struct Options {
     SceneOptions scene;
     RenderOptions render;
-    std::string output, png, json, techniques;
+    std::string output, png, json, techniques, tev;
     std::optional<uint64_t> spp;
     std::optional<double> time;
     std::optional<float> exposure;
@@ -36,6 +38,7 @@ struct Options {
 };
 
 constexpr float kMostStops = 100;
+constexpr std::chrono::milliseconds kStreamPeriod(500);
 
 void check(const Options& o) {
     render_budget(o.spp, o.time, {}, "--");
@@ -75,6 +78,10 @@ int render(const Options& o) {
         renderer = std::move(looked_at);
     }
 
+    std::optional<TevStream> tev;
+    if (!o.tev.empty()) tev.emplace(o.tev, o.output, loaded.scene.sensor.crop_width, loaded.scene.sensor.crop_height);
+    auto streamed = std::chrono::steady_clock::now();
+
     for (const std::string& warning : render_warnings(loaded.scene, used_settings(settings, renderer->stats())))
         log_warning(warning);
 
@@ -90,6 +97,10 @@ int render(const Options& o) {
             const double fraction =
                 budget.samples ? double(p.samples) / double(budget.samples) : p.seconds / budget.seconds;
             progress.update(std::min(fraction, 1.0), progress_details(p.samples, p.seconds, renderer->stats()));
+            if (const auto now = std::chrono::steady_clock::now(); tev && now - streamed > kStreamPeriod) {
+                tev->send(mean_image(renderer->film()));
+                streamed = now;
+            }
         });
     }
 
@@ -97,6 +108,7 @@ int render(const Options& o) {
     RenderStats stats = renderer->stats();
     if (position.samples > 0) {
         const Image image = mean_image(renderer->film());
+        if (tev) tev->send(image);
         write_exr(o.output, image, image_attributes(loaded.scene, settings, stats),
                   make_aovs(loaded.scene, settings, renderer->film(), o.aovs));
         if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
@@ -162,6 +174,8 @@ void add_render(CLI::App& app, Run& run) {
     command.add_option("--outliers", o->outliers,
                        "List the N pixels whose largest sample exceeds the mean of their others most, with commands "
                        "that replay them; renders one sample at a time");
+    command.add_option("--tev", o->tev, "Show the image so far in a running tev, twice a second")
+        ->type_name("HOST:PORT");
     command.add_flag("--strict", o->strict, "Fail (exit code 4) if invalid values or lost queue items were counted");
     command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
     command.callback([o, png, &run] {

@@ -25,6 +25,7 @@ void add_experiment(CLI::App& app, Run& run);
 void add_stress(CLI::App& app, Run& run);
 void add_bench(CLI::App& app, Run& run);
 void add_trace(CLI::App& app, Run& run);
+void add_view(CLI::App& app, Run& run);
 void add_help(CLI::App& app, Run& run);
 
 /// Options that say which scene is meant.

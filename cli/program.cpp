@@ -42,12 +42,13 @@ int run_program(int argc, const char* const* argv) {
     add_stress(app, run);
     add_bench(app, run);
     add_trace(app, run);
+    add_view(app, run);
     add_help(app, run);
     const auto named = [&](CLI::App* command) { return argc > 1 && command->check_name(argv[1]); };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(named).empty()) {
         log_error(
             fmt::format("unknown command '{}': render, info, convert, reference, compare, experiment, stress, bench, "
-                        "trace and help are "
+                        "trace, view and help are "
                         "known",
                         argv[1]));
         return int(ExitCode::usage);

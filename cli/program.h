@@ -1,4 +1,4 @@
-// The program: reads the command line, runs one command, turns errors into messages and exit codes (README.md).
+// The program: reads the command line, runs one command, turns errors into messages and exit codes (docs/program.md).
 #pragma once
 
 namespace ambilux {

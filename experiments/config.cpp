@@ -59,7 +59,7 @@ std::string scene_file(const Reader& r, const toml::node& path, const std::strin
         const char* place = std::getenv("AMBILUX_DATA");
         if (!place || !*place)
             throw r.error(path, fmt::format("scene '{}': the environment variable AMBILUX_DATA is not set; it names "
-                                            "the folder of the published scenes (README)",
+                                            "the folder of the published scenes (docs/building.md)",
                                             scene));
         file = fs::absolute(place).string() + file.substr(data.size());
     }

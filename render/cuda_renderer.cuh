@@ -145,6 +145,12 @@ private:
         else
             accel_ = accels.get<DeviceCwbvh>();
     }
+    /// The copy may have been made for a renderer with another camera.
+    SceneView device_view() const {
+        SceneView view = device_scene_->view();
+        view.sensor = scene_.sensor;
+        return view;
+    }
     /// Which tiles and how many samples a wave holds.
     void shape(const RenderSettings& settings, double mean) {
         constexpr uint32_t kMillion = 1u << 20;
@@ -194,7 +200,7 @@ private:
         wave_.state = state;
         const CwbvhTracer tracer = accel_ ? accel_->tracer() : CwbvhTracer();
         layout.record(UpdateFilm::kName);
-        return {state, order, Stages(layout, device_scene_->view(), tracer, policy_, wave_, queues, film_)};
+        return {state, order, Stages(layout, device_view(), tracer, policy_, wave_, queues, film_)};
     }
     uint64_t film_values() const { return uint64_t(wave_.width) * wave_.height * 3; }
 
@@ -221,7 +227,7 @@ private:
                    "queue counters");
         state_ = parts.state;
         stages_.emplace(parts.stages);
-        executor_.emplace(stream_, traced_, state_, clock_.data(), device_scene_->view(), parts.order);
+        executor_.emplace(stream_, traced_, state_, clock_.data(), device_view(), parts.order);
         if constexpr (!kFilmWide)
             if (pairs_) executor_->use(pairs_->tracer());
         if (graph_) cudaGraphExecDestroy(graph_);

@@ -5,6 +5,7 @@
 #include "integrators/registry.h"
 #include "render/make_on_backend.h"
 #include "render/selection.h"
+#include "render/shared_renderer.h"
 #include "render/twin/twin.h"
 
 namespace ambilux {
@@ -65,6 +66,10 @@ bool cuda_available() { return cuda_device_present(); }
 
 std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings& settings) {
     SharedAccels accels(scene);
+    return make_from(scene, settings, accels);
+}
+
+std::unique_ptr<Renderer> make_renderer(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
     return make_from(scene, settings, accels);
 }
 

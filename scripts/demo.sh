@@ -4,13 +4,15 @@
 # An installed package ambilux with its analysis (pip install ".[analysis]") is used as it is: nothing is built then.
 # CUDA kernels are built when a device is there, or with AMBILUX_CUDA=ON.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
+has_all='import sys, importlib.util as u
+sys.exit(not all(map(u.find_spec, ("ambilux", "analysis", "scipy", "matplotlib", "OpenEXR", "PIL"))))'
 installed=$(cd / && command -v python3 || true)
-if [[ -n $installed ]] && (cd / && "$installed" -c 'import ambilux, analysis, scipy, matplotlib, OpenEXR, PIL') 2>/dev/null; then
+if [[ -n $installed ]] && (cd / && "$installed" -c "$has_all") 2>/dev/null; then
   say "demo: with the installed package ambilux"
   python=$installed
   program=("$python" -m ambilux.cli)
 else
-  scripts/setup.sh
+  scripts/setup.sh demo
   # A folder of its own: that of scripts/test.sh may hold kernels.
   build="${AMBILUX_BUILD_DIR:-$root/build-demo}"
   AMBILUX_CMAKE_ARGS="-DAMBILUX_CUDA=$(cuda_where_it_runs) -DAMBILUX_PYTHON=OFF -DAMBILUX_TESTS=OFF ${AMBILUX_CMAKE_ARGS:-}"
@@ -20,5 +22,7 @@ fi
 start=$SECONDS
 "${program[@]}" experiment experiments/demo.toml -o out/demo --resume
 say "demo: the experiment took $((SECONDS - start)) s"
+made=$SECONDS
 "$python" -m analysis out/demo -o out/demo
+say "demo: the report took $((SECONDS - made)) s"
 echo "report: $root/out/demo/report.html"

@@ -1,18 +1,34 @@
 #!/usr/bin/env bash
 # Installs what building, testing and the analysis need and is not there yet: Debian 12 or Ubuntu 24.04 packages, and
 # a Python environment in .venv. Prints nothing when all is there. Safe to run again.
-# --fuzz: also what scripts/fuzz.sh needs.
+#   scripts/setup.sh         everything
+#   scripts/setup.sh demo    what scripts/demo.sh needs: no tools of tests, of formats and of the Python module
+#   scripts/setup.sh fuzz    everything, and what scripts/fuzz.sh needs
 # Exit code 4: something is missing and could not be installed; the message says what, and which command installs it.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 
+whole=1 fuzz=
+case $* in
+  "") ;;
+  demo) whole= ;;
+  fuzz) fuzz=1 ;;
+  *) say "usage: scripts/setup.sh [demo|fuzz]"; exit 2 ;;
+esac
+
 # Tools count as present when the command is, wherever it came from; libraries when the package is.
-declare -A tools=([g++]=g++ [cmake]=cmake [ninja]=ninja-build [ccache]=ccache [git]=git)
+declare -A tools=([g++]=g++ [cmake]=cmake [ninja]=ninja-build [git]=git)
 libraries=(
   libembree-dev libtbb-dev libopenexr-dev libimath-dev libpng-dev libjpeg-dev libpugixml-dev libtinygltf-dev zlib1g-dev libboost-dev libssl-dev
-  catch2 libcli11-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libtomlplusplus-dev
+  libcli11-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libtomlplusplus-dev libcpp-httplib-dev
 )
+requirements=(requirements.txt)
+if [[ $whole ]]; then
+  tools[ccache]=ccache
+  libraries+=(catch2)
+  requirements+=(requirements-tests.txt)
+fi
 
-if [[ ${1:-} == --fuzz ]]; then
+if [[ $fuzz ]]; then
   tools[clang++-19]=clang-19
   libraries+=(libclang-rt-19-dev)
 fi
@@ -24,7 +40,8 @@ done
 # ensurepip is what Debian leaves out of python3 and ships in python3-venv.
 python3 -c 'import venv, ensurepip' 2>/dev/null || missing+=(python3-venv)
 # Headers, for the Python module.
-python3 -c 'import os, sys, sysconfig; sys.exit(not os.path.exists(sysconfig.get_path("include") + "/Python.h"))' ||
+[[ -z $whole ]] ||
+  python3 -c 'import os, sys, sysconfig; sys.exit(not os.path.exists(sysconfig.get_path("include") + "/Python.h"))' ||
   missing+=(python3-dev)
 
 if command -v dpkg-query >/dev/null; then
@@ -42,18 +59,19 @@ give_up() {
   exit 4
 }
 
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+as_root=()
+apt_get() { "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q "$@" >>"$log" 2>&1 </dev/null; }
+
 if ((${#missing[@]})); then
   command -v apt-get >/dev/null || give_up "apt-get not found"
-  as_root=()
   if ((EUID != 0)); then
     command -v sudo >/dev/null || give_up "not root, and sudo not found"
     as_root=(sudo)
     [[ -t 0 ]] || as_root=(sudo -n)  # nobody there to type a password
   fi
   say "setup: installing ${missing[*]}"
-  log=$(mktemp)
-  trap 'rm -f "$log"' EXIT
-  apt_get() { "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q "$@" >>"$log" 2>&1 </dev/null; }
   # A list that cannot be refreshed may still serve.
   apt_get update || say "setup: apt-get update failed; trying with the package lists that are there"
   if ! apt_get install -y --no-install-recommends "${missing[@]}"; then
@@ -62,18 +80,29 @@ if ((${#missing[@]})); then
   fi
 fi
 
-# The Python environment is made anew when requirements.txt or the interpreter changed.
+# Browser tests skip without a Chromium. Ubuntu's package is a snap, which needs more than apt.
+if [[ $whole ]] && grep -qs '^ID=debian' /etc/os-release &&
+  ! command -v chromium >/dev/null && ! command -v google-chrome >/dev/null; then
+  ((EUID == 0)) || as_root=(sudo -n)
+  say "setup: installing chromium for browser tests"
+  # Fonts: a page without any draws no text.
+  { ((${#missing[@]})) || apt_get update || true; } && apt_get install -y --no-install-recommends chromium fonts-dejavu-core ||
+    say "setup: chromium could not be installed; browser tests are skipped"
+fi
+
+# The Python environment is made anew when the requirements or the interpreter changed; the larger one serves the demo too.
 stamp="$root/.venv/.made-from"
-wanted="$(python3 --version) $(sha256sum <requirements.txt)"
-if [[ ! -x $python || $(cat "$stamp" 2>/dev/null) != "$wanted" ]]; then
+made_from() { echo "$(python3 --version) $(cat "$@" | sha256sum)"; }
+made=$(cat "$stamp" 2>/dev/null || true)
+if [[ ! -x $python || ($made != "$(made_from requirements.txt requirements-tests.txt)" && $made != "$(made_from "${requirements[@]}")") ]]; then
   say "setup: making the Python environment in .venv"
   rm -rf "$root/.venv"
   python3 -m venv "$root/.venv"
-  if ! "$python" -m pip install --quiet --disable-pip-version-check -r requirements.txt; then
-    say "setup: pip could not install the packages of requirements.txt into .venv"
+  if ! "$python" -m pip install --quiet --disable-pip-version-check "${requirements[@]/#/-r}"; then
+    say "setup: pip could not install the packages of ${requirements[*]} into .venv"
     exit 4
   fi
-  echo "$wanted" >"$stamp"
+  made_from "${requirements[@]}" >"$stamp"
 fi
 
 # The same places in which CMake looks (cmake/dependencies.cmake). CUDA is optional, and the run must not depend on a message.

@@ -8,7 +8,7 @@ scripts/setup.sh
 # shellcheck disable=SC2119  # the arguments are for ctest
 configure_and_build
 
-[[ -n ${AMBILUX_DATA:-} ]] || say "AMBILUX_DATA is not set: tests on the downloaded scenes are skipped (see README.md)"
+[[ -n ${AMBILUX_DATA:-} ]] || say "AMBILUX_DATA is not set: tests on the downloaded scenes are skipped (see docs/building.md)"
 results="$build/test-results"
 rm -rf "$results"
 mkdir -p "$results"

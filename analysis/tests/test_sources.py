@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 # A folder includes those above it, and none below or beside it (docs/architecture.md, "Who may include whom").
 ORDER = [
     ["core"], ["models"], ["scene"], ["transport"], ["accel"], ["formats"], ["items", "queues", "film"], ["stages"],
-    ["integrators"], ["backends"], ["render"], ["experiments"], ["cli"], ["python"],
+    ["integrators"], ["backends"], ["render"], ["experiments"], ["view"], ["cli"], ["python"],
 ]
 RANK = {folder: rank for rank, folders in enumerate(ORDER) for folder in folders}
 # (file, included file): why it is right all the same. docs/architecture.md lists them too.

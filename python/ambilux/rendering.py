@@ -55,7 +55,8 @@ def render(scene: Scene | str | os.PathLike[str], integrator: str = "path", vari
            settings: Mapping[str, Any] | None = None) -> Image:
     """Renders `spp` samples per pixel, or for `time` seconds; with neither as many as the scene asks for.
 
-    `settings` are those of `ambilux help settings`. Other threads run meanwhile. An interrupt (KeyboardInterrupt) ends it after the sample per pixel in work.
+    `settings` are those of `ambilux help settings`. Other threads run meanwhile. An interrupt (KeyboardInterrupt) ends it
+    after the sample per pixel in work.
 
     >>> image = ambilux.render(scene, "bdpt", spp=2, seed=1, settings={"strategies": ["hits", "next_event"]})
     >>> image.samples, image.stats["integrator"], image.variance.shape == image.shape
