@@ -7,7 +7,6 @@
 #include <cuda_runtime.h>
 
 #include <optional>
-#include <stdexcept>
 #include <type_traits>
 
 #include "backends/cuda/device_memory.h"
@@ -155,18 +154,13 @@ private:
             kernel<<<blocks(kernel, kTraceBlock), kTraceBlock, 0, stream()>>>(stage, tracer, items);
         });
     }
-    /// f(FeatureSet, tracer) with the set that tracing needs. Kernels are made only for sets that the stage's own
-    /// features cover.
+    /// f(FeatureSet, tracer) with the set that tracing needs.
     template <class Stage, class Function>
     void with_tracer(const Stage& stage, Function f) const {
-        with_traversal_features(traced_, [&](auto set) {
-            if constexpr (Stage::kFeatures.covers(decltype(set)::value)) {
-                if constexpr (kPairs)
-                    if (pairs_) return f(set, *pairs_);
-                f(set, stage.tracer);
-            } else {
-                throw std::logic_error("no kernel traces rays of this scene: its level of features is too small");
-            }
+        with_traversal_features<Stage::kFeatures>(traced_, [&](auto set) {
+            if constexpr (kPairs)
+                if (pairs_) return f(set, *pairs_);
+            f(set, stage.tracer);
         });
     }
 
