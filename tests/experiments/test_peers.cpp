@@ -31,7 +31,7 @@ std::string own_run(const std::string& name, const std::string& depth = "{depth}
 }
 
 std::string config_of(const std::string& runs, const std::string& budget = "spp = [16, 48]") {
-    return "seeds = [1]\nbackend = \"cpu\"\nfilter = \"box\"\nagreement_spp = 256\n[reference]\nspp = 512\n[budget]\n" +
+    return "repeats = 0\nseeds = [1]\nbackend = \"cpu\"\nfilter = \"box\"\nagreement_spp = 256\n[reference]\nspp = 512\n[budget]\n" +
            budget + "\n[[scene]]\nname = \"box\"\npath = \"" + AMBILUX_SOURCE_DIR +
            "/scenes/cornell.xml\"\nsize = [16, 16]\nmax_depth = 3\n[[run]]\nname = \"path\"\nintegrator = \"path\"\n" +
            runs;
