@@ -68,19 +68,16 @@ private:
         return ExitCode::interrupted;
     }
 
-    /// Makes disturbed renders again, when all others are done: whoever held the machine may have left it. False if
-    /// interrupted.
+    /// Makes disturbed renders again, when all others are done: whoever held the machine may have left it.
     bool repeat_disturbed() {
         for (;;) {
             const std::vector<Disturbed> found = find_disturbed(folder_, prepared_);
             folder_.describe_disturbed(to_json(found, config_));
-            bool repeated = false;
-            for (const Disturbed& d : found) {
-                if (d.attempts.size() > config_.repeats) continue;
-                if (!repeat(d)) return false;
-                repeated = true;
-            }
-            if (!repeated) return true;
+            const auto next = std::min_element(found.begin(), found.end(), [](const Disturbed& a, const Disturbed& b) {
+                return a.attempts.size() < b.attempts.size();
+            });
+            if (next == found.end() || next->attempts.size() > config_.repeats) return true;
+            if (!repeat(*next)) return false;
         }
     }
 
@@ -92,8 +89,7 @@ private:
         // The state comes first: a process that is killed now goes on with it.
         make_folders(folder_.file("state", task.scene, ""));
         write_state(task.state_path, task.state);
-        folder_.runs().remove(task.prefix);
-        folder_.batches().remove(task.prefix);
+        forget(task);
         work_.plan(task.work, 1, work_after(task.scene, {}));
         return render(d.scene, run, d.seed);
     }
@@ -178,8 +174,23 @@ private:
         return make_task(index, prepared_.scenes[index], run, seed, folder_);
     }
 
-    /// One render through all of its checkpoints; false if interrupted.
+    /// One render through all of its checkpoints; false if interrupted. A peer that fails is left out and said.
     bool render(size_t index, const RunEntry& run, uint64_t seed) {
+        try {
+            return try_render(index, run, seed);
+        } catch (const PeerRefusal& e) {
+            const RenderTask task = task_of(index, run, seed);
+            peers_.lose(task.scene, run, seed, e.what());
+            forget(task);
+            work_.end(task.work);
+            std::error_code ignored;
+            fs::remove(task.state_path, ignored);
+            fs::remove(folder_.file("stats", task.scene, task.name + ".json"), ignored);
+            return true;
+        }
+    }
+
+    bool try_render(size_t index, const RunEntry& run, uint64_t seed) {
         if (!run.renderer.empty() && !peers_.agrees(prepared_.scenes[index], run)) {
             work_.skip(work_kind(prepared_.scenes[index], &run));
             return true;
@@ -212,9 +223,16 @@ private:
             folder_.runs().add(task.state.notes["rows"].get<std::vector<std::string>>());
         }
         folder_.batches().add(task.state.notes["batches"].get<std::vector<std::string>>());
+        if (!run.renderer.empty()) peers_.found_again(task.scene, run, seed);
         std::error_code ignored;
         fs::remove(task.state_path, ignored);
         return true;
+    }
+
+    /// Rows of a render that begins anew.
+    void forget(const RenderTask& task) {
+        folder_.runs().remove(task.prefix);
+        folder_.batches().remove(task.prefix);
     }
 
     /// What an earlier part saved.
@@ -230,10 +248,7 @@ private:
         }
         if (task.run.techniques) write_state(task.state_path, state);
         // Rows whose state is lost are made anew.
-        if (state.notes["rows"].empty()) {
-            folder_.runs().remove(task.prefix);
-            folder_.batches().remove(task.prefix);
-        }
+        if (state.notes["rows"].empty()) forget(task);
         const auto& done = state.notes["done"];
         for (size_t k = 0; k < checkpoints_.size(); ++k)
             if (std::find(done.begin(), done.end(), k) == done.end()) task.pending.push_back(k);
@@ -340,8 +355,7 @@ private:
         return r;
     }
 
-    /// The image at the last checkpoint of the list: where there are checkpoints in seconds, all images have had the
-    /// same time.
+    /// At the last checkpoint of the list: where there are some in seconds, all images have had the same time.
     void write_images(const RenderTask& task) {
         const Image image = mean_image(task.state.moments);
         write_exr(folder_.file("images", task.scene, task.name + ".exr"), image,
