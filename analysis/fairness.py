@@ -43,7 +43,9 @@ def repeat_remarks(experiment):
                + listed([f"{place} ({why})" for place, why in again], 3))
     left = [f"{d['scene']} {d['run']} seed {d['seed']} ({d['why']})" for d in experiment.manifest.get("disturbed") or []]
     if left:
-        yield f"{len(left)} render{'s' if len(left) > 1 else ''} stayed disturbed, whose times are not to be trusted: {listed(left)}"
+        again = experiment.manifest.get("repeats")
+        tried = f", also when made again up to {again} time{'s' if again > 1 else ''}" if again else " and not made again (repeats = 0)"
+        yield f"{len(left)} render{'s were' if len(left) > 1 else ' was'} disturbed{tried}; do not trust their times: {listed(left)}"
 
 
 def slowdown_remarks(experiment):

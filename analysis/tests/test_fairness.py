@@ -47,5 +47,5 @@ def test_what_was_made_again_and_what_stayed_disturbed_is_said(tmp_path):
     (folder / "manifest.json").write_text(json.dumps(manifest))
     again, left, held = fairness.remarks(experiment.load(folder))
     assert again.startswith("1 render was disturbed and made again") and again.endswith("box nee seed 2 (other processes held 40 % of the cores)")
-    assert left.startswith("1 render stayed disturbed") and "1.40 times" in left
+    assert left.startswith("1 render was disturbed and not made again") and "1.40 times" in left
     assert held == "clocks of the device were held down (thermal) during box nee seed 2"
