@@ -78,8 +78,11 @@ def draw(experiment, scene, reference, shown, insets):
     points = 7.5 if unit > 0.9 else 6.5
     headings = [style.fit(run, unit, points) for run, _, _ in shown]
     title = 0.08 + 0.12 * (max(h.count("\n") for h in headings) + 1)
+    name = style.fit(f"{scene}, reference", big_width, 8.5)
+    big_title = 0.08 + 0.14 * (name.count("\n") + 1)
+    title = title if below else max(title, big_title)
     block = title + rows * unit + 0.02 + map_height + numbers
-    head = 0.22 + rows * unit + 0.1 if below else 0.0
+    head = big_title + rows * unit + 0.1 if below else 0.0
     total = head + block * (-(-len(shown) // across)) if below else block + (0.25 if map_height < 0.25 else 0)
     with plt.rc_context(style.STYLE):
         figure = plt.figure(figsize=(style.PAGE, total))
@@ -95,10 +98,10 @@ def draw(experiment, scene, reference, shown, insets):
                 if row == 0:
                     axes.set_title(heading, pad=3, fontsize=points)
 
-        top = 0.22 if below else title
+        top = big_title if below else title
         big = place(0, top, big_width, rows * unit)
         big.imshow(images.tone_map(reference, factor), interpolation="nearest")
-        big.set_title(style.fit(f"{scene}, reference", big_width, 8.5), pad=3)
+        big.set_title(name, pad=3)
         bare(big)
         for (x, y, size), colour in zip(insets, INSET_COLOURS):
             big.add_patch(Rectangle((x - 0.5, y - 0.5), size, size, fill=False, lw=1.2, ec=colour))

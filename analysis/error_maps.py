@@ -28,7 +28,7 @@ def draw(scene, reference, columns):
     cell = min(2.2, (style.PAGE - 0.1) / across)
     lines = max(style.fit(run, cell, 8.5).count("\n") + 1 for run, *_ in columns)
     with plt.rc_context(style.STYLE):
-        figure, grid = plt.subplots(2 * blocks, across, figsize=(max(cell * across, style.COLUMN), blocks * (2 * cell * height / width + 0.12 + 0.13 * lines) + 1.0), squeeze=False,
+        figure, grid = plt.subplots(2 * blocks, across, figsize=(max(cell * across, style.COLUMN), blocks * (2 * cell * height / width + 0.25 + 0.15 * lines) + 1.1), squeeze=False,
                                     layout="constrained")
         for axes in grid.flat:
             axes.set_axis_off()

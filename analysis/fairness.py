@@ -29,6 +29,37 @@ def clocks_of(parts):
     return sum(found) / len(found) if found else None
 
 
+def attempts(experiment, scene, run):
+    """{seed: [earlier renders that were disturbed, as the runner recorded them]}."""
+    return {seed: found for seed, path in experiment.files("stats", scene, run, ".json") if (found := experiments.read_json(path).get("attempts"))}
+
+
+def repeat_remarks(experiment):
+    """Renders that were made again, and those whose last attempt was disturbed too."""
+    again = [(f"{scene} {run} seed {seed}", found[-1].get("why", "no reason given")) for scene in experiment.scenes for run in experiment.runs
+             for seed, found in attempts(experiment, scene, run).items()]
+    if again:
+        yield (f"{len(again)} render{'s were' if len(again) > 1 else ' was'} disturbed and made again, the last one counts: "
+               + listed([f"{place} ({why})" for place, why in again], 3))
+    left = [f"{d['scene']} {d['run']} seed {d['seed']} ({d['why']})" for d in experiment.manifest.get("disturbed") or []]
+    if left:
+        again = experiment.manifest.get("repeats")
+        tried = f", also when made again up to {again} time{'s' if again > 1 else ''}" if again else " and not made again (repeats = 0)"
+        yield f"{len(left)} render{'s were' if len(left) > 1 else ' was'} disturbed{tried}; do not trust their times: {listed(left)}"
+
+
+def slowdown_remarks(experiment):
+    """Devices whose clocks were held down during a render."""
+    found = {}
+    for scene in experiment.scenes:
+        for run in experiment.runs:
+            for seed, parts in machines(experiment, scene, run).items():
+                for name in sorted({n for p in parts for n in (p.get("gpu") or {}).get("slowdowns") or ()}):
+                    found.setdefault(name, []).append(f"{scene} {run} seed {seed}")
+    for name, places in found.items():
+        yield f"clocks of the device were held down ({name}) during {listed(places)}"
+
+
 def listed(places, most=5):
     return ", ".join(places[:most]) + (f" and {len(places) - most} more" if len(places) > most else "")
 
@@ -49,10 +80,13 @@ def remarks(experiment):
                     busy.append((share, f"{scene} {run} seed {seed} ({100 * share:.0f} %)"))
                 if (mhz := clocks_of(parts)) is not None:
                     clocks[f"{scene} {run} seed {seed}"] = mhz
-    if busy:
+    yield from repeat_remarks(experiment)
+    yield from slowdown_remarks(experiment)
+    told = bool(experiment.manifest.get("disturbed"))  # by the runner, with the reasons
+    if busy and not told:
         yield (f"other processes held more than {100 * BUSY:.0f} % of the cores during {len(busy)} renders, whose times are not to be trusted: "
                + listed([place for _, place in sorted(busy, reverse=True)]))
-    if spread:
+    if spread and not told:
         yield f"time per sample differs between seeds by more than a factor of {SPREAD:g}; repeat these runs on a quiet machine: {listed(spread)}"
     if clocks and max(clocks.values()) > SLOW * min(clocks.values()):
         low, high = min(clocks, key=clocks.get), max(clocks, key=clocks.get)

@@ -64,7 +64,7 @@ def draw(scene, shape, columns):
     cell = min(2.2, (style.PAGE - 0.6) / across)
     lines = max(style.fit(run, cell, 8.5).count("\n") + 2 for run, *_ in columns)
     with plt.rc_context(style.STYLE):
-        figure, grid = plt.subplots(rows, across, figsize=(cell * across + 0.6, rows * (cell * height / width + 0.08 + 0.13 * lines)), squeeze=False, layout="constrained")
+        figure, grid = plt.subplots(rows, across, figsize=(cell * across + 0.6, rows * (cell * height / width + 0.16 + 0.15 * lines)), squeeze=False, layout="constrained")
         for axes in grid.flat:
             axes.set_axis_off()
         for axes, (run, values, mean) in zip(grid.flat, columns):

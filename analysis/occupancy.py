@@ -51,6 +51,15 @@ def recorded(experiment, scene):
     return out
 
 
+def queue_labels(runs):
+    return [style.wrap(run, 30) for run in runs]
+
+
+def shown_stages(of_depth):
+    """Those with lines of their own: hits of the rays beside them are left out."""
+    return {name: share for name, share in of_depth.items() if np.any(share > 0) and not (name.endswith("shade") and name.replace("shade", "extend") in of_depth)}
+
+
 def draw_queues(axes, found):
     """Peaks over capacities as shaded cells, a row per run and a column per queue."""
     queues = list(dict.fromkeys(q for _, of_run in found.values() for q in of_run))
@@ -61,7 +70,7 @@ def draw_queues(axes, found):
             if np.isfinite(value):
                 axes.text(j, i, f"{100 * value:.0f}", ha="center", va="center", fontsize=6, color="white" if value < 0.5 else "black")
     axes.set_xticks(range(len(queues)), queues, rotation=90)
-    axes.set_yticks(range(len(found)), [style.wrap(run, 24) for run in found], fontsize=6)
+    axes.set_yticks(range(len(found)), queue_labels(found), fontsize=6)
     axes.set_title("peak of each queue, % of its capacity")
 
 
@@ -70,12 +79,12 @@ def draw(experiment, scene):
     found = recorded(experiment, scene)
     if not found:
         raise style.NotMade(f"{scene}: no items_by_depth and no queues in stats/{scene}/RUN_SEED.json")
-    shown = [run for run, (of_depth, _) in found.items() if of_depth]
+    shown = [run for run, (of_depth, _) in found.items() if shown_stages(of_depth)]
     with_queues = {run: pair for run, pair in found.items() if pair[1]}
     across = style.balanced(len(shown), ACROSS) if shown else 1
     rows = -(-len(shown) // across)
     with plt.rc_context(style.STYLE):
-        queues_height = 0.2 * len(with_queues) + 1.3 if with_queues else 0.0
+        queues_height = style.row_height(queue_labels(with_queues), 0.2)[0] * len(with_queues) + 1.3 if with_queues else 0.0
         figure = plt.figure(figsize=(style.PAGE, 1.55 * rows + queues_height + 0.3), layout="constrained")
         parts = figure.subfigures(2, 1, height_ratios=(1.55 * rows + 0.3, queues_height)) if shown and with_queues else [figure, figure]
         if shown:
@@ -83,9 +92,7 @@ def draw(experiment, scene):
             for axes in grid.flat[len(shown):]:
                 axes.set_axis_off()
             for i, (axes, run) in enumerate(zip(grid.flat, shown)):
-                for stage, share in found[run][0].items():
-                    if stage.endswith("shade") and stage.replace("shade", "extend") in found[run][0]:
-                        continue  # hits of the rays beside it
+                for stage, share in shown_stages(found[run][0]).items():
                     colour = stage_times.looks(stage)["color"]
                     depths = [d for d, value in enumerate(share) if value > 0]
                     axes.plot(depths, share[depths], color=colour, ls="--" if stage.startswith("light") else "-", marker="o", ms=2.5, lw=1, label=stage)
@@ -97,6 +104,7 @@ def draw(experiment, scene):
                     axes.set_ylabel("alive")
                 if i + across >= len(shown):
                     axes.set_xlabel("depth")
+                    axes.tick_params(labelbottom=True)
             entries = {}
             for axes in grid.flat:
                 entries |= dict(zip(*reversed(axes.get_legend_handles_labels())))

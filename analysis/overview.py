@@ -8,6 +8,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLo
 from analysis import ablation, convergence, efficiency, style, summary
 
 SIZE = (10.0, 5.63)  # inches: 16 to 9
+ROWS_HEIGHT = 4.2  # inches of all rows of ratios
 MOST_SCENES = 2  # with a panel of their own
 LARGER = {"font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10, "legend.fontsize": 9, "xtick.labelsize": 9, "ytick.labelsize": 9}
 
@@ -34,7 +35,9 @@ def draw_ratios(axes, experiment, lines):
     axes.xaxis.set_major_formatter(FuncFormatter(style.plain_number))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_yticks(range(len(shown)), [style.wrap(run, 26) for run in shown], fontsize=9 if len(shown) <= 8 else 7)
+    names = [style.wrap(run, 30) for run in shown]
+    row = 72 * ROWS_HEIGHT / max(1, len(shown))  # points
+    axes.set_yticks(range(len(shown)), names, fontsize=min(9, row / (1.3 * max((n.count("\n") + 1 for n in names), default=1))))
     axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.grid(True, axis="x", color="0.92", lw=0.6)
     axes.set_title(f"1 / ({efficiency.NAMES[experiment.metric]} · time) over that of {experiment.base}", loc="left")

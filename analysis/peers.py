@@ -36,6 +36,14 @@ def difference(entry):
     return ", ".join(p for p in parts if p)
 
 
+def lost(entry):
+    """{reason: seeds} of renders that ended before their time."""
+    out = {}
+    for item in entry.get("lost") or ():
+        out.setdefault(item.get("reason") or "no reason given", []).append(item.get("seed"))
+    return out
+
+
 def remarks(experiment):
     """Who was not timed and why; what the others render differently."""
     absent = {}
@@ -46,6 +54,9 @@ def remarks(experiment):
             absent.setdefault((e["run"], STATES[e["state"]], e.get("reason") or "no reason given"), []).append(e["scene"])
     for (run, state, reason), scenes in absent.items():
         yield f"{run}: {state} on {', '.join(scenes)} ({reason})"
+    for e in entries(experiment):
+        for reason, seeds in lost(e).items():
+            yield f"{e['scene']}, {e['run']}: seed{'s' if len(seeds) > 1 else ''} {', '.join(map(str, seeds))} left out ({reason})"
     told = {}
     for e in entries(experiment):
         for text in e.get("differences") or () if e["state"] in TIMED else ():

@@ -1,11 +1,16 @@
 """Sentences that a reader must know before believing the figures: gaps, dropped values, bias, references that are too noisy, pixels that decide, clocks."""
 
 import math
+import re
 
 from analysis import fairness, peers, summary, verdicts
 
 FEW_PIXELS = 2.0  # relMSE over relMSE without the worst pixels, from which on these hold more than half of it
 SLOW_CLOCK = 1.1  # ratio of clocks at start and end of an experiment that is told
+
+
+def listed(places, most=6):
+    return ", ".join(places[:most]) + (f" and {len(places) - most} more" if len(places) > most else "")
 
 
 def trimmed_share(experiment):
@@ -56,10 +61,13 @@ def doubt_remarks(lines):
     reasons = {}
     for line in lines:
         if line.efficiency is not None and line.efficiency.doubt:
-            reasons.setdefault(line.efficiency.doubt, []).append(f"{line.scene} {line.run}")
-    for doubt, places in reasons.items():
-        more = f" and {len(places) - 6} more" if len(places) > 6 else ""
-        yield f"no interval is stated for {', '.join(places[:6])}{more}: {doubt}"
+            found = reasons.setdefault(re.sub(r"^\d+ ", "", line.efficiency.doubt), {})
+            found.setdefault(line.efficiency.doubt, []).append(f"{line.scene} {line.run}")
+    for kind, found in reasons.items():
+        places = [place for doubt in found for place in found[doubt]]
+        counts = sorted(int(doubt.split()[0]) for doubt in found if doubt != kind)
+        said = kind if not counts else f"{counts[0]} {kind}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]} {kind}"
+        yield f"no interval is stated for {listed(places, 6)}: {said}"
 
 
 def clock_readings(experiment):
@@ -106,7 +114,7 @@ def remarks(experiment, lines):
             have = {(r.seed, r.checkpoint) for r in experiment.select(scene, run)}
             if len(have) < len(every) and (have or not peers.is_left_out(experiment, scene, run)):
                 found.append(f"{scene}, {run}: {len(have)} of {len(every)} checkpoints recorded; figures and table use what is there")
-    threshold = verdicts.bias_threshold(verdicts.family(lines))
+    threshold, quiet = verdicts.bias_threshold(verdicts.family(lines)), {}
     for line in lines:
         place = f"{line.scene}, {line.run}"
         noise = summary.reference_noise(experiment, line.scene)
@@ -124,5 +132,7 @@ def remarks(experiment, lines):
             found.append(f"{place}: the error falls with slope {line.slope.value:.3f} ± {line.slope.error:.3f} of samples, which is not the −1/2 of independent "
                          "samples without bias: look for bias, rare bright samples, or samples that are not independent")
         if not line.rmse.value >= noise and not math.isnan(noise):
-            found.append(f"{place}: the error is below the noise of the reference ({noise:.2g}) and so uncertain; a longer reference helps")
+            quiet.setdefault(line.scene, []).append(line.run)
+    for scene, runs in quiet.items():
+        found.append(f"{scene}: the error of {listed(runs)} is below the noise of the reference ({summary.reference_noise(experiment, scene):.2g}) and so uncertain; a longer reference helps")
     return found + list(method_remarks(experiment)) + list(same_remarks(lines)) + list(doubt_remarks(lines)) + list(trimmed_remarks(experiment, lines))

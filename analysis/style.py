@@ -65,23 +65,26 @@ def line_style(i):
     return {"color": colour(i), "marker": marker(i), "ls": DASHES[i // len(COLOURS) % len(DASHES)], "ms": 3, "lw": 1.2}
 
 
+def pieces(part, width):
+    """A part that is longer than a line: behind =, else behind _ or -, else anywhere."""
+    if len(part) <= width:
+        return [part]
+    at = part.rfind("=", 0, width) + 1 or max(part.rfind(c, 0, width) for c in "_-") + 1 or width
+    return [part[:at], *pieces(part[at:], width)]
+
+
 def wrap(text, width=18):
-    """Long names on several lines, for titles of narrow panels: a bracket on a line of its own, breaks behind + , = and spaces, elsewhere only where a part is longer than a line."""
+    """Long names on several lines, for titles of narrow panels: a bracket on a line of its own, breaks behind + , and spaces, elsewhere only where a part is longer than a line."""
     head, bracket, rest = text.partition("[")  # lvc[connections=4]
     if len(text) > width and head and bracket:
         return wrap(head, width) + "\n" + wrap(bracket + rest, width)
     lines = [""]
-    for part in re.findall(r"[^+,= ]+[+,=]*|[+,= ]+", text):
-        while part:
-            if len(lines[-1]) + len(part.rstrip()) <= width:
-                lines[-1] += part
-                break
-            if len(part) <= width or lines[-1].strip():
-                lines.append("")
-                part = part.lstrip()
-            if len(part) > width and not lines[-1]:
-                at = part.rfind("_", 0, width) + 1 or width
-                lines[-1], part = part[:at], part[at:]
+    for part in re.findall(r"[^+, ]+[+,]*|[+, ]+", text):
+        for piece in pieces(part, width):
+            if len(lines[-1]) + len(piece.rstrip()) <= width:
+                lines[-1] += piece
+            else:
+                lines.append(piece.lstrip())
     return "\n".join(line.strip() for line in lines if line.strip()) or text
 
 

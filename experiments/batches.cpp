@@ -24,6 +24,17 @@ Budget batch_end(const ExperimentConfig& config, const RenderPosition& at, const
     return budget;
 }
 
+Budget next_budget(const ExperimentConfig& config, const std::vector<size_t>& pending, const RenderPosition& at) {
+    const std::vector<Checkpoint> checkpoints = config.checkpoints();
+    Budget budget;
+    for (const size_t k : pending) {
+        const Checkpoint& c = checkpoints[k];
+        if (c.samples) budget.samples = budget.samples ? std::min(budget.samples, c.samples) : c.samples;
+        if (c.seconds > 0) budget.seconds = budget.seconds > 0 ? std::min(budget.seconds, c.seconds) : c.seconds;
+    }
+    return batch_end(config, at, budget);
+}
+
 std::vector<std::pair<size_t, size_t>> render_order(size_t scenes, size_t runs, uint64_t seed, bool random) {
     std::vector<std::pair<size_t, size_t>> order;
     for (size_t i = 0; i < scenes; ++i)

@@ -19,6 +19,9 @@ constexpr int kBatches = 16;
 /// `checkpoint`, or the end of the batch after `at` if that comes sooner by half a batch or more.
 Budget batch_end(const ExperimentConfig& config, const RenderPosition& at, const Budget& checkpoint);
 
+/// The budget until the first of the pending checkpoints, or the end of a batch (batch_end).
+Budget next_budget(const ExperimentConfig& config, const std::vector<size_t>& pending, const RenderPosition& at);
+
 /// Places in lists of `scenes` and `runs`: all pairs, as listed, or in an order that the seed decides.
 std::vector<std::pair<size_t, size_t>> render_order(size_t scenes, size_t runs, uint64_t seed, bool random);
 

@@ -260,8 +260,8 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     const toml::table root = parse_toml(path);
     const Reader r{path};
     r.check_keys(root, "the configuration",
-                 {"name", "metric", "order", "backend", "filter", "agreement_spp", "seeds", "reference", "budget",
-                  "scene", "run", "ablation", "reduced"});
+                 {"name", "metric", "order", "repeats", "backend", "filter", "agreement_spp", "seeds", "reference",
+                  "budget", "scene", "run", "ablation", "reduced"});
     const auto need = [&](std::string_view key) -> const toml::node& {
         if (const toml::node* node = root.get(key)) return *node;
         throw input_error(path, 0, fmt::format("lacks the key '{}'", key));
@@ -282,6 +282,8 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
             throw r.error(*order, fmt::format("order '{}': must be random or listed", text));
         config.random_order = text == "random";
     }
+    if (const toml::node* repeats = root.get("repeats"))
+        config.repeats = uint64_t(r.integer(*repeats, "repeats", 0, 100));
     if (const toml::node* spp = root.get("agreement_spp")) config.agreement_spp = read_agreement_spp(r, *spp);
     read_seeds(r, need("seeds"), config);
     const toml::table& reference = r.table(need("reference"), "reference");

@@ -63,6 +63,7 @@ struct ExperimentConfig {
     std::vector<double> seconds;   ///< checkpoints in seconds of render time, rising. One of both is set, or both
     std::string ablation_default;  ///< run that an ablation compares with; empty: no ablation
     bool random_order = true;  ///< of runs and scenes within a seed, so that a machine that changes treats all alike
+    uint64_t repeats = 1;  ///< times that a render is made again whose time others disturbed (experiments/disturbed.h)
     uint64_t agreement_spp = 1024;  ///< of a peer's image that is compared with the reference before it is timed
     std::string metric = "relmse";  ///< error that leads the report: "relmse" or "mse"
 

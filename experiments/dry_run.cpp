@@ -12,6 +12,7 @@
 #include "experiments/experiment_folder.h"
 #include "experiments/prepare.h"
 #include "experiments/reference_store.h"
+#include "experiments/render_task.h"
 #include "experiments/results.h"
 #include "experiments/work_estimate.h"
 
@@ -97,10 +98,6 @@ public:
     }
 
 private:
-    static std::string kind(const LoadedEntry& scene, const RunEntry* run) {
-        return scene.entry->name + "/" + (run ? run->name : "");
-    }
-
     void remember(uint64_t bytes, const std::string& what) {
         if (bytes <= memory_) return;
         memory_ = bytes;
@@ -119,7 +116,7 @@ private:
         const uint64_t wanted = scene.entry->reference.spp;
         std::string state = fmt::format("cached with {} spp", place.cached);
         if (place.cached < wanted) {
-            const std::string work = kind(scene, nullptr);
+            const std::string work = work_kind(scene, nullptr);
             const Pilot pilot = measure(scene.scene, place.settings, request_.interrupt, hooks_);
             remember(pilot.memory, "the reference of " + scene.entry->name);
             work_.measured(work, pilot.samples * pixels, pilot.seconds);
@@ -148,7 +145,7 @@ private:
         measure_render(scene, run);
         const double samples = config_.spp.empty() ? 0 : double(config_.spp.back()) * pixels,
                      seconds = config_.seconds.empty() ? 0 : config_.seconds.back();
-        const std::string work = kind(scene, &run);
+        const std::string work = work_kind(scene, &run);
         work_.plan(work, double(left), {samples, seconds});
         const double seconds_left = work_.seconds_left(work);
         render_seconds_ += seconds_left;
@@ -168,7 +165,7 @@ private:
             return;
         }
         const Pilot pilot = measure(scene.scene, settings, request_.interrupt, hooks_);
-        work_.measured(kind(scene, &run), pilot.samples * double(scene.pixels()), pilot.seconds);
+        work_.measured(work_kind(scene, &run), pilot.samples * double(scene.pixels()), pilot.seconds);
         remember(pilot.memory, what);
     }
 
@@ -184,6 +181,9 @@ private:
             text += fmt::format("  {} at {} spp\n", config_.spp.size(), fmt::join(config_.spp, ", "));
         if (!config_.seconds.empty())
             text += fmt::format("  {} at {} s\n", config_.seconds.size(), fmt::join(config_.seconds, ", "));
+        if (config_.repeats)
+            text += fmt::format("\na render that others disturb is made again, up to {} time{}\n", config_.repeats,
+                                config_.repeats > 1 ? "s" : "");
         if (!config_.ablation_default.empty())
             text += "\nablation: every run is compared with " + config_.ablation_default + "\n";
         return text;

@@ -140,6 +140,7 @@ void ExperimentFolder::write_manifest(bool finished) {
     manifest_["config"] = config_.file;
     manifest_["versions"] = describe_versions();
     manifest_["order"] = config_.random_order ? "random" : "listed";
+    manifest_["repeats"] = config_.repeats;
     manifest_["machine"] = describe_machine();
     manifest_["devices"] = prepared_.devices;
     manifest_["backends"] = prepared_.backends;

@@ -40,6 +40,8 @@ public:
     bool is_resumed() const { return !manifest_["resumed"].empty(); }
     /// What the manifest says of the reference of a scene.
     void describe_reference(size_t scene, const nlohmann::json& notes) { reference_notes_[scene] = notes; }
+    /// Renders whose times are not to be trusted though they were repeated.
+    void describe_disturbed(const nlohmann::json& list) { manifest_["disturbed"] = list; }
     void write_manifest(bool finished);
 
 private:

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "experiments/load.h"
 #include "formats/load.h"
 #include "render/renderer.h"
 
@@ -14,9 +15,10 @@ struct Hooks {
     std::function<Scene(const std::string& path, const LoadOptions&)> load_scene;
     std::function<std::unique_ptr<Renderer>(const Scene&, const RenderSettings&)> make_renderer;
     std::function<void(RenderSettings&, const std::string& key, const std::string& value)> apply_setting;
+    std::function<LoadReading()> load = read_load;  ///< of the machine
 };
 
-/// load_mitsuba, make_renderer and apply_setting.
+/// load_scene_file, make_renderer, apply_setting and read_load.
 Hooks default_hooks();
 
 }  // namespace ambilux

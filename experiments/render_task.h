@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "experiments/experiment_folder.h"
 #include "experiments/reference_store.h"
 #include "experiments/run_maker.h"
 #include "experiments/state.h"
@@ -37,5 +38,12 @@ struct RenderTask {
         return stats;
     }
 };
+
+/// Before its first sample. `scene` is the experiment's at `index`.
+RenderTask make_task(size_t index, const LoadedEntry& scene, const RunEntry& run, uint64_t seed,
+                     const ExperimentFolder& folder);
+
+/// What estimates of time put together: renders of one run, or with null the reference, of one scene.
+std::string work_kind(const LoadedEntry& scene, const RunEntry* run);
 
 }  // namespace ambilux

@@ -46,6 +46,7 @@ std::string resolved_toml(const ExperimentConfig& config) {
     root.insert("name", config.name);
     root.insert("metric", config.metric);
     root.insert("order", config.random_order ? "random" : "listed");
+    root.insert("repeats", int64_t(config.repeats));
     root.insert("backend", config.backend);
     const bool has_peers =
         std::any_of(config.runs.begin(), config.runs.end(), [](const RunEntry& run) { return !run.renderer.empty(); });

@@ -6,12 +6,15 @@
 #include <cmath>
 #include <filesystem>
 
+#include "backends/cuda_device.h"
 #include "core/atomic_file.h"
 #include "core/log.h"
 #include "core/progress.h"
 #include "experiments/batches.h"
+#include "experiments/disturbed.h"
 #include "experiments/drive.h"
 #include "experiments/experiment_folder.h"
+#include "experiments/gpu_watch.h"
 #include "experiments/load.h"
 #include "experiments/machine.h"
 #include "experiments/peers/peer_runs.h"
@@ -36,7 +39,7 @@ public:
         : request_(request), hooks_(hooks), prepared_(prepare_experiment(request.config, request.reduced, hooks)),
           config_(prepared_.config), checkpoints_(config_.checkpoints()),
           folder_(request.output, request.references, request.resume, prepared_), own_(config_, hooks_),
-          peers_(request, config_) {}
+          peers_(request, config_), nvml_(prepared_.backends.contains("cuda") ? cuda_device_bus_id() : "") {}
 
     ExitCode run() {
         folder_.add_clocks(folder_.is_resumed() ? "resumed" : "start");
@@ -51,6 +54,7 @@ public:
             for (const auto& [scene, run] :
                  render_order(prepared_.scenes.size(), config_.runs.size(), seed, config_.random_order))
                 if (!render(scene, config_.runs[run], seed)) return stopped();
+        if (!repeat_disturbed()) return stopped();
         folder_.remove_states();
         folder_.add_clocks("end");
         folder_.write_manifest(true);
@@ -64,9 +68,32 @@ private:
         return ExitCode::interrupted;
     }
 
-    static std::string kind(const LoadedEntry& scene, const RunEntry* run) {
-        return scene.entry->name + "/" + (run ? run->name : "");
+    /// Makes disturbed renders again, when all others are done: whoever held the machine may have left it.
+    bool repeat_disturbed() {
+        for (;;) {
+            const std::vector<Disturbed> found = find_disturbed(folder_, prepared_);
+            folder_.describe_disturbed(to_json(found, config_));
+            const auto next = std::min_element(found.begin(), found.end(), [](const Disturbed& a, const Disturbed& b) {
+                return a.attempts.size() < b.attempts.size();
+            });
+            if (next == found.end() || next->attempts.size() > config_.repeats) return true;
+            if (!repeat(*next)) return false;
+        }
     }
+
+    bool repeat(const Disturbed& d) {
+        const RunEntry& run = config_.runs[d.run];
+        RenderTask task = task_of(d.scene, run, d.seed);
+        log_info(fmt::format("{} {} is made again: {}", task.scene.entry->name, task.name, d.why));
+        task.state.notes["attempts"] = d.attempts;
+        // The state comes first: a process that is killed now goes on with it.
+        make_folders(folder_.file("state", task.scene, ""));
+        write_state(task.state_path, task.state);
+        forget(task);
+        work_.plan(task.work, 1, work_after(task.scene, {}));
+        return render(d.scene, run, d.seed);
+    }
+
     /// What is left of a render that stands at `p`.
     Work work_after(const LoadedEntry& scene, const RenderPosition& p) const {
         const double samples = config_.spp.empty() ? 0 : double(config_.spp.back()) - double(p.samples),
@@ -81,9 +108,9 @@ private:
             place = find_reference(folder_.references(), config_, *scene.entry, scene.scene, scene.max_depth, hooks_);
             const uint64_t wanted = scene.entry->reference.spp;
             if (place.cached < wanted)
-                work_.plan(kind(scene, nullptr), 1, {double(wanted - place.cached) * double(scene.pixels()), 0});
+                work_.plan(work_kind(scene, nullptr), 1, {double(wanted - place.cached) * double(scene.pixels()), 0});
             for (const RunEntry& run : config_.runs)
-                work_.plan(kind(scene, &run), double(config_.seeds.size()), work_after(scene, {}));
+                work_.plan(work_kind(scene, &run), double(config_.seeds.size()), work_after(scene, {}));
         }
     }
 
@@ -92,7 +119,7 @@ private:
     bool make_scene_reference(size_t index) {
         const LoadedEntry& scene = prepared_.scenes[index];
         SceneReference& made = references_made_[index];
-        const std::string work = kind(scene, nullptr);
+        const std::string work = work_kind(scene, nullptr);
         // Looked for again: another scene of this experiment may have been the same.
         made.place = find_reference(folder_.references(), config_, *scene.entry, scene.scene, scene.max_depth, hooks_);
         const ReferenceLock lock(made.place.path, request_.interrupt);
@@ -143,34 +170,32 @@ private:
 
     RunMaker& maker(const RunEntry& run) { return run.renderer.empty() ? static_cast<RunMaker&>(own_) : peers_; }
 
-    RenderTask make_task(size_t index, const RunEntry& run, uint64_t seed) const {
-        const LoadedEntry& scene = prepared_.scenes[index];
-        const std::string name = fmt::format("{}_{}", run.name, seed);
-        RenderTask task{index,
-                        scene,
-                        run,
-                        {},
-                        name,
-                        kind(scene, &run),
-                        result_prefix(scene.entry->name, run.name, seed),
-                        folder_.file("state", scene, name + ".state"),
-                        {},
-                        {},
-                        {}};
-        task.state.notes = {{"seconds", 0.0},
-                            {"done", nlohmann::json::array()},
-                            {"rows", nlohmann::json::array()},
-                            {"batches", nlohmann::json::array()}};
-        return task;
+    RenderTask task_of(size_t index, const RunEntry& run, uint64_t seed) const {
+        return make_task(index, prepared_.scenes[index], run, seed, folder_);
     }
 
-    /// One render through all of its checkpoints; false if interrupted.
+    /// One render through all of its checkpoints; false if interrupted. A peer that fails is left out and said.
     bool render(size_t index, const RunEntry& run, uint64_t seed) {
-        if (!run.renderer.empty() && !peers_.agrees(prepared_.scenes[index], run)) {
-            work_.skip(kind(prepared_.scenes[index], &run));
+        try {
+            return try_render(index, run, seed);
+        } catch (const PeerRefusal& e) {
+            const RenderTask task = task_of(index, run, seed);
+            peers_.lose(task.scene, run, seed, e.what());
+            forget(task);
+            work_.end(task.work);
+            std::error_code ignored;
+            fs::remove(task.state_path, ignored);
+            fs::remove(folder_.file("stats", task.scene, task.name + ".json"), ignored);
             return true;
         }
-        RenderTask task = make_task(index, run, seed);
+    }
+
+    bool try_render(size_t index, const RunEntry& run, uint64_t seed) {
+        if (!run.renderer.empty() && !peers_.agrees(prepared_.scenes[index], run)) {
+            work_.skip(work_kind(prepared_.scenes[index], &run));
+            return true;
+        }
+        RenderTask task = task_of(index, run, seed);
         if (folder_.runs().count(task.prefix) == checkpoints_.size() && !fs::exists(task.state_path)) {
             work_.skip(task.work);
             return true;
@@ -179,9 +204,11 @@ private:
         task.settings = settings_for(config_, task.scene, run, seed, hooks_);
         const std::unique_ptr<Renderer> renderer = maker(run).make(task.what(), task.total);
         const bool cuda = prepared_.backends.contains("cuda");
-        const LoadReading load = read_load();
+        gpu_ = {};
+        const LoadReading load = hooks_.load();
         const bool whole = pass_checkpoints(task, *renderer);
-        nlohmann::json machine = load_json(load, read_load());
+        nlohmann::json machine = load_json(load, hooks_.load());
+        machine["gpu"] = gpu_.json();
         machine["clocks"] = describe_clocks("after", cuda);
         task.state.notes["machine"].push_back(machine);
         if (!whole) {
@@ -196,29 +223,32 @@ private:
             folder_.runs().add(task.state.notes["rows"].get<std::vector<std::string>>());
         }
         folder_.batches().add(task.state.notes["batches"].get<std::vector<std::string>>());
+        if (!run.renderer.empty()) peers_.found_again(task.scene, run, seed);
         std::error_code ignored;
         fs::remove(task.state_path, ignored);
         return true;
     }
 
+    /// Rows of a render that begins anew.
+    void forget(const RenderTask& task) {
+        folder_.runs().remove(task.prefix);
+        folder_.batches().remove(task.prefix);
+    }
+
     /// What an earlier part saved.
     void restore(RenderTask& task) {
         RenderState& state = task.state;
-        if (task.run.techniques) {
-            if (fs::exists(task.state_path))
+        if (auto saved = read_state(task.state_path)) {
+            state = std::move(*saved);
+            if (state.notes.contains("stats")) task.total = restore_stats(state.notes["stats"]);
+            for (const auto& line : state.notes["rows"]) folder_.runs().add(line.get<std::string>());
+            if (task.run.techniques && state.notes["attempts"].empty())
                 log_info(fmt::format("{} {}: starts over, because the sums of its single strategies are not saved",
                                      task.scene.entry->name, task.name));
-            write_file_atomic(task.state_path, "begun\n");
-        } else if (auto saved = read_state(task.state_path)) {
-            state = std::move(*saved);
-            task.total = restore_stats(state.notes["stats"]);
-            for (const auto& line : state.notes["rows"]) folder_.runs().add(line.get<std::string>());
         }
+        if (task.run.techniques) write_state(task.state_path, state);
         // Rows whose state is lost are made anew.
-        if (state.notes["rows"].empty()) {
-            folder_.runs().remove(task.prefix);
-            folder_.batches().remove(task.prefix);
-        }
+        if (state.notes["rows"].empty()) forget(task);
         const auto& done = state.notes["done"];
         for (size_t k = 0; k < checkpoints_.size(); ++k)
             if (std::find(done.begin(), done.end(), k) == done.end()) task.pending.push_back(k);
@@ -233,11 +263,11 @@ private:
         work_.begin(task.work, work_after(task.scene, position));
         RenderStats counted = renderer.stats();
         while (!task.pending.empty()) {
-            const Budget budget = next_budget(task.pending, position);
+            const Budget budget = next_budget(config_, task.pending, position);
             const RenderPosition before = position;
-            const LoadReading load = read_load();
+            const LoadReading load = hooks_.load();
             position = drive_showing(task, renderer, position, budget);
-            const LoadReading after = read_load();
+            const LoadReading after = hooks_.load();
             add_part(task.total, counted, renderer.stats());
             state.notes["seconds"] = position.seconds;
             // The film restarts at each checkpoint and with each batch, so that a resumed render adds the same numbers
@@ -255,17 +285,6 @@ private:
             record_checkpoints(task, position, budget);
         }
         return true;
-    }
-
-    /// Until the first of the pending checkpoints, or the end of a batch if that comes sooner by half a batch or more.
-    Budget next_budget(const std::vector<size_t>& pending, const RenderPosition& at) const {
-        Budget budget;
-        for (const size_t k : pending) {
-            const Checkpoint& c = checkpoints_[k];
-            if (c.samples) budget.samples = budget.samples ? std::min(budget.samples, c.samples) : c.samples;
-            if (c.seconds > 0) budget.seconds = budget.seconds > 0 ? std::min(budget.seconds, c.seconds) : c.seconds;
-        }
-        return batch_end(config_, at, budget);
     }
 
     void record_batch(RenderTask& task, const FilmMoments& film, double seconds, double others) const {
@@ -286,6 +305,7 @@ private:
             work_.progress(task.work, double(p.samples - last.samples) * double(task.scene.pixels()),
                            p.seconds - last.seconds);
             last = p;
+            if (nvml_.is_there()) gpu_.add(nvml_.read());
             show(fmt::format("{} {} seed {}: {} spp", task.scene.entry->name, task.run.name, task.settings.seed,
                              p.samples));
         });
@@ -335,8 +355,7 @@ private:
         return r;
     }
 
-    /// The image at the last checkpoint of the list: where there are checkpoints in seconds, all images have had the
-    /// same time.
+    /// At the last checkpoint of the list: where there are some in seconds, all images have had the same time.
     void write_images(const RenderTask& task) {
         const Image image = mean_image(task.state.moments);
         write_exr(folder_.file("images", task.scene, task.name + ".exr"), image,
@@ -350,6 +369,7 @@ private:
                                     task.total.invalid.total()));
         nlohmann::json json = maker(task.run).statistics(task.what(), task.stated());
         json["machine"] = task.state.notes["machine"];
+        json["attempts"] = task.state.notes.value("attempts", nlohmann::json::array());
         write_file_atomic(folder_.file("stats", task.scene, task.name + ".json"),
                           json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
     }
@@ -362,6 +382,8 @@ private:
     ExperimentFolder folder_;
     OwnRuns own_;
     PeerRuns peers_;
+    const Nvml nvml_;
+    GpuReadings gpu_;  ///< of the render in work
     std::vector<SceneReference> references_made_ = std::vector<SceneReference>(prepared_.scenes.size());
     WorkEstimate work_;
     Progress* progress_ = nullptr;

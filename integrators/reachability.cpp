@@ -41,6 +41,15 @@ bool finds(uint32_t strategies, const Word& w) {
     return false;
 }
 
+/// True if the one strategy that is on for paths of this length finds this one.
+bool finds(const SingleStrategies& singles, const Word& w) {
+    const int s = singles.s[w.segments];
+    if (s == SingleStrategies::kNone) return false;
+    if (s == 0) return !w.delta_emitter;
+    // Vertex s - 1 is joined to vertex s; the emitter is vertex 0, the camera vertex w.segments.
+    return (s == 1 || w.connectable(s - 1)) && (s == w.segments || w.connectable(s));
+}
+
 /// The shortest word of the scene for which `lost` is true.
 template <class Lost>
 std::string shortest(const Features& f, int max_depth, Lost lost) {
@@ -78,18 +87,32 @@ uint32_t sampled_strategies(const RenderSettings& settings) {
     return settings.estimator == Estimator::naive ? uint32_t(kHitStrategies) : kHitStrategies | kNextEventStrategies;
 }
 
+namespace {
+
+std::string lacking(const std::string& path, const std::string& why) {
+    return fmt::format(
+        "the image lacks light of paths such as {} (Ld: point, spot or directional emitter, S: delta "
+        "lobe, D: another one, E: camera), which {}",
+        path, why);
+}
+
+}  // namespace
+
 std::string missing_light(const Features& features, const RenderSettings& settings) {
-    if (settings.singles.on || settings.automatic) return "";
+    if (settings.automatic) return "";
+    if (settings.singles.on && settings.integrator == "bdpt") {
+        const std::string lost = shortest(features, settings.max_depth, [&](const Word& w) {
+            return finds(uint32_t(kAllStrategies), w) && !finds(settings.singles, w);
+        });
+        return lost.empty() ? "" : lacking(lost, "these single strategies do not find");
+    }
     const uint32_t strategies = sampled_strategies(settings);
     if (strategies == 0) return "";  // an integrator that is no estimator of all light
     std::string lost = unreachable_path(features, strategies, kAllStrategies, settings.max_depth);
     const bool findable = !lost.empty();
     if (!findable) lost = unreachable_path(features, strategies, settings.max_depth);
     if (lost.empty()) return "";
-    return fmt::format(
-        "the image lacks light of paths such as {} (Ld: point, spot or directional emitter, S: delta "
-        "lobe, D: another one, E: camera), which {}",
-        lost, findable ? "these strategies do not find; integrator bdpt finds more" : "no strategy finds");
+    return lacking(lost, findable ? "these strategies do not find; integrator bdpt finds more" : "no strategy finds");
 }
 
 }  // namespace ambilux

@@ -166,7 +166,8 @@ std::vector<Setting> schedule_settings() {
         Is(Of::choice("fuse", &S::fuse, {"auto", "none"},
                       "stages run as parts of others, as suits the backend, or each with queues")),
         Is(Of::flag("specialise", &S::specialise, "kernels hold only what the scene has")),
-        Is(Of::flag("tail", &S::tail, "CUDA: the last subpaths of a wave take several bounces in one launch")),
+        Is(Of::flag("tail", &S::tail, "CUDA: the last subpaths of a wave take several bounces in one launch"))
+            .where(on_cuda, "only a device has launches to save"),
         Is(Of::choice(
                "compaction", [](auto& s) -> auto& { return compaction(s); }, {"atomic", "select", "none"},
                "items are appended to queues; lie at the places of their paths and are listed by a scan; or "
@@ -178,7 +179,8 @@ std::vector<Setting> schedule_settings() {
                "scenes with several types of BSDFs"))
             .limit("material", sorts, "there are no queues to sort")
             .limit("morton", sorts, "there are no queues to sort"),
-        Is(Of::flag("graph", &S::graph, "CUDA: one graph per wave; false launches kernel by kernel, for profilers")),
+        Is(Of::flag("graph", &S::graph, "CUDA: one graph per wave; false launches kernel by kernel, for profilers"))
+            .where(on_cuda, "only a device has graphs of kernels"),
     };
 }
 

@@ -1,4 +1,4 @@
-"""A busy machine is noticed, a quiet one is not accused."""
+"""A busy machine is noticed, a quiet one is not accused; what was made again is said."""
 
 import json
 
@@ -33,3 +33,19 @@ def test_busy_renders_slow_seeds_and_moving_clocks_are_named(tmp_path):
     assert "during 1 renders" in busy and busy.endswith("box nee seed 2 (25 %)")
     assert spread.endswith("box nee 2.00") and "factor of 1.15" in spread
     assert "2000 MHz at" in clocks and "seed 3" in clocks and "3000 at" in clocks
+
+
+def test_what_was_made_again_and_what_stayed_disturbed_is_said(tmp_path):
+    folder = synthetic.make(tmp_path / "r", scenes=("box",))
+    recorded(folder, lambda name: 0.2)
+    path = folder / "stats" / "box" / "nee_2.json"
+    stats = json.loads(path.read_text()) | {"attempts": [{"why": "other processes held 40 % of the cores", "seconds_per_sample": 1.0}]}
+    stats["machine"][0]["gpu"] = {"slowdowns": ["thermal"]}
+    path.write_text(json.dumps(stats))
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["disturbed"] = [{"scene": "box", "run": "nee", "seed": 2, "why": "a sample took 1.40 times as long as with another seed", "made": 2}]
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    again, left, held = fairness.remarks(experiment.load(folder))
+    assert again.startswith("1 render was disturbed and made again") and again.endswith("box nee seed 2 (other processes held 40 % of the cores)")
+    assert left.startswith("1 render was disturbed and not made again") and "1.40 times" in left
+    assert held == "clocks of the device were held down (thermal) during box nee seed 2"

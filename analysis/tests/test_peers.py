@@ -44,3 +44,8 @@ def test_a_folder_without_other_renderers_says_nothing(tmp_path):
 def test_a_damaged_file_is_refused(tmp_path, entries):
     with pytest.raises(experiment.InputError):
         peers.entries(load(tmp_path, entries))
+
+
+def test_lost_renders_are_said_with_their_reason(tmp_path):
+    data = load(tmp_path, [{**AGREES, "lost": [{"seed": 1, "reason": "no file a_1.exr"}, {"seed": 3, "reason": "no file a_1.exr"}]}])
+    assert any(said.endswith("seeds 1, 3 left out (no file a_1.exr)") for said in peers.remarks(data))

@@ -211,7 +211,7 @@ def test_bias_invalid_values_and_noisy_references_are_remarked(folder, tmp_path)
     text = "\n".join(remarks.remarks(data, summary.lines(data)))
     assert "box, mis: 4 values were NaN" in text
     assert "|z| = 9.5" in text
-    assert "box, nee: the error is below the noise of the reference" in text
+    assert "box: the error of nee is below the noise of the reference" in text
     assert "glass, nee: the error of 1 checkpoints is NaN or infinite" in text
 
 

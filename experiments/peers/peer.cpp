@@ -20,11 +20,13 @@ const std::vector<PeerKind>& peer_kinds() {
          {},
          {},
          nullptr,
+         false,
          true,
          start_python_peer},
-        {"luxcore", {"PATHCPU", "BIDIRCPU"}, {}, {}, {}, nullptr, true, start_python_peer},
-        {"command", {}, {}, {"command"}, {}, check_command, true, start_command_peer},
-        {"images", {}, {}, {"files"}, {"samples", "seconds"}, check_images, false, start_image_peer},
+        {"luxcore", {"PATHCPU", "BIDIRCPU", "PATHOCL"}, {}, {}, {}, nullptr, false, true, start_python_peer},
+        {"build", {}, {}, {"module"}, {}, nullptr, true, true, start_python_peer},
+        {"command", {}, {}, {"command"}, {}, check_command, false, true, start_command_peer},
+        {"images", {}, {}, {"files"}, {"samples", "seconds"}, check_images, false, false, start_image_peer},
     };
     return kinds;
 }

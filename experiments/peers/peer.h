@@ -53,7 +53,8 @@ struct PeerKind {
     std::vector<std::string> integrators, variants;  ///< that a run can name; the first is the default. Empty: none
     std::vector<std::string> texts, lists;           ///< further keys, all needed: strings, and lists of numbers
     std::string (*check)(const Settings&);           ///< what is wrong with them; empty if nothing. May be null
-    bool tested;  ///< that its agreement is measured: it can render as many samples as that needs
+    bool own_settings;  ///< takes integrator, variant, estimator and any `set`, and checks them itself
+    bool tested;        ///< that its agreement is measured: it can render as many samples as that needs
     std::unique_ptr<PeerRenderer> (*start)(const PeerJob&);  ///< throws PeerRefusal, Error(interrupted)
 };
 

@@ -35,7 +35,8 @@ void add_choice(const TomlReader& r, const toml::table& t, RunEntry& run, const 
 /// Names of files are relative to the configuration.
 std::string place_of(const TomlReader& r, const std::string& key, const std::string& text) {
     namespace fs = std::filesystem;
-    return key == "files" ? (fs::absolute(r.file).parent_path() / text).lexically_normal().string() : text;
+    return key == "files" || key == "module" ? (fs::absolute(r.file).parent_path() / text).lexically_normal().string()
+                                             : text;
 }
 
 }  // namespace
@@ -57,13 +58,17 @@ RunEntry read_peer_run(const TomlReader& r, const toml::table& t) {
     run.renderer = r.text(*t.get("renderer"), "renderer");
     const PeerKind& kind = *find_peer_kind(run.renderer);
     std::vector<std::string> keys = {"name", "renderer", "set"};
-    if (!kind.integrators.empty()) keys.emplace_back("integrator");
-    if (!kind.variants.empty()) keys.emplace_back("variant");
+    if (!kind.integrators.empty() || kind.own_settings) keys.emplace_back("integrator");
+    if (!kind.variants.empty() || kind.own_settings) keys.emplace_back("variant");
+    if (kind.own_settings) keys.emplace_back("estimator");
     keys.insert(keys.end(), kind.texts.begin(), kind.texts.end());
     keys.insert(keys.end(), kind.lists.begin(), kind.lists.end());
     r.check_keys(t, fmt::format("[[run]] of {}", run.renderer), keys);
     add_choice(r, t, run, "integrator", kind.integrators);
     add_choice(r, t, run, "variant", kind.variants);
+    if (kind.own_settings)
+        for (const char* key : {"integrator", "variant", "estimator"})
+            if (const toml::node* node = t.get(key)) add(run, key, r.text(*node, key), TomlReader::line_of(*node));
     for (const std::string& key : kind.texts) {
         const toml::node& node = r.need(t, key, "[[run]]");
         add(run, key, place_of(r, key, r.text(node, key)), TomlReader::line_of(node));
@@ -79,7 +84,7 @@ RunEntry read_peer_run(const TomlReader& r, const toml::table& t) {
             throw r.error(t, fmt::format("run '{}': {}", run.name, wrong));
     if (const toml::node* set = t.get("set")) {
         const toml::table& table = r.table(*set, "set");
-        r.check_keys(table, fmt::format("'set' of {}", run.renderer), {"rr_depth"});
+        if (!kind.own_settings) r.check_keys(table, fmt::format("'set' of {}", run.renderer), {"rr_depth"});
         for (const auto& [key, value] : table)
             add(run, std::string(key.str()), r.plain(value, key.str()), TomlReader::line_of(value));
     }

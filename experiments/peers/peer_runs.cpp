@@ -42,6 +42,29 @@ const nlohmann::json* PeerRuns::find(const LoadedEntry& scene, const RunEntry& r
     return nullptr;
 }
 
+nlohmann::json* PeerRuns::entry_of(const LoadedEntry& scene, const RunEntry& run) {
+    return const_cast<nlohmann::json*>(find(scene, run));
+}
+
+void PeerRuns::lose(const LoadedEntry& scene, const RunEntry& run, uint64_t seed, const std::string& reason) {
+    log_warning(fmt::format("{} {} seed {} is left out: {}", scene.entry->name, run.name, seed, reason));
+    nlohmann::json* const entry = entry_of(scene, run);
+    if (!entry) return;
+    found_again(scene, run, seed);
+    (*entry)["lost"].push_back({{"seed", seed}, {"reason", reason}});
+    write();
+}
+
+void PeerRuns::found_again(const LoadedEntry& scene, const RunEntry& run, uint64_t seed) {
+    nlohmann::json* const entry = entry_of(scene, run);
+    if (!entry || !entry->contains("lost")) return;
+    nlohmann::json rest = nlohmann::json::array();
+    for (const nlohmann::json& l : (*entry)["lost"])
+        if (l.value("seed", uint64_t(0)) != seed) rest.push_back(l);
+    (*entry)["lost"] = rest;
+    write();
+}
+
 bool PeerRuns::agrees(const LoadedEntry& scene, const RunEntry& run) const {
     const nlohmann::json* entry = find(scene, run);
     return entry && (entry->value("state", "") == "agrees" || entry->value("state", "") == "untested");
@@ -117,13 +140,9 @@ std::unique_ptr<PeerRenderer> PeerRuns::start(const RenderOf& render) const {
 }
 
 std::unique_ptr<Renderer> PeerRuns::make(const RenderOf& render, const RenderStats&) {
-    try {
-        std::unique_ptr<PeerRenderer> peer = start(render);
-        peer->set_seed(render.settings.seed);
-        return peer;
-    } catch (const PeerRefusal& e) {
-        throw Error(ExitCode::device, fmt::format("{} {}: {}", render.scene.entry->name, render.run.name, e.what()));
-    }
+    std::unique_ptr<PeerRenderer> peer = start(render);
+    peer->set_seed(render.settings.seed);
+    return peer;
 }
 
 MethodNames PeerRuns::names(const RenderOf& render, const RenderStats&) const {

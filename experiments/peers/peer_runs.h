@@ -23,6 +23,11 @@ public:
     /// That it is to be rendered.
     bool agrees(const LoadedEntry& scene, const RunEntry& run) const;
 
+    /// A render of it ended before its time, such as for want of an image: said with the results.
+    void lose(const LoadedEntry& scene, const RunEntry& run, uint64_t seed, const std::string& reason);
+    /// The same render is there now.
+    void found_again(const LoadedEntry& scene, const RunEntry& run, uint64_t seed);
+
     std::unique_ptr<Renderer> make(const RenderOf& render, const RenderStats& earlier) override;
     MethodNames names(const RenderOf& render, const RenderStats& stats) const override;
     nlohmann::json statistics(const RenderOf& render, const RenderStats& stats) const override;
@@ -32,6 +37,7 @@ private:
     std::unique_ptr<PeerRenderer> start(const RenderOf& render) const;
     nlohmann::json find_state(const RenderOf& render, const Reference& reference) const;
     const nlohmann::json* find(const LoadedEntry& scene, const RunEntry& run) const;
+    nlohmann::json* entry_of(const LoadedEntry& scene, const RunEntry& run);
     void write() const;
 
     const ExperimentRequest& request_;  ///< its `interrupt` is set when all is prepared

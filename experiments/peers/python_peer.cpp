@@ -28,8 +28,12 @@ nlohmann::json to_json(const PeerJob& job) {
                            {"max_depth", job.max_depth},
                            {"rr_depth", job.rr_depth},
                            {"folder", job.folder}};
-    for (const auto& [key, value] : job.run->settings)
-        if (key == "integrator" || key == "variant") json[key] = value;
+    nlohmann::json settings = nlohmann::json::array();
+    for (const auto& [key, value] : job.run->settings) {
+        if (key == "integrator" || key == "variant" || key == "module") json[key] = value;
+        if (key != "module") settings.push_back({key, value});
+    }
+    json["settings"] = settings;
     return json;
 }
 
@@ -57,7 +61,9 @@ public:
     }
 
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
-        child_.send(nlohmann::json{{"seed", pass_seed(seed_, first)}, {"samples", count}}.dump());
+        child_.send(nlohmann::json{
+            {"seed", pass_seed(seed_, first)}, {"samples", count}, {"first", first}, {"render_seed", seed_}}
+                        .dump());
         nlohmann::json answer;
         try {
             answer = receive(interrupt);
@@ -67,7 +73,11 @@ public:
         }
         if (answer.contains("refused")) throw PeerRefusal(false, answer["refused"].get<std::string>());
         const auto done = answer.value("samples", count);  // some end only after a little more than asked for
-        film_.add(read_pass(), done, answer.at("seconds").get<double>());
+        const double seconds = answer.at("seconds").get<double>();
+        if (answer.value("signed", false))  // a difference of sums
+            film_.add_signed(read_pass(), done, seconds);
+        else
+            film_.add(read_pass(), done, seconds);
         return done;
     }
 

@@ -1,5 +1,6 @@
 #include "formats/mitsuba/bsdf_plugins.h"
 #include "formats/mitsuba/coatings.h"
+#include "formats/mitsuba/plugins.h"
 #include "formats/mitsuba/principled.h"
 #include "formats/mitsuba/xml_values.h"
 
@@ -268,6 +269,16 @@ uint32_t default_material(Builder& builder, bool emitter) {
     const uint32_t record = uint32_t(builder.scene.bsdfs.size() - 1);
     builder.scene.materials.push_back({record, record, 0, {1, -1}});
     return known = uint32_t(builder.scene.materials.size() - 1);
+}
+
+const Plugins& bsdf_plugins() {
+    static const Plugins known = [] {
+        Plugins list = {"twosided",    "mask",    "bumpmap",      "normalmap", "blendbsdf",
+                        "mixturebsdf", "coating", "roughcoating", "null"};
+        BsdfModels::for_each([&](auto model) { list.emplace_back(decltype(model)::type::plugin); });
+        return list;
+    }();
+    return known;
 }
 
 }  // namespace ambilux::mitsuba

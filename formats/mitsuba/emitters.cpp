@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "formats/mitsuba/builder.h"
+#include "formats/mitsuba/plugins.h"
 #include "transport/emitter/spot.h"
 
 namespace ambilux::mitsuba {
@@ -168,6 +169,15 @@ void build_emitter(Builder& builder, const Object& object) {
         builder.scene.environment = uint32_t(builder.scene.emitters.size());
     }
     builder.scene.emitters.push_back(e);
+}
+
+const Plugins& emitter_plugins() {
+    static const Plugins known = [] {
+        Plugins list = {"sky", "sun", "sunsky"};
+        EmitterModels::for_each([&](auto model) { list.emplace_back(decltype(model)::type::plugin); });
+        return list;
+    }();
+    return known;
 }
 
 }  // namespace ambilux::mitsuba

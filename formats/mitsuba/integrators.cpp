@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
 
 #include "formats/mitsuba/builder.h"
+#include "formats/mitsuba/plugins.h"
 #include "transport/subpath/subpath.h"
 
 namespace ambilux::mitsuba {
@@ -11,19 +11,15 @@ namespace ambilux::mitsuba {
 namespace {
 
 /// Adds something to the image of the integrator inside of it, or makes it in another way.
-bool is_adapter(const std::string& type) {
-    static const std::set<std::string> types = {"moment", "aov", "multichannel", "adaptive", "irrcache"};
-    return types.contains(type);
-}
+const Plugins kAdapters = {"moment", "aov", "multichannel", "adaptive", "irrcache"};
 
 /// Solves the equation that the path tracer solves.
-bool is_full_transport(const std::string& type) {
-    static const std::set<std::string> types = {
-        "volpath",       "volpath_simple", "volpathmis", "pssmlt", "mlt",       "erpt",       "photonmapper",
-        "ppm",           "sppm",           "vpl",        "prb",    "prb_basic", "prbvolpath", "path_projective",
-        "prb_projective"};
-    return types.contains(type);
-}
+const Plugins kFullTransport = {
+    "volpath",       "volpath_simple", "volpathmis", "pssmlt", "mlt",       "erpt",       "photonmapper",
+    "ppm",           "sppm",           "vpl",        "prb",    "prb_basic", "prbvolpath", "path_projective",
+    "prb_projective"};
+
+const Plugins kOwn = {"direct", "path", "ptracer", "bdpt"};
 
 /// What other integrators are steered by.
 constexpr const char* kSteering[] = {"samples_per_pass", "block_size",  "timeout",     "light_image",
@@ -58,13 +54,13 @@ void build_integrator(Builder& builder, const Object& object) {
     Reader in(builder, object);
     IntegratorHint& hint = builder.scene.integrator;
     const std::string& type = object.type;
-    if (is_adapter(type)) return build_integrator(builder, inner_integrator(builder, in));
-    const bool full = is_full_transport(type);
+    if (is_one_of(kAdapters, type)) return build_integrator(builder, inner_integrator(builder, in));
+    const bool full = is_one_of(kFullTransport, type);
     if (type == "direct") {
         hint.type = "path";
         hint.max_depth = 2;
         in.ignore({"shading_samples", "emitter_samples", "bsdf_samples", "luminaire_samples"});
-    } else if (full || type == "path" || type == "ptracer" || type == "bdpt") {
+    } else if (full || is_one_of(kOwn, type)) {
         hint.type = type == "ptracer" ? "light" : (type == "bdpt" ? "bdpt" : "path");
         read_lengths(in, hint);
         if (full)
@@ -79,6 +75,15 @@ void build_integrator(Builder& builder, const Object& object) {
     for (const char* name : kSteering) in.ignore({name});
     // Of the others all values are about how they do it.
     if (!full) in.finish();
+}
+
+const Plugins& integrator_plugins() {
+    static const Plugins known = [] {
+        Plugins list = kOwn;
+        for (const Plugins& more : {kAdapters, kFullTransport}) list.insert(list.end(), more.begin(), more.end());
+        return list;
+    }();
+    return known;
 }
 
 }  // namespace ambilux::mitsuba

@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "formats/meshes/text_cursor.h"
 #include "formats/mitsuba/builder.h"
+#include "formats/mitsuba/plugins.h"
 #include "transport/subpath/subpath.h"
 
 namespace ambilux::mitsuba {
@@ -110,7 +111,7 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
     }();
     Reader in(builder, object ? *object : default_film);
     const std::string& type = in.object().type;
-    const bool known = type == "hdrfilm" || type == "tiledhdrfilm" || type == "ldrfilm" || type == "mfilm";
+    const bool known = is_one_of(film_plugins(), type);
     if (!known) builder.refuse(in.where(), "film type '" + type + "' is not supported", "hdrfilm is used");
     if (known && type != "hdrfilm")
         builder.note(in.where(), "a film of type '" + type + "' gets linear values, as hdrfilm does");
@@ -170,16 +171,15 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
 void read_sampler(Builder& builder, const Object* object) {
     if (!object) return;
     Reader in(builder, *object);
-    static const std::set<std::string> known = {"independent", "stratified", "multijitter", "orthogonal",
-                                                "ldsampler",   "halton",     "hammersley",  "sobol"};
+    const bool known = is_one_of(sampler_plugins(), object->type);
     // Every sampler has the same expected image; ours is independent.
-    if (!known.count(object->type))
+    if (!known)
         builder.note(object->where, "sampler type '" + object->type + "' is not known; samples are independent");
     const int64_t spp = in.integer("sample_count", 4);
     if (spp < 1 || spp > 1000000000) in.fail(in.where("sample_count"), "sample_count must be positive");
     builder.scene.integrator.spp = int(spp);
     in.ignore({"seed", "scramble", "jitter", "dimension", "strength"});
-    if (known.count(object->type)) in.finish();
+    if (known) in.finish();
 }
 
 /// Fails unless all rays of a perspective sensor can be traced.
@@ -268,6 +268,31 @@ void build_sensor(Builder& builder, const Object& object) {
     // Nothing moves, so that the shutter has no effect.
     in.ignore({"shutter_open", "shutter_close"});
     if (known || !builder.options.lenient) in.finish();
+}
+
+const Plugins& sensor_plugins() {
+    static const Plugins known = [] {
+        Plugins list;
+        SensorModels::for_each([&](auto model) { list.emplace_back(decltype(model)::type::plugin); });
+        return list;
+    }();
+    return known;
+}
+
+const Plugins& film_plugins() {
+    static const Plugins known = {"hdrfilm", "tiledhdrfilm", "ldrfilm", "mfilm"};
+    return known;
+}
+
+const Plugins& filter_plugins() {
+    static const Plugins known = {"box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"};
+    return known;
+}
+
+const Plugins& sampler_plugins() {
+    static const Plugins known = {"independent", "stratified", "multijitter", "orthogonal",
+                                  "ldsampler",   "halton",     "hammersley",  "sobol"};
+    return known;
 }
 
 }  // namespace ambilux::mitsuba

@@ -10,6 +10,7 @@
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/sdf_grid.h"
 #include "formats/mitsuba/builder.h"
+#include "formats/mitsuba/plugins.h"
 #include "formats/mitsuba/shape_jobs.h"
 
 namespace ambilux::mitsuba {
@@ -86,8 +87,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     }
     const std::string& type = object.type;
     const bool given = type == "mesh" && !builder.document.meshes.empty();
-    if (!is_quadric(type) && !is_mesh_file(type) && !is_tessellated(type) && type != "rectangle" && type != "cube" &&
-        !given) {
+    if (!is_one_of(shape_plugins(), type) && !given) {
         builder.refuse(object.where, "shape type '" + type + "' is not supported", "the shape is left out");
         return;
     }
@@ -357,6 +357,13 @@ void build_shapes(Builder& builder, const Object& root) {
         scene.shapes.push_back(shape);
     }
     for (const Quadric& q : scene.quadrics) scene.shapes[q.shape].first_primitive += uint32_t(scene.triangles.size());
+}
+
+const Plugins& shape_plugins() {
+    static const Plugins known = {"obj",    "ply",     "serialized",  "rectangle",   "cube",
+                                  "sphere", "disk",    "cylinder",    "shapegroup",  "instance",
+                                  "merge",  "sdfgrid", "linearcurve", "bsplinecurve"};
+    return known;
 }
 
 }  // namespace ambilux::mitsuba

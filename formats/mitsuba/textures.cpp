@@ -8,6 +8,7 @@
 #include "formats/file_budget.h"
 #include "formats/images/image_io.h"
 #include "formats/mitsuba/builder.h"
+#include "formats/mitsuba/plugins.h"
 
 namespace ambilux::mitsuba {
 
@@ -366,6 +367,12 @@ Rgb mean_color(const Builder& builder, const ParamRgb& parameter) {
     return parameter.texture >= 0 && !builder.validate_only
                ? parameter.value * builder.texture_means[size_t(parameter.texture)]
                : parameter.value;
+}
+
+const Plugins& texture_plugins() {
+    static const Plugins known = {"bitmap",         "checkerboard", "gridtexture", "rawconstant",
+                                  "mesh_attribute", "vertexcolors", "scale"};
+    return known;
 }
 
 }  // namespace ambilux::mitsuba

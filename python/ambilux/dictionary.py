@@ -5,27 +5,17 @@ An element stands in one line, so that the line of an error names its key.
 
 from __future__ import annotations
 
+import difflib
 import numbers
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+from ambilux import _core
 from ambilux.errors import SceneError
 
-TAGS = {
-    "bsdf": "diffuse roughdiffuse dielectric thindielectric roughdielectric conductor roughconductor plastic roughplastic twosided mask bumpmap normalmap blendbsdf "
-            "principled phong null",
-    "emitter": "area point spot directional constant envmap sunsky sun sky projector directionalarea",
-    "film": "hdrfilm ldrfilm specfilm",
-    "integrator": "path direct volpath ptracer bdpt aov moment volpathmis",
-    "rfilter": "box gaussian tent mitchell catmullrom lanczos",
-    "sampler": "independent stratified multijitter orthogonal ldsampler sobol halton",
-    "sensor": "perspective thinlens orthographic",
-    "shape": "sphere rectangle disk cube cylinder obj ply serialized shapegroup instance hair",
-    "texture": "bitmap checkerboard scale",
-}
-TAG_OF = {name: tag for tag, names in TAGS.items() for name in names.split()}
+TAG_OF: dict[str, str] = _core.plugins()  # of each type that the reader of scene files knows
 COLOURS = ("rgb", "srgb", "spectrum")
 
 
@@ -140,13 +130,19 @@ def add_value(lines: Lines, name: str, value: Any, path: str) -> None:
         fail(path, f"a {type(value).__name__} means nothing in a scene")
 
 
+def alternative(kind: str) -> str:
+    """The nearest known type, for somebody who mistyped it."""
+    near = difflib.get_close_matches(kind, TAG_OF, 1)
+    return f"; is {near[0]} ({TAG_OF[near[0]]}) meant?" if near else ""
+
+
 def add_object(lines: Lines, name: str, value: Mapping[str, Any], path: str) -> None:
     kind = value.get("type")
     if not isinstance(kind, str):
         fail(path, "an object has a type")
     tag = TAG_OF.get(kind)
     if tag is None:
-        fail(f"{path}.type", f"unknown type '{kind}'")
+        fail(f"{path}.type", f"unknown type '{kind}'{alternative(kind)}")
     attributes = {"type": kind}
     depth = path.count(".")
     if depth == 0 or "id" in value:

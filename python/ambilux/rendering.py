@@ -33,8 +33,9 @@ def count(name: str, value: int | None) -> int | None:
     return None if value is None else int(value)
 
 
-def begin(scene: Scene, settings: list[tuple[str, str]], spp: int | None, time: float | None) -> _core.Render:
-    core = _core.Render(scene._core, settings, count("spp", spp), time)
+def begin(scene: Scene | str | os.PathLike[str], size: tuple[int, int] | None, settings: Mapping[str, Any] | None, spp: int | None, time: float | None,
+          **named: Any) -> _core.Render:
+    core = _core.Render(scene_of(scene, size)._core, assignments(settings, **named), count("spp", spp), time)
     for text in core.warnings:
         warnings.warn(text, AmbiluxWarning, stacklevel=4)
     return core
@@ -62,8 +63,7 @@ def render(scene: Scene | str | os.PathLike[str], integrator: str = "path", vari
     >>> image.samples, image.stats["integrator"], image.variance.shape == image.shape
     (2, 'bdpt', True)
     """
-    core = begin(scene_of(scene, size),
-                 assignments(settings, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend), spp, time)
+    core = begin(scene, size, settings, spp, time, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend)
     core.advance(0)
     return finished(core)
 
@@ -96,8 +96,7 @@ def progressive(scene: Scene | str | os.PathLike[str], integrator: str = "path",
     """
     if not every > 0:
         raise UsageError(f"every {every}: more than zero seconds are needed")
-    core = begin(scene_of(scene, size),
-                 assignments(settings, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend), spp, time)
+    core = begin(scene, size, settings, spp, time, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend)
     return steps_of(core, every)
 
 

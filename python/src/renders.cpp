@@ -95,6 +95,20 @@ public:
         return !ended;
     }
 
+    /// Samples [first, first + count) of every pixel, whatever the budget is; returns the seconds that took. pixels()
+    /// are those of the samples since clear().
+    double add(uint32_t first, uint32_t count) {
+        double seconds = 0;
+        run_unlocked([&](const volatile bool* interrupt) {
+            const auto start = std::chrono::steady_clock::now();
+            position_.samples += renderer_->render(first, count, interrupt);
+            seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        });
+        position_.seconds += seconds;
+        return seconds;
+    }
+    void clear() { renderer_->clear_film(); }
+
     Reference pixels() { return to_reference(renderer_->film()); }
     uint64_t samples() const { return position_.samples; }
     double seconds() const { return position_.seconds; }
@@ -169,6 +183,8 @@ void bind_renders(nb::module_& m) {
         .def(nb::init<SharedScene, const Assignments&, std::optional<uint64_t>, std::optional<double>>(), "scene"_a,
              "settings"_a, "spp"_a.none(), "time"_a.none())
         .def("advance", &Render::advance, "seconds"_a)
+        .def("add", &Render::add, "first"_a, "count"_a)
+        .def("clear", &Render::clear)
         .def("pixels", &Render::pixels)
         .def("stats", &Render::stats)
         .def("attributes", &Render::attributes)

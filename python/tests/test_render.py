@@ -197,3 +197,22 @@ def test_the_program_and_its_version():
     done = program("--version")
     assert done.returncode == 0 and done.stdout.startswith(f"ambilux {ambilux.__version__} ")
     assert program("render").returncode == 2
+
+
+def test_single_strategies_say_what_light_they_do_not_find(scene):
+    with pytest.warns(ambilux.AmbiluxWarning, match="single strategies do not find"):
+        ambilux.render(scene, "bdpt", spp=1, backend="cpu", settings={"strategies": "s1t2+s2t2"})
+
+
+def test_samples_by_their_numbers_are_those_of_one_render(scene):
+    from ambilux import _core
+
+    settings = [("backend", "cpu"), ("seed", "3")]
+    whole = ambilux.render(scene, spp=6, seed=3, backend="cpu")
+    parts = _core.Render(scene._core, settings, 1000, None)
+    assert parts.add(0, 2) > 0
+    first = np.array(parts.pixels().rgb, dtype=np.float64)
+    parts.clear()
+    parts.add(2, 4)
+    mean = (2 * first + 4 * np.array(parts.pixels().rgb)) / 6
+    np.testing.assert_allclose(mean, whole.rgb, rtol=1e-5, atol=1e-6)

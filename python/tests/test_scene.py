@@ -118,3 +118,35 @@ def test_text_cannot_break_out_of_a_dictionary():
 def test_what_is_replaced_is_a_warning():
     with pytest.warns(ambilux.AmbiluxWarning, match="nonsense"):
         ambilux.Scene(changed("ball.nonsense", 1), lenient=True)
+
+
+def test_every_plugin_of_the_reader_is_known_to_dictionaries():
+    from ambilux import _core
+
+    tags = _core.plugins()
+    for name, tag in {"coating": "bsdf", "roughcoating": "bsdf", "phong": "bsdf", "ward": "bsdf", "difftrans": "bsdf", "mixturebsdf": "bsdf", "projector": "emitter",
+                      "sunsky": "emitter", "sdfgrid": "shape", "bsplinecurve": "shape", "gridtexture": "texture", "mesh_attribute": "texture", "prb": "integrator"}.items():
+        assert tags[name] == tag
+    # What a list names is known to its reader: alone it may lack something, but not be "not supported".
+    outer = {"bsdf": "ball.bsdf", "texture": "ball.bsdf.reflectance", "emitter": "light", "shape": "thing", "integrator": "integrator", "sensor": "sensor",
+             "film": "sensor.film", "rfilter": "sensor.film.rfilter", "sampler": "sensor.sampler"}
+    for name, tag in tags.items():
+        description = changed("ball.emitter" if name == "area" else outer[tag], {"type": name})
+        try:
+            ambilux.Scene(description)
+        except ambilux.SceneError as e:
+            assert "is not supported" not in str(e) or "inside of" in str(e), name
+            assert "unknown type" not in str(e), name
+
+
+def test_coatings_and_grids_stand_in_dictionaries():
+    coated = changed("ball.bsdf", {"type": "coating", "bsdf": {"type": "diffuse"}})
+    image = ambilux.render(ambilux.Scene(coated), spp=2, backend="cpu")
+    plain = ambilux.render(ambilux.Scene(changed("ball.bsdf", {"type": "diffuse"})), spp=2, backend="cpu")
+    assert not numpy_equal(image, plain)
+    with pytest.raises(ambilux.SceneError, match="is roughdielectric .bsdf. meant"):
+        ambilux.Scene(changed("ball.bsdf", {"type": "rough_dielectric"}))
+
+
+def numpy_equal(a, b):
+    return np.array_equal(a.rgb, b.rgb)

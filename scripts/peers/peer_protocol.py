@@ -1,7 +1,8 @@
 """How an experiment talks to a peer: one JSON object a line on standard input and output, images in a file.
 
 A script calls serve(start). start(job) loads the scene and returns (what it is, render); render(seed, samples) returns an image of
-height x width x 3 floats, the seconds that rendering took and, if they are others than asked for, the samples. What the peer itself prints goes to standard error.
+height x width x 3 floats, the seconds that rendering took and, if they are others than asked for, the samples; then True, if the image is a difference
+of sums, which may be negative. What the peer itself prints goes to standard error.
 """
 
 import json
@@ -22,7 +23,8 @@ def clean(error):
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def serve(start):
+def serve(start, whole=False):
+    """whole: render takes the request as it is, with the number of its first sample."""
     # Libraries print to descriptor 1: the lines of the protocol get another one.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
@@ -45,10 +47,10 @@ def serve(start):
     for line in sys.stdin:
         request = json.loads(line)
         try:
-            image, seconds, *samples = render(request["seed"], request["samples"])
+            image, seconds, *rest = render(request) if whole else render(request["seed"], request["samples"])
         except Exception as error:
             answer(refused=clean(error))
             continue
         with open(os.path.join(job["folder"], "pass.f32"), "wb") as file:
             file.write(image.astype("<f4", copy=False).tobytes())
-        answer(seconds=seconds, samples=samples[0] if samples else request["samples"])
+        answer(seconds=seconds, samples=rest[0] if rest else request["samples"], signed=bool(rest[1:] and rest[1]))

@@ -31,7 +31,8 @@ std::string own_run(const std::string& name, const std::string& depth = "{depth}
 }
 
 std::string config_of(const std::string& runs, const std::string& budget = "spp = [16, 48]") {
-    return "seeds = [1]\nbackend = \"cpu\"\nfilter = \"box\"\nagreement_spp = 256\n[reference]\nspp = 512\n[budget]\n" +
+    return "repeats = 0\nseeds = [1]\nbackend = \"cpu\"\nfilter = \"box\"\nagreement_spp = 256\n[reference]\nspp = "
+           "512\n[budget]\n" +
            budget + "\n[[scene]]\nname = \"box\"\npath = \"" + AMBILUX_SOURCE_DIR +
            "/scenes/cornell.xml\"\nsize = [16, 16]\nmax_depth = 3\n[[run]]\nname = \"path\"\nintegrator = \"path\"\n" +
            runs;
@@ -232,6 +233,47 @@ TEST_CASE("images made elsewhere take part at their times") {
     CHECK(contains(wrong("[10, 40]", "[10]"), "lists of equal length"));
     CHECK(contains(wrong("[10, 40]", "[10, 5]"), "must rise"));
     CHECK(contains(wrong("[10, 40]", "[1.5, 5]"), "integers"));
+}
+
+TEST_CASE("a run whose image is missing is left out with the reason, and is there once the image is") {
+    const TempFolder folder;
+    const std::string images =
+        "[[run]]\nname = \"theirs\"\nrenderer = \"images\"\nfiles = "
+        "\"theirs_{seed}_{number}.exr\"\nsamples = [16, 48]\nseconds = [0.1, 0.2]\n";
+    const Image grey{16, 16, std::vector<float>(16 * 16 * 3, 0.5f)};
+    write_exr(folder / "theirs_1_1.exr", grey, {});
+    const std::string output = run(folder, config_of(images));
+    CHECK(rows_of(output, "path") == 2);
+    CHECK(rows_of(output, "theirs") == 0);  // not half of a render
+    json entry = entry_of(output, "theirs");
+    REQUIRE(entry["lost"].size() == 1);
+    CHECK(entry["lost"][0]["seed"] == 1);
+    CHECK(contains(entry["lost"][0]["reason"], "theirs_1_2.exr"));
+    write_exr(folder / "theirs_1_2.exr", grey, {});
+    run(folder, read_file(folder / "e.toml"), true);
+    CHECK(rows_of(output, "theirs") == 2);
+    CHECK(entry_of(output, "theirs")["lost"].empty());
+}
+
+TEST_CASE("another build of this program takes any setting, and its module is looked for beside the configuration") {
+    const TempFolder folder;
+    folder.write("e.toml",
+                 config_of("[[run]]\nname = \"before\"\nrenderer = \"build\"\nmodule = \"old/python\"\nintegrator "
+                           "= \"bdpt\"\nvariant = \"lvc\"\nset = { connections = 2, gone = true }\n"));
+    const std::string text = read_file(folder / "e.toml");
+    const ExperimentConfig config = read_experiment(folder / "e.toml");
+    const RunEntry& before = config.runs[1];
+    CHECK(before.settings == Settings{{"integrator", "bdpt"},
+                                      {"variant", "lvc"},
+                                      {"module", folder / "old/python"},
+                                      {"connections", "2"},
+                                      {"gone", "true"}});
+    folder.write("r.toml", resolved_toml(config));
+    CHECK(resolved_toml(read_experiment(folder / "r.toml")) == read_file(folder / "r.toml"));
+    CHECK(contains(refusal(folder, "[[run]]\nname = \"b\"\nrenderer = \"build\"\n"), "module"));
+    const json entry = entry_of(run(folder, text), "before");
+    CHECK(entry["state"] == "missing");
+    CHECK(contains(entry["reason"], "old/python"));
 }
 
 TEST_CASE("passes are averaged by their samples, and what is no radiance is dropped and counted") {

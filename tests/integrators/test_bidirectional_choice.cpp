@@ -315,6 +315,34 @@ TEST_CASE("what strategies cannot reach follows from emitters, BSDFs and depth")
     CHECK(unreachable_path(mirrors, kAllStrategies, -1) == "Ld S E");
 }
 
+TEST_CASE("what single strategies do not find is said") {
+    const auto lost = [](uint32_t bsdfs, uint32_t emitters, const char* strategies, int max_depth) {
+        Features f{};
+        f.bsdfs = bsdfs;
+        f.emitters = emitters;
+        RenderSettings s;
+        s.integrator = "bdpt";
+        s.max_depth = max_depth;
+        apply_setting(s, "strategies", strategies);
+        const std::string text = missing_light(f, s);
+        if (text.empty()) return text;
+        CHECK(text.find("these single strategies do not find") != std::string::npos);
+        const size_t begin = text.find("such as ") + 8;
+        return text.substr(begin, text.find(" (Ld") - begin);
+    };
+    const uint32_t diffuse = bit(BsdfType::diffuse), glass = bit(BsdfType::dielectric) | diffuse,
+                   area = 1u << uint32_t(EmitterType::area), point = 1u << uint32_t(EmitterType::point);
+    CHECK(lost(diffuse, area, "s1t2+s2t2", 3) == "L E");  // none for lamps that the camera sees
+    CHECK(lost(diffuse, area, "s0t2+s1t2", 3) == "L D D E");
+    CHECK(lost(diffuse, area, "s0t2+s1t2+s2t2", 3).empty());
+    CHECK(lost(diffuse, area, "s0t2+s1t2+s3t1", 3).empty());
+    CHECK(lost(glass, area, "s0t2+s1t2", 2) == "L S E");
+    CHECK(lost(glass, area, "s0t2+s0t3", 2).empty());
+    CHECK(lost(glass, area, "s0t2+s0t3+s2t2", 3) == "L S D E");
+    CHECK(lost(glass, point, "s1t2", 2).empty());  // by way of glass no strategy finds a point: no matter of these
+    CHECK(lost(glass, point, "s0t3", 2) == "Ld D E");
+}
+
 TEST_CASE("the choice repeats: it depends on the seed, and on clocks only where it says so") {
     const Scene scene = project_scene("materials", 40, 30);
     RenderSettings s = automatic_settings(scene, 3);

@@ -140,7 +140,8 @@ inline Hooks fake_hooks(World& world) {
                     s.estimator = Estimator::mis;
                 else
                     throw Error(ExitCode::usage, key + "=" + value + " is not known");
-            }};
+            },
+            [] { return LoadReading{}; }};
 }
 
 constexpr const char* kConfig = R"(name = "fake"
