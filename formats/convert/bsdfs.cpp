@@ -1,4 +1,5 @@
 #include "formats/convert/writer.h"
+#include "transport/bsdf/coating.h"
 
 namespace ambilux::convert {
 
@@ -106,6 +107,20 @@ void add_parameters(Writer& w, xml_node node, const Textured<Principled>& p) {
     if (p.clearcoat > 0) unless_zero("clearcoat_gloss", (0.1 - double(p.clearcoat_alpha)) / (0.1 - 0.001));
 }
 
+/// A coating; the BSDF below it goes inside.
+xml_node add_coat(Writer& w, xml_node parent, const Coat& coat) {
+    xml_node node = add_object(parent, "bsdf", coat.rough() ? "roughcoating" : "coating");
+    add_ior(node, coat.ior());
+    add_rgb(node, "sigma_a", coat.absorption());
+    add_rgb(node, "specular_reflectance", coat.reflectance());
+    if (coat.rough()) {
+        add_text(node, "distribution", coat.distribution() == Microfacets::ggx ? "ggx" : "beckmann");
+        add_number(node, "alpha", coat.alpha());
+    }
+    w.note("Mitsuba 3 has no BSDFs 'coating' and 'roughcoating'");
+    return node;
+}
+
 /// With its bumps or normals around it.
 void add_bsdf(Writer& w, xml_node parent, uint32_t index) {
     const BsdfRecord& record = w.scene.bsdfs[index];
@@ -117,8 +132,11 @@ void add_bsdf(Writer& w, xml_node parent, uint32_t index) {
         parent = add_object(parent, "bsdf", "normalmap");
         add_texture(w, parent, "normalmap", record.normal_map, splat(1), false);
     }
-    if (record.bump_map >= 0 || record.normal_map >= 0)
-        w.note("bumps and normal maps of Mitsuba 3.6 and later differ: see docs/scenes.md");
+    if (record.bump_map >= 0 || record.normal_map >= 0) {
+        add_boolean(parent, "flip_invalid_normals", record.map_rules & kTurnNormals);
+        add_boolean(parent, "use_shadowing_function", record.map_rules & kShadowBumps);
+    }
+    if (record.coat != kNone) parent = add_coat(w, parent, Coat{w.scene.tables.data() + record.coat});
     BsdfModels::for_each([&](auto model) {
         using Model = typename decltype(model)::type;
         if (record.type != kBsdfType<Model>) return;

@@ -112,6 +112,15 @@ void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
             if (e.radiance.texture >= 0) add_texture(w, node, "texture", e.radiance.texture, e.radiance.value, false);
             return;
         }
+        case EmitterType::projector: {
+            xml_node node = add_object(parent, "emitter", "projector");
+            add_transform(node, "to_world", e.to_world);
+            add_number(node, "fov", degrees(2 * std::atan(double(e.cutoff))));
+            add_text(node, "fov_axis", "x");
+            ParamRgb irradiance = e.radiance;
+            irradiance.value = irradiance.value * float(1 / M_PI);  // the loader multiplies, as Mitsuba does
+            return add_color(w, node, "irradiance", irradiance);
+        }
         default: {
             xml_node node = add_object(parent, "emitter", "envmap");
             add_text(node, "filename", float_image(w, w.scene.textures[size_t(e.radiance.texture)], splat(1)));

@@ -45,11 +45,11 @@ bool write_nothing(std::string*, const std::string&, const std::vector<unsigned 
 
 /// Keeps the bytes of a file or a data URI: our readers decode them when they are needed. Those of a buffer come
 /// unchecked: image_views() takes them.
-bool keep_image(tinygltf::Image* image, const int index, std::string*, std::string*, int, int, const unsigned char* bytes,
-                int size, void* user) {
+bool keep_image(tinygltf::Image* image, const int index, std::string*, std::string*, int, int,
+                const unsigned char* bytes, int size, void* user) {
     auto& all = static_cast<Files*>(user)->context.image_bytes;
-    if (index < 0 || size < 0) return false;
     if (image->bufferView >= 0) return true;
+    if (index < 0 || size < 0) return false;
     if (all.size() <= size_t(index)) all.resize(size_t(index) + 1);
     all[size_t(index)].assign(reinterpret_cast<const char*>(bytes), size_t(size));
     return true;
@@ -125,7 +125,8 @@ std::vector<double> accessor_values(const Context& context, int index, int compo
               count = tinygltf::GetNumComponentsInType(uint32_t(a.type));
     if (size <= 0 || count < components || a.componentType == TINYGLTF_COMPONENT_TYPE_DOUBLE)
         fail("its accessor has the wrong type");
-    const uint64_t element = uint64_t(size) * uint64_t(count), given = model.bufferViews[size_t(a.bufferView)].byteStride, stride = given ? given : element;
+    const uint64_t element = uint64_t(size) * uint64_t(count),
+                   given = model.bufferViews[size_t(a.bufferView)].byteStride, stride = given ? given : element;
     if (stride < element || stride > 4096 || a.count > length || a.byteOffset > length ||
         (a.count > 0 && (a.count - 1) * stride + element > length - a.byteOffset))
         fail("its accessor reaches beyond its buffer");

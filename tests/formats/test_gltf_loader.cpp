@@ -243,7 +243,7 @@ TEST_CASE("files that lie are refused") {
     CHECK(contains(changed([](Json& j) { j["accessors"][0]["count"] = 5; }), "beyond its buffer"));
     CHECK(contains(changed([](Json& j) { j["accessors"][0]["count"] = 4000000000u; }), "beyond its buffer"));
     CHECK(contains(changed([](Json& j) { j["accessors"][0]["byteOffset"] = 4000000000u; }), "beyond its buffer"));
-    CHECK(contains(changed([](Json& j) { j["bufferViews"][0]["byteOffset"] = 4000000000u; }), "beyond its buffer"));
+    CHECK(contains(changed([](Json& j) { j["bufferViews"][0]["byteOffset"] = 4000000000u; }), "beyond the buffer"));
     CHECK(contains(changed([](Json& j) { j["accessors"][0]["type"] = "SCALAR"; }), "wrong type"));
     CHECK(contains(changed([](Json& j) { j["meshes"][0]["primitives"][0]["material"] = 7; }), "no material 7"));
     CHECK(contains(changed([](Json& j) { j["nodes"][0]["mesh"] = 7; }), "no mesh 7"));
@@ -252,6 +252,21 @@ TEST_CASE("files that lie are refused") {
     CHECK(contains(changed([](Json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 3; }),
                    "no texture 3"));
     CHECK(changed([](Json& j) { j["asset"].erase("version"); }) != "no error");
+    // Images inside of buffers.
+    for (const auto& [key, value, problem] :
+         std::vector<std::tuple<std::string, Json, std::string>>{{"byteOffset", 4000000000u, "beyond the buffer"},
+                                                                 {"byteLength", 4000000000u, "beyond the buffer"},
+                                                                 {"buffer", 7, "buffer"}}) {
+        const std::string error = changed([&](Json& j) {
+            j["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", 0}, {"byteLength", 48}});
+            j["bufferViews"].back()[key] = value;
+            j["images"] = {{{"bufferView", j["bufferViews"].size() - 1}, {"mimeType", "image/png"}}};
+            j["textures"] = {{{"source", 0}}};
+            j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 0;
+        });
+        INFO(error);
+        CHECK(contains(error, problem));
+    }
     // Whatever a file is cut off at.
     const TempFolder folder;
     const std::string text = quad_scene().dump();

@@ -1,10 +1,12 @@
-// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core PNG::PNG JPEG::JPEG
 // timeout: 200
 // Images of pbrt scenes: lights and materials with closed forms, the same scene in Mitsuba's XML, and both after
 // conversion.
 #include "formats/convert/convert.h"
 #include "formats/images/image_write.h"
+#include "scene/info.h"
 #include "tests/support/closed_forms.h"
+#include "tests/support/image_files.h"
 #include "tests/support/mitsuba_text.h"
 #include "tests/support/pbrt_text.h"
 
@@ -277,22 +279,58 @@ TEST_CASE("a part of the screen is what the crop of the whole screen is") {
     }
 }
 
+/// The scene and what the converter writes of it have the same features and the same samples, up to rounding.
+void check_converted(const Scene& scene, const std::string& path) {
+    write_mitsuba(scene, path);
+    const Scene again = load_mitsuba(path);
+    CHECK(again.warnings.empty());
+    CHECK(feature_names(again.features) == feature_names(scene.features));
+    CHECK(again.triangles.size() == scene.triangles.size());
+    CHECK(again.emitters.size() == scene.emitters.size());
+    const auto film = [](const Scene& s) { return render_scene(s, cpu_settings(s, Estimator::mis), 16).film; };
+    const FilmMoments a = film(scene), b = film(again);
+    double difference = 0, sum = 0;
+    for (size_t i = 0; i < a.sum.size(); ++i) difference += std::abs(a.mean(i) - b.mean(i)), sum += a.mean(i);
+    CHECK(sum > 0);
+    CHECK(difference < 1e-4 * sum);
+}
+
 TEST_CASE("scenes of the project are the same after conversion") {
     const TempFolder folder;
     for (const char* name : {"cornell", "glass", "lights", "materials", "textured"}) {
         INFO(name);
-        const Scene scene = project_scene(name, 48, 27);
-        const std::string out = folder / (std::string(name) + ".xml");
-        write_mitsuba(scene, out);
-        const Scene again = load_mitsuba(out);
-        CHECK(again.warnings.empty());
-        CHECK(again.features == scene.features);
-        CHECK(again.triangles.size() == scene.triangles.size());
-        CHECK(again.emitters.size() == scene.emitters.size());
-        const auto film = [](const Scene& s) { return render_scene(s, cpu_settings(s, Estimator::mis), 16).film; };
-        const FilmMoments a = film(scene), b = film(again);
-        double difference = 0, sum = 0;
-        for (size_t i = 0; i < a.sum.size(); ++i) difference += std::abs(a.mean(i) - b.mean(i)), sum += a.mean(i);
-        CHECK(difference < 1e-4 * sum);
+        check_converted(project_scene(name, 48, 27), folder / (std::string(name) + ".xml"));
     }
+}
+
+TEST_CASE("coatings, rules of maps and projectors are the same after conversion") {
+    const TempFolder folder;
+    folder.write("image.png", test::png_file(2, 1, {255, 0, 0, 255, 255, 0}));
+    const std::string board =
+        R"(<texture type="checkerboard"><rgb name="color0" value="0.2"/><rgb name="color1" value="0.8"/>
+           <transform name="to_uv"><scale x="9" y="7"/></transform></texture>)";
+    const std::string maps[] = {
+        "<bsdf type='coating'><rgb name='sigma_a' value='0.1 0.5 1'/><float name='thickness' value='0.7'/>"
+        "<bsdf type='diffuse'/></bsdf>",
+        "<bsdf type='roughcoating'><float name='alpha' value='0.3'/><string name='distribution' value='ggx'/>"
+        "<bsdf type='roughconductor'/></bsdf>",
+        "<bsdf type='bumpmap'><float name='scale' value='0.2'/>" + board + "<bsdf type='diffuse'/></bsdf>",
+        "<bsdf type='bumpmap'><boolean name='use_shadowing_function' value='false'/>" + board +
+            "<bsdf type='coating'><bsdf type='diffuse'/></bsdf></bsdf>",
+        "<bsdf type='twosided'><bsdf type='bumpmap'><boolean name='flip_invalid_normals' value='false'/>" + board +
+            "<bsdf type='roughplastic'/></bsdf></bsdf>"};
+    std::string shapes;
+    for (int i = 0; i < 5; ++i)
+        shapes += "<shape type='sphere'><point name='center' x='" + std::to_string(2 * i - 4) +
+                  "' y='0' z='0'/><float name='radius' value='0.9'/>" + maps[i] + "</shape>";
+    const std::string path = folder.write("scene.xml", R"(<scene version="3.0.0">
+        <sensor type="perspective"><float name="fov" value="60"/><transform name="to_world">
+            <lookat origin="0,2,9" target="0,0,0" up="0,1,0"/></transform>
+            <film type="hdrfilm"><integer name="width" value="48"/><integer name="height" value="27"/></film></sensor>
+        <emitter type="projector"><transform name="to_world"><lookat origin="0,3,6" target="0,0,0" up="0,1,0"/></transform>
+            <float name="fov" value="70"/><float name="scale" value="3"/>
+            <texture type="bitmap" name="irradiance"><string name="filename" value="image.png"/></texture></emitter>
+        <emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>)" +
+                                                           shapes + "</scene>");
+    check_converted(load_mitsuba(path), folder / "out.xml");
 }
