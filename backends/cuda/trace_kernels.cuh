@@ -157,6 +157,43 @@ struct WarpItems {
     }
 };
 
+/// A turn of a warp: its lanes visit nodes as long as many can, then test primitives. `any_hit`: a bool, or a constant;
+/// the lane's ray ends with its first hit. Lanes without a ray take part.
+template <Features F, class AnyHit, class Cursor, class Tracer>
+__device__ __forceinline__ void walk_together(const SceneView& scene, const Tracer& tracer, const TraceTuning& tuning,
+                                              AnyHit any_hit, Cursor& walk, typename Cursor::Entry* stack,
+                                              const Ray& ray, const CwbvhRay& box_ray, const RayShear& shear, float& t,
+                                              uint32_t& prim) {
+    constexpr uint32_t kWarp = 0xffffffffu;
+    uint32_t walking;
+    do {
+        bool walks = walk.can_step();
+        if (walks) {
+            walk.step(tracer, stack, box_ray, t);
+            walks = walk.can_step();
+        }
+        walking = uint32_t(__popc(__ballot_sync(kWarp, walks)));
+    } while (walking >= tuning.walk_at);
+
+    // All are asked anew after each round: lanes with many primitives would make the others wait.
+    uint32_t waiting = uint32_t(__popc(__ballot_sync(kWarp, walk.has_primitives())));
+    if (waiting >= tuning.primitives_at || waiting >= walking) {
+        do {
+            if (walk.has_primitives()) {
+                Hit hit = {t, 0.0f, 0.0f, kNone};
+                if (tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit)) {
+                    t = hit.t;
+                    prim = hit.prim;
+                    walk.keep(stack, hit.u, hit.v);
+                    if (any_hit) walk.end();
+                }
+                walk.after_primitive(stack);
+            }
+            waiting = uint32_t(__popc(__ballot_sync(kWarp, walk.has_primitives())));
+        } while (waiting >= tuning.primitives_at);
+    }
+}
+
 /// The loop behind trace_closest_persistent and trace_any_persistent. `finish(i, hit)` is called once per fetched ray:
 /// for all that have ended when the warp fetches others, since the whole warp waits for what it loads.
 template <Features F, bool AnyHit, class Tracer, class Fetch, class Finish>
@@ -205,33 +242,8 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
             }
         }
 
-        uint32_t walking;
-        do {
-            bool walks = walk.can_step();
-            if (walks) {
-                walk.step(tracer, stack, box_ray, t);
-                walks = walk.can_step();
-            }
-            walking = uint32_t(__popc(__ballot_sync(kWarp, walks)));
-        } while (walking >= tuning.walk_at);
-
-        // All are asked anew after each round: lanes with many primitives would make the others wait.
-        uint32_t waiting = uint32_t(__popc(__ballot_sync(kWarp, walk.has_primitives())));
-        if (waiting >= tuning.primitives_at || waiting >= walking) {
-            do {
-                if (walk.has_primitives()) {
-                    Hit hit = {t, 0.0f, 0.0f, kNone};
-                    if (tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit)) {
-                        t = hit.t;
-                        prim = hit.prim;
-                        walk.keep(stack, hit.u, hit.v);
-                        if (AnyHit) walk.end();
-                    }
-                    walk.after_primitive(stack);
-                }
-                waiting = uint32_t(__popc(__ballot_sync(kWarp, walk.has_primitives())));
-            } while (waiting >= tuning.primitives_at);
-        }
+        walk_together<F>(scene, tracer, tuning, std::bool_constant<AnyHit>(), walk, stack, ray, box_ray, shear, t,
+                         prim);
     }
 }
 
