@@ -8,6 +8,7 @@
 
 #include "accel/cwbvh.h"
 #include "accel/pair_bvh.h"
+#include "backends/cuda/instance_cursor.cuh"
 #include "backends/traversal_features.h"
 #include "core/warp.h"
 
@@ -133,8 +134,14 @@ struct PairCursor {
     }
 };
 
-template <class Tracer, bool AnyHit>
-using Walk = std::conditional_t<std::is_same_v<Tracer, PairTracer>, PairCursor<AnyHit>, CwbvhCursor<AnyHit>>;
+/// Binary BVHs have one level.
+template <Features F, class Tracer>
+constexpr bool kTwoLevels = F.instances && !std::is_same_v<Tracer, PairTracer>;
+
+template <Features F, class Tracer, bool AnyHit>
+using Walk = std::conditional_t<
+    std::is_same_v<Tracer, PairTracer>, PairCursor<AnyHit>,
+    std::conditional_t<kTwoLevels<F, Tracer>, InstanceCursor<CwbvhCursor<AnyHit>>, CwbvhCursor<AnyHit>>>;
 
 /// Items that a warp has claimed and not begun.
 struct WarpItems {
@@ -169,8 +176,8 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
                    stretch = per_thread >= 32             ? 128
                              : AnyHit && per_thread >= 16 ? 64
                                                           : 32;
-    Walk<Tracer, AnyHit> walk;
-    typename Walk<Tracer, AnyHit>::Entry stack[Walk<Tracer, AnyHit>::kEntries];
+    Walk<F, Tracer, AnyHit> walk;
+    typename Walk<F, Tracer, AnyHit>::Entry stack[Walk<F, Tracer, AnyHit>::kEntries];
     Ray ray = {};
     CwbvhRay box_ray = {};
     RayShear shear = {};
@@ -209,7 +216,10 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
         do {
             bool walks = walk.can_step();
             if (walks) {
-                walk.step(tracer, stack, box_ray, t);
+                if constexpr (kTwoLevels<F, Tracer>)
+                    walk.step(tracer, stack, ray, box_ray, shear, t, AnyHit ? 0u : ~0u);
+                else
+                    walk.step(tracer, stack, box_ray, t);
                 walks = walk.can_step();
             }
             walking = uint32_t(__popc(__ballot_sync(kWarp, walks)));
@@ -221,7 +231,13 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
             do {
                 if (walk.has_primitives()) {
                     Hit hit = {t, 0.0f, 0.0f, kNone};
-                    if (tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit)) {
+                    bool met;
+                    if constexpr (kTwoLevels<F, Tracer>)
+                        met =
+                            tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit, walk.id_offset);
+                    else
+                        met = tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit);
+                    if (met) {
                         t = hit.t;
                         prim = hit.prim;
                         walk.keep(stack, hit.u, hit.v);
