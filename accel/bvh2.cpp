@@ -128,13 +128,20 @@ uint32_t flatten(const BuildNode* root, Bvh2& out) {
 
 }  // namespace
 
-Bvh2 build_bvh2(const SceneView& scene) {
+Bvh2 build_bvh2(const SceneView& scene, const Group* group) {
     Bvh2 out;
     std::vector<RTCBuildPrimitive> primitives;
-    const uint32_t count = scene.primitive_count();
-    primitives.reserve(size_t(count) * 2);
-    for (uint32_t i = 0; i < count; ++i) {
-        const Bounds3f b = scene.is_triangle(i) ? triangle_bounds(scene, i) : quadric_bounds(scene.quadric(i));
+    const bool instances = !group && scene.instance_count > 0;
+    const uint32_t first = group ? group->first_triangle : 0,
+                   count = group ? first + group->triangle_count : scene.primitive_count() + scene.instance_count;
+    primitives.reserve(size_t(count - first) * 2);
+    for (uint32_t i = first; i < count; ++i) {
+        if (!group && scene.group_count && i >= scene.ungrouped_count() && i < scene.triangle_count) continue;
+        const Bounds3f b = scene.is_triangle(i) ? triangle_bounds(scene, i)
+                           : scene.is_instanced(i)
+                               ? instance_bounds(scene, scene.instances[i - scene.primitive_count()])
+                               : quadric_bounds(scene.quadric(i));
+        if (b.empty()) continue;
         // min and max skip NaN, so a triangle's vertices are looked at themselves.
         bool finite = is_finite(b.lower) && is_finite(b.upper);
         if (scene.is_triangle(i)) {
@@ -157,7 +164,7 @@ Bvh2 build_bvh2(const SceneView& scene) {
     RTCBVH bvh = rtcNewBVH(device);
     BuildInput input{scene};
     RTCBuildArguments args = rtcDefaultBuildArguments();
-    args.buildQuality = RTC_BUILD_QUALITY_HIGH;
+    args.buildQuality = instances ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH;
     args.maxBranchingFactor = 2;
     args.maxDepth = 64;
     args.sahBlockSize = 1;
@@ -357,10 +364,10 @@ uint32_t bvh2_depth(const Bvh2& bvh) {
     return deepest;
 }
 
-Bvh2 build_optimised_bvh2(const SceneView& scene) {
-    Bvh2 bvh = build_bvh2(scene);
+Bvh2 build_optimised_bvh2(const SceneView& scene, const Group* group) {
+    Bvh2 bvh = build_bvh2(scene, group);
     optimise_bvh2(bvh, kReinsertionPasses);
-    return bvh2_depth(bvh) > kMostBvh2Depth ? build_bvh2(scene) : bvh;
+    return bvh2_depth(bvh) > kMostBvh2Depth ? build_bvh2(scene, group) : bvh;
 }
 
 double bvh2_cost(const Bvh2& bvh) {

@@ -24,8 +24,10 @@ struct Bvh2 {
 };
 
 /// Builds a tree over all primitives of the scene with surface-area heuristic and spatial splits (Stich et al. 2009) by
-/// Embree's builder. Triangles that are not finite are left out. Throws Error(device) when Embree fails.
-Bvh2 build_bvh2(const SceneView& scene);
+/// Embree's builder. Triangles that are not finite are left out. With `group` over its triangles alone; without, over
+/// all others and instances, whose leaves have primitive_count() plus their index. Scenes with instances have no splits
+/// there. Throws Error(device) when Embree fails.
+Bvh2 build_bvh2(const SceneView& scene, const Group* group = nullptr);
 
 /// Box of the part of triangle `prim` in `within` on either side of the plane x[axis] = position. Rounded outwards.
 void split_triangle_bounds(const SceneView& scene, uint32_t prim, const Bounds3f& within, int axis, float position,
@@ -46,7 +48,7 @@ constexpr uint32_t kMostBvh2Depth = 96;
 
 /// The tree that rays are traced through: optimised, unless that makes it too deep. Among thousands of needles whose
 /// boxes all overlap, reinsertion would chain one after the other.
-Bvh2 build_optimised_bvh2(const SceneView& scene);
+Bvh2 build_optimised_bvh2(const SceneView& scene, const Group* group = nullptr);
 
 /// Sum of half areas of inner nodes over that of the root.
 double bvh2_cost(const Bvh2& bvh);

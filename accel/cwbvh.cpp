@@ -18,6 +18,8 @@ constexpr uint32_t kWidth = 8;
 constexpr uint32_t kMaxLeafSize = 3;
 /// Cost of testing a node's children and one primitive (Ylitie et al. 2017, section 5.1).
 constexpr float kNodeCost = 1.0f, kPrimitiveCost = 0.3f;
+/// And of going into an instance.
+constexpr float kInstanceCost = 6.0f;
 
 /// Best cost of representing a binary subtree by at most i+1 wide nodes or leaves, and how.
 struct Plan {
@@ -50,6 +52,10 @@ public:
             const Task task = tasks.back();
             tasks.pop_back();
             out_.depth = std::max(out_.depth, task.depth);
+            if (is_instance(task.binary)) {
+                write_instance(task.wide, bvh_.nodes[task.binary].prim - scene_.primitive_count());
+                continue;
+            }
             Children children;
             if (plans_[task.binary].leaf)
                 children.node[children.count++] = task.binary;  // the root of a tiny scene
@@ -77,6 +83,19 @@ private:
         return n;
     }
 
+    bool is_instance(uint32_t binary) const {
+        return bvh_.nodes[binary].is_leaf() && scene_.is_instanced(bvh_.nodes[binary].prim);
+    }
+
+    void write_instance(uint32_t wide, uint32_t index) {
+        const Instance& instance = scene_.instances[index];
+        CwbvhInstance node = {};
+        node.root = instance.group + 1;
+        node.id_offset = instance.first_id - instance.first_triangle;
+        node.to_group = instance.to_group;
+        std::memcpy(static_cast<void*>(&out_.nodes[wide]), &node, sizeof node);
+    }
+
     /// Dynamic programming from the leaves up (equations 1-5 of the paper).
     void make_plans() {
         std::vector<uint32_t> order = {bvh_.root};
@@ -88,6 +107,13 @@ private:
             const Bvh2Node& n = bvh_.nodes[order[i]];
             Plan& plan = plans_[order[i]];
             const float area = n.bounds.half_area();
+            if (n.is_leaf() && is_instance(order[i])) {
+                plan.primitives = kMaxLeafSize + 1;  // never part of a leaf
+                plan.leaf = false;
+                for (float& c : plan.cost) c = area * kInstanceCost;
+                for (uint8_t& s : plan.left_share) s = 0;
+                continue;
+            }
             if (n.is_leaf()) {
                 plan.primitives = 1;
                 plan.leaf = true;
@@ -269,10 +295,34 @@ CwbvhPrimitive make_cwbvh_primitive(const SceneView& scene, uint32_t prim) {
 
 CwbvhArrays collapse_bvh2(const SceneView& scene, const Bvh2& bvh) { return Collapser(scene, bvh).run(); }
 
+CwbvhArrays build_cwbvh(const SceneView& scene) {
+    CwbvhArrays all = collapse_bvh2(scene, build_optimised_bvh2(scene));
+    const size_t above = all.nodes.size();
+    std::vector<uint32_t> roots;
+    uint32_t deepest = 0;
+    for (uint32_t g = 0; g < scene.group_count; ++g) {
+        CwbvhArrays part = collapse_bvh2(scene, build_optimised_bvh2(scene, &scene.groups[g]));
+        const uint32_t nodes = uint32_t(all.nodes.size()), primitives = uint32_t(all.primitives.size());
+        for (CwbvhNode& node : part.nodes)
+            if (node.valid) node.first_child += nodes, node.first_primitive += primitives;
+        roots.push_back(nodes);
+        deepest = std::max(deepest, part.depth);
+        all.nodes.insert(all.nodes.end(), part.nodes.begin(), part.nodes.end());
+        all.primitives.insert(all.primitives.end(), part.primitives.begin(), part.primitives.end());
+    }
+    for (size_t i = 0; i < above; ++i)
+        if (is_instance(all.nodes[i])) all.nodes[i].first_child = roots[all.nodes[i].first_child - 1];
+    all.depth += deepest;
+    if (all.depth > uint32_t(kCwbvhStackSize))
+        throw Error(ExitCode::device, "wide BVH: a depth of " + std::to_string(all.depth) +
+                                          " in two levels exceeds the traversal stack of " +
+                                          std::to_string(kCwbvhStackSize));
+    return all;
+}
+
 CwbvhAccel::CwbvhAccel(const Scene& scene) {
     const auto start = std::chrono::steady_clock::now();
-    const SceneView view = scene.view();
-    arrays_ = collapse_bvh2(view, build_optimised_bvh2(view));
+    arrays_ = build_cwbvh(scene.view());
     build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

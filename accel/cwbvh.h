@@ -46,7 +46,7 @@ struct CwbvhTracer {
     /// Tests one entry of `primitives`; updates `hit` and returns true if the ray meets it at 0 < t < hit.t.
     template <Features F>
     AMBILUX_HD bool intersect_primitive(const SceneView& scene, const Ray& ray, const RayShear& shear, uint32_t index,
-                                        Hit& hit) const {
+                                        Hit& hit, uint32_t id_offset = 0) const {
         const CwbvhPrimitive p = detail::load_record(primitives + index);
         if constexpr (F.has_quadrics()) {
             if (!scene.is_triangle(p.template prim<F>())) {
@@ -66,20 +66,23 @@ struct CwbvhTracer {
             return Vec3f{p.normal_x, p.normal_y, detail::difference_of_products(a.x, b.y, a.y, b.x)};
         };
         if (!intersect_triangle(ray.o, ray.d, shear, p.v0, p.v1, p.v2, hit.t, crossing, normal)) return false;
-        if (!accepts<F>(scene, ray, p, crossing.u, crossing.v)) return false;
-        hit = {crossing.t, crossing.u, crossing.v, p.template prim<F>()};
+        if (!accepts<F>(scene, ray, p, crossing.u, crossing.v, id_offset)) return false;
+        hit = {crossing.t, crossing.u, crossing.v, p.template prim<F>() + (F.instances ? id_offset : 0u)};
         return true;
     }
 
 private:
     template <Features F>
-    AMBILUX_HD static bool accepts(const SceneView& scene, const Ray& ray, const CwbvhPrimitive& p, float u, float v) {
-        if constexpr (F.opacity) return !p.lets_pass() || accept_hit<F>(scene, ray, p.template prim<F>(), u, v);
+    AMBILUX_HD static bool accepts(const SceneView& scene, const Ray& ray, const CwbvhPrimitive& p, float u, float v,
+                                   uint32_t id_offset = 0) {
+        if constexpr (F.opacity)
+            return !p.lets_pass() || accept_hit<F>(scene, ray, p.template prim<F>(), u, v, id_offset);
         return true;
     }
     /// `AnyHit`: a bool, or a constant.
     template <Features F, class AnyHit>
     AMBILUX_HD bool traverse(const SceneView& scene, const Ray& ray, AnyHit any_hit, Hit& hit) const {
+        if constexpr (F.instances) return traverse_instances<F>(scene, ray, any_hit, hit);
         hit = {ray.tmax, 0.0f, 0.0f, kNone};
         if (!is_traceable(ray)) return false;
         const CwbvhRay box_ray = make_cwbvh_ray(ray.o, ray.d);
@@ -104,6 +107,54 @@ private:
         }
         return hit.prim != kNone;
     }
+    /// The same through two levels: at an instance the ray goes on in the group's tree, until the stack is where it
+    /// was.
+    template <Features F, class AnyHit>
+    AMBILUX_HD bool traverse_instances(const SceneView& scene, const Ray& ray, AnyHit any_hit, Hit& hit) const {
+        hit = {ray.tmax, 0.0f, 0.0f, kNone};
+        if (!is_traceable(ray)) return false;
+        Ray here = ray;
+        CwbvhRay box_ray = make_cwbvh_ray(ray.o, ray.d);
+        RayShear shear = make_ray_shear(ray.d);
+        CwbvhGroup stack[kCwbvhStackSize];
+        int top = 0, floor = -1;  // floor: of the stack while in a group
+        uint32_t id_offset = 0;
+        const auto move_to = [&](Vec3f o, Vec3f d) {
+            here.o = o, here.d = d;
+            box_ray = make_cwbvh_ray(o, d);
+            shear = make_ray_shear(d);
+        };
+        CwbvhGroup group = {0, 0x80000000u};
+        for (;;) {
+            const uint32_t index = take_child(group, box_ray.order);
+            if (group.hits & kCwbvhInnerBits) stack[top++] = group;
+            const CwbvhNode node = detail::load_record(nodes + index);
+            if (is_instance(node)) {
+                const Affine to_group = instance_transform(node);
+                floor = top;
+                id_offset = node.first_primitive;
+                group = {node.first_child, 0x80000000u};
+                move_to(to_group.point(ray.o), to_group.vector(ray.d));
+                continue;
+            }
+            const uint32_t hits = child_hits(node, box_ray, hit.t);
+            group = inner_hits(node, hits, box_ray.order);
+            for (CwbvhLeaves leaves = leaf_hits(node, hits); leaves.hits;) {
+                const bool met = intersect_primitive<F>(scene, here, shear, take_primitive(leaves), hit, id_offset);
+                if (any_hit && met) return true;
+            }
+            if (!(group.hits & kCwbvhInnerBits)) {
+                if (top == floor) {
+                    floor = -1;
+                    id_offset = 0;
+                    move_to(ray.o, ray.d);
+                }
+                if (top == 0) break;
+                group = stack[--top];
+            }
+        }
+        return hit.prim != kNone;
+    }
 };
 
 /// What a device needs: upload both arrays and make_tracer() from the copies.
@@ -120,9 +171,12 @@ inline CwbvhTracer make_tracer(const CwbvhNode* nodes, const CwbvhPrimitive* pri
 CwbvhPrimitive make_cwbvh_primitive(const SceneView& scene, uint32_t prim);
 
 /// Collapses a binary tree into a wide one of least expected cost (Ylitie et al. 2017, section 5.1), with children in
-/// the slots that make octant order the order along rays (section 3.2). Throws Error(device) if the tree is deeper than
-/// the traversal stack.
+/// the slots that make octant order the order along rays (section 3.2). Instances become nodes whose `root` is their
+/// group + 1. Throws Error(device) if the tree is deeper than the traversal stack.
 CwbvhArrays collapse_bvh2(const SceneView& scene, const Bvh2& bvh);
+
+/// The tree over everything and those of all groups, one behind the other.
+CwbvhArrays build_cwbvh(const SceneView& scene);
 
 /// The structure over a scene, built on the host.
 class CwbvhAccel {

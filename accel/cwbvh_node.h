@@ -2,6 +2,7 @@
 // its eight children.
 #pragma once
 
+#include <cstddef>
 #include <cstring>
 
 #include "accel/reciprocal.h"
@@ -32,6 +33,21 @@ struct alignas(16) CwbvhNode {
     uint32_t upper_x[2], upper_y[2], upper_z[2];
 };
 static_assert(sizeof(CwbvhNode) == 80);
+
+/// In place of a node: an instance, whose ray goes on in the tree of its group. Only here `valid` is 0, but for the
+/// root of an empty tree, which has no `root` either.
+struct alignas(16) CwbvhInstance {
+    float unused[4];
+    uint32_t root;       ///< index of the node where the group's tree begins
+    uint32_t id_offset;  ///< from stored primitives to those of this instance, modulo 2^32
+    uint32_t valid;      ///< 0
+    uint32_t unused_too;
+    Affine to_group;
+};
+static_assert(sizeof(CwbvhInstance) == sizeof(CwbvhNode) &&
+              offsetof(CwbvhInstance, valid) == offsetof(CwbvhNode, valid));
+
+AMBILUX_HD bool is_instance(const CwbvhNode& node) { return node.valid == 0 && node.first_child != 0; }
 
 /// Primitive as leaves hold it: a triangle's vertices and as much of its normal as there is room for, or for an
 /// analytic shape its id alone.
@@ -77,6 +93,13 @@ AMBILUX_HD CwbvhRay make_cwbvh_ray(Vec3f o, Vec3f d) {
     ray.order = 0x3f800000u | (ray.inverse_d.x < 0.0f ? 0u : 0x100u) | (ray.inverse_d.y < 0.0f ? 0u : 0x200u) |
                 (ray.inverse_d.z < 0.0f ? 0u : 0x400u);
     return ray;
+}
+
+/// The part of `node`, an instance, that moves rays: the parameter along them stays the same.
+AMBILUX_HD Affine instance_transform(const CwbvhNode& n) {
+    return {{{bits_float(n.lower_x[0]), bits_float(n.lower_x[1]), bits_float(n.lower_y[0]), bits_float(n.lower_y[1])},
+             {bits_float(n.lower_z[0]), bits_float(n.lower_z[1]), bits_float(n.upper_x[0]), bits_float(n.upper_x[1])},
+             {bits_float(n.upper_y[0]), bits_float(n.upper_y[1]), bits_float(n.upper_z[0]), bits_float(n.upper_z[1])}}};
 }
 
 /// A set of hit children. Bits 24 to 31: inner nodes in order of visit, the highest first; bits 0 to 7: the node's

@@ -58,12 +58,21 @@ const Ray& ray_of(const detail::EmbreeRayContext& context, RTCRayN* rays, unsign
     return context.rays[RTCRayN_id(rays, n, i)];
 }
 
+const Instance* instance_of(const RTCFilterFunctionNArguments* args, const SceneView& view, unsigned i) {
+    return view.instance_count ? detail::instance_at(view, RTCHitN_instID(args->hit, args->N, i, 0)) : nullptr;
+}
+uint32_t stored_triangle(const RTCFilterFunctionNArguments* args, const Instance* instance, unsigned i) {
+    return RTCHitN_primID(args->hit, args->N, i) + (instance ? instance->first_triangle : 0);
+}
+
 /// True if the ray of lane `i` meets the triangle: not one that lets it pass.
 bool accepts(const RTCFilterFunctionNArguments* args, const detail::EmbreeRayContext& context, unsigned i) {
-    return !context.opacity ||
-           accept_hit<kAllFeatures>(*context.scene, ray_of(context, args->ray, args->N, i),
-                                    RTCHitN_primID(args->hit, args->N, i), RTCHitN_u(args->hit, args->N, i),
-                                    RTCHitN_v(args->hit, args->N, i));
+    if (!context.opacity) return true;
+    const Instance* instance = instance_of(args, *context.scene, i);
+    const uint32_t offset = instance ? instance->first_id - instance->first_triangle : 0;
+    return accept_hit<kAllFeatures>(*context.scene, ray_of(context, args->ray, args->N, i),
+                                    stored_triangle(args, instance, i), RTCHitN_u(args->hit, args->N, i),
+                                    RTCHitN_v(args->hit, args->N, i), offset);
 }
 
 /// Rejects hits on surfaces that let their ray pass.
@@ -79,8 +88,10 @@ void filter_occluder(const RTCFilterFunctionNArguments* args) {
     const SceneView& view = *context.scene;
     for (unsigned i = 0; i < args->N; ++i) {
         if (args->valid[i] != -1) continue;
-        const Triangle tri = view.triangles[RTCHitN_primID(args->hit, args->N, i)];
-        if (detail::starts_on(ray_of(context, args->ray, args->N, i).o, view.vertices[tri.v0].p,
+        const Instance* instance = instance_of(args, view, i);
+        const Triangle tri = view.triangles[stored_triangle(args, instance, i)];
+        const Vec3f o = ray_of(context, args->ray, args->N, i).o;
+        if (detail::starts_on(instance ? instance->to_group.point(o) : o, view.vertices[tri.v0].p,
                               view.vertices[tri.v1].p, view.vertices[tri.v2].p) ||
             !accepts(args, context, i))
             args->valid[i] = 0;
@@ -159,7 +170,41 @@ void attach(RTCScene scene, RTCGeometry geometry, unsigned int id) {
     rtcReleaseGeometry(geometry);
 }
 
+RTCGeometry make_mesh(RTCDevice device, const Scene& scene, uint32_t first, uint32_t count) {
+    RTCGeometry mesh = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, scene.vertices.data(), 0,
+                               sizeof(MeshVertex), scene.vertices.size());
+    rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, scene.triangles.data(),
+                               first * sizeof(Triangle), sizeof(Triangle), count);
+    if (scene.features.opacity) rtcSetGeometryIntersectFilterFunction(mesh, filter_triangle);
+    rtcSetGeometryOccludedFilterFunction(mesh, filter_occluder);
+    return mesh;
+}
+
+RTCScene new_scene(RTCDevice device) {
+    RTCScene scene = rtcNewScene(device);
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+    return scene;
+}
+
 }  // namespace
+
+void EmbreeAccel::attach_instances(const Scene& scene) {
+    for (const Group& group : scene.groups) {
+        groups_.push_back(new_scene(device_));
+        attach(groups_.back(), make_mesh(device_, scene, group.first_triangle, group.triangle_count),
+               detail::kTriangleGeometry);
+        rtcCommitScene(groups_.back());
+    }
+    for (size_t i = 0; i < scene.instances.size(); ++i) {
+        RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+        rtcSetGeometryInstancedScene(geometry, groups_[scene.instances[i].group]);
+        rtcSetGeometryTimeStepCount(geometry, 1);
+        rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, scene.instances[i].to_world.m);
+        attach(scene_, geometry, detail::kFirstInstance + unsigned(i));
+    }
+}
 
 EmbreeAccel::EmbreeAccel(const Scene& scene)
     : bytes_(std::make_unique<std::atomic<int64_t>>(0)), user_(std::make_unique<UserData>()),
@@ -170,20 +215,9 @@ EmbreeAccel::EmbreeAccel(const Scene& scene)
     if (!device_) throw_embree_error(nullptr, "making a device");
     rtcSetDeviceMemoryMonitorFunction(device_, count_bytes, bytes_.get());
     width_ = packet_width(device_);
-    scene_ = rtcNewScene(device_);
-    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
-
-    if (!scene.triangles.empty()) {
-        RTCGeometry mesh = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-        rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, scene.vertices.data(), 0,
-                                   sizeof(MeshVertex), scene.vertices.size());
-        rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, scene.triangles.data(), 0,
-                                   sizeof(Triangle), scene.triangles.size());
-        if (scene.features.opacity) rtcSetGeometryIntersectFilterFunction(mesh, filter_triangle);
-        rtcSetGeometryOccludedFilterFunction(mesh, filter_occluder);
-        attach(scene_, mesh, 0);
-    }
+    scene_ = new_scene(device_);
+    if (const uint32_t count = user_->view.ungrouped_count())
+        attach(scene_, make_mesh(device_, scene, 0, count), detail::kTriangleGeometry);
     if (!scene.quadrics.empty()) {
         RTCGeometry shapes = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
         rtcSetGeometryUserPrimitiveCount(shapes, unsigned(scene.quadrics.size()));
@@ -191,8 +225,9 @@ EmbreeAccel::EmbreeAccel(const Scene& scene)
         rtcSetGeometryBoundsFunction(shapes, bound_quadric, nullptr);
         rtcSetGeometryIntersectFunction(shapes, intersect_quadric);
         rtcSetGeometryOccludedFunction(shapes, occlude_quadric);
-        attach(scene_, shapes, 1);
+        attach(scene_, shapes, detail::kQuadricGeometry);
     }
+    attach_instances(scene);
     rtcCommitScene(scene_);
     if (const RTCError error = rtcGetDeviceError(device_); error != RTC_ERROR_NONE)
         throw Error(ExitCode::device,
@@ -202,13 +237,16 @@ EmbreeAccel::EmbreeAccel(const Scene& scene)
 
 EmbreeAccel::EmbreeAccel(EmbreeAccel&& other) noexcept
     : bytes_(std::move(other.bytes_)), user_(std::move(other.user_)), device_(other.device_), scene_(other.scene_),
-      triangle_count_(other.triangle_count_), width_(other.width_), build_seconds_(other.build_seconds_) {
+      groups_(std::move(other.groups_)), triangle_count_(other.triangle_count_), width_(other.width_),
+      build_seconds_(other.build_seconds_) {
     other.device_ = nullptr;
     other.scene_ = nullptr;
+    other.groups_.clear();
 }
 
 EmbreeAccel::~EmbreeAccel() {
     if (scene_) rtcReleaseScene(scene_);
+    for (RTCScene group : groups_) rtcReleaseScene(group);
     if (device_) rtcReleaseDevice(device_);
 }
 

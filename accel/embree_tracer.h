@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <type_traits>
+#include <vector>
 
 #include "accel/embree_api.h"
 #include "accel/opacity.h"
@@ -31,6 +32,14 @@ struct EmbreeRayContext {
     const Ray* rays;
     bool opacity;
 };
+
+/// Geometries of the structure over everything; those of instances follow. Groups have the first one alone.
+constexpr unsigned kTriangleGeometry = 0, kQuadricGeometry = 1, kFirstInstance = 2;
+
+/// The instance that Embree names by `inst_id`; null for none.
+inline const Instance* instance_at(const SceneView& view, unsigned inst_id) {
+    return inst_id == RTC_INVALID_GEOMETRY_ID ? nullptr : view.instances + (inst_id - kFirstInstance);
+}
 
 /// Rays and the triangles that they met, side by side, and where they cross them.
 struct alignas(64) TriangleLanes {
@@ -66,9 +75,10 @@ struct EmbreeTracer {
             query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
             embree_intersect(scene, &context.base, &query);
             if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+            const unsigned inst_id = query.hit.instID[0];
             hit = {query.ray.tfar, query.hit.u, query.hit.v,
-                   query.hit.primID + (query.hit.geomID == 0 ? 0 : triangle_count)};
-            if (query.hit.geomID != 0 || refine(view, ray, hit)) return true;
+                   primitive_of<F>(view, query.hit.geomID, query.hit.primID, inst_id)};
+            if (query.hit.geomID != 0 || refine<F>(view, ray, inst_id, hit)) return true;
             query.ray.tnear = next_float_up(hit.t);
             query.ray.tfar = next_float_down(ray.tmax);
             hit = {ray.tmax, 0.0f, 0.0f, kNone};
@@ -130,14 +140,18 @@ private:
         typename EmbreePacket<W>::RayHit query;
         make_rays<W>(rays, count, query.ray, valid);
         for (uint32_t k = 0; k < W; ++k) query.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+        if constexpr (F.instances)
+            for (uint32_t k = 0; k < W; ++k) query.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
         EmbreePacket<W>::intersect(valid, scene, &context.base, coherent, &query);
         if constexpr (W == 16) return refine_packet<F>(view, rays, count, query, hits);
         for (uint32_t k = 0; k < count; ++k) {
             hits[k] = {rays[k].tmax, 0.0f, 0.0f, kNone};
             if (query.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) continue;
+            const unsigned inst_id = query.hit.instID[0][k];
             hits[k] = {query.ray.tfar[k], query.hit.u[k], query.hit.v[k],
-                       query.hit.primID[k] + (query.hit.geomID[k] == 0 ? 0 : triangle_count)};
-            if (query.hit.geomID[k] == 0 && !refine(view, rays[k], hits[k])) closest<F>(view, rays[k], hits[k]);
+                       primitive_of<F>(view, query.hit.geomID[k], query.hit.primID[k], inst_id)};
+            if (query.hit.geomID[k] == 0 && !refine<F>(view, rays[k], inst_id, hits[k]))
+                closest<F>(view, rays[k], hits[k]);
         }
     }
     /// Where the rays of a packet meet what Embree found.
@@ -145,8 +159,19 @@ private:
     void refine_packet(const SceneView& view, const Ray* rays, uint32_t count, const RTCRayHit16& query,
                        Hit* hits) const {
         detail::TriangleLanes lanes;
+        // Those that met an instance, in its group.
+        std::conditional_t<F.instances, RTCRay16, const RTCRay16&> moved = query.ray;
         for (uint32_t k = 0; k < lanes.kWidth; ++k) {
-            const uint32_t prim = query.hit.geomID[k] == 0 ? query.hit.primID[k] : kNone;
+            uint32_t prim = query.hit.geomID[k] == 0 ? query.hit.primID[k] : kNone;
+            if constexpr (F.instances) {
+                const Instance* instance = prim == kNone ? nullptr : detail::instance_at(view, query.hit.instID[0][k]);
+                if (instance) {
+                    prim += instance->first_triangle;
+                    const Vec3f o = instance->to_group.point(rays[k].o), d = instance->to_group.vector(rays[k].d);
+                    moved.org_x[k] = o.x, moved.org_y[k] = o.y, moved.org_z[k] = o.z;
+                    moved.dir_x[k] = d.x, moved.dir_y[k] = d.y, moved.dir_z[k] = d.z;
+                }
+            }
             const Triangle tri = prim == kNone ? Triangle{} : view.triangles[prim];
             Vec3f v0 = {0.0f, 0.0f, 0.0f}, v1 = v0, v2 = v0;
             if (prim != kNone) v0 = view.vertices[tri.v0].p, v1 = view.vertices[tri.v1].p, v2 = view.vertices[tri.v2].p;
@@ -154,16 +179,17 @@ private:
             lanes.v1[0][k] = v1.x, lanes.v1[1][k] = v1.y, lanes.v1[2][k] = v1.z;
             lanes.v2[0][k] = v2.x, lanes.v2[1][k] = v2.y, lanes.v2[2][k] = v2.z;
         }
-        detail::cross_triangles(query.ray, lanes);
+        detail::cross_triangles(moved, lanes);
         for (uint32_t k = 0; k < count; ++k) {
             hits[k] = {rays[k].tmax, 0.0f, 0.0f, kNone};
             if (query.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) continue;
+            const unsigned inst_id = query.hit.instID[0][k];
             hits[k] = {query.ray.tfar[k], query.hit.u[k], query.hit.v[k],
-                       query.hit.primID[k] + (query.hit.geomID[k] == 0 ? 0 : triangle_count)};
+                       primitive_of<F>(view, query.hit.geomID[k], query.hit.primID[k], inst_id)};
             if (query.hit.geomID[k] != 0) continue;
             if (lanes.inside[k] && lanes.t[k] > 0.0f && lanes.t[k] < rays[k].tmax)
                 hits[k] = {lanes.t[k], lanes.u[k], lanes.v[k], hits[k].prim};
-            else if (!refine(view, rays[k], hits[k]))
+            else if (!refine<F>(view, rays[k], inst_id, hits[k]))
                 closest<F>(view, rays[k], hits[k]);
         }
     }
@@ -178,14 +204,30 @@ private:
     }
     /// Embree finds the triangle; our own test tells where, as precisely as on a device, and knows the plane that the
     /// ray starts on: false if it is that of this triangle.
-    static bool refine(const SceneView& view, const Ray& ray, Hit& hit) {
-        const Triangle tri = view.triangles[hit.prim];
+    template <Features F>
+    static bool refine(const SceneView& view, const Ray& world_ray, unsigned inst_id, Hit& hit) {
+        Ray ray = world_ray;
+        uint32_t stored = hit.prim;
+        if constexpr (F.instances) {
+            if (const Instance* instance = detail::instance_at(view, inst_id)) {
+                stored = instance->triangle_of(hit.prim);
+                ray.o = instance->to_group.point(world_ray.o), ray.d = instance->to_group.vector(world_ray.d);
+            }
+        }
+        const Triangle tri = view.triangles[stored];
         const Vec3f v0 = view.vertices[tri.v0].p, v1 = view.vertices[tri.v1].p, v2 = view.vertices[tri.v2].p;
         TriangleCrossing crossing;
         if (!intersect_triangle(ray.o, ray.d, make_ray_shear(ray.d), v0, v1, v2, ray.tmax, crossing))
             return !detail::starts_on(ray.o, v0, v1, v2);
         hit = {crossing.t, crossing.u, crossing.v, hit.prim};
         return true;
+    }
+    /// `inst_id` is read in scenes with instances only.
+    template <Features F>
+    uint32_t primitive_of(const SceneView& view, unsigned geometry, unsigned index, unsigned inst_id) const {
+        if constexpr (F.instances)
+            if (const Instance* instance = detail::instance_at(view, inst_id)) return instance->first_id + index;
+        return index + (geometry == detail::kTriangleGeometry ? 0 : triangle_count);
     }
     template <Features F>
     static detail::EmbreeRayContext make_context(const SceneView& view, const Ray* rays) {
@@ -230,7 +272,8 @@ private:
     static constexpr uint32_t kFewestPacketRays = 3;  ///< fewer are traced one by one
 };
 
-/// Embree's structure over a scene: triangles as geometry 0, analytic shapes as geometry 1. The scene must outlive it.
+/// Embree's structure over a scene: triangles as geometry 0, analytic shapes as geometry 1, then instances of
+/// structures over groups. The scene must outlive it.
 class EmbreeAccel {
 public:
     /// Builds over all TBB threads. Throws Error(device) when Embree fails.
@@ -245,11 +288,14 @@ public:
     double build_seconds() const { return build_seconds_; }
 
 private:
+    void attach_instances(const Scene& scene);
+
     struct UserData;  ///< what the callbacks of the analytic shapes read
     std::unique_ptr<std::atomic<int64_t>> bytes_;
     std::unique_ptr<UserData> user_;
     RTCDevice device_ = nullptr;
     RTCScene scene_ = nullptr;
+    std::vector<RTCScene> groups_;
     uint32_t triangle_count_ = 0, width_ = 1;
     double build_seconds_ = 0;
 };

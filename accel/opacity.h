@@ -30,7 +30,8 @@ AMBILUX_HD uint32_t opacity_id(const SceneView& scene, const Ray& ray, uint32_t 
             if (q.type == PrimitiveType::disk) return prim;
             const Vec3f outwards =
                 q.type == PrimitiveType::sphere ? octahedral_decode({u, v}) : Vec3f{cosf(u), sinf(u), 0.0f};
-            if (dot(outwards, q.to_local.vector(ray.d)) > 0.0f) return prim + scene.primitive_count();
+            if (dot(outwards, q.to_local.vector(ray.d)) > 0.0f)
+                return prim + scene.primitive_count() + (F.instances ? scene.instanced_count : 0u);
         }
     }
     return prim;
@@ -41,9 +42,11 @@ AMBILUX_HD const Material& material_of(const SceneView& scene, uint32_t prim) {
 }
 
 /// True if `ray` meets the surface at (prim,u,v) rather than passing through it: opacity > hash(ray, opacity_id), so
-/// the answer does not depend on the order in which a tracer visits primitives.
+/// the answer does not depend on the order in which a tracer visits primitives. `prim` is stored; its id is that and
+/// `id_offset`.
 template <Features F>
-AMBILUX_HD bool accept_hit(const SceneView& scene, const Ray& ray, uint32_t prim, float u, float v) {
+AMBILUX_HD bool accept_hit(const SceneView& scene, const Ray& ray, uint32_t prim, float u, float v,
+                           uint32_t id_offset = 0) {
     if constexpr (!F.opacity) {
         return true;
     } else {
@@ -52,7 +55,7 @@ AMBILUX_HD bool accept_hit(const SceneView& scene, const Ray& ray, uint32_t prim
         const bool textured = F.textures && material.opacity.texture >= 0;
         const Vec2f uv = textured ? texture_uv<F>(scene, prim, u, v) : Vec2f{0.0f, 0.0f};
         return surface_opacity<F>(scene, material, uv) >
-               hash_float(ray.alpha_seed, opacity_id<F>(scene, ray, prim, u, v));
+               hash_float(ray.alpha_seed, opacity_id<F>(scene, ray, prim, u, v) + id_offset);
     }
 }
 

@@ -110,6 +110,8 @@ PairArrays pair_bvh2(const SceneView& scene, const Bvh2& bvh) { return Pairer(sc
 PairAccel::PairAccel(const Scene& scene) {
     const auto start = std::chrono::steady_clock::now();
     const SceneView view = scene.view();
+    if (view.instance_count)
+        throw Error(ExitCode::usage, "binary BVHs have one level: scenes with instances need another structure");
     arrays_ = pair_bvh2(view, build_optimised_bvh2(view));
     build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

@@ -41,7 +41,8 @@ inline uint32_t even_bits(uint32_t code) {
 /// Length of the diagonal of the box around all primitives; 0 for an empty scene.
 inline float scene_diagonal(const SceneView& scene) {
     Bounds3f bounds;
-    for (uint32_t i = 0; i < scene.triangle_count; ++i) bounds.extend(triangle_bounds(scene, i));
+    for (uint32_t i = 0; i < scene.ungrouped_count(); ++i) bounds.extend(triangle_bounds(scene, i));
+    for (uint32_t i = 0; i < scene.instance_count; ++i) bounds.extend(instance_bounds(scene, scene.instances[i]));
     for (uint32_t i = 0; i < scene.quadric_count; ++i) bounds.extend(quadric_bounds(scene.quadrics[i]));
     return bounds.empty() ? 0.0f : length(bounds.upper - bounds.lower);
 }

@@ -18,21 +18,28 @@ constexpr Features kOpaqueTriangles = {0, 0, bit(PrimitiveType::triangle), false
 /// Triangles of partial opacity, textured or not.
 constexpr Features kMaskedTriangles = {0, 0, bit(PrimitiveType::triangle), true, false, true};
 
+/// Triangles and analytic shapes alike.
 constexpr Features kOpaqueShapes = {0, 0, kAllFeatures.primitives, false, false, false};
 
+/// Scenes with instances.
+constexpr Features kOpaqueInstances = {0, 0, kAllFeatures.primitives, false, false, false, false, false, false, true};
+
 /// f(FeatureSet) with the least of these that tracing rays through a scene of `features` needs, or with `kOwn`, the
-/// features of the calling kernels: masked quadrics look textures up as their shading does, by the same function (a set
-/// of their own made extend 19 % slower on an H100). Throws std::logic_error if `kOwn` does not cover what is needed.
+/// features of the calling kernels: masked shapes look textures up as their shading does, by the same function (a set of
+/// their own made extend 19 % slower on an H100). Throws std::logic_error if `kOwn` does not cover what is needed.
 template <Features kOwn = kAllFeatures, class Function>
 auto with_traversal_features(const Features& features, Function f) {
-    const bool quadrics = features.has_quadrics(), opacity = features.opacity;
-    if (!quadrics && !opacity) return f(FeatureSet<kOpaqueTriangles>{});
-    if constexpr (kOwn.covers(kMaskedTriangles))
-        if (!quadrics) return f(FeatureSet<kMaskedTriangles>{});
-    if constexpr (kOwn.covers(kOpaqueShapes))
-        if (!opacity) return f(FeatureSet<kOpaqueShapes>{});
-    if constexpr (kOwn.covers(kMaskedTriangles) && kOwn.covers(kOpaqueShapes))
-        if (quadrics && opacity) return f(FeatureSet<kOwn>{});
+    const bool triangles = !features.has_quadrics() && !features.instances, opaque = !features.opacity;
+    constexpr bool kMasks = kOwn.covers(kMaskedTriangles), kShapes = kOwn.covers(kOpaqueShapes);
+    if (triangles && opaque) return f(FeatureSet<kOpaqueTriangles>{});
+    if constexpr (kMasks)
+        if (triangles) return f(FeatureSet<kMaskedTriangles>{});
+    if constexpr (kShapes)
+        if (opaque && !features.instances) return f(FeatureSet<kOpaqueShapes>{});
+    if constexpr (kOwn.covers(kOpaqueInstances))
+        if (opaque) return f(FeatureSet<kOpaqueInstances>{});
+    if constexpr (kMasks && kShapes)
+        if (kOwn.instances || !features.instances) return f(FeatureSet<kOwn>{});
     throw std::logic_error("no kernel traces rays of this scene: its level of features is too small");
 }
 

@@ -1,5 +1,5 @@
 # What follows from integrators/registry.list.
-set(AMBILUX_LEVELS Diffuse Untextured Triangle Masked Common All)
+set(AMBILUX_LEVELS Diffuse Untextured Triangle Masked Common Flat All)
 set(AMBILUX_REGISTRY ${PROJECT_SOURCE_DIR}/integrators/registry.list)
 
 # read_registry(): sets `entries` to one "integrator|variant|folder|NAME|unit|level level ..." for each line.

@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "core/half.h"
 #include "core/huge_pages.h"
+#include "formats/extent.h"
 #include "formats/finalize.h"
 #include "scene/pick_table.h"
 #include "transport/sensor/filter.h"
@@ -23,14 +24,6 @@ std::vector<float> checked_pick_table(const Scene& scene, const std::vector<doub
                           std::to_string(count) + ' ' + what + "; light sampling tells " + std::to_string(kMostPicks) +
                               " apart: " + advice);
     return pick_table(weights);
-}
-
-double triangle_area(const Scene& scene, const Triangle& t) {
-    const Vec3f &a = scene.vertices[t.v0].p, &b = scene.vertices[t.v1].p, &c = scene.vertices[t.v2].p;
-    const double u[3] = {double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z},
-                 v[3] = {double(c.x) - a.x, double(c.y) - a.y, double(c.z) - a.z};
-    const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
-    return 0.5 * std::sqrt(x * x + y * y + z * z);
 }
 
 Vec3f column(const Affine& a, int i) { return {a.m[0][i], a.m[1][i], a.m[2][i]}; }
@@ -72,45 +65,6 @@ void fill_areas(Scene& scene) {
         for (size_t i = 0; i < areas.size(); ++i)
             scene.tables.push_back(areas[i] > 0 ? float((double(cdf[i + 1]) - cdf[i]) / areas[i]) : 0.0f);
     }
-}
-
-/// Smallest sphere around the centre of the bounding box that holds all surfaces and the camera.
-void fill_bounds(Scene& scene) {
-    Vec3f lo = splat(kInfinity), hi = splat(-kInfinity);
-    const auto grow = [&](Vec3f a, Vec3f b) { lo = min(lo, a), hi = max(hi, b); };
-    const Vec3f camera = column(scene.sensor.to_world, 3);
-    grow(camera, camera);
-    for (const Triangle& t : scene.triangles)
-        for (uint32_t v : {t.v0, t.v1, t.v2}) grow(scene.vertices[v].p, scene.vertices[v].p);
-    // Centre and half axes of a box around a quadric; a sphere about the origin holds it with radius `reach`.
-    const auto quadric_ball = [](const Quadric& q, Vec3f& center) {
-        center = column(q.to_world, 3);
-        if (q.type == PrimitiveType::sphere) return q.radius;
-        const float flat = length(Vec3f{length(column(q.to_world, 0)), length(column(q.to_world, 1)), 0});
-        if (q.type == PrimitiveType::disk) return std::min(flat, std::max(q.radius, 0.0f));
-        const Vec3f half = column(q.to_world, 2) * 0.5f;
-        center = center + half;
-        return sqrtf(q.radius * q.radius + length_squared(half));
-    };
-    for (const Quadric& q : scene.quadrics) {
-        Vec3f c;
-        const float r = quadric_ball(q, c);
-        grow(c - splat(r), c + splat(r));
-    }
-    const Vec3f center = (lo + hi) * 0.5f;
-    float squared = length_squared(camera - center);
-    for (const Triangle& t : scene.triangles)
-        for (uint32_t v : {t.v0, t.v1, t.v2}) squared = max(squared, length_squared(scene.vertices[v].p - center));
-    float radius = sqrtf(squared);
-    for (const Quadric& q : scene.quadrics) {
-        Vec3f c;
-        const float r = quadric_ball(q, c);
-        radius = max(radius, length(c - center) + r);
-    }
-    scene.bounds_center = center;
-    // A little larger against rounding; an empty scene gets a sphere of radius 1, so that distant emitters have
-    // something to aim at.
-    scene.bounds_radius = radius > 0 ? radius * (1 + 1e-5f) : 1.0f;
 }
 
 Rgb load_texel(const Scene& scene, const Texture& t, size_t i) {
@@ -214,22 +168,6 @@ double fill_environment(Scene& scene, Emitter& emitter) {
     }
     append_environment_tables(scene, emitter, t.width, deal_tickets(row_sums), cell_tickets);
     return mean;
-}
-
-/// Most light from infinity that a scene takes up. No more passes through the sphere around everything than its disk
-/// has room for, and no more than falls on all surfaces: of a room with one stone far away the sphere alone would make
-/// too much.
-struct Receivers {
-    double disk;        ///< area that stops parallel light
-    double both_sides;  ///< area that light from everywhere falls on
-};
-
-Receivers receivers_of(const Scene& scene) {
-    const double disk = M_PI * double(scene.bounds_radius) * scene.bounds_radius;
-    double area = 0;
-    for (const Shape& shape : scene.shapes) area += double(shape.area);
-    if (!(area > 0)) return {disk, 4 * disk};
-    return {std::min(disk, area), std::min(4 * disk, 2 * area)};
 }
 
 bool is_masked_out(const Scene& scene, const Emitter& e) {
@@ -361,6 +299,7 @@ void fill_features(Scene& scene) {
         f.emitters |= bit(e.type);
         if (e.type != EmitterType::envmap) use(e.radiance.texture);  // an environment map has its own lookup
     }
+    f.instances = !scene.instances.empty();
     scene.features = f;
 }
 

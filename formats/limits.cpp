@@ -14,9 +14,9 @@ struct Named {
 };
 
 constexpr Named kLimits[] = {
-    {"pixels", &Limits::pixels},   {"bytes", &Limits::bytes},       {"total_bytes", &Limits::total_bytes},
-    {"shapes", &Limits::shapes},   {"includes", &Limits::includes}, {"expansion", &Limits::expansion},
-    {"nesting", &Limits::nesting}, {"seconds", &Limits::seconds},
+    {"pixels", &Limits::pixels},       {"bytes", &Limits::bytes},     {"total_bytes", &Limits::total_bytes},
+    {"shapes", &Limits::shapes},       {"copies", &Limits::copies},   {"includes", &Limits::includes},
+    {"expansion", &Limits::expansion}, {"nesting", &Limits::nesting}, {"seconds", &Limits::seconds},
 };
 
 /// Elements are visited by recursion: more may not fit the stack.

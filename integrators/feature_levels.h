@@ -38,6 +38,13 @@ constexpr Features kMaskedFeatures = {kCommonBsdfs, kCommonEmitters, bit(Primiti
 /// All but the rarer BSDFs and emitters, blends, coatings and rules of maps.
 constexpr Features kCommonFeatures = {kCommonBsdfs, kCommonEmitters, kAllFeatures.primitives, true, true, true};
 
+/// All but instances, of which every kernel of the last level asks at every hit.
+constexpr Features kFlatFeatures = [] {
+    Features f = kAllFeatures;
+    f.instances = false;
+    return f;
+}();
+
 /// Calls f.template operator()<F>() with the smallest level F that covers `needed`; with the full set if `specialise`
 /// is false.
 template <class Function>
@@ -47,6 +54,7 @@ decltype(auto) with_feature_level(const Features& needed, bool specialise, Funct
     if (specialise && kTriangleFeatures.covers(needed)) return f.template operator()<kTriangleFeatures>();
     if (specialise && kMaskedFeatures.covers(needed)) return f.template operator()<kMaskedFeatures>();
     if (specialise && kCommonFeatures.covers(needed)) return f.template operator()<kCommonFeatures>();
+    if (specialise && kFlatFeatures.covers(needed)) return f.template operator()<kFlatFeatures>();
     return f.template operator()<kAllFeatures>();
 }
 

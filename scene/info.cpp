@@ -1,5 +1,6 @@
 #include "scene/info.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -27,8 +28,37 @@ std::vector<std::string> feature_names(const Features& f) {
     if (f.blends) names.push_back("blends");
     if (f.coats) names.push_back("coatings");
     if (f.map_rules) names.push_back("rules of maps");
+    if (f.instances) names.push_back("instances");
     return names;
 }
+
+namespace {
+
+/// What is shown in several places, and the memory of its triangles if each place had a copy.
+nlohmann::json instances_info(const Scene& scene) {
+    const SceneView view = scene.view();
+    uint64_t grouped = 0;
+    std::vector<uint64_t> vertices;
+    for (const Group& g : scene.groups) {
+        grouped += g.triangle_count;
+        uint32_t first = kNone, last = 0;
+        for (uint32_t i = 0; i < g.triangle_count; ++i) {
+            const Triangle& t = scene.triangles[g.first_triangle + i];
+            for (uint32_t v : {t.v0, t.v1, t.v2}) first = std::min(first, v), last = std::max(last, v);
+        }
+        vertices.push_back(g.triangle_count ? last - first + 1 : 0);
+    }
+    uint64_t copies = uint64_t(view.instanced_count) * (sizeof(Triangle) + sizeof(uint16_t));
+    for (const Instance& i : scene.instances) copies += vertices[i.group] * sizeof(MeshVertex);
+    return {{"groups", scene.groups.size()},
+            {"group_triangles", grouped},
+            {"count", scene.instances.size()},
+            {"triangles", view.instanced_count},
+            {"bytes", scene.instances.size() * sizeof(Instance)},
+            {"bytes_of_copies", copies}};
+}
+
+}  // namespace
 
 nlohmann::json scene_info(const Scene& scene) {
     std::map<std::string, uint64_t> shapes, bsdfs, emitters, textures;
@@ -58,6 +88,7 @@ nlohmann::json scene_info(const Scene& scene) {
         {"degenerate_triangles", scene.degenerate_triangles},
         {"vertices", scene.vertices.size()},
         {"quadrics", scene.quadrics.size()},
+        {"instances", instances_info(scene)},
         {"materials", scene.materials.size()},
         {"bsdfs", bsdfs},
         {"textures", textures},

@@ -1,7 +1,7 @@
 // World-space boxes of primitives, rounded outwards.
 #pragma once
 
-#include "scene/view.h"
+#include "scene/placement.h"
 
 namespace ambilux {
 
@@ -53,6 +53,20 @@ AMBILUX_HD Bounds3f triangle_bounds(const SceneView& scene, uint32_t prim) {
     b.extend(scene.vertices[tri.v0].p);
     b.extend(scene.vertices[tri.v1].p);
     b.extend(scene.vertices[tri.v2].p);
+    return b;
+}
+
+/// Box of an instance, with what rounding does to rays that are moved into its group.
+AMBILUX_HD Bounds3f instance_bounds(const SceneView& scene, const Instance& instance) {
+    const Group& g = scene.groups[instance.group];
+    Bounds3f b;
+    if (!g.triangle_count) return b;
+    for (uint32_t corner = 0; corner < 8; ++corner)
+        b.extend(instance.to_world.point({corner & 1 ? g.upper.x : g.lower.x, corner & 2 ? g.upper.y : g.lower.y,
+                                          corner & 4 ? g.upper.z : g.lower.z}));
+    const Vec3f most = max(abs(b.lower), abs(b.upper));
+    const Vec3f pad = detail::placement_error(instance, most, max(abs(g.lower), abs(g.upper)));
+    b.lower = b.lower - pad, b.upper = b.upper + pad;
     return b;
 }
 

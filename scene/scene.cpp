@@ -28,13 +28,19 @@ SceneView Scene::view() const {
     v.bounds_center = bounds_center;
     v.bounds_radius = bounds_radius;
     v.sensor = sensor;
+    v.groups = groups.data();
+    v.instances = instances.data();
+    v.group_count = uint32_t(groups.size());
+    v.instance_count = uint32_t(instances.size());
+    for (const Instance& i : instances) v.instanced_count += groups[i.group].triangle_count;
     return v;
 }
 
 uint64_t Scene::memory_bytes() const {
     const auto bytes = [](const auto& array) { return uint64_t(array.size() * sizeof(array[0])); };
-    return bytes(vertices) + bytes(triangles) + bytes(quadrics) + bytes(shapes) + bytes(materials) + bytes(bsdfs) +
-           bytes(textures) + bytes(texels) + bytes(sort_keys) + bytes(emitters) + bytes(emitter_cdf) + bytes(tables);
+    return bytes(vertices) + bytes(triangles) + bytes(quadrics) + bytes(groups) + bytes(instances) + bytes(shapes) +
+           bytes(materials) + bytes(bsdfs) + bytes(textures) + bytes(texels) + bytes(sort_keys) + bytes(emitters) +
+           bytes(emitter_cdf) + bytes(tables);
 }
 
 }  // namespace ambilux

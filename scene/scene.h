@@ -34,6 +34,8 @@ struct Scene {
     std::vector<MeshVertex> vertices;
     std::vector<Triangle> triangles;
     std::vector<Quadric> quadrics;
+    std::vector<Group> groups;  ///< in the order of their triangles, which are the last ones
+    std::vector<Instance> instances;
     std::vector<Shape> shapes;
     std::vector<Material> materials;
     std::vector<BsdfRecord> bsdfs;

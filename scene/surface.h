@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/sampling.h"
+#include "scene/placement.h"
 #include "scene/ray.h"
 
 namespace ambilux {
@@ -77,22 +78,18 @@ AMBILUX_HD void any_tangents(SurfacePoint& s) {
     s.dpdv = frame.t;
 }
 
-/// Point of triangle `prim` at barycentrics (b1,b2) of its second and third vertex. `ng` is within 6 roundings of the
-/// triangle's, and 3 over the sine between its edges.
-AMBILUX_HD SurfacePoint triangle_surface_at(const SceneView& scene, uint32_t prim, float b1, float b2) {
-    const Triangle tri = scene.triangles[prim];
-    const uint32_t flags = scene.shapes[tri.shape].flags;
-    const MeshVertex &a = scene.vertices[tri.v0], &b = scene.vertices[tri.v1], &c = scene.vertices[tri.v2];
+/// Point of a triangle at barycentrics (b1,b2) of its second and third vertex, but for what names it. `ng` is within 6
+/// roundings of the triangle's, and 3 over the sine between its edges. `mirrored`: its vertices go round the other way.
+AMBILUX_HD SurfacePoint triangle_point(const MeshVertex& a, const MeshVertex& b, const MeshVertex& c, uint32_t flags,
+                                       float b1, float b2, bool mirrored = false) {
     const Vec3f p0 = a.p, p1 = b.p, p2 = c.p;
     const float b0 = 1.0f - b1 - b2;
     SurfacePoint s;
-    s.prim = prim;
-    s.shape = tri.shape;
     const Vec3f q0 = p0 * b0, q1 = p1 * b1, q2 = p2 * b2;
     s.p = q0 + q1 + q2;
     s.p_error = (abs(q0) + abs(q1) + abs(q2)) * gamma_bound(7);  // PBRT 4th ed., 6.8.5
     const Vec3f e1 = p1 - p0, e2 = p2 - p0;
-    s.ng = triangle_normal(e1, e2);
+    s.ng = mirrored ? triangle_normal(e2, e1) : triangle_normal(e1, e2);
     s.ns = s.ng;
     if (flags & kShapeHasNormals) {
         const Vec3f n = a.n * b0 + b.n * b1 + c.n * b2;
@@ -117,6 +114,34 @@ AMBILUX_HD SurfacePoint triangle_surface_at(const SceneView& scene, uint32_t pri
         s.dpdu = e1;
         s.dpdv = e2;
     }
+    return s;
+}
+
+/// Point of triangle `prim`, one that is stored.
+AMBILUX_HD SurfacePoint triangle_surface_at(const SceneView& scene, uint32_t prim, float b1, float b2) {
+    const Triangle tri = scene.triangles[prim];
+    SurfacePoint s = triangle_point(scene.vertices[tri.v0], scene.vertices[tri.v1], scene.vertices[tri.v2],
+                                    scene.shapes[tri.shape].flags, b1, b2);
+    s.prim = prim;
+    s.shape = tri.shape;
+    return s;
+}
+
+/// Point of a triangle of an instance, from its vertices in the scene: what a copy of the group would give.
+AMBILUX_HD SurfacePoint instanced_surface_at(const SceneView& scene, uint32_t prim, float b1, float b2) {
+    const Instance& instance = scene.instance_of(prim);
+    const Triangle tri = scene.triangles[instance.triangle_of(prim)];
+    const uint32_t flags = scene.shapes[tri.shape].flags;
+    const bool normals = flags & kShapeHasNormals;
+    const MeshVertex a = placed_vertex(instance, scene.vertices[tri.v0], normals),
+                     b = placed_vertex(instance, scene.vertices[tri.v1], normals),
+                     c = placed_vertex(instance, scene.vertices[tri.v2], normals);
+    SurfacePoint s = triangle_point(a, b, c, flags, b1, b2, instance.mirrored);
+    // Scales that differ may leave it on the other side of the vertex normals.
+    if (normals && dot(s.ng, a.n + b.n + c.n) < 0.0f) s.ng = -s.ng;
+    s.p_error = s.p_error + placement_error(instance, abs(s.p), abs(instance.to_group.point(s.p)));
+    s.prim = prim;
+    s.shape = tri.shape;
     return s;
 }
 
@@ -184,6 +209,8 @@ AMBILUX_HD SurfacePoint quadric_surface_at(const SceneView& scene, uint32_t prim
 /// space.
 template <Features F>
 AMBILUX_HD SurfacePoint surface_at(const SceneView& scene, uint32_t prim, float u, float v) {
+    if constexpr (F.instances)
+        if (scene.is_instanced(prim)) return detail::instanced_surface_at(scene, prim, u, v);
     if constexpr (F.has_quadrics()) {
         if constexpr (!F.has(PrimitiveType::triangle)) return detail::quadric_surface_at(scene, prim, u, v);
         if (!scene.is_triangle(prim)) return detail::quadric_surface_at(scene, prim, u, v);

@@ -76,6 +76,24 @@ struct Shape {
     float area;  ///< world area
 };
 
+/// Triangles that are shown in several places, in coordinates of their own, and the box around them.
+struct Group {
+    uint32_t first_triangle, triangle_count;
+    Vec3f lower, upper;
+};
+
+/// A group in one place. Its primitives have ids of their own, from first_id on: behind those of all that is stored.
+/// The outside of a surface stays outside of a mirror.
+struct alignas(16) Instance {
+    Affine to_world, to_group;
+    uint32_t group;
+    uint32_t first_triangle;  ///< of the group
+    uint32_t first_id;
+    uint32_t mirrored;
+
+    AMBILUX_HD uint32_t triangle_of(uint32_t prim) const { return prim - first_id + first_triangle; }
+};
+
 // ---- materials ----
 
 /// A BSDF with its adapters. `front` is used where the ray comes from the side of the shading normal. When `two_sided`,
@@ -171,11 +189,35 @@ struct SceneView {
     Vec3f bounds_center;   ///< bounding sphere of all surfaces (and of the camera position)
     float bounds_radius;
     Sensor sensor;
+    // Features::instances only. Triangles of groups lie behind all others.
+    const Group* groups;
+    const Instance* instances;  ///< first_id ascends
+    uint32_t group_count, instance_count;
+    uint32_t instanced_count;  ///< primitives of all instances
 
-    /// Primitive ids: 0..triangle_count-1 are triangles, then the quadrics.
+    /// Primitive ids: 0..triangle_count-1 are triangles, then the quadrics, then those of instances.
     AMBILUX_HD uint32_t primitive_count() const { return triangle_count + quadric_count; }
     AMBILUX_HD bool is_triangle(uint32_t prim) const { return prim < triangle_count; }
     AMBILUX_HD const Quadric& quadric(uint32_t prim) const { return quadrics[prim - triangle_count]; }
+    AMBILUX_HD bool is_instanced(uint32_t prim) const { return prim >= primitive_count(); }
+    /// Triangles that belong to no group.
+    AMBILUX_HD uint32_t ungrouped_count() const { return group_count ? groups[0].first_triangle : triangle_count; }
+    /// The instance that primitive `prim` belongs to.
+    AMBILUX_HD const Instance& instance_of(uint32_t prim) const {
+        uint32_t first = 0, last = instance_count - 1;
+        while (first < last) {
+            const uint32_t middle = first + (last - first + 1) / 2;
+            if (instances[middle].first_id <= prim)
+                first = middle;
+            else
+                last = middle - 1;
+        }
+        return instances[first];
+    }
+    /// What is stored of primitive `prim`.
+    AMBILUX_HD uint32_t stored(uint32_t prim) const {
+        return is_instanced(prim) ? instance_of(prim).triangle_of(prim) : prim;
+    }
     AMBILUX_HD uint32_t shape_of(uint32_t prim) const {
         return is_triangle(prim) ? triangles[prim].shape : quadric(prim).shape;
     }

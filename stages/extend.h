@@ -48,7 +48,7 @@ struct Extend {
         hits.complete(i, HitEnd{hit.u, hit.v, hit.prim, 0});
         // Otherwise nothing is sorted by material, or without keys that are kept.
         if constexpr (F.several_bsdfs())
-            if (hits.keys) hits.keys[i] = uint16_t(MaterialOrder::of(scene, hit.prim));
+            if (hits.keys) hits.keys[i] = uint16_t(MaterialOrder::of<F.instances>(scene, hit.prim));
     }
     AMBILUX_HD void operator()(uint32_t i) const {
         Ray ray;

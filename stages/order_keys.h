@@ -23,7 +23,11 @@ struct MaterialOrder {
     }
     AMBILUX_HD static uint32_t key(const SceneView& scene, const SlotHit& hit) { return of(scene, hit.prim); }
 
+    /// `Instances`: the scene may have some.
+    template <bool Instances = true>
     AMBILUX_HD static uint32_t of(const SceneView& scene, uint32_t prim) {
+        if constexpr (Instances)
+            if (scene.instance_count && prim != kNone) prim = scene.stored(prim);
         return prim == kNone ? min(scene.material_count, kMostSortKeys) : scene.sort_keys[prim];
     }
 };

@@ -4,7 +4,8 @@ namespace ambilux {
 
 DeviceScene::DeviceScene(const Scene& scene)
     : vertices_(scene.vertices, "vertices on the device"), triangles_(scene.triangles, "triangles on the device"),
-      quadrics_(scene.quadrics, "analytic shapes on the device"), shapes_(scene.shapes, "shapes on the device"),
+      quadrics_(scene.quadrics, "analytic shapes on the device"), groups_(scene.groups, "groups on the device"),
+      instances_(scene.instances, "instances on the device"), shapes_(scene.shapes, "shapes on the device"),
       materials_(scene.materials, "materials on the device"), bsdfs_(scene.bsdfs, "BSDFs on the device"),
       textures_(scene.textures, "texture records on the device"), texels_(scene.texels, "texels on the device"),
       sort_keys_(scene.sort_keys, "sort keys on the device"), emitters_(scene.emitters, "emitters on the device"),
@@ -13,6 +14,8 @@ DeviceScene::DeviceScene(const Scene& scene)
     view_.vertices = vertices_.data();
     view_.triangles = triangles_.data();
     view_.quadrics = quadrics_.data();
+    view_.groups = groups_.data();
+    view_.instances = instances_.data();
     view_.shapes = shapes_.data();
     view_.materials = materials_.data();
     view_.bsdfs = bsdfs_.data();
@@ -25,9 +28,9 @@ DeviceScene::DeviceScene(const Scene& scene)
 }
 
 uint64_t DeviceScene::bytes() const {
-    return vertices_.bytes() + triangles_.bytes() + quadrics_.bytes() + shapes_.bytes() + materials_.bytes() +
-           bsdfs_.bytes() + textures_.bytes() + texels_.bytes() + sort_keys_.bytes() + emitters_.bytes() +
-           emitter_cdf_.bytes() + tables_.bytes();
+    return vertices_.bytes() + triangles_.bytes() + quadrics_.bytes() + groups_.bytes() + instances_.bytes() +
+           shapes_.bytes() + materials_.bytes() + bsdfs_.bytes() + textures_.bytes() + texels_.bytes() +
+           sort_keys_.bytes() + emitters_.bytes() + emitter_cdf_.bytes() + tables_.bytes();
 }
 
 DeviceCwbvh::DeviceCwbvh(const CwbvhArrays& arrays)

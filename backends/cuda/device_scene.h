@@ -25,6 +25,8 @@ private:
     DeviceBuffer<MeshVertex> vertices_;
     DeviceBuffer<Triangle> triangles_;
     DeviceBuffer<Quadric> quadrics_;
+    DeviceBuffer<Group> groups_;
+    DeviceBuffer<Instance> instances_;
     DeviceBuffer<Shape> shapes_;
     DeviceBuffer<Material> materials_;
     DeviceBuffer<BsdfRecord> bsdfs_;

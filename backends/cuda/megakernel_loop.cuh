@@ -22,7 +22,7 @@ __device__ void run_regenerating(const Machine& machine, uint32_t slot, uint32_t
                                  RegenerationTuning tuning = {}) {
     constexpr Features F = Machine::kFeatures;
     enum Phase : uint32_t { kRests, kAnswer, kConnect, kBegin, kAsk };
-    using Cursor = CwbvhCursor<false>;
+    using Cursor = Walk<F, CwbvhTracer, false>;
     const WholeWarp warp;
     typename Machine::State s{};
     typename Machine::Counts counts{};

@@ -8,6 +8,7 @@
 
 #include "accel/cwbvh.h"
 #include "accel/pair_bvh.h"
+#include "backends/cuda/instance_cursor.cuh"
 #include "backends/traversal_features.h"
 #include "core/warp.h"
 
@@ -133,8 +134,14 @@ struct PairCursor {
     }
 };
 
-template <class Tracer, bool AnyHit>
-using Walk = std::conditional_t<std::is_same_v<Tracer, PairTracer>, PairCursor<AnyHit>, CwbvhCursor<AnyHit>>;
+/// Binary BVHs have one level.
+template <Features F, class Tracer>
+constexpr bool kTwoLevels = F.instances && !std::is_same_v<Tracer, PairTracer>;
+
+template <Features F, class Tracer, bool AnyHit>
+using Walk = std::conditional_t<
+    std::is_same_v<Tracer, PairTracer>, PairCursor<AnyHit>,
+    std::conditional_t<kTwoLevels<F, Tracer>, InstanceCursor<CwbvhCursor<AnyHit>>, CwbvhCursor<AnyHit>>>;
 
 /// Items that a warp has claimed and not begun.
 struct WarpItems {
@@ -158,18 +165,21 @@ struct WarpItems {
 };
 
 /// A turn of a warp: its lanes visit nodes as long as many can, then test primitives. `any_hit`: a bool, or a constant;
-/// the lane's ray ends with its first hit. Lanes without a ray take part.
+/// the lane's ray ends with its first hit. Lanes without a ray take part. With two levels the ray is in the coordinates
+/// of the tree that the lane is in.
 template <Features F, class AnyHit, class Cursor, class Tracer>
 __device__ __forceinline__ void walk_together(const SceneView& scene, const Tracer& tracer, const TraceTuning& tuning,
                                               AnyHit any_hit, Cursor& walk, typename Cursor::Entry* stack,
-                                              const Ray& ray, const CwbvhRay& box_ray, const RayShear& shear, float& t,
-                                              uint32_t& prim) {
+                                              Ray& ray, CwbvhRay& box_ray, RayShear& shear, float& t, uint32_t& prim) {
     constexpr uint32_t kWarp = 0xffffffffu;
     uint32_t walking;
     do {
         bool walks = walk.can_step();
         if (walks) {
-            walk.step(tracer, stack, box_ray, t);
+            if constexpr (kTwoLevels<F, Tracer>)
+                walk.step(tracer, stack, ray, box_ray, shear, t, any_hit ? 0u : ~0u);
+            else
+                walk.step(tracer, stack, box_ray, t);
             walks = walk.can_step();
         }
         walking = uint32_t(__popc(__ballot_sync(kWarp, walks)));
@@ -181,7 +191,12 @@ __device__ __forceinline__ void walk_together(const SceneView& scene, const Trac
         do {
             if (walk.has_primitives()) {
                 Hit hit = {t, 0.0f, 0.0f, kNone};
-                if (tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit)) {
+                bool met;
+                if constexpr (kTwoLevels<F, Tracer>)
+                    met = tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit, walk.id_offset);
+                else
+                    met = tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit);
+                if (met) {
                     t = hit.t;
                     prim = hit.prim;
                     walk.keep(stack, hit.u, hit.v);
@@ -206,8 +221,8 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
                    stretch = per_thread >= 32             ? 128
                              : AnyHit && per_thread >= 16 ? 64
                                                           : 32;
-    Walk<Tracer, AnyHit> walk;
-    typename Walk<Tracer, AnyHit>::Entry stack[Walk<Tracer, AnyHit>::kEntries];
+    Walk<F, Tracer, AnyHit> walk;
+    typename Walk<F, Tracer, AnyHit>::Entry stack[Walk<F, Tracer, AnyHit>::kEntries];
     Ray ray = {};
     CwbvhRay box_ray = {};
     RayShear shear = {};

@@ -9,6 +9,7 @@
 
 #include "core/atomic_file.h"
 #include "formats/convert/writer.h"
+#include "scene/flatten.h"
 
 namespace ambilux {
 namespace convert {
@@ -134,6 +135,11 @@ void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
 
 std::vector<std::string> write_mitsuba(const Scene& scene, const std::string& path) {
     namespace fs = std::filesystem;
+    if (!scene.instances.empty()) {
+        std::vector<std::string> notes = write_mitsuba(flatten_instances(scene), path);
+        notes.push_back("every instance is written as a copy");
+        return notes;
+    }
     const std::string stem = fs::path(path).stem().string() + "_files";
     convert::Writer w{scene, (fs::path(path).parent_path() / stem).string(), stem, {}, {}, {}};
     make_folders(w.folder);

@@ -1,6 +1,7 @@
 #include "formats/gltf/load.h"
 
 #include <cmath>
+#include <map>
 
 #include "core/math.h"
 #include "core/scoped_seconds.h"
@@ -14,7 +15,10 @@ using namespace mitsuba;
 
 class SceneMaker {
 public:
-    explicit SceneMaker(Context& context) : c_(context) {}
+    explicit SceneMaker(Context& context) : c_(context), uses_(c_.model.meshes.size()) {
+        for (const tinygltf::Node& node : c_.model.nodes)
+            if (node.mesh >= 0 && size_t(node.mesh) < uses_.size()) ++uses_[size_t(node.mesh)];
+    }
 
     void make() {
         const tinygltf::Model& model = c_.model;
@@ -89,6 +93,11 @@ private:
     void add_mesh(int index, const Matrix& to_world) {
         if (size_t(index) >= c_.model.meshes.size()) c_.fail("there is no mesh " + std::to_string(index));
         const tinygltf::Mesh& mesh = c_.model.meshes[size_t(index)];
+        // Meshes of several nodes become groups, but for what shines.
+        const bool shared = uses_[size_t(index)] > 1;
+        const bool first_use = shared && !groups_.contains(index);
+        if (first_use) groups_[index] = &add_object(c_.document, "shape", "shapegroup", c_.where);
+        bool any_shared = false;
         for (size_t i = 0; i < mesh.primitives.size(); ++i) {
             const tinygltf::Primitive& primitive = mesh.primitives[i];
             const std::string what = "mesh " + std::to_string(index) +
@@ -104,12 +113,22 @@ private:
             if (is_new) place->second = primitive_mesh(c_, primitive, s.tex_coord, what);
             Object& shape = add_object(c_.document, "shape", "mesh", c_.where);
             set_text(shape, "name", name);
-            set_transform(shape, "to_world", to_world);
             add_child(shape, *s.bsdf);
             if (s.emitter) add_child(shape, *s.emitter);
-            add_child(*c_.document.scene, shape);
+            if (shared && !s.emitter) {
+                any_shared = true;
+                if (first_use) add_child(*groups_[index], shape);
+            } else {
+                set_transform(shape, "to_world", to_world);
+                add_child(*c_.document.scene, shape);
+            }
             grow(place->second, to_world);
         }
+        if (!any_shared) return;
+        Object& instance = add_object(c_.document, "shape", "instance", c_.where);
+        set_transform(instance, "to_world", to_world);
+        add_child(instance, *groups_[index]);
+        add_child(*c_.document.scene, instance);
     }
 
     void grow(const Mesh& mesh, const Matrix& m) {
@@ -121,6 +140,8 @@ private:
     }
 
     Context& c_;
+    std::vector<uint32_t> uses_;     ///< of meshes by nodes
+    std::map<int, Object*> groups_;  ///< by mesh
     Object* sensor_ = nullptr;
     uint64_t visited_ = 0;
     Vec3f lower_ = splat(kInfinity), upper_ = splat(-kInfinity);

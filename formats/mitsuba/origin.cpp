@@ -16,7 +16,8 @@ constexpr double kFar = 16;
 Vec3d far_center(const Scene& scene) {
     const SceneView view = scene.view();
     Bounds3f box;
-    for (uint32_t i = 0; i < scene.triangles.size(); ++i) box.extend(triangle_bounds(view, i));
+    for (const Instance& i : scene.instances) box.extend(instance_bounds(view, i));
+    for (uint32_t i = 0; i < view.ungrouped_count(); ++i) box.extend(triangle_bounds(view, i));
     for (const Quadric& q : scene.quadrics) box.extend(quadric_bounds(q));
     const auto& m = scene.sensor.to_world.m;
     box.extend(Vec3f{m[0][3], m[1][3], m[2][3]});

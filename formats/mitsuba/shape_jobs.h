@@ -28,11 +28,28 @@ struct Job {
     bool flip = false, face_normals = false;
     bool reverse = false;      ///< meshes: the order of corners, so that the outside stays outside of a mirror
     double smooth_angle = -1;  ///< not negative: vertex normals are made anew, but not over sharper edges; degrees
+    int group = -1;            ///< its place in the groups: of instances, and of meshes that instances share
     // Result for meshes.
     Mesh world;
     uint32_t dropped = 0;
     bool vanished = false;  ///< had area before its transform, and none of it is left
 };
+
+/// What a shapegroup holds, in its own coordinates.
+struct GroupJobs {
+    std::vector<Job> jobs;
+    std::vector<Where> where;  ///< of the instances that share it, as everything below
+    std::vector<Matrix> placements;
+};
+
+/// Puts copies of what groups hold in the places of jobs of type "instance", or leaves it to be shared: meshes of
+/// groups whose copies would have more than Limits::copies triangles. Their jobs then come last, group by group, around
+/// the middle of the group. Fails where the scene would have too many shapes.
+void place_instances(const Builder& builder, std::vector<GroupJobs>& groups, const std::vector<MeshSource>& sources,
+                     std::vector<Job>& jobs);
+
+/// Adds groups and instances to a scene that has the triangles; `ends` are those of the groups.
+void add_instances(const Builder& builder, const std::vector<GroupJobs>& groups, const std::vector<uint32_t>& ends);
 
 /// Moves a mesh to world space, orients it and leaves out triangles without area.
 void transform_mesh(const Builder& builder, Job& job, const Mesh& mesh);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -22,6 +23,8 @@ struct ShapeBuilder {
     std::vector<MeshSource> sources;
     std::map<std::string, int> source_by_key;
     std::vector<Job> jobs;
+    std::vector<GroupJobs> groups;
+    std::map<const Object*, int> group_of;
 
     int add_source(MeshSource source, const std::string& key) {
         const auto [it, added] = source_by_key.try_emplace(key, int(sources.size()));
@@ -248,11 +251,25 @@ void ShapeBuilder::add_instance(const Object& object, const Matrix& outer) {
     Reader in(builder, object);
     const Object* group = in.take("shape");
     if (!group || group->type != "shapegroup") in.fail("instance has no shapegroup");
-    const Matrix to_world = outer * in.transform("to_world");
+    Job job;
+    job.where = object.where;
+    job.type = object.type;
+    job.to_world = outer * in.transform("to_world");
+    if (!(std::fabs(determinant(job.to_world)) > 0))
+        in.fail(in.where("to_world"), "the transform of the instance is singular");
     in.finish();
-    Reader group_in(builder, *group);
-    while (const Object* shape = group_in.take("shape")) add_shape(*shape, to_world, true, true);
-    group_in.finish();
+    const auto [known, is_new] = group_of.try_emplace(group, int(groups.size()));
+    if (is_new) {
+        std::vector<Job> others = std::exchange(jobs, {});
+        Reader group_in(builder, *group);
+        while (const Object* shape = group_in.take("shape")) add_shape(*shape, {}, true, true);
+        group_in.finish();
+        groups.push_back({std::exchange(jobs, std::move(others)), {}, {}});
+    }
+    job.group = known->second;
+    if (jobs.size() >= builder.options.limits.shapes)
+        in.fail("the scene has more shapes than --limits shapes=" + std::to_string(builder.options.limits.shapes));
+    jobs.push_back(std::move(job));
 }
 
 uint64_t memory_of(const Mesh& mesh) { return mesh_bytes(mesh.positions.size(), mesh.faces.size()); }
@@ -320,11 +337,12 @@ void add_mesh(Builder& builder, const Job& job, uint32_t index, Shape& shape) {
 }  // namespace
 
 void build_shapes(Builder& builder, const Object& root) {
-    ShapeBuilder shapes{builder, {}, {}, {}};
+    ShapeBuilder shapes{builder, {}, {}, {}, {}, {}};
     for (const Child& child : root.children) {
         if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false, false);
     }
     load_sources(builder, shapes.sources);
+    place_instances(builder, shapes.groups, shapes.sources, shapes.jobs);
     // Shapes get meshes of their own, and so does the scene.
     for (const MeshSource& s : shapes.sources) builder.take_memory(memory_of(s.content()), s.path);
     for (const Job& job : shapes.jobs)
@@ -340,8 +358,11 @@ void build_shapes(Builder& builder, const Object& root) {
 
     Scene& scene = builder.scene;
     reserve_meshes(shapes.jobs, scene);
+    std::vector<uint32_t> group_ends;
+    int group = -1;
     for (Job& job : shapes.jobs) {
         const uint32_t index = uint32_t(scene.shapes.size());
+        if (job.group != group) group = job.group, group_ends.push_back(uint32_t(scene.triangles.size()));
         Shape shape{job.material, job.emitter, 0, 0, 0, 0};
         if (job.emitter != kNone) scene.emitters[job.emitter].shape = index;
         if (job.source >= 0) {
@@ -357,6 +378,8 @@ void build_shapes(Builder& builder, const Object& root) {
         scene.shapes.push_back(shape);
     }
     for (const Quadric& q : scene.quadrics) scene.shapes[q.shape].first_primitive += uint32_t(scene.triangles.size());
+    group_ends.push_back(uint32_t(scene.triangles.size()));
+    add_instances(builder, shapes.groups, group_ends);
 }
 
 const Plugins& shape_plugins() {

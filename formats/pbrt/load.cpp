@@ -385,6 +385,7 @@ Scene load_pbrt(const std::string& path, const LoadOptions& options) {
         pbrt::Parser parser(scene);
         parser.parse_file(path, {path, 0}, 1);
         parser.finish();
+        pbrt::finish_curves(scene);
         report.write(document);
     }
     return mitsuba::load_document(path, document, options);

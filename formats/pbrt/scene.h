@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "formats/meshes/curves.h"
 #include "formats/pbrt/textures.h"
 
 namespace ambilux::pbrt {
@@ -30,6 +31,17 @@ struct State {
 /// What shapes can be put on: where their coordinates differ from those of Mitsuba's shape.
 enum class Surface { mesh, sphere, disk, cylinder };
 
+/// Curves that make one mesh.
+struct CurveMesh {
+    std::string name;  ///< of the mesh
+    Where where;
+    std::vector<Curve> curves;
+    const Object* bsdf;  ///< null: no others join
+    Object* group;
+    bool reversed;
+    Matrix to_world;
+};
+
 struct SceneMaker {
     SceneMaker(Document& d, Report& r, std::string f)
         : document(d), report(r), folder(std::move(f)), textures({folder, d, r}, d, r) {}
@@ -44,6 +56,7 @@ struct SceneMaker {
     Object* open_object = nullptr;
     double exposure = 1;  ///< imaging ratio of the film
     uint64_t shape_count = 0;
+    std::vector<CurveMesh> curves;
 
     /// BSDFs of materials; keeps the materials, so that no address comes twice.
     std::map<std::pair<Shared, Surface>, const Object*> materials;
@@ -59,6 +72,13 @@ struct Options {
 void add_options(SceneMaker& scene, const Options& options);
 
 void add_shape(SceneMaker& scene, const Parameters& in);
+/// Shape "curve" as cubic B-splines.
+std::vector<Curve> read_curve(SceneMaker& scene, const Parameters& in);
+/// A new mesh for curves, or null if they join the one before. `alone`: nothing may join.
+Object* add_curves(SceneMaker& scene, const Parameters& in, const std::vector<Curve>& curves, const Object* bsdf,
+                   bool alone);
+/// Makes the meshes, once all curves are known: the more there are, the fewer sides they have.
+void finish_curves(SceneMaker& scene);
 void add_light(SceneMaker& scene, const Described& light);
 /// The emitter of a shape. `area`: of the shape as pbrt measures it for the parameter power; 0: not known.
 const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area);

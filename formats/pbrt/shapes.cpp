@@ -229,13 +229,22 @@ Surface surface_of(const std::string& type) {
 void add_shape(SceneMaker& scene, const Parameters& in) {
     const std::string& type = in.type;
     const bool quadric = surface_of(type) != Surface::mesh;
-    if (!quadric && type != "trianglemesh" && type != "plymesh" && type != "bilinearmesh" && type != "loopsubdiv")
+    if (!quadric && type != "trianglemesh" && type != "plymesh" && type != "bilinearmesh" && type != "loopsubdiv" &&
+        type != "curve")
         return scene.report.refuse(in.where, "shape '" + type + "' is not supported", "it is left out");
     if (++scene.shape_count > scene.document.limits.shapes)
         fail(in.where,
              "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
     const Object* bsdf = surface_material(scene, scene.state.material, surface_of(type));
-    const Placed placed = quadric ? add_quadric(scene, in) : add_mesh(scene, in, *bsdf);
+    Placed placed;
+    if (type == "curve") {
+        const std::vector<Curve> curves = read_curve(scene, in);
+        if (!curves.empty())
+            placed.object = add_curves(scene, in, curves, bsdf, in.find("alpha") || scene.state.area_light);
+        if (!placed.object) return in.finish(scene.report);
+    } else {
+        placed = quadric ? add_quadric(scene, in) : add_mesh(scene, in, *bsdf);
+    }
     Object& shape = *placed.object;
     const UvMap uv = uv_map(placed.surface);
     set_transform(shape, "to_world", scene.state.ctm * placed.local);

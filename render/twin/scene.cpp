@@ -1,6 +1,7 @@
 #include "render/twin/scene.h"
 
 #include "render/twin/convert.h"
+#include "scene/flatten.h"
 
 namespace ambilux::twin {
 
@@ -102,7 +103,10 @@ void derive(Emitter& e) {
 
 }  // namespace
 
-DoubleScene::DoubleScene(const ambilux::Scene& scene) : scene_(scene) {
+DoubleScene::DoubleScene(const ambilux::Scene& given)
+    : flat_(given.instances.empty() ? nullptr : std::make_unique<ambilux::Scene>(flatten_instances(given))),
+      scene_(flat_ ? *flat_ : given) {
+    const ambilux::Scene& scene = scene_;
     convert_all(scene.vertices, vertices_);
     convert_all(scene.triangles, triangles_);
     convert_all(scene.quadrics, quadrics_);

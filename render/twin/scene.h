@@ -1,6 +1,7 @@
 // A scene in double precision.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "render/twin/in_double/scene/view.h"
@@ -13,13 +14,14 @@ namespace ambilux::twin {
 /// right angles and unit directions. Tables, texels and areas of shapes are those of the scene, good to 2^-24.
 class DoubleScene {
 public:
-    /// `scene` must outlive it.
+    /// `scene` must outlive it. Instances become copies.
     explicit DoubleScene(const ambilux::Scene& scene);
 
     SceneView view() const;
     uint64_t memory_bytes() const;
 
 private:
+    std::unique_ptr<const ambilux::Scene> flat_;  ///< of a scene with instances
     const ambilux::Scene& scene_;
     std::vector<MeshVertex> vertices_;
     std::vector<Triangle> triangles_;

@@ -320,7 +320,10 @@ TEST_CASE("patches and subdivision surfaces are tessellated") {
 
 TEST_CASE("what is not known is refused by name, file and line") {
     const std::vector<std::pair<std::string, std::string>> cases = {
-        {"Shape \"curve\"", "shape 'curve' is not supported"},
+        {"Shape \"hair\"", "shape 'hair' is not supported"},
+        {"Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]", "curves of type 'flat'"},
+        {"Shape \"curve\" \"string type\" \"cylinder\" \"point3 P\" [0 0 0 1 0 0 2 0 0]",
+         "3 control points do not make a curve of degree 3"},
         {"LightSource \"goniometric\"", "light 'goniometric' is not supported"},
         {"Material \"hair\" Shape \"sphere\"", "material 'hair' is not supported"},
         {"Material \"subsurface\" Shape \"sphere\"", "material 'subsurface' is not supported"},
@@ -419,4 +422,22 @@ TEST_CASE("files that nest, unpack or repeat stay within the limits") {
     const std::string text =
         "WorldBegin AttributeBegin Material \"diffuse\" \"rgb reflectance\" [.5 .5 .5] " + kTriangle + "AttributeEnd";
     for (size_t n = 0; n < text.size(); ++n) CHECK(pbrt_error(text.substr(0, n), options) != "");
+}
+
+TEST_CASE("curves are tubes, those of one material in one mesh") {
+    const std::string curve = "Shape \"curve\" \"string type\" \"cylinder\" \"float width\" 0.2 ";
+    const Scene s = test::load_pbrt_world(
+        curve + "\"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]\n" + curve +
+        "\"point3 P\" [0 1 0 1 1 0 2 1 0] \"integer degree\" 2\n" + curve +
+        "\"string basis\" \"bspline\" \"point3 P\" [-1 2 0 0 2 0 1 2 0 2 2 0] \"float width1\" 0.4\n"
+        "Material \"conductor\"\n" +
+        curve + "\"point3 P\" [0 3 0 1 3 0 2 3 0 3 3 0]\n");
+    REQUIRE(s.shapes.size() == 2);
+    // Areas of open tubes: circumference times length; the last of the first mesh is a cone.
+    const double slant = std::sqrt(1 + 0.1 * 0.1);
+    CHECK(s.shapes[0].area == Approx(2 * M_PI * (0.1 * 3 + 0.1 * 2 + 0.15 * slant)).epsilon(0.005));
+    CHECK(s.shapes[1].area == Approx(2 * M_PI * 0.1 * 3).epsilon(0.005));
+    float most = 0;
+    for (uint32_t i = 0; i < s.shapes[0].primitive_count; ++i) most = std::max(most, s.vertices[s.triangles[i].v0].p.x);
+    CHECK(most == Approx(3).margin(1e-5));
 }

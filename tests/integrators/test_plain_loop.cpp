@@ -11,63 +11,20 @@
 #include "core/parallel.h"
 #include "integrators/feature_levels.h"
 #include "integrators/path/integrator.h"
+#include "tests/support/plain_path.h"
 #include "tests/support/render_scene.h"
 
 using namespace ambilux;
+using test::plain_sample;
 
 namespace {
-
-using Mis = UnidirectionalMis;
-
-/// Adds what a vertex finds to the sample, once its way is free.
-template <Features F>
-struct PlainSink {
-    const SceneView& scene;
-    const EmbreeTracer& tracer;
-    const Rules<Mis>& rules;
-    Draws numbers;
-    Rgb& sample;
-
-    Draws draws() const { return numbers; }
-    bool valid(Rgb throughput) const { return is_valid_radiance(throughput); }
-    void add(const Candidate<Mis>& c) const { sample += c.value * mis_weight(c.ratio); }
-    void at(const Vertex<Mis>& v, const Subpath<Mis>& path, const Draws& draws) const {
-        Candidate<Mis> c;
-        if (!rules.next_event ||
-            !next_event<F>(scene, rules, v, path.throughput, path.depth, draws.next_event(path.depth), c))
-            return;
-        const Rgb value = c.value * mis_weight(c.ratio);
-        if (is_zero(value)) return;
-        const Ray ray = {c.origin, c.tmax, c.direction, F.opacity ? draws.shadow_seed(path.depth) : 0};
-        if (tracer.occluded<F>(scene, ray)) return;
-        sample += c.environment ? value * environment_radiance<F>(scene, c.direction) : value;
-    }
-};
-
-template <Features F>
-Rgb plain_sample(const SceneView& scene, const EmbreeTracer& tracer, const Rules<Mis>& rules, const PathSlot& p,
-                 const RngKey& key) {
-    Rgb sample = {0, 0, 0};
-    const Draws draws = {key};
-    const CameraSample camera = camera_sample(scene, p, draws);
-    Subpath<Mis> path = start_eye(scene, rules.mis, camera);
-    const PlainSink<F> sink = {scene, tracer, rules, draws, sample};
-    float tmax = camera.tmax;
-    for (bool goes_on = true; goes_on; tmax = kInfinity) {
-        Hit hit;
-        const Ray ray = {path.origin, tmax, path.direction, F.opacity ? draws.opacity_seed(path.depth) : 0};
-        if (!tracer.closest<F>(scene, ray, hit)) hit.prim = kNone;
-        goes_on = visit<F>(scene, rules, Side::eye, rules.longest(Side::eye), hit, path, sink);
-    }
-    return sample;
-}
 
 /// Sums of samples [0, spp) of every pixel, tiles dealt to all threads.
 std::vector<double> plain_loop(const Scene& scene, const RenderSettings& settings, uint32_t spp, double& seconds) {
     const SceneView view = scene.view();
     const EmbreeAccel accel(scene);
     const EmbreeTracer tracer = accel.tracer();
-    const Rules<Mis> rules = plan_path(scene, settings).rules;
+    const Rules<UnidirectionalMis> rules = plan_path(scene, settings).rules;
     const uint32_t width = scene.sensor.crop_width, height = scene.sensor.crop_height, side = 16,
                    across = (width + side - 1) / side, down = (height + side - 1) / side;
     std::vector<double> sums(size_t(width) * height * 3, 0.0);

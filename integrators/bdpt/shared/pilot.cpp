@@ -58,6 +58,7 @@ AMBILUX_LEVEL(kUntexturedFeatures)
 AMBILUX_LEVEL(kTriangleFeatures)
 AMBILUX_LEVEL(kMaskedFeatures)
 AMBILUX_LEVEL(kCommonFeatures)
+AMBILUX_LEVEL(kFlatFeatures)
 AMBILUX_LEVEL(kAllFeatures)
 #undef AMBILUX_LEVEL
 

@@ -1,0 +1,55 @@
+// A path tracer as a plain loop over the functions of transport/, one sample at a time.
+#pragma once
+
+#include "accel/embree_tracer.h"
+#include "stages/generate.h"
+#include "transport/subpath/next_event.h"
+#include "transport/subpath/visit.h"
+
+namespace ambilux::test {
+
+/// Adds what a vertex finds to the sample, once its way is free.
+template <Features F>
+struct PlainSink {
+    using Mis = UnidirectionalMis;
+    const SceneView& scene;
+    const EmbreeTracer& tracer;
+    const Rules<Mis>& rules;
+    Draws numbers;
+    Rgb& sample;
+
+    Draws draws() const { return numbers; }
+    bool valid(Rgb throughput) const { return is_valid_radiance(throughput); }
+    void add(const Candidate<Mis>& c) const { sample += c.value * mis_weight(c.ratio); }
+    void at(const Vertex<Mis>& v, const Subpath<Mis>& path, const Draws& draws) const {
+        Candidate<Mis> c;
+        if (!rules.next_event ||
+            !next_event<F>(scene, rules, v, path.throughput, path.depth, draws.next_event(path.depth), c))
+            return;
+        const Rgb value = c.value * mis_weight(c.ratio);
+        if (is_zero(value)) return;
+        const Ray ray = {c.origin, c.tmax, c.direction, F.opacity ? draws.shadow_seed(path.depth) : 0};
+        if (tracer.occluded<F>(scene, ray)) return;
+        sample += c.environment ? value * environment_radiance<F>(scene, c.direction) : value;
+    }
+};
+
+template <Features F>
+Rgb plain_sample(const SceneView& scene, const EmbreeTracer& tracer, const Rules<UnidirectionalMis>& rules,
+                 const PathSlot& p, const RngKey& key) {
+    Rgb sample = {0, 0, 0};
+    const Draws draws = {key};
+    const CameraSample camera = camera_sample(scene, p, draws);
+    Subpath<UnidirectionalMis> path = start_eye(scene, rules.mis, camera);
+    const PlainSink<F> sink = {scene, tracer, rules, draws, sample};
+    float tmax = camera.tmax;
+    for (bool goes_on = true; goes_on; tmax = kInfinity) {
+        Hit hit;
+        const Ray ray = {path.origin, tmax, path.direction, F.opacity ? draws.opacity_seed(path.depth) : 0};
+        if (!tracer.closest<F>(scene, ray, hit)) hit.prim = kNone;
+        goes_on = visit<F>(scene, rules, Side::eye, rules.longest(Side::eye), hit, path, sink);
+    }
+    return sample;
+}
+
+}  // namespace ambilux::test
