@@ -25,8 +25,8 @@ constexpr Features kOpaqueShapes = {0, 0, kAllFeatures.primitives, false, false,
 constexpr Features kOpaqueInstances = {0, 0, kAllFeatures.primitives, false, false, false, false, false, false, true};
 
 /// f(FeatureSet) with the least of these that tracing rays through a scene of `features` needs, or with `kOwn`, the
-/// features of the calling kernels: masked shapes look textures up as their shading does, by the same function (a set of
-/// their own made extend 19 % slower on an H100). Throws std::logic_error if `kOwn` does not cover what is needed.
+/// features of the calling kernels: masked shapes look textures up as their shading does, by the same function (a set
+/// of their own made extend 19 % slower on an H100). Throws std::logic_error if `kOwn` does not cover what is needed.
 template <Features kOwn = kAllFeatures, class Function>
 auto with_traversal_features(const Features& features, Function f) {
     const bool triangles = !features.has_quadrics() && !features.instances, opaque = !features.opacity;

@@ -169,8 +169,8 @@ struct WarpItems {
 /// of the tree that the lane is in.
 template <Features F, class AnyHit, class Cursor, class Tracer>
 __device__ __forceinline__ void walk_together(const SceneView& scene, const Tracer& tracer, const TraceTuning& tuning,
-                                              AnyHit any_hit, Cursor& walk, typename Cursor::Entry* stack,
-                                              Ray& ray, CwbvhRay& box_ray, RayShear& shear, float& t, uint32_t& prim) {
+                                              AnyHit any_hit, Cursor& walk, typename Cursor::Entry* stack, Ray& ray,
+                                              CwbvhRay& box_ray, RayShear& shear, float& t, uint32_t& prim) {
     constexpr uint32_t kWarp = 0xffffffffu;
     uint32_t walking;
     do {
