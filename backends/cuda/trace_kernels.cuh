@@ -168,7 +168,7 @@ struct WarpItems {
 /// the lane's ray ends with its first hit. Lanes without a ray take part. With two levels the ray is in the coordinates
 /// of the tree that the lane is in.
 template <Features F, class AnyHit, class Cursor, class Tracer>
-__device__ __forceinline__ void walk_together(const SceneView& scene, const Tracer& tracer, const TraceTuning& tuning,
+__device__ __forceinline__ void walk_together(const SceneView& scene, const Tracer& tracer, TraceTuning tuning,
                                               AnyHit any_hit, Cursor& walk, typename Cursor::Entry* stack, Ray& ray,
                                               CwbvhRay& box_ray, RayShear& shear, float& t, uint32_t& prim) {
     constexpr uint32_t kWarp = 0xffffffffu;
