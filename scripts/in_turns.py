@@ -1,6 +1,6 @@
 """Times two programs in turns: CPU seconds of `ambilux render` per sample of every pixel, and their ratio.
 
-Usage: scripts/in_turns.py OLD NEW [--turns 5] [--spp 8] SCENE RENDER_ARGUMENT...
+Usage: scripts/in_turns.py [--turns 5] [--spp 8] OLD NEW SCENE RENDER_ARGUMENT...
 OLD and NEW are ambilux programs. Seconds are those of the process (user and system) less those of a render of one
 sample, so that loading is not in them and other work on the machine hardly is. Prints the medians, the median of the
 ratios OLD/NEW with the least and the greatest, and whether the images of both are the same to the bit.

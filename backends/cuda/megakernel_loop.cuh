@@ -11,9 +11,9 @@ namespace ambilux::detail {
 
 /// Counts of lanes.
 struct RegenerationTuning {
-    uint32_t resting = 8;   ///< rays are left for something else when so many lanes have none under way
-    uint32_t together = 8;  ///< that want the same before it is done, as long as others have rays under way;
-    uint32_t waiting = 16;  ///< or that wait at all
+    uint32_t resting = 24;  ///< rays are left for something else when so many lanes have none under way
+    uint32_t together = 4;  ///< that want the same before it is done, as long as others have rays under way;
+    uint32_t waiting = 8;   ///< or that wait at all
 };
 
 /// Does the slots `slot`, `slot + stride` ... below `end`. All threads of a block call it.

@@ -6,6 +6,7 @@
 #include "accel/host_tracer.h"
 #include "core/parallel.h"
 #include "integrators/auto/film_footprint.h"
+#include "integrators/auto/merging.h"
 #include "integrators/auto/pilot_mis.h"
 #include "integrators/auto/variance_prediction.h"
 #include "integrators/bdpt/shared/policy.h"
@@ -66,6 +67,7 @@ struct Eye {
     PilotSums& pixel;
     PilotWork& work;
     EyeSums sums[kMostCandidates];
+    uint32_t first_smooth = 0;  ///< depth of the first vertex that can be connected; 0: none yet
 };
 
 template <Features F>
@@ -112,9 +114,9 @@ public:
             all.draw_rays += w.draw_rays / n;
         }
         result_.light_vertices = double(vertices_.size()) / n;
-        result_.expected_samples = expected_samples(
-            settings_, result_.work, uint64_t(view_.sensor.crop_width) * view_.sensor.crop_height, cuda_);
-        predict_variances(moments_, {pixels, splats_, pixels_, kPixelSamples, result_.expected_samples}, result_);
+        const uint64_t film = uint64_t(view_.sensor.crop_width) * view_.sensor.crop_height;
+        result_.expected_samples = expected_samples(settings_, result_.work, film, cuda_);
+        predict_variances(moments_, {pixels, splats_, pixels_, kPixelSamples, result_.expected_samples, film}, result_);
         return result_;
     }
 
@@ -205,6 +207,7 @@ private:
         }
         first_.resize(result_.samples + 1, uint32_t(vertices_.size()));
         moments_.light_vertices = vertices_.size();
+        hits_only_ = HitsOnlyLight<F>(rules_.mis, vertices_, result_.samples);
     }
 
     // ---- eye subpaths ----
@@ -241,9 +244,11 @@ private:
         }
     }
 
-    /// A hit or a sample of next event estimation.
-    void found(Eye& eye, const PilotEvent& e) const {
-        moments_.add(e, eye.pixel);
+    /// A hit or a sample of next event estimation. What hits alone find, seldom, is told by light nearby instead.
+    void found(Eye& eye, const PilotEvent& e, uint32_t segments) const {
+        const bool elsewhere = hits_only_.any() && HitsOnlyLight<F>::holds(eye.first_smooth, segments) &&
+                               e.shares.light + e.shares.connections <= 1e-4f * e.shares.unidirectional;
+        if (!elsewhere) moments_.add(e, eye.pixel);
         for (uint32_t c = 0; c < moments_.candidates.size(); ++c) {
             const Rgb value = e.value * (1.0f / moments_.sum_of(c, e.shares));
             eye.sums[c].add(value, value, 1.0);
@@ -259,10 +264,11 @@ private:
             if (!counts(c.value)) return;
             if (c.strategy.segments() == 1)
                 for (int k = 0; k < 3; ++k) eye.pixel.seen[k] = std::max(eye.pixel.seen[k], double(c.value[k]));
-            pilot.found(eye, {c.value, shares_of(c.ratio, 0)});
+            pilot.found(eye, {c.value, shares_of(c.ratio, 0)}, c.strategy.segments());
         }
         void at(const Vertex<PilotMis>& z, const PilotSubpath& path, const Draws&) const {
             const PilotVertex end = {z, path.throughput, path.depth};
+            if (eye.first_smooth == 0) pilot.first_smooth(eye, end);
             pilot.next_event(eye, end);
             if (pilot.rules_.connect && !pilot.vertices_.empty()) pilot.connect(eye, end);
         }
@@ -280,6 +286,14 @@ private:
         } while (visit<F>(view_, rules_, Side::eye, rules_.longest(Side::eye), hit, path, EyeSink{*this, eye}));
     }
 
+    void first_smooth(Eye& eye, const PilotVertex& z) const {
+        eye.first_smooth = z.depth;
+        if (!hits_only_.any() || !HitsOnlyLight<F>::begins_at(z.depth)) return;
+        hits_only_.at(z, rules_.max_depth, [&](Rgb value, float ratio) {
+            if (counts(value)) moments_.add({value, {ratio, 0.0f, 0.0f}, 1.0f, true}, eye.pixel);
+        });
+    }
+
     void next_event(Eye& eye, const PilotVertex& z) const {
         PilotCandidatePath c;
         if (!ambilux::next_event<F>(view_, rules_, z.vertex, z.throughput, z.depth, eye.draws.next_event(z.depth), c))
@@ -287,7 +301,7 @@ private:
         if (c.environment) c.value *= environment_radiance<F>(view_, c.direction);
         if (!counts(c.value)) return;
         eye.work.next_events += 1;
-        if (is_free(c, eye.draws, z.depth)) found(eye, {c.value, shares_of(c.ratio, 0)});
+        if (is_free(c, eye.draws, z.depth)) found(eye, {c.value, shares_of(c.ratio, 0)}, z.depth + 1);
     }
 
     /// The connection of two vertices; false if it brings nothing.
@@ -354,6 +368,7 @@ private:
     std::vector<const PilotVertex*> vertices_;  ///< of all tasks
     std::vector<const PilotSplat*> splats_;
     std::vector<uint32_t> first_;  ///< vertex of each light subpath
+    HitsOnlyLight<F> hits_only_;
 };
 
 }  // namespace

@@ -6,8 +6,9 @@
 
 namespace ambilux {
 
-/// What is predicted is the error after all samples of the render, without this share of the pixels.
-constexpr double kTrimmedPixels = 0.001;
+/// What is predicted is the error after all samples of the render, all pixels included, but for the brightest
+/// contributions, of which the whole image is expected to have no more than this: most renders do without them.
+constexpr double kUnexpected = 1.0;
 /// A shadow ray of next event estimation in rays of subpaths.
 constexpr double kShadowWork = 0.8;
 

@@ -91,8 +91,8 @@ private:
         }
     }
 
-    /// The brightest contributions, which after all samples of the render are in kTrimmedPixels of the pixels. Which
-    /// are the largest matters, not their order: of what is in question the larger half is taken, or the other half is
+    /// The brightest contributions, of which the whole render is expected to have kUnexpected. Which are the largest
+    /// matters, not their order: of what is in question the larger half is taken, or the other half is
     /// left.
     std::span<const Rare> outliers() {
         double share = 0;
@@ -104,7 +104,7 @@ private:
             for (auto r = taken; r != middle; ++r)
                 more +=
                     double(r->event->coverage) * double(r->sum) / double(r->event->total()) / double(moments_.samples);
-            if (share + more <= kTrimmedPixels / paths_.expected_samples) {
+            if (share + more <= kUnexpected / (double(paths_.film_pixels) * paths_.expected_samples)) {
                 share += more;
                 taken = middle;
             } else {

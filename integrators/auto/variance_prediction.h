@@ -24,7 +24,8 @@ struct PilotEvent {
     Rgb value;  ///< f / (n p) of the strategy that found it, for paired subpaths
     PilotShares shares;
     float coverage = 1.0f;  ///< of a splat: how much of it pixels of the film take
-    float total() const { return shares.unidirectional + shares.light + shares.connections; }
+    bool nearby = false;    ///< found by none of the strategies (integrators/auto/merging.h): of density 1
+    float total() const { return nearby ? 1.0f : shares.unidirectional + shares.light + shares.connections; }
 };
 
 struct PilotSplat {
@@ -90,6 +91,7 @@ struct PilotPaths {
     const std::vector<const PilotSplat*>& splats;
     uint32_t pixels_per_block, samples_per_pixel;
     double expected_samples;  ///< of every pixel, that the render takes
+    uint64_t film_pixels;
 };
 
 /// Fills Pilot::variance from sums over pixels and splats.
