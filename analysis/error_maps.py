@@ -40,6 +40,7 @@ def draw(scene, reference, columns):
             for axes in above, below:
                 axes.set_axis_on()
                 comparison.bare(axes)
+        figure.get_layout_engine().set(rect=(0, 0, 1, 1 - 0.08 / figure.get_figheight()))  # headings of several lines
         figure.colorbar(bottom, ax=list(grid.flat), location="bottom", extend="both", label="signed relative error (x − r) / (|r| + 0.01), mean over seeds", shrink=0.6, aspect=40)
         figure.colorbar(top, ax=list(grid.flat), location="bottom", extend="max", label="relative error |x − r| / (|r| + 0.01)", shrink=0.6, aspect=40)
     return figure

@@ -56,8 +56,8 @@ def queue_labels(runs):
 
 
 def shown_stages(of_depth):
-    """Those with lines of their own: hits of the rays beside them are left out."""
-    return {name: share for name, share in of_depth.items() if np.any(share > 0) and not (name.endswith("shade") and name.replace("shade", "extend") in of_depth)}
+    """Those with lines of their own, over two depths or more: hits of the rays beside them are left out."""
+    return {name: share for name, share in of_depth.items() if np.count_nonzero(share) > 1 and not (name.endswith("shade") and name.replace("shade", "extend") in of_depth)}
 
 
 def draw_queues(axes, found):
@@ -84,7 +84,7 @@ def draw(experiment, scene):
     across = style.balanced(len(shown), ACROSS) if shown else 1
     rows = -(-len(shown) // across)
     with plt.rc_context(style.STYLE):
-        queues_height = style.row_height(queue_labels(with_queues), 0.2)[0] * len(with_queues) + 1.3 if with_queues else 0.0
+        queues_height = style.row_height(queue_labels(with_queues), 0.1 + 0.1 * (max(n.count("\n") for n in queue_labels(with_queues)) + 1))[0] * len(with_queues) + 1.3 if with_queues else 0.0
         figure = plt.figure(figsize=(style.PAGE, 1.55 * rows + queues_height + 0.3), layout="constrained")
         parts = figure.subfigures(2, 1, height_ratios=(1.55 * rows + 0.3, queues_height)) if shown and with_queues else [figure, figure]
         if shown:

@@ -40,7 +40,7 @@ def draw_ratios(axes, experiment, lines):
     axes.set_yticks(range(len(shown)), names, fontsize=min(9, row / (1.3 * max((n.count("\n") + 1 for n in names), default=1))))
     axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.grid(True, axis="x", color="0.92", lw=0.6)
-    axes.set_title(f"1 / ({efficiency.NAMES[experiment.metric]} · time) over that of {experiment.base}", loc="left")
+    axes.set_title(f"1 / ({efficiency.NAMES[experiment.metric]} · time) over that of {experiment.base}", loc="right")
 
 
 def draw(experiment):
