@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/math.h"
+#include "core/scoped_seconds.h"
 #include "formats/gltf/model.h"
 
 namespace ambilux {

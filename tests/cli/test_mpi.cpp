@@ -1,0 +1,142 @@
+// libs: ambilux_experiments
+// timeout: 180
+// The built program under mpirun: images do not depend on the number of ranks, and a rank that is killed costs nothing
+// that was saved.
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "film/exr_io.h"
+#include "tests/support/program.h"
+#include "tests/support/skip.h"
+
+using namespace ambilux;
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+bool can_run() {
+    bool there = false;
+#if defined(AMBILUX_HAS_MPI)
+    there = std::system("mpirun --version > /dev/null 2>&1") == 0;
+#endif
+    if (!there) skip("mpirun or MPI is not there: several ranks are not tested");
+    return there;
+}
+
+/// More ranks than cores, as whoever runs the tests, containers included.
+pid_t start_ranks(const test::TempFolder& folder, int ranks, const std::vector<std::string>& arguments) {
+    for (const char* variable : {"OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"})
+        ::setenv(variable, "1", 1);
+    std::vector<std::string> all = {"--oversubscribe",     "--bind-to",    "none", "-n",
+                                    std::to_string(ranks), AMBILUX_PROGRAM};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    return test::start_program(folder, "mpirun", all);
+}
+
+test::Outcome run_ranks(const test::TempFolder& folder, int ranks, const std::vector<std::string>& arguments) {
+    return test::finish(folder, start_ranks(folder, ranks, arguments));
+}
+
+/// Processes that `parent` started, in the order of their ranks; empty until all are there.
+std::vector<pid_t> ranks_of(pid_t parent, size_t count) {
+    std::vector<pid_t> found;
+    for (const auto& entry : fs::directory_iterator("/proc")) {
+        std::ifstream file(entry.path() / "stat");
+        std::string pid, name, state;
+        pid_t of = 0;
+        if (!(file >> pid >> name >> state >> of) || of != parent || name != "(ambilux)") continue;
+        found.push_back(pid_t(std::stol(pid)));
+    }
+    std::sort(found.begin(), found.end());
+    if (found.size() < count) found.clear();
+    return found;
+}
+
+template <class Condition>
+bool wait_until(Condition condition) {
+    for (int i = 0; i < 3000; ++i, std::this_thread::sleep_for(std::chrono::milliseconds(10)))
+        if (condition()) return true;
+    return false;
+}
+
+Image image(const std::string& path) { return read_exr(path); }
+
+}  // namespace
+
+TEST_CASE("1, 2 and 4 ranks make the image of one process") {
+    if (!can_run()) return;
+    const test::TempFolder folder;
+    const std::vector<std::string> how = {"--spp", "40", "-i", "bdpt", "--range-size", "3", "--backend", "cpu"};
+    const auto arguments = [&](const std::string& output) {
+        std::vector<std::string> all = test::render(folder, how, output);
+        all.insert(all.end(), {"--json", folder / (output + ".json")});
+        return all;
+    };
+    REQUIRE(test::run(folder, arguments("one.exr")).code == 0);
+    for (const int ranks : {1, 2, 4}) {
+        CAPTURE(ranks);
+        const test::Outcome done = run_ranks(folder, ranks, arguments("many.exr"));
+        INFO(done.err);
+        REQUIRE(done.code == 0);
+        CHECK(bool(image(folder / "many.exr").rgb == image(folder / "one.exr").rgb));
+        const json stats = json::parse(read_file(folder / "many.exr.json"));
+        CHECK(stats["workers"].size() == size_t(ranks));
+        uint64_t samples = 0;
+        for (const auto& w : stats["workers"]) {
+            CHECK(!w["host"].get<std::string>().empty());
+            samples += w["samples"].get<uint64_t>();
+        }
+        CHECK(samples == 40);
+        CHECK(stats["rays"] == json::parse(read_file(folder / "one.exr.json"))["rays"]);
+    }
+}
+
+TEST_CASE("kill -9 of any rank ends the job with a message; --resume with another number of ranks goes on") {
+    if (!can_run()) return;
+    const test::TempFolder folder;
+    const auto arguments = [&](const std::string& output, std::vector<std::string> more) {
+        more.insert(more.end(),
+                    {"--spp", "240", "-i", "bdpt", "--range-size", "4", "--backend", "cpu", "--size", "64x48"});
+        std::vector<std::string> all = {"render", test::kCornell, "-o", folder / output};
+        all.insert(all.end(), more.begin(), more.end());
+        return all;
+    };
+    REQUIRE(test::run(folder, arguments("whole.exr", {})).code == 0);
+    for (const size_t victim : {0, 2}) {
+        CAPTURE(victim);
+        const std::string output = "killed" + std::to_string(victim) + ".exr", state = folder / (output + ".state");
+        const pid_t job = start_ranks(folder, 3, arguments(output, {"--checkpoint", "0.05"}));
+        std::vector<pid_t> ranks;
+        const bool begun = wait_until([&] {
+            if (ranks.empty()) ranks = ranks_of(job, 3);
+            return fs::exists(state) && !ranks.empty();
+        });
+        REQUIRE(begun);
+        ::kill(ranks[victim], SIGKILL);
+        const test::Outcome killed = test::finish(folder, job);
+        INFO(killed.err);
+        CHECK(killed.code != 0);
+        CHECK(test::contains(killed.err, "signal 9"));
+        REQUIRE(fs::exists(state));
+        const test::Outcome refused = run_ranks(folder, 2, arguments(output, {}));
+        CHECK(test::contains(refused.err, "--resume"));
+        const test::Outcome resumed = run_ranks(folder, 2, arguments(output, {"--resume"}));
+        INFO(resumed.err);
+        REQUIRE(resumed.code == 0);
+        CHECK(test::contains(resumed.err, "were rendered earlier"));
+        CHECK(bool(image(folder / output).rgb == image(folder / "whole.exr").rgb));
+        CHECK(!fs::exists(state));
+    }
+}
+
+TEST_CASE("commands that would do everything once per rank are refused") {
+    if (!can_run()) return;
+    const test::TempFolder folder;
+    const test::Outcome refused = run_ranks(folder, 2, {"info", test::kCornell});
+    CHECK(refused.code != 0);
+    CHECK(test::contains(refused.err, "info: only render and experiment work with several ranks"));
+}
