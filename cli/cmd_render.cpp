@@ -123,7 +123,10 @@ nlohmann::json describe_parts(const ParallelResult& result) {
                            {"samples", w.samples},
                            {"films", w.nodes},
                            {"busy_seconds", w.seconds}});
-    return {{"workers", workers}, {"range_size", result.ranges.size}, {"merge_seconds", result.merge_seconds}};
+    return {{"workers", workers},
+            {"range_size", result.ranges.size},
+            {"merge_seconds", result.merge_seconds},
+            {"receive_seconds", result.receive_seconds}};
 }
 
 int render_by_ranges(const Options& o) {

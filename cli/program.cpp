@@ -78,7 +78,8 @@ int run_program(int argc, const char* const* argv) {
         return flushed(run());
     } catch (const Error& e) {
         set_status_line("");
-        log_error(e.what());
+        log_error(ranks().rank() > 0 ? fmt::format("rank {} on {}: {}", ranks().rank(), host_name(), e.what())
+                                     : e.what());
         return int(e.code);
     } catch (const std::bad_alloc&) {
         set_status_line("");

@@ -40,4 +40,10 @@ FilmMoments MergeTree::sum() const {
     return sum;
 }
 
+FilmMoments MergeTree::take_sum() {
+    FilmMoments taken = entries_.size() == 1 ? std::move(entries_.begin()->second.film) : sum();
+    *this = {};
+    return taken;
+}
+
 }  // namespace ambilux

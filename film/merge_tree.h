@@ -34,6 +34,8 @@ public:
 
     /// The sum of all. With all ranges there, that of the tree.
     FilmMoments sum() const;
+    /// The same without a copy of a single film; nothing is left.
+    FilmMoments take_sum();
 
     struct Entry {
         RangeNode node;

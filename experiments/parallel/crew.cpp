@@ -1,6 +1,7 @@
 #include "experiments/parallel/crew.h"
 
 #include <chrono>
+#include <utility>
 
 #include "backends/cuda_device.h"
 #include "core/flag.h"
@@ -78,42 +79,48 @@ void Crew::work(size_t index, const Scene& scene, RenderSettings settings) {
         changed_.wait(lock, [&] { return worker.order || is_set(&stop_); });
         if (is_set(&stop_)) return;
         const Order order = *worker.order;
-        lock.unlock();
-        std::optional<Finished> finished = render(*renderer, order);
-        RenderStats stats = renderer->stats();
-        lock.lock();
-        if (!finished) return;
-        worker.stats = std::move(stats);
         worker.order.reset();
-        finished->worker = index;
-        finished_.push_back(std::move(*finished));
-        changed_.notify_all();
+        lock.unlock();
+        if (!render(index, *renderer, order)) return;
+        lock.lock();
     }
 }
 
-/// Nothing if it was stopped.
-std::optional<Finished> Crew::render(Renderer& renderer, const Order& order) const {
-    const auto start = Clock::now();
-    Finished finished;
-    finished.order = order;
-    renderer.clear_film();
-    if (order.trial_seconds > 0) {
-        finished.order.ranges.size = render_for(renderer, order.trial_seconds, &stop_);
-        finished.film = renderer.film();
-    } else {
-        MergeTree tree;
-        const uint64_t first = order.node.first(), end = std::min(order.node.end(), order.ranges.count());
-        for (uint64_t range = first; range < end; ++range) {
-            if (range > first) renderer.clear_film();
+/// False if it was stopped.
+bool Crew::render(size_t index, Renderer& renderer, const Order& order) {
+    auto start = Clock::now();
+    const uint64_t end = order.trial_seconds > 0 ? 1 : std::min(order.node.end(), order.ranges.count());
+    for (uint64_t range = order.node.first(); range < end; ++range) {
+        Piece piece;
+        piece.finished.order = order;
+        piece.range = range;
+        piece.last = range + 1 == end;
+        renderer.clear_film();
+        if (order.trial_seconds > 0) {
+            piece.finished.order.ranges.size = render_for(renderer, order.trial_seconds, &stop_);
+        } else {
             const uint32_t samples = order.ranges.length(range);
-            if (renderer.render(order.ranges.first_sample(range), samples, &stop_) < samples) return std::nullopt;
-            tree.add({0, range}, renderer.film());
+            if (renderer.render(order.ranges.first_sample(range), samples, &stop_) < samples) return false;
         }
-        finished.film = tree.sum();
+        piece.finished.film = renderer.film();
+        piece.finished.worker = index;
+        piece.finished.seconds = seconds_since(start);
+        start = Clock::now();
+        post(index, std::move(piece), renderer.stats());
+        if (is_set(&stop_)) return false;
     }
-    if (is_set(&stop_)) return std::nullopt;
-    finished.seconds = seconds_since(start);
-    return finished;
+    return true;
+}
+
+/// Waits while two films of the worker are not added up: there would be ever more of them.
+void Crew::post(size_t index, Piece piece, RenderStats stats) {
+    Worker& worker = *workers_[index];
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return worker.waiting < 2 || is_set(&stop_); });
+    worker.stats = std::move(stats);
+    ++worker.waiting;
+    pieces_.push_back(std::move(piece));
+    changed_.notify_all();
 }
 
 void Crew::give(size_t worker, const Order& order) {
@@ -126,11 +133,27 @@ void Crew::give(size_t worker, const Order& order) {
 
 std::vector<Finished> Crew::take(double seconds) {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return error_ || !finished_.empty(); });
+    changed_.wait_for(lock, std::chrono::duration<double>(seconds), [&] { return error_ || !pieces_.empty(); });
     if (error_) std::rethrow_exception(error_);
-    std::vector<Finished> taken(std::make_move_iterator(finished_.begin()), std::make_move_iterator(finished_.end()));
-    finished_.clear();
-    return taken;
+    std::vector<Finished> finished;
+    while (!pieces_.empty()) {
+        Piece piece = std::move(pieces_.front());
+        pieces_.pop_front();
+        Worker& worker = *workers_[piece.finished.worker];
+        --worker.waiting;
+        changed_.notify_all();
+        lock.unlock();
+        Finished& f = piece.finished;
+        worker.seconds += f.seconds;
+        worker.ranges.add({0, piece.range}, std::move(f.film));
+        if (piece.last) {
+            f.film = worker.ranges.take_sum();
+            f.seconds = std::exchange(worker.seconds, 0);
+            finished.push_back(std::move(f));
+        }
+        lock.lock();
+    }
+    return finished;
 }
 
 }  // namespace ambilux

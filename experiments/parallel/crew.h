@@ -46,8 +46,11 @@ public:
     void give(size_t worker, const Order& order);
     /// What was finished meanwhile; waits for it up to `seconds`. Throws what a worker threw.
     std::vector<Finished> take(double seconds);
-    /// Once no worker has anything to do.
-    RenderStats stats(size_t worker) const { return workers_[worker]->stats; }
+    /// Of all that it has done.
+    RenderStats stats(size_t worker) const {
+        const std::lock_guard lock(mutex_);
+        return workers_[worker]->stats;
+    }
 
 private:
     struct Worker {
@@ -55,16 +58,26 @@ private:
         RenderStats stats;
         bool ready = false;
         std::optional<Order> order;
+        int waiting = 0;     ///< its films that are not taken yet
+        MergeTree ranges;    ///< of the node in work; of the thread that takes, as the next
+        double seconds = 0;  ///< that it took
         std::thread thread;
+    };
+    /// A range that was rendered: the device goes on while its film is added up.
+    struct Piece {
+        Finished finished;
+        uint64_t range = 0;
+        bool last = false;  ///< of the node
     };
 
     void work(size_t index, const Scene& scene, RenderSettings settings);
-    std::optional<Finished> render(Renderer& renderer, const Order& order) const;
+    bool render(size_t index, Renderer& renderer, const Order& order);
+    void post(size_t index, Piece piece, RenderStats stats);
 
     std::vector<std::unique_ptr<Worker>> workers_;
     mutable std::mutex mutex_;
     std::condition_variable changed_;
-    std::deque<Finished> finished_;
+    std::deque<Piece> pieces_;
     std::exception_ptr error_;
     volatile bool stop_ = false;
 };

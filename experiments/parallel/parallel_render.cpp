@@ -175,6 +175,8 @@ private:
             }
             if (!working) return;
             take();
+            // Films of all workers take half of this thread's time at most.
+            dealer.set_node_seconds(std::max(Dealer::kNodeSeconds, 2 * double(workers_.size()) * film_seconds()));
             if (is_set(request_.interrupt)) {
                 interrupted_ = true;
                 return;
@@ -186,10 +188,24 @@ private:
         }
     }
 
+    /// That a film costs this thread.
+    double film_seconds() const {
+        uint64_t films = 0;
+        for (const Worker& w : workers_) films += w.share.nodes;
+        return films ? (merge_seconds_ + receive_seconds_) / double(films) : 0;
+    }
+
+    std::optional<Told> hear_timed() {
+        const auto start = Clock::now();
+        std::optional<Told> told = hear(ranks_);
+        if (told) receive_seconds_ += seconds_since(start);
+        return told;
+    }
+
     void take() {
         for (Finished& f : crew_->take(ranks_.size() > 1 ? kPollSeconds : kPatience))
             arrived(workers_[f.worker], f.order.node, std::move(f.film), f.seconds, crew_->stats(f.worker));
-        while (std::optional<Told> told = hear(ranks_)) {
+        while (std::optional<Told> told = hear_timed()) {
             const nlohmann::json& t = told->text;
             const auto sender = std::find_if(workers_.begin(), workers_.end(), [&](const Worker& w) {
                 return w.share.rank == told->from && w.index == t.at("worker");
@@ -265,6 +281,7 @@ private:
         std::stable_sort(result.workers.begin(), result.workers.end(),
                          [](const WorkerShare& a, const WorkerShare& b) { return a.rank < b.rank; });
         result.merge_seconds = merge_seconds_;
+        result.receive_seconds = receive_seconds_;
         if (!interrupted_) state_.remove();
         return result;
     }
@@ -278,7 +295,7 @@ private:
     Ranges ranges_;
     MergeTree tree_;
     RenderStats earlier_;
-    double earlier_seconds_ = 0, merge_seconds_ = 0;
+    double earlier_seconds_ = 0, merge_seconds_ = 0, receive_seconds_ = 0;
     SelectionStats choice_;
     std::optional<Crew> crew_;
     std::vector<Worker> workers_;

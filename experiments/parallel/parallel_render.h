@@ -31,8 +31,9 @@ struct ParallelResult {
     RenderPosition position;
     Ranges ranges;
     std::vector<WorkerShare> workers;
-    double merge_seconds = 0;  ///< of the first rank, adding films up
-    std::string state_path;    ///< of what is left, if it was interrupted; else empty
+    /// Of the first rank: adding films up, and receiving those of other ranks.
+    double merge_seconds = 0, receive_seconds = 0;
+    std::string state_path;  ///< of what is left, if it was interrupted; else empty
 };
 
 /// Called by the first rank, while the others serve. The image depends on the bounds of ranges alone where the devices

@@ -23,7 +23,9 @@ uint32_t Ranges::length(uint64_t range) const {
 uint32_t default_range_size(uint64_t samples, uint64_t pixels, bool cuda) {
     const auto divided = [](uint64_t a, uint64_t b) { return (a + b - 1) / b; };
     const uint64_t large_enough = divided(cuda ? kLeastPathsCuda : kLeastPathsCpu, std::max<uint64_t>(1, pixels));
-    return uint32_t(std::min(std::max(divided(samples, kUsualRanges), large_enough), std::max<uint64_t>(1, samples)));
+    const uint64_t cheap_films = cuda ? std::min<uint64_t>(256, divided(samples, 32)) : 1;
+    return uint32_t(std::min(std::max({divided(samples, kUsualRanges), large_enough, cheap_films}),
+                             std::max<uint64_t>(1, samples)));
 }
 
 Dealer::Dealer(const Ranges& ranges, double seconds, const MergeTree& done) : ranges_(ranges), seconds_(seconds) {
@@ -40,7 +42,7 @@ uint64_t Dealer::open() const {
 std::optional<RangeNode> Dealer::next(double elapsed, double per_range, double rate) {
     for (auto done = done_.find(at_); done != done_.end(); done = done_.find(at_)) at_ = done->second;
     if (at_ >= ranges_.count()) return std::nullopt;
-    double wanted = per_range > 0 ? kNodeSeconds / per_range : 1;
+    double wanted = per_range > 0 ? node_seconds_ / per_range : 1;
     if (seconds_ > 0) {
         const double left = seconds_ - elapsed;
         if (left <= 0 || left < 0.5 * per_range) return std::nullopt;

@@ -19,7 +19,8 @@ struct Ranges {
     uint32_t length(uint64_t range) const;
 };
 
-/// Samples of a range where nothing was said: about 128 ranges, none of which is too small for its device.
+/// Samples of a range where nothing was said: about 128 ranges, none of which is too small for its device. A CUDA
+/// device hands over the film after each: 256 samples, and at least 32 ranges (docs/scaling.md).
 uint32_t default_range_size(uint64_t samples, uint64_t pixels, bool cuda);
 
 /// Deals out ranges in their order. A worker gets a node of the tree at a time, so that it hands over one film for it:
@@ -31,6 +32,8 @@ public:
     /// `seconds`: the budget in time; 0: none. `done`: what an earlier part rendered.
     Dealer(const Ranges& ranges, double seconds, const MergeTree& done);
 
+    /// From now on, instead of kNodeSeconds.
+    void set_node_seconds(double seconds) { node_seconds_ = seconds; }
     /// What a worker does next that needs `per_range` seconds for a range (0: unknown), `elapsed` seconds after the
     /// start, while all together do `rate` ranges a second. Nothing when all is dealt or there is no time for half a
     /// range.
@@ -43,6 +46,7 @@ private:
     const double seconds_;
     std::map<uint64_t, uint64_t> done_;  ///< from a range to the end of its node
     uint64_t at_ = 0;
+    double node_seconds_ = kNodeSeconds;
 };
 
 }  // namespace ambilux

@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <thread>
 
 #include "core/error.h"
@@ -23,7 +21,9 @@ Told wait_for_setup(Ranks& ranks) {
     }
 }
 
-void serve(const Scene& scene, const ParallelRequest& request, Ranks& ranks) {
+}  // namespace
+
+void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& ranks) {
     const Told setup = wait_for_setup(ranks);
     if (setup.kind == Say::stop) return;
     if (setup.text.at("scene_hash") != scene_hash(scene))
@@ -59,16 +59,6 @@ void serve(const Scene& scene, const ParallelRequest& request, Ranks& ranks) {
                   {"seconds", f.seconds},
                   {"stats", save_stats(crew->stats(f.worker))}},
                  &f.film);
-    }
-}
-
-}  // namespace
-
-void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& ranks) {
-    try {
-        serve(scene, request, ranks);
-    } catch (const Error& e) {
-        throw Error(e.code, fmt::format("rank {} on {}: {}", ranks.rank(), host_name(), e.what()));
     }
 }
 

@@ -8,9 +8,11 @@
 #include <chrono>
 #include <thread>
 
+#include "core/ranks.h"
 #include "film/exr_io.h"
 #include "tests/support/program.h"
 #include "tests/support/skip.h"
+#include "tests/support/timeless_rows.h"
 
 using namespace ambilux;
 namespace fs = std::filesystem;
@@ -131,6 +133,101 @@ TEST_CASE("kill -9 of any rank ends the job with a message; --resume with anothe
         CHECK(bool(image(folder / output).rgb == image(folder / "whole.exr").rgb));
         CHECK(!fs::exists(state));
     }
+}
+
+namespace {
+
+std::string experiment(const std::string& budget) {
+    return R"(backend = "cpu"
+seeds = [1, 2]
+[reference]
+spp = 64
+[budget]
+)" + budget +
+           R"(
+[[scene]]
+name = "cornell"
+path = ")" +
+           test::kScenes + R"(cornell.xml"
+size = [32, 24]
+[[scene]]
+name = "glass"
+path = ")" +
+           test::kScenes + R"(glass.xml"
+size = [24, 16]
+[[run]]
+name = "path"
+integrator = "path"
+sweep = { estimator = ["nee", "mis"] }
+[[run]]
+name = "bdpt"
+integrator = "bdpt"
+)";
+}
+
+std::vector<std::string> sorted_rows(const std::string& folder) {
+    std::vector<std::string> rows = timeless(folder + "/runs.csv");
+    std::sort(rows.begin(), rows.end());
+    return rows;
+}
+
+}  // namespace
+
+TEST_CASE("an experiment over 3 ranks has the rows of one process, with device and host; kill -9 loses no row") {
+    if (!can_run()) return;
+    const test::TempFolder folder;
+    const std::string file = folder.write("e.toml", experiment("spp = [4, 60]"));
+    const std::string whole = folder / "whole", many = folder / "many", killed = folder / "killed";
+    REQUIRE(test::run(folder, {"experiment", file, "-o", whole}).code == 0);
+    const std::vector<std::string> expected = sorted_rows(whole);
+    REQUIRE(expected.size() == 2 * 2 * 3 * 2);
+    for (const std::string& row : expected) CHECK(row.ends_with("," + host_name()));
+
+    const test::Outcome done = run_ranks(folder, 3, {"experiment", file, "-o", many});
+    INFO(done.err);
+    REQUIRE(done.code == 0);
+    CHECK(bool(sorted_rows(many) == expected));
+    const json manifest = json::parse(read_file(many + "/manifest.json"));
+    CHECK(manifest["ranks"].size() == 3);
+    CHECK(!manifest["finished"].is_null());
+    CHECK(read_results(many + "/batches.csv", kBatchHeader).size() ==
+          read_results(whole + "/batches.csv", kBatchHeader).size());
+    for (const char* scene : {"cornell", "glass"})
+        for (const char* image : {"bdpt_1.exr", "bdpt_2.exr"}) {
+            const std::string name = std::string("/images/") + scene + "/" + image;
+            CHECK(bool(read_exr(many + name).rgb == read_exr(whole + name).rgb));
+        }
+
+    size_t rows = 0;
+    for (const size_t victim : {1, 0}) {
+        const pid_t job = start_ranks(folder, 3, {"experiment", file, "-o", killed, "--resume"});
+        std::vector<pid_t> ranks;
+        const bool begun = wait_until([&] {
+            if (ranks.empty()) ranks = ranks_of(job, 3);
+            return !ranks.empty() && fs::exists(killed + "/runs.csv") &&
+                   read_results(killed + "/runs.csv").size() > rows;
+        });
+        REQUIRE(begun);
+        ::kill(ranks[victim], SIGKILL);
+        CHECK(test::finish(folder, job).code != 0);
+        const size_t now = read_results(killed + "/runs.csv").size();
+        CHECK(now > rows);
+        rows = now;
+    }
+    REQUIRE(rows < expected.size());
+    const test::Outcome resumed = run_ranks(folder, 2, {"experiment", file, "-o", killed, "--resume"});
+    INFO(resumed.err);
+    REQUIRE(resumed.code == 0);
+    CHECK(bool(sorted_rows(killed) == expected));
+}
+
+TEST_CASE("ranks that share cores are refused where times are compared") {
+    if (!can_run()) return;
+    const test::TempFolder folder;
+    const std::string file = folder.write("e.toml", experiment("seconds = [0.05]"));
+    const test::Outcome refused = run_ranks(folder, 2, {"experiment", file, "-o", folder / "out"});
+    CHECK(refused.code != 0);
+    CHECK(test::contains(refused.err, "ranks 0 and 1 on " + host_name() + " share core"));
 }
 
 TEST_CASE("commands that would do everything once per rank are refused") {

@@ -72,6 +72,8 @@ TEST_CASE("the sum of a tree has the same bits in any order and for any nodes") 
             }
             CHECK(same(tree.sum(), expected));
             CHECK(tree.entries().size() == size_t(__builtin_popcountll(count)));
+            CHECK(same(tree.take_sum(), expected));
+            CHECK(tree.entries().empty());
         }
         FilmMoments one_by_one;
         for (uint64_t range = 0; range < count; ++range) one_by_one.add(film_of(range));
