@@ -139,6 +139,7 @@ private:
     using Executor = CudaExecutor<!kFilmWide>;  ///< binary BVHs are there for the path tracer
 
     void take_accel(const RenderSettings& settings, SharedAccels& accels) {
+        if (settings.accel != AccelKind::bvh2) accels.get<CwbvhAccel>();  // its bytes count where the scene is checked
         device_scene_ = accels.get<DeviceScene>();
         if (settings.accel == AccelKind::bvh2)
             pairs_.emplace(PairAccel(scene_).arrays());
