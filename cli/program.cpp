@@ -74,7 +74,7 @@ int run_program(int argc, const char* const* argv) {
     }
     set_quiet(quiet || ranks().rank() > 0);
     try {
-        check_ranks(argv[1]);
+        check_ranks(app.get_subcommands().front()->get_name());
         return flushed(run());
     } catch (const Error& e) {
         set_status_line("");
