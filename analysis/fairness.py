@@ -42,9 +42,12 @@ def repeat_remarks(experiment):
         yield (f"{len(again)} render{'s were' if len(again) > 1 else ' was'} disturbed and made again, the last one counts: "
                + listed([f"{place} ({why})" for place, why in again], 3))
     left = [f"{d['scene']} {d['run']} seed {d['seed']} ({d['why']})" for d in experiment.manifest.get("disturbed") or []]
+    shared = experiment.manifest.get("ranks_share")
+    if shared:
+        yield f"{shared}: no time is that of a render alone, and none was made again for it"
     if left:
-        again = experiment.manifest.get("repeats")
-        tried = f", also when made again up to {again} time{'s' if again > 1 else ''}" if again else " and not made again (repeats = 0)"
+        again = not shared and experiment.manifest.get("repeats")
+        tried = f", also when made again up to {again} time{'s' if again > 1 else ''}" if again else " and not made again" + ("" if shared else " (repeats = 0)")
         yield f"{len(left)} render{'s were' if len(left) > 1 else ' was'} disturbed{tried}; do not trust their times: {listed(left)}"
 
 

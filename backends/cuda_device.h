@@ -16,4 +16,10 @@ std::string cuda_device_name();
 /// CUDA_VISIBLE_DEVICES says; empty if cuda_device_present() is false.
 std::string cuda_device_bus_id();
 
+/// Devices that this process sees; 0 if cuda_device_present() is false.
+int cuda_device_count();
+
+/// What the calling thread does from now on, it does on this device. Throws Error(device) that says how many there are.
+void use_cuda_device(int device);
+
 }  // namespace ambilux

@@ -2,10 +2,12 @@
 
 #include <iostream>
 
+#include "backends/cuda_device.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "core/error.h"
 #include "core/log.h"
+#include "core/ranks.h"
 #include "experiments/dry_run.h"
 #include "experiments/runner.h"
 
@@ -22,11 +24,16 @@ void add_experiment(CLI::App& app, Run& run) {
     command.add_flag("--resume", request->resume, "Go on with the experiment that the folder holds");
     command.add_flag("--reduced", request->reduced,
                      "Smaller, as the section [reduced] of the configuration says: for a machine without a GPU");
+    command.add_flag("--shared-devices", request->shared_devices,
+                     "With several ranks: let them share devices or cores though budgets are in seconds");
     command.add_flag("--dry-run", *dry,
                      "Print what would be done, with an estimate of time and memory, and write nothing");
     command.callback([request, dry, &run] {
         run = [request, dry] {
+            // The ranks of a host take its devices in turn.
+            if (ranks().launched() && cuda_available()) use_cuda_device(ranks().local_rank() % cuda_device_count());
             request->on_prepared = [r = request.get()] { r->interrupt = save_when_interrupted(); };
+            if (*dry && ranks().rank() > 0) return int(ExitCode::done);
             if (*dry) {
                 std::cout << describe_plan(*request, default_hooks()) << std::flush;
                 return int(ExitCode::done);

@@ -15,6 +15,8 @@
 #include "core/memory_reserve.h"
 #include "core/outputs.h"
 #include "core/progress.h"
+#include "core/ranks.h"
+#include "experiments/parallel/parallel_render.h"
 #include "experiments/render_plan.h"
 #include "experiments/statistics.h"
 #include "experiments/technique_files.h"
@@ -35,6 +37,13 @@ struct Options {
     std::vector<std::string> aovs;
     uint32_t outliers = 0;
     bool strict = false;
+    std::vector<std::string> devices;
+    std::optional<uint32_t> range_size;
+    std::optional<double> checkpoint;
+    bool resume = false;
+
+    /// By ranges of samples, on several devices or with checkpoints (experiments/parallel/).
+    bool by_ranges() const { return !devices.empty() || range_size || checkpoint || resume || ranks().launched(); }
 };
 
 constexpr float kMostStops = 100;
@@ -52,6 +61,17 @@ void check(const Options& o) {
         make_folders(o.techniques);
         check_writable(o.techniques + "/techniques.json");
     }
+    if (!o.by_ranges()) return;
+    if (o.range_size && *o.range_size == 0) throw Error(ExitCode::usage, "--range-size: a range has samples");
+    if (o.checkpoint && !(*o.checkpoint > 0)) throw Error(ExitCode::usage, "--checkpoint: seconds between two states");
+    for (const auto& [option, given] : {std::pair("--outliers", o.outliers > 0),
+                                        {"--technique-images", !o.techniques.empty()},
+                                        {"--tev", !o.tev.empty()}})
+        if (given)
+            throw Error(ExitCode::usage,
+                        fmt::format("{} works on one device without checkpoints: leave --devices, --range-size, "
+                                    "--checkpoint, --resume and mpirun out",
+                                    option));
 }
 
 /// What writing the image takes: sums of its pixels, the image, and the file twice while it grows.
@@ -60,8 +80,96 @@ size_t bytes_to_save(const Scene& scene) {
     return size_t(scene.sensor.crop_width) * scene.sensor.crop_height * kPerPixel + kRest;
 }
 
+void write_images(const Options& o, const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
+                  const FilmMoments& film) {
+    const Image image = mean_image(film);
+    write_exr(o.output, image, image_attributes(scene, settings, stats), make_aovs(scene, settings, film, o.aovs));
+    if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
+}
+
+/// Statistics with what `found` adds to them, and the last words.
+int conclude(const Options& o, const LoadedScene& loaded, const RenderSettings& settings, const RenderStats& stats,
+             const RenderPosition& position, const nlohmann::json& found) {
+    if (!o.json.empty()) {
+        nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
+        json.update(found);
+        json["interrupted"] = position.interrupted;
+        write_json(o.json, json);
+    }
+    if (position.interrupted) {
+        log_error(position.samples ? fmt::format("interrupted: {} holds the {} samples per pixel that were finished",
+                                                 o.output, position.samples)
+                                   : "interrupted before the first sample was finished: nothing was saved");
+        return int(ExitCode::interrupted);
+    }
+    log_info(fmt::format("{}: {} spp in {}, {}", o.output, position.samples, format_duration(position.seconds),
+                         stats.device));
+    if (const std::string text = lost_values(stats); o.strict && !text.empty())
+        throw Error(ExitCode::device, "--strict: " + text + ". The image was saved");
+    return int(ExitCode::done);
+}
+
+void show_progress(Progress& progress, const Budget& budget, const RenderPosition& p, const RenderStats& stats) {
+    const double fraction = budget.samples ? double(p.samples) / double(budget.samples) : p.seconds / budget.seconds;
+    progress.update(std::min(fraction, 1.0), progress_details(p.samples, p.seconds, stats));
+}
+
+nlohmann::json describe_parts(const ParallelResult& result) {
+    nlohmann::json workers = nlohmann::json::array();
+    for (const WorkerShare& w : result.workers)
+        workers.push_back({{"rank", w.rank},
+                           {"host", w.host},
+                           {"device", w.device},
+                           {"samples", w.samples},
+                           {"films", w.nodes},
+                           {"busy_seconds", w.seconds}});
+    return {{"workers", workers},
+            {"range_size", result.ranges.size},
+            {"merge_seconds", result.merge_seconds},
+            {"receive_seconds", result.receive_seconds}};
+}
+
+int render_by_ranges(const Options& o) {
+    const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
+    ParallelRequest request;
+    request.settings = o.render.settings(loaded.scene);
+    request.budget = render_budget(o.spp, o.time, loaded.scene, "--");
+    expect(request.settings, request.budget);
+    request.devices = o.devices;
+    request.range_size = o.range_size.value_or(0);
+    request.state_path = o.output + ".state";
+    request.resume = o.resume;
+    request.checkpoint_seconds = o.checkpoint.value_or(request.checkpoint_seconds);
+    request.interrupt = save_when_interrupted();
+    if (ranks().rank() > 0) {
+        serve_parallel(loaded.scene, request, ranks());
+        return int(ExitCode::done);
+    }
+    MemoryReserve reserve(bytes_to_save(loaded.scene));
+    ParallelResult result;
+    {
+        Progress progress("render");
+        request.on_progress = [&](const RenderPosition& p, const RenderStats& stats) {
+            show_progress(progress, request.budget, p, stats);
+        };
+        result = render_parallel(loaded.scene, request, ranks());
+    }
+    reserve.release();
+    if (!result.state_path.empty())
+        log_error(
+            fmt::format("stopped by a signal, or because another rank ended: {} samples per pixel are in {}; the "
+                        "same command with --resume goes on",
+                        result.position.samples, result.state_path));
+    for (const std::string& warning : render_warnings(loaded.scene, used_settings(request.settings, result.stats)))
+        log_warning(warning);
+    if (result.position.samples > 0) write_images(o, loaded.scene, request.settings, result.stats, result.film);
+    if (const std::string text = lost_values(result.stats); !o.strict && !text.empty()) log_warning(text);
+    return conclude(o, loaded, request.settings, result.stats, result.position, describe_parts(result));
+}
+
 int render(const Options& o) {
     check(o);
+    if (o.by_ranges()) return render_by_ranges(o);
     const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
     RenderSettings settings = o.render.settings(loaded.scene);
     if (!o.techniques.empty() && settings.technique_depth == 0) settings.technique_depth = kDefaultTechniqueDepth;
@@ -94,9 +202,7 @@ int render(const Options& o) {
     {
         Progress progress("render");
         position = drive(*renderer, position, budget, interrupt, [&](const RenderPosition& p) {
-            const double fraction =
-                budget.samples ? double(p.samples) / double(budget.samples) : p.seconds / budget.seconds;
-            progress.update(std::min(fraction, 1.0), progress_details(p.samples, p.seconds, renderer->stats()));
+            show_progress(progress, budget, p, renderer->stats());
             if (const auto now = std::chrono::steady_clock::now(); tev && now - streamed > kStreamPeriod) {
                 tev->send(mean_image(renderer->film()));
                 streamed = now;
@@ -107,11 +213,9 @@ int render(const Options& o) {
     reserve.release();
     RenderStats stats = renderer->stats();
     if (position.samples > 0) {
-        const Image image = mean_image(renderer->film());
-        if (tev) tev->send(image);
-        write_exr(o.output, image, image_attributes(loaded.scene, settings, stats),
-                  make_aovs(loaded.scene, settings, renderer->film(), o.aovs));
-        if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
+        const FilmMoments film = renderer->film();
+        if (tev) tev->send(mean_image(film));
+        write_images(o, loaded.scene, settings, stats, film);
     }
     if (position.samples > 0 && !o.techniques.empty())
         write_technique_images(o.techniques, loaded.scene, settings, stats, renderer->strategy_images());
@@ -127,23 +231,7 @@ int render(const Options& o) {
             log_warning(e.what());
         }
     }
-    if (!o.json.empty()) {
-        nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
-        json.update(found);
-        json["interrupted"] = position.interrupted;
-        write_json(o.json, json);
-    }
-    if (position.interrupted) {
-        log_error(position.samples ? fmt::format("interrupted: {} holds the {} samples per pixel that were finished",
-                                                 o.output, position.samples)
-                                   : "interrupted before the first sample was finished: nothing was saved");
-        return int(ExitCode::interrupted);
-    }
-    log_info(fmt::format("{}: {} spp in {}, {}", o.output, position.samples, format_duration(position.seconds),
-                         stats.device));
-    if (const std::string text = lost_values(stats); o.strict && !text.empty())
-        throw Error(ExitCode::device, "--strict: " + text + ". The image was saved");
-    return int(ExitCode::done);
+    return conclude(o, loaded, settings, stats, position, found);
 }
 
 }  // namespace
@@ -176,6 +264,17 @@ void add_render(CLI::App& app, Run& run) {
                        "that replay them; renders one sample at a time");
     command.add_option("--tev", o->tev, "Show the image so far in a running tev, twice a second")
         ->type_name("HOST:PORT");
+    command
+        .add_option("--devices", o->devices,
+                    "Devices that share the render: numbers of CUDA devices, or cpu; of each rank with mpirun")
+        ->delimiter(',')
+        ->type_name("N,...");
+    command.add_option("--range-size", o->range_size,
+                       "Samples that a device renders before it hands its film over. The image does not depend on who "
+                       "renders which range");
+    command.add_option("--checkpoint", o->checkpoint,
+                       "Seconds between two states of the render, OUTPUT.state. Default with several devices: 60");
+    command.add_flag("--resume", o->resume, "Go on from OUTPUT.state, with any number of devices and ranks");
     command.add_flag("--strict", o->strict, "Fail (exit code 4) if invalid values or lost queue items were counted");
     command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
     command.callback([o, png, &run] {

@@ -9,6 +9,7 @@
 #include "cli/interrupt.h"
 #include "core/error.h"
 #include "core/log.h"
+#include "core/ranks.h"
 #include "core/version.h"
 
 namespace ambilux {
@@ -20,6 +21,17 @@ int flushed(int code) {
     if (std::cout) return code;
     log_error("cannot write to standard output");
     return code == int(ExitCode::done) ? int(ExitCode::device) : code;
+}
+
+/// Each rank would do all of the work, and write the same files.
+void check_ranks(const std::string& command) {
+    if (launched_ranks() == 1) return;
+    if (!ranks().launched())
+        throw Error(ExitCode::usage, fmt::format("{} processes were started, but this program was built without MPI: "
+                                                 "install libopenmpi-dev and build again",
+                                                 launched_ranks()));
+    if (command != "render" && command != "experiment")
+        throw Error(ExitCode::usage, fmt::format("{}: only render and experiment work with several ranks", command));
 }
 
 }  // namespace
@@ -60,12 +72,14 @@ int run_program(int argc, const char* const* argv) {
         const int code = app.exit(e);
         return flushed(code == 0 && argc > 1 ? int(ExitCode::done) : int(ExitCode::usage));
     }
-    set_quiet(quiet);
+    set_quiet(quiet || ranks().rank() > 0);
     try {
+        check_ranks(app.get_subcommands().front()->get_name());
         return flushed(run());
     } catch (const Error& e) {
         set_status_line("");
-        log_error(e.what());
+        log_error(ranks().rank() > 0 ? fmt::format("rank {} on {}: {}", ranks().rank(), host_name(), e.what())
+                                     : e.what());
         return int(e.code);
     } catch (const std::bad_alloc&) {
         set_status_line("");

@@ -29,6 +29,21 @@ if(AMBILUX_TESTS)
   message(STATUS "Catch2 ${Catch2_VERSION}")
 endif()
 
+# MPI is optional: one render or experiment over several processes (docs/scaling.md).
+set(AMBILUX_HAS_MPI OFF)
+if(NOT AMBILUX_MPI STREQUAL "OFF")
+  set(MPI_CXX_SKIP_MPICXX ON)  # the C interface alone
+  find_package(MPI QUIET COMPONENTS CXX)
+  if(MPI_CXX_FOUND)
+    set(AMBILUX_HAS_MPI ON)
+    message(STATUS "MPI ${MPI_CXX_VERSION}: renders and experiments over several processes")
+  elseif(AMBILUX_MPI STREQUAL "ON")
+    message(FATAL_ERROR "AMBILUX_MPI=ON, but no MPI was found: install libopenmpi-dev")
+  else()
+    message(STATUS "MPI not found (libopenmpi-dev): one process renders by itself")
+  endif()
+endif()
+
 # CUDA is optional.
 set(AMBILUX_HAS_CUDA OFF)
 if(NOT AMBILUX_CUDA STREQUAL "OFF")

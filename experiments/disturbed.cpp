@@ -72,12 +72,23 @@ std::string why_disturbed(const json& stats, double least) {
     return "";
 }
 
+std::string time_class(const json& stats) {
+    const auto text = [](const json& j, const char* key) {
+        const auto found = j.find(key);
+        return found != j.end() && found->is_string() ? found->get<std::string>() : std::string();
+    };
+    const json machine = machine_of(stats);
+    const bool named = text(stats, "backend") == "cuda";
+    return fmt::format("{} on {} {}", text(stats, "method"), text(stats, "device"),
+                       named || machine.empty() ? "" : text(machine.back(), "host"));
+}
+
 std::map<std::string, double> least_seconds(const std::vector<json>& seeds) {
     std::map<std::string, double> least;
     for (const json& stats : seeds) {
         const double own = stats.is_object() && seconds_of(stats) >= kShortestJudged ? per_sample(stats) : 0.0;
         if (!(own > 0)) continue;
-        const auto at = least.emplace(stats.value("method", ""), own).first;
+        const auto at = least.emplace(time_class(stats), own).first;
         at->second = std::min(at->second, own);
     }
     return least;
@@ -97,7 +108,7 @@ std::vector<Disturbed> find_disturbed(const ExperimentFolder& folder, const Prep
             std::map<std::string, double> least = least_seconds(seeds);
             for (size_t i = 0; i < seeds.size(); ++i) {
                 if (!seeds[i].is_object()) continue;
-                const std::string why = why_disturbed(seeds[i], least[seeds[i].value("method", "")]);
+                const std::string why = why_disturbed(seeds[i], least[time_class(seeds[i])]);
                 if (why.empty()) continue;
                 json attempts = seeds[i].value("attempts", json::array());
                 attempts.push_back({{"why", why},

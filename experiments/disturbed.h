@@ -28,7 +28,11 @@ struct Disturbed {
 /// them would bias what is measured.
 std::string why_disturbed(const nlohmann::json& stats, double least);
 
-/// {method: seconds per sample of the quickest} of the statistics of one run's seeds.
+/// What two renders must share for their times per sample to be compared: the method, the device, and the host where a
+/// device's name does not say what it is, as of CPUs.
+std::string time_class(const nlohmann::json& stats);
+
+/// {time_class: seconds per sample of the quickest} of the statistics of one run's seeds.
 std::map<std::string, double> least_seconds(const std::vector<nlohmann::json>& seeds);
 
 /// The disturbed renders of what the folder holds. Images made elsewhere have no times of their own.

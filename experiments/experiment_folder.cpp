@@ -8,7 +8,9 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/ranks.h"
 #include "experiments/machine.h"
+#include "experiments/parallel/task_dealer.h"
 #include "experiments/statistics.h"
 #include "film/metrics.h"
 
@@ -31,6 +33,11 @@ ExperimentFolder::ExperimentFolder(const std::string& path, const std::string& r
                                    const Prepared& prepared)
     : path_(path), references_(references.empty() ? path + "/references" : references), prepared_(prepared),
       config_(prepared.config), reference_notes_(prepared.scenes.size()) {
+    if (ranks().rank() > 0) {
+        runs_.emplace(tell_first_rank("runs"));
+        batches_.emplace(tell_first_rank("batches"));
+        return;
+    }
     open(resume);
     lock_.emplace(path_);
     remove_temporary_files();
@@ -64,6 +71,12 @@ std::string ExperimentFolder::file(const std::string& folder, const LoadedEntry&
 void ExperimentFolder::remove_states() const {
     std::error_code ignored;
     fs::remove_all(path_ + "/state", ignored);
+}
+
+void ExperimentFolder::remove_state(const std::string& path) const {
+    if (ranks().rank() > 0) return tell_first_rank("states")("remove", {path});
+    std::error_code ignored;
+    fs::remove(path, ignored);
 }
 
 /// Parts of files that a killed process left.
@@ -100,6 +113,12 @@ void ExperimentFolder::read_manifest() {
 
 void ExperimentFolder::add_clocks(const std::string& when) {
     manifest_["clocks"].push_back(describe_clocks(when, prepared_.backends.contains("cuda")));
+}
+
+void ExperimentFolder::describe_ranks(const nlohmann::json& notes, const std::string& shared) {
+    manifest_["ranks"] = notes;
+    // Of an earlier part it stays true.
+    if (!shared.empty()) manifest_["ranks_share"] = shared;
 }
 
 nlohmann::json ExperimentFolder::describe_scenes() const {

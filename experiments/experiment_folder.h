@@ -24,13 +24,16 @@ private:
 class ExperimentFolder {
 public:
     /// Makes the folder, or with `resume` continues one of the same configuration and scenes. `references`: where they
-    /// are kept; empty: inside. Throws Error.
+    /// are kept; empty: inside. Of several ranks the first one holds it; tables of the others tell it what they would
+    /// write (experiments/parallel/task_dealer.h). Throws Error.
     ExperimentFolder(const std::string& path, const std::string& references, bool resume, const Prepared& prepared);
 
     const std::string& path() const { return path_; }
     const std::string& references() const { return references_; }
     std::string file(const std::string& folder, const LoadedEntry& scene, const std::string& name) const;
     void remove_states() const;
+    /// Of a render that is complete, after its rows.
+    void remove_state(const std::string& path) const;
 
     ResultTable& runs() { return *runs_; }
     ResultTable& batches() { return *batches_; }
@@ -42,6 +45,8 @@ public:
     void describe_reference(size_t scene, const nlohmann::json& notes) { reference_notes_[scene] = notes; }
     /// Renders whose times are not to be trusted though they were repeated.
     void describe_disturbed(const nlohmann::json& list) { manifest_["disturbed"] = list; }
+    /// What the manifest says of the processes and their devices, and which of these they share ("": none).
+    void describe_ranks(const nlohmann::json& notes, const std::string& shared);
     void write_manifest(bool finished);
 
 private:

@@ -12,12 +12,19 @@
 #include <sstream>
 #include <thread>
 
+#include "core/ranks.h"
 #include "experiments/machine.h"
 
 namespace ambilux {
 namespace {
 
 double seconds_of(const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); }
+
+double process_seconds(pid_t process) {
+    std::ifstream stat(fmt::format("/proc/{}/stat", process));
+    const std::string text((std::istreambuf_iterator<char>(stat)), std::istreambuf_iterator<char>());
+    return parse_stat_seconds(text, double(::sysconf(_SC_CLK_TCK)));
+}
 
 /// CPU seconds of the processes that a process has started, those they started included. Those that have ended are in
 /// their parent's counts.
@@ -28,9 +35,7 @@ double child_seconds(pid_t parent, int depth = 0) {
     for (const auto& task : std::filesystem::directory_iterator(fmt::format("/proc/{}/task", parent), ignored)) {
         std::ifstream children(task.path() / "children");
         for (pid_t child = 0; children >> child;) {
-            std::ifstream stat(fmt::format("/proc/{}/stat", child));
-            std::string text((std::istreambuf_iterator<char>(stat)), std::istreambuf_iterator<char>());
-            seconds += parse_stat_seconds(text, double(::sysconf(_SC_CLK_TCK)));
+            seconds += process_seconds(child);
             if (depth < kMostGenerations) seconds += child_seconds(child, depth + 1);
         }
     }
@@ -79,6 +84,7 @@ LoadReading read_load() {
         if (rusage usage; ::getrusage(who, &usage) == 0)
             r.own += seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime);
     r.own += child_seconds(::getpid());
+    for (const int rank : ranks().local_peers()) r.ranks += process_seconds(rank) + child_seconds(rank);
     std::ifstream("/proc/loadavg") >> r.load;
     r.mhz = cpu_mhz().mean;
     return r;
@@ -87,7 +93,9 @@ LoadReading read_load() {
 double other_cores(const LoadReading& before, const LoadReading& after) {
     const double wall = after.wall - before.wall;
     if (!(wall > 0)) return 0;
-    return std::max(0.0, (after.busy - before.busy) + (after.steal - before.steal) - (after.own - before.own)) / wall;
+    const double all = (after.busy - before.busy) + (after.steal - before.steal),
+                 known = (after.own - before.own) + (after.ranks - before.ranks);
+    return std::max(0.0, all - known) / wall;
 }
 
 nlohmann::json load_json(const LoadReading& before, const LoadReading& after) {
@@ -96,6 +104,7 @@ nlohmann::json load_json(const LoadReading& before, const LoadReading& after) {
             {"cores", std::thread::hardware_concurrency()},
             {"other_cores", other_cores(before, after)},
             {"own_cores", (after.own - before.own) / wall},
+            {"rank_cores", (after.ranks - before.ranks) / wall},
             {"steal_cores", (after.steal - before.steal) / wall},
             {"load", {{"before", before.load}, {"after", after.load}}},
             {"cpu_mhz", {{"before", known(before.mhz)}, {"after", known(after.mhz)}}}};

@@ -14,7 +14,7 @@ namespace ambilux {
 const char* const kResultHeader =
     "scene,run,seed,checkpoint,budget,integrator,variant,estimator,backend,spp,time,rmse,rmse_corrected,reference_"
     "noise,relmse,relmse_corrected,relmse_trimmed,"
-    "relmse_trimmed_corrected,mape,bias,bias_z,rays,invalid,method";
+    "relmse_trimmed_corrected,mape,bias,bias_z,rays,invalid,method,device,host";
 const char* const kBatchHeader = "scene,run,seed,batch,spp,time,mse,relmse,other_cores";
 
 namespace {
@@ -41,10 +41,12 @@ std::string result_prefix(const std::string& scene, const std::string& run, uint
 std::string result_line(const ResultRow& r) {
     const Metrics& m = r.metrics;
     return fmt::format(
-        "{}{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.5g},{},{},{}",
+        "{}{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.5g},{},{},{},{"
+        "},{}",
         result_prefix(r.scene, r.run, r.seed), r.checkpoint, r.budget, r.integrator, r.variant, r.estimator, r.backend,
         r.spp, r.time, m.rmse, m.rmse_corrected, m.reference_noise, m.relmse, m.relmse_corrected, m.relmse_trimmed,
-        m.relmse_trimmed_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid, quoted(r.method));
+        m.relmse_trimmed_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid, quoted(r.method), quoted(r.device),
+        quoted(r.host));
 }
 
 std::string batch_line(const BatchRow& r) {
@@ -84,6 +86,7 @@ size_t ResultTable::count(const std::string& prefix) const {
 void ResultTable::add(const std::string& line) { add(std::vector<std::string>{line}); }
 
 void ResultTable::add(const std::vector<std::string>& lines) {
+    if (tell_) return tell_("add", lines);
     std::string text;
     for (const std::string& line : lines) {
         if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) continue;
@@ -94,6 +97,7 @@ void ResultTable::add(const std::vector<std::string>& lines) {
 }
 
 void ResultTable::remove(const std::string& prefix) {
+    if (tell_) return tell_("remove", {prefix});
     if (std::erase_if(lines_, [&](const std::string& line) { return line.starts_with(prefix); }) > 0) write();
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -21,6 +22,7 @@ struct ResultRow {
     Metrics metrics;
     uint64_t rays = 0, invalid = 0;
     std::string method;  ///< what ran (method_text)
+    std::string device, host;
 };
 
 /// Whole passes of one render, apart from its others: a sample of how much its errors scatter.
@@ -54,6 +56,9 @@ std::vector<std::string> read_results(const std::string& path, const char* heade
 /// One of both files, which grows by whole lines.
 class ResultTable {
 public:
+    /// Of another process, which is told: what to do ("add", "remove"), and the lines or the prefix.
+    using Tell = std::function<void(const char* what, const std::vector<std::string>& lines)>;
+    explicit ResultTable(Tell tell) : header_(nullptr), tell_(std::move(tell)) {}
     /// With the lines that the file holds.
     ResultTable(const std::string& path, const char* header);
     /// Lines that begin with `prefix`.
@@ -69,6 +74,7 @@ private:
 
     const std::string path_;
     const char* const header_;
+    const Tell tell_;
     std::vector<std::string> lines_;
 };
 

@@ -3,35 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <filesystem>
 
-#include "backends/cuda_device.h"
-#include "core/atomic_file.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "core/ranks.h"
 #include "experiments/batches.h"
 #include "experiments/disturbed.h"
-#include "experiments/drive.h"
-#include "experiments/experiment_folder.h"
-#include "experiments/gpu_watch.h"
-#include "experiments/load.h"
-#include "experiments/machine.h"
-#include "experiments/peers/peer_runs.h"
-#include "experiments/prepare.h"
-#include "experiments/reference_store.h"
-#include "experiments/render_task.h"
-#include "experiments/results.h"
-#include "experiments/state.h"
-#include "experiments/stats_sum.h"
-#include "experiments/technique_files.h"
-#include "experiments/work_estimate.h"
+#include "experiments/parallel/task_dealer.h"
+#include "experiments/task_runner.h"
 #include "film/png_io.h"
 
 namespace ambilux {
 namespace {
-
-namespace fs = std::filesystem;
 
 class Experiment {
 public:
@@ -39,66 +22,104 @@ public:
         : request_(request), hooks_(hooks), prepared_(prepare_experiment(request.config, request.reduced, hooks)),
           config_(prepared_.config), checkpoints_(config_.checkpoints()),
           folder_(request.output, request.references, request.resume, prepared_), own_(config_, hooks_),
-          peers_(request, config_), nvml_(prepared_.backends.contains("cuda") ? cuda_device_bus_id() : "") {}
+          peers_(request, config_), dealer_(folder_),
+          task_runner_({request_, hooks_, prepared_, checkpoints_, folder_, own_, peers_, references_made_, work_,
+                        [this](const std::string& what) { show(what); }}) {}
 
-    ExitCode run() {
+    ExitCode run() { return ranks().rank() > 0 ? serve() : lead(); }
+
+private:
+    /// Deals out what is to be done, and does its share.
+    ExitCode lead() {
         folder_.add_clocks(folder_.is_resumed() ? "resumed" : "start");
+        dealer_.greet(prepared_, request_, folder_);
         folder_.write_manifest(false);
         plan();
         Progress progress("experiment " + config_.name);
         progress_ = &progress;
-        for (size_t i = 0; i < prepared_.scenes.size(); ++i)
-            if (!make_scene_reference(i) || !examine_peers(i)) return stopped();
-        folder_.write_manifest(false);
+        std::vector<ExperimentTask> references, renders;
+        for (size_t i = 0; i < prepared_.scenes.size(); ++i) references.push_back({true, i, 0, 0});
         for (const uint64_t seed : config_.seeds)
             for (const auto& [scene, run] :
                  render_order(prepared_.scenes.size(), config_.runs.size(), seed, config_.random_order))
-                if (!render(scene, config_.runs[run], seed)) return stopped();
-        if (!repeat_disturbed()) return stopped();
+                renders.push_back({false, scene, run, seed});
+        if (ranks().size() > 1 && !deal(references)) return stopped();
+        for (size_t i = 0; i < prepared_.scenes.size(); ++i)
+            if (!make_scene_reference(i) || !examine_peers(i)) return stopped();
+        folder_.write_manifest(false);
+        if (!deal(renders) || !repeat_disturbed()) return stopped();
+        dealer_.stop();
         folder_.remove_states();
         folder_.add_clocks("end");
         folder_.write_manifest(true);
         return ExitCode::done;
     }
 
-private:
-    ExitCode stopped() {
-        folder_.add_clocks("interrupted");
-        folder_.write_manifest(false);
-        return ExitCode::interrupted;
+    bool deal(const std::vector<ExperimentTask>& tasks) {
+        return dealer_.deal(tasks, [&](const ExperimentTask& t, bool here) { return work_or_send(t, here); });
     }
 
-    /// Makes disturbed renders again, when all others are done: whoever held the machine may have left it.
+    bool work_or_send(const ExperimentTask& t, bool here) {
+        if (here) return work_on(t);
+        // Others have no table to look it up in.
+        if (!t.reference && task_runner_.is_done(t.scene, config_.runs[t.run], t.seed)) return false;
+        work_.skip(work_kind(prepared_.scenes[t.scene], t.reference ? nullptr : &config_.runs[t.run]));
+        return true;
+    }
+
+    /// Makes disturbed renders again, when all others are done: whoever held the machine may have left it. Ranks that
+    /// share devices or cores would only disturb each other again.
     bool repeat_disturbed() {
         for (;;) {
-            const std::vector<Disturbed> found = find_disturbed(folder_, prepared_);
-            folder_.describe_disturbed(to_json(found, config_));
-            const auto next = std::min_element(found.begin(), found.end(), [](const Disturbed& a, const Disturbed& b) {
+            std::vector<Disturbed> found = disturbed();
+            std::erase_if(found, [&](const Disturbed& d) { return d.attempts.size() > config_.repeats; });
+            if (found.empty() || dealer_.has_shares()) return true;
+            std::stable_sort(found.begin(), found.end(), [](const Disturbed& a, const Disturbed& b) {
                 return a.attempts.size() < b.attempts.size();
             });
-            if (next == found.end() || next->attempts.size() > config_.repeats) return true;
-            if (!repeat(*next)) return false;
+            std::vector<ExperimentTask> again;
+            for (const Disturbed& d : found) again.push_back({false, d.scene, d.run, d.seed});
+            if (!dealer_.deal(again, [&](const ExperimentTask& t, bool here) {
+                    return begin_again(t) ? work_or_send(t, here) : here;
+                }))
+                return false;
         }
     }
 
-    bool repeat(const Disturbed& d) {
-        const RunEntry& run = config_.runs[d.run];
-        RenderTask task = task_of(d.scene, run, d.seed);
-        log_info(fmt::format("{} {} is made again: {}", task.scene.entry->name, task.name, d.why));
-        task.state.notes["attempts"] = d.attempts;
-        // The state comes first: a process that is killed now goes on with it.
-        make_folders(folder_.file("state", task.scene, ""));
-        write_state(task.state_path, task.state);
-        forget(task);
-        work_.plan(task.work, 1, work_after(task.scene, {}));
-        return render(d.scene, run, d.seed);
+    std::vector<Disturbed> disturbed() {
+        std::vector<Disturbed> found = find_disturbed(folder_, prepared_);
+        folder_.describe_disturbed(to_json(found, config_));
+        return found;
     }
 
-    /// What is left of a render that stands at `p`.
-    Work work_after(const LoadedEntry& scene, const RenderPosition& p) const {
-        const double samples = config_.spp.empty() ? 0 : double(config_.spp.back()) - double(p.samples),
-                     seconds = config_.seconds.empty() ? 0 : config_.seconds.back() - p.seconds;
-        return {std::max(0.0, samples) * double(scene.pixels()), std::max(0.0, seconds)};
+    /// False if nothing speaks against it any more, since the one that it was compared with has been made again.
+    bool begin_again(const ExperimentTask& t) {
+        for (const Disturbed& d : disturbed())
+            if (d.scene == t.scene && d.run == t.run && d.seed == t.seed) {
+                task_runner_.begin_again(d);
+                return true;
+            }
+        return false;
+    }
+
+    /// Does what the first rank deals out.
+    ExitCode serve() {
+        serve_tasks(prepared_, request_, [&](const ExperimentTask& t) { return work_on(t); });
+        return ExitCode::done;
+    }
+
+    /// False if interrupted.
+    bool work_on(const ExperimentTask& t) {
+        if (t.reference) return make_scene_reference(t.scene);
+        if (references_made_[t.scene].image.samples == 0 && !make_scene_reference(t.scene)) return false;
+        return task_runner_.render(t.scene, config_.runs[t.run], t.seed);
+    }
+
+    ExitCode stopped() {
+        dealer_.wait_for_others();
+        folder_.add_clocks("interrupted");
+        folder_.write_manifest(false);
+        return ExitCode::interrupted;
     }
 
     void plan() {
@@ -110,11 +131,14 @@ private:
             if (place.cached < wanted)
                 work_.plan(work_kind(scene, nullptr), 1, {double(wanted - place.cached) * double(scene.pixels()), 0});
             for (const RunEntry& run : config_.runs)
-                work_.plan(work_kind(scene, &run), double(config_.seeds.size()), work_after(scene, {}));
+                work_.plan(work_kind(scene, &run), double(config_.seeds.size()), work_after(config_, scene, {}));
         }
     }
 
-    void show(const std::string& what) { progress_->update(work_.fraction(), what, work_.seconds_left()); }
+    void show(const std::string& what) {
+        dealer_.listen();
+        if (progress_) progress_->update(work_.fraction(), what, work_.seconds_left());
+    }
 
     bool make_scene_reference(size_t index) {
         const LoadedEntry& scene = prepared_.scenes[index];
@@ -168,212 +192,6 @@ private:
         return true;
     }
 
-    RunMaker& maker(const RunEntry& run) { return run.renderer.empty() ? static_cast<RunMaker&>(own_) : peers_; }
-
-    RenderTask task_of(size_t index, const RunEntry& run, uint64_t seed) const {
-        return make_task(index, prepared_.scenes[index], run, seed, folder_);
-    }
-
-    /// One render through all of its checkpoints; false if interrupted. A peer that fails is left out and said.
-    bool render(size_t index, const RunEntry& run, uint64_t seed) {
-        try {
-            return try_render(index, run, seed);
-        } catch (const PeerRefusal& e) {
-            const RenderTask task = task_of(index, run, seed);
-            peers_.lose(task.scene, run, seed, e.what());
-            forget(task);
-            work_.end(task.work);
-            std::error_code ignored;
-            fs::remove(task.state_path, ignored);
-            fs::remove(folder_.file("stats", task.scene, task.name + ".json"), ignored);
-            return true;
-        }
-    }
-
-    bool try_render(size_t index, const RunEntry& run, uint64_t seed) {
-        if (!run.renderer.empty() && !peers_.agrees(prepared_.scenes[index], run)) {
-            work_.skip(work_kind(prepared_.scenes[index], &run));
-            return true;
-        }
-        RenderTask task = task_of(index, run, seed);
-        if (folder_.runs().count(task.prefix) == checkpoints_.size() && !fs::exists(task.state_path)) {
-            work_.skip(task.work);
-            return true;
-        }
-        restore(task);
-        task.settings = settings_for(config_, task.scene, run, seed, hooks_);
-        const std::unique_ptr<Renderer> renderer = maker(run).make(task.what(), task.total);
-        const bool cuda = prepared_.backends.contains("cuda");
-        gpu_ = {};
-        const LoadReading load = hooks_.load();
-        const bool whole = pass_checkpoints(task, *renderer);
-        nlohmann::json machine = load_json(load, hooks_.load());
-        machine["gpu"] = gpu_.json();
-        machine["clocks"] = describe_clocks("after", cuda);
-        task.state.notes["machine"].push_back(machine);
-        if (!whole) {
-            if (task.state.moments.samples && !run.techniques) write_state(task.state_path, task.state);
-            return false;
-        }
-        work_.end(task.work);
-        finish(task);
-        if (run.techniques) {
-            write_technique_images(folder_.file("techniques", task.scene, task.name), task.scene.scene, task.settings,
-                                   task.stated(), renderer->strategy_images());
-            folder_.runs().add(task.state.notes["rows"].get<std::vector<std::string>>());
-        }
-        folder_.batches().add(task.state.notes["batches"].get<std::vector<std::string>>());
-        if (!run.renderer.empty()) peers_.found_again(task.scene, run, seed);
-        std::error_code ignored;
-        fs::remove(task.state_path, ignored);
-        return true;
-    }
-
-    /// Rows of a render that begins anew.
-    void forget(const RenderTask& task) {
-        folder_.runs().remove(task.prefix);
-        folder_.batches().remove(task.prefix);
-    }
-
-    /// What an earlier part saved.
-    void restore(RenderTask& task) {
-        RenderState& state = task.state;
-        if (auto saved = read_state(task.state_path)) {
-            state = std::move(*saved);
-            if (state.notes.contains("stats")) task.total = restore_stats(state.notes["stats"]);
-            for (const auto& line : state.notes["rows"]) folder_.runs().add(line.get<std::string>());
-            if (task.run.techniques && state.notes["attempts"].empty())
-                log_info(fmt::format("{} {}: starts over, because the sums of its single strategies are not saved",
-                                     task.scene.entry->name, task.name));
-        }
-        if (task.run.techniques) write_state(task.state_path, state);
-        // Rows whose state is lost are made anew.
-        if (state.notes["rows"].empty()) forget(task);
-        const auto& done = state.notes["done"];
-        for (size_t k = 0; k < checkpoints_.size(); ++k)
-            if (std::find(done.begin(), done.end(), k) == done.end()) task.pending.push_back(k);
-    }
-
-    /// Renders from checkpoint to checkpoint; false if interrupted.
-    bool pass_checkpoints(RenderTask& task, Renderer& renderer) {
-        RenderState& state = task.state;
-        RenderPosition position{state.moments.samples, state.notes["seconds"].get<double>(), false};
-        // Choosing is part of the method: its time counts.
-        position.seconds += renderer.stats().choice.seconds;
-        work_.begin(task.work, work_after(task.scene, position));
-        RenderStats counted = renderer.stats();
-        while (!task.pending.empty()) {
-            const Budget budget = next_budget(config_, task.pending, position);
-            const RenderPosition before = position;
-            const LoadReading load = hooks_.load();
-            position = drive_showing(task, renderer, position, budget);
-            const LoadReading after = hooks_.load();
-            add_part(task.total, counted, renderer.stats());
-            state.notes["seconds"] = position.seconds;
-            // The film restarts at each checkpoint and with each batch, so that a resumed render adds the same numbers
-            // in the same order as an uninterrupted one.
-            if (position.samples > before.samples) {
-                const FilmMoments film = renderer.film();
-                if (!position.interrupted)
-                    record_batch(task, film, position.seconds - before.seconds, other_cores(load, after));
-                state.moments.add(film);
-                renderer.clear_film();
-            }
-            counted = renderer.stats();  // a renderer may or may not restart its counters with its film
-            state.notes["stats"] = save_stats(task.total);
-            if (position.interrupted) return false;
-            record_checkpoints(task, position, budget);
-        }
-        return true;
-    }
-
-    void record_batch(RenderTask& task, const FilmMoments& film, double seconds, double others) const {
-        nlohmann::json& lines = task.state.notes["batches"];
-        BatchRow b = measure_batch(film, references_made_[task.scene_index].image, seconds);
-        b.scene = task.scene.entry->name;
-        b.run = task.run.name;
-        b.seed = task.settings.seed;
-        b.batch = lines.size();
-        b.other_cores = others;
-        lines.push_back(batch_line(b));
-    }
-
-    RenderPosition drive_showing(const RenderTask& task, Renderer& renderer, const RenderPosition& from,
-                                 const Budget& budget) {
-        RenderPosition last = from;
-        return drive(renderer, from, budget, request_.interrupt, [&](const RenderPosition& p) {
-            work_.progress(task.work, double(p.samples - last.samples) * double(task.scene.pixels()),
-                           p.seconds - last.seconds);
-            last = p;
-            if (nvml_.is_there()) gpu_.add(nvml_.read());
-            show(fmt::format("{} {} seed {}: {} spp", task.scene.entry->name, task.run.name, task.settings.seed,
-                             p.samples));
-        });
-    }
-
-    /// Rows, state and images of the checkpoints that `budget` ended at.
-    void record_checkpoints(RenderTask& task, const RenderPosition& position, const Budget& budget) {
-        const bool ended_by_time = budget.seconds > 0 && (budget.samples == 0 || position.samples < budget.samples);
-        const auto reached = [&](size_t k) {
-            const Checkpoint& c = checkpoints_[k];
-            return c.samples ? position.samples >= c.samples
-                             : position.seconds >= c.seconds || (ended_by_time && c.seconds <= budget.seconds);
-        };
-        std::vector<std::string> lines;
-        for (const size_t k : task.pending)
-            if (reached(k)) {
-                lines.push_back(result_line(row(task, k)));
-                task.state.notes["rows"].push_back(lines.back());
-                task.state.notes["done"].push_back(k);
-                if (k + 1 == checkpoints_.size()) write_images(task);
-            }
-        std::erase_if(task.pending, reached);
-        if (task.run.techniques) return;  // its rows wait until all of its files are there
-        if (lines.empty()) return;
-        write_state(task.state_path, task.state);
-        for (const std::string& line : lines) folder_.runs().add(line);
-    }
-
-    ResultRow row(const RenderTask& task, size_t k) {
-        ResultRow r;
-        r.scene = task.scene.entry->name;
-        r.run = task.run.name;
-        r.seed = task.settings.seed;
-        r.checkpoint = k;
-        r.budget = checkpoints_[k].samples ? "spp" : "seconds";
-        const MethodNames names = maker(task.run).names(task.what(), task.total);
-        r.integrator = names.integrator;
-        r.variant = names.variant;
-        r.estimator = names.estimator;
-        r.method = names.method;
-        r.backend = task.total.backend;
-        r.spp = task.state.moments.samples;
-        r.time = task.state.notes["seconds"].get<double>();
-        r.metrics = compare_images(task.state.moments, references_made_[task.scene_index].image);
-        r.rays = task.total.rays_extend + task.total.rays_occlude;
-        r.invalid = task.total.invalid.total();
-        return r;
-    }
-
-    /// At the last checkpoint of the list: where there are some in seconds, all images have had the same time.
-    void write_images(const RenderTask& task) {
-        const Image image = mean_image(task.state.moments);
-        write_exr(folder_.file("images", task.scene, task.name + ".exr"), image,
-                  maker(task.run).attributes(task.what(), task.stated()));
-        write_png(folder_.file("images", task.scene, task.name + ".png"), image);
-    }
-
-    void finish(const RenderTask& task) {
-        if (task.total.invalid.total())
-            log_warning(fmt::format("{} {}: {} invalid values dropped", task.scene.entry->name, task.name,
-                                    task.total.invalid.total()));
-        nlohmann::json json = maker(task.run).statistics(task.what(), task.stated());
-        json["machine"] = task.state.notes["machine"];
-        json["attempts"] = task.state.notes.value("attempts", nlohmann::json::array());
-        write_file_atomic(folder_.file("stats", task.scene, task.name + ".json"),
-                          json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-    }
-
     const ExperimentRequest& request_;
     const Hooks& hooks_;
     const Prepared prepared_;
@@ -382,10 +200,10 @@ private:
     ExperimentFolder folder_;
     OwnRuns own_;
     PeerRuns peers_;
-    const Nvml nvml_;
-    GpuReadings gpu_;  ///< of the render in work
     std::vector<SceneReference> references_made_ = std::vector<SceneReference>(prepared_.scenes.size());
     WorkEstimate work_;
+    TaskDealer dealer_;
+    TaskRunner task_runner_;
     Progress* progress_ = nullptr;
 };
 

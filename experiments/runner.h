@@ -18,6 +18,7 @@ struct ExperimentRequest {
     bool resume = false;
     const volatile bool* interrupt = nullptr;
     std::function<void()> on_prepared = {};    ///< called once all is checked, before the first render; may be empty
+    bool shared_devices = false;               ///< ranks may share devices or cores, budgets in seconds included
     bool reduced = false;                      ///< as the section [reduced] of the configuration says
     double reference_checkpoint_seconds = 30;  ///< how often a reference is saved
 };
@@ -28,7 +29,8 @@ struct ExperimentRequest {
 /// seeds of every run, not fewer runs. A render passes through all checkpoints, those in samples and those in seconds,
 /// without restarting. After each checkpoint its state is saved; with `resume` a stopped or killed experiment loses no
 /// more than the work since the last checkpoint, or since the start of a render that gathers images of single
-/// strategies. Returns done or interrupted. Throws Error.
+/// strategies. Returns done or interrupted. Throws Error. With several ranks (core/ranks.h) all call it: references and
+/// renders are dealt out one by one, and the first rank alone holds the folder.
 ExitCode run_experiment(const ExperimentRequest& request, const Hooks& hooks);
 
 }  // namespace ambilux

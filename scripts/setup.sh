@@ -24,7 +24,7 @@ libraries=(
 requirements=(requirements.txt)
 if [[ $whole ]]; then
   tools[ccache]=ccache
-  libraries+=(catch2)
+  libraries+=(catch2 libopenmpi-dev openmpi-bin)
   requirements+=(requirements-tests.txt)
 fi
 

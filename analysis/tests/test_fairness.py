@@ -49,3 +49,7 @@ def test_what_was_made_again_and_what_stayed_disturbed_is_said(tmp_path):
     assert again.startswith("1 render was disturbed and made again") and again.endswith("box nee seed 2 (other processes held 40 % of the cores)")
     assert left.startswith("1 render was disturbed and not made again") and "1.40 times" in left
     assert held == "clocks of the device were held down (thermal) during box nee seed 2"
+    manifest |= {"repeats": 1, "ranks_share": "ranks 0 and 1 on node share core 3"}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    _, shared, left, _ = fairness.remarks(experiment.load(folder))
+    assert shared.startswith("ranks 0 and 1 on node share core 3: no time") and "not made again;" in left

@@ -2,6 +2,8 @@
 
 #include <cuda_runtime.h>
 
+#include "core/error.h"
+
 namespace ambilux {
 namespace {
 
@@ -40,6 +42,23 @@ std::string cuda_device_bus_id() {
         cudaGetDevice(&device) == cudaSuccess && cudaDeviceGetPCIBusId(id, sizeof id, device) == cudaSuccess;
     cudaGetLastError();
     return known ? id : "";
+}
+
+int cuda_device_count() {
+    int count = 0;
+    if (!cuda_device_present() || cudaGetDeviceCount(&count) != cudaSuccess) return 0;
+    return count;
+}
+
+void use_cuda_device(int device) {
+    const int count = cuda_device_count();
+    if (device < 0 || device >= count)
+        throw Error(ExitCode::device, "CUDA device " + std::to_string(device) + " is not there: this process sees " +
+                                          std::to_string(count) + ", numbered from 0");
+    const cudaError_t set = cudaSetDevice(device);
+    if (set != cudaSuccess)
+        throw Error(ExitCode::device,
+                    "CUDA device " + std::to_string(device) + " cannot be used: " + cudaGetErrorString(set));
 }
 
 }  // namespace ambilux

@@ -1,5 +1,8 @@
 #include "backends/cuda/device_scene.h"
 
+#include "backends/cuda_device.h"
+#include "backends/scene_fit.h"
+
 namespace ambilux {
 
 DeviceScene::DeviceScene(const Scene& scene)
@@ -43,7 +46,13 @@ DevicePairs::DevicePairs(const PairArrays& arrays)
 
 template <>
 std::shared_ptr<const DeviceScene> SharedAccels::get() {
-    return once(device_scene_, [&] { return std::make_shared<const DeviceScene>(scene_); });
+    return once(device_scene_, [&] {
+        // With the structure, if it is made: it comes next.
+        size_t free = 0, total = 0;
+        cuda_check(cudaMemGetInfo(&free, &total), "device memory");
+        check_scene_fits(scene_, cwbvh_ ? cwbvh_->memory_bytes() : 0, free, total, cuda_device_name());
+        return std::make_shared<const DeviceScene>(scene_);
+    });
 }
 
 template <>

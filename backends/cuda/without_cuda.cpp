@@ -18,6 +18,10 @@ std::string cuda_device_name() { return {}; }
 
 std::string cuda_device_bus_id() { return {}; }
 
+int cuda_device_count() { return 0; }
+
+void use_cuda_device(int) { throw not_built(); }
+
 std::vector<Hit> trace_on_device(const Scene&, const std::vector<Ray>&, bool, bool, bool) { throw not_built(); }
 
 std::vector<std::vector<KernelTiming>> time_rays_on_device(const Scene&, const CwbvhArrays&,

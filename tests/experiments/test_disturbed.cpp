@@ -64,7 +64,31 @@ TEST_CASE(
     // Other methods, and renders too short to tell, are no measure.
     const auto found =
         least_seconds({stats_of(1, 10), stats_of(2, 10), stats_of(3, 10, 0, "bdpt"), stats_of(0.01, 10), nullptr});
-    CHECK(found == std::map<std::string, double>{{"path", 0.1}, {"bdpt", 0.3}});
+    CHECK(found == std::map<std::string, double>{{time_class(stats_of(1, 1)), 0.1},
+                                                 {time_class(stats_of(1, 1, 0, "bdpt")), 0.3}});
+}
+
+TEST_CASE("times are compared between equal devices, those of CPUs on one host alone, and ranks are no others") {
+    const auto on = [](const std::string& backend, const std::string& device, const std::string& host) {
+        json stats = stats_of(1, 10);
+        stats["backend"] = backend;
+        stats["device"] = device;
+        stats["machine"][0]["host"] = host;
+        return time_class(stats);
+    };
+    CHECK(on("cuda", "H100", "a") == on("cuda", "H100", "b"));
+    CHECK(on("cuda", "H100", "a") != on("cuda", "H200", "a"));
+    CHECK(on("cpu", "CPU, 8 threads", "a") != on("cpu", "CPU, 8 threads", "b"));
+    CHECK(on("cpu", "CPU, 8 threads", "a") != on("cpu", "CPU, 4 threads", "a"));
+    CHECK(on("cpu", "CPU, 8 threads", "a") == on("cpu", "CPU, 8 threads", "a"));
+
+    LoadReading before, after;
+    after.wall = 2;
+    after.busy = 10;
+    after.own = 2;
+    after.ranks = 6;
+    CHECK(other_cores(before, after) == Approx(1));
+    CHECK(load_json(before, after)["rank_cores"] == Approx(3));
 }
 
 TEST_CASE("the driver's library says what the device did") {

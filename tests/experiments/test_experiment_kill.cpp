@@ -7,9 +7,9 @@
 #include <random>
 #include <thread>
 
-#include "experiments/results.h"
 #include "film/exr_io.h"
 #include "tests/support/program.h"
+#include "tests/support/timeless_rows.h"
 
 using namespace ambilux;
 namespace fs = std::filesystem;
@@ -52,23 +52,6 @@ integrator = "bdpt"
 variant = "wavefront"
 techniques = 3
 )";
-}
-
-/// Rows without the column `time`, which is the 11th; names may hold commas in quotes.
-std::vector<std::string> timeless(const std::string& path) {
-    std::vector<std::string> rows = read_results(path);
-    for (std::string& row : rows) {
-        bool inside = false;
-        int field = 0;
-        std::string kept;
-        for (const char c : row) {
-            if (c == '"') inside = !inside;
-            field += c == ',' && !inside;
-            if (field != 10 || c == ',') kept += c;
-        }
-        row = kept;
-    }
-    return rows;
 }
 
 /// Files below `folder` that a finished experiment is made of, by their relative names.

@@ -23,24 +23,30 @@ struct Outcome {
     std::string out, err;
 };
 
-/// Starts the program with output and messages in files of `folder`, or with output elsewhere; `before` runs in the new
+/// Starts a program with output and messages in files of `folder`, or with output elsewhere; `before` runs in the new
 /// process first.
-inline pid_t start(const TempFolder& folder, const std::vector<std::string>& arguments, const std::string& output = "",
-                   const std::function<void()>& before = {}) {
+inline pid_t start_program(const TempFolder& folder, const std::string& program,
+                           const std::vector<std::string>& arguments, const std::string& output = "",
+                           const std::function<void()>& before = {}) {
     const pid_t child = ::fork();
     REQUIRE(child >= 0);
     if (child == 0) {
-        std::vector<char*> argv = {const_cast<char*>(AMBILUX_PROGRAM)};
+        std::vector<char*> argv = {const_cast<char*>(program.c_str())};
         for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
         argv.push_back(nullptr);
         const std::string out = output.empty() ? folder / ".out" : output;
         if (!std::freopen(out.c_str(), "w", stdout) || !std::freopen((folder / ".err").c_str(), "w", stderr))
             ::_exit(99);
         if (before) before();
-        ::execv(AMBILUX_PROGRAM, argv.data());
+        ::execvp(program.c_str(), argv.data());
         ::_exit(98);
     }
     return child;
+}
+
+inline pid_t start(const TempFolder& folder, const std::vector<std::string>& arguments, const std::string& output = "",
+                   const std::function<void()>& before = {}) {
+    return start_program(folder, AMBILUX_PROGRAM, arguments, output, before);
 }
 
 inline Outcome finish(const TempFolder& folder, pid_t child) {

@@ -1,0 +1,13 @@
+// Whether a scene fits on a device, before anything of it is there.
+#pragma once
+
+#include "scene/scene.h"
+
+namespace ambilux {
+
+/// Throws Error(device) with the bytes of geometry, textures, acceleration structure and the rest if together they are
+/// more than `free` of the `total` bytes of `device`.
+void check_scene_fits(const Scene& scene, uint64_t accel_bytes, uint64_t free, uint64_t total,
+                      const std::string& device);
+
+}  // namespace ambilux

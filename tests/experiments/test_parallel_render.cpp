@@ -1,0 +1,148 @@
+// libs: ambilux_experiments
+// timeout: 120
+// Several workers in one process: the image of a render does not depend on how many there are, nor on interrupts.
+#include <atomic>
+
+#include "core/error.h"
+#include "core/flag.h"
+#include "experiments/parallel/parallel_render.h"
+#include "film/ztest.h"
+#include "tests/support/render_scene.h"
+
+using namespace ambilux;
+
+namespace {
+
+ParallelRequest request_for(const Scene& scene, const test::TempFolder& folder, const std::string& integrator,
+                            const std::string& variant, size_t workers) {
+    ParallelRequest request;
+    request.settings = cpu_settings(scene, Estimator::mis);
+    apply_setting(request.settings, "integrator", integrator);
+    apply_setting(request.settings, "variant", variant);
+    request.budget = {50, 0};
+    request.devices = std::vector<std::string>(workers, "cpu");
+    request.range_size = 3;
+    request.state_path = folder / "state";
+    return request;
+}
+
+bool same(const FilmMoments& a, const FilmMoments& b) {
+    return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares;
+}
+
+}  // namespace
+
+TEST_CASE("sums and second moments have the same bits for 1, 2 and 3 workers") {
+    const Scene scene = project_scene("glass", 40, 30);
+    const test::TempFolder folder;
+    for (const auto& [integrator, variant] : std::vector<std::pair<std::string, std::string>>{{"path", "wavefront"},
+                                                                                              {"light", "wavefront"},
+                                                                                              {"bdpt", "wavefront"},
+                                                                                              {"bdpt", "streaming"},
+                                                                                              {"bdpt", "lvc"}}) {
+        CAPTURE(integrator, variant);
+        std::optional<ParallelResult> first;
+        for (const size_t workers : {1, 2, 3}) {
+            const ParallelResult result =
+                render_parallel(scene, request_for(scene, folder, integrator, variant, workers), ranks());
+            CHECK(result.film.samples == 50);
+            CHECK(result.stats.samples == 50);
+            CHECK(result.workers.size() == workers);
+            if (!first) first = result;
+            CHECK(same(result.film, first->film));
+            CHECK(result.stats.rays_extend == first->stats.rays_extend);
+        }
+        CHECK(!std::filesystem::exists(folder / "state"));
+    }
+}
+
+TEST_CASE("a render by ranges is the estimate of a plain one, lvc with a cache per worker included") {
+    const Scene scene = project_scene("cornell", 32, 24);
+    const test::TempFolder folder;
+    for (const std::string variant : {"wavefront", "lvc"}) {
+        CAPTURE(variant);
+        ParallelRequest request = request_for(scene, folder, "bdpt", variant, 2);
+        request.budget.samples = 400;
+        request.range_size = 16;
+        request.settings.seed = 7;
+        const ParallelResult parts = render_parallel(scene, request, ranks());
+        request.settings.seed = 8;
+        const RenderResult plain = render_scene(scene, request.settings, 400);
+        const ZTestResult z = z_test(to_estimate(parts.film), to_estimate(plain.film), {});
+        INFO(z.report());
+        CHECK(z.pass);
+    }
+}
+
+TEST_CASE("interrupted and resumed with other workers: the same bits, and the state is gone") {
+    const Scene scene = project_scene("cornell", 40, 30);
+    const test::TempFolder folder;
+    const FilmMoments expected =
+        render_parallel(scene, request_for(scene, folder, "bdpt", "wavefront", 1), ranks()).film;
+    volatile bool interrupt = false;
+    ParallelRequest request = request_for(scene, folder, "bdpt", "wavefront", 2);
+    request.interrupt = &interrupt;
+    request.checkpoint_seconds = 1e-3;
+    request.on_progress = [&](const RenderPosition& p, const RenderStats&) {
+        if (p.samples > 10) set_flag(&interrupt);
+    };
+    const ParallelResult part = render_parallel(scene, request, ranks());
+    CHECK(part.position.interrupted);
+    REQUIRE(part.state_path == folder / "state");
+    REQUIRE(part.film.samples > 10);
+    REQUIRE(part.film.samples < 50);
+
+    request = request_for(scene, folder, "bdpt", "wavefront", 3);
+    CHECK_THROWS_AS(render_parallel(scene, request, ranks()), Error);  // without resume
+    request.resume = true;
+    for (const char* other : {"seed", "spp", "range"}) {
+        CAPTURE(other);
+        ParallelRequest changed = request;
+        if (other == std::string("seed")) changed.settings.seed = 99;
+        if (other == std::string("spp")) changed.budget.samples = 51;
+        if (other == std::string("range")) changed.range_size = 4;
+        CHECK_THROWS_AS(render_parallel(scene, changed, ranks()), Error);
+    }
+    const ParallelResult whole = render_parallel(scene, request, ranks());
+    CHECK(same(whole.film, expected));
+    uint64_t rendered = 0;
+    for (const WorkerShare& w : whole.workers) rendered += w.samples;
+    CHECK(rendered == 50 - part.film.samples);
+    CHECK(!std::filesystem::exists(folder / "state"));
+}
+
+TEST_CASE("a budget in seconds holds for all workers together") {
+    const Scene scene = project_scene("cornell", 64, 48);
+    const test::TempFolder folder;
+    ParallelRequest request = request_for(scene, folder, "path", "wavefront", 2);
+    request.budget = {0, 1.0};
+    request.range_size = 0;
+    const ParallelResult result = render_parallel(scene, request, ranks());
+    // A range is a sixty-fourth of a second for one worker alone; the machine may be busy.
+    CHECK(result.position.seconds > 0.8);
+    CHECK(result.position.seconds < 3.0);
+    CHECK(result.film.samples > result.ranges.size);
+    CHECK(result.film.samples % result.ranges.size == 0);
+}
+
+TEST_CASE("what a worker throws ends the render") {
+    const Scene scene = project_scene("cornell", 16, 16);
+    const test::TempFolder folder;
+    ParallelRequest request = request_for(scene, folder, "path", "wavefront", 2);
+    request.settings.accel = AccelKind::bvh2;  // not on the CPU
+    CHECK_THROWS_AS(render_parallel(scene, request, ranks()), Error);
+}
+
+TEST_CASE("devices are numbers or cpu, and agree with the other options") {
+    const Ranks alone;
+    RenderSettings settings;
+    CHECK(choose_devices({"0", "2", "cpu"}, settings, alone).size() == 3);
+    CHECK(choose_devices({"0", "2", "cpu"}, settings, alone)[1].cuda == 2);
+    for (const std::string name : {"gpu", "-1", "1x", ""})
+        CHECK_THROWS_AS(choose_devices({name}, settings, alone), Error);
+    settings.deterministic = true;
+    CHECK_THROWS_AS(choose_devices({"0", "cpu"}, settings, alone), Error);
+    settings.backend = Backend::cpu;
+    CHECK(choose_devices({}, settings, alone)[0].name() == "cpu");
+    CHECK_THROWS_AS(choose_devices({"0"}, settings, alone), Error);
+}
