@@ -157,7 +157,8 @@ TEST_CASE("wrong runs of peers are refused with their line") {
     CHECK(contains(refusal(folder, head + "renderer = \"command\"\n"), "lacks the key 'command'"));
     CHECK(contains(refusal(folder, head + "renderer = \"command\"\ncommand = \"x {output} {spp}\"\n"), "{seed}"));
     const std::string wrong = refusal(folder, head + "renderer = \"mitsuba\"\nvariant = \"gpu\"\n");
-    CHECK(contains(wrong, "e.toml:20: variant 'gpu' of mitsuba: must be one of scalar_rgb"));
+    INFO(wrong);
+    CHECK(contains(wrong, "e.toml:21: variant 'gpu' of mitsuba: must be one of scalar_rgb"));
     folder.write("e.toml", config_of(head + "renderer = \"mitsuba\"\n"));
     const std::string resolved = resolved_toml(read_experiment(folder / "e.toml"));
     folder.write("r.toml", resolved);
