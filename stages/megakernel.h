@@ -1,10 +1,10 @@
 // megakernel: one thread does a slot's light subpath, its eye subpath and all connections, with the functions that the
-// stages use. It is a state machine that asks for one ray at a time, whatever the ray is for; a thread whose path has
-// ended begins another (Novak et al. 2010, "Path Regeneration for Interactive Path Tracing"). Who traces the rays, and
-// which lanes of a warp go on together, is the backend's matter: run() on a host, a persistent traversal on a device
-// (backends/cuda/megakernel_loop.cuh).
+// stages use. It is a state machine of at most one ray per round, so that lanes of a warp trace together whatever their
+// rays are for; lanes whose path has ended begin another (Novak et al. 2010, "Path Regeneration for Interactive Path
+// Tracing").
 #pragma once
 
+#include "core/warp.h"
 #include "stages/generate.h"
 #include "stages/stage.h"
 #include "transport/mis/heuristic.h"
@@ -22,7 +22,7 @@ struct MegakernelRecords {
 template <Features F, class Tracer>
 struct Megakernel {
     static constexpr const char* kName = "megakernel";
-    static constexpr Features kFeatures = F;
+    static constexpr uint32_t kBeginTogether = 8;  ///< lanes without a path wait for as many before they begin new ones
     using Mis = BidirectionalMis;
 
     SceneView scene;
@@ -35,10 +35,63 @@ struct Megakernel {
     MegakernelRecords records;
     StageRecord* record;
 
-    /// The vertex of the eye subpath that is being connected, as it is: textures are not looked up for every pair.
+    /// Does the slots `slot`, `slot + stride` ... below `end`, one after the other.
+    AMBILUX_HD void run(uint32_t slot, uint32_t end, uint32_t stride) const {
+        const WholeWarp warp;
+        State s{};
+        Counts counts{};
+        for (;;) {
+            const bool idle = !s.active && slot < end;
+            const uint32_t waiting = warp.count(idle), working = warp.count(s.active);
+            if (waiting + working == 0) break;
+            if (idle && (working == 0 || waiting >= kBeginTogether)) {
+                begin(s, slot);
+                slot += stride;
+            }
+
+            warp.meet();
+            Hit hit = {0.0f, 0.0f, 0.0f, kNone};
+            bool met = false;
+            const bool tested = s.testing, extended = !tested && s.going && !connecting(s);
+            if (tested || extended) met = trace(s, hit, counts);
+
+            warp.meet();
+            if (tested) {
+                s.testing = false;
+                if (!met) arrive(s);
+            }
+            if (extended) {
+                if (!met) hit.prim = kNone;
+                step(s, hit);
+            }
+
+            warp.meet();
+            if (!s.testing && connecting(s)) connect(s);
+
+            warp.meet();
+            if (s.active && !s.testing && !s.going && !connecting(s)) {
+                if (s.side == Side::light)
+                    begin_eye(s);
+                else
+                    finish(s);
+            }
+        }
+        add_count(&records.light_extend->items, counts.light_rays);
+        add_count(&records.extend->items, counts.eye_rays);
+        add_count(&records.occlude->items, counts.shadow_rays);
+    }
+
+private:
+    /// The vertex of the eye subpath that is being connected. Its surface is looked up for every pair: a thread has no
+    /// registers for it.
     struct WaitingVertex {
-        VertexItem item;
+        Vec3f d;  ///< of the ray that met it
+        uint32_t depth;
+        float u, v;
+        uint32_t prim;
         uint32_t next;  ///< the light vertex to connect next
+        Rgb throughput;
+        MisSums sums;
     };
 
     /// What a thread works on. Its next ray is the shadow ray if there is one, else, when the vertex has no connections
@@ -63,73 +116,11 @@ struct Megakernel {
         uint32_t light_rays, eye_rays, shadow_rays;
     };
 
-    /// What a thread with a path does next.
-    enum class Want : uint32_t { ray, connection, turn };
-
-    /// Does the slots `slot`, `slot + stride` ... below `end`, one after the other.
-    AMBILUX_HD void run(uint32_t slot, uint32_t end, uint32_t stride) const {
-        State s{};
-        Counts counts{};
-        while (s.active || slot < end) {
-            if (!s.active) {
-                begin(s, slot);
-                slot += stride;
-            } else if (const Want want = wants(s); want == Want::ray) {
-                Ray ray;
-                Hit hit = {0.0f, 0.0f, 0.0f, kNone};
-                bool met = s.testing;
-                if (next_ray(s, ray, counts)) met = tracer.template trace<F>(scene, ray, s.testing, hit);
-                answer(s, met, hit);
-            } else if (want == Want::connection) {
-                connect(s);
-            } else {
-                turn(s);
-            }
-        }
-        add(counts);
+    AMBILUX_HD Draws draws(const State& s) const {
+        return {wave.key(s.slot, s.side == Side::light ? Stream::light : Stream::eye)};
     }
-
-    AMBILUX_HD void add(const Counts& counts) const {
-        add_count(&records.light_extend->items, counts.light_rays);
-        add_count(&records.extend->items, counts.eye_rays);
-        add_count(&records.occlude->items, counts.shadow_rays);
-    }
-
-    AMBILUX_HD Want wants(const State& s) const {
-        if (s.testing) return Want::ray;
-        if (connecting(s)) return Want::connection;
-        return s.going ? Want::ray : Want::turn;
-    }
-    /// The ray that is wanted. False if it cannot be traced: it counts as blocked, or as a miss.
-    AMBILUX_HD bool next_ray(const State& s, Ray& ray, Counts& counts) const {
-        ++(s.testing ? counts.shadow_rays : s.side == Side::light ? counts.light_rays : counts.eye_rays);
-        ray = s.shadow;
-        if (!s.testing) {
-            ray = {s.path.origin, s.tmax, s.path.direction, 0};
-            if constexpr (F.opacity) ray.alpha_seed = draws(s).opacity_seed(s.path.depth);
-        }
-        StageRecord* const tracing = s.testing               ? records.occlude
-                                     : s.side == Side::light ? records.light_extend
-                                                             : records.extend;
-        return is_valid_ray(ray.o, ray.d, tracing);
-    }
-    /// Of the ray that was wanted: whether it met anything, and what, if it is not a shadow ray.
-    AMBILUX_HD void answer(State& s, bool met, Hit hit) const {
-        if (s.testing) {
-            s.testing = false;
-            if (!met) arrive(s);
-            return;
-        }
-        if (!met) hit.prim = kNone;
-        step(s, hit);
-    }
-    /// A subpath has ended: the eye subpath begins, or the sample is complete.
-    AMBILUX_HD void turn(State& s) const {
-        if (s.side == Side::light)
-            begin_eye(s);
-        else
-            finish(s);
-    }
+    /// A vertex past the capacity was not kept: the wave will be done again.
+    AMBILUX_HD bool connecting(const State& s) const { return s.vertex.next < light_vertices.capacity(); }
 
     AMBILUX_HD void begin(State& s, uint32_t slot) const {
         samples[slot] = {};
@@ -140,30 +131,6 @@ struct Megakernel {
         s.last = s.vertex.next = kNone;
         if (rules.splat || rules.connect) begin_light(s);
     }
-
-    /// The eye vertex and the next vertex of the light subpath that is not too far from the light.
-    AMBILUX_HD void connect(State& s) const {
-        const uint32_t depth = s.vertex.item.bits().depth();
-        uint32_t place, light_depth;
-        do {
-            if (!connecting(s)) return;
-            place = s.vertex.next;
-            const ConnectionVertexFront front = light_vertices.items.load_front(place);
-            light_depth = front.bits.depth();
-            s.vertex.next = front.link;
-        } while (depth + light_depth + 1 > rules.max_depth);
-        const BidirectionalEnd eye = unpack_end<F, Mis>(scene, s.vertex.item);
-        Candidate<Mis> c;
-        if (connection<F>(rules, eye, unpack_end<F>(scene, load_vertex<F>(light_vertices, place)), c))
-            test(s, c, draws(s), connection_ray(depth, light_depth), records.connect_vertices);
-    }
-
-private:
-    AMBILUX_HD Draws draws(const State& s) const {
-        return {wave.key(s.slot, s.side == Side::light ? Stream::light : Stream::eye)};
-    }
-    /// A vertex past the capacity was not kept: the wave will be done again.
-    AMBILUX_HD bool connecting(const State& s) const { return s.vertex.next < light_vertices.capacity(); }
 
     AMBILUX_HD void begin_light(State& s) const {
         const Draws d = draws(s);
@@ -192,6 +159,20 @@ private:
         s.active = false;
     }
 
+    AMBILUX_HD bool trace(const State& s, Hit& hit, Counts& counts) const {
+        ++(s.testing ? counts.shadow_rays : s.side == Side::light ? counts.light_rays : counts.eye_rays);
+        Ray ray = s.shadow;
+        if (!s.testing) {
+            ray = {s.path.origin, s.tmax, s.path.direction, 0};
+            if constexpr (F.opacity) ray.alpha_seed = draws(s).opacity_seed(s.path.depth);
+        }
+        StageRecord* const tracing = s.testing               ? records.occlude
+                                     : s.side == Side::light ? records.light_extend
+                                                             : records.extend;
+        if (!is_valid_ray(ray.o, ray.d, tracing)) return s.testing;  // its light does not arrive
+        return tracer.template trace<F>(scene, ray, s.testing, hit);
+    }
+
     AMBILUX_HD void arrive(State& s) const {
         if (s.side == Side::eye) {
             s.sum += s.value;
@@ -214,6 +195,7 @@ private:
     struct Sink {
         const Megakernel& kernel;
         State& s;
+        const Hit& hit;
 
         AMBILUX_HD Draws draws() const { return kernel.draws(s); }
         AMBILUX_HD void add(const Candidate<Mis>& c) const {
@@ -222,7 +204,7 @@ private:
             if (is_valid_radiance(weighted, kernel.records.mis_weight)) s.sum += weighted;
         }
         AMBILUX_HD void at(const BidirectionalVertex& x, const Subpath<Mis>& path, const Draws& draws) const {
-            kernel.connect_end(s, x, path, draws);
+            kernel.connect_end(s, x, path, hit, draws);
         }
         AMBILUX_HD bool valid(Rgb throughput) const {
             return is_valid_radiance(throughput,
@@ -233,11 +215,11 @@ private:
     /// Where the ray of the subpath ended. Both sides go through the same code as far as they can.
     AMBILUX_HD void step(State& s, const Hit& hit) const {
         s.tmax = kInfinity;
-        s.going = visit<F>(scene, rules, s.side, rules.longest(s.side), hit, s.path, Sink{*this, s});
+        s.going = visit<F>(scene, rules, s.side, rules.longest(s.side), hit, s.path, Sink{*this, s, hit});
     }
 
     /// A vertex and the camera or an emitter; and it is kept, or waits, for connections.
-    AMBILUX_HD void connect_end(State& s, const BidirectionalVertex& x, const Subpath<Mis>& path,
+    AMBILUX_HD void connect_end(State& s, const BidirectionalVertex& x, const Subpath<Mis>& path, const Hit& hit,
                                 const Draws& d) const {
         const bool light = s.side == Side::light;
         Candidate<Mis> c;
@@ -253,7 +235,25 @@ private:
         if (light)
             s.last = push_vertex<F>(light_vertices, pack_connection_vertex(x, path, s.last));
         else
-            s.vertex = {pack_vertex(x, path, s.slot), s.last};
+            s.vertex = {path.direction, path.depth, hit.u, hit.v, hit.prim, s.last, path.throughput, x.sums};
+    }
+
+    /// The eye vertex and the next vertex of the light subpath that is not too far from the light.
+    AMBILUX_HD void connect(State& s) const {
+        WaitingVertex& z = s.vertex;
+        uint32_t place, light_depth;
+        do {
+            if (!connecting(s)) return;
+            place = z.next;
+            const ConnectionVertexFront front = light_vertices.items.load_front(place);
+            light_depth = front.bits.depth();
+            z.next = front.link;
+        } while (z.depth + light_depth + 1 > rules.max_depth);
+        const SurfacePoint point = surface_at<F>(scene, z.prim, z.u, z.v);
+        const BidirectionalEnd eye = {vertex_with<F, Mis>(scene, z.d, z.depth, point, z.sums), z.throughput, z.depth};
+        Candidate<Mis> c;
+        if (connection<F>(rules, eye, unpack_end<F>(scene, load_vertex<F>(light_vertices, place)), c))
+            test(s, c, draws(s), connection_ray(z.depth, light_depth), records.connect_vertices);
     }
 };
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "backends/cuda/launch_items.cuh"
-#include "backends/cuda/megakernel_loop.cuh"
 #include "backends/cuda/trace_kernels.cuh"
 #include "stages/connection_loop.h"
 #include "stages/multi_bounce.h"
@@ -22,7 +21,7 @@ __global__ void __launch_bounds__(kStageBlock)
 template <class Stage>
 __global__ void __launch_bounds__(kStageBlock, LaunchTraits<Stage>::kBlocksPerSm)
     launch_paths(const __grid_constant__ Stage stage, uint32_t slots, const WaveState* state) {
-    run_regenerating(stage, blockIdx.x * kStageBlock + threadIdx.x, slots * state->samples, gridDim.x * kStageBlock);
+    stage.run(blockIdx.x * kStageBlock + threadIdx.x, slots * state->samples, gridDim.x * kStageBlock);
 }
 
 /// The last subpaths of a wave (MultiBounce), as far apart as there are threads for: lanes of a warp wait for each
