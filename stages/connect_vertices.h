@@ -3,6 +3,7 @@
 
 #include "stages/connect_emitter.h"
 #include "stages/connection_loop.h"
+#include "stages/fused_clock.h"
 #include "stages/light_vertex_search.h"
 #include "stages/mis_weight.h"
 #include "stages/occlude.h"
@@ -54,10 +55,13 @@ struct NextEventAndConnections {
     const WaveState* state;
     StageRecord* record;  ///< of connect_vertices
 
+    static constexpr uint32_t kClockedOnceIn = 16;  ///< vertices
+
     AMBILUX_HD void at(const SceneView& scene, const Rules<BidirectionalMis>& rules, const BidirectionalVertex& v,
                        const Subpath<BidirectionalMis>& path, uint32_t slot, const Draws& draws) const {
         next_event.at(scene, rules, v, path, slot, draws);
         if (!rules.connect) return;
+        const FusedClock clock(record, kClockedOnceIn);
         const LightVertexSearch lights = {source, draws.key, path.depth, v, rules.max_depth};
         uint32_t next = source.first(slot), found = lights.find(next);
         if (found == kNone) return;

@@ -1,5 +1,6 @@
 // libs: ambilux_transport ambilux_scene ambilux_core
 // How stages gather rays on a host: in order, all of them, at the ends of queues too.
+#include <chrono>
 #include <vector>
 
 #include "queues/layout.h"
@@ -121,4 +122,39 @@ TEST_CASE("A gathered queue of one traces each ray at once") {
         CHECK(f.counter.count == 0);
     }
     f.check_all(9);
+}
+
+TEST_CASE("A stage inside of another has the time that is its own, and the other does not") {
+    const auto busy = [](int milliseconds) {
+        const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(milliseconds);
+        while (std::chrono::steady_clock::now() < end) {}
+    };
+    StageRecord outer{}, inner{};
+    const int64_t before = FusedClock::inside();
+    {
+        const FusedClock clock(&outer);
+        busy(4);
+        {
+            const FusedClock other(&inner);
+            busy(8);
+        }
+        busy(4);
+    }
+    CHECK(double(inner.nanoseconds) >= 8e6);
+    CHECK(double(outer.nanoseconds) >= 8e6);
+    // Together they are all of the time, however long a busy machine made it.
+    CHECK(FusedClock::inside() - before == int64_t(inner.nanoseconds + outer.nanoseconds));
+    CHECK(outer.launches == 0);
+}
+
+TEST_CASE("A sampled stage is looked at once in a while, and its time counts as often") {
+    StageRecord sampled{};
+    constexpr uint32_t kEvery = 16, kCalls = 64 * kEvery;
+    for (uint32_t i = 0; i < kCalls; ++i) {
+        const FusedClock clock(&sampled, kEvery);
+        const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(20);
+        while (std::chrono::steady_clock::now() < end) {}
+    }
+    CHECK(double(sampled.nanoseconds) >= kCalls * 20e3);
+    CHECK(sampled.nanoseconds % kEvery == 0);
 }
