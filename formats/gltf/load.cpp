@@ -4,7 +4,7 @@
 #include <map>
 
 #include "core/math.h"
-#include "core/scoped_seconds.h"
+#include "formats/front_end.h"
 #include "formats/gltf/model.h"
 
 namespace ambilux {
@@ -151,19 +151,11 @@ private:
 }  // namespace gltf
 
 Scene load_gltf(const std::string& path, const LoadOptions& options) {
-    mitsuba::Document document;
-    document.limits = options.limits;
-    document.smooth_normals = false;
-    document.scene = &mitsuba::add_object(document, "scene", "", {path, 0});
-    {
-        const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
-        Report report(options.lenient);
+    return load_by(path, options, [&](mitsuba::Document& document, Report& report) {
         gltf::Context context{document, report, {path, 0}, {}, {}, {}, {}, false};
         gltf::read_model(context, path);
         gltf::SceneMaker(context).make();
-        report.write(document);
-    }
-    return mitsuba::load_document(path, document, options);
+    });
 }
 
 }  // namespace ambilux

@@ -32,7 +32,7 @@ void write_float_image(const std::string& path, uint32_t width, uint32_t height,
     write_file_atomic(path, stream.bytes);
 }
 
-void write_byte_image(const std::string& path, uint32_t width, uint32_t height, const std::vector<uint8_t>& rgb) {
+std::string png_bytes(uint32_t width, uint32_t height, const std::vector<uint8_t>& rgb) {
     png_image png{};
     png.version = PNG_IMAGE_VERSION;
     png.width = width;
@@ -41,8 +41,18 @@ void write_byte_image(const std::string& path, uint32_t width, uint32_t height, 
     std::string bytes(PNG_IMAGE_PNG_SIZE_MAX(png), '\0');
     png_alloc_size_t size = bytes.size();
     if (!png_image_write_to_memory(&png, bytes.data(), &size, 0, rgb.data(), 0, nullptr))
-        throw Error(ExitCode::device, "cannot write " + path + ": " + png.message);
+        throw Error(ExitCode::device, std::string("cannot make a PNG: ") + png.message);
     bytes.resize(size);
+    return bytes;
+}
+
+void write_byte_image(const std::string& path, uint32_t width, uint32_t height, const std::vector<uint8_t>& rgb) {
+    std::string bytes;
+    try {
+        bytes = png_bytes(width, height, rgb);
+    } catch (const Error& e) {
+        throw Error(e.code, path + ": " + e.what());
+    }
     write_file_atomic(path, bytes);
 }
 

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "core/error.h"
-#include "core/scoped_seconds.h"
+#include "formats/front_end.h"
 #include "formats/gzip.h"
 #include "formats/pbrt/scene.h"
 
@@ -373,22 +373,13 @@ void Parser::include(const Where& at, bool import) {
 }  // namespace pbrt
 
 Scene load_pbrt(const std::string& path, const LoadOptions& options) {
-    namespace fs = std::filesystem;
-    mitsuba::Document document;
-    document.limits = options.limits;
-    document.smooth_normals = false;
-    document.scene = &mitsuba::add_object(document, "scene", "", {path, 1});
-    {
-        const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
-        Report report(options.lenient);
-        pbrt::SceneMaker scene(document, report, fs::path(path).parent_path().string());
+    return load_by(path, options, [&](mitsuba::Document& document, Report& report) {
+        pbrt::SceneMaker scene(document, report, std::filesystem::path(path).parent_path().string());
         pbrt::Parser parser(scene);
         parser.parse_file(path, {path, 0}, 1);
         parser.finish();
         pbrt::finish_curves(scene);
-        report.write(document);
-    }
-    return mitsuba::load_document(path, document, options);
+    });
 }
 
 }  // namespace ambilux

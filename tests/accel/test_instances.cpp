@@ -30,17 +30,6 @@ constexpr Features F = kAllFeatures;
 
 bool close(Vec3f a, Vec3f b, float tolerance) { return max_component(abs(a - b)) <= tolerance; }
 
-std::vector<Ray> rays_for(uint32_t count, uint64_t seed) {
-    Random random(seed);
-    std::vector<Ray> rays;
-    for (uint32_t i = 0; i < count; ++i) {
-        const Vec3f o = random.in_box(4.0f), to = random.in_box(2.0f);
-        rays.push_back({o, i % 4 ? kInfinity : 3.0f * random.uniform(), i % 2 ? normalize(to - o) : random.direction(),
-                        i * 2654435761u});
-    }
-    return rays;
-}
-
 /// Ids of the copy's primitives: copies follow the triangles of no group, in the order of instances.
 uint32_t id_in_copy(const SceneView& instanced, const SceneView& flat, uint32_t prim) {
     if (instanced.is_instanced(prim)) return prim - instanced.primitive_count() + instanced.ungrouped_count();
@@ -142,7 +131,7 @@ TEST_CASE("copies of instances are what the loader copies") {
 TEST_CASE("rays meet instances where they meet copies") {
     const Scene scene = load_forest("<bsdf type='diffuse'/>"), copy = flatten_instances(scene);
     const SceneView view = scene.view();
-    const std::vector<Ray> rays = rays_for(40000, 1);
+    const std::vector<Ray> rays = test::rays_around(40000, 1);
     const EmbreeAccel embree(scene);
     const CwbvhAccel cwbvh(scene);
     check(compare(scene, copy, rays, [&](const Ray& ray, Hit& hit, bool& blocked) {
@@ -159,7 +148,7 @@ TEST_CASE("packets and the other structure meet instances as single rays do, wit
     for (const char* bsdf : {"<bsdf type='diffuse'/>", kMaskBsdf}) {
         const Scene scene = load_forest(bsdf);
         const SceneView view = scene.view();
-        const std::vector<Ray> rays = rays_for(32000, 2);
+        const std::vector<Ray> rays = test::rays_around(32000, 2);
         const EmbreeAccel embree(scene);
         const CwbvhAccel cwbvh(scene);
         uint32_t different = 0, other_tracer = 0, hits = 0;

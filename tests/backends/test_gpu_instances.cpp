@@ -15,24 +15,9 @@
 using namespace ambilux;
 using namespace ambilux::accel_test;
 
-namespace {
-
-std::vector<Ray> rays_for(uint32_t count) {
-    Random random(5);
-    std::vector<Ray> rays;
-    for (uint32_t i = 0; i < count; ++i) {
-        const Vec3f o = random.in_box(4.0f), to = random.in_box(2.0f);
-        rays.push_back({o, i % 4 ? kInfinity : 3.0f * random.uniform(), i % 2 ? normalize(to - o) : random.direction(),
-                        i * 2654435761u});
-    }
-    return rays;
-}
-
-}  // namespace
-
 TEST_CASE("rays on a device meet instances as on the host, with holes and without") {
     if (!device()) return;
-    const std::vector<Ray> rays = rays_for(100000);
+    const std::vector<Ray> rays = test::rays_around(100000, 5);
     for (const char* bsdf : {"<bsdf type='diffuse'/>", test::kMaskBsdf}) {
         const Scene scene = test::load_forest(bsdf);
         const SceneView view = scene.view();

@@ -117,19 +117,6 @@ TEST_CASE("the driver's library says what the device did") {
 
 namespace {
 
-/// Says what its samples cost, so that no busy machine disturbs these tests.
-struct SaysItsTime : FakeRenderer, SelfTimed {
-    double cost, last = 0;
-    SaysItsTime(const Scene& scene, const RenderSettings& settings, World& world, double c)
-        : FakeRenderer(scene, settings, world), cost(c) {}
-    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
-        const uint32_t done = FakeRenderer::render(first, count, interrupt);
-        last = cost * done;
-        return done;
-    }
-    double last_seconds() const override { return last; }
-};
-
 constexpr const char* kThreeSeeds = R"(repeats = 2
 seeds = [1, 2, 3]
 order = "listed"

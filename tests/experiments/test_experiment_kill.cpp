@@ -9,7 +9,7 @@
 
 #include "film/exr_io.h"
 #include "tests/support/program.h"
-#include "tests/support/timeless_rows.h"
+#include "tests/support/result_rows.h"
 
 using namespace ambilux;
 namespace fs = std::filesystem;
@@ -75,7 +75,7 @@ TEST_CASE("kill -9 at random moments, resumed each time: the same rows, images a
     const auto begun = std::chrono::steady_clock::now();
     REQUIRE(test::finish(folder, begin({"experiment", file, "-o", whole})).code == 0);
     const double duration = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-    const auto expected = timeless(whole + "/runs.csv");
+    const auto expected = test::timeless(whole + "/runs.csv");
     REQUIRE(expected.size() == 2 * 2 * 7 * 4);
 
     const unsigned seed = std::random_device()();
@@ -109,7 +109,7 @@ TEST_CASE("kill -9 at random moments, resumed each time: the same rows, images a
     INFO(last.err);
     REQUIRE(last.code == 0);
 
-    CHECK(bool(timeless(killed + "/runs.csv") == expected));
+    CHECK(bool(test::timeless(killed + "/runs.csv") == expected));
     const auto files = files_of(whole);
     CHECK(files_of(killed) == files);
     size_t images = 0, statistics = 0, techniques = 0;

@@ -1,4 +1,4 @@
-// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel PNG::PNG JPEG::JPEG
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel JPEG::JPEG
 // timeout: 120
 // What glTF scenes become, what is refused, files that lie, and the image of the same scene in Mitsuba's XML.
 #include "formats/gltf/load.h"
@@ -15,7 +15,6 @@ using namespace ambilux;
 using test::check_rgb;
 using test::contains;
 using test::has_note;
-using test::png_file;
 using test::TempFolder;
 using Json = nlohmann::json;
 
@@ -131,7 +130,7 @@ TEST_CASE("nodes place their meshes: products of matrices, quaternions and scale
 
 TEST_CASE("textures: colours are decoded, metal is blue, roughness green, rows run downwards") {
     Json j = quad_scene();
-    add_image(j, png_file(2, 1, {255, 128, 64, 0, 255, 0}));
+    add_image(j, png_bytes(2, 1, {255, 128, 64, 0, 255, 0}));
     Json& pbr = j["materials"][0]["pbrMetallicRoughness"];
     pbr = {{"baseColorTexture", {{"index", 0}}}, {"metallicRoughnessTexture", {{"index", 0}}}, {"metallicFactor", 0.5}};
     j["samplers"] = {{{"magFilter", 9728}, {"wrapS", 33071}, {"wrapT", 33071}}};

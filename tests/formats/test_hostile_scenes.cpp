@@ -1,4 +1,4 @@
-// libs: ambilux_formats ZLIB::ZLIB PNG::PNG JPEG::JPEG
+// libs: ambilux_formats ZLIB::ZLIB JPEG::JPEG
 // timeout: 120
 // Scene and mesh files that lie, nest, expand or lie outside of what can be traced.
 #include <zlib.h>

@@ -1,4 +1,4 @@
-// libs: ambilux_formats ambilux_accel PNG::PNG JPEG::JPEG
+// libs: ambilux_formats ambilux_accel JPEG::JPEG
 // timeout: 120
 // Whole scenes in the manner of those who write them: a collection in format 0.5, an old one in 0.4, an exporter's in
 // 3, and one with variables and fragments.
@@ -15,7 +15,7 @@ const std::string kTriangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1
 struct Folder : TempFolder {
     Folder() {
         write("m.obj", kTriangle);
-        write("t.png", png_file(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 90, 90, 90}));
+        write("t.png", png_bytes(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 90, 90, 90}));
     }
 };
 

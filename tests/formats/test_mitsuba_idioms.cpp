@@ -1,4 +1,4 @@
-// libs: ambilux_formats ambilux_accel PNG::PNG JPEG::JPEG
+// libs: ambilux_formats ambilux_accel JPEG::JPEG
 // timeout: 120
 // What scene collections and exporters write: each idiom loads, with the image that the file asks for, and what is done
 // in another way than the file says is noted.
@@ -129,7 +129,7 @@ TEST_CASE("spectra that are objects, and black bodies") {
 
 TEST_CASE("textures: scale, rawconstant, gridtexture, channel") {
     const TempFolder folder;
-    folder.write("i.png", png_file(1, 1, {255, 0, 128}));
+    folder.write("i.png", png_bytes(1, 1, {255, 0, 128}));
     const std::string image = "<string name='filename' value='i.png'/>";
     check_rgb(reflectance(load_quietly(textured("<texture name='reflectance' type='scale'><rgb name='scale' value='"
                                                 "0.5,1,0.25'/><texture type='scale'><float name='scale' value='0.5'/>"

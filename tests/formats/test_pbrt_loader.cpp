@@ -1,4 +1,4 @@
-// libs: ambilux_formats ZLIB::ZLIB PNG::PNG JPEG::JPEG
+// libs: ambilux_formats ZLIB::ZLIB JPEG::JPEG
 // timeout: 60
 // What pbrt scenes become, what is refused and how, and files that lie.
 #include <zlib.h>
@@ -172,7 +172,7 @@ TEST_CASE("cameras: the field of view is that of the shorter side, x points to t
 TEST_CASE("textures: t runs upwards, constants and images fold, checkerboards have cells of size 1") {
     const TempFolder folder;
     // Rows from the top: red green / blue white.
-    folder.write("t.png", png_file(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}));
+    folder.write("t.png", png_bytes(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}));
     const std::string
         image = "Texture \"i\" \"spectrum\" \"imagemap\" \"string filename\" \"t.png\" \"string filter\" \"point\"\n",
         quad =
@@ -204,7 +204,7 @@ TEST_CASE("textures: t runs upwards, constants and images fold, checkerboards ha
 
 TEST_CASE("images lie on spheres, disks and cylinders as pbrt has them") {
     const TempFolder folder;
-    folder.write("t.png", png_file(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}));
+    folder.write("t.png", png_bytes(2, 2, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}));
     const Scene s = load_pbrt_world(
         "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.png\" \"string filter\" \"point\" Material "
         "\"diffuse\" \"texture reflectance\" \"t\" Shape \"sphere\" Shape \"disk\" Shape \"cylinder\"",
@@ -220,7 +220,7 @@ TEST_CASE("images lie on spheres, disks and cylinders as pbrt has them") {
 
 TEST_CASE("factors of textures: reflectances end at 1, heights may be negative, coatings have a mean roughness") {
     const TempFolder folder;
-    folder.write("t.png", png_file(2, 1, {255, 255, 255, 0, 0, 0}));
+    folder.write("t.png", png_bytes(2, 1, {255, 255, 255, 0, 0, 0}));
     const std::string
         image = "\"imagemap\" \"string filename\" \"t.png\" \"string filter\" \"point\" \"string encoding\" \"linear\"",
         quad =

@@ -3,9 +3,5 @@
 
 void ambilux::fuzz::read(std::string_view bytes) {
     const InputFile file(bytes);
-    LoadOptions options;
-    options.limits = limits();
-    options.lenient = !bytes.empty() && bytes.back() == ' ';
-    options.width = options.height = 8;
-    load_gltf(file.path(), options);
+    load_gltf(file.path(), scene_options(bytes));
 }

@@ -1,11 +1,6 @@
-#include "formats/load.h"
 #include "tests/fuzz/target.h"
 
 void ambilux::fuzz::read(std::string_view bytes) {
     const InputFile file(bytes);
-    LoadOptions options;
-    options.limits = limits();
-    options.lenient = !bytes.empty() && bytes.back() == ' ';
-    options.width = options.height = 8;
-    load_mitsuba(file.path(), options);
+    load_mitsuba(file.path(), scene_options(bytes));
 }

@@ -12,7 +12,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/log.h"
-#include "formats/limits.h"
+#include "formats/load.h"
 
 namespace ambilux::fuzz {
 
@@ -27,6 +27,15 @@ inline Limits limits() {
     l.expansion = 1 << 16;
     l.seconds = 5;
     return l;
+}
+
+/// A small film; lenient where the input ends with a space.
+inline LoadOptions scene_options(std::string_view bytes) {
+    LoadOptions options;
+    options.limits = limits();
+    options.lenient = !bytes.empty() && bytes.back() == ' ';
+    options.width = options.height = 8;
+    return options;
 }
 
 /// The input as a file, for readers that take a name.

@@ -1,4 +1,4 @@
-// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core PNG::PNG JPEG::JPEG
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core JPEG::JPEG
 // timeout: 200
 // Images of pbrt scenes: lights and materials with closed forms, the same scene in Mitsuba's XML, and both after
 // conversion.
@@ -121,6 +121,24 @@ const std::string kXml = R"(<scene version='3.0.0'>
 <bsdf type='dielectric'><float name='int_ior' value='1.4'/><float name='ext_ior' value='1'/></bsdf></shape>
 </scene>)";
 
+/// The scene and what the converter writes of it have the same features and the same samples, up to the rounding of
+/// transforms. What the converter notes.
+std::vector<std::string> check_converted(const Scene& scene, const std::string& path, uint32_t spp = 16) {
+    const std::vector<std::string> notes = write_mitsuba(scene, path);
+    const Scene again = load_mitsuba(path);
+    CHECK(again.warnings.empty());
+    CHECK(feature_names(again.features) == feature_names(scene.features));
+    CHECK(again.triangles.size() == scene.triangles.size());
+    CHECK(again.emitters.size() == scene.emitters.size());
+    const auto film = [&](const Scene& s) { return render_scene(s, cpu_settings(s, Estimator::mis), spp).film; };
+    const FilmMoments a = film(scene), b = film(again);
+    double difference = 0, sum = 0;
+    for (size_t i = 0; i < a.sum.size(); ++i) difference += std::abs(a.mean(i) - b.mean(i)), sum += a.mean(i);
+    CHECK(sum > 0);
+    CHECK(difference < 1e-4 * sum);
+    return notes;
+}
+
 }  // namespace
 
 TEST_CASE("point lights: intensity, power, scale, exposure") {
@@ -241,16 +259,7 @@ TEST_CASE("a scene in both formats has one image, and so has what it is converte
     CHECK(z.pass);
     CHECK(z.detectable < 0.02);
 
-    // The same samples of what is written and read again: equal up to the rounding of transforms.
-    CHECK(write_mitsuba(pbrt, folder / "out/converted.xml").empty());
-    const Scene converted = load_mitsuba(folder / "out/converted.xml");
-    CHECK(converted.triangles.size() == pbrt.triangles.size());
-    CHECK(converted.features == pbrt.features);
-    const auto film = [](const Scene& s) { return render_scene(s, cpu_settings(s, Estimator::mis), 64).film; };
-    const FilmMoments a = film(pbrt), b = film(converted);
-    double difference = 0, sum = 0;
-    for (size_t i = 0; i < a.sum.size(); ++i) difference += std::abs(a.mean(i) - b.mean(i)), sum += a.mean(i);
-    CHECK(difference < 1e-4 * sum);
+    CHECK(check_converted(pbrt, folder / "out/converted.xml", 64).empty());
 }
 
 TEST_CASE("a part of the screen is what the crop of the whole screen is") {
@@ -279,22 +288,6 @@ TEST_CASE("a part of the screen is what the crop of the whole screen is") {
     }
 }
 
-/// The scene and what the converter writes of it have the same features and the same samples, up to rounding.
-void check_converted(const Scene& scene, const std::string& path) {
-    write_mitsuba(scene, path);
-    const Scene again = load_mitsuba(path);
-    CHECK(again.warnings.empty());
-    CHECK(feature_names(again.features) == feature_names(scene.features));
-    CHECK(again.triangles.size() == scene.triangles.size());
-    CHECK(again.emitters.size() == scene.emitters.size());
-    const auto film = [](const Scene& s) { return render_scene(s, cpu_settings(s, Estimator::mis), 16).film; };
-    const FilmMoments a = film(scene), b = film(again);
-    double difference = 0, sum = 0;
-    for (size_t i = 0; i < a.sum.size(); ++i) difference += std::abs(a.mean(i) - b.mean(i)), sum += a.mean(i);
-    CHECK(sum > 0);
-    CHECK(difference < 1e-4 * sum);
-}
-
 TEST_CASE("scenes of the project are the same after conversion") {
     const TempFolder folder;
     for (const char* name : {"cornell", "glass", "lights", "materials", "textured"}) {
@@ -305,7 +298,7 @@ TEST_CASE("scenes of the project are the same after conversion") {
 
 TEST_CASE("coatings, rules of maps and projectors are the same after conversion") {
     const TempFolder folder;
-    folder.write("image.png", test::png_file(2, 1, {255, 0, 0, 255, 255, 0}));
+    folder.write("image.png", png_bytes(2, 1, {255, 0, 0, 255, 255, 0}));
     const std::string board =
         R"(<texture type="checkerboard"><rgb name="color0" value="0.2"/><rgb name="color1" value="0.8"/>
            <transform name="to_uv"><scale x="9" y="7"/></transform></texture>)";

@@ -8,17 +8,17 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <thread>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/flag.h"
 #include "core/rng.h"
-#include "experiments/results.h"
+#include "experiments/drive.h"
 #include "experiments/runner.h"
 #include "formats/load.h"
 #include "tests/support/catch.h"
+#include "tests/support/result_rows.h"
 #include "tests/support/temp_folder.h"
 
 namespace ambilux::test {
@@ -98,6 +98,19 @@ private:
     uint64_t rays_ = 0, rendered_ = 0;
 };
 
+/// Says what its samples cost, so that no busy machine disturbs a test.
+struct SaysItsTime : FakeRenderer, SelfTimed {
+    double cost, last = 0;
+    SaysItsTime(const Scene& scene, const RenderSettings& settings, World& world, double c)
+        : FakeRenderer(scene, settings, world), cost(c) {}
+    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+        const uint32_t done = FakeRenderer::render(first, count, interrupt);
+        last = cost * done;
+        return done;
+    }
+    double last_seconds() const override { return last; }
+};
+
 inline Scene fake_scene(const std::string& path, const LoadOptions& options) {
     const std::string content = read_file(path);
     if (content.find("broken") != std::string::npos) throw input_error(path, 7, "unknown bsdf 'broken'");
@@ -175,39 +188,6 @@ inline void write_inputs(const TempFolder& folder, const std::string& config = k
 
 inline ExperimentRequest request(const TempFolder& folder, const std::string& output, bool resume = false) {
     return {folder / "e.toml", folder / output, "", resume, nullptr};
-}
-
-inline std::vector<std::vector<std::string>> table(const std::string& path) {
-    std::vector<std::vector<std::string>> rows;
-    for (const std::string& line : read_results(path)) {
-        rows.emplace_back(1);
-        bool inside = false;
-        for (const char c : line) {
-            if (c == '"')
-                inside = !inside;
-            else if (c == ',' && !inside)
-                rows.back().emplace_back();
-            else
-                rows.back().back() += c;
-        }
-    }
-    return rows;
-}
-
-inline size_t column(const std::string& name) {
-    std::istringstream in(kResultHeader);
-    size_t i = 0;
-    for (std::string field; std::getline(in, field, ','); ++i)
-        if (field == name) return i;
-    FAIL("no column " << name);
-    return 0;
-}
-
-/// Rows without the one column that clocks decide.
-inline std::vector<std::vector<std::string>> timeless(const std::string& path) {
-    auto rows = table(path);
-    for (auto& row : rows) row[column("time")] = "";
-    return rows;
 }
 
 inline std::string error_of(const std::function<void()>& f, ExitCode code = ExitCode::bad_input) {

@@ -1,7 +1,6 @@
-// Image files made in memory. Tests that include it link PNG::PNG and JPEG::JPEG.
+// Image files made in memory. Tests that include it link JPEG::JPEG.
 #pragma once
 
-#include <png.h>
 // jpeglib.h needs FILE.
 #include <cstdio>
 
@@ -13,21 +12,9 @@
 #include <string>
 #include <vector>
 
-namespace ambilux::test {
+#include "formats/images/image_write.h"
 
-/// RGB of 8 bits, top row first.
-inline std::string png_file(uint32_t width, uint32_t height, const std::vector<uint8_t>& rgb) {
-    png_image png{};
-    png.version = PNG_IMAGE_VERSION;
-    png.width = width;
-    png.height = height;
-    png.format = PNG_FORMAT_RGB;
-    std::string bytes(PNG_IMAGE_PNG_SIZE_MAX(png), '\0');
-    png_alloc_size_t size = bytes.size();
-    if (!png_image_write_to_memory(&png, bytes.data(), &size, 0, rgb.data(), 0, nullptr)) return "";
-    bytes.resize(size);
-    return bytes;
-}
+namespace ambilux::test {
 
 inline std::string jpeg_file(uint32_t width, uint32_t height, std::vector<uint8_t> rgb, bool progressive = false) {
     jpeg_compress_struct info;

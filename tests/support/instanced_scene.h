@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "tests/support/accel_scenes.h"
 #include "tests/support/mitsuba_text.h"
 
 namespace ambilux::test {
@@ -81,6 +82,18 @@ inline Scene load_forest(const std::string& bsdf, const LoadOptions& options = s
     const TempFolder folder;
     folder.write("ball.obj", ball(12, 16, bumps));
     return load(forest(bsdf), options, "3.0.0", &folder);
+}
+
+/// Rays around the forest, a quarter of them short, every second one towards its middle.
+inline std::vector<Ray> rays_around(uint32_t count, uint64_t seed) {
+    accel_test::Random random(seed);
+    std::vector<Ray> rays;
+    for (uint32_t i = 0; i < count; ++i) {
+        const Vec3f o = random.in_box(4.0f), to = random.in_box(2.0f);
+        rays.push_back({o, i % 4 ? kInfinity : 3.0f * random.uniform(), i % 2 ? normalize(to - o) : random.direction(),
+                        i * 2654435761u});
+    }
+    return rays;
 }
 
 }  // namespace ambilux::test

@@ -52,6 +52,13 @@ inline Scene load_quietly(const std::string& body, const std::string& version = 
     return s;
 }
 
+/// Parameters of a BSDF of that model.
+template <class Model>
+Textured<Model> parameters(const BsdfRecord& record) {
+    REQUIRE(record.type == kBsdfType<Model>);
+    return record.as<Model>();
+}
+
 /// Of the diffuse BSDF of a shape.
 inline Rgb reflectance(const Scene& s, size_t shape, Vec2f uv) {
     const BsdfRecord& record = s.bsdfs[s.materials[s.shapes[shape].material].front];

@@ -1,0 +1,22 @@
+#include "formats/front_end.h"
+
+#include "core/scoped_seconds.h"
+
+namespace ambilux {
+
+Scene load_by(const std::string& path, const LoadOptions& options,
+              const std::function<void(mitsuba::Document&, Report&)>& read) {
+    mitsuba::Document document;
+    document.limits = options.limits;
+    document.smooth_normals = false;
+    document.scene = &mitsuba::add_object(document, "scene", "", {path, 0});
+    {
+        const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
+        Report report(options.lenient);
+        read(document, report);
+        report.write(document);
+    }
+    return mitsuba::load_document(path, document, options);
+}
+
+}  // namespace ambilux
