@@ -1,26 +1,30 @@
 #!/usr/bin/env python3
 """Do the tests notice faults? Draws faults at random over sources, compiles them all into one copy of the project and runs the tests with one of them at a time.
 
-Usage: scripts/mutate.py [--seed S] [--count N] [--folder DIR] [--tests NAME...] [--retry] [--only ID...] [--report]
+Usage: scripts/mutate.py [--seed S] [--count N] [--folder DIR] [--tests NAME...] [--jobs N] [--retry] [--only ID...] [--built] [--report]
 
 A fault is an expression that is another than in the source: an operator replaced, a factor dropped, arguments swapped, a value 1 % too
 large (scripts/mutation_sites.py). The copy, below the folder, holds both and takes the wrong one where AMBILUX_FAULT is the fault's
 number; the project's own sources and builds hold nothing of this. The tests of each fault are those cases that reach it, cheapest first,
-until one fails; a crash or a time-out counts as a failure. Interrupted runs go on where they were. `--retry` gives survivors another try
-after tests have changed. A fault that no test can notice, since it changes nothing that matters, stands with its reason in
+until one fails; a crash or a time-out counts as a failure. Interrupted runs go on where they were. With `--jobs` faults are tried side by
+side, each on a core of its own. With `--built` the folder is one that another machine has built (source, build/tests, faults.json): nothing
+is compiled. `--retry` gives survivors another try after tests have changed. A fault that no test can notice, since it changes nothing that matters, stands with its reason in
 scripts/mutation_equivalents.txt and does not count.
 Exit status: 0 when at least 95 % were noticed.
 """
 
 import argparse
+import concurrent.futures
 import hashlib
 import json
 import os
+import queue
 import random
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -82,9 +86,12 @@ def write(path, text):
 class Workspace:
     """The mutated copy and what is known about it."""
 
-    def __init__(self, folder, tests):
+    def __init__(self, folder, tests, jobs):
         self.folder, self.source, self.build = folder, folder / "source", folder / "build"
-        self.tests = tests
+        self.tests, self.jobs = tests, jobs
+        self.cores = queue.SimpleQueue()
+        for core in sorted(os.sched_getaffinity(0))[:jobs]:
+            self.cores.put(core)
         self.faults = {}
         self.sources = {n: (ROOT / n).read_text() for n in project_files(*FOLDERS) if n.endswith((".h", ".cpp"))}
 
@@ -132,12 +139,16 @@ class Workspace:
             sys.exit(f"the copy does not compile, and no fault explains it: {sorted(lines)[:5]}")
         return found
 
+    def read(self):
+        """Faults of a copy that is built already."""
+        self.faults = {int(k): Site(**s) for k, s in json.loads((self.folder / "faults.json").read_text())["faults"].items()}
+
     def draw(self, seed, count):
         """Draws faults, without those that do not compile, or reads those of an earlier run."""
         key = hashlib.sha256(json.dumps([seed, count, self.sources], sort_keys=True).encode()).hexdigest()
         known = self.folder / "faults.json"
         if known.exists() and (saved := json.loads(known.read_text()))["key"] == key:
-            self.faults = {int(k): Site(**s) for k, s in saved["faults"].items()}
+            self.read()
             self.copy(), self.rewrite(), self.configure()
             return
         for old in ("results.jsonl", "cases.json"):
@@ -175,34 +186,53 @@ class Workspace:
         if log:
             environment["AMBILUX_FAULT_LOG"] = str(log)
         name = re.sub(r'([\\,\["])', r"\\\1", case)
+        core = self.cores.get() if self.jobs > 1 else None
+        command = ["nice", self.build / "tests" / test, name, "-a"]
         began = time.time()
         try:
-            code = run(["nice", self.build / "tests" / test, name, "-a"], env=environment, timeout=limit, cwd=self.build).returncode
+            code = run(command if core is None else ["taskset", "-c", str(core), *command], env=environment, timeout=limit, cwd=self.build).returncode
         except subprocess.TimeoutExpired:
             return "time-out", time.time() - began
+        finally:
+            if core is not None:
+                self.cores.put(core)
         return ("pass" if code == 0 else "fail"), time.time() - began
+
+    def side_by_side(self, function, items):
+        """(item, function(item)) as they are ready, as many at a time as there are jobs."""
+        with concurrent.futures.ThreadPoolExecutor(self.jobs) as pool:
+            running = {pool.submit(function, item): item for item in items}
+            for done in concurrent.futures.as_completed(running):
+                yield running[done], done.result()
+
+    def reach(self, test_and_case):
+        """Verdict, seconds and reached faults of a case without a fault."""
+        with tempfile.TemporaryDirectory() as folder:
+            log = Path(folder) / "reached.txt"
+            verdict, seconds = self.run_case(*test_and_case, log=log)
+            return verdict, seconds, [int(k) for k in log.read_text().split()] if log.exists() else None
 
     def baseline(self):
         """Seconds and reached faults of every case without a fault; cases that fail then are left out."""
         path = self.folder / "cases.json"
         cases = json.loads(path.read_text()) if path.exists() else {}
+        waiting = []
         for test in self.tests:
             program = self.build / "tests" / test
             stamp = hashlib.sha256(program.read_bytes()).hexdigest()
             if cases.get(test, {}).get("stamp") == stamp:
                 continue
-            known = {"stamp": stamp, "cases": {}}
-            for case in filter(None, map(str.strip, run([program, "--list-test-names-only"]).stdout.splitlines())):
-                log = self.folder / "reached.txt"
-                log.unlink(missing_ok=True)
-                verdict, seconds = self.run_case(test, case, log=log)
-                if verdict == "pass" and log.exists():
-                    known["cases"][case] = {"seconds": seconds, "reached": [int(k) for k in log.read_text().split()]}
-                else:
-                    say(f"left out, since it fails without a fault: {test}: {case}")
-            cases[test] = known
+            names = list(filter(None, map(str.strip, run([program, "--list-test-names-only"]).stdout.splitlines())))
+            waiting += [(test, case) for case in names]
+            cases[test] = {"stamp": stamp, "cases": {}}
+        for (test, case), (verdict, seconds, reached) in self.side_by_side(self.reach, waiting):
+            if verdict == "pass" and reached is not None:
+                cases[test]["cases"][case] = {"seconds": seconds, "reached": reached}
+            else:
+                say(f"left out, since it fails without a fault: {test}: {case}")
+        if waiting:
             path.write_text(json.dumps(cases, indent=1))
-            say(f"{test}: {len(known['cases'])} cases, {sum(c['seconds'] for c in known['cases'].values()):.0f} s")
+            say(f"{len(waiting)} cases, {sum(c['seconds'] for known in cases.values() for c in known['cases'].values()):.0f} s")
         order = [(c["seconds"], test, name, set(c["reached"])) for test in self.tests for name, c in cases[test]["cases"].items()]
         return sorted(order, key=lambda c: c[:3])
 
@@ -224,8 +254,7 @@ class Workspace:
     def run_faults(self, numbers):
         cases = self.baseline()
         done, began = 0, time.time()
-        for number in numbers:
-            result = self.try_fault(number, cases)
+        for number, result in self.side_by_side(lambda number: self.try_fault(number, cases), numbers):
             with open(self.folder / "results.jsonl", "a") as f:
                 f.write(json.dumps(result) + "\n")
             done += 1
@@ -276,15 +305,21 @@ def main():
     parser.add_argument("--count", type=int, default=80)
     parser.add_argument("--folder", type=Path, default=ROOT / "build-mutate", help="where the copy, its build and the results lie")
     parser.add_argument("--tests", nargs="+", help="test programs instead of all that are quick")
+    parser.add_argument("--jobs", type=int, default=1, help="how many faults are tried side by side")
+    parser.add_argument("--built", action="store_true", help="the folder holds a copy that is built")
     parser.add_argument("--retry", action="store_true", help="try survivors again")
     parser.add_argument("--only", type=int, nargs="+", help="numbers of the faults to try")
     parser.add_argument("--report", action="store_true", help="print what is known and end")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    workspace = Workspace(options.folder.resolve(), options.tests or default_tests())
-    workspace.draw(options.seed, options.count)
+    workspace = Workspace(options.folder.resolve(), options.tests or default_tests(), options.jobs)
+    if options.built:
+        workspace.read()
+    else:
+        workspace.draw(options.seed, options.count)
     if not options.report:
-        workspace.compile()
+        if not options.built:
+            workspace.compile()
         results = workspace.results()
         again = lambda k: k not in results or (options.retry and not results[k]["killed"])
         workspace.run_faults(options.only or [k for k in workspace.faults if again(k)])
