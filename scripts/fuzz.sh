@@ -25,6 +25,10 @@ fuzz="$root/build-fuzz"
 cmake --preset fuzz -DCMAKE_CXX_COMPILER="$CXX" >/dev/null
 cmake --build "$fuzz" -j "$(jobs)" --target "${names[@]/#/fuzz_}"
 seconds=$(awk -v minutes="$2" 'BEGIN {print int(60 * minutes + 0.5)}')
+if ((seconds < 1)); then
+  say "fuzz: '$2' minutes are less than a second, which libFuzzer takes for no end"
+  exit 2
+fi
 mkdir -p "$fuzz/findings"
 
 fuzz_one() {

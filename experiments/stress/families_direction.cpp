@@ -36,6 +36,7 @@ Family spot_cutoff() {
                   }};
         cell.benign = cutoff == 20;
         cell.quick = cutoff == 20 || cutoff == 0.1 || cutoff == 0.001;
+        if (cutoff <= 0.001) cell.limit = "Narrow cones and lobes";
         family.cells.push_back(cell);
     }
     return family;

@@ -44,20 +44,62 @@ std::string_view take_name(ByteReader& in) {
     return name;
 }
 
-/// Attributes are as long as they say: OpenEXR allocates before it reads.
+/// Bytes of a value of a type that always has the same number; 0: of another type.
+uint32_t fixed_size(std::string_view type) {
+    static constexpr std::pair<std::string_view, uint32_t> kSizes[] = {{"box2f", 16},
+                                                                       {"box2i", 16},
+                                                                       {"chromaticities", 32},
+                                                                       {"compression", 1},
+                                                                       {"deepImageState", 1},
+                                                                       {"double", 8},
+                                                                       {"envmap", 1},
+                                                                       {"float", 4},
+                                                                       {"int", 4},
+                                                                       {"keycode", 28},
+                                                                       {"lineOrder", 1},
+                                                                       {"m33d", 72},
+                                                                       {"m33f", 36},
+                                                                       {"m44d", 128},
+                                                                       {"m44f", 64},
+                                                                       {"rational", 8},
+                                                                       {"tiledesc", 9},
+                                                                       {"timecode", 8},
+                                                                       {"v2d", 16},
+                                                                       {"v2f", 8},
+                                                                       {"v2i", 8},
+                                                                       {"v3d", 24},
+                                                                       {"v3f", 12},
+                                                                       {"v3i", 12}};
+    for (const auto& [name, size] : kSizes)
+        if (type == name) return size;
+    return 0;
+}
+
+/// True if the value ends where its size says. OpenEXR goes by the value, and allocates what lengths inside of it say.
+bool has_its_size(std::string_view type, ByteReader value) {
+    if (const uint32_t size = fixed_size(type)) return value.left() == size;
+    if (type == "chlist") {
+        while (!take_name(value).empty()) value.take(16);
+        return value.left() == 0;
+    }
+    if (type == "stringvector") {
+        while (value.left()) value.take(value.u32());
+        return true;
+    }
+    if (type == "preview") {
+        const uint64_t width = value.u32(), height = value.u32();
+        return value.left() % 4 == 0 && width * height == value.left() / 4;
+    }
+    return true;
+}
+
 void check_attributes(std::string_view bytes, const FileBudget& budget) {
     ByteReader in{bytes, budget, kHeaderAt};
     for (std::string_view name; !(name = take_name(in)).empty();) {
         const std::string_view type = take_name(in);
         const uint32_t size = in.u32();
-        in.need(size);
-        if (type == "preview" && size >= 8) {
-            ByteReader preview{in.take(size), budget};
-            const uint64_t width = preview.u32(), height = preview.u32();
-            if (width * height != preview.left() / 4) budget.fail("cannot read EXR image: damaged preview");
-        } else {
-            in.take(size);
-        }
+        if (!has_its_size(type, ByteReader{in.take(size), budget}))
+            budget.fail("cannot read EXR image: damaged header");
     }
 }
 

@@ -20,6 +20,7 @@ namespace {
 std::string config() {
     const std::string scenes = std::string(AMBILUX_SOURCE_DIR) + "/scenes/";
     return R"(seeds = [1, 2]
+repeats = 0
 [reference]
 spp = 512
 [budget]

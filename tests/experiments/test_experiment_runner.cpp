@@ -200,7 +200,7 @@ TEST_CASE("a resumed render goes on with what its first part chose, and choosing
     // What ran is in the rows and in the statistics, and not what was asked for.
     for (const auto& row : table(folder / "out/runs.csv"))
         if (row[column("run")] == "chosen" && row[column("scene")] == "a") {
-            CHECK(row[column("method")] == stats["method"]);
+            CHECK(row[column("method")] == stats["method"].get<std::string>());
             CHECK(row[column("method")].starts_with("bdpt "));
         }
 }

@@ -436,7 +436,7 @@ TEST_CASE("what a device has no room for is not chosen: the next best runs") {
                                      [](const RenderSettings&) -> std::unique_ptr<Renderer> {
                                          throw Error(ExitCode::device, "no room at all");
                                      }),
-                      Catch::Contains("no room at all"));
+                      ContainsSubstring("no room at all"));
 }
 
 TEST_CASE("variants restrict the choice; other settings that it would make are refused by name") {

@@ -268,7 +268,7 @@ TEST_CASE("Renders that would not end are refused, and scenes without light are 
         RenderSettings s = settings_of(scene);
         s.integrator = name;
         s.max_depth = s.rr_depth = -1;
-        CHECK_THROWS_WITH(make_renderer(scene, s), Catch::Contains("max_depth") && Catch::Contains("rr_depth"));
+        CHECK_THROWS_WITH(make_renderer(scene, s), ContainsSubstring("max_depth") && ContainsSubstring("rr_depth"));
     }
     Scene dark = scene_from_text(
         scene_xml(4, "<sensor type='perspective'>" + square_film(8) + "</sensor><shape type='sphere'/>"));

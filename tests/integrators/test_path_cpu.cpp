@@ -287,13 +287,13 @@ TEST_CASE("Renders that would not end or cannot be made are refused", "[path]") 
     RenderSettings endless = settings_of(scene);
     endless.max_depth = -1;
     endless.rr_depth = -1;
-    CHECK_THROWS_WITH(make_renderer(scene, endless), Catch::Contains("max_depth") && Catch::Contains("rr_depth"));
+    CHECK_THROWS_WITH(make_renderer(scene, endless), ContainsSubstring("max_depth") && ContainsSubstring("rr_depth"));
     RenderSettings deep = settings_of(scene);
     deep.max_depth = 1 << 14;
     CHECK_THROWS_AS(make_renderer(scene, deep), Error);
     RenderSettings wrong = settings_of(scene);
     wrong.integrator = "vcm";
-    CHECK_THROWS_WITH(make_renderer(scene, wrong), Catch::Contains("vcm"));
+    CHECK_THROWS_WITH(make_renderer(scene, wrong), ContainsSubstring("vcm"));
     RenderSettings device = settings_of(scene);
     device.backend = "cuda";
     device.accel = "embree";
@@ -302,7 +302,7 @@ TEST_CASE("Renders that would not end or cannot be made are refused", "[path]") 
         device.backend = backend;
         device.accel = "bvh2";
         device.integrator = backend == std::string("cpu") ? "path" : "bdpt";
-        CHECK_THROWS_WITH(make_renderer(scene, device), Catch::Contains("bvh2") && Catch::Contains("cwbvh"));
+        CHECK_THROWS_WITH(make_renderer(scene, device), ContainsSubstring("bvh2") && ContainsSubstring("cwbvh"));
     }
 }
 

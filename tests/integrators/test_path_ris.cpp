@@ -109,7 +109,7 @@ TEST_CASE("candidates is a setting of path ris alone") {
     CHECK(setting_text(s, "candidates") == "5");
     for (const char* value : {"0", "65", "many"})
         CHECK_THROWS_WITH(apply_setting(s, "candidates", value),
-                          Catch::Contains("candidates=") && Catch::Contains("from 1 to 64"));
+                          ContainsSubstring("candidates=") && ContainsSubstring("from 1 to 64"));
     s.variant = "wavefront";
-    CHECK_THROWS_WITH(make_renderer(scene, s), Catch::StartsWith("candidates=5") && Catch::Contains("path ris"));
+    CHECK_THROWS_WITH(make_renderer(scene, s), StartsWith("candidates=5") && ContainsSubstring("path ris"));
 }

@@ -71,6 +71,6 @@ TEST_CASE("toy refuses what it has not") {
          {std::pair{"estimator", "nee"}, {"heuristic", "power"}, {"connections", "2"}, {"candidates", "4"}}) {
         RenderSettings s = toy_settings(scene);
         apply_setting(s, key, value);
-        CHECK_THROWS_WITH(make_renderer(scene, s), Catch::StartsWith(key) && Catch::Contains("integrator toy"));
+        CHECK_THROWS_WITH(make_renderer(scene, s), StartsWith(key) && ContainsSubstring("integrator toy"));
     }
 }

@@ -159,7 +159,7 @@ TEST_CASE("Roulette with a cap near one keeps the variance of a furnace of albed
     apply_setting(s, "rr_cap", "0.999");
     check_expectation(scene, s, expected);
     apply_setting(s, "rr_cap", "1");
-    CHECK_THROWS_WITH(make_renderer(scene, s), Catch::Contains("rr_cap") && Catch::Contains("max_depth"));
+    CHECK_THROWS_WITH(make_renderer(scene, s), ContainsSubstring("rr_cap") && ContainsSubstring("max_depth"));
     CHECK_THROWS_AS(apply_setting(s, "rr_cap", "0"), Error);
     CHECK_THROWS_AS(apply_setting(s, "rr_cap", "1.5"), Error);
     CHECK_THROWS_AS(apply_setting(s, "rr_cap", "nan"), Error);
