@@ -21,6 +21,7 @@ std::string config() {
     const std::string scenes = std::string(AMBILUX_SOURCE_DIR) + "/scenes/";
     return R"(seeds = [1, 2]
 repeats = 0
+backend = "cpu"
 [reference]
 spp = 512
 [budget]
