@@ -1,0 +1,67 @@
+#include "backends/cuda/host_texels.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "backends/cuda/device_memory.h"
+
+namespace ambilux {
+namespace {
+
+int current_device() {
+    int device = 0;
+    cuda_check(cudaGetDevice(&device), "device");
+    return device;
+}
+
+std::shared_ptr<uint8_t> managed(std::span<const uint8_t> texels) {
+    int pages_on_demand = 0;
+    cuda_check(cudaDeviceGetAttribute(&pages_on_demand, cudaDevAttrConcurrentManagedAccess, current_device()),
+               "managed memory");
+    if (!pages_on_demand)
+        throw Error(ExitCode::device,
+                    "this device cannot fetch pages of the host when it needs them: use --memory pinned");
+    uint8_t* data = nullptr;
+    cuda_check(cudaMallocManaged(reinterpret_cast<void**>(&data), texels.size()), "textures in host memory",
+               texels.size());
+    std::shared_ptr<uint8_t> owned(data, [](uint8_t* p) { cudaFree(p); });
+    std::memcpy(data, texels.data(), texels.size());
+    // Pages on a device are copies: the driver drops them without writing back, and several devices can have the same.
+#if CUDART_VERSION >= 13000
+    const cudaMemLocation any = {cudaMemLocationTypeHost, 0};
+#else
+    const int any = cudaCpuDeviceId;
+#endif
+    cuda_check(cudaMemAdvise(data, texels.size(), cudaMemAdviseSetReadMostly, any), "textures in host memory");
+    return owned;
+}
+
+std::shared_ptr<uint8_t> pinned(std::span<const uint8_t> texels) {
+    void* data = nullptr;
+    cuda_check(cudaHostAlloc(&data, texels.size(), cudaHostAllocPortable | cudaHostAllocMapped),
+               "textures in pinned host memory", texels.size());
+    std::shared_ptr<uint8_t> owned(static_cast<uint8_t*>(data), [](uint8_t* p) { cudaFreeHost(p); });
+    std::memcpy(data, texels.data(), texels.size());
+    return owned;
+}
+
+}  // namespace
+
+HostTexels::HostTexels(std::span<const uint8_t> texels, TextureMemory where) : where_(where), bytes_(texels.size()) {
+    if (bytes_ == 0) return;
+    data_ = where == TextureMemory::pinned ? pinned(texels) : managed(texels);
+}
+
+void HostTexels::prefetch(cudaStream_t stream) const {
+    if (where_ == TextureMemory::pinned) return;
+    const uint64_t free = free_device_bytes(), room = free - std::min(free, kLeftFree), bytes = std::min(bytes_, room);
+    if (bytes == 0) return;
+#if CUDART_VERSION >= 13000
+    const cudaMemLocation here = {cudaMemLocationTypeDevice, current_device()};
+    cuda_check(cudaMemPrefetchAsync(data(), bytes, here, 0, stream), "prefetch of textures");
+#else
+    cuda_check(cudaMemPrefetchAsync(data(), bytes, current_device(), stream), "prefetch of textures");
+#endif
+}
+
+}  // namespace ambilux
