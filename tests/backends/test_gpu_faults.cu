@@ -7,8 +7,14 @@
 // wraps: cudaStreamEndCapture cudaGetLastError
 // Memory of a device that runs out at any allocation, and a device that is lost at any call: code 4, one message, no
 // leak, what was finished is saved, and the next render works.
-#include <functional>
+#include <fcntl.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <functional>
+#include <map>
+
+#include "backends/cuda/device_memory.h"
 #include "cli/program.h"
 #include "core/atomic_file.h"
 #include "core/error.h"

@@ -5,6 +5,7 @@
 #include <cuda_runtime.h>
 
 #include <atomic>
+#include <utility>
 
 namespace ambilux::test {
 
@@ -112,8 +113,10 @@ AMBILUX_FAILS(cudaStreamBeginCaptureToGraph, false,
               (s, g, d, e, n, m))
 AMBILUX_FAILS(cudaLaunchKernel, false, (const void* f, dim3 g, dim3 b, void** a, size_t n, cudaStream_t s),
               (f, g, b, a, n, s))
+#if CUDART_VERSION >= 13000
 AMBILUX_FAILS(__cudaLaunchKernel, false, (cudaKernel_t f, dim3 g, dim3 b, void** a, size_t n, cudaStream_t s),
               (f, g, b, a, n, s))
+#endif
 AMBILUX_FAILS(cudaGraphLaunch, false, (cudaGraphExec_t g, cudaStream_t s), (g, s))
 AMBILUX_FAILS(cudaMemcpy, false, (void* to, const void* from, size_t n, cudaMemcpyKind k), (to, from, n, k))
 AMBILUX_FAILS(cudaMemcpyAsync, false, (void* to, const void* from, size_t n, cudaMemcpyKind k, cudaStream_t s),
