@@ -11,7 +11,9 @@ namespace ambilux {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-double seconds_between(Clock::time_point a, Clock::time_point b) { return std::chrono::duration<double>(b - a).count(); }
+double seconds_between(Clock::time_point a, Clock::time_point b) {
+    return std::chrono::duration<double>(b - a).count();
+}
 double seconds_since(Clock::time_point start) { return seconds_between(start, Clock::now()); }
 
 /// Samples from 0 on, in batches that grow, until about `seconds` are over.
@@ -106,13 +108,12 @@ bool Crew::next_task(size_t index, Task& task) {
 /// It would end long after the budget, and another device takes half as long for a range or less.
 bool Crew::is_too_slow(size_t index, const Open& node) const {
     if (node.order.seconds_left <= 0) return false;
-    const auto per_range = [](const Worker& w) {
-        return w.work.ranges ? w.work.seconds / double(w.work.ranges) : 0.0;
-    };
+    const auto per_range = [](const Worker& w) { return w.work.ranges ? w.work.seconds / double(w.work.ranges) : 0.0; };
     const double own = per_range(*workers_[index]);
     return seconds_between(Clock::now(), node.deadline) < 0.5 * own &&
-           std::any_of(workers_.begin(), workers_.end(),
-                       [&](const auto& w) { return per_range(*w) > 0 && per_range(*w) <= 0.5 * own; });
+           std::any_of(
+               workers_.begin(), workers_.end(),
+               [&](const auto& w) { return per_range(*w) > 0 && per_range(*w) <= 0.5 * own; });
 }
 
 /// False if it was stopped.

@@ -295,8 +295,9 @@ private:
         if (tree_.samples() == 0) return;
         state_.write(tree_, notes());
         state_.wait();
-        throw Error(fault.code, fmt::format("{}. {} samples per pixel are in {}; the same command with --resume goes on",
-                                            fault.what(), tree_.samples(), state_.path()));
+        throw Error(fault.code,
+                    fmt::format("{}. {} samples per pixel are in {}; the same command with --resume goes on",
+                                fault.what(), tree_.samples(), state_.path()));
     }
 
     ParallelResult end() {

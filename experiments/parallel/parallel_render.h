@@ -22,7 +22,7 @@ struct WorkerShare {
     int rank = 0;
     std::string host, device;
     uint64_t samples = 0, ranges = 0;
-    double seconds = 0;               ///< that it was busy
+    double seconds = 0;  ///< that it was busy
 };
 
 struct ParallelResult {

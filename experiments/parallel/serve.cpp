@@ -37,7 +37,7 @@ void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& r
     std::optional<Crew> crew(std::in_place, scene, settings, choose_devices(request.devices, settings, ranks), *host);
     host.reset();
     tell(ranks, 0, Say::ready, {{"host", host_name()}, {"devices", work_text(crew->work())}});
-    for (bool asked = true;;) {  // the first orders come by themselves
+    for (bool asked = true;;) {                               // the first orders come by themselves
         if (crew && is_set(request.interrupt)) crew.reset();  // the first rank decides what comes of it
         while (const std::optional<Told> told = hear(ranks)) {
             if (told->kind == Say::stop) return;

@@ -56,8 +56,8 @@ std::optional<Told> hear(Ranks& ranks) {
 }
 
 nlohmann::json order_text(const Order& order, bool last) {
-    return {{"size", order.ranges.size},   {"samples", order.ranges.samples},    {"level", order.node.level},
-            {"index", order.node.index},   {"seconds_left", order.seconds_left}, {"last", last}};
+    return {{"size", order.ranges.size}, {"samples", order.ranges.samples},    {"level", order.node.level},
+            {"index", order.node.index}, {"seconds_left", order.seconds_left}, {"last", last}};
 }
 
 Order read_order(const nlohmann::json& t) {
@@ -67,10 +67,8 @@ Order read_order(const nlohmann::json& t) {
 nlohmann::json work_text(const std::vector<DeviceWork>& devices) {
     nlohmann::json text = nlohmann::json::array();
     for (const DeviceWork& d : devices)
-        text.push_back({{"samples", d.samples},
-                        {"ranges", d.ranges},
-                        {"seconds", d.seconds},
-                        {"stats", save_stats(d.stats)}});
+        text.push_back(
+            {{"samples", d.samples}, {"ranges", d.ranges}, {"seconds", d.seconds}, {"stats", save_stats(d.stats)}});
     return text;
 }
 

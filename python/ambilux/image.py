@@ -35,11 +35,14 @@ class DeviceArray:
     def device(self) -> str:
         return f"cuda:{self._core.device}"
 
-    def __dlpack__(self, *, stream: Any = None, **options: Any) -> Any:
-        return self._core.array.__dlpack__(**options)
+    def __dlpack__(self, *, stream: Any = None, max_version: tuple[int, int] | None = None, dl_device: tuple[int, int] | None = None,
+                   copy: bool | None = None) -> Any:
+        if copy or dl_device not in (None, self.__dlpack_device__()):
+            raise BufferError("an array on the device is handed over as it is: copy it there")
+        return self._core.dlpack()
 
     def __dlpack_device__(self) -> tuple[int, int]:
-        return self._core.array.__dlpack_device__()
+        return 2, self._core.device  # kDLCUDA
 
     @property
     def __cuda_array_interface__(self) -> dict[str, Any]:

@@ -76,14 +76,14 @@ void bind_images(nb::module_& m) {
         .def_ro("device", &DeviceImage::device)
         .def_prop_ro("size", [](const DeviceImage& i) { return std::pair(i.width, i.height); })
         .def_prop_ro("pointer", [](const DeviceImage& i) { return reinterpret_cast<uintptr_t>(i.rgb.get()); })
-        .def_prop_ro(
-            "array",
+        .def(
+            "dlpack",
             [](nb::handle_t<DeviceImage> self) {
                 const auto& i = nb::cast<const DeviceImage&>(self);
                 return DevicePixels(i.rgb.get(), {size_t(i.height), size_t(i.width), 3}, self, {}, nb::dtype<float>(),
                                     nb::device::cuda::value, i.device);
             },
-            nb::rv_policy::reference, "For other packages, by __dlpack__.");
+            nb::rv_policy::reference, "A capsule of DLPack, which keeps the memory.");
     m.def("read_image", &read_image, "path"_a, "Pixels of an EXR file, and its attributes.");
     m.def("write_image", &write_image, "path"_a, "rgb"_a, "stderr"_a.none(), "samples"_a, "attributes"_a,
           "Writes an EXR file: a reference if `stderr` is given.");

@@ -1,12 +1,12 @@
 // libs: ambilux_cli ambilux_experiments ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_core
 // labels: gpu
-// wraps: cudaMalloc cudaMallocManaged cudaHostAlloc cudaStreamCreateWithFlags cudaGraphInstantiate cudaFree cudaFreeHost
-// wraps: cudaStreamDestroy cudaGraphDestroy cudaGraphExecDestroy cudaGraphAddNode cudaGraphConditionalHandleCreate
-// wraps: cudaStreamBeginCapture cudaStreamBeginCaptureToGraph cudaLaunchKernel __cudaLaunchKernel cudaGraphLaunch cudaMemcpy
-// wraps: cudaMemcpyAsync cudaMemset cudaMemsetAsync cudaStreamSynchronize cudaDeviceSynchronize cudaMemGetInfo
-// wraps: cudaStreamEndCapture cudaGetLastError
-// Memory of a device that runs out at any allocation, and a device that is lost at any call: code 4, one message, no
-// leak, what was finished is saved, and the next render works.
+// wraps: cudaMalloc cudaMallocManaged cudaHostAlloc cudaStreamCreateWithFlags cudaGraphInstantiate cudaFree
+// cudaFreeHost wraps: cudaStreamDestroy cudaGraphDestroy cudaGraphExecDestroy cudaGraphAddNode
+// cudaGraphConditionalHandleCreate wraps: cudaStreamBeginCapture cudaStreamBeginCaptureToGraph cudaLaunchKernel
+// __cudaLaunchKernel cudaGraphLaunch cudaMemcpy wraps: cudaMemcpyAsync cudaMemset cudaMemsetAsync cudaStreamSynchronize
+// cudaDeviceSynchronize cudaMemGetInfo wraps: cudaStreamEndCapture cudaGetLastError Memory of a device that runs out at
+// any allocation, and a device that is lost at any call: code 4, one message, no leak, what was finished is saved, and
+// the next render works.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -132,9 +132,8 @@ long lines(const std::string& text) { return std::count(text.begin(), text.end()
 
 std::vector<std::string> render_arguments(const std::string& scene, const std::string& output,
                                           const std::vector<std::string>& more) {
-    std::vector<std::string> all = {"--quiet", "render", scene, "-i",      "bdpt", "--backend",    "cuda",
-                                    "--size",  "32x24",  "-o",  output,    "--set", "wave_size=1024",
-                                    "--deterministic"};
+    std::vector<std::string> all = {"--quiet", "render", scene, "-i",   "bdpt",  "--backend",      "cuda",
+                                    "--size",  "32x24",  "-o",  output, "--set", "wave_size=1024", "--deterministic"};
     all.insert(all.end(), more.begin(), more.end());
     return all;
 }
@@ -193,9 +192,7 @@ TEST_CASE("the program ends with code 4 and one message, and the image holds the
     if (!device()) return;
     const TempFolder folder;
     const std::string exr = folder / "a.exr";
-    const auto arguments = [&](const std::string& spp) {
-        return render_arguments(scene_path(), exr, {"--spp", spp});
-    };
+    const auto arguments = [&](const std::string& spp) { return render_arguments(scene_path(), exr, {"--spp", spp}); };
     for (int i = 0; i < 3; ++i) REQUIRE(run(folder, arguments("24")).code == 0);
     std::map<int, Image> whole;  // by samples
     int saved = 0;
@@ -223,7 +220,8 @@ TEST_CASE("the program ends with code 4 and one message, and the image holds the
             const int samples = attributes.at("spp").get<int>();
             if (!whole.contains(samples)) {
                 const std::string other = folder / "b.exr";
-                REQUIRE(run(folder, render_arguments(scene_path(), other, {"--spp", std::to_string(samples)})).code == 0);
+                REQUIRE(run(folder, render_arguments(scene_path(), other, {"--spp", std::to_string(samples)})).code ==
+                        0);
                 whole[samples] = read_exr(other);
             }
             CHECK(bool(image.rgb == whole[samples].rgb));

@@ -81,7 +81,8 @@ TEST_CASE("the image on the device has the bits of the film, and outlives the re
         const auto bits_of = [&](const DeviceImage& image) {
             REQUIRE(image.width == 67);
             REQUIRE(image.height == 45);
-            cuda_check(cudaMemcpy(rgb.data(), image.rgb.get(), rgb.size() * sizeof(float), cudaMemcpyDeviceToHost), "image");
+            cuda_check(cudaMemcpy(rgb.data(), image.rgb.get(), rgb.size() * sizeof(float), cudaMemcpyDeviceToHost),
+                       "image");
             return rgb;
         };
         CHECK(bool(bits_of(*renderer->device_image()) == std::vector<float>(rgb.size(), 0.0f)));

@@ -68,32 +68,30 @@ inline cudaError_t destroyed(cudaError_t error, bool was_there) {
 
 }  // namespace ambilux::test
 
-#define AMBILUX_WRAPPED(name, parameters)   \
-    cudaError_t __real_##name parameters;   \
+#define AMBILUX_WRAPPED(name, parameters) \
+    cudaError_t __real_##name parameters; \
     cudaError_t __wrap_##name parameters
 /// A call that makes nothing.
-#define AMBILUX_FAILS(name, allocates, parameters, arguments)                                      \
-    AMBILUX_WRAPPED(name, parameters) {                                                            \
-        const cudaError_t error = ambilux::test::injected(allocates);                              \
-        return error != cudaSuccess ? error : __real_##name arguments;                             \
+#define AMBILUX_FAILS(name, allocates, parameters, arguments)          \
+    AMBILUX_WRAPPED(name, parameters) {                                \
+        const cudaError_t error = ambilux::test::injected(allocates);  \
+        return error != cudaSuccess ? error : __real_##name arguments; \
     }
-#define AMBILUX_MAKES(name, parameters, arguments)                                                 \
-    AMBILUX_WRAPPED(name, parameters) {                                                            \
-        const cudaError_t error = ambilux::test::injected(true);                                   \
-        return error != cudaSuccess ? error : ambilux::test::counted(__real_##name arguments, 1);  \
+#define AMBILUX_MAKES(name, parameters, arguments)                                                \
+    AMBILUX_WRAPPED(name, parameters) {                                                           \
+        const cudaError_t error = ambilux::test::injected(true);                                  \
+        return error != cudaSuccess ? error : ambilux::test::counted(__real_##name arguments, 1); \
     }
-#define AMBILUX_DESTROYS(name, Type)                                                               \
-    AMBILUX_WRAPPED(name, (Type object)) {                                                         \
-        return ambilux::test::destroyed(__real_##name(object), object != nullptr);                 \
-    }
+#define AMBILUX_DESTROYS(name, Type) \
+    AMBILUX_WRAPPED(name, (Type object)) { return ambilux::test::destroyed(__real_##name(object), object != nullptr); }
 
 // What our code calls; the list after "// wraps:" of the test must be the same.
 extern "C" {
 AMBILUX_MAKES(cudaMalloc, (void** p, size_t n), (p, n))
 AMBILUX_MAKES(cudaMallocManaged, (void** p, size_t n, unsigned int f), (p, n, f))
 AMBILUX_MAKES(cudaHostAlloc, (void** p, size_t n, unsigned int f), (p, n, f))
-AMBILUX_MAKES(cudaStreamCreateWithFlags, (cudaStream_t* s, unsigned int f), (s, f))
-AMBILUX_MAKES(cudaGraphInstantiate, (cudaGraphExec_t* e, cudaGraph_t g, unsigned long long f), (e, g, f))
+AMBILUX_MAKES(cudaStreamCreateWithFlags, (cudaStream_t * s, unsigned int f), (s, f))
+AMBILUX_MAKES(cudaGraphInstantiate, (cudaGraphExec_t * e, cudaGraph_t g, unsigned long long f), (e, g, f))
 AMBILUX_DESTROYS(cudaFree, void*)
 AMBILUX_DESTROYS(cudaFreeHost, void*)
 AMBILUX_DESTROYS(cudaStreamDestroy, cudaStream_t)
@@ -125,7 +123,7 @@ AMBILUX_FAILS(cudaMemset, false, (void* to, int v, size_t n), (to, v, n))
 AMBILUX_FAILS(cudaMemsetAsync, false, (void* to, int v, size_t n, cudaStream_t s), (to, v, n, s))
 AMBILUX_FAILS(cudaStreamSynchronize, false, (cudaStream_t s), (s))
 AMBILUX_FAILS(cudaDeviceSynchronize, false, (), ())
-AMBILUX_FAILS(cudaMemGetInfo, false, (size_t * f, size_t* t), (f, t))
+AMBILUX_FAILS(cudaMemGetInfo, false, (size_t* f, size_t* t), (f, t))
 
 // A capture ends in any case.
 AMBILUX_WRAPPED(cudaStreamEndCapture, (cudaStream_t s, cudaGraph_t* g)) {
