@@ -1,6 +1,7 @@
 #include "experiments/parallel/crew.h"
 
 #include <chrono>
+#include <future>
 #include <utility>
 
 #include "backends/cuda_device.h"
@@ -41,9 +42,7 @@ Crew::Crew(const Scene& scene, const RenderSettings& settings, const std::vector
             try {
                 run(i, scene, settings, host);
             } catch (...) {
-                const std::lock_guard lock(mutex_);
-                if (!error_) error_ = std::current_exception();
-                changed_.notify_all();
+                failed(std::current_exception());
             }
         });
     std::unique_lock lock(mutex_);
@@ -82,15 +81,35 @@ void Crew::run(size_t index, const Scene& scene, RenderSettings settings, Shared
     worker.work.stats = renderer->stats();
     worker.ready = true;
     changed_.notify_all();
+    std::future<void> handing;  // over the film before
     for (Task task;;) {
         changed_.wait(lock, [&] { return is_set(&stop_) || next_task(index, task); });
         if (is_set(&stop_)) return;
         worker.busy = true;
         lock.unlock();
-        if (!render(index, *renderer, task)) return;
+        std::optional<Piece> piece = render(index, *renderer, task);
+        if (!piece) return;
+        if (handing.valid()) handing.get();
+        handing = std::async(std::launch::async, [this, device = worker.device, stats = renderer->stats(),
+                                                  piece = std::move(*piece), film = renderer->take_film()]() mutable {
+            try {
+                if (device.cuda >= 0) use_cuda_device(device.cuda);
+                piece.film = film();
+                post(std::move(piece), std::move(stats));
+            } catch (...) {
+                failed(std::current_exception());
+            }
+        });
         task = {};
         lock.lock();
+        worker.busy = false;
     }
+}
+
+void Crew::failed(std::exception_ptr error) {
+    const std::lock_guard lock(mutex_);
+    if (!error_) error_ = error;
+    changed_.notify_all();
 }
 
 /// The next range, if there is one for this worker.
@@ -116,21 +135,18 @@ bool Crew::is_too_slow(size_t index, const Open& node) const {
                [&](const auto& w) { return per_range(*w) > 0 && per_range(*w) <= 0.5 * own; });
 }
 
-/// False if it was stopped.
-bool Crew::render(size_t index, Renderer& renderer, const Task& task) {
+/// Without the film. Nothing if it was stopped.
+std::optional<Crew::Piece> Crew::render(size_t index, Renderer& renderer, const Task& task) {
     const auto start = Clock::now();
     Order& order = task.node->order;
-    renderer.clear_film();
     if (order.trial_seconds > 0) {
         order.ranges.size = render_for(renderer, order.trial_seconds, &stop_);
     } else {
         const uint32_t samples = order.ranges.length(task.range);
-        if (renderer.render(order.ranges.first_sample(task.range), samples, &stop_) < samples) return false;
+        if (renderer.render(order.ranges.first_sample(task.range), samples, &stop_) < samples) return {};
     }
-    Piece piece = {task, index, renderer.film(), 0};
-    piece.seconds = seconds_since(start);
-    post(std::move(piece), renderer.stats());
-    return !is_set(&stop_);
+    if (is_set(&stop_)) return {};
+    return Piece{task, index, {}, seconds_since(start)};
 }
 
 /// Waits while two films of the worker are not added up: there would be ever more of them.
@@ -142,7 +158,6 @@ void Crew::post(Piece piece, RenderStats stats) {
     worker.work.samples += piece.film.samples;
     worker.work.seconds += piece.seconds;
     ++worker.work.ranges;
-    worker.busy = false;
     ++worker.waiting;
     pieces_.push_back(std::move(piece));
     changed_.notify_all();

@@ -96,8 +96,9 @@ private:
     void run(size_t index, const Scene& scene, RenderSettings settings, SharedAccels& host);
     bool next_task(size_t index, Task& task);
     bool is_too_slow(size_t index, const Open& node) const;
-    bool render(size_t index, Renderer& renderer, const Task& task);
+    std::optional<Piece> render(size_t index, Renderer& renderer, const Task& task);
     void post(Piece piece, RenderStats stats);
+    void failed(std::exception_ptr error);
 
     std::vector<std::unique_ptr<Worker>> workers_;
     mutable std::mutex mutex_;
