@@ -211,11 +211,13 @@ int render(const Options& o) {
         log_info(fmt::format("bdpt.auto: {}, after {}. To repeat it: {}", choice.name, format_duration(choice.seconds),
                              choice_line(choice)));
     KeptFilm kept(*renderer);
-    const bool on_device = renderer->stats().backend == "cuda";
+    RenderStats stats = renderer->stats();
+    FilmMoments film;
+    const bool on_device = stats.backend == "cuda";
     try {
         Progress progress("render");
         position = drive(*renderer, position, budget, interrupt, [&](const RenderPosition& p) {
-            const RenderStats stats = renderer->stats();
+            stats = renderer->stats();
             show_progress(progress, budget, p, stats);
             if (on_device) kept.look(stats);
             if (const auto now = std::chrono::steady_clock::now(); tev && now - streamed > kStreamPeriod) {
@@ -223,16 +225,16 @@ int render(const Options& o) {
                 streamed = now;
             }
         });
+        reserve.release();
+        stats = renderer->stats();
+        if (position.samples > 0) film = renderer->film();
     } catch (const Error& fault) {
         if (!on_device || fault.code != ExitCode::device) throw;
         reserve.release();
         save_after_fault(o, loaded.scene, settings, kept, fault);
     }
 
-    reserve.release();
-    RenderStats stats = renderer->stats();
     if (position.samples > 0) {
-        const FilmMoments film = renderer->film();
         if (tev) tev->send(mean_image(film));
         write_images(o, loaded.scene, settings, stats, film);
     }

@@ -40,6 +40,7 @@ public:
             if constexpr (requires { Stages::kTracesConnections; })
                 policy_.traces_connections = Stages::kTracesConnections && traces_connections(policy_, accel_->bytes());
         }
+        device_scene_->drop_texels();
         shape(settings, mean);
         const uint64_t kept = policy_.waves.keeps_light_vertices
                                   ? planned_light_vertices(mean, policy_.waves.most_light_subpaths(wave_.slot_count()))
@@ -54,7 +55,7 @@ public:
         clock_ = DeviceBuffer<uint64_t>(1);
         stream_ = make_stream();
         allocate_queues(queues, kept);
-        device_scene_->prefetch(stream_.get());
+        device_scene_->prefetch_texels(stream_.get());
         build_seconds_ = seconds_since(start);
     }
 
@@ -65,10 +66,10 @@ public:
             // All waves of a pass are queued at once; the host waits for the last.
             const uint32_t pass = std::min(count - done, preferred_batch());
             const auto pass_start = Clock::now();
-            film_is_whole_ = false;
             const uint32_t waves_before = read_state().done;
             uint32_t waves_per_sample = 0;
             for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles) ++waves_per_sample;
+            film_is_whole_ = false;
             for (uint32_t s = 0; s < pass; s += wave_.samples)
                 for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles)
                     launch_wave(tile, first + done + s, std::min(wave_.samples, pass - s));

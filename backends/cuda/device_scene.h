@@ -22,8 +22,11 @@ public:
     uint64_t bytes() const;
     /// What bytes() will be, with texels on the device.
     static uint64_t predicted_bytes(const Scene& scene) { return scene.memory_bytes(); }
-    /// Texels of the host that the device has room for come before they are asked for.
-    void prefetch(cudaStream_t stream) const {
+    /// Of texels that lie on the host, HostTexels::drop() and prefetch().
+    void drop_texels() const {
+        if (host_texels_) host_texels_->drop();
+    }
+    void prefetch_texels(cudaStream_t stream) const {
         if (host_texels_) host_texels_->prefetch(stream);
     }
 

@@ -8,6 +8,16 @@
 namespace ambilux {
 namespace {
 
+#if CUDART_VERSION >= 13000
+const cudaMemLocation kHost = {cudaMemLocationTypeHost, 0};
+#else
+constexpr int kHost = cudaCpuDeviceId;
+#endif
+
+void advise(const uint8_t* data, uint64_t bytes, cudaMemoryAdvise advice) {
+    cuda_check(cudaMemAdvise(data, bytes, advice, kHost), "textures in host memory");
+}
+
 int current_device() {
     int device = 0;
     cuda_check(cudaGetDevice(&device), "device");
@@ -27,12 +37,8 @@ std::shared_ptr<uint8_t> managed(std::span<const uint8_t> texels) {
     std::shared_ptr<uint8_t> owned(data, [](uint8_t* p) { cudaFree(p); });
     std::memcpy(data, texels.data(), texels.size());
     // Pages on a device are copies: the driver drops them without writing back, and several devices can have the same.
-#if CUDART_VERSION >= 13000
-    const cudaMemLocation any = {cudaMemLocationTypeHost, 0};
-#else
-    const int any = cudaCpuDeviceId;
-#endif
-    cuda_check(cudaMemAdvise(data, texels.size(), cudaMemAdviseSetReadMostly, any), "textures in host memory");
+    advise(data, texels.size(), cudaMemAdviseSetPreferredLocation);
+    advise(data, texels.size(), cudaMemAdviseSetReadMostly);
     return owned;
 }
 
@@ -52,6 +58,13 @@ HostTexels::HostTexels(std::span<const uint8_t> texels, TextureMemory where) : w
     data_ = where == TextureMemory::pinned ? pinned(texels) : managed(texels);
 }
 
+void HostTexels::drop() const {
+    if (where_ == TextureMemory::pinned || bytes_ == 0) return;
+    // Copies are merged into the one at the preferred location.
+    advise(data(), bytes_, cudaMemAdviseUnsetReadMostly);
+    advise(data(), bytes_, cudaMemAdviseSetReadMostly);
+}
+
 void HostTexels::prefetch(cudaStream_t stream) const {
     if (where_ == TextureMemory::pinned) return;
     const uint64_t free = free_device_bytes(), room = free - std::min(free, kLeftFree), bytes = std::min(bytes_, room);
@@ -62,6 +75,7 @@ void HostTexels::prefetch(cudaStream_t stream) const {
 #else
     cuda_check(cudaMemPrefetchAsync(data(), bytes, current_device(), stream), "prefetch of textures");
 #endif
+    cuda_check(cudaStreamSynchronize(stream), "prefetch of textures");
 }
 
 }  // namespace ambilux

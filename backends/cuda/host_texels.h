@@ -23,8 +23,11 @@ public:
     /// For device and host.
     const uint8_t* data() const { return data_.get(); }
     uint64_t bytes() const { return bytes_; }
-    /// Begins to copy to the current device what its free memory holds beside kLeftFree, in the order of `stream`: one
-    /// large copy takes less time than pages that are asked for one by one.
+    /// Drops the pages that devices have, which then tell as free what buffers can have. They come again when they are
+    /// touched.
+    void drop() const;
+    /// Copies to the current device what its free memory holds beside kLeftFree: one large copy takes less time than
+    /// pages that are asked for one by one.
     void prefetch(cudaStream_t stream) const;
 
 private:
