@@ -7,12 +7,13 @@ namespace ambilux {
 
 template <>
 std::shared_ptr<const CwbvhAccel> SharedAccels::get() {
-    return once(cwbvh_, [&] { return std::make_shared<const CwbvhAccel>(scene_); });
+    return once(cwbvh_, [&] { return host_ ? host_->get<CwbvhAccel>() : std::make_shared<const CwbvhAccel>(scene_); });
 }
 
 template <>
 std::shared_ptr<const EmbreeAccel> SharedAccels::get() {
-    return once(embree_, [&] { return std::make_shared<const EmbreeAccel>(scene_); });
+    return once(embree_,
+                [&] { return host_ ? host_->get<EmbreeAccel>() : std::make_shared<const EmbreeAccel>(scene_); });
 }
 
 }  // namespace ambilux

@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "scene/scene.h"
+#include "scene/texture_memory.h"
 
 namespace ambilux {
 
@@ -12,14 +13,25 @@ class CwbvhAccel;
 class EmbreeAccel;
 class DeviceScene;
 class DeviceCwbvh;
+class HostTexels;
 
 /// Each is made when it is first asked for, by whichever thread, and lives as long as this object or a renderer that
 /// holds it. The scene must not change meanwhile and must outlive them.
 class SharedAccels {
 public:
     explicit SharedAccels(const Scene& scene) : scene_(scene) {}
+    /// For one of several devices: what lies on the host is that of `host`, which must outlive this object.
+    SharedAccels(const Scene& scene, SharedAccels& host) : scene_(scene), host_(&host) {}
 
-    /// `T`: CwbvhAccel, EmbreeAccel; in builds with CUDA also DeviceScene, DeviceCwbvh (backends/cuda/device_scene.h).
+    /// Of copies that are made from now on.
+    void place_textures(TextureMemory where) {
+        const std::lock_guard<std::recursive_mutex> lock(mutex_);
+        textures_ = where;
+        if (host_) host_->place_textures(where);
+    }
+
+    /// `T`: CwbvhAccel, EmbreeAccel; in builds with CUDA also DeviceScene, DeviceCwbvh, HostTexels
+    /// (backends/cuda/device_scene.h).
     template <class T>
     std::shared_ptr<const T> get();
 
@@ -33,11 +45,14 @@ private:
     }
 
     const Scene& scene_;
+    SharedAccels* const host_ = nullptr;  ///< whose structures on the host these are; null: its own
+    TextureMemory textures_ = TextureMemory::device;
     std::recursive_mutex mutex_;  ///< some are made from others
     std::shared_ptr<const CwbvhAccel> cwbvh_;
     std::shared_ptr<const EmbreeAccel> embree_;
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceCwbvh> device_cwbvh_;
+    std::shared_ptr<const HostTexels> host_texels_;
 };
 
 template <>

@@ -14,21 +14,27 @@ uint64_t bytes_of(const std::vector<T>& values) {
 
 }  // namespace
 
-void check_scene_fits(const Scene& scene, uint64_t accel_bytes, uint64_t free, uint64_t total,
+void check_scene_fits(const Scene& scene, TextureMemory textures, uint64_t accel_bytes, uint64_t free, uint64_t total,
                       const std::string& device) {
-    const uint64_t needed = scene.memory_bytes() + accel_bytes;
+    const bool on_device = textures == TextureMemory::device;
+    const uint64_t without_texels = scene.memory_bytes() - bytes_of(scene.texels) + accel_bytes,
+                   needed = without_texels + (on_device ? bytes_of(scene.texels) : 0);
     if (needed <= free) return;
     const uint64_t geometry = bytes_of(scene.vertices) + bytes_of(scene.triangles) + bytes_of(scene.quadrics) +
                               bytes_of(scene.groups) + bytes_of(scene.instances) + bytes_of(scene.sort_keys),
                    texels = bytes_of(scene.texels), rest = scene.memory_bytes() - geometry - texels;
     // Rounded up, so that what does not fit never reads as if it did.
     const auto mib = [](uint64_t bytes) { return (bytes + (1 << 20) - 1) >> 20; };
-    throw Error(ExitCode::device,
-                fmt::format("this scene needs {} MiB on the device: {} of geometry, {} of textures, {} of acceleration "
-                            "structure, {} of the rest; {} of {} MiB of {} are free. Make its textures smaller, or use "
-                            "--backend cpu",
-                            mib(needed), mib(geometry), mib(texels), mib(accel_bytes), mib(rest), free >> 20,
-                            total >> 20, device));
+    const bool helps = on_device && without_texels <= free;
+    throw Error(
+        ExitCode::device,
+        fmt::format("this scene needs {} MiB on the device: {} of geometry, {} of textures{}, {} of acceleration "
+                    "structure, {} of the rest; {} of {} MiB of {} are free. {}use --backend cpu",
+                    mib(needed), mib(geometry), on_device ? mib(texels) : 0,
+                    on_device ? "" : fmt::format(" (their {} lie on the host)", mib(texels)), mib(accel_bytes),
+                    mib(rest), free >> 20, total >> 20, device,
+                    helps ? "Keep its textures on the host with --memory host, make them smaller, or "
+                          : "Make the scene smaller, or "));
 }
 
 }  // namespace ambilux

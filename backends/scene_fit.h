@@ -2,12 +2,13 @@
 #pragma once
 
 #include "scene/scene.h"
+#include "scene/texture_memory.h"
 
 namespace ambilux {
 
 /// Throws Error(device) with the bytes of geometry, textures, acceleration structure and the rest if together they are
-/// more than `free` of the `total` bytes of `device`.
-void check_scene_fits(const Scene& scene, uint64_t accel_bytes, uint64_t free, uint64_t total,
+/// more than `free` of the `total` bytes of `device`. Textures that lie on the host do not count.
+void check_scene_fits(const Scene& scene, TextureMemory textures, uint64_t accel_bytes, uint64_t free, uint64_t total,
                       const std::string& device);
 
 }  // namespace ambilux

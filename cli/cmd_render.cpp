@@ -16,6 +16,7 @@
 #include "core/outputs.h"
 #include "core/progress.h"
 #include "core/ranks.h"
+#include "experiments/kept_film.h"
 #include "experiments/parallel/parallel_render.h"
 #include "experiments/render_plan.h"
 #include "experiments/statistics.h"
@@ -121,7 +122,7 @@ nlohmann::json describe_parts(const ParallelResult& result) {
                            {"host", w.host},
                            {"device", w.device},
                            {"samples", w.samples},
-                           {"films", w.nodes},
+                           {"ranges", w.ranges},
                            {"busy_seconds", w.seconds}});
     return {{"workers", workers},
             {"range_size", result.ranges.size},
@@ -167,6 +168,16 @@ int render_by_ranges(const Options& o) {
     return conclude(o, loaded, request.settings, result.stats, result.position, describe_parts(result));
 }
 
+/// A device failed: saves what was finished, and says so in the message that ends the program.
+[[noreturn]] void save_after_fault(const Options& o, const Scene& scene, const RenderSettings& settings, KeptFilm& kept,
+                                   const Error& fault) {
+    const KeptFilm::Finished finished = kept.last();
+    if (finished.film.samples == 0) throw fault;
+    write_images(o, scene, settings, finished.stats, finished.film);
+    throw Error(fault.code, fmt::format("{}. {} holds the {} samples per pixel that were finished", fault.what(),
+                                        o.output, finished.film.samples));
+}
+
 int render(const Options& o) {
     check(o);
     if (o.by_ranges()) return render_by_ranges(o);
@@ -199,21 +210,31 @@ int render(const Options& o) {
     if (const SelectionStats choice = renderer->stats().choice; !choice.name.empty())
         log_info(fmt::format("bdpt.auto: {}, after {}. To repeat it: {}", choice.name, format_duration(choice.seconds),
                              choice_line(choice)));
-    {
+    KeptFilm kept(*renderer);
+    RenderStats stats = renderer->stats();
+    FilmMoments film;
+    const bool on_device = stats.backend == "cuda";
+    try {
         Progress progress("render");
         position = drive(*renderer, position, budget, interrupt, [&](const RenderPosition& p) {
-            show_progress(progress, budget, p, renderer->stats());
+            stats = renderer->stats();
+            show_progress(progress, budget, p, stats);
+            if (on_device) kept.look(stats);
             if (const auto now = std::chrono::steady_clock::now(); tev && now - streamed > kStreamPeriod) {
                 tev->send(mean_image(renderer->film()));
                 streamed = now;
             }
         });
+        reserve.release();
+        stats = renderer->stats();
+        if (position.samples > 0) film = renderer->film();
+    } catch (const Error& fault) {
+        if (!on_device || fault.code != ExitCode::device) throw;
+        reserve.release();
+        save_after_fault(o, loaded.scene, settings, kept, fault);
     }
 
-    reserve.release();
-    RenderStats stats = renderer->stats();
     if (position.samples > 0) {
-        const FilmMoments film = renderer->film();
         if (tev) tev->send(mean_image(film));
         write_images(o, loaded.scene, settings, stats, film);
     }

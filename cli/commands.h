@@ -42,7 +42,7 @@ struct SceneOptions {
 
 /// Options that say how it is rendered.
 struct RenderOptions {
-    std::string integrator = "path", variant = "wavefront", backend = "auto", precision = "single";
+    std::string integrator = "path", variant = "wavefront", backend = "auto", precision = "single", memory = "device";
     uint64_t seed = 0;
     std::optional<int> max_depth;
     bool deterministic = false;

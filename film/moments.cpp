@@ -1,9 +1,11 @@
 #include "film/moments.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "core/error.h"
+#include "core/parallel.h"
 
 namespace ambilux {
 
@@ -23,10 +25,14 @@ void FilmMoments::add(const FilmMoments& other) {
                                              std::to_string(height) + " and " + std::to_string(other.width) + "x" +
                                              std::to_string(other.height));
     samples += other.samples;
-    for (size_t i = 0; i < sum.size(); ++i) {
-        sum[i] += other.sum[i];
-        sum_squares[i] += other.sum_squares[i];
-    }
+    constexpr size_t kTogether = 1 << 15;
+    parallel_for((sum.size() + kTogether - 1) / kTogether, [&](size_t part) {
+        const size_t end = std::min(sum.size(), (part + 1) * kTogether);
+        for (size_t i = part * kTogether; i < end; ++i) {
+            sum[i] += other.sum[i];
+            sum_squares[i] += other.sum_squares[i];
+        }
+    });
 }
 
 }  // namespace ambilux

@@ -103,6 +103,12 @@ std::vector<Setting> main_settings() {
                       "what rays are traced through; auto: embree on the CPU, cwbvh on CUDA"))
             .limit("embree", on_cpu, "the cuda backend has a structure of its own, cwbvh")
             .limit("bvh2", has_binary_bvh, "a binary BVH to compare with cwbvh"),
+        Is(Of::choice(
+               "memory", &S::memory, {"device", "host", "pinned"},
+               "where textures lie on CUDA: device; host: in the host's memory, and pages in use on the device as "
+               "well; pinned: on the host alone"))
+            .limit("host", on_cuda, "a CPU has no memory but the host's")
+            .limit("pinned", on_cuda, "a CPU has no memory but the host's"),
     };
 }
 

@@ -8,6 +8,7 @@
 
 #include "queues/order.h"
 #include "queues/wave.h"
+#include "scene/texture_memory.h"
 #include "transport/mis/strategy.h"
 #include "transport/mis/unidirectional.h"
 
@@ -75,6 +76,7 @@ struct RenderSettings {
     float rr_cap = kRouletteCap;                     ///< its highest probability of survival
     uint64_t seed = 0;
     Choice<AccelKind> accel = AccelKind::automatic;
+    TextureMemory memory = TextureMemory::device;
     uint32_t wave_size = 0;  ///< paths in flight; 0 chooses
     QueuePolicy queues = {Compaction::atomic, Ordering::automatic};
     bool specialise = true;  ///< kernels hold only what the scene has

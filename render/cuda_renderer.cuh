@@ -9,6 +9,8 @@
 #include "accel/shared_accels.h"
 #include "backends/cuda/device_scene.h"
 #include "backends/cuda/executor.cuh"
+#include "backends/cuda/handles.h"
+#include "backends/cuda/mean_on_device.h"
 #include "backends/cuda_device.h"
 #include "core/error.h"
 #include "core/flag.h"
@@ -38,6 +40,7 @@ public:
             if constexpr (requires { Stages::kTracesConnections; })
                 policy_.traces_connections = Stages::kTracesConnections && traces_connections(policy_, accel_->bytes());
         }
+        device_scene_->drop_texels();
         shape(settings, mean);
         const uint64_t kept = policy_.waves.keeps_light_vertices
                                   ? planned_light_vertices(mean, policy_.waves.most_light_subpaths(wave_.slot_count()))
@@ -50,13 +53,10 @@ public:
         Layout placed(film, film_memory_.data());
         film_ = lay_out_film(placed, wave_, policy_.waves, kFilmWide);
         clock_ = DeviceBuffer<uint64_t>(1);
-        cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
+        stream_ = make_stream();
         allocate_queues(queues, kept);
+        device_scene_->prefetch_texels(stream_.get());
         build_seconds_ = seconds_since(start);
-    }
-    ~CudaRenderer() override {
-        if (graph_) cudaGraphExecDestroy(graph_);
-        if (stream_) cudaStreamDestroy(stream_);
     }
 
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
@@ -69,38 +69,57 @@ public:
             const uint32_t waves_before = read_state().done;
             uint32_t waves_per_sample = 0;
             for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles) ++waves_per_sample;
+            film_is_whole_ = false;
             for (uint32_t s = 0; s < pass; s += wave_.samples)
                 for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles)
                     launch_wave(tile, first + done + s, std::min(wave_.samples, pass - s));
-            cuda_check(cudaStreamSynchronize(stream_), "wave");
+            cuda_check(cudaStreamSynchronize(stream_.get()), "wave");
             const WaveState state = read_state();
             const uint32_t finished = std::min(pass, (state.done - waves_before) / waves_per_sample * wave_.samples);
+            film_is_whole_ = true;
+            samples_ += finished;
+            film_samples_ += finished;
             if (state.failed) grow();
             done += finished;
             if (finished == 0) continue;
             measured_seconds_ = seconds_since(pass_start);
             measured_samples_ = finished;
         }
-        samples_ += done;
-        film_samples_ += done;
         render_seconds_ += seconds_since(start);
         return done;
     }
 
     FilmMoments film() override {
-        FilmMoments film;
-        film.width = wave_.width;
-        film.height = wave_.height;
-        film.samples = film_samples_;
-        film.sum = read(film_.sums.sum, film_values());
-        film.sum_squares = read(film_.sums.sum_squares, film_values());
-        return film;
+        check_film();
+        return read_film(film_.sums, film_samples_);
     }
     void clear_film() override {
         for (double* sums : {film_.sums.sum, film_.sums.sum_squares})
             cuda_check(cudaMemset(sums, 0, film_values() * sizeof(double)), "clear the film");
         cuda_check(cudaDeviceSynchronize(), "clear the film");  // waves run on a stream of their own
         film_samples_ = 0;
+        film_is_whole_ = true;
+    }
+    /// A copy on the device takes a hundredth of the time of one to the host.
+    std::function<FilmMoments()> take_film() override {
+        check_film();
+        const uint64_t values = film_values();
+        try {
+            if (taken_.size() == 0) taken_ = DeviceBuffer<double>(2 * values, "a film that is handed over");
+        } catch (const Error&) {
+            return Renderer::take_film();  // no room for it
+        }
+        const FilmSums taken = {taken_.data(), taken_.data() + values};
+        for (const auto& [to, from] :
+             {std::pair{taken.sum, film_.sums.sum}, {taken.sum_squares, film_.sums.sum_squares}})
+            cuda_check(cudaMemcpy(to, from, values * sizeof(double), cudaMemcpyDeviceToDevice), "take the film");
+        const uint64_t samples = film_samples_;
+        clear_film();
+        return [this, taken, samples] { return read_film(taken, samples); };
+    }
+    std::optional<DeviceImage> device_image() override {
+        check_film();
+        return mean_on_device(film_.sums.sum, wave_.width, wave_.height, film_samples_);
     }
 
     RenderStats stats() override {
@@ -112,9 +131,9 @@ public:
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;
-        const std::vector<QueueCounter> counters = read(layout_.counters(), layout_.queue_names().size());
-        fill_stage_stats(layout_.record_names(), read(layout_.records(), layout_.record_names().size()), s);
-        fill_queue_stats(layout_, {counters.data()}, s);
+        if (memory_.size() > 0) read_counts();
+        fill_stage_stats(layout_.record_names(), records_, s);
+        fill_queue_stats(layout_, {counters_.data()}, s);
         s.memory_bytes = fixed_bytes() + memory_.bytes();
         s.memory_bytes_predicted = fixed_bytes() + layout_.bytes();
         s.features = feature_names(F);
@@ -228,11 +247,10 @@ private:
                    "queue counters");
         state_ = parts.state;
         stages_.emplace(parts.stages);
-        executor_.emplace(stream_, traced_, state_, clock_.data(), device_view(), parts.order);
+        executor_.emplace(stream_.get(), traced_, state_, clock_.data(), device_view(), parts.order);
         if constexpr (!kFilmWide)
             if (pairs_) executor_->use(pairs_->tracer());
-        if (graph_) cudaGraphExecDestroy(graph_);
-        graph_ = nullptr;
+        graph_.reset();
         if (use_graph_) graph_ = executor_->capture([&](Executor& exec) { run(exec); });
         cuda_check(cudaDeviceSynchronize(), "preparation");
     }
@@ -245,26 +263,39 @@ private:
     void launch_wave(uint32_t tile, uint32_t sample, uint32_t samples) {
         const WaveState state = {
             tile, sample, samples, 0, 0, 0, samples * light_subpaths_, policy_.waves.slots_in_flight};
-        detail::set_wave<<<1, 1, 0, stream_>>>(state_, state);
+        detail::set_wave<<<1, 1, 0, stream_.get()>>>(state_, state);
+        cuda_check(cudaGetLastError(), "wave");
         if (graph_)
-            cuda_check(cudaGraphLaunch(graph_, stream_), "wave");
+            cuda_check(cudaGraphLaunch(graph_.get(), stream_.get()), "wave");
         else
             executor_->launch([&](Executor& exec) { run(exec); });
     }
     /// A wave had more light vertices than there was capacity for.
     void grow() {
-        const std::vector<StageRecord> records = read(layout_.records(), layout_.record_names().size());
-        const std::vector<QueueCounter> counters = read(layout_.counters(), layout_.queue_names().size());
+        read_counts();
         uint64_t needed = 0;
-        for (size_t q = 0; q < counters.size(); ++q)
+        for (size_t q = 0; q < counters_.size(); ++q)
             if (layout_.queue_names()[q] == "light_vertices" || layout_.queue_names()[q] == "splats")
-                needed = std::max(needed, counters[q].peak);
+                needed = std::max(needed, counters_[q].peak);
         memory_ = DeviceBuffer<std::byte>();
         needed += needed / 4;
         allocate_queues(plan_queues(needed, 0), needed);
-        cuda_check(
-            cudaMemcpy(layout_.records(), records.data(), records.size() * sizeof(StageRecord), cudaMemcpyHostToDevice),
-            "statistics");
+        cuda_check(cudaMemcpy(layout_.records(), records_.data(), records_.size() * sizeof(StageRecord),
+                              cudaMemcpyHostToDevice),
+                   "statistics");
+    }
+    void read_counts() {
+        records_ = read(layout_.records(), layout_.record_names().size());
+        counters_ = read(layout_.counters(), layout_.queue_names().size());
+    }
+    FilmMoments read_film(const FilmSums& sums, uint64_t samples) const {
+        return {wave_.width, wave_.height, samples, read(sums.sum, film_values()),
+                read(sums.sum_squares, film_values())};
+    }
+    /// What a fault interrupts leaves waves in the film that are not counted.
+    void check_film() const {
+        if (!film_is_whole_)
+            throw Error(ExitCode::device, "the device failed in the middle of a sample: its film is lost");
     }
 
     template <class T>
@@ -282,6 +313,9 @@ private:
     bool use_graph_;
     Wave wave_{};
     Layout layout_;
+    std::vector<StageRecord> records_;    ///< as last read: they outlast a failure to grow
+    std::vector<QueueCounter> counters_;  ///< likewise
+    bool film_is_whole_ = true;
     uint32_t light_subpaths_ = 0;  ///< of one sample
     uint64_t samples_ = 0, film_samples_ = 0, measured_samples_ = 0;
     double build_seconds_ = 0, render_seconds_ = 0, measured_seconds_ = 0;
@@ -289,13 +323,14 @@ private:
     std::shared_ptr<const DeviceCwbvh> accel_;
     std::optional<DevicePairs> pairs_;  ///< instead, with accel=bvh2
     DeviceBuffer<std::byte> memory_, film_memory_;
+    DeviceBuffer<double> taken_;  ///< by take_film
     FilmBuffers film_{};
     DeviceBuffer<uint64_t> clock_;
     WaveState* state_ = nullptr;
-    cudaStream_t stream_ = nullptr;
+    Owned<cudaStream_t> stream_;
     std::optional<Stages> stages_;
     std::optional<Executor> executor_;
-    cudaGraphExec_t graph_ = nullptr;
+    Owned<cudaGraphExec_t> graph_;
 };
 
 }  // namespace ambilux

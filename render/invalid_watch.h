@@ -21,6 +21,8 @@ public:
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt = nullptr) override;
     FilmMoments film() override { return renderer_->film(); }
     void clear_film() override { renderer_->clear_film(); }
+    std::function<FilmMoments()> take_film() override { return renderer_->take_film(); }
+    std::optional<DeviceImage> device_image() override { return renderer_->device_image(); }
     uint32_t ready() const override { return renderer_->ready(); }
     RenderStats stats() override { return renderer_->stats(); }
     std::vector<StrategyImage> strategy_images() override { return renderer_->strategy_images(); }

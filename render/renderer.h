@@ -2,11 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "film/device_image.h"
 #include "film/moments.h"
 #include "integrators/settings.h"
 #include "scene/scene.h"
@@ -89,6 +92,15 @@ public:
     /// Sums over all samples rendered so far, per pixel of the crop.
     virtual FilmMoments film() = 0;
     virtual void clear_film() = 0;
+    /// Takes the film away and leaves an empty one. The function gives it, once, on any thread while this renders on;
+    /// before the next call.
+    virtual std::function<FilmMoments()> take_film() {
+        std::function<FilmMoments()> taken = [film = film()]() mutable { return std::move(film); };
+        clear_film();
+        return taken;
+    }
+    /// Means of the same samples without a way over the host; nothing where the film lies on the host.
+    virtual std::optional<DeviceImage> device_image() { return std::nullopt; }
     /// Samples that were rendered while the renderer was made: a first call of render(0, count) with at least so many
     /// adds them at no cost.
     virtual uint32_t ready() const { return 0; }

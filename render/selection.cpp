@@ -150,6 +150,8 @@ public:
         ready_ = 0;
         renderer_->clear_film();
     }
+    std::function<FilmMoments()> take_film() override { return drop(), renderer_->take_film(); }
+    std::optional<DeviceImage> device_image() override { return drop(), renderer_->device_image(); }
     uint32_t ready() const override { return ready_; }
     RenderStats stats() override {
         RenderStats s = renderer_->stats();

@@ -12,45 +12,90 @@ import random
 NODE_SECONDS = 2.0
 
 
-def simulate(devices, ranges, per_range, film_seconds, handle_seconds, latency, remote, rng, spread):
-    """Seconds until all films are added up; the seconds of the first rank that were spent on films.
+class Rank:
+    def __init__(self, speeds):
+        self.speeds = speeds
+        self.thread = 0.0  # when its thread has added up the films that it has
+        self.merged = [[0.0, 0.0] for _ in speeds]  # the last two films of each device
+        self.idle = list(range(len(speeds)))
+        self.queue = []  # nodes with ranges that no device has begun
+        self.mean = sum(speeds) / len(speeds)
 
-    per_range: seconds of a device for a range; film_seconds: that it waits for its film; handle_seconds: of the first
-    rank for a film that arrives; latency: from a film to the next order; spread: relative deviation of device speeds.
-    """
-    speeds = [per_range * (1 + spread * rng.uniform(-1, 1)) for _ in range(devices)]
-    rate = sum(1 / (s + film_seconds) for s in speeds)
-    node_seconds = max(NODE_SECONDS, 2 * devices * handle_seconds)
-    at, free_at, busy = 0, 0.0, 0.0
 
-    def deal(worker, known):
-        nonlocal at
-        if at >= ranges:
-            return 0
-        seconds = speeds[worker] + film_seconds
-        wanted = min(node_seconds / seconds, 0.5 * (ranges - at) / rate / seconds) if known else 1
-        most = int(min(max(wanted, 1), ranges - at))
-        length = 1 << (most.bit_length() - 1)
-        if at:
-            length = min(length, at & -at)
-        at += length
-        return length
+class Simulation:
+    """ranks: how many devices each has; seconds: of a device for a range with its film; merge: of a thread that adds a film up; network: of a film from
+    another rank to the first; latency: of a message and its answer; spread: relative deviation of the speeds of devices."""
 
-    events = []
-    for worker in range(devices):
-        if length := deal(worker, False):
-            heapq.heappush(events, (latency + length * (speeds[worker] + film_seconds), worker))
-    end = 0.0
-    while events:
-        time, worker = heapq.heappop(events)
-        begin = max(time, free_at)  # the first rank handles one film after the other
-        free_at = begin + handle_seconds
-        busy += handle_seconds
-        end = max(end, free_at)
-        if length := deal(worker, True):
-            wait = latency if remote else 0
-            heapq.heappush(events, (free_at + wait + length * (speeds[worker] + film_seconds), worker))
-    return end, busy
+    def __init__(self, ranks, ranges, seconds, merge, network, latency, spread, rng):
+        self.ranks = [Rank([seconds * (1 + spread * rng.uniform(-1, 1)) for _ in range(n)]) for n in ranks]
+        self.ranges, self.merge, self.network, self.latency = ranges, merge, network, latency
+        self.rate = sum(1 / s for r in self.ranks for s in r.speeds)
+        self.node_seconds = max(NODE_SECONDS, 2 * len(ranks) * (merge + network))
+        self.at, self.end, self.busy = 0, 0.0, 0.0
+        self.events, self.order = [], 0
+
+    def push(self, time, what, *arguments):
+        self.order += 1
+        heapq.heappush(self.events, (time, self.order, what, arguments))
+
+    def run(self):
+        for rank in self.ranks:
+            self.push(0.0, self.ask, rank, False)
+        while self.events:
+            time, _, what, arguments = heapq.heappop(self.events)
+            what(time, *arguments)
+        return self.end, self.busy
+
+    def on_first(self, time, seconds):
+        first = self.ranks[0]
+        first.thread = max(time, first.thread) + seconds
+        self.busy += seconds
+        self.end = max(self.end, first.thread)
+        return first.thread
+
+    def ask(self, time, rank, known):
+        """A rank whose devices have nothing gets nodes for them."""
+        time = self.on_first(time, 0.0)
+        wanted, devices = len(rank.idle), len(rank.speeds)
+        while wanted > 0 and self.at < self.ranges:
+            left = self.ranges - self.at
+            size = min(devices * self.node_seconds / rank.mean, 0.5 * devices * left / self.rate / rank.mean) if known else 1
+            most = int(min(max(size, 1), left))
+            length = 1 << (most.bit_length() - 1)
+            if self.at:
+                length = min(length, self.at & -self.at)
+            self.at += length
+            wanted -= length
+            rank.queue.append([length, length])  # not begun, not finished
+        idle, rank.idle = rank.idle, []
+        for device in idle:
+            self.begin(time + (self.latency if rank is not self.ranks[0] else 0), rank, device)
+
+    def begin(self, time, rank, device):
+        if not rank.queue:
+            rank.idle.append(device)
+            return False
+        node = rank.queue[0]
+        node[0] -= 1
+        if node[0] == 0:
+            rank.queue.pop(0)
+        self.push(time + rank.speeds[device], self.finish, rank, device, node)
+        return True
+
+    def finish(self, time, rank, device, node):
+        time = max(time, rank.merged[device][0])  # it waits while two of its films are not added up
+        rank.thread = max(time, rank.thread) + self.merge
+        if rank is self.ranks[0]:
+            self.busy += self.merge
+        rank.merged[device] = [rank.merged[device][1], rank.thread]
+        node[1] -= 1
+        if node[1] == 0:
+            self.push(rank.thread, self.arrive, rank)
+        if not self.begin(time, rank, device) and self.at < self.ranges:
+            self.push(time, self.ask, rank, True)
+
+    def arrive(self, time, rank):
+        self.on_first(time, self.merge + (self.network if rank is not self.ranks[0] else 0))
 
 
 def main():
@@ -61,19 +106,21 @@ def main():
     parser.add_argument("--download", type=float, default=5e9, help="bytes/s of a film from a device")
     parser.add_argument("--merge", type=float, default=3e9, help="bytes/s of adding a film up (measured: merge_seconds)")
     parser.add_argument("--network", type=float, default=10e9, help="bytes/s into the first rank (measured: receive_seconds)")
-    parser.add_argument("--latency", type=float, default=4e-3, help="seconds from a film to the next order")
+    parser.add_argument("--latency", type=float, default=4e-3, help="seconds from a wish to the order")
     parser.add_argument("--spread", type=float, default=0.02, help="relative deviation of the speeds of devices")
+    parser.add_argument("--per-rank", type=int, default=8, help="devices of a rank")
     parser.add_argument("--devices", type=int, nargs="*", default=[1, 2, 4, 8, 16, 64, 128, 512])
     a = parser.parse_args()
     film = 48 * a.pixels
     rng = random.Random(1)
-    print(f"film {film / 1e6:.0f} MB, {a.ranges} ranges of {a.render_seconds / a.ranges:.2f} s")
+    print(f"film {film / 1e6:.0f} MB, {a.ranges} ranges of {a.render_seconds / a.ranges:.2f} s, {a.per_rank} devices a rank")
     print("| devices | seconds | efficiency | first rank busy |\n| --- | --- | --- | --- |")
     for devices in a.devices:
-        remote = devices > 8
-        handle = film / a.merge + (film / a.network if remote else 0)
-        runs = [simulate(devices, a.ranges, a.render_seconds / a.ranges, film / a.download, handle, a.latency, remote, rng, a.spread)
-                for _ in range(20)]
+        ranks = [min(a.per_rank, devices - d) for d in range(0, devices, a.per_rank)]
+        runs = [
+            Simulation(ranks, a.ranges, a.render_seconds / a.ranges + film / a.download, film / a.merge, film / a.network, a.latency, a.spread, rng).run()
+            for _ in range(5)
+        ]
         seconds = sum(r[0] for r in runs) / len(runs)
         busy = sum(r[1] / r[0] for r in runs) / len(runs)
         print(f"| {devices} | {seconds:.1f} | {a.render_seconds / devices / seconds:.3f} | {busy:.0%} |")

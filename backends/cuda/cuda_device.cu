@@ -28,10 +28,11 @@ bool cuda_device_present() {
 std::string cuda_device_name() {
     int device = 0;
     cudaDeviceProp properties;
-    if (!cuda_device_present() || cudaGetDevice(&device) != cudaSuccess ||
-        cudaGetDeviceProperties(&properties, device) != cudaSuccess)
-        return {};
-    return properties.name;
+    if (!cuda_device_present()) return {};
+    const bool known =
+        cudaGetDevice(&device) == cudaSuccess && cudaGetDeviceProperties(&properties, device) == cudaSuccess;
+    cudaGetLastError();
+    return known ? properties.name : "";
 }
 
 std::string cuda_device_bus_id() {
@@ -46,8 +47,10 @@ std::string cuda_device_bus_id() {
 
 int cuda_device_count() {
     int count = 0;
-    if (!cuda_device_present() || cudaGetDeviceCount(&count) != cudaSuccess) return 0;
-    return count;
+    if (!cuda_device_present()) return 0;
+    const bool known = cudaGetDeviceCount(&count) == cudaSuccess;
+    cudaGetLastError();
+    return known ? count : 0;
 }
 
 void use_cuda_device(int device) {
@@ -56,6 +59,7 @@ void use_cuda_device(int device) {
         throw Error(ExitCode::device, "CUDA device " + std::to_string(device) + " is not there: this process sees " +
                                           std::to_string(count) + ", numbered from 0");
     const cudaError_t set = cudaSetDevice(device);
+    cudaGetLastError();
     if (set != cudaSuccess)
         throw Error(ExitCode::device,
                     "CUDA device " + std::to_string(device) + " cannot be used: " + cudaGetErrorString(set));

@@ -5,13 +5,15 @@
 
 namespace ambilux {
 
-DeviceScene::DeviceScene(const Scene& scene)
+DeviceScene::DeviceScene(const Scene& scene, std::shared_ptr<const HostTexels> texels)
     : vertices_(scene.vertices, "vertices on the device"), triangles_(scene.triangles, "triangles on the device"),
       quadrics_(scene.quadrics, "analytic shapes on the device"), groups_(scene.groups, "groups on the device"),
       instances_(scene.instances, "instances on the device"), shapes_(scene.shapes, "shapes on the device"),
       materials_(scene.materials, "materials on the device"), bsdfs_(scene.bsdfs, "BSDFs on the device"),
-      textures_(scene.textures, "texture records on the device"), texels_(scene.texels, "texels on the device"),
-      sort_keys_(scene.sort_keys, "sort keys on the device"), emitters_(scene.emitters, "emitters on the device"),
+      textures_(scene.textures, "texture records on the device"),
+      texels_(texels ? std::span<const uint8_t>() : std::span<const uint8_t>(scene.texels), "texels on the device"),
+      host_texels_(std::move(texels)), sort_keys_(scene.sort_keys, "sort keys on the device"),
+      emitters_(scene.emitters, "emitters on the device"),
       emitter_cdf_(scene.emitter_cdf, "emitter probabilities on the device"),
       tables_(scene.tables, "tables on the device"), view_(scene.view()) {
     view_.vertices = vertices_.data();
@@ -23,7 +25,7 @@ DeviceScene::DeviceScene(const Scene& scene)
     view_.materials = materials_.data();
     view_.bsdfs = bsdfs_.data();
     view_.textures = textures_.data();
-    view_.texels = texels_.data();
+    view_.texels = host_texels_ ? host_texels_->data() : texels_.data();
     view_.sort_keys = sort_keys_.data();
     view_.emitters = emitters_.data();
     view_.emitter_cdf = emitter_cdf_.data();
@@ -45,13 +47,21 @@ DevicePairs::DevicePairs(const PairArrays& arrays)
       primitives_(arrays.primitives, "primitives on the device"), root_(arrays.root) {}
 
 template <>
+std::shared_ptr<const HostTexels> SharedAccels::get() {
+    return once(host_texels_, [&] {
+        return host_ ? host_->get<HostTexels>() : std::make_shared<const HostTexels>(scene_.texels, textures_);
+    });
+}
+
+template <>
 std::shared_ptr<const DeviceScene> SharedAccels::get() {
     return once(device_scene_, [&] {
         // With the structure, if it is made: it comes next.
         size_t free = 0, total = 0;
         cuda_check(cudaMemGetInfo(&free, &total), "device memory");
-        check_scene_fits(scene_, cwbvh_ ? cwbvh_->memory_bytes() : 0, free, total, cuda_device_name());
-        return std::make_shared<const DeviceScene>(scene_);
+        check_scene_fits(scene_, textures_, cwbvh_ ? cwbvh_->memory_bytes() : 0, free, total, cuda_device_name());
+        const bool on_host = textures_ != TextureMemory::device;
+        return std::make_shared<const DeviceScene>(scene_, on_host ? get<HostTexels>() : nullptr);
     });
 }
 

@@ -5,21 +5,30 @@
 #include "accel/pair_bvh.h"
 #include "accel/shared_accels.h"
 #include "backends/cuda/device_memory.h"
+#include "backends/cuda/host_texels.h"
 #include "scene/scene.h"
 
 namespace ambilux {
 
-/// A scene's arrays on the device. The scene may be changed or destroyed afterwards.
+/// A scene's arrays on the device, its texels there or on the host. The scene may be changed or destroyed afterwards.
 class DeviceScene {
 public:
-    /// Throws Error(device) when memory runs out.
-    explicit DeviceScene(const Scene& scene);
+    /// Throws Error(device) when memory runs out. `texels`: those of the scene if they stay on the host; else null.
+    explicit DeviceScene(const Scene& scene, std::shared_ptr<const HostTexels> texels = {});
 
     /// Pointers are to device memory, valid as long as this object.
     SceneView view() const { return view_; }
+    /// On the device, without what the driver keeps there of texels that lie on the host.
     uint64_t bytes() const;
-    /// What bytes() will be.
+    /// What bytes() will be, with texels on the device.
     static uint64_t predicted_bytes(const Scene& scene) { return scene.memory_bytes(); }
+    /// Of texels that lie on the host, HostTexels::drop() and prefetch().
+    void drop_texels() const {
+        if (host_texels_) host_texels_->drop();
+    }
+    void prefetch_texels(cudaStream_t stream) const {
+        if (host_texels_) host_texels_->prefetch(stream);
+    }
 
 private:
     DeviceBuffer<MeshVertex> vertices_;
@@ -32,6 +41,7 @@ private:
     DeviceBuffer<BsdfRecord> bsdfs_;
     DeviceBuffer<Texture> textures_;
     DeviceBuffer<uint8_t> texels_;
+    std::shared_ptr<const HostTexels> host_texels_;  ///< instead
     DeviceBuffer<uint16_t> sort_keys_;
     DeviceBuffer<Emitter> emitters_;
     DeviceBuffer<float> emitter_cdf_, tables_;
@@ -69,6 +79,8 @@ private:
     uint32_t root_;
 };
 
+template <>
+std::shared_ptr<const HostTexels> SharedAccels::get<HostTexels>();
 template <>
 std::shared_ptr<const DeviceScene> SharedAccels::get<DeviceScene>();
 template <>

@@ -43,7 +43,7 @@ public:
 
     /// Captures what `schedule(*this)` launches.
     template <class Schedule>
-    cudaGraphExec_t capture(Schedule schedule) {
+    Owned<cudaGraphExec_t> capture(Schedule schedule) {
         return graph_.capture([&] { launch(schedule); });
     }
     /// Launches kernel by kernel; the host reads the size of a queue wherever the schedule loops.
@@ -51,6 +51,7 @@ public:
     void launch(Schedule schedule) {
         detail::start_clock<<<1, 1, 0, stream()>>>(clock_);
         schedule(*this);
+        cuda_check(cudaGetLastError(), "wave");  // of launches that are not looked at one by one
     }
 
     template <class Stage>

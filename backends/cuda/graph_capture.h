@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "backends/cuda/device_memory.h"
+#include "backends/cuda/handles.h"
 
 #if CUDART_VERSION < 12080
 #error "Graphs that choose one of several bodies need CUDA 12.8 or newer"
@@ -24,18 +24,21 @@ public:
 
     /// What `launches()` launches, ready to run.
     template <class Launches>
-    cudaGraphExec_t capture(Launches launches) {
+    Owned<cudaGraphExec_t> capture(Launches launches) {
         cuda_check(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), "begin of graph capture");
         active_ = true;
-        launches();
-        active_ = false;
-        cudaGraph_t graph = nullptr;
-        cuda_check(cudaStreamEndCapture(stream_, &graph), "graph capture");
+        Owned<cudaGraph_t> graph;
+        cudaError_t ended = cudaSuccess;
+        with_end(launches, [&] {
+            cudaGraph_t made = nullptr;
+            ended = cudaStreamEndCapture(stream_, &made);
+            graph.reset(made);
+            active_ = false;
+        });
+        cuda_check(ended, "graph capture");
         cudaGraphExec_t exec = nullptr;
-        const cudaError_t made = cudaGraphInstantiate(&exec, graph, 0);
-        cudaGraphDestroy(graph);
-        cuda_check(made, "graph instantiation");
-        return exec;
+        cuda_check(cudaGraphInstantiate(&exec, graph.get(), 0), "graph instantiation");
+        return Owned<cudaGraphExec_t>(exec);
     }
 
     cudaGraphConditionalHandle make_condition() const {
@@ -68,19 +71,36 @@ public:
 #endif
 
         const cudaStream_t outer = stream_;
-        cuda_check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream");
-        for (uint32_t k = 0; k < bodies; ++k) {
-            cuda_check(cudaStreamBeginCaptureToGraph(stream_, params.conditional.phGraph_out[k], nullptr, nullptr, 0,
-                                                     cudaStreamCaptureModeThreadLocal),
-                       "begin of conditional capture");
-            body(k);
-            cuda_check(cudaStreamEndCapture(stream_, nullptr), "conditional capture");
-        }
-        cuda_check(cudaStreamDestroy(stream_), "stream");
-        stream_ = outer;
+        const Owned<cudaStream_t> inner = make_stream();
+        stream_ = inner.get();
+        with_end(
+            [&] {
+                for (uint32_t k = 0; k < bodies; ++k) capture_into(params.conditional.phGraph_out[k], [&] { body(k); });
+            },
+            [&] { stream_ = outer; });
     }
 
 private:
+    template <class Launches>
+    void capture_into(cudaGraph_t graph, Launches launches) {
+        cuda_check(cudaStreamBeginCaptureToGraph(stream_, graph, nullptr, nullptr, 0, cudaStreamCaptureModeThreadLocal),
+                   "begin of conditional capture");
+        cudaError_t ended = cudaSuccess;
+        with_end(launches, [&] { ended = cudaStreamEndCapture(stream_, nullptr); });
+        cuda_check(ended, "conditional capture");
+    }
+    /// Calls `end` also where `launches` throws: a thread that captures cannot free memory.
+    template <class Launches, class End>
+    static void with_end(Launches launches, End end) {
+        try {
+            launches();
+        } catch (...) {
+            end();
+            cudaGetLastError();  // of what was cut short
+            throw;
+        }
+        end();
+    }
     /// The graph that the stream is captured into, and the nodes that the next one depends on.
     std::pair<cudaGraph_t, std::vector<cudaGraphNode_t>> captured() const {
         cudaStreamCaptureStatus status;

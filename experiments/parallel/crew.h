@@ -1,4 +1,5 @@
-// The devices of one process, each with a renderer and a thread of its own.
+// The devices of one process, each with a renderer and a thread of its own. Nodes of the tree over ranges are given to
+// all of them together: each device takes the next range, and one film comes of a node.
 #pragma once
 
 #include <condition_variable>
@@ -7,25 +8,27 @@
 #include <mutex>
 #include <thread>
 
+#include "accel/shared_accels.h"
 #include "experiments/parallel/ranges.h"
 #include "render/renderer.h"
 
 namespace ambilux {
 
-/// What a worker is told to render.
+/// What a crew is told to render.
 struct Order {
     Ranges ranges;
     RangeNode node;
-    /// Instead: samples from 0 on until these seconds are over. Their number becomes the size of ranges.
+    double seconds_left = 0;  ///< from now on, of a budget in time; 0: none
+    /// Instead of the node: samples from 0 on by the first device until these seconds are over. Their number becomes
+    /// the size of ranges.
     double trial_seconds = 0;
 };
 
 /// What it rendered.
 struct Finished {
-    size_t worker = 0;
     Order order;
     FilmMoments film;
-    double seconds = 0;
+    double seconds = 0;  ///< of all devices together
 };
 
 /// A device as --devices names it: the number of a CUDA device, or "cpu".
@@ -34,51 +37,76 @@ struct Device {
     std::string name() const { return cuda < 0 ? "cpu" : std::to_string(cuda); }
 };
 
+/// What a device has done so far.
+struct DeviceWork {
+    uint64_t samples = 0, ranges = 0;
+    double seconds = 0;  ///< that it was busy
+    RenderStats stats;
+};
+
 class Crew {
 public:
-    /// Makes a renderer for each device, all at the same time. Throws what one of them throws.
-    Crew(const Scene& scene, const RenderSettings& settings, const std::vector<Device>& devices);
+    /// Makes a renderer for each device, all at the same time, with what `host` has for all of them. Throws what one of
+    /// them throws.
+    Crew(const Scene& scene, const RenderSettings& settings, const std::vector<Device>& devices, SharedAccels& host);
     /// Gives up what is being rendered.
     ~Crew();
 
     size_t size() const { return workers_.size(); }
-    /// To a worker that has nothing to do.
-    void give(size_t worker, const Order& order);
-    /// What was finished meanwhile; waits for it up to `seconds`. Throws what a worker threw.
+    void give(const Order& order);
+    /// Ranges that its devices could begin now, beside those that it was given.
+    size_t wanted() const;
+    /// Nodes that were finished meanwhile; waits up to `seconds` for a film of any device. Throws what a device threw,
+    /// after what was finished before.
     std::vector<Finished> take(double seconds);
-    /// Of all that it has done.
-    RenderStats stats(size_t worker) const {
-        const std::lock_guard lock(mutex_);
-        return workers_[worker]->stats;
-    }
+    /// Of each device.
+    std::vector<DeviceWork> work() const;
 
 private:
+    using Clock = std::chrono::steady_clock;
+
+    /// An order in work.
+    struct Open {
+        Order order;
+        Clock::time_point deadline;
+        uint64_t next = 0, end = 0;  ///< ranges that no device has begun
+        uint64_t missing = 0;        ///< ranges whose films are not added up
+        double seconds = 0;
+        MergeTree films;  ///< of the thread that takes
+    };
     struct Worker {
         Device device;
-        RenderStats stats;
-        bool ready = false;
-        std::optional<Order> order;
-        int waiting = 0;     ///< its films that are not taken yet
-        MergeTree ranges;    ///< of the node in work; of the thread that takes, as the next
-        double seconds = 0;  ///< that it took
+        DeviceWork work;
+        bool ready = false, busy = false;
+        int waiting = 0;  ///< its films that are not taken yet
         std::thread thread;
+    };
+    struct Task {
+        std::shared_ptr<Open> node;
+        uint64_t range = 0;
     };
     /// A range that was rendered: the device goes on while its film is added up.
     struct Piece {
-        Finished finished;
-        uint64_t range = 0;
-        bool last = false;  ///< of the node
+        Task task;
+        size_t worker = 0;
+        FilmMoments film;
+        double seconds = 0;
     };
 
-    void work(size_t index, const Scene& scene, RenderSettings settings);
-    bool render(size_t index, Renderer& renderer, const Order& order);
-    void post(size_t index, Piece piece, RenderStats stats);
+    void run(size_t index, const Scene& scene, RenderSettings settings, SharedAccels& host);
+    bool next_task(size_t index, Task& task);
+    bool is_too_slow(size_t index, const Open& node) const;
+    std::optional<Piece> render(size_t index, Renderer& renderer, const Task& task);
+    void post(Piece piece, RenderStats stats);
+    void failed(std::exception_ptr error);
 
     std::vector<std::unique_ptr<Worker>> workers_;
     mutable std::mutex mutex_;
     std::condition_variable changed_;
+    std::deque<std::shared_ptr<Open>> open_;  ///< with ranges that no device has begun
     std::deque<Piece> pieces_;
     std::exception_ptr error_;
+    bool failed_ = false;  ///< take() has seen it
     volatile bool stop_ = false;
 };
 

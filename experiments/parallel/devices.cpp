@@ -41,8 +41,11 @@ std::vector<Device> choose_devices(const std::vector<std::string>& names, const 
         if (settings.backend != Backend::cuda && !(open && cuda_available())) return {{}};
         return {{ranks.local_rank() % std::max(1, cuda_device_count())}};
     }
-    if (ranks.local_size() > 1) return {devices[size_t(ranks.local_rank()) % devices.size()]};
-    return devices;
+    const auto rank = size_t(ranks.local_rank()), others = size_t(ranks.local_size());
+    std::vector<Device> own;
+    for (size_t i = rank; i < devices.size(); i += others) own.push_back(devices[i]);
+    if (own.empty()) own.push_back(devices[rank % devices.size()]);
+    return own;
 }
 
 }  // namespace ambilux

@@ -9,8 +9,8 @@
 
 namespace ambilux {
 
-/// `names`: what --devices lists: numbers of CUDA devices, or "cpu". Where a host has several ranks each takes one of
-/// them, in turn; without names one of the devices of its host, or the CPU. Throws Error(usage).
+/// `names`: what --devices lists: numbers of CUDA devices, or "cpu". Where a host has several ranks they share them, in
+/// turn, at least one each; without names a rank takes one of the devices of its host, or the CPU. Throws Error(usage).
 std::vector<Device> choose_devices(const std::vector<std::string>& names, const RenderSettings& settings,
                                    const Ranks& ranks);
 

@@ -12,6 +12,7 @@
 #include "experiments/parallel/wire.h"
 #include "experiments/statistics.h"
 #include "experiments/stats_sum.h"
+#include "render/shared_renderer.h"
 
 namespace ambilux {
 namespace {
@@ -27,7 +28,9 @@ constexpr double kTrialSeconds = 1, kTrialShare = 1.0 / 64;
 class ParallelRender {
 public:
     ParallelRender(const Scene& scene, const ParallelRequest& request, Ranks& ranks)
-        : scene_(scene), request_(request), ranks_(ranks), settings_(request.settings), state_(request.state_path) {}
+        : scene_(scene), request_(request), ranks_(ranks), settings_(request.settings), state_(request.state_path) {
+        host_.emplace(scene);
+    }
 
     ParallelResult run() {
         identity_ = identity();
@@ -36,18 +39,26 @@ public:
         gather();
         start_ = Clock::now();
         saved_ = start_;
-        if (ranges_.size == 0) find_range_size();
-        if (!interrupted_) render();
+        try {
+            if (ranges_.size == 0) find_range_size();
+            if (!interrupted_) render();
+        } catch (const Error& fault) {
+            if (fault.code == ExitCode::device) save_after_fault(fault);
+            throw;
+        }
         return end();
     }
 
 private:
-    struct Worker {
-        WorkerShare share;
-        size_t index = 0;  ///< in its process
-        bool busy = false;
-        double per_range = 0;  ///< seconds; 0: unknown
-        RenderStats stats;     ///< since it began
+    /// A rank with its devices.
+    struct Party {
+        int rank = 0;
+        std::string host;
+        std::vector<DeviceWork> devices;
+        uint64_t films = 0;    ///< that it handed over
+        uint64_t open = 0;     ///< nodes that it has not handed over
+        size_t wanted = 0;     ///< ranges that it could begin
+        double per_range = 0;  ///< seconds of one of its devices, as last measured; 0: unknown
     };
 
     /// What must be the same for a state to be continued.
@@ -91,7 +102,8 @@ private:
             RenderSettings probe = settings_;
             const Device device = choose_devices(request_.devices, settings_, ranks_)[0];
             probe.backend = device.cuda >= 0 ? Backend::cuda : Backend::cpu;
-            choice_ = make_renderer(scene_, probe)->stats().choice;
+            SharedAccels accels(scene_, *host_);
+            choice_ = make_renderer(scene_, probe, accels)->stats().choice;
             earlier_seconds_ += choice_.seconds;
         }
         settings_.automatic = false;
@@ -106,8 +118,11 @@ private:
                  {{"scene_hash", identity_["scene_hash"]},
                   {"expected_samples", settings_.expected_samples},
                   {"choice", choice_.settings}});
-        crew_.emplace(scene_, settings_, choose_devices(request_.devices, settings_, ranks_));
-        for (size_t i = 0; i < crew_->size(); ++i) add_worker(0, host_name(), i, crew_->stats(i));
+        crew_.emplace(scene_, settings_, choose_devices(request_.devices, settings_, ranks_), *host_);
+        host_.reset();
+        parties_.resize(size_t(ranks_.size()));
+        parties_[0].host = host_name();
+        parties_[0].devices = crew_->work();
         for (int ready = 1; ready < ranks_.size();) {
             const std::optional<Told> told = hear(ranks_);
             if (!told) {
@@ -118,25 +133,25 @@ private:
                 }
                 continue;
             }
-            const auto& devices = told->text.at("devices");
-            for (size_t i = 0; i < devices.size(); ++i)
-                add_worker(told->from, told->text.at("host"), i, restore_stats(devices[i]));
+            Party& party = parties_[size_t(told->from)];
+            party.rank = told->from;
+            party.host = told->text.at("host");
+            party.devices = restore_work(told->text.at("devices"));
+            party.wanted = party.devices.size();
             ++ready;
         }
-    }
-    void add_worker(int rank, const std::string& host, size_t index, const RenderStats& stats) {
-        workers_.push_back({{rank, host, stats.device}, index, false, 0, stats});
     }
 
     double elapsed() const { return earlier_seconds_ + seconds_since(start_); }
 
     void find_range_size() {
         const double seconds = std::min(kTrialSeconds, kTrialShare * request_.budget.seconds);
-        order(workers_[0], {{1, 0}, {}, seconds});
+        ++parties_[0].open;
+        crew_->give({{1, 0}, {}, 0, seconds});
         while (ranges_.size == 0 && !interrupted_) {
             for (Finished& f : crew_->take(kPatience)) {
                 ranges_.size = f.order.ranges.size;
-                arrived(workers_[0], f.order.node, std::move(f.film), f.seconds, crew_->stats(0));
+                arrived(parties_[0], f.order.node, std::move(f.film), f.seconds, crew_->work());
             }
             interrupted_ = is_set(request_.interrupt);
         }
@@ -145,38 +160,49 @@ private:
     /// Ranges a second of all together, those that are not known yet as fast as the mean.
     double rate() const {
         double sum = 0;
-        size_t known = 0;
-        for (const Worker& w : workers_)
-            if (w.per_range > 0) sum += 1 / w.per_range, ++known;
-        return known ? sum * double(workers_.size()) / double(known) : 0;
+        size_t known = 0, all = 0;
+        for (const Party& p : parties_) {
+            all += p.devices.size();
+            if (p.per_range <= 0) continue;
+            sum += double(p.devices.size()) / p.per_range;
+            known += p.devices.size();
+        }
+        return known ? sum * double(all) / double(known) : 0;
     }
 
-    void order(Worker& worker, const Order& what) {
-        worker.busy = true;
-        if (worker.share.rank == 0) return crew_->give(worker.index, what);
-        tell(ranks_, worker.share.rank, Say::order,
-             {{"worker", worker.index},
-              {"size", what.ranges.size},
-              {"samples", what.ranges.samples},
-              {"level", what.node.level},
-              {"index", what.node.index},
-              {"trial", what.trial_seconds}});
+    /// Gives a party what it could begin; what it does not get it will not get later either.
+    void deal(Dealer& dealer, Party& party) {
+        std::vector<Order> orders;
+        for (size_t given = 0; given < party.wanted;) {
+            const auto node = dealer.next(elapsed(), party.per_range, rate(), party.devices.size());
+            if (!node) break;
+            const double left = request_.budget.seconds > 0 ? request_.budget.seconds - elapsed() : 0;
+            orders.push_back({ranges_, *node, left});
+            given += node->end() - node->first();
+        }
+        party.wanted = 0;
+        party.open += orders.size();
+        for (const Order& order : orders) {
+            if (party.rank == 0)
+                crew_->give(order);
+            else
+                tell(ranks_, party.rank, Say::order, order_text(order, &order == &orders.back()));
+        }
     }
 
     void render() {
         Dealer dealer(ranges_, request_.budget.seconds, tree_);
         for (;;) {
+            parties_[0].wanted = crew_->wanted();
             bool working = false;
-            for (Worker& worker : workers_) {
-                if (!worker.busy)
-                    if (const auto node = dealer.next(elapsed(), worker.per_range, rate()))
-                        order(worker, {ranges_, *node});
-                working |= worker.busy;
+            for (Party& party : parties_) {
+                deal(dealer, party);
+                working |= party.open > 0;
             }
             if (!working) return;
             take();
-            // Films of all workers take half of this thread's time at most.
-            dealer.set_node_seconds(std::max(Dealer::kNodeSeconds, 2 * double(workers_.size()) * film_seconds()));
+            // Films of all parties take half of this thread's time at most.
+            dealer.set_node_seconds(std::max(Dealer::kNodeSeconds, 2 * double(parties_.size()) * film_seconds()));
             if (is_set(request_.interrupt)) {
                 interrupted_ = true;
                 return;
@@ -191,7 +217,7 @@ private:
     /// That a film costs this thread.
     double film_seconds() const {
         uint64_t films = 0;
-        for (const Worker& w : workers_) films += w.share.nodes;
+        for (const Party& p : parties_) films += p.films;
         return films ? (merge_seconds_ + receive_seconds_) / double(films) : 0;
     }
 
@@ -204,24 +230,23 @@ private:
 
     void take() {
         for (Finished& f : crew_->take(ranks_.size() > 1 ? kPollSeconds : kPatience))
-            arrived(workers_[f.worker], f.order.node, std::move(f.film), f.seconds, crew_->stats(f.worker));
+            arrived(parties_[0], f.order.node, std::move(f.film), f.seconds, crew_->work());
         while (std::optional<Told> told = hear_timed()) {
             const nlohmann::json& t = told->text;
-            const auto sender = std::find_if(workers_.begin(), workers_.end(), [&](const Worker& w) {
-                return w.share.rank == told->from && w.index == t.at("worker");
-            });
-            arrived(*sender, {t.at("level"), t.at("index")}, std::move(told->film), t.at("seconds"),
-                    restore_stats(t.at("stats")));
+            Party& party = parties_[size_t(told->from)];
+            if (told->kind == Say::wanted)
+                party.wanted = t.at("ranges");
+            else
+                arrived(party, {t.at("level"), t.at("index")}, std::move(told->film), t.at("seconds"),
+                        restore_work(t.at("devices")));
         }
     }
 
-    void arrived(Worker& worker, RangeNode node, FilmMoments film, double seconds, const RenderStats& stats) {
-        worker.busy = false;
-        worker.per_range = seconds / double(node.end() - node.first());
-        worker.share.seconds += seconds;
-        worker.share.samples += film.samples;
-        ++worker.share.nodes;
-        worker.stats = stats;
+    void arrived(Party& party, RangeNode node, FilmMoments film, double seconds, std::vector<DeviceWork> devices) {
+        --party.open;
+        ++party.films;
+        party.per_range = seconds / double(std::min(node.end(), ranges_.count()) - node.first());
+        party.devices = std::move(devices);
         const auto start = Clock::now();
         tree_.add(node, std::move(film));
         merge_seconds_ += seconds_since(start);
@@ -236,18 +261,19 @@ private:
         uint64_t bytes = 0, predicted = 0;
         double build = 0;
         std::map<std::string, int> devices;
-        for (const Worker& w : workers_) {
-            add_part(sum, {}, w.stats);
-            bytes += w.stats.memory_bytes;
-            predicted += w.stats.memory_bytes_predicted;
-            build = std::max(build, w.stats.build_seconds);
-            ++devices[w.share.host + ": " + w.stats.device];
-        }
+        for (const Party& p : parties_)
+            for (const DeviceWork& d : p.devices) {
+                add_part(sum, {}, d.stats);
+                bytes += d.stats.memory_bytes;
+                predicted += d.stats.memory_bytes_predicted;
+                build = std::max(build, d.stats.build_seconds);
+                ++devices[p.host + ": " + d.stats.device];
+            }
         sum.device.clear();
         for (const auto& [name, count] : devices)
             sum.device +=
                 fmt::format("{}{}{}", sum.device.empty() ? "" : "; ", count > 1 ? fmt::format("{} x ", count) : "",
-                            devices.size() > 1 || ranks_.size() > 1 ? name : workers_[0].stats.device);
+                            devices.size() > 1 || ranks_.size() > 1 ? name : parties_[0].devices[0].stats.device);
         sum.memory_bytes = bytes;
         sum.memory_bytes_predicted = predicted;
         sum.build_seconds = build;
@@ -264,6 +290,16 @@ private:
                 {"stats", save_stats(total())}};
     }
 
+    /// A device failed, which ends the render: whole nodes are saved, and the message says so.
+    void save_after_fault(const Error& fault) {
+        if (tree_.samples() == 0) return;
+        state_.write(tree_, notes());
+        state_.wait();
+        throw Error(fault.code,
+                    fmt::format("{}. {} samples per pixel are in {}; the same command with --resume goes on",
+                                fault.what(), tree_.samples(), state_.path()));
+    }
+
     ParallelResult end() {
         ParallelResult result;
         result.position = position();
@@ -277,9 +313,9 @@ private:
         crew_.reset();
         result.film = tree_.sum();
         result.ranges = ranges_;
-        for (const Worker& w : workers_) result.workers.push_back(w.share);
-        std::stable_sort(result.workers.begin(), result.workers.end(),
-                         [](const WorkerShare& a, const WorkerShare& b) { return a.rank < b.rank; });
+        for (const Party& p : parties_)
+            for (const DeviceWork& d : p.devices)
+                result.workers.push_back({p.rank, p.host, d.stats.device, d.samples, d.ranges, d.seconds});
         result.merge_seconds = merge_seconds_;
         result.receive_seconds = receive_seconds_;
         if (!interrupted_) state_.remove();
@@ -297,8 +333,9 @@ private:
     RenderStats earlier_;
     double earlier_seconds_ = 0, merge_seconds_ = 0, receive_seconds_ = 0;
     SelectionStats choice_;
+    std::optional<SharedAccels> host_;  ///< of all devices here, until they have made what they need of it
     std::optional<Crew> crew_;
-    std::vector<Worker> workers_;
+    std::vector<Party> parties_;  ///< by rank
     Clock::time_point start_, saved_;
     bool interrupted_ = false;
 };

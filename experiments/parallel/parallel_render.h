@@ -21,8 +21,8 @@ struct ParallelRequest {
 struct WorkerShare {
     int rank = 0;
     std::string host, device;
-    uint64_t samples = 0, nodes = 0;  ///< nodes: films that it handed over
-    double seconds = 0;               ///< that it was busy
+    uint64_t samples = 0, ranges = 0;
+    double seconds = 0;  ///< that it was busy
 };
 
 struct ParallelResult {

@@ -39,18 +39,19 @@ uint64_t Dealer::open() const {
     return ranges;
 }
 
-std::optional<RangeNode> Dealer::next(double elapsed, double per_range, double rate) {
+std::optional<RangeNode> Dealer::next(double elapsed, double per_range, double rate, size_t devices) {
+    const auto together = double(devices);
     for (auto done = done_.find(at_); done != done_.end(); done = done_.find(at_)) at_ = done->second;
     if (at_ >= ranges_.count()) return std::nullopt;
-    double wanted = per_range > 0 ? node_seconds_ / per_range : 1;
+    double wanted = per_range > 0 ? together * node_seconds_ / per_range : 1;
     if (seconds_ > 0) {
         const double left = seconds_ - elapsed;
         if (left <= 0 || left < 0.5 * per_range) return std::nullopt;
-        if (per_range > 0) wanted = std::min(wanted, left / per_range);
+        if (per_range > 0) wanted = std::min(wanted, together * left / per_range);
     }
     // Half of what the time that is left allows, so that whoever is late holds up the others by little.
     if (ranges_.samples && per_range > 0 && rate > 0)
-        wanted = std::min(wanted, 0.5 * double(open()) / rate / per_range);
+        wanted = std::min(wanted, 0.5 * together * double(open()) / rate / per_range);
     const auto after = done_.lower_bound(at_);
     const uint64_t end = after == done_.end() ? ranges_.count() : std::min(ranges_.count(), after->first);
     const auto most = uint64_t(std::clamp(wanted, 1.0, double(end - at_)));

@@ -23,8 +23,8 @@ struct Ranges {
 /// device hands over the film after each: 256 samples, and at least 32 ranges (docs/scaling.md).
 uint32_t default_range_size(uint64_t samples, uint64_t pixels, bool cuda);
 
-/// Deals out ranges in their order. A worker gets a node of the tree at a time, so that it hands over one film for it:
-/// as many ranges as take it about kNodeSeconds, and fewer towards the end, so that all end together.
+/// Deals out ranges in their order. A rank gets a node of the tree at a time, so that it hands over one film for it:
+/// as many ranges as take its devices about kNodeSeconds, and fewer towards the end, so that all end together.
 class Dealer {
 public:
     static constexpr double kNodeSeconds = 2;
@@ -34,10 +34,10 @@ public:
 
     /// From now on, instead of kNodeSeconds.
     void set_node_seconds(double seconds) { node_seconds_ = seconds; }
-    /// What a worker does next that needs `per_range` seconds for a range (0: unknown), `elapsed` seconds after the
-    /// start, while all together do `rate` ranges a second. Nothing when all is dealt or there is no time for half a
-    /// range.
-    std::optional<RangeNode> next(double elapsed, double per_range, double rate);
+    /// What `devices` devices do next, each of which needs `per_range` seconds for a range (0: unknown), `elapsed`
+    /// seconds after the start, while all together do `rate` ranges a second. Nothing when all is dealt or there is no
+    /// time for half a range.
+    std::optional<RangeNode> next(double elapsed, double per_range, double rate, size_t devices = 1);
 
 private:
     uint64_t open() const;

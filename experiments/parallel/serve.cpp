@@ -33,31 +33,33 @@ void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& r
     settings.expected_samples = setup.text.at("expected_samples");
     for (const auto& [key, value] : setup.text.at("choice").get<std::vector<std::pair<std::string, std::string>>>())
         apply_setting(settings, key, value);
-    std::optional<Crew> crew(std::in_place, scene, settings, choose_devices(request.devices, settings, ranks));
-    nlohmann::json devices = nlohmann::json::array();
-    for (size_t i = 0; i < crew->size(); ++i) devices.push_back(save_stats(crew->stats(i)));
-    tell(ranks, 0, Say::ready, {{"host", host_name()}, {"devices", devices}});
-    for (;;) {
+    std::optional<SharedAccels> host(scene);
+    std::optional<Crew> crew(std::in_place, scene, settings, choose_devices(request.devices, settings, ranks), *host);
+    host.reset();
+    tell(ranks, 0, Say::ready, {{"host", host_name()}, {"devices", work_text(crew->work())}});
+    for (bool asked = true;;) {                               // the first orders come by themselves
         if (crew && is_set(request.interrupt)) crew.reset();  // the first rank decides what comes of it
         while (const std::optional<Told> told = hear(ranks)) {
             if (told->kind == Say::stop) return;
-            const nlohmann::json& t = told->text;
-            if (crew)
-                crew->give(t.at("worker"),
-                           {{t.at("size"), t.at("samples")}, {t.at("level"), t.at("index")}, t.at("trial")});
+            if (told->text.at("last").get<bool>()) asked = false;
+            if (crew) crew->give(read_order(told->text));
         }
         if (!crew) {
             std::this_thread::sleep_for(std::chrono::duration<double>(kPollSeconds));
             continue;
         }
-        for (const Finished& f : crew->take(kPollSeconds))
+        const std::vector<Finished> finished = crew->take(kPollSeconds);
+        // Before its last film: the render ends when no film is missing.
+        if (const size_t ranges = asked ? 0 : crew->wanted()) {
+            tell(ranks, 0, Say::wanted, {{"ranges", ranges}});
+            asked = true;  // where no answer comes nothing is left
+        }
+        for (const Finished& f : finished)
             tell(ranks, 0, Say::finished,
-                 {{"worker", f.worker},
-                  {"size", f.order.ranges.size},
-                  {"level", f.order.node.level},
+                 {{"level", f.order.node.level},
                   {"index", f.order.node.index},
                   {"seconds", f.seconds},
-                  {"stats", save_stats(crew->stats(f.worker))}},
+                  {"devices", work_text(crew->work())}},
                  &f.film);
     }
 }

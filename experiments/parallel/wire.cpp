@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "experiments/stats_sum.h"
 
 namespace ambilux {
 namespace {
@@ -52,6 +53,30 @@ std::optional<Told> hear(Ranks& ranks) {
         at += head.values * sizeof(double);
     }
     return told;
+}
+
+nlohmann::json order_text(const Order& order, bool last) {
+    return {{"size", order.ranges.size}, {"samples", order.ranges.samples},    {"level", order.node.level},
+            {"index", order.node.index}, {"seconds_left", order.seconds_left}, {"last", last}};
+}
+
+Order read_order(const nlohmann::json& t) {
+    return {{t.at("size"), t.at("samples")}, {t.at("level"), t.at("index")}, t.at("seconds_left")};
+}
+
+nlohmann::json work_text(const std::vector<DeviceWork>& devices) {
+    nlohmann::json text = nlohmann::json::array();
+    for (const DeviceWork& d : devices)
+        text.push_back(
+            {{"samples", d.samples}, {"ranges", d.ranges}, {"seconds", d.seconds}, {"stats", save_stats(d.stats)}});
+    return text;
+}
+
+std::vector<DeviceWork> restore_work(const nlohmann::json& text) {
+    std::vector<DeviceWork> devices;
+    for (const auto& d : text)
+        devices.push_back({d.at("samples"), d.at("ranges"), d.at("seconds"), restore_stats(d.at("stats"))});
+    return devices;
 }
 
 }  // namespace ambilux

@@ -14,6 +14,44 @@ from ambilux import _core
 from ambilux.errors import UsageError
 
 
+class DeviceArray:
+    """The values of `Image.rgb` in the memory of a CUDA device: float32 of height x width x 3.
+
+    PyTorch, CuPy and others see the same memory, without a copy: torch.from_dlpack(array), cupy.from_dlpack(array), cupy.asarray(array). It is finished,
+    whichever stream reads it, and lives as long as any of them.
+    """
+
+    dtype = np.dtype(np.float32)
+
+    def __init__(self, core: _core.DeviceImage):
+        self._core = core
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        width, height = self._core.size
+        return height, width, 3
+
+    @property
+    def device(self) -> str:
+        return f"cuda:{self._core.device}"
+
+    def __dlpack__(self, *, stream: Any = None, max_version: tuple[int, int] | None = None, dl_device: tuple[int, int] | None = None,
+                   copy: bool | None = None) -> Any:
+        if copy or dl_device not in (None, self.__dlpack_device__()):
+            raise BufferError("an array on the device is handed over as it is: copy it there")
+        return self._core.dlpack()
+
+    def __dlpack_device__(self) -> tuple[int, int]:
+        return 2, self._core.device  # kDLCUDA
+
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]:
+        return {"version": 3, "shape": self.shape, "typestr": self.dtype.str, "data": (self._core.pointer, False), "strides": None, "stream": None}
+
+    def __repr__(self) -> str:
+        return f"<ambilux.DeviceArray {self.shape[1]}x{self.shape[0]} on {self.device}>"
+
+
 class Image:
     """Linear Rec.709 radiance: `rgb`, float32 of height x width x 3, row by row from the top left.
 
@@ -24,7 +62,8 @@ class Image:
     True
     """
 
-    def __init__(self, rgb: Any, stderr: Any = None, samples: int = 0, stats: dict[str, Any] | None = None, attributes: dict[str, Any] | None = None):
+    def __init__(self, rgb: Any, stderr: Any = None, samples: int = 0, stats: dict[str, Any] | None = None, attributes: dict[str, Any] | None = None,
+                 on_device: DeviceArray | None = None):
         self.rgb = pixels(rgb)
         #: Standard error of every value; None where it is not known.
         self.stderr = None if stderr is None else pixels(stderr)
@@ -34,6 +73,8 @@ class Image:
         self.stats = stats or {}
         #: What made the image, for the header of its file.
         self.attributes = attributes or {}
+        #: The same values on the device that rendered them, where `device` asked for them; else None.
+        self.on_device = on_device
 
     @classmethod
     def _of(cls, core: _core.Pixels, **more: Any) -> Image:

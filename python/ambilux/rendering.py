@@ -11,7 +11,7 @@ from typing import Any
 
 from ambilux import _core
 from ambilux.errors import AmbiluxWarning, UsageError
-from ambilux.image import Image
+from ambilux.image import DeviceArray, Image
 from ambilux.scene import Scene, load, setting_text
 
 
@@ -41,31 +41,44 @@ def begin(scene: Scene | str | os.PathLike[str], size: tuple[int, int] | None, s
     return core
 
 
-def finished(core: _core.Render) -> Image:
+def backend_of(device: str | None, backend: str | None, settings: Mapping[str, Any] | None) -> str | None:
+    """Images stay on the device that renders them."""
+    if device not in (None, "cpu", "cuda"):
+        raise UsageError(f"device {device!r}: cpu and cuda are known")
+    if device != "cuda":
+        return backend
+    if (chosen := (settings or {}).get("backend", backend)) not in (None, "auto", "cuda"):
+        raise UsageError(f"device 'cuda': backend {chosen!r} has its images on the host")
+    return "cuda"
+
+
+def finished(core: _core.Render, device: str | None) -> Image:
     if lost := core.lost():
         warnings.warn(lost, AmbiluxWarning, stacklevel=3)
-    return image_of(core)
+    return image_of(core, device)
 
 
-def image_of(core: _core.Render) -> Image:
-    return Image._of(core.pixels(), stats=json.loads(core.stats()), attributes=json.loads(core.attributes()))
+def image_of(core: _core.Render, device: str | None) -> Image:
+    on_device = DeviceArray(core.device_image()) if device == "cuda" else None
+    return Image._of(core.pixels(), stats=json.loads(core.stats()), attributes=json.loads(core.attributes()), on_device=on_device)
 
 
 def render(scene: Scene | str | os.PathLike[str], integrator: str = "path", variant: str | None = None, *, spp: int | None = None, time: float | None = None,
            seed: int | None = None, size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
-           settings: Mapping[str, Any] | None = None) -> Image:
+           device: str | None = None, settings: Mapping[str, Any] | None = None) -> Image:
     """Renders `spp` samples per pixel, or for `time` seconds; with neither as many as the scene asks for.
 
-    `settings` are those of `ambilux help settings`. Other threads run meanwhile. An interrupt (KeyboardInterrupt) ends it
+    With device="cuda" the image is on the device as well, as `image.on_device`. `settings` are those of `ambilux help settings`. Other threads run meanwhile. An interrupt (KeyboardInterrupt) ends it
     after the sample per pixel in work.
 
     >>> image = ambilux.render(scene, "bdpt", spp=2, seed=1, settings={"strategies": ["hits", "next_event"]})
     >>> image.samples, image.stats["integrator"], image.variance.shape == image.shape
     (2, 'bdpt', True)
     """
+    backend = backend_of(device, backend, settings)
     core = begin(scene, size, settings, spp, time, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend)
     core.advance(0)
-    return finished(core)
+    return finished(core, device)
 
 
 @dataclass(frozen=True)
@@ -87,7 +100,7 @@ class Step:
 
 def progressive(scene: Scene | str | os.PathLike[str], integrator: str = "path", variant: str | None = None, *, spp: int | None = None,
                 time: float | None = None, every: float = 0.5, seed: int | None = None, size: tuple[int, int] | None = None, max_depth: int | None = None,
-                backend: str | None = None, settings: Mapping[str, Any] | None = None) -> Iterator[Step]:
+                backend: str | None = None, device: str | None = None, settings: Mapping[str, Any] | None = None) -> Iterator[Step]:
     """The same render, with the image so far about `every` seconds and at the end.
 
     >>> steps = list(ambilux.progressive(scene, spp=64, every=0.01))
@@ -96,17 +109,18 @@ def progressive(scene: Scene | str | os.PathLike[str], integrator: str = "path",
     """
     if not every > 0:
         raise UsageError(f"every {every}: more than zero seconds are needed")
+    backend = backend_of(device, backend, settings)
     core = begin(scene, size, settings, spp, time, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend)
-    return steps_of(core, every)
+    return steps_of(core, every, device)
 
 
-def steps_of(core: _core.Render, every: float) -> Iterator[Step]:
+def steps_of(core: _core.Render, every: float, device: str | None) -> Iterator[Step]:
     shown, more = 0, True
     while more:
         more = core.advance(every)
         if core.samples > shown:
             shown = core.samples
-            image = image_of(core) if more else finished(core)
+            image = image_of(core, device) if more else finished(core, device)
             yield Step(image, core.samples, core.seconds)
 
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <optional>
 
+#include "film/device_image.h"
 #include "film/exr_io.h"
 #include "film/metrics.h"
 #include "film/png_io.h"
@@ -20,6 +21,8 @@ namespace {
 
 using Pixels = nb::ndarray<nb::numpy, float, nb::ndim<3>>;
 using PixelsIn = nb::ndarray<const float, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu>;
+
+using DevicePixels = nb::ndarray<float, nb::ndim<3>, nb::c_contig, nb::device::cuda>;
 
 /// A view of `image`, which `owner` keeps alive.
 Pixels view(Image& image, nb::handle owner) {
@@ -69,6 +72,18 @@ void bind_images(nb::module_& m) {
             },
             nb::rv_policy::reference)
         .def_ro("samples", &Reference::samples);
+    nb::class_<DeviceImage>(m, "DeviceImage", "Means of pixels in the memory of a CUDA device.")
+        .def_ro("device", &DeviceImage::device)
+        .def_prop_ro("size", [](const DeviceImage& i) { return std::pair(i.width, i.height); })
+        .def_prop_ro("pointer", [](const DeviceImage& i) { return reinterpret_cast<uintptr_t>(i.rgb.get()); })
+        .def(
+            "dlpack",
+            [](nb::handle_t<DeviceImage> self) {
+                const auto& i = nb::cast<const DeviceImage&>(self);
+                return DevicePixels(i.rgb.get(), {size_t(i.height), size_t(i.width), 3}, self, {}, nb::dtype<float>(),
+                                    nb::device::cuda::value, i.device);
+            },
+            nb::rv_policy::reference, "A capsule of DLPack, which keeps the memory.");
     m.def("read_image", &read_image, "path"_a, "Pixels of an EXR file, and its attributes.");
     m.def("write_image", &write_image, "path"_a, "rgb"_a, "stderr"_a.none(), "samples"_a, "attributes"_a,
           "Writes an EXR file: a reference if `stderr` is given.");

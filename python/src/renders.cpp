@@ -110,6 +110,11 @@ public:
     void clear() { renderer_->clear_film(); }
 
     Reference pixels() { return to_reference(renderer_->film()); }
+    std::optional<DeviceImage> device_image() {
+        std::optional<DeviceImage> image;
+        run_unlocked([&](const volatile bool*) { image = renderer_->device_image(); });
+        return image;
+    }
     uint64_t samples() const { return position_.samples; }
     double seconds() const { return position_.seconds; }
     std::string stats() const {
@@ -186,6 +191,7 @@ void bind_renders(nb::module_& m) {
         .def("add", &Render::add, "first"_a, "count"_a)
         .def("clear", &Render::clear)
         .def("pixels", &Render::pixels)
+        .def("device_image", &Render::device_image)
         .def("stats", &Render::stats)
         .def("attributes", &Render::attributes)
         .def("lost", &Render::lost)

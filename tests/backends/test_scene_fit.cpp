@@ -7,22 +7,55 @@
 
 using namespace ambilux;
 
-TEST_CASE("what a scene needs is compared with what is free, and told part by part") {
+namespace {
+
+/// 3 MiB of geometry and 5 of textures.
+Scene small_scene() {
     Scene scene;
     scene.vertices.resize((3 << 20) / sizeof(MeshVertex));
     scene.texels.resize(5 << 20);
-    const uint64_t structure = 2 << 20, needed = scene.memory_bytes() + structure;
-    CHECK_NOTHROW(check_scene_fits(scene, structure, needed, 1ull << 40, "device"));
-    std::string message;
+    return scene;
+}
+constexpr uint64_t kStructure = 2 << 20;
+
+/// The message; empty if it fits.
+std::string refusal(const Scene& scene, TextureMemory textures, uint64_t free) {
     try {
-        check_scene_fits(scene, structure, needed - 1, 80ull << 30, "Device of 80 GiB");
+        check_scene_fits(scene, textures, kStructure, free, 80ull << 30, "Device of 80 GiB");
     } catch (const Error& e) {
         CHECK(e.code == ExitCode::device);
-        message = e.what();
+        return e.what();
     }
-    for (const char* part : {"needs 10 MiB", "3 of geometry", "5 of textures", "2 of acceleration structure",
-                             "0 of the rest", "9 of 81920 MiB of Device of 80 GiB are free"}) {
+    return {};
+}
+
+void check_parts(const std::string& message, std::initializer_list<const char*> parts) {
+    for (const char* part : parts) {
         CAPTURE(part, message);
         CHECK(message.find(part) != std::string::npos);
     }
+}
+
+}  // namespace
+
+TEST_CASE("what a scene needs is compared with what is free, and told part by part") {
+    const Scene scene = small_scene();
+    const uint64_t needed = scene.memory_bytes() + kStructure;
+    CHECK(refusal(scene, TextureMemory::device, needed).empty());
+    check_parts(refusal(scene, TextureMemory::device, needed - 1),
+                {"needs 10 MiB", "3 of geometry", "5 of textures", "2 of acceleration structure", "0 of the rest",
+                 "9 of 81920 MiB of Device of 80 GiB are free", "--memory host"});
+}
+
+TEST_CASE("textures on the host do not count, and are not offered where they do not help") {
+    const Scene scene = small_scene();
+    const uint64_t needed = scene.memory_bytes() + kStructure - scene.texels.size();
+    for (const TextureMemory host : {TextureMemory::host, TextureMemory::pinned}) {
+        CHECK(refusal(scene, host, needed).empty());
+        check_parts(refusal(scene, host, needed - 1),
+                    {"needs 5 MiB", "0 of textures (their 5 lie on the host)", "use --backend cpu"});
+        CHECK(refusal(scene, host, needed - 1).find("--memory") == std::string::npos);
+    }
+    CHECK(refusal(scene, TextureMemory::device, needed).find("--memory host") != std::string::npos);
+    CHECK(refusal(scene, TextureMemory::device, needed - 1).find("--memory host") == std::string::npos);
 }

@@ -98,6 +98,19 @@ TEST_CASE("1, 2 and 4 ranks make the image of one process") {
         CHECK(samples == 40);
         CHECK(stats["rays"] == json::parse(read_file(folder / "one.exr.json"))["rays"]);
     }
+    // Ranks of two devices each hand over one film for both.
+    std::vector<std::string> shared = arguments("shared.exr");
+    shared.insert(shared.end(), {"--devices", "cpu,cpu,cpu,cpu"});
+    shared.erase(std::find(shared.begin(), shared.end(), "--backend"),
+                 std::find(shared.begin(), shared.end(), "cpu") + 1);
+    const test::Outcome done = run_ranks(folder, 2, shared);
+    INFO(done.err);
+    REQUIRE(done.code == 0);
+    CHECK(bool(image(folder / "shared.exr").rgb == image(folder / "one.exr").rgb));
+    const json workers = json::parse(read_file(folder / "shared.exr.json"))["workers"];
+    std::vector<int> ranks_of_workers;
+    for (const auto& w : workers) ranks_of_workers.push_back(w["rank"]);
+    CHECK(ranks_of_workers == std::vector{0, 0, 1, 1});
 }
 
 TEST_CASE("kill -9 of any rank ends the job with a message; --resume with another number of ranks goes on") {

@@ -1,6 +1,7 @@
 // libs: ambilux_experiments
 // timeout: 120
 // Budgets of samples and of time, on a process of known mean and variance in the renderer's place.
+#include "experiments/kept_film.h"
 #include "experiments/work_estimate.h"
 #include "tests/support/experiment_fakes.h"
 
@@ -93,4 +94,31 @@ TEST_CASE("the time that is left: by kind, and for budgets of samples and second
     work.end("a");
     work.skip("a");
     CHECK(work.seconds_left("a") == Approx(2 * 2));
+}
+
+TEST_CASE("what a failed device does not give back is there as of the last copy; what it gives back is whole") {
+    World world;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 2;
+    struct Failing : FakeRenderer {
+        using FakeRenderer::FakeRenderer;
+        bool lost = false;
+        FilmMoments film() override {
+            if (lost) throw Error(ExitCode::device, "lost");
+            return FakeRenderer::film();
+        }
+    };
+    Failing renderer(scene, {}, world);
+    KeptFilm kept(renderer);
+    CHECK(kept.last().film.samples == 0);
+    CHECK(renderer.render(0, 3, nullptr) == 3);
+    kept.look(renderer.stats());
+    const FilmMoments three = renderer.film();
+    CHECK(renderer.render(3, 2, nullptr) == 2);
+    CHECK(kept.last().film.samples == 5);
+    renderer.lost = true;
+    const KeptFilm::Finished last = kept.last();
+    CHECK(last.film.samples == 3);
+    CHECK(last.stats.samples == 3);
+    CHECK(last.film.sum == three.sum);
 }

@@ -3,6 +3,7 @@
 // Several workers in one process: the image of a render does not depend on how many there are, nor on interrupts.
 #include <atomic>
 
+#include "accel/embree_tracer.h"
 #include "core/error.h"
 #include "core/flag.h"
 #include "experiments/parallel/parallel_render.h"
@@ -131,6 +132,55 @@ TEST_CASE("what a worker throws ends the render") {
     ParallelRequest request = request_for(scene, folder, "path", "wavefront", 2);
     request.settings.accel = AccelKind::bvh2;  // not on the CPU
     CHECK_THROWS_AS(render_parallel(scene, request, ranks()), Error);
+}
+
+TEST_CASE("a crew renders a node on all of its devices, hands over one film for it, and has one structure for rays") {
+    const Scene scene = project_scene("glass", 24, 16);
+    const RenderSettings settings = cpu_settings(scene, Estimator::mis);
+    const Ranges ranges = {3, 40};  // 14 ranges, of which the last has one sample
+    SharedAccels host(scene);
+    Crew crew(scene, settings, std::vector<Device>(3), host);
+    CHECK(host.get<EmbreeAccel>().use_count() == 1 + 3 + 1);  // here, each renderer, and the question
+    CHECK(crew.wanted() == 3);
+    const std::vector<RangeNode> nodes = {{3, 0}, {2, 2}, {1, 6}};
+    for (const RangeNode& node : nodes) crew.give({ranges, node});
+    std::vector<Finished> finished;
+    while (finished.size() < nodes.size())
+        for (Finished& f : crew.take(1)) finished.push_back(std::move(f));
+    CHECK(crew.wanted() == 3);
+    MergeTree together, apart;
+    for (Finished& f : finished) together.add(f.order.node, std::move(f.film));
+    const std::unique_ptr<Renderer> one = make_renderer(scene, settings);
+    for (uint64_t range = 0; range < ranges.count(); ++range) {
+        one->clear_film();
+        REQUIRE(one->render(ranges.first_sample(range), ranges.length(range)) == ranges.length(range));
+        apart.add({0, range}, one->film());
+    }
+    CHECK(same(together.sum(), apart.sum()));
+    uint64_t samples = 0, rendered = 0;
+    for (const DeviceWork& d : crew.work()) samples += d.samples, rendered += d.ranges;
+    CHECK(samples == 40);
+    CHECK(rendered == 14);
+}
+
+TEST_CASE("ranks of a host share its devices") {
+    struct Some : Ranks {
+        int rank_of_host = 0, on_host = 1;
+        int local_rank() const override { return rank_of_host; }
+        int local_size() const override { return on_host; }
+    };
+    const auto names = [](int rank, int size) {
+        Some some;
+        some.rank_of_host = rank;
+        some.on_host = size;
+        std::string text;
+        for (const Device& d : choose_devices({"0", "1", "2"}, {}, some)) text += d.name();
+        return text;
+    };
+    CHECK(names(0, 1) == "012");
+    CHECK(names(0, 2) == "02");
+    CHECK(names(1, 2) == "1");
+    CHECK(names(3, 5) == "0");
 }
 
 TEST_CASE("devices are numbers or cpu, and agree with the other options") {
