@@ -52,20 +52,20 @@ TEST_CASE("Stages inside of others share the time of those around them as they d
         FAIL(name << " in " << inside);
         return FusedShare{};
     };
-    CHECK(share("generate", "extend").seconds == Catch::Approx(0.5));
-    CHECK(share("extend", "extend").share == Catch::Approx(0.75));
+    CHECK(share("generate", "extend").seconds == Approx(0.5));
+    CHECK(share("extend", "extend").share == Approx(0.75));
     // accumulate: 1 second, half of it in either, whose own times are equal; mis_weight in shade alone.
-    CHECK(share("shade", "shade").seconds == Catch::Approx(6 * 4 / 7.5));
-    CHECK(share("connect", "shade").seconds == Catch::Approx(6 * 2 / 7.5));
-    CHECK(share("mis_weight", "shade").seconds == Catch::Approx(6 * 1 / 7.5));
-    CHECK(share("accumulate", "shade").seconds == Catch::Approx(6 * 0.5 / 7.5));
-    CHECK(share("accumulate", "occlude").seconds == Catch::Approx(3 * 0.5 / 4.5));
+    CHECK(share("shade", "shade").seconds == Approx(6 * 4 / 7.5));
+    CHECK(share("connect", "shade").seconds == Approx(6 * 2 / 7.5));
+    CHECK(share("mis_weight", "shade").seconds == Approx(6 * 1 / 7.5));
+    CHECK(share("accumulate", "shade").seconds == Approx(6 * 0.5 / 7.5));
+    CHECK(share("accumulate", "occlude").seconds == Approx(3 * 0.5 / 4.5));
     CHECK(found.size() == 8);
     for (const char* host : {"extend", "shade", "occlude"}) {
         double sum = 0;
         for (const FusedShare& s : found) sum += s.inside == host ? s.seconds : 0;
         for (const StageStats& s : fused)
-            if (s.name == host) CHECK(sum == Catch::Approx(s.seconds));
+            if (s.name == host) CHECK(sum == Approx(s.seconds));
     }
 }
 
