@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from analysis import experiment as experiments
-from analysis import figures, flip_maps, pack, pyramid, remarks, report, summary, tables
+from analysis import figures, flip_maps, latex, pack, pyramid, remarks, report, summary, tables
 
 
 def write(path, text):
@@ -32,8 +32,8 @@ def analyse(results, out, insets=None, full_size=False):
     lines = summary.lines(data, flip_maps.of_runs(data))
     said = remarks.remarks(data, lines)
     write(out / "table.csv", tables.to_csv(lines))
-    write(out / "table.tex", tables.to_latex(data, lines))
-    write(out / "tests.tex", tables.tests_to_latex(lines))
+    for name, text in latex.files(data, lines).items():
+        write(out / name, text)
     made = figures.make_all(data, out, write, insets or {})
     try:
         rows = strategy_rows(data)
@@ -82,7 +82,7 @@ def main(arguments=None):
         print(f"not made: {name}: {reason}", file=sys.stderr)
     for message in made.broken:
         print(f"error: {message}", file=sys.stderr)
-    print(f"{len(made.pictures)} figures, 2 tables and report.html in {options.output}")
+    print(f"{len(made.pictures)} figures, tables and report.html in {options.output}")
     return 3 if made.broken else 0
 
 

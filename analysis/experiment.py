@@ -174,9 +174,11 @@ class Experiment:
         return next(iter(self.files("images", scene, run, ".exr")), None)
 
     def reference(self, scene):
-        """Path of the reference image as the manifest names it, relative to the folder or absolute; None if it is not there."""
+        """Path of the reference image as the manifest names it, relative to the folder or absolute; where results came from another machine, the file of
+        that name in references/ here or beside the folder (names hold a hash of all that decides the image). None if it is not there."""
         name = (self.scene_entry(scene).get("reference") or {}).get("file")
-        return self.folder / name if name and (self.folder / name).is_file() else None
+        places = [self.folder / name, *(place / "references" / Path(name).name for place in (self.folder, self.folder.resolve().parent))] if name else ()
+        return next((place for place in places if place.is_file()), None)
 
     def stats(self, scene, run):
         """Statistics of the renders of all seeds, as the runner wrote them."""

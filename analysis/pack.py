@@ -23,12 +23,15 @@ def sha256(path):
 
 
 def members(data, images):
-    """(name in the archive, path) of what is packed: results, and references that lie inside. Figures are left out: they are made again."""
+    """(name in the archive, path) of what is packed: results and references, also those that lie elsewhere. Figures are left out: they are made again."""
     folder = data.folder
     names = ["config.resolved.toml", "manifest.json", "runs.csv", "batches.csv", "peers.json"]
     found = [(name, folder / name) for name in names if (folder / name).is_file()]
     for place in ("stats", "images", "techniques", "references"):
         found += [(p.relative_to(folder).as_posix(), p) for p in sorted((folder / place).rglob("*")) if p.is_file() and p.name not in LEFT_OUT]
+    packed = {path for _, path in found}
+    elsewhere = {path for scene in data.scenes if (path := data.reference(scene)) is not None and path not in packed}
+    found += [(f"references/{path.name}", path) for path in sorted(elsewhere)]
     return [(name, path) for name, path in found if images or path.suffix not in LARGE]
 
 

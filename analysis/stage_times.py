@@ -82,6 +82,12 @@ def draw(experiment, times_of, units, width="page"):
 
 
 UNITS = "ns per pixel and sample"
+INSIDE = {  # of a backend: what runs inside of other stages (backends/fusion.h), and how its time is known
+    "cpu": " On the CPU connect, connect_camera, connect_vertices and occlude run inside of the stages that make their vertices; their time is taken off these, measured of occlude, of the others "
+           "estimated from one vertex of sixteen. mis_weight and accumulate have no clock: their time is that of the stage that makes the light.",
+    "cuda": " On CUDA connect, connect_camera, mis_weight, accumulate and the camera rays of generate run inside of other stages, whose bars hold their time, and the last bounces of a wave count as "
+            "shade; `ambilux bench stages SCENE --unfused` estimates the shares from a render without fusion.",
+}
 
 
 def table(experiment):
@@ -100,5 +106,5 @@ def make(experiment):
     yield style.Picture(
         "stage_times", draw(experiment, found, UNITS), "Time of the stages",
         "Mean over seeds of each stage's time per pixel and sample, as the renderer measured it. On the CPU backend it is summed over worker threads, so that a bar "
-        f"divided by their number is near the wall clock's. Stages below {100 * SMALL:g} % of every bar are drawn as one.{hidden}",
+        f"divided by their number is near the wall clock's. Stages below {100 * SMALL:g} % of every bar are drawn as one.{''.join(INSIDE[b] for b in experiment.manifest.get('backends') or () if b in INSIDE)}{hidden}",
         list(dict.fromkeys(run for _, run in found)), list(dict.fromkeys(scene for scene, _ in found)))

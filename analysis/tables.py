@@ -1,4 +1,4 @@
-"""The table of an experiment as CSV, LaTeX (booktabs) and HTML."""
+"""The table of an experiment as CSV and HTML (LaTeX: latex.py)."""
 
 import csv
 import html
@@ -157,41 +157,6 @@ def variances_to_csv(rows):
     return out.getvalue()
 
 
-def latex_escape(text):
-    special = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"} | {c: "\\" + c for c in "&%$#_{}"}
-    symbols = {"±": r"$\pm$", "–": "--", "−": "$-$", "·": r"$\cdot$", "†": r"$^\dagger$", "≥": r"$\geq$", "×": r"$\times$", "<": "$<$", ">": "$>$", "|": r"$|$"}
-    return "".join(special.get(c) or symbols.get(c) or c for c in text)
-
-
-def latex_number(text):
-    """Typesets minus signs and powers of ten of a cell."""
-    match = re.fullmatch(r"(-?[\d.]+)e([-+]\d+)", text)
-    if match:
-        return rf"${match[1]}\cdot 10^{{{int(match[2])}}}$"
-    return "$-$" + latex_escape(text[1:]) if text.startswith("-") and text != "-" else latex_escape(text)
-
-
-def to_latex(experiment, lines):
-    """A tabular for \\usepackage{booktabs}; scenes are separated by \\midrule; a run that is best by more than chance is bold."""
-    shown = headings(experiment, lines)
-    out = [r"% Needs \usepackage{booktabs}. " + latex_escape(caption(experiment, lines)), r"\begin{tabular}{ll" + "r" * (len(shown) - 2) + "}", r"\toprule",
-           " & ".join(latex_escape(h) for h in shown) + r" \\"]
-    scene, biased = None, verdicts.biased(lines)
-    bold = {scene: verdicts.best(lines, scene) for scene in experiment.scenes}
-    for line in lines:
-        row = cells(line, experiment.base, biased, shown)
-        row = [latex_escape(c) for c in row[:2]] + [latex_text(c) for c in row[2:]]
-        if line.scene != scene:
-            out.append(r"\midrule")
-        else:
-            row[0] = ""
-        scene = line.scene
-        if line is bold.get(scene):
-            row[shown.index("efficiency")] = rf"\textbf{{{row[shown.index('efficiency')]}}}"
-        out.append(" & ".join(row) + r" \\")
-    return "\n".join([*out, r"\bottomrule", r"\end{tabular}", ""])
-
-
 TEST_HEADINGS = ("scene", "run", "slope [95 %]", "bias [95 %]", "p of the bias", "greatest |z|")
 
 
@@ -201,30 +166,6 @@ def test_cells(line):
     slope = "–" if s is None else f"{s.value:.3f}" if math.isnan(s.low) else f"{s.value:.3f} [{s.low:.3f}, {s.high:.3f}]"
     bias = "–" if b is None else f"{b.estimate.value:+.1e} [{b.estimate.low:+.1e}, {b.estimate.high:+.1e}]"
     return [line.scene, line.run, slope, bias, "–" if b is None else f"{b.p:.2g}", f"{line.bias_z:.1f}"]
-
-
-def tests_to_latex(lines):
-    """A tabular of slopes and bias for \\usepackage{booktabs}."""
-    out = [r"% Needs \usepackage{booktabs}. Slope of log RMSE against log samples (over checkpoints in samples if there are both kinds), -1/2 without bias; mean difference to the reference over seeds at the checkpoint of the table, its noise included.",
-           r"\begin{tabular}{llrrrr}", r"\toprule", " & ".join(latex_escape(h) for h in TEST_HEADINGS) + r" \\"]
-    scene = None
-    for line in lines:
-        row = test_cells(line)
-        if line.scene != scene:
-            out.append(r"\midrule")
-        else:
-            row[0] = ""
-        scene = line.scene
-        out.append(" & ".join([*map(latex_escape, row[:2]), *(latex_text(c) for c in row[2:])]) + r" \\")
-    return "\n".join([*out, r"\bottomrule", r"\end{tabular}", ""])
-
-
-NUMBER = re.compile(r"(?<![\w.])([-+]?\d[\d.]*(?:e[-+]\d+)?)(?!\w)")
-
-
-def latex_text(cell):
-    """latex_number of every number of a cell such as "-1.2e-05 [-2.0e-05, 1.0e-06]", latex_escape of the rest."""
-    return "".join(latex_number(part.lstrip("+")) if i % 2 else latex_escape(part) for i, part in enumerate(NUMBER.split(cell)))
 
 
 def minus(text):

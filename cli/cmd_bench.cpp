@@ -11,6 +11,7 @@
 #include "core/progress.h"
 #include "experiments/drive.h"
 #include "experiments/statistics.h"
+#include "render/fused_shares.h"
 
 namespace ambilux {
 namespace {
@@ -24,6 +25,7 @@ struct Options {
     uint32_t items = 0;
     bool opaque = false;
     uint32_t spp = 16;
+    bool unfused = false;
 };
 
 /// Columns of the rows in `rows`, as far as they are numbers or text.
@@ -71,27 +73,66 @@ int queues(const Options& o) {
     return report(o, bench_queues(load_scene(o.scene, {{"--json", o.json}}).scene, o.backend, o.items, o.repetitions));
 }
 
+/// A render of `spp` samples of every pixel.
+RenderPosition render(const Options& o, Renderer& renderer) {
+    Progress progress("bench stages");
+    return drive(renderer, {}, {o.spp, 0}, save_when_interrupted(), [&](const RenderPosition& p) {
+        progress.update(double(p.samples) / o.spp, progress_details(p.samples, p.seconds, renderer.stats()));
+    });
+}
+
+/// What the shares of fused stages are, in words.
+constexpr const char* kShares =
+    "shares of a render with fuse=none, whose kernels hold all features and go through queues: an estimate";
+
+std::string shares_table(const std::vector<FusedShare>& shares, double fused, double unfused) {
+    std::string table = fmt::format("\n{}\nrender {:.4f} s, with fuse=none {:.4f} s\n{:<16} {:<16} {:>10} {:>7}\n",
+                                    kShares, fused, unfused, "inside", "stage", "seconds", "share");
+    for (const FusedShare& s : shares)
+        table += fmt::format("{:<16} {:<16} {:>10.4f} {:>6.1f}%\n", s.inside, s.stage, s.seconds, 100 * s.share);
+    return table;
+}
+
+nlohmann::json shares_json(const std::vector<FusedShare>& shares, double unfused) {
+    nlohmann::json rows = nlohmann::json::array();
+    for (const FusedShare& s : shares)
+        rows.push_back({{"inside", s.inside}, {"name", s.stage}, {"seconds", s.seconds}, {"share", s.share}});
+    return {{"how", kShares}, {"unfused_seconds", unfused}, {"stages", rows}};
+}
+
 int stages(const Options& o) {
     if (o.spp < 1) throw Error(ExitCode::usage, "--spp: at least 1 is needed");
     const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}});
     RenderSettings settings = o.render.settings(loaded.scene);
     settings.expected_samples = o.spp;
-    const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
-    RenderPosition position;
-    {
-        Progress progress("bench stages");
-        position = drive(*renderer, {}, {o.spp, 0}, save_when_interrupted(), [&](const RenderPosition& p) {
-            progress.update(double(p.samples) / o.spp, progress_details(p.samples, p.seconds, renderer->stats()));
-        });
-    }
+    if (o.unfused && settings.fuse == Fuse::none)
+        throw Error(ExitCode::usage, "--unfused: with fuse=none no stage runs inside of another");
+    std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
+    RenderPosition position = render(o, *renderer);
     const RenderStats stats = renderer->stats();
-    if (!o.json.empty()) write_json(o.json, stats_json(loaded.scene, settings, stats, loaded.seconds));
+    std::vector<FusedShare> shares;
+    double unfused_seconds = 0;
+    if (o.unfused && !position.interrupted) {
+        renderer.reset();  // its memory is needed
+        RenderSettings unfused = settings;
+        unfused.fuse = Fuse::none;
+        renderer = make_renderer(loaded.scene, unfused);
+        position.interrupted = render(o, *renderer).interrupted;
+        unfused_seconds = renderer->stats().render_seconds;
+        shares = fused_shares(stats.stages, renderer->stats().stages);
+    }
+    if (!o.json.empty()) {
+        nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
+        if (o.unfused) json["fused_shares"] = shares_json(shares, unfused_seconds);
+        write_json(o.json, json);
+    }
     if (o.json != "-") {
         const double all = double(stats.rays_extend) + double(stats.rays_occlude);
         std::cout << fmt::format("{} on {} ({}), {}x{}, {} spp, {}rays/s\n\n", o.scene.path, stats.device, stats.accel,
                                  loaded.scene.sensor.crop_width, loaded.scene.sensor.crop_height, position.samples,
                                  format_count(stats.render_seconds > 0 ? all / stats.render_seconds : 0))
                   << stage_table(stats);
+        if (!shares.empty()) std::cout << shares_table(shares, stats.render_seconds, unfused_seconds);
     }
     return int(position.interrupted ? ExitCode::interrupted : ExitCode::done);
 }
@@ -136,6 +177,9 @@ void add_bench(CLI::App& app, Run& run) {
     s->scene.add_to(stages_command);
     s->render.add_to(stages_command, false);
     stages_command.add_option("--spp", s->spp, "Samples per pixel")->capture_default_str();
+    stages_command.add_flag("--unfused", s->unfused,
+                            "Render again with fuse=none, and apportion the time of stages that run others inside of "
+                            "them by what these take there");
     stages_command.add_option("--json", s->json, "Write the statistics to a file, or - for standard output");
     stages_command.callback([s, &run] { run = [s] { return stages(*s); }; });
 }

@@ -38,7 +38,7 @@ void fill_stage_stats(const std::vector<std::string>& names, const std::vector<S
         stage.name = names[s];
         stage.launches = r.launches;
         stage.items = r.items;
-        stage.seconds = double(r.nanoseconds) * 1e-9;
+        stage.seconds = std::max(0.0, double(int64_t(r.nanoseconds)) * 1e-9);  // FusedClock: an estimate
         uint32_t depths = kTrackedDepths;
         while (depths > 0 && r.items_by_depth[depths - 1] == 0) --depths;
         stage.items_by_depth.assign(r.items_by_depth, r.items_by_depth + depths);

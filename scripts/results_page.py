@@ -33,7 +33,8 @@ def markdown(data, lines):
 def facts(data):
     """Device, revision, references and commands, as captions state them."""
     kept = ("Device", "Clocks", "Revision", "Scenes", "Seeds", "Command")
-    return [f"- {text}" for text in captions.data_behind(data, data.scenes, data.runs) if text.startswith(kept)]
+    found = [text for text in captions.data_behind(data, data.scenes, data.runs) if text.startswith(kept)]
+    return [f"- {re.sub(r'^Command: [^ ]*/ambilux ', 'Command: ambilux ', text)}" for text in found]  # wherever the program lies
 
 
 def said(data, lines):

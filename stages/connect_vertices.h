@@ -3,6 +3,7 @@
 
 #include "stages/connect_emitter.h"
 #include "stages/connection_loop.h"
+#include "stages/fused_clock.h"
 #include "stages/light_vertex_search.h"
 #include "stages/mis_weight.h"
 #include "stages/occlude.h"
@@ -49,15 +50,16 @@ struct NextEventAndPair {
 /// At an eye vertex of a host: next event estimation and all pairs, in the same order and of the same vertices.
 template <Features F, class Out>
 struct NextEventAndConnections {
-    NextEvent<F, BidirectionalMis, Out> next_event;
+    Clocked<NextEvent<F, BidirectionalMis, Out>> next_event;
     LightVertexSource source;
     const WaveState* state;
     StageRecord* record;  ///< of connect_vertices
 
     AMBILUX_HD void at(const SceneView& scene, const Rules<BidirectionalMis>& rules, const BidirectionalVertex& v,
                        const Subpath<BidirectionalMis>& path, uint32_t slot, const Draws& draws) const {
-        next_event.at(scene, rules, v, path, slot, draws);
+        if (rules.next_event) next_event.at(scene, rules, v, path, slot, draws);
         if (!rules.connect) return;
+        const FusedClock clock(record, true);
         const LightVertexSearch lights = {source, draws.key, path.depth, v, rules.max_depth};
         uint32_t next = source.first(slot), found = lights.find(next);
         if (found == kNone) return;
@@ -65,7 +67,7 @@ struct NextEventAndConnections {
         for (; found != kNone; found = lights.find(next)) {
             record->count_item(path.depth);
             push_connection<F>(scene, rules, source, *state, draws, end, slot, load_vertex<F>(source.vertices, found),
-                               found, next_event.seeds, next_event.candidates, record);
+                               found, next_event.inner.seeds, next_event.inner.candidates, record);
         }
     }
 };

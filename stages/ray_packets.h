@@ -2,7 +2,7 @@
 #pragma once
 
 #include "accel/traceable.h"
-#include "stages/stage.h"
+#include "stages/fused_clock.h"
 
 namespace ambilux {
 
@@ -91,6 +91,7 @@ private:
     __attribute__((noinline)) void trace() const {
         const auto& queue = stage.items();
         const uint32_t count = queue.counter->size();
+        const FusedClock clock(stage.record, most < kMostPacketRays);
         RayPackets<Stage> packets(stage);
         for (uint32_t i = 0; i < count; ++i) packets.add(i);
         packets.trace();

@@ -79,7 +79,7 @@ def test_trimmed_error_has_figures_columns_and_a_remark(folder, data, tmp_path, 
     assert float(row["relmse_trimmed"]) == pytest.approx(4 * 4 / 32 / 4, rel=1e-6) and float(row["relmse_over_trimmed"]) == pytest.approx(4)
     lines = summary.lines(data)
     assert "trimmed relMSE" in tables.headings(data, lines) and "(×4.0)" in tables.to_html(data, lines)
-    assert "trimmed relMSE" in (tmp_path / "table.tex").read_text()
+    assert "trimmed relMSE" in (tmp_path / "errors.tex").read_text()
 
 
 def test_trimming_that_changes_the_order_is_said(tmp_path):

@@ -55,3 +55,21 @@ def test_an_archive_makes_the_same_tables_again(folder, tmp_path, capsys):
         assert not any(name.endswith(".exr") for name in archive.namelist()) and "batches.csv" in archive.namelist()
     assert program.main(["pack", str(tmp_path), "-o", str(tmp_path / "c.zip")]) == 3
     assert "is no experiment folder" in capsys.readouterr().err
+
+
+def test_references_are_found_where_results_went(tmp_path):
+    """The runner states a reference outside of its folder by its place on the machine that made it."""
+    folder = synthetic.make(tmp_path / "all" / "run", scenes=("box",), runs=(("nee", 0.7, 1.5), ("mis", 0.5, 2.0)))
+    manifest = json.loads((folder / "manifest.json").read_text())
+    manifest["scenes"][0]["reference"]["file"] = "/gone/references/box-abc.exr"
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    assert experiment.load(folder).reference("box") == folder / "references" / "box-abc.exr"
+    (folder / "references").rename(tmp_path / "all" / "references")
+    assert experiment.load(folder).reference("box") == (tmp_path / "all" / "references" / "box-abc.exr").resolve()
+    assert program.main(["pack", str(folder), "-o", str(tmp_path / "all.zip")]) == 0
+    with zipfile.ZipFile(tmp_path / "all.zip") as archive:
+        assert "references/box-abc.exr" in archive.namelist()
+        archive.extractall(tmp_path / "there")
+    (tmp_path / "all" / "references" / "box-abc.exr").unlink()
+    assert experiment.load(folder).reference("box") is None
+    assert experiment.load(tmp_path / "there").reference("box") is not None

@@ -39,7 +39,7 @@ def test_all_files_are_written(output):
     if flip_maps.flip_evaluator is None:
         pytest.skip("flip-evaluator is not installed")
     expected = {f"{n}.{suffix}" for n in NAMES for suffix in ("pdf", "png", "caption.txt")}
-    assert {p.name for p in output.iterdir()} == expected | {"table.csv", "table.tex", "tests.tex", "strategy_variance.csv", "report.html"}
+    assert {p.name for p in output.iterdir()} == expected | {"table.csv", "table.tex", "errors.tex", "table_column.tex", "tests.tex", "strategy_variance.csv", "report.html"}
 
 
 @pytest.mark.filterwarnings("error::UserWarning")  # what matplotlib says of a layout that has no room
@@ -274,7 +274,7 @@ def test_long_names_are_wrapped_at_their_settings():
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
 def test_tables_are_latex(output, tmp_path):
     document = tmp_path / "tables.tex"
-    inputs = "\n".join(rf"\input{{{output / name}}}" for name in ("table.tex", "tests.tex"))
+    inputs = "\n".join(rf"\input{{{output / name}}}" for name in ("table.tex", "errors.tex", "table_column.tex", "tests.tex"))
     document.write_text(r"\documentclass{article}\usepackage{booktabs}\begin{document}" + "\n" + inputs + "\n" + r"\end{document}")
     made = subprocess.run(["pdflatex", "-interaction=nonstopmode", "-halt-on-error", document.name], cwd=tmp_path, capture_output=True, text=True)
     assert made.returncode == 0, made.stdout[-2000:]

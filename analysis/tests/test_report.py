@@ -6,9 +6,11 @@ import re
 
 import numpy as np
 import pytest
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextPath
 
 from analysis import __main__ as program
-from analysis import experiment, images, remarks, style, summary, tables, verdicts
+from analysis import experiment, images, latex, remarks, style, summary, tables, verdicts
 from analysis.tests import synthetic
 
 
@@ -64,23 +66,23 @@ def test_one_outlying_seed_is_not_flattered(tmp_path):
 
 def test_where_no_interval_can_be_trusted_the_table_says_why_and_gives_no_ratio(folder, tmp_path):
     data = experiment.load(folder)
-    row = next(r for r in tables.to_latex(data, summary.lines(data)).splitlines() if "& mis" in r)
-    assert "3 seeds" in row and "textbf" not in row
+    row = next(r for r in latex.results(data, summary.lines(data)).splitlines() if "& mis" in r)
+    assert "--$^{a}$" in row and "$^{a}$ 3 seeds" in latex.results(data, summary.lines(data)) and "textbf" not in row
     data = experiment.load(synthetic.make(tmp_path / "few", scenes=("box",), checkpoints=(1, 4, 16, 64), seconds=(0.04, 0.08), outliers=4.0))
     line = next(x for x in summary.lines(data) if x.run == "mis")
-    assert line.ratio.doubt == "few pixels decide" and "few pixels decide" in tables.to_latex(data, summary.lines(data))
+    assert line.ratio.doubt == "few pixels decide" and "few pixels decide" in latex.results(data, summary.lines(data))
 
 
 def test_bold_and_statements_need_significance(tmp_path):
     near = (("a", 1.0, 1.0), ("b", 0.997, 1.0), ("c", 2.0, 1.0))
     data = experiment.load(synthetic.make(tmp_path / "near", scenes=("box",), runs=near, batches=16))
     lines = summary.lines(data)
-    assert verdicts.best(lines, "box") is None and "textbf" not in tables.to_latex(data, lines)
+    assert verdicts.best(lines, "box") is None and "textbf" not in latex.results(data, lines)
     assert [verdicts.differs(line, lines) for line in lines] == [False, False, True]
     far = (("a", 1.0, 1.0), ("b", 0.8, 1.0), ("c", 2.0, 1.0))
     data = experiment.load(synthetic.make(tmp_path / "far", scenes=("box",), runs=far, batches=16))
     lines = summary.lines(data)
-    assert verdicts.best(lines, "box").run == "b" and tables.to_latex(data, lines).count("textbf") == 1
+    assert verdicts.best(lines, "box").run == "b" and latex.results(data, lines).count("textbf") == 1
 
 
 def test_the_configuration_chooses_the_metric_that_leads(tmp_path, capsys):
@@ -139,7 +141,7 @@ def test_verdicts_say_what_the_data_say(tmp_path):
     assert "no departure" in said["mis"][0] and "more than chance" in said["mis"][1]
     # Speed-ups that compare with a biased run are marked.
     assert verdicts.biased(lines) == {("box", "mis")}
-    marked = [row for row in tables.to_latex(data, lines).splitlines() if r"$^\dagger$" in row and row.endswith(r"\\")]
+    marked = [row for row in latex.results(data, lines).splitlines() if r"$^\dagger$" in row and row.endswith(r"\\")]
     assert len(marked) == 1 and "& mis" in marked[0]
 
 
@@ -170,17 +172,40 @@ def test_run_names_of_sweeps():
     assert experiment.settings_of("odd[name]") == ("odd[name]", {})
 
 
+def body_of(text):
+    return [line for line in text.splitlines() if line.endswith(r"\\") and "multicolumn" not in line]
+
+
 def test_latex_tables_have_equal_columns_and_no_raw_specials(folder):
     data = experiment.load(folder)
-    lines = summary.lines(data)
-    for text, headings in ((tables.to_latex(data, lines), tables.headings(data, lines)), (tables.tests_to_latex(lines), tables.TEST_HEADINGS)):
-        body = [line for line in text.splitlines() if line.endswith(r"\\")]
-        assert len(body) == 7
-        assert {line.count(" & ") for line in body} == {len(headings) - 1}
-        assert not re.search(r"[^\x00-\x7f]", "".join(body))
-        assert "[95 \\%]" in text
-    assert tables.latex_escape("a_b%") == r"a\_b\%"
-    assert tables.latex_number("-1.2e-05") == r"$-1.2\cdot 10^{-5}$"
+    made = latex.files(data, summary.lines(data))
+    assert list(made) == ["table.tex", "errors.tex", "table_column.tex", "tests.tex"]
+    for name, text in made.items():
+        body = body_of(text)
+        assert len(body) == 7, name
+        assert len({line.count(" & ") for line in body}) == 1, name
+        assert not re.search(r"[^\x00-\x7f]", text.split("\n", 1)[1]), name
+    assert all("[95 \\%]" in made[name] for name in ("table.tex", "table_column.tex", "tests.tex"))
+    assert latex.escape("a_b%") == r"a\_b\%"
+    assert latex.number("-1.2e-05") == r"$-1.2\cdot 10^{-5}$"
+
+
+def inches(tabular):
+    """Width of a tabular in Computer Modern of 8 points: the widest cell of each column, and the room between columns."""
+    def width(cell):
+        words = re.sub(r"\\begin\{tabular\}\[t\]\{[^}]*\}\}|\\end\{tabular\}|\\(?:textbf|emph|pm|cdot|dagger)\b|[${}^\\]", "", cell.replace(r"\begin{tabular}[t]{@{}l@{}}", ""))
+        return TextPath((0, 0), words, size=8, prop=FontProperties(family="cmr10")).get_extents().width if words.strip() else 0.0
+    rows = [[max(map(width, cell.split(r"\\"))) for cell in re.split(r" & ", line.removesuffix(r" \\"))] for line in body_of(tabular)]
+    return (sum(map(max, zip(*rows))) + 2 * 3.5 * len(rows[0])) / 72
+
+
+def test_latex_tables_are_as_wide_as_a_page_and_a_column_of_a_paper(tmp_path):
+    long = tuple((f"lvc[connections={n},wave_size=4096]", 1.0 + n / 100, 1.0) for n in (1, 16)) + (("hits+next_event+connections", 2.0, 1.0),)
+    data = experiment.load(synthetic.make(tmp_path / "r", scenes=("veach-ajar", "living-room[size=640x360]"), runs=long, batches=40, checkpoints=(1, 4, 16, 64), seconds=(0.04, 0.08)))
+    made = latex.files(data, summary.lines(data))
+    assert "[0." in made["table.tex"]  # intervals are stated
+    for name, widest in (("table.tex", style.PAGE), ("errors.tex", style.PAGE), ("tests.tex", style.PAGE), ("table_column.tex", style.COLUMN)):
+        assert 0.5 * widest < inches(made[name]) <= 0.97 * widest, name
 
 
 def test_unfinished_experiment_is_reported_with_a_remark(folder, tmp_path):

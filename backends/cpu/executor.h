@@ -8,6 +8,7 @@
 
 #include "queues/order.h"
 #include "queues/overflow.h"
+#include "stages/fused_clock.h"
 #include "stages/order_keys.h"
 #include "stages/ray_packets.h"
 #include "stages/stage.h"
@@ -25,14 +26,14 @@ public:
     template <class Stage>
     void run_slots(const Stage& stage, uint32_t slots, uint32_t samples = 0) {
         const uint32_t n = slots * (samples ? samples : state_->samples);
-        const auto start = Clock::now();
+        const Start start;
         for (uint32_t i = 0; i < n; ++i) stage(i);
         record(stage, n, start);
     }
     template <class Stage>
     void run_paths(const Stage& stage, uint32_t slots) {
         const uint32_t n = slots * state_->samples;
-        const auto start = Clock::now();
+        const Start start;
         stage.run(0, n, 1);
         record(stage, n, start);
     }
@@ -81,6 +82,11 @@ public:
 
 private:
     using Clock = std::chrono::steady_clock;
+    /// Of a launch. Stages that run inside of it have clocks of their own.
+    struct Start {
+        int64_t inside = FusedTime::inside();
+        Clock::time_point time = Clock::now();
+    };
 
     template <class Order, class Stage>
     void trace_packets(const Stage& stage, bool coherent) {
@@ -94,7 +100,7 @@ private:
         const auto& queue = stage.items();
         const uint32_t items = queue.counter->size();
         if (items == 0) return;
-        const auto start = Clock::now();
+        const Start start;
         const uint32_t* list = make_list<Order>(queue);
         const bool gaps = queue.flags && !list;
         const uint32_t n = gaps ? queue.capacity() : items;
@@ -132,9 +138,9 @@ private:
         return std::exchange(queue.flags[slot], uint8_t(0));
     }
     template <class Stage>
-    void record(const Stage& stage, uint32_t items, Clock::time_point start) {
-        const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start).count();
-        stage.record->add(items, state_->depth, uint64_t(ns));
+    void record(const Stage& stage, uint32_t items, const Start& start) {
+        const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start.time).count();
+        stage.record->add(items, state_->depth, uint64_t(ns - (FusedTime::inside() - start.inside)));
     }
 
     WaveState* state_;

@@ -6,6 +6,7 @@
 #include "stages/connect_emitter.h"
 #include "stages/extend.h"
 #include "stages/eye_vertex.h"
+#include "stages/fused_clock.h"
 #include "stages/generate.h"
 
 namespace ambilux {
@@ -61,7 +62,8 @@ struct PathIntegrator {
     struct Stages {
         using Eye = EyeSide<F, Tracer, kFusion>;
         using Connect = Sampling<F, Mis, typename Eye::Candidates>;
-        using AtVertex = std::conditional_t<kFusion.connect, Connect, QueueVertex<F, Mis>>;
+        using ConnectHere = std::conditional_t<kFusion.occlude, Clocked<Connect>, Connect>;
+        using AtVertex = std::conditional_t<kFusion.connect, ConnectHere, QueueVertex<F, Mis>>;
 
         Policy policy;
         Wave wave;
@@ -80,7 +82,7 @@ struct PathIntegrator {
             const Connect connect = sampling(record(connect_emitter), seeds);
             generate = {scene, wave, p.rules.mis, q.rays[0], film.samples, record(generate)};
             connect_emitter = {scene, wave, p.rules, m.eye.vertices, connect, connect.record};
-            const auto at_vertex = choose<kFusion.connect>(connect, QueueVertex<F, Mis>{m.eye.vertices});
+            const auto at_vertex = choose<kFusion.connect>(ConnectHere{connect}, QueueVertex<F, Mis>{m.eye.vertices});
             for (int k = 0; k < 2; ++k) {
                 extend[k] = {scene, tracer, wave, Stream::eye, q.rays[k], q.hits[k], record(extend[k])};
                 eye_vertex[k] = {scene,

@@ -6,6 +6,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <thread>
 
 #include "core/atomic_file.h"
@@ -461,6 +462,31 @@ TEST_CASE("info and bench stages") {
     CHECK(bench.code == 0);
     CHECK(contains(bench.out, "ns/item"));
     CHECK(json::parse(read_file(folder / "b.json"))["spp"] == 2);
+}
+
+TEST_CASE("bench stages apportions the time of stages that run others inside of them") {
+    const test::TempFolder folder;
+    const std::vector<std::string> command = {"bench", "stages", kCornell, "--backend", "cpu", "--size",
+                                              "24x16", "--spp",  "8",      "-i",        "bdpt"};
+    const auto with = [&](std::initializer_list<std::string> more) {
+        std::vector<std::string> all = command;
+        all.insert(all.end(), more);
+        return run(folder, all);
+    };
+    const Outcome bench = with({"--unfused", "--json", folder / "b.json"});
+    REQUIRE(bench.code == 0);
+    CHECK(contains(bench.out, "shares of a render with fuse=none"));
+    const json j = json::parse(read_file(folder / "b.json")), shares = j["fused_shares"];
+    CHECK(contains(shares["how"].get<std::string>(), "an estimate"));
+    CHECK(shares["unfused_seconds"].get<double>() > 0);
+    std::map<std::string, double> sums;
+    for (const json& s : shares["stages"]) sums[s["inside"]] += s["seconds"].get<double>();
+    CHECK(sums.count("shade") == 1);
+    for (const json& s : j["stages"])
+        if (sums.count(s["name"])) CHECK(sums[s["name"]] == Approx(s["seconds"].get<double>()).epsilon(1e-6));
+    const Outcome refused = with({"--unfused", "--set", "fuse=none"});
+    CHECK(refused.code == 2);
+    CHECK(contains(refused.err, "no stage runs inside of another"));
 }
 
 TEST_CASE("bench queues") {

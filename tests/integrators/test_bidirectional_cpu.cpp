@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <thread>
 
 #include "core/error.h"
 #include "tests/support/bidirectional_images.h"
@@ -164,6 +165,31 @@ TEST_CASE("G3, G8: memory is what was predicted, queues never overflow, and coun
                 CHECK(stats.rays_occlude == stages["occlude"].items);
                 CHECK(stats.invalid.total() == 0);
             }
+}
+
+TEST_CASE("Stages that run inside of others on a host have items and times of their own", "[bidirectional]") {
+    const Scene scene = project_scene("cornell", 64, 64);
+    for (RenderSettings s : {cpu_settings(scene, Estimator::mis, 5), settings_of(scene)}) {
+        INFO(s.integrator);
+        const RenderStats fused = render_scene(scene, s, 4).stats;
+        s.fuse = Fuse::none;
+        const RenderStats unfused = render_scene(scene, s, 4).stats;
+        double seconds = 0;
+        std::map<std::string, StageStats> of_fused;
+        for (const StageStats& stage : fused.stages) {
+            of_fused[stage.name] = stage;
+            seconds += stage.seconds;
+        }
+        for (const StageStats& stage : unfused.stages) {
+            INFO(stage.name);
+            if (!stage.name.starts_with("connect") && stage.name != "occlude") continue;
+            CHECK(of_fused[stage.name].items == stage.items);
+            CHECK(of_fused[stage.name].seconds > 0);
+        }
+        CHECK(of_fused.size() >= 6);
+        // What is taken off the stage around them is theirs: no thread is busy for longer than there is time.
+        CHECK(seconds <= 1.02 * fused.render_seconds * std::thread::hardware_concurrency());
+    }
 }
 
 TEST_CASE(

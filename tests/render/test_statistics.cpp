@@ -1,6 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 60
 // From the records of stages to the statistics of a render.
+#include "render/fused_shares.h"
 #include "render/statistics.h"
 
 #include "tests/support/catch.h"
@@ -21,4 +22,56 @@ TEST_CASE("Values dropped by a stage that runs as part of another count, though 
     CHECK(stats.invalid.total() == 2);  // what is below the range of floats is no error by itself
     CHECK(stats.invalid_by_stage.size() == 1);
     CHECK(stats.invalid_by_stage["connect"].underflow == 3);
+}
+
+TEST_CASE("A sampled clock below zero is no time") {
+    std::vector<StageRecord> records(1);
+    records[0].launches = 1;
+    records[0].nanoseconds = uint64_t(int64_t(-5));
+    RenderStats stats;
+    fill_stage_stats({"shade"}, records, stats);
+    CHECK(stats.stages.at(0).seconds == 0);
+}
+
+TEST_CASE("Stages inside of others share the time of those around them as they do in a render without fusion") {
+    const auto stage = [](const char* name, double seconds) {
+        StageStats s;
+        s.name = name;
+        s.seconds = seconds;
+        return s;
+    };
+    const std::vector<StageStats> fused = {stage("extend", 2), stage("shade", 6), stage("occlude", 3),
+                                           stage("splat", 1)};
+    const std::vector<StageStats> unfused = {stage("generate", 1), stage("extend", 3),     stage("shade", 4),
+                                             stage("connect", 2),  stage("mis_weight", 1), stage("occlude", 4),
+                                             stage("splat", 9),    stage("accumulate", 1)};
+    const std::vector<FusedShare> found = fused_shares(fused, unfused);
+    const auto share = [&](const char* name, const char* inside) {
+        for (const FusedShare& s : found)
+            if (s.stage == name && s.inside == inside) return s;
+        FAIL(name << " in " << inside);
+        return FusedShare{};
+    };
+    CHECK(share("generate", "extend").seconds == Approx(0.5));
+    CHECK(share("extend", "extend").share == Approx(0.75));
+    // accumulate: 1 second, half of it in either, whose own times are equal; mis_weight in shade alone.
+    CHECK(share("shade", "shade").seconds == Approx(6 * 4 / 7.5));
+    CHECK(share("connect", "shade").seconds == Approx(6 * 2 / 7.5));
+    CHECK(share("mis_weight", "shade").seconds == Approx(6 * 1 / 7.5));
+    CHECK(share("accumulate", "shade").seconds == Approx(6 * 0.5 / 7.5));
+    CHECK(share("accumulate", "occlude").seconds == Approx(3 * 0.5 / 4.5));
+    CHECK(found.size() == 8);
+    for (const char* host : {"extend", "shade", "occlude"}) {
+        double sum = 0;
+        for (const FusedShare& s : found) sum += s.inside == host ? s.seconds : 0;
+        for (const StageStats& s : fused)
+            if (s.name == host) CHECK(sum == Approx(s.seconds));
+    }
+}
+
+TEST_CASE("Stages with clocks of their own share no time") {
+    StageStats shade, connect;
+    shade.name = "shade", shade.seconds = 2;
+    connect.name = "connect", connect.seconds = 1;
+    CHECK(fused_shares({shade, connect}, {shade, connect}).empty());
 }

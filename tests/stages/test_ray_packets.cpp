@@ -1,5 +1,7 @@
 // libs: ambilux_transport ambilux_scene ambilux_core
 // How stages gather rays on a host: in order, all of them, at the ends of queues too.
+#include <chrono>
+#include <cmath>
 #include <vector>
 
 #include "queues/layout.h"
@@ -121,4 +123,55 @@ TEST_CASE("A gathered queue of one traces each ray at once") {
         CHECK(f.counter.count == 0);
     }
     f.check_all(9);
+}
+
+namespace {
+
+void busy(int microseconds) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(microseconds);
+    while (std::chrono::steady_clock::now() < end) {}
+}
+
+}  // namespace
+
+TEST_CASE("A stage inside of another has the time that is its own, and the other does not") {
+    StageRecord outer{}, inner{};
+    const int64_t before = FusedTime::inside();
+    {
+        const FusedClock clock(&outer);
+        busy(2000);
+        {
+            const FusedClock other(&inner);
+            busy(4000);
+        }
+        busy(2000);
+    }
+    // But for the time of looking at the clock.
+    CHECK(double(inner.nanoseconds) >= 3.9e6);
+    CHECK(double(outer.nanoseconds) >= 3.9e6);
+    // Together they are all of the time, however long a busy machine made it.
+    CHECK(FusedTime::inside() - before == int64_t(inner.nanoseconds + outer.nanoseconds));
+    CHECK(outer.launches == 0);
+}
+
+TEST_CASE("Looks at the clock are spread evenly over calls that alternate") {
+    constexpr int kCalls = 1 << 20;
+    int looks[4] = {};
+    for (int i = 0; i < kCalls; ++i) looks[i % 4] += FusedTime::looks();
+    const double expected = double(kCalls) / 4 / double(FusedTime::kOnceIn);
+    for (int n : looks) CHECK(std::abs(n - expected) < 5 * std::sqrt(expected));
+}
+
+TEST_CASE("The time of a sampled stage is counted as often as it was not looked at") {
+    StageRecord sampled{}, whole{};
+    {
+        const FusedClock all(&whole);
+        for (int i = 0; i < 4000; ++i) {
+            const FusedClock clock(&sampled, true);
+            busy(10);
+        }
+    }
+    // 40 ms of 250 looks, standard error 6 %; the rest is that of the stage around it, whatever was estimated.
+    CHECK(double(sampled.nanoseconds) > 0.75 * 40e6);
+    CHECK(double(sampled.nanoseconds + whole.nanoseconds) >= 39e6);
 }

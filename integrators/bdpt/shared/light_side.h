@@ -5,6 +5,7 @@
 #include "integrators/shared/subpath_queues.h"
 #include "stages/extend.h"
 #include "stages/eye_vertex.h"
+#include "stages/fused_clock.h"
 #include "stages/generate.h"
 #include "stages/light_vertex.h"
 #include "stages/mis_weight.h"
@@ -45,7 +46,8 @@ struct SplatSide {
     using WeighStage = WeighSplats<Weighted>;
     using Candidates = std::conditional_t<K.weigh, WeighStage, Queue<CandidateItem>>;
     using Connect = ConnectCamera<F, Candidates>;
-    using AtVertex = std::conditional_t<K.connect, Connect, QueueVertex<F, BidirectionalMis>>;
+    using ConnectHere = std::conditional_t<K.occlude, Clocked<Connect>, Connect>;
+    using AtVertex = std::conditional_t<K.connect, ConnectHere, QueueVertex<F, BidirectionalMis>>;
 
     OccludeStage occlude;
     WeighStage weigh;
@@ -66,7 +68,8 @@ struct SplatSide {
 
     Candidates candidates() const { return choose<K.weigh>(weigh, weigh.candidates); }
     AtVertex at_vertex() const {
-        return choose<K.connect>(connect_camera.connect, QueueVertex<F, BidirectionalMis>{connect_camera.vertices});
+        return choose<K.connect>(ConnectHere{connect_camera.connect},
+                                 QueueVertex<F, BidirectionalMis>{connect_camera.vertices});
     }
 };
 

@@ -72,7 +72,7 @@ struct TwoSidesStages {
         const NextEvent<F, Mis, Candidates> next_event = {eye.candidates(), record(connect_emitter), seeds};
         Connect connect;
         if constexpr (K.occlude)
-            connect = {next_event, source, w.state, record(connect_vertices)};
+            connect = {{next_event}, source, w.state, record(connect_vertices)};
         else
             connect = {next_event, source, m.eye_vertices, m.pairs};
         const SubpathQueues<SubpathRay>& q = m.subpaths;
