@@ -51,7 +51,12 @@ public:
         }
         if (m_.occlusionTexture.index >= 0) c_.note("occlusion textures are left out: light is traced");
         if (m_.alphaMode != "OPAQUE") bsdf = &with_opacity(*bsdf);
-        return {bsdf, emitter(), std::max(tex_coord_, 0)};
+        const bool double_sided = m_.doubleSided && bsdf->type == "twosided";
+        const Object* light = emitter();
+        if (light)
+            c_.note(double_sided ? "two-sided surfaces that shine are two, a hundred-thousandth of their extent apart"
+                                 : "surfaces that shine do so on their front side");
+        return {bsdf, light, std::max(tex_coord_, 0), double_sided};
     }
 
 private:
@@ -239,7 +244,6 @@ private:
         if (!(max_component(factor) * strength > 0)) return nullptr;
         Object& out = object("emitter", "area");
         set_color_or_texture(out, "radiance", factor * float(strength), used(m_.emissiveTexture));
-        c_.note("surfaces that shine do so on their front side");
         c_.emits = true;
         return &out;
     }

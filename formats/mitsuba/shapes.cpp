@@ -102,6 +102,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     if (!(std::fabs(determinant(job.to_world)) > 0))
         in.fail(in.where("to_world"), "the transform of the shape is singular");
     job.flip = in.boolean("flip_normals", false);
+    job.light_back = builder.document.light_backs.contains(&object);
     job.reverse = determinant(job.to_world) < 0;
     if (object.version >= 2 && (is_mesh_file(type) || type == "sphere")) {
         // In Mitsuba 3 a mirrored mesh keeps the order of its corners, whose outside so turns in, and so does that of a
