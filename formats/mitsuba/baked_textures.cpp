@@ -1,6 +1,7 @@
 #include "formats/mitsuba/baked_textures.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <numeric>
 
@@ -10,8 +11,8 @@ namespace ambilux::mitsuba {
 
 namespace {
 
-/// Texels a side of a grid for textures of different sizes.
-constexpr uint32_t kMostTexels = 4096;
+/// Texels a side of what is made: where edges of texels must be kept, and where a finer grid is but more exact.
+constexpr uint64_t kMostTexels = 4096, kMostFine = 2048;
 
 bool is_flat(const Texture& t) { return t.type == TextureType::checkerboard && t.color0 == t.color1; }
 
@@ -23,20 +24,50 @@ WrapMode wrap_of(const Texture& t) { return t.type == TextureType::checkerboard 
 struct Input {
     Rgb value;
     const Texture* texture = nullptr;
+    uint32_t periods[2] = {1, 1};  ///< of the texture, in one of the bitmap
 };
 
-/// Texels a side along one axis: steps fall on edges of texels, and what is interpolated gets twice as many.
-uint32_t grid_size(const std::vector<Input>& inputs, uint32_t Texture::* side, bool stepped) {
-    uint64_t common = 1;
-    uint32_t most = 1;
+double density(const Texture& t) {
+    return std::fabs(double(t.to_uv[0][0]) * t.to_uv[1][1] - double(t.to_uv[0][1]) * t.to_uv[1][0]);
+}
+
+/// Surface coordinates of texture coordinates.
+Vec2f surface_coordinates(const Texture& t, double s, double v) {
+    const auto& m = t.to_uv;
+    const double det = double(m[0][0]) * m[1][1] - double(m[0][1]) * m[1][0], a = s - m[0][2], b = v - m[1][2];
+    return {float((m[1][1] * a - m[0][1] * b) / det), float((m[0][0] * b - m[1][0] * a) / det)};
+}
+
+/// False unless the texture repeats along each axis of the model a whole number of times, or is laid out as the model.
+bool count_periods(Input& input, const Texture& model) {
+    const Texture& t = *input.texture;
+    if (wrap_of(t) != wrap_of(model)) return false;
+    if (memcmp(t.to_uv, model.to_uv, sizeof t.to_uv) == 0) return true;
+    if (wrap_of(t) != WrapMode::repeat || !(density(model) > 0)) return false;
+    const auto place = [&](double s, double v) { return texture_coordinates(t, surface_coordinates(model, s, v)); };
+    const Vec2f o = place(0, 0), x = place(1, 0) - o, y = place(0, 1) - o;
+    const auto whole = [](float f) { return std::fabs(f - std::round(f)) < 1e-4f && std::fabs(f) > 0.5f; };
+    input.periods[0] = uint32_t(std::lround(std::fabs(x.x))), input.periods[1] = uint32_t(std::lround(std::fabs(y.y)));
+    return whole(x.x) && whole(y.y) && std::fabs(x.y) < 1e-4f && std::fabs(y.x) < 1e-4f;
+}
+
+/// Texels a side along an axis. Edges of steps fall on edges of texels; centres of interpolated texels on centres.
+uint32_t grid_size(const std::vector<Input>& inputs, int axis, bool stepped) {
+    uint64_t common = 1, most = 1;
     for (const Input& input : inputs) {
         if (!input.texture) continue;
-        const uint32_t n = input.texture->type == TextureType::checkerboard ? 2 : input.texture->*side;
+        const Texture& t = *input.texture;
+        const uint64_t n = uint64_t(t.type == TextureType::checkerboard ? 2
+                                    : axis                              ? t.height
+                                                                        : t.width) *
+                           input.periods[axis];
         most = std::max(most, n);
-        common = std::min<uint64_t>(std::lcm(common, uint64_t(n)), 2 * uint64_t(kMostTexels));
+        common = std::min(std::lcm(common, n), 2 * kMostTexels);
     }
     if (stepped && common <= kMostTexels) return uint32_t(common);
-    return std::max(most, std::min(2 * most, kMostTexels));
+    for (const uint64_t fine : {5, 3})
+        if (fine * most <= kMostFine) return uint32_t(fine * most);
+    return uint32_t(most);
 }
 
 }  // namespace
@@ -44,8 +75,8 @@ uint32_t grid_size(const std::vector<Input>& inputs, uint32_t Texture::* side, b
 ParamRgb baked_color(Builder& builder, const Reader& in, const std::vector<ParamRgb>& inputs, const BakedFunction& f) {
     if (builder.validate_only) return {splat(1), -1};
     std::vector<Input> parts;
-    const Texture* model = nullptr;
-    bool one_size = true, stepped = true;
+    const Texture* model = nullptr;  // the one with the longest period
+    bool stepped = true;
     for (const ParamRgb& p : inputs) {
         parts.push_back({p.value});
         if (p.texture < 0) continue;
@@ -55,56 +86,45 @@ ParamRgb baked_color(Builder& builder, const Reader& in, const std::vector<Param
             continue;
         }
         parts.back().texture = &t;
-        if (!model) model = &t;
-        if (memcmp(t.to_uv, model->to_uv, sizeof t.to_uv) != 0 || wrap_of(t) != wrap_of(*model))
-            in.fail("textures that are combined must have the same coordinates and wrap mode");
+        if (!model || density(t) < density(*model)) model = &t;
         stepped &= is_stepped(t);
-        one_size &= t.type == TextureType::bitmap && is_stepped(t) == is_stepped(*model) && t.width == model->width &&
-                    t.height == model->height;
     }
     std::vector<Rgb> values(parts.size());
     if (!model) {
         for (size_t i = 0; i < parts.size(); ++i) values[i] = parts[i].value;
         return {f(values), -1};
     }
+    for (Input& part : parts)
+        if (part.texture && !count_periods(part, *model))
+            in.fail(
+                "textures that are combined must have the same wrap mode, and coordinates that fit into each other");
     Texture out = *model;
     out.type = TextureType::bitmap;
     out.wrap = wrap_of(*model);
     out.filter = stepped ? TextureFilter::nearest : TextureFilter::bilinear;
     out.color0 = out.color1 = {0, 0, 0};
     out.decode_table = 0;
-    if (!one_size) {
-        out.width = grid_size(parts, &Texture::width, stepped);
-        out.height = grid_size(parts, &Texture::height, stepped);
-    }
+    out.width = grid_size(parts, 0, stepped);
+    out.height = grid_size(parts, 1, stepped);
     const size_t count = size_t(out.width) * out.height;
     builder.take_memory(count * 16, in.where().file);
-    // Lookups are in the textures' own coordinates.
-    std::vector<Texture> own;
-    for (const Input& part : parts) {
-        own.push_back(part.texture ? *part.texture : out);
-        own.back().to_uv[0][0] = own.back().to_uv[1][1] = 1;
-        own.back().to_uv[0][1] = own.back().to_uv[0][2] = own.back().to_uv[1][0] = own.back().to_uv[1][2] = 0;
-    }
     const SceneView view = builder.scene.view();
     std::vector<float> texels;
     texels.reserve(4 * count);
     double sum[3] = {0, 0, 0};
     for (uint32_t y = 0; y < out.height; ++y)
         for (uint32_t x = 0; x < out.width; ++x) {
-            const Vec2f st = {(float(x) + 0.5f) / float(out.width), (float(y) + 0.5f) / float(out.height)};
+            const Vec2f uv = surface_coordinates(*model, (x + 0.5) / out.width, (y + 0.5) / out.height);
             for (size_t i = 0; i < parts.size(); ++i) {
                 values[i] = parts[i].value;
-                if (!parts[i].texture) continue;
-                values[i] *= one_size ? load_texel(view, own[i], x, y) : eval_texture<kAllFeatures>(view, own[i], st);
+                if (parts[i].texture) values[i] *= eval_texture<kAllFeatures>(view, *parts[i].texture, uv);
             }
             const Rgb c = f(values);
             for (int i = 0; i < 3; ++i) sum[i] += double(c[i]);
             texels.insert(texels.end(), {c.x, c.y, c.z, 1.0f});
         }
-    const double n = double(count);
-    return {splat(1),
-            add_baked_texture(builder, out, texels, {float(sum[0] / n), float(sum[1] / n), float(sum[2] / n)})};
+    const auto mean = [&](int i) { return float(sum[i] / double(count)); };
+    return {splat(1), add_baked_texture(builder, out, texels, {mean(0), mean(1), mean(2)})};
 }
 
 ParamFloat baked_number(Builder& builder, const Reader& in, const std::vector<ParamFloat>& inputs,

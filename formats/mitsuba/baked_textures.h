@@ -11,9 +11,9 @@ namespace ambilux::mitsuba {
 /// Values of the inputs at one point.
 using BakedFunction = std::function<Rgb(const std::vector<Rgb>&)>;
 
-/// `f` of the inputs: a constant if they are, else a bitmap with the coordinates that all their textures must have. Of
-/// textures of one size it has the texels of `f`; others are put on a grid finer than each. When only validating, a
-/// constant.
+/// `f` of the inputs: a constant if they are, else a bitmap, finer than their textures unless those are large. Textures
+/// must have one wrap mode, and coordinates that are the same or, where they repeat, fit a whole number of times into
+/// those of the longest period. When only validating, a constant.
 ParamRgb baked_color(Builder& builder, const Reader& in, const std::vector<ParamRgb>& inputs, const BakedFunction& f);
 
 /// The same of numbers.

@@ -119,10 +119,14 @@ def catalogue():
     s["blendbsdf"] = sphere(bsdf("blendbsdf", number("weight", 0.3) + two))
     s["blendbsdf texture"] = panel(bsdf("blendbsdf", bitmap("weight", "heights.png", yes("raw")) + two))
     masked = bsdf("mask", number("opacity", 0.4) + bsdf("conductor", string("material", "Au")))
-    s["blendbsdf mask"] = sphere(bsdf("blendbsdf", number("weight", 0.3) + masked + GREY))
-    s["blendbsdf masks texture"] = panel(
-        bsdf("blendbsdf", bitmap("weight", "heights.png", yes("raw")) + masked + bsdf("mask", numbers_checker("opacity", 0.9, 0.1) + GREY)))
-    s["blendbsdf null"] = sphere(bsdf("mask", number("opacity", 0.8) + bsdf("blendbsdf", number("weight", 0.3) + bsdf("null") + GREY)))
+    # Deep, because Mitsuba counts what paths pass through.
+    def deep(text):
+        return text.replace('name="max_depth" value="5"', 'name="max_depth" value="40"')
+
+    s["blendbsdf mask"] = deep(sphere(bsdf("blendbsdf", number("weight", 0.3) + masked + GREY)))
+    s["blendbsdf masks texture"] = deep(panel(
+        bsdf("blendbsdf", bitmap("weight", "heights.png", yes("raw")) + masked + bsdf("mask", numbers_checker("opacity", 0.9, 0.1) + GREY))))
+    s["blendbsdf null"] = deep(sphere(bsdf("mask", number("opacity", 0.8) + bsdf("blendbsdf", number("weight", 0.3) + bsdf("null") + GREY))))
     s["mask mask"] = panel(bsdf("mask", number("opacity", 0.7) + bsdf("mask", numbers_checker("opacity", 0.9, 0.1) + bsdf("twosided", GREY))))
     sides = bsdf("blendbsdf", number("weight", 0.3) + two) + bsdf("blendbsdf", number("weight", 0.6) + GREY + bsdf("diffuse", rgb("reflectance", "0.1, 0.2, 0.8")))
     turned = '<transform name="to_world"><rotate x="1" angle="60"/><rotate z="1" angle="50"/><translate z="1.2"/></transform>'

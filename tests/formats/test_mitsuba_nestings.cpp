@@ -1,6 +1,8 @@
 // libs: ambilux_formats ambilux_accel JPEG::JPEG
 // timeout: 120
 // Masks, blends, two-sided surfaces and maps inside of each other: opacities and weights of what a nesting becomes.
+#include <map>
+
 #include "tests/support/image_files.h"
 #include "tests/support/mitsuba_text.h"
 #include "transport/opacity.h"
@@ -148,11 +150,39 @@ TEST_CASE("opacities and weights from textures") {
         CHECK(chances(product, {(float(x) + 0.5f) / 4, 0.25f}).opacity == Approx(x / 3.0 * (x < 2 ? 1 : 0.5)));
         CHECK(chances(product, {(float(x) + 0.5f) / 4, 0.75f}).opacity == Approx(x / 3.0 * (x < 2 ? 0.5 : 1)));
     }
-    const std::string scaled = "<transform name='to_uv'><scale x='2' y='1'/></transform>";
+    // Twice as often along u.
+    const Scene dense =
+        rectangle(mask(texture("opacity", "two.png", "<transform name='to_uv'><scale x='2' y='1'/></transform>"),
+                       mask(ramp, diffuse(0.2))),
+                  &folder);
+    for (int y = 0; y < 2; ++y)
+        for (int x = 0; x < 4; ++x)
+            CHECK(chances(dense, {(float(x) + 0.5f) / 4, (float(y) + 0.5f) / 2}).opacity ==
+                  Approx((x % 2 == y ? 1.0 : 0.2) * x / 3.0).margin(1e-6));
+    const std::string scaled = "<transform name='to_uv'><scale x='1.5' y='1'/></transform>";
     CHECK(contains(error_of("<shape type='rectangle'>" +
                                 mask(ramp, mask(texture("opacity", "two.png", scaled), diffuse(0.2))) + "</shape>",
                             {}, "3.0.0", &folder),
-                   "must have the same coordinates"));
+                   "must have the same wrap mode, and coordinates that fit"));
+}
+
+TEST_CASE("what is interpolated is combined more finely") {
+    const TempFolder folder;
+    folder.write("ramp.png", png_bytes(4, 1, {0, 0, 0, 85, 85, 85, 170, 170, 170, 255, 255, 255}));
+    const std::string ramp =
+        "<texture type='bitmap' name='opacity'><string name='filename' value='ramp.png'/><boolean "
+        "name='raw' value='true'/><string name='wrap_mode' value='clamp'/></texture>";
+    const Scene plain = rectangle(mask(ramp, diffuse(0.2)), &folder),
+                inverse = rectangle(nested("blendbsdf", std::string(ramp).replace(ramp.find("opacity"), 7, "weight") +
+                                                            diffuse(0.8) + "<bsdf type='null'/>"),
+                                    &folder),
+                square = rectangle(mask(ramp, mask(ramp, diffuse(0.2))), &folder);
+    for (int i = 0; i <= 40; ++i) {
+        const Vec2f uv = {float(i) / 40, 0.5f};
+        const double o = chances(plain, uv).opacity;
+        CHECK(chances(inverse, uv).opacity == Approx(1 - o).margin(1e-6));  // linear functions exactly
+        CHECK(chances(square, uv).opacity == Approx(o * o).margin(0.0012));
+    }
 }
 
 TEST_CASE("two-sided surfaces hold masks and blends on either side") {

@@ -219,24 +219,27 @@ TEST_CASE("projection lights have the intensity of their image, upright") {
 
 TEST_CASE("goniometric lights shine in all directions by their image") {
     const TempFolder folder;
-    constexpr int n = 32;
-    // Octants: the sign of each coordinate is told from the place in the square.
+    constexpr int n = 128;
+    // Signs of two coordinates are told from the place in the square (Clarberg 2008), and the third one follows.
     std::vector<float> texels;
     for (int y = 0; y < n; ++y)
         for (int x = 0; x < n; ++x) {
-            const double u = 2 * (x + 0.5) / n - 1, v = 2 * (y + 0.5) / n - 1;
-            const bool up = std::abs(u) + std::abs(v) < 1;
-            const float value = (u > 0 ? 1.0f : 2.0f) * (up ? 1.0f : 3.0f);
+            const double u = 2 * (x + 0.5) / n - 1, v = 2 * (y + 0.5) / n - 1, d = 1 - std::abs(u) - std::abs(v),
+                         r = 1 - std::abs(d), z = std::copysign(1 - r * r, d);
+            const float value = float((u > 0 ? 1 : 2) * (v > 0 ? 1 : 3) * (2 + z));
             texels.insert(texels.end(), {value, value, value});
         }
     write_float_image(folder / "g.exr", n, n, texels);
-    // z of the image is y of the light: towards the plane's +y or -y from its place.
+    // y of the image is z of the light, which is negative below it, and z is its y.
     check_plane(
         plane_under(
             "AttributeBegin Translate .25 -.25 .7 LightSource \"goniometric\" \"rgb I\" [2 3 4] \"float scale\" .5 "
             "\"string filename\" \"g.exr\" AttributeEnd"),
         kAlbedo * Rgb{1, 1.5f, 2},
-        [](double x, double y) { return (x > .25 ? 1 : 2) * (y > -.25 ? 1 : 3) * from_point(x, y, .25, -.25, .7); },
+        [](double x, double y) {
+            const double dx = x - .25, dy = y + .25, l = std::sqrt(dx * dx + dy * dy + .49);
+            return (dx > 0 ? 3 : 6) * (2 + dy / l) * from_point(x, y, .25, -.25, .7);
+        },
         &folder);
     const Scene s = load_pbrt_text(
         plane_under("LightSource \"goniometric\" \"string filename\" \"g.exr\" \"float power\" 7"), {}, &folder);
@@ -256,16 +259,16 @@ TEST_CASE("area lights of two sides shine up and down") {
     const auto light = [](const std::string& sides) {
         return "AttributeBegin Material \"diffuse\" \"rgb reflectance\" [0 0 0] AreaLightSource \"diffuse\" \"rgb L\" "
                "[2 3 4] " +
-               sides + " Translate 0 0 2 Shape \"disk\" \"float radius\" 40 AttributeEnd";
+               sides + " Translate 0 0 2 Shape \"disk\" \"float radius\" 1.5 AttributeEnd";
     };
-    const auto far_disk = [](double x, double y) {
-        // A disk of radius a at height h: exact on its axis, and next to it.
-        const double a = 40, h = 2, r2 = x * x + y * y, c = r2 + a * a + h * h;
+    const auto from_disk = [](double x, double y) {
+        const double a = 1.5, h = 2, r2 = x * x + y * y, c = r2 + a * a + h * h;
         return M_PI / 2 * (1 - (r2 + h * h - a * a) / std::sqrt(c * c - 4 * r2 * a * a));
     };
-    check_plane(plane_under(light("\"bool twosided\" true")), kAlbedo * Rgb{2, 3, 4}, far_disk);
-    check_plane(plane_under("ReverseOrientation " + light("\"bool twosided\" true")), kAlbedo * Rgb{2, 3, 4}, far_disk);
-    check_plane(plane_under("ReverseOrientation " + light("")), kAlbedo * Rgb{2, 3, 4}, far_disk);
+    check_plane(plane_under(light("\"bool twosided\" true")), kAlbedo * Rgb{2, 3, 4}, from_disk);
+    check_plane(plane_under("ReverseOrientation " + light("\"bool twosided\" true")), kAlbedo * Rgb{2, 3, 4},
+                from_disk);
+    check_plane(plane_under("ReverseOrientation " + light("")), kAlbedo * Rgb{2, 3, 4}, from_disk);
     for (const char* shape : {"\"sphere\"", "\"cylinder\"", "\"disk\"", "\"sphere\" \"float zmin\" 0",
                               "\"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 1 1 0] \"integer indices\" [0 1 2]"})
         for (const char* turn : {"", "ReverseOrientation ", "Scale -1 1 1 "}) {
