@@ -121,6 +121,7 @@ private:
             } else {
                 set_transform(shape, "to_world", to_world);
                 add_child(*c_.document.scene, shape);
+                if (s.emitter && s.double_sided) add_child(*c_.document.scene, add_light_back(c_.document, shape));
             }
             grow(place->second, to_world);
         }

@@ -51,7 +51,12 @@ public:
         }
         if (m_.occlusionTexture.index >= 0) c_.note("occlusion textures are left out: light is traced");
         if (m_.alphaMode != "OPAQUE") bsdf = &with_opacity(*bsdf);
-        return {bsdf, emitter(), std::max(tex_coord_, 0)};
+        const bool double_sided = m_.doubleSided && bsdf->type == "twosided";
+        const Object* light = emitter();
+        if (light)
+            c_.note(double_sided ? "two-sided surfaces that shine are two, a hundred-thousandth of their extent apart"
+                                 : "surfaces that shine do so on their front side");
+        return {bsdf, light, std::max(tex_coord_, 0), double_sided};
     }
 
 private:
@@ -60,7 +65,8 @@ private:
     void check_extensions() {
         for (const auto& [name, value] : m_.extensions) {
             if (name == "KHR_materials_emissive_strength" || name == "KHR_materials_transmission" ||
-                name == "KHR_materials_volume" || name == "KHR_materials_ior" || name == "KHR_materials_clearcoat")
+                name == "KHR_materials_volume" || name == "KHR_materials_ior" || name == "KHR_materials_clearcoat" ||
+                name == "KHR_materials_specular" || name == "KHR_materials_sheen")
                 continue;
             if (name.starts_with("KHR_materials_") || name.starts_with("EXT_") || name.starts_with("MSFT_"))
                 c_.refuse(what_ + ": extension '" + name + "' is not supported", "it is left out");
@@ -139,13 +145,51 @@ private:
 
     double ior() { return number(extension(m_.extensions, "KHR_materials_ior"), "ior", 1.5); }
 
+    /// Refuses textures of an extension.
+    void without_textures(const tinygltf::Value& of, std::initializer_list<const char*> names) {
+        for (const char* name : names)
+            if (of.Has(name)) c_.refuse(what_ + ": " + name + " is not supported", "it is left out");
+    }
+    Rgb color_in(const tinygltf::Value& of, const char* name, Rgb fallback) {
+        if (!of.Has(name) || !of.Get(name).IsArray() || of.Get(name).ArrayLen() < 3) return fallback;
+        for (int i = 0; i < 3; ++i) fallback[i] = float(of.Get(name).Get(i).GetNumberAsDouble());
+        return fallback;
+    }
+
+    /// Index of refraction of the opaque part: KHR_materials_specular scales the reflectance at normal incidence.
+    double opaque_ior() {
+        const tinygltf::Value* specular = extension(m_.extensions, "KHR_materials_specular");
+        const double n = std::max(ior(), 1.0);
+        if (!specular) return n;
+        without_textures(*specular, {"specularTexture", "specularColorTexture"});
+        const Rgb tint = color_in(*specular, "specularColorFactor", splat(1));
+        const double factor = number(specular, "specularFactor", 1) * double(luminance(tint)),
+                     reflectance = std::clamp((n - 1) * (n - 1) / ((n + 1) * (n + 1)) * factor, 0.0, 0.9);
+        if (factor != 1)
+            c_.note(
+                "a specular factor scales the reflectance at normal incidence, not that at grazing angles; its "
+                "colour counts by its luminance");
+        return (1 + std::sqrt(reflectance)) / (1 - std::sqrt(reflectance));
+    }
+
+    void set_sheen(Object& out) {
+        const tinygltf::Value* sheen = extension(m_.extensions, "KHR_materials_sheen");
+        if (!sheen) return;
+        without_textures(*sheen, {"sheenColorTexture", "sheenRoughnessTexture"});
+        const float most = max_component(color_in(*sheen, "sheenColorFactor", splat(0)));
+        if (!(most > 0)) return;
+        set_number(out, "sheen", std::clamp(double(most), 0.0, 1.0));
+        c_.note("sheen is approximated by that of the principled BSDF, which is white");
+    }
+
     const Object& principled() {
         Object& out = object("bsdf", "principled");
         const auto& pbr = m_.pbrMetallicRoughness;
         set_color_or_texture(out, "base_color", base_, base_texture_);
         set_number_or_texture(out, "roughness", pbr.roughnessFactor, rough_texture_, "g");
         set_number_or_texture(out, "metallic", pbr.metallicFactor, rough_texture_, "b");
-        set_number(out, "eta", std::max(ior(), 1.0));
+        set_number(out, "eta", opaque_ior());
+        set_sheen(out);
         c_.note("metallic-roughness materials are Mitsuba's principled BSDF, whose diffuse lobe is Burley's");
         const tinygltf::Value* coat = extension(m_.extensions, "KHR_materials_clearcoat");
         if (number(coat, "clearcoatFactor", 0) > 0) {
@@ -239,7 +283,6 @@ private:
         if (!(max_component(factor) * strength > 0)) return nullptr;
         Object& out = object("emitter", "area");
         set_color_or_texture(out, "radiance", factor * float(strength), used(m_.emissiveTexture));
-        c_.note("surfaces that shine do so on their front side");
         c_.emits = true;
         return &out;
     }

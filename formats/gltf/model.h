@@ -24,7 +24,8 @@ struct Context {
     struct Surface {
         const Object* bsdf = nullptr;
         const Object* emitter = nullptr;
-        int tex_coord = 0;  ///< set of texture coordinates that all its textures use
+        int tex_coord = 0;          ///< set of texture coordinates that all its textures use
+        bool double_sided = false;  ///< opaque, and what shines does so on both sides
     };
     std::map<int, Surface> materials;
     bool emits = false;

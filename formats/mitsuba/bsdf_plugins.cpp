@@ -199,7 +199,7 @@ void read_plugin(Builder&, Reader& in, Textured<DiffuseTransmitter>& p) {
     p.transmittance = in.textured_color("transmittance", splat(0.5f), SpectrumUse::reflectance);
 }
 
-void read_plugin(Builder&, Reader& in, Textured<Principled>& p) { p = read_principled(in).opaque; }
+void read_plugin(Builder& builder, Reader& in, Textured<Principled>& p) { p = read_principled(builder, in).opaque; }
 
 }  // namespace
 

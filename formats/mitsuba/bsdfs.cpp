@@ -1,3 +1,4 @@
+#include "formats/mitsuba/baked_textures.h"
 #include "formats/mitsuba/bsdf_plugins.h"
 #include "formats/mitsuba/coatings.h"
 #include "formats/mitsuba/plugins.h"
@@ -11,7 +12,6 @@ namespace {
 /// What adapters add to the BSDF inside of them.
 struct Adapters {
     ParamFloat opacity = {1, -1};
-    bool has_opacity = false;
     int32_t normal_map = -1, bump_map = -1;
     float bump_scale = 1;
     uint32_t map_rules = 0;
@@ -21,7 +21,15 @@ struct Adapters {
 };
 
 /// What a BSDF is inside of.
-enum class Place { outside, part, two_sided };
+enum class Place { outside, two_sided };
+
+bool is_constant(const ParamFloat& p) { return p.texture < 0; }
+bool same(const ParamFloat& a, const ParamFloat& b) { return a.value == b.value && a.texture == b.texture; }
+
+ParamFloat product(Builder& builder, const Reader& in, const ParamFloat& a, const ParamFloat& b) {
+    if (is_constant(a) || is_constant(b)) return {a.value * b.value, std::max(a.texture, b.texture)};
+    return baked_number(builder, in, {a, b}, [](const auto& v) { return v[0] * v[1]; });
+}
 
 const Object& nested_bsdf(Reader& in) {
     const Object* nested = in.take("bsdf");
@@ -40,18 +48,16 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
             if (adapters.coat)
                 in.fail("a mask inside of a coating is not supported: put the coating inside of the mask");
             if (place == Place::two_sided)
-                in.fail("a mask inside of twosided is not supported: put the twosided inside of the mask");
-            if (place == Place::part) in.fail("a mask inside of a blend is not supported");
-            if (adapters.has_opacity) in.fail("a mask inside of a mask is not supported");
-            adapters.has_opacity = true;
+                builder.note(in.where(), "a mask inside of twosided, which Mitsuba refuses, is taken as one around it");
             const Value* opacity = object->find("opacity");
+            ParamFloat own;
             if (opacity && (opacity->kind == ValueKind::rgb || opacity->kind == ValueKind::spectrum)) {
-                adapters.opacity = {luminance(in.color("opacity", splat(0.5f), SpectrumUse::reflectance)), -1};
+                own = {luminance(in.color("opacity", splat(0.5f), SpectrumUse::reflectance)), -1};
             } else {
-                adapters.opacity = in.textured_number("opacity", 0.5f);
+                own = in.textured_number("opacity", 0.5f);
             }
-            if (adapters.opacity.value < 0 || adapters.opacity.value > 1)
-                in.fail(in.where("opacity"), "opacity must lie between 0 and 1");
+            if (own.value < 0 || own.value > 1) in.fail(in.where("opacity"), "opacity must lie between 0 and 1");
+            adapters.opacity = product(builder, in, adapters.opacity, own);
         } else if (object->type == "bumpmap" || object->type == "normalmap") {
             if (adapters.coat)
                 in.fail("a map inside of a coating is not supported: put the coating inside of the " + object->type);
@@ -117,10 +123,8 @@ struct MaterialBuilder {
     uint32_t build(const Object& object, Adapters outer, Place place) {
         const Object& inner = *strip(builder, &object, outer, place);
         const bool two_sided = place == Place::two_sided;
-        if (inner.type == "twosided") {
-            if (two_sided) Reader(builder, inner).fail("twosided inside of twosided");
-            return build_two_sided(inner, outer);
-        }
+        if (inner.type == "twosided") return build_two_sided(inner, outer, place);
+        if (inner.type == "null") return build_null(inner, two_sided);
         if (inner.type == "blendbsdf") return build_blend(inner, outer, place);
         if (inner.type == "mixturebsdf") return build_mixture(inner, outer, place);
         if (inner.type == "principled") return build_principled(inner, outer, two_sided);
@@ -128,26 +132,44 @@ struct MaterialBuilder {
         return add({record, record, two_sided, {}}, outer);
     }
 
-    uint32_t build_two_sided(const Object& object, const Adapters& outer) {
+    /// A part that is not there.
+    uint32_t build_null(const Object& object, bool two_sided) {
+        Reader in(builder, object);
+        if (two_sided) in.fail("a BSDF that transmits light cannot be inside of twosided");
+        in.finish();
+        const uint32_t index = black();
+        if (!builder.validate_only) builder.scene.materials[index].opacity = {0, -1};
+        return index;
+    }
+
+    uint32_t build_two_sided(const Object& object, const Adapters& outer, Place place) {
         Reader in(builder, object);
         const Object& first = nested_bsdf(in);
         const Object* second = in.take("bsdf");
         in.finish();
-        if (!second) {
-            const uint32_t index = build(first, outer, Place::two_sided);
-            if (!builder.validate_only) builder.scene.materials[index].opacity = outer.opacity;
-            return index;
-        }
-        const auto side = [&](const Object& side_object) {
-            Adapters adapters = outer;
-            const Object* leaf = strip(builder, &side_object, adapters, Place::two_sided);
-            if (leaf->type == "twosided") Reader(builder, *leaf).fail("twosided inside of twosided");
-            if (leaf->type == "blendbsdf" || leaf->type == "mixturebsdf")
-                Reader(builder, *leaf).fail("a blend on one side of a twosided with two BSDFs is not supported");
-            return add_record(builder, read_bsdf(builder, *leaf), *leaf, adapters, true);
-        };
-        const uint32_t front = side(first);
-        return add({front, side(*second), 1, {}}, outer);
+        // One that is inside of another is met on its front only.
+        if (!second || place == Place::two_sided) return build(first, outer, Place::two_sided);
+        const uint32_t front = build(first, without_opacity(outer), Place::two_sided),
+                       back = build(*second, without_opacity(outer), Place::two_sided);
+        if (builder.validate_only) return 0;
+        const ParamFloat opacity = opacity_of(front);
+        if (!same(opacity, opacity_of(back))) in.fail("the two sides of a twosided must have the same opacity");
+        const uint32_t index = both_sides(front, back);
+        builder.scene.materials[index].opacity = product(builder, in, outer.opacity, opacity);
+        return index;
+    }
+
+    /// What is met on one side and on the other, either of which may be a blend.
+    uint32_t both_sides(uint32_t front, uint32_t back) {
+        const Material f = builder.scene.materials[front], b = builder.scene.materials[back];
+        if (f.first != kNone) return blend(both_sides(f.first, back), both_sides(f.second, back), f.second_weight, {});
+        if (b.first != kNone)
+            return blend(both_sides(front, b.first), both_sides(front, b.second), b.second_weight, {});
+        return add({f.front, b.front, 1, {}}, {});
+    }
+
+    ParamFloat opacity_of(uint32_t material) const {
+        return builder.validate_only ? ParamFloat{1, -1} : builder.scene.materials[material].opacity;
     }
 
     /// Points are of `second` with a chance of `weight`.
@@ -163,35 +185,52 @@ struct MaterialBuilder {
         return add(material, outer);
     }
 
+    /// The same of parts behind masks: the whole has an opacity, and of what is met other weights.
+    uint32_t masked_blend(const Reader& in, uint32_t first, uint32_t second, ParamFloat weight, const Adapters& outer) {
+        const ParamFloat a = opacity_of(first), b = opacity_of(second);
+        const ParamFloat full{1, -1};
+        if (same(a, full) && same(b, full)) return blend(first, second, weight, outer);
+        if (builder.validate_only) return 0;
+        Adapters mask = outer;
+        const auto masked = [&](const ParamFloat& whole) {
+            mask.opacity = product(builder, in, outer.opacity, whole);
+            for (uint32_t part : {first, second}) builder.scene.materials[part].opacity = full;
+        };
+        const auto seen = [](const std::vector<float>& v) { return (1 - v[2]) * v[0] + v[2] * v[1]; };
+        const auto of_second = [&](const std::vector<float>& v) { return seen(v) > 0 ? v[2] * v[1] / seen(v) : v[2]; };
+        if (same(a, b)) {
+            masked(a);
+            return blend(first, second, weight, mask);
+        }
+        masked(baked_number(builder, in, {a, b, weight}, seen));
+        for (const auto& [gone, left] : {std::pair{a, second}, {b, first}})
+            if (is_constant(gone) && gone.value == 0) {
+                builder.scene.materials[left].opacity = mask.opacity;
+                return left;
+            }
+        const ParamFloat of_seen = baked_number(builder, in, {a, b, weight}, of_second);
+        if (of_seen.texture >= 0)
+            builder.note(in.where(), "of masks inside of a blend, weights and opacities are made texel by texel");
+        return blend(first, second, of_seen, mask);
+    }
+
     static Adapters without_opacity(Adapters adapters) {
         adapters.opacity = {1, -1};
         return adapters;
     }
-    static Place part_of(Place place) { return place == Place::two_sided ? place : Place::part; }
 
     uint32_t build_blend(const Object& object, const Adapters& outer, Place place) {
         Reader in(builder, object);
         const ParamFloat weight = in.textured_number("weight", 0.5f);
-        if (weight.texture < 0 && !(weight.value >= 0 && weight.value <= 1))
+        if (is_constant(weight) && !(weight.value >= 0 && weight.value <= 1))
             in.fail(in.where("weight"), "the weight of a blend must lie between 0 and 1");
         const Object& first = nested_bsdf(in);
         const Object* second = in.take("bsdf");
         if (!second) in.fail("blendbsdf needs two nested BSDFs");
         in.finish();
-        const bool first_null = first.type == "null", second_null = second->type == "null";
-        if (first_null || second_null) {  // a mask
-            if (place != Place::outside || outer.has_opacity || outer.coat || first_null == second_null)
-                in.fail("a blend with null inside of other adapters is not supported");
-            Adapters mask = outer;
-            mask.opacity = first_null ? weight : ParamFloat{1 - weight.value, -1};
-            mask.has_opacity = true;
-            if (second_null && weight.texture >= 0)
-                in.fail("a blend with null as its second BSDF needs a number as its weight");
-            return build(first_null ? *second : first, mask, Place::part);
-        }
-        const uint32_t a = build(first, without_opacity(outer), part_of(place)),
-                       b = build(*second, without_opacity(outer), part_of(place));
-        return blend(a, b, weight, outer);
+        const uint32_t a = build(first, without_opacity(outer), place),
+                       b = build(*second, without_opacity(outer), place);
+        return masked_blend(in, a, b, weight, outer);
     }
 
     uint32_t build_mixture(const Object& object, const Adapters& outer, Place place) {
@@ -199,8 +238,7 @@ struct MaterialBuilder {
         const std::string text = in.text("weights", "");
         const std::vector<double> weights = parse_list(text, in.where("weights"), "weights");
         std::vector<uint32_t> parts;
-        while (const Object* nested = in.take("bsdf"))
-            parts.push_back(build(*nested, without_opacity(outer), part_of(place)));
+        while (const Object* nested = in.take("bsdf")) parts.push_back(build(*nested, without_opacity(outer), place));
         in.finish();
         if (parts.empty() || parts.size() != weights.size())
             in.fail(in.where("weights"), "mixturebsdf has " + std::to_string(parts.size()) + " BSDFs and " +
@@ -217,10 +255,12 @@ struct MaterialBuilder {
         double rest_weight = sum < 1 - 1e-6 ? 1 - sum : weights.back();
         for (size_t i = sum < 1 - 1e-6 ? parts.size() : parts.size() - 1; i-- > 0;) {
             const double both = rest_weight + weights[i];
-            rest = blend(parts[i], rest, {float(both > 0 ? rest_weight / both : 0), -1},
-                         i == 0 ? outer : without_opacity(outer));
+            rest = masked_blend(in, parts[i], rest, {float(both > 0 ? rest_weight / both : 0), -1},
+                                i == 0 ? outer : without_opacity(outer));
             rest_weight = both;
         }
+        if (parts.size() == 1 && rest == parts.back() && !builder.validate_only)
+            builder.scene.materials[rest].opacity = product(builder, in, outer.opacity, opacity_of(rest));
         return rest;
     }
 
@@ -233,17 +273,19 @@ struct MaterialBuilder {
 
     uint32_t build_principled(const Object& object, const Adapters& outer, bool two_sided) {
         Reader in(builder, object);
-        const PrincipledParts parts = read_principled(in);
+        const PrincipledParts parts = read_principled(builder, in);
         in.finish();
-        if (parts.glass_weight > 0 && two_sided) in.fail("a BSDF that transmits light cannot be inside of twosided");
+        const ParamFloat& glass = parts.glass_weight;
+        const bool transmits = !is_constant(glass) || glass.value > 0;
+        if (transmits && two_sided) in.fail("a BSDF that transmits light cannot be inside of twosided");
         const auto leaf = [&](const BsdfRecord& record, const Adapters& adapters) {
             const uint32_t index = add_record(builder, record, object, adapters, two_sided);
             return add({index, index, two_sided, {}}, adapters);
         };
-        if (parts.glass_weight == 0) return leaf(bsdf_record(parts.opaque), outer);
-        if (parts.glass_weight == 1) return leaf(bsdf_record(parts.glass), outer);
+        if (!transmits) return leaf(bsdf_record(parts.opaque), outer);
+        if (is_constant(glass) && glass.value == 1) return leaf(bsdf_record(parts.glass), outer);
         return blend(leaf(bsdf_record(parts.opaque), without_opacity(outer)),
-                     leaf(bsdf_record(parts.glass), without_opacity(outer)), {parts.glass_weight, -1}, outer);
+                     leaf(bsdf_record(parts.glass), without_opacity(outer)), glass, outer);
     }
 };
 

@@ -135,6 +135,8 @@ int32_t add_environment_image(Builder& builder, const std::string& name, const T
 int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels);
 /// Texture of float texels that bilinear lookups find at texel centres.
 int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels, Rgb mean);
+/// Texture of these RGBA texels with the size, coordinates, wrap mode and filter of `settings`.
+int32_t add_baked_texture(Builder& builder, const Texture& settings, const std::vector<float>& texels, Rgb mean);
 /// Mean colour of a parameter over its texture.
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter);
 

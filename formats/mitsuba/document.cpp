@@ -50,6 +50,18 @@ Object& add_object(Document& document, const std::string& tag, const std::string
     return object;
 }
 
+Object& add_light_back(Document& document, const Object& shape) {
+    Object& back = add_object(document, shape.tag, shape.type, shape.where);
+    back.values = shape.values;
+    back.children = shape.children;
+    const Value* flip = shape.find("flip_normals");
+    const bool flipped = flip && flip->number != 0;
+    std::erase_if(back.values, [](const Value& v) { return v.name == "flip_normals"; });
+    set_boolean(back, "flip_normals", !flipped);
+    document.light_backs.insert(&back);
+    return back;
+}
+
 void add_child(Object& parent, const Object& child, const std::string& name) {
     parent.children.push_back({name, child.where, "", &child});
 }

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -75,7 +76,8 @@ struct Document {
     std::map<std::string, Texels> images;  ///< of textures of type "image" and emitters of type "envmap", by "image"
     std::vector<std::pair<std::string, Sha256Digest>> file_digests;  ///< of other files that were read
     std::vector<std::string> warnings, notes;
-    bool smooth_normals = true;  ///< meshes without normals get smooth ones, as in Mitsuba
+    std::set<const Object*> light_backs;  ///< shapes that are the other side of another one's light, just behind it
+    bool smooth_normals = true;           ///< meshes without normals get smooth ones, as in Mitsuba
 
     /// Path of a file named in `where.file`: relative to that file's folder, then to the <path> folders, then to the
     /// main file's. Throws Error(bad_input) if there is none.
@@ -84,6 +86,8 @@ struct Document {
 
 /// A new object of the document, of format 2.
 Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where);
+/// The same shape turned over, for a light of two sides; to be added behind the shape, once that is complete.
+Object& add_light_back(Document& document, const Object& shape);
 void add_child(Object& parent, const Object& child, const std::string& name = "");
 void set_boolean(Object& object, const std::string& name, bool value);
 void set_integer(Object& object, const std::string& name, int64_t value);

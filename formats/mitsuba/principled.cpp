@@ -2,23 +2,32 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+
+#include "formats/mitsuba/baked_textures.h"
 
 namespace ambilux::mitsuba {
 namespace {
 
-/// A share between 0 and `most`.
-float share(Reader& in, const char* name, float fallback, float most = 1) {
-    const double value = in.number(name, fallback);
+/// A share between 0 and `most`. With --lenient, a texture is its mean.
+float share(Builder& builder, Reader& in, const char* name, float fallback, float most = 1) {
+    const ParamFloat given = in.textured_number(name, fallback);
+    double value = given.value;
+    if (given.texture >= 0) {
+        builder.refuse(in.where(name), fmt::format("a texture as '{}' of principled is not supported", name),
+                       "its mean is used");
+        value = luminance(mean_color(builder, {splat(given.value), given.texture}));
+    }
     if (!(value >= 0 && value <= most))
         in.fail(in.where(name), fmt::format("'{}' must lie between 0 and {:g}", name, most));
     return float(value);
 }
 
 /// Index of refraction: `eta`, or `specular`, a share of 8 % reflectance at normal incidence (Burley 2012).
-float read_eta(Reader& in) {
+float read_eta(Builder& builder, Reader& in) {
     if (in.has("eta") && in.has("specular")) in.fail(in.where("specular"), "both 'eta' and 'specular' are given");
-    if (in.has("specular")) return 2 / (1 - std::sqrt(0.08f * share(in, "specular", 0.5f))) - 1;
+    if (in.has("specular")) return 2 / (1 - std::sqrt(0.08f * share(builder, in, "specular", 0.5f))) - 1;
     const float eta = in.ior("eta", "bk7");
     if (!(eta >= 1)) in.fail(in.where("eta"), "'eta' of principled must not be less than 1");
     return eta;
@@ -28,7 +37,7 @@ uint16_t of_65535(float value) { return uint16_t(std::lround(value * 65535)); }
 
 }  // namespace
 
-PrincipledParts read_principled(Reader& in) {
+PrincipledParts read_principled(Builder& builder, Reader& in) {
     PrincipledParts parts;
     Textured<Principled>& p = parts.opaque;
     p = {};
@@ -37,45 +46,55 @@ PrincipledParts read_principled(Reader& in) {
     p.metallic = in.textured_number("metallic", 0);
     for (const auto& [name, value] : {std::pair{"roughness", p.roughness.value}, {"metallic", p.metallic.value}})
         if (!(value >= 0 && value <= 1)) in.fail(in.where(name), fmt::format("'{}' must lie between 0 and 1", name));
-    p.ior = in.has("eta") || in.has("specular") ? read_eta(in) : 1.5f;
-    p.aspect = std::sqrt(1 - 0.9f * share(in, "anisotropic", 0));
-    p.specular_tint = share(in, "spec_tint", 0);
-    p.sheen = share(in, "sheen", 0);
-    p.sheen_tint = of_65535(share(in, "sheen_tint", 0));
-    p.flatness = of_65535(share(in, "flatness", 0));
-    p.clearcoat = share(in, "clearcoat", 0);
-    p.clearcoat_alpha = 0.1f + (0.001f - 0.1f) * share(in, "clearcoat_gloss", 0);
-    const float spec_trans = share(in, "spec_trans", 0);
+    p.ior = in.has("eta") || in.has("specular") ? read_eta(builder, in) : 1.5f;
+    p.aspect = std::sqrt(1 - 0.9f * share(builder, in, "anisotropic", 0));
+    p.specular_tint = share(builder, in, "spec_tint", 0);
+    p.sheen = share(builder, in, "sheen", 0);
+    p.sheen_tint = of_65535(share(builder, in, "sheen_tint", 0));
+    p.flatness = of_65535(share(builder, in, "flatness", 0));
+    p.clearcoat = share(builder, in, "clearcoat", 0);
+    p.clearcoat_alpha = 0.1f + (0.001f - 0.1f) * share(builder, in, "clearcoat_gloss", 0);
+    const ParamFloat spec_trans = in.textured_number("spec_trans", 0);
+    if (!(spec_trans.value >= 0 && spec_trans.value <= 1))
+        in.fail(in.where("spec_trans"), "'spec_trans' must lie between 0 and 1");
     // How another renderer chooses its samples.
-    in.ignore({"diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "clearcoat_sampling_rate"});
-    if (spec_trans == 0) return parts;
+    in.ignore({"diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "clearcoat_sampling_rate",
+               "spec_reflectance_sampling_rate", "spec_trans_sampling_rate"});
+    if (spec_trans.texture < 0 && spec_trans.value == 0) return parts;
 
-    if (p.metallic.texture >= 0)
-        in.fail(in.where("spec_trans"), "spec_trans with a texture as metallic is not supported");
     if (p.specular_tint > 0) in.fail(in.where("spec_tint"), "spec_trans with spec_tint is not supported");
-    if (p.base_color.texture >= 0)
-        in.fail(in.where("base_color"), "spec_trans with a texture as base_color is not supported");
-    if (p.roughness.texture >= 0)
-        in.fail(in.where("roughness"), "spec_trans with a texture as roughness is not supported");
     if (p.ior == 1) in.fail(in.where("eta"), "spec_trans needs an index of refraction other than 1");
-    const float glass = (1 - p.metallic.value) * spec_trans, rest = 1 - glass;
-    if (glass == 1 && p.clearcoat > 0) in.fail(in.where("clearcoat"), "clearcoat on glass alone is not supported");
-    parts.glass_weight = glass;
+    const bool textured = spec_trans.texture >= 0 || p.metallic.texture >= 0;
+    if (textured && (p.clearcoat > 0 || p.sheen > 0))
+        in.fail("spec_trans or metallic from a texture, with clearcoat or sheen, is not supported");
+    const auto glass_share = [](const std::vector<float>& v) { return (1 - v[0]) * v[1]; };
+    parts.glass_weight = baked_number(builder, in, {p.metallic, spec_trans}, glass_share);
+    const bool all_glass = parts.glass_weight.texture < 0 && parts.glass_weight.value == 1;
+    if (all_glass && p.clearcoat > 0) in.fail(in.where("clearcoat"), "clearcoat on glass alone is not supported");
     parts.glass = {};
     parts.glass.specular_reflectance = {splat(1), -1};
-    const Rgb c = p.base_color.value;
-    parts.glass.specular_transmittance = {{std::sqrt(c.x), std::sqrt(c.y), std::sqrt(c.z)}, -1};
-    const float alpha = p.roughness.value * p.roughness.value;
-    parts.glass.alpha_u = {std::max(alpha / p.aspect, 1e-3f), -1};
-    parts.glass.alpha_v = {std::max(alpha * p.aspect, 1e-3f), -1};
+    parts.glass.specular_transmittance = baked_color(builder, in, {p.base_color}, [](const std::vector<Rgb>& v) {
+        return Rgb{std::sqrt(v[0].x), std::sqrt(v[0].y), std::sqrt(v[0].z)};
+    });
+    const auto alpha = [&](float factor) {
+        return baked_number(builder, in, {p.roughness},
+                            [factor](const std::vector<float>& v) { return std::max(v[0] * v[0] * factor, 1e-3f); });
+    };
+    parts.glass.alpha_u = alpha(1 / p.aspect);
+    parts.glass.alpha_v = p.aspect == 1 ? parts.glass.alpha_u : alpha(p.aspect);
     parts.glass.ior = p.ior;
     parts.glass.distribution = Microfacets::ggx;
     parts.glass.sample_visible = true;
-    if (glass < 1) {
-        p.metallic.value /= rest;
+    if (all_glass) return parts;
+    if (!textured) {
+        const float rest = 1 - parts.glass_weight.value;
         p.clearcoat /= rest;
-        p.sheen /= std::max(1 - spec_trans, 1e-6f);
+        p.sheen /= std::max(1 - spec_trans.value, 1e-6f);
     }
+    p.metallic = baked_number(builder, in, {p.metallic, spec_trans}, [&](const std::vector<float>& v) {
+        const float rest = 1 - glass_share(v);
+        return rest > 0 ? std::min(v[0] / rest, 1.0f) : 0.0f;
+    });
     return parts;
 }
 

@@ -10,8 +10,8 @@ namespace ambilux::mitsuba {
 struct PrincipledParts {
     Textured<Principled> opaque;
     Textured<RoughDielectric> glass;
-    float glass_weight = 0;
+    ParamFloat glass_weight = {0, -1};
 };
-PrincipledParts read_principled(Reader& in);
+PrincipledParts read_principled(Builder& builder, Reader& in);
 
 }  // namespace ambilux::mitsuba

@@ -27,9 +27,37 @@ Vec3d area_normal(Vec3f a, Vec3f b, Vec3f c) {
     return cross(from_a(b), from_a(c));
 }
 
-}  // namespace
+/// How far the back of a light lies behind its front, in shares of its extent and of its coordinates: several roundings
+/// of a ray's origin.
+constexpr float kBackOfExtent = 1e-5f, kBackOfCoordinate = 4e-6f;
 
-void transform_mesh(const Builder& builder, Job& job, const Mesh& source) {
+void move_behind(Mesh& mesh) {
+    if (mesh.positions.empty()) return;
+    Vec3f lower = mesh.positions[0], upper = lower;
+    for (const Vec3f& p : mesh.positions) lower = min(lower, p), upper = max(upper, p);
+    const float distance = std::max(kBackOfExtent * max_component(upper - lower),
+                                    kBackOfCoordinate * max_component(max(abs(lower), abs(upper))));
+    const std::vector<Vec3f> normals = mesh.normals.empty() ? smooth_normals(mesh) : mesh.normals;
+    for (size_t i = 0; i < normals.size(); ++i) mesh.positions[i] += normals[i] * distance;
+}
+
+/// The same of a quadric's transform: outside of one that shines inwards, inside of one that shone outwards.
+void move_behind(const Job& job, Matrix& m) {
+    const double most = std::max({std::fabs(m.m[0][3]), std::fabs(m.m[1][3]), std::fabs(m.m[2][3])});
+    const Vec3d x = column(m, 0), y = column(m, 1), z = column(m, 2);
+    const double extent = std::max(length(x), length(y)),
+                 distance = std::max(double(kBackOfExtent) * extent, double(kBackOfCoordinate) * (most + extent));
+    if (job.type == "disk") {
+        const Vec3d n = cross(x, y);
+        const double side = (n.x * z.x + n.y * z.y + n.z * z.z < 0) == job.flip ? 1 : -1, l = length(n);
+        m = translation(side * distance * n.x / l, side * distance * n.y / l, side * distance * n.z / l) * m;
+        return;
+    }
+    const double factor = 1 + (job.flip ? -1 : 1) * distance / extent;
+    m = m * scaling(factor, factor, job.type == "sphere" ? factor : 1);
+}
+
+void place_mesh(const Builder& builder, Job& job, const Mesh& source) {
     const bool split = job.smooth_angle >= 0 && !job.face_normals;
     const Mesh smooth = split ? split_at_edges(job.where.file, source, job.smooth_angle) : Mesh{};
     const Mesh& mesh = split ? smooth : source;
@@ -88,12 +116,20 @@ void transform_mesh(const Builder& builder, Job& job, const Mesh& source) {
     }
 }
 
+}  // namespace
+
+void transform_mesh(const Builder& builder, Job& job, const Mesh& source) {
+    place_mesh(builder, job, source);
+    if (job.light_back) move_behind(job.world);
+}
+
 Quadric make_quadric(Builder& builder, const Job& job) {
     Quadric q{};
     q.type = job.type == "sphere" ? PrimitiveType::sphere
                                   : (job.type == "disk" ? PrimitiveType::disk : PrimitiveType::cylinder);
     q.flip = job.flip;
     Matrix m = job.to_world;
+    if (job.light_back) move_behind(job, m);
     const Vec3d x = column(m, 0), y = column(m, 1), z = column(m, 2);
     const double lx = length(x), ly = length(y), lz = length(z);
     if (q.type == PrimitiveType::disk) {

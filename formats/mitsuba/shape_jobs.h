@@ -27,6 +27,7 @@ struct Job {
     int source = -1;  ///< meshes: index into the sources
     bool flip = false, face_normals = false;
     bool reverse = false;      ///< meshes: the order of corners, so that the outside stays outside of a mirror
+    bool light_back = false;   ///< lies just behind another shape (Document::light_backs)
     double smooth_angle = -1;  ///< not negative: vertex normals are made anew, but not over sharper edges; degrees
     int group = -1;            ///< its place in the groups: of instances, and of meshes that instances share
     // Result for meshes.

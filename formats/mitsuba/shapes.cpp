@@ -8,6 +8,7 @@
 #include "formats/file_budget.h"
 #include "formats/gzip.h"
 #include "formats/meshes/curves.h"
+#include "formats/meshes/height_field.h"
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/sdf_grid.h"
 #include "formats/mitsuba/builder.h"
@@ -44,7 +45,7 @@ struct ShapeBuilder {
 bool is_quadric(const std::string& type) { return type == "sphere" || type == "disk" || type == "cylinder"; }
 /// Made of triangles when they are read, because they are no primitives of ours.
 bool is_tessellated(const std::string& type) {
-    return type == "sdfgrid" || type == "linearcurve" || type == "bsplinecurve";
+    return type == "sdfgrid" || type == "linearcurve" || type == "bsplinecurve" || type == "heightfield";
 }
 bool is_mesh_file(const std::string& type) { return type == "obj" || type == "ply" || type == "serialized"; }
 
@@ -102,6 +103,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     if (!(std::fabs(determinant(job.to_world)) > 0))
         in.fail(in.where("to_world"), "the transform of the shape is singular");
     job.flip = in.boolean("flip_normals", false);
+    job.light_back = builder.document.light_backs.contains(&object);
     job.reverse = determinant(job.to_world) < 0;
     if (object.version >= 2 && (is_mesh_file(type) || type == "sphere")) {
         // In Mitsuba 3 a mirrored mesh keeps the order of its corners, whose outside so turns in, and so does that of a
@@ -200,14 +202,18 @@ void ShapeBuilder::read_tessellated(Reader& in, Job& job, const Matrix& outer) {
     const std::string name = in.text("filename", "");
     if (name.empty()) in.fail(job.type + " shape has no filename");
     const std::string path = builder.document.resolve(name, in.where("filename"));
-    const bool grid = job.type == "sdfgrid";
+    const bool grid = job.type == "sdfgrid", field = job.type == "heightfield";
+    const double scale = field ? in.number("scale", 1) : 1;
+    const bool smooth = field && in.boolean("shading_normals", true);
+    job.face_normals = field && !smooth;
     const std::string normals = grid ? in.text("normals", "smooth") : "";
     if (grid && normals != "smooth" && normals != "analytic")
         in.fail(in.where("normals"), "'" + normals + "' are no normals of an sdfgrid: smooth or analytic");
     // Radii of curves do not follow the shape's own transform, its points do.
-    const Matrix placed = grid ? Matrix{} : in.transform("to_world");
-    if (!grid) job.to_world = outer;
-    std::string key = path + "|" + job.type + normals;
+    const bool follows = grid || field;
+    const Matrix placed = follows ? Matrix{} : in.transform("to_world");
+    if (!follows) job.to_world = outer;
+    std::string key = path + "|" + job.type + normals + std::to_string(scale) + std::to_string(smooth);
     for (const auto& row : placed.m)
         for (double m : row) (key += '|') += std::to_string(float_bits(float(m)));
     if (const auto known = source_by_key.find(key); known != source_by_key.end()) {
@@ -219,7 +225,9 @@ void ShapeBuilder::read_tessellated(Reader& in, Job& job, const Matrix& outer) {
     builder.file_digests.push_back({path, sha256(bytes)});
     MeshSource source;
     source.type = job.type;
-    if (grid) {
+    if (field) {
+        source.mesh = read_height_field(path, bytes, scale, smooth, limits);
+    } else if (grid) {
         source.mesh = mesh_of_grid(path, read_distance_grid(path, bytes, limits),
                                    normals == "smooth" ? GridNormals::smooth : GridNormals::analytic);
     } else {
@@ -383,9 +391,9 @@ void build_shapes(Builder& builder, const Object& root) {
 }
 
 const Plugins& shape_plugins() {
-    static const Plugins known = {"obj",    "ply",     "serialized",  "rectangle",   "cube",
-                                  "sphere", "disk",    "cylinder",    "shapegroup",  "instance",
-                                  "merge",  "sdfgrid", "linearcurve", "bsplinecurve"};
+    static const Plugins known = {"obj",    "ply",     "serialized",  "rectangle",    "cube",
+                                  "sphere", "disk",    "cylinder",    "shapegroup",   "instance",
+                                  "merge",  "sdfgrid", "linearcurve", "bsplinecurve", "heightfield"};
     return known;
 }
 

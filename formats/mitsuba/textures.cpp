@@ -355,6 +355,12 @@ int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::
     return add_plain_texture(builder, image);
 }
 
+int32_t add_baked_texture(Builder& builder, const Texture& settings, const std::vector<float>& texels, Rgb mean) {
+    Texture texture = settings;
+    texture.offset = append_floats(builder.scene, texels, false, texture.format);
+    return add_texture(builder, texture, mean);
+}
+
 int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels) {
     LoadedImage image;
     image.width = width;

@@ -32,22 +32,36 @@ mitsuba::Vec3d direction_of(double s, double t) {
 
 }  // namespace
 
-Environment read_environment(mitsuba::Document& document, const std::string& path, const Where& where) {
+Rgb SphereImage::at(double x, double y, double z) const {
+    const auto [s, t] = square_of(x, y, z);
+    const size_t u = std::min(size_t(s * double(size)), size - 1), v = std::min(size_t(t * double(size)), size - 1);
+    return texels[v * size + u];
+}
+
+SphereImage read_sphere_image(mitsuba::Document& document, const std::string& path, const Where& where,
+                              const char* light) {
     const std::string bytes = read_input(path, document.limits);
     document.file_digests.push_back({path, sha256(bytes)});
     const Texels texels = read_image(path, bytes, document.limits);
     if (texels.width != texels.height)
-        fail(where, "the image of an infinite light is " + std::to_string(texels.width) + "x" +
+        fail(where, "the image of " + std::string(light) + " is " + std::to_string(texels.width) + "x" +
                         std::to_string(texels.height) + "; an equal-area octahedral map is square");
     const size_t n = texels.width;
-    std::vector<Rgb> colors(n * n);
+    SphereImage out{n, std::vector<Rgb>(n * n)};
     for (size_t i = 0; i < n * n; ++i)
         for (int c = 0; c < 3; ++c) {
             double v = texels.is_8bit ? texels.bytes[4 * i + size_t(c)] / 255.0 : texels.floats[4 * i + size_t(c)];
             if (!texels.is_linear) v = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
             if (!std::isfinite(v)) fail({path, 0}, "a texel is not finite");
-            colors[i][c] = float(std::max(v, 0.0));
+            out.texels[i][c] = float(std::max(v, 0.0));
         }
+    return out;
+}
+
+Environment read_environment(mitsuba::Document& document, const std::string& path, const Where& where) {
+    const SphereImage sphere = read_sphere_image(document, path, where, "an infinite light");
+    const size_t n = sphere.size;
+    const std::vector<Rgb>& colors = sphere.texels;
 
     Environment out{path + "#latitude-longitude", 0};
     for (size_t y = 0; y < n; ++y)
@@ -76,10 +90,9 @@ Environment read_environment(mitsuba::Document& document, const std::string& pat
                 const double sine = std::sin(theta);
                 for (int i = 0; i < kSub; ++i) {
                     const double phi = (double(x) + (i + 0.5) / kSub) / double(width) * 2 * M_PI;
-                    const auto [s, t] = square_of(std::sin(phi) * sine, std::cos(theta), -std::cos(phi) * sine);
-                    const size_t u = std::min(size_t(s * double(n)), n - 1), v = std::min(size_t(t * double(n)), n - 1);
+                    const Rgb color = sphere.at(std::sin(phi) * sine, std::cos(theta), -std::cos(phi) * sine);
                     const double w = std::max(sine, 1e-6);
-                    for (int c = 0; c < 3; ++c) sum[c] += w * double(colors[v * n + u][c]);
+                    for (int c = 0; c < 3; ++c) sum[c] += w * double(color[c]);
                     weight += w;
                 }
             }

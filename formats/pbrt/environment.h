@@ -1,6 +1,8 @@
 // Environment maps of pbrt.
 #pragma once
 
+#include <vector>
+
 #include "formats/pbrt/tokens.h"
 
 namespace ambilux::pbrt {
@@ -10,7 +12,17 @@ struct Environment {
     double illuminance;  ///< of a surface that faces +z
 };
 
-/// Reads an image of the sphere in equal-area octahedral coordinates.
+/// An image of the sphere in equal-area octahedral coordinates (Clarberg 2008), linear and nowhere negative.
+struct SphereImage {
+    size_t size = 0;  ///< texels a side
+    std::vector<Rgb> texels;
+
+    Rgb at(double x, double y, double z) const;  ///< of the texel that unit (x,y,z) falls into
+};
+SphereImage read_sphere_image(mitsuba::Document& document, const std::string& path, const Where& where,
+                              const char* light);
+
+/// Reads the image of an infinite light.
 Environment read_environment(mitsuba::Document& document, const std::string& path, const Where& where);
 
 }  // namespace ambilux::pbrt

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "formats/pbrt/environment.h"
-#include "formats/pbrt/scene.h"
+#include "formats/pbrt/light_parameters.h"
 #include "formats/spot_falloff.h"
 
 namespace ambilux::pbrt {
@@ -16,26 +16,6 @@ Vec3d point_of(const Matrix& m, Vec3d p) {
     return {row(0), row(1), row(2)};
 }
 Vec3d minus(Vec3d a, Vec3d b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-
-struct Emission {
-    Rgb color;
-    double scale;  ///< of the parameter and the film
-
-    Rgb scaled(double factor = 1) const { return color * float(scale * factor); }
-};
-
-Emission emission(SceneMaker& scene, const Described& light, const char* name) {
-    const Parameter* p = light.in.find(name);
-    const double scale = light.in.number("scale", 1);
-    if (!(scale >= 0)) fail(light.in.where_of("scale"), "the scale of a light must not be negative");
-    return {p ? scene.spectra().color(*p, ColorUse::light, light.space) : splat(1), scale * scene.exposure};
-}
-
-/// Factor that gives the light the power of its parameter, over that of a light of 1.
-double power_factor(const Described& light, const char* name, double of_one) {
-    const double value = light.in.number(name, -1);
-    return value > 0 ? value / of_one : 1;
-}
 
 void add_point(SceneMaker& scene, const Described& light) {
     Object& object = add_object(scene.document, "emitter", "point", light.in.where);
@@ -80,25 +60,45 @@ void add_spot(SceneMaker& scene, const Described& light) {
     add_child(*scene.document.scene, object);
 }
 
-/// Rotation of the world's transform; a uniform scale is nothing to what is infinitely far away.
-Matrix rotation_part(Matrix m) {
-    const double scale = std::cbrt(std::fabs(determinant(m)));
-    for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) m.m[i][j] /= scale > 0 ? scale : 1;
-        m.m[i][3] = 0;
+/// Several infinite lights are one: a constant light on top of the one there is.
+void add_to_environment(SceneMaker& scene, Rgb radiance) {
+    Object& object = *scene.environment;
+    const auto value = [&](const char* name) -> Value& {
+        return *std::find_if(object.values.begin(), object.values.end(),
+                             [&](const Value& v) { return v.name == name; });
+    };
+    if (object.type == "constant") {
+        value("radiance").rgb += radiance;
+        return;
     }
-    return m;
+    const double scale = value("scale").number;
+    Value& image = value("image");
+    Texels texels = scene.document.images[image.text];
+    if (scale > 0) {
+        for (size_t i = 0; i < texels.floats.size(); ++i)
+            if (i % 4 < 3) texels.floats[i] += radiance[int(i % 4)] / float(scale);
+    } else {
+        value("scale").number = 1;
+        for (size_t i = 0; i < texels.floats.size(); ++i) texels.floats[i] = i % 4 < 3 ? radiance[int(i % 4)] : 1.0f;
+    }
+    image.text += "+";
+    scene.document.images[image.text] = std::move(texels);
 }
 
 void add_infinite(SceneMaker& scene, const Described& light) {
     const Parameters& in = light.in;
-    if (in.find("portal")) scene.report.refuse(in.where_of("portal"), "portals are not supported", "it is left out");
+    if (in.find("portal"))
+        scene.report.note(in.where_of("portal"),
+                          "portals are left out: light is not looked for behind them alone, and what would come "
+                          "another way comes too, which makes no difference where walls enclose the rest");
     const std::string name = in.text("filename", "");
     const Emission e = emission(scene, light, "L");
     if (name.empty()) {
-        Object& object = add_object(scene.document, "emitter", "constant", in.where);
-        set_rgb(object, "radiance", e.scaled(power_factor(light, "illuminance", M_PI)));
-        return add_child(*scene.document.scene, object);
+        const Rgb radiance = e.scaled(power_factor(light, "illuminance", M_PI));
+        if (scene.environment) return add_to_environment(scene, radiance);
+        scene.environment = &add_object(scene.document, "emitter", "constant", in.where);
+        set_rgb(*scene.environment, "radiance", radiance);
+        return add_child(*scene.document.scene, *scene.environment);
     }
     if (in.find("L")) fail(in.where_of("L"), "both 'L' and 'filename' are given");
     const std::string path = resolve(scene.folder, name, in.where_of("filename"));
@@ -106,11 +106,21 @@ void add_infinite(SceneMaker& scene, const Described& light) {
     scene.report.note(in.where,
                       "environment maps are resampled from the equal-area octahedron to latitude and "
                       "longitude, which blurs them by half a texel");
-    Object& object = add_object(scene.document, "emitter", "envmap", in.where);
+    Rgb more{};
+    if (scene.environment) {  // a constant one joins the map
+        if (scene.environment->type != "constant") fail(in.where, "two infinite lights with images are not supported");
+        more = scene.environment->find("radiance")->rgb;
+        scene.environment->type = "envmap";
+        scene.environment->values.clear();
+    } else {
+        scene.environment = &add_object(scene.document, "emitter", "envmap", in.where);
+        add_child(*scene.document.scene, *scene.environment);
+    }
+    Object& object = *scene.environment;
     set_text(object, "image", environment.image);
     set_number(object, "scale", e.scale * power_factor(light, "illuminance", environment.illuminance));
     set_transform(object, "to_world", rotation_part(scene.state.ctm));
-    add_child(*scene.document.scene, object);
+    if (!is_zero(more)) add_to_environment(scene, more);
 }
 
 }  // namespace
@@ -125,6 +135,10 @@ void add_light(SceneMaker& scene, const Described& light) {
         add_distant(scene, light);
     else if (type == "infinite")
         add_infinite(scene, light);
+    else if (type == "projection")
+        add_projection(scene, light);
+    else if (type == "goniometric")
+        add_goniometric(scene, light);
     else
         return scene.report.refuse(light.in.where, "light '" + type + "' is not supported", "it is left out");
     light.in.finish(scene.report);
@@ -133,8 +147,7 @@ void add_light(SceneMaker& scene, const Described& light) {
 const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area) {
     const Parameters& in = light.in;
     if (in.type != "diffuse") fail(in.where, "area light '" + in.type + "' is not known: diffuse is");
-    if (in.boolean("twosided", false))
-        scene.report.refuse(in.where_of("twosided"), "area lights of two sides are not supported", "it has one");
+    if (in.boolean("twosided", false)) area *= 2;
     Object& object = add_object(scene.document, "emitter", "area", in.where);
     const Emission e = emission(scene, light, "L");
     const std::string name = in.text("filename", "");

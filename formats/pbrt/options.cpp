@@ -154,7 +154,8 @@ Object& film(SceneMaker& scene, const Parameters& in, const Options& options, do
         set_integer(out, "crop_height", crop[3] - crop[2]);
     }
     const std::string sensor = in.text("sensor", "cie1931");
-    if (sensor != "cie1931" || in.number("whitebalance", 0) != 0)
+    const double white = in.number("whitebalance", 0);
+    if (sensor != "cie1931" || white != 0)
         scene.report.note(in.where, "colours are those of sensor cie1931 without white balance; '" + sensor +
                                         "' counts for its exposure only");
     if (in.find("maxcomponentvalue"))

@@ -54,7 +54,8 @@ struct SceneMaker {
     std::map<std::string, Shared> named_materials;
     std::map<std::string, Object*> objects;  ///< shape groups of ObjectBegin
     Object* open_object = nullptr;
-    double exposure = 1;  ///< imaging ratio of the film
+    Object* environment = nullptr;  ///< emitter of the infinite lights so far
+    double exposure = 1;            ///< imaging ratio of the film
     uint64_t shape_count = 0;
     std::vector<CurveMesh> curves;
 

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "formats/meshes/loop_subdivision.h"
+#include "formats/pbrt/cut_quadrics.h"
 #include "formats/pbrt/scene.h"
 
 namespace ambilux::pbrt {
@@ -157,11 +158,11 @@ struct Placed {
     double area = 0;
 };
 
-/// Refuses parts of quadrics.
-void whole(SceneMaker& scene, const Parameters& in, const char* name, double value) {
-    if (std::fabs(in.number(name, value) - value) > 1e-6 * std::max(std::fabs(value), 1.0))
-        scene.report.refuse(in.where_of(name), "a " + in.type + " that is cut by '" + name + "' is not supported",
-                            "it is whole");
+Surface surface_of(const std::string& type) {
+    return type == "sphere"     ? Surface::sphere
+           : type == "disk"     ? Surface::disk
+           : type == "cylinder" ? Surface::cylinder
+                                : Surface::mesh;
 }
 
 Placed add_quadric(SceneMaker& scene, const Parameters& in) {
@@ -169,16 +170,12 @@ Placed add_quadric(SceneMaker& scene, const Parameters& in) {
     out.object = &add_object(scene.document, "shape", in.type, in.where);
     const double radius = in.number("radius", 1);
     if (!(radius > 0)) fail(in.where_of("radius"), "radius must be positive");
-    whole(scene, in, "phimax", 360);
     if (in.type == "sphere") {
         out.surface = Surface::sphere;
-        if (in.number("zmin", -radius) > -radius) whole(scene, in, "zmin", -radius);
-        if (in.number("zmax", radius) < radius) whole(scene, in, "zmax", radius);
         out.local = scaling(radius, radius, radius);
         out.area = 4 * M_PI * radius * radius;
     } else if (in.type == "disk") {
         out.surface = Surface::disk;
-        whole(scene, in, "innerradius", 0);
         out.local = translation(0, 0, in.number("height", 0)) * scaling(radius, radius, 1);
         out.area = M_PI * radius * radius;
     } else {
@@ -203,12 +200,18 @@ Placed add_mesh(SceneMaker& scene, const Parameters& in, const Object& material)
         in.ignore({"displacement", "edgelength"});
         return out;
     }
-    Mesh mesh = in.type == "trianglemesh"   ? triangle_mesh(in)
+    const bool cut = surface_of(in.type) != Surface::mesh;
+    double exact_area = 0;
+    Mesh mesh = cut                         ? cut_quadric(in, exact_area)
+                : in.type == "trianglemesh" ? triangle_mesh(in)
                 : in.type == "bilinearmesh" ? bilinear_mesh(scene, in)
                                             : loop_subdivision(scene, in);
+    if (cut)
+        scene.report.note(in.where,
+                          "parts of spheres, disks and cylinders are triangles: 256 around, 128 from pole to pole");
     if (mesh.uvs.empty() && has_texture(material)) mesh = with_default_uvs(mesh);
     check_mesh(in.where.file + ":" + std::to_string(in.where.line), mesh);
-    out.area = triangle_area(mesh, scene.state.ctm);
+    out.area = cut ? exact_area : triangle_area(mesh, scene.state.ctm);
     out.object = &add_object(scene.document, "shape", "mesh", in.where);
     const std::string name =
         in.where.file + ":" + std::to_string(in.where.line) + "#" + std::to_string(scene.document.meshes.size());
@@ -217,25 +220,29 @@ Placed add_mesh(SceneMaker& scene, const Parameters& in, const Object& material)
     return out;
 }
 
-Surface surface_of(const std::string& type) {
-    return type == "sphere"     ? Surface::sphere
-           : type == "disk"     ? Surface::disk
-           : type == "cylinder" ? Surface::cylinder
-                                : Surface::mesh;
+/// A light of two sides is two shapes.
+void add_back(SceneMaker& scene, const Parameters& in, const Object& shape, const Object& bsdf) {
+    if (bsdf.type != "twosided") {
+        scene.report.refuse(in.where, "a light of two sides whose surface lets light through is not supported",
+                            "it has one");
+        return;
+    }
+    scene.report.note(in.where, "lights of two sides are two surfaces, a hundred-thousandth of their extent apart");
+    add_child(*scene.document.scene, add_light_back(scene.document, shape));
 }
 
 }  // namespace
 
 void add_shape(SceneMaker& scene, const Parameters& in) {
     const std::string& type = in.type;
-    const bool quadric = surface_of(type) != Surface::mesh;
-    if (!quadric && type != "trianglemesh" && type != "plymesh" && type != "bilinearmesh" && type != "loopsubdiv" &&
+    const bool round = surface_of(type) != Surface::mesh, quadric = round && !is_cut(in);
+    if (!round && type != "trianglemesh" && type != "plymesh" && type != "bilinearmesh" && type != "loopsubdiv" &&
         type != "curve")
         return scene.report.refuse(in.where, "shape '" + type + "' is not supported", "it is left out");
     if (++scene.shape_count > scene.document.limits.shapes)
         fail(in.where,
              "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
-    const Object* bsdf = surface_material(scene, scene.state.material, surface_of(type));
+    const Object* bsdf = surface_material(scene, scene.state.material, quadric ? surface_of(type) : Surface::mesh);
     Placed placed;
     if (type == "curve") {
         const std::vector<Curve> curves = read_curve(scene, in);
@@ -269,6 +276,8 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
         add_child(shape, area_emitter(scene, *scene.state.area_light, uv, placed.area));
     in.finish(scene.report);
     add_child(scene.open_object ? *scene.open_object : *scene.document.scene, shape);
+    if (scene.state.area_light && !scene.open_object && scene.state.area_light->in.boolean("twosided", false))
+        add_back(scene, in, shape, *bsdf);
 }
 
 }  // namespace ambilux::pbrt

@@ -88,10 +88,12 @@ Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
         out.kind = Texture::Kind::checkerboard;
         out.mapping = mapping(in);
         out.color = even.color, out.odd = odd.color;
-        if (!even.is_constant() || !odd.is_constant())
-            report_.refuse(in.where, "a checkerboard of textures is not supported", "a checkerboard of greys is used");
-        if (!even.is_constant()) out.color = splat(1);
-        if (!odd.is_constant()) out.odd = splat(0);
+        if (!even.is_constant() || !odd.is_constant()) {
+            out.color = splat(1), out.odd = splat(0);
+            out = fold(in, {even, odd, out}, [](const std::vector<Rgb>& c) { return c[2].x > 0.5f ? c[0] : c[1]; });
+        }
+    } else if (in.type == "bilerp") {
+        out = bilerp(is_float, in, space);
     } else if (in.type == "imagemap") {
         out = image_texture(is_float, in);
     } else {
@@ -181,48 +183,6 @@ void Textures::load_texels(TextureImage& image) const {
     }
 }
 
-Texture Textures::fold(const Parameters& in, const std::vector<Texture>& parts,
-                       const std::function<Rgb(const std::vector<Rgb>&)>& f) {
-    Texture out;
-    // The kind of the first that is no constant, whose coordinates all others must have.
-    const Texture* model = nullptr;
-    bool fits = true;
-    for (const Texture& part : parts) {
-        if (part.is_constant()) continue;
-        if (part.kind == Texture::Kind::image) load_texels(*part.image);
-        if (!model) model = &part;
-        fits &= part.kind == model->kind && part.mapping == model->mapping && part.wrap == model->wrap &&
-                part.filter == model->filter;
-        if (fits && model->image)
-            fits = part.image->width == model->image->width && part.image->height == model->image->height;
-    }
-    if (!fits)
-        report_.refuse(
-            in.where,
-            "a texture of type '" + in.type + "' of textures of different kinds, sizes or coordinates is not supported",
-            "constants are put in for them");
-    std::vector<Rgb> values(parts.size());
-    const auto combine = [&](const std::function<Rgb(const Texture&)>& value) {
-        for (size_t i = 0; i < parts.size(); ++i)
-            values[i] = parts[i].is_constant() || !fits ? parts[i].color : value(parts[i]);
-        return f(values);
-    };
-    if (model && fits) out = *model;
-    out.where = in.where;
-    if (out.kind != Texture::Kind::image) {
-        out.color = combine([](const Texture& t) { return t.color; });
-        out.odd = combine([](const Texture& t) { return t.odd; });
-        return out;
-    }
-    out.image = std::make_shared<TextureImage>();
-    out.image->is_file = false;
-    out.image->width = model->image->width, out.image->height = model->image->height;
-    for (size_t i = 0; i < model->image->texels.size(); ++i)
-        out.image->texels.push_back(combine([i](const Texture& t) { return t.color * t.image->texels[i]; }));
-    out.color = splat(1);
-    return out;
-}
-
 std::string Textures::bake(const Texture& texture, const ColorMap& map) {
     load_texels(*texture.image);
     const TextureImage& image = *texture.image;
@@ -303,6 +263,11 @@ void Textures::set_color(Object& object, const std::string& name, const Texture&
     const bool beyond = texture.kind == Texture::Kind::image && max_component(texture.color) > 1;
     const ColorMap clip = [](Rgb c) { return min(c, splat(1)); };
     mitsuba::add_child(object, this->object(texture, uv, beyond ? clip : ColorMap{}), name);
+}
+
+const TextureImage& Textures::texels_of(const Texture& texture) const {
+    load_texels(*texture.image);
+    return *texture.image;
 }
 
 double Textures::mean(const Texture& texture) const {

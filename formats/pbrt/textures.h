@@ -64,6 +64,8 @@ public:
     void set_color(Object& object, const std::string& name, const Texture& texture, const UvMap& uv);
     /// Of all texels or cells.
     double mean(const Texture& texture) const;
+    /// Its image, with texels.
+    const TextureImage& texels_of(const Texture& texture) const;
     /// The texture as an object of its own.
     const Object& object(const Texture& texture, const UvMap& uv, const ColorMap& map = {});
 
@@ -72,6 +74,9 @@ private:
     Texture image_texture(bool is_float, const Parameters& in);
     Texture fold(const Parameters& in, const std::vector<Texture>& parts,
                  const std::function<Rgb(const std::vector<Rgb>&)>& f);
+    Texture on_one_grid(const Parameters& in, const std::vector<Texture>& parts,
+                        const std::function<Rgb(const std::vector<Rgb>&)>& f);
+    Texture bilerp(bool is_float, const Parameters& in, ColorSpace space) const;
     UvMap mapping(const Parameters& in) const;
     const Texture& named(const Parameter& p, bool is_float) const;
     std::shared_ptr<TextureImage> image_file(const std::string& path, double gamma, bool is_number);

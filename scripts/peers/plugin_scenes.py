@@ -118,6 +118,23 @@ def catalogue():
     two = bsdf("diffuse", rgb("reflectance", "0.8, 0.1, 0.1")) + bsdf("roughconductor", METAL + number("alpha", 0.2))
     s["blendbsdf"] = sphere(bsdf("blendbsdf", number("weight", 0.3) + two))
     s["blendbsdf texture"] = panel(bsdf("blendbsdf", bitmap("weight", "heights.png", yes("raw")) + two))
+    masked = bsdf("mask", number("opacity", 0.4) + bsdf("conductor", string("material", "Au")))
+    # Deep, because Mitsuba counts what paths pass through.
+    def deep(text):
+        return text.replace('name="max_depth" value="5"', 'name="max_depth" value="40"')
+
+    s["blendbsdf mask"] = deep(sphere(bsdf("blendbsdf", number("weight", 0.3) + masked + GREY)))
+    s["blendbsdf masks texture"] = deep(panel(
+        bsdf("blendbsdf", bitmap("weight", "heights.png", yes("raw")) + masked + bsdf("mask", numbers_checker("opacity", 0.9, 0.1) + GREY))))
+    s["blendbsdf null"] = deep(sphere(bsdf("mask", number("opacity", 0.8) + bsdf("blendbsdf", number("weight", 0.3) + bsdf("null") + GREY))))
+    s["mask mask"] = panel(bsdf("mask", number("opacity", 0.7) + bsdf("mask", numbers_checker("opacity", 0.9, 0.1) + bsdf("twosided", GREY))))
+    sides = bsdf("blendbsdf", number("weight", 0.3) + two) + bsdf("blendbsdf", number("weight", 0.6) + GREY + bsdf("diffuse", rgb("reflectance", "0.1, 0.2, 0.8")))
+    turned = '<transform name="to_world"><rotate x="1" angle="60"/><rotate z="1" angle="50"/><translate z="1.2"/></transform>'
+    for side in ("", yes("flip_normals")):
+        name = "twosided blends" + (" turned" if side else "")
+        s[name] = shape('<shape type="rectangle">' + turned + side + bsdf("twosided", sides) + "</shape>")
+    s["principled glass textures"] = panel(
+        bsdf("principled", bitmap("base_color") + bitmap("metallic", "heights.png", yes("raw")) + number("roughness", 0.4) + number("spec_trans", 0.6)))
     s["mask number"] = panel(bsdf("mask", number("opacity", 0.4) + GREY))
     s["mask bitmap"] = panel(bsdf("mask", bitmap("opacity", "heights.png", yes("raw")) + GREY))
     s["mask checkerboard"] = panel(bsdf("mask", numbers_checker("opacity", 0.9, 0.1) + bsdf("twosided", GREY)))

@@ -177,6 +177,44 @@ TEST_CASE("alpha, emission, glass and panes") {
     CHECK(bsdf(glass).as<RoughDielectric>().ior == Approx(1.33f));
 }
 
+TEST_CASE("what shines and has two sides shines on both") {
+    Json j = quad_scene();
+    j["materials"][0]["emissiveFactor"] = {1, 2, 3};
+    CHECK(load(j).emitters.size() == 1);
+    j["materials"][0]["doubleSided"] = true;
+    const Scene s = load(j);
+    REQUIRE(s.emitters.size() == 2);
+    REQUIRE(s.shapes.size() == 2);
+    CHECK(has_note(s, "two-sided surfaces that shine are two"));
+    CHECK(s.emitters[1].radiance.value == s.emitters[0].radiance.value);
+    for (const MeshVertex& v : s.vertices) CHECK(v.p.z == Approx(v.n.z > 0 ? 0.0 : -2e-5).margin(1e-6));
+    j["materials"][0]["alphaMode"] = "BLEND";
+    CHECK(load(j).emitters.size() == 1);
+}
+
+TEST_CASE("specular factors and sheen, as Blender writes them") {
+    const auto principled_of = [](const Json& extensions) {
+        Json j = quad_scene();
+        j["materials"][0]["extensions"] = extensions;
+        const Scene s = load(j);
+        return s.bsdfs[s.materials[s.shapes[0].material].front].as<Principled>();
+    };
+    CHECK(principled_of({{"KHR_materials_ior", {{"ior", 1.45}}}}).ior == Approx(1.45));
+    CHECK(principled_of({{"KHR_materials_ior", {{"ior", 1.45}}}, {"KHR_materials_specular", {{"specularFactor", 1}}}})
+              .ior == Approx(1.45));
+    // Half of the reflectance at normal incidence, 0.04.
+    const double root = std::sqrt(0.02);
+    CHECK(principled_of({{"KHR_materials_specular", {{"specularFactor", 0.5}}}}).ior ==
+          Approx((1 + root) / (1 - root)).epsilon(1e-5));
+    CHECK(principled_of({{"KHR_materials_specular", {{"specularColorFactor", {0.5, 0.5, 0.5}}}}}).ior ==
+          Approx((1 + root) / (1 - root)).epsilon(1e-5));
+    CHECK(principled_of({{"KHR_materials_specular", {{"specularFactor", 0}}}}).ior == 1);
+    CHECK(principled_of({{"KHR_materials_sheen", {{"sheenColorFactor", {0.1, 0.3, 0.2}}}}}).sheen == Approx(0.3));
+    Json j = quad_scene();
+    j["materials"][0]["extensions"] = {{"KHR_materials_specular", {{"specularTexture", {{"index", 0}}}}}};
+    CHECK(contains(error_of(j), "specularTexture is not supported"));
+}
+
 TEST_CASE("lights along -z of their nodes") {
     const Json turn = {{"translation", {0, 0, 2}}, {"rotation", {0, std::sqrt(0.5), 0, std::sqrt(0.5)}}};
     const Scene sun =

@@ -1,11 +1,13 @@
-// libs: ambilux_formats ambilux_accel
+// libs: ambilux_formats ambilux_accel JPEG::JPEG
 // timeout: 120
-// Shapes that become triangles: distances on a grid, and curves.
+// Shapes that become triangles: distances and heights on a grid, and curves.
 #include <cmath>
 #include <cstring>
 
 #include "formats/meshes/curves.h"
+#include "formats/meshes/height_field.h"
 #include "formats/meshes/sdf_grid.h"
+#include "tests/support/image_files.h"
 #include "tests/support/mitsuba_text.h"
 
 using namespace ambilux;
@@ -49,6 +51,41 @@ TEST_CASE("sdfgrid: a ball has its radius, normals and area, and is closed") {
         CHECK(area(mesh) == Approx(4 * M_PI * 0.09).epsilon(8e-3));  // twice that of the radius
         if (normals == GridNormals::smooth) CHECK(mesh.faces.size() == 2 * mesh.positions.size() - 4);  // Euler
     }
+}
+
+TEST_CASE("heightfield: heights of an image over a square, with the patches' own normals") {
+    const TempFolder folder;
+    // A slope of 1 along x and a bump: 3 columns, 2 rows, the first of them along y = -1.
+    write_float_image(folder / "h.exr", 3, 2, {0, 0, 0, 1, 1, 1, 2, 2, 2, 0, 0, 0, 1, 1, 1, 4, 4, 4});
+    const std::string shape =
+        "<shape type='heightfield'><string name='filename' value='h.exr'/><float name='scale' value='0.5'/>";
+    const Scene s = load(shape + "</shape>", {}, "0.6.0", &folder);
+    CHECK(has_note(s, "shapes of type 'heightfield' are triangles: 8 of them"));
+    REQUIRE(s.vertices.size() == 8);
+    const float heights[6] = {0, 0.5f, 1, 0, 0.5f, 2};
+    for (uint32_t i = 0; i < 6; ++i) {
+        check_rgb(s.vertices[i].p, {float(i % 3) - 1, i < 3 ? -1.0f : 1.0f, heights[i]});
+        CHECK(s.vertices[i].u == float(i % 3) / 2);
+        CHECK(s.vertices[i].v == (i < 3 ? 0.0f : 1.0f));
+    }
+    // Middles lie on the bilinear patches.
+    check_rgb(s.vertices[6].p, {-0.5f, 0, 0.25f});
+    check_rgb(s.vertices[7].p, {0.5f, 0, 1});
+    // The first column knows the slope alone: half a unit of height a cell, and cells are one unit wide.
+    check_rgb(s.vertices[0].n, normalize(Vec3f{-0.5f, 0, 1}));
+    // The corner of the bump: 1.5 along x, and 1 along y in one cell, which is two units.
+    check_rgb(s.vertices[5].n, normalize(Vec3f{-1.5f, -0.5f, 1}));
+    const Scene flat = load(shape + "<boolean name='shadingNormals' value='false'/></shape>", {}, "0.6.0", &folder);
+    CHECK((flat.shapes[0].flags & kShapeHasNormals) == 0);
+    CHECK(flat.shapes[0].area == Approx(s.shapes[0].area));
+    write_float_image(folder / "thin.exr", 3, 1, std::vector<float>(9, 1.0f));
+    CHECK(contains(
+        error_of("<shape type='heightfield'><string name='filename' value='thin.exr'/></shape>", {}, "0.6.0", &folder),
+        "two rows and columns"));
+    // Many cells are two triangles each.
+    const Mesh many = mesh_of_heights("many", 800, 700, std::vector<float>(560000, 0.0f), true);
+    CHECK(many.positions.size() == 560000);
+    CHECK(many.faces.size() == 2u * 799 * 699);
 }
 
 TEST_CASE("sdfgrid: files that are no grid of distances are refused") {

@@ -87,8 +87,6 @@ TEST_CASE("blends: what they are made of, with weights; null makes a mask of it"
     CHECK(
         contains(refused("<bsdf type='mixturebsdf'><string name='weights' value='0.6,0.6'/>" + red + blue + "</bsdf>"),
                  "sum to 1 at most"));
-    CHECK(contains(refused("<bsdf type='blendbsdf'><bsdf type='mask'>" + red + "</bsdf>" + red + "</bsdf>"),
-                   "a mask inside of a blend"));
 }
 
 TEST_CASE("principled: parameters, and transmission as a blend with rough glass") {

@@ -193,6 +193,102 @@ TEST_CASE("an environment map that shines from above") {
         kAlbedo * Rgb{1, 1.5f, 2}, [](double, double) { return M_PI; }, &folder);
 }
 
+TEST_CASE("projection lights have the intensity of their image, upright") {
+    const TempFolder folder;
+    // The left half is red and the right one blue, the lower row half as bright.
+    write_float_image(folder / "slide.exr", 2, 2, {4, 0, 0, 0, 0, 2, 2, 0, 0, 0, 0, 1});
+    // Down from a height of 2, its x along the world's and its y against it; half of its square is 0.75 wide there.
+    const std::string slide =
+        "AttributeBegin Transform [1 0 0 0 0 -1 0 0 0 0 -1 0 0 0 2 1] LightSource \"projection\" \"float fov\" "
+        "41.112090439 "
+        "\"string filename\" \"slide.exr\" \"float scale\" 3 AttributeEnd";
+    const Scene s = load_pbrt_text(plane_under(slide), {}, &folder);
+    Image expected = image_of(kSize, kSize, kAlbedo * Rgb{12, 0, 0}, [&](double film_x, double film_y) {
+        const double x = plane_x(film_x), y = plane_y(film_y);
+        if (x > 0 || std::fabs(x) > 0.75 || std::fabs(y) > 0.75) return 0.0;
+        return (y < 0 ? 1 : 0.5) * from_point(x, y, 0, 0, 2) / M_PI;
+    });
+    const Image blue = image_of(kSize, kSize, kAlbedo * Rgb{0, 0, 6}, [&](double film_x, double film_y) {
+        const double x = plane_x(film_x), y = plane_y(film_y);
+        if (x < 0 || std::fabs(x) > 0.75 || std::fabs(y) > 0.75) return 0.0;
+        return (y < 0 ? 1 : 0.5) * from_point(x, y, 0, 0, 2) / M_PI;
+    });
+    for (size_t i = 0; i < blue.rgb.size(); ++i) expected.rgb[i] += blue.rgb[i];
+    check_expectation(s, cpu_settings(s, Estimator::nee), expected);
+}
+
+TEST_CASE("goniometric lights shine in all directions by their image") {
+    const TempFolder folder;
+    constexpr int n = 128;
+    // Signs of two coordinates are told from the place in the square (Clarberg 2008), and the third one follows.
+    std::vector<float> texels;
+    for (int y = 0; y < n; ++y)
+        for (int x = 0; x < n; ++x) {
+            const double u = 2 * (x + 0.5) / n - 1, v = 2 * (y + 0.5) / n - 1, d = 1 - std::abs(u) - std::abs(v),
+                         r = 1 - std::abs(d), z = std::copysign(1 - r * r, d);
+            const float value = float((u > 0 ? 1 : 2) * (v > 0 ? 1 : 3) * (2 + z));
+            texels.insert(texels.end(), {value, value, value});
+        }
+    write_float_image(folder / "g.exr", n, n, texels);
+    // y of the image is z of the light, which is negative below it, and z is its y.
+    check_plane(
+        plane_under(
+            "AttributeBegin Translate .25 -.25 .7 LightSource \"goniometric\" \"rgb I\" [2 3 4] \"float scale\" .5 "
+            "\"string filename\" \"g.exr\" AttributeEnd"),
+        kAlbedo * Rgb{1, 1.5f, 2},
+        [](double x, double y) {
+            const double dx = x - .25, dy = y + .25, l = std::sqrt(dx * dx + dy * dy + .49);
+            return (dx > 0 ? 3 : 6) * (2 + dy / l) * from_point(x, y, .25, -.25, .7);
+        },
+        &folder);
+    const Scene s = load_pbrt_text(
+        plane_under("LightSource \"goniometric\" \"string filename\" \"g.exr\" \"float power\" 7"), {}, &folder);
+    REQUIRE(s.emitters.size() == 6);
+    double power = 0;
+    for (const Emitter& e : s.emitters) {
+        const Texture& t = s.textures[size_t(e.radiance.texture)];
+        double sum = 0;
+        for (uint32_t y = 0; y < t.height; ++y)
+            for (uint32_t x = 0; x < t.width; ++x) sum += double(load_texel(s.view(), t, x, y).y);
+        power += 4 * sum / (double(t.width) * t.height) * double(e.radiance.value.y);
+    }
+    CHECK(power == Approx(7).epsilon(1e-3));
+}
+
+TEST_CASE("area lights of two sides shine up and down") {
+    const auto light = [](const std::string& sides) {
+        return "AttributeBegin Material \"diffuse\" \"rgb reflectance\" [0 0 0] AreaLightSource \"diffuse\" \"rgb L\" "
+               "[2 3 4] " +
+               sides + " Translate 0 0 2 Shape \"disk\" \"float radius\" 1.5 AttributeEnd";
+    };
+    const auto from_disk = [](double x, double y) {
+        const double a = 1.5, h = 2, r2 = x * x + y * y, c = r2 + a * a + h * h;
+        return M_PI / 2 * (1 - (r2 + h * h - a * a) / std::sqrt(c * c - 4 * r2 * a * a));
+    };
+    check_plane(plane_under(light("\"bool twosided\" true")), kAlbedo * Rgb{2, 3, 4}, from_disk);
+    check_plane(plane_under("ReverseOrientation " + light("\"bool twosided\" true")), kAlbedo * Rgb{2, 3, 4},
+                from_disk);
+    check_plane(plane_under("ReverseOrientation " + light("")), kAlbedo * Rgb{2, 3, 4}, from_disk);
+    for (const char* shape : {"\"sphere\"", "\"cylinder\"", "\"disk\"", "\"sphere\" \"float zmin\" 0",
+                              "\"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 1 1 0] \"integer indices\" [0 1 2]"})
+        for (const char* turn : {"", "ReverseOrientation ", "Scale -1 1 1 "}) {
+            INFO(shape << turn);
+            const Scene s = load_pbrt_text(plane_under(
+                std::string("AttributeBegin ") + turn +
+                "AreaLightSource \"diffuse\" \"bool twosided\" true Translate 0 0 2 Shape " + shape + " AttributeEnd"));
+            REQUIRE(s.emitters.size() == 2);
+            // The other one lies behind it: against its normal.
+            const auto at = [&](size_t i) {
+                return surface_at<kAllFeatures>(s.view(), s.shapes[i].first_primitive, .2f, .2f);
+            };
+            const SurfacePoint front = at(0), back = at(1);
+            CHECK(dot(front.ng, back.ng) == Approx(-1).margin(1e-4));
+            const float gap = dot(back.p - front.p, back.ng);
+            CHECK(gap > 4e-6f);
+            CHECK(gap < 1e-4f);
+        }
+}
+
 TEST_CASE("area lights shine along their normal, and alpha lets light pass") {
     const std::string quad =
         "AreaLightSource \"diffuse\" \"rgb L\" [2 3 4] Translate 0 0 2 Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 -1 "
