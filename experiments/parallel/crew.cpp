@@ -90,8 +90,8 @@ void Crew::run(size_t index, const Scene& scene, RenderSettings settings, Shared
         std::optional<Piece> piece = render(index, *renderer, task);
         if (!piece) return;
         if (handing.valid()) handing.get();
-        handing = std::async(std::launch::async, [this, device = worker.device, stats = renderer->stats(),
-                                                  piece = std::move(*piece), film = renderer->take_film()]() mutable {
+        auto hand_over = [this, device = worker.device, stats = renderer->stats(), piece = std::move(*piece),
+                          film = renderer->take_film()]() mutable {
             try {
                 if (device.cuda >= 0) use_cuda_device(device.cuda);
                 piece.film = film();
@@ -99,10 +99,11 @@ void Crew::run(size_t index, const Scene& scene, RenderSettings settings, Shared
             } catch (...) {
                 failed(std::current_exception());
             }
-        });
+        };
         task = {};
         lock.lock();
-        worker.busy = false;
+        worker.busy = false;  // before its film comes: who takes that asks at once what is wanted
+        handing = std::async(std::launch::async, std::move(hand_over));
     }
 }
 
