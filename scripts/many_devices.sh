@@ -26,7 +26,7 @@ figures() {
   "$python" - "$out/$1.json" "$1" <<'PY'
 import json, sys
 j = json.load(open(sys.argv[1]))
-busy = ", ".join(f"{w['samples']} spp in {w['busy_seconds']:.2f} s, {w['films']} films" for w in j.get("workers", []))
+busy = ", ".join(f"{w['samples']} spp in {w['busy_seconds']:.2f} s, {w['ranges']} ranges" for w in j.get("workers", []))
 print(f"{sys.argv[2]}: {j['seconds']['render']:.3f} s, merging {j.get('merge_seconds', 0):.3f} s; {busy}")
 PY
 }

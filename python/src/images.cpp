@@ -83,7 +83,8 @@ void bind_images(nb::module_& m) {
                 return DevicePixels(i.rgb.get(), {size_t(i.height), size_t(i.width), 3}, self, {}, nb::dtype<float>(),
                                     nb::device::cuda::value, i.device);
             },
-            nb::rv_policy::reference, "A capsule of DLPack, which keeps the memory.");
+            nb::rv_policy::reference, nb::sig("def dlpack(self) -> object"),
+            "A capsule of DLPack, which keeps the memory.");
     m.def("read_image", &read_image, "path"_a, "Pixels of an EXR file, and its attributes.");
     m.def("write_image", &write_image, "path"_a, "rgb"_a, "stderr"_a.none(), "samples"_a, "attributes"_a,
           "Writes an EXR file: a reference if `stderr` is given.");

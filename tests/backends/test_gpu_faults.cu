@@ -1,12 +1,12 @@
 // libs: ambilux_cli ambilux_experiments ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_core
 // labels: gpu
-// wraps: cudaMalloc cudaMallocManaged cudaHostAlloc cudaStreamCreateWithFlags cudaGraphInstantiate cudaFree
-// cudaFreeHost wraps: cudaStreamDestroy cudaGraphDestroy cudaGraphExecDestroy cudaGraphAddNode
-// cudaGraphConditionalHandleCreate wraps: cudaStreamBeginCapture cudaStreamBeginCaptureToGraph cudaLaunchKernel
-// __cudaLaunchKernel cudaGraphLaunch cudaMemcpy wraps: cudaMemcpyAsync cudaMemset cudaMemsetAsync cudaStreamSynchronize
-// cudaDeviceSynchronize cudaMemGetInfo wraps: cudaStreamEndCapture cudaGetLastError Memory of a device that runs out at
-// any allocation, and a device that is lost at any call: code 4, one message, no leak, what was finished is saved, and
-// the next render works.
+// wraps: cudaMalloc cudaMallocManaged cudaHostAlloc cudaStreamCreateWithFlags cudaGraphInstantiate cudaGraphAddNode
+// wraps: cudaFree cudaFreeHost cudaStreamDestroy cudaGraphDestroy cudaGraphExecDestroy cudaStreamEndCapture
+// wraps: cudaGraphConditionalHandleCreate cudaStreamBeginCapture cudaStreamBeginCaptureToGraph cudaGraphLaunch
+// wraps: cudaLaunchKernel __cudaLaunchKernel cudaMemcpy cudaMemcpyAsync cudaMemset cudaMemsetAsync cudaGetLastError
+// wraps: cudaStreamSynchronize cudaDeviceSynchronize cudaMemGetInfo
+// Memory of a device that runs out at any allocation, and a device that is lost at any call: code 4, one message, no
+// leak, what was finished is saved, and the next render works.
 #include <fcntl.h>
 #include <unistd.h>
 

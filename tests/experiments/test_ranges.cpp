@@ -101,3 +101,16 @@ TEST_CASE("a budget in seconds ends within half a range of the slowest device") 
     CHECK(!Dealer({8, 0}, 20, {}).next(20.0, 0, 0));
     CHECK(!Dealer({8, 0}, 20, {}).next(19.9, 1, 1));
 }
+
+TEST_CASE("a rank gets as many times the ranges as it has devices, and no more than its share of what is left") {
+    const Ranges ranges = {1, 1024};
+    const auto length = [&](double rate, size_t devices) {
+        const RangeNode node = Dealer(ranges, 0, {}).next(0, 0.5, rate, devices).value();
+        return node.end() - node.first();
+    };
+    CHECK(length(16, 1) == 4);  // 2 s of one device
+    CHECK(length(16, 8) == 32);
+    CHECK(length(1024, 8) == 8);                                           // half of the second that all need for it
+    const auto timed = Dealer({1, 0}, 10, {}).next(9, 0.5, 0, 4).value();  // 1 s is left
+    CHECK(timed.end() - timed.first() == 8);
+}
