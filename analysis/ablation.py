@@ -25,7 +25,7 @@ def label_lines(runs, base):
 def ratio_ticks(low, high):
     """Ticks of a logarithmic axis of ratios, few enough to read: 1 is one of them."""
     decades = math.log10(high / low)
-    subs = (1,) if decades > 3 else (1, 3) if decades > 1.6 else (1, 2, 5) if decades > 0.7 else (1, 1.5, 2, 3, 5, 7) if decades > 0.3 else (1, 1.2, 1.5, 2, 3, 5, 7, 8, 9)
+    subs = (1,) if decades > 3 else (1, 3) if decades > 1.6 else (1, 2, 5) if decades > 0.7 else (1, 1.5, 2, 3, 5, 7) if decades > 0.4 else (1, 1.2, 1.5, 2, 3, 5, 7, 8, 9)
     return [s * 10.0**e for e in range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1) for s in subs if low <= s * 10.0**e <= high]
 
 

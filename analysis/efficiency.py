@@ -53,15 +53,22 @@ def wholes(experiment, scene, run, batches, metric):
     return [getattr(last[seed], ERRORS[metric]) * last[seed].spp for seed in batches if seed in last]
 
 
-def of_batches(experiment, scene, run, metric):
-    """Work of a run's batches: (error of one sample, seconds of one sample) of each; None without batches."""
+def selection(experiment, scene, run, rows):
+    """{seed: seconds of one sample that went into selecting a method (bdpt.auto), which no batch holds}, up to the checkpoint of `rows`."""
+    samples = {r.seed: r.spp for r in rows}
+    seconds = {seed: (stats.get("choice") or {}).get("seconds", 0.0) for seed, stats in experiment.stats_by_seed(scene, run).items()}
+    return {seed: s / samples[seed] for seed, s in seconds.items() if s and seed in samples}
+
+
+def of_batches(experiment, scene, run, metric, rows):
+    """Work of a run's batches: (error of one sample, seconds of one sample) of each; None without batches. `rows`: of the checkpoint at which runs compare."""
     batches = batches_of(experiment, scene, run)
     if not batches:
         return None
     values = variances(batches, metric)
-    times = [b.time / b.spp for of_seed in batches.values() for b in of_seed]
-    rows = np.array([*zip((v for of_seed in values for v in of_seed), times)])
-    return Work(rows, "batches", heavy_tails.doubt_of_batches(values, wholes(experiment, scene, run, batches, metric)))
+    before = selection(experiment, scene, run, rows)
+    times = [b.time / b.spp + before.get(b.seed, 0.0) for of_seed in batches.values() for b in of_seed]
+    return Work(np.array([*zip((v for of_seed in values for v in of_seed), times)]), "batches", heavy_tails.doubt_of_batches(values, wholes(experiment, scene, run, batches, metric)))
 
 
 def averaging(experiment, scene, run, metric):

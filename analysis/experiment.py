@@ -182,7 +182,11 @@ class Experiment:
 
     def stats(self, scene, run):
         """Statistics of the renders of all seeds, as the runner wrote them."""
-        return [read_json(path) for _, path in self.files("stats", scene, run, ".json")]
+        return list(self.stats_by_seed(scene, run).values())
+
+    def stats_by_seed(self, scene, run):
+        """{seed: statistics}."""
+        return {seed: read_json(path) for seed, path in self.files("stats", scene, run, ".json")}
 
     def techniques(self, scene, run):
         """(seed, folder) of all folders techniques/SCENE/RUN_SEED that hold a techniques.json."""

@@ -44,6 +44,7 @@ class Notes:
         self.letters = {}
 
     def mark(self, reason):
+        reason = re.sub(r" \(x[\d.]+\)$", "", re.sub(r"^\d+ (batches|seeds)$", r"too few \1", reason))
         return "--$^{" + self.letters.setdefault(reason, "abcdefghijklmnopqrstuvwxyz"[min(len(self.letters), 25)]) + "}$"
 
     def below(self):

@@ -84,7 +84,7 @@ def draw(experiment, times_of, units, width="page"):
 UNITS = "ns per pixel and sample"
 INSIDE = {  # of a backend: what runs inside of other stages (backends/fusion.h), and how its time is known
     "cpu": " On the CPU connect, connect_camera, connect_vertices and occlude run inside of the stages that make their vertices; their time is taken off these, measured of occlude, of the others "
-           "estimated from one vertex of sixteen. mis_weight and accumulate have no clock: their time is that of the stage that makes the light.",
+           "estimated from one vertex of sixteen (on a busy machine too little: waits stay with shade). mis_weight and accumulate have no clock: their time is that of the stage that makes the light.",
     "cuda": " On CUDA connect, connect_camera, mis_weight, accumulate and the camera rays of generate run inside of other stages, whose bars hold their time, and the last bounces of a wave count as "
             "shade; `ambilux bench stages SCENE --unfused` estimates the shares from a render without fusion.",
 }

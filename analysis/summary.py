@@ -143,8 +143,8 @@ def speedup(experiment, scene, run, base=None):
 
 def works(experiment, scene, run, checkpoint):
     """(Work over batches or None, Work over seeds at one checkpoint) of the metric that leads."""
-    return (efficiency.of_batches(experiment, scene, run, experiment.metric),
-            efficiency.of_seeds(experiment.select(scene, run, checkpoint), experiment.metric))
+    rows = experiment.select(scene, run, checkpoint)
+    return efficiency.of_batches(experiment, scene, run, experiment.metric, rows), efficiency.of_seeds(rows, experiment.metric)
 
 
 def ratios(of_run, of_base, name, for_test=False):

@@ -73,3 +73,14 @@ def test_references_are_found_where_results_went(tmp_path):
     (tmp_path / "all" / "references" / "box-abc.exr").unlink()
     assert experiment.load(folder).reference("box") is None
     assert experiment.load(tmp_path / "there").reference("box") is not None
+
+
+def test_selecting_a_method_counts_as_time_of_its_run(tmp_path):
+    folder = synthetic.make(tmp_path / "run", scenes=("box",), runs=(("nee", 0.7, 1.5), ("auto", 0.5, 2.0)), batches=16)
+    before = {line.run: line.efficiency_batches.value for line in summary.lines(experiment.load(folder))}
+    for seed in (1, 2, 3):
+        path = folder / "stats" / "box" / f"auto_{seed}.json"
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"choice": {"name": "b", "seconds": 0.128, "candidates": []}}))
+    after = {line.run: line.efficiency_batches.value for line in summary.lines(experiment.load(folder))}
+    assert after["nee"] == before["nee"]
+    assert after["auto"] == pytest.approx(before["auto"] / 2)  # 0.128 s beside 64 samples of 2 ms
