@@ -46,9 +46,12 @@ bool count_periods(Input& input, const Texture& model) {
     if (wrap_of(t) != WrapMode::repeat || !(density(model) > 0)) return false;
     const auto place = [&](double s, double v) { return texture_coordinates(t, surface_coordinates(model, s, v)); };
     const Vec2f o = place(0, 0), x = place(1, 0) - o, y = place(0, 1) - o;
-    const auto whole = [](float f) { return std::fabs(f - std::round(f)) < 1e-4f && std::fabs(f) > 0.5f; };
+    const auto whole = [](float f) {
+        return std::fabs(f - std::round(f)) < 1e-4f && std::fabs(f) > 0.5f && std::fabs(f) <= float(kMostTexels);
+    };
+    if (!whole(x.x) || !whole(y.y) || !(std::fabs(x.y) < 1e-4f) || !(std::fabs(y.x) < 1e-4f)) return false;
     input.periods[0] = uint32_t(std::lround(std::fabs(x.x))), input.periods[1] = uint32_t(std::lround(std::fabs(y.y)));
-    return whole(x.x) && whole(y.y) && std::fabs(x.y) < 1e-4f && std::fabs(y.x) < 1e-4f;
+    return true;
 }
 
 /// Texels a side along an axis. Edges of steps fall on edges of texels; centres of interpolated texels on centres.

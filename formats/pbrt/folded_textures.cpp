@@ -32,6 +32,7 @@ bool place(const Texture& texture, const UvMap& grid, Placed& out) {
     out.s.shift = a[0][2] - out.s.scale * b[0][2], out.t.shift = a[1][2] - out.t.scale * b[1][2];
     // Cells of a checkerboard repeat after two.
     const double period = texture.kind == Texture::Kind::checkerboard ? 2 : 1;
+    if (!(std::fabs(out.s.scale) <= double(kMostTexels) && std::fabs(out.t.scale) <= double(kMostTexels))) return false;
     return is_whole(out.s.scale / period) && is_whole(out.t.scale / period);
 }
 

@@ -118,7 +118,7 @@ def catalogue():
     two = bsdf("diffuse", rgb("reflectance", "0.8, 0.1, 0.1")) + bsdf("roughconductor", METAL + number("alpha", 0.2))
     s["blendbsdf"] = sphere(bsdf("blendbsdf", number("weight", 0.3) + two))
     s["blendbsdf texture"] = panel(bsdf("blendbsdf", bitmap("weight", "heights.png", yes("raw")) + two))
-    masked = bsdf("mask", number("opacity", 0.4) + bsdf("conductor", string("material", "Au")))
+    masked = bsdf("mask", number("opacity", 0.4) + bsdf("diffuse", rgb("reflectance", "0.8, 0.1, 0.1")))
     # Deep, because Mitsuba counts what paths pass through.
     def deep(text):
         return text.replace('name="max_depth" value="5"', 'name="max_depth" value="40"')

@@ -257,8 +257,9 @@ TEST_CASE("what is not known is refused by name") {
     };
     add("extension 'KHR_draco_mesh_compression' is not supported")["extensionsRequired"] = {
         "KHR_draco_mesh_compression"};
-    add("extension 'KHR_materials_sheen' is not supported")["materials"][0]["extensions"]["KHR_materials_sheen"] = {
-        {"sheenRoughnessFactor", 1}};
+    add("extension 'KHR_materials_iridescence' is not supported")["materials"][0]["extensions"]
+                                                                 ["KHR_materials_iridescence"] = {
+                                                                     {"iridescenceFactor", 1}};
     add("points and lines")["meshes"][0]["primitives"][0]["mode"] = 1;
     add("colours of vertices")["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 0;
     for (const auto& [problem, j] : cases) {

@@ -289,6 +289,47 @@ TEST_CASE("area lights of two sides shine up and down") {
         }
 }
 
+TEST_CASE("lights made on loading: paths, light paths and all strategies together have one image") {
+    const TempFolder folder;
+    std::vector<float> texels;
+    for (int i = 0; i < 64; ++i) texels.insert(texels.end(), {float(1 + i % 3), float(1 + i % 5), float(1 + i / 8)});
+    write_float_image(folder / "g.exr", 8, 8, texels);
+    const std::string lights[] = {
+        "AttributeBegin Translate .2 1.5 .3 LightSource \"goniometric\" \"string filename\" \"g.exr\" AttributeEnd",
+        "AttributeBegin Translate 0 2 0 Rotate 90 1 0 0 LightSource \"projection\" \"float fov\" 80 \"string "
+        "filename\" "
+        "\"g.exr\" AttributeEnd",
+        "AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [2 3 4] \"bool twosided\" true Translate 0 1 0 Rotate 60 "
+        "1 0 0 "
+        "Shape \"disk\" \"float radius\" .5 AttributeEnd"};
+    for (const std::string& light : lights) {
+        INFO(light);
+        const Scene s = load_pbrt_text(
+            "LookAt 0 2 4 0 .5 0 0 1 0 Camera \"perspective\" \"float fov\" 50 Film \"rgb\" \"integer xresolution\" 24 "
+            "\"integer yresolution\" 16 PixelFilter \"box\" Integrator \"path\" \"integer maxdepth\" 4 WorldBegin " +
+                light +
+                " Material \"diffuse\" \"rgb reflectance\" [.6 .5 .4] Shape \"trianglemesh\" \"point3 P\" [-3 0 -3 3 0 "
+                "-3 3 0 3 "
+                "-3 0 3] \"integer indices\" [0 1 2 0 2 3] Translate .8 .4 0 Shape \"sphere\" \"float radius\" .4",
+            {}, &folder);
+        const auto film = [&](const char* integrator, uint64_t seed) {
+            RenderSettings settings = cpu_settings(s, Estimator::mis, seed);
+            settings.integrator = integrator;
+            return to_estimate(render_scene(s, settings, 2048).film);
+        };
+        const auto paths = film("path", 1);
+        ZTestOptions options;
+        options.block = 4;
+        options.rounding = 1e-4;
+        for (const char* integrator : {"light", "bdpt"}) {
+            const ZTestResult z = z_test(film(integrator, 2), paths, options);
+            INFO(integrator << ": " << z.report());
+            CHECK(z.pass);
+            CHECK(z.detectable < 0.03);
+        }
+    }
+}
+
 TEST_CASE("area lights shine along their normal, and alpha lets light pass") {
     const std::string quad =
         "AreaLightSource \"diffuse\" \"rgb L\" [2 3 4] Translate 0 0 2 Shape \"trianglemesh\" \"point3 P\" [-1 -1 0 -1 "
