@@ -125,7 +125,7 @@ public:
     RenderStats stats() override {
         RenderStats s;
         s.backend = "cuda";
-        s.device = cuda_device_name();
+        s.device = device_name_;
         s.accel = pairs_ ? "bvh2" : "cwbvh";
         s.settings = settings_;
         s.build_seconds = build_seconds_;
@@ -311,6 +311,7 @@ private:
     typename Integrator::Policy policy_;
     Features traced_;  ///< what rays are traced for
     bool use_graph_;
+    std::string device_name_ = cuda_device_name();  ///< cudaGetDeviceProperties takes milliseconds
     Wave wave_{};
     Layout layout_;
     std::vector<StageRecord> records_;    ///< as last read: they outlast a failure to grow

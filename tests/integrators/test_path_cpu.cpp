@@ -162,7 +162,8 @@ TEST_CASE("G3, G8: memory is what was predicted, queues never overflow, and coun
                 uint64_t sum = 0;
                 for (uint64_t n : stage.items_by_depth) sum += n;
                 CHECK(sum == stage.items);
-                CHECK(stage.launches > 0);
+                // What runs inside of another stage has its items, and its time, but no launches.
+                CHECK((stage.launches > 0) == (stage.name != "connect"));
             }
             CHECK(stages["extend"].items_by_depth.at(1) == uint64_t(w) * h * 2);
             CHECK(stats.rays_extend == stages["extend"].items);
