@@ -456,7 +456,7 @@ TEST_CASE("lenient loading lists each substitution once") {
         "<sensor type='perspective'><film type='hdrfilm'><rfilter type='sharp'/></film></sensor>\n"
         "<bsdf type='measured' id='p'><float name='roughness' value='1'/></bsdf>\n"
         "<shape type='rectangle'><ref id='p'/></shape>\n<shape type='rectangle'><ref id='p'/></shape>\n"
-        "<shape type='sdfgrid'/>\n<emitter type='lantern'/>\n<shape type='rectangle'><float name='odd' "
+        "<shape type='ellipsoids'/>\n<emitter type='lantern'/>\n<shape type='rectangle'><float name='odd' "
         "value='1'/></shape>",
         lenient);
     CHECK(s.shapes.size() == 3);
@@ -466,7 +466,7 @@ TEST_CASE("lenient loading lists each substitution once") {
                               ":2: integrator type 'depth' is not supported; path is used",
                               ":8: emitter type 'lantern'",
                               ":4: BSDF type 'measured' is not supported",
-                              ":7: shape type 'sdfgrid'",
+                              ":7: shape type 'ellipsoids'",
                               ":9: unknown parameter 'odd' of shape 'rectangle'; it is ignored"};
     for (const char* part : expected) {
         INFO(part);
