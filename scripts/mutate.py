@@ -172,9 +172,10 @@ class Workspace:
         say("building " + " ".join(self.tests))
         began = time.time()
         # Compilers say more about what is unreachable or unused in faults than in sources.
-        result = subprocess.run(["nice", "cmake", "--build", self.build, "-j", str(os.cpu_count()), "--target", *self.tests], stdout=subprocess.DEVNULL)
+        result = run(["nice", "cmake", "--build", self.build, "-j", str(len(os.sched_getaffinity(0))), "--target", *self.tests])
         if result.returncode:
-            sys.exit("the build failed")
+            errors = [line for line in result.stdout.splitlines() if re.search(r"error|FAILED", line)]
+            sys.exit("\n".join(["the build failed", *errors[:20]]))
         say(f"built in {time.time() - began:.0f} s")
 
     # ---- running tests ----
