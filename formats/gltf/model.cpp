@@ -77,6 +77,24 @@ void image_views(Context& context) {
     }
 }
 
+/// Since version 2.9 tinygltf asks for sizes too.
+template <class Callbacks>
+Callbacks callbacks(Files& files) {
+    Callbacks c;
+    c.FileExists = file_exists;
+    c.ExpandFilePath = same_path;
+    c.ReadWholeFile = read_whole_file;
+    c.WriteWholeFile = write_nothing;
+    c.user_data = &files;
+    if constexpr (requires { c.GetFileSizeInBytes; })
+        c.GetFileSizeInBytes = [](size_t* size, std::string*, const std::string& name, void*) {
+            std::error_code error;
+            *size = std::filesystem::file_size(name, error);
+            return !error;
+        };
+    return c;
+}
+
 }  // namespace
 
 void read_model(Context& context, const std::string& path) {
@@ -85,7 +103,7 @@ void read_model(Context& context, const std::string& path) {
     if (bytes.size() > size_t(INT32_MAX)) context.fail("a glTF file may have 2 GiB at most");
     Files files{context, ""};
     tinygltf::TinyGLTF reader;
-    reader.SetFsCallbacks({file_exists, same_path, read_whole_file, write_nothing, &files});
+    reader.SetFsCallbacks(callbacks<tinygltf::FsCallbacks>(files));
     reader.SetImageLoader(keep_image, &files);
     const std::string folder = std::filesystem::path(path).parent_path().string();
     std::string error, warning;
