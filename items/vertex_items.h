@@ -65,10 +65,10 @@ struct ConnectionVertex {
     ConnectionVertexFront front;
     Rgb throughput;  ///< of a diffuse vertex: times its reflectance
     float dvcm;
-    Vec2f d, n;  ///< of the ray that met it; frame.n
-    Vec3f tangent;
-    uint32_t record;  ///< ScatteringParts
-    Rgb color0;       ///< BsdfInputs, where there are textures
+    Vec2f d, n;     ///< of the ray that met it; frame.n
+    Vec3f tangent;  ///< ScatteringParts
+    uint32_t record;
+    Rgb color0;  ///< BsdfInputs, where there are textures
     float number0;
     Rgb color1;
     float number1;

@@ -100,7 +100,7 @@ public:
         film_samples_ = 0;
         film_is_whole_ = true;
     }
-    /// A copy on the device takes a hundredth of the time of one to the host.
+    /// Waits for a copy on the device alone, whose memory is so much faster than the bus.
     std::function<FilmMoments()> take_film() override {
         check_film();
         const uint64_t values = film_values();
@@ -311,7 +311,7 @@ private:
     typename Integrator::Policy policy_;
     Features traced_;  ///< what rays are traced for
     bool use_graph_;
-    std::string device_name_ = cuda_device_name();  ///< cudaGetDeviceProperties takes milliseconds
+    std::string device_name_ = cuda_device_name();  ///< asked for once: stats() is called often
     Wave wave_{};
     Layout layout_;
     std::vector<StageRecord> records_;    ///< as last read: they outlast a failure to grow

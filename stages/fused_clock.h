@@ -15,7 +15,7 @@ public:
     static constexpr int64_t kOnceIn = 16;  ///< calls of a sampled stage, on average
 
     /// Nanoseconds of stages inside of others so far: the difference over a launch is no time of the stage that was
-    /// launched. What is sampled is an estimate, without bias.
+    /// launched. What is sampled is an estimate.
     static int64_t inside() { return inside_; }
 
     /// True for one call of kOnceIn. Each call has the same chance, whatever those before it had (a geometric gap):

@@ -77,11 +77,11 @@ void Crew::run(size_t index, const Scene& scene, RenderSettings settings, Shared
         SharedAccels accels(scene, host);
         return make_renderer(scene, settings, accels);
     }();
+    std::future<void> handing;  // over the film before; before the lock, which it needs to end
     std::unique_lock lock(mutex_);
     worker.work.stats = renderer->stats();
     worker.ready = true;
     changed_.notify_all();
-    std::future<void> handing;  // over the film before
     for (Task task;;) {
         changed_.wait(lock, [&] { return is_set(&stop_) || next_task(index, task); });
         if (is_set(&stop_)) return;

@@ -6,6 +6,7 @@
 #include "core/half.h"
 #include "formats/convert/writer.h"
 #include "formats/images/image_write.h"
+#include "formats/srgb.h"
 
 namespace ambilux::convert {
 
@@ -19,7 +20,7 @@ Decoding decoding_of(const Scene& scene, const Texture& t) {
     const float* table = scene.tables.data() + t.decode_table;
     bool linear = true, srgb = true;
     for (int i = 0; i < 256; ++i) {
-        const double v = i / 255.0, s = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+        const double v = i / 255.0, s = srgb_to_linear(v);
         linear &= std::fabs(table[i] - v) < 1e-6;
         srgb &= std::fabs(table[i] - s) < 1e-6;
     }

@@ -6,6 +6,7 @@
 #include "core/math.h"
 #include "formats/file_budget.h"
 #include "formats/images/image_io.h"
+#include "formats/srgb.h"
 
 namespace ambilux {
 
@@ -73,7 +74,7 @@ Mesh read_height_field(const std::string& path, std::string_view bytes, double s
         for (int k = 0; k < 3; ++k) {
             const size_t at = 4 * i + size_t(k);
             double v = texels.is_8bit ? texels.bytes[at] / 255.0 : double(texels.floats[at]);
-            if (!texels.is_linear) v = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+            if (!texels.is_linear) v = srgb_to_linear(v);
             c[k] = float(v);
         }
         heights[i] = float(scale * double(luminance(c)));

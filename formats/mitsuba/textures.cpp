@@ -9,6 +9,7 @@
 #include "formats/images/image_io.h"
 #include "formats/mitsuba/builder.h"
 #include "formats/mitsuba/plugins.h"
+#include "formats/srgb.h"
 
 namespace ambilux::mitsuba {
 
@@ -18,7 +19,7 @@ namespace {
 float decode(float value, double gamma) {
     if (gamma == 1) return value;
     const double v = value;
-    if (gamma == -1) return float(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+    if (gamma == -1) return float(srgb_to_linear(v));
     return float(std::pow(v, gamma));
 }
 

@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/text_cursor.h"
+#include "formats/srgb.h"
 
 namespace ambilux::mitsuba {
 namespace {
@@ -33,8 +34,6 @@ Vec3d any_up(Vec3d d) {
     const double sign = std::copysign(1.0, z), a = -1 / (sign + z);
     return {1 + sign * x * x * a, sign * x * y * a, -sign * x};
 }
-
-float srgb_to_linear(double v) { return float(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4)); }
 
 }  // namespace
 
@@ -203,7 +202,7 @@ Value ValueParser::parse_color(const XmlSource& source, const pugi::xml_node& no
     }
     if (c.size() != 3) fail(at, "<" + tag + "> needs one or three numbers, not " + std::to_string(c.size()));
     if (tag == "srgb")
-        value.rgb = {srgb_to_linear(c[0]), srgb_to_linear(c[1]), srgb_to_linear(c[2])};
+        value.rgb = {float(srgb_to_linear(c[0])), float(srgb_to_linear(c[1])), float(srgb_to_linear(c[2]))};
     else
         value.rgb = {float(c[0]), float(c[1]), float(c[2])};
     return value;

@@ -6,6 +6,7 @@
 #include "core/math.h"
 #include "core/parallel.h"
 #include "formats/file_budget.h"
+#include "formats/srgb.h"
 
 namespace ambilux::pbrt {
 
@@ -51,7 +52,7 @@ SphereImage read_sphere_image(mitsuba::Document& document, const std::string& pa
     for (size_t i = 0; i < n * n; ++i)
         for (int c = 0; c < 3; ++c) {
             double v = texels.is_8bit ? texels.bytes[4 * i + size_t(c)] / 255.0 : texels.floats[4 * i + size_t(c)];
-            if (!texels.is_linear) v = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+            if (!texels.is_linear) v = srgb_to_linear(v);
             if (!std::isfinite(v)) fail({path, 0}, "a texel is not finite");
             out.texels[i][c] = float(std::max(v, 0.0));
         }

@@ -1,4 +1,5 @@
 #include "formats/pbrt/textures.h"
+#include "formats/srgb.h"
 
 #include <algorithm>
 #include <cmath>
@@ -157,7 +158,7 @@ void Textures::load_texels(TextureImage& image) const {
     const double gamma = image.gamma != 0 ? image.gamma : texels.is_linear ? 1 : -1;
     const auto decode = [gamma](double v) {
         if (gamma == 1) return v;
-        if (gamma == -1) return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+        if (gamma == -1) return srgb_to_linear(v);
         return std::pow(v, gamma);
     };
     double table[256];

@@ -2,6 +2,8 @@
 // timeout: 120
 // Several workers in one process: the image of a render does not depend on how many there are, nor on interrupts.
 #include <atomic>
+#include <chrono>
+#include <thread>
 
 #include "accel/embree_tracer.h"
 #include "core/error.h"
@@ -161,6 +163,22 @@ TEST_CASE("a crew renders a node on all of its devices, hands over one film for 
     for (const DeviceWork& d : crew.work()) samples += d.samples, rendered += d.ranges;
     CHECK(samples == 40);
     CHECK(rendered == 14);
+}
+
+TEST_CASE("a crew whose films nobody takes ends when it is given up") {
+    const Scene scene = project_scene("glass", 8, 8);
+    SharedAccels host(scene);
+    Crew crew(scene, cpu_settings(scene, Estimator::mis), std::vector<Device>(2), host);
+    crew.give({{1, 32}, {5, 0}});
+    // Each worker renders on until two of its films wait and one cannot be handed over.
+    const auto ranges = [&] {
+        uint64_t sum = 0;
+        for (const DeviceWork& d : crew.work()) sum += d.ranges;
+        return sum;
+    };
+    for (int i = 0; i < 1000 && ranges() < 4; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    CHECK(ranges() == 4);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
 }
 
 TEST_CASE("ranks of a host share its devices") {
