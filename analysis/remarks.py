@@ -51,8 +51,15 @@ def same_remarks(lines):
         r = line.ratio_time
         if r is None:
             continue
-        said = (f"{'faster' if r.value > 1 else 'slower'} by {r.value:.3g} in time per sample" if verdicts.differs(line, lines)
-                else "no effect on time per sample found" + (f" (ratio {r.value:.3g} [{r.low:.3g}, {r.high:.3g}])" if r.trusted else f" ({r.doubt})"))
+        told = f"a sample takes {1 / r.value:.3g} times as long [{1 / r.high:.3g}, {1 / r.low:.3g}]"
+        if not r.trusted:
+            said = f"no time per sample is stated: {r.doubt}"
+        elif verdicts.differs(line, lines):
+            said = told
+        elif r.low <= 1 <= r.high:
+            said = f"no effect on time per sample found: {told}"
+        else:
+            said = f"{told}, which {line.seeds} seeds cannot tell from 1 at the level of the whole table"
         yield f"{line.scene}, {line.run}: the same images at equal seeds as the run it is compared with; {said}"
 
 
