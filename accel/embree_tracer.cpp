@@ -26,7 +26,7 @@ void detail::cross_triangles(const RTCRay16& r, TriangleLanes& lanes) {
         const Vec3f v2 = {lanes.v2[0][k], lanes.v2[1][k], lanes.v2[2][k]};
         const TriangleEdges edges = triangle_edges(o, make_ray_shear(d), v0, v1, v2);
         const Vec3f n = accurate_cross(v1 - v0, v2 - v0);
-        const TriangleCrossing c = edges.crossing(rounded_divide(height_over_plane(v0 - o, n), fused_dot(d, n)));
+        const TriangleCrossing c = edges.crossing(rounded_divide(height_over_plane(v0 - o, n), dot(d, n)));
         lanes.t[k] = c.t, lanes.u[k] = c.u, lanes.v[k] = c.v;
         lanes.inside[k] = edges.inside;
     }

@@ -28,19 +28,11 @@ struct TriangleCrossing {
     float t, u, v;
 };
 
-namespace detail {
-
-/// Explicit fused operations: the value, and with it the answer on a shared edge, is the same in every triangle and on
-/// host and device.
-AMBILUX_HD float fused_dot(Vec3f a, Vec3f b) { return fmaf(a.x, b.x, fmaf(a.y, b.y, a.z * b.z)); }
-
-}  // namespace detail
-
 /// Height of the origin over the plane of triangle (v0,v1,v2) times |n| for a = v0 - o, zero if it is no more than the
 /// rounding of its distance; `n` is the normal, not unit.
 AMBILUX_HD float height_over_plane(Vec3f a, Vec3f n) {
-    const float height = detail::fused_dot(a, n);
-    return fabsf(height) > gamma_bound(6) * detail::fused_dot(abs(a), abs(n)) ? height : 0.0f;
+    const float height = dot(a, n);
+    return fabsf(height) > gamma_bound(6) * dot(abs(a), abs(n)) ? height : 0.0f;
 }
 
 /// Where a ray is to the edges of a triangle.
@@ -56,9 +48,9 @@ struct TriangleEdges {
 
 AMBILUX_HD TriangleEdges triangle_edges(Vec3f o, const RayShear& shear, Vec3f v0, Vec3f v1, Vec3f v2) {
     const Vec3f a = v0 - o, b = v1 - o, c = v2 - o;
-    const float ax = detail::fused_dot(a, shear.x), ay = detail::fused_dot(a, shear.y);
-    const float bx = detail::fused_dot(b, shear.x), by = detail::fused_dot(b, shear.y);
-    const float cx = detail::fused_dot(c, shear.x), cy = detail::fused_dot(c, shear.y);
+    const float ax = dot(a, shear.x), ay = dot(a, shear.y);
+    const float bx = dot(b, shear.x), by = dot(b, shear.y);
+    const float cx = dot(c, shear.x), cy = dot(c, shear.y);
     const float u = detail::difference_of_products(cx, by, cy, bx);
     const float v = detail::difference_of_products(ax, cy, ay, cx);
     const float w = detail::difference_of_products(bx, ay, by, ax);
@@ -83,7 +75,7 @@ AMBILUX_HD bool intersect_triangle(Vec3f o, Vec3f d, const RayShear& shear, Vec3
     // axis-aligned triangle.
     const Vec3f n = normal();
     const float height = height_over_plane(a, n);
-    const float t = rounded_divide(height, detail::fused_dot(d, n));  // not a number for two zeros
+    const float t = rounded_divide(height, dot(d, n));  // not a number for two zeros
     if (!(t > 0.0f && t < tmax)) return false;
     hit = edges.crossing(t);
     return true;

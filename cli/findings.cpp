@@ -127,7 +127,8 @@ nlohmann::json report_invalid_values(const FinishedRender& render, const Replay&
         if (counts.total()) missing.push_back(stage);
     if (missing.empty()) return list;
     log_info("looking for the values that stages dropped, by replaying samples on the CPU (Ctrl-C ends the search)");
-    for (const InvalidRecord& r : find_invalid(render.watch, replay, render.scene, per_stage, interrupt)) {
+    const FoundInvalid search = find_invalid(render.watch, replay, render.scene, per_stage, interrupt);
+    for (const InvalidRecord& r : search.found) {
         const std::string what = r.light_subpath == kNone ? fmt::format(" --pixel {},{}", r.x, r.y)
                                                           : fmt::format(" --light-subpath {}", r.light_subpath);
         report_invalid(r, trace_command(render, fmt::format("{} --sample {}", what, r.sample)), list);
@@ -135,10 +136,10 @@ nlohmann::json report_invalid_values(const FinishedRender& render, const Replay&
     }
     if (is_set(interrupt)) return list;
     for (const std::string& stage : missing)
-        log_warning(
-            fmt::format("the replay on the CPU did not find the values that stage {} dropped, in the {} first "
-                        "samples that had invalid ones (docs/replay.md)",
-                        stage, kMostInvalidSamples));
+        log_warning(fmt::format(
+            "the replay on the CPU did not find the values that stage {} dropped, in the first samples that "
+            "had invalid ones: {} (docs/replay.md)",
+            stage, fmt::join(search.samples, ", ")));
     return list;
 }
 

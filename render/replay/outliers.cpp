@@ -105,18 +105,19 @@ std::vector<Outlier> find_outliers(const SampleWatch& watch, const Replay& repla
     return outliers;
 }
 
-std::vector<InvalidRecord> find_invalid(InvalidWatch& watch, const Replay& replay, const Scene& scene,
-                                        uint32_t per_stage, const volatile bool* interrupt) {
+FoundInvalid find_invalid(InvalidWatch& watch, const Replay& replay, const Scene& scene, uint32_t per_stage,
+                          const volatile bool* interrupt) {
     InvalidList list{per_stage, {}, {}};
     const std::map<std::string, InvalidCounts> all = watch.by_stage();
-    size_t left = kMostInvalidSamples;
+    std::vector<uint32_t> searched;
     for (const InvalidBatch& batch : watch.batches())
-        for (const InvalidBatch& sample : watch.samples(batch, left, interrupt)) {
-            if (left == 0 || list.has_enough(all) || is_set(interrupt)) return std::move(list.kept);
-            --left;
+        for (const InvalidBatch& sample : watch.samples(batch, kMostInvalidSamples - searched.size(), interrupt)) {
+            if (searched.size() == kMostInvalidSamples || list.has_enough(all) || is_set(interrupt))
+                return {std::move(list.kept), std::move(searched)};
+            searched.push_back(sample.first);
             search_sample(sample, replay, scene, list, interrupt);
         }
-    return std::move(list.kept);
+    return {std::move(list.kept), std::move(searched)};
 }
 
 }  // namespace ambilux

@@ -29,9 +29,14 @@ struct InvalidRecord {
 constexpr size_t kMostInvalidSamples = 4;
 constexpr uint32_t kMostInvalidSubpaths = 1u << 22;
 
+struct FoundInvalid {
+    std::vector<InvalidRecord> found;
+    std::vector<uint32_t> samples;  ///< that were searched
+};
+
 /// The first `per_stage` of every stage, by replaying samples that `watch` remembers. Fewer than there were if on CUDA
 /// a path was another one. The film of `watch` is of no use any more.
-std::vector<InvalidRecord> find_invalid(InvalidWatch& watch, const Replay& replay, const Scene& scene,
-                                        uint32_t per_stage, const volatile bool* interrupt = nullptr);
+FoundInvalid find_invalid(InvalidWatch& watch, const Replay& replay, const Scene& scene, uint32_t per_stage,
+                          const volatile bool* interrupt = nullptr);
 
 }  // namespace ambilux

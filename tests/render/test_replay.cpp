@@ -204,7 +204,7 @@ struct InvalidFindings {
         REQUIRE(watch.render(0, 3) == 3);
         REQUIRE(watch.batches().size() == 1);
         CHECK(watch.batches()[0].count == 3);
-        found = find_invalid(watch, *replay, scene, per_stage);
+        found = find_invalid(watch, *replay, scene, per_stage).found;
     }
 };
 
