@@ -74,7 +74,7 @@ def to_html(experiment):
     for e in entries(experiment):
         a = e.get("agreement") or {}
         detectable, p = a.get("detectable"), a.get("p")
-        cells = [e["scene"], e["run"], e.get("version") or e["renderer"], STATES[e["state"]], difference(e), "" if p is None else f"{p:.2g}",
+        cells = [e["scene"], e["run"], e.get("version") or e["renderer"], STATES[e["state"]] + (" with our path tracer" if a.get("with_own_path") else ""), difference(e), "" if p is None else f"{p:.2g}",
                  "" if detectable is None else f"{100 * detectable:.2g} %", str(a.get("samples", "")), seconds(e.get("load_seconds")), seconds(e.get("compile_seconds")),
                  "; ".join(e.get("changes") or ()), e.get("reason") or "; ".join(e.get("differences") or ())]
         rows.append("<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in cells) + "</tr>")

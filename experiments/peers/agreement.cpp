@@ -17,6 +17,26 @@ FilmMoments as_one_sample(const FilmMoments& part) {
     return one;
 }
 
+/// kAgreementParts parts of `samples` per pixel; empty if interrupted.
+std::vector<FilmMoments> render_parts(Renderer& renderer, uint64_t samples, const volatile bool* interrupt,
+                                      RenderPosition& position) {
+    const uint64_t each = std::max<uint64_t>(1, samples / kAgreementParts);
+    std::vector<FilmMoments> parts;
+    for (int i = 1; i <= kAgreementParts; ++i) {
+        position = drive(renderer, position, {each * uint64_t(i), 0}, interrupt);
+        if (position.interrupted) return {};
+        parts.push_back(as_one_sample(renderer.film()));
+        renderer.clear_film();
+    }
+    return parts;
+}
+
+FilmMoments sum_of(const std::vector<FilmMoments>& parts) {
+    FilmMoments all = parts[0];
+    for (size_t i = 1; i < parts.size(); ++i) all.add(parts[i]);
+    return all;
+}
+
 nlohmann::json finite(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
 }  // namespace
@@ -24,28 +44,28 @@ nlohmann::json finite(double value) { return std::isfinite(value) ? nlohmann::js
 Agreement measure_agreement(PeerRenderer& peer, uint64_t samples, const Reference& reference,
                             const volatile bool* interrupt) {
     Agreement a;
-    const uint64_t each = std::max<uint64_t>(1, samples / kAgreementParts);
-    std::vector<FilmMoments> parts;
-    FilmMoments all;
     RenderPosition position;
-    for (int i = 1; i <= kAgreementParts; ++i) {
-        position = drive(peer, position, {each * uint64_t(i), 0}, interrupt);
-        if (position.interrupted) {
-            a.interrupted = true;
-            return a;
-        }
-        parts.push_back(as_one_sample(peer.film()));
-        peer.clear_film();
-        if (i == 1)
-            all = parts.back();
-        else
-            all.add(parts.back());
-    }
+    const std::vector<FilmMoments> parts = render_parts(peer, samples, interrupt, position);
+    a.interrupted = parts.empty();
+    if (a.interrupted) return a;
     a.samples = position.samples;
     a.seconds = position.seconds;
-    a.image = mean_image(all);
+    a.parts = sum_of(parts);
     a.test = z_test(to_estimate(parts), to_estimate(reference));
     return a;
+}
+
+void compare_with_own(Agreement& a, Renderer& own, const volatile bool* interrupt) {
+    RenderPosition position;
+    const std::vector<FilmMoments> parts = render_parts(own, a.samples, interrupt, position);
+    a.interrupted = parts.empty();
+    if (a.interrupted) return;
+    ZTestOptions options;
+    options.same_estimator = true;
+    const ZTestResult test = z_test(to_estimate(a.parts), to_estimate(sum_of(parts)), options);
+    if (!test.pass) return;
+    a.test = test;
+    a.with_own_path = true;
 }
 
 nlohmann::json to_json(const Agreement& a) {
@@ -54,6 +74,7 @@ nlohmann::json to_json(const Agreement& a) {
             {"undecided", t.undecided},
             {"samples", a.samples},
             {"seconds", a.seconds},
+            {"with_own_path", a.with_own_path},
             {"tests", t.tests},
             {"relative_difference", finite(t.relative_difference)},
             {"detectable", finite(t.detectable)},

@@ -17,7 +17,8 @@ constexpr uint64_t kAgreementSeed = ~uint64_t(0);
 struct Agreement {
     bool interrupted = false;
     ZTestResult test;
-    Image image;
+    FilmMoments parts;           ///< each part counts as one sample
+    bool with_own_path = false;  ///< `test` is against our path tracer, not the reference
     uint64_t samples = 0;
     double seconds = 0;
 };
@@ -27,7 +28,12 @@ struct Agreement {
 Agreement measure_agreement(PeerRenderer& peer, uint64_t samples, const Reference& reference,
                             const volatile bool* interrupt);
 
-/// pass, samples, seconds, relative_difference, detectable, worst {z, p, x, y, width, height, channel}.
+/// The same samples by `own`, the estimator of the peer, decide where the reference, by another one, does not agree:
+/// neither estimator may have met bright samples that are rare in it, which leaves both equally dark and their
+/// variances too small. Variances are pooled.
+void compare_with_own(Agreement& agreement, Renderer& own, const volatile bool* interrupt);
+
+/// pass, samples, seconds, with_own_path, relative_difference, detectable, worst {z, p, x, y, width, height, channel}.
 nlohmann::json to_json(const Agreement& agreement);
 
 }  // namespace ambilux

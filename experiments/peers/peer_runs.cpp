@@ -24,6 +24,12 @@ nlohmann::json to_json(const PeerDescription& d) {
             {"differences", d.differences}};
 }
 
+/// Mitsuba's path, LuxCore's PATHCPU and PATHOCL.
+bool is_path_tracer(const RunEntry& run) {
+    const std::string name = setting_value(run.settings, "integrator");
+    return run.renderer != "command" && (name.empty() || name.substr(0, 4) == "path" || name.substr(0, 4) == "PATH");
+}
+
 }  // namespace
 
 PeerRuns::PeerRuns(const ExperimentRequest& request, const ExperimentConfig& config)
@@ -111,10 +117,17 @@ nlohmann::json PeerRuns::find_state(const RenderOf& render, const Reference& ref
         peer->set_seed(kAgreementSeed - 1);
         agreement = measure_agreement(*peer, 4 * config_.agreement_spp, reference, request_.interrupt);
     }
+    if (!agreement.interrupted && !agreement.test.pass && is_path_tracer(render.run)) {
+        RenderSettings settings = render.settings;
+        settings.integrator = "path";
+        settings.variant = "wavefront";
+        settings.seed = kAgreementSeed;
+        compare_with_own(agreement, *make_renderer(render.scene.scene, settings), request_.interrupt);
+    }
     if (agreement.interrupted) throw Error(ExitCode::interrupted, "interrupted");
     const std::string image = fmt::format("images/{}/{}_agreement", render.scene.entry->name, render.run.name);
-    write_exr(request_.output + "/" + image + ".exr", agreement.image);
-    write_png(request_.output + "/" + image + ".png", agreement.image);
+    write_exr(request_.output + "/" + image + ".exr", mean_image(agreement.parts));
+    write_png(request_.output + "/" + image + ".png", mean_image(agreement.parts));
     entry["agreement"] = ambilux::to_json(agreement);
     entry["image"] = image + ".exr";
     entry["state"] = agreement.test.pass ? "agrees" : agreement.test.undecided ? "undecided" : "differs";

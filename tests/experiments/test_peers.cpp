@@ -8,12 +8,14 @@
 #include "core/flag.h"
 #include "experiments/drive.h"
 #include "experiments/load.h"
+#include "experiments/peers/agreement.h"
 #include "experiments/peers/child_process.h"
 #include "experiments/peers/command_peer.h"
 #include "experiments/peers/image_peer.h"
 #include "experiments/peers/pass_film.h"
 #include "film/exr_io.h"
 #include "tests/support/experiment_fakes.h"
+#include "tests/support/render_scene.h"
 #include "tests/support/skip.h"
 
 using namespace ambilux;
@@ -100,6 +102,43 @@ TEST_CASE("a peer that agrees is timed, one that does not is reported and not ti
         CHECK(fs::exists(output + "/peers/box/none"));
         CHECK_FALSE(fs::exists(output + "/peers/box/same"));
     }
+}
+
+TEST_CASE("a path tracer that the reference fails may agree with as many samples of ours, and with nobody else's") {
+    const auto scene_of = [](const char* reflectance) {
+        return scene_from_text(std::string(R"(<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm">
+            <integer name="width" value="16"/><integer name="height" value="16"/><rfilter type="box"/></film></sensor>
+            <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="180"/><translate z="4"/></transform>
+            <bsdf type="diffuse"><rgb name="reflectance" value=")") +
+                               reflectance + R"("/></bsdf></shape>
+            <emitter type="constant"/></scene>)");
+    };
+    const Scene scene = scene_of("0.5"), darker = scene_of("0.4");
+    const auto renderer_of = [](const Scene& s, uint64_t seed) {
+        RenderSettings settings = cpu_settings(s, Estimator::mis, seed);
+        return make_renderer(s, settings);
+    };
+    Agreement a;
+    a.samples = 256;
+    const std::unique_ptr<Renderer> peer = renderer_of(scene, 1);
+    for (uint32_t i = 0; i < kAgreementParts; ++i) {
+        peer->render(i * 16, 16);
+        FilmMoments part = peer->film();
+        peer->clear_film();
+        for (size_t k = 0; k < part.sum.size(); ++k)
+            part.sum[k] = part.mean(k), part.sum_squares[k] = part.sum[k] * part.sum[k];
+        part.samples = 1;
+        if (i == 0)
+            a.parts = part;
+        else
+            a.parts.add(part);
+    }
+    compare_with_own(a, *renderer_of(darker, 2), nullptr);
+    CHECK_FALSE(a.test.pass);
+    CHECK_FALSE(a.with_own_path);
+    compare_with_own(a, *renderer_of(scene, 2), nullptr);
+    CHECK(a.test.pass);
+    CHECK(a.with_own_path);
 }
 
 TEST_CASE("a Python peer that is not installed is skipped by name, and one that breaks its promises is refused") {
