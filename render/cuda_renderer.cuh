@@ -45,7 +45,7 @@ public:
         clock_ = DeviceBuffer<uint64_t>(1);
         stream_ = make_stream();
         allocate_queues();
-        device_scene_->prefetch_texels(stream_.get());
+        if (settings.memory == 0) device_scene_->prefetch_texels(stream_.get());
         build_seconds_ = seconds_since(start);
     }
 
@@ -54,7 +54,7 @@ public:
         uint32_t done = 0;
         while (next_tile_ > 0 || (done < count && !is_set(interrupt))) {
             // All waves of a pass are queued at once; the host waits for the last.
-            const uint32_t pass = std::min(count - done, preferred_batch());
+            const uint32_t pass = is_set(interrupt) ? 1 : std::min(count - done, preferred_batch());
             const auto pass_start = Clock::now();
             const uint32_t waves_before = read_state().done, first_tile = next_tile_;
             film_is_whole_ = false;
