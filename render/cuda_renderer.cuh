@@ -53,8 +53,10 @@ public:
         const auto start = Clock::now();
         uint32_t done = 0;
         while (next_tile_ > 0 || (done < count && !is_set(interrupt))) {
-            // All waves of a pass are queued at once; the host waits for the last.
-            const uint32_t pass = is_set(interrupt) ? 1 : std::min(count - done, preferred_batch());
+            // All waves of a pass are queued at once; the host waits for the last. Of parts, those of one sample: behind
+            // one that failed, those of the next would leave nothing where others are done.
+            const bool one = plan_.in_parts() || is_set(interrupt);
+            const uint32_t pass = one ? 1 : std::min(count - done, preferred_batch());
             const auto pass_start = Clock::now();
             const uint32_t waves_before = read_state().done, first_tile = next_tile_;
             film_is_whole_ = false;

@@ -12,6 +12,7 @@
 #include "integrators/registry.h"
 #include "render/shared_renderer.h"
 #include "tests/support/bidirectional_images.h"
+#include "tests/support/caught_subpaths.h"
 
 using namespace ambilux;
 
@@ -173,16 +174,7 @@ TEST_CASE("a budget does not change the expectation of bidirectional variants") 
 }
 
 TEST_CASE("more light vertices than were planned for: waves are divided where the budget has no room for them") {
-    // One light subpath of fifty is caught in a box and has 200 vertices: waves with many of these are not rare.
-    const Scene scene = scene_from_text(R"(<scene version="3.0.0">
-        <sensor type="perspective"><float name="fov" value="40"/><transform name="to_world">
-        <lookat origin="0,3,9" target="0,0,0" up="0,1,0"/></transform>
-        <film type="hdrfilm"><integer name="width" value="128"/><integer name="height" value="128"/></film></sensor>
-        <emitter type="point"><point name="position" x="0" y="-5" z="0"/><rgb name="intensity" value="1"/></emitter>
-        <emitter type="point"><point name="position" x="0" y="2" z="0"/><rgb name="intensity" value="49"/></emitter>
-        <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/><scale value="3"/></transform></shape>
-        <shape type="cube"><transform name="to_world"><translate y="-5"/></transform><bsdf type="twosided">
-        <bsdf type="diffuse"><rgb name="reflectance" value="0.99"/></bsdf></bsdf></shape></scene>)");
+    const Scene scene = scene_of_caught_subpaths();
     SharedAccels accels(scene);
     for (const char* variant : {"wavefront", "lvc"}) {
         CAPTURE(variant);
