@@ -53,8 +53,8 @@ public:
         const auto start = Clock::now();
         uint32_t done = 0;
         while (next_tile_ > 0 || (done < count && !is_set(interrupt))) {
-            // All waves of a pass are queued at once; the host waits for the last. Of parts, those of one sample: behind
-            // one that failed, those of the next would leave nothing where others are done.
+            // All waves of a pass are queued at once; the host waits for the last. Of parts, those of one sample:
+            // behind one that failed, those of the next sample would overwrite what is done of this one.
             const bool one = plan_.in_parts() || is_set(interrupt);
             const uint32_t pass = one ? 1 : std::min(count - done, preferred_batch());
             const auto pass_start = Clock::now();
