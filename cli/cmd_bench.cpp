@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
+#include "experiments/bench_frames.h"
 #include "experiments/drive.h"
 #include "experiments/statistics.h"
 #include "render/fused_shares.h"
@@ -26,6 +27,7 @@ struct Options {
     bool opaque = false;
     uint32_t spp = 16;
     bool unfused = false;
+    uint32_t frames = 100;
 };
 
 /// Columns of the rows in `rows`, as far as they are numbers or text.
@@ -137,6 +139,30 @@ int stages(const Options& o) {
     return int(position.interrupted ? ExitCode::interrupted : ExitCode::done);
 }
 
+/// Images a second.
+int frames(const Options& o) {
+    if (o.frames < 1) throw Error(ExitCode::usage, "--frames: at least 1 is needed");
+    const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}});
+    RenderSettings settings = o.render.settings(loaded.scene);
+    settings.expected_samples = 1;
+    const std::unique_ptr<Renderer> renderer = make_renderer(loaded.scene, settings);
+    const FrameTimes times = time_frames(*renderer, o.frames, save_when_interrupted());
+    const RenderStats stats = renderer->stats();
+    const double median = times.median(), late = times.late();
+    report(o, {{"scene", o.scene.path},
+               {"method", method_text(used_settings(settings, stats))},
+               {"device", stats.device},
+               {"size", {loaded.scene.sensor.crop_width, loaded.scene.sensor.crop_height}},
+               {"frames", times.seconds.size()},
+               {"median_seconds", median},
+               {"percentile_95_seconds", late},
+               {"frames_per_second", median > 0 ? 1.0 / median : 0.0},
+               {"memory", setting_text(settings, "memory")},
+               {"memory_bytes_predicted", stats.memory_bytes_predicted},
+               {"memory_bytes_peak", stats.memory_bytes_peak}});
+    return int(times.seconds.size() < o.frames ? ExitCode::interrupted : ExitCode::done);
+}
+
 }  // namespace
 
 void add_bench(CLI::App& app, Run& run) {
@@ -171,6 +197,15 @@ void add_bench(CLI::App& app, Run& run) {
         ->capture_default_str();
     queues_command.add_option("--json", q->json, "Write the result to a file, or - for standard output");
     queues_command.callback([q, &run] { run = [q] { return queues(*q); }; });
+
+    auto f = std::make_shared<Options>();
+    CLI::App& frames_command = *command.add_subcommand(
+        "frames", "Images a second: one sample of every pixel, on a film that was cleared, and its image on the host");
+    f->scene.add_to(frames_command);
+    f->render.add_to(frames_command, false);
+    frames_command.add_option("--frames", f->frames, "Frames that are timed")->capture_default_str();
+    frames_command.add_option("--json", f->json, "Write the result to a file, or - for standard output");
+    frames_command.callback([f, &run] { run = [f] { return frames(*f); }; });
 
     auto s = std::make_shared<Options>();
     CLI::App& stages_command = *command.add_subcommand("stages", "Time and items of every stage of a render");

@@ -49,6 +49,7 @@ int info(const Options& o) {
                        {"features", stats.features},
                        {"skipped", stats.skipped},
                        {"accel", stats.accel},
+                       {"memory", setting_text(settings, "memory")},
                        {"memory_bytes", stats.memory_bytes}};
     json["seconds"] = {{"load", loaded.seconds},
                        {"read", loaded.times.read},

@@ -74,6 +74,7 @@ void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
     command.add_option("--backend", backend, help_of("backend"))->capture_default_str();
     command.add_option("--precision", precision, help_of("precision"))->capture_default_str();
     command.add_option("--memory", memory, help_of("memory"))->capture_default_str();
+    command.add_option("--textures", textures, help_of("textures"))->capture_default_str();
     command.add_option("--seed", seed, help_of("seed"))->check(refuse_negative)->capture_default_str();
     command.add_option("--max-depth", max_depth, help_of("max_depth"));
     command.add_flag("--deterministic", deterministic, help_of("deterministic"));
@@ -88,6 +89,7 @@ RenderSettings RenderOptions::settings(const Scene& scene) const {
     apply_setting(s, "backend", backend);
     apply_setting(s, "precision", precision);
     apply_setting(s, "memory", memory);
+    apply_setting(s, "textures", textures);
     s.seed = seed;
     if (max_depth) apply_setting(s, "max_depth", std::to_string(*max_depth));
     s.deterministic = deterministic;

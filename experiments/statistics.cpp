@@ -128,6 +128,7 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const
          {"invalid", invalid},
          {"memory_bytes", stats.memory_bytes},
          {"memory_bytes_predicted", stats.memory_bytes_predicted},
+         {"memory_bytes_peak", stats.memory_bytes_peak},
          {"features", stats.features},
          {"skipped", stats.skipped},
          {"choice", choice_json(stats.choice)},
@@ -143,6 +144,8 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& asked, con
                              {"backend", stats.backend},
                              {"device", stats.device},
                              {"seconds", stats.render_seconds},
+                             {"memory_bytes", stats.memory_bytes_predicted},
+                             {"memory_bytes_peak", stats.memory_bytes_peak},
                              {"software", fmt::format("ambilux {}", version())},
                              {"git_revision", git_revision()}};
     const RenderSettings settings = used_settings(asked, stats);

@@ -73,6 +73,7 @@ void add_part(RenderStats& total, const RenderStats& before, const RenderStats& 
     sum.queues = total.queues;
     sum.invalid = total.invalid;
     sum.invalid_by_stage = total.invalid_by_stage;
+    sum.memory_bytes_peak = std::max(total.memory_bytes_peak, now.memory_bytes_peak);
     sum.render_seconds = total.render_seconds + now.render_seconds - before.render_seconds;
     sum.rays_extend = total.rays_extend + now.rays_extend - before.rays_extend;
     sum.rays_occlude = total.rays_occlude + now.rays_occlude - before.rays_occlude;
@@ -122,7 +123,7 @@ nlohmann::json save_stats(const RenderStats& s) {
             {"queues", queues},
             {"invalid", save(s.invalid)},
             {"invalid_by_stage", invalid},
-            {"memory", {s.memory_bytes, s.memory_bytes_predicted}},
+            {"memory", {s.memory_bytes, s.memory_bytes_predicted, s.memory_bytes_peak}},
             {"features", s.features},
             {"skipped", s.skipped},
             {"choice", save(s.choice)}};
@@ -148,6 +149,7 @@ RenderStats restore_stats(const nlohmann::json& j) {
     for (const auto& [stage, counts] : j.at("invalid_by_stage").items()) s.invalid_by_stage[stage] = restore(counts);
     s.memory_bytes = j.at("memory").at(0);
     s.memory_bytes_predicted = j.at("memory").at(1);
+    s.memory_bytes_peak = j.at("memory").at(2);
     s.features = j.at("features").get<std::vector<std::string>>();
     s.skipped = j.at("skipped").get<std::vector<std::string>>();
     s.choice = restore_choice(j.at("choice"));

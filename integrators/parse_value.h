@@ -20,6 +20,11 @@ std::string allowed_numbers(Number lowest, Number highest) {
     return fmt::format("{} from {} to {}", std::is_integral_v<Number> ? "an integer" : "a number", lowest, highest);
 }
 
+/// A whole number of bytes, at least 1, with K, M, G or T for powers of 1024.
+uint64_t parse_bytes(const std::string& key, const std::string& value);
+/// As parse_bytes takes it, with the largest unit that divides it.
+std::string text_of_bytes(uint64_t bytes);
+
 template <class Number>
 Number parse_number(const std::string& key, const std::string& value, Number lowest, Number highest) {
     Number result{};

@@ -28,6 +28,14 @@ Declaration<S> strategies() {
             [](const S& s) -> SettingValue { return strategies_text(s); }};
 }
 
+Declaration<S> memory() {
+    const char* const key = "memory";
+    return {key, "all, or bytes such as 512M or 4G (powers of 1024)",
+            "most memory of a render, of each device or on the CPU; waves are planned for it",
+            [=](S& s, const std::string& value) { s.memory = value == "all" ? 0 : parse_bytes(key, value); },
+            [](const S& s) -> SettingValue { return s.memory ? text_of_bytes(s.memory) : "all"; }};
+}
+
 /// Light subpaths per pixel, where tiles of the film have a whole number of them.
 Declaration<S> light_paths() {
     const char* const key = "light_paths";
@@ -103,8 +111,9 @@ std::vector<Setting> main_settings() {
                       "what rays are traced through; auto: embree on the CPU, cwbvh on CUDA"))
             .limit("embree", on_cpu, "the cuda backend has a structure of its own, cwbvh")
             .limit("bvh2", has_binary_bvh, "a binary BVH to compare with cwbvh"),
+        Is(memory()),
         Is(Of::choice(
-               "memory", &S::memory, {"device", "host", "pinned"},
+               "textures", &S::textures, {"device", "host", "pinned"},
                "where textures lie on CUDA: device; host: in the host's memory, and pages in use on the device as "
                "well; pinned: on the host alone"))
             .limit("host", on_cuda, "a CPU has no memory but the host's")

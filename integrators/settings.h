@@ -76,7 +76,8 @@ struct RenderSettings {
     float rr_cap = kRouletteCap;                     ///< its highest probability of survival
     uint64_t seed = 0;
     Choice<AccelKind> accel = AccelKind::automatic;
-    TextureMemory memory = TextureMemory::device;
+    uint64_t memory = 0;  ///< most bytes of a render (render/wave_plan.h); 0: what there is
+    TextureMemory textures = TextureMemory::device;
     uint32_t wave_size = 0;  ///< paths in flight; 0 chooses
     QueuePolicy queues = {Compaction::atomic, Ordering::automatic};
     bool specialise = true;  ///< kernels hold only what the scene has

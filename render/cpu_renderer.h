@@ -5,6 +5,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <new>
 
 #include "accel/host_tracer.h"
@@ -17,6 +18,7 @@
 #include "integrators/integrator.h"
 #include "render/cpu_wave.h"
 #include "render/statistics.h"
+#include "render/wave_plan.h"
 #include "scene/info.h"
 
 namespace ambilux {
@@ -28,16 +30,16 @@ public:
         : scene_(scene), settings_(settings), view_(scene.view()), policy_(Integrator::plan(scene, settings)),
           accel_name_(settings.accel == AccelKind::cwbvh ? "cwbvh" : "embree") {
         const auto start = Clock::now();
-        shape(settings);
-        const uint64_t values = uint64_t(wave_.width) * wave_.height * 3;
+        shape(cpu_wave_size(settings));
         try {
             take_accel(settings, accels);
-            allocate_film(values);
             double mean = 0;
             if constexpr (kFilmWide) mean = Integrator::pilot(policy_, view_, tracer_, settings.seed);
-            const uint64_t kept = planned_kept(mean, policy_.waves.most_light_subpaths(wave_.slot_count()));
+            fit(mean);
+            allocate_film();
             waves_.resize(size_t(arena_.max_concurrency()));
-            for (WaveMemory& w : waves_) allocate(w, uint32_t(kept));
+            for (WaveMemory& w : waves_) allocate(w, planned_kept(mean));
+            held_ = peak_ = planned_bytes(mean);
         } catch (const std::bad_alloc&) {
             throw Error(ExitCode::device,
                         fmt::format("out of memory: a film of {}x{} needs more than there is; a smaller --size or "
@@ -55,7 +57,8 @@ public:
             const auto pass_start = Clock::now();
             arena_.execute([&] {
                 const uint32_t chunks = (tile_count(wave_) + wave_.tiles - 1) / wave_.tiles;
-                parallel_for(chunks, [&](uint32_t c) { render_tiles(c * wave_.tiles, first + done, pass); });
+                parallel_for(chunks,
+                             [&](uint32_t c) { render_tiles(c * wave_.tiles, wave_.tiles, first + done, pass); });
                 if constexpr (kFilmWide) update_film(first + done);
             });
             done += pass;
@@ -85,7 +88,8 @@ public:
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;
-        s.memory_bytes = s.memory_bytes_predicted = fixed_bytes();
+        s.memory_bytes = s.memory_bytes_predicted = fixed_bytes().total();
+        s.memory_bytes_peak = peak_;
         const Layout* largest = &waves_[0].layout;
         std::vector<StageRecord> total(largest->record_names().size() + 1);
         std::vector<const QueueCounter*> counters;
@@ -127,8 +131,9 @@ private:
         OrderMemory order;
     };
 
-    void shape(const RenderSettings& settings) {
-        wave_ = cpu_wave(scene_, settings, arena_.max_concurrency());
+    /// A wave of about `size` paths.
+    void shape(uint32_t size) {
+        wave_ = cpu_wave(scene_, settings_, arena_.max_concurrency(), size);
         if (!kFilmWide) return;
         wave_.samples = 1;  // a sample is complete when all its waves are done
         film_wave_ = wave_;
@@ -136,6 +141,24 @@ private:
         film_wave_.state = &film_state_;
         if (policy_.waves.slots_in_flight)
             policy_.waves.slots_in_flight = std::max(kTilePixels, wave_.slot_count() / 4);
+    }
+    /// Makes waves smaller until all of them fit into settings.memory, beside all else.
+    void fit(double mean) {
+        if (settings_.memory == 0) return;
+        const auto fits = [&](uint32_t tiles) {
+            shape(tiles * kTilePixels);
+            return planned_bytes(mean) <= settings_.memory;
+        };
+        const uint32_t most = std::max(1u, cpu_wave_size(settings_) / kTilePixels);
+        const uint32_t best = largest_that_fits(settings_.wave_size ? most : 1, most, fits);
+        shape(std::max(best, settings_.wave_size ? most : 1) * kTilePixels);
+        if (best > 0) return;
+        RenderBytes least = fixed_bytes();
+        least.waves = planned_bytes(mean) - least.total();
+        refuse_budget(settings_, least);
+    }
+    uint64_t planned_bytes(double mean) {
+        return fixed_bytes().total() + uint64_t(arena_.max_concurrency()) * wave_bytes(planned_kept(mean));
     }
     void take_accel(const RenderSettings& settings, SharedAccels& accels) {
         const auto take = [&](const auto& accel) {
@@ -148,23 +171,31 @@ private:
         else
             take(accels.get<EmbreeAccel>());
     }
-    void allocate_film(uint64_t values) {
+    /// Each array of the film with its number of values.
+    template <class Function>
+    void each_array(Function f) {
+        const uint64_t values = uint64_t(wave_.width) * wave_.height * 3;
+        f(film_.sum, values);
+        f(film_.sum_squares, values);
+        if (!kFilmWide) return;
+        f(film_samples_, film_wave_.slot_count());
+        f(splats_, values);
+        f(strategies_, strategy_values(policy_.waves.strategy_depth, values / 3));
+        f(strategies_dropped_, strategy_count(policy_.waves.strategy_depth));
+    }
+    void allocate_film() {
         film_.width = wave_.width;
         film_.height = wave_.height;
-        film_.sum.resize(values);
-        film_.sum_squares.resize(values);
-        if (!kFilmWide) return;
-        film_samples_.resize(film_wave_.slot_count());
-        splats_.resize(values);
-        strategies_.resize(strategy_values(policy_.waves.strategy_depth, values / 3));
-        strategies_dropped_.resize(strategy_count(policy_.waves.strategy_depth));
+        each_array([](auto& array, uint64_t values) { array.resize(values); });
     }
     /// All but the waves.
-    uint64_t fixed_bytes() const {
-        return scene_.memory_bytes() + accel_bytes_ + (film_.sum.size() + film_.sum_squares.size()) * sizeof(double) +
-               (splats_.size() + strategies_.size()) * sizeof(double) + film_samples_.size() * sizeof(Lane);
+    RenderBytes fixed_bytes() {
+        uint64_t film = 0;
+        each_array([&](const auto& array, uint64_t values) { film += values * sizeof(array[0]); });
+        return {scene_bytes(scene_, TextureMemory::device), accel_bytes_, film, 0};
     }
-    uint64_t planned_kept(double mean, uint64_t subpaths) const {
+    uint32_t planned_kept(double mean) const {
+        const uint64_t subpaths = policy_.waves.most_light_subpaths(wave_.slot_count());
         return policy_.waves.keeps_light_vertices ? planned_light_vertices(mean, subpaths) : 0;
     }
 
@@ -174,10 +205,18 @@ private:
         w.samples = layout.allocate<Lane>(kFilmWide ? 0 : slots);
         w.queues = Integrator::lay_out(layout, policy_, {slots, kept});
         w.order = lay_out_order(layout, policy_.waves.queues, policy_.waves.order_slots(slots));
-        return stages(layout, w, 0);
+        return stages(layout, w, 0, wave_.tiles);
+    }
+    uint64_t wave_bytes(uint32_t kept) {
+        WaveMemory w;
+        Layout plan;
+        lay_out(plan, w, kept);
+        return plan.bytes();
     }
     void allocate(WaveMemory& w, uint32_t kept) {
-        const WaveMemory old = std::exchange(w, {});
+        const StageRecord* const old = w.layout.records();
+        const std::vector<StageRecord> records(old, old + w.layout.record_names().size());
+        w = {};
         Layout plan;
         lay_out(plan, w, kept);
         w.planned_bytes = plan.bytes();
@@ -186,10 +225,11 @@ private:
         lay_out(w.layout, w, kept);
         const std::vector<QueueCounter> counters = w.layout.first_counters();
         std::copy(counters.begin(), counters.end(), w.layout.counters());
-        for (size_t r = 0; r < old.layout.record_names().size(); ++r) w.layout.records()[r] = old.layout.records()[r];
+        std::copy(records.begin(), records.end(), w.layout.records());
     }
-    typename Integrator::Stages stages(Layout& layout, WaveMemory& w, uint32_t first_tile) {
+    typename Integrator::Stages stages(Layout& layout, WaveMemory& w, uint32_t first_tile, uint32_t tiles) {
         Wave wave = wave_;
+        wave.tiles = tiles;
         wave.state = w.state;
         Lane* const samples = kFilmWide ? film_samples_.data() + size_t(first_tile) * kTilePixels : w.samples;
         const FilmBuffers film = {samples,
@@ -202,11 +242,11 @@ private:
     }
     FilmSums sums() { return {film_.sum.data(), film_.sum_squares.data()}; }
 
-    void render_tiles(uint32_t first_tile, uint32_t first_sample, uint32_t count) {
+    void render_tiles(uint32_t first_tile, uint32_t tiles, uint32_t first_sample, uint32_t count) {
         WaveMemory& w = waves_[size_t(tbb::this_task_arena::current_thread_index())];
         const uint32_t light_subpaths =
-            light_subpaths_in(wave_, first_tile, wave_.tiles, policy_.waves.light_subpaths_per_tile);
-        const auto stages = this->stages(w.layout, w, first_tile);
+            light_subpaths_in(wave_, first_tile, tiles, policy_.waves.light_subpaths_per_tile);
+        const auto stages = this->stages(w.layout, w, first_tile, tiles);
         CpuExecutor executor(w.state, view_, w.order);
         for (uint32_t s = 0; s < count; s += wave_.samples) {
             const uint32_t samples = std::min(wave_.samples, count - s);
@@ -220,21 +260,41 @@ private:
                         policy_.waves.slots_in_flight};
             Integrator::schedule(executor, stages);
             if (w.state->failed) {
-                grow(w);
-                return render_tiles(first_tile, first_sample + s, count - s);
+                if (grow(w, tiles)) return render_tiles(first_tile, tiles, first_sample + s, count - s);
+                render_tiles(first_tile, tiles / 2, first_sample + s, count - s);
+                return render_tiles(first_tile + tiles / 2, tiles - tiles / 2, first_sample + s, count - s);
             }
             if constexpr (!kFilmWide)
                 executor.run_slots(UpdateFilm{stages.wave, w.samples, {}, sums(), w.layout.record(UpdateFilm::kName)},
-                                   wave_.tiles * kTilePixels, 1);
+                                   tiles * kTilePixels, 1);
         }
     }
-    /// A wave had more light vertices than there was capacity for.
-    void grow(WaveMemory& w) {
+    /// A wave of `tiles` had more light vertices than there was capacity for. False if a budget leaves no room: then
+    /// each half of the wave is a wave of its own. Light subpaths are alike, so that what they bring does not depend on
+    /// why they were divided.
+    bool grow(WaveMemory& w, uint32_t tiles) {
         uint64_t needed = 0;
         for (size_t q = 0; q < w.layout.queue_names().size(); ++q)
             if (w.layout.queue_names()[q] == "light_vertices" || w.layout.queue_names()[q] == "splats")
                 needed = std::max(needed, w.layout.counters()[q].peak);
-        allocate(w, uint32_t(std::min<uint64_t>(needed + needed / 4, 1u << 30)));
+        const uint32_t kept = uint32_t(std::min<uint64_t>(needed + needed / 4, 1u << 30));
+        if (reserve(wave_bytes(kept) - w.planned_bytes)) return allocate(w, kept), true;
+        QueueCounter* const counters = w.layout.counters();
+        for (size_t q = 0; q < w.layout.queue_names().size(); ++q)
+            counters[q].peak = std::min<uint64_t>(counters[q].peak, counters[q].capacity);
+        if (tiles > 1) return false;
+        RenderBytes least = fixed_bytes();
+        least.waves = held_ + wave_bytes(kept) - w.planned_bytes - least.total();
+        refuse_budget(settings_, least);
+    }
+    /// False if a budget has no room for so many bytes more.
+    bool reserve(uint64_t more) {
+        uint64_t held = held_;
+        do {
+            if (settings_.memory > 0 && held + more > settings_.memory) return false;
+        } while (!held_.compare_exchange_weak(held, held + more));
+        for (uint64_t peak = peak_; peak < held + more && !peak_.compare_exchange_weak(peak, held + more);) {}
+        return true;
     }
 
     void update_film(uint32_t sample) {
@@ -268,6 +328,7 @@ private:
     std::vector<double> splats_, strategies_;
     std::vector<uint64_t> strategies_dropped_;
     FilmMoments film_;
+    std::atomic<uint64_t> held_ = 0, peak_ = 0;  ///< bytes, by all waves and all else
     uint64_t accel_bytes_ = 0, samples_ = 0, measured_samples_ = 0;
     double build_seconds_ = 0, render_seconds_ = 0, measured_seconds_ = 0;
 };

@@ -16,8 +16,9 @@
 #include "core/flag.h"
 #include "integrators/integrator.h"
 #include "render/device_film.h"
-#include "render/device_wave.h"
+#include "render/device_plan.h"
 #include "render/statistics.h"
+#include "render/wave_plan.h"
 #include "scene/info.h"
 
 namespace ambilux {
@@ -32,50 +33,43 @@ public:
         : scene_(scene), settings_(settings), policy_(Integrator::plan(scene, settings)),
           traced_(settings.specialise ? scene.features : kAllFeatures), use_graph_(settings.graph) {
         const auto start = Clock::now();
-        take_accel(settings, accels);
-        double mean = 0;
-        if constexpr (kFilmWide) {
-            const HostTracer tracer(accels.get<CwbvhAccel>()->tracer());
-            mean = Integrator::pilot(policy_, scene.view(), tracer, settings.seed);
-            if constexpr (requires { Stages::kTracesConnections; })
-                policy_.traces_connections = Stages::kTracesConnections && traces_connections(policy_, accel_->bytes());
-        }
+        if (settings.accel == AccelKind::bvh2)
+            take(PairAccel(scene_).arrays(), accels);
+        else
+            take(accels.get<CwbvhAccel>()->arrays(), accels);
         device_scene_->drop_texels();
-        shape(settings, mean);
-        const uint64_t kept = policy_.waves.keeps_light_vertices
-                                  ? planned_light_vertices(mean, policy_.waves.most_light_subpaths(wave_.slot_count()))
-                                  : 0;
-        Layout film;
-        lay_out_film(film, wave_, policy_.waves, kFilmWide);
-        const Layout queues = plan_queues(kept, film.bytes());
-        film_memory_ = DeviceBuffer<std::byte>(film.bytes(), "film");
-        film_memory_.zero();
-        Layout placed(film, film_memory_.data());
-        film_ = lay_out_film(placed, wave_, policy_.waves, kFilmWide);
+        const uint64_t room = room_for_film_and_waves();
+        prefer(settings.memory ? room : room / 2);
+        fit(room, true);
+        allocate_film();
         clock_ = DeviceBuffer<uint64_t>(1);
         stream_ = make_stream();
-        allocate_queues(queues, kept);
-        device_scene_->prefetch_texels(stream_.get());
+        allocate_queues();
+        if (settings.memory == 0) device_scene_->prefetch_texels(stream_.get());
         build_seconds_ = seconds_since(start);
     }
 
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
         const auto start = Clock::now();
         uint32_t done = 0;
-        while (done < count && !is_set(interrupt)) {
-            // All waves of a pass are queued at once; the host waits for the last.
-            const uint32_t pass = std::min(count - done, preferred_batch());
+        while (next_tile_ > 0 || (done < count && !is_set(interrupt))) {
+            // All waves of a pass are queued at once; the host waits for the last. Of parts, those of one sample:
+            // behind one that failed, those of the next sample would overwrite what is done of this one.
+            const bool one = plan_.in_parts() || is_set(interrupt);
+            const uint32_t pass = one ? 1 : std::min(count - done, preferred_batch());
             const auto pass_start = Clock::now();
-            const uint32_t waves_before = read_state().done;
-            uint32_t waves_per_sample = 0;
-            for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles) ++waves_per_sample;
+            const uint32_t waves_before = read_state().done, first_tile = next_tile_;
             film_is_whole_ = false;
-            for (uint32_t s = 0; s < pass; s += wave_.samples)
-                for (uint32_t tile = 0; tile < tile_count(wave_); tile += wave_.tiles)
-                    launch_wave(tile, first + done + s, std::min(wave_.samples, pass - s));
+            for (uint32_t s = 0; s < pass; s += plan_.wave.samples) {
+                for (uint32_t tile = s ? 0 : first_tile; tile < tile_count(plan_.wave); tile += plan_.wave.tiles)
+                    launch_wave(tile, first + done + s, std::min(plan_.wave.samples, pass - s));
+                if (plan_.in_parts()) update_whole_film(first + done + s);
+            }
             cuda_check(cudaStreamSynchronize(stream_.get()), "wave");
             const WaveState state = read_state();
-            const uint32_t finished = std::min(pass, (state.done - waves_before) / waves_per_sample * wave_.samples);
+            const WaveProgress progress = progress_of(plan_.wave, first_tile, state.done - waves_before);
+            next_tile_ = progress.next_tile;
+            const uint32_t finished = std::min(pass, progress.samples);
             film_is_whole_ = true;
             samples_ += finished;
             film_samples_ += finished;
@@ -104,11 +98,14 @@ public:
     std::function<FilmMoments()> take_film() override {
         check_film();
         const uint64_t values = film_values();
+        const uint64_t bytes = held_bytes() + 2 * values * sizeof(double) + image_bytes();
+        if (taken_.size() == 0 && settings_.memory > 0 && bytes > settings_.memory) return Renderer::take_film();
         try {
             if (taken_.size() == 0) taken_ = DeviceBuffer<double>(2 * values, "a film that is handed over");
         } catch (const Error&) {
             return Renderer::take_film();  // no room for it
         }
+        note_peak();
         const FilmSums taken = {taken_.data(), taken_.data() + values};
         for (const auto& [to, from] :
              {std::pair{taken.sum, film_.sums.sum}, {taken.sum_squares, film_.sums.sum_squares}})
@@ -119,7 +116,8 @@ public:
     }
     std::optional<DeviceImage> device_image() override {
         check_film();
-        return mean_on_device(film_.sums.sum, wave_.width, wave_.height, film_samples_);
+        note_peak(image_bytes());
+        return mean_on_device(film_.sums.sum, plan_.wave.width, plan_.wave.height, film_samples_);
     }
 
     RenderStats stats() override {
@@ -134,8 +132,9 @@ public:
         if (memory_.size() > 0) read_counts();
         fill_stage_stats(layout_.record_names(), records_, s);
         fill_queue_stats(layout_, {counters_.data()}, s);
-        s.memory_bytes = fixed_bytes() + memory_.bytes();
-        s.memory_bytes_predicted = fixed_bytes() + layout_.bytes();
+        s.memory_bytes = held_bytes();
+        s.memory_bytes_predicted = held_bytes() - memory_.bytes() + layout_.bytes();
+        s.memory_bytes_peak = peak_;
         s.features = feature_names(F);
         s.skipped = Integrator::skipped(scene_, policy_);
         skipped_features(F, s.skipped);
@@ -151,59 +150,81 @@ public:
     }
 
     uint32_t preferred_batch() const override {
-        return whole_waves(batch_of(measured_seconds_, measured_samples_), wave_.samples);
+        return whole_waves(batch_of(measured_seconds_, measured_samples_), plan_.wave.samples);
     }
 
 private:
     using Executor = CudaExecutor<!kFilmWide>;  ///< binary BVHs are there for the path tracer
 
-    void take_accel(const RenderSettings& settings, SharedAccels& accels) {
-        if (settings.accel != AccelKind::bvh2) accels.get<CwbvhAccel>();  // its bytes count where the scene is checked
+    /// With `arrays` of the structure on the host: the pilot; whether the least fits into a budget; then the copies.
+    template <class Arrays>
+    void take(const Arrays& arrays, SharedAccels& accels) {
+        if constexpr (kFilmWide) {
+            const HostTracer tracer(accels.get<CwbvhAccel>()->tracer());
+            plan_.mean = Integrator::pilot(policy_, scene_.view(), tracer, settings_.seed);
+            if constexpr (requires { Stages::kTracesConnections; })
+                policy_.traces_connections = Stages::kTracesConnections && traces_connections(policy_, arrays.bytes());
+        }
+        scene_bytes_ = scene_bytes(scene_, settings_.textures);
+        accel_bytes_ = arrays.bytes();
+        plan_.shape_least();
+        if (settings_.memory > 0 && needed_bytes(true) + fixed_bytes() > settings_.memory)
+            refuse(needed_bytes(true), true);
         device_scene_ = accels.get<DeviceScene>();
-        if (settings.accel == AccelKind::bvh2)
-            pairs_.emplace(PairAccel(scene_).arrays());
+        if constexpr (std::is_same_v<Arrays, PairArrays>)
+            pairs_.emplace(arrays);
         else
             accel_ = accels.get<DeviceCwbvh>();
     }
     /// The copy may have been made for a renderer with another camera.
     SceneView device_view() const {
-        SceneView view = device_scene_->view();
+        SceneView view = device_scene_ ? device_scene_->view() : scene_.view();  // of a plan no one looks at it
         view.sensor = scene_.sensor;
         return view;
     }
-    /// Which tiles and how many samples a wave holds.
-    void shape(const RenderSettings& settings, double mean) {
+    /// Makes waves fit into `room` bytes, with the film if that is not there yet.
+    void fit(uint64_t room, bool with_film) {
+        const bool fits = plan_.fit(room, [&] { return needed_bytes(with_film); });
+        if (!fits) refuse(needed_bytes(with_film), with_film);
+    }
+    /// Slots of a wave that do well are counted from the bytes of a million.
+    void prefer(uint64_t room) {
         constexpr uint32_t kMillion = 1u << 20;
-        const bool streams = policy_.waves.slots_in_flight > 0;
-        if (streams) policy_.waves.slots_in_flight = kMillion;
+        if (plan_.streams()) policy_.waves.slots_in_flight = kMillion;
         Layout million;
-        Integrator::lay_out(
-            million, policy_,
-            {kMillion, uint32_t(planned_light_vertices(mean, policy_.waves.most_light_subpaths(kMillion)))});
-        const uint64_t splat_bytes = !kFilmWide ? 0 : settings.deterministic ? 3 * sizeof(double) : sizeof(Lane);
-        const uint64_t bytes_per_path = (million.bytes() >> 20) + splat_bytes + sizeof(Lane);
-        const uint32_t plateau = streams ? kStreamPlateau : kFilmWide ? kFilmWidePlateau : kWavePlateau;
-        const uint32_t size = device_wave_size(scene_, settings, plateau, bytes_per_path, free_device_bytes());
-        wave_ = shape_wave(scene_, settings.seed, size, ~0u);
-        if (kFilmWide) {  // splats may land anywhere
-            wave_.tiles = tile_count(wave_);
-            wave_.samples = std::max(1u, size / (wave_.tiles * kTilePixels));
-        }
-        if (streams) {
-            policy_.waves.slots_in_flight = size;
-            wave_.samples = stream_samples(size, wave_.tiles * kTilePixels, settings.expected_samples, kLightRay - 1);
-        }
-        light_subpaths_ = light_subpaths_in(wave_, 0, wave_.tiles, policy_.waves.light_subpaths_per_tile);
-        if (uint64_t(light_subpaths_) * wave_.samples > 0xffffffffull)
-            throw Error(ExitCode::usage, "wave_size=" + std::to_string(settings.wave_size) +
-                                             ": more light subpaths than can be numbered; set a smaller one, or fewer "
-                                             "light_paths");
-        policy_.waves.multi_bounce_below = multi_bounce_below(settings, wave_.slot_count());
+        const uint64_t subpaths = policy_.waves.most_light_subpaths(kMillion);
+        Integrator::lay_out(million, policy_, {kMillion, planned_light_vertices(plan_.mean, subpaths)});
+        const uint64_t splat_bytes = !kFilmWide ? 0 : settings_.deterministic ? 3 * sizeof(double) : sizeof(Lane);
+        plan_.shape_preferred((million.bytes() >> 20) + splat_bytes + sizeof(Lane), room);
     }
-    uint64_t fixed_bytes() const {
+    [[noreturn]] void refuse(uint64_t needed, bool with_film) {
+        const uint64_t free = device_scene_ ? free_device_bytes() : ~uint64_t(0);
+        if (settings_.memory == 0 || needed > free) refuse_wave(needed, free, plan_.wave.slot_count());
+        Layout plan;
+        lay_out_film(plan, plan_.film_wave, policy_.waves, kFilmWide);
+        const uint64_t film = with_film ? plan.bytes() : film_memory_.bytes();
+        refuse_budget(settings_, {scene_bytes_, accel_bytes_, film + image_bytes(), needed - (with_film ? film : 0)});
+    }
+    /// Of the scene, its structure, a clock, and an image that may be asked for.
+    uint64_t fixed_bytes() const { return scene_bytes_.total() + accel_bytes_ + sizeof(uint64_t) + image_bytes(); }
+    uint64_t image_bytes() const { return film_values() * sizeof(float); }
+    /// Of what is free, and of what is left of a budget.
+    uint64_t room_for_film_and_waves() const {
+        const uint64_t free = free_device_bytes(), held = fixed_bytes() + film_memory_.bytes() + taken_.bytes();
+        return settings_.memory ? std::min(free, settings_.memory - std::min(settings_.memory, held)) : free;
+    }
+    uint64_t needed_bytes(bool with_film) {
+        Layout film, queues;
+        if (with_film) lay_out_film(film, plan_.film_wave, policy_.waves, kFilmWide);
+        lay_out(queues, plan_.kept());
+        return queues.bytes() + (with_film ? film.bytes() : 0);
+    }
+    uint64_t held_bytes() const {
         return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) + film_memory_.bytes() +
-               clock_.bytes();
+               clock_.bytes() + memory_.bytes() + taken_.bytes();
     }
+    /// `more`: what is not the renderer's for long.
+    void note_peak(uint64_t more = 0) { peak_ = std::max(peak_, held_bytes() + more); }
 
     /// Memory of a wave, and what works on it.
     struct WaveParts {
@@ -212,35 +233,39 @@ private:
         Stages stages;
     };
     WaveParts lay_out(Layout& layout, uint32_t kept) {
-        const uint32_t slots = wave_.slot_count(), listed = policy_.waves.order_slots(slots);
+        const uint32_t slots = plan_.wave.slot_count(), listed = policy_.waves.order_slots(slots);
         WaveState* const state = layout.allocate<WaveState>(1);
         const typename Integrator::Memory queues = Integrator::lay_out(layout, policy_, {slots, kept});
         const OrderMemory order =
             lay_out_order(layout, policy_.waves.queues, listed, order_temporary_bytes(policy_.waves.queues, listed));
-        wave_.state = state;
+        plan_.wave.state = plan_.film_wave.state = state;
+        FilmBuffers film = film_;
+        if (plan_.in_parts()) film.samples = layout.allocate<Lane>(slots);
+        part_samples_ = film.samples;
         const CwbvhTracer tracer = accel_ ? accel_->tracer() : CwbvhTracer();
         layout.record(UpdateFilm::kName);
-        return {state, order, Stages(layout, device_view(), tracer, policy_, wave_, queues, film_)};
+        return {state, order, Stages(layout, device_view(), tracer, policy_, plan_.wave, queues, film)};
     }
-    uint64_t film_values() const { return uint64_t(wave_.width) * wave_.height * 3; }
+    uint64_t film_values() const { return uint64_t(plan_.wave.width) * plan_.wave.height * 3; }
 
-    /// Queues for `kept` light vertices, which must fit beside `other_bytes`.
-    Layout plan_queues(uint64_t kept, uint64_t other_bytes) {
-        if (kept > 0xf0000000ull)
-            throw Error(ExitCode::device,
-                        "light subpaths have more vertices than can be numbered: set a max_depth or "
-                        "a smaller wave_size");
+    void allocate_film() {
         Layout plan;
-        lay_out(plan, uint32_t(kept));
-        check_memory(plan.bytes() + other_bytes, free_device_bytes(), wave_.slot_count());
-        return plan;
+        lay_out_film(plan, plan_.film_wave, policy_.waves, kFilmWide);
+        film_memory_ = DeviceBuffer<std::byte>(plan.bytes(), "film");
+        film_memory_.zero();
+        Layout placed(plan, film_memory_.data());
+        film_ = lay_out_film(placed, plan_.film_wave, policy_.waves, kFilmWide);
     }
     /// The queues, and the graph that uses them.
-    void allocate_queues(const Layout& plan, uint64_t kept) {
+    void allocate_queues() {
+        const uint32_t kept = plan_.kept();
+        Layout plan;
+        lay_out(plan, kept);
         memory_ = DeviceBuffer<std::byte>(plan.bytes(), "queues");
         memory_.zero();
+        note_peak();
         layout_ = Layout(plan, memory_.data());
-        const WaveParts parts = lay_out(layout_, uint32_t(kept));
+        const WaveParts parts = lay_out(layout_, kept);
         const std::vector<QueueCounter> counters = layout_.first_counters();
         cuda_check(cudaMemcpy(layout_.counters(), counters.data(), counters.size() * sizeof(QueueCounter),
                               cudaMemcpyHostToDevice),
@@ -256,21 +281,40 @@ private:
     }
     void run(Executor& exec) {
         Integrator::schedule(exec, *stages_);
-        const UpdateFilm update = {wave_, film_.samples, film_.splats, film_.sums, layout_.record(UpdateFilm::kName)};
-        exec.run_slots(update, wave_.tiles * kTilePixels, 1);
+        if (!plan_.in_parts()) update_film(exec);
         exec.finish_wave();
+    }
+    /// Of all pixels of plan_.film_wave.
+    void update_film(Executor& exec) {
+        const UpdateFilm update = {plan_.film_wave, film_.samples, film_.splats, film_.sums,
+                                   layout_.record(UpdateFilm::kName)};
+        exec.run_slots(update, plan_.film_wave.tiles * kTilePixels, 1);
+    }
+    /// After the last part of a sample; nothing if one of them failed.
+    void update_whole_film(uint32_t sample) {
+        const WaveState state = {0, sample, 1, 0, 0, 0, 0, 0};
+        detail::set_wave<<<1, 1, 0, stream_.get()>>>(state_, state);
+        cuda_check(cudaGetLastError(), "film");
+        executor_->launch([&](Executor& exec) { update_film(exec); });
     }
     void launch_wave(uint32_t tile, uint32_t sample, uint32_t samples) {
         const WaveState state = {
-            tile, sample, samples, 0, 0, 0, samples * light_subpaths_, policy_.waves.slots_in_flight};
+            tile, sample, samples, 0, 0, 0, samples * plan_.light_subpaths(tile), policy_.waves.slots_in_flight};
         detail::set_wave<<<1, 1, 0, stream_.get()>>>(state_, state);
         cuda_check(cudaGetLastError(), "wave");
         if (graph_)
             cuda_check(cudaGraphLaunch(graph_.get(), stream_.get()), "wave");
         else
             executor_->launch([&](Executor& exec) { run(exec); });
+        if (!plan_.in_parts()) return;
+        const uint64_t lanes =
+            uint64_t(std::min(uint32_t(plan_.wave.tiles), tile_count(plan_.wave) - tile)) * kTilePixels;
+        cuda_check(cudaMemcpyAsync(film_.samples + uint64_t(tile) * kTilePixels, part_samples_, lanes * sizeof(Lane),
+                                   cudaMemcpyDeviceToDevice, stream_.get()),
+                   "samples of a part of the film");
     }
-    /// A wave had more light vertices than there was capacity for.
+    /// A wave had more light vertices than there was capacity for. Where there is no memory for more, waves get
+    /// smaller.
     void grow() {
         read_counts();
         uint64_t needed = 0;
@@ -278,8 +322,9 @@ private:
             if (layout_.queue_names()[q] == "light_vertices" || layout_.queue_names()[q] == "splats")
                 needed = std::max(needed, counters_[q].peak);
         memory_ = DeviceBuffer<std::byte>();
-        needed += needed / 4;
-        allocate_queues(plan_queues(needed, 0), needed);
+        plan_.keep(needed);
+        fit(room_for_film_and_waves(), false);
+        allocate_queues();
         cuda_check(cudaMemcpy(layout_.records(), records_.data(), records_.size() * sizeof(StageRecord),
                               cudaMemcpyHostToDevice),
                    "statistics");
@@ -289,7 +334,7 @@ private:
         counters_ = read(layout_.counters(), layout_.queue_names().size());
     }
     FilmMoments read_film(const FilmSums& sums, uint64_t samples) const {
-        return {wave_.width, wave_.height, samples, read(sums.sum, film_values()),
+        return {plan_.wave.width, plan_.wave.height, samples, read(sums.sum, film_values()),
                 read(sums.sum_squares, film_values())};
     }
     /// What a fault interrupts leaves waves in the film that are not counted.
@@ -312,12 +357,14 @@ private:
     Features traced_;  ///< what rays are traced for
     bool use_graph_;
     std::string device_name_ = cuda_device_name();  ///< asked for once: stats() is called often
-    Wave wave_{};
+    DevicePlan plan_{scene_, settings_, policy_.waves, kFilmWide};
+    SceneBytes scene_bytes_{};  ///< on the device
+    uint64_t accel_bytes_ = 0, peak_ = 0;
+    uint32_t next_tile_ = 0;  ///< where a sample goes on of which only parts are done
     Layout layout_;
     std::vector<StageRecord> records_;    ///< as last read: they outlast a failure to grow
     std::vector<QueueCounter> counters_;  ///< likewise
     bool film_is_whole_ = true;
-    uint32_t light_subpaths_ = 0;  ///< of one sample
     uint64_t samples_ = 0, film_samples_ = 0, measured_samples_ = 0;
     double build_seconds_ = 0, render_seconds_ = 0, measured_seconds_ = 0;
     std::shared_ptr<const DeviceScene> device_scene_;
@@ -326,6 +373,7 @@ private:
     DeviceBuffer<std::byte> memory_, film_memory_;
     DeviceBuffer<double> taken_;  ///< by take_film
     FilmBuffers film_{};
+    Lane* part_samples_ = nullptr;  ///< of eye subpaths, by slot of the wave
     DeviceBuffer<uint64_t> clock_;
     WaveState* state_ = nullptr;
     Owned<cudaStream_t> stream_;

@@ -6,8 +6,8 @@
 
 namespace ambilux {
 
-/// Places for the film of `wave`; its memory must be zero at first. `splats`: a sample of any pixel may add to any
-/// other one, so that each pixel has a sum for every sample of a wave.
+/// Places for the film of `wave`, which is added to it at once; its memory must be zero at first. `splats`: a sample of
+/// any pixel may add to any other one, so that each pixel has a sum for every sample of a wave.
 inline FilmBuffers lay_out_film(Layout& layout, const Wave& wave, const WavePolicy& policy, bool splats) {
     const uint64_t pixels = uint64_t(wave.width) * wave.height, cells = splats ? pixels * wave.samples : 0;
     FilmBuffers film{};

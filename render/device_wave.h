@@ -14,9 +14,9 @@ constexpr uint32_t kFilmWidePlateau = 1u << 25;
 constexpr uint32_t kStreamPlateau = 1u << 23;
 
 /// Paths of a wave where `settings` leave it open: `plateau`, from which on more do not pay, or as many as the render
-/// has, or as fit into half of the `free` bytes beside what other programs hold.
+/// has, or as fit into `room` bytes.
 uint32_t device_wave_size(const Scene& scene, const RenderSettings& settings, uint32_t plateau, uint64_t bytes_per_path,
-                          uint64_t free);
+                          uint64_t room);
 
 /// Samples of a wave of variant streaming: enough paths for each of `slots` that the last ones, which leave slots idle,
 /// matter little. `paths`: of a sample; `expected`: samples of the render, 0 if not known; `most`: paths of a wave.
@@ -37,8 +37,16 @@ bool traces_connections(const Policy& policy, uint64_t bytes) {
            w.queues.ordering != Ordering::morton && bytes <= kTracedInPlace;
 }
 
-/// Throws Error(device) that names the ways out if `needed` bytes for a wave of `paths` are more than are free.
-void check_memory(uint64_t needed, uint64_t free, uint32_t paths);
+/// Throws Error(device) that names the ways out of `needed` bytes for a wave of `paths`, more than are free.
+[[noreturn]] void refuse_wave(uint64_t needed, uint64_t free, uint32_t paths);
+
+/// How far waves have come that go through the film tile by tile.
+struct WaveProgress {
+    uint32_t samples;    ///< of every pixel that are finished, in whole waves
+    uint32_t next_tile;  ///< of the sample after them
+};
+/// After `waves` that began with sample 0 at `first_tile`.
+WaveProgress progress_of(const Wave& wave, uint32_t first_tile, uint32_t waves);
 
 /// `batch` samples in whole waves of `wave_samples`, at least one: the last depths of a wave cost as much for few paths
 /// as for many.

@@ -55,7 +55,7 @@ std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& se
     const bool open = settings.backend == Backend::automatic && settings.accel != AccelKind::embree && !in_double;
     const bool cuda = settings.backend == Backend::cuda || (open && cuda_available());
     check_settings(settings, variant, cuda);
-    accels.place_textures(settings.memory);
+    accels.place_textures(settings.textures);
     if (in_double) return make_twin(scene, settings);
     if (settings.automatic)
         return make_automatic(scene, settings, cuda, accels,

@@ -69,6 +69,7 @@ struct RenderStats {
     std::map<std::string, InvalidCounts> invalid_by_stage;
     uint64_t memory_bytes = 0;            ///< allocated for this render (scene, structure, queues, film)
     uint64_t memory_bytes_predicted = 0;  ///< computed before the allocation
+    uint64_t memory_bytes_peak = 0;       ///< the most at any time
     std::vector<std::string> features;    ///< what the kernels contain
     SelectionStats choice;
     std::vector<std::string> skipped;  ///< stages and kernel parts that this scene does not need

@@ -65,9 +65,12 @@ double timed(const Scene& scene, RenderSettings settings, bool cuda, const MakeR
     constexpr double kLongEnough = 0.05;
     const VariantTraits& traits = variant_of(settings).traits;
     const uint32_t paths_per_wave = traits.light_subpaths ? 1u << 21 : 1u << 22;
-    if (cuda && settings.wave_size == 0 && !traits.streams) settings.wave_size = paths_per_wave;
-    const std::unique_ptr<Renderer> renderer = make(settings);
     const uint32_t pixels = scene.sensor.crop_width * scene.sensor.crop_height;
+    if (settings.memory)
+        settings.expected_samples = std::max(1u, paths_per_wave / std::max(1u, pixels));  // fewer where memory is short
+    else if (cuda && settings.wave_size == 0 && !traits.streams)
+        settings.wave_size = paths_per_wave;
+    const std::unique_ptr<Renderer> renderer = make(settings);
     const uint32_t count =
         cuda ? std::clamp(paths_per_wave / std::max(1u, pixels), 1u, renderer->preferred_batch()) : 1;
     const auto seconds_of = [&](uint32_t first, uint32_t samples) {
@@ -211,7 +214,9 @@ public:
     }
 
     std::unique_ptr<Renderer> run(SharedAccels& accels, bool cwbvh) {
-        if (cuda_ && settings_.expected_seconds > 0 && settings_.expected_samples == 0 && unreachable_[0].empty())
+        // A budget holds one renderer at a time.
+        const bool ahead = cuda_ && settings_.memory == 0 && settings_.expected_seconds > 0;
+        if (ahead && settings_.expected_samples == 0 && unreachable_[0].empty())
             head_start_.emplace(settings_of(settings_, candidates_[0]), make_);
         std::vector<PilotCandidate> predicted;
         for (const SelectionCandidate& c : candidates_) predicted.push_back(c.pilot);

@@ -37,10 +37,10 @@ def write_scene(folder, textures, side):
     return path
 
 
-def render(program, scene, folder, memory, spp):
+def render(program, scene, folder, textures, spp):
     """Seconds, bytes on the device and the error against the first image; or why it was refused."""
     out, first, stats = folder / "out.exr", folder / "first.exr", folder / "stats.json"
-    command = [program, "--quiet", "render", scene, "-o", out, "--json", stats, "--backend", "cuda", "--memory", memory, "--spp", spp, "--deterministic"]
+    command = [program, "--quiet", "render", scene, "-o", out, "--json", stats, "--backend", "cuda", "--textures", textures, "--spp", spp, "--deterministic"]
     done = subprocess.run([str(c) for c in command], stderr=subprocess.PIPE, text=True)
     if done.returncode:
         return done.stderr.strip()
@@ -53,17 +53,17 @@ def render(program, scene, folder, memory, spp):
 
 
 def report(program, scene, folder, spp, turns, what):
-    print(f"\n{what}\n\n| memory | build s | render s, each turn | MiB on the device | RMSE against the first |\n| --- | --- | --- | --- | --- |")
-    rows = {memory: [] for memory in ("device", "host", "pinned")}
+    print(f"\n{what}\n\n| textures | build s | render s, each turn | MiB on the device | RMSE against the first |\n| --- | --- | --- | --- | --- |")
+    rows = {textures: [] for textures in ("device", "host", "pinned")}
     for _ in range(turns):
-        for memory, results in rows.items():
-            results.append(render(program, scene, folder, memory, spp))
-    for memory, results in rows.items():
+        for textures, results in rows.items():
+            results.append(render(program, scene, folder, textures, spp))
+    for textures, results in rows.items():
         if isinstance(results[0], str):
-            print(f"| {memory} | {results[0]} | | | |")
+            print(f"| {textures} | {results[0]} | | | |")
             continue
         times = ", ".join(f"{r[0]['render']:.3f}" for r in results)
-        print(f"| {memory} | {results[-1][0]['build']:.2f} | {times} | {results[0][1] >> 20} | {results[-1][2]} |")
+        print(f"| {textures} | {results[-1][0]['build']:.2f} | {times} | {results[0][1] >> 20} | {results[-1][2]} |")
 
 
 def main():

@@ -30,7 +30,7 @@ std::shared_ptr<uint8_t> managed(std::span<const uint8_t> texels) {
                "managed memory");
     if (!pages_on_demand)
         throw Error(ExitCode::device,
-                    "this device cannot fetch pages of the host when it needs them: use --memory pinned");
+                    "this device cannot fetch pages of the host when it needs them: use --textures pinned");
     uint8_t* data = nullptr;
     cuda_check(cudaMallocManaged(reinterpret_cast<void**>(&data), texels.size()), "textures in host memory",
                texels.size());

@@ -27,4 +27,10 @@ DeviceImage mean_on_device(const double* sum, uint32_t width, uint32_t height, u
     return image;
 }
 
+void copy_to_host(const DeviceImage& image, std::vector<float>& rgb) {
+    rgb.resize(size_t(image.width) * image.height * 3);
+    cuda_check(cudaMemcpy(rgb.data(), image.rgb.get(), rgb.size() * sizeof(float), cudaMemcpyDeviceToHost),
+               "image from the device");
+}
+
 }  // namespace ambilux

@@ -1,6 +1,7 @@
 // What stands for the CUDA backend in a build without CUDA.
 #include "backends/cuda/bench_queues.h"
 #include "backends/cuda/bench_rays.h"
+#include "backends/cuda/mean_on_device.h"
 #include "backends/cuda_device.h"
 #include "backends/trace_on_device.h"
 #include "core/error.h"
@@ -21,6 +22,8 @@ std::string cuda_device_bus_id() { return {}; }
 int cuda_device_count() { return 0; }
 
 void use_cuda_device(int) { throw not_built(); }
+
+void copy_to_host(const DeviceImage&, std::vector<float>&) { throw not_built(); }
 
 std::vector<Hit> trace_on_device(const Scene&, const std::vector<Ray>&, bool, bool, bool) { throw not_built(); }
 

@@ -258,7 +258,7 @@ private:
     /// Of all devices, and of what an earlier part did.
     RenderStats total() const {
         RenderStats sum = earlier_;
-        uint64_t bytes = 0, predicted = 0;
+        uint64_t bytes = 0, predicted = 0, peak = 0;
         double build = 0;
         std::map<std::string, int> devices;
         for (const Party& p : parties_)
@@ -266,6 +266,7 @@ private:
                 add_part(sum, {}, d.stats);
                 bytes += d.stats.memory_bytes;
                 predicted += d.stats.memory_bytes_predicted;
+                peak += d.stats.memory_bytes_peak;
                 build = std::max(build, d.stats.build_seconds);
                 ++devices[p.host + ": " + d.stats.device];
             }
@@ -276,6 +277,7 @@ private:
                             devices.size() > 1 || ranks_.size() > 1 ? name : parties_[0].devices[0].stats.device);
         sum.memory_bytes = bytes;
         sum.memory_bytes_predicted = predicted;
+        sum.memory_bytes_peak = peak;
         sum.build_seconds = build;
         sum.choice = choice_;
         sum.samples = tree_.samples();

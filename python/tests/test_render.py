@@ -30,6 +30,16 @@ def test_a_render_is_that_of_the_program(scene, tmp_path):
     assert image.stats["integrator"] == "bdpt" and image.stats["variant"] == "lvc" and image.stats["spp"] == 4
 
 
+def test_a_budget_of_memory_is_kept_or_refused(scene):
+    any_memory = ambilux.render(scene, spp=2, backend="cpu")
+    image = ambilux.render(scene, spp=2, backend="cpu", settings={"memory": "64M"})
+    assert image.stats["memory"] == "64M" and any_memory.stats["memory"] == "all"
+    assert image.stats["memory_bytes_predicted"] <= image.stats["memory_bytes_peak"] <= 64 << 20
+    np.testing.assert_array_equal(image.rgb, any_memory.rgb)
+    with pytest.raises(ambilux.DeviceError, match="at least"):
+        ambilux.render(scene, spp=1, backend="cpu", settings={"memory": "1K"})
+
+
 def test_arrays_are_not_copied(scene):
     image = ambilux.render(scene, spp=2, backend="cpu")
     assert image.rgb.dtype == np.float32 and image.shape == (24, 32, 3)

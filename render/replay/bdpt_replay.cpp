@@ -48,11 +48,11 @@ public:
         ctx_.cull = policy_.waves.cull;
         ctx_.radiance_first = pairing_ == ReplayPairing::registers;
         if (!policy_.rules.connect) pairing_ = ReplayPairing::none;
-        wave_ = cpu_wave(scene, settings, tbb::task_arena().max_concurrency());
+        wave_ = cpu_wave(scene, settings, tbb::task_arena().max_concurrency(), cpu_wave_size(settings));
         wave_.samples = 1;
         const Ordering ordering = settings.queues.ordering;
-        cache_known_ =
-            settings.backend != Backend::cuda && (ordering == Ordering::automatic || ordering == Ordering::none);
+        cache_known_ = settings.backend != Backend::cuda && settings.memory == 0 &&
+                       (ordering == Ordering::automatic || ordering == Ordering::none);
     }
 
     ReplaySample sample(const ReplayRequest& request) const override {
@@ -170,7 +170,8 @@ private:
             out.complete = false;
             out.notes.push_back(
                 "connections are missing: which light vertices were drawn depends on the order of the cache, which is "
-                "known on the CPU without ordering only; --light-subpath N connects with those of one light subpath");
+                "known on the CPU without ordering and without a budget of memory only; --light-subpath N connects "
+                "with those of one light subpath");
             return nullptr;
         }
         out.notes.push_back(fmt::format("connections: with draws from the cache of a render on the CPU with {} threads",

@@ -69,7 +69,7 @@ public:
         s.rays_extend = counts_.rays_extend;
         s.rays_occlude = counts_.rays_occlude;
         s.invalid = counts_.invalid;
-        s.memory_bytes = s.memory_bytes_predicted =
+        s.memory_bytes = s.memory_bytes_predicted = s.memory_bytes_peak =
             scene_.memory_bytes() + tracer_.memory_bytes() + 3 * sizeof(double) * film_.sum.size();
         s.features = feature_names(ambilux::kAllFeatures);
         return s;
@@ -146,7 +146,7 @@ private:
 
 /// Settings of which the twin has but one value.
 void check(const RenderSettings& settings) {
-    for (const char* key : {"cull", "technique_depth", "light_paths", "bdpt.auto"}) {
+    for (const char* key : {"cull", "technique_depth", "light_paths", "bdpt.auto", "memory"}) {
         const Setting& s = *find_general_setting(key);
         if (!s.is_default(settings))
             throw Error(ExitCode::usage, fmt::format("{}={}: precision=double is a plain loop and does without; leave "

@@ -63,7 +63,7 @@ long fail_everywhere(Fault fault, long step, const Scene& scene, const Case& c) 
     const auto work = [&] { render_once(scene, settings); };
     const char* const name = fault == Fault::lost ? "cudaErrorLaunchFailure" : "cudaErrorMemoryAllocation";
     const bool in_cub = c.has("compaction", "select");  // which has names of its own for what fails inside of it
-    const bool managed = c.has("memory", "host");       // of which the driver may give back more than it had taken
+    const bool managed = c.has("textures", "host");     // of which the driver may give back more than it had taken
     for (int i = 0; i < 3; ++i) work();                 // what is made once for all
     const uint64_t free_before = free_device_bytes();
     const long alive = cuda_faults.alive;
@@ -106,8 +106,8 @@ const std::vector<Case> kCases = {
     {"path, binary", {{"accel", "bvh2"}}},
     {"path, selected and sorted", {{"compaction", "select"}, {"ordering", "morton"}}},
     {"path, deterministic, by material", {{"deterministic", "true"}, {"ordering", "material"}}},
-    {"path, textures on the host", {{"memory", "host"}}},
-    {"path, textures pinned", {{"memory", "pinned"}}},
+    {"path, textures on the host", {{"textures", "host"}}},
+    {"path, textures pinned", {{"textures", "pinned"}}},
     {"light", {{"integrator", "light"}}},
     {"wavefront", {{"integrator", "bdpt"}}},
     {"wavefront, strategies", {{"integrator", "bdpt"}, {"technique_depth", "4"}}},

@@ -12,13 +12,13 @@ using namespace ambilux;
 
 namespace {
 
-RenderSettings settings_of(const Scene& scene, const char* integrator, TextureMemory memory) {
+RenderSettings settings_of(const Scene& scene, const char* integrator, TextureMemory textures) {
     RenderSettings s = cpu_settings(scene, Estimator::mis);
     s.backend = "cuda";
     s.integrator = integrator;
     s.deterministic = true;  // bits are compared
     s.wave_size = 8192;
-    s.memory = memory;
+    s.textures = textures;
     return s;
 }
 
@@ -62,7 +62,7 @@ TEST_CASE("textures beyond the device's memory are refused there, and render fro
         message = e.what();
     }
     INFO(message);
-    CHECK(message.find("--memory host") != std::string::npos);
+    CHECK(message.find("--textures host") != std::string::npos);
     for (const TextureMemory memory : kOnHost) {
         CAPTURE(int(memory));
         const RenderResult here = render_scene(scene, settings_of(scene, "path", memory), 8);

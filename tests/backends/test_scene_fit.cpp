@@ -44,7 +44,7 @@ TEST_CASE("what a scene needs is compared with what is free, and told part by pa
     CHECK(refusal(scene, TextureMemory::device, needed).empty());
     check_parts(refusal(scene, TextureMemory::device, needed - 1),
                 {"needs 10 MiB", "3 of geometry", "5 of textures", "2 of acceleration structure", "0 of the rest",
-                 "9 of 81920 MiB of Device of 80 GiB are free", "--memory host"});
+                 "9 of 81920 MiB of Device of 80 GiB are free", "--textures host"});
 }
 
 TEST_CASE("textures on the host do not count, and are not offered where they do not help") {
@@ -56,6 +56,6 @@ TEST_CASE("textures on the host do not count, and are not offered where they do 
                     {"needs 5 MiB", "0 of textures (their 5 lie on the host)", "use --backend cpu"});
         CHECK(refusal(scene, host, needed - 1).find("--memory") == std::string::npos);
     }
-    CHECK(refusal(scene, TextureMemory::device, needed).find("--memory host") != std::string::npos);
-    CHECK(refusal(scene, TextureMemory::device, needed - 1).find("--memory host") == std::string::npos);
+    CHECK(refusal(scene, TextureMemory::device, needed).find("--textures host") != std::string::npos);
+    CHECK(refusal(scene, TextureMemory::device, needed - 1).find("--textures host") == std::string::npos);
 }

@@ -68,6 +68,8 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {{"reference", kCornell, "-o", folder / "r.exr", "--spp", "4", "-i", "path"}, "-i"},
         {{"bench", "rays", kCornell, "--repetitions", "0"}, "at least 1"},
         {{"bench", "queues", kCornell, "--repetitions", "0"}, "at least 1"},
+        {{"bench", "frames", kCornell, "--frames", "0"}, "at least 1"},
+        {{"bench", "frames", kCornell, "--memory", "4X"}, "512M or 4G"},
         {{"bench", "queues", kCornell, "--items", "many"}, "--items"},
         {{"bench", "queues", kCornell, "--items", "-1"}, "--items"},
         {{"bench", "queues", kCornell, "--items", "300000000"}, "at most"},
@@ -487,6 +489,32 @@ TEST_CASE("bench stages apportions the time of stages that run others inside of 
     const Outcome refused = with({"--unfused", "--set", "fuse=none"});
     CHECK(refused.code == 2);
     CHECK(contains(refused.err, "no stage runs inside of another"));
+}
+
+TEST_CASE("bench frames: times of images, and the memory that they took") {
+    const test::TempFolder folder;
+    const Outcome bench =
+        run(folder, {"bench", "frames", kCornell, "--backend", "cpu", "--size", "24x16", "-i", "bdpt", "--variant",
+                     "lvc", "--memory", "64M", "--frames", "5", "--json", folder / "f.json"});
+    REQUIRE(bench.code == 0);
+    CHECK(contains(bench.out, "frames_per_second"));
+    const nlohmann::json json = nlohmann::json::parse(read_file(folder / "f.json"));
+    CHECK(json["frames"] == 5);
+    CHECK(json["memory"] == "64M");
+    CHECK(json["median_seconds"] > 0.0);
+    CHECK(json["percentile_95_seconds"] >= json["median_seconds"]);
+    CHECK(json["memory_bytes_peak"] <= 64u << 20);
+    CHECK(json["memory_bytes_peak"] >= json["memory_bytes_predicted"]);
+}
+
+TEST_CASE("a budget of memory that is too small is refused with the bytes of each part") {
+    const test::TempFolder folder;
+    const Outcome refused = run(folder, {"render", kCornell, "--backend", "cpu", "-i", "bdpt", "--size", "640x360",
+                                         "--memory", "8M", "-o", folder / "o.exr", "--spp", "1"});
+    CHECK(refused.code == 4);
+    for (const char* part :
+         {"memory=8M", "at least", "of geometry", "of textures", "of acceleration structure", "of film", "of waves"})
+        CHECK(contains(refused.err, part));
 }
 
 TEST_CASE("bench queues") {
