@@ -8,6 +8,7 @@
 #include "models/bsdf/phong.h"
 #include "models/bsdf/plastic.h"
 #include "models/bsdf/principled.h"
+#include "models/bsdf/principled_thin.h"
 #include "models/bsdf/rough_conductor.h"
 #include "models/bsdf/rough_dielectric.h"
 #include "models/bsdf/rough_diffuse.h"
@@ -29,7 +30,8 @@
     X(Phong, phong)                            \
     X(Ward, ward)                              \
     X(DiffuseTransmitter, diffuse_transmitter) \
-    X(Principled, principled)
+    X(Principled, principled)                  \
+    X(PrincipledThin, principled_thin)
 
 namespace ambilux {
 

@@ -107,6 +107,18 @@ void read_plugin(ModelTag<ConstantEmitter>, Builder&, Reader& in, Emitter& e) {
     e.radiance = {in.color("radiance", {1, 1, 1}, SpectrumUse::emission), -1};
 }
 
+void read_plugin(ModelTag<CollimatedEmitter>, Builder& builder, Reader& in, Emitter& e) {
+    const Matrix m = rigid_transform(builder, in);
+    builder.check_range(in.where(), "the emitter of type 'collimated'", {column(m, 3)});
+    e.position = to_vec3f(column(m, 3));
+    e.direction = to_vec3f(column(m, 2));
+    e.radiance = {in.color("power", {1, 1, 1}, SpectrumUse::emission), -1};
+}
+
+void read_plugin(ModelTag<DirectionalAreaEmitter>, Builder&, Reader& in, Emitter& e) {
+    e.radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
+}
+
 void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter& e) {
     const Matrix m = without_place(rigid_transform(builder, in));
     e.to_world = to_affine(m);

@@ -4,9 +4,10 @@
 // Position and direction are sampled one after the other and carry their own measures. For all emitters alike the flux
 // of a sample is
 //   radiance · cos_theta / (pick · pdf_pos · pdf_dir),
-// where a delta position or direction has "density" 1 and `radiance` is then intensity or irradiance. For emitters at
-// infinity the direction comes first and the position lies on the disk perpendicular to it that covers the scene's
-// bounding sphere.
+// where a delta position or direction has "density" 1 and `radiance` is then intensity or irradiance; of emitters with
+// both, power, and of those that send every point's light along its normal, power per area. For emitters at infinity
+// the direction comes first and the position lies on the disk perpendicular to it that covers the scene's bounding
+// sphere.
 #pragma once
 
 #include "transport/emitter.h"
@@ -19,6 +20,8 @@ template <Features F>
 AMBILUX_HD float pdf_emission_position(const SceneView& view, uint32_t emitter, uint32_t prim) {
     const Emitter& e = view.emitters[emitter];
     if (F.has(EmitterType::area) && e.type == EmitterType::area) return area_pdf_position(view, e, prim);
+    if (F.has(EmitterType::directional_area) && e.type == EmitterType::directional_area)
+        return area_pdf_position(view, e, prim);
     if (is_infinite(e.type)) return 1.0f / (kPi * sqr(view.bounds_radius));
     return 1.0f;
 }
