@@ -133,7 +133,7 @@ void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter&
     float largest = 0;
     const int32_t texture =
         is_given ? add_environment_image(builder, given->first, given->second, largest)
-                 : load_environment_image(builder, builder.document.resolve(name, in.where("filename")), largest);
+                 : load_environment_image(builder, in, builder.document.resolve(name, in.where("filename")), largest);
     e.radiance = {splat(float(scale)), texture};
     const double most = std::numeric_limits<float>::max();
     if (!(scale <= most && scale * largest <= most))

@@ -15,13 +15,12 @@
 namespace ambilux {
 
 /// Density per area with which sample_emission starts at a point of emitter `emitter`, given that it was picked: on
-/// primitive `prim` of an area emitter, on the disk for emitters at infinity; 1 for delta positions.
+/// primitive `prim` of an area emitter, on the disk for emitters at infinity; 1 for delta positions. Not for beams
+/// (is_beam): no other strategy has a density to compare.
 template <Features F>
 AMBILUX_HD float pdf_emission_position(const SceneView& view, uint32_t emitter, uint32_t prim) {
     const Emitter& e = view.emitters[emitter];
     if (F.has(EmitterType::area) && e.type == EmitterType::area) return area_pdf_position(view, e, prim);
-    if (F.has(EmitterType::directional_area) && e.type == EmitterType::directional_area)
-        return area_pdf_position(view, e, prim);
     if (is_infinite(e.type)) return 1.0f / (kPi * sqr(view.bounds_radius));
     return 1.0f;
 }
