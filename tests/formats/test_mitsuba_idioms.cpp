@@ -4,11 +4,13 @@
 // in another way than the file says is noted.
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "core/math.h"
 #include "formats/meshes/mesh.h"
 #include "tests/support/image_files.h"
 #include "tests/support/mitsuba_text.h"
+#include "transport/emitter.h"
 
 using namespace ambilux;
 using namespace ambilux::test;
@@ -187,6 +189,26 @@ TEST_CASE("vertex colours of 0.6 are sRGB unless the shape says otherwise") {
     CHECK(seen("",
                "<texture name='reflectance' type='mesh_attribute'><string name='name' value='vertex_color'/></texture>",
                "3.0.0") == Approx(0.5).epsilon(1e-4));
+}
+
+TEST_CASE("names of files as Windows writes them; opacities that are colours") {
+    const TempFolder folder;
+    std::filesystem::create_directory(folder / "textures");
+    folder.write("textures/i.png", png_bytes(1, 1, {255, 0, 128}));
+    load_quietly(textured("<texture name='reflectance' type='bitmap'><string name='filename' "
+                          "value='textures\\i.png'/></texture>"),
+                 "0.6.0", &folder);
+    CHECK(contains(error_of(textured("<texture name='reflectance' type='bitmap'><string name='filename' "
+                                     "value='textures\\j.png'/></texture>"),
+                            {}, "0.6.0", &folder),
+                   "does not exist"));
+    const auto mask = [](const char* opacity) {
+        return "<shape type='rectangle'><bsdf type='mask'><rgb name='opacity' value='" + std::string(opacity) +
+               "'/><bsdf type='diffuse'/></bsdf></shape>";
+    };
+    const Scene grey = load_quietly(mask("0.4"));
+    CHECK(grey.materials[grey.shapes[0].material].opacity.value == Approx(0.4));
+    CHECK(contains(error_of(mask("0.3, 0.5, 0.7")), ":2: a mask of a coloured opacity is not supported"));
 }
 
 TEST_CASE("textures: scale, rawconstant, gridtexture, channel") {

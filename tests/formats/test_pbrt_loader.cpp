@@ -543,3 +543,17 @@ TEST_CASE("curves are tubes, those of one material in one mesh") {
     CHECK(test::contains(test::pbrt_error("WorldBegin\n" + curve + "\"point3 P\" [0 0 0 1 0 0 2 0 0]\n"),
                          "3 control points do not make a curve of degree 3"));
 }
+
+TEST_CASE("attributes of materials count for named ones too") {
+    const auto alpha = [](const std::string& material) {
+        const Scene s =
+            load_pbrt_world("Attribute \"material\" \"float roughness\" 0.04 " + material + " Shape \"sphere\"");
+        const BsdfRecord& r = s.bsdfs[s.materials[s.shapes[0].material].front];
+        REQUIRE(r.type == BsdfType::rough_conductor);
+        return r.as<RoughConductor>().alpha_u.value;
+    };
+    CHECK(alpha("Material \"conductor\"") == Approx(0.2));
+    CHECK(alpha("MakeNamedMaterial \"m\" \"string type\" \"conductor\" NamedMaterial \"m\"") == Approx(0.2));
+    CHECK(alpha("MakeNamedMaterial \"m\" \"string type\" \"conductor\" \"float roughness\" .09 NamedMaterial \"m\"") ==
+          Approx(0.3));
+}
