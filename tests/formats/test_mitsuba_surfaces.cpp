@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/math.h"
+#include "formats/convert/convert.h"
 #include "scene/surface.h"
 #include "tests/support/mitsuba_text.h"
 #include "transport/blend.h"
@@ -314,4 +315,30 @@ TEST_CASE("collimated and directionalarea: a ray with power, a shape with power 
     CHECK(contains(error_of("<emitter type='collimated'><transform name='to_world'><scale x='2'/></transform>"
                             "</emitter>"),
                    "must not scale or shear"));
+}
+
+TEST_CASE("thin sheets and beams are written as they were read") {
+    const Scene a = load_quietly(
+        "<emitter type='collimated'><transform name='to_world'><lookat origin='1,2,3' target='0,0.5,0' up='0,1,0'/>"
+        "</transform><rgb name='power' value='1,2,3'/></emitter><shape type='cube'><bsdf type='principledthin'><rgb "
+        "name='base_color' value='.2,.3,.4'/><float name='spec_trans' value='.3'/><float name='diff_trans' "
+        "value='1.6'/>"
+        "<float name='sheen' value='.5'/></bsdf><emitter type='directionalarea'><rgb name='radiance' value='4,5,6'/>"
+        "</emitter></shape>");
+    const TempFolder folder;
+    const std::vector<std::string> notes = write_mitsuba(a, folder / "out.xml");
+    CHECK(std::count(notes.begin(), notes.end(), "Mitsuba 3 has no emitter 'collimated'") == 1);
+    const Scene b = load_mitsuba(folder / "out.xml");
+    CHECK(b.features == a.features);
+    REQUIRE(b.emitters.size() == 2);
+    check_rgb(b.emitters[0].position, a.emitters[0].position);
+    check_rgb(b.emitters[0].direction, a.emitters[0].direction);
+    check_rgb(b.emitters[0].radiance.value, a.emitters[0].radiance.value);
+    check_rgb(b.emitters[1].radiance.value, a.emitters[1].radiance.value);
+    const auto thin = [](const Scene& s) {
+        return parameters<PrincipledThin>(s.bsdfs[s.materials[s.shapes[0].material].front]);
+    };
+    CHECK(thin(b).through == Approx(thin(a).through));
+    CHECK(thin(b).specular.value == thin(a).specular.value);
+    CHECK(thin(b).sheen == thin(a).sheen);
 }
