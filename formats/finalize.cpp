@@ -49,7 +49,7 @@ void fill_areas(Scene& scene) {
         shape.area = float(area);
     }
     for (Emitter& emitter : scene.emitters) {
-        if (emitter.type != EmitterType::area) continue;
+        if (!is_on_surface(emitter.type)) continue;
         const Shape& shape = scene.shapes[emitter.shape];
         emitter.area_cdf = kNone;
         if (shape.primitive_count < 2) continue;
@@ -171,7 +171,7 @@ double fill_environment(Scene& scene, Emitter& emitter) {
 }
 
 bool is_masked_out(const Scene& scene, const Emitter& e) {
-    if (e.type != EmitterType::area) return false;
+    if (!is_on_surface(e.type)) return false;
     const ParamFloat& opacity = scene.materials[scene.shapes[e.shape].material].opacity;
     return opacity.texture < 0 && !(opacity.value > 0);
 }
@@ -203,6 +203,14 @@ double power(ModelTag<ConstantEmitter>, Scene& scene, Emitter& e, const Receiver
 }
 double power(ModelTag<EnvmapEmitter>, Scene& scene, Emitter& e, const Receivers& to) {
     return M_PI * to.both_sides * fill_environment(scene, e);
+}
+
+double power(ModelTag<CollimatedEmitter>, Scene& scene, Emitter& e, const Receivers&) {
+    return mean_luminance(scene, e.radiance);
+}
+double power(ModelTag<DirectionalAreaEmitter>, Scene& scene, Emitter& e, const Receivers&) {
+    if (is_masked_out(scene, e)) return 0;
+    return scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
 }
 
 void fill_emitters(Scene& scene, LightPicking picking) {

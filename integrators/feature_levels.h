@@ -26,7 +26,9 @@ constexpr uint32_t kCommonBsdfs = bit(BsdfType::diffuse) | bit(BsdfType::rough_d
                                   bit(BsdfType::plastic) | bit(BsdfType::rough_plastic);
 
 /// Emitters of these levels.
-constexpr uint32_t kCommonEmitters = kAllFeatures.emitters & ~bit(EmitterType::projector);
+constexpr uint32_t kCommonEmitters = bit(EmitterType::area) | bit(EmitterType::point) | bit(EmitterType::spot) |
+                                     bit(EmitterType::directional) | bit(EmitterType::constant) |
+                                     bit(EmitterType::envmap);
 
 /// Every common BSDF, texture and emitter, on triangles that are neither bumped nor holed.
 constexpr Features kTriangleFeatures = {kCommonBsdfs, kCommonEmitters, bit(PrimitiveType::triangle),

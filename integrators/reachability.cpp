@@ -16,25 +16,34 @@ constexpr int kLongestWord = 5;
 constexpr uint32_t kDeltaBsdfs = BsdfModels::mask([](auto m) { return decltype(m)::type::delta; });
 constexpr uint32_t kSmoothBsdfs = BsdfModels::mask([](auto m) { return decltype(m)::type::smooth; });
 
+/// What rays and next event estimation find of an emitter: both, the latter only, nothing.
+enum class Origin { extent, delta, beam };
+
+constexpr uint32_t emitters_of(Origin origin) {
+    return origin == Origin::extent  ? ~detail::kDeltaEmitters
+           : origin == Origin::delta ? detail::kDeltaEmitters & ~detail::kBeamEmitters
+                                     : detail::kBeamEmitters;
+}
+
 /// A path of `segments`: bit i - 1 of `delta` says that its vertex i, counted from the emitter, is passed by a delta
 /// lobe.
 struct Word {
     int segments;
     uint32_t delta;
-    bool delta_emitter;
+    Origin origin;
 
     bool connectable(int i) const { return !(delta >> (i - 1) & 1u); }
     std::string text() const {
-        std::string s = delta_emitter ? "Ld" : "L";
+        std::string s = origin == Origin::extent ? "L" : origin == Origin::delta ? "Ld" : "Lb";
         for (int i = 1; i < segments; ++i) s += connectable(i) ? " D" : " S";
         return s + " E";
     }
 };
 
 bool finds(uint32_t strategies, const Word& w) {
-    if (!w.delta_emitter && (strategies & kHitStrategies)) return true;
-    if (w.segments == 1) return !w.delta_emitter && (strategies & kLightStrategies);
-    if ((strategies & kNextEventStrategies) && w.connectable(1)) return true;
+    if (w.origin == Origin::extent && (strategies & kHitStrategies)) return true;
+    if (w.segments == 1) return w.origin == Origin::extent && (strategies & kLightStrategies);
+    if ((strategies & kNextEventStrategies) && w.origin != Origin::beam && w.connectable(1)) return true;
     if ((strategies & kLightStrategies) && w.connectable(w.segments - 1)) return true;
     for (int i = 1; i + 1 < w.segments; ++i)
         if ((strategies & kConnectionStrategies) && w.connectable(i) && w.connectable(i + 1)) return true;
@@ -45,7 +54,8 @@ bool finds(uint32_t strategies, const Word& w) {
 bool finds(const SingleStrategies& singles, const Word& w) {
     const int s = singles.s[w.segments];
     if (s == SingleStrategies::kNone) return false;
-    if (s == 0) return !w.delta_emitter;
+    if (s == 0) return w.origin == Origin::extent;
+    if (s == 1 && w.origin == Origin::beam) return false;
     // Vertex s - 1 is joined to vertex s; the emitter is vertex 0, the camera vertex w.segments.
     return (s == 1 || w.connectable(s - 1)) && (s == w.segments || w.connectable(s));
 }
@@ -59,12 +69,11 @@ std::string shortest(const Features& f, int max_depth, Lost lost) {
             const uint32_t all = (1u << (k - 1)) - 1;
             if ((delta != 0 && !(f.bsdfs & kDeltaBsdfs) && !f.coats) || (delta != all && !(f.bsdfs & kSmoothBsdfs)))
                 continue;
-            for (const bool delta_emitter : {false, true}) {
+            for (const Origin origin : {Origin::extent, Origin::delta, Origin::beam}) {
                 // No camera sees a delta emitter.
-                if (k == 1 && delta_emitter) continue;
-                const uint32_t emitters = delta_emitter ? detail::kDeltaEmitters : ~detail::kDeltaEmitters;
-                const Word w = {k, delta, delta_emitter};
-                if ((f.emitters & emitters) && lost(w)) return w.text();
+                if (k == 1 && origin != Origin::extent) continue;
+                const Word w = {k, delta, origin};
+                if ((f.emitters & emitters_of(origin)) && lost(w)) return w.text();
             }
         }
     return "";
@@ -91,8 +100,8 @@ namespace {
 
 std::string lacking(const std::string& path, const std::string& why) {
     return fmt::format(
-        "the image lacks light of paths such as {} (Ld: point, spot or directional emitter, S: delta "
-        "lobe, D: another one, E: camera), which {}",
+        "the image lacks light of paths such as {} (Ld: point, spot or directional emitter, Lb: collimated or "
+        "directionalarea, S: delta lobe, D: another one, E: camera), which {}",
         path, why);
 }
 

@@ -8,6 +8,7 @@
 #include "models/bsdf/phong.h"
 #include "models/bsdf/plastic.h"
 #include "models/bsdf/principled.h"
+#include "models/bsdf/principled_thin.h"
 #include "models/bsdf/rough_conductor.h"
 #include "models/bsdf/rough_dielectric.h"
 #include "models/bsdf/rough_diffuse.h"
@@ -29,7 +30,8 @@
     X(Phong, phong)                            \
     X(Ward, ward)                              \
     X(DiffuseTransmitter, diffuse_transmitter) \
-    X(Principled, principled)
+    X(Principled, principled)                  \
+    X(PrincipledThin, principled_thin)
 
 namespace ambilux {
 
@@ -62,7 +64,11 @@ using BsdfConstants = decltype(detail::constants_of(BsdfModels{}));
 
 /// True if light can pass to the other side.
 AMBILUX_HD constexpr bool bsdf_transmits(BsdfType type) {
-    return BsdfModels::contains<detail::kTransmittingBsdfs>(uint32_t(type));
+    // The last one without a branch of its own: one more reorders operands in the kernels of diffuse scenes, whose code
+    // is to stay (docs/performance.md).
+    constexpr uint32_t kLast = std::bit_floor(detail::kTransmittingBsdfs);
+    return BsdfModels::contains < detail::kTransmittingBsdfs & ~kLast > (uint32_t(type)) |
+           BsdfModels::contains<kLast>(uint32_t(type));
 }
 /// True if there is a lobe that is not a delta, so that connecting to other vertices can give light.
 AMBILUX_HD constexpr bool bsdf_is_smooth(BsdfType type) {

@@ -43,6 +43,14 @@ struct EnvmapEmitter {
     static constexpr const char* plugin = "envmap";
     static constexpr bool surface = false, delta_position = false, delta_direction = false, infinite = true;
 };
+struct CollimatedEmitter {
+    static constexpr const char* plugin = "collimated";
+    static constexpr bool surface = false, delta_position = true, delta_direction = true, infinite = false;
+};
+struct DirectionalAreaEmitter {
+    static constexpr const char* plugin = "directionalarea";
+    static constexpr bool surface = true, delta_position = false, delta_direction = true, infinite = false;
+};
 
 }  // namespace ambilux
 
@@ -54,7 +62,9 @@ struct EnvmapEmitter {
     X(DirectionalEmitter, directional) \
     X(ConstantEmitter, constant)       \
     X(EnvmapEmitter, envmap)           \
-    X(ProjectorEmitter, projector)
+    X(ProjectorEmitter, projector)     \
+    X(CollimatedEmitter, collimated)   \
+    X(DirectionalAreaEmitter, directional_area)
 
 namespace ambilux {
 
@@ -84,6 +94,8 @@ constexpr uint32_t kDirectionEmitters = EmitterModels::mask([](auto m) { return 
 constexpr uint32_t kDeltaEmitters = kPositionEmitters | kDirectionEmitters;
 constexpr uint32_t kInfiniteEmitters = EmitterModels::mask([](auto m) { return decltype(m)::type::infinite; });
 constexpr uint32_t kEnvironmentEmitters = kInfiniteEmitters & ~kDirectionEmitters;
+constexpr uint32_t kSurfaceEmitters = EmitterModels::mask([](auto m) { return decltype(m)::type::surface; });
+constexpr uint32_t kBeamEmitters = kDirectionEmitters & ~kInfiniteEmitters;
 
 }  // namespace detail
 
@@ -96,6 +108,14 @@ AMBILUX_HD constexpr bool has_delta_direction(EmitterType type) {
 /// No ray meets it by chance.
 AMBILUX_HD constexpr bool is_delta(EmitterType type) {
     return EmitterModels::contains<detail::kDeltaEmitters>(uint32_t(type));
+}
+/// Its light leaves places of the scene in one direction each: of all points that could ask for it, next event
+/// estimation meets none on its way. Light subpaths alone carry it.
+AMBILUX_HD constexpr bool is_beam(EmitterType type) {
+    return EmitterModels::contains<detail::kBeamEmitters>(uint32_t(type));
+}
+constexpr bool is_on_surface(EmitterType type) {
+    return EmitterModels::contains<detail::kSurfaceEmitters>(uint32_t(type));
 }
 AMBILUX_HD constexpr bool is_infinite(EmitterType type) {
     return EmitterModels::contains<detail::kInfiniteEmitters>(uint32_t(type));

@@ -29,6 +29,7 @@ struct Features {
     constexpr bool several_bsdfs() const { return bsdfs & (bsdfs - 1); }
     constexpr bool has_quadrics() const { return primitives & ~1u; }
     constexpr bool has_environment() const { return emitters & detail::kEnvironmentEmitters; }
+    constexpr bool has_beams() const { return emitters & detail::kBeamEmitters; }
 
     /// True if kernels built for *this can render a scene that needs `other`.
     constexpr bool covers(const Features& other) const {

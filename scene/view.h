@@ -70,7 +70,7 @@ enum ShapeFlags : uint32_t {
 /// What all primitives of one shape share. Primitives of a shape are consecutive.
 struct Shape {
     uint32_t material;
-    uint32_t emitter;  ///< index of its area emitter or kNone
+    uint32_t emitter;  ///< index of the emitter on it or kNone
     uint32_t flags;    ///< ShapeFlags
     uint32_t first_primitive, primitive_count;
     float area;  ///< world area
@@ -122,17 +122,17 @@ struct EnvironmentCell {
 };
 
 /// Emitter. `radiance` holds, in this order of types: radiance, intensity (W/sr), intensity, perpendicular irradiance,
-/// radiance, radiance scale, intensity along the axis.
+/// radiance, radiance scale, intensity along the axis, power, power per area.
 struct Emitter {
     EmitterType type;
-    uint32_t shape;     ///< area: its shape
+    uint32_t shape;     ///< area, directional_area: its shape
     uint32_t area_cdf;  ///< area over triangles: primitive_count+1 floats in tables, and then the density per area on
                         ///< each; kNone for a single primitive
     float pick_probability;      ///< chance that light sampling picks this emitter
     ParamRgb radiance;           ///< area: textured by surface uv; spot, projector: textured by projection
     Affine to_world, to_local;   ///< spot, projector: +z is the axis; envmap: rotation; point, directional: unused
-    Vec3f position;              ///< point, spot, projector
-    Vec3f direction;             ///< directional: direction in which light travels; spot: axis. Unit
+    Vec3f position;              ///< point, spot, projector, collimated
+    Vec3f direction;             ///< directional, collimated: direction in which light travels; spot: axis. Unit
     float one_minus_cos_cutoff;  ///< spot: of the angle where it ends; a cosine would lose the digits of narrow ones
     float cutoff, beam_width;    ///< spot: angles to the axis in radians
                                  ///< projector: tangents of half the field of view along x and y

@@ -26,6 +26,7 @@
 #include "transport/bsdf/phong.h"
 #include "transport/bsdf/plastic.h"
 #include "transport/bsdf/principled.h"
+#include "transport/bsdf/principled_thin.h"
 #include "transport/bsdf/rough_conductor.h"
 #include "transport/bsdf/rough_dielectric.h"
 #include "transport/bsdf/rough_diffuse.h"

@@ -3,8 +3,10 @@
 #pragma once
 
 #include "transport/emitter/area.h"
+#include "transport/emitter/collimated.h"
 #include "transport/emitter/constant.h"
 #include "transport/emitter/directional.h"
+#include "transport/emitter/directional_area.h"
 #include "transport/emitter/envmap.h"
 #include "transport/emitter/point.h"
 #include "transport/emitter/projector.h"

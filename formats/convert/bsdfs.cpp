@@ -90,21 +90,33 @@ void add_parameters(Writer& w, xml_node node, const Textured<DiffuseTransmitter>
     add_color(w, node, "transmittance", p.transmittance);
     w.note("Mitsuba 3 has no BSDF 'difftrans'");
 }
-void add_parameters(Writer& w, xml_node node, const Textured<Principled>& p) {
+void add_unless_zero(xml_node node, const char* name, double value, double most = 1) {
+    if (value > 1e-7) add_number(node, name, value < most ? value : most);
+}
+
+/// What both principled BSDFs have.
+template <class P>
+void add_principled(Writer& w, xml_node node, const P& p) {
     add_color(w, node, "base_color", p.base_color);
     add_textured_number(w, node, "roughness", p.roughness);
-    add_textured_number(w, node, "metallic", p.metallic);
-    const auto unless_zero = [&](const char* name, double value) {
-        if (value > 1e-7) add_number(node, name, value < 1 ? value : 1);
-    };
     add_number(node, "eta", p.ior);
-    unless_zero("anisotropic", (1 - double(p.aspect) * p.aspect) / 0.9);
-    unless_zero("spec_tint", p.specular_tint);
-    unless_zero("sheen", p.sheen);
-    unless_zero("sheen_tint", p.sheen_tint / 65535.0);
-    unless_zero("flatness", p.flatness / 65535.0);
-    unless_zero("clearcoat", p.clearcoat);
-    if (p.clearcoat > 0) unless_zero("clearcoat_gloss", (0.1 - double(p.clearcoat_alpha)) / (0.1 - 0.001));
+    add_unless_zero(node, "anisotropic", (1 - double(p.aspect) * p.aspect) / 0.9);
+    add_unless_zero(node, "spec_tint", p.specular_tint);
+    add_unless_zero(node, "sheen", p.sheen);
+    add_unless_zero(node, "sheen_tint", p.sheen_tint / 65535.0);
+    add_unless_zero(node, "flatness", p.flatness / 65535.0);
+}
+
+void add_parameters(Writer& w, xml_node node, const Textured<Principled>& p) {
+    add_principled(w, node, p);
+    add_textured_number(w, node, "metallic", p.metallic);
+    add_unless_zero(node, "clearcoat", p.clearcoat);
+    if (p.clearcoat > 0) add_unless_zero(node, "clearcoat_gloss", (0.1 - double(p.clearcoat_alpha)) / (0.1 - 0.001));
+}
+void add_parameters(Writer& w, xml_node node, const Textured<PrincipledThin>& p) {
+    add_principled(w, node, p);
+    add_textured_number(w, node, "spec_trans", p.specular);
+    add_unless_zero(node, "diff_trans", 2 * double(p.through), 2);
 }
 
 /// A coating; the BSDF below it goes inside.

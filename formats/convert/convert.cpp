@@ -91,6 +91,20 @@ void add_sensor(Writer& w, xml_node root) {
 void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
     switch (e.type) {
         case EmitterType::area: return add_color(w, add_object(parent, "emitter", "area"), "radiance", e.radiance);
+        case EmitterType::directional_area:
+            return add_color(w, add_object(parent, "emitter", "directionalarea"), "radiance", e.radiance);
+        case EmitterType::collimated: {
+            xml_node node = add_object(parent, "emitter", "collimated");
+            const Frame frame = frame_from_normal(e.direction);
+            Affine to_world{};
+            for (int i = 0; i < 3; ++i) {
+                const float row[4] = {frame.s[i], frame.t[i], frame.n[i], e.position[i]};
+                std::copy(row, row + 4, to_world.m[i]);
+            }
+            add_transform(node, "to_world", to_world);
+            add_rgb(node, "power", e.radiance.value);
+            return w.note("Mitsuba 3 has no emitter 'collimated'");
+        }
         case EmitterType::constant: {
             return add_color(w, add_object(parent, "emitter", "constant"), "radiance", e.radiance);
         }
@@ -156,7 +170,7 @@ std::vector<std::string> write_mitsuba(const Scene& scene, const std::string& pa
         if (shape.primitive_count && materials.insert(shape.material).second)
             convert::add_material(w, root, shape.material, fmt::format("material{}", shape.material));
     for (const Emitter& e : scene.emitters)
-        if (e.type != EmitterType::area) convert::add_emitter(w, root, e);
+        if (!is_on_surface(e.type)) convert::add_emitter(w, root, e);
     convert::add_shapes(w, root);
     std::ostringstream text;
     document.save(text, "    ");

@@ -201,6 +201,8 @@ void read_plugin(Builder&, Reader& in, Textured<DiffuseTransmitter>& p) {
 
 void read_plugin(Builder& builder, Reader& in, Textured<Principled>& p) { p = read_principled(builder, in).opaque; }
 
+void read_plugin(Builder& builder, Reader& in, Textured<PrincipledThin>& p) { p = read_principled_thin(builder, in); }
+
 }  // namespace
 
 BsdfRecord diffuse_record(float reflectance) {

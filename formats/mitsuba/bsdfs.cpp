@@ -52,7 +52,11 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
             const Value* opacity = object->find("opacity");
             ParamFloat own;
             if (opacity && (opacity->kind == ValueKind::rgb || opacity->kind == ValueKind::spectrum)) {
-                own = {luminance(in.color("opacity", splat(0.5f), SpectrumUse::reflectance)), -1};
+                const Rgb color = in.color("opacity", splat(0.5f), SpectrumUse::reflectance);
+                if (max_component(color) - min_component(color) > 1e-3f)
+                    builder.refuse(in.where("opacity"), "a mask of a coloured opacity is not supported",
+                                   "its luminance is used");
+                own = {luminance(color), -1};
             } else {
                 own = in.textured_number("opacity", 0.5f);
             }

@@ -127,8 +127,8 @@ struct ScaledTexture {
     Rgb scale;
 };
 ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
-/// Image as float texels without flip or decoding table, for environment maps; and the largest of them.
-int32_t load_environment_image(Builder& builder, const std::string& path, float& largest);
+/// Image as float texels without flip or decoding table, for the environment map `in`; and the largest of them.
+int32_t load_environment_image(Builder& builder, Reader& in, const std::string& path, float& largest);
 /// The same of an image of the document.
 int32_t add_environment_image(Builder& builder, const std::string& name, const Texels& image, float& largest);
 /// The same of RGBA texels that are at hand.

@@ -1,5 +1,6 @@
 #include "formats/mitsuba/document.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "core/error.h"
@@ -24,6 +25,12 @@ std::string Document::resolve(const std::string& name, const Where& where) const
     for (const fs::path& folder : folders) {
         const fs::path candidate = folder / path;
         if (fs::exists(candidate, ignored)) return candidate.string();
+    }
+    // As exporters on Windows write it.
+    if (name.find('\\') != std::string::npos) {
+        std::string slashed = name;
+        std::replace(slashed.begin(), slashed.end(), '\\', '/');
+        return resolve(slashed, where);
     }
     throw input_error(where.file, where.line, "file '" + name + "' does not exist");
 }

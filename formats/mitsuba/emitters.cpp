@@ -107,6 +107,18 @@ void read_plugin(ModelTag<ConstantEmitter>, Builder&, Reader& in, Emitter& e) {
     e.radiance = {in.color("radiance", {1, 1, 1}, SpectrumUse::emission), -1};
 }
 
+void read_plugin(ModelTag<CollimatedEmitter>, Builder& builder, Reader& in, Emitter& e) {
+    const Matrix m = rigid_transform(builder, in);
+    builder.check_range(in.where(), "the emitter of type 'collimated'", {column(m, 3)});
+    e.position = to_vec3f(column(m, 3));
+    e.direction = to_vec3f(column(m, 2));
+    e.radiance = {in.color("power", {1, 1, 1}, SpectrumUse::emission), -1};
+}
+
+void read_plugin(ModelTag<DirectionalAreaEmitter>, Builder&, Reader& in, Emitter& e) {
+    e.radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
+}
+
 void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter& e) {
     const Matrix m = without_place(rigid_transform(builder, in));
     e.to_world = to_affine(m);
@@ -121,7 +133,7 @@ void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter&
     float largest = 0;
     const int32_t texture =
         is_given ? add_environment_image(builder, given->first, given->second, largest)
-                 : load_environment_image(builder, builder.document.resolve(name, in.where("filename")), largest);
+                 : load_environment_image(builder, in, builder.document.resolve(name, in.where("filename")), largest);
     e.radiance = {splat(float(scale)), texture};
     const double most = std::numeric_limits<float>::max();
     if (!(scale <= most && scale * largest <= most))

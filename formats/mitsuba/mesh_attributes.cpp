@@ -2,7 +2,10 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/scoped_seconds.h"
+#include "formats/file_budget.h"
 #include "formats/mitsuba/shape_jobs.h"
+#include "formats/srgb.h"
 
 namespace ambilux::mitsuba {
 
@@ -70,6 +73,19 @@ bool has_mesh_attributes(const Object& bsdf) {
         throw input_error(bsdf.where.file, bsdf.where.line,
                           "mesh attributes together with other textures in one BSDF are not supported");
     return attributes > 0;
+}
+
+Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source) {
+    const ScopedSeconds clock(&builder.options.times->read);
+    const std::string bytes = read_input(source.path, builder.options.limits);
+    builder.file_digests.push_back({source.path, sha256(bytes)});
+    Mesh mesh = read_ply(source.path, bytes, source.flip_v, builder.options.limits, true);
+    if (in.object().version >= 2 || !in.boolean("srgb", true)) return mesh;
+    for (MeshAttribute& a : mesh.attributes)
+        if (a.name == "vertex_color")
+            for (Rgb& value : a.values)
+                for (int c = 0; c < 3; ++c) value[c] = float(srgb_to_linear(value[c]));
+    return mesh;
 }
 
 Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh& mesh,

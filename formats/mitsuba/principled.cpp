@@ -10,12 +10,19 @@
 namespace ambilux::mitsuba {
 namespace {
 
+ParamFloat textured_share(Reader& in, const char* name, float fallback) {
+    const ParamFloat given = in.textured_number(name, fallback);
+    if (!(given.value >= 0 && given.value <= 1))
+        in.fail(in.where(name), fmt::format("'{}' must lie between 0 and 1", name));
+    return given;
+}
+
 /// A share between 0 and `most`. With --lenient, a texture is its mean.
 float share(Builder& builder, Reader& in, const char* name, float fallback, float most = 1) {
     const ParamFloat given = in.textured_number(name, fallback);
     double value = given.value;
     if (given.texture >= 0) {
-        builder.refuse(in.where(name), fmt::format("a texture as '{}' of principled is not supported", name),
+        builder.refuse(in.where(name), fmt::format("a texture as '{}' of {} is not supported", name, in.object().type),
                        "its mean is used");
         value = luminance(mean_color(builder, {splat(given.value), given.texture}));
     }
@@ -29,11 +36,23 @@ float read_eta(Builder& builder, Reader& in) {
     if (in.has("eta") && in.has("specular")) in.fail(in.where("specular"), "both 'eta' and 'specular' are given");
     if (in.has("specular")) return 2 / (1 - std::sqrt(0.08f * share(builder, in, "specular", 0.5f))) - 1;
     const float eta = in.ior("eta", "bk7");
-    if (!(eta >= 1)) in.fail(in.where("eta"), "'eta' of principled must not be less than 1");
+    if (!(eta >= 1)) in.fail(in.where("eta"), "'eta' of " + in.object().type + " must not be less than 1");
     return eta;
 }
 
 uint16_t of_65535(float value) { return uint16_t(std::lround(value * 65535)); }
+
+/// What both principled BSDFs have.
+template <class Parameters>
+void read_common(Builder& builder, Reader& in, Parameters& p) {
+    p.base_color = in.textured_color("base_color", splat(0.5f), SpectrumUse::reflectance);
+    p.roughness = textured_share(in, "roughness", 0.5f);
+    p.aspect = std::sqrt(1 - 0.9f * share(builder, in, "anisotropic", 0));
+    p.specular_tint = share(builder, in, "spec_tint", 0);
+    p.sheen = share(builder, in, "sheen", 0);
+    p.sheen_tint = of_65535(share(builder, in, "sheen_tint", 0));
+    p.flatness = of_65535(share(builder, in, "flatness", 0));
+}
 
 }  // namespace
 
@@ -41,22 +60,12 @@ PrincipledParts read_principled(Builder& builder, Reader& in) {
     PrincipledParts parts;
     Textured<Principled>& p = parts.opaque;
     p = {};
-    p.base_color = in.textured_color("base_color", splat(0.5f), SpectrumUse::reflectance);
-    p.roughness = in.textured_number("roughness", 0.5f);
-    p.metallic = in.textured_number("metallic", 0);
-    for (const auto& [name, value] : {std::pair{"roughness", p.roughness.value}, {"metallic", p.metallic.value}})
-        if (!(value >= 0 && value <= 1)) in.fail(in.where(name), fmt::format("'{}' must lie between 0 and 1", name));
+    read_common(builder, in, p);
+    p.metallic = textured_share(in, "metallic", 0);
     p.ior = in.has("eta") || in.has("specular") ? read_eta(builder, in) : 1.5f;
-    p.aspect = std::sqrt(1 - 0.9f * share(builder, in, "anisotropic", 0));
-    p.specular_tint = share(builder, in, "spec_tint", 0);
-    p.sheen = share(builder, in, "sheen", 0);
-    p.sheen_tint = of_65535(share(builder, in, "sheen_tint", 0));
-    p.flatness = of_65535(share(builder, in, "flatness", 0));
     p.clearcoat = share(builder, in, "clearcoat", 0);
     p.clearcoat_alpha = 0.1f + (0.001f - 0.1f) * share(builder, in, "clearcoat_gloss", 0);
-    const ParamFloat spec_trans = in.textured_number("spec_trans", 0);
-    if (!(spec_trans.value >= 0 && spec_trans.value <= 1))
-        in.fail(in.where("spec_trans"), "'spec_trans' must lie between 0 and 1");
+    const ParamFloat spec_trans = textured_share(in, "spec_trans", 0);
     // How another renderer chooses its samples.
     in.ignore({"diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "clearcoat_sampling_rate",
                "spec_reflectance_sampling_rate", "spec_trans_sampling_rate"});
@@ -96,6 +105,17 @@ PrincipledParts read_principled(Builder& builder, Reader& in) {
         return rest > 0 ? std::min(v[0] / rest, 1.0f) : 0.0f;
     });
     return parts;
+}
+
+Textured<PrincipledThin> read_principled_thin(Builder& builder, Reader& in) {
+    Textured<PrincipledThin> p{};
+    read_common(builder, in, p);
+    p.specular = textured_share(in, "spec_trans", 0);
+    p.ior = in.has("eta") ? read_eta(builder, in) : 1.5f;
+    p.through = share(builder, in, "diff_trans", 0, 2) / 2;
+    in.ignore({"diffuse_reflectance_sampling_rate", "specular_reflectance_sampling_rate",
+               "specular_transmittance_sampling_rate", "diffuse_transmittance_sampling_rate"});
+    return p;
 }
 
 }  // namespace ambilux::mitsuba

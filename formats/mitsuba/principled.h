@@ -14,4 +14,6 @@ struct PrincipledParts {
 };
 PrincipledParts read_principled(Builder& builder, Reader& in);
 
+Textured<PrincipledThin> read_principled_thin(Builder& builder, Reader& in);
+
 }  // namespace ambilux::mitsuba

@@ -59,6 +59,10 @@ void transform_mesh(const Builder& builder, Job& job, const Mesh& mesh);
 /// coordinates of their own.
 bool has_mesh_attributes(const Object& bsdf);
 
+/// The PLY file of a shape with its attributes. Colours of vertices in files of the older generation are sRGB unless
+/// the shape says otherwise (`srgb`).
+Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source);
+
 /// The mesh with vertices and coordinates of its own for every triangle, so that `textures`, one for every attribute,
 /// have its values between them: blocks of 2x2 texels, in which a bilinear lookup is linear.
 Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh& mesh,

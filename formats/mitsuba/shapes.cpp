@@ -39,7 +39,7 @@ struct ShapeBuilder {
     void read_mesh_file(Reader& in, Job& job);
     void read_tessellated(Reader& in, Job& job, const Matrix& outer);
     uint32_t add_emitter(const Object& object);
-    uint32_t material_of_attributes(Job& job, const Object& bsdf);
+    uint32_t material_of_attributes(Job& job, Reader& in, const Object& bsdf);
 };
 
 bool is_quadric(const std::string& type) { return type == "sphere" || type == "disk" || type == "cylinder"; }
@@ -125,11 +125,12 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     else if (emitter)
         job.emitter = add_emitter(*emitter);
     if (attributes)
-        job.material = material_of_attributes(job, *bsdf);
+        job.material = material_of_attributes(job, in, *bsdf);
     else
         job.material =
             bsdf ? build_material(builder, *bsdf, emitter != nullptr) : default_material(builder, emitter != nullptr);
     in.ignore({"silhouette_sampling_weight", "shutter_open", "shutter_close"});
+    if (type == "ply" && object.version < 2) in.ignore({"srgb"});  // of colours that nothing uses
     in.finish();
     if (jobs.size() >= builder.options.limits.shapes)
         in.fail("the scene has more shapes than --limits shapes=" + std::to_string(builder.options.limits.shapes));
@@ -137,15 +138,9 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
 }
 
 /// Reads the mesh now, and gives the shape a copy of it that its textures are made for.
-uint32_t ShapeBuilder::material_of_attributes(Job& job, const Object& bsdf) {
+uint32_t ShapeBuilder::material_of_attributes(Job& job, Reader& in, const Object& bsdf) {
     MeshSource source = sources[size_t(job.source)];
-    Mesh mesh;
-    {
-        const ScopedSeconds clock(&builder.options.times->read);
-        const std::string bytes = read_input(source.path, builder.options.limits);
-        builder.file_digests.push_back({source.path, sha256(bytes)});
-        mesh = read_ply(source.path, bytes, source.flip_v, builder.options.limits, true);
-    }
+    const Mesh mesh = read_with_attributes(builder, in, source);
     std::map<std::string, int32_t> textures;
     source.mesh = with_attribute_atlas(builder, source.path, mesh, textures);
     source.path.clear();

@@ -132,6 +132,14 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
     return out;
 }
 
+/// How the values of an image are stored; 0: as its format implies.
+double read_gamma(Reader& in) {
+    const double gamma = in.number("gamma", 0);
+    if (!(gamma >= 0 && gamma <= 100) && gamma != -1)
+        in.fail(in.where("gamma"), "gamma must lie between 0 and 100, or be -1 for sRGB");
+    return gamma;
+}
+
 /// The image of the document that the object names, if it does.
 const Texels* given_image(Builder& builder, Reader& in) {
     if (builder.document.images.empty() || !in.has("image")) return nullptr;
@@ -143,8 +151,9 @@ const Texels* given_image(Builder& builder, Reader& in) {
 /// uv transform: `to_uv` of the newer format, scale and offset of the older one.
 void read_to_uv(Reader& in, float out[2][3]) {
     const Matrix m = in.transform("to_uv");
-    const double su = in.number("uscale", 1), sv = in.number("vscale", 1), ou = in.number("uoffset", 0),
-                 ov = in.number("voffset", 0);
+    if (in.text("coordinates", "uv") != "uv") in.fail(in.where("coordinates"), "textures have coordinates uv only");
+    const double both = in.number("uvscale", 1), su = in.number("uscale", both), sv = in.number("vscale", both),
+                 ou = in.number("uoffset", 0), ov = in.number("voffset", 0);
     const int columns[3] = {0, 1, 3};
     for (int j = 0; j < 3; ++j) {
         out[0][j] = float(su * m.m[0][columns[j]] + (j == 2 ? ou : 0));
@@ -258,10 +267,7 @@ int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
         if (name.empty()) in.fail("bitmap texture has no filename");
         const std::string path = given ? name : builder.document.resolve(name, in.where("filename"));
         const bool raw = in.boolean("raw", false);
-        double gamma = in.number("gamma", 0);
-        if (raw) gamma = 1;
-        if (!(gamma >= 0 && gamma <= 100) && gamma != -1)
-            in.fail(in.where("gamma"), "gamma must lie between 0 and 100, or be -1 for sRGB");
+        const double given_gamma = read_gamma(in), gamma = raw ? 1 : given_gamma;
         const std::string channel = in.text("channel", "");
         if (channel.size() > 1 || std::string("rgba").find(channel) == std::string::npos)
             in.fail(in.where("channel"), "'" + channel + "' is no channel: r, g, b or a");
@@ -335,8 +341,9 @@ int32_t add_plain_texture(Builder& builder, const LoadedImage& image) {
 
 }  // namespace
 
-int32_t load_environment_image(Builder& builder, const std::string& path, float& largest) {
-    const LoadedImage image = load_image(builder, path, 0, true);
+int32_t load_environment_image(Builder& builder, Reader& in, const std::string& path, float& largest) {
+    const double gamma = in.object().version < 2 ? read_gamma(in) : 0;
+    const LoadedImage image = load_image(builder, path, gamma, true);
     largest = image.largest;
     return add_plain_texture(builder, image);
 }

@@ -46,6 +46,7 @@ private:
     Matrix look_at_matrix(const Where& at);
     Matrix invert(const Matrix& m, const Where& at) const;
     Parameters parameters(const std::string& directive, const Where& at, const char* kind = nullptr);
+    void read_list(Parameters& in, const char* kind);
     Shared described(const std::string& directive, const Where& at, const char* kind);
     void save(bool is_object, const Where& at);
     void restore(bool is_object, const Where& at);
@@ -111,16 +112,21 @@ Parameters Parser::parameters(const std::string& directive, const Where& at, con
     in.directive = directive;
     in.where = at;
     in.type = tokens_->quoted("the type of " + directive);
+    read_list(in, kind);
+    return in;
+}
+
+/// The parameters, and what attributes of that kind, if any, say of the others.
+void Parser::read_list(Parameters& in, const char* kind) {
     in.list = read_parameters(*tokens_, *budget_);
-    if (!kind) return in;
+    if (!kind) return;
     const auto defaults = scene_.state.attributes.find(kind);
-    if (defaults == scene_.state.attributes.end()) return in;
+    if (defaults == scene_.state.attributes.end()) return;
     for (const Parameter& p : defaults->second)
         if (std::none_of(in.list.begin(), in.list.end(), [&](const Parameter& q) { return q.name == p.name; })) {
             in.list.push_back(p);
             in.list.back().used = true;  // it may be for others
         }
-    return in;
 }
 
 Shared Parser::described(const std::string& directive, const Where& at, const char* kind) {
@@ -285,7 +291,7 @@ bool Parser::material(const std::string& name, const Where& at) {
         Parameters in;
         in.directive = name;
         in.where = at;
-        in.list = read_parameters(*tokens_, *budget_);
+        read_list(in, "material");
         in.type = in.text("type", "");
         if (in.type.empty()) fail(at, "material '" + id + "' has no type");
         scene_.named_materials[id] = std::make_shared<Described>(Described{std::move(in), scene_.state.space});

@@ -55,7 +55,7 @@ Mesh vertices_of(const Parameters& in) {
 
 Mesh triangle_mesh(const Parameters& in) {
     Mesh mesh = vertices_of(in);
-    in.ignore({"S"});  // tangents, which our BSDFs take from texture coordinates
+    in.ignore({"S", "faceIndices"});  // tangents, which our BSDFs take from texture coordinates; faces of ptex
     const std::vector<uint32_t> indices = indices_of(in, 3, mesh.positions.size());
     for (size_t i = 0; i < indices.size(); i += 3) mesh.faces.push_back({indices[i], indices[i + 1], indices[i + 2]});
     return mesh;

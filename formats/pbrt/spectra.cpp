@@ -73,6 +73,20 @@ Rgb of_luminance_1(Rgb color, const Where& where) {
     return color / y;
 }
 
+/// Chromaticities (x, y) of lights that are known by name, for the observer of 2 degrees: CIE 15:2004, fluorescent
+/// lamps F1 to F12 in table T.7; ACES as SMPTE ST 2065-1 has it.
+struct Illuminant {
+    const char* name;
+    double x, y;
+};
+constexpr Illuminant kIlluminants[] = {
+    {"stdillum-D50", 0.34567, 0.35850}, {"illum-acesD60", 0.32168, 0.33767}, {"stdillum-F1", 0.31310, 0.33727},
+    {"stdillum-F2", 0.37208, 0.37529},  {"stdillum-F3", 0.40910, 0.39430},   {"stdillum-F4", 0.44018, 0.40329},
+    {"stdillum-F5", 0.31379, 0.34531},  {"stdillum-F6", 0.37790, 0.38835},   {"stdillum-F7", 0.31292, 0.32933},
+    {"stdillum-F8", 0.34588, 0.35875},  {"stdillum-F9", 0.37417, 0.37281},   {"stdillum-F10", 0.34609, 0.35986},
+    {"stdillum-F11", 0.38052, 0.37713}, {"stdillum-F12", 0.43695, 0.40441},
+};
+
 Rgb named_illuminant(const std::string& name, const Where& where) {
     if (name == "stdillum-D65") return splat(1);
     if (name == "stdillum-A")
@@ -86,10 +100,10 @@ Rgb named_illuminant(const std::string& name, const Where& where) {
             rgb[i] = float(std::max(0.0, m.m[i][0] * xyz[0] + m.m[i][1] * xyz[1] + m.m[i][2] * xyz[2]));
         return rgb;
     };
-    if (name == "stdillum-D50") return white_of(0.34567, 0.35850);
-    if (name == "illum-acesD60") return white_of(0.32168, 0.33767);
+    for (const Illuminant& known : kIlluminants)
+        if (name == known.name) return white_of(known.x, known.y);
     fail(where, "no spectrum of a light is known by the name '" + name +
-                    "': stdillum-A, stdillum-D50, stdillum-D65 and illum-acesD60 are");
+                    "': stdillum-A, stdillum-D50, stdillum-D65, stdillum-F1 to F12 and illum-acesD60 are");
 }
 
 }  // namespace

@@ -5,6 +5,15 @@
 
 namespace ambilux {
 
+namespace {
+
+/// True if next event estimation finds light of any emitter.
+bool samples_emitters(const Scene& scene) {
+    return std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return !is_beam(e.type); });
+}
+
+}  // namespace
+
 PathPolicy plan_path(const Scene& scene, const RenderSettings& settings) {
     check_depths(settings);
     PathPolicy p{};
@@ -12,7 +21,7 @@ PathPolicy plan_path(const Scene& scene, const RenderSettings& settings) {
     r.max_depth = segment_limit(settings);
     r.rr_depth = roulette_depth(settings);
     r.rr_cap = settings.rr_cap;
-    r.next_event = !scene.emitters.empty() && settings.estimator != Estimator::naive && r.max_depth >= 2;
+    r.next_event = samples_emitters(scene) && settings.estimator != Estimator::naive && r.max_depth >= 2;
     r.mis = {settings.estimator, settings.heuristic, r.next_event};
     r.count_hits =
         std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return !is_delta(e.type); });
@@ -27,10 +36,11 @@ PathPolicy plan_path(const Scene& scene, const RenderSettings& settings) {
 std::vector<std::string> skipped_path_parts(const Scene& scene, const Rules<UnidirectionalMis>& r) {
     std::vector<std::string> parts;
     if (!r.next_event)
-        parts.emplace_back(scene.emitters.empty() ? "connect, occlude: no emitters"
-                           : r.mis.estimator == Estimator::naive
-                               ? "connect, occlude: estimator naive samples no emitters"
-                               : "connect, occlude: max_depth leaves no segment for them");
+        parts.emplace_back(
+            scene.emitters.empty()                ? "connect, occlude: no emitters"
+            : !samples_emitters(scene)            ? "connect, occlude: next event estimation finds none of the emitters"
+            : r.mis.estimator == Estimator::naive ? "connect, occlude: estimator naive samples no emitters"
+                                                  : "connect, occlude: max_depth leaves no segment for them");
     if (!r.count_hits)
         parts.emplace_back(scene.emitters.empty()
                                ? "mis_weight and accumulate of hits: no emitters"

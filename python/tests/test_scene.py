@@ -124,14 +124,15 @@ def test_every_plugin_of_the_reader_is_known_to_dictionaries():
     from ambilux import _core
 
     tags = _core.plugins()
-    for name, tag in {"coating": "bsdf", "roughcoating": "bsdf", "phong": "bsdf", "ward": "bsdf", "difftrans": "bsdf", "mixturebsdf": "bsdf", "projector": "emitter",
+    for name, tag in {"coating": "bsdf", "roughcoating": "bsdf", "phong": "bsdf", "ward": "bsdf", "difftrans": "bsdf", "mixturebsdf": "bsdf", "principledthin": "bsdf",
+                      "projector": "emitter", "collimated": "emitter", "directionalarea": "emitter",
                       "sunsky": "emitter", "sdfgrid": "shape", "bsplinecurve": "shape", "gridtexture": "texture", "mesh_attribute": "texture", "prb": "integrator"}.items():
         assert tags[name] == tag
     # What a list names is known to its reader: alone it may lack something, but not be "not supported".
     outer = {"bsdf": "ball.bsdf", "texture": "ball.bsdf.reflectance", "emitter": "light", "shape": "thing", "integrator": "integrator", "sensor": "sensor",
              "film": "sensor.film", "rfilter": "sensor.film.rfilter", "sampler": "sensor.sampler"}
     for name, tag in tags.items():
-        description = changed("ball.emitter" if name == "area" else outer[tag], {"type": name})
+        description = changed("ball.emitter" if name in ("area", "directionalarea") else outer[tag], {"type": name})
         try:
             ambilux.Scene(description)
         except ambilux.SceneError as e:

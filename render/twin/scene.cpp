@@ -95,7 +95,7 @@ void derive(Quadric& q) {
 }
 
 void derive(Emitter& e) {
-    if (e.type == EmitterType::spot || e.type == EmitterType::directional) e.direction = normalize(e.direction);
+    if (e.type == EmitterType::spot || has_delta_direction(e.type)) e.direction = normalize(e.direction);
     if (e.type != EmitterType::spot && e.type != EmitterType::projector && e.type != EmitterType::envmap) return;
     set_orthogonal(e.to_world);
     e.to_local = inverse_of_orthogonal(e.to_world);

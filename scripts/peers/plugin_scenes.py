@@ -115,6 +115,13 @@ def catalogue():
         "clearcoat": 0.8, "clearcoat_gloss": 0.3, "specular": 0.6}.items())))
     s["principled glass"] = sphere(bsdf("principled", base + number("roughness", 0.5) + number("spec_trans", 0.6) + number("eta", 1.4)))
     s["principled textures"] = panel(bsdf("principled", bitmap("base_color") + numbers_checker("roughness", 0.2, 0.7)))
+    # Smooth, or Mitsuba loses light that passes at grazing angles.
+    s["principledthin"] = panel(bsdf("principledthin", base + number("roughness", 0.25) + number("spec_trans", 0.5) + number("diff_trans", 0.8)))
+    s["principledthin all lobes"] = panel(bsdf("principledthin", base + "".join(number(k, v) for k, v in {
+        "roughness": 0.3, "spec_trans": 0.4, "diff_trans": 1.2, "eta": 1.3, "anisotropic": 0.6, "spec_tint": 0.5, "sheen": 0.7,
+        "sheen_tint": 0.4, "flatness": 0.4}.items())))
+    s["principledthin textures"] = panel(bsdf("principledthin", bitmap("base_color") + bitmap("spec_trans", "heights.png", yes("raw"))
+                                              + number("roughness", 0.25) + number("diff_trans", 1.5)))
     two = bsdf("diffuse", rgb("reflectance", "0.8, 0.1, 0.1")) + bsdf("roughconductor", METAL + number("alpha", 0.2))
     s["blendbsdf"] = sphere(bsdf("blendbsdf", number("weight", 0.3) + two))
     s["blendbsdf texture"] = panel(bsdf("blendbsdf", bitmap("weight", "heights.png", yes("raw")) + two))
@@ -172,6 +179,13 @@ def catalogue():
     s["spot texture"] = lit(f'<emitter type="spot">{aim}{rgb("intensity", "40")}{number("cutoff_angle", 25)}{bitmap("texture")}</emitter>')
     s["projector"] = lit(f'<emitter type="projector">{aim}{number("fov", 40)}{bitmap("irradiance")}{number("scale", 10)}</emitter>')
     s["directional"] = lit(f'<emitter type="directional"><vector name="direction" x="0.3" y="0.5" z="-1"/>{rgb("irradiance", "3, 2, 1")}</emitter>')
+    # Light subpaths alone carry it. On a sphere too, every normal of which is another one.
+    lamp = '<transform name="to_world"><scale value="0.8"/><rotate x="1" angle="170"/><translate x="0.3" y="-0.4" z="3"/></transform>'
+    black = bsdf("diffuse", rgb("reflectance", "0"))
+    ball = f'<shape type="sphere"><point name="center" x="0" y="0" z="1"/>{GREY}</shape>'
+    for kind, place in (("", lamp), (" sphere", '<point name="center" x="-1.5" y="-1" z="2"/><float name="radius" value="0.3"/>')):
+        shaped = f'<shape type="{"sphere" if kind else "rectangle"}">{place}{black}<emitter type="directionalarea">{rgb("radiance", "9, 8, 7")}</emitter></shape>'
+        s["directionalarea" + kind] = scene(ball + GROUND + shaped, integrator="ptracer")
     s["constant"] = lit(DIM)
     env = f'<emitter type="envmap">{string("filename", "env.exr")}{number("scale", 0.8)}'
     s["envmap"] = lit(env + "</emitter>")

@@ -66,14 +66,19 @@ def of_mitsuba(path, seeds, spp):
     return np.stack([np.array(mi.render(loaded, seed=100 + s, spp=spp), dtype=np.float64)[:, :, :3] for s in range(seeds)])
 
 
+def is_light_traced(text):
+    return 'integrator type="ptracer"' in text
+
+
 def of_ours(program, path, seeds, spp):
     import mitsuba as mi
     import numpy as np
 
     images = []
+    integrator = "light" if is_light_traced(path.read_text(encoding="utf-8")) else "path"
     for s in range(seeds):
         out = path.with_suffix(".exr")
-        command = [program, "render", str(path), "-o", str(out), "--spp", str(spp), "--seed", str(s + 1), "-i", "path", "--backend", "cpu"]
+        command = [program, "render", str(path), "-o", str(out), "--spp", str(spp), "--seed", str(s + 1), "-i", integrator, "--backend", "cpu"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise RuntimeError((done.stderr or done.stdout).strip().splitlines()[-1])
@@ -94,7 +99,7 @@ def compare(options, name, text):
         if all(result[key] == value for key, value in asked.items()):
             return result
     path.write_text(text, encoding="utf-8")
-    shared = plugin_scenes.BOX not in text
+    shared = plugin_scenes.BOX not in text or is_light_traced(text)
     seeds = options.seeds * (4 if shared else 1)
     spp = max(1, options.spp * options.seeds // seeds)
     theirs = of_mitsuba(path, seeds, spp)

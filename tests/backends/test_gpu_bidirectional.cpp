@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "film/image.h"
+#include "tests/support/beam_scene.h"
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/gpu_device.h"
 
@@ -66,6 +67,20 @@ TEST_CASE("G5: bidirectional renders of both backends at equal seeds: pixels and
             s.max_depth = 6;
             check_backends(scene, s, 1);
         }
+    }
+}
+
+TEST_CASE("G5: emitters that light subpaths alone carry, and a thin sheet: both backends find the same light") {
+    if (!device()) return;
+    for (const bool lamp : {false, true}) {
+        const Scene scene = scene_from_text(beam_room(96, 6, lamp));
+        for (const auto& [integrator, variant] :
+             {std::pair{"light", "wavefront"}, {"bdpt", "wavefront"}, {"bdpt", "megakernel"}, {"bdpt", "streaming"}}) {
+            INFO(lamp << " " << integrator << " " << variant);
+            check_backends(scene, settings_of(scene, integrator, variant, "cuda"), 1);
+        }
+        // The path tracer finds the lamp alone, by way of the sheet too.
+        if (lamp) check_backends(scene, settings_of(scene, "path", "wavefront", "cuda"), 4);
     }
 }
 

@@ -4,11 +4,13 @@
 // in another way than the file says is noted.
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "core/math.h"
 #include "formats/meshes/mesh.h"
 #include "tests/support/image_files.h"
 #include "tests/support/mitsuba_text.h"
+#include "transport/emitter.h"
 
 using namespace ambilux;
 using namespace ambilux::test;
@@ -125,6 +127,88 @@ TEST_CASE("spectra that are objects, and black bodies") {
     CHECK(contains(error_of("<emitter type='point'><spectrum name='intensity' type='d65'><float name='k' "
                             "value='1'/></spectrum></emitter>"),
                    "unknown parameter 'k' of a spectrum"));
+}
+
+TEST_CASE("textures of 0.6: one scale for both coordinates, which are uv; a scaled texture at the top") {
+    const auto checkers = [](const std::string& xml) {
+        return load_quietly(textured("<texture name='reflectance' type='checkerboard'>" + xml + "</texture>"), "0.6.0")
+            .textures.at(0);
+    };
+    const Texture t = checkers(
+        "<float name='uvscale' value='10'/><float name='vscale' value='3'/>"
+        "<string name='coordinates' value='uv'/>");
+    CHECK(t.to_uv[0][0] == 10);
+    CHECK(t.to_uv[1][1] == 3);
+    CHECK(contains(error_of(textured("<texture name='reflectance' type='checkerboard'><string name='coordinates' "
+                                     "value='local'/></texture>"),
+                            {}, "0.6.0"),
+                   "textures have coordinates uv only"));
+    const Scene s = load_quietly(
+        "<texture type='checkerboard' id='c'/><texture type='scale' id='half'><float name='scale' value='0.5'/><ref "
+        "id='c'/></texture>" +
+            textured("<ref name='reflectance' id='half'/>"),
+        "0.6.0");
+    check_rgb(reflectance(s, 0, {0.1f, 0.1f}), splat(0.2f));
+    CHECK(contains(error_of("<texture type='scale' id='none'/>"), "has no nested texture"));
+}
+
+TEST_CASE("envmap of 0.6: gamma of its image") {
+    const TempFolder folder;
+    folder.write("sky.png", png_bytes(2, 2, std::vector<uint8_t>(12, 128)));
+    const auto radiance = [&](const std::string& gamma) {
+        const Scene s =
+            load_quietly("<emitter type='envmap'><string name='filename' value='sky.png'/>" + gamma + "</emitter>",
+                         "0.6.0", &folder);
+        return environment_radiance<kAllFeatures>(s.view(), {0, 0, 1}).x;
+    };
+    CHECK(radiance("") == Approx(0.2158605).epsilon(1e-3));
+    CHECK(radiance("<float name='gamma' value='-1'/>") == Approx(0.2158605).epsilon(1e-3));
+    CHECK(radiance("<float name='gamma' value='1'/>") == Approx(128 / 255.0).epsilon(1e-3));
+    CHECK(contains(error_of("<emitter type='envmap'><string name='filename' value='sky.png'/><float name='gamma' "
+                            "value='1'/></emitter>",
+                            {}, "3.0.0", &folder),
+                   "unknown parameter 'gamma'"));
+}
+
+TEST_CASE("vertex colours of 0.6 are sRGB unless the shape says otherwise") {
+    const TempFolder folder;
+    folder.write("v.ply",
+                 "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                 "property float r\nproperty float g\nproperty float b\nelement face 1\nproperty list uchar int "
+                 "vertex_indices\nend_header\n0 0 0 .5 .5 .5\n1 0 0 .5 .5 .5\n0 1 0 .5 .5 .5\n3 0 1 2\n");
+    const auto seen = [&](const std::string& more, const std::string& texture, const std::string& version) {
+        const Scene s = load_quietly("<shape type='ply'><string name='filename' value='v.ply'/>" + more +
+                                         "<bsdf type='diffuse'>" + texture + "</bsdf></shape>",
+                                     version, &folder);
+        return reflectance(s, 0, {0.3f, 0.3f}).x;
+    };
+    const std::string old = "<texture name='reflectance' type='vertexcolors'/>";
+    CHECK(seen("", old, "0.6.0") == Approx(0.2140411).epsilon(1e-4));
+    CHECK(seen("<boolean name='srgb' value='false'/>", old, "0.6.0") == Approx(0.5).epsilon(1e-4));
+    CHECK(seen("<boolean name='srgb' value='true'/>", "", "0.6.0") == 0.5f);
+    CHECK(seen("",
+               "<texture name='reflectance' type='mesh_attribute'><string name='name' value='vertex_color'/></texture>",
+               "3.0.0") == Approx(0.5).epsilon(1e-4));
+}
+
+TEST_CASE("names of files as Windows writes them; opacities that are colours") {
+    const TempFolder folder;
+    std::filesystem::create_directory(folder / "textures");
+    folder.write("textures/i.png", png_bytes(1, 1, {255, 0, 128}));
+    load_quietly(textured("<texture name='reflectance' type='bitmap'><string name='filename' "
+                          "value='textures\\i.png'/></texture>"),
+                 "0.6.0", &folder);
+    CHECK(contains(error_of(textured("<texture name='reflectance' type='bitmap'><string name='filename' "
+                                     "value='textures\\j.png'/></texture>"),
+                            {}, "0.6.0", &folder),
+                   "does not exist"));
+    const auto mask = [](const char* opacity) {
+        return "<shape type='rectangle'><bsdf type='mask'><rgb name='opacity' value='" + std::string(opacity) +
+               "'/><bsdf type='diffuse'/></bsdf></shape>";
+    };
+    const Scene grey = load_quietly(mask("0.4"));
+    CHECK(grey.materials[grey.shapes[0].material].opacity.value == Approx(0.4));
+    CHECK(contains(error_of(mask("0.3, 0.5, 0.7")), ":2: a mask of a coloured opacity is not supported"));
 }
 
 TEST_CASE("textures: scale, rawconstant, gridtexture, channel") {

@@ -334,7 +334,7 @@ TEST_CASE("emitters: values, frames, one environment") {
                    ":3: only one constant, envmap or sky"));
     CHECK(contains(error_of("<emitter type='point'><rgb name='intensity' value='-1'/></emitter>"),
                    "'intensity' is negative"));
-    CHECK(contains(error_of("<emitter type='collimated'/>"), "emitter type 'collimated' is not supported"));
+    CHECK(contains(error_of("<emitter type='beam'/>"), "emitter type 'beam' is not supported"));
 }
 
 TEST_CASE("environment maps are stored as halves unless that loses something") {

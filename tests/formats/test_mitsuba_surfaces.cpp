@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/math.h"
+#include "formats/convert/convert.h"
 #include "scene/surface.h"
 #include "tests/support/mitsuba_text.h"
 #include "transport/blend.h"
@@ -246,4 +247,98 @@ TEST_CASE("projector: fields of view by the texture's shape") {
     CHECK(e.radiance.value.x == Approx(6 * M_PI));
     CHECK(e.position.z == 3);
     CHECK(s.features.emitters == bit(EmitterType::projector));
+}
+
+TEST_CASE("principledthin: parameters, and what is refused") {
+    const auto load_thin = [](const std::string& xml) {
+        const Scene s = load_quietly("<shape type='rectangle'><bsdf type='principledthin'>" + xml + "</bsdf></shape>");
+        return parameters<PrincipledThin>(s.bsdfs[s.materials[s.shapes[0].material].front]);
+    };
+    const auto number = [](const char* name, const char* value) {
+        return "<float name='" + std::string(name) + "' value='" + value + "'/>";
+    };
+    const auto plain = load_thin("");
+    CHECK(plain.ior == 1.5f);
+    CHECK(plain.roughness.value == 0.5f);
+    CHECK(plain.specular.value == 0);
+    CHECK(plain.through == 0);
+    const auto p =
+        load_thin(number("spec_trans", "0.4") + number("diff_trans", "1.5") + number("eta", "1.3") +
+                  number("anisotropic", "0.5") + number("spec_tint", "0.3") + number("sheen", "0.2") +
+                  number("sheen_tint", "0.6") + number("flatness", "0.1") +
+                  number("specular_reflectance_sampling_rate", "2") + "<rgb name='base_color' value='0.1,0.2,0.3'/>");
+    CHECK(p.specular.value == 0.4f);
+    CHECK(p.through == 0.75f);
+    CHECK(p.ior == 1.3f);
+    CHECK(p.aspect == Approx(std::sqrt(0.55)));
+    CHECK(p.specular_tint == 0.3f);
+    CHECK(p.sheen == 0.2f);
+    CHECK(p.sheen_tint == 39321);
+    CHECK(p.flatness == 6554);
+    check_rgb(p.base_color.value, {0.1f, 0.2f, 0.3f});
+    const auto error = [](const std::string& xml) {
+        return error_of("<shape type='rectangle'><bsdf type='principledthin'>" + xml + "</bsdf></shape>");
+    };
+    CHECK(contains(error(number("diff_trans", "2.5")), "'diff_trans' must lie between 0 and 2"));
+    CHECK(contains(error(number("eta", "0.9")), "'eta' of principledthin must not be less than 1"));
+    CHECK(contains(error("<texture type='checkerboard' name='sheen'/>"),
+                   ":2: a texture as 'sheen' of principledthin is not supported"));
+    CHECK(contains(error(number("metallic", "1")), "unknown parameter 'metallic' of bsdf 'principledthin'"));
+    CHECK(
+        contains(error_of("<shape type='rectangle'><bsdf type='twosided'><bsdf type='principledthin'/></bsdf></shape>"),
+                 "transmits light cannot be inside of twosided"));
+}
+
+TEST_CASE("collimated and directionalarea: a ray with power, a shape with power per area") {
+    const Scene s = load_quietly(
+        "<emitter type='collimated'><transform name='toWorld'><lookat origin='1,2,3' target='1,2,0' up='0,1,0'/>"
+        "</transform><rgb name='power' value='1,2,3'/></emitter><shape type='cube'><emitter type='directionalarea'>"
+        "<rgb name='radiance' value='4,5,6'/></emitter></shape>",
+        "0.6.0");
+    REQUIRE(s.emitters.size() == 2);
+    const Emitter &beam = s.emitters[0], &area = s.emitters[1];
+    CHECK(beam.type == EmitterType::collimated);
+    check_rgb(beam.position, {1, 2, 3});
+    check_rgb(beam.direction, {0, 0, -1});
+    check_rgb(beam.radiance.value, {1, 2, 3});
+    CHECK(area.type == EmitterType::directional_area);
+    CHECK(s.shapes[area.shape].emitter == 1);
+    CHECK(area.area_cdf != kNone);
+    // Picked by power: luminances, and an area of 24.
+    CHECK(beam.pick_probability / area.pick_probability ==
+          Approx(luminance(beam.radiance.value) / (24 * luminance(area.radiance.value))).epsilon(0.01));
+    CHECK(s.features.has_beams());
+    // No rays of this emitter meet anything by chance: it is on no list of hits.
+    CHECK(contains(error_of("<emitter type='directionalarea'/>"), "emitter type 'directionalarea' is not supported"));
+    CHECK(contains(error_of("<shape type='cube'><emitter type='collimated'/></shape>"),
+                   "emitter type 'collimated' on a shape is not supported"));
+    CHECK(contains(error_of("<emitter type='collimated'><transform name='to_world'><scale x='2'/></transform>"
+                            "</emitter>"),
+                   "must not scale or shear"));
+}
+
+TEST_CASE("thin sheets and beams are written as they were read") {
+    const Scene a = load_quietly(
+        "<emitter type='collimated'><transform name='to_world'><lookat origin='1,2,3' target='0,0.5,0' up='0,1,0'/>"
+        "</transform><rgb name='power' value='1,2,3'/></emitter><shape type='cube'><bsdf type='principledthin'><rgb "
+        "name='base_color' value='.2,.3,.4'/><float name='spec_trans' value='.3'/><float name='diff_trans' "
+        "value='1.6'/>"
+        "<float name='sheen' value='.5'/></bsdf><emitter type='directionalarea'><rgb name='radiance' value='4,5,6'/>"
+        "</emitter></shape>");
+    const TempFolder folder;
+    const std::vector<std::string> notes = write_mitsuba(a, folder / "out.xml");
+    CHECK(std::count(notes.begin(), notes.end(), "Mitsuba 3 has no emitter 'collimated'") == 1);
+    const Scene b = load_mitsuba(folder / "out.xml");
+    CHECK(b.features == a.features);
+    REQUIRE(b.emitters.size() == 2);
+    check_rgb(b.emitters[0].position, a.emitters[0].position);
+    check_rgb(b.emitters[0].direction, a.emitters[0].direction);
+    check_rgb(b.emitters[0].radiance.value, a.emitters[0].radiance.value);
+    check_rgb(b.emitters[1].radiance.value, a.emitters[1].radiance.value);
+    const auto thin = [](const Scene& s) {
+        return parameters<PrincipledThin>(s.bsdfs[s.materials[s.shapes[0].material].front]);
+    };
+    CHECK(thin(b).through == Approx(thin(a).through));
+    CHECK(thin(b).specular.value == thin(a).specular.value);
+    CHECK(thin(b).sheen == thin(a).sheen);
 }

@@ -130,6 +130,14 @@ TEST_CASE("colours: spaces, black bodies, spectra and what lights make of them")
     CHECK(luminance(light("\"blackbody I\" 3000 \"float scale\" 5")) == Approx(5));
     CHECK(luminance(light("\"spectrum I\" [300 7 900 7]")) == Approx(1));
     check_rgb(light("\"spectrum I\" \"stdillum-D65\""), splat(1));
+    // Fluorescent lamps: F7 is daylight, F12 warm; both of luminance 1.
+    check_rgb(light("\"spectrum I\" \"stdillum-F7\""), splat(1), 5e-3);
+    const Rgb f12 = light("\"spectrum I\" \"stdillum-F12\"");
+    CHECK(luminance(f12) == Approx(1).epsilon(1e-4));
+    CHECK(f12.x > 1.3);
+    CHECK(f12.z < 0.4);
+    CHECK(contains(pbrt_error("WorldBegin LightSource \"point\" \"spectrum I\" \"stdillum-F13\""),
+                   "known by the name 'stdillum-F13'"));
     const Rgb warm = light("\"blackbody I\" 3000");
     CHECK(warm.x > warm.y);
     CHECK(warm.y > warm.z);
@@ -542,4 +550,26 @@ TEST_CASE("curves are tubes, those of one material in one mesh") {
     CHECK(most == Approx(3).margin(1e-5));
     CHECK(test::contains(test::pbrt_error("WorldBegin\n" + curve + "\"point3 P\" [0 0 0 1 0 0 2 0 0]\n"),
                          "3 control points do not make a curve of degree 3"));
+}
+
+TEST_CASE("attributes of materials count for named ones too") {
+    const auto alpha = [](const std::string& material) {
+        const Scene s =
+            load_pbrt_world("Attribute \"material\" \"float roughness\" 0.04 " + material + " Shape \"sphere\"");
+        const BsdfRecord& r = s.bsdfs[s.materials[s.shapes[0].material].front];
+        REQUIRE(r.type == BsdfType::rough_conductor);
+        return r.as<RoughConductor>().alpha_u.value;
+    };
+    CHECK(alpha("Material \"conductor\"") == Approx(0.2));
+    CHECK(alpha("MakeNamedMaterial \"m\" \"string type\" \"conductor\" NamedMaterial \"m\"") == Approx(0.2));
+    CHECK(alpha("MakeNamedMaterial \"m\" \"string type\" \"conductor\" \"float roughness\" .09 NamedMaterial \"m\"") ==
+          Approx(0.3));
+}
+
+TEST_CASE("faces of ptex and tangents of meshes are left out") {
+    const Scene s = load_pbrt_world(
+        "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] \"integer faceIndices\" "
+        "[0] "
+        "\"vector3 S\" [1 0 0 1 0 0 1 0 0]");
+    CHECK(s.triangles.size() == 1);
 }

@@ -294,6 +294,16 @@ TEST_CASE("what strategies cannot reach follows from emitters, BSDFs and depth")
             using B = typename decltype(bsdf)::type;
             const Features f = {
                 bit(BsdfType::diffuse) | bit(kBsdfType<B>), bit(kEmitterType<E>), 1, false, false, false};
+            if (is_beam(kEmitterType<E>)) {
+                // Light subpaths alone begin there.
+                CHECK(lost(f, kPath) == "Lb D E");
+                CHECK(lost(f, kPath, 1).empty());
+                CHECK(lost(f, kPlain) == (B::delta ? "Lb D D S E" : ""));
+                CHECK(lost(f, kLightStrategies) == (B::delta ? "Lb D D S E" : ""));
+                CHECK(lost(f, kConnectionStrategies) == "Lb D E");
+                CHECK(unreachable_path(f, kAllStrategies, -1) == (B::delta ? "Lb S E" : ""));
+                return;
+            }
             const bool chain = is_delta(kEmitterType<E>) && B::delta;
             INFO(name_of(kEmitterType<E>) << ", " << name_of(kBsdfType<B>));
             CHECK(lost(f, kPath) == (chain ? "Ld S D E" : ""));

@@ -1,7 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 300
-// Images of phong, ward, difftrans and coatings in front of a constant environment, against integrals of the published
-// formulas over the hemisphere.
+// Images of phong, ward, difftrans, thin sheets and coatings in front of a constant environment, against integrals of
+// the published formulas over the hemisphere.
 #include <functional>
 
 #include "tests/support/closed_forms.h"
@@ -102,6 +102,36 @@ TEST_CASE("ward: three ways to divide a Gaussian of the half vector's slopes") {
 
 TEST_CASE("difftrans: what falls on the other side") {
     check("<bsdf type='difftrans'><rgb name='transmittance' value='0.6'/></bsdf>", 0.6);
+}
+
+TEST_CASE("principledthin: two specular lobes by Fresnel, the one that passes narrower, and two diffuse ones") {
+    const double ior = 1.5, roughness = 0.8, base = 0.6, specular = 0.4, through = 0.3;
+    const auto schlick = [](double c) { return std::pow(1 - c, 5); };
+    const auto reflected = [&](double c) {
+        const double t = std::sqrt(1 - (1 - c * c) / (ior * ior)), s = (c - ior * t) / (c + ior * t),
+                     p = (ior * c - t) / (ior * c + t);
+        return 0.5 * (s * s + p * p);
+    };
+    // GGX with shadowing and masking apart (Walter et al. 2007).
+    const auto lobe = [&](V w, double rough, bool reflects) {
+        V m = {kView.x + w.x, kView.y + w.y, kView.z + w.z};
+        const double l = std::sqrt(dot(m, m)), a2 = std::pow(rough, 4), z = m.z / l, d = z * z * (a2 - 1) + 1;
+        const double f = reflected(dot(kView, m) / l);
+        const auto g1 = [&](double c) { return 2 / (1 + std::sqrt(1 + a2 * (1 - c * c) / (c * c))); };
+        return (reflects ? f : base * (1 - f)) * a2 / (M_PI * d * d) * g1(kView.z) * g1(w.z) / (4 * kView.z * w.z);
+    };
+    const auto diffuse = [&](V w) {
+        V m = {kView.x + w.x, kView.y + w.y, kView.z + w.z};
+        const double c2 = dot(kView, m) * dot(kView, m) / dot(m, m), rr = 2 * roughness * c2;
+        const double i = schlick(kView.z), o = schlick(w.z);
+        return base / M_PI * ((1 - 0.5 * i) * (1 - 0.5 * o) + rr * (i + o + i * o * (rr - 1)));
+    };
+    check("<bsdf type='principledthin'><rgb name='base_color' value='0.6'/>" + number("roughness", roughness) +
+              number("spec_trans", specular) + number("diff_trans", 2 * through) + "</bsdf>",
+          albedo([&](V w) {
+              return specular * (lobe(w, roughness, true) + lobe(w, roughness * (0.65 * ior - 0.35), false)) +
+                     (1 - specular) * ((1 - through) * diffuse(w) + through * base / M_PI);
+          }));
 }
 
 TEST_CASE("coating: a mirror's share, and the base's behind two boundaries and an absorbing layer") {

@@ -204,7 +204,7 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
             times_cosine(q, normal(0), to_light);
             over_distance(q, distance2(position(0), position(1)), error(0), error(1));
         } else if (is_delta(e.type)) {
-            steps.next_event.value = pick;
+            steps.next_event.value = is_beam(e.type) ? 0 : pick;
         } else {
             steps.next_event = at_directions(to_light, to_light, conditioning,
                                              [&](Vec3f d, Vec3f) { return pdf_environment_direct<F>(scene, d); });
@@ -262,7 +262,7 @@ inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePa
             if (k == 1 ? type == EmitterType::area : !delta(k - 1)) group = kLightStrategies;
             p *= light_subpaths;
         } else if (s == 1) {
-            if (!delta(1)) group = kNextEventStrategies;
+            if (!delta(1) && !is_beam(type)) group = kNextEventStrategies;
         } else if (!delta(s - 1) && !delta(s)) {
             group = kConnectionStrategies;
             p *= connections;

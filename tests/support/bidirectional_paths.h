@@ -190,6 +190,20 @@ inline std::vector<SceneCase> scene_cases() {
         "name='to_world'><lookat origin='-1,3,1' target='-0.3,0,0' up='0,0,1'/></transform></emitter>" +
         "<emitter type='directional'><vector name='direction' x='-0.8' y='-1.2' z='-0.6'/>" + rgb("irradiance", "1.5") +
         "</emitter>";
+    // Of one on a sphere every normal is another one.
+    const auto directional_area = [](const std::string& shape) {
+        return shape + "<bsdf type='diffuse'/><emitter type='directionalarea'>" + rgb("radiance", "5") +
+               "</emitter></shape>";
+    };
+    const std::string beams =
+        "<emitter type='collimated'>" + rgb("power", "20") +
+        "<transform name='to_world'><lookat origin='0.2,2.5,0.3' target='0.45,0,0.4' up='0,0,1'/></transform>"
+        "</emitter>" +
+        directional_area(
+            "<shape type='cube'><transform name='to_world'><scale value='0.3'/><rotate x='1' y='1' "
+            "angle='30'/><translate y='2.6'/></transform>") +
+        directional_area(
+            "<shape type='sphere'><point name='center' x='0.6' y='1.7' z='0.4'/><float name='radius' value='0.1'/>");
     return {
         {"room", 24000, whole(sensor("perspective", perspective) + walls + bodies() + lamps)},
         {"sky", 120000,
@@ -211,6 +225,7 @@ inline std::vector<SceneCase> scene_cases() {
                area_light("<shape type='disk'><transform name='to_world'><scale value='0.4'/><rotate x='1' "
                           "angle='90'/><translate y='2'/></transform>") +
                "<emitter type='constant'>" + rgb("radiance", "1") + "</emitter>")},
+        {"beams", 24000, whole(sensor("perspective", perspective) + walls + bodies() + beams + masked_lamps)},
         {"masked lamps", 24000, whole(sensor("perspective", perspective) + walls + bodies() + masked_lamps)},
         // Next event estimation meets such spots on paths that light subpaths began.
         {"narrow spots", 24000,
@@ -489,11 +504,10 @@ private:
         return names[int(scene_.bsdfs[back ? m.back : m.front].type)];
     }
     void count(Kind kind, const OraclePath& path) {
-        static const char* const emitters[] = {"area", "point", "spot", "directional", "constant", "envmap"};
         static const char* const shapes[] = {"mesh", "sphere", "disk", "cylinder"};
         static const char* const sensors[] = {"perspective", "thinlens", "orthographic"};
         const Emitter& e = scene_.emitters[path.emitter];
-        std::string light = emitters[int(e.type)];
+        std::string light = name_of(e.type);
         if (e.type == EmitterType::area)
             light = scene_.is_triangle(path.light.prim) ? shapes[0] : shapes[int(scene_.quadric(path.light.prim).type)];
         const std::string name = kKindNames[kind];

@@ -56,6 +56,10 @@ inline float least_alpha(Bsdf b) {
             alpha = std::min(p.alpha_u, p.alpha_v);
         else if constexpr (requires { p.alpha, p.distribution; })
             alpha = p.alpha;
+        else if constexpr (requires { p.through; }) {
+            const MicrofacetDistribution narrow = BsdfAt<PrincipledThin>{p}.microfacets(false);
+            alpha = p.specular > 0 ? std::min(narrow.alpha_u, narrow.alpha_v) : 0;
+        }
     });
     return alpha;
 }
@@ -181,6 +185,24 @@ inline Bsdf principled_with_all(float roughness, float metallic) {
     });
 }
 
+/// `specular`, `through` and roughness set; with a tint, sheen and all else if `all`.
+inline Bsdf principled_thin(float roughness, float specular, float through, bool all = false) {
+    Resolved<PrincipledThin> p = white<PrincipledThin>();
+    p.base_color = {0.8f, 0.5f, 0.1f};
+    p.roughness = roughness;
+    p.specular = specular;
+    p.through = through;
+    p.aspect = 1;
+    if (all) {
+        p.aspect = std::sqrt(1 - 0.9f * 0.5f);
+        p.specular_tint = 0.3f;
+        p.sheen = 0.6f;
+        p.sheen_tint = 32768;
+        p.flatness = 13107;
+    }
+    return bsdf_of(p);
+}
+
 /// Every BSDF type over roughness 0.01 to 1, isotropic and not, both distributions and both ways to sample them, ior
 /// below and above 1.
 inline std::vector<BsdfCase> bsdf_cases() {
@@ -201,6 +223,13 @@ inline std::vector<BsdfCase> bsdf_cases() {
             const std::string suffix = std::to_string(metallic) + " " + std::to_string(roughness);
             add("principled " + suffix, principled(roughness, metallic));
             add("principled with all " + suffix, principled_with_all(roughness, metallic));
+        }
+    for (float roughness : {0.2f, 0.7f})
+        for (auto [specular, through] : {std::pair{1.0f, 0.0f}, {0.0f, 0.4f}, {0.6f, 0.3f}, {0.0f, 1.0f}}) {
+            const std::string suffix =
+                std::to_string(roughness) + " " + std::to_string(specular) + " " + std::to_string(through);
+            add("principled_thin " + suffix, principled_thin(roughness, specular, through));
+            add("principled_thin with all " + suffix, principled_thin(roughness, specular, through, true));
         }
     for (float alpha : {0.0f, 0.2f}) {
         const std::string suffix = " " + std::to_string(alpha);

@@ -29,7 +29,13 @@ TEST_CASE("Recursive weights equal those of all strategies enumerated, and those
         if (kind == "hit") continue;
         for (const char* light : {"constant", "envmap"}) require(kind + ", " + light);
         if (kind == "escape") continue;
+        const bool samples = kind != "next event";
         for (const char* light : {"point", "spot", "directional"}) require(kind + ", " + light);
+        for (const char* beam : {"collimated", "directional_area"})
+            if (samples)
+                require(kind + ", " + beam);
+            else
+                CHECK(!seen.contains(kind + ", " + beam));
     }
 }
 

@@ -31,7 +31,9 @@ struct Outcome {
 /// by delta lobes.
 Outcome test_sampling(const Bsdf& b, Vec3f wi, uint32_t sequence) {
     const FresnelDielectric f = fresnel_dielectric(wi.z, ior_of(b));
-    const Vec3f refracted = f.cos_t != 0 ? normalize(refract(wi, f)) : Vec3f{0, 0, std::copysign(1.0f, -wi.z)};
+    const Vec3f refracted = b.type == BsdfType::principled_thin ? -wi
+                            : f.cos_t != 0                      ? normalize(refract(wi, f))
+                                                                : Vec3f{0, 0, std::copysign(1.0f, -wi.z)};
     const bool through = is_transmissive(b);
     const LobeGrid mirror(reflect(wi), lobe_width(b), 16, 16), behind(refracted, lobe_width(b), 16, 16);
     const int n = mirror.size();

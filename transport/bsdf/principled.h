@@ -4,17 +4,11 @@
 
 #include "core/sampling.h"
 #include "models/bsdf/principled.h"
+#include "transport/bsdf/burley.h"
 #include "transport/bsdf/fresnel.h"
-#include "transport/bsdf/microfacet.h"
 #include "transport/bsdf/sample.h"
 
 namespace ambilux {
-
-/// Schlick's (1 - cos)^5.
-AMBILUX_HD float schlick_weight(float cosine) {
-    const float m = clamp(1.0f - cosine, 0.0f, 1.0f), m2 = m * m;
-    return m2 * m2 * m;
-}
 
 /// Normals of the clearcoat: GTR with exponent 1 (Burley 2012, appendix B, equations 4 and 5).
 struct ClearcoatDistribution {
@@ -38,10 +32,7 @@ struct ClearcoatDistribution {
 
 template <>
 struct BsdfAt<Principled> : Resolved<Principled> {
-    AMBILUX_HD MicrofacetDistribution microfacets() const {
-        const float alpha = roughness * roughness;
-        return {Microfacets::ggx, max(alpha / aspect, 1e-3f), max(alpha * aspect, 1e-3f)};
-    }
+    AMBILUX_HD MicrofacetDistribution microfacets() const { return burley_microfacets(roughness, aspect); }
     AMBILUX_HD ClearcoatDistribution coating() const { return {clearcoat_alpha * clearcoat_alpha}; }
 
     /// Shares of lobes in sampling, the diffuse one's is the rest: they do not depend on directions.
@@ -53,41 +44,12 @@ struct BsdfAt<Principled> : Resolved<Principled> {
         return {1.0f / sum, coat / sum};
     }
 
-    /// Base colour divided by its luminance.
-    AMBILUX_HD Rgb tint() const {
-        const float l = luminance(base_color);
-        return l > 0.0f ? base_color / l : splat(1.0f);
-    }
-
     AMBILUX_HD Rgb fresnel(float cosine) const {
         const float w = schlick_weight(cosine), dielectric = 1.0f - metallic;
         Rgb f = (base_color + (splat(1.0f) - base_color) * w) * metallic;
         f += splat(dielectric * (1.0f - specular_tint) * fresnel_dielectric(cosine, ior).reflectance);
-        if (specular_tint > 0.0f) {
-            const Rgb f0 = tint() * sqr((ior - 1.0f) / (ior + 1.0f));
-            f += (f0 + (splat(1.0f) - f0) * w) * (dielectric * specular_tint);
-        }
+        if (specular_tint > 0.0f) f += burley_tinted_fresnel(base_color, ior, w) * (dielectric * specular_tint);
         return f;
-    }
-
-    /// Diffuse lobe with retroreflection, its subsurface form and sheen; `cosine`: of either direction with the half
-    /// vector. Without the cosine of the direction that light leaves in.
-    AMBILUX_HD Rgb diffuse(float cos_i, float cos_o, float cosine) const {
-        const float fi = schlick_weight(cos_i), fo = schlick_weight(cos_o);
-        const float rr = 2.0f * roughness * cosine * cosine;
-        float shape = (1.0f - 0.5f * fi) * (1.0f - 0.5f * fo) + rr * (fo + fi + fo * fi * (rr - 1.0f));
-        if (flatness > 0) {
-            const float f90 = 0.5f * rr, fss = lerp(1.0f, f90, fo) * lerp(1.0f, f90, fi);
-            const float subsurface = 1.25f * (fss * (1.0f / (cos_o + cos_i) - 0.5f) + 0.5f);
-            shape = lerp(shape, subsurface, float(flatness) / 65535.0f);
-        }
-        Rgb value = base_color * (shape * kInvPi);
-        if (sheen > 0.0f) {
-            const float share = float(sheen_tint) / 65535.0f;
-            const Rgb color = splat(1.0f - share) + tint() * share;
-            value += color * (sheen * schlick_weight(cosine));
-        }
-        return value * (1.0f - metallic);
     }
 
     AMBILUX_HD BsdfValue evaluate(Vec3f wi, Vec3f wo, TransportMode) const { return formula_apart(*this, wi, wo); }
@@ -99,9 +61,10 @@ struct BsdfAt<Principled> : Resolved<Principled> {
         const MicrofacetReflection main = microfacets().reflection(wi, wo, m, cos_m, true);
         const Shares p = shares();
         const float rest = 1.0f - p.specular - p.clearcoat;
-        BsdfValue v = {fresnel(cos_m) * main.value + diffuse(wi.z, wo.z, cos_m) * wo.z,
-                       p.specular * main.pdf_sa + rest * (wo.z * kInvPi),
-                       p.specular * main.pdf_reverse_sa + rest * (wi.z * kInvPi)};
+        BsdfValue v = {
+            fresnel(cos_m) * main.value + burley_diffuse(*this, wi.z, wo.z, cos_m) * ((1.0f - metallic) * wo.z),
+            p.specular * main.pdf_sa + rest * (wo.z * kInvPi),
+            p.specular * main.pdf_reverse_sa + rest * (wi.z * kInvPi)};
         if (clearcoat > 0.0f) {
             const float d = coating().d(min(m.z, 1.0f)), f = 0.04f + 0.96f * schlick_weight(cos_m);
             const float g = ClearcoatDistribution::g1(wi.z) * ClearcoatDistribution::g1(wo.z);

@@ -4,9 +4,10 @@
 // Position and direction are sampled one after the other and carry their own measures. For all emitters alike the flux
 // of a sample is
 //   radiance · cos_theta / (pick · pdf_pos · pdf_dir),
-// where a delta position or direction has "density" 1 and `radiance` is then intensity or irradiance. For emitters at
-// infinity the direction comes first and the position lies on the disk perpendicular to it that covers the scene's
-// bounding sphere.
+// where a delta position or direction has "density" 1 and `radiance` is then intensity or irradiance; of emitters with
+// both, power, and of those that send every point's light along its normal, power per area. For emitters at infinity
+// the direction comes first and the position lies on the disk perpendicular to it that covers the scene's bounding
+// sphere.
 #pragma once
 
 #include "transport/emitter.h"
@@ -14,7 +15,8 @@
 namespace ambilux {
 
 /// Density per area with which sample_emission starts at a point of emitter `emitter`, given that it was picked: on
-/// primitive `prim` of an area emitter, on the disk for emitters at infinity; 1 for delta positions.
+/// primitive `prim` of an area emitter, on the disk for emitters at infinity; 1 for delta positions. Not for beams
+/// (is_beam): no other strategy has a density to compare.
 template <Features F>
 AMBILUX_HD float pdf_emission_position(const SceneView& view, uint32_t emitter, uint32_t prim) {
     const Emitter& e = view.emitters[emitter];

@@ -39,7 +39,8 @@ struct EmissionSample {
     Vec3f p_error;    ///< bound of the absolute error of each coordinate of p; zero unless p lies on a surface
     Vec3f ng;         ///< unit normal of the emitting side; d where there is no surface
     Vec3f d;          ///< unit, direction in which light leaves
-    Rgb radiance;     ///< area, constant, envmap: radiance; point, spot: intensity; directional: irradiance
+    Rgb radiance;     ///< area, constant, envmap: radiance; point, spot: intensity; directional: irradiance;
+                      ///< collimated: power; directional_area: power per area
     float pdf_pos;    ///< density per area (infinite: on the disk); 1 for a delta position
     float pdf_dir;    ///< density per solid angle; 1 for a delta direction
     float cos_theta;  ///< cosine between ng and d; 1 where there is no surface

@@ -129,6 +129,8 @@ struct BidirectionalMis {
     AMBILUX_HD MisSums first_light_sums(const SceneView& scene, const Path& path, Vec3f p, float cos_in) const {
         const SubpathStart& start = path.start;
         const Emitter& e = scene.emitters[start.emitter];
+        if constexpr (F.has_beams())
+            if (is_beam(e.type)) return {0.0f, 0.0f};  // no other strategy samples its light
         const float scale = start.inv_pdf / cos_in;
         float next_event = 0.0f, hit = 0.0f;  // densities of the light vertex from the other side times scale
         switch (e.type) {

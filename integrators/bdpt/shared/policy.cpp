@@ -26,9 +26,11 @@ void set_rules(Rules<BidirectionalMis>& r, const Scene& scene) {
     const bool emitters = !scene.emitters.empty();
     const bool area = std::any_of(scene.emitters.begin(), scene.emitters.end(),
                                   [](const Emitter& e) { return e.type == EmitterType::area; });
+    const bool sampled =
+        std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const Emitter& e) { return !is_beam(e.type); });
     r.splat = emitters && r.mis.has(kLightStrategies) && r.max_depth > 0;
     r.connect = emitters && r.mis.has(kConnectionStrategies) && r.max_depth >= 3;
-    r.next_event = emitters && r.mis.has(kNextEventStrategies) && r.max_depth >= 2;
+    r.next_event = sampled && r.mis.has(kNextEventStrategies) && r.max_depth >= 2;
     r.count_hits = area && r.mis.has(kHitStrategies);
     // No light subpath finds the environment that the camera sees: eye subpaths of one segment count it for the light
     // tracer.

@@ -1,0 +1,30 @@
+// The principled BSDF of a sheet without thickness, both sides.
+#pragma once
+
+#include "models/bsdf/model.h"
+
+namespace ambilux {
+
+struct PrincipledThin {
+    static constexpr const char* plugin = "principledthin";
+    static constexpr bool smooth = true, delta = false, transmits = true, tabulated = false;
+
+    template <class Color, class Number>
+    struct Inputs {
+        Color base_color;
+        Number roughness;
+        Number specular;  ///< share of the specular lobes; the diffuse ones have the rest
+    };
+
+    struct Constants {
+        float ior;            ///< inside of the sheet over outside, at least 1
+        float aspect;         ///< root of roughness along t over that along s
+        float specular_tint;  ///< share of the base colour in the reflection
+        float sheen;          ///< weight of reflection at grazing angles
+        float through;        ///< share of diffuse light that goes to the other side, 0 to 1
+        uint16_t sheen_tint;  ///< share of the base colour in the sheen, in 1/65535
+        uint16_t flatness;    ///< share of the approximation of subsurface scattering, in 1/65535
+    };
+};
+
+}  // namespace ambilux
