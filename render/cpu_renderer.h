@@ -35,6 +35,7 @@ public:
             allocate_film(values);
             double mean = 0;
             if constexpr (kFilmWide) mean = Integrator::pilot(policy_, view_, tracer_, settings.seed);
+            if constexpr (kLearns) allocate_kept();
             const uint64_t kept = planned_kept(mean, policy_.waves.most_light_subpaths(wave_.slot_count()));
             waves_.resize(size_t(arena_.max_concurrency()));
             for (WaveMemory& w : waves_) allocate(w, uint32_t(kept));
@@ -57,6 +58,7 @@ public:
                 const uint32_t chunks = (tile_count(wave_) + wave_.tiles - 1) / wave_.tiles;
                 parallel_for(chunks, [&](uint32_t c) { render_tiles(c * wave_.tiles, first + done, pass); });
                 if constexpr (kFilmWide) update_film(first + done);
+                if constexpr (kLearns) learn();
             });
             done += pass;
             measured_seconds_ = seconds_since(pass_start);
@@ -115,6 +117,9 @@ public:
 
 private:
     static constexpr bool kFilmWide = Integrator::kFilmWide;
+    /// It keeps something from wave to wave, which is brought up to date after each sample.
+    static constexpr bool kLearns =
+        requires(Layout& layout, typename Integrator::Policy& policy) { Integrator::lay_out_kept(layout, policy); };
 
     /// Queues of one thread. They grow when a wave has more light vertices than any before.
     struct WaveMemory {
@@ -159,10 +164,24 @@ private:
         strategies_.resize(strategy_values(policy_.waves.strategy_depth, values / 3));
         strategies_dropped_.resize(strategy_count(policy_.waves.strategy_depth));
     }
+    void allocate_kept() {
+        Layout plan;
+        Integrator::lay_out_kept(plan, policy_);
+        kept_ = std::vector<Lane>((plan.bytes() + sizeof(Lane) - 1) / sizeof(Lane));
+        Layout placed(plan, reinterpret_cast<std::byte*>(kept_.data()));
+        Integrator::lay_out_kept(placed, policy_);
+        Integrator::fill_kept(policy_,
+                              [](auto* to, const auto& values) { std::copy(values.begin(), values.end(), to); });
+    }
+    void learn() {
+        const auto stage = Integrator::learn(policy_, &film_state_, nullptr);
+        if (stage.is_due()) parallel_for(Integrator::items_to_learn(policy_), [&](uint32_t i) { stage(i); }, 64u);
+    }
     /// All but the waves.
     uint64_t fixed_bytes() const {
         return scene_.memory_bytes() + accel_bytes_ + (film_.sum.size() + film_.sum_squares.size()) * sizeof(double) +
-               (splats_.size() + strategies_.size()) * sizeof(double) + film_samples_.size() * sizeof(Lane);
+               kept_.size() * sizeof(Lane) + (splats_.size() + strategies_.size()) * sizeof(double) +
+               film_samples_.size() * sizeof(Lane);
     }
     uint64_t planned_kept(double mean, uint64_t subpaths) const {
         return policy_.waves.keeps_light_vertices ? planned_light_vertices(mean, subpaths) : 0;
@@ -264,7 +283,7 @@ private:
     HostTracer tracer_;
     std::shared_ptr<const void> accel_;
     std::vector<WaveMemory> waves_;
-    std::vector<Lane> film_samples_;
+    std::vector<Lane> film_samples_, kept_;
     std::vector<double> splats_, strategies_;
     std::vector<uint64_t> strategies_dropped_;
     FilmMoments film_;

@@ -25,6 +25,9 @@ namespace ambilux {
 template <class Integrator, Features F>
 class CudaRenderer final : public Renderer {
     static constexpr bool kFilmWide = Integrator::kFilmWide;
+    /// It keeps something from wave to wave, which is brought up to date after each.
+    static constexpr bool kLearns =
+        requires(Layout& layout, typename Integrator::Policy& policy) { Integrator::lay_out_kept(layout, policy); };
     using Stages = typename Integrator::Stages;
 
 public:
@@ -41,6 +44,7 @@ public:
                 policy_.traces_connections = Stages::kTracesConnections && traces_connections(policy_, accel_->bytes());
         }
         device_scene_->drop_texels();
+        if constexpr (kLearns) allocate_kept();
         shape(settings, mean);
         const uint64_t kept = policy_.waves.keeps_light_vertices
                                   ? planned_light_vertices(mean, policy_.waves.most_light_subpaths(wave_.slot_count()))
@@ -200,9 +204,21 @@ private:
                                              "light_paths");
         policy_.waves.multi_bounce_below = multi_bounce_below(settings, wave_.slot_count());
     }
+    void allocate_kept() {
+        Layout plan;
+        Integrator::lay_out_kept(plan, policy_);
+        kept_ = DeviceBuffer<std::byte>(plan.bytes(), "what waves learn");
+        kept_.zero();
+        Layout placed(plan, kept_.data());
+        Integrator::lay_out_kept(placed, policy_);
+        Integrator::fill_kept(policy_, [](auto* to, const auto& values) {
+            cuda_check(cudaMemcpy(to, values.data(), values.size() * sizeof(*to), cudaMemcpyHostToDevice),
+                       "what waves learn");
+        });
+    }
     uint64_t fixed_bytes() const {
-        return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) + film_memory_.bytes() +
-               clock_.bytes();
+        return kept_.bytes() + device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) +
+               film_memory_.bytes() + clock_.bytes();
     }
 
     /// Memory of a wave, and what works on it.
@@ -220,6 +236,7 @@ private:
         wave_.state = state;
         const CwbvhTracer tracer = accel_ ? accel_->tracer() : CwbvhTracer();
         layout.record(UpdateFilm::kName);
+        if constexpr (kLearns) layout.record(Integrator::kLearnName);
         return {state, order, Stages(layout, device_view(), tracer, policy_, wave_, queues, film_)};
     }
     uint64_t film_values() const { return uint64_t(wave_.width) * wave_.height * 3; }
@@ -258,6 +275,10 @@ private:
         Integrator::schedule(exec, *stages_);
         const UpdateFilm update = {wave_, film_.samples, film_.splats, film_.sums, layout_.record(UpdateFilm::kName)};
         exec.run_slots(update, wave_.tiles * kTilePixels, 1);
+        if constexpr (kLearns) {
+            const auto learn = Integrator::learn(policy_, state_, layout_.record(Integrator::kLearnName));
+            if (const uint32_t items = Integrator::items_to_learn(policy_)) exec.run_slots(learn, items, 1);
+        }
         exec.finish_wave();
     }
     void launch_wave(uint32_t tile, uint32_t sample, uint32_t samples) {
@@ -323,7 +344,7 @@ private:
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceCwbvh> accel_;
     std::optional<DevicePairs> pairs_;  ///< instead, with accel=bvh2
-    DeviceBuffer<std::byte> memory_, film_memory_;
+    DeviceBuffer<std::byte> memory_, film_memory_, kept_;
     DeviceBuffer<double> taken_;  ///< by take_film
     FilmBuffers film_{};
     DeviceBuffer<uint64_t> clock_;

@@ -1,0 +1,16 @@
+// Settings of variant learned.
+#pragma once
+
+#include "integrators/setting.h"
+
+namespace ambilux {
+
+struct LearnedSettings {
+    float share = 0.7f;  ///< of draws that follow what was learned
+    float weight =
+        0.0f;  ///< draws that multiple importance sampling counts for each that is made; 0: the pilot decides
+
+    static LearnedSettings plan(const RenderSettings& settings);
+};
+
+}  // namespace ambilux
