@@ -23,35 +23,36 @@ struct UpdateDraws {
         return state->samples >= kOften || (now & (now - 1)) == 0 || now / kOften != before / kOften;
     }
 
-    AMBILUX_HD void operator()(uint32_t cell) const {
+    /// Of a group of cells.
+    AMBILUX_HD void operator()(uint32_t group) const {
         if (!is_due()) return;
-        const uint32_t clusters = table.clusters.leaves();
-        float own_total = 0.0f, group_total = 0.0f, total = 0.0f;
-        for (uint32_t k = 0; k < clusters; ++k) {
-            own_total += own(cell, k);
-            group_total += group(cell, k);
-        }
+        const uint32_t first = group << kGroupBits, clusters = table.clusters.leaves();
+        float own_totals[kGroup] = {}, totals[kGroup] = {}, sums[kGroup] = {}, group_total = 0.0f;
+        for (uint32_t k = 0; k < clusters; ++k)
+            for (uint32_t c = 0; c < kGroup; ++c) own_totals[c] += score(first + c, k);
+        for (const float t : own_totals) group_total += t;
         if (!(group_total > 0.0f)) return;
-        const float a = own_total > 0.0f ? kOwn / own_total : 0.0f, b = (1.0f - kOwn) / group_total;
-        const auto weight = [&](uint32_t k) { return sqrtf(a * own(cell, k) + b * group(cell, k)); };
-        for (uint32_t k = 0; k < clusters; ++k) total += weight(k);
-        const float scale = share * float(DrawTable::kTickets - 1) / total;
-        float sum = 0.0f;
-        for (uint32_t k = 0; k < clusters; ++k) {
-            sum += weight(k);
-            table.tickets[table.row(cell) + k] = uint16_t(sum * scale);
-        }
+        const auto for_weights = [&](auto&& use) {
+            for (uint32_t k = 0; k < clusters; ++k) {
+                float own[kGroup], of_group = 0.0f;
+                for (uint32_t c = 0; c < kGroup; ++c) of_group += own[c] = score(first + c, k);
+                const float shared = (1.0f - kOwn) / group_total * of_group;
+                for (uint32_t c = 0; c < kGroup; ++c)
+                    use(c, k, sqrtf(shared + (own[c] > 0.0f ? kOwn / own_totals[c] * own[c] : 0.0f)));
+            }
+        };
+        for_weights([&](uint32_t c, uint32_t, float weight) { totals[c] += weight; });
+        for_weights([&](uint32_t c, uint32_t k, float weight) {
+            sums[c] += weight;
+            table.tickets[table.row(first + c) + k] =
+                uint16_t(share * float(DrawTable::kTickets - 1) / totals[c] * sums[c]);
+        });
     }
 
 private:
-    static constexpr uint32_t kOften = 16;
+    static constexpr uint32_t kOften = 16, kGroup = 1u << kGroupBits;
 
-    AMBILUX_HD float own(uint32_t cell, uint32_t k) const { return float(table.sums[table.row(cell) + k]); }
-    AMBILUX_HD float group(uint32_t cell, uint32_t k) const {
-        float sum = 0.0f;
-        for (uint32_t c = cell >> kGroupBits << kGroupBits, n = 0; n < 1u << kGroupBits; ++n) sum += own(c + n, k);
-        return sum;
-    }
+    AMBILUX_HD float score(uint32_t cell, uint32_t k) const { return float(table.sums[table.row(cell) + k]); }
 };
 
 }  // namespace ambilux

@@ -14,7 +14,7 @@ namespace ambilux {
 namespace {
 
 using Mis = BidirectionalMis;
-constexpr uint32_t kSubpaths = 16384;  ///< from the camera, and as many from emitters
+constexpr uint32_t kSubpaths = 8192;  ///< from the camera, and as many from emitters
 
 /// Keeps the vertices where connections may start.
 struct KeepEnds {
@@ -110,7 +110,8 @@ void split(std::vector<DrawSplit>& splits, uint32_t at, PilotPoint* begin, Pilot
                                 : std::max_element(begin, middle, [axis](const PilotPoint& a, const PilotPoint& b) {
                                       return a.x[axis] < b.x[axis];
                                   })->x[axis];
-        splits[at] = {lower + (upper - lower) * 0.5f, axis};
+        const float between = lower + (upper - lower) * 0.5f;
+        splits[at] = {between > lower ? between : upper, axis};
     }
     split(splits, 2 * at, begin, middle, size);
     split(splits, 2 * at + 1, middle, end, size);
@@ -168,8 +169,6 @@ void measure_pairs(const SceneView& scene, const HostTracer& tracer, const Rules
         if (pairs > 0) uniform += squares, learned += roots * roots / pairs;
     }
     if (learned > 0) found.gain = float(uniform / learned);
-    if (getenv("AMB_PRINT"))
-        fprintf(stderr, "eyes %zu lights %zu unit %g gain %g\n", eyes.size(), lights.size(), found.unit, found.gain);
 }
 
 }  // namespace

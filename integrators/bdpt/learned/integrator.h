@@ -101,7 +101,7 @@ struct LearnedIntegrator {
     static UpdateDraws learn(const Policy& p, const WaveState* state, StageRecord* record) {
         return {p.table, state, p.learned.share, record};
     }
-    static uint32_t items_to_learn(const Policy& p) { return p.rules.connect ? kCells : 0; }
+    static uint32_t items_to_learn(const Policy& p) { return p.rules.connect ? kCells >> UpdateDraws::kGroupBits : 0; }
 
 private:
     /// Learned draws have less variance than their number tells, so that they deserve more weight.

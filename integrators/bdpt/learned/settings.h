@@ -1,7 +1,7 @@
 // Settings of variant learned.
 #pragma once
 
-#include "integrators/setting.h"
+#include "integrators/settings.h"
 
 namespace ambilux {
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "integrators/bdpt/learned/settings.h"
+#include "integrators/setting.h"
 
 namespace ambilux {
 
