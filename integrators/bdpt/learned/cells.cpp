@@ -117,58 +117,18 @@ void split(std::vector<DrawSplit>& splits, uint32_t at, PilotPoint* begin, Pilot
     split(splits, 2 * at + 1, middle, end, size);
 }
 
-/// Connects each eye vertex with one light vertex, of which all are equally likely, and sets unit and gain.
+/// What connections bring to an eye vertex from all vertices of a light subpath, whether something blocks them or not.
 template <Features F>
-void measure_pairs(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& rules,
-                   const std::vector<SubpathEnd<Mis>>& eyes, const std::vector<SubpathEnd<Mis>>& lights,
-                   DrawCells& found) {
-    if (eyes.empty() || lights.empty()) return;
-    const auto partner = [&](size_t i) { return i * 7919 % lights.size(); };
-    std::vector<float> scores(eyes.size());
-    parallel_for(
-        eyes.size(),
-        [&](size_t i) {
-            Candidate<Mis> c;
-            if (!connection<F>(rules, eyes[i], lights[partner(i)], c)) return;
-            const float score = luminance(c.value) * mis_weight(c.ratio) / luminance(eyes[i].throughput);
-            if (!std::isfinite(score) || tracer.occluded<F>(scene, {c.origin, c.tmax, c.direction, uint32_t(i)}))
-                return;
-            scores[i] = score;
-        },
-        size_t(64));
+double mean_score(const Rules<Mis>& rules, const std::vector<SubpathEnd<Mis>>& eyes,
+                  const std::vector<SubpathEnd<Mis>>& lights) {
     double sum = 0;
-    for (const float s : scores) sum += s;
-    const double mean = sum / double(eyes.size()) * found.mean_light_vertices;
-    if (mean > 1e-15 && mean < 1e15) found.unit = float(mean * mean);
-
-    // Upper levels of the same trees, so that an entry has some pairs.
-    const uint32_t cell_levels = 6, cluster_levels = 4, clusters = 1u << cluster_levels;
-    const DrawTree cell_tree = {found.cells.data(), cell_levels},
-                   cluster_tree = {found.clusters.data(), cluster_levels};
-    struct Entry {
-        double pairs = 0, squares = 0;
-    };
-    std::vector<Entry> table(size_t(clusters) << cell_levels);
-    const auto leaf = [](const DrawTree& tree, const SubpathEnd<Mis>& e) {
-        const PilotPoint x = point_of(e);
-        return tree.leaf({x.x[0], x.x[1], x.x[2]}, {x.x[3], x.x[4], x.x[5]});
-    };
-    for (size_t i = 0; i < eyes.size(); ++i) {
-        Entry& e = table[size_t(leaf(cell_tree, eyes[i])) * clusters + leaf(cluster_tree, lights[partner(i)])];
-        ++e.pairs;
-        e.squares += double(scores[i]) * scores[i];
+    for (size_t i = 0; i < eyes.size() && !lights.empty(); ++i) {
+        Candidate<Mis> c;
+        if (!connection<F>(rules, eyes[i], lights[i * 7919 % lights.size()], c)) continue;
+        const float score = luminance(c.value) * mis_weight(c.ratio) / luminance(eyes[i].throughput);
+        if (std::isfinite(score)) sum += score;
     }
-    double uniform = 0, learned = 0;
-    for (size_t row = 0; row < table.size(); row += clusters) {
-        double pairs = 0, squares = 0, roots = 0;
-        for (uint32_t k = 0; k < clusters; ++k) {
-            pairs += table[row + k].pairs;
-            squares += table[row + k].squares;
-            roots += std::sqrt(table[row + k].squares * table[row + k].pairs);
-        }
-        if (pairs > 0) uniform += squares, learned += roots * roots / pairs;
-    }
-    if (learned > 0) found.gain = float(uniform / learned);
+    return sum / double(std::max<size_t>(eyes.size(), 1)) * double(lights.size()) / kSubpaths;
 }
 
 }  // namespace
@@ -194,7 +154,8 @@ DrawCells find_draw_cells(const SceneView& scene, const HostTracer& tracer, cons
     found.mean_light_vertices = double(lights.size()) / kSubpaths;
     found.cells = split_points(points_of(eyes), cell_levels);
     found.clusters = split_points(points_of(lights), cluster_levels);
-    measure_pairs<F>(scene, tracer, rules, eyes, lights, found);
+    const double mean = mean_score<F>(rules, eyes, lights);
+    if (mean > 1e-15 && mean < 1e15) found.unit = float(mean * mean);
     return found;
 }
 

@@ -23,7 +23,6 @@ struct DrawCells {
     std::vector<DrawSplit> cells, clusters;  ///< DrawTree
     double mean_light_vertices = 0;          ///< of a light subpath that connections may use
     float unit = 1.0f;                       ///< of scores: what connections bring, squared
-    float gain = 1.0f;  ///< second moment of uniform draws over that of draws that know cell and cluster, roughly
 };
 
 /// Its subpaths belong to no image (integrators/bdpt/shared/pilot.h).

@@ -52,7 +52,7 @@ struct LearnedIntegrator {
         if (!p.light_subpaths()) return 0.0;
         p.found = find_draw_cells<F>(scene, tracer, p.rules, seed, kCellLevels, kClusterLevels);
         const double mean = p.found.mean_light_vertices;
-        if (p.cache_draws > 0 && mean > 0.0) p.rules.mis.connections = weight(p) * float(p.cache_draws / mean);
+        if (p.cache_draws > 0 && mean > 0.0) p.rules.mis.connections = p.learned.weight * float(p.cache_draws / mean);
         return mean;
     }
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
@@ -104,12 +104,6 @@ struct LearnedIntegrator {
     static uint32_t items_to_learn(const Policy& p) { return p.rules.connect ? kCells >> UpdateDraws::kGroupBits : 0; }
 
 private:
-    /// Learned draws have less variance than their number tells, so that they deserve more weight.
-    static float weight(const Policy& p) {
-        if (p.learned.weight > 0.0f) return p.learned.weight;
-        return std::clamp(p.learned.share * p.found.gain, 1.0f, 4.0f);
-    }
-
     static constexpr uint32_t kCellLevels = 11, kClusterLevels = 8, kCells = 1u << kCellLevels,
                               kClusters = 1u << kClusterLevels;
 };

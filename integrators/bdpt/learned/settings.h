@@ -6,9 +6,8 @@
 namespace ambilux {
 
 struct LearnedSettings {
-    float share = 0.7f;  ///< of draws that follow what was learned
-    float weight =
-        0.0f;  ///< draws that multiple importance sampling counts for each that is made; 0: the pilot decides
+    float share = 0.7f;   ///< of draws that follow what was learned
+    float weight = 2.0f;  ///< draws that multiple importance sampling counts for each that is made
 
     static LearnedSettings plan(const RenderSettings& settings);
 };
