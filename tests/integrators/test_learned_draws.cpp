@@ -139,17 +139,25 @@ TEST_CASE("a draw finds a vertex with the probability that its contribution is d
     CHECK(std::fabs(double(none) - missing) < 5 * std::sqrt(missing));
 }
 
-TEST_CASE("leaves of a tree of cells hold as many points each, and vertices find theirs") {
-    std::vector<PilotPoint> points(4096);
-    for (uint32_t i = 0; i < points.size(); ++i) {
-        const Vec4f u = random_floats({3, i, 0, Stream::test}, 0);
-        points[i] = {{u.x * 10, u.y * u.y, u.z, 0, 0, u.w < 0.5f ? 1.0f : -1.0f}};
+TEST_CASE("leaves of a tree of cells hold as many points each, and some where many points share a coordinate") {
+    for (const bool sides : {false, true}) {
+        std::vector<PilotPoint> points(4096);
+        for (uint32_t i = 0; i < points.size(); ++i) {
+            const Vec4f u = random_floats({3, i, 0, Stream::test}, 0);
+            points[i] = {{u.x * 10, u.y * u.y, u.z, 0, 0, !sides ? u.w : u.w < 0.25f ? 1.0f : -1.0f}};
+        }
+        std::vector<DrawSplit> splits = split_points(points, 6);
+        const DrawTree tree = {splits.data(), 6};
+        std::vector<uint32_t> counts(64);
+        for (const PilotPoint& p : points) ++counts[tree.leaf({p.x[0], p.x[1], p.x[2]}, {p.x[3], p.x[4], p.x[5]})];
+        for (const uint32_t n : counts) {
+            if (sides)
+                CHECK(n > 0);
+            else
+                CHECK(n == 64);
+        }
     }
-    std::vector<DrawSplit> splits = split_points(points, 6);
-    const DrawTree tree = {splits.data(), 6};
-    std::vector<uint32_t> counts(64);
-    for (const PilotPoint& p : points) ++counts[tree.leaf({p.x[0], p.x[1], p.x[2]}, {p.x[3], p.x[4], p.x[5]})];
-    for (const uint32_t n : counts) CHECK(n == 64);
+    const std::vector<PilotPoint> points(3);
     for (const uint32_t few : {0u, 1u, 3u}) CHECK(split_points({points.begin(), points.begin() + few}, 4).size() == 16);
 }
 

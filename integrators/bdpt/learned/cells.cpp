@@ -96,22 +96,22 @@ uint32_t widest(const PilotPoint* begin, const PilotPoint* end, float size) {
     return best;
 }
 
+/// Half of the points on either side, but for those with the coordinate of the one in the middle: they stay together.
 void split(std::vector<DrawSplit>& splits, uint32_t at, PilotPoint* begin, PilotPoint* end, float size) {
     if (at >= splits.size()) return;
-    if (begin == end) splits[at] = {0.0f, 0};
-    PilotPoint* middle = begin + (end - begin) / 2;
+    PilotPoint* middle = begin;
+    splits[at] = {0.0f, 0};
     if (begin != end) {
         const uint32_t axis = widest(begin, end, size);
-        std::nth_element(begin, middle, end,
-                         [axis](const PilotPoint& a, const PilotPoint& b) { return a.x[axis] < b.x[axis]; });
-        const float upper = middle->x[axis],
-                    lower = middle == begin
-                                ? upper
-                                : std::max_element(begin, middle, [axis](const PilotPoint& a, const PilotPoint& b) {
-                                      return a.x[axis] < b.x[axis];
-                                  })->x[axis];
-        const float between = lower + (upper - lower) * 0.5f;
-        splits[at] = {between > lower ? between : upper, axis};
+        const auto below = [axis](const PilotPoint& a, const PilotPoint& b) { return a.x[axis] < b.x[axis]; };
+        PilotPoint* half = begin + (end - begin) / 2;
+        std::nth_element(begin, half, end, below);
+        float value = half->x[axis];
+        if (value == std::min_element(begin, end, below)->x[axis])
+            for (const PilotPoint* p = half; p != end; ++p)
+                if (p->x[axis] > half->x[axis] && (value == half->x[axis] || p->x[axis] < value)) value = p->x[axis];
+        splits[at] = {value, axis};
+        middle = std::partition(begin, end, [&](const PilotPoint& p) { return p.x[axis] < value; });
     }
     split(splits, 2 * at, begin, middle, size);
     split(splits, 2 * at + 1, middle, end, size);

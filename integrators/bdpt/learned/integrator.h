@@ -104,7 +104,7 @@ struct LearnedIntegrator {
     static uint32_t items_to_learn(const Policy& p) { return p.rules.connect ? kCells >> UpdateDraws::kGroupBits : 0; }
 
 private:
-    static constexpr uint32_t kCellLevels = 11, kClusterLevels = 8, kCells = 1u << kCellLevels,
+    static constexpr uint32_t kCellLevels = 9, kClusterLevels = 8, kCells = 1u << kCellLevels,
                               kClusters = 1u << kClusterLevels;
 };
 
