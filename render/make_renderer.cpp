@@ -24,12 +24,15 @@ RenderSettings settled(const RenderSettings& settings, const Variant& variant, b
     return s;
 }
 
-/// The smallest level of features that covers the scene.
-const CompiledRenderer& compiled_for(const Scene& scene, const RenderSettings& s) {
+/// The smallest level of features that covers the scene, of those that the backend is compiled for.
+CompiledRenderer::Make compiled_for(bool cuda, const Scene& scene, const RenderSettings& s) {
     const Features needed = s.specialise && s.fuse != Fuse::none ? scene.features : kAllFeatures;
     const Variant& variant = variant_of(s);
-    for (const CompiledRenderer& r : compiled_renderers())
-        if (r.integrator == variant.integrator && r.variant == variant.variant && r.level.covers(needed)) return r;
+    for (const CompiledRenderer& r : compiled_renderers()) {
+        const CompiledRenderer::Make make = cuda ? r.cuda : r.cpu;
+        if (make && r.integrator == variant.integrator && r.variant == variant.variant && r.level.covers(needed))
+            return make;
+    }
     throw Error(ExitCode::usage, fmt::format("{}: integrators/registry.list has no level All for it", variant.name()));
 }
 
@@ -43,8 +46,7 @@ std::unique_ptr<Renderer> make_on(bool cuda, const Scene& scene, const RenderSet
                     "this program was built without CUDA: install the CUDA toolkit and build again, "
                     "or use --backend cpu");
 #endif
-    const CompiledRenderer& made = compiled_for(scene, s);
-    return (cuda ? made.cuda : made.cpu)(scene, s, accels);
+    return compiled_for(cuda, scene, s)(scene, s, accels);
 }
 
 std::unique_ptr<Renderer> make_from(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {

@@ -104,18 +104,18 @@ TEST_CASE("any number of light subpaths gives the direct light of a lamp, by t =
 
 TEST_CASE("light subpaths of one slot differ: four times as many have a quarter of the variance") {
     const Scene scene = project_scene("cornell", 32, 32);
-    const auto variance = [&](const char* light_paths, uint64_t seed) {
+    const auto variance = [&](const char* light_paths, uint64_t seed, uint32_t spp) {
         const FilmMoments film =
-            render_scene(scene, with_light_paths(method_settings(scene, kLightTracer, seed), light_paths), 256).film;
+            render_scene(scene, with_light_paths(method_settings(scene, kLightTracer, seed), light_paths), spp).film;
         double sum = 0;
         for (size_t i = 0; i < film.sum.size(); ++i) sum += film.variance(i);
         return sum;
     };
-    for (const auto& [few, many] : {std::pair{"1", "4"}, {"0.25", "1"}, {"4", "16"}}) {
+    for (const auto& [few, many, spp] : {std::tuple{"1", "4", 128u}, {"0.25", "1", 256u}, {"4", "16", 64u}}) {
         double ratio = 0, square = 0;
         constexpr int kSeeds = 8;
         for (uint64_t seed = 1; seed <= kSeeds; ++seed) {
-            const double r = variance(few, seed) / variance(many, seed + 100);
+            const double r = variance(few, seed, spp) / variance(many, seed + 100, spp);
             ratio += r / kSeeds;
             square += r * r / kSeeds;
         }
