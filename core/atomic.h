@@ -17,6 +17,15 @@ AMBILUX_HD void add_count(uint64_t* counter, int64_t n) {
 #endif
 }
 
+/// One more. Returns what it was.
+AMBILUX_HD uint32_t fetch_add(uint32_t* counter) {
+#if defined(__CUDA_ARCH__)
+    return atomicAdd(counter, 1u);
+#else
+    return (*counter)++;
+#endif
+}
+
 /// Threads of a host may share `sum` too. Returns what it was.
 AMBILUX_HD int64_t fetch_add_shared(int64_t* sum, int64_t value) {
 #if defined(__CUDA_ARCH__)

@@ -49,7 +49,7 @@ Declaration<S> light_paths() {
         s.light_subpaths_per_tile = uint32_t(per_tile);
     };
     return {key, fmt::format("{} in multiples of 1/{}", allowed_numbers(kLeast, kMost), kTilePixels),
-            "light subpaths per pixel; with connections in variant lvc only", set,
+            "light subpaths per pixel; with connections in the variants lvc and learned only", set,
             [](const S& s) -> SettingValue { return float(s.light_subpaths_per_tile) / kTilePixels; }};
 }
 
@@ -64,6 +64,7 @@ bool weighs(const VariantTraits& v, bool) { return v.weights; }
 bool culls(const VariantTraits& v, bool) { return v.culls; }
 bool gathers_strategies(const VariantTraits& v, bool) { return v.strategy_images; }
 bool draws_vertices(const VariantTraits& v, bool) { return v.draws; }
+bool draws_together(const VariantTraits& v, bool) { return v.draws_together; }
 bool sorts(const VariantTraits& v, bool) { return v.sorts; }
 bool compacts(const VariantTraits& v, bool) { return v.compacts; }
 bool repeats(const VariantTraits& v, bool cuda) { return v.repeats || !cuda; }
@@ -159,7 +160,7 @@ std::vector<Setting> estimator_settings() {
             .image_attribute(),
         Is(Of::choice("draws", &S::draws, {"auto", "coherent", "independent"},
                       "lanes of a warp draw light vertices that lie together (auto on CUDA), or each for itself"))
-            .where(draws_vertices, "no light vertices are drawn")
+            .where(draws_together, "no light vertices are drawn, or as was learned")
             .chosen_by_auto()
             .limit("coherent", on_cuda, "lanes of a warp draw together"),
         Is(light_paths())

@@ -9,6 +9,7 @@ struct VariantTraits {
     bool strategies = false;       ///< strategies (s,t) to choose from
     bool light_subpaths = false;   ///< subpaths that start on emitters
     bool draws = false;            ///< eye vertices draw light vertices from a cache
+    bool draws_together = false;   ///< lanes of a warp may draw vertices that lie together
     bool strategy_images = false;  ///< gathers images of single strategies
     bool weights = true;           ///< weighs strategies against each other
     bool culls = true;             ///< has shadow rays that Russian roulette may drop

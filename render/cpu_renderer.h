@@ -35,6 +35,7 @@ public:
             take_accel(settings, accels);
             double mean = 0;
             if constexpr (kFilmWide) mean = Integrator::pilot(policy_, view_, tracer_, settings.seed);
+            if constexpr (kLearns) allocate_kept();
             fit(mean);
             allocate_film();
             waves_.resize(size_t(arena_.max_concurrency()));
@@ -60,6 +61,7 @@ public:
                 parallel_for(chunks,
                              [&](uint32_t c) { render_tiles(c * wave_.tiles, wave_.tiles, first + done, pass); });
                 if constexpr (kFilmWide) update_film(first + done);
+                if constexpr (kLearns) learn();
             });
             done += pass;
             measured_seconds_ = seconds_since(pass_start);
@@ -119,6 +121,9 @@ public:
 
 private:
     static constexpr bool kFilmWide = Integrator::kFilmWide;
+    /// It keeps something from wave to wave, which is brought up to date after each sample.
+    static constexpr bool kLearns =
+        requires(Layout& layout, typename Integrator::Policy& policy) { Integrator::lay_out_kept(layout, policy); };
 
     /// Queues of one thread. They grow when a wave has more light vertices than any before.
     struct WaveMemory {
@@ -188,9 +193,22 @@ private:
         film_.height = wave_.height;
         each_array([](auto& array, uint64_t values) { array.resize(values); });
     }
+    void allocate_kept() {
+        Layout plan;
+        Integrator::lay_out_kept(plan, policy_);
+        kept_ = std::vector<Lane>((plan.bytes() + sizeof(Lane) - 1) / sizeof(Lane));
+        Layout placed(plan, reinterpret_cast<std::byte*>(kept_.data()));
+        Integrator::lay_out_kept(placed, policy_);
+        Integrator::fill_kept(policy_,
+                              [](auto* to, const auto& values) { std::copy(values.begin(), values.end(), to); });
+    }
+    void learn() {
+        const auto stage = Integrator::learn(policy_, &film_state_, nullptr);
+        if (stage.is_due()) parallel_for(Integrator::items_to_learn(policy_), [&](uint32_t i) { stage(i); }, 64u);
+    }
     /// All but the waves.
     RenderBytes fixed_bytes() {
-        uint64_t film = 0;
+        uint64_t film = kept_.size() * sizeof(Lane);
         each_array([&](const auto& array, uint64_t values) { film += values * sizeof(array[0]); });
         return {scene_bytes(scene_, TextureMemory::device), accel_bytes_, film, 0};
     }
@@ -324,7 +342,7 @@ private:
     HostTracer tracer_;
     std::shared_ptr<const void> accel_;
     std::vector<WaveMemory> waves_;
-    std::vector<Lane> film_samples_;
+    std::vector<Lane> film_samples_, kept_;
     std::vector<double> splats_, strategies_;
     std::vector<uint64_t> strategies_dropped_;
     FilmMoments film_;

@@ -26,6 +26,9 @@ namespace ambilux {
 template <class Integrator, Features F>
 class CudaRenderer final : public Renderer {
     static constexpr bool kFilmWide = Integrator::kFilmWide;
+    /// It keeps something from wave to wave, which is brought up to date after each.
+    static constexpr bool kLearns =
+        requires(Layout& layout, typename Integrator::Policy& policy) { Integrator::lay_out_kept(layout, policy); };
     using Stages = typename Integrator::Stages;
 
 public:
@@ -38,6 +41,7 @@ public:
         else
             take(accels.get<CwbvhAccel>()->arrays(), accels);
         device_scene_->drop_texels();
+        if constexpr (kLearns) allocate_kept();
         const uint64_t room = room_for_film_and_waves();
         prefer(settings.memory ? room : room / 2);
         fit(room, true);
@@ -165,6 +169,11 @@ private:
             if constexpr (requires { Stages::kTracesConnections; })
                 policy_.traces_connections = Stages::kTracesConnections && traces_connections(policy_, arrays.bytes());
         }
+        if constexpr (kLearns) {
+            Layout plan;
+            Integrator::lay_out_kept(plan, policy_);
+            learned_bytes_ = plan.bytes();
+        }
         scene_bytes_ = scene_bytes(scene_, settings_.textures);
         accel_bytes_ = arrays.bytes();
         plan_.shape_least();
@@ -203,10 +212,12 @@ private:
         Layout plan;
         lay_out_film(plan, plan_.film_wave, policy_.waves, kFilmWide);
         const uint64_t film = with_film ? plan.bytes() : film_memory_.bytes();
-        refuse_budget(settings_, {scene_bytes_, accel_bytes_, film + image_bytes(), needed - (with_film ? film : 0)});
+        refuse_budget(settings_, {scene_bytes_, accel_bytes_, film + image_bytes() + learned_bytes_, needed - (with_film ? film : 0)});
     }
-    /// Of the scene, its structure, a clock, and an image that may be asked for.
-    uint64_t fixed_bytes() const { return scene_bytes_.total() + accel_bytes_ + sizeof(uint64_t) + image_bytes(); }
+    /// Of the scene, its structure, what waves learn, a clock, and an image that may be asked for.
+    uint64_t fixed_bytes() const {
+        return scene_bytes_.total() + accel_bytes_ + learned_bytes_ + sizeof(uint64_t) + image_bytes();
+    }
     uint64_t image_bytes() const { return film_values() * sizeof(float); }
     /// Of what is free, and of what is left of a budget.
     uint64_t room_for_film_and_waves() const {
@@ -221,7 +232,19 @@ private:
     }
     uint64_t held_bytes() const {
         return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) + film_memory_.bytes() +
-               clock_.bytes() + memory_.bytes() + taken_.bytes();
+               kept_.bytes() + clock_.bytes() + memory_.bytes() + taken_.bytes();
+    }
+    void allocate_kept() {
+        Layout plan;
+        Integrator::lay_out_kept(plan, policy_);
+        kept_ = DeviceBuffer<std::byte>(plan.bytes(), "what waves learn");
+        kept_.zero();
+        Layout placed(plan, kept_.data());
+        Integrator::lay_out_kept(placed, policy_);
+        Integrator::fill_kept(policy_, [](auto* to, const auto& values) {
+            cuda_check(cudaMemcpy(to, values.data(), values.size() * sizeof(*to), cudaMemcpyHostToDevice),
+                       "what waves learn");
+        });
     }
     /// `more`: what is not the renderer's for long.
     void note_peak(uint64_t more = 0) { peak_ = std::max(peak_, held_bytes() + more); }
@@ -244,6 +267,7 @@ private:
         part_samples_ = film.samples;
         const CwbvhTracer tracer = accel_ ? accel_->tracer() : CwbvhTracer();
         layout.record(UpdateFilm::kName);
+        if constexpr (kLearns) layout.record(Integrator::kLearnName);
         return {state, order, Stages(layout, device_view(), tracer, policy_, plan_.wave, queues, film)};
     }
     uint64_t film_values() const { return uint64_t(plan_.wave.width) * plan_.wave.height * 3; }
@@ -282,6 +306,10 @@ private:
     void run(Executor& exec) {
         Integrator::schedule(exec, *stages_);
         if (!plan_.in_parts()) update_film(exec);
+        if constexpr (kLearns) {
+            const auto learn = Integrator::learn(policy_, state_, layout_.record(Integrator::kLearnName));
+            if (const uint32_t items = Integrator::items_to_learn(policy_)) exec.run_slots(learn, items, 1);
+        }
         exec.finish_wave();
     }
     /// Of all pixels of plan_.film_wave.
@@ -359,7 +387,7 @@ private:
     std::string device_name_ = cuda_device_name();  ///< asked for once: stats() is called often
     DevicePlan plan_{scene_, settings_, policy_.waves, kFilmWide};
     SceneBytes scene_bytes_{};  ///< on the device
-    uint64_t accel_bytes_ = 0, peak_ = 0;
+    uint64_t accel_bytes_ = 0, learned_bytes_ = 0, peak_ = 0;
     uint32_t next_tile_ = 0;  ///< where a sample goes on of which only parts are done
     Layout layout_;
     std::vector<StageRecord> records_;    ///< as last read: they outlast a failure to grow
@@ -370,7 +398,7 @@ private:
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceCwbvh> accel_;
     std::optional<DevicePairs> pairs_;  ///< instead, with accel=bvh2
-    DeviceBuffer<std::byte> memory_, film_memory_;
+    DeviceBuffer<std::byte> memory_, film_memory_, kept_;
     DeviceBuffer<double> taken_;  ///< by take_film
     FilmBuffers film_{};
     Lane* part_samples_ = nullptr;  ///< of eye subpaths, by slot of the wave

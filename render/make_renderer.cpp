@@ -19,7 +19,7 @@ RenderSettings settled(const RenderSettings& settings, const Variant& variant, b
         s.queues.ordering = cuda && variant.traits.sorts && several ? Ordering::material : Ordering::none;
     s.queues.keyed_hits =
         s.queues.ordering == Ordering::material && s.queues.compaction == Compaction::atomic && several;
-    if (s.draws == CacheDraws::automatic && variant.traits.draws)
+    if (s.draws == CacheDraws::automatic && variant.traits.draws_together)
         s.draws = cuda ? CacheDraws::coherent : CacheDraws::independent;
     return s;
 }

@@ -10,27 +10,28 @@
 
 namespace ambilux {
 
-/// The eye end `z` of `slot` and light vertex `light`, which lies at `place`. `Out` takes candidates. The scale is
-/// asked for last: until then no register keeps it.
-template <Features F, class Out>
-AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Rules<BidirectionalMis>& rules,
-                                     const LightVertexSource& source, const WaveState& state, const Draws& draws,
-                                     const BidirectionalEnd& z, uint32_t slot, const ConnectionVertex& light,
-                                     uint32_t place, bool seeds, const Out& candidates, StageRecord* record) {
+/// The eye end `z` of `slot` and light vertex `light`, which lies at `place`. `Out` takes candidates. The scale of the
+/// `Draw` is asked for last: until then no register keeps it.
+template <Features F, class Draw, class Out>
+AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Rules<BidirectionalMis>& rules, const Draw& draw,
+                                     const WaveState& state, const Draws& draws, const BidirectionalEnd& z,
+                                     uint32_t slot, const ConnectionVertex& light, uint32_t place, bool seeds,
+                                     const Out& candidates, StageRecord* record) {
     const BidirectionalEnd y = unpack_end<F>(scene, light);
     Candidate<BidirectionalMis> c;
     if (!connection<F>(rules, z, y, c)) return;
-    c.value *= source.scale(state);
+    if constexpr (requires { draw.mark(c, z.throughput, state); }) draw.mark(c, z.throughput, state);
+    c.value *= draw.scale(state);
     if (!is_valid_radiance(c.value, record)) return;
-    const uint32_t which = connection_ray(z.depth, source.draws > 0 ? kMaxDepth + place : y.depth);
+    const uint32_t which = connection_ray(z.depth, draw.from_cache() ? kMaxDepth + place : y.depth);
     candidates.push(pack_candidate(c, slot, seeds ? draws.shadow_seed(which) : 0));
 }
 
 /// At an eye vertex: next event estimation, and the first pair for connect_vertices.
-template <Features F, class Out>
+template <Features F, class Out, class Source = LightVertexSource>
 struct NextEventAndPair {
     NextEvent<F, BidirectionalMis, Out> next_event;
-    LightVertexSource source;
+    Source source;
     Queue<ConnectionVertex> eye_vertices;
     Queue<PairItem> pairs;
 
@@ -40,18 +41,19 @@ struct NextEventAndPair {
         if (!rules.connect) return;
         const Warp warp;
         uint32_t next = source.first(slot);
-        const uint32_t light = LightVertexSearch{source, draws.key, path.depth, v, rules.max_depth}.find(next);
+        const uint32_t link = source.link(v, slot),
+                       light = source.search(draws.key, path.depth, v, rules.max_depth, link).find(next);
         if (light != kNone)
-            pairs.push({push_vertex<F>(eye_vertices, pack_connection_vertex(v, path, slot)), light, slot, next});
+            pairs.push({push_vertex<F>(eye_vertices, pack_connection_vertex(v, path, link)), light, slot, next});
         warp.meet();  // else lanes that search longer than others stay apart
     }
 };
 
 /// At an eye vertex of a host: next event estimation and all pairs, in the same order and of the same vertices.
-template <Features F, class Out>
+template <Features F, class Out, class Source = LightVertexSource>
 struct NextEventAndConnections {
     Clocked<NextEvent<F, BidirectionalMis, Out>> next_event;
-    LightVertexSource source;
+    Source source;
     const WaveState* state;
     StageRecord* record;  ///< of connect_vertices
 
@@ -60,20 +62,21 @@ struct NextEventAndConnections {
         if (rules.next_event) next_event.at(scene, rules, v, path, slot, draws);
         if (!rules.connect) return;
         const FusedClock clock(record, true);
-        const LightVertexSearch lights = {source, draws.key, path.depth, v, rules.max_depth};
+        const auto lights = source.search(draws.key, path.depth, v, rules.max_depth, source.link(v, slot));
         uint32_t next = source.first(slot), found = lights.find(next);
         if (found == kNone) return;
         const BidirectionalEnd end = unpack_end<F>(scene, pack_connection_vertex(v, path, slot));
         for (; found != kNone; found = lights.find(next)) {
             record->count_item(path.depth);
-            push_connection<F>(scene, rules, source, *state, draws, end, slot, load_vertex<F>(source.vertices, found),
-                               found, next_event.inner.seeds, next_event.inner.candidates, record);
+            push_connection<F>(scene, rules, lights.draw(found), *state, draws, end, slot,
+                               load_vertex<F>(source.vertices, found), found, next_event.inner.seeds,
+                               next_event.inner.candidates, record);
         }
     }
 };
 
 /// The pairs of an eye vertex one after the other. Pairs for whose candidates there is no capacity are deferred.
-template <Features F, class Out>
+template <Features F, class Out, class Source = LightVertexSource>
 struct ConnectVertices {
     static constexpr const char* kName = "connect_vertices";
 
@@ -82,7 +85,7 @@ struct ConnectVertices {
     Rules<BidirectionalMis> rules;
     Queue<PairItem> pairs, deferred;
     Queue<ConnectionVertex> vertices;
-    LightVertexSource source;
+    Source source;
     Out candidates;
     uint32_t candidate_capacity;
     const QueueCounter* candidate_counter;
@@ -128,12 +131,15 @@ struct ConnectVertices {
         const uint32_t place = pair.light;
         // Before anything waits for the eye vertex.
         const ConnectionVertex light = load_vertex<F>(source.vertices, place);
-        const BidirectionalEnd z = unpack_end<F>(scene, load_vertex<F>(vertices, pair.vertex));
+        const ConnectionVertex eye = load_vertex<F>(vertices, pair.vertex);
+        const BidirectionalEnd z = unpack_end<F>(scene, eye);
         const Draws draws = {wave.key(pair.path)};
         const Warp warp;
-        pair.light = LightVertexSearch{source, draws.key, z.depth, z.vertex, rules.max_depth}.find(pair.next);
+        const auto search = source.search(draws.key, z.depth, z.vertex, rules.max_depth, eye.front.link);
+        pair.light = search.find(pair.next);
         warp.meet();  // else lanes that search longer than others stay apart
-        push_connection<F>(scene, rules, source, *wave.state, draws, z, pair.path, light, place, seeds, out, record);
+        push_connection<F>(scene, rules, search.draw(place), *wave.state, draws, z, pair.path, light, place, seeds, out,
+                           record);
         if (pair.light == kNone) return false;
         ++count.steps;
         return true;

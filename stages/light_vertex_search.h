@@ -3,12 +3,17 @@
 #pragma once
 
 #include "core/warp.h"
+#include "stages/occlude.h"
 #include "stages/stage.h"
 
 namespace ambilux {
 
+struct LightVertexSearch;
+
 /// The light vertices of a wave.
 struct LightVertexSource {
+    using Learn = LearnNothing;
+
     LightVertices vertices;
     const uint32_t* last_vertex;  ///< per slot: of its light subpath. Not used by draws
     uint32_t draws;               ///< of an eye vertex from all vertices; 0: those of the light subpath of its slot
@@ -16,6 +21,13 @@ struct LightVertexSource {
 
     /// Where a search starts; kNone: there is nothing to connect with.
     AMBILUX_HD uint32_t first(uint32_t slot) const { return draws > 0 ? draws : last_vertex[slot]; }
+
+    AMBILUX_HD bool from_cache() const { return draws > 0; }
+    static LearnNothing learn() { return {}; }
+    /// What the queue of eye vertices keeps of the vertex `v` of a slot (ConnectionVertexFront::link).
+    AMBILUX_HD static uint32_t link(const BidirectionalVertex&, uint32_t slot) { return slot; }
+    AMBILUX_HD LightVertexSearch search(const RngKey& key, uint32_t depth, const BidirectionalVertex& z,
+                                        uint32_t max_depth, uint32_t link) const;
 
     /// What a connection is worth: M vertices of N subpaths are in a cache, and k draws estimate the sum over a
     /// subpath's vertices by M / (N k) times theirs.
@@ -45,6 +57,9 @@ struct LightVertexSearch {
     const BidirectionalVertex& z;
     uint32_t max_depth;  ///< of a path
 
+    /// How the light vertex at `place` was found.
+    AMBILUX_HD const LightVertexSource& draw([[maybe_unused]] uint32_t place) const { return source; }
+
     /// The next one, kNone if there is none, from `next` on, which goes on: a vertex of the light subpath of the same
     /// slot, or, over a cache, the number of draws that are left.
     AMBILUX_HD uint32_t find(uint32_t& next) const {
@@ -64,5 +79,10 @@ struct LightVertexSearch {
         return kNone;
     }
 };
+
+AMBILUX_HD LightVertexSearch LightVertexSource::search(const RngKey& key, uint32_t depth, const BidirectionalVertex& z,
+                                                       uint32_t max_depth, uint32_t) const {
+    return {*this, key, depth, z, max_depth};
+}
 
 }  // namespace ambilux

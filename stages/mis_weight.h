@@ -56,11 +56,12 @@ struct WeighCandidates {
     AMBILUX_HD void operator()(uint32_t i) const { push(candidates.load(i)); }
 
     AMBILUX_HD uint32_t push(const CandidateItem& c) const {
-        ShadowItem item;
+        typename Out::value_type item;
         return weigh(c, item) ? shadows.push(item) : 0;
     }
     /// False if nothing is left to be tested.
-    AMBILUX_HD bool weigh(const CandidateItem& c, ShadowItem& item) const {
+    template <class Item>
+    AMBILUX_HD bool weigh(const CandidateItem& c, Item& item) const {
         Rgb value;
         if (!weighted_light(c.value, c.ratio, record, value)) return false;
         if (cull > 0.0f && c.tmax != kTowardsEnvironment) {
@@ -69,7 +70,7 @@ struct WeighCandidates {
             value *= factor;
         }
         strategies.remember(c.path, c.value, c.strategy);
-        item = {value, c.path, c.origin, c.tmax, c.direction, c.opacity_seed};
+        make_shadow(c, value, item);
         return true;
     }
 };

@@ -8,9 +8,20 @@
 
 namespace ambilux {
 
-/// Shadow rays of eye vertices. `Out` takes contributions.
-template <Features F, class Tracer, class Out>
+/// Nothing is learned from shadow rays.
+struct LearnNothing {
+    using Item = ShadowItem;
+
+    AMBILUX_HD static const ShadowItem& ray(const ShadowItem& item) { return item; }
+    AMBILUX_HD void arrive(const ShadowItem&) const {}
+};
+
+/// Shadow rays of eye vertices. `Out` takes contributions, `Learn` sees those that are free.
+template <Features F, class Tracer, class Out, class Learn = LearnNothing>
 struct Occlude {
+    using Item = typename Learn::Item;
+    static constexpr bool kLearns = !std::is_same_v<Learn, LearnNothing>;
+
     static constexpr const char* kName = "occlude";
     static constexpr Features kFeatures = F;
     static constexpr bool kAnyHit = true;
@@ -18,15 +29,17 @@ struct Occlude {
 
     SceneView scene;
     Tracer tracer;
-    Queue<ShadowItem> shadows;
+    Queue<Item> shadows;
     Out contributions;
     StageRecord* record;
     StrategyFilm strategies;
+    [[no_unique_address]] Learn learn = {};
 
-    const Queue<ShadowItem>& items() const { return shadows; }
+    const Queue<Item>& items() const { return shadows; }
 
     AMBILUX_HD bool fetch(uint32_t i, Ray& ray, Kept& kept) const {
-        const ShadowItem item = shadows.load(i);
+        const Item whole = shadows.load(i);
+        const ShadowItem& item = Learn::ray(whole);
         kept = {item.value, item.path};
         // The sample that light would be added to. In kernels for environments this costs more than it brings.
         if constexpr (!F.has_environment() && requires { contributions.samples; })
@@ -35,14 +48,15 @@ struct Occlude {
     }
     AMBILUX_HD void finish([[maybe_unused]] uint32_t i, Kept kept, bool blocked) const {
         if (blocked) return;
-        if constexpr (F.has_environment())
+        if constexpr (F.has_environment() || kLearns)
             arrive(kept, shadows.load(i));
         else
             contributions.push(kept);
     }
     AMBILUX_HD void operator()(uint32_t i) const { process(shadows.load(i)); }
-    AMBILUX_HD void process(const ShadowItem& item) const {
-        if (is_free(item)) arrive({item.value, item.path}, item);
+    AMBILUX_HD void process(const Item& whole) const {
+        const ShadowItem& item = Learn::ray(whole);
+        if (is_free(item)) arrive({item.value, item.path}, whole);
     }
     AMBILUX_HD bool is_free(const ShadowItem& item) const {
         Ray ray;
@@ -61,7 +75,9 @@ private:
         ray = {item.origin, fabsf(item.tmax), item.direction, item.opacity_seed};
         return is_valid_ray(item.origin, item.direction, record);
     }
-    AMBILUX_HD void arrive(Kept kept, const ShadowItem& item) const {
+    AMBILUX_HD void arrive(Kept kept, const Item& whole) const {
+        [[maybe_unused]] const ShadowItem& item = Learn::ray(whole);
+        learn.arrive(whole);
         if constexpr (F.has_environment()) {
             if (item.tmax == kTowardsEnvironment) {
                 const Rgb radiance = environment_radiance<F>(scene, item.direction);

@@ -75,6 +75,8 @@ private:
 /// that makes them ends is traced by a launch.
 template <class Stage>
 struct Gathered {
+    using value_type = typename std::remove_cvref_t<decltype(std::declval<Stage>().items())>::value_type;
+
     Stage stage;
     const WaveState* state;
     uint32_t most;

@@ -10,43 +10,47 @@
 
 namespace ambilux {
 
-/// Queues that lie between the stages of one depth.
-struct EyeQueues {
+/// Queues that lie between the stages of one depth. `Shadow`: Occlude::Item.
+template <class Shadow>
+struct EyeQueuesOf {
     Queue<VertexItem> vertices;
     Queue<EmissionItem> emission;
     Queue<Contribution> emission_contributions;
     Queue<CandidateItem> candidates;
-    Queue<ShadowItem> shadows;
+    Queue<Shadow> shadows;
     Queue<Contribution> shadow_contributions;
     Lane* raw;  ///< StrategyFilm
 
-    EyeQueues() = default;
+    EyeQueuesOf() = default;
     /// `slots`: items of a depth; `paths`: of the wave; `connects`: rules let vertices be connected with anything.
     template <Fusion K, Features F, class Mis>
-    static EyeQueues lay_out(Layout& layout, uint32_t slots, uint32_t paths, const Rules<Mis>& rules,
-                             const WavePolicy& waves) {
+    static EyeQueuesOf lay_out(Layout& layout, uint32_t slots, uint32_t paths, const Rules<Mis>& rules,
+                               const WavePolicy& waves) {
         const bool by_path = waves.queues.fixed_places(),
                    hits = !K.weigh && (rules.count_hits || rules.count_environment);
         const uint32_t connects = rules.next_event || rules.connect ? slots : 0, emits = hits ? slots : 0;
-        EyeQueues q;
+        EyeQueuesOf q;
         q.vertices = layout.queue<VertexItem>("vertices", K.connect ? 0 : connects, by_path, VertexItem::lanes<F>());
         q.emission = layout.queue<EmissionItem>("emission", emits, by_path);
         q.emission_contributions = layout.queue<Contribution>("emission_contributions", emits, by_path);
         q.candidates = layout.queue<CandidateItem>("candidates", K.weigh ? 0 : connects, by_path);
-        q.shadows = layout.queue<ShadowItem>("shadows", connects, by_path && !K.occlude);
+        q.shadows = layout.queue<Shadow>("shadows", connects, by_path && !K.occlude);
         q.shadow_contributions = layout.queue<Contribution>("shadow_contributions", K.weigh ? 0 : connects, by_path);
         q.raw = layout.allocate<Lane>(waves.strategy_depth ? paths : 0);
         return q;
     }
 };
 
-/// The stages behind the vertex stages.
-template <Features F, class Tracer, Fusion K>
+using EyeQueues = EyeQueuesOf<ShadowItem>;
+
+/// The stages behind the vertex stages. `Learn`: see Occlude.
+template <Features F, class Tracer, Fusion K, class Learn = LearnNothing>
 struct EyeSide {
+    using Queues = EyeQueuesOf<typename Learn::Item>;
     using Contributions = std::conditional_t<K.weigh, Accumulate, Queue<Contribution>>;
     using EmissionStage = WeighEmission<Contributions>;
-    using OccludeStage = Occlude<F, Tracer, Contributions>;
-    using Shadows = std::conditional_t<K.occlude, Gathered<OccludeStage>, Queue<ShadowItem>>;
+    using OccludeStage = Occlude<F, Tracer, Contributions, Learn>;
+    using Shadows = std::conditional_t<K.occlude, Gathered<OccludeStage>, Queue<typename Learn::Item>>;
     using WeighStage = WeighCandidates<Shadows>;
     using Emission = std::conditional_t<K.weigh, EmissionStage, Queue<EmissionItem>>;
     using Candidates = std::conditional_t<K.weigh, WeighStage, Queue<CandidateItem>>;
@@ -56,8 +60,8 @@ struct EyeSide {
     OccludeStage occlude;
     WeighStage weigh;
 
-    EyeSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave, const EyeQueues& q,
-            const FilmBuffers& film, const WavePolicy& waves) {
+    EyeSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave, const Queues& q,
+            const FilmBuffers& film, const WavePolicy& waves, const Learn& learn = {}) {
         const StrategyFilm strategies = {film.strategies, film.strategies_dropped, q.raw, waves.strategy_depth};
         StageRecord* const accumulates = layout.record(Accumulate::kName);
         StageRecord* const weighs = layout.record(WeighStage::kName);
@@ -70,7 +74,8 @@ struct EyeSide {
                    q.shadows,
                    choose<K.weigh>(accumulate, q.shadow_contributions),
                    layout.record(OccludeStage::kName),
-                   strategies};
+                   strategies,
+                   learn};
         // One by one where a path keeps what came of its last candidate, or what it has brought decides about the next.
         const uint32_t gathered = strategies.sums || waves.cull > 0.0f ? 1 : q.shadows.capacity();
         weigh = {q.candidates, choose<K.occlude>(Gathered<OccludeStage>{occlude, wave.state, gathered}, q.shadows),
@@ -88,8 +93,8 @@ struct EyeSide {
 };
 
 /// Emission of one depth: weighted, added to its paths.
-template <class Executor, Features F, class Tracer, Fusion K>
-void run_emission([[maybe_unused]] Executor& exec, [[maybe_unused]] const EyeSide<F, Tracer, K>& eye) {
+template <class Executor, Features F, class Tracer, Fusion K, class Learn>
+void run_emission([[maybe_unused]] Executor& exec, [[maybe_unused]] const EyeSide<F, Tracer, K, Learn>& eye) {
     if constexpr (!K.weigh) {
         exec.run(eye.weigh_emission);
         exec.run(eye.accumulate_emission);
@@ -97,8 +102,8 @@ void run_emission([[maybe_unused]] Executor& exec, [[maybe_unused]] const EyeSid
 }
 
 /// Candidates of one launch: weighted, tested, added to their paths. `several`: there may be several of a path.
-template <class Executor, Features F, class Tracer, Fusion K>
-void run_candidates(Executor& exec, const EyeSide<F, Tracer, K>& eye, bool several) {
+template <class Executor, Features F, class Tracer, Fusion K, class Learn>
+void run_candidates(Executor& exec, const EyeSide<F, Tracer, K, Learn>& eye, bool several) {
     if constexpr (!K.weigh) exec.run(eye.weigh);
     if constexpr (K.occlude)
         exec.trace_gathered(eye.occlude);

@@ -13,6 +13,7 @@ namespace ambilux {
 /// Keeps the last item that a stage pushed.
 template <class Item>
 struct LastItem {
+    using value_type = Item;
     Item* item;
     bool* pushed;
 

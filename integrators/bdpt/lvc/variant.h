@@ -11,6 +11,7 @@ struct LvcVariant {
     static constexpr VariantTraits kTraits = {.strategies = true,
                                               .light_subpaths = true,
                                               .draws = true,
+                                              .draws_together = true,
                                               .strategy_images = true,
                                               .repeats = false,
                                               .finds_all_light = true};

@@ -11,9 +11,10 @@ namespace ambilux {
 
 /// Memory of one wave. Most queues hold the most they can ever be given, since a slot has one item at a time. Of shadow
 /// rays it may have several, as many as there is capacity for.
-struct TwoSidesMemory {
+template <class Shadow>
+struct TwoSidesMemoryOf {
     SubpathQueues<SubpathRay> subpaths;
-    EyeQueues eye;
+    EyeQueuesOf<Shadow> eye;
     SplatQueues splats;
     Queue<ConnectionVertex> eye_vertices;  ///< of one depth, for pairs
     LightVertices light_vertices;
@@ -21,12 +22,12 @@ struct TwoSidesMemory {
     uint32_t* last_vertex;
 
     template <Fusion K, Features F>
-    static TwoSidesMemory lay_out(Layout& layout, const BdptPolicy& p, WaveSize n) {
+    static TwoSidesMemoryOf lay_out(Layout& layout, const BdptPolicy& p, WaveSize n) {
         const bool by_path = p.waves.queues.fixed_places();
         const uint32_t lanes = ConnectionVertex::lanes<F>(), pairs = p.rules.connect && !K.occlude ? n.slots : 0;
-        TwoSidesMemory m;
+        TwoSidesMemoryOf m;
         m.subpaths = {layout, n.slots, p.waves.queues};
-        m.eye = EyeQueues::lay_out<K, F>(layout, n.slots, n.slots, p.rules, p.waves);
+        m.eye = EyeQueuesOf<Shadow>::template lay_out<K, F>(layout, n.slots, n.slots, p.rules, p.waves);
         m.splats = SplatQueues::lay_out<K, F>(layout, n.slots, n.kept + p.waves.most_light_subpaths(n.slots), p);
         m.eye_vertices = layout.queue<ConnectionVertex>("eye_vertices", pairs, false, lanes);
         m.light_vertices = layout.queue<ConnectionVertex>("light_vertices", p.rules.connect ? n.kept : 0, false, lanes);
@@ -37,36 +38,43 @@ struct TwoSidesMemory {
     }
 };
 
-template <Features F, class Tracer, Fusion K>
+using TwoSidesMemory = TwoSidesMemoryOf<ShadowItem>;
+
+/// `Source`: where light vertices come from (stages/light_vertex_search.h).
+template <Features F, class Tracer, Fusion K, class Source = LightVertexSource>
 struct TwoSidesStages {
     using Mis = BidirectionalMis;
-    using Eye = EyeSide<F, Tracer, K>;
+    using Eye = EyeSide<F, Tracer, K, typename Source::Learn>;
     using Splats = SplatSide<F, Tracer, K>;
     using Candidates = typename Eye::Candidates;
-    using Connect =
-        std::conditional_t<K.occlude, NextEventAndConnections<F, Candidates>, NextEventAndPair<F, Candidates>>;
+    using Connect = std::conditional_t<K.occlude, NextEventAndConnections<F, Candidates, Source>,
+                                       NextEventAndPair<F, Candidates, Source>>;
     using AtVertex = std::conditional_t<K.connect, Connect, QueueVertex<F, Mis>>;
     /// A device may trace connections in place, in kernels for diffuse surfaces.
-    static constexpr bool kTracesConnections = K.weigh && !K.occlude && F.bsdfs == bit(BsdfType::diffuse);
+    static constexpr bool kTracesConnections =
+        K.weigh && !K.occlude && F.bsdfs == bit(BsdfType::diffuse) && std::is_same_v<Source, LightVertexSource>;
 
     BdptPolicy policy;
     Wave wave;
     Eye eye;
     Splats splats;
     LightStages<F, Tracer, K> light;
-    LightVertexSource source;
+    Source source;
     GenerateEye<Mis> generate;
     Extend<F, Tracer, Mis> extend[2];
     EyeVertex<F, Mis, typename Eye::Emission, AtVertex> eye_vertex[2];
     ConnectEmitter<F, Mis, Connect> connect_emitter;
-    ConnectVertices<F, Candidates> connect_vertices, connect_deferred;
+    ConnectVertices<F, Candidates, Source> connect_vertices, connect_deferred;
 
     TwoSidesStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const BdptPolicy& p, const Wave& w,
                    const TwoSidesMemory& m, const FilmBuffers& film)
-        : policy(p), wave(w), eye(layout, scene, tracer, w, m.eye, film, p.waves),
+        : TwoSidesStages(layout, scene, tracer, p, w, m, film,
+                         {m.light_vertices, m.last_vertex, p.cache_draws, p.coherent_draws}) {}
+    TwoSidesStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const BdptPolicy& p, const Wave& w,
+                   const TwoSidesMemoryOf<typename Source::Learn::Item>& m, const FilmBuffers& film, const Source& from)
+        : policy(p), wave(w), eye(layout, scene, tracer, w, m.eye, film, p.waves, from.learn()),
           splats(layout, scene, tracer, w, m.splats, film, p, m.eye.raw),
-          light(layout, scene, tracer, w, m.subpaths, m.light_vertices, m.last_vertex, splats, p),
-          source{m.light_vertices, m.last_vertex, p.cache_draws, p.coherent_draws} {
+          light(layout, scene, tracer, w, m.subpaths, m.light_vertices, m.last_vertex, splats, p), source(from) {
         const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
         const bool seeds = F.opacity || p.waves.cull > 0.0f;
         const NextEvent<F, Mis, Candidates> next_event = {eye.candidates(), record(connect_emitter), seeds};
@@ -112,8 +120,8 @@ struct TwoSidesStages {
 };
 
 /// The pairs of one depth: connected, weighted, tested, added to their paths.
-template <class Executor, Features F, class Tracer, Fusion K>
-void run_connections(Executor& exec, const TwoSidesStages<F, Tracer, K>& s, bool several_bounces) {
+template <class Executor, Features F, class Tracer, Fusion K, class Source>
+void run_connections(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s, bool several_bounces) {
     if constexpr (s.kTracesConnections && Executor::kMultiBounce)
         if (s.policy.traces_connections) return exec.run(s.connect_and_occlude(several_bounces));
     const bool several = several_bounces || !s.policy.one_connection_per_launch;
@@ -129,8 +137,8 @@ void run_connections(Executor& exec, const TwoSidesStages<F, Tracer, K>& s, bool
     });
 }
 
-template <class Executor, Features F, class Tracer, Fusion K>
-void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K>& s) {
+template <class Executor, Features F, class Tracer, Fusion K, class Source>
+void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s) {
     const Rules<BidirectionalMis>& rules = s.policy.rules;
     start_eye_subpaths<K.generate>(exec, s.generate, s.extend[0], s.wave.tiles * kTilePixels);
     repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several) {

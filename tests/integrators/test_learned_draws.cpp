@@ -1,0 +1,171 @@
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// timeout: 600
+// data: tagged
+// Variant learned of bdpt: draws from a cache that follow what earlier samples have found.
+#include <cmath>
+#include <numeric>
+
+#include "core/rng.h"
+#include "integrators/bdpt/learned/cells.h"
+#include "stages/learned_draws.h"
+#include "tests/support/bidirectional_images.h"
+
+using namespace ambilux;
+
+namespace {
+
+RenderSettings settings_of(const Scene& scene, const char* variant, uint64_t seed) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
+    s.integrator = "bdpt";
+    s.variant = variant;
+    return s;
+}
+
+/// Of one sample, relative to the squared mean: what relMSE is made of.
+double relative_variance(const FilmMoments& film) {
+    double sum = 0;
+    const double n = double(film.samples);
+    for (size_t i = 0; i < film.sum.size(); ++i) {
+        const double mean = film.sum[i] / n, variance = (film.sum_squares[i] / n - mean * mean) * n / (n - 1);
+        sum += variance / (mean * mean + 0.01);
+    }
+    return sum / double(film.sum.size());
+}
+
+}  // namespace
+
+TEST_CASE("learned draws have the expectation of paired subpaths, whatever their share and their weight") {
+    for (const char* name : {"cornell", "glass", "lights", "materials"}) {
+        const Scene scene = project_scene(name, 40, 30);
+        // Hits of the lamp by way of the sphere are rare and the same for both variants.
+        const char* strategies = name == std::string("glass") ? "next_event+connections+light" : "all";
+        RenderSettings reference = settings_of(scene, "wavefront", 21);
+        apply_setting(reference, "strategies", strategies);
+        const Estimate paired = render_batches(scene, reference, 512);
+        RenderSettings s = settings_of(scene, "learned", 22);
+        apply_setting(s, "strategies", strategies);
+        INFO(name);
+        check_agreement(render_batches(scene, s, 256), paired, 0.08);
+        if (name != std::string("cornell")) continue;
+        for (const auto& [draws, share, weight] : {std::tuple{1u, "0.95", "4"}, {8u, "0.3", "0.5"}}) {
+            s.connections = draws;
+            apply_setting(s, "learned_share", share);
+            apply_setting(s, "learned_weight", weight);
+            INFO(draws << " draws, share " << share << ", weight " << weight);
+            check_agreement(render_batches(scene, s, 256), paired, 0.08);
+        }
+    }
+}
+
+TEST_CASE("learned draws of connections alone, for both heuristics and over stages with queues of their own") {
+    const Scene scene = project_scene("cornell", 32, 32);
+    RenderSettings s = settings_of(scene, "wavefront", 31);
+    apply_setting(s, "strategies", "connections+light");
+    s.max_depth = 4;
+    for (const MisHeuristic heuristic : {MisHeuristic::balance, MisHeuristic::power}) {
+        s.heuristic = heuristic;
+        s.variant = "wavefront";
+        const Estimate paired = render_batches(scene, s, 256);
+        RenderSettings learned = s;
+        learned.variant = "learned";
+        learned.seed = 32;
+        check_agreement(render_batches(scene, learned, 256), paired, 0.06);
+        learned.specialise = false;
+        const RenderResult fused = render_scene(scene, learned, 5);
+        learned.fuse = Fuse::none;
+        const RenderResult staged = render_scene(scene, learned, 5);
+        CHECK(fused.film.sum == staged.film.sum);
+        CHECK(fused.film.sum_squares == staged.film.sum_squares);
+    }
+}
+
+TEST_CASE("what is learned does not depend on the order of threads, and memory is what was predicted") {
+    const Scene scene = project_scene("materials", 64, 48);
+    const RenderSettings s = settings_of(scene, "learned", 5);
+    const RenderResult a = render_scene(scene, s, 9), b = render_scene(scene, s, 9);
+    CHECK(a.film.sum == b.film.sum);
+    CHECK(a.film.sum_squares == b.film.sum_squares);
+    CHECK(a.stats.memory_bytes == a.stats.memory_bytes_predicted);
+    CHECK(a.stats.invalid.total() == 0);
+    for (const QueueStats& q : a.stats.queues) CHECK(q.overflow == 0);
+}
+
+TEST_CASE("scenes without light vertices, and paths too short for connections") {
+    for (const int depth : {0, 1, 2, 3}) {
+        const Scene scene = project_scene("cornell", 16, 16);
+        RenderSettings s = settings_of(scene, "learned", 5);
+        s.max_depth = depth;
+        CHECK(render_scene(scene, s, 4).stats.invalid.total() == 0);
+    }
+}
+
+TEST_CASE("a draw finds a vertex with the probability that its contribution is divided by") {
+    constexpr uint32_t kLevels = 3, kClusters = 1u << kLevels, kVertices = 57, kDraws = 3, kKeys = 200'000;
+    std::vector<DrawSplit> splits(kClusters);
+    std::vector<uint16_t> tickets = {100, 100, 20000, 20001, 40000, 50000, 50000, 60000}, cluster(kVertices);
+    std::vector<uint32_t> sorted(kVertices), first(kClusters + 1);
+    for (uint32_t i = 0; i < kVertices; ++i) cluster[i] = uint16_t(i * 5 % 7 == 6 ? 4 : i * 5 % 7);  // 6, 7 are empty
+    for (const uint16_t c : cluster) ++first[c + 1];
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    std::vector<uint32_t> next = first;
+    for (uint32_t i = 0; i < kVertices; ++i) sorted[next[cluster[i]]++] = i;
+    QueueCounter counter = {};
+    counter.count = counter.capacity = kVertices;
+    LearnedSource source = {};
+    source.vertices.counter = &counter;
+    source.draws = kDraws;
+    source.by_cluster = {first.data(), nullptr, nullptr, cluster.data(), sorted.data()};
+    source.table = {{splits.data(), 0}, {splits.data(), kLevels}, tickets.data(), nullptr, 1.0f};
+    std::vector<uint64_t> counts(kVertices);
+    uint64_t none = 0;
+    const BidirectionalVertex z = {};
+    for (uint32_t k = 0; k < kKeys; ++k) {
+        const RngKey key = {1, k, 0, Stream::test};
+        const LearnedSearch search = {source, key, 1, z, 10, 0};
+        for (uint32_t d = 0; d < kDraws; ++d) {
+            const uint32_t at = search.drawn(d, kVertices);
+            ++(at == kNone ? none : counts[at]);
+        }
+    }
+    double probability = 0;
+    for (uint32_t i = 0; i < kVertices; ++i) {
+        const double p = 1.0 / double(LearnedDraw{source, 0, cluster[i]}.inverse_probability());
+        const double expected = p * kKeys * kDraws;
+        INFO("vertex " << i << ": " << counts[i] << ", expected " << expected);
+        CHECK(std::fabs(double(counts[i]) - expected) < 5 * std::sqrt(expected));
+        probability += p;
+    }
+    const double missing = (1.0 - probability) * kKeys * kDraws;
+    CHECK(std::fabs(double(none) - missing) < 5 * std::sqrt(missing));
+}
+
+TEST_CASE("leaves of a tree of cells hold as many points each, and some where many points share a coordinate") {
+    for (const bool sides : {false, true}) {
+        std::vector<PilotPoint> points(4096);
+        for (uint32_t i = 0; i < points.size(); ++i) {
+            const Vec4f u = random_floats({3, i, 0, Stream::test}, 0);
+            points[i] = {{u.x * 10, u.y * u.y, u.z, 0, 0, !sides ? u.w : u.w < 0.25f ? 1.0f : -1.0f}};
+        }
+        std::vector<DrawSplit> splits = split_points(points, 6);
+        const DrawTree tree = {splits.data(), 6};
+        std::vector<uint32_t> counts(64);
+        for (const PilotPoint& p : points) ++counts[tree.leaf({p.x[0], p.x[1], p.x[2]}, {p.x[3], p.x[4], p.x[5]})];
+        for (const uint32_t n : counts) {
+            if (sides)
+                CHECK(n > 0);
+            else
+                CHECK(n == 64);
+        }
+    }
+    const std::vector<PilotPoint> points(3);
+    for (const uint32_t few : {0u, 1u, 3u}) CHECK(split_points({points.begin(), points.begin() + few}, 4).size() == 16);
+}
+
+TEST_CASE("behind a door ajar learned draws have much less variance than uniform ones", "[data]") {
+    const auto scene = published_scene("veach-ajar", 64, 36);
+    if (!scene) return;
+    const double uniform = relative_variance(render_scene(*scene, settings_of(*scene, "lvc", 3), 128).film),
+                 learned = relative_variance(render_scene(*scene, settings_of(*scene, "learned", 3), 128).film);
+    INFO(uniform << " and " << learned);
+    CHECK(learned < uniform * 0.65);
+}
