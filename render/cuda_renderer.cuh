@@ -212,7 +212,8 @@ private:
         Layout plan;
         lay_out_film(plan, plan_.film_wave, policy_.waves, kFilmWide);
         const uint64_t film = with_film ? plan.bytes() : film_memory_.bytes();
-        refuse_budget(settings_, {scene_bytes_, accel_bytes_, film + image_bytes() + learned_bytes_, needed - (with_film ? film : 0)});
+        refuse_budget(settings_, {scene_bytes_, accel_bytes_, film + image_bytes() + learned_bytes_,
+                                  needed - (with_film ? film : 0)});
     }
     /// Of the scene, its structure, what waves learn, a clock, and an image that may be asked for.
     uint64_t fixed_bytes() const {
