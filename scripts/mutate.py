@@ -174,7 +174,7 @@ class Workspace:
         # Compilers say more about what is unreachable or unused in faults than in sources.
         result = run(["nice", "cmake", "--build", self.build, "-j", str(len(os.sched_getaffinity(0))), "--target", *self.tests])
         if result.returncode:
-            errors = [line for line in result.stdout.splitlines() if re.search(r"error|FAILED", line)]
+            errors = [line for line in result.stdout.splitlines() if re.search(r"\berror:|FAILED", line)]
             sys.exit("\n".join(["the build failed", *errors[:20]]))
         say(f"built in {time.time() - began:.0f} s")
 
