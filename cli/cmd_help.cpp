@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <iostream>
 
 #include "cli/commands.h"
@@ -9,8 +11,19 @@ namespace ambilux {
 
 void add_help(CLI::App& app, Run& run) {
     CLI::App& command =
-        *app.add_subcommand("help", "Settings and integrators with their values and defaults; manual page, completion");
-    command.require_subcommand(1);
+        *app.add_subcommand("help", "Options of a command; settings and integrators with their values and defaults; manual page, completion");
+    command.require_subcommand(0, 1);
+    auto name = std::make_shared<std::string>();
+    command.add_option("COMMAND", *name, "A command whose options to print, such as render");
+    command.callback([&app, &command, name, &run] {
+        if (!command.get_subcommands().empty()) return;
+        run = [&app, name] {
+            const CLI::App* const asked = name->empty() ? &app : app.get_subcommand_no_throw(*name);
+            if (!asked) throw Error(ExitCode::usage, fmt::format("help: there is no command '{}'", *name));
+            std::cout << asked->help() << std::flush;
+            return int(ExitCode::done);
+        };
+    });
     CLI::App& settings = *command.add_subcommand("settings", "All settings and variants of integrators");
     auto markdown = std::make_shared<bool>(false);
     settings.add_flag("--markdown", *markdown, "As docs/reference.md");

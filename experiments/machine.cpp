@@ -17,6 +17,18 @@
 #include "core/version.h"
 
 namespace ambilux {
+namespace {
+
+/// The first word of digits and dots, such as 580.65.06; all of it without one.
+std::string version_in(const std::string& line) {
+    std::istringstream words(line);
+    for (std::string word; words >> word;)
+        if (word.find('.') != std::string::npos && word.find_first_not_of("0123456789.") == std::string::npos)
+            return word;
+    return line;
+}
+
+}  // namespace
 
 nlohmann::json describe_machine() {
     nlohmann::json machine = {{"cpu", nullptr},
@@ -34,7 +46,7 @@ nlohmann::json describe_machine() {
         }
     // "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build ..."
     std::ifstream driver("/proc/driver/nvidia/version");
-    if (std::string line; std::getline(driver, line)) machine["driver"] = line;
+    if (std::string line; std::getline(driver, line)) machine["driver"] = version_in(line);
     if (utsname name; ::uname(&name) == 0)
         machine["system"] = std::string(name.sysname) + " " + name.release + " " + name.machine;
     return machine;

@@ -100,6 +100,9 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
     CHECK(help.code == 2);
     CHECK(contains(help.out, "experiment"));
     CHECK(run(folder, {"render", "--help"}).code == 0);
+    CHECK(run(folder, {"help", "render"}).out == run(folder, {"render", "--help"}).out);
+    CHECK(contains(run(folder, {"help"}).out, "stress"));
+    CHECK(contains(run(folder, {"help", "rnder"}).err, "there is no command 'rnder'"));
     CHECK(contains(run(folder, {"--version"}).out, "ambilux "));
 }
 
