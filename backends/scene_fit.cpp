@@ -29,7 +29,7 @@ void check_scene_fits(const Scene& scene, TextureMemory textures, uint64_t accel
                    texels = bytes_of(scene.texels);
     if (needed <= free) return;
     // Rounded up, so that what does not fit never reads as if it did.
-    const auto mib = [](uint64_t bytes) { return (bytes + (1 << 20) - 1) >> 20; };
+    const auto mib = [](uint64_t b) { return (b + (1 << 20) - 1) >> 20; };
     const bool helps = on_device && without_texels <= free;
     throw Error(
         ExitCode::device,
