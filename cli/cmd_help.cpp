@@ -10,8 +10,9 @@
 namespace ambilux {
 
 void add_help(CLI::App& app, Run& run) {
-    CLI::App& command =
-        *app.add_subcommand("help", "Options of a command; settings and integrators with their values and defaults; manual page, completion");
+    CLI::App& command = *app.add_subcommand(
+        "help",
+        "Options of a command; settings and integrators with their values and defaults; manual page, completion");
     command.require_subcommand(0, 1);
     auto name = std::make_shared<std::string>();
     command.add_option("COMMAND", *name, "A command whose options to print, such as render");
