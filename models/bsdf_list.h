@@ -67,8 +67,8 @@ AMBILUX_HD constexpr bool bsdf_transmits(BsdfType type) {
     // The last one without a branch of its own: one more reorders operands in the kernels of diffuse scenes, whose code
     // is to stay (docs/performance.md).
     constexpr uint32_t kLast = std::bit_floor(detail::kTransmittingBsdfs);
-    constexpr uint32_t kOthers = detail::kTransmittingBsdfs & ~kLast;
-    return BsdfModels::contains<kOthers>(uint32_t(type)) | BsdfModels::contains<kLast>(uint32_t(type));
+    return BsdfModels::contains < detail::kTransmittingBsdfs & ~kLast > (uint32_t(type)) |
+           BsdfModels::contains<kLast>(uint32_t(type));
 }
 /// True if there is a lobe that is not a delta, so that connecting to other vertices can give light.
 AMBILUX_HD constexpr bool bsdf_is_smooth(BsdfType type) {

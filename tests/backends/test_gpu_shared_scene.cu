@@ -1,10 +1,8 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: gpu
 // What renderers of one scene share on a device, and choices that are made there.
+#include "accel/shared_accels.h"
 #include "backends/cuda/device_scene.h"
-#include "integrators/bdpt/wavefront/variant.h"
-#include "integrators/path/variant.h"
-#include "render/make_on_backend.h"
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/gpu_device.h"
 
@@ -32,10 +30,8 @@ TEST_CASE("renderers of one scene share its copy on the device, which lives as l
     std::weak_ptr<const DeviceCwbvh> structure;
     {
         SharedAccels accels(scene);
-        with_feature_level(scene.features, true, [&]<Features F>() {
-            a = make_on_cuda<PathVariant, F>(scene, path, accels);
-            b = make_on_cuda<LightVariant, F>(scene, light, accels);
-        });
+        a = make_renderer(scene, path, accels);
+        b = make_renderer(scene, light, accels);
         copy = accels.get<DeviceScene>();
         structure = accels.get<DeviceCwbvh>();
         CHECK(accels.get<DeviceScene>() == copy.lock());
