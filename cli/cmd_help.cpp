@@ -8,20 +8,30 @@
 #include "integrators/settings_help.h"
 
 namespace ambilux {
+namespace {
+
+/// Of all commands if `name` is empty.
+std::string help_of_command(const CLI::App& app, const std::string& name) {
+    // app.help() would be that of the command `help`.
+    if (name.empty()) return app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
+    for (const CLI::App* const command : app.get_subcommands([](const CLI::App*) { return true; }))
+        if (command->get_name() == name) return command->help(app.get_name());
+    throw Error(ExitCode::usage, fmt::format("help: there is no command '{}'", name));
+}
+
+}  // namespace
 
 void add_help(CLI::App& app, Run& run) {
     CLI::App& command = *app.add_subcommand(
         "help",
         "Options of a command; settings and integrators with their values and defaults; manual page, completion");
     command.require_subcommand(0, 1);
-    auto name = std::make_shared<std::string>();
-    command.add_option("COMMAND", *name, "A command whose options to print, such as render");
-    command.callback([&app, &command, name, &run] {
+    auto asked = std::make_shared<std::string>();
+    command.add_option("COMMAND", *asked, "A command whose options to print, such as render");
+    command.callback([&app, &command, asked, &run] {
         if (!command.get_subcommands().empty()) return;
-        run = [&app, name] {
-            const CLI::App* const asked = name->empty() ? &app : app.get_subcommand_no_throw(*name);
-            if (!asked) throw Error(ExitCode::usage, fmt::format("help: there is no command '{}'", *name));
-            std::cout << asked->help() << std::flush;
+        run = [&app, asked] {
+            std::cout << help_of_command(app, *asked) << std::flush;
             return int(ExitCode::done);
         };
     });
