@@ -3,6 +3,7 @@
 // What renderers of one scene share on a device, and choices that are made there.
 #include "accel/shared_accels.h"
 #include "backends/cuda/device_scene.h"
+#include "render/shared_renderer.h"
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/gpu_device.h"
 
