@@ -15,17 +15,38 @@ namespace {
 
 using Mis = BidirectionalMis;
 constexpr uint32_t kSubpaths = 8192;  ///< from the camera, and as many from emitters
+constexpr uint32_t kWhole = 512;      ///< whose ends are kept whole
 
-/// Keeps the vertices where connections may start.
+PilotPoint point_of(const SubpathEnd<Mis>& e) {
+    const Scattering& s = e.vertex.scattering;
+    const Vec3f p = e.vertex.point.p, n = dot(s.ng, s.wi_world) < 0.0f ? -s.ng : s.ng;
+    return {{p.x, p.y, p.z, n.x, n.y, n.z}};
+}
+
+/// Vertices where connections may start.
+struct Ends {
+    std::vector<PilotPoint> points;
+    std::vector<SubpathEnd<Mis>> whole;
+
+    void append(const Ends& other) {
+        points.insert(points.end(), other.points.begin(), other.points.end());
+        whole.insert(whole.end(), other.whole.begin(), other.whole.end());
+    }
+};
+
 struct KeepEnds {
-    std::vector<SubpathEnd<Mis>>& ends;
+    Ends& ends;
+    bool whole;
     uint32_t max_depth;
     const Draws& subpath_draws;
 
     Draws draws() const { return subpath_draws; }
     void add(const Candidate<Mis>&) const {}
     void at(const Vertex<Mis>& v, const Subpath<Mis>& path, const Draws&) const {
-        if (path.depth + 2 <= max_depth) ends.push_back({v, path.throughput, path.depth});
+        if (path.depth + 2 > max_depth) return;
+        const SubpathEnd<Mis> end = {v, path.throughput, path.depth};
+        ends.points.push_back(point_of(end));
+        if (whole) ends.whole.push_back(end);
     }
     bool valid(Rgb) const { return true; }
 };
@@ -48,9 +69,8 @@ bool start(const SceneView& scene, const Mis& mis, Side side, const Draws& draws
 }
 
 template <Features F>
-std::vector<SubpathEnd<Mis>> trace(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& rules,
-                                   uint64_t seed, Side side) {
-    std::vector<std::vector<SubpathEnd<Mis>>> ends(kSubpaths);
+Ends trace(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& rules, uint64_t seed, Side side) {
+    std::vector<Ends> ends(kSubpaths);
     parallel_for(
         kSubpaths,
         [&](uint32_t i) {
@@ -62,23 +82,12 @@ std::vector<SubpathEnd<Mis>> trace(const SceneView& scene, const HostTracer& tra
                 const Ray ray = {path.origin, kInfinity, path.direction, draws.opacity_seed(path.depth)};
                 tracer.closest<F>(scene, ray, hit);
             } while (visit<F>(scene, rules, side, rules.longest(side), hit, path,
-                              KeepEnds{ends[i], rules.max_depth, draws}));
+                              KeepEnds{ends[i], i < kWhole, rules.max_depth, draws}));
         },
         64u);
-    std::vector<SubpathEnd<Mis>> all;
-    for (const auto& of_subpath : ends) all.insert(all.end(), of_subpath.begin(), of_subpath.end());
+    Ends all;
+    for (const Ends& of_subpath : ends) all.append(of_subpath);
     return all;
-}
-
-PilotPoint point_of(const SubpathEnd<Mis>& e) {
-    const Scattering& s = e.vertex.scattering;
-    const Vec3f p = e.vertex.point.p, n = dot(s.ng, s.wi_world) < 0.0f ? -s.ng : s.ng;
-    return {{p.x, p.y, p.z, n.x, n.y, n.z}};
-}
-std::vector<PilotPoint> points_of(const std::vector<SubpathEnd<Mis>>& ends) {
-    std::vector<PilotPoint> points;
-    for (const SubpathEnd<Mis>& e : ends) points.push_back(point_of(e));
-    return points;
 }
 
 /// The axis along which the points lie furthest apart. Opposite normals are as far apart as half the scene.
@@ -128,7 +137,7 @@ double mean_score(const Rules<Mis>& rules, const std::vector<SubpathEnd<Mis>>& e
         const float score = luminance(c.value) * mis_weight(c.ratio) / luminance(eyes[i].throughput);
         if (std::isfinite(score)) sum += score;
     }
-    return sum / double(std::max<size_t>(eyes.size(), 1)) * double(lights.size()) / kSubpaths;
+    return sum / double(std::max<size_t>(eyes.size(), 1)) * double(lights.size()) / kWhole;
 }
 
 }  // namespace
@@ -148,13 +157,13 @@ std::vector<DrawSplit> split_points(std::vector<PilotPoint> points, uint32_t lev
 template <Features F>
 DrawCells find_draw_cells(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& rules, uint64_t seed,
                           uint32_t cell_levels, uint32_t cluster_levels) {
-    const auto lights = trace<F>(scene, tracer, rules, seed, Side::light),
-               eyes = trace<F>(scene, tracer, rules, seed, Side::eye);
+    Ends lights = trace<F>(scene, tracer, rules, seed, Side::light),
+         eyes = trace<F>(scene, tracer, rules, seed, Side::eye);
     DrawCells found;
-    found.mean_light_vertices = double(lights.size()) / kSubpaths;
-    found.cells = split_points(points_of(eyes), cell_levels);
-    found.clusters = split_points(points_of(lights), cluster_levels);
-    const double mean = mean_score<F>(rules, eyes, lights);
+    found.mean_light_vertices = double(lights.points.size()) / kSubpaths;
+    found.cells = split_points(std::move(eyes.points), cell_levels);
+    found.clusters = split_points(std::move(lights.points), cluster_levels);
+    const double mean = mean_score<F>(rules, eyes.whole, lights.whole);
     if (mean > 1e-15 && mean < 1e15) found.unit = float(mean * mean);
     return found;
 }
