@@ -16,6 +16,7 @@
 #include "core/flag.h"
 #include "integrators/integrator.h"
 #include "render/device_film.h"
+#include "render/device_kept.cuh"
 #include "render/device_plan.h"
 #include "render/statistics.h"
 #include "render/wave_plan.h"
@@ -26,9 +27,7 @@ namespace ambilux {
 template <class Integrator, Features F>
 class CudaRenderer final : public Renderer {
     static constexpr bool kFilmWide = Integrator::kFilmWide;
-    /// It keeps something from wave to wave, which is brought up to date after each.
-    static constexpr bool kLearns =
-        requires(Layout& layout, typename Integrator::Policy& policy) { Integrator::lay_out_kept(layout, policy); };
+    static constexpr bool kLearns = DeviceKept<Integrator>::kSome;
     using Stages = typename Integrator::Stages;
 
 public:
@@ -41,7 +40,7 @@ public:
         else
             take(accels.get<CwbvhAccel>()->arrays(), accels);
         device_scene_->drop_texels();
-        if constexpr (kLearns) allocate_kept();
+        kept_.allocate(policy_);
         const uint64_t room = room_for_film_and_waves();
         prefer(settings.memory ? room : room / 2);
         fit(room, true);
@@ -169,11 +168,7 @@ private:
             if constexpr (requires { Stages::kTracesConnections; })
                 policy_.traces_connections = Stages::kTracesConnections && traces_connections(policy_, arrays.bytes());
         }
-        if constexpr (kLearns) {
-            Layout plan;
-            Integrator::lay_out_kept(plan, policy_);
-            learned_bytes_ = plan.bytes();
-        }
+        kept_.plan(policy_);
         scene_bytes_ = scene_bytes(scene_, settings_.textures);
         accel_bytes_ = arrays.bytes();
         plan_.shape_least();
@@ -212,12 +207,12 @@ private:
         Layout plan;
         lay_out_film(plan, plan_.film_wave, policy_.waves, kFilmWide);
         const uint64_t film = with_film ? plan.bytes() : film_memory_.bytes();
-        refuse_budget(settings_, {scene_bytes_, accel_bytes_, film + image_bytes() + learned_bytes_,
+        refuse_budget(settings_, {scene_bytes_, accel_bytes_, film + image_bytes() + kept_.planned(),
                                   needed - (with_film ? film : 0)});
     }
     /// Of the scene, its structure, what waves learn, a clock, and an image that may be asked for.
     uint64_t fixed_bytes() const {
-        return scene_bytes_.total() + accel_bytes_ + learned_bytes_ + sizeof(uint64_t) + image_bytes();
+        return scene_bytes_.total() + accel_bytes_ + kept_.planned() + sizeof(uint64_t) + image_bytes();
     }
     uint64_t image_bytes() const { return film_values() * sizeof(float); }
     /// Of what is free, and of what is left of a budget.
@@ -234,18 +229,6 @@ private:
     uint64_t held_bytes() const {
         return device_scene_->bytes() + (pairs_ ? pairs_->bytes() : accel_->bytes()) + film_memory_.bytes() +
                kept_.bytes() + clock_.bytes() + memory_.bytes() + taken_.bytes();
-    }
-    void allocate_kept() {
-        Layout plan;
-        Integrator::lay_out_kept(plan, policy_);
-        kept_ = DeviceBuffer<std::byte>(plan.bytes(), "what waves learn");
-        kept_.zero();
-        Layout placed(plan, kept_.data());
-        Integrator::lay_out_kept(placed, policy_);
-        Integrator::fill_kept(policy_, [](auto* to, const auto& values) {
-            cuda_check(cudaMemcpy(to, values.data(), values.size() * sizeof(*to), cudaMemcpyHostToDevice),
-                       "what waves learn");
-        });
     }
     /// `more`: what is not the renderer's for long.
     void note_peak(uint64_t more = 0) { peak_ = std::max(peak_, held_bytes() + more); }
@@ -388,7 +371,7 @@ private:
     std::string device_name_ = cuda_device_name();  ///< asked for once: stats() is called often
     DevicePlan plan_{scene_, settings_, policy_.waves, kFilmWide};
     SceneBytes scene_bytes_{};  ///< on the device
-    uint64_t accel_bytes_ = 0, learned_bytes_ = 0, peak_ = 0;
+    uint64_t accel_bytes_ = 0, peak_ = 0;
     uint32_t next_tile_ = 0;  ///< where a sample goes on of which only parts are done
     Layout layout_;
     std::vector<StageRecord> records_;    ///< as last read: they outlast a failure to grow
@@ -399,7 +382,8 @@ private:
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceCwbvh> accel_;
     std::optional<DevicePairs> pairs_;  ///< instead, with accel=bvh2
-    DeviceBuffer<std::byte> memory_, film_memory_, kept_;
+    DeviceBuffer<std::byte> memory_, film_memory_;
+    DeviceKept<Integrator> kept_;
     DeviceBuffer<double> taken_;  ///< by take_film
     FilmBuffers film_{};
     Lane* part_samples_ = nullptr;  ///< of eye subpaths, by slot of the wave
