@@ -32,7 +32,11 @@ Declaration<S> memory() {
     const char* const key = "memory";
     return {key, "all, or bytes such as 512M or 4G (powers of 1024)",
             "most memory of a render, of each device or on the CPU; waves are planned for it",
-            [=](S& s, const std::string& value) { s.memory = value == "all" ? 0 : parse_bytes(key, value); },
+            [=](S& s, const std::string& value) {
+                if (value == "device" || value == "host" || value == "pinned")
+                    refuse_value(key, value, "bytes are needed; where textures lie is the setting textures");
+                s.memory = value == "all" ? 0 : parse_bytes(key, value);
+            },
             [](const S& s) -> SettingValue { return s.memory ? text_of_bytes(s.memory) : "all"; }};
 }
 

@@ -107,6 +107,13 @@ TEST_CASE("bytes are read with their unit and printed with the largest that divi
     }
     for (const char* wrong : {"", "0", "G", "4g", "4GB", "-1", "1.5G", "99999999999T", "18446744073709551616"})
         CHECK_THROWS_AS(parse_bytes("memory", wrong), Error);
+    RenderSettings s;
+    try {
+        apply_setting(s, "memory", "host");
+        FAIL("accepted");
+    } catch (const Error& e) {
+        CHECK(std::string(e.what()).find("the setting textures") != std::string::npos);
+    }
 }
 
 TEST_CASE("1920x1080 within 256 MiB, 1 GiB and 4 GiB, of all integrators and variants on the CPU") {
