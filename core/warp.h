@@ -62,6 +62,23 @@ struct WholeWarp {
     }
 };
 
+/// All threads of a block of a device, none of which has ended. On a host every thread is a block of its own.
+struct WholeBlock {
+    AMBILUX_HD void meet() const {
+#if defined(__CUDA_ARCH__)
+        __syncthreads();
+#endif
+    }
+    /// For how many threads `b` is true.
+    AMBILUX_HD uint32_t count(bool b) const {
+#if defined(__CUDA_ARCH__)
+        return uint32_t(__syncthreads_count(b));
+#else
+        return b;
+#endif
+    }
+};
+
 /// The lanes that come together with the same key.
 struct SameKey {
     uint32_t lanes = 1;  ///< as bits

@@ -127,7 +127,7 @@ class Workspace:
         commands = json.loads((self.build / "compile_commands.json").read_text())
         found, lines = set(), set()
         for entry in commands:
-            if re.search(r"/(bdpt_All|path_All|film/\w+|test_stages|test_bidirectional_stages)\.cpp$", entry["file"]):
+            if re.search(r"/((?:bdpt|path|learned)_All|bsdf_plugins|film/\w+|test_stages|test_bidirectional_stages)\.cpp$", entry["file"]):
                 command = re.sub(r"^\S*ccache ", "", re.sub(r" -o \S+", "", entry["command"])) + " -fsyntax-only -w -fmax-errors=0"
                 errors = run(command, shell=True, cwd=entry["directory"]).stderr
                 lines |= {(os.path.relpath(os.path.normpath(Path(entry["directory"]) / m[1]), self.source), int(m[2]))

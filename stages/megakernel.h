@@ -1,7 +1,9 @@
 // megakernel: one thread does a slot's light subpath, its eye subpath and all connections, with the functions that the
 // stages use. It is a state machine of at most one ray per round, so that lanes of a warp trace together whatever their
 // rays are for; lanes whose path has ended begin another (Novak et al. 2010, "Path Regeneration for Interactive Path
-// Tracing").
+// Tracing"). All warps of a block do the same part of a round at a time: a multiprocessor's cache of instructions holds
+// a part, not the whole, and warps that were each at another part waited for instructions two thirds of their time
+// (docs/lab/2026-11-26-megakernel.md).
 #pragma once
 
 #include "core/warp.h"
@@ -23,6 +25,7 @@ template <Features F, class Tracer>
 struct Megakernel {
     static constexpr const char* kName = "megakernel";
     static constexpr uint32_t kBeginTogether = 8;  ///< lanes without a path wait for as many before they begin new ones
+    static constexpr uint32_t kStepTogether = 256;  ///< threads whose ray has ended wait for as many of their block
     using Mis = BidirectionalMis;
 
     SceneView scene;
@@ -38,38 +41,44 @@ struct Megakernel {
     /// Does the slots `slot`, `slot + stride` ... below `end`, one after the other.
     AMBILUX_HD void run(uint32_t slot, uint32_t end, uint32_t stride) const {
         const WholeWarp warp;
+        const WholeBlock block;
         State s{};
         Counts counts{};
+        Hit hit{};
+        bool landed = false;  // where the subpath's ray ended is in `hit`
         for (;;) {
             const bool idle = !s.active && slot < end;
             const uint32_t waiting = warp.count(idle), working = warp.count(s.active);
-            if (waiting + working == 0) break;
+            if (block.count(idle || s.active) == 0) break;
             if (idle && (working == 0 || waiting >= kBeginTogether)) {
                 begin(s, slot);
                 slot += stride;
             }
 
-            warp.meet();
-            Hit hit = {0.0f, 0.0f, 0.0f, kNone};
-            bool met = false;
-            const bool tested = s.testing, extended = !tested && s.going && !connecting(s);
-            if (tested || extended) met = trace(s, hit, counts);
-
-            warp.meet();
+            const bool tested = s.testing, extended = !tested && s.going && !landed && !connecting(s);
+            Hit met = {0.0f, 0.0f, 0.0f, kNone};
+            const bool meets = (tested || extended) && trace(s, met, counts);
             if (tested) {
                 s.testing = false;
-                if (!met) arrive(s);
+                if (!meets) arrive(s);
             }
             if (extended) {
-                if (!met) hit.prim = kNone;
+                landed = true;
+                hit = met;
+                if (!meets) hit.prim = kNone;
+            }
+
+            const uint32_t steps = block.count(landed), others = block.count(s.active && !landed);
+            if (landed && (steps >= kStepTogether || others == 0)) {
+                landed = false;
                 step(s, hit);
             }
 
-            warp.meet();
+            block.meet();
             if (!s.testing && connecting(s)) connect(s);
 
-            warp.meet();
-            if (s.active && !s.testing && !s.going && !connecting(s)) {
+            block.meet();
+            if (s.active && !s.testing && !s.going && !landed && !connecting(s)) {
                 if (s.side == Side::light)
                     begin_eye(s);
                 else

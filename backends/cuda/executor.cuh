@@ -63,7 +63,7 @@ public:
     template <class Stage>
     void run_paths(const Stage& stage, uint32_t slots) {
         const auto kernel = detail::launch_paths<Stage>;
-        kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(stage, slots, state_);
+        kernel<<<blocks(kernel, kPathBlock), kPathBlock, 0, stream()>>>(stage, slots, state_);
         finish(stage, nullptr, nullptr, slots);
     }
     template <class Stage>

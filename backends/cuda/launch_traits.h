@@ -5,12 +5,13 @@
 #include "stages/connect_vertices.h"
 #include "stages/eye_vertex.h"
 #include "stages/light_vertex.h"
-#include "stages/megakernel.h"
 #include "stages/streaming.h"
 
 namespace ambilux {
 
 constexpr uint32_t kStageBlock = 128;
+/// The megakernel has one block on each multiprocessor, whose threads go through its parts together.
+constexpr uint32_t kPathBlock = 512;
 
 /// 1 leaves registers to the compiler. kGathers: hits are in no order, and misses of no use.
 template <class Stage>
@@ -48,7 +49,5 @@ template <Features F>
 struct LaunchTraits<StreamLightVertex<F>> : BlocksPerSm<is_diffuse(F) ? 5 : 4> {};
 template <Features F, class Out>
 struct LaunchTraits<StreamConnect<F, Out>> : BlocksPerSm<is_diffuse(F) ? 7 : 4> {};
-template <Features F, class Tracer>
-struct LaunchTraits<Megakernel<F, Tracer>> : BlocksPerSm<4> {};
 
 }  // namespace ambilux

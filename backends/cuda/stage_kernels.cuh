@@ -19,9 +19,9 @@ __global__ void __launch_bounds__(kStageBlock)
 
 /// All threads stay until the last slot is done.
 template <class Stage>
-__global__ void __launch_bounds__(kStageBlock, LaunchTraits<Stage>::kBlocksPerSm)
+__global__ void __launch_bounds__(kPathBlock, 1)
     launch_paths(const __grid_constant__ Stage stage, uint32_t slots, const WaveState* state) {
-    stage.run(blockIdx.x * kStageBlock + threadIdx.x, slots * state->samples, gridDim.x * kStageBlock);
+    stage.run(blockIdx.x * kPathBlock + threadIdx.x, slots * state->samples, gridDim.x * kPathBlock);
 }
 
 /// The last subpaths of a wave (MultiBounce), as far apart as there are threads for: lanes of a warp wait for each
