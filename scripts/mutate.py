@@ -109,6 +109,10 @@ class Workspace:
         write(self.source / "cmake/registry.cmake", re.sub(r"set\(AMBILUX_LEVELS [^)]*\)", "set(AMBILUX_LEVELS All)", (ROOT / "cmake/registry.cmake").read_text()))
         write(self.source / "integrators/registry.list", (ROOT / "integrators/registry.list").read_text().replace("Diffuse All", ""))
 
+        # The twin in double precision is made from the sources without faults: it checks, it is not checked.
+        twin = (ROOT / "cmake/double_precision.cmake").read_text()
+        write(self.source / "cmake/double_precision.cmake", twin.replace("-DSOURCE=${PROJECT_SOURCE_DIR}", f"-DSOURCE={ROOT}"))
+
     def rewrite(self):
         by_file = {}
         for number, site in self.faults.items():
