@@ -73,7 +73,7 @@ def doubt_remarks(lines):
     for kind, found in reasons.items():
         places = [place for doubt in found for place in found[doubt]]
         counts = sorted(int(doubt.split()[0]) for doubt in found if doubt != kind)
-        said = kind if not counts else f"{counts[0]} {kind}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]} {kind}"
+        said = kind if not counts else (f"{counts[0]} {kind}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]} {kind}") + ", too few"
         yield f"no interval is stated for {listed(places, 6)}: {said}"
 
 
