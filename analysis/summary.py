@@ -136,13 +136,14 @@ def slope(experiment, scene, run, x="spp"):
 
 
 def speedup(experiment, scene, run, base=None):
-    """equal_error.speedup of a run over the base run, by wall-clock time. None if a scene lacks either."""
+    """equal_error.speedup of a run over the base run, by wall-clock time. None if a scene lacks either, or an error is below the noise of the reference."""
     names = (base or experiment.base, run)
     curves = [curve(experiment, scene, name) for name in names]
-    if not all(curves):
-        return None
     last = experiment.last_common_checkpoint(scene)
-    doubts = [mean_error(experiment.select(scene, name, last), "rmse").doubt for name in names] if last is not None else []
+    at_last = [mean_error(experiment.select(scene, name, last), "rmse") for name in names] if last is not None else []
+    if not all(curves) or any(e.value <= 0 for e in at_last):
+        return None
+    doubts = [e.doubt for e in at_last]
     return replace(found, doubt=next(filter(None, doubts), "")) if (found := equal_error.speedup(*((c.seconds, c.error) for c in curves))) else None
 
 

@@ -75,7 +75,7 @@ def speedup_text(line, base, biased):
     if line.run == base or s is None:
         return "1" if line.run == base else "–"
     dagger = "†" if (line.scene, line.run) in biased or (line.scene, base) in biased else ""
-    return (f"{s.sign} " if s.sign else "") + number(s.value, 2) + ("?" if s.doubt else "") + dagger
+    return (f"{s.sign} " if s.sign else "") + number(s.value, 2) + ("?" if s.doubt and line.ratio_time is None else "") + dagger
 
 
 def slope_text(line):

@@ -79,10 +79,10 @@ def work(rng, error, seconds, seeds, spread, batches=16):
     return efficiency.Work(errors, "batches", "", {seed: seconds * float(np.exp(spread * rng.normal())) for seed in range(1, seeds + 1)})
 
 
-@pytest.mark.parametrize("seeds, spread", [(3, 0.0), (3, 0.05), (3, 0.3), (2, 0.1), (5, 0.1)])
+@pytest.mark.parametrize("seeds, spread", [(3, 0.0), (3, 0.1), (2, 0.05)])
 def test_times_that_vary_between_renders_are_in_the_interval(seeds, spread):
     """A busy machine slows whole renders down, with all of their batches: of 48 batches with 3 seeds, times are known from 3."""
-    rng, trials = np.random.default_rng(12), 200
+    rng, trials = np.random.default_rng(12), 100
     covered = tests = 0
     for _ in range(trials):
         a, b = work(rng, 1.0, 2.0, seeds, spread), work(rng, 2.0, 3.0, seeds, spread)
