@@ -66,16 +66,17 @@ def letters_of_runs(lines, columns, inches):
 
 
 def in_parts(lines, letters):
-    """The lines in lists of whole scenes that a page has room for."""
-    parts, used = [], 0
+    """The lines in lists that a page has room for, of whole scenes where one fits on a page."""
+    parts, used = [[]], 0
     for scene in dict.fromkeys(line.scene for line in lines):
-        of_scene = [line for line in lines if line.scene == scene]
-        needs = sum(name(line.run, letters).count(r"\\") + 1 for line in of_scene) + 1
-        if not parts or used + needs > LINES:
-            parts.append([])
-            used = 0
-        parts[-1] += of_scene
-        used += needs
+        of_scene = [(line, name(line.run, letters).count(r"\\") + 1) for line in lines if line.scene == scene]
+        whole = 1 + sum(needs for _, needs in of_scene)
+        for i, (line, needs) in enumerate(of_scene):
+            if parts[-1] and used + (whole if i == 0 and whole <= LINES else needs + 1) > LINES:
+                parts.append([])
+                used = 0
+            used += needs + (not parts[-1] or i == 0)
+            parts[-1].append(line)
     return parts
 
 
