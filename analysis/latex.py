@@ -7,7 +7,7 @@ import re
 from functools import lru_cache
 
 from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextPath
+from matplotlib.textpath import text_to_path
 
 from analysis import style, tables, verdicts
 
@@ -49,7 +49,7 @@ def name(words, letters):
 @lru_cache(maxsize=4096)
 def points(words):
     """Width of words in \\footnotesize: Computer Modern of 8 points, whose letters are 6 % wider than those of 10 points made smaller."""
-    return 1.06 * TextPath((0, 0), words, size=8, prop=FontProperties(family="cmr10")).get_extents().width if words.strip() else 0.0
+    return 1.06 * text_to_path.get_text_width_height_descent(words, FontProperties(family="cmr10", size=8), ismath=False)[0] if words.strip() else 0.0
 
 
 def width(cell):

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextPath
+from matplotlib.textpath import text_to_path
 
 from analysis import __main__ as program
 from analysis import experiment, heavy_tails, images, latex, remarks, style, summary, tables, verdicts
@@ -194,7 +194,7 @@ def inches(tabular):
     """Width of a tabular in Computer Modern of 8 points: the widest cell of each column, and the room between columns."""
     def width(cell):
         words = re.sub(r"\\begin\{tabular\}\[t\]\{[^}]*\}\}|\\end\{tabular\}|\\(?:textbf|emph|pm|cdot|dagger)\b|[${}^\\]", "", cell.replace(r"\begin{tabular}[t]{@{}l@{}}", ""))
-        return TextPath((0, 0), words, size=8, prop=FontProperties(family="cmr10")).get_extents().width if words.strip() else 0.0
+        return text_to_path.get_text_width_height_descent(words, FontProperties(family="cmr10", size=8), ismath=False)[0] if words.strip() else 0.0
     rows = [[max(map(width, cell.split(r"\\"))) for cell in re.split(r" & ", line.removesuffix(r" \\"))] for line in body_of(tabular)]
     return (sum(map(max, zip(*rows))) + 2 * 3.5 * len(rows[0])) / 72
 
