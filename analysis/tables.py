@@ -219,18 +219,30 @@ def minus(text):
     return re.sub(r"(?<![\w)])-(?=\d)|(?<=e)-(?=\d)", "−", text)
 
 
+def breakable(name):
+    """A name as HTML that may be broken before a bracket and behind commas, plus signs and underscores."""
+    return re.sub(r"(?=\[)|(?<=[,+_])", "<wbr>", html.escape(name))
+
+
+def is_words(cell):
+    """Whether a cell is a sentence, which may stand on several lines, and no number with its interval."""
+    return cell.count(" ") > 1 and not re.match(r"[\d<−–]", cell)
+
+
 def to_html(experiment, lines):
     shown = headings(experiment, lines)
     head = "".join(f"<th>{html.escape(h)}</th>" for h in (*shown, "Mrays/s", "bias |z|"))
-    out = [f"<table><thead><tr>{head}</tr></thead><tbody>"]
+    out = [f'<table class="results"><thead><tr>{head}</tr></thead><tbody>']
     scene, biased = None, verdicts.biased(lines)
     bold = {scene: verdicts.best(lines, scene) for scene in experiment.scenes}
     for line in lines:
-        row = [html.escape(minus(c) if i > 1 else c) for i, c in enumerate(cells(line, experiment.base, biased, shown))]
+        row = [html.escape(minus(c)) if i > 1 else breakable(c) for i, c in enumerate(cells(line, experiment.base, biased, shown))]
         row += [number(line.rays_per_second / 1e6), f"{line.bias_z:.1f}"]
         if line is bold.get(line.scene):
             row[shown.index("efficiency")] = f"<b>{row[shown.index('efficiency')]}</b>"
         kind = ' class="first"' if line.scene != scene else ""
+        if line.scene == scene:
+            row[0] = ""
         scene = line.scene
-        out.append(f"<tr{kind}>" + "".join(f"<td>{c}</td>" for c in row) + "</tr>")
+        out.append(f"<tr{kind}>" + "".join(f'<td class="words">{c}</td>' if is_words(c) else f"<td>{c}</td>" for c in row) + "</tr>")
     return "\n".join([*out, "</tbody></table>"])
