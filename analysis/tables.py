@@ -194,12 +194,12 @@ def to_csv(lines):
 
 
 def variances_to_csv(rows):
-    """`rows`: (scene, run, s, t, Estimate, share, seeds)."""
+    """`rows`: (scene, run, s, t, Estimate, share, seeds, share of its greatest pixel)."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["scene", "run", "s", "t", "variance", "variance_error", "variance_low", "variance_high", "share", "seeds"])
-    for scene, run, s, t, e, share, seeds in rows:
-        writer.writerow([scene, run, s, t, *(f"{v:.9g}" for v in (e.value, e.error, e.low, e.high, share)), seeds])
+    writer.writerow(["scene", "run", "s", "t", "variance", "variance_error", "variance_low", "variance_high", "share", "seeds", "largest_pixel"])
+    for scene, run, s, t, e, share, seeds, pixel in rows:
+        writer.writerow([scene, run, s, t, *(f"{v:.9g}" for v in (e.value, e.error, e.low, e.high, share)), seeds, f"{pixel:.9g}"])
     return out.getvalue()
 
 

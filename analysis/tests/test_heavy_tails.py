@@ -73,30 +73,19 @@ def test_the_same_data_give_the_same_interval():
     assert heavy_tails.estimate([(1, rows)], "batches") == heavy_tails.estimate([(1, rows)], "batches")
 
 
-def work(rng, error, seconds, seeds, spread, batches=16):
-    """efficiency.Work over batches of a run whose renders take `spread` more or less time each."""
-    errors = error * rng.gamma(40, 1 / 40, (seeds * batches, 1))
-    return efficiency.Work(errors, "batches", "", {seed: seconds * float(np.exp(spread * rng.normal())) for seed in range(1, seeds + 1)})
-
-
 @pytest.mark.parametrize("seeds, spread", [(3, 0.0), (3, 0.1), (2, 0.05)])
 def test_times_that_vary_between_renders_are_in_the_interval(seeds, spread):
     """A busy machine slows whole renders down, with all of their batches: of 48 batches with 3 seeds, times are known from 3."""
-    rng, trials = np.random.default_rng(12), 100
-    covered = tests = 0
-    for _ in range(trials):
-        a, b = work(rng, 1.0, 2.0, seeds, spread), work(rng, 2.0, 3.0, seeds, spread)
-        found = efficiency.ratio(a, b, "b")
-        covered += found.low <= 3 <= found.high
-        tests += efficiency.ratio(a, work(rng, 1.0, 2.0, seeds, spread), "b", for_test=True).p < 0.05
-    assert covered / trials > 0.95 - 4 * math.sqrt(0.95 * 0.05 / trials)
-    assert tests / trials < 0.05 + 4 * math.sqrt(0.95 * 0.05 / trials)
+    trials = 100
+    covered, tests = coverage.simulate_times(seeds, spread, trials)
+    assert covered > 0.95 - 4 * math.sqrt(0.95 * 0.05 / trials)
+    assert tests < 0.05 + 4 * math.sqrt(0.95 * 0.05 / trials)
 
 
 def test_seeds_that_are_slow_together_are_pairs():
     """The same seed was busy by 1.6 for both runs: their ratio does not see it, the efficiency of one does."""
     rng = np.random.default_rng(13)
-    a, b = (work(rng, 1.0, 1.0, 3, 0.0) for _ in range(2))
+    a, b = (coverage.work(rng, 1.0, 1.0, 3, 0.0) for _ in range(2))
     busy = {1: 1.0, 2: 1.6, 3: 1.1}
     slow = [efficiency.Work(w.rows, w.over, "", busy) for w in (a, b)]
     assert efficiency.ratio(*slow, "b") == efficiency.ratio(a, b, "b")
