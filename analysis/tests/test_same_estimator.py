@@ -1,6 +1,7 @@
 """Switches that keep the estimator are found by their errors and compared by their time."""
 
 import csv
+import json
 
 import pytest
 
@@ -52,3 +53,12 @@ def test_single_paths_that_rounding_sent_another_way_do_not_make_another_estimat
     assert same_estimator.same(data, "box", RUNS[2][0], "base") is True
     ratio = summary.ratio_over(data, "box", RUNS[2][0], "base")  # what sweeps show is what the table shows
     assert ratio.over == same_estimator.OVER == summary.ratio_over(data, "box", RUNS[1][0], "base").over
+
+
+def test_a_switch_that_sets_what_is_there_anyway_shows_the_machine(tmp_path):
+    data = load(tmp_path / "r")
+    for seed in (1, 2, 3):
+        path = data.folder / "stats" / "box" / f"base_{seed}.json"
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"ordering": "none", "tail": False}))
+    said = list(remarks.same_remarks(summary.lines(data), data))
+    assert [text.endswith("the difference is that of the machine") for text in said] == [False, True]  # ordering=morton, tail=false
