@@ -93,7 +93,7 @@ def facts(experiment):
     versions, machine = m.get("versions") or {}, m.get("machine") or {}
     devices = [d for d in m.get("devices") or [] if d]
     parts = [m.get("date"), versions.get("ambilux") and f"Ambilux {versions['ambilux']} ({versions.get('git_revision', 'revision unknown')})",
-             ", ".join(devices) or machine.get("cpu"), ", ".join(m.get("backends") or []) and "backend " + ", ".join(m["backends"]),
+             ", ".join(devices + [machine["cpu"]] if machine.get("cpu") else devices), ", ".join(m.get("backends") or []) and "backend " + ", ".join(m["backends"]),
              f"seeds {', '.join(map(str, m['seeds']))}" if m.get("seeds") else None]
     return " · ".join(html.escape(str(p)) for p in parts if p)
 
