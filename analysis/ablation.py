@@ -5,7 +5,7 @@ import math
 import matplotlib.pyplot as plt
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
-from analysis import efficiency, experiment as experiments, style, summary, verdicts
+from analysis import efficiency, experiment as experiments, same_estimator, style, summary, tables, verdicts
 
 WIDEST_INTERVAL = 30.0  # bars of two seeds can have intervals over decades; the axis shows this much beyond the values
 RATIO = "ratio of efficiencies"
@@ -51,7 +51,7 @@ def draw_bars(axes, experiment, scene, bars, first, biased):
         else:  # an outline: the value is there, how sure it is cannot be said
             axes.barh(i, r.value - 1, left=1, height=0.62, color="none", edgecolor="0.5", ls=(0, (2, 2)), lw=0.7, zorder=2)
         dagger = "†" if (scene, run) in biased or (scene, experiment.base) in biased else ""
-        axes.text(1.02, i, (style.short_number(r.value) if r.trusted else "?") + dagger, transform=axes.get_yaxis_transform(), va="center", ha="left", fontsize=7)
+        axes.text(1.02, i, (style.short_number(r.value) if r.trusted else "?") + (" =" if r.over == same_estimator.OVER else "") + dagger, transform=axes.get_yaxis_transform(), va="center", ha="left", fontsize=7)
     axes.axvline(1, color="black", lw=0.8, zorder=4)
     axes.set_ylim(len(bars) - 0.4, -0.6)
     names = label_lines([run for run, _ in bars], experiment.base)
@@ -82,10 +82,11 @@ def make(experiment):
     """Yields the figure of bars."""
     if len(experiment.runs) < 2:
         raise style.NotMade("an ablation needs two runs")
+    lines = summary.lines(experiment)
     yield style.Picture(
         "ablation", draw(experiment), f"Efficiency over that of the run {experiment.base}",
-        f"Bars: 1 / ({efficiency.NAMES[experiment.metric]} · time) of a run over that of {experiment.base}, all pixels, arithmetic means; right of 1 is better. Whiskers: 95 % interval over batches of "
-        "passes, or over seeds where there are none. Dashed outlines with a question mark: the data do not support an interval, the table says why. "
+        f"Bars: 1 / ({efficiency.NAMES[experiment.metric]} · time) of a run over that of {experiment.base}, at {tables.EQUAL[summary.equal(experiment)]}, all pixels, arithmetic means; right of 1 is better. "
+        f"Whiskers: 95 % interval over {tables.units(lines)}. {tables.same_sentence(lines, experiment.base)}Dashed outlines with a question mark: the data do not support an interval, the table says why. "
         f"A dagger: the mean of the run or of {experiment.base} is off by more than chance allows. "
         "The run that others are compared with is that of [ablation] in the configuration, else the first.",
         experiment.runs, experiment.scenes)
@@ -123,13 +124,6 @@ def with_default(experiment, name, key, entries):
     return every, [run for _, run in every].index(name)
 
 
-def sweep_ratios(experiment, scene, entries, first):
-    """Judged or None of each entry's efficiency over that of the entry `first`."""
-    last = experiment.last_common_checkpoint(scene)
-    works = [summary.works(experiment, scene, run, last) for _, run in entries]
-    return [efficiency.lead(*summary.ratios(own, works[first], entries[first][1])) for own in works]
-
-
 def draw_sweep(experiment, entries, key, first=0, width="column"):
     """Ratios of efficiencies over that of the entry `first`: lines over positive numbers on a logarithmic axis, points beside each other over names."""
     numbers = [number_or_none(value) for value, _ in entries]
@@ -139,7 +133,8 @@ def draw_sweep(experiment, entries, key, first=0, width="column"):
         figure, axes = plt.subplots(figsize=(style.COLUMN if width == "column" else style.PAGE, 2.3), layout="constrained")
         for i, scene in enumerate(scenes):
             x = numbers if numeric else [n + 0.7 * ((i + 0.5) / len(scenes) - 0.5) for n in range(len(entries))]
-            found = [(at, r, n == first) for n, (at, r) in enumerate(zip(x, sweep_ratios(experiment, scene, entries, first))) if r and math.isfinite(r.value)]
+            ratios = [summary.ratio_over(experiment, scene, run, entries[first][1]) for _, run in entries]
+            found = [(at, r, n == first) for n, (at, r) in enumerate(zip(x, ratios)) if r and math.isfinite(r.value)]
             if not found:
                 continue
             looks = style.line_style(i) | ({} if numeric else {"ls": "none"})
@@ -149,8 +144,8 @@ def draw_sweep(experiment, entries, key, first=0, width="column"):
                     continue  # over itself: 1
                 if r.trusted:
                     axes.plot([at, at], [r.low, r.high], color=style.colour(i), lw=1, solid_capstyle="butt")
-                else:
-                    axes.plot(at, r.value, marker="o", ms=7, mfc="none", mec=style.colour(i), mew=0.6)
+                else:  # hollow, over the full one
+                    axes.plot(at, r.value, marker=style.marker(i), ms=4, mfc="white", mec=style.colour(i), mew=0.8, zorder=4)
         axes.axhline(1, color="0.4", lw=0.8, zorder=1)
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(FixedLocator(ratio_ticks(*axes.get_ylim())))
@@ -178,5 +173,5 @@ def make_sweeps(experiment):
         first = default or 0
         yield style.Picture(
             style.file_name("sweep", name, key), draw_sweep(experiment, every, key, first), f"Efficiency of {name} over its variant {key} = {every[first][0]}",
-            f"1 / ({efficiency.NAMES[experiment.metric]} · time) over that of {key} = {every[first][0]}. Bars: 95 % interval over batches of passes, or over seeds where there are none; circles: the data do "
+            f"1 / ({efficiency.NAMES[experiment.metric]} · time) over that of {key} = {every[first][0]}. Bars: 95 % interval over batches of passes, over seeds where those are not to be trusted, of runs that make the same images over pairs of seeds; hollow: the data do "
             "not support one.", [run for _, run in every], experiment.scenes)

@@ -22,7 +22,7 @@ def draw_guide(axes, curves, x, slope):
 
 
 def draw_panel(axes, experiment, scene, x, measure, shown):
-    """One scene, or a word in place of it. shown: the runs that are told apart."""
+    """One scene, or a word in place of it. shown: the runs that are told apart. A run looks the same in all panels and figures."""
     curves = {run: c for run in experiment.runs if (c := summary.curve(experiment, scene, run, measure, x))}
     axes.set_title(style.wrap(scene, 30))
     if not curves:
@@ -34,14 +34,14 @@ def draw_panel(axes, experiment, scene, x, measure, shown):
     draw_guide(axes, curves.values(), x, summary.SLOPES[measure])
     for run, c in curves.items():
         if run in shown:
-            axes.plot(getattr(c, x), c.error, label=run, zorder=3, **style.line_style(shown.index(run)))
+            axes.plot(getattr(c, x), c.error, label=run, zorder=3, **style.line_style(experiment.runs.index(run)))
         else:
             axes.plot(getattr(c, x), c.error, color="0.8", lw=0.8, zorder=1.5)
     limits = axes.get_ylim()  # of the lines: a band can be decades wide and would flatten everything
     strength = 0.2 if len(shown) <= 3 else 0.11  # many bands on top of each other
     for run, c in curves.items():
         if run in shown:
-            axes.fill_between(getattr(c, x), c.low, c.high, color=style.colour(shown.index(run)), alpha=strength, lw=0, zorder=2)
+            axes.fill_between(getattr(c, x), c.low, c.high, color=style.colour(experiment.runs.index(run)), alpha=strength, lw=0, zorder=2)
     noise = summary.reference_noise(experiment, scene)
     # Shown where it matters: a reference far below the data would only stretch the axis.
     if measure == "rmse" and noise > 0.3 * min(c.error.min() for c in curves.values()):

@@ -4,7 +4,7 @@ The efficiency of an estimator is 1 / (variance * time) (Pharr, Jakob and Humphr
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,11 +16,15 @@ NAMES = {"relmse": "relMSE", "mse": "MSE"}
 
 @dataclass(frozen=True)
 class Work:
-    """What a run pays for its error: rows of (error, time) whose means' product it is, one for each independent unit."""
+    """What a run pays for its error, the product of the means of what follows.
+
+    Over seeds a unit is a row of (error, time). Over batches it is a row of (error) alone, and times are those of seeds: what slows a render down slows all of its batches down, so
+    that only renders tell how far times can be trusted."""
 
     rows: np.ndarray
     over: str  # "seeds" or "batches"
     doubt: str  # of intervals
+    seconds: dict | None = None  # {seed: seconds of a sample}, over batches
 
 
 def few_pixels(rows):
@@ -61,14 +65,31 @@ def selection(experiment, scene, run, rows):
 
 
 def of_batches(experiment, scene, run, metric, rows):
-    """Work of a run's batches: (error of one sample, seconds of one sample) of each; None without batches. `rows`: of the checkpoint at which runs compare."""
+    """Work of a run's batches: error of one sample of each, seconds of one sample of each seed; None without batches. `rows`: of the checkpoint at which runs compare."""
     batches = batches_of(experiment, scene, run)
     if not batches:
         return None
-    values = variances(batches, metric)
+    values, methods = variances(batches, metric), experiment.methods(scene, run)
     before = selection(experiment, scene, run, rows)
-    times = [b.time / b.spp + before.get(b.seed, 0.0) for of_seed in batches.values() for b in of_seed]
-    return Work(np.array([*zip((v for of_seed in values for v in of_seed), times)]), "batches", heavy_tails.doubt_of_batches(values, wholes(experiment, scene, run, batches, metric)))
+    seconds = {seed: sum(b.time for b in of_seed) / sum(b.spp for b in of_seed) + before.get(seed, 0.0) for seed, of_seed in batches.items()}
+    doubt = "seeds ran different methods" if len(methods) > 1 else heavy_tails.doubt_of_batches(
+        values, wholes(experiment, scene, run, batches, metric), heavy_tails.SAME_METHOD if methods else heavy_tails.DIFFERENT)
+    return Work(np.array([v for of_seed in values for v in of_seed]).reshape(-1, 1), "batches", doubt, seconds)
+
+
+def time_factors(signed):
+    """[heavy_tails.Factor] of the times of [(sign, Work)], of seeds. Seeds that both of two works have are pairs: a busy machine slows neighbours down together."""
+    times = [(sign, w.seconds) for sign, w in signed if w.seconds is not None]
+    common = set.intersection(*(set(t) for _, t in times)) if times else set()
+    groups = [times] if len(times) > 1 and len(common) > 1 else [[t] for t in times]
+    out = []
+    for group in groups:
+        seeds = sorted(common if len(group) > 1 else group[0][1])
+        values = [(sign, np.array([t[seed] for seed in seeds])) for sign, t in group]
+        influence = sum(sign * v / v.mean() for sign, v in values)
+        out.append(heavy_tails.Factor(sum(sign * math.log(v.mean()) for sign, v in values), float(influence.std(ddof=1)) / math.sqrt(len(seeds)) if len(seeds) > 1 else 0.0,
+                                      max(1, len(seeds) - 1)))
+    return out
 
 
 def averaging(experiment, scene, run, metric):
@@ -82,8 +103,10 @@ def judged(signed, over, doubt, for_test=False):
     units = min(len(w.rows) for _, w in signed)
     if units == 0 or any(not np.isfinite(w.rows).all() or not (w.rows.mean(axis=0) > 0).all() for _, w in signed):
         return heavy_tails.unknown(math.nan, over, units, "errors below the reference's noise" if units else "no results")
+    if any(w.seconds is not None and len(w.seconds) < 2 for _, w in signed):
+        doubt = doubt or "1 seed"
     resample = not for_test and (over == "batches" or units >= heavy_tails.FEWEST_RESAMPLED_SEEDS)
-    return heavy_tails.estimate([(sign, w.rows) for sign, w in signed], over, doubt, resample)
+    return heavy_tails.estimate([(sign, w.rows) for sign, w in signed], over, doubt, resample, besides=time_factors(signed))
 
 
 def efficiency(work):
@@ -110,7 +133,10 @@ def root(j):
 
 
 def lead(over_batches, over_seeds):
-    """Which of both is shown first: that of more units, if its interval is to be trusted."""
-    if over_batches is None:
-        return over_seeds
-    return over_seeds if not over_batches.trusted and over_seeds is not None and over_seeds.trusted else over_batches
+    """Which of both is shown first: that of more units whose interval is to be trusted. Of neither it is the value over seeds, which is that of the errors and times beside it (batches may have
+    missed what the whole image shows), and the doubt about batches."""
+    if over_batches is None or over_seeds is None:
+        return over_seeds if over_batches is None else over_batches
+    if over_batches.trusted or over_seeds.trusted:
+        return over_batches if over_batches.trusted else over_seeds
+    return replace(over_seeds, doubt=over_batches.doubt) if over_batches.doubt else over_seeds

@@ -39,12 +39,13 @@ def budget_at_error(budgets, errors, target):
 @dataclass(frozen=True)
 class Speedup:
     """Times `base` / times `run` to the error `target`: > 1 means that the run is faster. sign: "" for a number, ">" or "<" for a bound, since a time
-    lies outside of what was measured by more than FAR."""
+    lies outside of what was measured by more than FAR. doubt: why an error behind it has no interval (heavy_tails.py)."""
 
     value: float
     sign: str
     target: float
     extrapolated: float
+    doubt: str = ""
 
 
 def speedup(base, run):

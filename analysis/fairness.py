@@ -36,19 +36,27 @@ def attempts(experiment, scene, run):
 
 def repeat_remarks(experiment):
     """Renders that were made again, and those whose last attempt was disturbed too."""
-    again = [(f"{scene} {run} seed {seed}", found[-1].get("why", "no reason given")) for scene in experiment.scenes for run in experiment.runs
-             for seed, found in attempts(experiment, scene, run).items()]
-    if again:
-        yield (f"{len(again)} render{'s were' if len(again) > 1 else ' was'} disturbed and made again, the last one counts: "
-               + listed([f"{place} ({why})" for place, why in again], 3))
-    left = [f"{d['scene']} {d['run']} seed {d['seed']} ({d['why']})" for d in experiment.manifest.get("disturbed") or []]
+    again = {(scene, run, seed): found[-1].get("why", "no reason given") for scene in experiment.scenes for run in experiment.runs
+             for seed, found in attempts(experiment, scene, run).items()}
+    left = {(d["scene"], d["run"], d["seed"]): d["why"] for d in experiment.manifest.get("disturbed") or []}
+
+    def places(found):
+        return listed([f"{scene} {run} seed {seed} ({why})" for (scene, run, seed), why in found.items()], 3)
+    mended = {place: why for place, why in again.items() if place not in left}
+    if mended:
+        yield f"{renders(len(mended))} disturbed and made again, the last one counts: {places(mended)}"
     shared = experiment.manifest.get("ranks_share")
     if shared:
         yield f"{shared}: no time is that of a render alone, and none was made again for it"
     if left:
-        again = not shared and experiment.manifest.get("repeats")
-        tried = f", also when made again up to {again} time{'s' if again > 1 else ''}" if again else " and not made again" + ("" if shared else " (repeats = 0)")
-        yield f"{len(left)} render{'s were' if len(left) > 1 else ' was'} disturbed{tried}; do not trust their times: {listed(left)}"
+        times = not shared and experiment.manifest.get("repeats")
+        tried = f", also when made again up to {times} time{'s' if times > 1 else ''}" if times else " and not made again" + ("" if shared else " (repeats = 0)")
+        every = sum(len(experiment.seeds(scene, run)) for scene in experiment.scenes for run in experiment.runs)
+        yield f"{renders(len(left))} disturbed{tried}, of {every}; do not trust their times: {places(left)}"
+
+
+def renders(count):
+    return f"{count} render{'s were' if count > 1 else ' was'}"
 
 
 def slowdown_remarks(experiment):

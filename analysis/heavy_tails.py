@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.stats import kruskal
 from scipy.stats import t as student
 
@@ -17,7 +18,8 @@ FEWEST_SEEDS = 3
 LARGEST = 2.5  # largest value over the mean, from which on a few values decide
 TRIMMED = 1.25  # relMSE over relMSE without its worst pixels, from which on a few pixels decide
 AVERAGING = 1.5  # error of the whole over what independent batches make of it
-DIFFERENT = 0.01  # chance at which seeds count as different
+DIFFERENT = 0.01  # chance at which seeds count as different where it is not known that all ran one method
+SAME_METHOD = 1e-4  # the same where they did: then only samples that are not independent make a difference
 
 
 @dataclass(frozen=True)
@@ -68,42 +70,68 @@ def resampled(signed, resamples, seed):
     return total[good] / np.sqrt(variance[good])
 
 
-def estimate(signed, over, doubt="", by_bootstrap=True, level=0.95, seed=1):
-    """Judged of exp(sum of sign * log_product(rows)). `signed`: [(sign, rows)], rows of shape (n, k), positive.
+@dataclass(frozen=True)
+class Factor:
+    """The logarithm of a factor that few independent units tell, its standard error and degrees of freedom (Student's)."""
+
+    log: float
+    error: float
+    degrees: float
+
+    def half(self, chance):
+        """Half the width of the interval that misses with this chance."""
+        return float(student.isf(chance / 2, self.degrees)) * self.error if self.error > 0 else 0.0
+
+
+def chance_beyond(distance, factors):
+    """Chance at which the interval of the sum of independent factors ends `distance` from it, 1e-12 at least; of one factor it is Student's p."""
+    if len(factors) == 1:
+        return float(2 * student.sf(distance / factors[0].error, factors[0].degrees))
+
+    def excess(logarithm):
+        return math.sqrt(sum(f.half(math.exp(logarithm)) ** 2 for f in factors)) - distance
+    least = math.log(1e-12)
+    return 1.0 if excess(0.0) >= 0 else 1e-12 if excess(least) <= 0 else math.exp(brentq(excess, least, 0.0, xtol=1e-6))
+
+
+def estimate(signed, over, doubt="", by_bootstrap=True, level=0.95, seed=1, besides=()):
+    """Judged of exp(sum of sign * log_product(rows)) times the factors `besides`. `signed`: [(sign, rows)], rows of shape (n, k), positive.
 
     by_bootstrap: the bootstrap-t interval on the logarithm (Efron 1979; Hall 1988, Ann. Stat. 16(3), on why the studentised one follows skewed
-    data), else Student's with the degrees of freedom of Welch and Satterthwaite. p is Student's in either case: its tail needs no resamples.
+    data), else Student's with the degrees of freedom of Welch and Satterthwaite. Intervals of independent factors are put together by the squares of their half widths, on
+    either side of the sum (MOVER: Zou and Donner 2008, Stat. Med. 27(10)). p is that of such an interval from Student's alone: its tail needs no resamples.
     """
     signed = [(sign, np.asarray(rows, dtype=float).reshape(len(rows), -1)) for sign, rows in signed]
     units = min(len(rows) for _, rows in signed)
     parts = [(sign, *log_product(rows), len(rows)) for sign, rows in signed if len(rows) > 1]
     theta = sum(sign * float(log_product(rows)[0]) for sign, rows in signed) if units > 1 else sum(
         sign * float(np.log(rows.mean(axis=0)).sum()) for sign, rows in signed)
+    theta += sum(f.log for f in besides)
     value = math.exp(theta)
     if doubt or units < 2:
         return unknown(value, over, units, doubt or f"{units} of {over}")
-    variance = float(sum(error**2 for _, _, error, _ in parts))
-    error = math.sqrt(variance)
+    of_rows = float(sum(error**2 for _, _, error, _ in parts))
+    error = math.sqrt(of_rows + sum(f.error**2 for f in besides))
     if error == 0:
         return Judged(value, value, value, 1.0 if math.isclose(value, 1, rel_tol=1e-9) else 0.0, over, units)
-    degrees = variance**2 / sum(float(e) ** 4 / (n - 1) for _, _, e, n in parts)
-    p = float(2 * student.sf(abs(theta) / error, degrees))
-    tail = (1 - level) / 2
-    if by_bootstrap:
-        low, high = np.quantile(resampled(signed, RESAMPLES, seed), [tail, 1 - tail])
-    else:
-        high = float(student.ppf(1 - tail, degrees))
-        low = -high
-    return Judged(value, math.exp(theta - high * error), math.exp(theta - low * error), p, over, units)
+    own = [Factor(0.0, math.sqrt(of_rows), of_rows**2 / sum(float(e) ** 4 / (n - 1) for _, _, e, n in parts))] if of_rows > 0 else []
+    p = chance_beyond(abs(theta), [f for f in (*own, *besides) if f.error > 0])
+    ends = [f.half(1 - level) for f in own for _ in range(2)] or [0.0, 0.0]
+    if own and by_bootstrap:
+        low, high = np.quantile(resampled(signed, RESAMPLES, seed), [(1 - level) / 2, (1 + level) / 2])
+        ends = [max(0.0, end) * math.sqrt(of_rows) for end in (high, -low)]
+    few = sum(f.half(1 - level) ** 2 for f in besides)
+    below, above = (math.sqrt(end**2 + few) for end in ends)
+    return Judged(value, math.exp(theta - below), math.exp(theta + above), p, over, units)
 
 
-def doubt_of_batches(groups, whole=()):
+def doubt_of_batches(groups, whole=(), different=DIFFERENT):
     """Why an interval over batches of passes is not to be trusted; "" if nothing speaks against it.
 
     groups: for each seed its batches' values, each an estimate of one and the same variance of a sample; whole: for each seed what the image of all its batches
     makes of it. Three things are asked of the data. (1) No value is LARGEST times the mean or more: a tail whose far end was met
     once or twice has more beyond. (2) Batches average out: the whole's value is about that of the batches, mean whole / mean batches = 1 for
-    independent ones, and their number where all have the same error, such as light that none has found. (3) Seeds agree (Kruskal and Wallis 1952).
+    independent ones, and their number where all have the same error, such as light that none has found. (3) Seeds agree (Kruskal and Wallis 1952; `different`: the chance below which they do not).
     """
     values = np.concatenate([np.asarray(g, dtype=float) for g in groups]) if groups else np.array([])
     if len(values) < FEWEST_BATCHES:
@@ -114,8 +142,8 @@ def doubt_of_batches(groups, whole=()):
         return "few samples decide"
     ratio = averaging(groups, whole)
     if ratio >= AVERAGING:
-        return f"batches do not average out (x{ratio:.1f})"
-    if len(groups) > 1 and min(map(len, groups)) > 1 and np.ptp(values) > 0 and kruskal(*groups).pvalue < DIFFERENT:
+        return f"batches do not average out (×{ratio:.1f})"
+    if len(groups) > 1 and min(map(len, groups)) > 1 and np.ptp(values) > 0 and kruskal(*groups).pvalue < different:
         return "seeds differ"
     return ""
 

@@ -5,7 +5,7 @@ import math
 import matplotlib.pyplot as plt
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
-from analysis import ablation, convergence, efficiency, style, summary
+from analysis import ablation, convergence, efficiency, style, summary, tables, verdicts
 
 SIZE = (10.0, 5.63)  # inches: 16 to 9
 ROWS_HEIGHT = 4.2  # inches of all rows of ratios
@@ -14,7 +14,8 @@ LARGER = {"font.size": 10, "axes.titlesize": 11, "axes.labelsize": 10, "legend.f
 
 
 def draw_ratios(axes, experiment, lines):
-    """Points with intervals, a row per run and a colour per scene; hollow where the data support no interval."""
+    """Points with intervals, a row per run and a colour per scene; hollow where the data support no interval, with a dagger where a mean is off."""
+    biased = verdicts.biased(lines)
     shown = [r for r in experiment.runs if r != experiment.base]
     height = 0.7 / max(1, len(experiment.scenes))
     for i, scene in enumerate(experiment.scenes):
@@ -27,6 +28,8 @@ def draw_ratios(axes, experiment, lines):
                       label=scene)
             if r.trusted:
                 axes.plot([r.low, r.high], [y, y], color=style.colour(i), lw=1.2)
+            if biased & {(scene, line.run), (scene, experiment.base)}:
+                axes.annotate("†", (max(r.value, r.high if r.trusted else 0), y), xytext=(5, 0), textcoords="offset points", va="center", fontsize=8, color=style.colour(i))
     axes.axvline(1, color="0.3", lw=0.8, zorder=0)
     axes.set_xscale("log")
     low, high = axes.get_xlim()
@@ -49,7 +52,8 @@ def draw(experiment):
     measure = "relmse" if experiment.metric == "relmse" else "rmse"
     scenes = experiment.scenes[:MOST_SCENES]
     ranked = sorted((line for line in lines if line.scene == scenes[0] and math.isfinite(line.efficiency.value)), key=lambda line: -line.efficiency.value)
-    told = experiment.runs if len(experiment.runs) <= convergence.TOGETHER else [line.run for line in ranked[:convergence.TOGETHER]]
+    best = {line.run for line in ranked[:convergence.TOGETHER]}
+    told = experiment.runs if len(experiment.runs) <= convergence.TOGETHER else [run for run in experiment.runs if run in best]
     with plt.rc_context(style.STYLE | LARGER):
         figure = plt.figure(figsize=SIZE, layout="constrained")
         left, right = figure.subfigures(1, 2, width_ratios=(1, 1.15) if len(scenes) == 1 else (1.25, 1))
@@ -77,8 +81,10 @@ def make(experiment):
     """Yields the figure."""
     if len(experiment.runs) < 2:
         raise style.NotMade("a comparison needs two runs")
+    lines = summary.lines(experiment)
     more = f" Of {len(experiment.scenes)} scenes the first {MOST_SCENES} have panels of their own." if len(experiment.scenes) > MOST_SCENES else ""
+    grey = f" Grey: runs that are not among the {convergence.TOGETHER} most efficient ones of the first scene." if len(experiment.runs) > convergence.TOGETHER else ""
     yield style.Picture(
         "overview", draw(experiment), f"Overview of {experiment.name}",
-        "Left: error against time, arithmetic mean over seeds, all pixels. Right: ratio of efficiencies at equal time with 95 % intervals over batches of passes, or over seeds where there are none; "
-        f"hollow: the data support no interval.{more}", experiment.runs, experiment.scenes)
+        f"Left: error against time, arithmetic mean over seeds, all pixels; bands: its 95 % interval over seeds.{grey} Right: ratio of efficiencies over {experiment.base} at {tables.EQUAL[summary.equal(experiment)]}, "
+        f"with 95 % intervals over {tables.units(lines)}; hollow: the data support no interval; a dagger: the mean of the run or of {experiment.base} is off by more than chance allows.{more}", experiment.runs, experiment.scenes)

@@ -10,6 +10,7 @@ from matplotlib.colors import LogNorm
 from analysis import experiment as experiments, images, strategy_variance, style
 
 KINDS = ("weighted", "raw")
+ONE_PIXEL = 0.5  # share of a strategy's variance
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB (ITU-R BT.709)
 
 
@@ -127,7 +128,7 @@ def make(experiment, scene, run):
 
 
 def variances(experiment, scene, run):
-    """[(s, t, Estimate of the variance of one weighted sample, share of the sum, seeds)] over the seeds that recorded the strategy; [] without two seeds."""
+    """[(s, t, Estimate of the variance of one weighted sample, share of the sum, seeds, share of its greatest pixel)] over the seeds that recorded the strategy; [] without two seeds."""
     folders = [read(folder) for _, folder in experiment.techniques(scene, run)]
     if len(folders) < 2:
         return []
@@ -135,9 +136,10 @@ def variances(experiment, scene, run):
     for st in sorted({st for f in folders for st in f.entries}, key=lambda st: (sum(st), st[0])):
         found = [(f.entries[st]["weighted"], f.spp) for f in folders if "weighted" in f.entries.get(st, {})]
         if len(found) > 1:
-            out.append((*st, strategy_variance.strategy_variance([images.read_exr(p) for p, _ in found], [spp for _, spp in found]), len(found)))
-    total = sum(e.value for _, _, e, _ in out)
-    return [(s, t, e, e.value / total if total > 0 else math.nan, n) for s, t, e, n in out]
+            pictures, spp = [images.read_exr(p) for p, _ in found], [spp for _, spp in found]
+            out.append((*st, strategy_variance.strategy_variance(pictures, spp), len(found), strategy_variance.largest_pixel(pictures, spp)))
+    total = sum(e.value for _, _, e, *_ in out)
+    return [(s, t, e, e.value / total if total > 0 else math.nan, n, pixel) for s, t, e, n, pixel in out]
 
 
 def make_variance(experiment, scene, run):
@@ -145,7 +147,8 @@ def make_variance(experiment, scene, run):
     found = variances(experiment, scene, run)
     if not found:
         raise style.NotMade(f"the variance of strategies needs techniques/{scene}/{run}_SEED of two seeds")
-    cells = {(s, t): share for s, t, _, share, _ in found}
+    cells = {(s, t): share for s, t, _, share, *_ in found}
+    decided = {(s, t) for s, t, *_, pixel in found if pixel >= ONE_PIXEL}
     lengths, columns = sorted({s + t - 1 for s, t in cells}), sorted({s for s, _ in cells})
     table = np.array([[cells.get((s, k + 1 - s), math.nan) for s in columns] for k in lengths])
     with plt.rc_context(style.STYLE):
@@ -158,7 +161,7 @@ def make_variance(experiment, scene, run):
                 share = 100 * table[i, j]
                 if math.isfinite(share):
                     text = "0" if share == 0 else "<0.01" if share < 0.01 else style.short_number(share, 2)
-                    axes.text(j, i, text, ha="center", va="center", fontsize=6.5, color="black" if share > 3e-2 * top else "white")
+                    axes.text(j, i, text + ("*" if (columns[j], k + 1 - columns[j]) in decided else ""), ha="center", va="center", fontsize=6.5, color="black" if share > 3e-2 * top else "white")
         axes.set_xticks(range(len(columns)), columns)
         axes.set_yticks(range(len(lengths)), lengths)
         axes.set_xlabel("s: vertices from the light")
@@ -166,6 +169,6 @@ def make_variance(experiment, scene, run):
         figure.colorbar(drawn, label="% of the sum of variances", extend="min")
     yield style.Picture(
         style.file_name("strategy_variance", scene, run), figure, f"Variance of the strategies of {run} on {scene}",
-        f"Unbiased variance over {max(n for *_, n in found)} seeds of each weighted strategy's image, times spp, mean over pixels and channels, as a share of the sum over "
-        "strategies. Strategies share subpaths, so that the sum is not the variance of the image. Values with jackknife intervals: strategy_variance.csv.",
+        f"Unbiased variance over {max(n for *_, n, _ in found)} seeds of each weighted strategy's image, times spp, mean over pixels and channels, as a share of the sum over "
+        f"strategies. Strategies share subpaths, so that the sum is not the variance of the image. {'A star: one pixel holds half of it or more, so that a single bright sample decides and other seeds will tell otherwise. ' if decided else ''}Values, from three seeds on with jackknife intervals: strategy_variance.csv.",
         [run], [scene])

@@ -3,9 +3,11 @@
 import math
 import re
 
+from analysis import experiment as experiments
 from analysis import fairness, peers, summary, verdicts
 
 FEW_PIXELS = 2.0  # relMSE over relMSE without the worst pixels, from which on these hold more than half of it
+ROUNDING = 1e-3
 SLOW_CLOCK = 1.1  # ratio of clocks at start and end of an experiment that is told
 
 
@@ -26,7 +28,9 @@ def trimmed_remarks(experiment, lines):
         few = [line for line in known if line.few_pixels >= FEW_PIXELS]
         if not few:
             continue
-        whole, trimmed = (min(known, key=lambda line: getattr(line, m).value).run for m in ("relmse", "trimmed"))
+        # Of errors that differ in rounding alone, the first run's.
+        least = {m: min(getattr(line, m).value for line in known) for m in ("relmse", "trimmed")}
+        whole, trimmed = (next(line.run for line in known if getattr(line, m).value <= least[m] * (1 + ROUNDING)) for m in least)
         better = f"; without them {trimmed} has the least error, with them {whole}" if whole != trimmed else ""
         few.sort(key=lambda line: -line.few_pixels)
         told = ", ".join(f"{line.run} {line.few_pixels:.3g}" for line in few[:4])
@@ -45,10 +49,11 @@ def method_remarks(experiment):
                 yield f"{scene}, {run}: seeds ran different methods, so that their mean is of a mixture: {told}"
 
 
-def same_remarks(lines):
-    """Runs that are the base run's estimator: what their time says."""
+def same_remarks(lines, experiment=None):
+    """Runs that are the base run's estimator: what their time says. Those that set what the base run has anyway show how far the machine can be trusted."""
     for line in lines:
         r = line.ratio_time
+        anyway = experiment is not None and sets_nothing(experiment, line.scene, line.run)
         if r is None:
             continue
         told = f"a sample takes {1 / r.value:.3g} times as long [{1 / r.high:.3g}, {1 / r.low:.3g}]"
@@ -60,7 +65,15 @@ def same_remarks(lines):
             said = f"no effect on time per sample found: {told}"
         else:
             said = f"{told}, which {line.seeds} seeds cannot tell from 1 at the level of the whole table"
-        yield f"{line.scene}, {line.run}: the same images at equal seeds as the run it is compared with; {said}"
+        yield (f"{line.scene}, {line.run}: the same images at equal seeds as the run it is compared with; {said}"
+               + ("; it sets what that run has anyway, so that the difference is that of the machine" if anyway else ""))
+
+
+def sets_nothing(experiment, scene, run):
+    """Whether a run named like base[key=value] sets what the statistics of the base run have without it."""
+    name, settings = experiments.settings_of(run)
+    recorded = experiment.stats(scene, experiment.base) if name == experiment.base and settings else ()
+    return bool(recorded) and all(str(stats.get(key)).lower() == value.lower() for stats in recorded for key, value in settings.items())
 
 
 def doubt_remarks(lines):
@@ -73,7 +86,7 @@ def doubt_remarks(lines):
     for kind, found in reasons.items():
         places = [place for doubt in found for place in found[doubt]]
         counts = sorted(int(doubt.split()[0]) for doubt in found if doubt != kind)
-        said = kind if not counts else f"{counts[0]} {kind}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]} {kind}"
+        said = kind if not counts else (f"{counts[0]} {kind}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]} {kind}") + ", too few"
         yield f"no interval is stated for {listed(places, 6)}: {said}"
 
 
@@ -142,4 +155,4 @@ def remarks(experiment, lines):
             quiet.setdefault(line.scene, []).append(line.run)
     for scene, runs in quiet.items():
         found.append(f"{scene}: the error of {listed(runs)} is below the noise of the reference ({summary.reference_noise(experiment, scene):.2g}) and so uncertain; a longer reference helps")
-    return found + list(method_remarks(experiment)) + list(same_remarks(lines)) + list(doubt_remarks(lines)) + list(trimmed_remarks(experiment, lines))
+    return found + list(method_remarks(experiment)) + list(same_remarks(lines, experiment)) + list(doubt_remarks(lines)) + list(trimmed_remarks(experiment, lines))

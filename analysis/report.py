@@ -93,7 +93,7 @@ def facts(experiment):
     versions, machine = m.get("versions") or {}, m.get("machine") or {}
     devices = [d for d in m.get("devices") or [] if d]
     parts = [m.get("date"), versions.get("ambilux") and f"Ambilux {versions['ambilux']} ({versions.get('git_revision', 'revision unknown')})",
-             ", ".join(devices) or machine.get("cpu"), ", ".join(m.get("backends") or []) and "backend " + ", ".join(m["backends"]),
+             ", ".join(devices + [machine["cpu"]] if machine.get("cpu") else devices), ", ".join(m.get("backends") or []) and "backend " + ", ".join(m["backends"]),
              f"seeds {', '.join(map(str, m['seeds']))}" if m.get("seeds") else None]
     return " · ".join(html.escape(str(p)) for p in parts if p)
 
@@ -111,13 +111,14 @@ def figure(out, name, title, caption):
     # 7 inches, the page of a paper, are as wide as the page here.
     with Image.open(out / f"{name}.png") as picture:
         width = round(picture.width / style.DPI / style.PAGE * 1100)
+    large = ' class="large"' if width > 700 else ""  # too much for a telephone: it can be moved there
     uri = "data:image/png;base64," + base64.b64encode((out / f"{name}.png").read_bytes()).decode()
-    return (f'<figure id="{html.escape(name)}"><h3>{html.escape(title)}</h3><img src="{uri}" alt="{html.escape(title)}" width="{width}"><figcaption>{html.escape(caption)} '
+    return (f'<figure id="{html.escape(name)}"><h3>{html.escape(title)}</h3><div class="sheet"><img src="{uri}" alt="{html.escape(title)}" width="{width}"{large}></div><figcaption>{html.escape(caption)} '
             f"<code>{html.escape(name)}.pdf</code></figcaption></figure>")
 
 
 def verdict_table(lines):
-    rows = [f"<tr><td>{html.escape(scene)}</td><td>{html.escape(run)}</td><td>{html.escape(tables.minus(slope))}</td><td>{html.escape(tables.minus(bias))}</td></tr>"
+    rows = [f"<tr><td>{tables.breakable(scene)}</td><td>{tables.breakable(run)}</td><td>{html.escape(tables.minus(slope))}</td><td>{html.escape(tables.minus(bias))}</td></tr>"
             for (scene, run), (slope, bias) in verdicts.verdicts(lines).items()]
     return ('<table class="said"><thead><tr><th>scene</th><th>run</th><th>convergence</th><th>bias</th></tr></thead><tbody>' + "".join(rows) + "</tbody></table>")
 

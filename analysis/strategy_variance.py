@@ -22,6 +22,14 @@ def variance_of_one_sample(images, spp):
     return float((w * (x - mean) ** 2).sum(axis=0).mean() / (len(x) - 1))
 
 
+def largest_pixel(images, spp):
+    """Share of variance_of_one_sample that the greatest pixel holds, its channels together; NaN without variance. Near 1 a single bright sample decides. images: shape (n, height, width, channels)."""
+    x = np.asarray(images, dtype=float)
+    w = np.broadcast_to(np.asarray(spp, dtype=float), len(x)).reshape(-1, *[1] * (x.ndim - 1))
+    of_pixels = (w * (x - (w * x).sum(axis=0) / w.sum()) ** 2).sum(axis=(0, -1))
+    return float(of_pixels.max() / of_pixels.sum()) if of_pixels.sum() > 0 else float("nan")
+
+
 def strategy_variance(images, spp, confidence=0.95):
     """variance_of_one_sample with its standard error and interval.
 

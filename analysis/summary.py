@@ -136,9 +136,15 @@ def slope(experiment, scene, run, x="spp"):
 
 
 def speedup(experiment, scene, run, base=None):
-    """equal_error.speedup of a run over the base run, by wall-clock time. None if a scene lacks either."""
-    curves = [curve(experiment, scene, name) for name in (base or experiment.base, run)]
-    return equal_error.speedup(*((c.seconds, c.error) for c in curves)) if all(curves) else None
+    """equal_error.speedup of a run over the base run, by wall-clock time. None if a scene lacks either, or an error is below the noise of the reference."""
+    names = (base or experiment.base, run)
+    curves = [curve(experiment, scene, name) for name in names]
+    last = experiment.last_common_checkpoint(scene)
+    at_last = [mean_error(experiment.select(scene, name, last), "rmse") for name in names] if last is not None else []
+    if not all(curves) or any(e.value <= 0 for e in at_last):
+        return None
+    doubts = [e.doubt for e in at_last]
+    return replace(found, doubt=next(filter(None, doubts), "")) if (found := equal_error.speedup(*((c.seconds, c.error) for c in curves))) else None
 
 
 def works(experiment, scene, run, checkpoint):
@@ -150,6 +156,18 @@ def works(experiment, scene, run, checkpoint):
 def ratios(of_run, of_base, name, for_test=False):
     """(ratio of efficiencies over batches, over seeds) of two pairs of works; None for what either lacks."""
     return [efficiency.ratio(a, b, name, for_test) if a is not None and b is not None and len(a.rows) and len(b.rows) else None for a, b in zip(of_run, of_base)]
+
+
+def time_ratio(experiment, scene, run, base):
+    """same_estimator.time_ratio of a run that is the estimator of `base`; None of another, and of `base` itself."""
+    return same_estimator.time_ratio(experiment, scene, run, base) if run != base and same_estimator.same(experiment, scene, run, base) else None
+
+
+def ratio_over(experiment, scene, run, base):
+    """What Line.ratio is, over any run `base`, at the last checkpoint that all runs have."""
+    last = experiment.last_common_checkpoint(scene)
+    of_run, of_base = (works(experiment, scene, name, last) for name in (run, base))
+    return time_ratio(experiment, scene, run, base) or efficiency.lead(*ratios(of_run, of_base, base))
 
 
 def line(experiment, scene, run, checkpoint):
@@ -169,8 +187,7 @@ def line(experiment, scene, run, checkpoint):
         work_seeds=of_seeds, work_batches=of_batches, averaging=efficiency.averaging(experiment, scene, run, experiment.metric),
         ratio_seeds=ratio_seeds, ratio_batches=ratio_batches,
         time_per_sample=mean_or_nan(list(same_estimator.seconds_per_sample(experiment, scene, run).values())),
-        ratio_time=(same_estimator.time_ratio(experiment, scene, run, experiment.base)
-                    if run != experiment.base and same_estimator.same(experiment, scene, run, experiment.base) else None),
+        ratio_time=time_ratio(experiment, scene, run, experiment.base),
         speedup=speedup(experiment, scene, run) if experiment.select(scene, experiment.base, checkpoint) else None,
         slope=slope_spp, slope_time=slope(experiment, scene, run, "seconds")[0], slope_seeds=slope_seeds,
         bias=bias.bias_test([r.bias for r in rows], reference_error, [r.bias_z for r in rows]),
@@ -187,6 +204,12 @@ def lines(experiment, flips=None):
     return [replace(x, flip=flips[x.scene, x.run][0], flip_median=flips[x.scene, x.run][1]) if (x.scene, x.run) in flips else x for x in found] if flips else found
 
 
+def equal(experiment):
+    """What runs have alike where the table compares them: "time" or "samples"."""
+    kinds = experiment.budgets - {""} or set(experiment.manifest.get("checkpoints") or {})
+    return "samples" if kinds == {"spp"} else "time"
+
+
 def rows_used(experiment):
     """A sentence on which rows stand for what."""
     if experiment.budget("spp"):
@@ -195,5 +218,3 @@ def rows_used(experiment):
     kind = next(iter(experiment.budgets), "")
     named = {"spp": "in samples", "seconds": "in seconds"}.get(kind, "of one kind")
     return f"All axes, speed-ups and slopes use all checkpoints, which are {named}; the table's errors and bias use the last one that all runs have reached."
-
-

@@ -63,6 +63,11 @@ def best(lines, scene):
     return first
 
 
+def told(p, limit, seeds, found, none):
+    """What a test says: found; found by itself, but not at the level of the whole table; or nothing found."""
+    return found if p < limit else f"{none} at the level of the whole table, though the interval excludes it ({seeds} seeds)" if p < 0.05 else none
+
+
 def verdicts(lines):
     """What the data say on slope and bias, in whole sentences, for (scene, run)."""
     out = {}
@@ -72,13 +77,13 @@ def verdicts(lines):
             slope_said = "slope: not tested (needs two seeds and two checkpoints above the noise of the reference)"
         else:
             slope_said = (f"slope {line.slope.value:.3f} [{line.slope.low:.3f}, {line.slope.high:.3f}]: "
-                          + ("differs from −1/2 by more than chance" if p < limit(lines) else "no departure from −1/2 found"))
+                          + told(p, limit(lines), line.slope_seeds, "differs from −1/2 by more than chance", "no departure from −1/2 found"))
         if line.bias is None:
             bias_said = "bias over seeds: not tested (needs two seeds)"
         else:
             e = line.bias.estimate
             known = "" if math.isfinite(line.reference_error) else " (the noise of the reference is unknown and counts as none)"
             bias_said = (f"mean off by {e.value:+.2e} [{e.low:+.1e}, {e.high:+.1e}]: "
-                         + ("more than chance and the noise of the reference explain" if line.bias.p < limit(lines) else "no bias found") + known)
+                         + told(line.bias.p, limit(lines), line.seeds, "more than chance and the noise of the reference explain", "no bias found") + known)
         out[line.scene, line.run] = (slope_said, bias_said)
     return out

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from analysis import captions, experiment, flip_maps, remarks, summary, tables
+from analysis import captions, experiment, flip_maps, remarks, summary, tables, verdicts
 
 FIGURES = {"results": ("overview", "convergence_time_relmse", "convergence_spp", "stage_times", "comparison_glass"), "results_switches": ("ablation",)}
 # Untrimmed errors and equal time lead.
@@ -18,7 +18,7 @@ HEADINGS = ("scene", "run", "spp", "relMSE", "ratio [95 %]", "time to equal RMSE
 
 def markdown(data, lines):
     shown = [h for h in HEADINGS if h in tables.headings(data, lines)]
-    biased = set()
+    biased = verdicts.biased(lines)
     out = ["| " + " | ".join(shown) + " |", "|" + " --- |" * len(shown)]
     scene = None
     for line in lines:

@@ -1,7 +1,7 @@
 "use strict";
 const REPORT = JSON.parse(document.getElementById("data").textContent);
 
-for (const element of document.querySelectorAll(".plot")) new Plot(element, REPORT.plot);
+const plots = [...document.querySelectorAll(".plot")].map(element => new Plot(element, REPORT.plot));
 
 // Images are decoded when they come near the screen: pages of many scenes open at once.
 const viewers = new Map();
@@ -15,4 +15,4 @@ const near = new IntersectionObserver(entries => {
 }, {rootMargin: "800px"});
 for (const element of document.querySelectorAll(".viewer")) near.observe(element);
 let waiting = 0;
-window.addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(() => viewers.forEach(v => v.canvases && v.layout()), 150); });
+window.addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(() => { viewers.forEach(v => v.canvases && v.layout()); plots.forEach(p => p.draw()); }, 150); });

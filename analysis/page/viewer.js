@@ -159,7 +159,7 @@ class Viewer {
     canvas.addEventListener("dblclick", e => this.zoomAt(canvas, e, 2));
     let last = null;
     canvas.addEventListener("pointerdown", e => { last = [e.clientX, e.clientY]; canvas.setPointerCapture(e.pointerId); canvas.focus({preventScroll: true}); });
-    canvas.addEventListener("pointerup", () => { last = null; });
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { last = null; });
     canvas.addEventListener("pointermove", e => {
       if (last) {
         const s = this.scaleOf(canvas) / (window.devicePixelRatio || 1);
@@ -269,6 +269,7 @@ class Viewer {
     this.canvases.forEach(({canvas, name}, i) => {
       const index = this.side ? i : this.current, context = canvas.getContext("2d"), s = this.scaleOf(canvas);
       name.textContent = this.scene.images[index].name;
+      canvas.classList.toggle("zoomed", this.zoom > 1);  // only then a finger moves the image and not the page
       context.setTransform(1, 0, 0, 1, 0, 0);
       context.clearRect(0, 0, canvas.width, canvas.height);
       context.imageSmoothingEnabled = s < 1;

@@ -1,14 +1,15 @@
 """How often do the intervals of heavy_tails.py cover the truth? python -m analysis.tests.coverage [TRIALS]
 
 Renders are simulated pixel by pixel: independent passes of normal, log-normal and outlier samples, and light subpaths that reach several pixels.
-Printed for each case: the share of tables in which an interval is stated, how often a stated one covers, and the share of all in which it is stated and wrong.
+Printed for each case: the share of tables in which an interval is stated, how often a stated one covers, and the share of all in which it is stated and wrong; then the
+same of ratios of runs whose renders take more or less time each.
 """
 
 import sys
 
 import numpy as np
 
-from analysis import heavy_tails
+from analysis import efficiency, heavy_tails
 
 BATCHES = 16
 
@@ -60,7 +61,7 @@ def interval(errors, samples):
     seeds, batches, pixels = errors.shape
     if batches > 1:
         whole = samples * batches * (errors.mean(axis=1) ** 2).mean(axis=1)
-        return heavy_tails.estimate([(1, values.ravel())], "batches", heavy_tails.doubt_of_batches(list(values), list(whole)))
+        return heavy_tails.estimate([(1, values.ravel())], "batches", heavy_tails.doubt_of_batches(list(values), list(whole), heavy_tails.SAME_METHOD))
     worst = max(1, pixels // 1000)
     ordered = np.sort(errors[:, 0] ** 2, axis=1)
     few = ordered.mean(axis=1) / ordered[:, :-worst].mean(axis=1)
@@ -81,12 +82,36 @@ def simulate(case, trials, seed=1):
     return stated / trials, covered / stated if stated else float("nan"), (stated - covered) / trials
 
 
+def work(rng, error, seconds, seeds, spread, batches=BATCHES):
+    """efficiency.Work of a run whose renders take `spread` more or less time each: a busy machine slows a whole render down, with all of its batches."""
+    errors = error * rng.gamma(40, 1 / 40, (seeds * batches, 1))
+    return efficiency.Work(errors, "batches", "", {seed: seconds * float(np.exp(spread * rng.normal())) for seed in range(1, seeds + 1)})
+
+
+def simulate_times(seeds, spread, trials, seed=12):
+    """(coverage of the ratio of two runs, share of ratios that differ from 1 at 5 % where there is no difference)."""
+    rng = np.random.default_rng(seed)
+    covered = tests = 0
+    for _ in range(trials):
+        run = work(rng, 1.0, 2.0, seeds, spread)
+        found = efficiency.ratio(run, work(rng, 2.0, 3.0, seeds, spread), "base")
+        covered += found.low <= 3 <= found.high
+        tests += efficiency.ratio(run, work(rng, 1.0, 2.0, seeds, spread), "base", for_test=True).p < 0.05
+    return covered / trials, tests / trials
+
+
+TIMES = ((3, 0.0), (3, 0.01), (3, 0.1), (2, 0.05), (10, 0.1))  # seeds, spread of the times of renders
+
+
 def main():
     trials = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
     print(f"{'case':28} {'stated':>7} {'covers':>7} {'wrong of all':>13}")
     for case in CASES:
         stated, covers, wrong = simulate(case, trials)
         print(f"{case[0]:28} {stated:7.3f} {covers:7.3f} {wrong:13.3f}", flush=True)
+    print(f"{'ratio where times vary':28} {'covers':>7} {'p < 5 %':>8}")
+    for seeds, spread in TIMES:
+        print(f"{f'{seeds} seeds, {spread:.0%}':28} " + "{:7.3f} {:8.3f}".format(*simulate_times(seeds, spread, trials)), flush=True)
 
 
 if __name__ == "__main__":

@@ -205,7 +205,7 @@ def test_exposure_of_raw_rows_undoes_their_scale():
 
 
 def test_variance_of_strategies_is_that_of_their_noise(folder):
-    rows = {(s, t): e for s, t, e, _, n in pyramid.variances(experiment.load(folder), "box", "lvc[connections=1]") if n == 3}
+    rows = {(s, t): e for s, t, e, _, n, _ in pyramid.variances(experiment.load(folder), "box", "lvc[connections=1]") if n == 3}
     assert len(rows) == 8
     for (s, _), e in rows.items():
         assert e.value == pytest.approx((0.2 * (s + 1)) ** 2, rel=4 * np.sqrt(2 / (2 * 48 * 36 * 3)))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis import heavy_tails
+from analysis import efficiency, heavy_tails
 from analysis.tests import coverage
 
 TRIALS = 120
@@ -36,7 +36,7 @@ def test_reasons_are_named():
     assert heavy_tails.doubt_of_batches(steady, [1.0, 1.0, 1.0]) == ""
     assert heavy_tails.doubt_of_batches([steady[0]], [1.0]) == "16 batches"
     assert heavy_tails.doubt_of_batches([[*steady[0][:-1], 4.0], *steady[1:]], [1.0] * 3) == "few samples decide"
-    assert heavy_tails.doubt_of_batches(steady, [16.0] * 3) == "batches do not average out (x16.0)"
+    assert heavy_tails.doubt_of_batches(steady, [16.0] * 3) == "batches do not average out (×16.0)"
     assert heavy_tails.doubt_of_batches([[2 * x for x in steady[0]], *steady[1:]], [2.0, 1.0, 1.0]) == "seeds differ"
     assert heavy_tails.doubt_of_batches([], []) == "no batches"
     assert heavy_tails.doubt_of_seeds([1.0]) == "1 seed" and heavy_tails.doubt_of_seeds([1.0, 1.1]) == "2 seeds"
@@ -71,3 +71,33 @@ def test_ratio_of_two_runs_covers_the_truth():
 def test_the_same_data_give_the_same_interval():
     rows = np.random.default_rng(2).gamma(8, 1 / 8, (40, 2))
     assert heavy_tails.estimate([(1, rows)], "batches") == heavy_tails.estimate([(1, rows)], "batches")
+
+
+@pytest.mark.parametrize("seeds, spread", [(3, 0.0), (3, 0.1), (2, 0.05)])
+def test_times_that_vary_between_renders_are_in_the_interval(seeds, spread):
+    """A busy machine slows whole renders down, with all of their batches: of 48 batches with 3 seeds, times are known from 3."""
+    trials = 100
+    covered, tests = coverage.simulate_times(seeds, spread, trials)
+    assert covered > 0.95 - 4 * math.sqrt(0.95 * 0.05 / trials)
+    assert tests < 0.05 + 4 * math.sqrt(0.95 * 0.05 / trials)
+
+
+def test_seeds_that_are_slow_together_are_pairs():
+    """The same seed was busy by 1.6 for both runs: their ratio does not see it, the efficiency of one does."""
+    rng = np.random.default_rng(13)
+    a, b = (coverage.work(rng, 1.0, 1.0, 3, 0.0) for _ in range(2))
+    busy = {1: 1.0, 2: 1.6, 3: 1.1}
+    slow = [efficiency.Work(w.rows, w.over, "", busy) for w in (a, b)]
+    assert efficiency.ratio(*slow, "b") == efficiency.ratio(a, b, "b")
+    one = efficiency.efficiency(slow[0])
+    assert one.high / one.low > 2 and one.value == pytest.approx(efficiency.efficiency(a).value / np.mean(list(busy.values())))
+    alone = efficiency.Work(a.rows, a.over, "", {1: 1.0})
+    assert efficiency.efficiency(alone).doubt == "1 seed"
+
+
+def test_of_two_values_that_nothing_supports_that_of_the_whole_image_is_shown():
+    """Batches that each miss the same light look better than their image is."""
+    batches, seeds = (heavy_tails.unknown(value, over, 3, doubt) for value, over, doubt in ((34.4, "batches", "batches do not average out (×3.6)"), (9.9, "seeds", "2 seeds")))
+    shown = efficiency.lead(batches, seeds)
+    assert (shown.value, shown.doubt) == (9.9, "batches do not average out (×3.6)")
+    assert efficiency.lead(None, seeds) is seeds and efficiency.lead(batches, None) is batches

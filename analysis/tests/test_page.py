@@ -204,7 +204,32 @@ def test_convergence_plot_tells_the_numbers(page, folder):
     assert [float(v) for v in match.groups() if v] == pytest.approx([v for v in values if math.isfinite(v)], rel=0.01)
 
 
+def ends(path):
+    """((x, y), (x, y)) of the first and the last point of a path of lines."""
+    points = [tuple(map(float, p.split())) for p in path.get_attribute("d").strip("M").split("L")]
+    return points[0], points[-1]
+
+
+def test_guide_of_the_convergence_plot_has_the_slope_that_it_says(page):
+    """Errors of the synthetic runs fall as one over the root of time, so that all lines are parallel to the guide, also where the axis cuts it off."""
+    plot = page.locator(".plot")
+    plot.locator("select.y").select_option("rmse")
+    for hidden in (0, 1):
+        if hidden:
+            plot.locator(".legend button").first.click()
+        slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in map(ends, [plot.locator("path.guide"), *plot.locator("path.line").all()])]
+        assert slopes == pytest.approx([slopes[0]] * len(slopes), rel=0.03)
+
+
 def test_page_fits_a_narrow_window(page):
     page.set_viewport_size({"width": 420, "height": 800})
     page.wait_for_timeout(400)
     assert page.evaluate("document.documentElement.scrollWidth") <= 420
+    # The plot is drawn anew in that width, so that its words keep their size, and a finger on an image that is shown whole moves the page.
+    assert page.evaluate("(() => { const s = document.querySelector('.plot .space > svg'); return s.viewBox.baseVal.width / s.getBoundingClientRect().width; })()") == pytest.approx(1, abs=0.02)
+    assert page.evaluate("getComputedStyle(document.querySelector('.viewer canvas')).touchAction") == "pan-y"
+    # Names stay in sight while a table is moved.
+    table = page.locator("table.results")
+    table.evaluate("t => { t.parentElement.scrollLeft = 1e4; }")
+    box = table.locator("tbody td:nth-child(2)").first.bounding_box()
+    assert 0 <= box["x"] < 60

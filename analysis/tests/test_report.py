@@ -7,10 +7,10 @@ import re
 import numpy as np
 import pytest
 from matplotlib.font_manager import FontProperties
-from matplotlib.textpath import TextPath
+from matplotlib.textpath import text_to_path
 
 from analysis import __main__ as program
-from analysis import experiment, images, latex, remarks, style, summary, tables, verdicts
+from analysis import experiment, heavy_tails, images, latex, remarks, style, summary, tables, verdicts
 from analysis.tests import synthetic
 
 
@@ -66,23 +66,23 @@ def test_one_outlying_seed_is_not_flattered(tmp_path):
 
 def test_where_no_interval_can_be_trusted_the_table_says_why_and_gives_no_ratio(folder, tmp_path):
     data = experiment.load(folder)
-    row = next(r for r in latex.results(data, summary.lines(data)).splitlines() if "& mis" in r)
-    assert "--$^{a}$" in row and "$^{a}$ too few seeds" in latex.results(data, summary.lines(data)) and "textbf" not in row
+    row = next(r for r in latex.results(data, summary.lines(data))[0].splitlines() if "& mis" in r)
+    assert "--$^{a}$" in row and "$^{a}$ too few seeds" in latex.results(data, summary.lines(data))[0] and "textbf" not in row
     data = experiment.load(synthetic.make(tmp_path / "few", scenes=("box",), checkpoints=(1, 4, 16, 64), seconds=(0.04, 0.08), outliers=4.0))
     line = next(x for x in summary.lines(data) if x.run == "mis")
-    assert line.ratio.doubt == "few pixels decide" and "few pixels decide" in latex.results(data, summary.lines(data))
+    assert line.ratio.doubt == "few pixels decide" and "few pixels decide" in latex.results(data, summary.lines(data))[0]
 
 
 def test_bold_and_statements_need_significance(tmp_path):
     near = (("a", 1.0, 1.0), ("b", 0.997, 1.0), ("c", 2.0, 1.0))
     data = experiment.load(synthetic.make(tmp_path / "near", scenes=("box",), runs=near, batches=16))
     lines = summary.lines(data)
-    assert verdicts.best(lines, "box") is None and "textbf" not in latex.results(data, lines)
+    assert verdicts.best(lines, "box") is None and "textbf" not in latex.results(data, lines)[0]
     assert [verdicts.differs(line, lines) for line in lines] == [False, False, True]
     far = (("a", 1.0, 1.0), ("b", 0.8, 1.0), ("c", 2.0, 1.0))
     data = experiment.load(synthetic.make(tmp_path / "far", scenes=("box",), runs=far, batches=16))
     lines = summary.lines(data)
-    assert verdicts.best(lines, "box").run == "b" and latex.results(data, lines).count("textbf") == 1
+    assert verdicts.best(lines, "box").run == "b" and latex.results(data, lines)[0].count("textbf") == 1
 
 
 def test_the_configuration_chooses_the_metric_that_leads(tmp_path, capsys):
@@ -141,7 +141,7 @@ def test_verdicts_say_what_the_data_say(tmp_path):
     assert "no departure" in said["mis"][0] and "more than chance" in said["mis"][1]
     # Speed-ups that compare with a biased run are marked.
     assert verdicts.biased(lines) == {("box", "mis")}
-    marked = [row for row in latex.results(data, lines).splitlines() if r"$^\dagger$" in row and row.endswith(r"\\")]
+    marked = [row for row in latex.results(data, lines)[0].splitlines() if r"$^\dagger$" in row and row.endswith(r"\\")]
     assert len(marked) == 1 and "& mis" in marked[0]
 
 
@@ -194,7 +194,7 @@ def inches(tabular):
     """Width of a tabular in Computer Modern of 8 points: the widest cell of each column, and the room between columns."""
     def width(cell):
         words = re.sub(r"\\begin\{tabular\}\[t\]\{[^}]*\}\}|\\end\{tabular\}|\\(?:textbf|emph|pm|cdot|dagger)\b|[${}^\\]", "", cell.replace(r"\begin{tabular}[t]{@{}l@{}}", ""))
-        return TextPath((0, 0), words, size=8, prop=FontProperties(family="cmr10")).get_extents().width if words.strip() else 0.0
+        return text_to_path.get_text_width_height_descent(words, FontProperties(family="cmr10", size=8), ismath=False)[0] if words.strip() else 0.0
     rows = [[max(map(width, cell.split(r"\\"))) for cell in re.split(r" & ", line.removesuffix(r" \\"))] for line in body_of(tabular)]
     return (sum(map(max, zip(*rows))) + 2 * 3.5 * len(rows[0])) / 72
 
@@ -206,6 +206,30 @@ def test_latex_tables_are_as_wide_as_a_page_and_a_column_of_a_paper(tmp_path):
     assert "[0." in made["table.tex"]  # intervals are stated
     for name, widest in (("table.tex", style.PAGE), ("errors.tex", style.PAGE), ("tests.tex", style.PAGE), ("table_column.tex", style.COLUMN)):
         assert 0.5 * widest < inches(made[name]) <= 0.97 * widest, name
+
+
+def test_latex_tables_of_many_long_names_are_as_wide_as_a_page_and_no_longer(tmp_path, monkeypatch):
+    """Names are broken as far as the table has no room for them; tables are continued, with whole scenes where a page has room for one."""
+    monkeypatch.setattr(heavy_tails, "RESAMPLES", 49)
+    long = tuple((f"lvc[connections={n},light_paths=0.25,wave_size=4096]", 1.0 + n / 100, 1.0) for n in range(16)) + (("a_method_with_a_very_long_name_as_people_give_them", 2.0, 1.0),)
+    data = experiment.load(synthetic.make(tmp_path / "r", scenes=("cornell[max_depth=3]", "cornell[max_depth=6]", "glass"), runs=long, batches=16, checkpoints=(1, 16)))
+    made = latex.files(data, summary.lines(data))
+    assert {"table.tex", "table_2.tex", "table_column.tex", "table_column_2.tex"} <= made.keys()
+    for name, text in made.items():
+        assert inches(text) <= 0.97 * (style.COLUMN if "column" in name else style.PAGE), name
+        assert sum(max(cell.count(r"\\{}") for cell in row.split(" & ")) + 1 for row in body_of(text)) <= latex.LINES, name
+    rows = [row for name, text in made.items() if re.fullmatch(r"table(_\d)?.tex", name) for row in body_of(text) if " & " in row and not row.startswith("scene")]
+    assert len(rows) == 3 * 17
+
+
+def test_printed_intervals_hold_the_printed_value():
+    rng = np.random.default_rng(4)
+    for _ in range(500):
+        value = 10.0 ** rng.uniform(-6, 5)
+        low, high = (value * math.exp(sign * 10.0 ** rng.uniform(-5, 0.5)) for sign in (-1, 1))
+        told = [float(x) for x in re.findall(r"[\d.]+(?:e[-+]\d+)?", tables.interval(heavy_tails.Judged(value, low, high, 0.5, "seeds", 3)))]
+        assert told[1] <= told[0] <= told[2] and told == pytest.approx([value, low, high], rel=0.06)
+    assert tables.interval(heavy_tails.Judged(0.437, 0.4352, 0.4388, 0.5, "seeds", 3)) == "0.437 [0.435, 0.439]"
 
 
 def test_unfinished_experiment_is_reported_with_a_remark(folder, tmp_path):

@@ -43,3 +43,12 @@ def test_seeds_of_different_numbers_of_samples_weigh_by_them():
     assert np.mean(found) == pytest.approx(4.0, abs=4 * 4.0 * np.sqrt(0.02 / 400))
     same = np.array(images[0])
     assert sv.variance_of_one_sample(same, [8, 8, 8]) == pytest.approx(8 * same.var(axis=0, ddof=1).mean())
+
+
+def test_a_single_bright_sample_is_told():
+    rng = np.random.default_rng(6)
+    x = rng.normal(size=(2, 8, 9, 3))
+    assert sv.largest_pixel(x, [10, 20]) < 0.2
+    x[1, 3, 4] += 1000
+    assert sv.largest_pixel(x, [10, 20]) > 0.999
+    assert math.isnan(sv.largest_pixel(np.ones((2, 3, 3, 3)), 1))
