@@ -162,6 +162,10 @@ Emitter read_sky(Builder& builder, Reader& in, const Matrix& rotation);
 /// millimetres on the diagonal of a 36 x 24 mm film.
 Vec2f field_of_view(Reader& in, double aspect);
 void build_sensor(Builder& builder, const Object& object);
+/// The sensor, or of a batch of sensors the first one.
+void build_sensors(Builder& builder, const Object& first);
+/// For a scene that has none: it sees all shapes, as in Mitsuba 3.
+void build_default_sensor(Builder& builder, const Object& scene);
 void build_integrator(Builder& builder, const Object& object);
 
 /// Rotation and translation of `m` without scale, its axes made exactly orthonormal; `problem` is set if `m` scales or

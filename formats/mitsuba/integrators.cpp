@@ -21,6 +21,9 @@ const Plugins kFullTransport = {
 
 const Plugins kOwn = {"direct", "path", "ptracer", "bdpt"};
 
+/// Shows another quantity than light.
+const Plugins kOtherQuantities = {"depth", "stokes", "field", "ao"};
+
 /// What other integrators are steered by.
 constexpr const char* kSteering[] = {"samples_per_pass", "block_size",  "timeout",     "light_image",
                                      "sample_direct",    "granularity", "brute_force", "sppm_radius"};
@@ -31,6 +34,17 @@ void read_lengths(Reader& in, IntegratorHint& hint) {
     if (hint.max_depth < -1) in.fail(in.where("max_depth"), "max_depth must be -1 or larger");
     if (hint.max_depth >= int(kMaxDepth))
         in.fail(in.where("max_depth"), fmt::format("max_depth may be {} at most, or -1 for no limit", kMaxDepth - 1));
+}
+
+/// One of another program: how it samples does not matter here, its path lengths do.
+void build_foreign_integrator(Builder& builder, Reader& in) {
+    const Object* nested = in.take("integrator");
+    builder.note(in.where(), fmt::format("integrator '{}' is not known; {} is used", in.object().type,
+                                         nested ? "the one inside of it" : "path, with its max_depth,"));
+    if (nested) return build_integrator(builder, *nested);
+    builder.scene.integrator.type = "path";
+    read_lengths(in, builder.scene.integrator);
+    builder.scene.integrator.hide_emitters = in.boolean("hide_emitters", false);
 }
 
 /// The integrator inside of an adapter.
@@ -55,12 +69,13 @@ void build_integrator(Builder& builder, const Object& object) {
     IntegratorHint& hint = builder.scene.integrator;
     const std::string& type = object.type;
     if (is_one_of(kAdapters, type)) return build_integrator(builder, inner_integrator(builder, in));
-    const bool full = is_one_of(kFullTransport, type);
+    const bool full = is_one_of(kFullTransport, type), other = is_one_of(kOtherQuantities, type);
+    if (!full && !other && !is_one_of(kOwn, type)) return build_foreign_integrator(builder, in);
     if (type == "direct") {
         hint.type = "path";
         hint.max_depth = 2;
         in.ignore({"shading_samples", "emitter_samples", "bsdf_samples", "luminaire_samples"});
-    } else if (full || is_one_of(kOwn, type)) {
+    } else if (!other) {
         hint.type = type == "ptracer" ? "light" : (type == "bdpt" ? "bdpt" : "path");
         read_lengths(in, hint);
         if (full)

@@ -40,6 +40,17 @@ void validate_unused(Builder& builder) {
     builder.validate_only = false;
 }
 
+/// Emitters of shapes that stand elsewhere; it may be beside them.
+std::set<const Object*> referenced_emitters(const Document& document) {
+    std::set<const Object*> emitters;
+    for (const Child& shape : document.scene->children) {
+        if (shape.object->tag != "shape") continue;
+        for (const Child& child : shape.object->children)
+            if (child.object->tag == "emitter" && !child.object->id.empty()) emitters.insert(child.object);
+    }
+    return emitters;
+}
+
 /// All but what finalize_scene() adds, in coordinates about `origin`. `outside`: Builder::outside.
 Scene build_scene(const std::string& path, const Document& document, const LoadOptions& options, Vec3d origin,
                   std::optional<Error>* outside) {
@@ -55,16 +66,18 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     Reader root(builder, *document.scene);
     const Object* sensor = root.take("sensor");
     const Object* integrator = root.take("integrator");
-    if (!sensor) throw input_error(path, 0, "the scene has no sensor");
-    build_sensor(builder, *sensor);
+    if (sensor) build_sensors(builder, *sensor);
     if (integrator) build_integrator(builder, *integrator);
     if (const Object* other = root.take("sensor")) builder.note(other->where, "the first of several sensors is used");
     // What others refer to, used or not.
     for (const char* tag : {"sensor", "bsdf", "texture", "shape", "film", "sampler", "rfilter"})
         while (root.take(tag)) {}
-    while (const Object* emitter = root.take("emitter")) build_emitter(builder, *emitter);
+    const std::set<const Object*> of_shapes = referenced_emitters(document);
+    while (const Object* emitter = root.take("emitter"))
+        if (!of_shapes.contains(emitter)) build_emitter(builder, *emitter);
     root.finish();
     build_shapes(builder, *document.scene);
+    if (!sensor) build_default_sensor(builder, *document.scene);
     validate_unused(builder);
     scene.content_hash = content_hash(builder);
     if (options.files) {

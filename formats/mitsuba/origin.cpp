@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/primitive_bounds.h"
-
 namespace ambilux::mitsuba {
 namespace {
 
@@ -13,12 +11,17 @@ constexpr double kFar = 16;
 
 }  // namespace
 
-Vec3d far_center(const Scene& scene) {
+Bounds3f surface_bounds(const Scene& scene) {
     const SceneView view = scene.view();
     Bounds3f box;
     for (const Instance& i : scene.instances) box.extend(instance_bounds(view, i));
     for (uint32_t i = 0; i < view.ungrouped_count(); ++i) box.extend(triangle_bounds(view, i));
     for (const Quadric& q : scene.quadrics) box.extend(quadric_bounds(q));
+    return box;
+}
+
+Vec3d far_center(const Scene& scene) {
+    Bounds3f box = surface_bounds(scene);
     const auto& m = scene.sensor.to_world.m;
     box.extend(Vec3f{m[0][3], m[1][3], m[2][3]});
     const auto half = [](float a, float b) { return 0.5 * (double(a) + double(b)); };

@@ -71,9 +71,15 @@ PrincipledParts read_principled(Builder& builder, Reader& in) {
                "spec_reflectance_sampling_rate", "spec_trans_sampling_rate"});
     if (spec_trans.texture < 0 && spec_trans.value == 0) return parts;
 
-    if (p.specular_tint > 0) in.fail(in.where("spec_tint"), "spec_trans with spec_tint is not supported");
     if (p.ior == 1) in.fail(in.where("eta"), "spec_trans needs an index of refraction other than 1");
     const bool textured = spec_trans.texture >= 0 || p.metallic.texture >= 0;
+    if (p.specular_tint > 0) {
+        // The tint is of the share (1 - metallic), of which the glass takes a part that has none.
+        if (textured) in.fail(in.where("spec_tint"), "spec_tint with spec_trans from a texture is not supported");
+        if (p.specular_tint > 1 - spec_trans.value)
+            in.fail(in.where("spec_tint"), "spec_tint and spec_trans may be 1 together at most");
+        p.specular_tint = std::min(p.specular_tint / (1 - spec_trans.value), 1.0f);
+    }
     if (textured && (p.clearcoat > 0 || p.sheen > 0))
         in.fail("spec_trans or metallic from a texture, with clearcoat or sheen, is not supported");
     const auto glass_share = [](const std::vector<float>& v) { return (1 - v[0]) * v[1]; };

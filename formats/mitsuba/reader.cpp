@@ -9,8 +9,13 @@
 #include "core/error.h"
 #include "formats/mitsuba/builder.h"
 #include "formats/mitsuba/named_media.h"
+#include "formats/mitsuba/plugins.h"
 
 namespace ambilux::mitsuba {
+
+/// Marks of objects for manifold sampling (Zeltner et al. 2020) and what came after it: they choose samples only.
+static const Plugins kMarks = {"caustic_caster_single", "caustic_caster_multi",   "caustic_receiver",
+                               "caustic_bouncer",       "caustic_emitter_single", "caustic_emitter_multi"};
 
 void Builder::refuse(const Where& where, const std::string& problem, const std::string& instead) {
     if (!options.lenient) throw input_error(where.file, where.line, problem);
@@ -167,7 +172,12 @@ ParamFloat Reader::textured_number(const std::string& name, float fallback) {
             fail(texture->where, "a number cannot come from a texture that is scaled by a colour");
         return {scaled.scale.x, scaled.texture};
     }
-    const float value = float(number(name, fallback));
+    const Value* v = object_.find(name);
+    // A colour is the mean of its channels, as in Mitsuba 3.
+    const bool colored = v && (v->kind == ValueKind::rgb || (v->kind == ValueKind::spectrum && v->samples.empty()));
+    if (colored) used_values_.insert(v);
+    const Rgb rgb = colored && v->kind == ValueKind::rgb ? v->rgb : splat(colored ? float(v->number) : 0);
+    const float value = colored ? (rgb.x + rgb.y + rgb.z) / 3 : float(number(name, fallback));
     if (!std::isfinite(value)) fail(where(name), "'" + name + "' is too large for a float");
     return {value, -1};
 }
@@ -197,7 +207,13 @@ void Reader::ignore(std::initializer_list<const char*> names) {
 
 void Reader::finish() {
     for (const Value& v : object_.values)
-        if (!used_values_.count(&v))
+        if (used_values_.count(&v))
+            continue;
+        else if (object_.version < 2 || is_one_of(kMarks, v.name))
+            builder_.note(v.where, fmt::format("parameter '{}' of {}{} is not known and left out{}", v.name,
+                                               object_.tag, object_.type.empty() ? "" : " '" + object_.type + "'",
+                                               object_.version < 2 ? ", as Mitsuba 0.6 does" : ""));
+        else
             builder_.refuse(v.where, "unknown parameter '" + v.name + "' of " + object_.tag + " '" + object_.type + "'",
                             "it is ignored");
     for (const Child& child : object_.children)

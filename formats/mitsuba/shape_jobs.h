@@ -11,6 +11,7 @@ struct MeshSource {
     std::string path, type;
     bool flip_v = false;
     int shape_index = 0;
+    bool lacks_materials = false;  ///< obj: its shape would have them from an .mtl file, if there is one
     Mesh mesh;
     const Mesh* given = nullptr;  ///< of the document, instead of `mesh`
     Sha256Digest digest{};
@@ -42,6 +43,9 @@ struct GroupJobs {
     std::vector<Where> where;  ///< of the instances that share it, as everything below
     std::vector<Matrix> placements;
 };
+
+/// What a shape of type obj says of parts of its file, each of which can have its BSDF in the older generation.
+void read_obj_parts(Builder& builder, Reader& in, MeshSource& source);
 
 /// Puts copies of what groups hold in the places of jobs of type "instance", or leaves it to be shared: meshes of
 /// groups whose copies would have more than Limits::copies triangles. Their jobs then come last, group by group, around

@@ -186,10 +186,9 @@ void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
     job.smooth_angle = in.number("max_smooth_angle", -1);
     if (in.has("max_smooth_angle") && !(job.smooth_angle >= 0 && job.smooth_angle <= 180))
         in.fail(in.where("max_smooth_angle"), "max_smooth_angle must lie between 0 and 180 degrees");
-    if (job.type == "obj")
-        in.ignore({"collapse", "load_materials"});  // older generation: one shape per group or for all looks the same
-    const std::string key =
-        source.path + "|" + std::to_string(source.flip_v) + "|" + std::to_string(source.shape_index);
+    if (job.type == "obj") read_obj_parts(builder, in, source);
+    const std::string key = source.path + "|" + std::to_string(source.flip_v) + "|" +
+                            std::to_string(source.shape_index) + "|" + std::to_string(source.lacks_materials);
     job.source = add_source(std::move(source), key);
 }
 
@@ -285,6 +284,7 @@ void load_sources(Builder& builder, std::vector<MeshSource>& sources) {
         if (s.path.empty()) return;
         const Limits& limits = builder.options.limits;
         const std::string bytes = gunzip_if_packed(s.path, read_input(s.path, limits), limits);
+        s.lacks_materials = s.lacks_materials && bytes.find("mtllib ") != std::string::npos;
         const auto read = [&] {
             if (s.type == "obj") return read_obj(s.path, bytes, s.flip_v, limits);
             if (s.type == "ply") return read_ply(s.path, bytes, s.flip_v, limits);
@@ -297,8 +297,12 @@ void load_sources(Builder& builder, std::vector<MeshSource>& sources) {
                 s.mesh = read();
         });
     });
-    for (const MeshSource& s : sources)
-        if (!s.path.empty()) builder.file_digests.push_back({s.path, s.digest});
+    for (const MeshSource& s : sources) {
+        if (s.path.empty()) continue;
+        builder.file_digests.push_back({s.path, s.digest});
+        if (s.lacks_materials)
+            builder.note({s.path, 1}, "materials of obj files are not read; such shapes without a BSDF are diffuse");
+    }
 }
 
 void reserve_meshes(const std::vector<Job>& jobs, Scene& scene) {

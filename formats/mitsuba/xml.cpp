@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/text_cursor.h"
+#include "formats/mitsuba/plugins.h"
 #include "formats/mitsuba/xml_values.h"
 
 namespace ambilux::mitsuba {
@@ -50,10 +51,17 @@ struct Parser {
             if (tag == "luminaire") tag = "emitter";
             if (tag == "camera") tag = "sensor";
             const Where at = where(source, child);
+            // Mitsuba 2 has one element for both.
+            if (tag == "spectrum" && child.attribute("type") &&
+                is_one_of(texture_plugins(), values.attribute(source, child, "type")) &&
+                !ValueParser::is_spectrum_plugin(values.attribute(source, child, "type")))
+                tag = "texture";
             if (ValueParser::is_value_tag(tag)) {
                 Value value = values.parse_value(source, child, tag);
-                if (!names.insert(value.name).second) fail(at, "parameter '" + value.name + "' is given twice");
-                object.values.push_back(std::move(value));
+                if (names.insert(value.name).second)
+                    object.values.push_back(std::move(value));
+                else
+                    replace_value(source, object, std::move(value));
             } else if (tag == "ref") {
                 ValueParser::allow(source, child, {"name", "id"});
                 object.children.push_back(
@@ -82,6 +90,15 @@ struct Parser {
                 fail(at, "unknown element <" + tag + ">");
             }
         }
+    }
+
+    /// The last one counts in Mitsuba 0.6.
+    void replace_value(const XmlSource& source, Object& object, Value value) {
+        if (source.version >= 2) fail(value.where, "parameter '" + value.name + "' is given twice");
+        document.notes.push_back(value.where.file + ":" + std::to_string(value.where.line) + ": parameter '" +
+                                 value.name + "' is given twice; the last one counts");
+        for (Value& v : object.values)
+            if (v.name == value.name) v = value;
     }
 
     void add_id(const std::string& id, const Object* object, const Where& at) {

@@ -1,6 +1,7 @@
 // Spectra that are objects: <spectrum type="..."> of format 3 and <blackbody> of the older generation.
 #include <cmath>
 
+#include "formats/mitsuba/plugins.h"
 #include "formats/mitsuba/spectrum.h"
 #include "formats/mitsuba/xml_values.h"
 
@@ -14,6 +15,10 @@ double positive(const Value& value) {
 }
 
 }  // namespace
+
+bool ValueParser::is_spectrum_plugin(const std::string& type) {
+    return is_one_of({"uniform", "rawconstant", "d65", "srgb", "blackbody", "regular", "irregular"}, type);
+}
 
 Value ValueParser::parse_blackbody(const XmlSource& source, const pugi::xml_node& node) {
     const Where at = where(source, node);

@@ -49,7 +49,9 @@ double parse_number(const std::string& text, const Where& where, const std::stri
     TextCursor cursor(text);
     cursor.skip_space();
     double value = 0;
-    const bool ok = cursor.number(value);
+    bool ok = cursor.number(value);
+    cursor.skip_space();
+    if (ok && !cursor.done()) ok = cursor.word() == "f";  // 0.5f, as Mitsuba 2 takes it
     cursor.skip_space();
     if (!ok || !cursor.done() || !std::isfinite(value)) fail(where, "'" + text + "' is not a number (" + what + ")");
     return value;

@@ -44,6 +44,8 @@ public:
     std::string parameter_name(const XmlSource& source, const pugi::xml_node& node);
 
     static bool is_value_tag(const std::string& tag);
+    /// Of <spectrum type="...">.
+    static bool is_spectrum_plugin(const std::string& type);
     Value parse_value(const XmlSource& source, const pugi::xml_node& node, const std::string& tag);
 
 private:
