@@ -50,10 +50,12 @@ std::vector<Curve> read_curve(SceneMaker& scene, const Parameters& in) {
         fail(in.where_of("type"), "curve type '" + type + "' is not known: flat, cylinder, ribbon");
     if (basis != "bezier" && basis != "bspline")
         fail(in.where_of("basis"), "basis '" + basis + "' is not known: bezier, bspline");
-    if (type != "cylinder")
-        scene.report.refuse(in.where,
-                            "curves of type '" + type + "', whose normals do not go round them, are not supported",
+    if (type == "ribbon")
+        scene.report.refuse(in.where, "curves of type 'ribbon', which face a direction of their own, are not supported",
                             "they are cylinders");
+    if (type == "flat")
+        scene.report.note(
+            in.where, "flat curves, which face every ray, are tubes: they look as wide, but their normals go round");
     in.ignore({"N", "splitdepth"});
     const int64_t degree = in.integer("degree", 3);
     if (degree != 2 && degree != 3) fail(in.where_of("degree"), "the degree of a curve is 2 or 3");

@@ -320,7 +320,8 @@ void Parser::texture(const Where& at) {
     const std::string id = tokens_->quoted("the name of a texture"), kind = tokens_->quoted("the kind of a texture");
     if (kind != "float" && kind != "spectrum")
         fail(at, "texture '" + id + "' is of kind '" + kind + "', neither float nor spectrum");
-    scene_.textures.define(id, kind == "float", parameters("Texture", at, "texture"), scene_.state.space);
+    scene_.textures.define(id, kind == "float", parameters("Texture", at, "texture"), scene_.state.space,
+                           scene_.state.ctm);
 }
 
 bool Parser::world(const std::string& name, const Where& at) {

@@ -1,0 +1,135 @@
+// libs: ambilux_formats ZLIB::ZLIB
+// timeout: 60
+// Coordinates of textures in pbrt scenes, and what scenes of others were found to hold.
+#include <cmath>
+#include <cstring>
+
+#include "core/atomic_file.h"
+#include "formats/images/image_io.h"
+#include "formats/images/image_write.h"
+#include "tests/support/mitsuba_text.h"
+#include "tests/support/pbrt_text.h"
+
+using namespace ambilux;
+using namespace ambilux::test;
+
+namespace {
+
+const std::string kTriangle = "Shape \"trianglemesh\" \"point3 P\" [1 0 2  3 0 2  1 4 2] \"integer indices\" [0 1 2] ";
+
+std::string texture(const std::string& mapping, const std::string& name = "t") {
+    return "Texture \"" + name + "\" \"spectrum\" \"checkerboard\" " + mapping + " ";
+}
+
+const std::string kTextured = "Material \"diffuse\" \"texture reflectance\" \"t\" ";
+
+void check_uvs(const Scene& s, const std::vector<Vec2f>& expected) {
+    REQUIRE(s.vertices.size() >= expected.size());
+    for (size_t i = 0; i < expected.size(); ++i) {
+        INFO(i);
+        CHECK(s.vertices[i].u == Approx(expected[i].x).margin(1e-5));
+        CHECK(s.vertices[i].v == Approx(expected[i].y).margin(1e-5));
+    }
+}
+
+std::string pfm(float scale, std::initializer_list<float> values, bool grey = false) {
+    std::string out = (grey ? "Pf\n2 2\n" : "PF\n2 2\n") + std::to_string(scale) + "\n";
+    for (const float v : values) {
+        char bytes[4];
+        memcpy(bytes, &v, 4);
+        if (scale > 0) std::swap(bytes[0], bytes[3]), std::swap(bytes[1], bytes[2]);
+        out.append(bytes, 4);
+    }
+    return out;
+}
+
+}  // namespace
+
+TEST_CASE("planar mappings take coordinates from places in the world") {
+    const std::string planar =
+        texture("\"string mapping\" \"planar\" \"vector3 v1\" [.5 0 0] \"vector3 v2\" [0 .25 .5] \"float udelta\" 3");
+    check_uvs(load_pbrt_world(planar + kTextured + kTriangle), {{3.5f, 1}, {4.5f, 1}, {3.5f, 2}});
+    // The texture's transform, and that of the shape.
+    check_uvs(load_pbrt_world("AttributeBegin Translate 1 0 0 Scale 2 2 2 " + planar + "AttributeEnd Translate 0 0 2 " +
+                              kTextured + kTriangle),
+              {{3, 1}, {3.5f, 1}, {3, 1.5f}});
+    // A sphere becomes a mesh.
+    const Scene s = load_pbrt_world(planar + kTextured + "Shape \"sphere\"");
+    CHECK(s.quadrics.empty());
+    for (size_t i = 0; i < s.vertices.size(); i += 997)
+        CHECK(s.vertices[i].u == Approx(3 + 0.5 * double(s.vertices[i].p.x)).margin(1e-5));
+}
+
+TEST_CASE("cylindrical and spherical mappings have no seam within a triangle") {
+    const std::string cylindrical = texture("\"string mapping\" \"cylindrical\"");
+    // From (-1,-1,0) over (-1,1,0) to (1,0,3): angles -135, 135 and 0 degrees, of which 0 is at s = 1/2.
+    const std::string mesh =
+        "Shape \"trianglemesh\" \"point3 P\" [-1 -1 0  -1 1 0  1 0 3] \"integer indices\" [0 1 2] ";
+    check_uvs(load_pbrt_world(cylindrical + kTextured + mesh), {{1.125f, 0}, {0.875f, 0}, {0.5f, 3}});
+    const std::string spherical = texture("\"string mapping\" \"spherical\"");
+    const Scene s =
+        load_pbrt_world(spherical + kTextured +
+                        "Shape \"trianglemesh\" \"point3 P\" [1 0 0  0 1 0  0 0 2] \"integer indices\" [0 1 2]");
+    check_uvs(s, {{0.5f, 0}, {0.5f, 0.25f}, {0, 0.125f}});  // the pole lies between the others
+    CHECK(has_note(s, "linear over each triangle"));
+    const std::string two = texture("", "u") + cylindrical +
+                            "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" \"texture reflectance\" \"t\" "
+                            "MakeNamedMaterial \"b\" \"string type\" \"diffuse\" \"texture reflectance\" \"u\" "
+                            "Material \"mix\" \"string materials\" [\"a\" \"b\"] ";
+    CHECK(contains(pbrt_error("WorldBegin " + two + kTriangle), "textures of different mappings on one surface"));
+    CHECK(contains(pbrt_error("WorldBegin " + texture("\"string mapping\" \"cubic\"")),
+                   "unknown texture mapping 'cubic'"));
+}
+
+TEST_CASE("meshes without coordinates have those of pbrt, also in files and under masks") {
+    const TempFolder folder;
+    const std::string head =
+                          "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                          "property float z\n",
+                      faces = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    folder.write("bare.ply", head + faces + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    folder.write("full.ply", head + "property float u\nproperty float v\n" + faces +
+                                 "0 0 0 .1 .2\n1 0 0 .3 .4\n0 1 0 .5 .6\n3 0 1 2\n");
+    const auto file = [](const std::string& name) { return "Shape \"plymesh\" \"string filename\" \"" + name + "\" "; };
+    const std::vector<Vec2f> defaults = {{0, 0}, {1, 0}, {1, 1}};
+    check_uvs(load_pbrt_world(texture("") + kTextured + file("bare.ply"), {}, &folder), defaults);
+    check_uvs(load_pbrt_world(texture("") + kTextured + file("full.ply"), {}, &folder), {{0.1f, 0.2f}, {0.3f, 0.4f}});
+    const std::string mask = "Texture \"m\" \"float\" \"checkerboard\" ";
+    check_uvs(load_pbrt_world(mask + kTriangle + "\"texture alpha\" \"m\""), defaults);
+    check_uvs(load_pbrt_world(mask + file("bare.ply") + "\"texture alpha\" \"m\"", {}, &folder), defaults);
+}
+
+TEST_CASE("maps of floats, from bottom to top and in either byte order") {
+    const TempFolder folder;
+    for (const float scale : {-1.0f, 2.0f}) {
+        INFO(scale);
+        folder.write("t.pfm", pfm(scale, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}));
+        const Texels t = read_image("t.pfm", read_file(folder / "t.pfm"));
+        REQUIRE(t.floats.size() == 16);
+        CHECK(t.is_linear);
+        CHECK(t.floats[0] == 7 * std::fabs(scale));  // the upper left
+        CHECK(t.floats[8] == 1 * std::fabs(scale));
+        CHECK(t.floats[3] == 1);
+    }
+    const Texels grey = read_image("t.pfm", pfm(-1, {1, 2, 3, 4}, true));
+    CHECK(grey.floats[6] == 4);
+    CHECK_THROWS_AS(read_image("t.pfm", pfm(-1, {1, 2, 3})), Error);
+    CHECK_THROWS_AS(read_image("t.pfm", "PF\n2 2\nnone\n"), Error);
+    CHECK_THROWS_AS(read_image("t.pfm", "PF\n70000 70000\n-1\n"), Error);
+}
+
+TEST_CASE("lights of two sides on nothing, and portals that look at one map") {
+    const TempFolder folder;
+    const Scene pane = load_pbrt_world(
+        "AreaLightSource \"diffuse\" \"bool twosided\" true \"rgb L\" [1 2 3] Material \"interface\" " + kTriangle);
+    CHECK(pane.emitters.size() == 2);
+    CHECK(pane.shapes.size() == 2);
+
+    write_float_image(folder / "sky.exr", 4, 4, std::vector<float>(48, 2.0f));
+    const std::string sky = "LightSource \"infinite\" \"string filename\" \"sky.exr\" \"point3 portal\" ";
+    const Scene one =
+        load_pbrt_world(sky + "[0 0 0 1 0 0 1 1 0 0 1 0] " + sky + "[5 0 0 6 0 0 6 1 0 5 1 0]", {}, &folder);
+    CHECK(one.emitters.size() == 1);
+    CHECK(has_note(one, "portals that look at one map share its light"));
+    check_rgb(one.emitters[0].radiance.value, splat(1));
+}
