@@ -375,7 +375,7 @@ TEST_CASE("errors say where") {
         {"AttributeBegin", "AttributeBegin has no end"},
         {"ObjectBegin \"a\"", "ObjectBegin has no end"},
         {"ObjectInstance \"a\"", "unknown object 'a'"},
-        {"NamedMaterial \"a\"", "unknown material 'a'"},
+        {"NamedMaterial \"a\" Shape \"sphere\"", "unknown material 'a'"},
         {"CoordSysTransform \"a\"", "unknown coordinate system 'a'"},
         {"ColorSpace \"a\"", "unknown colour space 'a'"},
         {"Include \"none.pbrt\"", "file 'none.pbrt' does not exist"},

@@ -133,3 +133,44 @@ TEST_CASE("lights of two sides on nothing, and portals that look at one map") {
     CHECK(has_note(one, "portals that look at one map share its light"));
     check_rgb(one.emitters[0].radiance.value, splat(1));
 }
+
+TEST_CASE("options have a name and a value") {
+    const auto loads = [](const std::string& options) {
+        return pbrt_error(options + " WorldBegin " + kTriangle + "LightSource \"infinite\"");
+    };
+    CHECK(loads("Option \"seed\" 42 Option \"disablepixeljitter\" false Option \"msereferenceout\" \"x.txt\"") ==
+          "no error");
+    CHECK(loads("Option \"bool wavefront\" [true]") == "no error");
+    CHECK_THAT(loads("Option \"forcediffuse\" true"), ContainsSubstring("'forcediffuse' is not supported"));
+    CHECK_THAT(loads("Option \"bool disablepixeljitter\" [true]"), ContainsSubstring("is not supported"));
+    CHECK_THAT(loads("Option seed 42"), ContainsSubstring("must be a string in quotes"));
+    CHECK_THAT(pbrt_error("Option \"seed\""), ContainsSubstring("option 'seed' must have one value"));
+    CHECK_THAT(loads("Option \"seed\" [1 2]"), ContainsSubstring("must have one value"));
+}
+
+TEST_CASE("materials may be named before they are defined") {
+    const std::string a = "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" \"rgb reflectance\" [.1 .2 .3] ",
+                      mix = "MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"a\" \"b\"] ",
+                      b = "MakeNamedMaterial \"b\" \"string type\" \"conductor\" ";
+    const auto same = [](const std::string& late, const std::string& early) {
+        const Scene one = load_pbrt_world(late), two = load_pbrt_world(early);
+        CHECK(one.materials.size() == two.materials.size());
+        CHECK(one.shapes.size() == two.shapes.size());
+        CHECK(one.emitters.size() == two.emitters.size());
+        CHECK(one.instances.size() == two.instances.size());
+        REQUIRE(!one.vertices.empty());
+        CHECK(std::fabs(one.vertices[0].p.x - two.vertices[0].p.x) < 1e-6f);
+        return one;
+    };
+    const std::string shape =
+        "AttributeBegin Translate 5 0 0 AreaLightSource \"diffuse\" NamedMaterial \"a\" " + kTriangle + " AttributeEnd ";
+    same(shape + a, a + shape);
+    const std::string mixed = "NamedMaterial \"m\" " + kTriangle;
+    same(mixed + mix + b + a, a + b + mix + mixed);
+    same(mix + mixed + a + b, a + b + mix + mixed);
+    same("ObjectBegin \"o\" " + mixed + "ObjectEnd ObjectInstance \"o\" " + a + b + mix,
+         a + b + mix + "ObjectBegin \"o\" " + mixed + "ObjectEnd ObjectInstance \"o\" ");
+    CHECK_THAT(pbrt_error("WorldBegin " + mix + mixed + a), ContainsSubstring("unknown material 'b'"));
+    CHECK_THAT(pbrt_error("WorldBegin NamedMaterial \"none\" " + kTriangle),
+               ContainsSubstring("scene.pbrt:1: unknown material 'none'"));
+}
