@@ -89,6 +89,8 @@ inline constexpr char kNamedMaterial[] = "NamedMaterial";
 Shared named_material(const SceneMaker& scene, const std::string& name, const Where& where);
 /// Shape "curve" as cubic B-splines.
 std::vector<Curve> read_curve(SceneMaker& scene, const Parameters& in);
+/// Shape "curve" of type "ribbon".
+Mesh ribbon_mesh(SceneMaker& scene, const Parameters& in);
 /// A new mesh for curves, or null if they join the one before. `alone`: nothing may join.
 Object* add_curves(SceneMaker& scene, const Parameters& in, const std::vector<Curve>& curves, const Object* bsdf,
                    bool alone);

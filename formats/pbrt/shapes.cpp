@@ -212,6 +212,7 @@ Mesh own_mesh(SceneMaker& scene, const Parameters& in, double& exact_area) {
     }
     if (in.type == "trianglemesh") return triangle_mesh(in);
     if (in.type == "bilinearmesh") return bilinear_mesh(scene, in);
+    if (in.type == "curve") return ribbon_mesh(scene, in);
     return loop_subdivision(scene, in);
 }
 
@@ -305,12 +306,15 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
         if (surface != Surface::mesh) surface = Surface::mesh, bsdf = surface_bsdf();
     }
     Placed placed;
-    if (type == "curve") {
+    if (type == "curve" && in.text("type", "flat") != "ribbon") {
         const std::vector<Curve> curves = read_curve(scene, in);
         if (projection)
             scene.report.refuse(in.where, "texture mappings other than uv on curves are not supported", "uv is used");
+        const bool textured = has_texture(*bsdf);
+        if (textured)
+            scene.report.note(in.where, "textures on curves go round them, not from edge to edge as they are seen");
         if (!curves.empty())
-            placed.object = add_curves(scene, in, curves, bsdf, in.find("alpha") || scene.state.area_light);
+            placed.object = add_curves(scene, in, curves, bsdf, textured || in.find("alpha") || scene.state.area_light);
         if (!placed.object) return in.finish(scene.report);
     } else if (surface != Surface::mesh) {
         placed = add_quadric(scene, in);

@@ -162,8 +162,8 @@ TEST_CASE("materials may be named before they are defined") {
         CHECK(std::fabs(one.vertices[0].p.x - two.vertices[0].p.x) < 1e-6f);
         return one;
     };
-    const std::string shape =
-        "AttributeBegin Translate 5 0 0 AreaLightSource \"diffuse\" NamedMaterial \"a\" " + kTriangle + " AttributeEnd ";
+    const std::string shape = "AttributeBegin Translate 5 0 0 AreaLightSource \"diffuse\" NamedMaterial \"a\" " +
+                              kTriangle + " AttributeEnd ";
     same(shape + a, a + shape);
     const std::string mixed = "NamedMaterial \"m\" " + kTriangle;
     same(mixed + mix + b + a, a + b + mix + mixed);
@@ -173,4 +173,39 @@ TEST_CASE("materials may be named before they are defined") {
     CHECK_THAT(pbrt_error("WorldBegin " + mix + mixed + a), ContainsSubstring("unknown material 'b'"));
     CHECK_THAT(pbrt_error("WorldBegin NamedMaterial \"none\" " + kTriangle),
                ContainsSubstring("scene.pbrt:1: unknown material 'none'"));
+}
+
+TEST_CASE("ribbons face their normals, and u goes along curves") {
+    const std::string curve =
+        "Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0] \"float width0\" 1 \"float width1\" 2 ";
+    const Scene flat = load_pbrt_world(curve + "\"string type\" \"ribbon\" \"normal N\" [0 0 2 0 0 2]");
+    REQUIRE(flat.vertices.size() == 34);
+    check_uvs(flat, {{0, 0}, {0, 1}, {1 / 16.0f, 0}});
+    for (size_t i = 0; i < 34; ++i) {
+        const MeshVertex& v = flat.vertices[i];
+        CHECK(v.p.x == Approx(3 * double(v.u)).margin(1e-6));
+        CHECK(v.p.y == Approx((double(v.v) - 0.5) * (1 + double(v.u))).margin(1e-6));
+        CHECK(v.p.z == Approx(0).margin(1e-6));
+        CHECK(v.n.z == Approx(1));
+    }
+    // A quarter of a turn, at a steady angle.
+    const Scene twisted = load_pbrt_world(curve + "\"string type\" \"ribbon\" \"normal N\" [0 0 1 0 1 0]");
+    check_rgb(twisted.vertices[16].n, {0, std::sqrt(0.5f), std::sqrt(0.5f)});
+    check_rgb(twisted.vertices[32].n, {0, 1, 0});
+    // Splines: two segments.
+    const std::string spline =
+        "Shape \"curve\" \"string basis\" \"bspline\" \"string type\" \"ribbon\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0 "
+        "4 0 0] ";
+    const Scene two = load_pbrt_world(spline + "\"normal N\" [0 0 1 0 0 1 0 0 1]");
+    REQUIRE(two.vertices.size() == 68);
+    CHECK(two.vertices[0].p.x == Approx(1));
+    CHECK(two.vertices[67].p.x == Approx(3));
+    CHECK_THAT(pbrt_error("WorldBegin " + spline + "\"normal N\" [0 0 1 0 0 1]"), ContainsSubstring("needs 3 normals"));
+    CHECK_THAT(pbrt_error("WorldBegin " + spline + "\"normal N\" [0 0 1 0 0 0 0 0 1]"),
+               ContainsSubstring("normal is zero"));
+
+    const Scene tube = load_pbrt_world(texture("") + kTextured + curve);
+    for (size_t i = 0; i < tube.vertices.size(); ++i)
+        CHECK(tube.vertices[i].u == Approx(double(tube.vertices[i].p.x) / 3).margin(1e-5));
+    CHECK(has_note(tube, "textures on curves go round them"));
 }
