@@ -55,9 +55,11 @@ Mesh vertices_of(const Parameters& in) {
     return mesh;
 }
 
-Mesh triangle_mesh(const Parameters& in) {
+Mesh triangle_mesh(SceneMaker& scene, const Parameters& in) {
     Mesh mesh = vertices_of(in);
-    in.ignore({"S", "faceIndices"});  // tangents, which our BSDFs take from texture coordinates; faces of ptex
+    if (in.find("S"))
+        scene.report.note(in.where_of("S"), "tangents S are left out: rough surfaces turn with texture coordinates");
+    in.ignore({"faceIndices"});  // of ptex
     const std::vector<uint32_t> indices = indices_of(in, 3, mesh.positions.size());
     for (size_t i = 0; i < indices.size(); i += 3) mesh.faces.push_back({indices[i], indices[i + 1], indices[i + 2]});
     return mesh;
@@ -121,7 +123,7 @@ Mesh bilinear_mesh(SceneMaker& scene, const Parameters& in) {
 }
 
 Mesh loop_subdivision(SceneMaker& scene, const Parameters& in) {
-    Mesh mesh = triangle_mesh(in);
+    Mesh mesh = triangle_mesh(scene, in);
     const int64_t levels = in.integer("levels", 3);
     if (levels < 0 || levels > 12) fail(in.where_of("levels"), "levels must lie between 0 and 12");
     scene.report.note(in.where,
@@ -210,7 +212,7 @@ Mesh own_mesh(SceneMaker& scene, const Parameters& in, double& exact_area) {
                               "parts of spheres, disks and cylinders are triangles: 256 around, 128 from pole to pole");
         return cut_quadric(in, exact_area);
     }
-    if (in.type == "trianglemesh") return triangle_mesh(in);
+    if (in.type == "trianglemesh") return triangle_mesh(scene, in);
     if (in.type == "bilinearmesh") return bilinear_mesh(scene, in);
     if (in.type == "curve") return ribbon_mesh(scene, in);
     return loop_subdivision(scene, in);

@@ -7,6 +7,7 @@
 #include "core/atomic_file.h"
 #include "formats/images/image_io.h"
 #include "formats/images/image_write.h"
+#include "formats/pbrt/coating.h"
 #include "tests/support/mitsuba_text.h"
 #include "tests/support/pbrt_text.h"
 
@@ -200,6 +201,8 @@ TEST_CASE("ribbons face their normals, and u goes along curves") {
     REQUIRE(two.vertices.size() == 68);
     CHECK(two.vertices[0].p.x == Approx(1));
     CHECK(two.vertices[67].p.x == Approx(3));
+    CHECK_THAT(pbrt_error("WorldBegin " + spline),
+               ContainsSubstring("a ribbon of 2 segments needs 3 normals N, not 0"));
     CHECK_THAT(pbrt_error("WorldBegin " + spline + "\"normal N\" [0 0 1 0 0 1]"), ContainsSubstring("needs 3 normals"));
     CHECK_THAT(pbrt_error("WorldBegin " + spline + "\"normal N\" [0 0 1 0 0 0 0 0 1]"),
                ContainsSubstring("normal is zero"));
@@ -208,4 +211,38 @@ TEST_CASE("ribbons face their normals, and u goes along curves") {
     for (size_t i = 0; i < tube.vertices.size(); ++i)
         CHECK(tube.vertices[i].u == Approx(double(tube.vertices[i].p.x) / 3).margin(1e-5));
     CHECK(has_note(tube, "textures on curves go round them"));
+}
+
+TEST_CASE("coatings dim what passes them") {
+    // Without losses and for walks without end the surface is as it says.
+    check_rgb(pbrt::Coating{1.5, 0, 100000}.diffuse_below({0.2f, 0.5f, 0.9f}), {0.2f, 0.5f, 0.9f}, 1e-5f);
+    // A random walk as pbrt's, of four million paths.
+    check_rgb(pbrt::Coating{}.diffuse_below({0.2f, 0.5f, 0.9f}), {0.19490f, 0.48446f, 0.8527f}, 1e-3);
+    check_rgb(pbrt::Coating{1.5, 1, 10}.diffuse_below(splat(0.5f)), splat(0.05066f), 3e-4);
+
+    const auto reflectance = [](const std::string& parameters, const TempFolder* folder = nullptr) {
+        const Scene s = load_pbrt_world("Material \"coateddiffuse\" " + parameters + " " + kTriangle, {}, folder);
+        return s.bsdfs[s.materials[s.shapes[0].material].front].as<Plastic>().reflectance;
+    };
+    check_rgb(reflectance("\"rgb reflectance\" [.2 .5 .9]").value, {0.19490f, 0.48446f, 0.8527f}, 1e-3);
+    check_rgb(reflectance("\"float thickness\" 0 \"integer maxdepth\" 1000").value, splat(0.5f));
+    check_rgb(reflectance("\"float thickness\" .2").value, splat(0.29930f), 3e-4);
+    CHECK(contains(pbrt_error("WorldBegin Material \"coateddiffuse\" \"integer maxdepth\" 0 " + kTriangle),
+                   "must be positive"));
+
+    // A metal at normal incidence: one way through the layer and back.
+    const auto metal = [](const std::string& thickness) {
+        const Scene s = load_pbrt_world("Material \"coatedconductor\" \"float thickness\" " + thickness + kTriangle);
+        return s.bsdfs[s.materials[s.shapes[0].material].front].as<Conductor>().specular_reflectance.value;
+    };
+    const Rgb thin = metal("0 "), thick = metal("5 ");
+    for (int i = 0; i < 3; ++i) CHECK(thick[i] < 0.1f * thin[i]);
+}
+
+TEST_CASE("parameters that nobody knows are refused in integrators too") {
+    CHECK(pbrt_error("Integrator \"bdpt\" \"bool visualizeweights\" false \"integer maxdepth\" 3 WorldBegin " +
+                     kTriangle) == "no error");
+    CHECK(contains(pbrt_error("Integrator \"path\" \"integer maxDepth\" 3 WorldBegin " + kTriangle),
+                   "unknown parameter 'maxDepth' of Integrator 'path'"));
+    CHECK(has_note(load_pbrt_world(kTriangle + "\"vector3 S\" [1 0 0 1 0 0 1 0 0]"), "tangents S are left out"));
 }
