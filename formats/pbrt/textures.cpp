@@ -132,6 +132,9 @@ Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
         }
     } else if (in.type == "bilerp") {
         out = bilerp(is_float, in, space);
+    } else if (in.type == "dots") {
+        out = fold(in, {part("inside", 1), part("outside", 0), dots(in)},
+                   [](const std::vector<Rgb>& c) { return c[0] * c[2] + c[1] * (splat(1) - c[2]); });
     } else if (in.type == "imagemap") {
         out = image_texture(is_float, in);
     } else {

@@ -82,6 +82,7 @@ private:
     Texture on_one_grid(const Parameters& in, const std::vector<Texture>& parts,
                         const std::function<Rgb(const std::vector<Rgb>&)>& f);
     Texture bilerp(bool is_float, const Parameters& in, ColorSpace space) const;
+    Texture dots(const Parameters& in) const;
     void set_mapping(Texture& texture, const Parameters& in) const;
     const Texture& named(const Parameter& p, bool is_float) const;
     std::shared_ptr<TextureImage> image_file(const std::string& path, double gamma, bool is_number);

@@ -529,6 +529,22 @@ TEST_CASE("textures of textures on one grid") {
         for (float v : {0.0f, 0.7f, 1.0f})
             CHECK(reflectance(corners, 0, {u, v}).x ==
                   Approx((1 - v) * u * 0.4 + v * ((1 - u) * 0.8 + u)).margin(1e-5));
+
+    // Centres by Perlin's noise, computed by a program of its own.
+    const Scene dots = shown(
+        "Texture \"t\" \"spectrum\" \"dots\" \"float uscale\" 4 \"float vscale\" 4 \"float vdelta\" 1 "
+        "\"rgb inside\" [1 .5 0] \"rgb outside\" [0 .25 1]");
+    CHECK(has_note(dots, "dots are an image of 256 texels a side"));
+    const auto at = [&](double x, double y) { return reflectance(dots, 0, {float(x / 4), float((y - 1) / 4)}); };
+    const Vec2f centres[] = {{1.1132f, 2.0119f}, {2.0509f, 2.9011f}, {3.0247f, 3.9469f}};
+    for (const Vec2f c : centres)
+        for (int k = 0; k < 8; ++k) {
+            const double x = std::cos(k * M_PI / 4), y = std::sin(k * M_PI / 4);
+            check_rgb(at(c.x + 0.32 * x, c.y + 0.32 * y), {1, 0.5f, 0});
+            check_rgb(at(c.x + 0.38 * x, c.y + 0.38 * y), {0, 0.25f, 1});
+        }
+    check_rgb(at(1, 4), {0, 0.25f, 1});
+    check_rgb(at(2, 1.3), {0, 0.25f, 1});
 }
 
 TEST_CASE("curves are tubes, those of one material in one mesh") {
