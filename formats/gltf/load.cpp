@@ -15,18 +15,20 @@ using namespace mitsuba;
 
 class SceneMaker {
 public:
-    explicit SceneMaker(Context& context) : c_(context), uses_(c_.model.meshes.size()) {
-        for (const tinygltf::Node& node : c_.model.nodes)
-            if (node.mesh >= 0 && size_t(node.mesh) < uses_.size()) ++uses_[size_t(node.mesh)];
+    explicit SceneMaker(Context& context)
+        : c_(context), uses_(c_.model.meshes.size()), parents_(c_.model.nodes.size(), -1) {
+        for (size_t i = 0; i < c_.model.nodes.size(); ++i) {
+            const tinygltf::Node& node = c_.model.nodes[i];
+            if (node.mesh >= 0 && size_t(node.mesh) < uses_.size())
+                uses_[size_t(node.mesh)] += has_instances(node) ? 2 : 1;
+            for (const int child : node.children)
+                if (child >= 0 && size_t(child) < parents_.size()) parents_[size_t(child)] = int(i);
+        }
     }
 
     void make() {
-        const tinygltf::Model& model = c_.model;
-        if (model.scenes.empty()) c_.fail("it has no scene");
-        const size_t index = model.defaultScene < 0 ? 0 : size_t(model.defaultScene);
-        if (index >= model.scenes.size()) c_.fail("there is no scene " + std::to_string(index));
-        if (model.scenes.size() > 1) c_.note("one of several scenes is used: the default one");
-        for (const int node : model.scenes[index].nodes) visit(node, {}, 1);
+        for (const int node : roots()) visit(node, {}, 1);
+        if (shown_ == 0) c_.fail("it shows no triangles");
         Object& sensor = sensor_ ? *sensor_ : add_default_camera(c_, lower_, upper_);
         add_child(*c_.document.scene, sensor);
         add_child(*c_.document.scene, add_object(c_.document, "integrator", "path", c_.where));
@@ -38,6 +40,90 @@ public:
     }
 
 private:
+    std::vector<int> roots() {
+        const tinygltf::Model& model = c_.model;
+        if (!model.scenes.empty()) {
+            const size_t index = model.defaultScene < 0 ? 0 : size_t(model.defaultScene);
+            if (index >= model.scenes.size()) c_.fail("there is no scene " + std::to_string(index));
+            if (model.scenes.size() > 1) c_.note("one of several scenes is used: the default one");
+            return model.scenes[index].nodes;
+        }
+        c_.note("the file has no scene: all its nodes are used");
+        std::vector<int> out;
+        for (size_t i = 0; i < parents_.size(); ++i)
+            if (parents_[i] < 0) out.push_back(int(i));
+        return out;
+    }
+
+    static bool has_instances(const tinygltf::Node& node) {
+        return node.extensions.contains("EXT_mesh_gpu_instancing");
+    }
+
+    /// From a node to the world.
+    Matrix global(int node) const {
+        Matrix m;
+        for (size_t steps = 0; node >= 0; node = parents_[size_t(node)]) {
+            if (size_t(node) >= parents_.size()) c_.fail("there is no node " + std::to_string(node));
+            if (++steps > c_.document.limits.nesting)
+                c_.fail("nodes are nested deeper than --limits nesting=" + std::to_string(c_.document.limits.nesting));
+            m = local(c_.model.nodes[size_t(node)]) * m;
+        }
+        return m;
+    }
+
+    Pose pose_of(const tinygltf::Node& node) const {
+        Pose pose;
+        const tinygltf::Model& model = c_.model;
+        const std::vector<double>& weights =
+            node.weights.empty() ? model.meshes[size_t(node.mesh)].weights : node.weights;
+        pose.weights = weights;
+        if (node.skin < 0) return pose;
+        const std::string what = "skin " + std::to_string(node.skin);
+        if (size_t(node.skin) >= model.skins.size()) c_.fail("there is no " + what);
+        const tinygltf::Skin& skin = model.skins[size_t(node.skin)];
+        std::vector<double> inverse;
+        if (skin.inverseBindMatrices >= 0)
+            inverse = accessor_values(c_, skin.inverseBindMatrices, 16, what + ", inverseBindMatrices");
+        if (!inverse.empty() && inverse.size() < 16 * skin.joints.size())
+            c_.fail(what + " has fewer matrices than joints");
+        for (size_t i = 0; i < skin.joints.size(); ++i) {
+            Matrix bind;
+            for (int k = 0; k < 16 && !inverse.empty(); ++k) bind.m[k % 4][k / 4] = inverse[16 * i + size_t(k)];
+            if (skin.joints[i] < 0) c_.fail(what + " has a joint that is no node");
+            pose.joints.push_back(global(skin.joints[i]) * bind);
+        }
+        if (pose.joints.empty()) c_.fail(what + " has no joints");
+        return pose;
+    }
+
+    /// Transforms of EXT_mesh_gpu_instancing.
+    std::vector<Matrix> instances_of(const tinygltf::Node& node) {
+        const tinygltf::Value* given = extension(node.extensions, "EXT_mesh_gpu_instancing");
+        if (!given || !given->Has("attributes")) return {Matrix{}};
+        const tinygltf::Value& attributes = given->Get("attributes");
+        const auto values = [&](const char* name, int n) {
+            const double accessor = number(&attributes, name, -1);
+            return accessor < 0 ? std::vector<double>{}
+                                : accessor_values(c_, int(accessor), n, "node '" + node.name + "', " + name);
+        };
+        const std::vector<double> t = values("TRANSLATION", 3), r = values("ROTATION", 4), s = values("SCALE", 3);
+        const size_t count = std::max({t.size() / 3, r.size() / 4, s.size() / 3});
+        for (const auto& [list, n] : {std::pair{&t, 3}, std::pair{&r, 4}, std::pair{&s, 3}})
+            if (!list->empty() && list->size() != count * size_t(n))
+                c_.fail("node '" + node.name + "' has instances of unequal attributes");
+        std::vector<Matrix> out;
+        for (size_t i = 0; i < count; ++i) {
+            tinygltf::Node place;
+            const auto part = [i](const std::vector<double>& from, std::vector<double>& to, int n) {
+                if (!from.empty())
+                    to.assign(from.begin() + std::ptrdiff_t(i) * n, from.begin() + std::ptrdiff_t(i + 1) * n);
+            };
+            part(t, place.translation, 3), part(r, place.rotation, 4), part(s, place.scale, 3);
+            out.push_back(local(place));
+        }
+        return out;
+    }
+
     Matrix local(const tinygltf::Node& node) const {
         Matrix m;
         if (node.matrix.size() == 16) {
@@ -71,10 +157,10 @@ private:
             c_.fail("it has more nodes than --limits shapes=" + std::to_string(limits.shapes));
         const tinygltf::Node& node = c_.model.nodes[size_t(index)];
         const Matrix to_world = outer * local(node);
-        if (node.extensions.contains("EXT_mesh_gpu_instancing"))
-            c_.refuse("node '" + node.name + "': extension 'EXT_mesh_gpu_instancing' is not supported",
-                      "it is left out");
-        if (node.mesh >= 0) add_mesh(node.mesh, to_world);
+        if (node.mesh >= 0) {
+            if (size_t(node.mesh) >= c_.model.meshes.size()) c_.fail("there is no mesh " + std::to_string(node.mesh));
+            for (const Matrix& place : instances_of(node)) add_mesh(index, to_world * place);
+        }
         if (node.camera >= 0 && sensor_) c_.note("the first of several cameras is used");
         if (node.camera >= 0 && !sensor_) {
             if (size_t(node.camera) >= c_.model.cameras.size())
@@ -90,11 +176,15 @@ private:
         for (const int child : node.children) visit(child, to_world, depth + 1);
     }
 
-    void add_mesh(int index, const Matrix& to_world) {
-        if (size_t(index) >= c_.model.meshes.size()) c_.fail("there is no mesh " + std::to_string(index));
+    void add_mesh(int at, Matrix to_world) {
+        const tinygltf::Node& node = c_.model.nodes[size_t(at)];
+        const int index = node.mesh;
         const tinygltf::Mesh& mesh = c_.model.meshes[size_t(index)];
-        // Meshes of several nodes become groups, but for what shines.
-        const bool shared = uses_[size_t(index)] > 1;
+        const Pose pose = pose_of(node);
+        const bool posed = !pose.joints.empty() || !node.weights.empty();
+        if (!pose.joints.empty()) to_world = {};  // joints place it
+        // Meshes of several nodes become groups, but for what shines or has a pose of its own.
+        const bool shared = uses_[size_t(index)] > 1 && !posed;
         const bool first_use = shared && !groups_.contains(index);
         if (first_use) groups_[index] = &add_object(c_.document, "shape", "shapegroup", c_.where);
         bool any_shared = false;
@@ -104,13 +194,16 @@ private:
                                      (mesh.name.empty() ? "" : " '" + mesh.name + "'") + ", primitive " +
                                      std::to_string(i);
             if (primitive.mode >= 0 && primitive.mode < TINYGLTF_MODE_TRIANGLES) {
-                c_.refuse(what + ": points and lines are not supported", "they are left out");
+                c_.note("points and lines have no surface and are left out");
                 continue;
             }
-            const Context::Surface s = surface(c_, primitive.material);
-            const std::string name = c_.where.file + ", " + what;
+            ++shown_;
+            const VertexColors colors = vertex_colors(c_, primitive, what);
+            const Context::Surface s = surface(c_, primitive.material, colors);
+            const std::string name =
+                c_.where.file + ", " + what + (posed ? ", node " + std::to_string(at) : std::string());
             const auto [place, is_new] = c_.document.meshes.try_emplace(name);
-            if (is_new) place->second = primitive_mesh(c_, primitive, s.tex_coord, what);
+            if (is_new) place->second = primitive_mesh(c_, primitive, s.tex_coord, pose, colors, what);
             Object& shape = add_object(c_.document, "shape", "mesh", c_.where);
             set_text(shape, "name", name);
             add_child(shape, *s.bsdf);
@@ -142,9 +235,10 @@ private:
 
     Context& c_;
     std::vector<uint32_t> uses_;     ///< of meshes by nodes
+    std::vector<int> parents_;       ///< of nodes; -1: none
     std::map<int, Object*> groups_;  ///< by mesh
     Object* sensor_ = nullptr;
-    uint64_t visited_ = 0;
+    uint64_t visited_ = 0, shown_ = 0;
     Vec3f lower_ = splat(kInfinity), upper_ = splat(-kInfinity);
 };
 

@@ -27,12 +27,14 @@ struct Context {
         int tex_coord = 0;          ///< set of texture coordinates that all its textures use
         bool double_sided = false;  ///< opaque, and what shines does so on both sides
     };
-    std::map<int, Surface> materials;
+    std::map<std::string, Surface> materials;  ///< by index and colours of vertices
     bool emits = false;
 
     [[noreturn]] void fail(const std::string& message) const;
     void note(const std::string& text) { report.note(where, text); }
     void refuse(const std::string& problem, const std::string& instead) { report.refuse(where, problem, instead); }
+    /// A part of an extension that is not supported: refused only where the file says that nobody can do without it.
+    void leave_out(const std::string& extension, const std::string& what);
 };
 
 /// Reads the file with its buffers and images. Sets what a Context needs of them.
@@ -42,11 +44,30 @@ void read_model(Context& context, const std::string& path);
 /// buffers. `what` is for messages.
 std::vector<double> accessor_values(const Context& context, int accessor, int components, const std::string& what);
 
+/// The bytes of a view, which lie inside of its buffer. Throws Error(bad_input).
+std::pair<const unsigned char*, uint64_t> view_bytes(const Context& context, int index, const std::string& what);
+
+/// What moves the vertices of a mesh at a node.
+struct Pose {
+    std::vector<Matrix> joints;   ///< of its skin, from the mesh to the world; empty: no skin
+    std::vector<double> weights;  ///< of morph targets
+};
+
+/// COLOR_0: factors of the base colour and its alpha.
+struct VertexColors {
+    bool varies = false, alpha_varies = false;
+    Rgb color = {1, 1, 1};  ///< of the first vertex, and of all unless it varies
+    double alpha = 1;
+    std::vector<Rgb> values, alphas;
+};
+VertexColors vertex_colors(const Context& context, const tinygltf::Primitive& primitive, const std::string& what);
+
 /// Triangles of a primitive, with the set of texture coordinates that its material wants.
-Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int tex_coord, const std::string& what);
+Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int tex_coord, const Pose& pose,
+                    const VertexColors& colors, const std::string& what);
 
 /// Material -1 is the default.
-Context::Surface surface(Context& context, int material);
+Context::Surface surface(Context& context, int material, const VertexColors& colors);
 
 /// Numbers in extensions of objects.
 const tinygltf::Value* extension(const tinygltf::ExtensionMap& extensions, const char* name);

@@ -27,11 +27,11 @@ Texels read_image(const std::string& path, std::string_view bytes, const Limits&
     };
     // TGA last, since anything might look like it.
     constexpr Format formats[] = {{is_png, read_png}, {is_jpeg, read_jpeg}, {is_exr, read_exr_texels},
-                                  {is_hdr, read_hdr}, {is_pnm, read_pnm},   {is_bmp, read_bmp},
-                                  {is_tga, read_tga}};
+                                  {is_hdr, read_hdr}, {is_pnm, read_pnm},   {is_pfm, read_pfm},
+                                  {is_bmp, read_bmp}, {is_tga, read_tga}};
     for (const Format& format : formats)
         if (format.is(bytes)) return format.read(bytes, budget);
-    budget.fail("cannot read image: it is none of PNG, JPEG, EXR, HDR, PNM (P5, P6), BMP, TGA");
+    budget.fail("cannot read image: it is none of PNG, JPEG, EXR, HDR, PNM (P5, P6, PF), BMP, TGA");
 }
 
 }  // namespace ambilux

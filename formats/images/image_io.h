@@ -20,9 +20,9 @@ struct Texels {
     std::vector<float> floats;   ///< 4 per texel otherwise
 };
 
-/// Decodes PNG (libpng), JPEG (libjpeg-turbo), EXR (OpenEXR: channels R G B A or Y, data window), HDR, PNM (P5 and P6),
-/// BMP or TGA. The format follows from the content. Throws Error(bad_input) with `path`, also for what is beyond the
-/// limits, before it is allocated.
+/// Decodes PNG (libpng), JPEG (libjpeg-turbo), EXR (OpenEXR: channels R G B A or Y, data window), HDR, PNM (P5, P6,
+/// PF), BMP or TGA. The format follows from the content. Throws Error(bad_input) with `path`, also for what is beyond
+/// the limits, before it is allocated.
 Texels read_image(const std::string& path, std::string_view bytes, const Limits& limits = {});
 
 }  // namespace ambilux

@@ -1,4 +1,7 @@
-// Netpbm's binary greymaps (P5) and pixmaps (P6).
+// Netpbm's binary greymaps (P5) and pixmaps (P6), and maps of floats (Pf, PF).
+#include <cmath>
+#include <cstring>
+
 #include "formats/images/readers.h"
 
 namespace ambilux {
@@ -22,7 +25,47 @@ uint64_t take_number(ByteReader& in) {
     return value;
 }
 
+/// Next word of the header, up to the one blank behind it.
+std::string take_word(ByteReader& in) {
+    std::string word;
+    uint8_t c = in.u8();
+    while (is_space(c)) c = in.u8();
+    for (; !is_space(c) && word.size() < 32; c = in.u8()) word += char(c);
+    if (!is_space(c)) in.budget.fail("cannot read PFM image: damaged header");
+    return word;
+}
+
 }  // namespace
+
+bool is_pfm(std::string_view bytes) { return bytes.starts_with("PF") || bytes.starts_with("Pf"); }
+
+/// Rows from bottom to top; a negative scale means little endian, its size the unit of the values.
+Texels read_pfm(std::string_view bytes, FileBudget& budget) {
+    ByteReader in{bytes, budget, 2};
+    const uint64_t channels = bytes[1] == 'F' ? 3 : 1;
+    const uint64_t width = take_number(in), height = take_number(in);
+    char* end = nullptr;
+    const std::string word = take_word(in);
+    const float scale = std::strtof(word.c_str(), &end);
+    if (*end || !std::isfinite(scale) || scale == 0) budget.fail("cannot read PFM image: its scale is no number");
+    budget.pixels(width, height);
+    in.need(width * height * channels * 4);
+    Texels texels = make_texels(width, height, false, budget);
+    texels.is_linear = true;
+    for (uint64_t i = 0; i < width * height; ++i) {
+        float* texel = &texels.floats[4 * ((height - 1 - i / width) * width + i % width)];
+        for (uint64_t c = 0; c < channels; ++c) {
+            uint32_t bits = 0;
+            for (int k = 0; k < 4; ++k) bits |= uint32_t(in.u8()) << (scale < 0 ? 8 * k : 24 - 8 * k);
+            memcpy(texel + c, &bits, 4);
+            texel[c] *= std::fabs(scale);
+        }
+        if (channels == 1) texel[1] = texel[2] = texel[0];
+        texel[3] = 1;
+        budget.tick();
+    }
+    return texels;
+}
 
 bool is_pnm(std::string_view bytes) { return bytes.starts_with("P5") || bytes.starts_with("P6"); }
 

@@ -13,6 +13,7 @@ bool is_jpeg(std::string_view bytes);
 bool is_exr(std::string_view bytes);
 bool is_hdr(std::string_view bytes);
 bool is_pnm(std::string_view bytes);
+bool is_pfm(std::string_view bytes);
 bool is_bmp(std::string_view bytes);
 /// TGA has no magic number: true if all of its header makes sense.
 bool is_tga(std::string_view bytes);
@@ -22,6 +23,7 @@ Texels read_jpeg(std::string_view bytes, FileBudget& budget);
 Texels read_exr_texels(std::string_view bytes, FileBudget& budget);
 Texels read_hdr(std::string_view bytes, FileBudget& budget);
 Texels read_pnm(std::string_view bytes, FileBudget& budget);
+Texels read_pfm(std::string_view bytes, FileBudget& budget);
 Texels read_bmp(std::string_view bytes, FileBudget& budget);
 Texels read_tga(std::string_view bytes, FileBudget& budget);
 

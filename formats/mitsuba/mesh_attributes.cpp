@@ -104,12 +104,13 @@ Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh&
     builder.take_memory(mesh_bytes(3 * mesh.faces.size(), mesh.faces.size()), path);
     Mesh out;
     // Vertices that were shared keep the normal that they would have got.
-    const std::vector<Vec3f> normals = mesh.normals.empty() ? smooth_normals(mesh) : mesh.normals;
+    const bool flat = mesh.normals.empty() && !builder.document.smooth_normals;
+    const std::vector<Vec3f> normals = mesh.normals.empty() && !flat ? smooth_normals(mesh) : mesh.normals;
     for (size_t t = 0; t < mesh.faces.size(); ++t)
         for (uint32_t k = 0; k < 3; ++k) {
             const uint32_t v = mesh.faces[t][k];
             out.positions.push_back(mesh.positions[v]);
-            out.normals.push_back(normals[v]);
+            if (!flat) out.normals.push_back(normals[v]);
             const double x = atlas.x(t) + (k == 1 ? 1.5 : 0.5), y = atlas.y(t) + (k == 2 ? 1.5 : 0.5);
             out.uvs.push_back({float(x / atlas.width), float(y / atlas.height)});
             if (k == 2) out.faces.push_back({uint32_t(3 * t), uint32_t(3 * t + 1), uint32_t(3 * t + 2)});

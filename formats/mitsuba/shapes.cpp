@@ -114,7 +114,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     }
     const Object* bsdf = in.take("bsdf");
     const bool attributes = bsdf && has_mesh_attributes(*bsdf);
-    if (attributes && type != "ply") in.fail("mesh attributes are read from ply files only");
+    if (attributes && type != "ply" && type != "mesh") in.fail("mesh attributes are read from ply files only");
     if (is_tessellated(type))
         read_tessellated(in, job, outer);
     else
@@ -140,9 +140,10 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
 /// Reads the mesh now, and gives the shape a copy of it that its textures are made for.
 uint32_t ShapeBuilder::material_of_attributes(Job& job, Reader& in, const Object& bsdf) {
     MeshSource source = sources[size_t(job.source)];
-    const Mesh mesh = read_with_attributes(builder, in, source);
+    const Mesh mesh = source.given ? *source.given : read_with_attributes(builder, in, source);
+    source.given = nullptr;
     std::map<std::string, int32_t> textures;
-    source.mesh = with_attribute_atlas(builder, source.path, mesh, textures);
+    source.mesh = with_attribute_atlas(builder, source.path.empty() ? job.where.file : source.path, mesh, textures);
     source.path.clear();
     job.source = add_source(std::move(source), "attributes " + std::to_string(jobs.size()));
     builder.attribute_textures = &textures;

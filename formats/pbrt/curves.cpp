@@ -50,11 +50,10 @@ std::vector<Curve> read_curve(SceneMaker& scene, const Parameters& in) {
         fail(in.where_of("type"), "curve type '" + type + "' is not known: flat, cylinder, ribbon");
     if (basis != "bezier" && basis != "bspline")
         fail(in.where_of("basis"), "basis '" + basis + "' is not known: bezier, bspline");
-    if (type != "cylinder")
-        scene.report.refuse(in.where,
-                            "curves of type '" + type + "', whose normals do not go round them, are not supported",
-                            "they are cylinders");
-    in.ignore({"N", "splitdepth"});
+    if (type == "flat")
+        scene.report.note(
+            in.where, "flat curves, which face every ray, are tubes: they look as wide, but their normals go round");
+    in.ignore({"N", "splitdepth"});  // N is for ribbons
     const int64_t degree = in.integer("degree", 3);
     if (degree != 2 && degree != 3) fail(in.where_of("degree"), "the degree of a curve is 2 or 3");
     if (degree == 2 && basis == "bspline") {
@@ -109,6 +108,7 @@ Object* add_curves(SceneMaker& scene, const Parameters& in, const std::vector<Cu
 void finish_curves(SceneMaker& scene) {
     for (CurveMesh& c : scene.curves) {
         Mesh mesh = mesh_of_bspline_curves(c.where.file, c.curves);
+        for (Vec2f& uv : mesh.uvs) std::swap(uv.x, uv.y);  // pbrt's u goes along
         scene.report.note(c.where,
                           "curves are tubes of triangles: " + std::to_string(mesh.faces.size()) + " of them here");
         scene.document.meshes[c.name] = std::move(mesh);

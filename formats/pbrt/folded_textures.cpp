@@ -22,6 +22,10 @@ struct Placed {
     Axis s, t;
 };
 
+bool same_projection(const Texture& a, const Texture& b) {
+    return a.projection && b.projection ? a.projection->same(*b.projection) : a.projection == b.projection;
+}
+
 /// False if a grid with coordinates `grid` holds no whole number of periods of the texture.
 bool place(const Texture& texture, const UvMap& grid, Placed& out) {
     const auto& a = texture.mapping.m;
@@ -89,7 +93,7 @@ Texture Textures::fold(const Parameters& in, const std::vector<Texture>& parts,
         if (part.kind == Texture::Kind::image) load_texels(*part.image);
         if (!model) model = &part;
         fits &= part.kind == model->kind && part.mapping == model->mapping && part.wrap == model->wrap &&
-                part.filter == model->filter;
+                part.filter == model->filter && same_projection(part, *model);
         if (fits && model->image)
             fits = part.image->width == model->image->width && part.image->height == model->image->height;
     }
@@ -140,7 +144,7 @@ Texture Textures::on_one_grid(const Parameters& in, const std::vector<Texture>& 
         if (parts[i].is_constant()) continue;
         repeats &= parts[i].wrap == "repeat";
         same &= parts[i].wrap == longest->wrap && parts[i].mapping == grid;
-        fits &= place(parts[i], grid, places[i]);
+        fits &= place(parts[i], grid, places[i]) && same_projection(parts[i], *longest);
     }
     fits &= repeats || same;
     if (!fits)
@@ -158,6 +162,7 @@ Texture Textures::on_one_grid(const Parameters& in, const std::vector<Texture>& 
                  "textures of textures of different kinds, sizes or coordinates are put on one grid of texels");
     out.kind = Texture::Kind::image;
     out.mapping = grid;
+    out.projection = longest->projection;
     out.wrap = longest->wrap;
     out.filter = nearest ? "nearest" : "bilinear";
     out.image = std::make_shared<TextureImage>();
@@ -182,7 +187,8 @@ Texture Textures::bilerp(bool is_float, const Parameters& in, ColorSpace space) 
     Texture out;
     out.kind = Texture::Kind::image;
     out.where = in.where;
-    out.mapping = UvMap{{{0.5, 0, 0.25}, {0, 0.5, 0.25}}} * mapping(in);
+    set_mapping(out, in);
+    out.mapping = UvMap{{{0.5, 0, 0.25}, {0, 0.5, 0.25}}} * out.mapping;
     out.wrap = "clamp";
     out.image = std::make_shared<TextureImage>();
     out.image->is_file = false;

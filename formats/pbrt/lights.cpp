@@ -85,6 +85,16 @@ void add_to_environment(SceneMaker& scene, Rgb radiance) {
     scene.document.images[image.text] = std::move(texels);
 }
 
+/// True if the environment is that map already.
+bool is_the_same_map(const SceneMaker& scene, const std::string& image, double scale, const Matrix& to_world) {
+    if (!scene.environment || scene.environment->type != "envmap") return false;
+    const Matrix& known = scene.environment->find("to_world")->transform;
+    bool same = scene.environment->find("image")->text == image && scene.environment->find("scale")->number == scale;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) same &= known.m[i][j] == to_world.m[i][j];
+    return same;
+}
+
 void add_infinite(SceneMaker& scene, const Described& light) {
     const Parameters& in = light.in;
     if (in.find("portal"))
@@ -106,6 +116,11 @@ void add_infinite(SceneMaker& scene, const Described& light) {
     scene.report.note(in.where,
                       "environment maps are resampled from the equal-area octahedron to latitude and "
                       "longitude, which blurs them by half a texel");
+    const double scale = e.scale * power_factor(light, "illuminance", environment.illuminance);
+    const Matrix turned = rotation_part(scene.state.ctm);
+    if (in.find("portal") && is_the_same_map(scene, environment.image, scale, turned)) {
+        return scene.report.note(in.where, "portals that look at one map share its light");
+    }
     Rgb more{};
     if (scene.environment) {  // a constant one joins the map
         if (scene.environment->type != "constant") fail(in.where, "two infinite lights with images are not supported");
@@ -118,8 +133,8 @@ void add_infinite(SceneMaker& scene, const Described& light) {
     }
     Object& object = *scene.environment;
     set_text(object, "image", environment.image);
-    set_number(object, "scale", e.scale * power_factor(light, "illuminance", environment.illuminance));
-    set_transform(object, "to_world", rotation_part(scene.state.ctm));
+    set_number(object, "scale", scale);
+    set_transform(object, "to_world", turned);
     if (!is_zero(more)) add_to_environment(scene, more);
 }
 

@@ -92,6 +92,7 @@ void Parser::finish() {
     if (!saved_.empty())
         fail(saved_.back().where, std::string(saved_.back().is_object ? "Object" : "Attribute") + "Begin has no end");
     if (!in_world_) fail(scene_.document.scene->where, "the scene has no WorldBegin");
+    finish_shapes(scene_);
 }
 
 void Parser::directive(const Token& word) {
@@ -267,9 +268,9 @@ bool Parser::option(const std::string& name, const Where& at) {
         parameters(name, at);  // how pbrt finds hits
     } else if (name == "Option") {
         static const std::set<std::string> changing = {"disablepixeljitter", "forcediffuse"};
-        for (const Parameter& p : read_parameters(*tokens_, *budget_))
-            if (changing.contains(p.name) && p.strings == std::vector<std::string>{"true"})
-                scene_.report.refuse(p.where, "option '" + p.name + "' is not supported", "it is left out");
+        const Parameter p = read_option(*tokens_);
+        if (changing.contains(p.name) && p.strings == std::vector<std::string>{"true"})
+            scene_.report.refuse(at, "option '" + p.name + "' is not supported", "it is left out");
     } else if (name == "WorldBegin") {
         need_world(name, at, false);
         in_world_ = true;
@@ -296,10 +297,7 @@ bool Parser::material(const std::string& name, const Where& at) {
         if (in.type.empty()) fail(at, "material '" + id + "' has no type");
         scene_.named_materials[id] = std::make_shared<Described>(Described{std::move(in), scene_.state.space});
     } else if (name == "NamedMaterial") {
-        const std::string id = tokens_->quoted("the name of a material");
-        const auto known = scene_.named_materials.find(id);
-        if (known == scene_.named_materials.end()) fail(at, "unknown material '" + id + "'");
-        scene_.state.material = known->second;
+        scene_.state.material = named_material(scene_, tokens_->quoted("the name of a material"), at);
     } else if (name == "Texture") {
         texture(at);
     } else if (name == "MakeNamedMedium") {
@@ -320,13 +318,14 @@ void Parser::texture(const Where& at) {
     const std::string id = tokens_->quoted("the name of a texture"), kind = tokens_->quoted("the kind of a texture");
     if (kind != "float" && kind != "spectrum")
         fail(at, "texture '" + id + "' is of kind '" + kind + "', neither float nor spectrum");
-    scene_.textures.define(id, kind == "float", parameters("Texture", at, "texture"), scene_.state.space);
+    scene_.textures.define(id, kind == "float", parameters("Texture", at, "texture"), scene_.state.space,
+                           scene_.state.ctm);
 }
 
 bool Parser::world(const std::string& name, const Where& at) {
     if (name == "Shape") {
         need_world(name, at, true);
-        add_shape(scene_, parameters(name, at, "shape"));
+        add_shape_when_known(scene_, parameters(name, at, "shape"));
     } else if (name == "LightSource") {
         need_world(name, at, true);
         add_light(scene_, *described(name, at, "light"));

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "formats/mitsuba/named_media.h"
+#include "formats/pbrt/coating.h"
 #include "formats/pbrt/scene.h"
 
 namespace ambilux::pbrt {
@@ -129,24 +130,43 @@ private:
         return object;
     }
 
-    /// What the layers of a coating have beside roughness and index.
-    void check_layers() {
+    /// What the layers of a coating have beside roughness.
+    Coating coating(const char* eta) {
         const Parameter* albedo = in_.find("albedo");
         bool absorbs = albedo && albedo->is_texture();
         for (double a : albedo ? albedo->numbers : std::vector<double>{}) absorbs |= a != 0;
         if (absorbs)
             scene_.report.refuse(albedo->where, "a medium inside of a coating is not supported", "it is left out");
-        in_.ignore({"maxdepth", "nsamples", "g", "thickness"});  // how pbrt walks at random; of the medium
+        in_.ignore({"nsamples", "g"});  // how pbrt walks at random; of the medium
+        const Texture thickness = textures().number(in_, "thickness", 0.01);
+        if (!thickness.is_constant())
+            scene_.report.note(thickness.where, "a coating has the mean of its thickness everywhere");
+        const int64_t depth = in_.integer("maxdepth", 10);
+        if (depth < 1) fail(in_.where_of("maxdepth"), "the maxdepth of a coating must be positive");
+        return {scene_.spectra().ior(in_, eta, 1.5), std::max(textures().mean(thickness), 0.0), depth};
+    }
+
+    /// The reflectance of a diffuse surface below a coating: that of a texture is scaled as its mean is.
+    Texture below(const Coating& coating, Texture texture) {
+        if (texture.is_constant()) {
+            texture.color = coating.diffuse_below(texture.color);
+            return texture;
+        }
+        const double mean = std::clamp(textures().mean(texture), 1e-3, 1.0);
+        const float scale = float(double(coating.diffuse_below(splat(float(mean))).x) / mean);
+        texture.color *= scale;
+        if (texture.kind == Texture::Kind::checkerboard) texture.odd *= scale;
+        return texture;
     }
 
     Object& coated_diffuse() {
         const Roughness r = roughness("", 0);
-        check_layers();
+        const Coating coat = coating("eta");
         Object& object = bsdf(r.is_smooth() ? "plastic" : "roughplastic");
         scene_.report.note(in_.where, "coateddiffuse is approximated by " + object.type +
                                           ": layers in closed form instead of random walks");
-        textures().set_color(object, "diffuse_reflectance", reflectance("reflectance", 0.5), uv_);
-        set_number(object, "int_ior", scene_.spectra().ior(in_, "eta", 1.5));
+        textures().set_color(object, "diffuse_reflectance", below(coat, reflectance("reflectance", 0.5)), uv_);
+        set_number(object, "int_ior", coat.eta);
         set_number(object, "ext_ior", 1);
         set_boolean(object, "nonlinear", true);
         if (!r.is_smooth()) set_roughness(object, r, true);
@@ -199,13 +219,12 @@ private:
     Object& coated_conductor() {
         roughness("interface.", 0);  // the coating is taken for smooth
         const Roughness r = roughness("conductor.", 0);
-        check_layers();
+        const Coating coat = coating("interface.eta");
         Object& object = bsdf(r.is_smooth() ? "conductor" : "roughconductor");
         if (!r.is_smooth()) set_roughness(object, r);
         std::optional<Texture> colored;
         if (in_.find("reflectance")) colored = reflectance("reflectance", 0.5);
         const Metal m = metal("conductor.", object, colored ? &*colored : nullptr);
-        const double coat_ior = scene_.spectra().ior(in_, "interface.eta", 1.5);
         scene_.report.note(in_.where, "coatedconductor is approximated by " + object.type +
                                           " with the reflectance that coating and metal have at normal incidence");
         set_rgb(object, "eta", m.eta);
@@ -217,7 +236,8 @@ private:
         };
         Rgb ratio;
         for (int i = 0; i < 3; ++i) {
-            const double outer = fresnel(1, coat_ior, 0), inner = fresnel(coat_ior, m.eta[i], m.k[i]);
+            const double outer = fresnel(1, coat.eta, 0);
+            const double inner = fresnel(coat.eta, m.eta[i], m.k[i]) * std::exp(-2 * coat.thickness);
             const double both = outer + (1 - outer) * (1 - outer) * inner / (1 - outer * inner);
             ratio[i] = float(std::min(both / std::max(fresnel(1, m.eta[i], m.k[i]), 1e-6), 1.0));
         }

@@ -192,7 +192,11 @@ void add_integrator(SceneMaker& scene, const Options& options, const Where& wher
     set_integer(out, "max_depth", depth + 1);
     if (in.boolean("regularize", false))
         scene.report.note(in.where_of("regularize"), "regularization, a bias against noise, is left out");
-    for (const Parameter& p : in.list) p.used = true;  // how the others do it
+    // How light is looked for; rrthreshold is of pbrt-v3.
+    in.ignore({"lightsampler", "rrthreshold", "visualizestrategies", "visualizeweights", "samplebsdf", "samplelights",
+               "bootstrapsamples", "chains", "mutationsperpixel", "largestepprobability", "sigma",
+               "photonsperiteration", "radius", "seed"});
+    in.finish(scene.report);
     add_child(*scene.document.scene, out);
 }
 

@@ -82,6 +82,24 @@ std::vector<Parameter> read_parameters(Tokenizer& tokens, FileBudget& budget) {
     return list;
 }
 
+Parameter read_option(Tokenizer& tokens) {
+    const Token name = tokens.next();
+    const std::vector<std::string> words = words_of(name.text);
+    Parameter p;
+    p.where = tokens.where(name);
+    if (name.kind != TokenKind::quoted || words.empty() || words.size() > 2)
+        fail(p.where, "the name of an Option must be a string in quotes");
+    p.name = words.back();
+    Token value = tokens.next();
+    const bool in_list = value.kind == TokenKind::open;
+    if (in_list) value = tokens.next();
+    if ((value.kind != TokenKind::word && value.kind != TokenKind::quoted) ||
+        (in_list && tokens.next().kind != TokenKind::close))
+        fail(p.where, "option '" + p.name + "' must have one value");
+    p.strings = {value.text};
+    return p;
+}
+
 const Parameter* Parameters::find(const std::string& name) const {
     for (const Parameter& p : list)
         if (p.name == name) {

@@ -53,4 +53,7 @@ private:
 /// Reads them up to the next directive.
 std::vector<Parameter> read_parameters(Tokenizer& tokens, FileBudget& budget);
 
+/// Name and value of directive Option, which have no type: one string, or one word. A type before the name is left out.
+Parameter read_option(Tokenizer& tokens);
+
 }  // namespace ambilux::pbrt

@@ -42,6 +42,13 @@ struct CurveMesh {
     Matrix to_world;
 };
 
+/// A shape on a material that the file defines further down.
+struct LateShape {
+    Parameters in;
+    State state;
+    Object* open_object;
+};
+
 struct SceneMaker {
     SceneMaker(Document& d, Report& r, std::string f)
         : document(d), report(r), folder(std::move(f)), textures({folder, d, r}, d, r) {}
@@ -58,6 +65,7 @@ struct SceneMaker {
     double exposure = 1;            ///< imaging ratio of the film
     uint64_t shape_count = 0;
     std::vector<CurveMesh> curves;
+    std::vector<LateShape> late_shapes;
 
     /// BSDFs of materials; keeps the materials, so that no address comes twice.
     std::map<std::pair<Shared, Surface>, const Object*> materials;
@@ -73,8 +81,16 @@ struct Options {
 void add_options(SceneMaker& scene, const Options& options);
 
 void add_shape(SceneMaker& scene, const Parameters& in);
+/// At once, or by finish_shapes if the shape's material is still unknown.
+void add_shape_when_known(SceneMaker& scene, Parameters in);
+void finish_shapes(SceneMaker& scene);
+/// Directive of what stands for a material that is not defined yet; its type is the name.
+inline constexpr char kNamedMaterial[] = "NamedMaterial";
+Shared named_material(const SceneMaker& scene, const std::string& name, const Where& where);
 /// Shape "curve" as cubic B-splines.
 std::vector<Curve> read_curve(SceneMaker& scene, const Parameters& in);
+/// Shape "curve" of type "ribbon".
+Mesh ribbon_mesh(SceneMaker& scene, const Parameters& in);
 /// A new mesh for curves, or null if they join the one before. `alone`: nothing may join.
 Object* add_curves(SceneMaker& scene, const Parameters& in, const std::vector<Curve>& curves, const Object* bsdf,
                    bool alone);

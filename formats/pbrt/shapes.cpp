@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
+#include "formats/gzip.h"
 #include "formats/meshes/loop_subdivision.h"
 #include "formats/pbrt/cut_quadrics.h"
 #include "formats/pbrt/scene.h"
@@ -53,9 +55,11 @@ Mesh vertices_of(const Parameters& in) {
     return mesh;
 }
 
-Mesh triangle_mesh(const Parameters& in) {
+Mesh triangle_mesh(SceneMaker& scene, const Parameters& in) {
     Mesh mesh = vertices_of(in);
-    in.ignore({"S", "faceIndices"});  // tangents, which our BSDFs take from texture coordinates; faces of ptex
+    if (in.find("S"))
+        scene.report.note(in.where_of("S"), "tangents S are left out: rough surfaces turn with texture coordinates");
+    in.ignore({"faceIndices"});  // of ptex
     const std::vector<uint32_t> indices = indices_of(in, 3, mesh.positions.size());
     for (size_t i = 0; i < indices.size(); i += 3) mesh.faces.push_back({indices[i], indices[i + 1], indices[i + 2]});
     return mesh;
@@ -79,6 +83,7 @@ Mesh with_default_uvs(const Mesh& mesh) {
 
 Mesh bilinear_mesh(SceneMaker& scene, const Parameters& in) {
     const Mesh corners = vertices_of(in);
+    in.ignore({"emissionfilename"});  // how pbrt samples the light of an image, which the light has itself
     const std::vector<uint32_t> indices = indices_of(in, 4, corners.positions.size());
     FileBudget budget(in.where.file, scene.document.limits);
     Mesh out;
@@ -118,13 +123,28 @@ Mesh bilinear_mesh(SceneMaker& scene, const Parameters& in) {
 }
 
 Mesh loop_subdivision(SceneMaker& scene, const Parameters& in) {
-    Mesh mesh = triangle_mesh(in);
+    Mesh mesh = triangle_mesh(scene, in);
     const int64_t levels = in.integer("levels", 3);
     if (levels < 0 || levels > 12) fail(in.where_of("levels"), "levels must lie between 0 and 12");
     scene.report.note(in.where,
                       "a loopsubdiv is refined as often as it says, and its vertices moved to the limit surface");
     return subdivide_loop(in.where.file + ":" + std::to_string(in.where.line), mesh, int(levels),
                           scene.document.limits);
+}
+
+/// Whether a PLY file gives texture coordinates, as its header tells; what cannot be told counts as yes.
+bool has_uvs(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::string head(1 << 16, '\0');
+    file.read(head.data(), std::streamsize(head.size()));
+    head.resize(size_t(std::max<std::streamsize>(file.gcount(), 0)));
+    if (!head.starts_with("ply")) return false;  // packed
+    const size_t end = head.find("end_header");
+    if (end == std::string::npos) return true;
+    for (const char* name : {" u", " s", " texture_u"})
+        for (const char* line : {"\n", "\r"})
+            if (head.find(name + std::string(line)) < end) return true;
+    return false;
 }
 
 bool has_texture(const Object& object, int depth = 0) {
@@ -153,7 +173,6 @@ double triangle_area(const Mesh& mesh, const Matrix& m) {
 
 struct Placed {
     Object* object = nullptr;
-    Surface surface = Surface::mesh;
     Matrix local;
     double area = 0;
 };
@@ -171,15 +190,12 @@ Placed add_quadric(SceneMaker& scene, const Parameters& in) {
     const double radius = in.number("radius", 1);
     if (!(radius > 0)) fail(in.where_of("radius"), "radius must be positive");
     if (in.type == "sphere") {
-        out.surface = Surface::sphere;
         out.local = scaling(radius, radius, radius);
         out.area = 4 * M_PI * radius * radius;
     } else if (in.type == "disk") {
-        out.surface = Surface::disk;
         out.local = translation(0, 0, in.number("height", 0)) * scaling(radius, radius, 1);
         out.area = M_PI * radius * radius;
     } else {
-        out.surface = Surface::cylinder;
         const double low = in.number("zmin", -1), high = in.number("zmax", 1);
         const double bottom = std::min(low, high), top = std::max(low, high);
         if (!(top > bottom)) fail(in.where, "a cylinder needs a length: zmin equals zmax");
@@ -189,29 +205,49 @@ Placed add_quadric(SceneMaker& scene, const Parameters& in) {
     return out;
 }
 
-Placed add_mesh(SceneMaker& scene, const Parameters& in, const Object& material) {
+Mesh own_mesh(SceneMaker& scene, const Parameters& in, double& exact_area) {
+    if (surface_of(in.type) != Surface::mesh) {
+        if (is_cut(in))
+            scene.report.note(in.where,
+                              "parts of spheres, disks and cylinders are triangles: 256 around, 128 from pole to pole");
+        return cut_quadric(in, exact_area);
+    }
+    if (in.type == "trianglemesh") return triangle_mesh(scene, in);
+    if (in.type == "bilinearmesh") return bilinear_mesh(scene, in);
+    if (in.type == "curve") return ribbon_mesh(scene, in);
+    return loop_subdivision(scene, in);
+}
+
+/// `textured`: something on it needs coordinates, which `projection`, if any, gives.
+Placed add_mesh(SceneMaker& scene, const Parameters& in, bool textured, const Projection* projection) {
     Placed out;
-    if (in.type == "plymesh") {
-        out.object = &add_object(scene.document, "shape", "ply", in.where);
-        set_text(*out.object, "filename", resolve(scene.folder, in.text("filename", ""), in.where_of("filename")));
+    double exact_area = 0;
+    Mesh mesh;
+    const bool is_file = in.type == "plymesh";
+    if (is_file) {
+        const std::string path = resolve(scene.folder, in.text("filename", ""), in.where_of("filename"));
         if (in.find("displacement"))
             scene.report.refuse(in.where_of("displacement"), "displacement of meshes is not supported",
                                 "it is left out");
-        in.ignore({"displacement", "edgelength"});
-        return out;
+        in.ignore({"displacement", "edgelength", "displacement.edgelength"});
+        if (!textured || (!projection && has_uvs(path))) {
+            out.object = &add_object(scene.document, "shape", "ply", in.where);
+            set_text(*out.object, "filename", path);
+            return out;
+        }
+        const Limits& limits = scene.document.limits;
+        const std::string bytes = gunzip_if_packed(path, read_input(path, limits), limits);
+        scene.document.file_digests.push_back({path, sha256(bytes)});
+        mesh = read_ply(path, bytes, false, limits);
+    } else {
+        mesh = own_mesh(scene, in, exact_area);
     }
-    const bool cut = surface_of(in.type) != Surface::mesh;
-    double exact_area = 0;
-    Mesh mesh = cut                         ? cut_quadric(in, exact_area)
-                : in.type == "trianglemesh" ? triangle_mesh(in)
-                : in.type == "bilinearmesh" ? bilinear_mesh(scene, in)
-                                            : loop_subdivision(scene, in);
-    if (cut)
-        scene.report.note(in.where,
-                          "parts of spheres, disks and cylinders are triangles: 256 around, 128 from pole to pole");
-    if (mesh.uvs.empty() && has_texture(material)) mesh = with_default_uvs(mesh);
     check_mesh(in.where.file + ":" + std::to_string(in.where.line), mesh);
-    out.area = cut ? exact_area : triangle_area(mesh, scene.state.ctm);
+    if (projection)
+        mesh = projected(mesh, scene.state.ctm, *projection);
+    else if (mesh.uvs.empty() && textured)
+        mesh = with_default_uvs(mesh);
+    out.area = is_file ? 0 : exact_area > 0 ? exact_area : triangle_area(mesh, scene.state.ctm);
     out.object = &add_object(scene.document, "shape", "mesh", in.where);
     const std::string name =
         in.where.file + ":" + std::to_string(in.where.line) + "#" + std::to_string(scene.document.meshes.size());
@@ -220,9 +256,26 @@ Placed add_mesh(SceneMaker& scene, const Parameters& in, const Object& material)
     return out;
 }
 
+/// The BSDF with the shape's `alpha` around it.
+const Object* masked(SceneMaker& scene, const Parameters& in, const Object* bsdf, const UvMap& uv) {
+    const Parameter* alpha = in.find("alpha");
+    if (!alpha) return bsdf;
+    const Texture opacity = scene.textures.number(in, "alpha", 1);
+    if (opacity.is_constant() && opacity.color.x <= 0 && scene.state.area_light) {
+        scene.report.refuse(alpha->where, "a light of alpha 0, which shines unseen, is not supported", "it is seen");
+        return bsdf;
+    }
+    if (opacity.is_constant() && !(opacity.color.x < 1)) return bsdf;
+    Object& mask = add_object(scene.document, "bsdf", "mask", alpha->where);
+    scene.textures.set_number(mask, "opacity", opacity, uv);
+    add_child(mask, *bsdf);
+    return &mask;
+}
+
 /// A light of two sides is two shapes.
 void add_back(SceneMaker& scene, const Parameters& in, const Object& shape, const Object& bsdf) {
-    if (bsdf.type != "twosided") {
+    // A pane without a boundary in front of another one is one; whatever else lets light through is not.
+    if (bsdf.type != "twosided" && bsdf.type != "null") {
         scene.report.refuse(in.where, "a light of two sides whose surface lets light through is not supported",
                             "it has one");
         return;
@@ -242,33 +295,39 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
     if (++scene.shape_count > scene.document.limits.shapes)
         fail(in.where,
              "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
-    const Object* bsdf = surface_material(scene, scene.state.material, quadric ? surface_of(type) : Surface::mesh);
+    Surface surface = quadric ? surface_of(type) : Surface::mesh;
+    const auto surface_bsdf = [&] {
+        return masked(scene, in, surface_material(scene, scene.state.material, surface), uv_map(surface));
+    };
+    const Object* bsdf = surface_bsdf();
+    const std::shared_ptr<const Projection> projection = scene.textures.projection_of(*bsdf);
+    if (projection) {
+        if (scene.open_object)
+            scene.report.refuse(in.where, "texture mappings other than uv inside of an object are not supported",
+                                "they stand as where the object does");
+        if (surface != Surface::mesh) surface = Surface::mesh, bsdf = surface_bsdf();
+    }
     Placed placed;
-    if (type == "curve") {
+    if (type == "curve" && in.text("type", "flat") != "ribbon") {
         const std::vector<Curve> curves = read_curve(scene, in);
+        if (projection)
+            scene.report.refuse(in.where, "texture mappings other than uv on curves are not supported", "uv is used");
+        const bool textured = has_texture(*bsdf);
+        if (textured)
+            scene.report.note(in.where, "textures on curves go round them, not from edge to edge as they are seen");
         if (!curves.empty())
-            placed.object = add_curves(scene, in, curves, bsdf, in.find("alpha") || scene.state.area_light);
+            placed.object = add_curves(scene, in, curves, bsdf, textured || in.find("alpha") || scene.state.area_light);
         if (!placed.object) return in.finish(scene.report);
+    } else if (surface != Surface::mesh) {
+        placed = add_quadric(scene, in);
     } else {
-        placed = quadric ? add_quadric(scene, in) : add_mesh(scene, in, *bsdf);
+        const bool shines = scene.state.area_light && scene.state.area_light->in.find("filename");
+        placed = add_mesh(scene, in, shines || has_texture(*bsdf), projection.get());
     }
     Object& shape = *placed.object;
-    const UvMap uv = uv_map(placed.surface);
+    const UvMap uv = uv_map(surface);
     set_transform(shape, "to_world", scene.state.ctm * placed.local);
     if (scene.state.reverse_orientation) set_boolean(shape, "flip_normals", true);
-    const Parameter* alpha = in.find("alpha");
-    if (alpha) {
-        const Texture opacity = scene.textures.number(in, "alpha", 1);
-        if (opacity.is_constant() && opacity.color.x <= 0 && scene.state.area_light)
-            scene.report.refuse(alpha->where, "a light of alpha 0, which shines unseen, is not supported",
-                                "it is seen");
-        else if (!opacity.is_constant() || opacity.color.x < 1) {
-            Object& mask = add_object(scene.document, "bsdf", "mask", alpha->where);
-            scene.textures.set_number(mask, "opacity", opacity, uv);
-            add_child(mask, *bsdf);
-            bsdf = &mask;
-        }
-    }
     add_child(shape, *bsdf);
     if (scene.state.area_light && scene.open_object)
         scene.report.note(in.where, "shapes of an object do not shine, as in pbrt");

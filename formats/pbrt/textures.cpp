@@ -15,7 +15,9 @@ UvMap operator*(const UvMap& a, const UvMap& b) {
     return c;
 }
 
-void Textures::define(const std::string& name, bool is_float, const Parameters& in, ColorSpace space) {
+void Textures::define(const std::string& name, bool is_float, const Parameters& in, ColorSpace space,
+                      const mitsuba::Matrix& ctm) {
+    ctm_ = ctm;
     auto& known = is_float ? numbers_ : colors_;
     if (known.contains(name)) fail(in.where, "texture '" + name + "' is defined twice");
     const Texture texture = build(is_float, in, space);
@@ -52,15 +54,50 @@ Texture Textures::color(const Parameters& in, const std::string& name, Rgb fallb
     return texture;
 }
 
-UvMap Textures::mapping(const Parameters& in) const {
+void Textures::set_mapping(Texture& texture, const Parameters& in) const {
     const std::string kind = in.text("mapping", "uv");
-    if (kind != "uv")
-        report_.refuse(in.where_of("mapping"), "texture mapping '" + kind + "' is not supported", "uv is used");
-    if (kind != "uv") in.ignore({"v1", "v2"});
-    UvMap map;
-    map.m[0][0] = in.number("uscale", 1), map.m[0][2] = in.number("udelta", 0);
-    map.m[1][1] = in.number("vscale", 1), map.m[1][2] = in.number("vdelta", 0);
-    return map;
+    if (kind == "uv") {
+        texture.mapping.m[0][0] = in.number("uscale", 1), texture.mapping.m[0][2] = in.number("udelta", 0);
+        texture.mapping.m[1][1] = in.number("vscale", 1), texture.mapping.m[1][2] = in.number("vdelta", 0);
+        return;
+    }
+    Projection projection;
+    if (kind == "planar") {
+        projection.v1 = in.point("v1", projection.v1), projection.v2 = in.point("v2", projection.v2);
+        projection.ds = in.number("udelta", 0), projection.dt = in.number("vdelta", 0);
+    } else if (kind == "cylindrical") {
+        projection.kind = Projection::Kind::cylindrical;
+    } else if (kind == "spherical") {
+        projection.kind = Projection::Kind::spherical;
+    } else {
+        fail(in.where_of("mapping"), "unknown texture mapping '" + kind + "': uv, planar, cylindrical, spherical");
+    }
+    if (!(std::fabs(mitsuba::determinant(ctm_)) > 0)) fail(in.where, "the transform of the texture is singular");
+    projection.to_texture = mitsuba::affine_inverse(ctm_);
+    if (kind != "planar")
+        report_.note(in.where, "coordinates of cylindrical and spherical mappings are linear over each triangle");
+    texture.projection = std::make_shared<const Projection>(projection);
+}
+
+std::shared_ptr<const Projection> Textures::projection_of(const Object& object) const {
+    std::shared_ptr<const Projection> found;
+    bool any = false, mixed = false;
+    const std::function<void(const Object&, int)> walk = [&](const Object& o, int depth) {
+        const auto it = projections_.find(&o);
+        if (it != projections_.end()) {
+            const bool same = found && it->second ? found->same(*it->second) : found == it->second;
+            mixed |= any && !same;
+            if (!any) found = it->second;
+            any = true;
+        }
+        for (const mitsuba::Child& child : o.children)
+            if (child.object && depth < 32) walk(*child.object, depth + 1);
+    };
+    walk(object, 0);
+    if (mixed)
+        report_.refuse(object.where, "textures of different mappings on one surface are not supported",
+                       "all have the coordinates of the first");
+    return found;
 }
 
 Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
@@ -87,7 +124,7 @@ Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
                            "it has two");
         const Texture even = part("tex1", 1), odd = part("tex2", 0);
         out.kind = Texture::Kind::checkerboard;
-        out.mapping = mapping(in);
+        set_mapping(out, in);
         out.color = even.color, out.odd = odd.color;
         if (!even.is_constant() || !odd.is_constant()) {
             out.color = splat(1), out.odd = splat(0);
@@ -95,6 +132,9 @@ Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
         }
     } else if (in.type == "bilerp") {
         out = bilerp(is_float, in, space);
+    } else if (in.type == "dots") {
+        out = fold(in, {part("inside", 1), part("outside", 0), dots(in)},
+                   [](const std::vector<Rgb>& c) { return c[0] * c[2] + c[1] * (splat(1) - c[2]); });
     } else if (in.type == "imagemap") {
         out = image_texture(is_float, in);
     } else {
@@ -118,7 +158,7 @@ Texture Textures::image_texture(bool is_float, const Parameters& in) {
             fail(in.where_of("encoding"), "unknown encoding '" + encoding + "'");
     }
     out.image = image_file(path, gamma, is_float);
-    out.mapping = mapping(in);
+    set_mapping(out, in);
     out.wrap = in.text("wrap", "repeat");
     if (out.wrap != "repeat" && out.wrap != "clamp") {
         report_.refuse(in.where_of("wrap"), "wrap mode '" + out.wrap + "' is not supported", "repeat is used");
@@ -209,7 +249,7 @@ std::string Textures::bake(const Texture& texture, const ColorMap& map) {
 
 const Object& Textures::object(const Texture& texture, const UvMap& uv, const ColorMap& map) {
     using namespace mitsuba;
-    UvMap to_uv = texture.mapping * uv;
+    UvMap to_uv = texture.projection ? texture.mapping : texture.mapping * uv;
     Object* object = nullptr;
     Rgb factor = splat(1);
     if (texture.kind == Texture::Kind::image) {
@@ -242,6 +282,7 @@ const Object& Textures::object(const Texture& texture, const UvMap& uv, const Co
     for (int i = 0; i < 2; ++i)
         for (int j = 0; j < 3; ++j) m.m[i][columns[j]] = to_uv.m[i][j];
     set_transform(*object, "to_uv", m);
+    projections_[object] = texture.projection;
     if (factor == splat(1)) return *object;
     Object& scaled = add_object(document_, "texture", "scale", texture.where);
     set_rgb(scaled, "scale", factor);

@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "formats/pbrt/projection.h"
 #include "formats/pbrt/spectra.h"
 
 namespace ambilux::pbrt {
@@ -32,9 +33,10 @@ struct Texture {
     enum class Kind { constant, checkerboard, image };
     Kind kind = Kind::constant;
     Where where;
-    Rgb color = {1, 1, 1};  ///< constant; of the cells with an even sum; factor of the image
-    Rgb odd{};              ///< of the other cells
-    UvMap mapping;          ///< from pbrt's (u,v) to its (s,t)
+    Rgb color = {1, 1, 1};                         ///< constant; of the cells with an even sum; factor of the image
+    Rgb odd{};                                     ///< of the other cells
+    UvMap mapping;                                 ///< from pbrt's (u,v) to its (s,t)
+    std::shared_ptr<const Projection> projection;  ///< gives (s,t) instead, or null
     std::string wrap = "repeat", filter = "bilinear";
     std::shared_ptr<TextureImage> image;
 
@@ -50,8 +52,9 @@ public:
 
     const SpectrumReader& spectra() const { return spectra_; }
 
-    /// Directive Texture.
-    void define(const std::string& name, bool is_float, const Parameters& in, ColorSpace space);
+    /// Directive Texture; `ctm` places it in the world.
+    void define(const std::string& name, bool is_float, const Parameters& in, ColorSpace space,
+                const mitsuba::Matrix& ctm);
 
     /// Parameters that are numbers or textures of them, colours or textures of them.
     Texture number(const Parameters& in, const std::string& name, double fallback) const;
@@ -68,6 +71,8 @@ public:
     const TextureImage& texels_of(const Texture& texture) const;
     /// The texture as an object of its own.
     const Object& object(const Texture& texture, const UvMap& uv, const ColorMap& map = {});
+    /// What gives all textures below `object` their coordinates: null if the shape does. Refused if they differ.
+    std::shared_ptr<const Projection> projection_of(const Object& object) const;
 
 private:
     Texture build(bool is_float, const Parameters& in, ColorSpace space);
@@ -77,7 +82,8 @@ private:
     Texture on_one_grid(const Parameters& in, const std::vector<Texture>& parts,
                         const std::function<Rgb(const std::vector<Rgb>&)>& f);
     Texture bilerp(bool is_float, const Parameters& in, ColorSpace space) const;
-    UvMap mapping(const Parameters& in) const;
+    Texture dots(const Parameters& in) const;
+    void set_mapping(Texture& texture, const Parameters& in) const;
     const Texture& named(const Parameter& p, bool is_float) const;
     std::shared_ptr<TextureImage> image_file(const std::string& path, double gamma, bool is_number);
     void load_texels(TextureImage& image) const;
@@ -88,6 +94,8 @@ private:
     Report& report_;
     std::map<std::string, Texture> colors_, numbers_;
     std::map<std::string, std::shared_ptr<TextureImage>> images_;
+    std::map<const Object*, std::shared_ptr<const Projection>> projections_;  ///< of textures as objects
+    mitsuba::Matrix ctm_;                                                     ///< of the texture being defined
     uint64_t baked_bytes_ = 0;
 };
 

@@ -329,7 +329,6 @@ TEST_CASE("patches and subdivision surfaces are tessellated") {
 TEST_CASE("what is not known is refused by name, file and line") {
     const std::vector<std::pair<std::string, std::string>> cases = {
         {"Shape \"hair\"", "shape 'hair' is not supported"},
-        {"Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]", "curves of type 'flat'"},
         {"LightSource \"laser\"", "light 'laser' is not supported"},
         {"AreaLightSource \"diffuse\" \"bool twosided\" true Material \"dielectric\" Shape \"sphere\"", "two sides"},
         {"Material \"hair\" Shape \"sphere\"", "material 'hair' is not supported"},
@@ -374,7 +373,7 @@ TEST_CASE("errors say where") {
         {"AttributeBegin", "AttributeBegin has no end"},
         {"ObjectBegin \"a\"", "ObjectBegin has no end"},
         {"ObjectInstance \"a\"", "unknown object 'a'"},
-        {"NamedMaterial \"a\"", "unknown material 'a'"},
+        {"NamedMaterial \"a\" Shape \"sphere\"", "unknown material 'a'"},
         {"CoordSysTransform \"a\"", "unknown coordinate system 'a'"},
         {"ColorSpace \"a\"", "unknown colour space 'a'"},
         {"Include \"none.pbrt\"", "file 'none.pbrt' does not exist"},
@@ -530,6 +529,22 @@ TEST_CASE("textures of textures on one grid") {
         for (float v : {0.0f, 0.7f, 1.0f})
             CHECK(reflectance(corners, 0, {u, v}).x ==
                   Approx((1 - v) * u * 0.4 + v * ((1 - u) * 0.8 + u)).margin(1e-5));
+
+    // Centres by Perlin's noise, computed by a program of its own.
+    const Scene dots = shown(
+        "Texture \"t\" \"spectrum\" \"dots\" \"float uscale\" 4 \"float vscale\" 4 \"float vdelta\" 1 "
+        "\"rgb inside\" [1 .5 0] \"rgb outside\" [0 .25 1]");
+    CHECK(has_note(dots, "dots are an image of 256 texels a side"));
+    const auto at = [&](double x, double y) { return reflectance(dots, 0, {float(x / 4), float((y - 1) / 4)}); };
+    const Vec2f centres[] = {{1.1132f, 2.0119f}, {2.0509f, 2.9011f}, {3.0247f, 3.9469f}};
+    for (const Vec2f c : centres)
+        for (int k = 0; k < 8; ++k) {
+            const double x = std::cos(k * M_PI / 4), y = std::sin(k * M_PI / 4);
+            check_rgb(at(c.x + 0.32 * x, c.y + 0.32 * y), {1, 0.5f, 0});
+            check_rgb(at(c.x + 0.38 * x, c.y + 0.38 * y), {0, 0.25f, 1});
+        }
+    check_rgb(at(1, 4), {0, 0.25f, 1});
+    check_rgb(at(2, 1.3), {0, 0.25f, 1});
 }
 
 TEST_CASE("curves are tubes, those of one material in one mesh") {

@@ -1,0 +1,159 @@
+// Triangles of a primitive as they stand: morphed, and on the joints of a skin.
+#include <algorithm>
+#include <cmath>
+
+#include "formats/gltf/model.h"
+
+namespace ambilux::gltf {
+
+namespace {
+
+int attribute(const std::map<std::string, int>& all, const std::string& name) {
+    const auto it = all.find(name);
+    return it == all.end() ? -1 : it->second;
+}
+
+std::vector<Vec3f> triples_of(const Context& context, int accessor, const std::string& what) {
+    std::vector<Vec3f> out;
+    if (accessor < 0) return out;
+    const std::vector<double> v = accessor_values(context, accessor, 3, what);
+    for (size_t i = 0; i + 2 < v.size(); i += 3) out.push_back({float(v[i]), float(v[i + 1]), float(v[i + 2])});
+    return out;
+}
+
+void add_morphs(const Context& context, Mesh& mesh, const tinygltf::Primitive& primitive,
+                const std::vector<double>& weights, const std::string& what) {
+    for (size_t i = 0; i < std::min(weights.size(), primitive.targets.size()); ++i) {
+        if (weights[i] == 0) continue;
+        const auto add = [&](std::vector<Vec3f>& to, const char* name) {
+            const std::string target = what + ", morph target " + std::to_string(i) + ", " + name;
+            const std::vector<Vec3f> by = triples_of(context, attribute(primitive.targets[i], name), target);
+            if (by.empty() || to.empty()) return;
+            if (by.size() != to.size()) context.fail(target + ": its size is not that of the primitive");
+            for (size_t k = 0; k < to.size(); ++k) to[k] += by[k] * float(weights[i]);
+        };
+        add(mesh.positions, "POSITION");
+        add(mesh.normals, "NORMAL");
+    }
+}
+
+/// Every vertex to where the weighted mean of its joints takes it.
+void put_on_skin(Context& context, Mesh& mesh, const tinygltf::Primitive& primitive, const std::vector<Matrix>& joints,
+                 const std::string& what) {
+    const size_t n = mesh.positions.size();
+    std::vector<Matrix> sums(n);
+    for (Matrix& m : sums)
+        for (auto& row : m.m) std::fill(row, row + 4, 0.0);
+    std::vector<double> total(n);
+    std::vector<size_t> first(n);  // joint
+    for (int set = 0;; ++set) {
+        const std::string tail = "_" + std::to_string(set);
+        const int of_joints = attribute(primitive.attributes, "JOINTS" + tail),
+                  of_weights = attribute(primitive.attributes, "WEIGHTS" + tail);
+        if (of_joints < 0 || of_weights < 0) break;
+        const std::vector<double> joint = accessor_values(context, of_joints, 4, what + ", JOINTS" + tail),
+                                  weight = accessor_values(context, of_weights, 4, what + ", WEIGHTS" + tail);
+        if (joint.size() != 4 * n || weight.size() != 4 * n)
+            context.fail(what + ": joints and weights are not given for every vertex");
+        for (size_t i = 0; i < 4 * n; ++i) {
+            if (!(joint[i] >= 0 && joint[i] < double(joints.size())))
+                context.fail(what + ": joint " + std::to_string(int64_t(joint[i])) + " of " +
+                             std::to_string(joints.size()));
+            if (set == 0 && i % 4 == 0) first[i / 4] = size_t(joint[i]);
+            const Matrix& m = joints[size_t(joint[i])];
+            for (int r = 0; r < 3; ++r)
+                for (int c = 0; c < 4; ++c) sums[i / 4].m[r][c] += weight[i] * m.m[r][c];
+            total[i / 4] += weight[i];
+        }
+    }
+    for (size_t i = 0; i < n; ++i) {
+        Matrix m = sums[i];
+        if (!(total[i] > 0)) {
+            context.note("vertices without weights follow their first joint");
+            m = joints[first[i]];
+            total[i] = 1;
+        }
+        for (int r = 0; r < 3; ++r)
+            for (double& v : m.m[r]) v /= total[i];
+        for (int c = 0; c < 4; ++c) m.m[3][c] = c == 3;
+        mesh.positions[i] = mitsuba::to_affine(m).point(mesh.positions[i]);
+        if (mesh.normals.empty()) continue;
+        // By the cofactors, so that it stays perpendicular to the surface.
+        const mitsuba::Vec3d x = mitsuba::column(m, 0), y = mitsuba::column(m, 1), z = mitsuba::column(m, 2),
+                             a = cross(y, z), b = cross(z, x), c = cross(x, y);
+        const Vec3f v = mesh.normals[i];
+        mesh.normals[i] = {float(a.x * v.x + b.x * v.y + c.x * v.z), float(a.y * v.x + b.y * v.y + c.y * v.z),
+                           float(a.z * v.x + b.z * v.y + c.z * v.z)};
+    }
+}
+
+}  // namespace
+
+VertexColors vertex_colors(const Context& context, const tinygltf::Primitive& primitive, const std::string& what) {
+    VertexColors out;
+    const int index = attribute(primitive.attributes, "COLOR_0");
+    if (index < 0) return out;
+    const std::vector<double> v = accessor_values(context, index, 3, what + ", COLOR_0");
+    for (size_t i = 0; i + 2 < v.size(); i += 3) out.values.push_back({float(v[i]), float(v[i + 1]), float(v[i + 2])});
+    if (context.model.accessors[size_t(index)].type == TINYGLTF_TYPE_VEC4) {
+        const std::vector<double> all = accessor_values(context, index, 4, what + ", COLOR_0");
+        for (size_t i = 3; i < all.size(); i += 4) out.alphas.push_back(splat(float(all[i])));
+    }
+    for (const std::vector<Rgb>* list : {&out.values, &out.alphas})
+        for (const Rgb& c : *list)
+            if (!is_finite(c) || min_component(c) < 0) context.fail(what + ": a colour is negative or not finite");
+    const auto settle = [](const std::vector<Rgb>& all, Rgb& one, bool& varies) {
+        if (all.empty()) return;
+        one = all[0];
+        varies = std::any_of(all.begin(), all.end(), [&](Rgb c) { return !(c == all[0]); });
+    };
+    Rgb alpha = splat(1);
+    settle(out.values, out.color, out.varies);
+    settle(out.alphas, alpha, out.alpha_varies);
+    out.alpha = alpha.x;
+    return out;
+}
+
+Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int tex_coord, const Pose& pose,
+                    const VertexColors& colors, const std::string& what) {
+    Mesh mesh;
+    const auto find = [&](const std::string& name) { return attribute(primitive.attributes, name); };
+    const auto triples = [&](const std::string& name) { return triples_of(context, find(name), what + ", " + name); };
+    mesh.positions = triples("POSITION");
+    if (mesh.positions.empty()) context.fail(what + " has no positions");
+    mesh.normals = triples("NORMAL");
+    const std::string uv = "TEXCOORD_" + std::to_string(tex_coord);
+    if (find(uv) >= 0) {
+        const std::vector<double> v = accessor_values(context, find(uv), 2, what + ", " + uv);
+        for (size_t i = 0; i + 1 < v.size(); i += 2) mesh.uvs.push_back({float(v[i]), float(v[i + 1])});
+    }
+    add_morphs(context, mesh, primitive, pose.weights, what);
+    if (!pose.joints.empty()) put_on_skin(context, mesh, primitive, pose.joints, what);
+    if (colors.varies) mesh.attributes.push_back({"vertex_color", false, 3, colors.values});
+    if (colors.alpha_varies) mesh.attributes.push_back({"vertex_alpha", false, 1, colors.alphas});
+    std::vector<uint32_t> indices;
+    if (primitive.indices >= 0) {
+        for (double i : accessor_values(context, primitive.indices, 1, what + ", indices")) {
+            if (!(i >= 0 && i < double(mesh.positions.size())))
+                context.fail(what + ": index " + std::to_string(int64_t(i)) + " of " +
+                             std::to_string(mesh.positions.size()) + " vertices");
+            indices.push_back(uint32_t(i));
+        }
+    } else {
+        for (uint32_t i = 0; i < mesh.positions.size(); ++i) indices.push_back(i);
+    }
+    if (primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP || primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN) {
+        for (size_t i = 2; i < indices.size(); ++i)
+            if (primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN)
+                mesh.faces.push_back({indices[0], indices[i - 1], indices[i]});
+            else
+                mesh.faces.push_back({indices[i - 2 + i % 2], indices[i - 1 - i % 2], indices[i]});
+    } else {
+        for (size_t i = 0; i + 2 < indices.size(); i += 3)
+            mesh.faces.push_back({indices[i], indices[i + 1], indices[i + 2]});
+    }
+    check_mesh(context.where.file + ": " + what, mesh);
+    return mesh;
+}
+
+}  // namespace ambilux::gltf

@@ -1,0 +1,213 @@
+#include "formats/gltf/textures.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/srgb.h"
+
+namespace ambilux::gltf {
+
+using namespace mitsuba;
+
+namespace {
+
+double texel(const Texels& image, size_t i) { return image.is_8bit ? image.bytes[i] / 255.0 : image.floats[i]; }
+
+Texels like(const Texels& source) {
+    Texels out;
+    out.width = source.width, out.height = source.height, out.is_8bit = source.is_8bit;
+    out.is_linear = source.is_linear;
+    return out;
+}
+
+const char* wrap_of(int mode) {
+    return mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? "clamp"
+           : mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? "mirror"
+                                                           : "repeat";
+}
+
+}  // namespace
+
+Used used(const tinygltf::Value* object, const char* name) {
+    if (!object || !object->Has(name)) return {};
+    const tinygltf::Value& info = object->Get(name);
+    Used out{int(number(&info, "index", -1)), int(number(&info, "texCoord", 0)), nullptr};
+    if (info.Has("extensions") && info.Get("extensions").Has("KHR_texture_transform"))
+        out.transform = &info.Get("extensions").Get("KHR_texture_transform");
+    return out;
+}
+
+Used TextureMaker::with_image(const Used& use) {
+    if (use.index < 0) return use;
+    if (size_t(use.index) >= c_.model.textures.size())
+        c_.fail(what_ + ": there is no texture " + std::to_string(use.index));
+    const tinygltf::Texture& texture = c_.model.textures[size_t(use.index)];
+    if (texture.source >= 0) return use;
+    const std::string name = "texture " + std::to_string(use.index);
+    if (!texture.extensions.empty())
+        c_.refuse(what_ + ": the image of " + name + " is one of extension '" + texture.extensions.begin()->first +
+                      "', which is not supported",
+                  "it is left out");
+    else
+        c_.note(name + " has no image and is left out");
+    return {};
+}
+
+/// The image with this index, decoded once.
+const std::string& TextureMaker::image(int index) {
+    std::string& name = c_.images[index];
+    if (!name.empty()) return name;
+    if (index < 0 || size_t(index) >= c_.image_bytes.size())
+        c_.fail(what_ + ": there is no image " + std::to_string(index));
+    const std::string wanted = c_.where.file + ", image " + std::to_string(index);
+    c_.document.images[wanted] = read_image(wanted, c_.image_bytes[size_t(index)], c_.document.limits);
+    return name = wanted;
+}
+
+Object& TextureMaker::bitmap(const Used& use, bool raw, const char* channel) {
+    Object& out = bitmap_of(use, image(c_.model.textures[size_t(use.index)].source));
+    if (raw) set_boolean(out, "raw", true);
+    if (*channel) set_text(out, "channel", channel);
+    return out;
+}
+
+Object& TextureMaker::bitmap_of(const Used& use, std::string name) {
+    const tinygltf::Texture& texture = c_.model.textures[size_t(use.index)];
+    Matrix to_uv;
+    int tex_coord = use.tex_coord;
+    if (const tinygltf::Value* t = use.transform) {
+        const auto pair = [&](const char* key, int i, double fallback) {
+            if (!t->Has(key) || !t->Get(key).IsArray() || t->Get(key).ArrayLen() < 2) return fallback;
+            const tinygltf::Value& v = t->Get(key).Get(i);
+            return v.IsNumber() ? v.GetNumberAsDouble() : fallback;
+        };
+        const double a = number(t, "rotation", 0), x = pair("scale", 0, 1), y = pair("scale", 1, 1);
+        to_uv.m[0][0] = std::cos(a) * x, to_uv.m[0][1] = std::sin(a) * y, to_uv.m[0][3] = pair("offset", 0, 0);
+        to_uv.m[1][0] = -std::sin(a) * x, to_uv.m[1][1] = std::cos(a) * y, to_uv.m[1][3] = pair("offset", 1, 0);
+        tex_coord = int(number(t, "texCoord", tex_coord));
+    }
+    if (tex_coord_ >= 0 && tex_coord != tex_coord_)
+        c_.refuse(what_ + " uses several sets of texture coordinates", "the first of them is used");
+    else
+        tex_coord_ = tex_coord;
+    std::string wrap_u = "repeat", wrap_v = "repeat";
+    bool nearest = false;
+    if (texture.sampler >= 0 && size_t(texture.sampler) < c_.model.samplers.size()) {
+        const tinygltf::Sampler& sampler = c_.model.samplers[size_t(texture.sampler)];
+        wrap_u = wrap_of(sampler.wrapS), wrap_v = wrap_of(sampler.wrapT);
+        nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
+    }
+    // There is one mode for both axes. An axis within [0, 1] takes the other one's; a mirrored image that repeats is
+    // one that is mirrored.
+    if (wrap_u != wrap_v && !use.transform && lies_in_unit(tex_coord, 0)) wrap_u = wrap_v;
+    if (wrap_u != wrap_v && !use.transform && lies_in_unit(tex_coord, 1)) wrap_v = wrap_u;
+    for (std::string* wrap : {&wrap_u, &wrap_v})
+        if (wrap_u != wrap_v && *wrap == "mirror") {
+            const int axis = wrap == &wrap_v;
+            name = mirrored(name, axis);
+            to_uv = (axis ? scaling(1, 0.5, 1) : scaling(0.5, 1, 1)) * to_uv;
+            *wrap = "repeat";
+        }
+    Object& out = object("texture", "bitmap");
+    set_text(out, "image", name);
+    set_transform(out, "to_uv", to_uv);
+    set_text(out, "wrap_mode_u", wrap_u);
+    set_text(out, "wrap_mode_v", wrap_v);
+    if (nearest) set_text(out, "filter_type", "nearest");
+    return out;
+}
+
+/// True if all meshes of the material have their coordinates in [0, 1] along an axis.
+bool TextureMaker::lies_in_unit(int set, int axis) const {
+    const std::string name = "TEXCOORD_" + std::to_string(set);
+    for (const tinygltf::Mesh& mesh : c_.model.meshes)
+        for (const tinygltf::Primitive& primitive : mesh.primitives) {
+            const auto it = primitive.attributes.find(name);
+            if (primitive.material != material_ || it == primitive.attributes.end()) continue;
+            const std::vector<double> uv = accessor_values(c_, it->second, 2, what_ + ", " + name);
+            for (size_t i = size_t(axis); i < uv.size(); i += 2)
+                if (!(uv[i] >= 0 && uv[i] <= 1)) return false;
+        }
+    return true;
+}
+
+/// The image and behind it, along the axis, its mirror image.
+std::string TextureMaker::mirrored(const std::string& name, int axis) {
+    const std::string out_name = name + (axis ? ", mirrored below" : ", mirrored on the right");
+    const Texels source = c_.document.images[name];
+    Texels& out = c_.document.images[out_name];
+    if (out.width) return out_name;
+    out = like(source);
+    (axis ? out.height : out.width) *= 2;
+    for (uint32_t y = 0; y < out.height; ++y)
+        for (uint32_t x = 0; x < out.width; ++x) {
+            const uint32_t from_x = x < source.width ? x : out.width - 1 - x,
+                           from_y = y < source.height ? y : out.height - 1 - y;
+            const auto copy = [&, i = 4 * (size_t(from_y) * source.width + from_x)](const auto& from, auto& to) {
+                to.insert(to.end(), from.begin() + std::ptrdiff_t(i), from.begin() + std::ptrdiff_t(i + 4));
+            };
+            source.is_8bit ? copy(source.bytes, out.bytes) : copy(source.floats, out.floats);
+        }
+    return out_name;
+}
+
+Object& TextureMaker::normals(const Used& use, double scale) {
+    std::string name = image(c_.model.textures[size_t(use.index)].source);
+    if (scale != 1) {
+        const Texels source = c_.document.images[name];
+        name += ", normals scaled by " + std::to_string(scale);
+        Texels& out = c_.document.images[name];
+        out = like(source);
+        out.is_8bit = false;
+        out.bytes.clear();
+        out.floats.clear();
+        for (size_t i = 0; i < 4 * size_t(out.width) * out.height; i += 4) {
+            double n[3];
+            for (size_t k = 0; k < 3; ++k) n[k] = (2 * texel(source, i + k) - 1) * (k < 2 ? scale : 1);
+            const double l = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+            for (const double v : n) out.floats.push_back(float(l > 0 ? 0.5 + v / l / 2 : 0.5));
+            out.floats.push_back(1);
+        }
+    }
+    Object& out = bitmap_of(use, name);
+    set_boolean(out, "raw", true);
+    return out;
+}
+
+Object& TextureMaker::cut_alpha(const Used& use, double factor, double cutoff) {
+    std::string name = image(c_.model.textures[size_t(use.index)].source);
+    const Texels source = c_.document.images[name];
+    name += ", cut at " + std::to_string(cutoff) + " of " + std::to_string(factor);
+    Texels& out = c_.document.images[name];
+    out = {};
+    out.width = source.width, out.height = source.height, out.is_8bit = true;
+    for (size_t i = 0; i < size_t(out.width) * out.height; ++i) {
+        const uint8_t v = texel(source, 4 * i + 3) * factor >= cutoff ? 255 : 0;
+        out.bytes.insert(out.bytes.end(), {v, v, v, 255});
+    }
+    Object& made = bitmap_of(use, name);
+    set_boolean(made, "raw", true);
+    return made;
+}
+
+const Object& TextureMaker::scaled(const Object& texture, Rgb factor) {
+    if (factor == splat(1)) return texture;
+    Object& out = object("texture", "scale");
+    set_rgb(out, "scale", factor);
+    add_child(out, texture);
+    return out;
+}
+
+Rgb TextureMaker::mean(const Used& use, bool raw) {
+    const Texels& source = c_.document.images[image(c_.model.textures[size_t(use.index)].source)];
+    const size_t count = size_t(source.width) * source.height;
+    double sum[3] = {0, 0, 0};
+    for (size_t i = 0; i < count; ++i)
+        for (size_t k = 0; k < 3; ++k) {
+            const double v = texel(source, 4 * i + k);
+            sum[k] += raw || source.is_linear ? v : srgb_to_linear(v);
+        }
+    return Rgb{float(sum[0]), float(sum[1]), float(sum[2])} / float(std::max<size_t>(count, 1));
+}
+
+}  // namespace ambilux::gltf
