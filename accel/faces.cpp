@@ -14,11 +14,12 @@ Faces::Faces(const Scene& scene) {
         [&](uint32_t i) {
             const Triangle tri = view.triangles[i];
             const SurfacePoint point = detail::triangle_surface_at(view, i, 0.0f, 0.0f);
+            const bool flat = !(view.shapes[tri.shape].flags & kShapeHasNormals);
             faces_[i] = {view.vertices[tri.v0].p,
                          view.vertices[tri.v1].p,
                          view.vertices[tri.v2].p,
                          point.ng,
-                         point.dpdu,
+                         flat ? frame_from_normal_tangent(point.ng, point.dpdu).s : point.dpdu,
                          tri.shape};
         },
         1024u);

@@ -18,6 +18,7 @@ struct SurfacePoint {
     Vec3f dpdu, dpdv;  ///< partial derivatives of p by uv; zero or arbitrary tangents where uv do not define them
     Vec2f uv;          ///< texture coordinates as in Mitsuba: triangles without uvs use barycentrics (b1,b2)
     uint32_t prim, shape;
+    bool framed;  ///< dpdu is already the s axis of frame_from_normal_tangent(ns, dpdu)
 };
 
 /// Octahedral map of a unit vector to [-1,1]² (Cigolle et al. 2014, "A Survey of Efficient Representations for
@@ -103,6 +104,7 @@ AMBILUX_HD SurfacePoint triangle_point(const MeshVertex& a, const MeshVertex& b,
                                        float b1, float b2, bool mirrored = false) {
     const Vec3f p0 = a.p, p1 = b.p, p2 = c.p;
     SurfacePoint s;
+    s.framed = false;
     place_on_triangle(s, p0, p1, p2, b1, b2);
     const Vec3f e1 = p1 - p0, e2 = p2 - p0;
     s.ng = mirrored ? triangle_normal(e2, e1) : triangle_normal(e1, e2);
@@ -149,6 +151,7 @@ AMBILUX_HD SurfacePoint face_surface_at(const SceneView& scene, uint32_t prim, f
     s.prim = prim;
     s.shape = face.shape;
     const uint32_t flags = scene.shapes[face.shape].flags;
+    s.framed = !(flags & kShapeHasNormals);
     if (flags & (kShapeHasNormals | kShapeHasUvs)) {
         const Triangle tri = scene.triangles[prim];
         const MeshVertex &a = scene.vertices[tri.v0], &b = scene.vertices[tri.v1], &c = scene.vertices[tri.v2];
@@ -193,6 +196,7 @@ AMBILUX_HD SurfacePoint quadric_surface_at(const SceneView& scene, uint32_t prim
     SurfacePoint s;
     s.prim = prim;
     s.shape = q.shape;
+    s.framed = false;
     Vec3f local, normal;
     if (q.type == PrimitiveType::sphere) {
         local = normal = octahedral_decode({u, v});

@@ -54,7 +54,8 @@ struct Triangle {
 /// What of a triangle is the same at all of its points, in one line of a host's cache.
 struct alignas(64) Face {
     Vec3f p0, p1, p2;
-    Vec3f ng, dpdu;  ///< as in SurfacePoint
+    Vec3f ng;    ///< as in SurfacePoint
+    Vec3f dpdu;  ///< the same; of a triangle without vertex normals the s axis of its frame (SurfacePoint::framed)
     uint32_t shape;
 };
 
