@@ -26,6 +26,7 @@ void put(std::string& out, const T* values, size_t count) {
 template <class T>
 bool take(std::string_view& in, T* values, size_t count) {
     if (count > in.size() / sizeof(T)) return false;
+    if (count == 0) return true;                        // values may be null then, which memcpy must not be given
     std::memcpy(values, in.data(), count * sizeof(T));  // NOLINT(bugprone-suspicious-stringview-data-usage): sized
     in.remove_prefix(count * sizeof(T));
     return true;

@@ -17,6 +17,7 @@
 #include "core/flag.h"
 #include "core/parallel.h"
 #include "integrators/integrator.h"
+#include "integrators/keeps.h"
 #include "render/cpu_wave.h"
 #include "render/statistics.h"
 #include "render/wave_plan.h"
@@ -122,9 +123,7 @@ public:
 
 private:
     static constexpr bool kFilmWide = Integrator::kFilmWide;
-    /// It keeps something from wave to wave, which is brought up to date after each sample.
-    static constexpr bool kLearns =
-        requires(Layout& layout, typename Integrator::Policy& policy) { Integrator::lay_out_kept(layout, policy); };
+    static constexpr bool kLearns = KeepsBetweenWaves<Integrator>;
 
     /// Queues of one thread. They grow when a wave has more light vertices than any before.
     struct WaveMemory {

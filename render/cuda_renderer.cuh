@@ -27,7 +27,7 @@ namespace ambilux {
 template <class Integrator, Features F>
 class CudaRenderer final : public Renderer {
     static constexpr bool kFilmWide = Integrator::kFilmWide;
-    static constexpr bool kLearns = DeviceKept<Integrator>::kSome;
+    static constexpr bool kLearns = KeepsBetweenWaves<Integrator>;
     using Stages = typename Integrator::Stages;
 
 public:
@@ -66,7 +66,7 @@ public:
             for (uint32_t s = 0; s < pass; s += plan_.wave.samples) {
                 for (uint32_t tile = s ? 0 : first_tile; tile < tile_count(plan_.wave); tile += plan_.wave.tiles)
                     launch_wave(tile, first + done + s, std::min(plan_.wave.samples, pass - s));
-                if (plan_.in_parts()) update_whole_film(first + done + s);
+                if (plan_.in_parts()) finish_whole_sample(first + done + s);
             }
             cuda_check(cudaStreamSynchronize(stream_.get()), "wave");
             const WaveState state = read_state();
@@ -289,25 +289,25 @@ private:
     }
     void run(Executor& exec) {
         Integrator::schedule(exec, *stages_);
-        if (!plan_.in_parts()) update_film(exec);
+        if (!plan_.in_parts()) finish_samples(exec);
+        exec.finish_wave();
+    }
+    /// All pixels of plan_.film_wave go to the film, and what waves learn is brought up to date.
+    void finish_samples(Executor& exec) {
+        const UpdateFilm update = {plan_.film_wave, film_.samples, film_.splats, film_.sums,
+                                   layout_.record(UpdateFilm::kName)};
+        exec.run_slots(update, plan_.film_wave.tiles * kTilePixels, 1);
         if constexpr (kLearns) {
             const auto learn = Integrator::learn(policy_, state_, layout_.record(Integrator::kLearnName));
             if (const uint32_t items = Integrator::items_to_learn(policy_)) exec.run_slots(learn, items, 1);
         }
-        exec.finish_wave();
-    }
-    /// Of all pixels of plan_.film_wave.
-    void update_film(Executor& exec) {
-        const UpdateFilm update = {plan_.film_wave, film_.samples, film_.splats, film_.sums,
-                                   layout_.record(UpdateFilm::kName)};
-        exec.run_slots(update, plan_.film_wave.tiles * kTilePixels, 1);
     }
     /// After the last part of a sample; nothing if one of them failed.
-    void update_whole_film(uint32_t sample) {
+    void finish_whole_sample(uint32_t sample) {
         const WaveState state = {0, sample, 1, 0, 0, 0, 0, 0};
         detail::set_wave<<<1, 1, 0, stream_.get()>>>(state_, state);
         cuda_check(cudaGetLastError(), "film");
-        executor_->launch([&](Executor& exec) { update_film(exec); });
+        executor_->launch([&](Executor& exec) { finish_samples(exec); });
     }
     void launch_wave(uint32_t tile, uint32_t sample, uint32_t samples) {
         const WaveState state = {

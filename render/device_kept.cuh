@@ -2,7 +2,7 @@
 #pragma once
 
 #include "backends/cuda/device_memory.h"
-#include "queues/layout.h"
+#include "integrators/keeps.h"
 
 namespace ambilux {
 
@@ -11,13 +11,9 @@ class DeviceKept {
     using Policy = typename Integrator::Policy;
 
 public:
-    /// The integrator keeps something, which is brought up to date after each wave.
-    static constexpr bool kSome =
-        requires(Layout& layout, Policy& policy) { Integrator::lay_out_kept(layout, policy); };
-
     /// Bytes that it will take.
     uint64_t plan([[maybe_unused]] Policy& policy) {
-        if constexpr (kSome) {
+        if constexpr (KeepsBetweenWaves<Integrator>) {
             Layout layout;
             Integrator::lay_out_kept(layout, policy);
             planned_ = layout.bytes();
@@ -25,7 +21,7 @@ public:
         return planned_;
     }
     void allocate([[maybe_unused]] Policy& policy) {
-        if constexpr (kSome) {
+        if constexpr (KeepsBetweenWaves<Integrator>) {
             Layout layout;
             Integrator::lay_out_kept(layout, policy);
             memory_ = DeviceBuffer<std::byte>(layout.bytes(), "what waves learn");

@@ -17,20 +17,15 @@ const Value* Object::find(const std::string& name) const {
 
 std::string Document::resolve(const std::string& name, const Where& where) const {
     std::error_code ignored;
-    const fs::path path(name);
-    if (path.is_absolute() && fs::exists(path, ignored)) return name;
     std::vector<fs::path> folders = {fs::path(where.file).parent_path()};
     folders.insert(folders.end(), search_folders.begin(), search_folders.end());
     if (!files.empty()) folders.push_back(fs::path(files[0].first).parent_path());
-    for (const fs::path& folder : folders) {
-        const fs::path candidate = folder / path;
-        if (fs::exists(candidate, ignored)) return candidate.string();
-    }
-    // As exporters on Windows write it.
-    if (name.find('\\') != std::string::npos) {
-        std::string slashed = name;
-        std::replace(slashed.begin(), slashed.end(), '\\', '/');
-        return resolve(slashed, where);
+    std::string slashed = name;  // backslashes are what exporters on Windows write
+    std::replace(slashed.begin(), slashed.end(), '\\', '/');
+    for (const fs::path path : {name, slashed}) {
+        if (path.is_absolute() && fs::exists(path, ignored)) return path.string();
+        for (const fs::path& folder : folders)
+            if (fs::path candidate = folder / path; fs::exists(candidate, ignored)) return candidate.string();
     }
     throw input_error(where.file, where.line, "file '" + name + "' does not exist");
 }

@@ -60,9 +60,9 @@ cudaError_t __wrap_cudaFree(void* p) {
 namespace {
 
 /// All but the tutorials'.
-constexpr std::pair<const char*, const char*> kVariants[] = {{"path", "wavefront"}, {"light", "wavefront"},
-                                                             {"bdpt", "wavefront"}, {"bdpt", "lvc"},
-                                                             {"bdpt", "streaming"}, {"bdpt", "megakernel"}};
+constexpr std::pair<const char*, const char*> kVariants[] = {
+    {"path", "wavefront"}, {"light", "wavefront"}, {"bdpt", "wavefront"}, {"bdpt", "lvc"},
+    {"bdpt", "learned"},   {"bdpt", "streaming"},  {"bdpt", "megakernel"}};
 
 RenderSettings settings_of(const Scene& scene, const char* integrator, const char* variant) {
     RenderSettings s = cpu_settings(scene, Estimator::mis);
@@ -156,7 +156,7 @@ TEST_CASE("parts of the film have the expectation of the whole") {
     RenderSettings reference = settings_of(scene, "bdpt", "wavefront");
     reference.seed = 5;
     const Estimate expected = render_batches(scene, reference, 256);
-    for (const char* variant : {"wavefront", "lvc", "streaming", "megakernel"}) {
+    for (const char* variant : {"wavefront", "lvc", "learned", "streaming", "megakernel"}) {
         RenderSettings s = settings_of(scene, "bdpt", variant);
         s.memory = small_budget(scene, s) + (2 << 20);
         const ZTestResult result = z_test(render_batches(scene, s, 256), expected);

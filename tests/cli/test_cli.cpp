@@ -573,7 +573,8 @@ TEST_CASE("Outliers come with a command that replays them") {
     const Outcome light = run(folder, {"trace", kCornell, "--size", "24x16", "-i", "light", "--light-subpath", "7",
                                        "--sample", "1", "--strategy", "s2t1", "--json", "-"});
     REQUIRE(light.code == 0);
-    for (const json& splat : json::parse(light.out)["splats"]) CHECK(splat["s"] == 2);
+    const json replay = json::parse(light.out);
+    for (const json& splat : replay["splats"]) CHECK(splat["s"] == 2);
 }
 
 TEST_CASE("A render that drops invalid values names the command that replays the first of each stage") {

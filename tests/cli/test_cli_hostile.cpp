@@ -8,6 +8,7 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <thread>
 
 #include "core/file_lock.h"
@@ -30,6 +31,14 @@ bool wait_for(const std::function<bool()>& is) {
         if (is()) return true;
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
+    return false;
+}
+
+/// The process catches the signal (proc(5), SigCgt).
+bool catches(pid_t process, int signal) {
+    std::ifstream status("/proc/" + std::to_string(process) + "/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.rfind("SigCgt:", 0) == 0) return std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1;
     return false;
 }
 
@@ -160,6 +169,7 @@ TEST_CASE("signals end loading at once, and without a trace") {
     const std::string scene = folder.write("s.xml", text + "</scene>");
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
         const pid_t child = start(folder, {"render", scene, "--spp", "1", "-o", folder / "a.exr"});
+        REQUIRE(wait_for([&] { return catches(child, signal); }));
         std::this_thread::sleep_for(std::chrono::milliseconds(300));
         ::kill(child, signal);
         const auto sent = Clock::now();

@@ -36,6 +36,11 @@ void give_back(void* p) noexcept {
 
 void* operator new(size_t n) { return counted(std::malloc(n)); }
 void* operator new[](size_t n) { return counted(std::malloc(n)); }
+// std::stable_sort asks this way.
+void* operator new(size_t n, const std::nothrow_t&) noexcept {
+    void* const p = std::malloc(n);
+    return p ? counted(p) : nullptr;
+}
 void* operator new(size_t n, std::align_val_t a) {
     return counted(std::aligned_alloc(size_t(a), (n + size_t(a) - 1) / size_t(a) * size_t(a)));
 }

@@ -14,7 +14,8 @@ inline Scene scene_of_caught_subpaths() {
         <film type="hdrfilm"><integer name="width" value="128"/><integer name="height" value="128"/></film></sensor>
         <emitter type="point"><point name="position" x="0" y="-5" z="0"/><rgb name="intensity" value="1"/></emitter>
         <emitter type="point"><point name="position" x="0" y="2" z="0"/><rgb name="intensity" value="49"/></emitter>
-        <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/><scale value="3"/></transform></shape>
+        <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/><scale value="3"/></transform>
+        </shape>
         <shape type="cube"><transform name="to_world"><translate y="-5"/></transform><bsdf type="twosided">
         <bsdf type="diffuse"><rgb name="reflectance" value="0.99"/></bsdf></bsdf></shape></scene>)");
 }

@@ -97,7 +97,7 @@ struct LearnedIntegrator {
         if (s.policy.rules.splat) exec.run(s.splats.splat);
         if (s.policy.rules.connect) exec.clear(s.source.vertices);
     }
-    /// Runs after all waves of a sample, over as many items.
+    /// Runs after all waves of a sample, over items_to_learn items.
     static UpdateDraws learn(const Policy& p, const WaveState* state, StageRecord* record) {
         return {p.table, state, p.learned.share, record};
     }
