@@ -2,6 +2,7 @@
 
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"
+#include "accel/faces.h"
 
 namespace ambilux {
 
@@ -14,6 +15,11 @@ template <>
 std::shared_ptr<const EmbreeAccel> SharedAccels::get() {
     return once(embree_,
                 [&] { return host_ ? host_->get<EmbreeAccel>() : std::make_shared<const EmbreeAccel>(scene_); });
+}
+
+template <>
+std::shared_ptr<const Faces> SharedAccels::get() {
+    return once(faces_, [&] { return host_ ? host_->get<Faces>() : std::make_shared<const Faces>(scene_); });
 }
 
 }  // namespace ambilux

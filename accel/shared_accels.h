@@ -11,6 +11,7 @@ namespace ambilux {
 
 class CwbvhAccel;
 class EmbreeAccel;
+class Faces;
 class DeviceScene;
 class DeviceCwbvh;
 class HostTexels;
@@ -30,7 +31,7 @@ public:
         if (host_) host_->place_textures(where);
     }
 
-    /// `T`: CwbvhAccel, EmbreeAccel; in builds with CUDA also DeviceScene, DeviceCwbvh, HostTexels
+    /// `T`: CwbvhAccel, EmbreeAccel, Faces; in builds with CUDA also DeviceScene, DeviceCwbvh, HostTexels
     /// (backends/cuda/device_scene.h).
     template <class T>
     std::shared_ptr<const T> get();
@@ -50,6 +51,7 @@ private:
     std::recursive_mutex mutex_;  ///< some are made from others
     std::shared_ptr<const CwbvhAccel> cwbvh_;
     std::shared_ptr<const EmbreeAccel> embree_;
+    std::shared_ptr<const Faces> faces_;
     std::shared_ptr<const DeviceScene> device_scene_;
     std::shared_ptr<const DeviceCwbvh> device_cwbvh_;
     std::shared_ptr<const HostTexels> host_texels_;
@@ -59,5 +61,7 @@ template <>
 std::shared_ptr<const CwbvhAccel> SharedAccels::get<CwbvhAccel>();
 template <>
 std::shared_ptr<const EmbreeAccel> SharedAccels::get<EmbreeAccel>();
+template <>
+std::shared_ptr<const Faces> SharedAccels::get<Faces>();
 
 }  // namespace ambilux

@@ -9,7 +9,7 @@ namespace ambilux {
 /// Sine and cosine of x in [-pi/4, pi/4] by their series, which are below rounding after these terms: absolute error
 /// 1e-7. A general sinf has to reduce its argument first. In double precision it does so: the terms are those of
 /// floats.
-AMBILUX_HD void sin_cos_octant(float x, float& sine, float& cosine) {
+AMBILUX_HD_SMALL void sin_cos_octant(float x, float& sine, float& cosine) {
     if constexpr (!kSinglePrecision) {
         sine = sinf(x);
         cosine = cosf(x);
@@ -33,7 +33,7 @@ AMBILUX_HD void sin_cos_turns(float t, float& sine, float& cosine) {
 }
 
 /// Uniform point of the unit disk, concentric map (Shirley and Chiu 1997). Density 1/pi per area. Absolute error 3e-7.
-AMBILUX_HD Vec2f square_to_disk(Vec2f u) {
+AMBILUX_HD_SMALL Vec2f square_to_disk(Vec2f u) {
     const float a = 2.0f * u.x - 1.0f, b = 2.0f * u.y - 1.0f;
     if (a == 0.0f && b == 0.0f) return {0.0f, 0.0f};
     const bool wide = fabsf(a) > fabsf(b);
@@ -45,7 +45,7 @@ AMBILUX_HD Vec2f square_to_disk(Vec2f u) {
 
 /// Cosine-weighted direction of the upper hemisphere. Density cos(theta)/pi per solid angle. Unit to 4e-7; the square
 /// of its cosine is off by 8e-7 at most.
-AMBILUX_HD Vec3f square_to_cosine_hemisphere(Vec2f u) {
+AMBILUX_HD_SMALL Vec3f square_to_cosine_hemisphere(Vec2f u) {
     const Vec2f d = square_to_disk(u);
     // Never exactly on the horizon, where the density would be zero.
     return {d.x, d.y, sqrtf(max(1.0f - d.x * d.x - d.y * d.y, 1e-14f))};
@@ -71,7 +71,7 @@ AMBILUX_HD Vec3f square_to_cone(Vec2f u, float one_minus_cos_max) {
 
 /// Uniform barycentrics (b1, b2) of a triangle, square-root map (Turk 1990). Density 1/area per area. Relative error of
 /// 3 roundings; 1 - b1 - b2 >= -2^-24.
-AMBILUX_HD Vec2f square_to_triangle(Vec2f u) {
+AMBILUX_HD_SMALL Vec2f square_to_triangle(Vec2f u) {
     const float s = sqrtf(u.x);
     return {s * (1.0f - u.y), s * u.y};
 }

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <new>
 
+#include "accel/faces.h"
 #include "accel/host_tracer.h"
 #include "accel/shared_accels.h"
 #include "backends/cpu/executor.h"
@@ -174,6 +175,9 @@ private:
             take(accels.get<CwbvhAccel>());
         else
             take(accels.get<EmbreeAccel>());
+        faces_ = accels.get<Faces>();
+        view_.faces = faces_->data();
+        accel_bytes_ += faces_->memory_bytes();
     }
     /// Each array of the film with its number of values.
     template <class Function>
@@ -340,6 +344,7 @@ private:
     StageRecord film_record_{};
     HostTracer tracer_;
     std::shared_ptr<const void> accel_;
+    std::shared_ptr<const Faces> faces_;
     std::vector<WaveMemory> waves_;
     std::vector<Lane> film_samples_, kept_;
     std::vector<double> splats_, strategies_;

@@ -18,6 +18,7 @@ struct SurfacePoint {
     Vec3f dpdu, dpdv;  ///< partial derivatives of p by uv; zero or arbitrary tangents where uv do not define them
     Vec2f uv;          ///< texture coordinates as in Mitsuba: triangles without uvs use barycentrics (b1,b2)
     uint32_t prim, shape;
+    bool framed;  ///< dpdu is already the s axis of frame_from_normal_tangent(ns, dpdu)
 };
 
 /// Octahedral map of a unit vector to [-1,1]² (Cigolle et al. 2014, "A Survey of Efficient Representations for
@@ -78,27 +79,39 @@ AMBILUX_HD void any_tangents(SurfacePoint& s) {
     s.dpdv = frame.t;
 }
 
+/// Where barycentrics (b1,b2) lie on a triangle, as SurfacePoint::p and p_error.
+AMBILUX_HD void place_on_triangle(SurfacePoint& s, Vec3f p0, Vec3f p1, Vec3f p2, float b1, float b2) {
+    const Vec3f q0 = p0 * (1.0f - b1 - b2), q1 = p1 * b1, q2 = p2 * b2;
+    s.p = q0 + q1 + q2;
+    s.p_error = (abs(q0) + abs(q1) + abs(q2)) * gamma_bound(7);  // PBRT 4th ed., 6.8.5
+}
+
+/// Unit normal between those of three vertices, or `ng` where there is none.
+AMBILUX_HD Vec3f interpolated_normal(const MeshVertex& a, const MeshVertex& b, const MeshVertex& c, float b1, float b2,
+                                     Vec3f ng) {
+    const Vec3f n = a.n * (1.0f - b1 - b2) + b.n * b1 + c.n * b2;
+    const float l2 = length_squared(n);
+    return l2 > 1e-20f ? n * inverse_sqrt(l2) : ng;
+}
+
+AMBILUX_HD Vec2f interpolated_uv(Vec2f t0, Vec2f t1, Vec2f t2, float b1, float b2) {
+    return t0 * (1.0f - b1 - b2) + t1 * b1 + t2 * b2;
+}
+
 /// Point of a triangle at barycentrics (b1,b2) of its second and third vertex, but for what names it. `ng` is within 6
 /// roundings of the triangle's, and 3 over the sine between its edges. `mirrored`: its vertices go round the other way.
 AMBILUX_HD SurfacePoint triangle_point(const MeshVertex& a, const MeshVertex& b, const MeshVertex& c, uint32_t flags,
                                        float b1, float b2, bool mirrored = false) {
     const Vec3f p0 = a.p, p1 = b.p, p2 = c.p;
-    const float b0 = 1.0f - b1 - b2;
     SurfacePoint s;
-    const Vec3f q0 = p0 * b0, q1 = p1 * b1, q2 = p2 * b2;
-    s.p = q0 + q1 + q2;
-    s.p_error = (abs(q0) + abs(q1) + abs(q2)) * gamma_bound(7);  // PBRT 4th ed., 6.8.5
+    s.framed = false;
+    place_on_triangle(s, p0, p1, p2, b1, b2);
     const Vec3f e1 = p1 - p0, e2 = p2 - p0;
     s.ng = mirrored ? triangle_normal(e2, e1) : triangle_normal(e1, e2);
-    s.ns = s.ng;
-    if (flags & kShapeHasNormals) {
-        const Vec3f n = a.n * b0 + b.n * b1 + c.n * b2;
-        const float l2 = length_squared(n);
-        if (l2 > 1e-20f) s.ns = n * inverse_sqrt(l2);
-    }
+    s.ns = flags & kShapeHasNormals ? interpolated_normal(a, b, c, b1, b2, s.ng) : s.ng;
     if (flags & kShapeHasUvs) {
         const Vec2f t0 = a.uv(), t1 = b.uv(), t2 = c.uv();
-        s.uv = t0 * b0 + t1 * b1 + t2 * b2;
+        s.uv = interpolated_uv(t0, t1, t2, b1, b2);
         const Vec2f d1 = t1 - t0, d2 = t2 - t0;
         const float det = difference_of_products(d1.x, d2.y, d1.y, d2.x);
         if (det == 0.0f) {
@@ -124,6 +137,27 @@ AMBILUX_HD SurfacePoint triangle_surface_at(const SceneView& scene, uint32_t pri
                                     scene.shapes[tri.shape].flags, b1, b2);
     s.prim = prim;
     s.shape = tri.shape;
+    return s;
+}
+
+/// The same from its Face, with dpdu alone of the derivatives.
+AMBILUX_HD SurfacePoint face_surface_at(const SceneView& scene, uint32_t prim, float b1, float b2) {
+    const Face& face = scene.faces[prim];
+    SurfacePoint s;
+    place_on_triangle(s, face.p0, face.p1, face.p2, b1, b2);
+    s.ng = s.ns = face.ng;
+    s.dpdu = face.dpdu;
+    s.uv = {b1, b2};
+    s.prim = prim;
+    s.shape = face.shape;
+    const uint32_t flags = scene.shapes[face.shape].flags;
+    s.framed = !(flags & kShapeHasNormals);
+    if (flags & (kShapeHasNormals | kShapeHasUvs)) {
+        const Triangle tri = scene.triangles[prim];
+        const MeshVertex &a = scene.vertices[tri.v0], &b = scene.vertices[tri.v1], &c = scene.vertices[tri.v2];
+        if (flags & kShapeHasNormals) s.ns = interpolated_normal(a, b, c, b1, b2, face.ng);
+        if (flags & kShapeHasUvs) s.uv = interpolated_uv(a.uv(), b.uv(), c.uv(), b1, b2);
+    }
     return s;
 }
 
@@ -162,6 +196,7 @@ AMBILUX_HD SurfacePoint quadric_surface_at(const SceneView& scene, uint32_t prim
     SurfacePoint s;
     s.prim = prim;
     s.shape = q.shape;
+    s.framed = false;
     Vec3f local, normal;
     if (q.type == PrimitiveType::sphere) {
         local = normal = octahedral_decode({u, v});
@@ -215,6 +250,10 @@ AMBILUX_HD SurfacePoint surface_at(const SceneView& scene, uint32_t prim, float 
         if constexpr (!F.has(PrimitiveType::triangle)) return detail::quadric_surface_at(scene, prim, u, v);
         if (!scene.is_triangle(prim)) return detail::quadric_surface_at(scene, prim, u, v);
     }
+#if !defined(__CUDA_ARCH__)
+    if constexpr (!F.bumps)
+        if (scene.faces) return detail::face_surface_at(scene, prim, u, v);
+#endif
     return detail::triangle_surface_at(scene, prim, u, v);
 }
 

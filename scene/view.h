@@ -51,6 +51,14 @@ struct Triangle {
     uint32_t shape;
 };
 
+/// What of a triangle is the same at all of its points, in one line of a host's cache.
+struct alignas(64) Face {
+    Vec3f p0, p1, p2;
+    Vec3f ng;    ///< as in SurfacePoint
+    Vec3f dpdu;  ///< the same; of a triangle without vertex normals the s axis of its frame (SurfacePoint::framed)
+    uint32_t shape;
+};
+
 /// Analytic shape. Local forms: unit sphere at the origin; unit disk z = 0, normal +z; cylinder x²+y² = 1, 0 <= z <= 1,
 /// normal outwards. `to_world` holds scale (radius, length), rotation and translation; scale is uniform for sphere and
 /// disk, uniform in xy for the cylinder. `flip` reverses the normal.
@@ -183,6 +191,8 @@ struct SceneView {
     const Emitter* emitters;
     const float32* emitter_cdf;  ///< emitter_count+1 floats: cumulative pick_probability
     const float32* tables;
+    const Face* faces =
+        nullptr;  ///< per triangle, on a host that renders; null: made of its vertices wherever asked for
     uint32_t vertex_count, triangle_count, quadric_count, shape_count, material_count, bsdf_count, texture_count,
         emitter_count;
     uint32_t environment;  ///< index of the constant or envmap emitter, or kNone

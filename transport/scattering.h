@@ -60,7 +60,7 @@ AMBILUX_HD Scattering make_scattering(const SceneView& scene, const SurfacePoint
     Vec3f n = point.ns;
     if constexpr (F.bumps) n = perturbed_normal<F>(scene, record, point);
     Scattering s;
-    s.frame = frame_from_normal_tangent(n, point.dpdu);
+    s.frame = point.framed ? Frame{point.dpdu, cross(n, point.dpdu), n} : frame_from_normal_tangent(n, point.dpdu);
     s.ng = point.ng;
     if (flip) {
         s.frame.n = -s.frame.n;
