@@ -14,6 +14,7 @@ from analysis import images, style
 
 BESIDE = 6  # runs beside the reference; more stand below it
 ACROSS = 7
+HIGHEST = 8.6  # inches of a figure, beside a caption on a page
 INSETS = 2
 INSET_COLOURS = (style.COLOURS[1], style.COLOURS[4])  # vermilion and sky blue: told apart in grey too
 
@@ -71,13 +72,17 @@ def draw(experiment, scene, reference, shown, insets):
     factor, rows = images.exposure(reference), len(insets)
     below = len(shown) > BESIDE
     across = style.balanced(len(shown), ACROSS) if below else len(shown) + 1
-    unit = style.PAGE / ACROSS if below else style.PAGE / (across + rows * width / height + 0.15)  # inches of an inset; the reference is as high as all of them
-    gap, big_width, map_height, numbers = 0.03, rows * unit * width / height, unit * height / width, 0.46
+    unit = style.PAGE / (across + rows * width / height + 0.15)  # inches of an inset; the reference is as high as all of them
+    apart = style.PAGE / across if below else unit  # columns, spread over the page
+    points = 7.5 if apart > 0.9 else 6.5
+    headings = [style.fit(run, apart, points) for run, _, _ in shown]
+    title, numbers = 0.08 + 0.12 * (max(h.count("\n") for h in headings) + 1), 0.46
+    if below:  # as large as a page has room for
+        blocks = -(-len(shown) // across)
+        unit = min(style.PAGE / ACROSS, max(0.5, (HIGHEST - 0.5 - blocks * (title + 0.02 + numbers)) / (rows + blocks * (rows + height / width))))
+    gap, big_width, map_height = 0.03, rows * unit * width / height, unit * height / width
     maps = [images.relative_error(image, reference) for _, _, image in shown]
     highest = images.highest_of(maps)
-    points = 7.5 if unit > 0.9 else 6.5
-    headings = [style.fit(run, unit, points) for run, _, _ in shown]
-    title = 0.08 + 0.12 * (max(h.count("\n") for h in headings) + 1)
     name = style.fit(f"{scene}, reference", big_width, 8.5)
     big_title = 0.08 + 0.14 * (name.count("\n") + 1)
     title = title if below else max(title, big_title)
@@ -108,7 +113,7 @@ def draw(experiment, scene, reference, shown, insets):
         left = big_width + 0.1
         put_insets(reference, "reference", left, top)
         for i, (run, seed, image) in enumerate(shown):
-            x = i % across * unit if below else left + (i + 1) * unit
+            x = i % across * apart + (apart - unit) / 2 if below else left + (i + 1) * unit
             y = head + (i // across) * block + title if below else top
             put_insets(image, headings[i], x, y)
             axes = place(x, y + rows * unit + 0.02, unit - gap, map_height)

@@ -6,7 +6,7 @@ import numpy as np
 from analysis import comparison, images, style
 
 BLOCK = 4  # pixels: of the signed map
-ACROSS = 6
+ACROSS = 7
 
 
 def mean_image(experiment, scene, run, reference):
@@ -26,7 +26,8 @@ def draw(scene, reference, columns):
     across = style.balanced(len(columns), ACROSS)
     blocks = -(-len(columns) // across)
     cell = min(2.2, (style.PAGE - 0.1) / across)
-    lines = max(style.fit(run, cell, 8.5).count("\n") + 1 for run, *_ in columns)
+    points = 8.5 if cell > 1.3 else 7
+    lines = max(style.fit(run, cell, points).count("\n") + 1 for run, *_ in columns)
     with plt.rc_context(style.STYLE):
         figure, grid = plt.subplots(2 * blocks, across, figsize=(max(cell * across, style.COLUMN), blocks * (2 * cell * height / width + 0.25 + 0.15 * lines) + 1.1), squeeze=False,
                                     layout="constrained")
@@ -36,7 +37,7 @@ def draw(scene, reference, columns):
             above, below = grid[2 * (i // across)][i % across], grid[2 * (i // across) + 1][i % across]
             top = above.imshow(error, cmap=style.ERROR_COLOURS, vmin=0, vmax=highest, interpolation="nearest")
             bottom = below.imshow(difference, cmap=style.SIGNED_COLOURS, vmin=-signed, vmax=signed, interpolation="nearest")
-            above.set_title(style.fit(run, cell, 8.5))
+            above.set_title(style.fit(run, cell, points), fontsize=points)
             for axes in above, below:
                 axes.set_axis_on()
                 comparison.bare(axes)

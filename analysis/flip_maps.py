@@ -20,7 +20,7 @@ try:
 except ImportError:
     flip_evaluator = None
 
-ACROSS = 6
+ACROSS = 7
 
 
 def flip(image, reference):
@@ -62,14 +62,16 @@ def draw(scene, shape, columns):
     across = style.balanced(len(columns), ACROSS)
     rows = -(-len(columns) // across)
     cell = min(2.2, (style.PAGE - 0.6) / across)
-    lines = max(style.fit(run, cell, 8.5).count("\n") + 2 for run, *_ in columns)
+    points = 8.5 if cell > 1.3 else 7
+    lines = max(style.fit(run, cell, points).count("\n") + 2 for run, *_ in columns)
     with plt.rc_context(style.STYLE):
         figure, grid = plt.subplots(rows, across, figsize=(cell * across + 0.6, rows * (cell * height / width + 0.16 + 0.15 * lines)), squeeze=False, layout="constrained")
         for axes in grid.flat:
             axes.set_axis_off()
         for axes, (run, values, mean) in zip(grid.flat, columns):
             drawn = axes.imshow(values / 255, cmap=style.ERROR_COLOURS, vmin=0, vmax=1, interpolation="nearest")
-            axes.set_title(style.fit(run, cell, 8.5) + f"\nmean {mean:.3f}, median {np.median(values) / 255:.3f}" if cell > 1.6 else style.fit(run, cell, 8.5) + f"\nmean {mean:.3f}")
+            median = f", median {np.median(values) / 255:.3f}" if cell > 1.6 else ""
+            axes.set_title(f"{style.fit(run, cell, points)}\nmean {mean:.3f}{median}", fontsize=points)
             axes.set_axis_on()
             comparison.bare(axes)
         figure.colorbar(drawn, ax=list(grid.flat), label="HDR-FLIP", fraction=0.05, aspect=14)

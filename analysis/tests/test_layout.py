@@ -48,7 +48,7 @@ def test_headings_and_footers_do_not_collide(which, request):
     reference, shown = comparison.load(data, scene)
     for figure in (comparison.draw(data, scene, reference, shown, [(0, 0, 9), (20, 10, 9)]), next(error_maps.make(data, scene)).figure, overview.draw(data)):
         assert not overlap(texts_of(figure, headings))
-        assert figure.get_figwidth() <= 10
+        assert figure.get_figwidth() <= 10 and figure.get_figheight() <= 9
         style.plt.close(figure)
 
 
