@@ -34,7 +34,7 @@ Rgb Coating::diffuse_below(Rgb reflectance) const {
     const double bounces = double((depth + 1) / 2);
     Rgb out;
     for (int i = 0; i < 3; ++i) {
-        const double r = double(reflectance[i]), again = r * back_dimmed;
+        const double r = double(reflectance[i]), again = std::min(r * back_dimmed, 1 - 1e-9);
         const double all = passed * passed * r * (1 - std::pow(again, bounces)) / (1 - again);
         out[i] = float(std::clamp(all / (1 + all * back), 0.0, 1.0));
     }

@@ -1,21 +1,27 @@
 // Materials that shapes name before the file defines them: pbrt looks them up at its end.
+#include <set>
+
 #include "formats/pbrt/scene.h"
 
 namespace ambilux::pbrt {
 
 namespace {
 
-bool is_known(const SceneMaker& scene, const Shared& material, uint64_t depth) {
-    if (!material) return true;
-    const bool is_name = material->in.directive == kNamedMaterial;
-    if (!is_name && material->in.type != "mix") return true;
-    const Parameter* parts = is_name ? nullptr : material->in.find("materials");
-    if (!is_name && !parts) return true;
-    // A mix of itself is known: what makes it says what is wrong.
-    if (depth > scene.named_materials.size()) return true;
-    for (const std::string& name : is_name ? std::vector<std::string>{material->in.type} : parts->strings) {
-        const auto known = scene.named_materials.find(name);
-        if (known == scene.named_materials.end() || !is_known(scene, known->second, depth + 1)) return false;
+/// The material, and all that it mixes. A mix of itself is known: what makes it says what is wrong.
+bool is_known(const SceneMaker& scene, const Shared& material) {
+    std::set<Shared> seen;
+    std::vector<Shared> open = {material};
+    while (!open.empty()) {
+        const Shared next = std::move(open.back());
+        open.pop_back();
+        if (!next || !seen.insert(next).second) continue;
+        if (next->in.directive == kNamedMaterial) return false;
+        const Parameter* parts = next->in.type == "mix" ? next->in.find("materials") : nullptr;
+        for (const std::string& name : parts ? parts->strings : std::vector<std::string>{}) {
+            const auto known = scene.named_materials.find(name);
+            if (known == scene.named_materials.end()) return false;
+            open.push_back(known->second);
+        }
     }
     return true;
 }
@@ -33,7 +39,10 @@ Shared named_material(const SceneMaker& scene, const std::string& name, const Wh
 }
 
 void add_shape_when_known(SceneMaker& scene, Parameters in) {
-    if (is_known(scene, scene.state.material, 0)) return add_shape(scene, in);
+    // The name may be defined by now.
+    if (scene.state.material && scene.state.material->in.directive == kNamedMaterial)
+        scene.state.material = named_material(scene, scene.state.material->in.type, scene.state.material->in.where);
+    if (is_known(scene, scene.state.material)) return add_shape(scene, in);
     if (scene.late_shapes.size() >= scene.document.limits.shapes)
         fail(in.where,
              "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace ambilux::pbrt {
 
@@ -82,7 +83,9 @@ void Textures::set_mapping(Texture& texture, const Parameters& in) const {
 std::shared_ptr<const Projection> Textures::projection_of(const Object& object) const {
     std::shared_ptr<const Projection> found;
     bool any = false, mixed = false;
-    const std::function<void(const Object&, int)> walk = [&](const Object& o, int depth) {
+    std::set<const Object*> seen;
+    const std::function<void(const Object&)> walk = [&](const Object& o) {
+        if (!seen.insert(&o).second) return;
         const auto it = projections_.find(&o);
         if (it != projections_.end()) {
             const bool same = found && it->second ? found->same(*it->second) : found == it->second;
@@ -91,9 +94,9 @@ std::shared_ptr<const Projection> Textures::projection_of(const Object& object) 
             any = true;
         }
         for (const mitsuba::Child& child : o.children)
-            if (child.object && depth < 32) walk(*child.object, depth + 1);
+            if (child.object) walk(*child.object);
     };
-    walk(object, 0);
+    walk(object);
     if (mixed)
         report_.refuse(object.where, "textures of different mappings on one surface are not supported",
                        "all have the coordinates of the first");
