@@ -15,6 +15,7 @@ Scene load_by(const std::string& path, const LoadOptions& options,
         Report report(options.lenient);
         read(document, report);
         report.write(document);
+        mitsuba::check_references(document);
     }
     return mitsuba::load_document(path, document, options);
 }

@@ -84,6 +84,10 @@ struct Document {
     std::string resolve(const std::string& name, const Where& where) const;
 };
 
+/// Throws Error(bad_input) if objects contain themselves or, each counted as often as it is referred to, are more or
+/// nested deeper than the limits allow.
+void check_references(const Document& document);
+
 /// A new object of the document, of format 2.
 Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where);
 /// The same shape turned over, for a light of two sides; to be added behind the shape, once that is complete.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/error.h"
 #include "core/scoped_seconds.h"
@@ -13,17 +14,23 @@ namespace {
 
 bool is_attribute(const Object& texture) { return texture.type == "mesh_attribute" || texture.type == "vertexcolors"; }
 
-/// Textures of the BSDF: how many take values from the mesh, and how many depend on coordinates.
-void count_textures(const Object& object, int& attributes, int& others) {
-    for (const Child& child : object.children) {
-        const Object& inner = *child.object;
-        if (inner.tag == "texture" && is_attribute(inner))
-            ++attributes;
-        else if (inner.tag == "texture" && inner.type != "scale" && inner.type != "rawconstant")
-            ++others;
-        count_textures(inner, attributes, others);
+/// Textures of a BSDF: are there some that take values from the mesh, and some that depend on coordinates?
+struct TextureUse {
+    bool attributes = false, others = false;
+    std::set<const Object*> seen = {};  ///< objects are shared: what is twice in each of n levels is there 2^n times
+
+    void look_into(const Object& object) {
+        if (!seen.insert(&object).second) return;
+        for (const Child& child : object.children) {
+            const Object& inner = *child.object;
+            if (inner.tag == "texture" && is_attribute(inner))
+                attributes = true;
+            else if (inner.tag == "texture" && inner.type != "scale" && inner.type != "rawconstant")
+                others = true;
+            look_into(inner);
+        }
     }
-}
+};
 
 struct Atlas {
     uint32_t columns, width, height;
@@ -67,12 +74,12 @@ std::vector<float> texels_of(const Atlas& atlas, const Mesh& mesh, const MeshAtt
 }  // namespace
 
 bool has_mesh_attributes(const Object& bsdf) {
-    int attributes = 0, others = 0;
-    count_textures(bsdf, attributes, others);
-    if (attributes && others)
+    TextureUse use;
+    use.look_into(bsdf);
+    if (use.attributes && use.others)
         throw input_error(bsdf.where.file, bsdf.where.line,
                           "mesh attributes together with other textures in one BSDF are not supported");
-    return attributes > 0;
+    return use.attributes;
 }
 
 Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source) {

@@ -24,20 +24,11 @@ bool is_object_tag(const std::string& tag) {
 }
 
 constexpr int kNewestVersion = 3;
-/// Objects that a shape may be made of, on average.
-constexpr uint64_t kObjectsPerShape = 16;
-
-/// Of an object with all that is in it, each counted as often as it is referred to.
-struct Extent {
-    uint64_t objects;  ///< 0 until it is known
-    uint64_t height;   ///< objects in objects
-};
 
 struct Parser {
     Document& document;
     ValueParser values;
     std::vector<std::string> open_files;  ///< canonical paths of the files being parsed
-    std::map<const Object*, Extent> extents;
 
     void parse_children(const XmlSource& source, const pugi::xml_node& node, Object& object, uint64_t depth) {
         if (depth > document.limits.nesting)
@@ -182,26 +173,7 @@ struct Parser {
                     if (it == document.ids.end()) fail(child.where, "reference to unknown id '" + child.ref + "'");
                     child.object = it->second;
                 }
-        measure(*document.scene, 1);
-    }
-
-    /// Checks what references make of the document: objects must not contain themselves, nor grow without bounds.
-    Extent measure(const Object& object, uint64_t depth) {
-        const auto [entry, is_new] = extents.try_emplace(&object, Extent{0, 0});
-        if (!is_new) return entry->second;
-        Extent sum = {1, 1};
-        for (const Child& child : object.children) {
-            const Extent inner = depth < document.limits.nesting ? measure(*child.object, depth + 1) : Extent{1, 1};
-            if (inner.objects == 0) fail(child.where, "circular reference to id '" + child.object->id + "'");
-            sum = {sum.objects + inner.objects, std::max(sum.height, inner.height + 1)};
-            if (depth + inner.height > document.limits.nesting)
-                fail(child.where,
-                     "references are nested deeper than --limits nesting=" + std::to_string(document.limits.nesting));
-            if (sum.objects / kObjectsPerShape > document.limits.shapes)
-                fail(child.where, "the references of the scene make more objects of it than --limits shapes=" +
-                                      std::to_string(document.limits.shapes) + " would need");
-        }
-        return extents[&object] = sum;
+        check_references(document);
     }
 };
 
@@ -211,7 +183,7 @@ Document parse_document(const std::string& path, const std::vector<std::pair<std
                         const Limits& limits, const std::string* text) {
     Document document;
     document.limits = limits;
-    Parser parser{document, ValueParser(document), {}, {}};
+    Parser parser{document, ValueParser(document), {}};
     std::set<std::string> given;
     for (const auto& [name, value] : parameters) {
         parser.values.set_parameter(name, value);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <set>
 
 #include "formats/gzip.h"
 #include "formats/meshes/loop_subdivision.h"
@@ -147,10 +148,16 @@ bool has_uvs(const std::string& path) {
     return false;
 }
 
-bool has_texture(const Object& object, int depth = 0) {
-    for (const Child& child : object.children)
-        if (child.object->tag == "texture" || (depth < 16 && has_texture(*child.object, depth + 1))) return true;
-    return false;
+/// `seen`: what was looked into; objects are shared, and a mix of mixes may hold one 2^n times.
+bool has_texture(const Object& object, std::set<const Object*>& seen) {
+    if (!seen.insert(&object).second) return false;
+    return std::any_of(object.children.begin(), object.children.end(), [&](const Child& child) {
+        return child.object->tag == "texture" || has_texture(*child.object, seen);
+    });
+}
+bool has_texture(const Object& object) {
+    std::set<const Object*> seen;
+    return has_texture(object, seen);
 }
 
 /// Area of the triangles in the world if all have the same, else 0: pbrt gives its power to each.

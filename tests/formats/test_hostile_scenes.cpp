@@ -154,6 +154,15 @@ TEST_CASE("what doubles at every step is refused: includes, parameters, referenc
         groups += "<shape type='shapegroup' id='g" + std::to_string(i) + "'>" + ref + ref + "</shape>";
     }
     CHECK(contains(body_error(groups), "more objects"));
+
+    std::string mixes = "WorldBegin\nMakeNamedMaterial \"m0\" \"string type\" \"diffuse\"\n";
+    for (int i = 1; i <= 40; ++i) {
+        const std::string earlier = " \"m" + std::to_string(i - 1) + "\"";
+        mixes += "MakeNamedMaterial \"m" + std::to_string(i) + "\" \"string type\" \"mix\" \"string materials\" [" +
+                 earlier + earlier + " ]\n";
+    }
+    const std::string pbrt = folder.write("scene.pbrt", mixes + "NamedMaterial \"m40\"\nShape \"sphere\"\n");
+    CHECK(contains(mesh_error([&] { load_scene(pbrt); }), "more objects"));
     LoadOptions options;
     options.limits.shapes = 10;
     CHECK(contains(body_error(repeat("<shape type='sphere'/>\n", 11), options),
