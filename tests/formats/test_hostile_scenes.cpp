@@ -162,7 +162,7 @@ TEST_CASE("what doubles at every step is refused: includes, parameters, referenc
                  earlier + earlier + " ]\n";
     }
     const std::string pbrt = folder.write("scene.pbrt", mixes + "NamedMaterial \"m40\"\nShape \"sphere\"\n");
-    CHECK(contains(mesh_error([&] { load_scene(pbrt); }), "more objects"));
+    CHECK(contains(mesh_error([&] { load_pbrt(pbrt); }), "more objects"));
     LoadOptions options;
     options.limits.shapes = 10;
     CHECK(contains(body_error(repeat("<shape type='sphere'/>\n", 11), options),
