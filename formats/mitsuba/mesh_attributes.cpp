@@ -15,7 +15,7 @@ namespace {
 bool is_attribute(const Object& texture) { return texture.type == "mesh_attribute" || texture.type == "vertexcolors"; }
 
 /// Textures of a BSDF: are there some that take values from the mesh, and some that depend on coordinates?
-struct TextureUse {
+struct AttributeUse {
     bool attributes = false, others = false;
     std::set<const Object*> seen = {};  ///< objects are shared: what is twice in each of n levels is there 2^n times
 
@@ -74,7 +74,7 @@ std::vector<float> texels_of(const Atlas& atlas, const Mesh& mesh, const MeshAtt
 }  // namespace
 
 bool has_mesh_attributes(const Object& bsdf) {
-    TextureUse use;
+    AttributeUse use;
     use.look_into(bsdf);
     if (use.attributes && use.others)
         throw input_error(bsdf.where.file, bsdf.where.line,
