@@ -85,7 +85,7 @@ Shape "plymesh" "string filename" "floor.ply"
 AttributeEnd
 AttributeBegin
 Translate -1.5 1 0
-Material "coateddiffuse" "rgb reflectance" [.6 .2 .2] "float roughness" 0
+Material "coateddiffuse" "rgb reflectance" [.6 .2 .2] "float roughness" 0 "float thickness" 0 "integer maxdepth" 100
 Shape "sphere"
 AttributeEnd
 AttributeBegin
