@@ -40,9 +40,9 @@ Family corners() {
                   [furnace] { return SceneFiles{furnace_scene(furnace)}; }};
         cell.benign = fov == 60;
         cell.quick = fov == 60 || fov == 0.01;
+        // The hit point's rounding is 1e-7 of the room, the view's width 3e-5.
+        if (fov == 0.001) cell.limit = "Contact shadows and thin panes";
         // The second moment of next event estimation has no bound where two lamps meet.
-        // The hit point's rounding is 1e-7 of the room, the view's width 3e-5 at 0.001 degrees.
-        if (fov <= 0.01) cell.limit = "Contact shadows and thin panes";
         if (fov <= 1) cell.rare = "path-nee path-ris light";
         family.cells.push_back(cell);
     }

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "core/math.h"
+#include "formats/file_budget.h"
 #include "formats/front_end.h"
 #include "formats/gltf/model.h"
 
@@ -12,6 +13,9 @@ namespace gltf {
 namespace {
 
 using namespace mitsuba;
+
+/// What an instance takes until the scene is built, measured.
+constexpr uint64_t kBytesOfInstance = 1600;
 
 class SceneMaker {
 public:
@@ -102,15 +106,18 @@ private:
         if (!given || !given->Has("attributes")) return {Matrix{}};
         const tinygltf::Value& attributes = given->Get("attributes");
         const auto values = [&](const char* name, int n) {
-            const double accessor = number(&attributes, name, -1);
+            const int accessor = integer(&attributes, name, -1);
             return accessor < 0 ? std::vector<double>{}
-                                : accessor_values(c_, int(accessor), n, "node '" + node.name + "', " + name);
+                                : accessor_values(c_, accessor, n, "node '" + node.name + "', " + name);
         };
         const std::vector<double> t = values("TRANSLATION", 3), r = values("ROTATION", 4), s = values("SCALE", 3);
         const size_t count = std::max({t.size() / 3, r.size() / 4, s.size() / 3});
         for (const auto& [list, n] : {std::pair{&t, 3}, std::pair{&r, 4}, std::pair{&s, 3}})
             if (!list->empty() && list->size() != count * size_t(n))
                 c_.fail("node '" + node.name + "' has instances of unequal attributes");
+        // A few bytes may ask for millions: accessors without a buffer are zeros.
+        instances_ += count;
+        FileBudget(c_.where.file, c_.document.limits).bytes(instances_, kBytesOfInstance);
         std::vector<Matrix> out;
         for (size_t i = 0; i < count; ++i) {
             tinygltf::Node place;
@@ -198,25 +205,29 @@ private:
                 continue;
             }
             ++shown_;
-            const VertexColors colors = vertex_colors(c_, primitive, what);
-            const Context::Surface s = surface(c_, primitive.material, colors);
             const std::string name =
                 c_.where.file + ", " + what + (posed ? ", node " + std::to_string(at) : std::string());
             const auto [place, is_new] = c_.document.meshes.try_emplace(name);
-            if (is_new) place->second = primitive_mesh(c_, primitive, s.tex_coord, pose, colors, what);
+            if (is_new) {
+                const VertexColors colors = vertex_colors(c_, primitive, what);
+                surfaces_[name] = surface(c_, primitive.material, colors);
+                place->second = primitive_mesh(c_, primitive, surfaces_[name].tex_coord, pose, colors, what);
+            }
+            grow(place->second, to_world);
+            const Context::Surface& s = surfaces_[name];
+            any_shared |= shared && !s.emitter;
+            if (shared && !s.emitter && !first_use) continue;
             Object& shape = add_object(c_.document, "shape", "mesh", c_.where);
             set_text(shape, "name", name);
             add_child(shape, *s.bsdf);
             if (s.emitter) add_child(shape, *s.emitter);
             if (shared && !s.emitter) {
-                any_shared = true;
-                if (first_use) add_child(*groups_[index], shape);
+                add_child(*groups_[index], shape);
             } else {
                 set_transform(shape, "to_world", to_world);
                 add_child(*c_.document.scene, shape);
                 if (s.emitter && s.double_sided) add_child(*c_.document.scene, add_light_back(c_.document, shape));
             }
-            grow(place->second, to_world);
         }
         if (!any_shared) return;
         Object& instance = add_object(c_.document, "shape", "instance", c_.where);
@@ -234,11 +245,12 @@ private:
     }
 
     Context& c_;
-    std::vector<uint32_t> uses_;     ///< of meshes by nodes
-    std::vector<int> parents_;       ///< of nodes; -1: none
-    std::map<int, Object*> groups_;  ///< by mesh
+    std::vector<uint32_t> uses_;                        ///< of meshes by nodes
+    std::vector<int> parents_;                          ///< of nodes; -1: none
+    std::map<int, Object*> groups_;                     ///< by mesh
+    std::map<std::string, Context::Surface> surfaces_;  ///< by the names of meshes in the document
     Object* sensor_ = nullptr;
-    uint64_t visited_ = 0, shown_ = 0;
+    uint64_t visited_ = 0, shown_ = 0, instances_ = 0;
     Vec3f lower_ = splat(kInfinity), upper_ = splat(-kInfinity);
 };
 

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -249,10 +251,8 @@ private:
 }  // namespace
 
 Context::Surface surface(Context& context, int index, const VertexColors& colors) {
-    std::string key = std::to_string(index);
-    for (const double v : {double(colors.color.x), double(colors.color.y), double(colors.color.z), colors.alpha,
-                           double(colors.varies), double(colors.alpha_varies)})
-        key += "|" + std::to_string(v);
+    const std::string key = fmt::format("{}|{}|{}|{}|{}|{}|{}", index, colors.color.x, colors.color.y, colors.color.z,
+                                        colors.alpha, colors.varies, colors.alpha_varies);
     const auto known = context.materials.find(key);
     if (known != context.materials.end()) return known->second;
     static const tinygltf::Material plain;

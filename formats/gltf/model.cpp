@@ -1,6 +1,7 @@
 #include "formats/gltf/model.h"
 
 #include <algorithm>
+#include <climits>
 #include <cmath>
 #include <filesystem>
 #include <set>
@@ -136,6 +137,10 @@ void read_model(Context& context, const std::string& path) {
 const tinygltf::Value* extension(const tinygltf::ExtensionMap& extensions, const char* name) {
     const auto it = extensions.find(name);
     return it == extensions.end() || !it->second.IsObject() ? nullptr : &it->second;
+}
+
+int integer(const tinygltf::Value* object, const char* name, int fallback) {
+    return int(std::clamp(number(object, name, fallback), -1.0, double(INT_MAX)));
 }
 
 double number(const tinygltf::Value* object, const char* name, double fallback) {

@@ -72,6 +72,8 @@ Context::Surface surface(Context& context, int material, const VertexColors& col
 /// Numbers in extensions of objects.
 const tinygltf::Value* extension(const tinygltf::ExtensionMap& extensions, const char* name);
 double number(const tinygltf::Value* object, const char* name, double fallback);
+/// An index: -1 for numbers below it.
+int integer(const tinygltf::Value* object, const char* name, int fallback);
 
 /// Emitters and the camera of a node.
 void add_light(Context& context, const tinygltf::Light& light, const Matrix& to_world);

@@ -1,5 +1,7 @@
 #include "formats/gltf/textures.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -13,13 +15,6 @@ namespace {
 
 double texel(const Texels& image, size_t i) { return image.is_8bit ? image.bytes[i] / 255.0 : image.floats[i]; }
 
-Texels like(const Texels& source) {
-    Texels out;
-    out.width = source.width, out.height = source.height, out.is_8bit = source.is_8bit;
-    out.is_linear = source.is_linear;
-    return out;
-}
-
 const char* wrap_of(int mode) {
     return mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? "clamp"
            : mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? "mirror"
@@ -31,7 +26,7 @@ const char* wrap_of(int mode) {
 Used used(const tinygltf::Value* object, const char* name) {
     if (!object || !object->Has(name)) return {};
     const tinygltf::Value& info = object->Get(name);
-    Used out{int(number(&info, "index", -1)), int(number(&info, "texCoord", 0)), nullptr};
+    Used out{integer(&info, "index", -1), integer(&info, "texCoord", 0), nullptr};
     if (info.Has("extensions") && info.Get("extensions").Has("KHR_texture_transform"))
         out.transform = &info.Get("extensions").Get("KHR_texture_transform");
     return out;
@@ -84,7 +79,7 @@ Object& TextureMaker::bitmap_of(const Used& use, std::string name) {
         const double a = number(t, "rotation", 0), x = pair("scale", 0, 1), y = pair("scale", 1, 1);
         to_uv.m[0][0] = std::cos(a) * x, to_uv.m[0][1] = std::sin(a) * y, to_uv.m[0][3] = pair("offset", 0, 0);
         to_uv.m[1][0] = -std::sin(a) * x, to_uv.m[1][1] = std::cos(a) * y, to_uv.m[1][3] = pair("offset", 1, 0);
-        tex_coord = int(number(t, "texCoord", tex_coord));
+        tex_coord = integer(t, "texCoord", tex_coord);
     }
     if (tex_coord_ >= 0 && tex_coord != tex_coord_)
         c_.refuse(what_ + " uses several sets of texture coordinates", "the first of them is used");
@@ -131,14 +126,24 @@ bool TextureMaker::lies_in_unit(int set, int axis) const {
     return true;
 }
 
+/// The image of this name, without texels if it is new.
+Texels& TextureMaker::derived(const std::string& name, const Texels& source, uint32_t width, uint32_t height,
+                              bool is_8bit) {
+    Texels& out = c_.document.images[name];
+    if (out.width) return out;
+    take_texels(c_.document, c_.where, uint64_t(width) * height, is_8bit ? 4 : 16);
+    out.width = width, out.height = height, out.is_8bit = is_8bit;
+    out.is_linear = source.is_linear;
+    return out;
+}
+
 /// The image and behind it, along the axis, its mirror image.
 std::string TextureMaker::mirrored(const std::string& name, int axis) {
     const std::string out_name = name + (axis ? ", mirrored below" : ", mirrored on the right");
-    const Texels source = c_.document.images[name];
-    Texels& out = c_.document.images[out_name];
-    if (out.width) return out_name;
-    out = like(source);
-    (axis ? out.height : out.width) *= 2;
+    const Texels& source = c_.document.images.at(name);
+    Texels& out =
+        derived(out_name, source, source.width * (axis ? 1 : 2), source.height * (axis ? 2 : 1), source.is_8bit);
+    if (!out.bytes.empty() || !out.floats.empty()) return out_name;
     for (uint32_t y = 0; y < out.height; ++y)
         for (uint32_t x = 0; x < out.width; ++x) {
             const uint32_t from_x = x < source.width ? x : out.width - 1 - x,
@@ -151,41 +156,40 @@ std::string TextureMaker::mirrored(const std::string& name, int axis) {
     return out_name;
 }
 
-Object& TextureMaker::normals(const Used& use, double scale) {
-    std::string name = image(c_.model.textures[size_t(use.index)].source);
-    if (scale != 1) {
-        const Texels source = c_.document.images[name];
-        name += ", normals scaled by " + std::to_string(scale);
-        Texels& out = c_.document.images[name];
-        out = like(source);
-        out.is_8bit = false;
-        out.bytes.clear();
-        out.floats.clear();
-        for (size_t i = 0; i < 4 * size_t(out.width) * out.height; i += 4) {
-            double n[3];
-            for (size_t k = 0; k < 3; ++k) n[k] = (2 * texel(source, i + k) - 1) * (k < 2 ? scale : 1);
-            const double l = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-            for (const double v : n) out.floats.push_back(float(l > 0 ? 0.5 + v / l / 2 : 0.5));
-            out.floats.push_back(1);
-        }
+/// Normals of the image, their slopes `scale` times as steep.
+std::string TextureMaker::steeper(const std::string& name, double scale) {
+    const std::string out_name = fmt::format("{}, normals scaled by {}", name, scale);
+    const Texels& source = c_.document.images.at(name);
+    Texels& out = derived(out_name, source, source.width, source.height, false);
+    if (!out.floats.empty()) return out_name;
+    for (size_t i = 0; i < 4 * size_t(out.width) * out.height; i += 4) {
+        double n[3];
+        for (size_t k = 0; k < 3; ++k) n[k] = (2 * texel(source, i + k) - 1) * (k < 2 ? scale : 1);
+        const double l = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        for (const double v : n) out.floats.push_back(float(l > 0 ? 0.5 + v / l / 2 : 0.5));
+        out.floats.push_back(1);
     }
-    Object& out = bitmap_of(use, name);
+    return out_name;
+}
+
+Object& TextureMaker::normals(const Used& use, double scale) {
+    const std::string& name = image(c_.model.textures[size_t(use.index)].source);
+    Object& out = bitmap_of(use, scale == 1 ? name : steeper(name, scale));
     set_boolean(out, "raw", true);
     return out;
 }
 
 Object& TextureMaker::cut_alpha(const Used& use, double factor, double cutoff) {
-    std::string name = image(c_.model.textures[size_t(use.index)].source);
-    const Texels source = c_.document.images[name];
-    name += ", cut at " + std::to_string(cutoff) + " of " + std::to_string(factor);
-    Texels& out = c_.document.images[name];
-    out = {};
-    out.width = source.width, out.height = source.height, out.is_8bit = true;
-    for (size_t i = 0; i < size_t(out.width) * out.height; ++i) {
-        const uint8_t v = texel(source, 4 * i + 3) * factor >= cutoff ? 255 : 0;
-        out.bytes.insert(out.bytes.end(), {v, v, v, 255});
-    }
-    Object& made = bitmap_of(use, name);
+    const std::string& name = image(c_.model.textures[size_t(use.index)].source);
+    const std::string out_name = fmt::format("{}, cut at {} of {}", name, cutoff, factor);
+    const Texels& source = c_.document.images.at(name);
+    Texels& out = derived(out_name, source, source.width, source.height, true);
+    if (out.bytes.empty())
+        for (size_t i = 0; i < size_t(out.width) * out.height; ++i) {
+            const uint8_t v = texel(source, 4 * i + 3) * factor >= cutoff ? 255 : 0;
+            out.bytes.insert(out.bytes.end(), {v, v, v, 255});
+        }
+    Object& made = bitmap_of(use, out_name);
     set_boolean(made, "raw", true);
     return made;
 }

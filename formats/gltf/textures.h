@@ -41,9 +41,10 @@ private:
     Object& object(const char* tag, const char* type) { return mitsuba::add_object(c_.document, tag, type, c_.where); }
     const std::string& image(int index);
     Object& bitmap_of(const Used& use, std::string image);
-    void set_wraps(Object& out, const tinygltf::Sampler& sampler, int set, Matrix& to_uv, bool transformed);
     bool lies_in_unit(int set, int axis) const;
+    Texels& derived(const std::string& name, const Texels& source, uint32_t width, uint32_t height, bool is_8bit);
     std::string mirrored(const std::string& name, int axis);
+    std::string steeper(const std::string& name, double scale);
 
     Context& c_;
     int material_;

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "core/error.h"
+#include "formats/file_budget.h"
 
 namespace ambilux::mitsuba {
 
@@ -41,6 +42,15 @@ Value& add_value(Object& object, const std::string& name, ValueKind kind) {
 }
 
 }  // namespace
+
+void take_texels(Document& document, const Where& where, uint64_t texels, uint64_t bytes_each) {
+    FileBudget(where.file, document.limits).bytes(texels, bytes_each);
+    document.made_texels += texels * bytes_each;
+    if (document.made_texels > document.limits.total_bytes)
+        throw input_error(where.file, where.line,
+                          "with it, textures take more memory than --limits total_bytes=" +
+                              std::to_string(document.limits.total_bytes));
+}
 
 Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where) {
     document.storage.push_back(std::make_unique<Object>());

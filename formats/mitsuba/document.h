@@ -76,6 +76,7 @@ struct Document {
     std::map<std::string, Texels> images;  ///< of textures of type "image" and emitters of type "envmap", by "image"
     std::vector<std::pair<std::string, Sha256Digest>> file_digests;  ///< of other files that were read
     std::vector<std::string> warnings, notes;
+    uint64_t made_texels = 0;             ///< bytes of images that front ends made (take_texels)
     std::set<const Object*> light_backs;  ///< shapes that are the other side of another one's light, just behind it
     bool smooth_normals = true;           ///< meshes without normals get smooth ones, as in Mitsuba
 
@@ -90,6 +91,9 @@ void check_references(const Document& document);
 
 /// A new object of the document, of format 2.
 Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where);
+/// Before a front end makes an image of its own: throws Error(bad_input) where one or all are more than the limits
+/// allow.
+void take_texels(Document& document, const Where& where, uint64_t texels, uint64_t bytes_each);
 /// The same shape turned over, for a light of two sides; to be added behind the shape, once that is complete.
 Object& add_light_back(Document& document, const Object& shape);
 void add_child(Object& parent, const Object& child, const std::string& name = "");

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <set>
 
@@ -135,6 +136,8 @@ Mesh loop_subdivision(SceneMaker& scene, const Parameters& in) {
 
 /// Whether a PLY file gives texture coordinates, as its header tells; what cannot be told counts as yes.
 bool has_uvs(const std::string& path) {
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(path, ignored)) return true;  // read_input says what is wrong with it
     std::ifstream file(path, std::ios::binary);
     std::string head(1 << 16, '\0');
     file.read(head.data(), std::streamsize(head.size()));

@@ -230,12 +230,7 @@ void Textures::load_texels(TextureImage& image) const {
 std::string Textures::bake(const Texture& texture, const ColorMap& map) {
     load_texels(*texture.image);
     const TextureImage& image = *texture.image;
-    FileBudget budget(texture.where.file, document_.limits);
-    baked_bytes_ += image.texels.size() * 16;
-    budget.bytes(image.texels.size(), 16);
-    if (baked_bytes_ > document_.limits.total_bytes)
-        fail(texture.where, "with it, textures take more memory than --limits total_bytes=" +
-                                std::to_string(document_.limits.total_bytes));
+    mitsuba::take_texels(document_, texture.where, image.texels.size(), 16);
     const std::string name =
         texture.where.file + ":" + std::to_string(texture.where.line) + "#" + std::to_string(document_.images.size());
     Texels& out = document_.images[name];

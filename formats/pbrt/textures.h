@@ -96,7 +96,6 @@ private:
     std::map<std::string, std::shared_ptr<TextureImage>> images_;
     std::map<const Object*, std::shared_ptr<const Projection>> projections_;  ///< of textures as objects
     mitsuba::Matrix ctm_;                                                     ///< of the texture being defined
-    uint64_t baked_bytes_ = 0;
 };
 
 }  // namespace ambilux::pbrt

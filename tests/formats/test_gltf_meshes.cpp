@@ -218,3 +218,42 @@ TEST_CASE("scaled normals, means of textures, modes of the two axes") {
     empty["textures"][2]["extensions"]["KHR_texture_basisu"] = {{"source", 0}};
     CHECK(contains(error_of(empty), "extension 'KHR_texture_basisu'"));
 }
+
+TEST_CASE("what a few bytes ask for is counted") {
+    // Accessors without a buffer view are zeros, as many as they say.
+    Json j = quad_scene();
+    const auto view_of = [&j](int accessor) { return j["accessors"][size_t(accessor)]["bufferView"]; };
+    const Json value = view_of(add_accessor<float>(j, {1, 0, 0}, "VEC3", kFloat, 1)),
+               place = view_of(add_accessor<uint8_t>(j, {0}, "SCALAR", kByte, 1));
+    const Json sparse = {{"count", 1},
+                         {"indices", {{"bufferView", place}, {"componentType", kByte}}},
+                         {"values", {{"bufferView", value}}}};
+    j["accessors"].push_back({{"componentType", kFloat}, {"count", 30000000}, {"type", "VEC3"}, {"sparse", sparse}});
+    j["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] = j["accessors"].size() - 1;
+    CHECK(contains(error_of(j), "--limits bytes"));
+
+    // Images that are made of others: two scales of one map of normals.
+    Json maps = quad_scene();
+    maps["images"] = {{{"uri", data_uri("image/png", grey_png(0, 255))}}};
+    maps["textures"] = {{{"source", 0}}};
+    maps["materials"].push_back(maps["materials"][0]);
+    for (size_t i = 0; i < 2; ++i) maps["materials"][i]["normalTexture"] = {{"index", 0}, {"scale", 2.0 + double(i)}};
+    Json second = maps["meshes"][0]["primitives"][0];
+    second["material"] = 1;
+    maps["meshes"][0]["primitives"].push_back(second);
+    LoadOptions options;
+    options.limits.total_bytes = 50;
+    CHECK(contains(error_of(maps, options), "with it, textures take more memory than --limits total_bytes=50"));
+}
+
+TEST_CASE("colours of vertices that differ by little are two") {
+    Json j = quad_scene();
+    Json second = j["meshes"][0]["primitives"][0];
+    const auto colored = [&j](float v) { return add_accessor<float>(j, std::vector<float>(12, v), "VEC3", kFloat, 4); };
+    second["attributes"]["COLOR_0"] = colored(2e-8f);
+    attributes(j)["COLOR_0"] = colored(1e-8f);
+    j["meshes"][0]["primitives"].push_back(second);
+    const Scene s = load(j);
+    REQUIRE(s.shapes.size() == 2);
+    CHECK(s.shapes[0].material != s.shapes[1].material);
+}

@@ -1,6 +1,8 @@
 // libs: ambilux_formats ZLIB::ZLIB
 // timeout: 60
 // Coordinates of textures in pbrt scenes, and what scenes of others were found to hold.
+#include <sys/stat.h>
+
 #include <cmath>
 #include <cstring>
 
@@ -245,4 +247,11 @@ TEST_CASE("parameters that nobody knows are refused in integrators too") {
     CHECK(contains(pbrt_error("Integrator \"path\" \"integer maxDepth\" 3 WorldBegin " + kTriangle),
                    "unknown parameter 'maxDepth' of Integrator 'path'"));
     CHECK(has_note(load_pbrt_world(kTriangle + "\"vector3 S\" [1 0 0 1 0 0 1 0 0]"), "tangents S are left out"));
+}
+
+TEST_CASE("a pipe in the place of a mesh with textures is refused") {
+    const TempFolder folder;
+    REQUIRE(::mkfifo((folder / "pipe.ply").c_str(), 0600) == 0);
+    const std::string mesh = "Shape \"plymesh\" \"string filename\" \"" + folder / "pipe.ply" + "\"";
+    CHECK(contains(pbrt_error("WorldBegin " + texture("") + kTextured + mesh), "no regular file"));
 }
