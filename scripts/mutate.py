@@ -132,7 +132,7 @@ class Workspace:
         found, lines = set(), set()
         for entry in commands:
             if re.search(r"/((?:bdpt|path|learned)_All|bsdf_plugins|film/\w+|test_stages|test_bidirectional_stages)\.cpp$", entry["file"]):
-                command = re.sub(r"^\S*ccache ", "", re.sub(r" -o \S+", "", entry["command"])) + " -fsyntax-only -w -fmax-errors=0"
+                command = re.sub(r"^(env \S+ )?\S*ccache ", "", re.sub(r" -o \S+", "", entry["command"])) + " -fsyntax-only -w -fmax-errors=0"
                 errors = run(command, shell=True, cwd=entry["directory"]).stderr
                 lines |= {(os.path.relpath(os.path.normpath(Path(entry["directory"]) / m[1]), self.source), int(m[2]))
                           for m in re.finditer(r"^(\S+?):(\d+):(?:\d+:)?\s+(?:error|required from)", errors, re.MULTILINE)}
