@@ -1,5 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 900
+// seconds: 72
 // Variants of bidirectional path tracing give the same image.
 #include <algorithm>
 #include <cmath>
