@@ -235,7 +235,10 @@ class Workspace:
             stamp = hashlib.sha256(program.read_bytes()).hexdigest()
             if cases.get(test, {}).get("stamp") == stamp:
                 continue
-            names = list(filter(None, map(str.strip, run([program, "--list-test-names-only"]).stdout.splitlines())))
+            listed = run([program, "--list-test-names-only"])
+            if "Unrecognised token" in listed.stdout + listed.stderr:  # Catch2 3
+                listed = run([program, "--list-tests", "--verbosity", "quiet"])
+            names = list(filter(None, map(str.strip, listed.stdout.splitlines())))
             waiting += [(test, case) for case in names]
             cases[test] = {"stamp": stamp, "cases": {}}
         for (test, case), (verdict, seconds, reached) in self.side_by_side(self.reach, waiting):
