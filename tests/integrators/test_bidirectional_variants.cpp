@@ -134,6 +134,8 @@ TEST_CASE("Light that is culled before its shadow ray keeps its expectation and 
         s.integrator = integrator;
         const Estimate without = render_batches(scene, s, 1024);
         const uint64_t rays = render_scene(scene, s, 4).stats.rays_occlude;
+        s.cull = 0.005f;
+        CHECK(render_scene(scene, s, 4).stats.rays_occlude < rays);
         s.seed = 42;
         s.cull = 0.5f;
         CHECK(render_scene(scene, s, 4).stats.rays_occlude < rays * 9 / 10);
