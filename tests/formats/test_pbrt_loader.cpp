@@ -333,7 +333,7 @@ TEST_CASE("what is not known is refused by name, file and line") {
         {"AreaLightSource \"diffuse\" \"bool twosided\" true Material \"dielectric\" Shape \"sphere\"", "two sides"},
         {"Material \"hair\" Shape \"sphere\"", "material 'hair' is not supported"},
         {"Material \"subsurface\" Shape \"sphere\"", "material 'subsurface' is not supported"},
-        {"Texture \"t\" \"float\" \"fbm\"", "texture type 'fbm' is not supported"},
+        {"Texture \"t\" \"float\" \"ptex\"", "texture type 'ptex' is not supported"},
         {"Shape \"sphere\" \"float radius\" 1 \"float size\" 2", "unknown parameter 'size' of Shape 'sphere'"},
         {"MakeNamedMedium \"m\" \"string type\" \"homogeneous\"", "media are not supported"},
     };
