@@ -279,15 +279,18 @@ const Object* masked(SceneMaker& scene, const Parameters& in, const Object* bsdf
     const Parameter* alpha = in.find("alpha");
     if (!alpha) return bsdf;
     const Texture opacity = scene.textures.number(in, "alpha", 1);
-    if (opacity.is_constant() && opacity.color.x <= 0 && scene.state.area_light) {
-        scene.report.refuse(alpha->where, "a light of alpha 0, which shines unseen, is not supported", "it is seen");
-        return bsdf;
-    }
     if (opacity.is_constant() && !(opacity.color.x < 1)) return bsdf;
     Object& mask = add_object(scene.document, "bsdf", "mask", alpha->where);
     scene.textures.set_number(mask, "opacity", opacity, uv);
     add_child(mask, *bsdf);
     return &mask;
+}
+
+/// A light of alpha 0: it lights what there is, and no ray meets it.
+bool shines_unseen(SceneMaker& scene, const Parameters& in) {
+    if (!scene.state.area_light || scene.open_object || !in.find("alpha")) return false;
+    const Texture opacity = scene.textures.number(in, "alpha", 1);
+    return opacity.is_constant() && opacity.color.x <= 0;
 }
 
 /// A light of two sides is two shapes.
@@ -314,7 +317,9 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
         fail(in.where,
              "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
     Surface surface = quadric ? surface_of(type) : Surface::mesh;
-    const auto surface_bsdf = [&] {
+    const bool hidden = shines_unseen(scene, in);
+    const auto surface_bsdf = [&]() -> const Object* {
+        if (hidden) return &add_object(scene.document, "bsdf", "null", in.where);
         return masked(scene, in, surface_material(scene, scene.state.material, surface), uv_map(surface));
     };
     const Object* bsdf = surface_bsdf();
@@ -367,7 +372,7 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
     if (scene.state.area_light && scene.open_object)
         scene.report.note(in.where, "shapes of an object do not shine, as in pbrt");
     else if (scene.state.area_light)
-        add_child(shape, area_emitter(scene, *scene.state.area_light, uv, placed.area));
+        add_child(shape, area_emitter(scene, *scene.state.area_light, uv, placed.area, hidden));
     in.finish(scene.report);
     add_child(scene.open_object ? *scene.open_object : *scene.document.scene, shape);
     if (scene.state.area_light && !scene.open_object && scene.state.area_light->in.boolean("twosided", false))
