@@ -1,5 +1,5 @@
-// Hidden area emitter: lights the scene as an area emitter does, and no ray meets it (pbrt-v4's area lights of alpha
-// 0). To all strategies it is a point emitter whose place, and with it the intensity radiance · area · cosine, is drawn
+// Hidden area emitter, pbrt-v4's area light of alpha 0: lights the scene as an area emitter does, and no ray meets it.
+// To all strategies it is a point emitter whose place, and with it the intensity radiance · area · cosine, is drawn
 // anew for each sample: the density of the place is the same for all of them and cancels in the weights.
 #pragma once
 
