@@ -71,7 +71,6 @@ class RandomScene:
         x, y, z = self.axis()
         return distance * x, distance * y, distance * abs(z) + lift
 
-    # Transforms
     def rotation(self):
         return '<rotate x="%.5f" y="%.5f" z="%.5f" ' % self.axis() + f'angle="{self.u(-180, 180):.4f}"/>'
 
@@ -89,7 +88,6 @@ class RandomScene:
         t += self.some(f'<translate x="{self.u(-2, 2):.4f}" y="{self.u(-2, 2):.4f}"/>')
         return self.some(f'<transform name="to_uv">{t}</transform>', 0.6)
 
-    # Textures
     def bitmap(self, name, file, raw=False):
         t = string("filename", file) + string("wrap_mode", self.one("repeat", "mirror", "clamp")) + string("filter_type", self.one("nearest", "bilinear"))
         return f'<texture type="bitmap" name="{name}">{t}{flag("raw") if raw or self.p(0.3) else ""}{self.to_uv()}</texture>'
@@ -109,7 +107,6 @@ class RandomScene:
             return self.bitmap(name, "heights.png", True)
         return self.checker(name, [self.u(a, b)] * 3, [self.u(a, b)] * 3)
 
-    # BSDFs
     def alpha(self, name="alpha"):
         return num(name, self.one(self.u(0.02, 1), self.u(0.05, 0.5), 10 ** self.u(-3, -1), 1))
 
@@ -127,10 +124,8 @@ class RandomScene:
         self.has |= {"delta"} if k in self.DELTA + self.DELTA_THROUGH else {"ours"} if k in (*self.OURS, "difftrans") else set()
         some, s, rest = self.some, self.spectrum, ("anisotropic", "sheen", "sheen_tint", "flatness", "spec_tint")
         shares = "".join(some(num(n, self.one(self.u(0, 1), 1))) for n in rest)
-        if k in ("diffuse", "roughdiffuse"):
-            t = s("reflectance") + (num("alpha", self.u(0, 1)) if k != "diffuse" else "")
-        elif k == "difftrans":
-            t = s("transmittance")
+        if k in ("diffuse", "roughdiffuse", "difftrans"):
+            t = s("transmittance" if k == "difftrans" else "reflectance") + (num("alpha", self.u(0, 1)) if k == "roughdiffuse" else "")
         elif k in ("conductor", "roughconductor"):
             eta, absorption = self.one(*METALS)
             t = self.one(string("material", "none"), tag("rgb", "eta", eta) + tag("rgb", "k", absorption), rgb("eta", self.colour(0.1, 3)) + rgb("k", self.colour(0.5, 5)))
@@ -149,11 +144,10 @@ class RandomScene:
         elif k == "principledthin":  # Mitsuba loses some specular transmission
             t = s("base_color") + num("roughness", self.u(0.1, 1)) + num("spec_trans", 0 if self.mitsuba else self.u(0, 1)) + num("diff_trans", self.u(0, 2))
             t += num("eta", self.u(1.1, 2)) + shares
-        elif k == "phong":
-            t = rgb("diffuse_reflectance", self.colour(0, 0.5)) + rgb("specular_reflectance", self.colour(0, 0.5)) + num("exponent", 10 ** self.u(0, 3))
-        else:
-            t = rgb("diffuse_reflectance", self.colour(0, 0.5)) + rgb("specular_reflectance", self.colour(0, 0.4)) + num("alpha_u", self.u(0.05, 0.5))
-            t += num("alpha_v", self.u(0.05, 0.5)) + string("variant", self.one("ward", "ward-duer", "balanced"))
+        else:  # phong and ward
+            t = rgb("diffuse_reflectance", self.colour(0, 0.5)) + rgb("specular_reflectance", self.colour(0, 0.5))
+            t += num("exponent", 10 ** self.u(0, 3)) if k == "phong" else string("variant", self.one("ward", "ward-duer", "balanced")) + "".join(
+                num(n, self.u(0.05, 0.5)) for n in ("alpha_u", "alpha_v"))
         return f'<bsdf type="{k}">{t}</bsdf>'
 
     def wrap(self, kind, inside):
@@ -165,32 +159,28 @@ class RandomScene:
         kinds = self.SMOOTH * 2 + (() if self.mitsuba else self.OURS) + (() if smooth or self.no_delta else self.DELTA)
         if level <= 0 or self.p(0.5):
             return self.leaf(kinds)
-        k = self.one("blendbsdf", "bumpmap", "normalmap", "twosided", *(() if self.mitsuba else ("mixturebsdf", "coating", "roughcoating")))
+        k = self.one("blendbsdf", "map", "map", "twosided", *(() if self.mitsuba else ("mixturebsdf", "coating", "roughcoating")))
         if k == "twosided":
             return self.twosided(level - 1, smooth)
         if k == "blendbsdf":
             return self.wrap(k, self.number("weight", 0, 1) + self.opaque(level - 1, True) + self.opaque(level - 1, True))
-        if k in ("bumpmap", "normalmap"):
-            return self.map(k, self.leaf(kinds))
-        if k == "mixturebsdf":
-            a = self.u(0, 1)
-            return self.ours(k, string("weights", f"{a:.4f}, {self.u(0, 1 - a):.4f}") + self.opaque(level - 1, smooth) + self.opaque(level - 1, smooth))
+        if k == "map":
+            return self.map(self.leaf(kinds))
         if k == "coating" and (smooth or self.no_delta):
             return self.leaf(kinds)
-        self.has |= {"delta"} if k == "coating" else set()
+        self.has |= {"ours", "delta"} if k == "coating" else {"ours"}
+        if k == "mixturebsdf":
+            a = self.u(0, 1)
+            return self.wrap(k, string("weights", f"{a:.4f}, {self.u(0, 1 - a):.4f}") + self.opaque(level - 1, smooth) + self.opaque(level - 1, smooth))
         t = num("int_ior", self.u(1.1, 1.9)) + rgb("sigma_a", self.colour(0, 1)) + num("thickness", self.u(0, 2))
         t += string("distribution", self.one("ggx", "beckmann")) + num("alpha", self.u(0.05, 0.5)) if k == "roughcoating" else ""
-        return self.ours(k, t + self.leaf(("diffuse", "roughconductor", "roughplastic")))
+        return self.wrap(k, t + self.leaf(("diffuse", "roughconductor", "roughplastic")))
 
-    def ours(self, kind, inside):
-        self.has.add("ours")
-        return self.wrap(kind, inside)
-
-    def map(self, kind, inner):
-        rules = self.some(flag("flip_invalid_normals", self.p(0.5)) + flag("use_shadowing_function", self.p(0.5)))
-        if kind == "bumpmap":
-            return self.wrap(kind, self.bitmap("arbitrary", "heights.png", True) + num("scale", self.u(-0.4, 0.4)) + rules + inner)
-        return self.wrap(kind, self.bitmap("normalmap", "normals.png", True) + rules + inner)
+    def map(self, inner, transmits=False):
+        kind = self.one("bumpmap", "normalmap")
+        t = self.bitmap("arbitrary", "heights.png", True) + num("scale", self.u(-0.4, 0.4)) if kind == "bumpmap" else self.bitmap("normalmap", "normals.png", True)
+        turn = "" if transmits and self.mitsuba else flag("flip_invalid_normals", self.p(0.5))  # docs/scenes.md
+        return self.wrap(kind, t + self.some(turn + flag("use_shadowing_function", self.p(0.5))) + inner)
 
     def twosided(self, level, smooth=False):
         while True:
@@ -200,19 +190,16 @@ class RandomScene:
 
     def material(self, level=2):
         k = self.r.random()
-        if k < 0.35:
-            return self.opaque(level)
         if k < 0.5:
-            return self.twosided(level - 1)
+            return self.opaque(level) if k < 0.35 else self.twosided(level - 1)
         if k < 0.75:
             inner = self.leaf(self.THROUGH + (() if self.no_delta else self.DELTA_THROUGH * 2) + (() if self.mitsuba else ("difftrans",)))
-            return self.map(self.one("bumpmap", "normalmap"), inner) if self.p(0.2) and "thin" not in inner else inner
+            return self.map(inner, True) if self.p(0.2) and "thin" not in inner else inner
         if k < 0.87:
             self.has.add("null")
             return self.wrap("mask", self.number("opacity", 0.05, 1) + (self.material(level - 1) if level > 0 else self.opaque(0)))
         return self.wrap("blendbsdf", self.number("weight", 0, 1) + self.opaque(0, True) + self.leaf(self.one(self.THROUGH, self.SMOOTH)))
 
-    # Shapes
     def shape(self, size, at, emits="", quadrics=True):
         k = self.one("rectangle", "cube", "obj", "ply", "serialized", *(("sphere", "sphere", "sphere", "disk", "cylinder") if quadrics else ()))
         self.tags.add(k)
@@ -242,7 +229,6 @@ class RandomScene:
         places = [self.place(self.u(0.4, 0.8), self.colour(-1.2, 1.2), True) for _ in range(self.r.randint(1, 3))]
         return f'<shape type="shapegroup" id="g">\n{text}</shape>\n' + "".join(f'<shape type="instance"><ref id="g"/>{t}</shape>\n' for t in places)
 
-    # Emitters
     def light(self, kind):
         self.tags.add(kind)
         if kind in ("area", "directionalarea"):
@@ -250,7 +236,7 @@ class RandomScene:
             return self.shape(self.u(0.2, 0.8), self.above(self.u(2, 3.5)), kind)
         self.has |= {"delta_light"} | ({"beam"} if kind == "collimated" else set())
         origin, target, (x, y, z) = self.above(self.u(2.5, 4), 0.5), self.colour(-0.5, 0.5), self.axis()
-        t = '<transform name="to_world"><lookat origin="%.4f, %.4f, %.4f" ' % origin + 'target="%.3f, %.3f, %.3f" ' % tuple(target) + f'up="{x:.3f}, {y:.3f}, {z:.3f}"/></transform>'
+        t = '<transform name="to_world"><lookat origin="%.4f, %.4f, %.4f" target="%.3f, %.3f, %.3f" up="%.3f, %.3f, %.3f"/></transform>' % (*origin, *target, x, y, z)
         if kind == "point":
             t = point("point", "position", origin) + rgb("intensity", self.colour(3, 20))
         elif kind == "spot":
@@ -269,7 +255,8 @@ class RandomScene:
         k = self.one("constant", "envmap", "envmap", "sunsky", "sky")
         self.tags.add(k)
         self.has |= {"env", "sun"} if k == "sunsky" else {"env"}
-        turn = self.some(f'<transform name="to_world">{self.rotation()}{self.some("<scale " + self.one("x", "y", "z") + chr(61) + chr(34) + "-1" + chr(34) + "/>", 0.3)}</transform>', 0.7)
+        mirror = self.some(f'<scale {self.one("x", "y", "z")}="-1"/>', 0.3)
+        turn = self.some(f'<transform name="to_world">{self.rotation()}{mirror}</transform>', 0.7)
         if k == "constant":
             return f'<emitter type="constant">{rgb("radiance", self.colour(0.05, 1))}</emitter>\n'
         if k == "envmap":
@@ -277,7 +264,6 @@ class RandomScene:
         t = point("vector", "sun_direction", self.above(1, 0.1)) + num("turbidity", self.u(1, 10)) + rgb("albedo", self.colour(0, 1))
         return f'<emitter type="sunsky">{t}{num("sun_scale", 0.05 if k == "sunsky" else 0)}{num("sky_scale", self.u(3, 20))}</emitter>\n'
 
-    # The whole
     def sensor(self):
         k = self.one("perspective", "perspective", "perspective", "thinlens", "orthographic")
         self.tags.add(k)
