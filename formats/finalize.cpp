@@ -171,9 +171,8 @@ double fill_environment(Scene& scene, Emitter& emitter) {
 }
 
 bool is_masked_out(const Scene& scene, const Emitter& e) {
-    if (!is_on_surface(e.type)) return false;
-    const ParamFloat& opacity = scene.materials[scene.shapes[e.shape].material].opacity;
-    return opacity.texture < 0 && !(opacity.value > 0);
+    if (!is_on_surface(e.type) || has_delta_position(e.type)) return false;
+    return scene.materials[scene.shapes[e.shape].material].unseen();
 }
 
 // Power of an emitter, luminance of watts, one function a model.
@@ -211,6 +210,10 @@ double power(ModelTag<CollimatedEmitter>, Scene& scene, Emitter& e, const Receiv
 double power(ModelTag<DirectionalAreaEmitter>, Scene& scene, Emitter& e, const Receivers&) {
     if (is_masked_out(scene, e)) return 0;
     return scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
+}
+
+double power(ModelTag<HiddenAreaEmitter>, Scene& scene, Emitter& e, const Receivers&) {
+    return M_PI * scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
 }
 
 void fill_emitters(Scene& scene, LightPicking picking) {
