@@ -93,5 +93,5 @@ TEST_CASE("what finds no hidden light says so") {
     CHECK_THROWS_WITH(scene_from_text(scene_xml(2, "<sensor type='perspective'>" + square_film(4) +
                                                        "</sensor><shape type='sphere'><emitter "
                                                        "type='hiddenarea'/></shape>")),
-                      Catch::Matchers::ContainsSubstring("needs bsdf 'null'"));
+                      ContainsSubstring("needs bsdf 'null'"));
 }
