@@ -217,6 +217,7 @@ double power(ModelTag<HiddenAreaEmitter>, Scene& scene, Emitter& e, const Receiv
 }
 
 void fill_emitters(Scene& scene, LightPicking picking) {
+    scene.light_picking = name_of(picking);
     scene.emitter_cdf = {0.0f};
     if (scene.emitters.empty()) return;
     const Receivers receivers = receivers_of(scene);

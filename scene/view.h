@@ -60,13 +60,13 @@ struct alignas(64) Face {
 };
 
 /// Analytic shape. Local forms: unit sphere at the origin; unit disk z = 0, normal +z; cylinder x²+y² = 1, 0 <= z <= 1,
-/// normal outwards. `to_world` holds scale (radius, length), rotation and translation; scale is uniform for sphere and
-/// disk, uniform in xy for the cylinder. `flip` reverses the normal.
+/// normal outwards. `to_world` holds scale (radius, length), rotation and translation; scale is uniform for the
+/// sphere, uniform in xy for the cylinder. A disk has any affine map. `flip` reverses the normal.
 struct Quadric {
     PrimitiveType type;
     uint32_t shape;
     uint32_t flip;
-    float radius;  ///< of sphere, disk, cylinder in world units
+    float radius;  ///< of sphere and cylinder in world units; a bound of a disk's
     Affine to_world, to_local;
 };
 

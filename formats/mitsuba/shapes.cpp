@@ -105,7 +105,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     job.flip = in.boolean("flip_normals", false);
     job.light_back = builder.document.light_backs.contains(&object);
     job.reverse = determinant(job.to_world) < 0;
-    if (object.version >= 2 && (is_mesh_file(type) || type == "sphere")) {
+    if (builder.document.mirrors_turn_in && object.version >= 2 && (is_mesh_file(type) || type == "sphere")) {
         // In Mitsuba 3 a mirrored mesh keeps the order of its corners, whose outside so turns in, and so does that of a
         // sphere. An instance keeps it.
         const bool mirrored = determinant(in.transform("to_world")) < 0;

@@ -68,6 +68,31 @@ TEST_CASE("ReverseOrientation and mirrors leave normals as pbrt has them") {
     check_rgb(normal("Scale 1 1 -1 "), {0, 0, -1});
 }
 
+TEST_CASE("mirrored files of meshes and quadrics keep their outside, as in pbrt") {
+    const TempFolder folder;
+    folder.write("t.ply",
+                 "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    const auto z = [&](const std::string& before) {
+        const Scene s = load_pbrt_world(before + "Shape \"plymesh\" \"string filename\" \"t.ply\"", {}, &folder);
+        const Triangle& t = s.triangles[0];
+        return normalize(cross(s.vertices[t.v1].p - s.vertices[t.v0].p, s.vertices[t.v2].p - s.vertices[t.v0].p)).z;
+    };
+    CHECK(z("") == 1);
+    CHECK(z("Scale -1 1 1 ") == 1);
+    CHECK(z("Scale 1 1 -1 ") == -1);
+    CHECK(z("ReverseOrientation Scale -1 1 1 ") == -1);
+    for (const std::string type : {"sphere", "disk", "cylinder"}) {
+        INFO(type);
+        const auto flip = [&](const std::string& before) {
+            return load_pbrt_world(before + "Shape \"" + type + "\"").quadrics[0].flip;
+        };
+        CHECK(flip("") == 0);
+        CHECK(flip("Scale -1 1 1 ") == 0);
+        CHECK(flip("ReverseOrientation Scale -1 1 1 ") == 1);
+    }
+}
+
 TEST_CASE("meshes without normals are flat") {
     const Scene s = load_pbrt_world(
         "Shape \"trianglemesh\" \"point3 P\" [0 0 0  1 0 0  0 1 0  0 0 1] \"integer indices\" [0 1 2 0 1 3]");
