@@ -30,8 +30,8 @@ inline std::string hidden_room(uint32_t size, int max_depth, bool lamp) {
     s += "<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' angle='180'/><translate "
          "x='0.3' y='0.5' z='1.6'/></transform>" +
          hidden_light(
-             "<texture name='radiance' type='checkerboard'><rgb name='color0' value='1,2,3'/><rgb "
-             "name='color1' value='9,6,3'/></texture>") +
+             "<texture name='radiance' type='checkerboard'><rgb name='color0' value='0.1,0.5,1'/><rgb "
+             "name='color1' value='1,0.7,0.3'/></texture>") +
          "</shape>";
     for (const char* x : {"-0.8", "0.2"})
         s += std::string("<shape type='sphere'><point name='center' x='") + x +
