@@ -39,12 +39,14 @@ struct Options {
     uint32_t outliers = 0;
     bool strict = false;
     std::vector<std::string> devices;
-    std::optional<uint32_t> range_size;
+    std::optional<uint32_t> range_size, block_films;
     std::optional<double> checkpoint;
     bool resume = false;
 
     /// By ranges of samples, on several devices or with checkpoints (experiments/parallel/).
-    bool by_ranges() const { return !devices.empty() || range_size || checkpoint || resume || ranks().launched(); }
+    bool by_ranges() const {
+        return !devices.empty() || range_size || block_films || checkpoint || resume || ranks().launched();
+    }
 };
 
 constexpr float kMostStops = 100;
@@ -64,6 +66,7 @@ void check(const Options& o) {
     }
     if (!o.by_ranges()) return;
     if (o.range_size && *o.range_size == 0) throw Error(ExitCode::usage, "--range-size: a range has samples");
+    if (o.block_films && *o.block_films == 0) throw Error(ExitCode::usage, "--block-films: a block has films");
     if (o.checkpoint && !(*o.checkpoint > 0)) throw Error(ExitCode::usage, "--checkpoint: seconds between two states");
     for (const auto& [option, given] : {std::pair("--outliers", o.outliers > 0),
                                         {"--technique-images", !o.techniques.empty()},
@@ -84,9 +87,7 @@ size_t bytes_to_save(const Scene& scene) {
 void write_images(const Options& o, const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
                   const FilmMoments& film) {
     const Image image = mean_image(film);
-    Attributes attributes = image_attributes(scene, settings, stats);
-    attributes["light_picking"] = o.scene.light_picking;
-    write_exr(o.output, image, attributes, make_aovs(scene, settings, film, o.aovs));
+    write_exr(o.output, image, image_attributes(scene, settings, stats), make_aovs(scene, settings, film, o.aovs));
     if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
 }
 
@@ -97,7 +98,6 @@ int conclude(const Options& o, const LoadedScene& loaded, const RenderSettings& 
         nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
         json.update(found);
         json["interrupted"] = position.interrupted;
-        json["light_picking"] = o.scene.light_picking;
         write_json(o.json, json);
     }
     if (position.interrupted) {
@@ -141,6 +141,7 @@ int render_by_ranges(const Options& o) {
     expect(request.settings, request.budget);
     request.devices = o.devices;
     request.range_size = o.range_size.value_or(0);
+    request.block_nodes = o.block_films.value_or(0);
     request.state_path = o.output + ".state";
     request.resume = o.resume;
     request.checkpoint_seconds = o.checkpoint.value_or(request.checkpoint_seconds);
@@ -296,6 +297,9 @@ void add_render(CLI::App& app, Run& run) {
     command.add_option("--range-size", o->range_size,
                        "Samples that a device renders before it hands its film over. The image does not depend on who "
                        "renders which range");
+    command.add_option("--block-films", o->block_films,
+                       "Films that a rank adds up before the first one gets them; 1: the first one gets each. Default: "
+                       "1 below 16 ranks, else the root of their number. The image does not depend on it");
     command.add_option("--checkpoint", o->checkpoint,
                        "Seconds between two states of the render, OUTPUT.state. Default with several devices: 60");
     command.add_flag("--resume", o->resume, "Go on from OUTPUT.state, with any number of devices and ranks");

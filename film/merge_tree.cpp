@@ -16,6 +16,7 @@ void MergeTree::add(RangeNode node, FilmMoments film) {
         if (other == entries_.end() || other->second.node != sibling) break;
         // a + b is b + a, bit by bit.
         film.add(other->second.film);
+        spare_ = std::move(other->second.film);
         entries_.erase(other);
         node = {node.level + 1, node.index >> 1};
     }
@@ -42,6 +43,13 @@ FilmMoments MergeTree::sum() const {
 
 FilmMoments MergeTree::take_sum() {
     FilmMoments taken = entries_.size() == 1 ? std::move(entries_.begin()->second.film) : sum();
+    *this = {};
+    return taken;
+}
+
+std::vector<MergeTree::Entry> MergeTree::take_entries() {
+    std::vector<Entry> taken;
+    for (auto& [first, entry] : entries_) taken.push_back(std::move(entry));
     *this = {};
     return taken;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <utility>
 
 #include "film/moments.h"
 
@@ -41,12 +42,17 @@ public:
         RangeNode node;
         FilmMoments film;
     };
+    /// The sums that are kept, which the tree has no longer.
+    std::vector<Entry> take_entries();
+    /// The film that was last added to another one, for its memory; empty if there is none.
+    FilmMoments take_spare() { return std::exchange(spare_, {}); }
     /// The sums that are kept, by their first range.
     const std::map<uint64_t, Entry>& entries() const { return entries_; }
 
 private:
     std::map<uint64_t, Entry> entries_;
     uint64_t samples_ = 0;  ///< per pixel
+    FilmMoments spare_;
 };
 
 }  // namespace ambilux

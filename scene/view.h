@@ -117,6 +117,8 @@ struct Material {
 
     /// False if every ray meets it.
     AMBILUX_HD bool lets_pass() const { return opacity.texture >= 0 || !(opacity.value >= 1.0f); }
+    /// True if no ray meets it.
+    bool unseen() const { return opacity.texture < 0 && !(opacity.value > 0.0f); }
 };
 
 // ---- emitters ----
@@ -130,10 +132,11 @@ struct EnvironmentCell {
 };
 
 /// Emitter. `radiance` holds, in this order of types: radiance, intensity (W/sr), intensity, perpendicular irradiance,
-/// radiance, radiance scale, intensity along the axis, power, power per area.
+/// radiance, radiance scale, intensity along the axis, power, power per area,
+/// radiance.
 struct Emitter {
     EmitterType type;
-    uint32_t shape;     ///< area, directional_area: its shape
+    uint32_t shape;     ///< area, directional_area, hidden_area: its shape
     uint32_t area_cdf;  ///< area over triangles: primitive_count+1 floats in tables, and then the density per area on
                         ///< each; kNone for a single primitive
     float pick_probability;      ///< chance that light sampling picks this emitter

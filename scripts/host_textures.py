@@ -53,17 +53,16 @@ def render(program, scene, folder, textures, spp):
 
 
 def report(program, scene, folder, spp, turns, what):
-    print(f"\n{what}\n\n| textures | build s | render s, each turn | MiB on the device | RMSE against the first |\n| --- | --- | --- | --- | --- |")
-    rows = {textures: [] for textures in ("device", "host", "pinned")}
-    for _ in range(turns):
-        for textures, results in rows.items():
-            results.append(render(program, scene, folder, textures, spp))
-    for textures, results in rows.items():
-        if isinstance(results[0], str):
-            print(f"| {textures} | {results[0]} | | | |")
-            continue
-        times = ", ".join(f"{r[0]['render']:.3f}" for r in results)
-        print(f"| {textures} | {results[-1][0]['build']:.2f} | {times} | {results[0][1] >> 20} | {results[-1][2]} |")
+    """Prints each render as it ends: a machine that is lent for minutes may be gone before the last."""
+    print(f"\n{what}\n\n| textures | turn | load s | build s | render s | MiB on the device | RMSE against the first |\n| --- | --- | --- | --- | --- | --- | --- |", flush=True)
+    for turn in range(1, turns + 1):
+        for textures in ("device", "host", "pinned"):
+            result = render(program, scene, folder, textures, spp)
+            if isinstance(result, str):
+                print(f"| {textures} | {turn} | {result} | | | | |", flush=True)
+                continue
+            seconds, memory, rmse = result
+            print(f"| {textures} | {turn} | {seconds['load']:.2f} | {seconds['build']:.2f} | {seconds['render']:.3f} | {memory >> 20} | {rmse} |", flush=True)
 
 
 def main():
@@ -85,6 +84,8 @@ def main():
                                   stdout=subprocess.PIPE, text=True)
         try:
             held = holder.stdout.readline().strip()
+            if not held:
+                sys.exit("the device's memory could not be taken: see above")
             report(a.program, scene, folder, a.spp, a.turns, f"{texels} MiB of textures; of the device's memory {held}")
         finally:
             holder.stdin.close()

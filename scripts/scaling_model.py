@@ -2,11 +2,13 @@
 """What one render over many devices would take, on machines that are not here (docs/scaling.md).
 
 Simulates the first rank and its devices event by event, with the rule by which ranges are dealt out
-(experiments/parallel/ranges.cpp) and with costs that were measured where they can be.
+(experiments/parallel/ranges.cpp), the blocks whose films other ranks add up (experiments/parallel/collector.cpp), and with costs that were
+measured where they can be.
 """
 
 import argparse
 import heapq
+import math
 import random
 
 NODE_SECONDS = 2.0
@@ -22,15 +24,23 @@ class Rank:
         self.mean = sum(speeds) / len(speeds)
 
 
+class Block:
+    def __init__(self, at, length, ranks):
+        self.end, self.missing = at + length, length
+        self.collector = ranks[1 + at // length % (len(ranks) - 1)] if len(ranks) > 1 else None
+
+
 class Simulation:
     """ranks: how many devices each has; seconds: of a device for a range with its film; merge: of a thread that adds a film up; network: of a film from
-    another rank to the first; latency: of a message and its answer; spread: relative deviation of the speeds of devices."""
+    another rank; latency: of a message and its answer; spread: relative deviation of the speeds of devices; nodes: in a block."""
 
-    def __init__(self, ranks, ranges, seconds, merge, network, latency, spread, rng):
+    def __init__(self, ranks, ranges, seconds, merge, network, latency, spread, nodes, rng):
         self.ranks = [Rank([seconds * (1 + spread * rng.uniform(-1, 1)) for _ in range(n)]) for n in ranks]
         self.ranges, self.merge, self.network, self.latency = ranges, merge, network, latency
         self.rate = sum(1 / s for r in self.ranks for s in r.speeds)
-        self.node_seconds = max(NODE_SECONDS, 2 * len(ranks) * (merge + network))
+        self.nodes = nodes
+        self.node_seconds = max(NODE_SECONDS, 2 * len(ranks) / nodes * (merge + network))
+        self.block = None
         self.at, self.end, self.busy = 0, 0.0, 0.0
         self.events, self.order = [], 0
 
@@ -59,17 +69,23 @@ class Simulation:
         wanted, devices = len(rank.idle), len(rank.speeds)
         while wanted > 0 and self.at < self.ranges:
             left = self.ranges - self.at
-            size = min(devices * self.node_seconds / rank.mean, 0.5 * devices * left / self.rate / rank.mean) if known else 1
-            most = int(min(max(size, 1), left))
-            length = 1 << (most.bit_length() - 1)
-            if self.at:
-                length = min(length, self.at & -self.at)
+            size = min(devices * self.node_seconds / rank.mean, 0.5 * devices * left / self.rate / rank.mean) if known else devices
+            if not self.block or self.at == self.block.end:
+                self.block = Block(self.at, self.cut(size * self.nodes, left), self.ranks)
+            length = self.cut(size, self.block.end - self.at)
+            if length == self.block.missing and self.at + length == self.block.end:
+                self.block.collector = None
             self.at += length
             wanted -= length
-            rank.queue.append([length, length])  # not begun, not finished
+            rank.queue.append([length, length, length, self.block])  # not begun, not finished, all
         idle, rank.idle = rank.idle, []
         for device in idle:
             self.begin(time + (self.latency if rank is not self.ranks[0] else 0), rank, device)
+
+    def cut(self, size, left):
+        most = int(min(max(size, 1), left))
+        length = 1 << (most.bit_length() - 1)
+        return min(length, self.at & -self.at) if self.at else length
 
     def begin(self, time, rank, device):
         if not rank.queue:
@@ -90,12 +106,25 @@ class Simulation:
         rank.merged[device] = [rank.merged[device][1], rank.thread]
         node[1] -= 1
         if node[1] == 0:
-            self.push(rank.thread, self.arrive, rank)
+            self.push(rank.thread, self.arrive, rank, node)
         if not self.begin(time, rank, device) and self.at < self.ranges:
             self.push(time, self.ask, rank, True)
 
-    def arrive(self, time, rank):
-        self.on_first(time, self.merge + (self.network if rank is not self.ranks[0] else 0))
+    def arrive(self, time, rank, node):
+        """A film of a node: to the rank that collects its block, else to the first one."""
+        block, collector = node[3], node[3].collector
+        if collector is None:
+            self.on_first(time, self.merge + (self.network if rank is not self.ranks[0] else 0))
+            return
+        received = max(time, collector.thread) + self.network
+        rank.thread = max(rank.thread, received)
+        collector.thread = received + self.merge
+        block.missing -= node[2]
+        if block.missing == 0:
+            self.push(collector.thread, self.collected, collector)
+
+    def collected(self, time, collector):
+        collector.thread = max(collector.thread, self.on_first(time, self.network + self.merge) - self.merge)
 
 
 def main():
@@ -109,6 +138,7 @@ def main():
     parser.add_argument("--latency", type=float, default=4e-3, help="seconds from a wish to the order")
     parser.add_argument("--spread", type=float, default=0.02, help="relative deviation of the speeds of devices")
     parser.add_argument("--per-rank", type=int, default=8, help="devices of a rank")
+    parser.add_argument("--block-films", type=int, default=0, help="films that a rank adds up for the first one; 1: none; default: as the program")
     parser.add_argument("--devices", type=int, nargs="*", default=[1, 2, 4, 8, 16, 64, 128, 512])
     a = parser.parse_args()
     film = 48 * a.pixels
@@ -117,8 +147,9 @@ def main():
     print("| devices | seconds | efficiency | first rank busy |\n| --- | --- | --- | --- |")
     for devices in a.devices:
         ranks = [min(a.per_rank, devices - d) for d in range(0, devices, a.per_rank)]
+        nodes = a.block_films or (1 if len(ranks) < 16 else 1 << (math.isqrt(len(ranks)).bit_length() - 1))
         runs = [
-            Simulation(ranks, a.ranges, a.render_seconds / a.ranges + film / a.download, film / a.merge, film / a.network, a.latency, a.spread, rng).run()
+            Simulation(ranks, a.ranges, a.render_seconds / a.ranges + film / a.download, film / a.merge, film / a.network, a.latency, a.spread, nodes, rng).run()
             for _ in range(5)
         ]
         seconds = sum(r[0] for r in runs) / len(runs)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Writes a Slurm job to standard output; submit it with sbatch.
-#   scripts/slurm.sh render NODES DEVICES SCENE -o OUT.exr [options]     one render: a rank per device, by mpirun
+#   scripts/slurm.sh render NODES DEVICES SCENE -o OUT.exr [options]     one render: a rank per node with all devices, by mpirun
 #   scripts/slurm.sh experiment NODES DEVICES CONFIG -o DIR [options]    one experiment: a rank per device, by mpirun
 #   scripts/slurm.sh array CONFIG... -- DIR [options]                    one job per configuration, each into DIR/NAME
 # DEVICES: GPUs per node; 0: one rank per node that takes all of its cores.
@@ -31,15 +31,21 @@ case $command in
     ((nodes >= 1)) || usage
     header "$command"
     echo "#SBATCH --nodes=$nodes"
+    ranks=1
     if ((devices)); then
-      echo "#SBATCH --ntasks-per-node=$devices"
+      # A rank hands over one film for all of its devices; renders of an experiment are timed on one device each.
+      if [[ $command == render ]]; then
+        set -- "$@" --devices "$(seq -s, 0 $((devices - 1)))"
+        echo "#SBATCH --cpus-per-task=$((2 * devices))"
+      else
+        ranks=$devices
+      fi
       echo "#SBATCH --gpus-per-node=$devices"
-      map="--map-by ppr:$devices:node --bind-to none"
     else
-      echo "#SBATCH --ntasks-per-node=1"
       echo "#SBATCH --exclusive"
-      map="--map-by ppr:1:node --bind-to none"
     fi
+    echo "#SBATCH --ntasks-per-node=$ranks"
+    map="--map-by ppr:$ranks:node --bind-to none"
     # exec: the signal before the time limit reaches mpirun, which passes it on and lets ranks save what they have.
     echo "exec mpirun --mca odls_base_sigkill_timeout 30 $map$(quoted "$program" "$command" "$@" --resume)"
     ;;

@@ -4,16 +4,21 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdlib>
+#include <deque>
 
+#include "core/error.h"
 #include "core/ranks.h"
 
 namespace ambilux {
 namespace {
 
-/// A message is its head and its bytes, in pieces that an int can count.
+/// A message is its head (kind, bytes of the text, bytes of each array), its text and its arrays, in pieces that an int
+/// can count.
 constexpr int kHead = 1, kPiece = 2;
+constexpr size_t kMostArrays = 2, kHeadValues = 2 + kMostArrays;
 constexpr uint64_t kPieceBytes = 1u << 30;
 
 /// Called by the main thread only.
@@ -41,32 +46,65 @@ public:
     std::vector<int> local_peers() const override { return local_peers_; }
     bool launched() const override { return true; }
 
-    void send(int to, int kind, const std::string& bytes) override {
-        const uint64_t head[2] = {uint64_t(kind), bytes.size()};
-        MPI_Send(head, 2, MPI_UINT64_T, to, kHead, MPI_COMM_WORLD);
-        for (uint64_t at = 0; at < bytes.size(); at += kPieceBytes)
-            MPI_Send(bytes.data() + at, int(std::min(kPieceBytes, bytes.size() - at)), MPI_BYTE, to, kPiece,
-                     MPI_COMM_WORLD);
+    void send(int to, int kind, const std::string& bytes, std::span<const std::span<const double>> arrays) override {
+        if (arrays.size() > kMostArrays) throw Error(ExitCode::device, "a message has too many arrays");
+        std::array<uint64_t, kHeadValues> head = {uint64_t(kind), bytes.size()};
+        for (size_t i = 0; i < arrays.size(); ++i) head[2 + i] = arrays[i].size_bytes();
+        std::vector<MPI_Request> open;
+        const auto begin = [&](const void* from, uint64_t size, int tag) {
+            for (uint64_t at = 0; at < size; at += kPieceBytes)
+                MPI_Isend(static_cast<const char*>(from) + at, int(std::min(kPieceBytes, size - at)), MPI_BYTE, to, tag,
+                          MPI_COMM_WORLD, &open.emplace_back());
+        };
+        begin(head.data(), head.size() * sizeof(uint64_t), kHead);
+        begin(bytes.data(), bytes.size(), kPiece);
+        for (const auto& array : arrays) begin(array.data(), array.size_bytes(), kPiece);
+        // The other one may wait until its own message to this one is received.
+        for (int sent = 0;;) {
+            MPI_Testall(int(open.size()), open.data(), &sent, MPI_STATUSES_IGNORE);
+            if (sent) return;
+            if (std::optional<RankMessage> message = receive(nullptr)) inbox_.push_back(std::move(*message));
+        }
     }
-    std::optional<RankMessage> poll() override {
-        int there = 0;
-        MPI_Status status;
-        MPI_Iprobe(MPI_ANY_SOURCE, kHead, MPI_COMM_WORLD, &there, &status);
-        if (!there) return std::nullopt;
-        uint64_t head[2];
-        const int from = status.MPI_SOURCE;
-        MPI_Recv(head, 2, MPI_UINT64_T, from, kHead, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
-        RankMessage message = {from, int(head[0]), std::string(head[1], '\0')};
-        for (uint64_t at = 0; at < head[1]; at += kPieceBytes)
-            MPI_Recv(message.bytes.data() + at, int(std::min(kPieceBytes, head[1] - at)), MPI_BYTE, from, kPiece,
-                     MPI_COMM_WORLD, MPI_STATUS_IGNORE);
-        return message;
+    std::optional<RankMessage> poll(Arrays* memory) override {
+        if (inbox_.empty()) return receive(memory);
+        RankMessage first = std::move(inbox_.front());
+        inbox_.pop_front();
+        return first;
     }
     void abort(int code) override { MPI_Abort(MPI_COMM_WORLD, code); }
 
 private:
+    static std::optional<RankMessage> receive(Arrays* memory) {
+        int there = 0;
+        MPI_Status status;
+        MPI_Iprobe(MPI_ANY_SOURCE, kHead, MPI_COMM_WORLD, &there, &status);
+        if (!there) return std::nullopt;
+        std::array<uint64_t, kHeadValues> head{};
+        const int from = status.MPI_SOURCE;
+        const auto take = [from](void* to, uint64_t size, int tag) {
+            for (uint64_t at = 0; at < size; at += kPieceBytes)
+                MPI_Recv(static_cast<char*>(to) + at, int(std::min(kPieceBytes, size - at)), MPI_BYTE, from, tag,
+                         MPI_COMM_WORLD, MPI_STATUS_IGNORE);
+        };
+        take(head.data(), sizeof head, kHead);
+        RankMessage message = {from, int(head[0]), std::string(head[1], '\0'), {}};
+        take(message.bytes.data(), head[1], kPiece);
+        for (size_t i = 2; i < head.size() && head[i] > 0; ++i) {
+            std::vector<double>& array = message.arrays.emplace_back();
+            if (memory && !memory->empty()) {
+                array = std::move(memory->back());
+                memory->pop_back();
+            }
+            array.resize(head[i] / sizeof(double));
+            take(array.data(), head[i], kPiece);
+        }
+        return message;
+    }
+
     int rank_ = 0, size_ = 1, local_rank_ = 0, local_size_ = 1;
     std::vector<int> local_peers_;
+    std::deque<RankMessage> inbox_;  ///< what came while something was sent
 };
 
 }  // namespace

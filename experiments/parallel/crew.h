@@ -22,6 +22,8 @@ struct Order {
     /// Instead of the node: samples from 0 on by the first device until these seconds are over. Their number becomes
     /// the size of ranges.
     double trial_seconds = 0;
+    RangeNode block = {};  ///< that the node is part of
+    int collector = 0;     ///< the rank that its film is for
 };
 
 /// What it rendered.

@@ -9,6 +9,7 @@
 #include "core/flag.h"
 #include "core/log.h"
 #include "experiments/parallel/checkpoint.h"
+#include "experiments/parallel/collector.h"
 #include "experiments/parallel/wire.h"
 #include "experiments/statistics.h"
 #include "experiments/stats_sum.h"
@@ -55,8 +56,7 @@ private:
         int rank = 0;
         std::string host;
         std::vector<DeviceWork> devices;
-        uint64_t films = 0;    ///< that it handed over
-        uint64_t open = 0;     ///< nodes that it has not handed over
+        uint64_t open = 0;     ///< nodes that it has not rendered
         size_t wanted = 0;     ///< ranges that it could begin
         double per_range = 0;  ///< seconds of one of its devices, as last measured; 0: unknown
     };
@@ -151,7 +151,8 @@ private:
         while (ranges_.size == 0 && !interrupted_) {
             for (Finished& f : crew_->take(kPatience)) {
                 ranges_.size = f.order.ranges.size;
-                arrived(parties_[0], f.order.node, std::move(f.film), f.seconds, crew_->work());
+                rendered(parties_[0], f.order.node, f.seconds, crew_->work());
+                arrived(f.order.node, std::move(f.film));
             }
             interrupted_ = is_set(request_.interrupt);
         }
@@ -177,8 +178,10 @@ private:
             const auto node = dealer.next(elapsed(), party.per_range, rate(), party.devices.size());
             if (!node) break;
             const double left = request_.budget.seconds > 0 ? request_.budget.seconds - elapsed() : 0;
-            orders.push_back({ranges_, *node, left});
+            const int collector = collector_of(dealer.block(), *node, ranks_.size());
+            orders.push_back({ranges_, *node, left, 0, dealer.block(), collector});
             given += node->end() - node->first();
+            if (collector) collected_later_ += node->end() - node->first();
         }
         party.wanted = 0;
         party.open += orders.size();
@@ -191,7 +194,9 @@ private:
     }
 
     void render() {
-        Dealer dealer(ranges_, request_.budget.seconds, tree_);
+        const unsigned nodes = request_.block_nodes ? request_.block_nodes : default_block_nodes(ranks_.size());
+        Dealer dealer(ranges_, request_.budget.seconds, tree_, nodes);
+        bool last = false;
         for (;;) {
             parties_[0].wanted = crew_->wanted();
             bool working = false;
@@ -199,56 +204,81 @@ private:
                 deal(dealer, party);
                 working |= party.open > 0;
             }
-            if (!working) return;
+            if (!working && collected_later_ == 0) return;
+            if (!working && !std::exchange(last, true)) want_collected(true);
             take();
             // Films of all parties take half of this thread's time at most.
-            dealer.set_node_seconds(std::max(Dealer::kNodeSeconds, 2 * double(parties_.size()) * film_seconds()));
+            dealer.set_node_seconds(
+                std::max(Dealer::kNodeSeconds, 2 * double(parties_.size()) / nodes * film_seconds()));
             if (is_set(request_.interrupt)) {
                 interrupted_ = true;
                 return;
             }
-            if (seconds_since(saved_) >= request_.checkpoint_seconds) {
-                state_.write(tree_, notes());
-                saved_ = Clock::now();
-            }
+            checkpoint();
         }
     }
 
-    /// That a film costs this thread.
-    double film_seconds() const {
-        uint64_t films = 0;
-        for (const Party& p : parties_) films += p.films;
-        return films ? (merge_seconds_ + receive_seconds_) / double(films) : 0;
+    /// What was finished half an interval before is in a state, be its block whole or not.
+    void checkpoint() {
+        const double since = seconds_since(saved_);
+        if (since >= 0.5 * request_.checkpoint_seconds && !wanted_collected_ && collected_later_ > 0)
+            want_collected(false);
+        if (since < request_.checkpoint_seconds) return;
+        state_.write(tree_, notes());
+        saved_ = Clock::now();
+        wanted_collected_ = false;
     }
+
+    void want_collected(bool last) {
+        wanted_collected_ = true;
+        for (int rank = 1; rank < ranks_.size(); ++rank) tell(ranks_, rank, Say::hand_over, {{"last", last}});
+    }
+
+    /// That a film costs this thread.
+    double film_seconds() const { return films_ ? (merge_seconds_ + receive_seconds_) / double(films_) : 0; }
 
     std::optional<Told> hear_timed() {
         const auto start = Clock::now();
-        std::optional<Told> told = hear(ranks_);
+        std::optional<Told> told = hear(ranks_, &memory_);
         if (told) receive_seconds_ += seconds_since(start);
         return told;
     }
 
     void take() {
-        for (Finished& f : crew_->take(ranks_.size() > 1 ? kPollSeconds : kPatience))
-            arrived(parties_[0], f.order.node, std::move(f.film), f.seconds, crew_->work());
+        for (Finished& f : crew_->take(ranks_.size() > 1 ? kPollSeconds : kPatience)) {
+            rendered(parties_[0], f.order.node, f.seconds, crew_->work());
+            if (f.order.collector)
+                tell_part(ranks_, f);
+            else
+                arrived(f.order.node, std::move(f.film));
+        }
         while (std::optional<Told> told = hear_timed()) {
             const nlohmann::json& t = told->text;
             Party& party = parties_[size_t(told->from)];
-            if (told->kind == Say::wanted)
+            if (told->kind == Say::wanted) {
                 party.wanted = t.at("ranges");
+                continue;
+            }
+            const RangeNode node = read_node(t.at("node"));
+            if (told->kind == Say::collected)
+                collected_later_ -= node.end() - node.first();
             else
-                arrived(party, {t.at("level"), t.at("index")}, std::move(told->film), t.at("seconds"),
-                        restore_work(t.at("devices")));
+                rendered(party, node, t.at("seconds"), restore_work(t.at("devices")));
+            if (told->film.samples) arrived(node, std::move(told->film));
         }
     }
 
-    void arrived(Party& party, RangeNode node, FilmMoments film, double seconds, std::vector<DeviceWork> devices) {
+    void rendered(Party& party, RangeNode node, double seconds, std::vector<DeviceWork> devices) const {
         --party.open;
-        ++party.films;
         party.per_range = seconds / double(std::min(node.end(), ranges_.count()) - node.first());
         party.devices = std::move(devices);
+    }
+
+    void arrived(RangeNode node, FilmMoments film) {
+        ++films_;
         const auto start = Clock::now();
         tree_.add(node, std::move(film));
+        if (memory_.empty() && ranks_.size() > 1) memory_ = memory_of(tree_.take_spare());
         merge_seconds_ += seconds_since(start);
         if (request_.on_progress) request_.on_progress(position(), total());
     }
@@ -334,6 +364,10 @@ private:
     MergeTree tree_;
     RenderStats earlier_;
     double earlier_seconds_ = 0, merge_seconds_ = 0, receive_seconds_ = 0;
+    uint64_t films_ = 0;            ///< that came here
+    uint64_t collected_later_ = 0;  ///< ranges whose films other ranks add up before they come here
+    bool wanted_collected_ = false;
+    Arrays memory_;  ///< for the next film
     SelectionStats choice_;
     std::optional<SharedAccels> host_;  ///< of all devices here, until they have made what they need of it
     std::optional<Crew> crew_;

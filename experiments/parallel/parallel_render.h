@@ -13,6 +13,7 @@ struct ParallelRequest {
     std::string state_path;
     bool resume = false;
     double checkpoint_seconds = 60;
+    unsigned block_nodes = 0;  ///< films that a rank adds up for the first one; 0: default_block_nodes
     const volatile bool* interrupt = nullptr;
     std::function<void(const RenderPosition&, const RenderStats&)> on_progress = {};
 };

@@ -28,7 +28,8 @@ uint32_t default_range_size(uint64_t samples, uint64_t pixels, bool cuda) {
                              std::max<uint64_t>(1, samples)));
 }
 
-Dealer::Dealer(const Ranges& ranges, double seconds, const MergeTree& done) : ranges_(ranges), seconds_(seconds) {
+Dealer::Dealer(const Ranges& ranges, double seconds, const MergeTree& done, unsigned nodes)
+    : ranges_(ranges), seconds_(seconds), nodes_(nodes) {
     for (const auto& [first, entry] : done.entries()) done_[first] = entry.node.end();
 }
 
@@ -43,7 +44,7 @@ std::optional<RangeNode> Dealer::next(double elapsed, double per_range, double r
     const auto together = double(devices);
     for (auto done = done_.find(at_); done != done_.end(); done = done_.find(at_)) at_ = done->second;
     if (at_ >= ranges_.count()) return std::nullopt;
-    double wanted = per_range > 0 ? together * node_seconds_ / per_range : 1;
+    double wanted = together * (per_range > 0 ? node_seconds_ / per_range : 1);
     if (seconds_ > 0) {
         const double left = seconds_ - elapsed;
         if (left <= 0 || left < 0.5 * per_range) return std::nullopt;
@@ -54,13 +55,21 @@ std::optional<RangeNode> Dealer::next(double elapsed, double per_range, double r
         wanted = std::min(wanted, 0.5 * together * double(open()) / rate / per_range);
     const auto after = done_.lower_bound(at_);
     const uint64_t end = after == done_.end() ? ranges_.count() : std::min(ranges_.count(), after->first);
+    if (at_ >= block_end_) {
+        block_ = cut(wanted * nodes_, end);
+        block_end_ = block_.end();
+    }
+    const RangeNode node = cut(wanted, block_end_);
+    at_ = node.end();
+    return node;
+}
+
+/// A node that begins where the next range is and ends by `end`, of `wanted` ranges at most.
+RangeNode Dealer::cut(double wanted, uint64_t end) const {
     const auto most = uint64_t(std::clamp(wanted, 1.0, double(end - at_)));
     const uint64_t aligned = at_ ? at_ & (~at_ + 1) : most;  // the largest power of two that divides it
-    const uint64_t length = std::min(std::bit_floor(most), aligned);
-    const auto level = uint32_t(std::countr_zero(length));
-    const RangeNode node = {level, at_ >> level};
-    at_ += length;
-    return node;
+    const auto level = uint32_t(std::countr_zero(std::min(std::bit_floor(most), aligned)));
+    return {level, at_ >> level};
 }
 
 }  // namespace ambilux

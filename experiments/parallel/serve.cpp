@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/flag.h"
+#include "experiments/parallel/collector.h"
 #include "experiments/parallel/parallel_render.h"
 #include "experiments/parallel/wire.h"
 #include "experiments/statistics.h"
@@ -21,6 +22,35 @@ Told wait_for_setup(Ranks& ranks) {
     }
 }
 
+/// What this rank adds up for the first one.
+class Collecting {
+public:
+    explicit Collecting(Ranks& ranks) : ranks_(ranks) {}
+
+    /// False if it says something else.
+    bool heard(Told& told) {
+        if (told.kind == Say::hand_over) {
+            send(films_.hand_over(told.text.at("last")));
+        } else if (told.kind == Say::part) {
+            send(films_.add(read_node(told.text.at("block")), read_node(told.text.at("node")), std::move(told.film)));
+            if (memory_.empty()) memory_ = memory_of(films_.take_spare());
+        } else {
+            return false;
+        }
+        return true;
+    }
+    Arrays* memory() { return &memory_; }
+
+private:
+    void send(const std::vector<MergeTree::Entry>& films) {
+        for (const auto& [node, film] : films) tell(ranks_, 0, Say::collected, {{"node", node_text(node)}}, &film);
+    }
+
+    Ranks& ranks_;
+    Collector films_;
+    Arrays memory_;  ///< for the next film
+};
+
 }  // namespace
 
 void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& ranks) {
@@ -37,10 +67,12 @@ void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& r
     std::optional<Crew> crew(std::in_place, scene, settings, choose_devices(request.devices, settings, ranks), *host);
     host.reset();
     tell(ranks, 0, Say::ready, {{"host", host_name()}, {"devices", work_text(crew->work())}});
+    Collecting collecting(ranks);
     for (bool asked = true;;) {                               // the first orders come by themselves
         if (crew && is_set(request.interrupt)) crew.reset();  // the first rank decides what comes of it
-        while (const std::optional<Told> told = hear(ranks)) {
+        while (std::optional<Told> told = hear(ranks, collecting.memory())) {
             if (told->kind == Say::stop) return;
+            if (collecting.heard(*told)) continue;
             if (told->text.at("last").get<bool>()) asked = false;
             if (crew) crew->give(read_order(told->text));
         }
@@ -54,13 +86,12 @@ void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& r
             tell(ranks, 0, Say::wanted, {{"ranges", ranges}});
             asked = true;  // where no answer comes nothing is left
         }
-        for (const Finished& f : finished)
-            tell(ranks, 0, Say::finished,
-                 {{"level", f.order.node.level},
-                  {"index", f.order.node.index},
-                  {"seconds", f.seconds},
-                  {"devices", work_text(crew->work())}},
-                 &f.film);
+        for (const Finished& f : finished) {
+            if (f.order.collector) tell_part(ranks, f);
+            const nlohmann::json text = {
+                {"node", node_text(f.order.node)}, {"seconds", f.seconds}, {"devices", work_text(crew->work())}};
+            tell(ranks, 0, Say::finished, text, f.order.collector ? nullptr : &f.film);
+        }
     }
 }
 

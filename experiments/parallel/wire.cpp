@@ -1,6 +1,7 @@
 #include "experiments/parallel/wire.h"
 
 #include <cstring>
+#include <span>
 
 #include "core/error.h"
 #include "experiments/stats_sum.h"
@@ -9,59 +10,70 @@ namespace ambilux {
 namespace {
 
 struct Head {
-    uint64_t text, width, height, samples, values;
+    uint64_t width, height, samples;
 };
 
 }  // namespace
 
 void tell(Ranks& ranks, int to, Say kind, const nlohmann::json& text, const FilmMoments* film) {
-    const std::string words = text.dump();
-    Head head = {words.size(), 0, 0, 0, 0};
-    if (film) head = {words.size(), film->width, film->height, film->samples, film->sum.size()};
-    const size_t bytes = head.values * sizeof(double);
-    std::string message(sizeof head + words.size() + 2 * bytes, '\0');
-    char* at = message.data();
-    const auto put = [&](const void* from, size_t count) {
-        if (count) std::memcpy(at, from, count);
-        at += count;
-    };
-    put(&head, sizeof head);
-    put(words.data(), words.size());
+    Head head = {0, 0, 0};
+    std::vector<std::span<const double>> arrays;
     if (film) {
-        put(film->sum.data(), bytes);
-        put(film->sum_squares.data(), bytes);
+        head = {film->width, film->height, film->samples};
+        arrays = {film->sum, film->sum_squares};
     }
-    ranks.send(to, int(kind), message);
+    std::string message(sizeof head, '\0');
+    std::memcpy(message.data(), &head, sizeof head);
+    ranks.send(to, int(kind), message + text.dump(), arrays);
 }
 
-std::optional<Told> hear(Ranks& ranks) {
-    const std::optional<RankMessage> message = ranks.poll();
+void tell_part(Ranks& ranks, const Finished& f) {
+    tell(ranks, f.order.collector, Say::part, {{"block", node_text(f.order.block)}, {"node", node_text(f.order.node)}},
+         &f.film);
+}
+
+std::optional<Told> hear(Ranks& ranks, Arrays* memory) {
+    std::optional<RankMessage> message = ranks.poll(memory);
     if (!message) return std::nullopt;
     Head head;
     const std::string& bytes = message->bytes;
     if (bytes.size() < sizeof head) throw Error(ExitCode::device, "a message of another rank is cut off");
     std::memcpy(&head, bytes.data(), sizeof head);
-    if (bytes.size() != sizeof head + head.text + 2 * head.values * sizeof(double))
-        throw Error(ExitCode::device, "a message of another rank is cut off");
-    const char* at = bytes.data() + sizeof head;
-    Told told = {message->from, Say(message->kind), nlohmann::json::parse(at, at + head.text), {}};
-    at += head.text;
-    told.film = {uint32_t(head.width), uint32_t(head.height), head.samples, std::vector<double>(head.values),
-                 std::vector<double>(head.values)};
-    for (std::vector<double>* values : {&told.film.sum, &told.film.sum_squares}) {
-        if (head.values) std::memcpy(values->data(), at, head.values * sizeof(double));
-        at += head.values * sizeof(double);
+    Told told = {
+        message->from, Say(message->kind), nlohmann::json::parse(bytes.begin() + sizeof head, bytes.end()), {}};
+    told.film = {uint32_t(head.width), uint32_t(head.height), head.samples, {}, {}};
+    if (message->arrays.size() == 2) {
+        told.film.sum = std::move(message->arrays[0]);
+        told.film.sum_squares = std::move(message->arrays[1]);
     }
+    if (told.film.sum.size() != 3 * head.width * head.height || told.film.sum_squares.size() != told.film.sum.size())
+        throw Error(ExitCode::device, "a message of another rank is cut off");
     return told;
 }
 
+Arrays memory_of(FilmMoments film) {
+    Arrays memory;
+    for (std::vector<double>* values : {&film.sum, &film.sum_squares})
+        if (!values->empty()) memory.push_back(std::move(*values));
+    return memory;
+}
+
+nlohmann::json node_text(const RangeNode& node) { return {node.level, node.index}; }
+RangeNode read_node(const nlohmann::json& text) { return {text.at(0), text.at(1)}; }
+
 nlohmann::json order_text(const Order& order, bool last) {
-    return {{"size", order.ranges.size}, {"samples", order.ranges.samples},    {"level", order.node.level},
-            {"index", order.node.index}, {"seconds_left", order.seconds_left}, {"last", last}};
+    return {{"size", order.ranges.size},
+            {"samples", order.ranges.samples},
+            {"node", node_text(order.node)},
+            {"seconds_left", order.seconds_left},
+            {"block", node_text(order.block)},
+            {"collector", order.collector},
+            {"last", last}};
 }
 
 Order read_order(const nlohmann::json& t) {
-    return {{t.at("size"), t.at("samples")}, {t.at("level"), t.at("index")}, t.at("seconds_left")};
+    return {{t.at("size"), t.at("samples")}, read_node(t.at("node")), t.at("seconds_left"), 0,
+            read_node(t.at("block")),        t.at("collector")};
 }
 
 nlohmann::json work_text(const std::vector<DeviceWork>& devices) {

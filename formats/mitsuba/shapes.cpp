@@ -127,8 +127,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     if (attributes)
         job.material = material_of_attributes(job, in, *bsdf);
     else
-        job.material =
-            bsdf ? build_material(builder, *bsdf, emitter != nullptr) : default_material(builder, emitter != nullptr);
+        job.material = shape_material(builder, bsdf, emitter, job.where);
     in.ignore({"silhouette_sampling_weight", "shutter_open", "shutter_close"});
     if (type == "ply" && object.version < 2) in.ignore({"srgb"});  // of colours that nothing uses
     in.finish();
