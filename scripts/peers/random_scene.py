@@ -91,7 +91,8 @@ class RandomScene:
         return self.some(f'<transform name="to_uv">{t}</transform>', 0.6)
 
     def bitmap(self, name, file, raw=False, turns=True):
-        t = string("filename", file) + string("wrap_mode", self.one("repeat", "mirror", "clamp")) + string("filter_type", self.one("nearest", "bilinear"))
+        wrap, sampled = self.one("repeat", "mirror", "clamp"), self.one("nearest", "bilinear")
+        t = string("filename", file) + string("wrap_mode", wrap) + string("filter_type", sampled if turns else "bilinear")
         return f'<texture type="bitmap" name="{name}">{t}{flag("raw") if raw or self.p(0.3) else ""}{self.to_uv(turns)}</texture>'
 
     def checker(self, name, a, b):
@@ -180,7 +181,7 @@ class RandomScene:
 
     def map(self, inner, transmits=False):
         kind = self.one("bumpmap", "normalmap")
-        if kind == "bumpmap":  # Mitsuba's derivatives of turned bitmaps are wrong
+        if kind == "bumpmap":  # Mitsuba's derivatives of turned bitmaps are wrong, and it loses light of bounces without interpolation
             t = self.bitmap("arbitrary", "heights.png", True, not self.mitsuba) + num("scale", self.u(-0.4, 0.4))
         else:
             t = self.bitmap("normalmap", "normals.png", True)
