@@ -110,7 +110,9 @@ def methods_of(scene, seed, has_mitsuba):
     bidirectional += [] if lacks_light else ["no light images"]
     bidirectional += [] if {"delta", "hidden"} & has else ["light"]  # what it cannot see
     chosen = [(choose.choice(path), "path"), ("bdpt", "path"), (choose.choice(bidirectional), "bdpt" if lacks_light else "path")]
-    return [pair for pair in chosen if not (lacks_light and pair == ("bdpt", "path"))] + ([("mitsuba", "path")] if has_mitsuba else [])
+    passes_panes = {"null", "delta_light"} <= has and "thindielectric" in scene.tags  # shadow rays of Mitsuba's volpath
+    chosen = [pair for pair in chosen if not (lacks_light and pair == ("bdpt", "path"))]
+    return chosen + ([("mitsuba", "path")] if has_mitsuba and not passes_panes else [])
 
 
 def check_scene(options, seed, totals):

@@ -74,23 +74,26 @@ class RandomScene:
     def rotation(self):
         return '<rotate x="%.5f" y="%.5f" z="%.5f" ' % self.axis() + f'angle="{self.u(-180, 180):.4f}"/>'
 
-    def place(self, size, at, affine):
+    def place(self, size, at, affine, mirrors=True):
         t = f'<scale value="{size:.4f}"/>'
         if affine and self.p(0.5):
             t = '<scale x="%.4f" y="%.4f" z="%.4f"/>' % tuple(size * self.u(0.4, 1.3) for _ in range(3))
-        t += self.some(f'<scale {self.one("x", "y", "z")}="-1"/>', 0.2)
+        mirror = self.some(f'<scale {self.one("x", "y", "z")}="-1"/>', 0.2)
+        t += mirror if mirrors else ""
         if affine and self.p(0.25):
             t += f'<matrix value="1 {self.u(-0.6, 0.6):.4f} 0 0 0 1 {self.u(-0.6, 0.6):.4f} 0 0 0 1 0 0 0 0 1"/>'
         return f'<transform name="to_world">{t}{self.rotation()}<translate x="{at[0]:.4f}" y="{at[1]:.4f}" z="{at[2]:.4f}"/></transform>'
 
-    def to_uv(self):
-        t = self.some(f'<rotate z="1" angle="{self.u(0, 360):.3f}"/>') + f'<scale x="{self.u(-4, 4):.4f}" y="{self.u(0.3, 4):.4f}"/>'
+    def to_uv(self, turns=True):
+        turn = self.some(f'<rotate z="1" angle="{self.u(0, 360):.3f}"/>')
+        t = (turn if turns else "") + f'<scale x="{self.u(-4, 4):.4f}" y="{self.u(0.3, 4):.4f}"/>'
         t += self.some(f'<translate x="{self.u(-2, 2):.4f}" y="{self.u(-2, 2):.4f}"/>')
         return self.some(f'<transform name="to_uv">{t}</transform>', 0.6)
 
-    def bitmap(self, name, file, raw=False):
-        t = string("filename", file) + string("wrap_mode", self.one("repeat", "mirror", "clamp")) + string("filter_type", self.one("nearest", "bilinear"))
-        return f'<texture type="bitmap" name="{name}">{t}{flag("raw") if raw or self.p(0.3) else ""}{self.to_uv()}</texture>'
+    def bitmap(self, name, file, raw=False, turns=True):
+        wrap, sampled = self.one("repeat", "mirror", "clamp"), self.one("nearest", "bilinear")
+        t = string("filename", file) + string("wrap_mode", wrap) + string("filter_type", sampled if turns else "bilinear")
+        return f'<texture type="bitmap" name="{name}">{t}{flag("raw") if raw or self.p(0.3) else ""}{self.to_uv(turns)}</texture>'
 
     def checker(self, name, a, b):
         return f'<texture type="checkerboard" name="{name}">{rgb("color0", a)}{rgb("color1", b)}{self.to_uv()}</texture>'
@@ -178,7 +181,10 @@ class RandomScene:
 
     def map(self, inner, transmits=False):
         kind = self.one("bumpmap", "normalmap")
-        t = self.bitmap("arbitrary", "heights.png", True) + num("scale", self.u(-0.4, 0.4)) if kind == "bumpmap" else self.bitmap("normalmap", "normals.png", True)
+        if kind == "bumpmap":  # Mitsuba's derivatives of turned bitmaps are wrong, and it loses light of bounces without interpolation
+            t = self.bitmap("arbitrary", "heights.png", True, not self.mitsuba) + num("scale", self.u(-0.4, 0.4))
+        else:
+            t = self.bitmap("normalmap", "normals.png", True)
         turn = "" if transmits and self.mitsuba else flag("flip_invalid_normals", self.p(0.5))  # docs/scenes.md
         return self.wrap(kind, t + self.some(turn + flag("use_shadowing_function", self.p(0.5))) + inner)
 
@@ -203,15 +209,18 @@ class RandomScene:
     def shape(self, size, at, emits="", quadrics=True):
         k = self.one("rectangle", "cube", "obj", "ply", "serialized", *(("sphere", "sphere", "sphere", "disk", "cylinder") if quadrics else ()))
         self.tags.add(k)
-        is_file, t = k in ("obj", "ply", "serialized"), self.some(flag("flip_normals"), 0.2)
-        if is_file:  # Mitsuba shines along vertex normals
+        t = self.some(flag("flip_normals"), 0.2)
+        turns_dark = emits and k not in ("rectangle", "disk", "cylinder")  # a closed lamp that shines inwards
+        t = "" if turns_dark else t
+        if k in ("obj", "ply", "serialized"):  # Mitsuba shines along vertex normals
             t += string("filename", f"mesh.{k}") + (flag("face_normals") if emits and self.mitsuba or self.p(0.3) else "")
         if k == "cylinder":
             t += point("point", "p0", (0, 0, self.u(-1, 0))) + point("point", "p1", (self.u(-0.5, 0.5), 0, 1)) + num("radius", self.u(0.2, 0.7))
         if k == "sphere" and self.p(0.4):
             t += point("point", "center", at) + num("radius", 0.7 * size)
         else:
-            t += self.place(size, at, k not in ("sphere", "cylinder"))
+            mirrors = not (turns_dark or emits and self.mitsuba and k == "cylinder")  # Mitsuba samples normals of mirrored cylinders wrongly
+            t += self.place(size, at, k not in ("sphere", "cylinder"), mirrors)
         if emits:
             self.has.add("area")
             self.tags.add(emits)
