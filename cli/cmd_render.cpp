@@ -87,9 +87,7 @@ size_t bytes_to_save(const Scene& scene) {
 void write_images(const Options& o, const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
                   const FilmMoments& film) {
     const Image image = mean_image(film);
-    Attributes attributes = image_attributes(scene, settings, stats);
-    attributes["light_picking"] = o.scene.light_picking;
-    write_exr(o.output, image, attributes, make_aovs(scene, settings, film, o.aovs));
+    write_exr(o.output, image, image_attributes(scene, settings, stats), make_aovs(scene, settings, film, o.aovs));
     if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
 }
 
@@ -100,7 +98,6 @@ int conclude(const Options& o, const LoadedScene& loaded, const RenderSettings& 
         nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
         json.update(found);
         json["interrupted"] = position.interrupted;
-        json["light_picking"] = o.scene.light_picking;
         write_json(o.json, json);
     }
     if (position.interrupted) {

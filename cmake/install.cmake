@@ -3,11 +3,11 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 add_library(ambilux_library INTERFACE)
-target_link_libraries(ambilux_library INTERFACE ambilux_experiments)
+target_link_libraries(ambilux_library INTERFACE ambilux_experiments ambilux_convert)
 set_target_properties(ambilux_library PROPERTIES EXPORT_NAME library)
 
 set(libraries ambilux_options ambilux_core ambilux_models ambilux_scene ambilux_transport ambilux_accel ambilux_images
-  ambilux_formats ambilux_items ambilux_queues ambilux_stages ambilux_film ambilux_integrators ambilux_backends
+  ambilux_formats ambilux_convert ambilux_items ambilux_queues ambilux_stages ambilux_film ambilux_integrators ambilux_backends
   ambilux_render ambilux_experiments ambilux_library)
 install(TARGETS ${libraries} EXPORT AmbiluxTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/ambilux
   INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ambilux)

@@ -118,6 +118,7 @@ nlohmann::json save_stats(const RenderStats& s) {
             {"build_seconds", s.build_seconds},
             {"render_seconds", s.render_seconds},
             {"samples", s.samples},
+            {"wave_paths", s.wave_paths},
             {"rays", {s.rays_extend, s.rays_occlude}},
             {"stages", stages},
             {"queues", queues},
@@ -138,6 +139,7 @@ RenderStats restore_stats(const nlohmann::json& j) {
     s.build_seconds = j.at("build_seconds");
     s.render_seconds = j.at("render_seconds");
     s.samples = j.at("samples");
+    s.wave_paths = j.value("wave_paths", 0u);  // states of older versions lack it
     s.rays_extend = j.at("rays").at(0);
     s.rays_occlude = j.at("rays").at(1);
     for (const auto& stage : j.at("stages"))

@@ -171,9 +171,8 @@ double fill_environment(Scene& scene, Emitter& emitter) {
 }
 
 bool is_masked_out(const Scene& scene, const Emitter& e) {
-    if (!is_on_surface(e.type)) return false;
-    const ParamFloat& opacity = scene.materials[scene.shapes[e.shape].material].opacity;
-    return opacity.texture < 0 && !(opacity.value > 0);
+    if (!is_on_surface(e.type) || has_delta_position(e.type)) return false;
+    return scene.materials[scene.shapes[e.shape].material].unseen();
 }
 
 // Power of an emitter, luminance of watts, one function a model.
@@ -213,7 +212,12 @@ double power(ModelTag<DirectionalAreaEmitter>, Scene& scene, Emitter& e, const R
     return scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
 }
 
+double power(ModelTag<HiddenAreaEmitter>, Scene& scene, Emitter& e, const Receivers&) {
+    return M_PI * scene.shapes[e.shape].area * mean_luminance(scene, e.radiance);
+}
+
 void fill_emitters(Scene& scene, LightPicking picking) {
+    scene.light_picking = name_of(picking);
     scene.emitter_cdf = {0.0f};
     if (scene.emitters.empty()) return;
     const Receivers receivers = receivers_of(scene);

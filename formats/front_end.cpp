@@ -9,6 +9,7 @@ Scene load_by(const std::string& path, const LoadOptions& options,
     mitsuba::Document document;
     document.limits = options.limits;
     document.smooth_normals = false;
+    document.mirrors_turn_in = false;
     document.scene = &mitsuba::add_object(document, "scene", "", {path, 0});
     {
         const ScopedSeconds clock(options.times ? &options.times->read : nullptr);

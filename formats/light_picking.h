@@ -7,6 +7,7 @@
 namespace ambilux {
 
 enum class LightPicking : uint32_t { power, uniform };
+inline const char* name_of(LightPicking picking) { return picking == LightPicking::uniform ? "uniform" : "power"; }
 
 /// Share of all picks that finite emitters get at least, and that emitters at infinity get at least, where there are
 /// both. Powers of the two do not compare: how much light comes from infinity depends on how the scene is closed, which

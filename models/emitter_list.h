@@ -1,9 +1,9 @@
 // The emitters there are: the only list of them, and what each says of itself.
 //
 // - plugin: its name in Mitsuba's scene files;
-// - surface: it is part of a shape, and rays can meet it;
+// - surface: it is part of a shape, which rays can meet unless its position is a delta;
 // - delta_position, delta_direction: its light starts at one point, or leaves in one direction, so that no ray finds it
-//   by chance;
+//   by chance; a hidden area draws that point anew for each sample;
 // - infinite: its light comes from outside of the scene.
 //
 // Functions are in transport/emitter/, plugins in formats/mitsuba/emitters.cpp, powers in formats/finalize.cpp.
@@ -51,20 +51,25 @@ struct DirectionalAreaEmitter {
     static constexpr const char* plugin = "directionalarea";
     static constexpr bool surface = true, delta_position = false, delta_direction = true, infinite = false;
 };
+struct HiddenAreaEmitter {
+    static constexpr const char* plugin = "hiddenarea";
+    static constexpr bool surface = true, delta_position = true, delta_direction = false, infinite = false;
+};
 
 }  // namespace ambilux
 
 /// X(model, name): the struct and the name in messages and files.
-#define AMBILUX_EMITTERS(X)            \
-    X(AreaEmitter, area)               \
-    X(PointEmitter, point)             \
-    X(SpotEmitter, spot)               \
-    X(DirectionalEmitter, directional) \
-    X(ConstantEmitter, constant)       \
-    X(EnvmapEmitter, envmap)           \
-    X(ProjectorEmitter, projector)     \
-    X(CollimatedEmitter, collimated)   \
-    X(DirectionalAreaEmitter, directional_area)
+#define AMBILUX_EMITTERS(X)                     \
+    X(AreaEmitter, area)                        \
+    X(PointEmitter, point)                      \
+    X(SpotEmitter, spot)                        \
+    X(DirectionalEmitter, directional)          \
+    X(ConstantEmitter, constant)                \
+    X(EnvmapEmitter, envmap)                    \
+    X(ProjectorEmitter, projector)              \
+    X(CollimatedEmitter, collimated)            \
+    X(DirectionalAreaEmitter, directional_area) \
+    X(HiddenAreaEmitter, hidden_area)
 
 namespace ambilux {
 
@@ -78,7 +83,7 @@ concept EmitterModel = requires {
     { (Model::delta_position) } -> std::same_as<const bool&>;
     { (Model::delta_direction) } -> std::same_as<const bool&>;
     { (Model::infinite) } -> std::same_as<const bool&>;
-    requires Model::surface + Model::delta_position + Model::infinite == 1;
+    requires Model::infinite != (Model::surface || Model::delta_position);
 };
 template <class, EmitterModel... Models>
 using EmitterModelsOf = ModelList<Models...>;

@@ -92,6 +92,7 @@ public:
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;
+        s.wave_paths = policy_.waves.order_slots(wave_.slot_count());
         s.memory_bytes = s.memory_bytes_predicted = fixed_bytes().total();
         s.memory_bytes_peak = peak_;
         const Layout* largest = &waves_[0].layout;

@@ -132,6 +132,7 @@ public:
         s.build_seconds = build_seconds_;
         s.render_seconds = render_seconds_;
         s.samples = samples_;
+        s.wave_paths = policy_.waves.order_slots(plan_.wave.slot_count());
         if (memory_.size() > 0) read_counts();
         fill_stage_stats(layout_.record_names(), records_, s);
         fill_queue_stats(layout_, {counters_.data()}, s);

@@ -62,6 +62,7 @@ struct RenderStats {
     double build_seconds = 0;   ///< acceleration structure, upload, allocation
     double render_seconds = 0;  ///< inside render(), wall clock
     uint64_t samples = 0;       ///< per pixel
+    uint32_t wave_paths = 0;    ///< in flight at once in a wave (on a CPU each thread has one); 0: no waves
     uint64_t rays_extend = 0, rays_occlude = 0;
     std::vector<StageStats> stages;
     std::vector<QueueStats> queues;

@@ -30,6 +30,7 @@ struct Scene {
     std::vector<std::string> notes;     ///< what is done in another way than the file says, with the same image
     uint64_t degenerate_triangles = 0;  ///< triangles without area that the loader left out
     IntegratorHint integrator;
+    std::string light_picking = "power";  ///< how next event estimation and light subpaths choose an emitter
 
     std::vector<MeshVertex> vertices;
     std::vector<Triangle> triangles;

@@ -60,13 +60,13 @@ struct alignas(64) Face {
 };
 
 /// Analytic shape. Local forms: unit sphere at the origin; unit disk z = 0, normal +z; cylinder x²+y² = 1, 0 <= z <= 1,
-/// normal outwards. `to_world` holds scale (radius, length), rotation and translation; scale is uniform for sphere and
-/// disk, uniform in xy for the cylinder. `flip` reverses the normal.
+/// normal outwards. `to_world` holds scale (radius, length), rotation and translation; scale is uniform for the
+/// sphere, uniform in xy for the cylinder. A disk has any affine map. `flip` reverses the normal.
 struct Quadric {
     PrimitiveType type;
     uint32_t shape;
     uint32_t flip;
-    float radius;  ///< of sphere, disk, cylinder in world units
+    float radius;  ///< of sphere and cylinder in world units; a bound of a disk's
     Affine to_world, to_local;
 };
 
@@ -117,6 +117,8 @@ struct Material {
 
     /// False if every ray meets it.
     AMBILUX_HD bool lets_pass() const { return opacity.texture >= 0 || !(opacity.value >= 1.0f); }
+    /// True if no ray meets it.
+    bool unseen() const { return opacity.texture < 0 && !(opacity.value > 0.0f); }
 };
 
 // ---- emitters ----
@@ -130,10 +132,11 @@ struct EnvironmentCell {
 };
 
 /// Emitter. `radiance` holds, in this order of types: radiance, intensity (W/sr), intensity, perpendicular irradiance,
-/// radiance, radiance scale, intensity along the axis, power, power per area.
+/// radiance, radiance scale, intensity along the axis, power, power per area,
+/// radiance.
 struct Emitter {
     EmitterType type;
-    uint32_t shape;     ///< area, directional_area: its shape
+    uint32_t shape;     ///< area, directional_area, hidden_area: its shape
     uint32_t area_cdf;  ///< area over triangles: primitive_count+1 floats in tables, and then the density per area on
                         ///< each; kNone for a single primitive
     float pick_probability;      ///< chance that light sampling picks this emitter

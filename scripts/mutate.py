@@ -128,14 +128,18 @@ class Workspace:
 
     def broken(self):
         """Faults that do not compile, by the compiler's messages about a few files that include all of the others."""
-        commands = json.loads((self.build / "compile_commands.json").read_text())
         found, lines = set(), set()
-        for entry in commands:
-            if re.search(r"/((?:bdpt|path|learned)_All|bsdf_plugins|film/\w+|test_stages|test_bidirectional_stages)\.cpp$", entry["file"]):
-                command = re.sub(r"^\S*ccache ", "", re.sub(r" -o \S+", "", entry["command"])) + " -fsyntax-only -w -fmax-errors=0"
-                errors = run(command, shell=True, cwd=entry["directory"]).stderr
-                lines |= {(os.path.relpath(os.path.normpath(Path(entry["directory"]) / m[1]), self.source), int(m[2]))
-                          for m in re.finditer(r"^(\S+?):(\d+):(?:\d+:)?\s+(?:error|required from)", errors, re.MULTILINE)}
+
+        def errors(entry):
+            command = re.sub(r"^(env \S+ )?\S*ccache ", "", re.sub(r" -o \S+", "", entry["command"])) + " -fsyntax-only -w -fmax-errors=0"
+            return {(os.path.relpath(os.path.normpath(Path(entry["directory"]) / m[1]), self.source), int(m[2]))
+                    for m in re.finditer(r"^(\S+?):(\d+):(?:\d+:)?\s+(?:error|required from)", run(command, shell=True, cwd=entry["directory"]).stderr, re.MULTILINE)}
+
+        including = r"/((?:bdpt|path|learned)_All|bsdf_plugins|film/\w+|test_stages|test_bidirectional_stages)\.cpp$"
+        commands = [c for c in json.loads((self.build / "compile_commands.json").read_text()) if re.search(including, c["file"])]
+        with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+            for of_file in pool.map(errors, commands):
+                lines |= of_file
         for number, site in self.faults.items():
             # The rewritten file has one line more, the include.
             found |= {number for file, line in lines if file == site.file and site.line <= line - 1 <= site.last_line}
@@ -161,15 +165,16 @@ class Workspace:
         say(f"{len(sites)} places for faults in {len(self.sources)} files")
         dropped = set()
         self.copy()
-        while True:
-            drawn = mutation_sites.draw(sites, count, random.Random(seed), dropped)
-            self.faults = dict(enumerate(drawn, 1))
-            self.rewrite(), self.configure()
-            broken = self.broken()
-            say(f"{count} faults drawn, {len(broken)} of them do not compile")
-            if not broken:
-                break
-            dropped |= {self.faults[k] for k in broken}
+        # One error hides others, so that it takes several rounds. Twice as many first: those that take the place of broken ones are among them.
+        for tried in (2 * count, count):
+            broken = True
+            while broken:
+                drawn = mutation_sites.draw(sites, tried, random.Random(seed), dropped)
+                self.faults = dict(enumerate(drawn, 1))
+                self.rewrite(), self.configure()
+                broken = self.broken()
+                say(f"{len(drawn)} faults drawn, {len(broken)} of them do not compile")
+                dropped |= {self.faults[k] for k in broken}
         known.write_text(json.dumps({"key": key, "faults": {k: vars(s) for k, s in self.faults.items()}}, indent=1))
 
     def compile(self):
@@ -207,8 +212,11 @@ class Workspace:
         """(item, function(item)) as they are ready, as many at a time as there are jobs."""
         with concurrent.futures.ThreadPoolExecutor(self.jobs) as pool:
             running = {pool.submit(function, item): item for item in items}
-            for done in concurrent.futures.as_completed(running):
-                yield running[done], done.result()
+            try:
+                for done in concurrent.futures.as_completed(running):
+                    yield running[done], done.result()
+            finally:
+                pool.shutdown(cancel_futures=True)
 
     def reach(self, test_and_case):
         """Verdict, seconds and reached faults of a case without a fault."""
@@ -227,7 +235,10 @@ class Workspace:
             stamp = hashlib.sha256(program.read_bytes()).hexdigest()
             if cases.get(test, {}).get("stamp") == stamp:
                 continue
-            names = list(filter(None, map(str.strip, run([program, "--list-test-names-only"]).stdout.splitlines())))
+            listed = run([program, "--list-test-names-only"])
+            if "Unrecognised token" in listed.stdout + listed.stderr:  # Catch2 3
+                listed = run([program, "--list-tests", "--verbosity", "quiet"])
+            names = list(filter(None, map(str.strip, listed.stdout.splitlines())))
             waiting += [(test, case) for case in names]
             cases[test] = {"stamp": stamp, "cases": {}}
         for (test, case), (verdict, seconds, reached) in self.side_by_side(self.reach, waiting):
@@ -241,16 +252,6 @@ class Workspace:
         order = [(c["seconds"], test, name, set(c["reached"])) for test in self.tests for name, c in cases[test]["cases"].items()]
         return sorted(order, key=lambda c: c[:3])
 
-    def try_fault(self, number, cases):
-        reaching = [c for c in cases if number in c[3]]
-        spent = 0
-        for seconds, test, case, _ in reaching:
-            verdict, took = self.run_case(test, case, number, limit=30 + 10 * seconds)
-            spent += took
-            if verdict != "pass":
-                return {"fault": number, "killed": True, "by": f"{test}: {case}", "how": verdict, "seconds": round(spent, 1)}
-        return {"fault": number, "killed": False, "by": f"{len(reaching)} cases reach it", "how": "survived", "seconds": round(spent, 1)}
-
     def results(self):
         path = self.folder / "results.jsonl"
         lines = path.read_text().splitlines() if path.exists() else []
@@ -258,13 +259,32 @@ class Workspace:
 
     def run_faults(self, numbers):
         cases = self.baseline()
-        done, began = 0, time.time()
-        for number, result in self.side_by_side(lambda number: self.try_fault(number, cases), numbers):
+        reaching = {number: [c for c in cases if number in c[3]] for number in numbers}
+        left, spent, killed, began = {k: len(reaching[k]) for k in numbers}, dict.fromkeys(numbers, 0.0), {}, time.time()
+
+        def try_case(number_and_case):
+            number, (seconds, test, case, _) = number_and_case
+            return ("skipped", 0) if number in killed else self.run_case(test, case, number, limit=30 + 10 * seconds)
+
+        def conclude(number, how, by):
+            result = {"fault": number, "killed": how != "survived", "by": by, "how": how, "seconds": round(spent[number], 1)}
             with open(self.folder / "results.jsonl", "a") as f:
                 f.write(json.dumps(result) + "\n")
-            done += 1
-            left = (time.time() - began) / done * (len(numbers) - done)
-            say(f"[{done}/{len(numbers)}, {left / 60:.0f} min left] {number} {result['how']} ({result['by']}; {result['seconds']} s): {self.faults[number].describe()}")
+            done = len(killed) + sum(not left[k] for k in numbers if k not in killed)
+            minutes = (time.time() - began) / done * (len(numbers) - done) / 60
+            say(f"[{done}/{len(numbers)}, {minutes:.0f} min left] {number} {how} ({by}; {result['seconds']} s): {self.faults[number].describe()}")
+
+        for number in (k for k in numbers if not left[k]):
+            conclude(number, "survived", "0 cases reach it")
+        # Cases of a fault side by side, since a survivor has to pass all of them.
+        for (number, case), (verdict, took) in self.side_by_side(try_case, [(k, c) for k in numbers for c in reaching[k]]):
+            spent[number] += took
+            left[number] -= 1
+            if verdict not in ("pass", "skipped") and number not in killed:
+                killed[number] = True
+                conclude(number, verdict, f"{case[1]}: {case[2]}")
+            elif not left[number] and number not in killed:
+                conclude(number, "survived", f"{len(reaching[number])} cases reach it")
 
 
 def flat(text):

@@ -201,7 +201,7 @@ class Finder:
             kinds += "|return "
         for m in re.finditer(kinds, self.masked[low:high]):
             start, end = _trim(self.masked, low + m.end(), _right(self.masked, low + m.end(), high, ()))
-            if end < high and self.masked[end] in ";,":
+            if end < high and self.masked[end] in ";," and not re.fullmatch(r"0(\.0)?f?", self.text[start:end]):
                 self.add("value 1 % too large", start, end, f"({self.text[start:end]}) * 1.01f")
 
     def statements(self, low, high):

@@ -20,12 +20,16 @@ fi
 status=0
 ctest --test-dir "$build" --output-on-failure --no-tests=error -j "$(nproc)" \
   --output-junit "$results/ctest.xml" --test-output-size-passed 65536 "${selection[@]}" "$@" </dev/null || status=$?
-"$python" -m pytest -q -p no:cacheprovider analysis --junitxml "$results/pytest.xml" </dev/null || status=$?
+# Each suite of Python keeps one core busy.
+"$python" -m pytest -q -p no:cacheprovider analysis --junitxml "$results/pytest.xml" </dev/null >"$results/pytest.log" 2>&1 &
+analysis_tests=$!
 python_tests=()
 if [[ -d $build/python/ambilux ]]; then
   python_tests=("$results/python.xml")
   PYTHONPATH="$build/python:$root" "$python" -m pytest -q -p no:cacheprovider python --junitxml "${python_tests[0]}" </dev/null ||
     status=$?
 fi
+wait "$analysis_tests" || status=$?
+cat "$results/pytest.log"
 "$python" scripts/count_tests.py "$results/ctest.xml" "$results/pytest.xml" "${python_tests[@]}" || status=1
 exit "$status"

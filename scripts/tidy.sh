@@ -7,7 +7,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 tidy="$root/.venv/bin/clang-tidy"
 [[ -x $tidy ]] || { say "tidy: $tidy is not there; run scripts/setup.sh first"; exit 4; }
 database="$root/build-tidy"
-cmake -S "$root" -B "$database" -G Ninja -DAMBILUX_CUDA=OFF >/dev/null
+cmake -S "$root" -B "$database" -G Ninja -DAMBILUX_CUDA=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON >/dev/null
 cmake --build "$database" --target ambilux_version >/dev/null  # a header that a source includes
 
 # Of the generated renderers those with all features, which hold the code of the others.

@@ -9,7 +9,7 @@ set(work ${BUILD}/install-consumer)
 file(REMOVE_RECURSE ${work})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${work}/prefix)
 run(${CMAKE_COMMAND} -S ${SOURCE}/examples/library -B ${work}/build -G Ninja -DCMAKE_PREFIX_PATH=${work}/prefix
-  -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER})
+  "-DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}")
 run(${CMAKE_COMMAND} --build ${work}/build)
 run(${work}/build/first_render ${SOURCE}/scenes/cornell.xml ${work}/a.exr)
 run(${work}/prefix/bin/ambilux compare ${work}/a.exr ${work}/a.exr)

@@ -8,6 +8,7 @@
 #include "transport/emitter/directional.h"
 #include "transport/emitter/directional_area.h"
 #include "transport/emitter/envmap.h"
+#include "transport/emitter/hidden_area.h"
 #include "transport/emitter/point.h"
 #include "transport/emitter/projector.h"
 #include "transport/emitter/spot.h"

@@ -93,6 +93,9 @@ void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
         case EmitterType::area: return add_color(w, add_object(parent, "emitter", "area"), "radiance", e.radiance);
         case EmitterType::directional_area:
             return add_color(w, add_object(parent, "emitter", "directionalarea"), "radiance", e.radiance);
+        case EmitterType::hidden_area:
+            add_color(w, add_object(parent, "emitter", "hiddenarea"), "radiance", e.radiance);
+            return w.note("Mitsuba 3 has no emitter 'hiddenarea'");
         case EmitterType::collimated: {
             xml_node node = add_object(parent, "emitter", "collimated");
             const Frame frame = frame_from_normal(e.direction);

@@ -1,4 +1,7 @@
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "formats/file_budget.h"
@@ -87,6 +90,19 @@ std::vector<double> accessor_values(const Context& context, int index, int compo
         const double to = component(at.first + i * at.stride, s.indices.componentType, false);
         if (!(to >= 0 && to < double(a.count))) fail("a sparse value has no place");
         copy(values, i, &out[size_t(to) * size_t(components)]);
+    }
+    return out;
+}
+
+std::vector<uint32_t> accessor_indices(const Context& context, int index, int components, size_t limit,
+                                       const std::string& what) {
+    const std::vector<double> values = accessor_values(context, index, components, what);
+    std::vector<uint32_t> out;
+    out.reserve(values.size());
+    for (const double v : values) {
+        if (!(v >= 0 && v < double(limit) && v == std::floor(v)))
+            context.fail(fmt::format("{}: index {:g} of {}", what, v, limit));
+        out.push_back(uint32_t(v));
     }
     return out;
 }

@@ -51,16 +51,14 @@ void put_on_skin(Context& context, Mesh& mesh, const tinygltf::Primitive& primit
         const int of_joints = attribute(primitive.attributes, "JOINTS" + tail),
                   of_weights = attribute(primitive.attributes, "WEIGHTS" + tail);
         if (of_joints < 0 || of_weights < 0) break;
-        const std::vector<double> joint = accessor_values(context, of_joints, 4, what + ", JOINTS" + tail),
-                                  weight = accessor_values(context, of_weights, 4, what + ", WEIGHTS" + tail);
+        const std::vector<uint32_t> joint =
+            accessor_indices(context, of_joints, 4, joints.size(), what + ", JOINTS" + tail);
+        const std::vector<double> weight = accessor_values(context, of_weights, 4, what + ", WEIGHTS" + tail);
         if (joint.size() != 4 * n || weight.size() != 4 * n)
             context.fail(what + ": joints and weights are not given for every vertex");
         for (size_t i = 0; i < 4 * n; ++i) {
-            if (!(joint[i] >= 0 && joint[i] < double(joints.size())))
-                context.fail(what + ": joint " + std::to_string(int64_t(joint[i])) + " of " +
-                             std::to_string(joints.size()));
-            if (set == 0 && i % 4 == 0) first[i / 4] = size_t(joint[i]);
-            const Matrix& m = joints[size_t(joint[i])];
+            if (set == 0 && i % 4 == 0) first[i / 4] = joint[i];
+            const Matrix& m = joints[joint[i]];
             for (int r = 0; r < 3; ++r)
                 for (int c = 0; c < 4; ++c) sums[i / 4].m[r][c] += weight[i] * m.m[r][c];
             total[i / 4] += weight[i];
@@ -133,12 +131,7 @@ Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int 
     if (colors.alpha_varies) mesh.attributes.push_back({"vertex_alpha", false, 1, colors.alphas});
     std::vector<uint32_t> indices;
     if (primitive.indices >= 0) {
-        for (double i : accessor_values(context, primitive.indices, 1, what + ", indices")) {
-            if (!(i >= 0 && i < double(mesh.positions.size())))
-                context.fail(what + ": index " + std::to_string(int64_t(i)) + " of " +
-                             std::to_string(mesh.positions.size()) + " vertices");
-            indices.push_back(uint32_t(i));
-        }
+        indices = accessor_indices(context, primitive.indices, 1, mesh.positions.size(), what + ", indices");
     } else {
         for (uint32_t i = 0; i < mesh.positions.size(); ++i) indices.push_back(i);
     }

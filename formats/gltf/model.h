@@ -43,6 +43,9 @@ void read_model(Context& context, const std::string& path);
 /// All values of an accessor, `components` of each element, normalized integers as shares of 1. Checked against the
 /// buffers. `what` is for messages.
 std::vector<double> accessor_values(const Context& context, int accessor, int components, const std::string& what);
+/// The same where all values must be whole numbers from 0 to below `limit`.
+std::vector<uint32_t> accessor_indices(const Context& context, int accessor, int components, size_t limit,
+                                       const std::string& what);
 
 /// The bytes of a view, which lie inside of its buffer. Throws Error(bad_input).
 std::pair<const unsigned char*, uint64_t> view_bytes(const Context& context, int index, const std::string& what);

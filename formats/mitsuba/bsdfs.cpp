@@ -308,8 +308,15 @@ uint32_t build_own_material(Builder& builder, const Object& bsdf) {
     return MaterialBuilder{builder}.build(bsdf, {}, Place::outside);
 }
 
-uint32_t default_material(Builder& builder, bool emitter) {
-    uint32_t& known = builder.default_materials[emitter];
+uint32_t shape_material(Builder& builder, const Object* bsdf, const Object* emitter, const Where& where) {
+    if (emitter && emitter->type == HiddenAreaEmitter::plugin) {
+        const uint32_t index = bsdf ? build_material(builder, *bsdf) : kNone;
+        const bool unseen = bsdf && (builder.validate_only || builder.scene.materials[index].unseen());
+        if (!unseen) throw input_error(where.file, where.line, "a shape with emitter 'hiddenarea' needs bsdf 'null'");
+        return index;
+    }
+    if (bsdf) return build_material(builder, *bsdf, emitter != nullptr);
+    uint32_t& known = builder.default_materials[emitter != nullptr];
     if (known != kNone) return known;
     builder.scene.bsdfs.push_back(diffuse_record(emitter ? 0.0f : 0.5f));
     const uint32_t record = uint32_t(builder.scene.bsdfs.size() - 1);

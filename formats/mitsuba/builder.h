@@ -144,8 +144,8 @@ Rgb mean_color(const Builder& builder, const ParamRgb& parameter);
 uint32_t build_material(Builder& builder, const Object& bsdf, bool emits = false);
 /// The same for one shape alone: with Builder::attribute_textures.
 uint32_t build_own_material(Builder& builder, const Object& bsdf);
-/// Diffuse material for shapes without a BSDF: reflectance 0.5, on emitters 0.
-uint32_t default_material(Builder& builder, bool emitter);
+/// The material of the shape at `where`; without a BSDF it is diffuse, of reflectance 0.5, on emitters 0.
+uint32_t shape_material(Builder& builder, const Object* bsdf, const Object* emitter, const Where& where);
 
 /// All shapes, with their area emitters.
 void build_shapes(Builder& builder, const Object& scene);

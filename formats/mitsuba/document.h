@@ -79,6 +79,7 @@ struct Document {
     uint64_t made_texels = 0;             ///< bytes of images that front ends made (take_texels)
     std::set<const Object*> light_backs;  ///< shapes that are the other side of another one's light, just behind it
     bool smooth_normals = true;           ///< meshes without normals get smooth ones, as in Mitsuba
+    bool mirrors_turn_in = true;          ///< mirrored meshes of files, and spheres, turn in, as in Mitsuba 2 and 3
 
     /// Path of a file named in `where.file`: relative to that file's folder, then to the <path> folders, then to the
     /// main file's. Throws Error(bad_input) if there is none.

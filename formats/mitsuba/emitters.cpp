@@ -119,6 +119,11 @@ void read_plugin(ModelTag<DirectionalAreaEmitter>, Builder&, Reader& in, Emitter
     e.radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
 }
 
+/// Of pbrt, for scenes that are converted.
+void read_plugin(ModelTag<HiddenAreaEmitter>, Builder&, Reader& in, Emitter& e) {
+    e.radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
+}
+
 void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter& e) {
     const Matrix m = without_place(rigid_transform(builder, in));
     e.to_world = to_affine(m);

@@ -105,7 +105,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     job.flip = in.boolean("flip_normals", false);
     job.light_back = builder.document.light_backs.contains(&object);
     job.reverse = determinant(job.to_world) < 0;
-    if (object.version >= 2 && (is_mesh_file(type) || type == "sphere")) {
+    if (builder.document.mirrors_turn_in && object.version >= 2 && (is_mesh_file(type) || type == "sphere")) {
         // In Mitsuba 3 a mirrored mesh keeps the order of its corners, whose outside so turns in, and so does that of a
         // sphere. An instance keeps it.
         const bool mirrored = determinant(in.transform("to_world")) < 0;
@@ -127,8 +127,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     if (attributes)
         job.material = material_of_attributes(job, in, *bsdf);
     else
-        job.material =
-            bsdf ? build_material(builder, *bsdf, emitter != nullptr) : default_material(builder, emitter != nullptr);
+        job.material = shape_material(builder, bsdf, emitter, job.where);
     in.ignore({"silhouette_sampling_weight", "shutter_open", "shutter_close"});
     if (type == "ply" && object.version < 2) in.ignore({"srgb"});  // of colours that nothing uses
     in.finish();

@@ -82,12 +82,27 @@ uint32_t grid_size(const std::vector<Texture>& parts, const std::vector<Placed>&
 
 }  // namespace
 
+Rgb evaluate(const Texture& texture, const SurfacePlace& place) {
+    if (texture.is_constant()) return texture.color;
+    if (texture.kind == Texture::Kind::solid) return texture.color * (*texture.solid)(place);
+    double s = place.u, t = place.v;
+    if (texture.projection) {
+        const Vec2f st = coordinates(*texture.projection, place.p);
+        s = double(st.x), t = double(st.y);
+    }
+    const auto& m = texture.mapping.m;
+    return lookup(texture, m[0][0] * s + m[0][1] * t + m[0][2], m[1][0] * s + m[1][1] * t + m[1][2]);
+}
+
 Texture Textures::fold(const Parameters& in, const std::vector<Texture>& parts,
                        const std::function<Rgb(const std::vector<Rgb>&)>& f) {
     Texture out;
     // The kind of the first that is no constant, whose coordinates all others must have.
     const Texture* model = nullptr;
     bool fits = true;
+    for (const Texture& part : parts)
+        if (part.kind == Texture::Kind::solid)
+            return solid_of(in.where, parts, [f](const std::vector<Rgb>& c, const SurfacePlace&) { return f(c); });
     for (const Texture& part : parts) {
         if (part.is_constant()) continue;
         if (part.kind == Texture::Kind::image) load_texels(*part.image);

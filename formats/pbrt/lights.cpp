@@ -159,11 +159,11 @@ void add_light(SceneMaker& scene, const Described& light) {
     light.in.finish(scene.report);
 }
 
-const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area) {
+const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area, bool hidden) {
     const Parameters& in = light.in;
     if (in.type != "diffuse") fail(in.where, "area light '" + in.type + "' is not known: diffuse is");
     if (in.boolean("twosided", false)) area *= 2;
-    Object& object = add_object(scene.document, "emitter", "area", in.where);
+    Object& object = add_object(scene.document, "emitter", hidden ? "hiddenarea" : "area", in.where);
     const Emission e = emission(scene, light, "L");
     const std::string name = in.text("filename", "");
     const bool has_power = in.number("power", -1) > 0;

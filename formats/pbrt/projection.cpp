@@ -9,14 +9,13 @@ namespace {
 using mitsuba::Matrix;
 using mitsuba::Vec3d;
 
-Vec3d placed(const Matrix& m, Vec3f p) {
-    const auto row = [&](int i) {
-        return m.m[i][0] * double(p.x) + m.m[i][1] * double(p.y) + m.m[i][2] * double(p.z) + m.m[i][3];
-    };
+Vec3d placed(const Matrix& m, Vec3d p) {
+    const auto row = [&](int i) { return m.m[i][0] * p.x + m.m[i][1] * p.y + m.m[i][2] * p.z + m.m[i][3]; };
     return {row(0), row(1), row(2)};
 }
+Vec3d placed(const Matrix& m, Vec3f p) { return placed(m, Vec3d{p.x, p.y, p.z}); }
 
-Vec2f coordinates(const Projection& projection, Vec3d p) {
+Vec2f in_texture(const Projection& projection, Vec3d p) {
     const double phi = std::atan2(p.y, p.x);
     switch (projection.kind) {
         case Projection::Kind::cylindrical: return {float((M_PI + phi) / (2 * M_PI)), float(p.z)};
@@ -30,6 +29,10 @@ Vec2f coordinates(const Projection& projection, Vec3d p) {
 }
 
 }  // namespace
+
+Vec2f coordinates(const Projection& projection, Vec3d world) {
+    return in_texture(projection, placed(projection.to_texture, world));
+}
 
 bool Projection::same(const Projection& other) const {
     const auto equal = [](Vec3d a, Vec3d b) { return a.x == b.x && a.y == b.y && a.z == b.z; };
@@ -45,7 +48,7 @@ Mesh projected(const Mesh& mesh, const Matrix& to_world, const Projection& proje
     if (projection.kind == Projection::Kind::planar) {
         out = mesh;
         out.uvs.clear();
-        for (const Vec3f& p : mesh.positions) out.uvs.push_back(coordinates(projection, placed(m, p)));
+        for (const Vec3f& p : mesh.positions) out.uvs.push_back(in_texture(projection, placed(m, p)));
         return out;
     }
     float Vec2f::* const turn = projection.kind == Projection::Kind::cylindrical ? &Vec2f::x : &Vec2f::y;
@@ -59,7 +62,7 @@ Mesh projected(const Mesh& mesh, const Matrix& to_world, const Projection& proje
             on_axis[k] = std::hypot(p.x, p.y) <= 1e-6 * length(p);
             out.positions.push_back(mesh.positions[face[k]]);
             if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[face[k]]);
-            out.uvs.push_back(coordinates(projection, p));
+            out.uvs.push_back(in_texture(projection, p));
             if (!on_axis[k]) most = std::fmax(most, out.uvs.back().*turn);
         }
         for (size_t k = 0; k < 3; ++k) {

@@ -16,6 +16,9 @@ struct Projection {
     bool same(const Projection& other) const;
 };
 
+/// (s,t) of a place in the world.
+Vec2f coordinates(const Projection& projection, mitsuba::Vec3d world);
+
 /// The mesh with the (s,t) that its corners have in the world, linear over each triangle. Those of cylinders and
 /// spheres do not jump back within a triangle.
 Mesh projected(const Mesh& mesh, const mitsuba::Matrix& to_world, const Projection& projection);

@@ -97,8 +97,9 @@ Object* add_curves(SceneMaker& scene, const Parameters& in, const std::vector<Cu
 /// Makes the meshes, once all curves are known: the more there are, the fewer sides they have.
 void finish_curves(SceneMaker& scene);
 void add_light(SceneMaker& scene, const Described& light);
-/// The emitter of a shape. `area`: of the shape as pbrt measures it for the parameter power; 0: not known.
-const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area);
+/// The emitter of a shape. `area`: of the shape as pbrt measures it for the parameter power; 0: not known. `hidden`: no
+/// ray meets it.
+const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area, bool hidden);
 
 /// BSDF of a material, two-sided unless it transmits light; null material: diffuse.
 const Object* surface_material(SceneMaker& scene, const Shared& material, Surface surface);

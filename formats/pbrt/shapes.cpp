@@ -8,6 +8,7 @@
 #include "formats/meshes/loop_subdivision.h"
 #include "formats/pbrt/cut_quadrics.h"
 #include "formats/pbrt/scene.h"
+#include "formats/pbrt/solid_baking.h"
 
 namespace ambilux::pbrt {
 
@@ -228,8 +229,10 @@ Mesh own_mesh(SceneMaker& scene, const Parameters& in, double& exact_area) {
     return loop_subdivision(scene, in);
 }
 
-/// `textured`: something on it needs coordinates, which `projection`, if any, gives.
-Placed add_mesh(SceneMaker& scene, const Parameters& in, bool textured, const Projection* projection) {
+/// `textured`: something on it needs coordinates, which `projection`, if any, gives. `solid`: a BSDF with solid
+/// textures, which is replaced by one with images; else null.
+Placed add_mesh(SceneMaker& scene, const Parameters& in, bool textured, const Projection* projection,
+                const Object** solid) {
     Placed out;
     double exact_area = 0;
     Mesh mesh;
@@ -240,7 +243,7 @@ Placed add_mesh(SceneMaker& scene, const Parameters& in, bool textured, const Pr
             scene.report.refuse(in.where_of("displacement"), "displacement of meshes is not supported",
                                 "it is left out");
         in.ignore({"displacement", "edgelength", "displacement.edgelength"});
-        if (!textured || (!projection && has_uvs(path))) {
+        if (!textured || (!projection && !solid && has_uvs(path))) {
             out.object = &add_object(scene.document, "shape", "ply", in.where);
             set_text(*out.object, "filename", path);
             return out;
@@ -257,6 +260,11 @@ Placed add_mesh(SceneMaker& scene, const Parameters& in, bool textured, const Pr
         mesh = projected(mesh, scene.state.ctm, *projection);
     else if (mesh.uvs.empty() && textured)
         mesh = with_default_uvs(mesh);
+    if (solid) {
+        BakedMesh baked = bake_solids(scene, in.where, mesh, scene.state.ctm, **solid);
+        mesh = std::move(baked.mesh);
+        *solid = baked.bsdf;
+    }
     out.area = is_file ? 0 : exact_area > 0 ? exact_area : triangle_area(mesh, scene.state.ctm);
     out.object = &add_object(scene.document, "shape", "mesh", in.where);
     const std::string name =
@@ -271,15 +279,18 @@ const Object* masked(SceneMaker& scene, const Parameters& in, const Object* bsdf
     const Parameter* alpha = in.find("alpha");
     if (!alpha) return bsdf;
     const Texture opacity = scene.textures.number(in, "alpha", 1);
-    if (opacity.is_constant() && opacity.color.x <= 0 && scene.state.area_light) {
-        scene.report.refuse(alpha->where, "a light of alpha 0, which shines unseen, is not supported", "it is seen");
-        return bsdf;
-    }
     if (opacity.is_constant() && !(opacity.color.x < 1)) return bsdf;
     Object& mask = add_object(scene.document, "bsdf", "mask", alpha->where);
     scene.textures.set_number(mask, "opacity", opacity, uv);
     add_child(mask, *bsdf);
     return &mask;
+}
+
+/// A light of alpha 0: it lights what there is, and no ray meets it.
+bool shines_unseen(SceneMaker& scene, const Parameters& in) {
+    if (!scene.state.area_light || scene.open_object || !in.find("alpha")) return false;
+    const Texture opacity = scene.textures.number(in, "alpha", 1);
+    return opacity.is_constant() && opacity.color.x <= 0;
 }
 
 /// A light of two sides is two shapes.
@@ -306,11 +317,22 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
         fail(in.where,
              "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
     Surface surface = quadric ? surface_of(type) : Surface::mesh;
-    const auto surface_bsdf = [&] {
+    const bool hidden = shines_unseen(scene, in);
+    const auto surface_bsdf = [&]() -> const Object* {
+        if (hidden) return &add_object(scene.document, "bsdf", "null", in.where);
         return masked(scene, in, surface_material(scene, scene.state.material, surface), uv_map(surface));
     };
     const Object* bsdf = surface_bsdf();
-    const std::shared_ptr<const Projection> projection = scene.textures.projection_of(*bsdf);
+    const bool solid = scene.textures.has_solid(*bsdf);
+    // Images that stand for solid textures have coordinates of their own.
+    std::shared_ptr<const Projection> projection =
+        solid && surface == Surface::mesh ? nullptr : scene.textures.projection_of(*bsdf);
+    if (solid) {
+        if (scene.open_object)
+            scene.report.refuse(in.where, "solid textures inside of an object are not supported",
+                                "they stand as where the object does");
+        if (projection) projection = nullptr, surface = Surface::mesh, bsdf = surface_bsdf();
+    }
     if (projection) {
         if (scene.open_object)
             scene.report.refuse(in.where, "texture mappings other than uv inside of an object are not supported",
@@ -322,6 +344,10 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
         const std::vector<Curve> curves = read_curve(scene, in);
         if (projection)
             scene.report.refuse(in.where, "texture mappings other than uv on curves are not supported", "uv is used");
+        if (solid) {
+            scene.report.refuse(in.where, "solid textures on curves are not supported", "the curve is grey");
+            bsdf = surface_material(scene, nullptr, surface);
+        }
         const bool textured = has_texture(*bsdf);
         if (textured)
             scene.report.note(in.where, "textures on curves go round them, not from edge to edge as they are seen");
@@ -330,9 +356,13 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
         if (!placed.object) return in.finish(scene.report);
     } else if (surface != Surface::mesh) {
         placed = add_quadric(scene, in);
+        if (solid) bsdf = bake_solids(scene, in.where, surface, scene.state.ctm * placed.local, *bsdf);
     } else {
         const bool shines = scene.state.area_light && scene.state.area_light->in.find("filename");
-        placed = add_mesh(scene, in, shines || has_texture(*bsdf), projection.get());
+        if (shines && solid)
+            scene.report.refuse(in.where, "a light with an image on a mesh with solid textures is not supported",
+                                "the image lies wrong");
+        placed = add_mesh(scene, in, shines || has_texture(*bsdf), projection.get(), solid ? &bsdf : nullptr);
     }
     Object& shape = *placed.object;
     const UvMap uv = uv_map(surface);
@@ -342,7 +372,7 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
     if (scene.state.area_light && scene.open_object)
         scene.report.note(in.where, "shapes of an object do not shine, as in pbrt");
     else if (scene.state.area_light)
-        add_child(shape, area_emitter(scene, *scene.state.area_light, uv, placed.area));
+        add_child(shape, area_emitter(scene, *scene.state.area_light, uv, placed.area, hidden));
     in.finish(scene.report);
     add_child(scene.open_object ? *scene.open_object : *scene.document.scene, shape);
     if (scene.state.area_light && !scene.open_object && scene.state.area_light->in.boolean("twosided", false))

@@ -122,9 +122,8 @@ Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
         out = fold(in, {part("tex1", 0), part("tex2", 1), number(in, "amount", 0.5)},
                    [](const std::vector<Rgb>& c) { return c[0] * (splat(1) - c[2]) + c[1] * c[2]; });
     } else if (in.type == "checkerboard") {
-        if (in.integer("dimension", 2) != 2)
-            report_.refuse(in.where_of("dimension"), "a checkerboard of three dimensions is not supported",
-                           "it has two");
+        if (in.integer("dimension", 2) == 3) return solid(is_float, in, space);
+        if (in.integer("dimension", 2) != 2) fail(in.where_of("dimension"), "a checkerboard has 2 or 3 dimensions");
         const Texture even = part("tex1", 1), odd = part("tex2", 0);
         out.kind = Texture::Kind::checkerboard;
         set_mapping(out, in);
@@ -140,6 +139,9 @@ Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
                    [](const std::vector<Rgb>& c) { return c[0] * c[2] + c[1] * (splat(1) - c[2]); });
     } else if (in.type == "imagemap") {
         out = image_texture(is_float, in);
+    } else if (in.type == "directionmix" || (in.type == "marble" && !is_float) ||
+               (is_float && (in.type == "fbm" || in.type == "windy" || in.type == "wrinkled"))) {
+        out = solid(is_float, in, space);
     } else {
         report_.refuse(in.where, "texture type '" + in.type + "' is not supported", "a grey of 0.5 is used");
         out.color = splat(0.5f);
@@ -250,6 +252,11 @@ const Object& Textures::object(const Texture& texture, const UvMap& uv, const Co
     UvMap to_uv = texture.projection ? texture.mapping : texture.mapping * uv;
     Object* object = nullptr;
     Rgb factor = splat(1);
+    if (texture.kind == Texture::Kind::solid) {
+        object = &add_object(document_, "texture", "solid", texture.where);
+        made_[object] = {texture, map};
+        return *object;
+    }
     if (texture.kind == Texture::Kind::image) {
         // Images lie upside down in pbrt's (s,t).
         to_uv = UvMap{{{1, 0, 0}, {0, -1, 1}}} * to_uv;
@@ -281,10 +288,14 @@ const Object& Textures::object(const Texture& texture, const UvMap& uv, const Co
         for (int j = 0; j < 3; ++j) m.m[i][columns[j]] = to_uv.m[i][j];
     set_transform(*object, "to_uv", m);
     projections_[object] = texture.projection;
-    if (factor == splat(1)) return *object;
+    if (factor == splat(1)) {
+        made_[object] = {texture, map};
+        return *object;
+    }
     Object& scaled = add_object(document_, "texture", "scale", texture.where);
     set_rgb(scaled, "scale", factor);
     add_child(scaled, *object);
+    made_[&scaled] = {texture, map};
     return scaled;
 }
 
@@ -300,8 +311,9 @@ void Textures::set_number(Object& object, const std::string& name, const Texture
 
 void Textures::set_color(Object& object, const std::string& name, const Texture& texture, const UvMap& uv) {
     if (texture.is_constant()) return mitsuba::set_rgb(object, name, texture.color);
-    const bool beyond = texture.kind == Texture::Kind::image && max_component(texture.color) > 1;
-    const ColorMap clip = [](Rgb c) { return min(c, splat(1)); };
+    const bool beyond = texture.kind == Texture::Kind::solid ||
+                        (texture.kind == Texture::Kind::image && max_component(texture.color) > 1);
+    const ColorMap clip = [](Rgb c) { return max(min(c, splat(1)), splat(0)); };
     mitsuba::add_child(object, this->object(texture, uv, beyond ? clip : ColorMap{}), name);
 }
 
@@ -313,6 +325,7 @@ const TextureImage& Textures::texels_of(const Texture& texture) const {
 double Textures::mean(const Texture& texture) const {
     if (texture.is_constant()) return texture.color.x;
     if (texture.kind == Texture::Kind::checkerboard) return 0.5 * (double(texture.color.x) + texture.odd.x);
+    if (texture.kind == Texture::Kind::solid) return mean_of_solid(texture);
     load_texels(*texture.image);
     double sum = 0;
     for (const Rgb& c : texture.image->texels) sum += c.x;

@@ -28,9 +28,18 @@ struct TextureImage {
     std::vector<Rgb> texels;
 };
 
+/// A point of a surface where a texture is asked for.
+struct SurfacePlace {
+    Vec3d p;              ///< in the world
+    Vec3d n;              ///< unit geometric normal, of either side
+    double u = 0, v = 0;  ///< pbrt's coordinates of the shape
+};
+using SolidFunction = std::function<Rgb(const SurfacePlace&)>;
+
 /// A texture whose inner textures are folded into it.
 struct Texture {
-    enum class Kind { constant, checkerboard, image };
+    /// A solid texture has values at places of the world, not of the plane.
+    enum class Kind { constant, checkerboard, image, solid };
     Kind kind = Kind::constant;
     Where where;
     Rgb color = {1, 1, 1};                         ///< constant; of the cells with an even sum; factor of the image
@@ -39,11 +48,24 @@ struct Texture {
     std::shared_ptr<const Projection> projection;  ///< gives (s,t) instead, or null
     std::string wrap = "repeat", filter = "bilinear";
     std::shared_ptr<TextureImage> image;
+    std::shared_ptr<const SolidFunction> solid;  ///< `color` is a factor of it
+    double detail = 0;                           ///< of a solid: length in the world over which it changes
 
     bool is_constant() const { return kind == Kind::constant; }
 };
 
 using ColorMap = std::function<Rgb(Rgb)>;
+
+/// What a texture object was made of.
+struct MadeTexture {
+    Texture texture;
+    ColorMap map;
+
+    Rgb at(const SurfacePlace& place) const;
+};
+
+/// Value at a place; images must have texels.
+Rgb evaluate(const Texture& texture, const SurfacePlace& place);
 
 class Textures {
 public:
@@ -73,6 +95,10 @@ public:
     const Object& object(const Texture& texture, const UvMap& uv, const ColorMap& map = {});
     /// What gives all textures below `object` their coordinates: null if the shape does. Refused if they differ.
     std::shared_ptr<const Projection> projection_of(const Object& object) const;
+    /// Whether a solid texture lies below `object`, which is to be replaced then (bake_solids).
+    bool has_solid(const Object& object) const;
+    /// What the object of a texture was made of, with texels; null for other objects.
+    const MadeTexture* made(const Object& object) const;
 
 private:
     Texture build(bool is_float, const Parameters& in, ColorSpace space);
@@ -83,6 +109,10 @@ private:
                         const std::function<Rgb(const std::vector<Rgb>&)>& f);
     Texture bilerp(bool is_float, const Parameters& in, ColorSpace space) const;
     Texture dots(const Parameters& in) const;
+    Texture solid(bool is_float, const Parameters& in, ColorSpace space);
+    Texture solid_of(const Where& where, const std::vector<Texture>& parts,
+                     const std::function<Rgb(const std::vector<Rgb>&, const SurfacePlace&)>& f) const;
+    static double mean_of_solid(const Texture& texture);
     void set_mapping(Texture& texture, const Parameters& in) const;
     const Texture& named(const Parameter& p, bool is_float) const;
     std::shared_ptr<TextureImage> image_file(const std::string& path, double gamma, bool is_number);
@@ -95,7 +125,8 @@ private:
     std::map<std::string, Texture> colors_, numbers_;
     std::map<std::string, std::shared_ptr<TextureImage>> images_;
     std::map<const Object*, std::shared_ptr<const Projection>> projections_;  ///< of textures as objects
-    mitsuba::Matrix ctm_;                                                     ///< of the texture being defined
+    std::map<const Object*, MadeTexture> made_;
+    mitsuba::Matrix ctm_;  ///< of the texture being defined
 };
 
 }  // namespace ambilux::pbrt

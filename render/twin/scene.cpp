@@ -88,7 +88,24 @@ Affine inverse_of_orthogonal(const Affine& a) {
     return inverse;
 }
 
+/// Of any map that has one.
+Affine inverse_of(const Affine& a) {
+    Affine inverse{};
+    const Vec3f axes[3] = {column(a, 0), column(a, 1), column(a, 2)}, origin = column(a, 3);
+    const double volume = dot(axes[0], cross(axes[1], axes[2]));
+    for (int i = 0; i < 3; ++i) {
+        const Vec3f row = cross(axes[(i + 1) % 3], axes[(i + 2) % 3]) / volume;
+        for (int j = 0; j < 3; ++j) inverse.m[i][j] = row[j];
+        inverse.m[i][3] = -dot(row, origin);
+    }
+    return inverse;
+}
+
 void derive(Quadric& q) {
+    if (q.type == PrimitiveType::disk) {  // any ellipse
+        q.to_local = inverse_of(q.to_world);
+        return;
+    }
     set_orthogonal(q.to_world, q.radius);
     if (q.type == PrimitiveType::sphere) set_column(q.to_world, 2, normalize(column(q.to_world, 2)) * q.radius);
     q.to_local = inverse_of_orthogonal(q.to_world);

@@ -1,6 +1,7 @@
 // libs: ambilux_formats ambilux_accel
 // labels: accel
 // timeout: 300
+// seconds: 30
 // The host builds of the CUDA traversals, of the wide BVH and of the binary one, against Embree: same rays, same hits
 // (pitfall G12), at every scale (B33).
 #include <tbb/task_arena.h>

@@ -10,6 +10,7 @@
 #include "tests/support/beam_scene.h"
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/gpu_device.h"
+#include "tests/support/hidden_light_scene.h"
 
 using namespace ambilux;
 
@@ -81,6 +82,19 @@ TEST_CASE("G5: emitters that light subpaths alone carry, and a thin sheet: both 
         }
         // The path tracer finds the lamp alone, by way of the sheet too.
         if (lamp) check_backends(scene, settings_of(scene, "path", "wavefront", "cuda"), 4);
+    }
+}
+
+TEST_CASE("G5: hidden lights: both backends find the same light") {
+    if (!device()) return;
+    const Scene scene = scene_from_text(hidden_room(96, 6, true));
+    for (const auto& [integrator, variant] : {std::pair{"path", "wavefront"},
+                                              {"light", "wavefront"},
+                                              {"bdpt", "wavefront"},
+                                              {"bdpt", "megakernel"},
+                                              {"bdpt", "streaming"}}) {
+        INFO(integrator << " " << variant);
+        check_backends(scene, settings_of(scene, integrator, variant, "cuda"), 1);
     }
 }
 

@@ -90,11 +90,12 @@ long fail_everywhere(Fault fault, long step, const Scene& scene, const Case& c) 
         if (begun) CHECK(message.find(in_cub ? "cudaError" : name) != std::string::npos);
         REQUIRE(cuda_faults.alive == alive);
         if (!begun) {
+            // `alive` counts to the object. What the driver keeps besides: a page or two of its own come and go; a leak
+            // at each of some hundred faults would be more.
+            constexpr uint64_t kPages = 2 * 65536;
             const uint64_t free_after = free_device_bytes();
-            if (managed)
-                CHECK(free_after >= free_before);
-            else
-                CHECK(free_after == free_before);
+            CHECK(free_after + kPages >= free_before);
+            if (!managed) CHECK(free_after <= free_before + kPages);
             return n;
         }
     }

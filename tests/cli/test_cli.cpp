@@ -278,6 +278,9 @@ TEST_CASE("G13: every accepted option changes something") {
                                        "--light-picking", picking, "-o", folder / (picking + std::string(".exr"))});
         INFO(o.err);
         CHECK(o.code == 0);
+        Attributes told;
+        read_exr(folder / (picking + std::string(".exr")), &told);
+        CHECK(told["light_picking"] == picking);
     }
     CHECK(bool(read_exr(folder / "power.exr").rgb != read_exr(folder / "uniform.exr").rgb));
 

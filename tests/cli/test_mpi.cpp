@@ -1,5 +1,6 @@
 // libs: ambilux_experiments
 // timeout: 180
+// seconds: 41
 // The built program under mpirun: images do not depend on the number of ranks, and a rank that is killed costs nothing
 // that was saved.
 #include <sched.h>

@@ -5,6 +5,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "experiments/statistics.h"
+#include "experiments/stats_sum.h"
 #include "integrators/registry.h"
 #include "tests/support/render_scene.h"
 
@@ -140,6 +141,13 @@ TEST_CASE("statistics name every setting as used and as asked for, images those 
     const Attributes attributes = image_attributes(scene, asked, r.stats);
     CHECK(attributes.at("integrator") == json["integrator"]);
     CHECK(attributes.at("method") == json["method"]);
+    CHECK(json["light_picking"] == "power");
+    CHECK(attributes.at("light_picking") == "power");
+    // Asked for as 0, which leaves it open.
+    CHECK(json["asked"]["wave_size"] == 0);
+    CHECK(json["wave_paths"] >= kTilePixels);
+    CHECK(attributes.at("wave_paths") == json["wave_paths"]);
+    CHECK(restore_stats(save_stats(r.stats)).wave_paths == r.stats.wave_paths);
     RenderSettings lvc;
     lvc.integrator = "bdpt";
     lvc.variant = "lvc";

@@ -1,6 +1,7 @@
 // libs: ambilux_core
 // timeout: 900
 // labels: stress
+// seconds: 75
 // `ambilux stress --quick`, as CI runs it: no cell is wrong, but where docs/numerics.md says so.
 #include <cstdlib>
 

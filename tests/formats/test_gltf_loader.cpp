@@ -1,4 +1,4 @@
-// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel JPEG::JPEG
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_convert ambilux_formats ambilux_accel JPEG::JPEG
 // timeout: 120
 // What glTF scenes become, what is refused, files that lie, and the image of the same scene in Mitsuba's XML.
 #include "formats/gltf/load.h"

@@ -79,7 +79,17 @@ TEST_CASE("joints move the vertices of a skin, and its node does not") {
     check_rgb(position(loose, 3), {0, 1, -6});
     j["skins"][0]["joints"] = {2};
     attributes(j)["JOINTS_0"] = add_accessor<uint8_t>(j, std::vector<uint8_t>(16, 1), "VEC4", kByte, 4);
-    CHECK(contains(error_of(j), "joint 1 of 1"));
+    CHECK(contains(error_of(j), "JOINTS_0: index 1 of 1"));
+    attributes(j)["JOINTS_0"] = add_accessor<float>(j, std::vector<float>(16, -4e26f), "VEC4", kFloat, 4);
+    CHECK(contains(error_of(j), "JOINTS_0: index -4e+26 of 1"));
+}
+
+TEST_CASE("indices of vertices that are no whole numbers, or beyond all integers, are refused") {
+    for (const auto& [index, told] : {std::pair{1.9f, "1.9"}, {-3.7e26f, "-3.7e+26"}, {4.0f, "4"}, {NAN, "nan"}}) {
+        Json j = quad_scene();
+        j["meshes"][0]["primitives"][0]["indices"] = add_accessor<float>(j, {0, 1, index}, "SCALAR", kFloat, 3);
+        CHECK(contains(error_of(j), std::string("indices: index ") + told + " of 4"));
+    }
 }
 
 TEST_CASE("morph targets by the weights of the mesh, or of its node") {

@@ -1,4 +1,4 @@
-// libs: ambilux_formats ambilux_accel
+// libs: ambilux_convert ambilux_formats ambilux_accel
 // timeout: 120
 // BSDFs that are made of others, those of the older generation, and textures from meshes.
 #include <cmath>

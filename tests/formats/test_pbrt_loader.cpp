@@ -68,6 +68,31 @@ TEST_CASE("ReverseOrientation and mirrors leave normals as pbrt has them") {
     check_rgb(normal("Scale 1 1 -1 "), {0, 0, -1});
 }
 
+TEST_CASE("mirrored files of meshes and quadrics keep their outside, as in pbrt") {
+    const TempFolder folder;
+    folder.write("t.ply",
+                 "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    const auto z = [&](const std::string& before) {
+        const Scene s = load_pbrt_world(before + "Shape \"plymesh\" \"string filename\" \"t.ply\"", {}, &folder);
+        const Triangle& t = s.triangles[0];
+        return normalize(cross(s.vertices[t.v1].p - s.vertices[t.v0].p, s.vertices[t.v2].p - s.vertices[t.v0].p)).z;
+    };
+    CHECK(z("") == 1);
+    CHECK(z("Scale -1 1 1 ") == 1);
+    CHECK(z("Scale 1 1 -1 ") == -1);
+    CHECK(z("ReverseOrientation Scale -1 1 1 ") == -1);
+    for (const std::string type : {"sphere", "disk", "cylinder"}) {
+        INFO(type);
+        const auto flip = [&](const std::string& before) {
+            return load_pbrt_world(before + "Shape \"" + type + "\"").quadrics[0].flip;
+        };
+        CHECK(flip("") == 0);
+        CHECK(flip("Scale -1 1 1 ") == 0);
+        CHECK(flip("ReverseOrientation Scale -1 1 1 ") == 1);
+    }
+}
+
 TEST_CASE("meshes without normals are flat") {
     const Scene s = load_pbrt_world(
         "Shape \"trianglemesh\" \"point3 P\" [0 0 0  1 0 0  0 1 0  0 0 1] \"integer indices\" [0 1 2 0 1 3]");
@@ -333,7 +358,7 @@ TEST_CASE("what is not known is refused by name, file and line") {
         {"AreaLightSource \"diffuse\" \"bool twosided\" true Material \"dielectric\" Shape \"sphere\"", "two sides"},
         {"Material \"hair\" Shape \"sphere\"", "material 'hair' is not supported"},
         {"Material \"subsurface\" Shape \"sphere\"", "material 'subsurface' is not supported"},
-        {"Texture \"t\" \"float\" \"fbm\"", "texture type 'fbm' is not supported"},
+        {"Texture \"t\" \"float\" \"ptex\"", "texture type 'ptex' is not supported"},
         {"Shape \"sphere\" \"float radius\" 1 \"float size\" 2", "unknown parameter 'size' of Shape 'sphere'"},
         {"MakeNamedMedium \"m\" \"string type\" \"homogeneous\"", "media are not supported"},
     };
@@ -579,6 +604,33 @@ TEST_CASE("attributes of materials count for named ones too") {
     CHECK(alpha("MakeNamedMaterial \"m\" \"string type\" \"conductor\" NamedMaterial \"m\"") == Approx(0.2));
     CHECK(alpha("MakeNamedMaterial \"m\" \"string type\" \"conductor\" \"float roughness\" .09 NamedMaterial \"m\"") ==
           Approx(0.3));
+}
+
+TEST_CASE("a light of alpha 0 shines unseen; what is no light is gone") {
+    const auto load = [](const std::string& alpha, const std::string& light) {
+        return load_pbrt_world(light + "Shape \"sphere\" " + alpha);
+    };
+    const std::string light = "AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] ";
+    const auto type = [](const Scene& s) { return s.emitters.at(0).type; };
+    const auto opacity = [](const Scene& s) { return s.materials[s.shapes[0].material].opacity.value; };
+    const Scene unseen = load("\"float alpha\" 0", light), seen = load("\"float alpha\" .5", light);
+    CHECK(type(unseen) == EmitterType::hidden_area);
+    CHECK(opacity(unseen) == 0);
+    CHECK(unseen.emitters[0].radiance.value == load("", light).emitters[0].radiance.value);
+    CHECK(unseen.emitters[0].pick_probability == 1);
+    CHECK(type(seen) == EmitterType::area);
+    CHECK(opacity(seen) == 0.5f);
+    const Scene none = load("\"float alpha\" 0", "");
+    CHECK(none.emitters.empty());
+    CHECK(opacity(none) == 0);
+    // From a texture too, of a mesh, to both sides.
+    const Scene s = load_pbrt_world(
+        "Texture \"zero\" \"float\" \"constant\" \"float value\" 0\n"
+        "AreaLightSource \"diffuse\" \"bool twosided\" true Material \"dielectric\" "
+        "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] \"texture alpha\" "
+        "\"zero\"");
+    REQUIRE(s.emitters.size() == 2);
+    for (const Emitter& e : s.emitters) CHECK(e.type == EmitterType::hidden_area);
 }
 
 TEST_CASE("faces of ptex and tangents of meshes are left out") {

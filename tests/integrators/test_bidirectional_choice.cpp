@@ -1,6 +1,7 @@
 // libs: ambilux_experiments ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // data: tagged
 // timeout: 900
+// seconds: 71
 // bdpt.auto=true: what the pilot predicts is what renders show, and what follows from it.
 #include <algorithm>
 #include <cmath>

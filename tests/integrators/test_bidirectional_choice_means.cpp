@@ -1,5 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 300
+// seconds: 45
 // bdpt.auto=true is unbiased whatever it chooses: over emitters of every type and bodies of glass and metal, each
 // candidate that the choice may take has the image of all strategies.
 #include "render/selection.h"

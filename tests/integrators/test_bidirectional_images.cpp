@@ -1,5 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 600
+// seconds: 41
 // Light tracing and bidirectional path tracing, all strategies together and by themselves, against the path tracer and
 // against closed forms (B1-B34).
 #include <sstream>

@@ -1,5 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 600
+// seconds: 41
 // Where other bidirectional renderers broke (B1-B34): shading normals, refraction, lights, specular chains, coincident
 // vertices, scale, opacity. What concerns furnaces, cameras and films is in test_bidirectional_images.cpp.
 #include <array>

@@ -1,6 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: statistical
 // timeout: 900
+// seconds: 69
 // Strategies (s,t) one by one: their images beside a render, and as masks.
 #include <cmath>
 #include <map>

@@ -1,5 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 900
+// seconds: 72
 // Variants of bidirectional path tracing give the same image.
 #include <algorithm>
 #include <cmath>
@@ -133,6 +134,8 @@ TEST_CASE("Light that is culled before its shadow ray keeps its expectation and 
         s.integrator = integrator;
         const Estimate without = render_batches(scene, s, 1024);
         const uint64_t rays = render_scene(scene, s, 4).stats.rays_occlude;
+        s.cull = 0.005f;
+        CHECK(render_scene(scene, s, 4).stats.rays_occlude < rays);
         s.seed = 42;
         s.cull = 0.5f;
         CHECK(render_scene(scene, s, 4).stats.rays_occlude < rays * 9 / 10);

@@ -1,5 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 600
+// seconds: 72
 // How many light subpaths there are (light_paths): the image stays what it is, whatever their number, and more of them
 // find more.
 #include <cmath>

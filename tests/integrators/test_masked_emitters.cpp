@@ -1,5 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 240
+// seconds: 25
 // Emitters behind a mask: every strategy finds the light that the emitter sends without it, as in Mitsuba.
 #include "tests/support/bidirectional_images.h"
 

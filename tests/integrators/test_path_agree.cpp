@@ -1,6 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // data: tagged
 // timeout: 300
+// seconds: 35
 // The estimators naive, nee and mis (balance, power) have the same expectation on every scene: z-tests of pairs that
 // share no random numbers.
 #include <cmath>

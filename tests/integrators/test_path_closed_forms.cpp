@@ -1,5 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 300
+// seconds: 33
 // The path tracer against closed forms: furnaces, direct light of every emitter through every camera, what is seen
 // directly, and partial opacity.
 #include <array>

@@ -1,4 +1,4 @@
-// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core JPEG::JPEG
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_convert ambilux_formats ambilux_accel JPEG::JPEG
 // timeout: 200
 // Images of pbrt scenes: lights and materials with closed forms, the same scene in Mitsuba's XML, and both after
 // conversion.

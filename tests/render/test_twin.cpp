@@ -153,6 +153,25 @@ TEST_CASE("At equal seeds images are those of the renderers but for the rounding
         }
 }
 
+TEST_CASE("Disks are ellipses of any affine map, in both precisions", "[twin]") {
+    for (const char* map :
+         {"<scale x='0.8' y='0.3' z='-0.5'/>", "<matrix value='1 .5 .2 0 .1 .6 -.3 0 0 .2 -1 0 0 0 0 1'/>"})
+        for (const char* integrator : {"path", "bdpt", "light"}) {
+            INFO(map << ", " << integrator);
+            const Scene scene = scene_from_text(scene_xml(
+                3,
+                "<sensor type='orthographic'><transform name='to_world'><rotate x='1' angle='150'/><translate "
+                "y='1' z='2'/></transform>" +
+                    square_film(16) + "</sensor><shape type='rectangle'>" + diffuse(kAlbedo) +
+                    "</shape><shape type='disk'><transform name='to_world'>" + map +
+                    "<translate z='0.9'/></transform>" + area_light(kLight) + "</shape>"));
+            const RenderSettings s = twin_settings(scene, integrator, 5);
+            const FilmMoments twin = render_scene(scene, s, 16).film, floats = render_scene(scene, single(s), 16).film;
+            CHECK(relative_difference(twin, floats) < 1e-4);
+            CHECK(relative_difference(twin, floats) > 1e-9);
+        }
+}
+
 TEST_CASE("At other seeds images have the expectation of the renderers", "[twin]") {
     for (const char* name : {"cornell", "furnace", "lights", "materials", "textured"}) {
         INFO(name);

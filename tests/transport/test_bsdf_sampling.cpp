@@ -1,6 +1,7 @@
 // libs: ambilux_core ambilux_transport
 // labels: statistical
 // timeout: 300
+// seconds: 90
 // Sampling of every BSDF follows the density that it states.
 #include <cstdio>
 

@@ -11,9 +11,9 @@ using namespace ambilux::test;
 namespace {
 
 constexpr Features kAll = kAllFeatures;
-constexpr int kKinds = 9;
+constexpr int kKinds = 10;
 const char* const kNames[kKinds] = {"mesh", "sphere",      "disk",     "cylinder", "point",
-                                    "spot", "directional", "constant", "envmap"};
+                                    "spot", "directional", "constant", "envmap",   "hidden area"};
 
 std::vector<Rgb> sky_image() {
     std::vector<Rgb> image;
@@ -38,6 +38,10 @@ Scene make_light(int kind) {
         case 5: add_spot(s, {1, 0, 3}, {-1, 0, -3}, 30, 10, splat(40)); break;
         case 6: add_emitter(s, EmitterType::directional, splat(0.5f)).direction = normalize(Vec3f{0.3f, 0, -1}); break;
         case 7: add_emitter(s, EmitterType::constant, splat(0.25f)); break;
+        case 9:
+            add_area(s, add_rectangle(s, {-1, -1, 2}, {0, 2, 0}, {2, 0, 0}, 5), splat(3)).type =
+                EmitterType::hidden_area;
+            break;
         default: add_envmap(s, 10, 7, sky_image(), splat(0.5f), rotation_to({0.2f, 1, 0.3f})); break;
     }
     complete(s);
@@ -81,7 +85,8 @@ TEST_CASE("Emission carries the emitter's power", "[emitter]") {
                                      spot,
                                      0.5 * disk,
                                      0.25 * 4 * M_PI * disk,
-                                     sky * disk};
+                                     sky * disk,
+                                     M_PI * 3 * 4};
     for (int kind = 0; kind < kKinds; ++kind) {
         const Scene scene = make_light(kind);
         const SceneView view = view_of(scene);
@@ -96,18 +101,20 @@ TEST_CASE("Emission carries the emitter's power", "[emitter]") {
                 continue;
             }
             stats.add(flux(s));
-            wrong += std::fabs(length(s.d) - 1) > 1e-5f || std::fabs(dot(s.d, s.ng) - s.cos_theta) > 1e-5f;
+            const bool hidden = scene.emitters[0].type == EmitterType::hidden_area;
+            const Vec3f ng = hidden ? Vec3f{0, 0, -1} : s.ng;
+            wrong += std::fabs(length(s.d) - 1) > 1e-5f || std::fabs(dot(s.d, ng) - s.cos_theta) > 1e-5f;
             // The queried densities are the sampled ones. Where a rounded direction matters, at the border of a table's
             // cell, the rim of a spot or the pole of a map, they lie between those around it.
             wrong += !close(pdf_emission_position<kAll>(view, 0, s.prim), s.pdf_pos);
-            const float queried = pdf_emission_direction<kAll>(view, 0, s.ng, s.d);
+            const float queried = pdf_emission_direction<kAll>(view, 0, ng, s.d);
             if (close(queried, s.pdf_dir)) continue;
             float low = queried, high = queried;
             const Frame around = frame_from_normal(s.d);
             for (int k = 0; k < 8; ++k) {
                 const float angle = float(k) * kPi / 4;
                 const Vec3f moved = normalize(s.d + (around.s * cosf(angle) + around.t * sinf(angle)) * 1e-6f);
-                const float p = pdf_emission_direction<kAll>(view, 0, s.ng, moved);
+                const float p = pdf_emission_direction<kAll>(view, 0, ng, moved);
                 low = std::min(low, p), high = std::max(high, p);
             }
             wrong += !(s.pdf_dir >= low * 0.9999f && s.pdf_dir <= high * 1.0001f);
@@ -127,7 +134,8 @@ TEST_CASE("B7: the kinds of delta are told apart", "[emitter]") {
         EmissionSample s;
         INFO(kNames[kind]);
         REQUIRE(sample_emission<kAll>(view_of(scene), {0.5f, 0.3f, 0.6f, 0.2f}, {0.4f, 0.45f}, s));
-        CHECK(s.delta_position == (type == EmitterType::point || type == EmitterType::spot));
+        CHECK(s.delta_position ==
+              (type == EmitterType::point || type == EmitterType::spot || type == EmitterType::hidden_area));
         CHECK(s.delta_direction == (type == EmitterType::directional));
         CHECK(s.infinite ==
               (type == EmitterType::directional || type == EmitterType::constant || type == EmitterType::envmap));

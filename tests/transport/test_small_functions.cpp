@@ -10,6 +10,7 @@
 #include "tests/support/emitter_scene.h"
 #include "transport/bsdf.h"
 #include "transport/mis/bidirectional.h"
+#include "transport/subpath/rules.h"
 #include "transport/subpath/start.h"
 
 using namespace ambilux;
@@ -163,5 +164,21 @@ TEST_CASE("light subpaths start beside the lamp's surface, on the side that it s
         REQUIRE(length(moved) < 1e-4f);
         // Radiance per projected density, which is pi for a cosine lobe: the flux of a uniform lamp.
         REQUIRE(path.throughput.x == Approx(3 * M_PI * 4).epsilon(1e-4));
+    }
+}
+
+TEST_CASE("a subpath has no segment that brings nothing") {
+    for (const bool hits : {false, true}) {
+        Rules<BidirectionalMis> r{};
+        r.mis = {MisHeuristic::balance, kAllStrategies, 1.0f, 1.0f};
+        r.max_depth = 5;
+        r.count_hits = hits;
+        CHECK(r.longest(Side::light) == 4);
+        CHECK(r.longest(Side::eye) == (hits ? 5 : 4));
+        r.count_environment = true;
+        CHECK(r.longest(Side::light) == 4);
+        CHECK(r.longest(Side::eye) == 5);
+        r.mis.strategies = kAllStrategies & ~kHitStrategies;
+        CHECK(r.longest(Side::eye) == (hits ? 5 : 4));
     }
 }

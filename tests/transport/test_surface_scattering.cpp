@@ -466,6 +466,9 @@ TEST_CASE("rules of maps: the normal turns towards the camera, and bumps shadow 
     const float shadow = 2 / (1 + std::sqrt(1 + alpha2 * tan2));
     const BsdfValue v = scatter_evaluate<F>(s, light, TransportMode::radiance);
     CHECK(v.value.x == Approx(0.9 / M_PI * dot(turned_n, light) * shadow).epsilon(1e-4));
+    set_mapped(surface, records()[0], kTurnNormals, 50);
+    CHECK(scatter_evaluate<F>(make_scattering<F>(surface.scene(), p, camera), light, TransportMode::radiance).value.x ==
+          Approx(0.9 / M_PI * dot(turned_n, light)).epsilon(1e-5));
     set_mapped(surface, records()[0], 0, 50);
     CHECK(is_zero(scatter_eval<F>(make_scattering<F>(surface.scene(), p, camera), light, TransportMode::radiance)));
 }

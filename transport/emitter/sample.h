@@ -19,15 +19,15 @@ struct EmitterFunctions;
 struct EmitterSample {
     Vec3f p;         ///< point on the emitter; for environment and directional a point beyond the scene's bounds
     Vec3f p_error;   ///< bound of the absolute error of each coordinate of p; zero where p is exact or at infinity
-    Vec3f ng;        ///< area: unit normal of the emitting side; otherwise -wi
+    Vec3f ng;        ///< area, hidden_area: unit normal of the emitting side; otherwise -wi
     Vec3f wi;        ///< unit, from the reference to the light
     float distance;  ///< from the reference to p; kInfinity for environment and directional
     Rgb radiance;    ///< area, constant, envmap: radiance towards the reference; point, spot: intensity / distance²;
-                     ///< directional: irradiance
+                     ///< directional: irradiance; hidden_area: radiance · area · cosine / distance²
     Vec2f env_uv;    ///< envmap: where in the image wi points; other types leave it alone
     float pdf_sa;  ///< density of wi per solid angle times the pick probability; for delta lights the pick probability
                    ///< alone
-    bool delta;    ///< no other strategy can find this light: point, spot, directional
+    bool delta;    ///< no ray can find this light: point, spot, directional, hidden_area
     uint32_t emitter;
     uint32_t prim;  ///< area: the primitive that p lies on; other types leave it alone
     float opacity;  ///< area: chance that a ray meets the emitter at p; other types leave it alone
@@ -40,10 +40,11 @@ struct EmissionSample {
     Vec3f ng;         ///< unit normal of the emitting side; d where there is no surface
     Vec3f d;          ///< unit, direction in which light leaves
     Rgb radiance;     ///< area, constant, envmap: radiance; point, spot: intensity; directional: irradiance;
-                      ///< collimated: power; directional_area: power per area
+                      ///< collimated: power; directional_area: power per area; hidden_area:
+                      ///< radiance · area
     float pdf_pos;    ///< density per area (infinite: on the disk); 1 for a delta position
     float pdf_dir;    ///< density per solid angle; 1 for a delta direction
-    float cos_theta;  ///< cosine between ng and d; 1 where there is no surface
+    float cos_theta;  ///< cosine between the surface's normal and d; 1 where there is no surface
     float pick;       ///< probability of this emitter
     uint32_t emitter;
     uint32_t prim;  ///< area: the primitive that p lies on; otherwise kNone

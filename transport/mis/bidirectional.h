@@ -132,6 +132,10 @@ struct BidirectionalMis {
         if constexpr (F.has_beams())
             if (is_beam(e.type)) return {0.0f, 0.0f};  // no other strategy samples its light
         const float scale = start.inv_pdf / cos_in;
+        if constexpr (F.has(EmitterType::hidden_area))
+            if (e.type == EmitterType::hidden_area)
+                return {masked(kNextEventStrategies, e.pick_probability * length_squared(p - path.origin) * scale),
+                        0.0f};
         float next_event = 0.0f, hit = 0.0f;  // densities of the light vertex from the other side times scale
         switch (e.type) {
             case EmitterType::area: {
@@ -209,6 +213,11 @@ struct BidirectionalMis {
         if constexpr (F.opacity) pdf_hit_sa *= sample_opacity(scene, light);
         const float fewer = light.delta ? 0.0f : masked(kHitStrategies, term(pdf_hit_sa / light.pdf_sa));
         float more = cos_z;  // density of a light subpath to here over that of this sample
+        if constexpr (F.has(EmitterType::hidden_area))
+            if (e.type == EmitterType::hidden_area) {
+                more *= pdf_emission_direction<F>(scene, light.emitter, light.ng, -light.wi) / sqr(light.distance);
+                return term(ratio_behind(z, first, more, f.pdf_reverse_sa));
+            }
         switch (e.type) {
             case EmitterType::area:  // the cosine at the light is in both
                 more *= e.pick_probability * pdf_emission_position<F>(scene, light.emitter, light.prim) * kInvPi /

@@ -1,0 +1,23 @@
+# Headers of the standard library and of others that most sources read, compiled once for each set of flags. The project's own are not among them: a change of
+# one would rebuild everything. Sources include what they use all the same, since CUDA sources and whoever uses the installed headers have no precompiled ones;
+# -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON builds without.
+set(AMBILUX_COMMON_HEADERS <algorithm> <array> <atomic> <chrono> <cmath> <cstdint> <cstring> <filesystem> <functional> <limits> <map> <memory> <mutex> <numeric>
+  <optional> <set> <string> <string_view> <utility> <vector>)
+
+# precompile(TARGET HEADER...) or precompile(TARGET REUSE_FROM OTHER), whose flags must be the same.
+function(precompile target)
+  if("${ARGV1}" STREQUAL REUSE_FROM)
+    target_precompile_headers(${target} ${ARGN})
+  else()
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+  endif()
+  if(CCACHE_PROGRAM AND CMAKE_CXX_COMPILER_ID STREQUAL GNU AND NOT CMAKE_DISABLE_PRECOMPILE_HEADERS)
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-fpch-preprocess>)  # or ccache does not see them
+  endif()
+endfunction()
+
+# Of all libraries: their definitions are those of every target that takes them.
+file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/precompiled.cpp CONTENT "")
+add_library(ambilux_precompiled OBJECT ${CMAKE_CURRENT_BINARY_DIR}/precompiled.cpp)
+target_link_libraries(ambilux_precompiled PRIVATE ambilux_options fmt::fmt spdlog::spdlog nlohmann_json::nlohmann_json TBB::tbb Threads::Threads)
+precompile(ambilux_precompiled ${AMBILUX_COMMON_HEADERS} <fmt/format.h> <nlohmann/json.hpp>)

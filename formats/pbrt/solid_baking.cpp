@@ -1,0 +1,286 @@
+#include "formats/pbrt/solid_baking.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <set>
+
+namespace ambilux::pbrt {
+
+using namespace mitsuba;
+
+namespace {
+
+/// Texels of a shape; before, they are as fine as the texture asks for.
+constexpr double kMostTexels = 1 << 21;
+/// Of the length over which a texture changes: lines between centres are off by a hundredth of its finest octave.
+constexpr double kTexel = 1.0 / 8;
+/// Texels a side of a triangle's block.
+constexpr double kMostSide = 1024;
+
+Vec3d placed(const Matrix& m, Vec3d p, double w = 1) {
+    const auto row = [&](int i) { return m.m[i][0] * p.x + m.m[i][1] * p.y + m.m[i][2] * p.z + w * m.m[i][3]; };
+    return {row(0), row(1), row(2)};
+}
+Vec3d minus(Vec3d a, Vec3d b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+Vec3d unit(Vec3d v) {
+    const double l = length(v);
+    return l > 0 ? Vec3d{v.x / l, v.y / l, v.z / l} : Vec3d{0, 0, 1};
+}
+/// a + x (b - a) + y (c - a)
+Vec3d between(Vec3d a, Vec3d b, Vec3d c, double x, double y) {
+    const auto mix = [&](double p, double q, double r) { return p + x * (q - p) + y * (r - p); };
+    return {mix(a.x, b.x, c.x), mix(a.y, b.y, c.y), mix(a.z, b.z, c.z)};
+}
+
+/// The BSDF again, with what `replace` gives in the place of textures.
+class Copier {
+public:
+    using Replace = std::function<const Object*(const Object& texture)>;
+    Copier(Document& document, Replace replace) : document_(document), replace_(std::move(replace)) {}
+
+    const Object* copy(const Object& object) {
+        if (const Object*& known = copies_[&object]; known) return known;
+        if (object.tag == "texture")
+            if (const Object* other = replace_(object)) return copies_[&object] = other;
+        Object& out = add_object(document_, object.tag, object.type, object.where);
+        out.values = object.values;
+        for (const Child& child : object.children) add_child(out, *copy(*child.object), child.name);
+        return copies_[&object] = &out;
+    }
+
+private:
+    Document& document_;
+    Replace replace_;
+    std::map<const Object*, const Object*> copies_;
+};
+
+/// Calls f(texture object, what it was made of) once for each texture below `object`.
+void for_textures(const SceneMaker& scene, const Object& object,
+                  const std::function<void(const Object&, const MadeTexture&)>& f) {
+    std::set<const Object*> seen;
+    const std::function<void(const Object&)> walk = [&](const Object& o) {
+        if (!seen.insert(&o).second) return;
+        if (o.tag == "texture")
+            if (const MadeTexture* made = scene.textures.made(o)) return f(o, *made);
+        for (const Child& child : o.children) walk(*child.object);
+    };
+    walk(object);
+}
+
+double finest_detail(const SceneMaker& scene, const Object& bsdf) {
+    double detail = std::numeric_limits<double>::infinity();
+    for_textures(scene, bsdf, [&](const Object&, const MadeTexture& made) {
+        if (made.texture.kind == Texture::Kind::solid) detail = std::min(detail, made.texture.detail);
+    });
+    return detail;
+}
+
+const Object* add_image(SceneMaker& scene, const Where& where, uint32_t width, uint32_t height,
+                        std::vector<float> texels) {
+    const std::string name =
+        where.file + ":" + std::to_string(where.line) + "#" + std::to_string(scene.document.images.size());
+    Texels& image = scene.document.images[name];
+    image.width = width, image.height = height;
+    image.is_linear = true;
+    image.floats = std::move(texels);
+    Object& object = add_object(scene.document, "texture", "bitmap", where);
+    set_text(object, "image", name);
+    set_boolean(object, "raw", true);
+    set_text(object, "wrap_mode", "clamp");
+    set_text(object, "filter_type", "bilinear");
+    return &object;
+}
+
+void note_size(SceneMaker& scene, const Where& where, double size) {
+    char text[32];
+    snprintf(text, sizeof text, "%.0e", size);
+    scene.report.note(where, std::string("solid textures are images of their shape, of texels about ") + text +
+                                 " across, linear between their centres");
+}
+
+/// Corners of a triangle in the world, with coordinates.
+struct Corners {
+    Vec3d p[3], n;
+    Vec2f uv[3];
+
+    double longest() const {
+        return std::max({length(minus(p[1], p[0])), length(minus(p[2], p[1])), length(minus(p[0], p[2]))});
+    }
+    SurfacePlace at(double x, double y) const {
+        const auto mix = [&](float a, float b, float c) { return a + x * (double(b) - a) + y * (double(c) - a); };
+        return {between(p[0], p[1], p[2], x, y), n, mix(uv[0].x, uv[1].x, uv[2].x), mix(uv[0].y, uv[1].y, uv[2].y)};
+    }
+};
+
+/// Blocks of texels, a square for each triangle, in rows of falling height.
+struct Atlas {
+    struct Block {
+        uint32_t x = 0, y = 0, side = 2;
+    };
+    std::vector<Block> blocks;
+    uint32_t width = 0, height = 0;
+    double size = 0;  ///< of the largest texel
+
+    Atlas(const std::vector<Corners>& triangles, double wanted) : blocks(triangles.size()) {
+        std::vector<double> edges;
+        for (const Corners& t : triangles) edges.push_back(t.longest());
+        const double longest = *std::max_element(edges.begin(), edges.end());
+        size = std::max(std::min(wanted, longest), longest / (kMostSide - 1));
+        const auto side = [&](double edge) { return std::max(std::ceil(edge / size), 1.0) + 1; };
+        for (const double least = 4.0 * double(blocks.size());; size *= 1.1) {
+            double sum = 0;
+            for (const double e : edges) sum += side(e) * side(e);
+            if (sum <= std::max(kMostTexels, least)) break;
+        }
+        for (size_t i = 0; i < blocks.size(); ++i) blocks[i].side = uint32_t(side(edges[i]));
+        pack();
+    }
+
+private:
+    void pack() {
+        double area = 0;
+        for (const Block& b : blocks) area += double(b.side) * b.side, width = std::max(width, b.side);
+        width = std::max(width, uint32_t(std::ceil(std::sqrt(area))));
+        std::vector<uint32_t> order(blocks.size());
+        std::iota(order.begin(), order.end(), 0);
+        std::stable_sort(order.begin(), order.end(),
+                         [&](uint32_t a, uint32_t b) { return blocks[a].side > blocks[b].side; });
+        uint32_t x = 0, y = 0;
+        for (const uint32_t i : order) {
+            Block& b = blocks[i];
+            if (x + b.side > width) x = 0, y = height;
+            b.x = x, b.y = y;
+            x += b.side;
+            height = std::max(height, y + b.side);
+        }
+    }
+};
+
+/// Coordinates of the surface do not go on over the edges of triangles.
+void check_tangents(SceneMaker& scene, const Where& where, const Object& bsdf) {
+    bool turns = false;
+    std::set<const Object*> seen;
+    const std::function<void(const Object&)> walk = [&](const Object& o) {
+        if (!seen.insert(&o).second) return;
+        const Value *u = o.find("alpha_u"), *v = o.find("alpha_v");
+        turns |= o.type == "normalmap" || (u && v && u->number != v->number);
+        for (const Child& child : o.children) walk(*child.object);
+    };
+    walk(bsdf);
+    if (turns)
+        scene.report.refuse(where, "solid textures on meshes with normal maps or two roughnesses are not supported",
+                            "these turn from triangle to triangle");
+}
+
+}  // namespace
+
+BakedMesh bake_solids(SceneMaker& scene, const Where& where, const Mesh& mesh, const Matrix& to_world,
+                      const Object& bsdf) {
+    check_tangents(scene, where, bsdf);
+    FileBudget(where.file, scene.document.limits).bytes(mesh.faces.size(), sizeof(Corners) + 3 * sizeof(Vec3f));
+    std::vector<Corners> triangles;
+    for (const auto& face : mesh.faces) {
+        Corners t;
+        for (size_t k = 0; k < 3; ++k) {
+            const Vec3f p = mesh.positions[face[k]];
+            t.p[k] = placed(to_world, {p.x, p.y, p.z});
+            t.uv[k] = mesh.uvs[face[k]];
+        }
+        t.n = unit(cross(minus(t.p[1], t.p[0]), minus(t.p[2], t.p[0])));
+        triangles.push_back(t);
+    }
+    const Atlas atlas(triangles, kTexel * finest_detail(scene, bsdf));
+    note_size(scene, where, atlas.size);
+    Copier copier(scene.document, [&](const Object& texture) -> const Object* {
+        const MadeTexture* made = scene.textures.made(texture);
+        if (!made) return nullptr;
+        const uint64_t count = uint64_t(atlas.width) * atlas.height;
+        take_texels(scene.document, where, count, 16);
+        std::vector<float> texels(4 * count, 1.0f);
+        tbb::parallel_for(size_t(0), triangles.size(), [&](size_t i) {
+            const Atlas::Block& b = atlas.blocks[i];
+            const double cells = b.side - 1;
+            for (uint32_t y = 0; y < b.side; ++y)
+                for (uint32_t x = 0; x < b.side && x + y <= b.side; ++x) {  // the last ones lie behind the third edge
+                    const Rgb c = made->at(triangles[i].at(x / cells, y / cells));
+                    float* texel = &texels[4 * ((uint64_t(b.y) + y) * atlas.width + b.x + x)];
+                    texel[0] = c.x, texel[1] = c.y, texel[2] = c.z;
+                }
+        });
+        return add_image(scene, where, atlas.width, atlas.height, std::move(texels));
+    });
+    BakedMesh out;
+    out.bsdf = copier.copy(bsdf);
+    for (size_t i = 0; i < mesh.faces.size(); ++i) {
+        const Atlas::Block& b = atlas.blocks[i];
+        const uint32_t first = uint32_t(out.mesh.positions.size());
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t v = mesh.faces[i][k];
+            out.mesh.positions.push_back(mesh.positions[v]);
+            if (!mesh.normals.empty()) out.mesh.normals.push_back(mesh.normals[v]);
+            const double x = b.x + 0.5 + (k == 1 ? b.side - 1 : 0), y = b.y + 0.5 + (k == 2 ? b.side - 1 : 0);
+            out.mesh.uvs.push_back({float(x / atlas.width), float(y / atlas.height)});
+        }
+        out.mesh.faces.push_back({first, first + 1, first + 2});
+    }
+    return out;
+}
+
+const Object* bake_solids(SceneMaker& scene, const Where& where, Surface surface, const Matrix& to_world,
+                          const Object& bsdf) {
+    const double turn = 2 * M_PI;
+    const double radius = std::max(length(column(to_world, 0)), length(column(to_world, 1)));
+    const double along = surface == Surface::sphere ? M_PI * radius : length(column(to_world, 2));
+    const double sizes[2] = {surface == Surface::disk ? radius : turn * radius,
+                             surface == Surface::disk ? turn * radius : along};
+    double size = std::max(kTexel * finest_detail(scene, bsdf), std::sqrt(sizes[0] * sizes[1] / kMostTexels));
+    size = std::min(size, radius / 32);  // the normal changes too
+    const auto count = [size](double extent) { return uint32_t(std::clamp(std::ceil(extent / size), 1.0, 65536.0)); };
+    const uint32_t width = count(sizes[0]), height = count(sizes[1]);
+    note_size(scene, where, size);
+    // Where Mitsuba's shape has coordinates (u,v), and its normal there.
+    const auto local = [&](double u, double v, Vec3d& p, Vec3d& n) {
+        if (surface == Surface::sphere) {
+            p = n = {std::sin(M_PI * v) * std::cos(turn * u), std::sin(M_PI * v) * std::sin(turn * u),
+                     std::cos(M_PI * v)};
+        } else if (surface == Surface::disk) {
+            p = {u * std::cos(turn * v), u * std::sin(turn * v), 0}, n = {0, 0, 1};
+        } else {
+            n = {std::cos(turn * u), std::sin(turn * u), 0}, p = {n.x, n.y, v};
+        }
+    };
+    const Matrix inverse = affine_inverse(to_world);
+    const UvMap to_pbrt = uv_map(surface);
+    Copier copier(scene.document, [&](const Object& texture) -> const Object* {
+        const MadeTexture* made = scene.textures.made(texture);
+        if (!made) return nullptr;
+        if (made->texture.kind != Texture::Kind::solid) return &texture;
+        take_texels(scene.document, where, uint64_t(width) * height, 16);
+        std::vector<float> texels(4 * size_t(width) * height, 1.0f);
+        tbb::parallel_for(0u, height, [&](uint32_t y) {
+            for (uint32_t x = 0; x < width; ++x) {
+                const double u = (x + 0.5) / width, v = (y + 0.5) / height;
+                Vec3d p, n;
+                local(u, v, p, n);
+                const auto& m = to_pbrt.m;
+                // Normals go by the transposed inverse.
+                Vec3d world_n;
+                double* const out[3] = {&world_n.x, &world_n.y, &world_n.z};
+                for (int i = 0; i < 3; ++i)
+                    *out[i] = inverse.m[0][i] * n.x + inverse.m[1][i] * n.y + inverse.m[2][i] * n.z;
+                const Rgb c = made->at({placed(to_world, p), unit(world_n), m[0][0] * u + m[0][1] * v + m[0][2],
+                                        m[1][0] * u + m[1][1] * v + m[1][2]});
+                float* texel = &texels[4 * (size_t(y) * width + x)];
+                texel[0] = c.x, texel[1] = c.y, texel[2] = c.z;
+            }
+        });
+        return add_image(scene, where, width, height, std::move(texels));
+    });
+    return copier.copy(bsdf);
+}
+
+}  // namespace ambilux::pbrt
