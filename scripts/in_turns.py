@@ -1,9 +1,10 @@
 """Times two programs in turns: CPU seconds of `ambilux render` per sample of every pixel, and their ratio.
 
 Usage: scripts/in_turns.py [--turns 5] [--spp 8] OLD NEW SCENE RENDER_ARGUMENT...
-OLD and NEW are ambilux programs. Seconds are those of the process (user and system) less those of a render of one
-sample, so that loading is not in them and other work on the machine hardly is. Prints the medians, the median of the
-ratios OLD/NEW with the least and the greatest, and whether the images of both are the same to the bit.
+OLD and NEW are ambilux programs, or scripts that start one (by mpirun, say). Seconds are those of the process (user and
+system) less those of a render of one sample, so that loading is not in them and other work on the machine hardly is.
+Prints the medians, the median of the ratios OLD/NEW with the least and the greatest, the same of wall clock, which is
+worth something on a quiet machine only, and whether the images of both are the same to the bit.
 """
 
 import argparse
@@ -13,15 +14,17 @@ import resource
 import statistics
 import subprocess
 import tempfile
+import time
 
 import numpy as np
 
 
-def cpu_seconds(command):
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+def seconds_of(command):
+    """CPU seconds, wall clock."""
+    start, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return np.array([after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, time.monotonic() - start])
 
 
 def pixels(path):
@@ -44,7 +47,7 @@ def main():
         def seconds(program, name):
             def of(spp):
                 out = str(pathlib.Path(folder) / f"{name}.exr")
-                return cpu_seconds([program, "render", *a.arguments, "--backend", "cpu", "--spp", str(spp), "-o", out])
+                return seconds_of([program, "render", *a.arguments, "--backend", "cpu", "--spp", str(spp), "-o", out])
             return (of(a.spp + 1) - of(1)) / a.spp
         pairs = []
         for turn in range(a.turns):
@@ -54,13 +57,16 @@ def main():
         same = "?"
         try:
             for program, name in ((a.old, "old"), (a.new, "new")):
-                cpu_seconds([program, "render", *a.arguments, "--backend", "cpu", "--spp", "2", "-o", f"{folder}/{name}.exr"])
+                seconds_of([program, "render", *a.arguments, "--backend", "cpu", "--spp", "2", "-o", f"{folder}/{name}.exr"])
             same = pixels(f"{folder}/old.exr") == pixels(f"{folder}/new.exr")
         except ImportError:
             pass
-    ratios = [o / n for o, n in pairs]
-    print(f"old {statistics.median(o for o, _ in pairs):.4f} s, new {statistics.median(n for _, n in pairs):.4f} s a sample; "
-          f"old/new {statistics.median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f}); same images: {same}")
+    for kind, name in enumerate(("CPU", "wall")):
+        old, new = [o[kind] for o, _ in pairs], [n[kind] for _, n in pairs]
+        ratios = [o / n for o, n in zip(old, new)]
+        print(f"{name}: old {statistics.median(old):.4f} s, new {statistics.median(new):.4f} s a sample; "
+              f"old/new {statistics.median(ratios):.3f} ({min(ratios):.3f} to {max(ratios):.3f})")
+    print(f"same images: {same}")
 
 
 if __name__ == "__main__":

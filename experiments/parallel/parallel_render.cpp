@@ -21,8 +21,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Other ranks are looked at as often; a film of theirs is seconds of work.
-constexpr double kPollSeconds = 2e-3, kPatience = 0.05;
+/// Other ranks are looked at as often; a film of theirs is seconds of work, and a look costs a core 25 us.
+constexpr double kPollSeconds = 5e-3, kPatience = 0.05;
 /// A render in seconds begins with a range of one device: this long, or this share of its time.
 constexpr double kTrialSeconds = 1, kTrialShare = 1.0 / 64;
 
