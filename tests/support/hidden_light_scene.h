@@ -12,7 +12,7 @@ inline std::string hidden_light(const std::string& radiance) {
     return "<bsdf type='null'/><emitter type='hiddenarea'>" + radiance + "</emitter>";
 }
 
-/// A closed room with a dull mirror and a pane of glass in it, under hidden lights: a textured rectangle, two spheres
+/// A closed room with a dull mirror and a pane in it, under hidden lights: a textured rectangle, two spheres
 /// in view, a cylinder, and, if `lamp`, an area emitter.
 inline std::string hidden_room(uint32_t size, int max_depth, bool lamp) {
     std::string s =
@@ -26,7 +26,8 @@ inline std::string hidden_room(uint32_t size, int max_depth, bool lamp) {
          "type='roughconductor'><string name='material' value='none'/><float name='alpha' "
          "value='0.4'/></bsdf></shape>";
     s += "<shape type='rectangle'><transform name='to_world'><scale value='0.4'/><rotate x='1' angle='80'/><translate "
-         "x='-0.5' y='0.3' z='0.5'/></transform><bsdf type='thindielectric'/></shape>";
+         "x='-0.5' y='0.3' z='0.5'/></transform>" +
+         diffuse({0.5f, 0.5f, 0.5f}) + "</shape>";
     s += "<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' angle='180'/><translate "
          "x='0.3' y='0.5' z='1.6'/></transform>" +
          hidden_light(
