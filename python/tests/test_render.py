@@ -72,8 +72,14 @@ def test_progressive_ends_with_the_image_of_render(scene):
 
 
 def test_time_is_met(scene):
-    steps = list(ambilux.progressive(scene, time=0.6, every=0.2, backend="cpu"))
-    assert 2 <= len(steps) <= 6 and 0.3 < steps[-1].seconds < 2
+    # Other processes may take the cores at the wrong moment: one of three tries must succeed.
+    tries = []
+    for _ in range(3):
+        steps = list(ambilux.progressive(scene, time=0.6, every=0.2, backend="cpu"))
+        tries.append((len(steps), steps[-1].seconds))
+        if 2 <= len(steps) <= 6 and 0.3 < steps[-1].seconds < 2:
+            return
+    raise AssertionError(tries)
 
 
 def test_usage_errors(scene):

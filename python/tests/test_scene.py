@@ -132,7 +132,7 @@ def test_every_plugin_of_the_reader_is_known_to_dictionaries():
     outer = {"bsdf": "ball.bsdf", "texture": "ball.bsdf.reflectance", "emitter": "light", "shape": "thing", "integrator": "integrator", "sensor": "sensor",
              "film": "sensor.film", "rfilter": "sensor.film.rfilter", "sampler": "sensor.sampler"}
     for name, tag in tags.items():
-        description = changed("ball.emitter" if name in ("area", "directionalarea") else outer[tag], {"type": name})
+        description = changed("ball.emitter" if name in ("area", "directionalarea", "hiddenarea") else outer[tag], {"type": name})
         try:
             ambilux.Scene(description)
         except ambilux.SceneError as e:
