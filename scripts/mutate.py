@@ -260,7 +260,7 @@ class Workspace:
     def run_faults(self, numbers):
         cases = self.baseline()
         reaching = {number: [c for c in cases if number in c[3]] for number in numbers}
-        left, spent, killed, began = {k: len(reaching[k]) for k in numbers}, dict.fromkeys(numbers, 0.0), {}, time.time()
+        left, spent, killed, began = {k: len(reaching[k]) for k in numbers}, dict.fromkeys(numbers, 0.0), set(), time.time()
 
         def try_case(number_and_case):
             number, (seconds, test, case, _) = number_and_case
@@ -281,7 +281,7 @@ class Workspace:
             spent[number] += took
             left[number] -= 1
             if verdict not in ("pass", "skipped") and number not in killed:
-                killed[number] = True
+                killed.add(number)
                 conclude(number, verdict, f"{case[1]}: {case[2]}")
             elif not left[number] and number not in killed:
                 conclude(number, "survived", f"{len(reaching[number])} cases reach it")

@@ -10,32 +10,16 @@ Each scene is rendered by a process of its own, so that one that crashes or hang
 """
 
 import argparse
-import csv
-import os
 import subprocess
 import sys
 import time
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
-HEADER = ["cell", "method", "backend", "boxes_x", "boxes_y", "samples", "pixels", "seconds", "invalid", "state", "note", "boxes"]
+from stress_table import BATCHES, BOXES, Table, box_means, failed, measured, not_finished, nothing
+
 METHODS = ("path", "ptracer")
-BATCHES, BOXES = 32, 4  # as in experiments/stress/measure.h
 RESULT = "result: "  # after whatever Mitsuba prints
-
-
-def box_means(image, boxes_x, boxes_y):
-    """Means over pixels and channels of the boxes of an image, and how many values were no numbers or negative, and count as 0."""
-    import numpy as np
-
-    height, width = image.shape[:2]
-    bad = ~np.isfinite(image) | (image < 0)
-    image = np.where(bad, 0, image).astype(np.float64)
-    # Pixel x lies in box x * boxes // width.
-    columns = [-(-i * width // boxes_x) for i in range(boxes_x + 1)]
-    rows = [-(-i * height // boxes_y) for i in range(boxes_y + 1)]
-    means = [image[rows[j]:rows[j + 1], columns[i]:columns[i + 1]].mean() for j in range(boxes_y) for i in range(boxes_x)]
-    return means, int(bad.sum())
 
 
 def render(path, method, variant, paths):
@@ -60,12 +44,7 @@ def render(path, method, variant, paths):
         means, bad = box_means(image, boxes_x, boxes_y)
         values += means
         invalid += bad
-    return [boxes_x, boxes_y, spp * BATCHES, width * height, f"{time.monotonic() - start:.3f}", invalid, "", "", " ".join(f"{v:.9g}" for v in values)]
-
-
-def nothing(state, note):
-    clean = " ".join(note.replace(",", ";").replace('"', "'").split())
-    return [1, 1, 0, 1, 0, 0, state, clean[:300] or "no message", ""]
+    return measured(boxes_x, boxes_y, spp * BATCHES, width * height, time.monotonic() - start, invalid, values)
 
 
 def in_own_process(options, path, method):
@@ -73,10 +52,9 @@ def in_own_process(options, path, method):
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=options.limit, check=False)
     except subprocess.TimeoutExpired:
-        return nothing("left out", f"not finished in {options.limit:g} s")
+        return not_finished(options.limit)
     if done.returncode != 0:
-        lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
-        return nothing("refused", f"exit status {done.returncode}: {lines[-1] if lines else ''}")
+        return failed(done)
     return done.stdout.rpartition(RESULT)[2].strip().split(",")
 
 
@@ -92,23 +70,11 @@ def main():
     if options.one:
         print(RESULT + ",".join(str(x) for x in render(options.scenes, options.one, options.variant, options.paths)))
         return 0
-    with open(options.scenes / "expected.csv", encoding="utf-8") as file:
-        cells = list(csv.DictReader(file))
-    done = set()
-    if options.output.exists():
-        with open(options.output, encoding="utf-8") as file:
-            done = {(row["cell"], row["method"]) for row in csv.DictReader(file)}
-    else:
-        options.output.write_text(",".join(HEADER) + "\n", encoding="utf-8")
-    jobs = [(cell, method) for cell in cells for method in METHODS if (cell["cell"], method) not in done]
-    for i, (cell, method) in enumerate(jobs):
-        print(f"{i + 1} of {len(jobs)}: {cell['cell']} {method}", file=sys.stderr)
+    table = Table(options.scenes, options.output, METHODS)
+    for i, (cell, method) in enumerate(table.jobs):
+        print(f"{i + 1} of {len(table.jobs)}: {cell['cell']} {method}", file=sys.stderr)
         why = cell["not_mitsuba"]
-        line = nothing("left out", why) if why else in_own_process(options, options.scenes / f"{cell['cell']}.xml", method)
-        with open(options.output, "a", encoding="utf-8") as file:
-            file.write(",".join([cell["cell"], method, "mitsuba", *map(str, line)]) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
+        table.add(cell["cell"], method, "mitsuba", nothing("left out", why) if why else in_own_process(options, options.scenes / f"{cell['cell']}.xml", method))
     return 0
 
 

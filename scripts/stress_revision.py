@@ -12,7 +12,6 @@ Each batch is a render of its own with a seed of its own, on a core of its own. 
 
 import argparse
 import concurrent.futures
-import csv
 import json
 import os
 import queue
@@ -23,7 +22,7 @@ import time
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
-from stress_mitsuba import BATCHES, BOXES, HEADER, box_means, nothing
+from stress_table import BATCHES, BOXES, Table, box_means, failed, measured, not_finished
 
 METHODS = {
     "path-nee": ["-i", "path", "--set", "estimator=nee"],
@@ -57,16 +56,15 @@ def render(options, scene, how, core):
                 done = subprocess.run([*map(str, command), "--seed", str(batch + 1)], capture_output=True, text=True, timeout=max(left, 0.1), check=False,
                                       preexec_fn=lambda: os.sched_setaffinity(0, {core}))
             except subprocess.TimeoutExpired:
-                return nothing("left out", f"not finished in {options.limit:g} s")
+                return not_finished(options.limit)
             if done.returncode != 0:
-                lines = [line for line in done.stderr.splitlines() if line.strip()]
-                return nothing("refused", f"exit status {done.returncode}: {lines[-1] if lines else ''}")
+                return failed(done)
             counts = json.loads(told.read_text())["invalid"]
             invalid += sum(counts.get(kind, 0) for kind in ("nan", "inf", "negative"))
             means, bad = box_means(OpenEXR.File(str(image)).channels()["RGB"].pixels, boxes_x, boxes_y)
             values += means
             invalid += bad
-    return [boxes_x, boxes_y, spp * BATCHES, width * height, f"{time.monotonic() - start:.3f}", invalid, "", "", " ".join(f"{v:.9g}" for v in values)]
+    return measured(boxes_x, boxes_y, spp * BATCHES, width * height, time.monotonic() - start, invalid, values)
 
 
 def main():
@@ -79,14 +77,7 @@ def main():
     parser.add_argument("--limit", type=float, default=60, help="seconds that all batches of a scene may take (default: %(default)g)")
     parser.add_argument("--jobs", type=int, default=1, help="scenes rendered side by side, each on a core of its own")
     options = parser.parse_args()
-    with open(options.scenes / "expected.csv", encoding="utf-8") as file:
-        cells = list(csv.DictReader(file))
-    done = set()
-    if options.output.exists():
-        with open(options.output, encoding="utf-8") as file:
-            done = {(row["cell"], row["method"]) for row in csv.DictReader(file)}
-    else:
-        options.output.write_text(",".join(HEADER) + "\n", encoding="utf-8")
+    table = Table(options.scenes, options.output, options.method)
     cores = queue.SimpleQueue()
     for core in sorted(os.sched_getaffinity(0))[: options.jobs]:
         cores.put(core)
@@ -94,19 +85,17 @@ def main():
     def one(job):
         core = cores.get()
         try:
-            return render(options, options.scenes / f"{job[0]}.xml", METHODS[job[1]], core)
+            return render(options, options.scenes / f"{job[0]['cell']}.xml", METHODS[job[1]], core)
         finally:
             cores.put(core)
 
-    jobs = [(cell["cell"], method) for cell in cells for method in options.method if (cell["cell"], method) not in done]
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        running = {pool.submit(one, job): job for job in jobs}
+        running = {pool.submit(one, job): job for job in table.jobs}
         try:
             for i, finished in enumerate(concurrent.futures.as_completed(running)):
                 cell, method = running[finished]
-                with open(options.output, "a", encoding="utf-8") as file:
-                    file.write(",".join([cell, method, "cpu", *map(str, finished.result())]) + "\n")
-                print(f"{i + 1} of {len(jobs)}: {cell} {method}", file=sys.stderr)
+                table.add(cell["cell"], method, "cpu", finished.result())
+                print(f"{i + 1} of {len(table.jobs)}: {cell['cell']} {method}", file=sys.stderr)
         finally:
             pool.shutdown(cancel_futures=True)
     return 0

@@ -43,6 +43,17 @@ Value& add_value(Object& object, const std::string& name, ValueKind kind) {
 
 }  // namespace
 
+void for_all_below(const Object& object, const std::function<void(const Object&)>& f) {
+    std::set<const Object*> seen;
+    const std::function<void(const Object&)> visit = [&](const Object& o) {
+        if (!seen.insert(&o).second) return;
+        f(o);
+        for (const Child& child : o.children)
+            if (child.object) visit(*child.object);
+    };
+    visit(object);
+}
+
 void take_texels(Document& document, const Where& where, uint64_t texels, uint64_t bytes_each) {
     FileBudget(where.file, document.limits).bytes(texels, bytes_each);
     document.made_texels += texels * bytes_each;

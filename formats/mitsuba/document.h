@@ -2,6 +2,7 @@
 // built from. Plugins and parameters are Mitsuba's, in the snake_case of format 2 and later.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -92,6 +93,8 @@ void check_references(const Document& document);
 
 /// A new object of the document, of format 2.
 Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where);
+/// Calls f once for the object and each below it.
+void for_all_below(const Object& object, const std::function<void(const Object&)>& f);
 /// Before a front end makes an image of its own: throws Error(bad_input) where one or all are more than the limits
 /// allow.
 void take_texels(Document& document, const Where& where, uint64_t texels, uint64_t bytes_each);

@@ -231,10 +231,9 @@ Matrix rigid_part(const Matrix& m, bool& problem) {
     problem = !is_orthogonal(m, 1e-3);
     for (const Vec3d& c : {x, y, z}) problem |= !(std::abs(length(c) - 1) < 1e-3);
     const auto scaled = [](Vec3d a, double s) { return Vec3d{a.x * s, a.y * s, a.z * s}; };
-    const auto minus = [](Vec3d a, Vec3d b) { return Vec3d{a.x - b.x, a.y - b.y, a.z - b.z}; };
     // Gram-Schmidt from z, the view direction; a reflection stays one.
     const Vec3d uz = scaled(z, 1 / length(z));
-    const Vec3d py = minus(y, scaled(uz, dot(y, uz))), uy = scaled(py, 1 / length(py));
+    const Vec3d py = y - scaled(uz, dot(y, uz)), uy = scaled(py, 1 / length(py));
     const Vec3d right = cross(uy, uz), ux = scaled(right, dot(right, x) < 0 ? -1 : 1);
     Matrix r = m;
     const Vec3d columns[3] = {ux, uy, uz};

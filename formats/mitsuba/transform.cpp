@@ -40,6 +40,11 @@ Matrix rotation(double x, double y, double z, double degrees) {
 double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Vec3d cross(Vec3d a, Vec3d b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 double length(Vec3d a) { return std::sqrt(dot(a, a)); }
+Vec3d transformed(const Matrix& a, Vec3d p, double w) {
+    const auto row = [&](int i) { return a.m[i][0] * p.x + a.m[i][1] * p.y + a.m[i][2] * p.z + w * a.m[i][3]; };
+    return {row(0), row(1), row(2)};
+}
+
 Vec3d column(const Matrix& a, int i) { return {a.m[0][i], a.m[1][i], a.m[2][i]}; }
 
 Matrix look_at(Vec3d origin, Vec3d target, Vec3d up, bool& valid) {

@@ -26,8 +26,11 @@ double determinant(const Matrix& a);
 /// Inverse of an affine matrix with determinant other than 0.
 Matrix affine_inverse(const Matrix& a);
 Affine to_affine(const Matrix& a);
+/// A point (w = 1), or a direction (w = 0); the last row is taken for 0 0 0 1.
+Vec3d transformed(const Matrix& a, Vec3d p, double w = 1);
 /// Columns of the linear part.
 Vec3d column(const Matrix& a, int i);
+inline Vec3d operator-(Vec3d a, Vec3d b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 double dot(Vec3d a, Vec3d b);
 Vec3d cross(Vec3d a, Vec3d b);
 double length(Vec3d a);

@@ -11,15 +11,9 @@ using namespace mitsuba;
 
 namespace {
 
-Vec3d point_of(const Matrix& m, Vec3d p) {
-    const auto row = [&](int i) { return m.m[i][0] * p.x + m.m[i][1] * p.y + m.m[i][2] * p.z + m.m[i][3]; };
-    return {row(0), row(1), row(2)};
-}
-Vec3d minus(Vec3d a, Vec3d b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-
 void add_point(SceneMaker& scene, const Described& light) {
     Object& object = add_object(scene.document, "emitter", "point", light.in.where);
-    const Vec3d p = point_of(scene.state.ctm, light.in.point("from", {0, 0, 0}));
+    const Vec3d p = transformed(scene.state.ctm, light.in.point("from", {0, 0, 0}));
     set_vector(object, "position", p);
     set_rgb(object, "intensity", emission(scene, light, "I").scaled(power_factor(light, "power", 4 * M_PI)));
     add_child(*scene.document.scene, object);
@@ -27,9 +21,9 @@ void add_point(SceneMaker& scene, const Described& light) {
 
 void add_distant(SceneMaker& scene, const Described& light) {
     Object& object = add_object(scene.document, "emitter", "directional", light.in.where);
-    const Vec3d from = point_of(scene.state.ctm, light.in.point("from", {0, 0, 0})),
-                to = point_of(scene.state.ctm, light.in.point("to", {0, 0, 1}));
-    set_vector(object, "direction", minus(to, from));
+    const Vec3d from = transformed(scene.state.ctm, light.in.point("from", {0, 0, 0})),
+                to = transformed(scene.state.ctm, light.in.point("to", {0, 0, 1}));
+    set_vector(object, "direction", to - from);
     set_rgb(object, "irradiance", emission(scene, light, "L").scaled(power_factor(light, "illuminance", 1)));
     add_child(*scene.document.scene, object);
 }
@@ -37,8 +31,8 @@ void add_distant(SceneMaker& scene, const Described& light) {
 void add_spot(SceneMaker& scene, const Described& light) {
     const Parameters& in = light.in;
     Object& object = add_object(scene.document, "emitter", "spot", in.where);
-    const Vec3d from = point_of(scene.state.ctm, in.point("from", {0, 0, 0})),
-                to = point_of(scene.state.ctm, in.point("to", {0, 0, 1})), axis = minus(to, from);
+    const Vec3d from = transformed(scene.state.ctm, in.point("from", {0, 0, 0})),
+                to = transformed(scene.state.ctm, in.point("to", {0, 0, 1})), axis = to - from;
     bool valid = true;
     const Vec3d up = std::fabs(axis.x) < 0.9 * length(axis) ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0};
     const Matrix to_world = look_at(from, to, up, valid);

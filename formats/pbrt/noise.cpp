@@ -26,6 +26,16 @@ constexpr uint8_t kPermutation[256] = {
 
 uint32_t permuted(int64_t i) { return kPermutation[i & 255]; }
 
+template <class Function>
+double sum_of_octaves(Vec3d p, double omega, int octaves, Function f) {
+    double sum = 0, frequency = 1, amplitude = 1;
+    for (int i = 0; i < octaves; ++i) {
+        sum += amplitude * f(noise(frequency * p.x, frequency * p.y, frequency * p.z));
+        frequency *= kLacunarity, amplitude *= omega;
+    }
+    return sum;
+}
+
 }  // namespace
 
 double noise(double x, double y, double z) {
@@ -50,22 +60,12 @@ double noise(double x, double y, double z) {
 }
 
 double fbm(Vec3d p, double omega, int octaves) {
-    double sum = 0, frequency = 1, amplitude = 1;
-    for (int i = 0; i < octaves; ++i) {
-        sum += amplitude * noise(frequency * p.x, frequency * p.y, frequency * p.z);
-        frequency *= kLacunarity, amplitude *= omega;
-    }
-    return sum;
+    return sum_of_octaves(p, omega, octaves, [](double n) { return n; });
 }
 
 double turbulence(Vec3d p, double omega, int octaves) {
-    double sum = 0, frequency = 1, amplitude = 1;
-    for (int i = 0; i < octaves; ++i) {
-        sum += amplitude * std::fabs(noise(frequency * p.x, frequency * p.y, frequency * p.z));
-        frequency *= kLacunarity, amplitude *= omega;
-    }
-    // The mean of the octave that would follow.
-    return sum + amplitude * 0.2;
+    // And the mean of the octave that would follow.
+    return sum_of_octaves(p, omega, octaves, [](double n) { return std::fabs(n); }) + std::pow(omega, octaves) * 0.2;
 }
 
 }  // namespace ambilux::pbrt

@@ -9,11 +9,7 @@ namespace {
 using mitsuba::Matrix;
 using mitsuba::Vec3d;
 
-Vec3d placed(const Matrix& m, Vec3d p) {
-    const auto row = [&](int i) { return m.m[i][0] * p.x + m.m[i][1] * p.y + m.m[i][2] * p.z + m.m[i][3]; };
-    return {row(0), row(1), row(2)};
-}
-Vec3d placed(const Matrix& m, Vec3f p) { return placed(m, Vec3d{p.x, p.y, p.z}); }
+Vec3d placed(const Matrix& m, Vec3f p) { return transformed(m, {p.x, p.y, p.z}); }
 
 Vec2f in_texture(const Projection& projection, Vec3d p) {
     const double phi = std::atan2(p.y, p.x);
@@ -31,7 +27,7 @@ Vec2f in_texture(const Projection& projection, Vec3d p) {
 }  // namespace
 
 Vec2f coordinates(const Projection& projection, Vec3d world) {
-    return in_texture(projection, placed(projection.to_texture, world));
+    return in_texture(projection, transformed(projection.to_texture, world));
 }
 
 bool Projection::same(const Projection& other) const {

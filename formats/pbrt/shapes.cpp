@@ -2,7 +2,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <set>
 
 #include "formats/gzip.h"
 #include "formats/meshes/loop_subdivision.h"
@@ -153,15 +152,10 @@ bool has_uvs(const std::string& path) {
 }
 
 /// `seen`: what was looked into; objects are shared, and a mix of mixes may hold one 2^n times.
-bool has_texture(const Object& object, std::set<const Object*>& seen) {
-    if (!seen.insert(&object).second) return false;
-    return std::any_of(object.children.begin(), object.children.end(), [&](const Child& child) {
-        return child.object->tag == "texture" || has_texture(*child.object, seen);
-    });
-}
 bool has_texture(const Object& object) {
-    std::set<const Object*> seen;
-    return has_texture(object, seen);
+    bool found = false;
+    for_all_below(object, [&](const Object& o) { found |= o.tag == "texture"; });
+    return found;
 }
 
 /// Area of the triangles in the world if all have the same, else 0: pbrt gives its power to each.

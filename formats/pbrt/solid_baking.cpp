@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <set>
 
 namespace ambilux::pbrt {
 
@@ -21,11 +20,6 @@ constexpr double kTexel = 1.0 / 8;
 /// Texels a side of a triangle's block.
 constexpr double kMostSide = 1024;
 
-Vec3d placed(const Matrix& m, Vec3d p, double w = 1) {
-    const auto row = [&](int i) { return m.m[i][0] * p.x + m.m[i][1] * p.y + m.m[i][2] * p.z + w * m.m[i][3]; };
-    return {row(0), row(1), row(2)};
-}
-Vec3d minus(Vec3d a, Vec3d b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 Vec3d unit(Vec3d v) {
     const double l = length(v);
     return l > 0 ? Vec3d{v.x / l, v.y / l, v.z / l} : Vec3d{0, 0, 1};
@@ -58,23 +52,11 @@ private:
     std::map<const Object*, const Object*> copies_;
 };
 
-/// Calls f(texture object, what it was made of) once for each texture below `object`.
-void for_textures(const SceneMaker& scene, const Object& object,
-                  const std::function<void(const Object&, const MadeTexture&)>& f) {
-    std::set<const Object*> seen;
-    const std::function<void(const Object&)> walk = [&](const Object& o) {
-        if (!seen.insert(&o).second) return;
-        if (o.tag == "texture")
-            if (const MadeTexture* made = scene.textures.made(o)) return f(o, *made);
-        for (const Child& child : o.children) walk(*child.object);
-    };
-    walk(object);
-}
-
 double finest_detail(const SceneMaker& scene, const Object& bsdf) {
     double detail = std::numeric_limits<double>::infinity();
-    for_textures(scene, bsdf, [&](const Object&, const MadeTexture& made) {
-        if (made.texture.kind == Texture::Kind::solid) detail = std::min(detail, made.texture.detail);
+    for_all_below(bsdf, [&](const Object& o) {
+        const MadeTexture* made = scene.textures.made(o);
+        if (made && made->texture.kind == Texture::Kind::solid) detail = std::min(detail, made->texture.detail);
     });
     return detail;
 }
@@ -107,9 +89,7 @@ struct Corners {
     Vec3d p[3], n;
     Vec2f uv[3];
 
-    double longest() const {
-        return std::max({length(minus(p[1], p[0])), length(minus(p[2], p[1])), length(minus(p[0], p[2]))});
-    }
+    double longest() const { return std::max({length(p[1] - p[0]), length(p[2] - p[1]), length(p[0] - p[2])}); }
     SurfacePlace at(double x, double y) const {
         const auto mix = [&](float a, float b, float c) { return a + x * (double(b) - a) + y * (double(c) - a); };
         return {between(p[0], p[1], p[2], x, y), n, mix(uv[0].x, uv[1].x, uv[2].x), mix(uv[0].y, uv[1].y, uv[2].y)};
@@ -163,14 +143,10 @@ private:
 /// Coordinates of the surface do not go on over the edges of triangles.
 void check_tangents(SceneMaker& scene, const Where& where, const Object& bsdf) {
     bool turns = false;
-    std::set<const Object*> seen;
-    const std::function<void(const Object&)> walk = [&](const Object& o) {
-        if (!seen.insert(&o).second) return;
+    for_all_below(bsdf, [&](const Object& o) {
         const Value *u = o.find("alpha_u"), *v = o.find("alpha_v");
         turns |= o.type == "normalmap" || (u && v && u->number != v->number);
-        for (const Child& child : o.children) walk(*child.object);
-    };
-    walk(bsdf);
+    });
     if (turns)
         scene.report.refuse(where, "solid textures on meshes with normal maps or two roughnesses are not supported",
                             "these turn from triangle to triangle");
@@ -187,10 +163,10 @@ BakedMesh bake_solids(SceneMaker& scene, const Where& where, const Mesh& mesh, c
         Corners t;
         for (size_t k = 0; k < 3; ++k) {
             const Vec3f p = mesh.positions[face[k]];
-            t.p[k] = placed(to_world, {p.x, p.y, p.z});
+            t.p[k] = transformed(to_world, {p.x, p.y, p.z});
             t.uv[k] = mesh.uvs[face[k]];
         }
-        t.n = unit(cross(minus(t.p[1], t.p[0]), minus(t.p[2], t.p[0])));
+        t.n = unit(cross(t.p[1] - t.p[0], t.p[2] - t.p[0]));
         triangles.push_back(t);
     }
     const Atlas atlas(triangles, kTexel * finest_detail(scene, bsdf));
@@ -272,7 +248,7 @@ const Object* bake_solids(SceneMaker& scene, const Where& where, Surface surface
                 double* const out[3] = {&world_n.x, &world_n.y, &world_n.z};
                 for (int i = 0; i < 3; ++i)
                     *out[i] = inverse.m[0][i] * n.x + inverse.m[1][i] * n.y + inverse.m[2][i] * n.z;
-                const Rgb c = made->at({placed(to_world, p), unit(world_n), m[0][0] * u + m[0][1] * v + m[0][2],
+                const Rgb c = made->at({transformed(to_world, p), unit(world_n), m[0][0] * u + m[0][1] * v + m[0][2],
                                         m[1][0] * u + m[1][1] * v + m[1][2]});
                 float* texel = &texels[4 * (size_t(y) * width + x)];
                 texel[0] = c.x, texel[1] = c.y, texel[2] = c.z;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 
 #include "formats/pbrt/noise.h"
 #include "formats/pbrt/textures.h"
@@ -11,15 +10,11 @@
 namespace ambilux::pbrt {
 
 using mitsuba::Matrix;
+using mitsuba::transformed;
 
 namespace {
 
 Vec3d operator*(double s, Vec3d v) { return {s * v.x, s * v.y, s * v.z}; }
-
-Vec3d transformed(const Matrix& m, Vec3d p, double w) {
-    const auto row = [&](int i) { return m.m[i][0] * p.x + m.m[i][1] * p.y + m.m[i][2] * p.z + w * m.m[i][3]; };
-    return {row(0), row(1), row(2)};
-}
 
 /// Colour of pbrt's marble for t in [0,1]: cubic Bezier curves through colours of a photograph.
 Rgb marble_color(double t) {
@@ -119,14 +114,9 @@ double Textures::mean_of_solid(const Texture& texture) {
 }
 
 bool Textures::has_solid(const Object& object) const {
-    std::set<const Object*> seen;
-    const std::function<bool(const Object&)> walk = [&](const Object& o) {
-        if (!seen.insert(&o).second) return false;
-        return (o.tag == "texture" && o.type == "solid") ||
-               std::any_of(o.children.begin(), o.children.end(),
-                           [&](const mitsuba::Child& c) { return walk(*c.object); });
-    };
-    return walk(object);
+    bool found = false;
+    mitsuba::for_all_below(object, [&](const Object& o) { found |= o.tag == "texture" && o.type == "solid"; });
+    return found;
 }
 
 Rgb MadeTexture::at(const SurfacePlace& place) const {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 namespace ambilux::pbrt {
 
@@ -83,20 +82,14 @@ void Textures::set_mapping(Texture& texture, const Parameters& in) const {
 std::shared_ptr<const Projection> Textures::projection_of(const Object& object) const {
     std::shared_ptr<const Projection> found;
     bool any = false, mixed = false;
-    std::set<const Object*> seen;
-    const std::function<void(const Object&)> walk = [&](const Object& o) {
-        if (!seen.insert(&o).second) return;
+    mitsuba::for_all_below(object, [&](const Object& o) {
         const auto it = projections_.find(&o);
-        if (it != projections_.end()) {
-            const bool same = found && it->second ? found->same(*it->second) : found == it->second;
-            mixed |= any && !same;
-            if (!any) found = it->second;
-            any = true;
-        }
-        for (const mitsuba::Child& child : o.children)
-            if (child.object) walk(*child.object);
-    };
-    walk(object);
+        if (it == projections_.end()) return;
+        const bool same = found && it->second ? found->same(*it->second) : found == it->second;
+        mixed |= any && !same;
+        if (!any) found = it->second;
+        any = true;
+    });
     if (mixed)
         report_.refuse(object.where, "textures of different mappings on one surface are not supported",
                        "all have the coordinates of the first");

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "tests/support/closed_forms.h"
+#include "tests/support/small_room.h"
 
 namespace ambilux {
 
@@ -28,19 +28,11 @@ inline std::string beam_room(uint32_t size, int max_depth, bool lamp) {
     const std::string turned =
         "<transform name='to_world'><rotate x='1' angle='60'/><rotate z='1' angle='25'/>"
         "<scale value='0.5'/><translate x='-0.3' y='0.2' z='0.6'/></transform>";
-    std::string s =
-        "<sensor type='perspective'><float name='fov' value='60'/><transform name='to_world'><lookat "
-        "origin='0.3,-1.7,1' target='0,1,0.9' up='0,0,1'/></transform>" +
-        square_film(size) + "</sensor>";
-    s += "<shape type='cube'><boolean name='flip_normals' value='true'/><transform name='to_world'><scale x='1.5' "
-         "y='2' z='1'/><translate z='1'/></transform>" +
-         diffuse({0.6f, 0.5f, 0.4f}) + "</shape>";
+    std::string s = room_in_view(size);
     s += "<shape type='rectangle'>" + turned +
          "<bsdf type='principledthin'><rgb name='base_color' value='0.8,0.5,0.3'/><float name='roughness' "
          "value='0.6'/><float name='spec_trans' value='0.5'/><float name='diff_trans' value='0.8'/></bsdf></shape>";
-    s += "<shape type='sphere'><point name='center' x='0.7' y='0.6' z='0.4'/><float name='radius' value='0.3'/><bsdf "
-         "type='roughconductor'><string name='material' value='none'/><float name='alpha' "
-         "value='0.4'/></bsdf></shape>";
+    s += dull_ball();
     s += collimated("0.5,0.5,1.9", "-0.3,0.2,0.6", {4, 3, 2});
     s += "<shape type='disk'><transform name='to_world'><scale value='0.3'/><rotate x='1' angle='180'/><translate "
          "x='0.7' y='0.5' z='1.8'/></transform>" +
@@ -48,10 +40,7 @@ inline std::string beam_room(uint32_t size, int max_depth, bool lamp) {
     // Its normals point everywhere.
     s += "<shape type='sphere'><point name='center' x='-0.8' y='0.9' z='1.4'/><float name='radius' value='0.1'/>" +
          diffuse({0.5f, 0.5f, 0.5f}) + directional_area({20, 15, 10}) + "</shape>";
-    if (lamp)
-        s += "<shape type='rectangle'><transform name='to_world'><scale value='0.2'/><rotate x='1' "
-             "angle='180'/><translate x='-0.5' z='1.9'/></transform>" +
-             diffuse({0, 0, 0}) + area_light({6, 6, 6}) + "</shape>";
+    if (lamp) s += ceiling_lamp();
     return scene_xml(max_depth, s);
 }
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "tests/support/closed_forms.h"
+#include "tests/support/small_room.h"
 
 namespace ambilux {
 
@@ -15,16 +15,8 @@ inline std::string hidden_light(const std::string& radiance) {
 /// A closed room with a dull mirror and a pane in it, under hidden lights: a textured rectangle, two spheres
 /// in view, a cylinder, and, if `lamp`, an area emitter.
 inline std::string hidden_room(uint32_t size, int max_depth, bool lamp) {
-    std::string s =
-        "<sensor type='perspective'><float name='fov' value='60'/><transform name='to_world'><lookat "
-        "origin='0.3,-1.7,1' target='0,1,0.9' up='0,0,1'/></transform>" +
-        square_film(size) + "</sensor>";
-    s += "<shape type='cube'><boolean name='flip_normals' value='true'/><transform name='to_world'><scale x='1.5' "
-         "y='2' z='1'/><translate z='1'/></transform>" +
-         diffuse({0.6f, 0.5f, 0.4f}) + "</shape>";
-    s += "<shape type='sphere'><point name='center' x='0.7' y='0.6' z='0.4'/><float name='radius' value='0.3'/><bsdf "
-         "type='roughconductor'><string name='material' value='none'/><float name='alpha' "
-         "value='0.4'/></bsdf></shape>";
+    std::string s = room_in_view(size);
+    s += dull_ball();
     s += "<shape type='rectangle'><transform name='to_world'><scale value='0.4'/><rotate x='1' angle='80'/><translate "
          "x='-0.5' y='0.3' z='0.5'/></transform>" +
          diffuse({0.5f, 0.5f, 0.5f}) + "</shape>";
@@ -41,10 +33,7 @@ inline std::string hidden_room(uint32_t size, int max_depth, bool lamp) {
     s += "<shape type='cylinder'><point name='p0' x='-1' y='-0.5' z='0.3'/><point name='p1' x='-1' y='0.5' "
          "z='0.5'/><float name='radius' value='0.1'/>" +
          hidden_light(rgb("radiance", {2, 3, 5})) + "</shape>";
-    if (lamp)
-        s += "<shape type='rectangle'><transform name='to_world'><scale value='0.2'/><rotate x='1' "
-             "angle='180'/><translate x='-0.5' z='1.9'/></transform>" +
-             diffuse({0, 0, 0}) + area_light({6, 6, 6}) + "</shape>";
+    if (lamp) s += ceiling_lamp();
     return scene_xml(max_depth, s);
 }
 
