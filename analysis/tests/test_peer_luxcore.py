@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[2]
 PEERS = ROOT / "scripts" / "peers"
 sys.path.insert(0, str(PEERS))
 import kernel_build  # noqa: E402
+import peer_luxcore  # noqa: E402
 from peer_protocol import Refused  # noqa: E402
 
 
@@ -45,6 +46,66 @@ def test_a_build_that_fails_says_how():
         build("import sys; sys.exit(print('no libnvrtc') or 3)")
     with pytest.raises(Refused, match="ended with signal SIGABRT"):
         build("import os; os.abort()")
+
+
+class DeviceSession(peer_luxcore.Session):
+    """A session as PATHOCL's: its film holds what the device last handed over, 32 samples at a time; the sample of number n has the value n."""
+
+    def __init__(self):
+        super().__init__(None, None, {}, (2, 1))
+        self.handed, self.looks, self.running = 0, 0, False
+        self.Pause = lambda: setattr(self, "running", False)
+
+    def run(self, seed):
+        self.session, self.running = self, True
+
+    def counted(self):
+        self.looks += 1
+        if self.running and self.looks % 3 == 0:
+            self.handed += 32
+        return float(self.handed)
+
+    def image(self):
+        return np.full((1, 2, 3), (self.handed + 1) / 2, np.float32)
+
+
+def test_a_pass_of_kernels_lies_between_two_films_that_the_device_hands_over():
+    session = DeviceSession()
+    for _ in range(3):
+        before = session.handed
+        image, seconds, samples, signed = peer_luxcore.pass_of_kernels(session, 1, 40)
+        assert samples == 64 and seconds > 0 and signed
+        # The first film behind the pause begins the pass: what it brings is not of it.
+        first = before + 32
+        assert session.handed == first + 64
+        np.testing.assert_allclose(image, first + 32.5)
+
+
+def test_a_session_without_further_samples_is_refused(monkeypatch):
+    monkeypatch.setattr(peer_luxcore, "SILENCE", 0.2)
+    session = DeviceSession()
+    session.counted = lambda: 0.0
+    with pytest.raises(Refused, match="no further sample in 0.2 s: 0 of"):
+        peer_luxcore.pass_of_kernels(session, 1, 4)
+
+
+class Devices(dict):
+    def GetAllNames(self):
+        return list(self)
+
+    def Get(self, key):
+        value = self[key]
+        return type("Property", (), {"GetString": lambda _: value})()
+
+
+@pytest.mark.parametrize(("kinds", "chosen"), [(["OPENCL_GPU", "CUDA_GPU", "CUDA_GPU"], 1), (["OPENCL_CPU", "OPENCL_GPU"], 1), (["OPENCL_CPU"], 0)])
+def test_one_device_is_used_and_cuda_before_opencl(kinds, chosen):
+    devices = Devices({f"opencl.device.{i}.{k}": v for i, kind in enumerate(kinds) for k, v in (("type", kind), ("name", f"card {i}"))})
+    name, kind, settings = peer_luxcore.choose_device(type("Lux", (), {"GetOpenCLDeviceDescs": lambda: devices}))
+    assert (name, kind) == (f"card {chosen}", kinds[chosen])
+    assert settings["opencl.devices.select"] == "".join("1" if i == chosen else "0" for i in range(len(kinds)))
+    assert settings["cuda.optix.devices.select"] == "0" * len(kinds)
+    assert peer_luxcore.choose_device(type("Lux", (), {"GetOpenCLDeviceDescs": lambda: Devices()})) is None
 
 
 def lines_of(process):

@@ -55,8 +55,8 @@ def choose_device(lc):
         if kind in kinds:
             chosen = kinds.index(kind)
             settings = {"opencl.devices.select": "".join("1" if i == chosen else "0" for i in range(len(kinds))), "opencl.native.threads.count": 0,
-                        # Our own traversal is CUDA's too; OptiX would build further kernels.
-                        "context.cuda.optix.enable": False, "film.opencl.enable": False}
+                        # Our traversal is CUDA's too. LuxCore makes a context of OptiX unless this says 0, and dies where that library is missing.
+                        "cuda.optix.devices.select": "0" * len(kinds), "accelerator.type": "BVH", "film.opencl.enable": False}
             if kind == "OPENCL_CPU":
                 settings["opencl.task.count"] = 8192  # 512 Ki are for a device
             return devices.Get(f"opencl.device.{chosen}.name").GetString(), kind, settings
@@ -64,7 +64,8 @@ def choose_device(lc):
 
 
 def with_one_allocator():
-    """pyluxcore brings an allocator that must be there before a driver is loaded, which else frees what the other one gave: start again with it."""
+    """pyluxcore brings an allocator, and drivers are loaded behind it (OpenCL's for every engine). Unless it was there first, they free what the other
+    one gave and end the process: start again with it."""
     found = importlib.util.find_spec("pyluxcore")
     if not found or not found.origin:
         return
@@ -213,16 +214,14 @@ def build_kernels(job):
     _, render = start(job, build=False)
     render(1, 1)
     kernel_build.log_line(begin, "first sample")
-    # LuxCore's threads and Python's end are not on good terms.
-    os._exit(0)
 
 
 if __name__ == "__main__":
     with open(sys.argv[1], encoding="utf-8") as file:
         asked = json.load(file)
-    if asked["integrator"] == "PATHOCL":
-        with_one_allocator()
+    with_one_allocator()
     if BUILD in sys.argv:
         build_kernels(asked)
     else:
         serve(start)
+    os._exit(0)  # Python's end and LuxCore's log handler are not on good terms
