@@ -227,8 +227,10 @@ inline std::vector<SceneCase> scene_cases() {
                "<emitter type='constant'>" + rgb("radiance", "1") + "</emitter>")},
         {"beams", 24000, whole(sensor("perspective", perspective) + walls + bodies() + beams + masked_lamps)},
         {"all around", 60000,
-         whole(sensor("spherical", "") + bodies() + lamps + "<emitter type='constant'>" + rgb("radiance", "1") +
-               "</emitter>")},
+         whole(sensor("spherical", "") + bodies() + lamps +
+               area_light("<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate y='1' "
+                          "angle='180'/><translate y='1' z='6'/></transform>") +
+               "<emitter type='constant'>" + rgb("radiance", "1") + "</emitter>")},
         {"masked lamps", 24000, whole(sensor("perspective", perspective) + walls + bodies() + masked_lamps)},
         // Next event estimation meets such spots on paths that light subpaths began.
         {"narrow spots", 24000,
