@@ -1,4 +1,4 @@
-// libs: ambilux_formats ambilux_accel JPEG::JPEG
+// libs: ambilux_convert ambilux_formats ambilux_accel JPEG::JPEG
 // data: tagged
 // timeout: 120
 // The Mitsuba loader: what it understands, and what it says about what it does not. Numbers marked "Mitsuba" were read

@@ -61,20 +61,21 @@ TEST_CASE("inside of a sphere that shines every pixel has its radiance, by every
 
 TEST_CASE("in a room path tracing, light tracing and all strategies agree, over the edges of film and crop too") {
     const std::vector<Method> methods(std::begin(kEach), std::begin(kEach) + 6);
-    for (const auto& [filter, crop] : {std::pair{"gaussian", std::string()},
-                                       {"tent", crop_window(0, 0, 4, 4)},
-                                       {"gaussian", crop_window(12, 4, 4, 4)}}) {
+    agree(scene_from_text(room_around(spherical_camera(16, 8, "gaussian"), 4)), methods, 1u << 12, 1u << 10, 0.08);
+    // At the seam and a pole, in a film of few pixels: splats arrive from everywhere.
+    for (const auto& [filter, crop] :
+         {std::pair{"tent", crop_window(0, 0, 4, 4)}, {"gaussian", crop_window(4, 4, 4, 4)}}) {
         INFO(filter << ' ' << crop);
-        const Scene scene = scene_from_text(room_around(spherical_camera(16, 8, filter, crop), 4));
-        agree(scene, methods, 1u << 12, 1u << 11, 0.08);
+        const Scene scene = scene_from_text(room_around(spherical_camera(8, 8, filter, crop), 4));
+        agree(scene, {kAll, kLightTracer}, 1u << 13, 1u << 13, 0.08);
     }
 }
 
-TEST_CASE("a film smaller than its filter holds the mean of all that is around") {
-    const Scene scene = furnace(spherical_camera(2, 1, "gaussian"), 2);
+TEST_CASE("a film no larger than its filter holds the mean of all that is around") {
+    const Scene scene = furnace(spherical_camera(4, 4, "gaussian"), 2);
     for (const Method& m : {kAll, kLightTracer}) {
         INFO(m.name);
-        check_image(scene, method_settings(scene, m, 3), furnace_image(2, 1, 2));
+        check_image(scene, method_settings(scene, m, 3), furnace_image(4, 4, 2));
     }
 }
 
