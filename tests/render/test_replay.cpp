@@ -139,7 +139,8 @@ TEST_CASE("A replayed sample of light tracing and of bdpt is the render's, bit b
 }
 
 TEST_CASE("Replayed samples of a spherical sensor are the render's, at the edges of the film too") {
-    const Scene scene = scene_from_text(room_around(spherical_camera(12, 6, "gaussian"), 4));
+    // Tails of a gaussian are so small that sums of doubles would depend on the order of splats.
+    const Scene scene = scene_from_text(room_around(spherical_camera(12, 6, "tent"), 4));
     for (const Config& c : {kPaths[0], kBidirectional[0], kBidirectional[2], kBidirectional[6]}) {
         CAPTURE(text_of(c));
         RenderSettings settings = settings_of(scene, c);
