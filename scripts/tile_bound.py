@@ -159,17 +159,19 @@ class Scene:
         return np.sqrt(np.prod(scores, 0))
 
     def table(self, same=False):
-        """Name of the best single candidate; gains by draws of each tile, by eye samples, by both. No tile has the path
-        tracer while others have light subpaths: too few samples tell in which of them it misses light."""
+        """Name of the best single candidate; gains by draws of each tile, by eye samples, by both. The path tracer has all
+        tiles or none: too few samples tell in which of them it misses light. What all tiles share is chosen by both
+        halves: a whole image tells it better than tiles tell theirs."""
         one, fine = np.ones(1), 2.0 ** np.arange(-4, 2.01, 0.5)
         bdpt = list(range(1, 1 + len(DRAWS)))
         singles = {"path": self.best([0], one, [0], same)}
         singles |= {f"{DRAWS[m - 1]} draws, {light:g}": self.best([m], one, [light], same) for m in bdpt for light in LIGHT}
-        varied = [self.best([0], SAMPLES, [0], same), *(self.best([m], SAMPLES, fine, same) for m in bdpt)]
-        # Which one all tiles share is chosen by both halves: a whole image tells it better than tiles tell theirs.
         name = min(singles, key=lambda n: singles[n][0])
-        base, eye = singles[name][1], min(varied, key=lambda x: x[0])[1]
-        return name, [base / x for x in (self.best(bdpt, one, LIGHT, same)[1], eye, self.best(bdpt, SAMPLES, fine, same)[1])]
+        path = self.best([0], SAMPLES, [0], same)
+        varied = [[singles["path"], self.best(bdpt, one, LIGHT, same)],
+                  [path, *(self.best([m], SAMPLES, fine, same) for m in bdpt)],
+                  [path, self.best(bdpt, SAMPLES, fine, same)]]
+        return name, [singles[name][1] / min(v, key=lambda x: x[0])[1] for v in varied]
 
 
 def print_table(files):
