@@ -56,16 +56,16 @@ struct Megakernel {
             }
 
             const bool tested = s.testing, extended = !tested && s.going && !landed && !connecting(s);
-            Hit met = {0.0f, 0.0f, 0.0f, kNone};
-            const bool meets = (tested || extended) && trace(s, met, counts);
+            Hit nearest = {0.0f, 0.0f, 0.0f, kNone};
+            const bool blocked = (tested || extended) && trace(s, nearest, counts);
             if (tested) {
                 s.testing = false;
-                if (!meets) arrive(s);
+                if (!blocked) arrive(s);
             }
             if (extended) {
                 landed = true;
-                hit = met;
-                if (!meets) hit.prim = kNone;
+                hit = nearest;
+                if (!blocked) hit.prim = kNone;
             }
 
             const uint32_t steps = block.count(landed), others = block.count(s.active && !landed);
