@@ -141,7 +141,7 @@ inline PathRays camera_rays(const SceneView& scene, uint32_t size, BatchKeys key
         const uint32_t path = uint32_t(i);
         const Vec4f u = random_floats(key(path, 0), 0);
         const float x = float(even_bits(path)) + u.x, y = float(even_bits(path >> 1)) + u.y;
-        const CameraSample sample = sample_camera_ray(sensor, {x, y}, {u.z, u.w});
+        const CameraSample sample = sample_camera_ray<kAllFeatures>(sensor, {x, y}, {u.z, u.w});
         camera.rays[i] = {sample.o, sample.tmax, sample.d, random_bits(key(path, 0), 1).x};
         camera.path_of[i] = path;
     });

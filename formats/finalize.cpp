@@ -312,6 +312,7 @@ void fill_features(Scene& scene) {
         if (e.type != EmitterType::envmap) use(e.radiance.texture);  // an environment map has its own lookup
     }
     f.instances = !scene.instances.empty();
+    f.latlong = is_latlong(scene.sensor.type);
     scene.features = f;
 }
 

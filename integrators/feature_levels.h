@@ -37,7 +37,7 @@ constexpr Features kTriangleFeatures = {kCommonBsdfs, kCommonEmitters, bit(Primi
 /// The same with holes.
 constexpr Features kMaskedFeatures = {kCommonBsdfs, kCommonEmitters, bit(PrimitiveType::triangle), true, false, true};
 
-/// All but the rarer BSDFs and emitters, blends, coatings and rules of maps.
+/// All but the rarer BSDFs, emitters and sensors, blends, coatings and rules of maps.
 constexpr Features kCommonFeatures = {kCommonBsdfs, kCommonEmitters, kAllFeatures.primitives, true, true, true};
 
 /// All but instances, of which every kernel of the last level asks at every hit.

@@ -22,6 +22,7 @@ struct Features {
     bool coats = false;       ///< any coating
     bool map_rules = false;   ///< any map with MapRules
     bool instances = false;   ///< any group of triangles in several places (scene/view.h, Instance)
+    bool latlong = false;     ///< a sensor of all directions (models/sensor_list.h)
 
     constexpr bool has(BsdfType t) const { return bsdfs >> uint32_t(t) & 1u; }
     constexpr bool has(EmitterType t) const { return emitters >> uint32_t(t) & 1u; }
@@ -36,7 +37,7 @@ struct Features {
         return !(other.bsdfs & ~bsdfs) && !(other.emitters & ~emitters) && !(other.primitives & ~primitives) &&
                (textures || !other.textures) && (bumps || !other.bumps) && (opacity || !other.opacity) &&
                (blends || !other.blends) && (coats || !other.coats) && (map_rules || !other.map_rules) &&
-               (instances || !other.instances);
+               (instances || !other.instances) && (latlong || !other.latlong);
     }
     constexpr bool operator==(const Features&) const = default;
 };
@@ -48,6 +49,7 @@ constexpr uint32_t bit(PrimitiveType t) { return 1u << uint32_t(t); }
 constexpr Features kAllFeatures = {BsdfModels::kAll,
                                    EmitterModels::kAll,
                                    (1u << uint32_t(PrimitiveType::count)) - 1,
+                                   true,
                                    true,
                                    true,
                                    true,

@@ -32,7 +32,7 @@ public:
         const Draws draws = {{seed_, y * view_.sensor.crop_width + x, sample, Stream::eye}};
         const Vec4f u = draws.camera();
         const CameraSample camera =
-            sample_camera_ray(view_.sensor, sample_film_position(view_, x, y, {u.x, u.y}), {u.z, u.w});
+            sample_camera_ray<kAllFeatures>(view_.sensor, sample_film_position(view_, x, y, {u.x, u.y}), {u.z, u.w});
         Ray ray = {camera.o, camera.tmax, camera.d, 0};
         Rgb seen = {1.0f, 1.0f, 1.0f};
         for (uint32_t depth = 1; depth <= kMostDeltas; ++depth) {

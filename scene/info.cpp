@@ -29,6 +29,7 @@ std::vector<std::string> feature_names(const Features& f) {
     if (f.coats) names.push_back("coatings");
     if (f.map_rules) names.push_back("rules of maps");
     if (f.instances) names.push_back("instances");
+    if (f.latlong) names.push_back("spherical sensor");
     return names;
 }
 
@@ -71,10 +72,14 @@ nlohmann::json scene_info(const Scene& scene) {
     for (const Texture& t : scene.textures) ++textures[t.type == TextureType::bitmap ? "bitmap" : "checkerboard"];
     const Sensor& s = scene.sensor;
     const double degrees = 360 / M_PI;
-    nlohmann::json sensor = {{"type", name_of(s.type)}, {"near_clip", s.near_clip}, {"far_clip", s.far_clip}};
-    if (s.type == SensorType::orthographic)
+    nlohmann::json sensor = {{"type", name_of(s.type)}};
+    if (!is_latlong(s.type)) {
+        sensor["near_clip"] = s.near_clip;
+        sensor["far_clip"] = s.far_clip;
+    }
+    if (is_parallel(s.type))
         sensor["half_extent"] = {s.tan_half_fov.x, s.tan_half_fov.y};
-    else
+    else if (!is_latlong(s.type))
         sensor["fov_degrees"] = {std::atan(s.tan_half_fov.x) * degrees, std::atan(s.tan_half_fov.y) * degrees};
     if (s.type == SensorType::thin_lens) {
         sensor["aperture_radius"] = s.aperture_radius;

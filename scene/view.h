@@ -165,9 +165,9 @@ struct Sensor {
     SensorType type;
     Affine to_world;     ///< camera space: +z is the view direction, +y up, +x LEFT in the image (Mitsuba)
     Vec2f tan_half_fov;  ///< perspective, thin lens: tangent of half the field of view along x and y of the full film
-                         ///< orthographic: half of the film's extent in camera units
+                         ///< orthographic: half of the film's extent in camera units; spherical: 0
     Vec2f principal_offset;                 ///< shift of the principal point as a fraction of the film size
-    float near_clip, far_clip;              ///< along the view axis, scene units
+    float near_clip, far_clip;              ///< along the view axis, scene units; spherical: 0 and infinite
     float aperture_radius, focus_distance;  ///< thin lens
     uint32_t film_width, film_height;
     uint32_t crop_x, crop_y, crop_width, crop_height;

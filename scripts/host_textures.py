@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """What textures in host memory cost (docs/scaling.md): renders a wall of large textures, and prints times in turns.
 
-    scripts/host_textures.py PROGRAM [--textures N] [--side PIXELS] [--left MIB]
+    scripts/host_textures.py PROGRAM [--textures N] [--side PIXELS] [--left MIB] [--values device pinned]
 
 Every pixel of the wall sees texels from anywhere, the worst case for pages: textures are much finer than the image.
-First the device has room for all textures; then, with --left, another process takes its memory until that much is left.
+First the device has room for all textures; then another process takes its memory until --left is left. On a shared
+device leave `host` out there: more managed memory than a device has free can stop it for others too.
 """
 
 import argparse
@@ -52,11 +53,11 @@ def render(program, scene, folder, textures, spp):
     return told["seconds"], told["memory_bytes"], json.loads(compared.stdout)["rmse"]
 
 
-def report(program, scene, folder, spp, turns, what):
+def report(program, scene, folder, spp, turns, values, what):
     """Prints each render as it ends: a machine that is lent for minutes may be gone before the last."""
     print(f"\n{what}\n\n| textures | turn | load s | build s | render s | MiB on the device | RMSE against the first |\n| --- | --- | --- | --- | --- | --- | --- |", flush=True)
     for turn in range(1, turns + 1):
-        for textures in ("device", "host", "pinned"):
+        for textures in values:
             result = render(program, scene, folder, textures, spp)
             if isinstance(result, str):
                 print(f"| {textures} | {turn} | {result} | | | | |", flush=True)
@@ -72,6 +73,7 @@ def main():
     parser.add_argument("--side", type=int, default=8192, help="pixels; a texture has 4 bytes for each")
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--turns", type=int, default=3)
+    parser.add_argument("--values", nargs="+", choices=("device", "host", "pinned"), default=("device", "host", "pinned"), help="of the setting textures")
     parser.add_argument("--left", type=int, help="MiB that are left on the device in the second part; default: 1024 more than half of the textures")
     a = parser.parse_args()
     texels = a.textures * a.side**2 * 4 >> 20
@@ -79,14 +81,14 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         scene = write_scene(folder, a.textures, a.side)
-        report(a.program, scene, folder, a.spp, a.turns, f"{texels} MiB of textures, a device with room for them")
+        report(a.program, scene, folder, a.spp, a.turns, a.values, f"{texels} MiB of textures, a device with room for them")
         holder = subprocess.Popen([sys.executable, pathlib.Path(__file__).with_name("hold_device_memory.py"), str(left)], stdin=subprocess.PIPE,
                                   stdout=subprocess.PIPE, text=True)
         try:
             held = holder.stdout.readline().strip()
             if not held:
                 sys.exit("the device's memory could not be taken: see above")
-            report(a.program, scene, folder, a.spp, a.turns, f"{texels} MiB of textures; of the device's memory {held}")
+            report(a.program, scene, folder, a.spp, a.turns, a.values, f"{texels} MiB of textures; of the device's memory {held}")
         finally:
             holder.stdin.close()
             holder.wait()

@@ -2,7 +2,8 @@
 # Builds a wheel of the package ambilux for this machine's Python, with all libraries that the distribution's Python
 # does not bring and their licences, tries it in a fresh environment, and puts it into dist/.
 #   scripts/wheel.sh                    CPU only
-#   AMBILUX_CUDA=ON scripts/wheel.sh    with CUDA kernels; the driver is looked for when they are to run
+#   AMBILUX_CUDA=ON scripts/wheel.sh    with CUDA kernels; the driver is looked for when they are to run. They are for devices of
+#                                       compute capability 9.0 and, by PTX, newer ones: AMBILUX_CUDA_ARCHITECTURES='80;90' for more
 # It runs on x86-64 Linux with AVX2, the same version of Python and a glibc as new as this machine's.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 scripts/setup.sh
@@ -17,7 +18,7 @@ fi
 tools="$work/tools/bin"
 
 CMAKE_BUILD_PARALLEL_LEVEL=$(jobs) python3 -m pip wheel --quiet --disable-pip-version-check --no-deps . -w "$work/out" \
-  -Cbuild-dir="$root/build-wheel"
+  -Cbuild-dir="$root/build-wheel" -Ccmake.define.AMBILUX_CUDA_ARCHITECTURES="${AMBILUX_CUDA_ARCHITECTURES:-90}"
 built=("$work"/out/ambilux-*.whl)
 PATH="$tools:$PATH" "$tools/auditwheel" repair --exclude 'libcuda.so.*' -w "$work/out/repaired" "${built[0]}"
 repaired=("$work"/out/repaired/*.whl)

@@ -9,12 +9,13 @@
 namespace ambilux {
 
 /// Camera ray of a path.
+template <Features F>
 AMBILUX_HD CameraSample camera_sample(const SceneView& scene, const PathSlot& p, const Draws& draws) {
     const Vec4f u = draws.camera();
-    return sample_camera_ray(scene.sensor, sample_film_position(scene, p.x, p.y, {u.x, u.y}), {u.z, u.w});
+    return sample_camera_ray<F>(scene.sensor, sample_film_position(scene, p.x, p.y, {u.x, u.y}), {u.z, u.w});
 }
 
-template <class Mis>
+template <Features F, class Mis>
 struct GenerateEye {
     static constexpr const char* kName = "generate";
     using Items = SubpathItems<Mis>;
@@ -35,8 +36,8 @@ struct GenerateEye {
         samples[slot] = {};
         const PathSlot p = wave.locate(slot);
         if (!p.active) return false;
-        const CameraSample c = camera_sample(scene, p, {wave.key(p)});
-        ray = Items::pack(start_eye(scene, mis, c), Side::eye, slot, c.tmax);
+        const CameraSample c = camera_sample<F>(scene, p, {wave.key(p)});
+        ray = Items::pack(start_eye<F>(scene, mis, c), Side::eye, slot, c.tmax);
         return true;
     }
 };
@@ -53,7 +54,7 @@ AMBILUX_HD bool start_light_subpath(const SceneView& scene, const Rules<Bidirect
     if (!is_valid_radiance(path.throughput, record)) return false;
     const Vec4f u = draws.emission_direction();
     Candidate<BidirectionalMis> c;
-    if (draws.number == 0 && visible_emitter(scene, rules, e, {u.z, u.w}, c) && is_valid_radiance(c.value, record))
+    if (draws.number == 0 && visible_emitter<F>(scene, rules, e, {u.z, u.w}, c) && is_valid_radiance(c.value, record))
         splats.push(pack_candidate(c, slot, F.opacity ? draws.shadow_seed(0) : 0));
     return rules.max_depth >= 2;
 }

@@ -56,16 +56,16 @@ struct Megakernel {
             }
 
             const bool tested = s.testing, extended = !tested && s.going && !landed && !connecting(s);
-            Hit met = {0.0f, 0.0f, 0.0f, kNone};
-            const bool meets = (tested || extended) && trace(s, met, counts);
+            Hit nearest = {0.0f, 0.0f, 0.0f, kNone};
+            const bool blocked = (tested || extended) && trace(s, nearest, counts);
             if (tested) {
                 s.testing = false;
-                if (!meets) arrive(s);
+                if (!blocked) arrive(s);
             }
             if (extended) {
                 landed = true;
-                hit = met;
-                if (!meets) hit.prim = kNone;
+                hit = nearest;
+                if (!blocked) hit.prim = kNone;
             }
 
             const uint32_t steps = block.count(landed), others = block.count(s.active && !landed);
@@ -150,14 +150,14 @@ private:
         if (!is_valid_radiance(s.path.throughput, records.light_generate)) return;
         const Vec4f u = d.emission_direction();
         Candidate<Mis> c;
-        if (visible_emitter(scene, rules, e, {u.z, u.w}, c)) test(s, c, d, 0, records.light_generate);
+        if (visible_emitter<F>(scene, rules, e, {u.z, u.w}, c)) test(s, c, d, 0, records.light_generate);
         s.going = rules.max_depth >= 2;
     }
 
     AMBILUX_HD void begin_eye(State& s) const {
         s.side = Side::eye;
-        const CameraSample camera = camera_sample(scene, wave.locate(s.slot), draws(s));
-        s.path = start_eye(scene, rules.mis, camera);
+        const CameraSample camera = camera_sample<F>(scene, wave.locate(s.slot), draws(s));
+        s.path = start_eye<F>(scene, rules.mis, camera);
         s.tmax = camera.tmax;
         s.going = true;
         s.sum = {0.0f, 0.0f, 0.0f};

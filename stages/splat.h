@@ -5,9 +5,11 @@
 #include "film/strategy_film.h"
 #include "stages/stage.h"
 #include "transport/sensor/filter.h"
+#include "transport/sensor/latlong.h"
 
 namespace ambilux {
 
+template <Features F>
 struct Splat {
     static constexpr const char* kName = "splat";
 
@@ -24,8 +26,13 @@ struct Splat {
         const SplatItem item = splats.load(i);
         // Either would do for a hole; asking for both loads both lanes at once.
         if ((item.path == kNoPath) | (item.film.x != item.film.x)) return;
+        for_each_film_position<F>(scene.sensor, item.film, [&](Vec2f film) { add(item, film); });
+    }
+
+private:
+    AMBILUX_HD void add(const SplatItem& item, Vec2f film) const {
         const Sensor& sensor = scene.sensor;
-        const float x = item.film.x - float(sensor.crop_x), y = item.film.y - float(sensor.crop_y);
+        const float x = film.x - float(sensor.crop_x), y = film.y - float(sensor.crop_y);
         const float r = sensor.filter_radius;
         const int32_t x0 = max(int32_t(ceilf(x - r - 0.5f)), 0);
         const int32_t x1 = min(int32_t(floorf(x + r - 0.5f)), int32_t(wave.width) - 1);

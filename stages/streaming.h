@@ -18,6 +18,7 @@ constexpr uint32_t kLightRay = 0x80000000u;
 
 /// The slots, and what each of them keeps. A slot goes on with whichever path is next when it is done with one, so that
 /// all are at work until there are no more.
+template <Features F>
 struct StreamPool {
     using Items = SubpathItems<BidirectionalMis>;
 
@@ -48,8 +49,8 @@ struct StreamPool {
             samples[path] = {};
             const PathSlot p = wave.locate(path);
             if (!p.active) continue;
-            const CameraSample c = camera_sample(scene, p, {wave.key(p)});
-            rays.put(slot, Items::pack(start_eye(scene, rules.mis, c), Side::eye, path, c.tmax));
+            const CameraSample c = camera_sample<F>(scene, p, {wave.key(p)});
+            rays.put(slot, Items::pack(start_eye<F>(scene, rules.mis, c), Side::eye, path, c.tmax));
             return;
         }
     }
@@ -63,10 +64,11 @@ struct StreamPool {
     }
 };
 
+template <Features F>
 struct StreamBegin {
     static constexpr const char* kName = "generate";
 
-    StreamPool pool;
+    StreamPool<F> pool;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t slot) const { pool.begin(slot, slot); }
@@ -81,7 +83,7 @@ struct StreamExtend {
 
     SceneView scene;
     Tracer tracer;
-    StreamPool pool;
+    StreamPool<F> pool;
     Queue<SlotHit> eye_hits, light_hits;
     StageRecord* record;
 
@@ -89,7 +91,7 @@ struct StreamExtend {
 
     AMBILUX_HD bool fetch(uint32_t slot, Ray& ray) const {
         const SubpathRay item = pool.rays.load(slot);
-        ray = {item.origin, StreamPool::Items::tmax(item), item.direction, 0};
+        ray = {item.origin, StreamPool<F>::Items::tmax(item), item.direction, 0};
         if constexpr (F.opacity) {
             const uint32_t path = item.path & ~kLightRay;
             const Draws draws =
@@ -129,7 +131,7 @@ template <Features F, class EmissionOut>
 struct StreamEyeVertex {
     static constexpr const char* kName = "shade";
 
-    StreamPool pool;
+    StreamPool<F> pool;
     Queue<SlotHit> hits;
     EmissionOut emission;
     Queue<VertexItem> vertices;
@@ -167,11 +169,11 @@ struct StreamEyeVertex {
         vertex.front.bits = {depth};
         vertex.front.link = kNoPath;
         bool connects = false;
-        Subpath<BidirectionalMis> path = StreamPool::Items::unpack(h.ray);
+        Subpath<BidirectionalMis> path = StreamPool<F>::Items::unpack(h.ray);
         SubpathRay next = {};  // depth 0
         if (visit<F>(pool.scene, rules, Side::eye, rules.longest(Side::eye), h.hit(), path,
                      Sink{*this, h.ray.path, vertex, connects}))
-            next = StreamPool::Items::pack(path, Side::eye, h.ray.path, kInfinity);
+            next = StreamPool<F>::Items::pack(path, Side::eye, h.ray.path, kInfinity);
         pool.pending.store(end.slot, next);
         pool.eye.store(end.slot, vertex, lanes_of<F>(vertex));
         turns.push({h.ray.path, end.slot, connects || (rules.splat && depth == 1) ? 1u : 0u, 0});
@@ -183,7 +185,7 @@ template <Features F, class Splats>
 struct StreamTurn {
     static constexpr const char* kName = "light_generate";
 
-    StreamPool pool;
+    StreamPool<F> pool;
     Queue<TurnItem> turns;
     Splats splats;
     StageRecord* record;
@@ -196,7 +198,7 @@ struct StreamTurn {
         if (turn.light_subpath &&
             start_light_subpath<F>(pool.scene, pool.rules, pool.light_draws(turn.path, pool.eye.load_front(turn.slot)),
                                    turn.path, splats, record, path))
-            pool.rays.put(turn.slot, StreamPool::Items::pack(path, Side::light, turn.path | kLightRay, kInfinity));
+            pool.rays.put(turn.slot, StreamPool<F>::Items::pack(path, Side::light, turn.path | kLightRay, kInfinity));
         else
             pool.advance(turn.slot);
     }
@@ -207,7 +209,7 @@ template <Features F>
 struct StreamLightVertex {
     static constexpr const char* kName = "light_shade";
 
-    StreamPool pool;
+    StreamPool<F> pool;
     Queue<SlotHit> hits;
     Queue<VertexItem> camera_vertices;
     Queue<ConnectionVertex> pairs;  ///< light vertices, whose `link` is the slot of the eye vertex
@@ -244,11 +246,11 @@ struct StreamLightVertex {
         const bool splat = rules.splat && draws.number == 0;
         // A path has one segment more than its light subpath, and those of the eye subpath if there is one.
         const uint32_t longest = splat ? rules.max_depth - 1 : rules.max_depth - 1 - eye.bits.depth();
-        Subpath<BidirectionalMis> path = StreamPool::Items::unpack(h.ray);
+        Subpath<BidirectionalMis> path = StreamPool<F>::Items::unpack(h.ray);
         if (!visit<F>(pool.scene, rules, Side::light, longest, h.hit(), path,
                       Sink{*this, eye, draws, splat, end.slot, h.ray.path}))
             return pool.advance(end.slot);
-        pool.rays.put(end.slot, StreamPool::Items::pack(path, Side::light, h.ray.path | kLightRay, kInfinity));
+        pool.rays.put(end.slot, StreamPool<F>::Items::pack(path, Side::light, h.ray.path | kLightRay, kInfinity));
     }
 };
 
@@ -257,7 +259,7 @@ template <Features F, class Out>
 struct StreamConnect {
     static constexpr const char* kName = "connect_vertices";
 
-    StreamPool pool;
+    StreamPool<F> pool;
     Queue<ConnectionVertex> pairs;
     LightVertexSource source;
     Out candidates;

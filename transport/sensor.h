@@ -4,3 +4,4 @@
 #include "transport/sensor/camera.h"
 #include "transport/sensor/filter.h"
 #include "transport/sensor/importance.h"
+#include "transport/sensor/latlong.h"

@@ -10,6 +10,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/flag.h"
+#include "core/log.h"
 #include "experiments/peers/child_process.h"
 #include "experiments/peers/pass_peer.h"
 #include "experiments/peers/peer_scripts.h"
@@ -90,12 +91,15 @@ private:
     }
 
     nlohmann::json receive(const volatile bool* interrupt) {
-        const auto line = child_.read_line(interrupt);
-        if (!line && is_set(interrupt)) throw Error(ExitCode::interrupted, "interrupted");
-        if (!line) throw PeerRefusal(false, fmt::format("{} ended: {}", peers_python(), child_.last_words()));
-        nlohmann::json answer = nlohmann::json::parse(*line, nullptr, false);
-        if (!answer.is_object()) throw PeerRefusal(false, "an answer that is not JSON: " + *line);
-        return answer;
+        for (;;) {
+            const auto line = child_.read_line(interrupt);
+            if (!line && is_set(interrupt)) throw Error(ExitCode::interrupted, "interrupted");
+            if (!line) throw PeerRefusal(false, fmt::format("{} ended: {}", peers_python(), child_.last_words()));
+            nlohmann::json answer = nlohmann::json::parse(*line, nullptr, false);
+            if (!answer.is_object()) throw PeerRefusal(false, "an answer that is not JSON: " + *line);
+            if (!answer.contains("progress")) return answer;
+            log_info(fmt::format("{}: {}", name_, answer["progress"].get<std::string>()));
+        }
     }
 
     /// Three floats a pixel, row-major from the top left.

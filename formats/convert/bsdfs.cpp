@@ -100,7 +100,8 @@ void add_principled(Writer& w, xml_node node, const P& p) {
     add_color(w, node, "base_color", p.base_color);
     add_textured_number(w, node, "roughness", p.roughness);
     add_number(node, "eta", p.ior);
-    add_unless_zero(node, "anisotropic", (1 - double(p.aspect) * p.aspect) / 0.9);
+    if (p.anisotropic.texture >= 0 || p.anisotropic.value > 0)
+        add_textured_number(w, node, "anisotropic", p.anisotropic);
     add_unless_zero(node, "spec_tint", p.specular_tint);
     add_unless_zero(node, "sheen", p.sheen);
     add_unless_zero(node, "sheen_tint", p.sheen_tint / 65535.0);

@@ -63,12 +63,11 @@ Affine scaled(Affine a, double x, double y) {
 
 void add_sensor(Writer& w, xml_node root) {
     const Sensor& s = w.scene.sensor;
-    const bool parallel = is_parallel(s.type);
-    xml_node node = add_object(root, "sensor",
-                               parallel           ? "orthographic"
-                               : has_lens(s.type) ? "thinlens"
-                                                  : "perspective");
-    if (parallel) {
+    xml_node node = add_object(root, "sensor", plugin_of(s.type));
+    if (is_latlong(s.type)) {
+        add_transform(node, "to_world", s.to_world);
+        w.note(fmt::format("Mitsuba 3 has no sensor '{}'", plugin_of(s.type)));
+    } else if (is_parallel(s.type)) {
         const double aspect = double(s.film_width) / s.film_height;
         add_transform(node, "to_world", scaled(s.to_world, s.tan_half_fov.x, s.tan_half_fov.y * aspect));
     } else {
@@ -78,8 +77,10 @@ void add_sensor(Writer& w, xml_node root) {
         if (s.principal_offset.x != 0) add_number(node, "principal_point_offset_x", s.principal_offset.x);
         if (s.principal_offset.y != 0) add_number(node, "principal_point_offset_y", s.principal_offset.y);
     }
-    add_number(node, "near_clip", s.near_clip);
-    add_number(node, "far_clip", s.far_clip);
+    if (!is_latlong(s.type)) {
+        add_number(node, "near_clip", s.near_clip);
+        add_number(node, "far_clip", s.far_clip);
+    }
     if (has_lens(s.type)) {
         add_number(node, "aperture_radius", s.aperture_radius);
         add_number(node, "focus_distance", s.focus_distance);

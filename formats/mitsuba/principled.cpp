@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "formats/mitsuba/baked_textures.h"
+#include "transport/bsdf/burley.h"
 
 namespace ambilux::mitsuba {
 namespace {
@@ -47,7 +48,7 @@ template <class Parameters>
 void read_common(Builder& builder, Reader& in, Parameters& p) {
     p.base_color = in.textured_color("base_color", splat(0.5f), SpectrumUse::reflectance);
     p.roughness = textured_share(in, "roughness", 0.5f);
-    p.aspect = std::sqrt(1 - 0.9f * share(builder, in, "anisotropic", 0));
+    p.anisotropic = textured_share(in, "anisotropic", 0);
     p.specular_tint = share(builder, in, "spec_tint", 0);
     p.sheen = share(builder, in, "sheen", 0);
     p.sheen_tint = of_65535(share(builder, in, "sheen_tint", 0));
@@ -91,12 +92,15 @@ PrincipledParts read_principled(Builder& builder, Reader& in) {
     parts.glass.specular_transmittance = baked_color(builder, in, {p.base_color}, [](const std::vector<Rgb>& v) {
         return Rgb{std::sqrt(v[0].x), std::sqrt(v[0].y), std::sqrt(v[0].z)};
     });
-    const auto alpha = [&](float factor) {
-        return baked_number(builder, in, {p.roughness},
-                            [factor](const std::vector<float>& v) { return std::max(v[0] * v[0] * factor, 1e-3f); });
+    const auto alpha = [&](bool along_s) {
+        return baked_number(builder, in, {p.roughness, p.anisotropic}, [along_s](const std::vector<float>& v) {
+            const MicrofacetDistribution d = burley_microfacets(v[0], v[1]);
+            return along_s ? d.alpha_u : d.alpha_v;
+        });
     };
-    parts.glass.alpha_u = alpha(1 / p.aspect);
-    parts.glass.alpha_v = p.aspect == 1 ? parts.glass.alpha_u : alpha(p.aspect);
+    const bool isotropic = p.anisotropic.texture < 0 && p.anisotropic.value == 0;
+    parts.glass.alpha_u = alpha(true);
+    parts.glass.alpha_v = isotropic ? parts.glass.alpha_u : alpha(false);
     parts.glass.ior = p.ior;
     parts.glass.distribution = Microfacets::ggx;
     parts.glass.sample_visible = true;

@@ -198,6 +198,29 @@ void check_rays(Reader& in, const Sensor& sensor) {
         in.fail(fmt::format("rays of the sensor begin up to {:g} from it; {:g} is possible", reach, kMostCoordinate));
 }
 
+/// How a sensor with a view axis projects.
+void read_lens(Reader& in, Sensor& sensor, double aspect) {
+    if (!is_parallel(sensor.type)) {
+        sensor.tan_half_fov = field_of_view(in, aspect);
+        sensor.principal_offset = {range_parameter(in, "principal_point_offset_x", 0),
+                                   range_parameter(in, "principal_point_offset_y", 0)};
+    }
+    sensor.near_clip = range_parameter(in, "near_clip", 1e-2);
+    sensor.far_clip = float(in.number("far_clip", 1e4));
+    if (!(sensor.near_clip > 0 && sensor.near_clip < sensor.far_clip))
+        in.fail(in.where("near_clip"), "near_clip must be positive and smaller than far_clip");
+    sensor.focus_distance = float(in.number("focus_distance", sensor.far_clip));
+    if (has_lens(sensor.type)) {
+        if (!in.has("aperture_radius")) in.fail("thinlens has no aperture_radius");
+        sensor.aperture_radius = range_parameter(in, "aperture_radius", 0);
+        if (!(sensor.aperture_radius >= 0))
+            in.fail(in.where("aperture_radius"), "aperture_radius must not be negative");
+        if (!(sensor.focus_distance > 0)) in.fail(in.where("focus_distance"), "focus_distance must be positive");
+        range_parameter(in, "focus_distance", std::min(sensor.far_clip, kMostCoordinate));
+    }
+    if (!is_parallel(sensor.type)) check_rays(in, sensor);
+}
+
 /// The sensor of that plugin; perspective, and false, if there is none.
 bool find_sensor(const std::string& plugin, SensorType& type) {
     type = SensorType::perspective;
@@ -245,26 +268,15 @@ void build_sensor(Builder& builder, const Object& object) {
         if (problem)
             builder.refuse(in.where("to_world"), "the sensor's transform must not scale or shear",
                            "scale and shear are left out");
-        sensor.tan_half_fov = field_of_view(in, aspect);
-        sensor.principal_offset = {range_parameter(in, "principal_point_offset_x", 0),
-                                   range_parameter(in, "principal_point_offset_y", 0)};
     }
     builder.check_range(in.where("to_world"), "the sensor", {column(to_world, 3)});
     sensor.to_world = to_affine(to_world);
-    sensor.near_clip = range_parameter(in, "near_clip", 1e-2);
-    sensor.far_clip = float(in.number("far_clip", 1e4));
-    if (!(sensor.near_clip > 0 && sensor.near_clip < sensor.far_clip))
-        in.fail(in.where("near_clip"), "near_clip must be positive and smaller than far_clip");
-    sensor.focus_distance = float(in.number("focus_distance", sensor.far_clip));
-    if (has_lens(sensor.type)) {
-        if (!in.has("aperture_radius")) in.fail("thinlens has no aperture_radius");
-        sensor.aperture_radius = range_parameter(in, "aperture_radius", 0);
-        if (!(sensor.aperture_radius >= 0))
-            in.fail(in.where("aperture_radius"), "aperture_radius must not be negative");
-        if (!(sensor.focus_distance > 0)) in.fail(in.where("focus_distance"), "focus_distance must be positive");
-        range_parameter(in, "focus_distance", std::min(sensor.far_clip, kMostCoordinate));
+    if (is_latlong(sensor.type)) {
+        sensor.near_clip = 0;
+        sensor.far_clip = kInfinity;
+    } else {
+        read_lens(in, sensor, aspect);
     }
-    if (!is_parallel(sensor.type)) check_rays(in, sensor);
     // Nothing moves, so that the shutter has no effect.
     in.ignore({"shutter_open", "shutter_close"});
     if (known || !builder.options.lenient) in.finish();

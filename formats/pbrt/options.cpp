@@ -18,6 +18,14 @@ struct Window {
     double half_height() const { return (y1 - y0) / 2; }
 };
 
+/// The map without the uniform part of its scale, which is nothing to what starts in one point.
+Matrix unscaled(Matrix m) {
+    const double scale = std::cbrt(std::fabs(determinant(m)));
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) m.m[i][j] /= scale > 0 ? scale : 1;
+    return m;
+}
+
 Window screen_window(SceneMaker& scene, const Parameters& in, double aspect) {
     const double frame = in.number("frameaspectratio", aspect);
     Window w = frame > 1 ? Window{-frame, frame, -1, 1} : Window{-1, 1, -1 / frame, 1 / frame};
@@ -31,6 +39,24 @@ Window screen_window(SceneMaker& scene, const Parameters& in, double aspect) {
     return w;
 }
 
+/// A camera of all directions. pbrt's longitude begins at its x and counts to its z, Mitsuba's from -z to its own x.
+Object& spherical_camera(SceneMaker& scene, const Parameters& in, const Options& options) {
+    const std::string mapping = in.text("mapping", "equalarea");
+    if (mapping != "equirectangular")
+        scene.report.refuse(in.find("mapping") ? in.where_of("mapping") : in.where,
+                            "mapping '" + mapping + "' of a spherical camera is not supported",
+                            "equirectangular is used");
+    Object& sensor = add_object(scene.document, "sensor", "spherical", in.where);
+    Matrix turn = scaling(1, 1, 1);
+    turn.m[0][0] = turn.m[2][2] = 0;
+    turn.m[0][2] = -1;
+    turn.m[2][0] = 1;
+    set_transform(sensor, "to_world", unscaled(options.camera_to_world * turn));
+    in.ignore({"lensradius", "focaldistance", "frameaspectratio", "screenwindow"});
+    in.finish(scene.report);
+    return sensor;
+}
+
 Object& camera(SceneMaker& scene, const Options& options, double aspect) {
     static const Parameters plain = [] {
         Parameters p;
@@ -39,6 +65,7 @@ Object& camera(SceneMaker& scene, const Options& options, double aspect) {
         return p;
     }();
     const Parameters& in = options.camera ? *options.camera : plain;
+    if (in.type == "spherical") return spherical_camera(scene, in, options);
     const bool parallel = in.type == "orthographic";
     if (!parallel && in.type != "perspective")
         scene.report.refuse(in.where, "camera '" + in.type + "' is not supported", "perspective is used");
@@ -72,8 +99,7 @@ Object& camera(SceneMaker& scene, const Options& options, double aspect) {
         if (lens > 0 && std::fabs(scale - 1) > 1e-3)
             scene.report.refuse(in.where, "a lens on a camera that is scaled is not supported",
                                 "its size is left as it is");
-        for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) to_world.m[i][j] /= scale > 0 ? scale : 1;
+        to_world = unscaled(to_world);
     }
     set_transform(sensor, "to_world", to_world);
     // pbrt clips nothing.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "transport/sensor/filter.h"
+#include "transport/sensor/latlong.h"
 
 namespace ambilux {
 
@@ -25,12 +26,17 @@ inline float filter_energy(const SceneView& scene) {
 /// Sum of the filters of the film's pixels at a place; less than one along the edges.
 inline float filter_coverage(const SceneView& scene, Vec2f film) {
     const Sensor& s = scene.sensor;
-    const float x = film.x - float(s.crop_x), y = film.y - float(s.crop_y), r = s.filter_radius;
-    if (x >= r && y >= r && x <= float(s.crop_width) - r && y <= float(s.crop_height) - r) return 1.0f;
     float sum = 0.0f;
-    for (float py = max(0.0f, ceilf(y - r - 0.5f)); py <= y + r - 0.5f && py < float(s.crop_height); py += 1.0f)
-        for (float px = max(0.0f, ceilf(x - r - 0.5f)); px <= x + r - 0.5f && px < float(s.crop_width); px += 1.0f)
-            sum += filter_value(scene, {x - (px + 0.5f), y - (py + 0.5f)});
+    for_each_film_position<kAllFeatures>(s, film, [&](Vec2f at) {
+        const float x = at.x - float(s.crop_x), y = at.y - float(s.crop_y), r = s.filter_radius;
+        if (x >= r && y >= r && x <= float(s.crop_width) - r && y <= float(s.crop_height) - r) {
+            sum += 1.0f;
+            return;
+        }
+        for (float py = max(0.0f, ceilf(y - r - 0.5f)); py <= y + r - 0.5f && py < float(s.crop_height); py += 1.0f)
+            for (float px = max(0.0f, ceilf(x - r - 0.5f)); px <= x + r - 0.5f && px < float(s.crop_width); px += 1.0f)
+                sum += filter_value(scene, {x - (px + 0.5f), y - (py + 0.5f)});
+    });
     return min(sum, 1.0f);
 }
 

@@ -183,7 +183,7 @@ private:
         if (!sample_start<F>(view_, draws, e)) return;
         const Vec4f u = draws.emission_direction();
         PilotCandidatePath c;
-        if (visible_emitter(view_, rules_, e, {u.z, u.w}, c)) splat(task, c, draws, 0, e.radiance);
+        if (visible_emitter<F>(view_, rules_, e, {u.z, u.w}, c)) splat(task, c, draws, 0, e.radiance);
         PilotSubpath path = start_light(rules_.mis, e);
         if (rules_.max_depth < 2 || !is_finite(path.throughput)) return;
         Hit hit;
@@ -277,8 +277,8 @@ private:
 
     void eye_subpath(Eye& eye, uint32_t x, uint32_t y) const {
         if (rules_.max_depth == 0) return;
-        const CameraSample camera = camera_sample(view_, PathSlot{x, y, 0, 0, true}, eye.draws);
-        PilotSubpath path = start_eye(view_, rules_.mis, camera);
+        const CameraSample camera = camera_sample<F>(view_, PathSlot{x, y, 0, 0, true}, eye.draws);
+        PilotSubpath path = start_eye<F>(view_, rules_.mis, camera);
         Hit hit;
         do {
             eye.work.eye_rays += 1;

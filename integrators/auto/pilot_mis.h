@@ -35,8 +35,9 @@ struct PilotMis {
     bool has(uint32_t bits) const { return kAllStrategies & bits; }
     static constexpr bool counts_last_segment(bool) { return true; }
 
+    template <Features F>
     void start_eye(const SceneView& scene, Vec3f d, Sums& sums, SubpathStart& start) const {
-        for (uint32_t m = 0; m < kSets; ++m) sets[m].start_eye(scene, d, sums.of[m], start);
+        for (uint32_t m = 0; m < kSets; ++m) sets[m].start_eye<F>(scene, d, sums.of[m], start);
     }
     static void start_light(const EmissionSample& e, SubpathStart& start) { BidirectionalMis::start_light(e, start); }
 
@@ -76,15 +77,17 @@ struct PilotMis {
                    sets[m].ratio_behind(z.of[m], z_first, p.z_area, p.z_reverse_sa);
         });
     }
+    template <Features F>
     Ratio camera_ratio(const SceneView& scene, const Sums& y, bool first, const CameraConnection& c, float cos_y,
                        float pdf_reverse_sa) const {
         return each<Ratio>(
-            [&](uint32_t m) { return sets[m].camera_ratio(scene, y.of[m], first, c, cos_y, pdf_reverse_sa); });
+            [&](uint32_t m) { return sets[m].camera_ratio<F>(scene, y.of[m], first, c, cos_y, pdf_reverse_sa); });
     }
+    template <Features F>
     Ratio visible_emitter_ratio(const SceneView& scene, const CameraConnection& c, float cos_light, float pdf_pos,
                                 float opacity) const {
         return each<Ratio>(
-            [&](uint32_t m) { return sets[m].visible_emitter_ratio(scene, c, cos_light, pdf_pos, opacity); });
+            [&](uint32_t m) { return sets[m].visible_emitter_ratio<F>(scene, c, cos_light, pdf_pos, opacity); });
     }
 
 private:

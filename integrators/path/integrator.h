@@ -68,7 +68,7 @@ struct PathIntegrator {
         Policy policy;
         Wave wave;
         Eye eye;
-        GenerateEye<Mis> generate;
+        GenerateEye<F, Mis> generate;
         Extend<F, Tracer, Mis> extend[2];
         EyeVertex<F, Mis, typename Eye::Emission, AtVertex> eye_vertex[2];
         ConnectEmitter<F, Mis, Connect> connect_emitter;

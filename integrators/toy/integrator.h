@@ -49,7 +49,7 @@ struct ToyIntegrator {
 
         Wave wave;
         Eye eye;
-        GenerateEye<Mis> generate;
+        GenerateEye<F, Mis> generate;
         Extend<F, Tracer, Mis> extend;
         Ambient<F, typename Eye::Candidates> ambient;
 

@@ -32,7 +32,7 @@ struct Resolved : M::template Inputs<Rgb, float>, M::Constants {
 };
 
 /// What textures may have set at a point: colours and numbers in the order of the model's Inputs. Vertices in queues
-/// keep it.
+/// keep it. The third number of a model with one colour is the first component of the second one.
 struct BsdfInputs {
     Rgb colors[2];
     float numbers[2];
@@ -47,7 +47,8 @@ struct InputCount {
     using Parameters = typename Model::template Inputs<ParamRgb, ParamFloat>;
     static constexpr uint32_t words = std::is_empty_v<Values> ? 0 : sizeof(Values) / sizeof(float),
                               all = std::is_empty_v<Values> ? 0 : sizeof(Parameters) / sizeof(float) - words,
-                              colors = (words - all) / 2, numbers = all - colors;
+                              colors = (words - all) / 2, numbers = all - colors,
+                              plain_numbers = numbers < 2 ? numbers : 2;  ///< those of BsdfInputs::numbers
 };
 
 /// True if colours come first and numbers after them, not more than vertices in queues can keep.
@@ -55,7 +56,7 @@ template <class Model>
 constexpr bool inputs_in_order() {
     using Count = InputCount<Model>;
     using Values = typename Count::Values;
-    if constexpr (Count::colors > 2 || Count::numbers > 2)
+    if constexpr (Count::colors > 2 || Count::numbers > (Count::colors < 2 ? 3 : 2))
         return false;
     else
         return []<size_t... C, size_t... N>(std::index_sequence<C...>, std::index_sequence<N...>) {
@@ -79,6 +80,7 @@ AMBILUX_HD void for_each_input(const Textured<Model>& parameters, BsdfInputs& in
     if constexpr (Count::colors > 1) op(colors[1], inputs.colors[1]);
     if constexpr (Count::numbers > 0) op(numbers[0], inputs.numbers[0]);
     if constexpr (Count::numbers > 1) op(numbers[1], inputs.numbers[1]);
+    if constexpr (Count::numbers > 2) op(numbers[2], inputs.colors[1].x);
 }
 
 /// Parameters of a model at a point from its inputs and constants. By memcpy: a visitor with a count of inputs made the
@@ -90,7 +92,10 @@ AMBILUX_HD Resolved<Model> resolved(const BsdfInputs& inputs, const typename Mod
     if constexpr (Count::colors > 0) memcpy(&values, inputs.colors, Count::colors * sizeof(Rgb));
     if constexpr (Count::numbers > 0)
         memcpy(reinterpret_cast<char*>(&values) + Count::colors * sizeof(Rgb), inputs.numbers,
-               Count::numbers * sizeof(float));
+               Count::plain_numbers * sizeof(float));
+    if constexpr (Count::numbers > 2)
+        memcpy(reinterpret_cast<char*>(&values) + Count::colors * sizeof(Rgb) + 2 * sizeof(float), &inputs.colors[1].x,
+               sizeof(float));
     return {values, constants};
 }
 
@@ -102,7 +107,10 @@ AMBILUX_HD BsdfInputs inputs_of(const Resolved<Model>& parameters) {
     if constexpr (Count::colors > 0) memcpy(inputs.colors, &values, Count::colors * sizeof(Rgb));
     if constexpr (Count::numbers > 0)
         memcpy(inputs.numbers, reinterpret_cast<const char*>(&values) + Count::colors * sizeof(Rgb),
-               Count::numbers * sizeof(float));
+               Count::plain_numbers * sizeof(float));
+    if constexpr (Count::numbers > 2)
+        memcpy(&inputs.colors[1].x,
+               reinterpret_cast<const char*>(&values) + Count::colors * sizeof(Rgb) + 2 * sizeof(float), sizeof(float));
     return inputs;
 }
 

@@ -13,11 +13,11 @@ struct Principled {
     struct Inputs {
         Color base_color;
         Number roughness, metallic;
+        Number anisotropic;  ///< 0 to 1: how much longer highlights are along s than along t
     };
 
     struct Constants {
         float ior;              ///< interior over exterior index of refraction, at least 1
-        float aspect;           ///< root of roughness along t over that along s
         float specular_tint;    ///< share of the base colour in the dielectric reflection
         float sheen;            ///< weight of reflection at grazing angles
         float clearcoat;        ///< weight of the coating

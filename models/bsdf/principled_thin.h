@@ -13,12 +13,12 @@ struct PrincipledThin {
     struct Inputs {
         Color base_color;
         Number roughness;
-        Number specular;  ///< share of the specular lobes; the diffuse ones have the rest
+        Number specular;     ///< share of the specular lobes; the diffuse ones have the rest
+        Number anisotropic;  ///< 0 to 1: how much longer highlights are along s than along t
     };
 
     struct Constants {
         float ior;            ///< inside of the sheet over outside, at least 1
-        float aspect;         ///< root of roughness along t over that along s
         float specular_tint;  ///< share of the base colour in the reflection
         float sheen;          ///< weight of reflection at grazing angles
         float through;        ///< share of diffuse light that goes to the other side, 0 to 1

@@ -82,6 +82,17 @@ def test_time_is_met(scene):
     raise AssertionError(tries)
 
 
+def test_a_spherical_sensor_sees_all_around():
+    inside = ambilux.Scene({
+        "type": "scene",
+        "sensor": {"type": "spherical", "film": {"type": "hdrfilm", "width": 8, "height": 4}},
+        "shell": {"type": "sphere", "radius": 2.0, "flip_normals": True, "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 3.0}},
+                  "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}},
+    })
+    assert inside.info["sensor"] == {"type": "spherical"}
+    np.testing.assert_allclose(ambilux.render(inside, spp=4, backend="cpu").rgb, 3.0, rtol=1e-5)
+
+
 def test_usage_errors(scene):
     for arguments in ({"integrator": "magic"}, {"spp": 0}, {"spp": -1}, {"spp": 1.5}, {"spp": 1, "time": 1.0}, {"time": -1.0}, {"settings": {"no_such": 1}},
                       {"variant": "lvc"}, {"size": (0, 1)}, {"backend": "tpu"}):

@@ -149,9 +149,10 @@ inline std::vector<ReplayNumber> connection_densities(const SubpathEnd<Bidirecti
 /// t = 1 from a point on a light subpath, seen through the lens point of `lens_u`.
 inline std::vector<ReplayNumber> camera_densities(const SceneView& view, Vec3f p, Vec2f lens_u) {
     CameraConnection camera;
-    if (!connect_to_camera(view.sensor, p, lens_u, camera)) return {};
+    if (!connect_to_camera<kReplayFeatures>(view.sensor, p, lens_u, camera)) return {};
     const char* name = camera_delta_direction(view.sensor) ? "pdf_camera_area" : "pdf_camera_sa";
-    return {{"distance", camera.camera_distance}, {name, BidirectionalMis::camera_pdf(view.sensor, camera.cos_camera)}};
+    return {{"distance", camera.camera_distance},
+            {name, BidirectionalMis::camera_pdf<kReplayFeatures>(view.sensor, camera.cos_camera)}};
 }
 
 }  // namespace ambilux

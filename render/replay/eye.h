@@ -98,9 +98,10 @@ void replay_eye(const ReplayContext<Mis>& ctx, const typename ReplayEye<Mis>::Sa
     out.eye.side = Side::eye;
     out.eye.number = pixel;
     const Draws draws = {{out.seed, pixel, out.sample, Stream::eye}};
-    const CameraSample camera = camera_sample(ctx.view, PathSlot{out.x, out.y, pixel, out.sample, true}, draws);
+    const CameraSample camera =
+        camera_sample<kReplayFeatures>(ctx.view, PathSlot{out.x, out.y, pixel, out.sample, true}, draws);
     ReplayEye<Mis> eye{ctx, sample_emitter, connect, details, draws, out, EyeArrival<Mis>(ctx)};
-    Subpath<Mis> path = start_eye(ctx.view, ctx.rules.mis, camera);
+    Subpath<Mis> path = start_eye<kReplayFeatures>(ctx.view, ctx.rules.mis, camera);
     DropWatch watch;
     do {
         eye.ray = path;

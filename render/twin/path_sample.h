@@ -56,8 +56,8 @@ public:
         const Draws draws = {{seed, pixel, sample, Stream::eye}};
         const Vec4f u = draws.camera();
         const Vec2f film = sample_film_position(scene_, x, y, {u.x, u.y});
-        const CameraSample c = sample_camera_ray(scene_.sensor, film, {u.z, u.w});
-        follow(Side::eye, draws, start_eye(scene_, rules_.mis, c), c.tmax);
+        const CameraSample c = sample_camera_ray<kFeatures>(scene_.sensor, film, {u.z, u.w});
+        follow(Side::eye, draws, start_eye<kFeatures>(scene_, rules_.mis, c), c.tmax);
         return sum_;
     }
 
@@ -72,7 +72,7 @@ private:
         if (!valid(path.throughput)) return;
         const Vec4f u = draws.emission_direction();
         Candidate<Mis> c;
-        if (visible_emitter(scene_, rules_, e, {u.z, u.w}, c)) splat(c, draws.shadow_seed(0));
+        if (visible_emitter<kFeatures>(scene_, rules_, e, {u.z, u.w}, c)) splat(c, draws.shadow_seed(0));
         if (rules_.max_depth >= 2) follow(Side::light, draws, path, kInfinity);
     }
 

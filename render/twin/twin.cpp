@@ -121,14 +121,17 @@ private:
     /// To the pixels whose filters reach it.
     void add(const Splat& s) {
         const Sensor& sensor = view_.sensor;
-        const double x = s.film.x - sensor.crop_x, y = s.film.y - sensor.crop_y, r = sensor.filter_radius;
-        const int x0 = std::max(int(std::ceil(x - r - 0.5)), 0), y0 = std::max(int(std::ceil(y - r - 0.5)), 0);
-        const int x1 = std::min(int(std::floor(x + r - 0.5)), int(film_.width) - 1);
-        const int y1 = std::min(int(std::floor(y + r - 0.5)), int(film_.height) - 1);
-        for (int py = y0; py <= y1; ++py)
-            for (int px = x0; px <= x1; ++px)
-                sample_[size_t(py) * film_.width + size_t(px)] +=
-                    s.value * filter_value(view_, {x - (px + 0.5), y - (py + 0.5)});
+        const double r = sensor.filter_radius;
+        for_each_film_position<kAllFeatures>(sensor, s.film, [&](Vec2f film) {
+            const double x = film.x - sensor.crop_x, y = film.y - sensor.crop_y;
+            const int x0 = std::max(int(std::ceil(x - r - 0.5)), 0), y0 = std::max(int(std::ceil(y - r - 0.5)), 0);
+            const int x1 = std::min(int(std::floor(x + r - 0.5)), int(film_.width) - 1);
+            const int y1 = std::min(int(std::floor(y + r - 0.5)), int(film_.height) - 1);
+            for (int py = y0; py <= y1; ++py)
+                for (int px = x0; px <= x1; ++px)
+                    sample_[size_t(py) * film_.width + size_t(px)] +=
+                        s.value * filter_value(view_, {x - (px + 0.5), y - (py + 0.5)});
+        });
     }
 
     RenderSettings settings_;

@@ -2,7 +2,7 @@
 
 A script calls serve(start). start(job) loads the scene and returns (what it is, render); render(seed, samples) returns an image of
 height x width x 3 floats, the seconds that rendering took and, if they are others than asked for, the samples; then True, if the image is a difference
-of sums, which may be negative. What the peer itself prints goes to standard error.
+of sums, which may be negative. What the peer itself prints goes to standard error. While start works it may say how far it is by progress(text).
 """
 
 import json
@@ -19,6 +19,21 @@ class Refused(Exception):
     """What the peer cannot do, by name."""
 
 
+_answers = None
+
+
+def answer(**what):
+    _answers.write(json.dumps(what) + "\n")
+    _answers.flush()
+
+
+def progress(text):
+    """A line for who waits; also in the peer's log."""
+    print(text, file=sys.stderr, flush=True)
+    if _answers:
+        answer(progress=clean(text))
+
+
 def clean(error):
     return " ".join(str(error).split()) or type(error).__name__
 
@@ -26,13 +41,9 @@ def clean(error):
 def serve(start, whole=False):
     """whole: render takes the request as it is, with the number of its first sample."""
     # Libraries print to descriptor 1: the lines of the protocol get another one.
-    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    global _answers
+    _answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-
-    def answer(**what):
-        answers.write(json.dumps(what) + "\n")
-        answers.flush()
-
     with open(sys.argv[1], encoding="utf-8") as file:
         job = json.load(file)
     begin = time.perf_counter()

@@ -11,6 +11,7 @@
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/gpu_device.h"
 #include "tests/support/hidden_light_scene.h"
+#include "tests/support/spherical_scene.h"
 
 using namespace ambilux;
 
@@ -88,6 +89,20 @@ TEST_CASE("G5: emitters that light subpaths alone carry, and a thin sheet: both 
 TEST_CASE("G5: hidden lights: both backends find the same light") {
     if (!device()) return;
     const Scene scene = scene_from_text(hidden_room(96, 6, true));
+    for (const auto& [integrator, variant] : {std::pair{"path", "wavefront"},
+                                              {"light", "wavefront"},
+                                              {"bdpt", "wavefront"},
+                                              {"bdpt", "megakernel"},
+                                              {"bdpt", "streaming"}}) {
+        INFO(integrator << " " << variant);
+        check_backends(scene, settings_of(scene, integrator, variant, "cuda"), 1);
+    }
+}
+
+TEST_CASE("G5: a spherical sensor: both backends find the same light, over the edges of the film too") {
+    if (!device()) return;
+    const Scene scene = scene_from_text(room_around(spherical_camera(96, 48, "gaussian"), 6));
+    REQUIRE(scene.features.latlong);
     for (const auto& [integrator, variant] : {std::pair{"path", "wavefront"},
                                               {"light", "wavefront"},
                                               {"bdpt", "wavefront"},

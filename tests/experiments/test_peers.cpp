@@ -152,7 +152,8 @@ TEST_CASE("a Python peer that is not installed is skipped by name, and one that 
         fs::remove_all(folder / "out");
         return entry_of(run(folder, config_of("[[run]]\nname = \"m\"\nrenderer = \"mitsuba\"\n")), "m");
     };
-    json entry = answer("echo '{\"missing\": \"mitsuba cannot be imported\"}'");
+    json entry =
+        answer("echo '{\"progress\": \"kernels, 10 s\"}'; echo '{\"missing\": \"mitsuba cannot be imported\"}'");
     CHECK(entry["state"] == "missing");
     CHECK(entry["reason"] == "mitsuba cannot be imported");
     entry = answer("echo 'it fell over' >&2");

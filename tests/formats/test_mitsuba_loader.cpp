@@ -1,4 +1,4 @@
-// libs: ambilux_formats ambilux_accel JPEG::JPEG
+// libs: ambilux_convert ambilux_formats ambilux_accel JPEG::JPEG
 // data: tagged
 // timeout: 120
 // The Mitsuba loader: what it understands, and what it says about what it does not. Numbers marked "Mitsuba" were read
@@ -12,7 +12,9 @@
 
 #include "core/error.h"
 #include "core/math.h"
+#include "formats/convert/convert.h"
 #include "formats/load.h"
+#include "integrators/feature_levels.h"
 #include "scene/info.h"
 #include "tests/support/catch.h"
 #include "tests/support/image_files.h"
@@ -280,6 +282,37 @@ TEST_CASE("sensors: field of view by every rule, film, crop, size override") {
         load("<sensor type='perspective'><transform name='to_world'><scale x='-1'/></transform></sensor>").sensor;
     check_rgb(mirrored.to_world.vector({1, 0, 0}), {-1, 0, 0});
     check_rgb(mirrored.to_world.vector({0, 0, 1}), {0, 0, 1});
+}
+
+TEST_CASE("sensors: a spherical one has a place and a turn, and nothing to clip or to focus") {
+    const std::string sensor =
+        "<sensor type='spherical'><transform name='to_world'><rotate y='1' angle='90'/><translate x='3'/></transform>";
+    const Scene s = load(sensor + "</sensor>");
+    CHECK(s.sensor.type == SensorType::spherical);
+    CHECK(s.features.latlong);
+    CHECK_FALSE(kCommonFeatures.covers(s.features));
+    CHECK(kFlatFeatures.covers(s.features));
+    CHECK_FALSE(load("<sensor type='thinlens'><float name='aperture_radius' value='1'/></sensor>").features.latlong);
+    check_rgb(s.sensor.to_world.vector({0, 0, 1}), {1, 0, 0});
+    check_rgb(s.sensor.to_world.point({0, 0, 0}), {3, 0, 0});
+    CHECK(s.sensor.far_clip == kInfinity);
+    const nlohmann::json info = scene_info(s);
+    CHECK(info["sensor"] == nlohmann::json{{"type", "spherical"}});
+    CHECK(load("<sensor type='spherical'><float name='shutterOpen' value='1'/></sensor>", {}, "0.6.0").sensor.type ==
+          SensorType::spherical);
+    CHECK(contains(error_of(sensor + "<float name='fov' value='40'/></sensor>"), "fov"));
+    CHECK(contains(
+        error_of("<sensor type='spherical'><transform name='to_world'><scale value='2'/></transform></sensor>"),
+        "must not scale or shear"));
+    // Written and read again; Mitsuba 3 has none.
+    const test::TempFolder folder;
+    const std::string path = folder / "out.xml";
+    const std::vector<std::string> notes = write_mitsuba(s, path);
+    CHECK(std::count(notes.begin(), notes.end(), "Mitsuba 3 has no sensor 'spherical'") == 1);
+    const Sensor again = load_mitsuba(path).sensor;
+    CHECK(again.type == SensorType::spherical);
+    CHECK(std::equal(&again.to_world.m[0][0], &again.to_world.m[0][0] + 12, &s.sensor.to_world.m[0][0],
+                     [](float a, float b) { return std::fabs(a - b) < 1e-6f; }));
 }
 
 TEST_CASE("integrators: the inner one of moment counts, direct is two segments") {

@@ -227,6 +227,20 @@ TEST_CASE("principled: transmission with textures") {
           Approx(metal / (1 - (1 - metal) * 0.5)));
     const auto rough = parameters<RoughDielectric>(shared.bsdfs[shared.materials[m.second].front]);
     CHECK(eval_float<kAllFeatures>(shared.view(), rough.alpha_u, {0.75f, 0.5f}) == Approx(metal * metal));
+    // A third number, of a glass as two of its own.
+    const Scene turned = rectangle(
+        nested("principled", number("spec_trans", 0.5) + texture("anisotropic") + texture("roughness")), &folder);
+    const Material& t = turned.materials[turned.shapes[0].material];
+    const auto front = parameters<Principled>(turned.bsdfs[turned.materials[t.first].front]);
+    CHECK(eval_float<kAllFeatures>(turned.view(), front.anisotropic, {0.75f, 0.5f}) == Approx(metal));
+    const auto glossy = parameters<RoughDielectric>(turned.bsdfs[turned.materials[t.second].front]);
+    const double aspect = std::sqrt(1 - 0.9 * double(metal));
+    CHECK(eval_float<kAllFeatures>(turned.view(), glossy.alpha_u, {0.75f, 0.5f}) == Approx(metal * metal / aspect));
+    CHECK(eval_float<kAllFeatures>(turned.view(), glossy.alpha_v, {0.75f, 0.5f}) == Approx(metal * metal * aspect));
+    const Scene thin = rectangle(nested("principledthin", texture("anisotropic") + texture("spec_trans")), &folder);
+    const auto sheet = parameters<PrincipledThin>(thin.bsdfs[thin.materials[thin.shapes[0].material].front]);
+    CHECK(eval_float<kAllFeatures>(thin.view(), sheet.anisotropic, {0.75f, 0.5f}) == Approx(metal));
+    CHECK(sheet.specular.texture == sheet.anisotropic.texture);
     LoadOptions lenient;
     lenient.lenient = true;
     const std::string tinted = "<shape type='rectangle'>" + nested("principled", texture("clearcoat")) + "</shape>";

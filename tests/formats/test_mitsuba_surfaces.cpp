@@ -270,7 +270,7 @@ TEST_CASE("principledthin: parameters, and what is refused") {
     CHECK(p.specular.value == 0.4f);
     CHECK(p.through == 0.75f);
     CHECK(p.ior == 1.3f);
-    CHECK(p.aspect == Approx(std::sqrt(0.55)));
+    CHECK(p.anisotropic.value == 0.5f);
     CHECK(p.specular_tint == 0.3f);
     CHECK(p.sheen == 0.2f);
     CHECK(p.sheen_tint == 39321);
@@ -322,7 +322,7 @@ TEST_CASE("thin sheets and beams are written as they were read") {
         "<emitter type='collimated'><transform name='to_world'><lookat origin='1,2,3' target='0,0.5,0' up='0,1,0'/>"
         "</transform><rgb name='power' value='1,2,3'/></emitter><shape type='cube'><bsdf type='principledthin'><rgb "
         "name='base_color' value='.2,.3,.4'/><float name='spec_trans' value='.3'/><float name='diff_trans' "
-        "value='1.6'/>"
+        "value='1.6'/><texture name='anisotropic' type='checkerboard'/>"
         "<float name='sheen' value='.5'/></bsdf><emitter type='directionalarea'><rgb name='radiance' value='4,5,6'/>"
         "</emitter></shape>");
     const TempFolder folder;
@@ -341,4 +341,7 @@ TEST_CASE("thin sheets and beams are written as they were read") {
     CHECK(thin(b).through == Approx(thin(a).through));
     CHECK(thin(b).specular.value == thin(a).specular.value);
     CHECK(thin(b).sheen == thin(a).sheen);
+    for (const Vec2f uv : {Vec2f{0.1f, 0.1f}, {0.6f, 0.1f}})
+        CHECK(eval_float<kAllFeatures>(b.view(), thin(b).anisotropic, uv) ==
+              Approx(eval_float<kAllFeatures>(a.view(), thin(a).anisotropic, uv)));
 }

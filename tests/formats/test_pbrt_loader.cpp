@@ -11,6 +11,7 @@
 #include "tests/support/mitsuba_text.h"
 #include "tests/support/pbrt_text.h"
 #include "transport/emitter/envmap.h"
+#include "transport/sensor/camera.h"
 
 using namespace ambilux;
 using namespace ambilux::test;
@@ -200,6 +201,30 @@ TEST_CASE("cameras: the field of view is that of the shorter side, x points to t
         "\"float screenwindow\" [-4 4 -2 2] WorldBegin");
     CHECK(o.sensor.tan_half_fov.x == Approx(4));
     CHECK(o.sensor.tan_half_fov.y == Approx(2));
+}
+
+TEST_CASE("cameras: a spherical one begins at x and counts to z") {
+    const std::string look = "Scale 2 2 2 LookAt 1 2 3  1 2 10  0 1 0 Camera \"spherical\" ",
+                      film = "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 4 ";
+    const Scene s = load_pbrt_text(film + look + "\"string mapping\" \"equirectangular\" WorldBegin");
+    CHECK(s.sensor.type == SensorType::spherical);
+    // pbrt's direction at (u,v): cos(2 pi u) sin(pi v), cos(pi v), sin(2 pi u) sin(pi v).
+    const struct {
+        Vec2f film;
+        Vec3f d;
+    } cases[] = {{{0, 2}, {1, 0, 0}},
+                 {{2, 2}, {0, 0, 1}},
+                 {{4, 2}, {-1, 0, 0}},
+                 {{6, 2}, {0, 0, -1}},
+                 {{1, 2}, {float(M_SQRT1_2), 0, float(M_SQRT1_2)}},
+                 {{3, 0}, {0, 1, 0}},
+                 {{3, 4}, {0, -1, 0}}};
+    for (const auto& c : cases) {
+        const CameraSample ray = sample_camera_ray<kAllFeatures>(s.sensor, c.film, {0.5f, 0.5f});
+        CHECK(length(ray.d - c.d) < 1e-5f);
+        check_rgb(ray.o, {1, 2, 3});
+    }
+    CHECK_THROWS_WITH(load_pbrt_text(film + look + "WorldBegin"), ContainsSubstring("'equalarea'"));
 }
 
 TEST_CASE("textures: t runs upwards, constants and images fold, checkerboards have cells of size 1") {

@@ -56,6 +56,26 @@ TEST_CASE("layers of a plain surface are its reflectance, normal, distance and p
     CHECK(position.values[1] > 0.05);
 }
 
+TEST_CASE("layers of a spherical sensor lie all around it") {
+    const test::TempFolder folder;
+    folder.write("s.xml", R"(<scene version="3.0.0">
+<sensor type="spherical"><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="4"/>
+<rfilter type="box"/></film></sensor>
+<shape type="sphere"><float name="radius" value="2"/><boolean name="flip_normals" value="true"/><emitter type="area"/></shape>
+</scene>)");
+    const auto layers = sample_aovs(load_mitsuba(folder / "s.xml"), {}, 32);
+    const Layer &depth = layer_of(layers, "depth"), &position = layer_of(layers, "position");
+    for (const float d : depth.values) CHECK(d == Approx(2).epsilon(1e-5));
+    for (uint32_t y = 0; y < 4; ++y)
+        for (uint32_t x = 0; x < 8; ++x) {
+            CAPTURE(x, y);
+            const float* p = &position.values[(y * 8 + x) * 3];
+            CHECK((p[0] > 0) == (x < 4));
+            CHECK((p[1] > 0) == (y < 2));
+            CHECK((p[2] > 0) == (x >= 2 && x < 6));
+        }
+}
+
 TEST_CASE("albedo and normal are those behind glass and in mirrors, depth is that of the glass") {
     const test::TempFolder folder;
     const std::string slab = R"(<shape type="cube"><transform name="to_world"><scale x="3" y="3" z="0.1"/>

@@ -6,6 +6,7 @@
 #include "render/twin/path_sample.h"
 #include "render/twin/scene.h"
 #include "tests/support/closed_forms.h"
+#include "tests/support/spherical_scene.h"
 
 using namespace ambilux;
 
@@ -151,6 +152,19 @@ TEST_CASE("At equal seeds images are those of the renderers but for the rounding
             // More than nothing: floats were not compared with themselves.
             CHECK(relative_difference(twin.film, floats.film) > 1e-9);
         }
+}
+
+TEST_CASE("A spherical sensor has the image of the renderers at equal seeds, over the edges of its film too",
+          "[twin]") {
+    const Scene scene = scene_from_text(room_around(spherical_camera(16, 8, "gaussian"), 4));
+    for (const char* integrator : {"path", "bdpt", "light"}) {
+        INFO(integrator);
+        const RenderSettings s = twin_settings(scene, integrator, 5);
+        const RenderResult twin = render_scene(scene, s, 16), floats = render_scene(scene, single(s), 16);
+        CHECK(twin.stats.invalid.total() == 0);
+        CHECK(relative_difference(twin.film, floats.film) < 2e-3);
+        CHECK(relative_difference_of_means(twin.film, floats.film) < 1e-4);
+    }
 }
 
 TEST_CASE("Disks are ellipses of any affine map, in both precisions", "[twin]") {

@@ -222,9 +222,10 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
         }
         OracleDensity& q = steps.eye[i];
         if (i == k - 1) {
-            const double cos_camera = dot64(towards, axis) / std::sqrt(dot64(axis, axis));
+            const double cos_camera = is_latlong(sensor.type) ? double(camera_cosine<F>(sensor, towards))
+                                                              : dot64(towards, axis) / std::sqrt(dot64(axis, axis));
             q.value = camera_delta_direction(sensor) ? camera_pdf_position(sensor)
-                                                     : camera_pdf_direction_sa(sensor, float(cos_camera));
+                                                     : camera_pdf_direction_sa<F>(sensor, float(cos_camera));
             q.error = camera_delta_direction(sensor) ? 0 : 3 * double(kDirectionError) / cos_camera;
         } else {
             q = scattering_step(scene, path.vertices[i + 1], path.to_eye[i + 1], -path.to_eye[i], false, conditioning);

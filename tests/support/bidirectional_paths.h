@@ -226,6 +226,11 @@ inline std::vector<SceneCase> scene_cases() {
                           "angle='90'/><translate y='2'/></transform>") +
                "<emitter type='constant'>" + rgb("radiance", "1") + "</emitter>")},
         {"beams", 24000, whole(sensor("perspective", perspective) + walls + bodies() + beams + masked_lamps)},
+        {"all around", 60000,
+         whole(sensor("spherical", "") + bodies() + lamps +
+               area_light("<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate y='1' "
+                          "angle='180'/><translate y='1' z='6'/></transform>") +
+               "<emitter type='constant'>" + rgb("radiance", "1") + "</emitter>")},
         {"masked lamps", 24000, whole(sensor("perspective", perspective) + walls + bodies() + masked_lamps)},
         // Next event estimation meets such spots on paths that light subpaths began.
         {"narrow spots", 24000,
@@ -315,9 +320,9 @@ private:
         const Sensor& sensor = scene_.sensor;
         lens_u_ = {u.z, u.w};
         const CameraSample c =
-            sample_camera_ray(sensor, {u.x * float(sensor.film_width), u.y * float(sensor.film_height)}, lens_u_);
+            sample_camera_ray<F>(sensor, {u.x * float(sensor.film_width), u.y * float(sensor.film_height)}, lens_u_);
         camera_p_ = lens(lens_u_);
-        BidirectionalSubpath path = start_eye(scene_, mis_, c);
+        BidirectionalSubpath path = start_eye<F>(scene_, mis_, c);
         float tmax = c.tmax;
         while (eye_.size() < kMaxVertices) {
             Hit hit;
@@ -441,7 +446,7 @@ private:
 
     void visible(Vec2f lens_u) {
         BidirectionalCandidate c;
-        if (!visible_emitter(scene_, rules_, emission_, lens_u, c)) return;
+        if (!visible_emitter<F>(scene_, rules_, emission_, lens_u, c)) return;
         OraclePath p = join(0, 0, c.direction);
         p.emitter = emission_.emitter;
         p.light = emission_point();
@@ -505,14 +510,13 @@ private:
     }
     void count(Kind kind, const OraclePath& path) {
         static const char* const shapes[] = {"mesh", "sphere", "disk", "cylinder"};
-        static const char* const sensors[] = {"perspective", "thinlens", "orthographic"};
         const Emitter& e = scene_.emitters[path.emitter];
         std::string light = name_of(e.type);
         if (e.type == EmitterType::area)
             light = scene_.is_triangle(path.light.prim) ? shapes[0] : shapes[int(scene_.quadric(path.light.prim).type)];
         const std::string name = kKindNames[kind];
         ++tally_.seen[name + ", " + light];
-        ++tally_.seen[name + ", " + sensors[int(scene_.sensor.type)]];
+        ++tally_.seen[name + ", " + plugin_of(scene_.sensor.type)];
         for (uint32_t i = 1; i < path.k; ++i)
             ++tally_.seen[name + ", " + bsdf_name(path, i) + (path.vertices[i].delta ? ", delta" : "")];
     }
@@ -552,7 +556,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
     }
     CameraConnection camera{};
     if (!(infinite && k == 1)) {
-        if (!connect_to_camera(scene_.sensor, position(k - 1), path.lens_u, camera)) return;
+        if (!connect_to_camera<F>(scene_.sensor, position(k - 1), path.lens_u, camera)) return;
         path.to_eye[k - 1] = camera.wi;
     }
     const auto go_on = [&](const BidirectionalVertex& vertex, const OraclePath::Vertex& x, Vec3f wo,
@@ -611,8 +615,9 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
     const float axis_length = length(axis), cos_camera = -dot(path.to_eye[k - 1], axis) / axis_length;
     CameraSample c{};
     c.d = -path.to_eye[k - 1];
-    c.o = path.camera_p + c.d * (scene_.sensor.near_clip * axis_length / cos_camera);
-    w = start_eye(scene_, mis_, c);
+    c.o = path.camera_p;
+    if (!is_latlong(scene_.sensor.type)) c.o = c.o + c.d * (scene_.sensor.near_clip * axis_length / cos_camera);
+    w = start_eye<F>(scene_, mis_, c);
     for (uint32_t i = k - 1; i > 0; --i) {
         z[i] = meet(Side::eye, w, path.vertices[i]);
         if (i == 1 && path.vertices[1].delta && is_delta(e.type)) break;
@@ -633,7 +638,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
             CHECK((infinite ? mis_.escape_ratio<F>(scene_, w, w.sums, ratio)
                             : mis_.hit_ratio<F>(scene_, w, w.sums, path.emitter, path.light, ratio)));
         } else if (s == k) {
-            if (k == 1 ? !visible_emitter(scene_, rules_, start, path.lens_u, candidate)
+            if (k == 1 ? !visible_emitter<F>(scene_, rules_, start, path.lens_u, candidate)
                        : !camera_connection<F>(scene_, rules_, y[k - 1], {1, 1, 1}, k - 1, path.lens_u, candidate))
                 return;
             ratio = candidate.ratio;

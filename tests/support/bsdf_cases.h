@@ -170,7 +170,7 @@ inline Bsdf principled(float roughness, float metallic, float anisotropic = 0) {
     p.base_color = {0.8f, 0.5f, 0.1f};
     p.roughness = roughness;
     p.metallic = metallic;
-    p.aspect = std::sqrt(1 - 0.9f * anisotropic);
+    p.anisotropic = anisotropic;
     p.clearcoat_alpha = 0.1f;
     return bsdf_of(p);
 }
@@ -192,9 +192,9 @@ inline Bsdf principled_thin(float roughness, float specular, float through, bool
     p.roughness = roughness;
     p.specular = specular;
     p.through = through;
-    p.aspect = 1;
+    p.anisotropic = 0;
     if (all) {
-        p.aspect = std::sqrt(1 - 0.9f * 0.5f);
+        p.anisotropic = 0.5f;
         p.specular_tint = 0.3f;
         p.sheen = 0.6f;
         p.sheen_tint = 32768;

@@ -39,8 +39,8 @@ Rgb plain_sample(const SceneView& scene, const EmbreeTracer& tracer, const Rules
                  const PathSlot& p, const RngKey& key) {
     Rgb sample = {0, 0, 0};
     const Draws draws = {key};
-    const CameraSample camera = camera_sample(scene, p, draws);
-    Subpath<UnidirectionalMis> path = start_eye(scene, rules.mis, camera);
+    const CameraSample camera = camera_sample<F>(scene, p, draws);
+    Subpath<UnidirectionalMis> path = start_eye<F>(scene, rules.mis, camera);
     const PlainSink<F> sink = {scene, tracer, rules, draws, sample};
     float tmax = camera.tmax;
     for (bool goes_on = true; goes_on; tmax = kInfinity) {

@@ -18,7 +18,8 @@ TEST_CASE("Recursive weights equal those of all strategies enumerated, and those
     const std::vector<std::string> all = {"hit",        "escape",        "next event",
                                           "connection", "light tracing", "visible light"};
     for (const std::string& kind : all) {
-        for (const char* sensor : {"perspective", "thinlens", "orthographic"}) require(kind + ", " + sensor);
+        for (const char* sensor : {"perspective", "thinlens", "orthographic", "spherical"})
+            require(kind + ", " + sensor);
         if (kind != "escape")
             for (const char* shape : {"mesh", "sphere", "disk", "cylinder"}) require(kind + ", " + shape);
         if (kind == "visible light") continue;

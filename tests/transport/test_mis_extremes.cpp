@@ -155,7 +155,7 @@ TEST_CASE("B27: without a light subpath strategies that need one have no weight,
         const BidirectionalMis none{h, kAllStrategies, 0.0f, 0.0f};
         MisSums eye;
         SubpathStart start;
-        none.start_eye(view, {0, 0, 1}, eye, start);
+        none.start_eye<kAllFeatures>(view, {0, 0, 1}, eye, start);
         CHECK(eye.dvcm == 0);
         for (int k = 0; k < 3; ++k) {
             eye = none.sums_at_hit(eye, 2.0f, 0.5f, false);
@@ -166,8 +166,8 @@ TEST_CASE("B27: without a light subpath strategies that need one have no weight,
         CameraConnection camera{};
         camera.cos_camera = 0.9f, camera.camera_distance = 2;
         const MisSums light = {0.4f, 0.7f};
-        CHECK(mis_weight(none.camera_ratio(view, light, true, camera, 0.5f, 0.2f)) == 0);
-        CHECK(mis_weight(none.visible_emitter_ratio(view, camera, 0.5f, 0.3f, 1.0f)) == 0);
+        CHECK(mis_weight(none.camera_ratio<kAllFeatures>(view, light, true, camera, 0.5f, 0.2f)) == 0);
+        CHECK(mis_weight(none.visible_emitter_ratio<kAllFeatures>(view, camera, 0.5f, 0.3f, 1.0f)) == 0);
         EmitterSample sample{};
         sample.pdf_sa = 1, sample.distance = 2, sample.delta = true, sample.wi = {0, 0, 1};
         BsdfValue f{};

@@ -106,7 +106,7 @@ TEST_CASE("Camera rays are Mitsuba's", "[sensor]") {
     for (const auto& c : cases) {
         Sensor s = make_sensor(c.type, c.type == SensorType::orthographic ? 2.0f : 1.0f);
         if (c.type == SensorType::perspective) s.principal_offset = {0.1f, -0.2f};
-        const CameraSample ray = sample_camera_ray(s, c.film, {0.3f, 0.8f});
+        const CameraSample ray = sample_camera_ray<kAllFeatures>(s, c.film, {0.3f, 0.8f});
         INFO("sensor type " << uint32_t(c.type));
         CHECK(length(ray.o - c.o) < 2e-5f);
         CHECK(length(ray.d - c.d) < 2e-5f);
@@ -121,25 +121,25 @@ TEST_CASE("The image is not mirrored: right on the film is right of the viewer, 
     Sensor s = make_sensor(SensorType::perspective);
     // At the origin, looking along -z with y up: the viewer's right is +x.
     s.to_world = affine_from_columns({-1, 0, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 0});
-    const Vec3f top_left = sample_camera_ray(s, {0, 0}, {0, 0}).d,
-                bottom_right = sample_camera_ray(s, {30, 20}, {0, 0}).d;
+    const Vec3f top_left = sample_camera_ray<kAllFeatures>(s, {0, 0}, {0, 0}).d,
+                bottom_right = sample_camera_ray<kAllFeatures>(s, {30, 20}, {0, 0}).d;
     CHECK(top_left.x < 0);
     CHECK(top_left.y > 0);
     CHECK(bottom_right.x > 0);
     CHECK(bottom_right.y < 0);
-    CHECK(sample_camera_ray(s, {15, 10}, {0, 0}).d.z == Approx(-1));
+    CHECK(sample_camera_ray<kAllFeatures>(s, {15, 10}, {0, 0}).d.z == Approx(-1));
     CHECK(bottom_right.x / -bottom_right.z == Approx(std::tan(20 * M_PI / 180)));
 }
 
 TEST_CASE("A thin lens is sharp at its focus distance and a pinhole in the limit", "[sensor]") {
     const Sensor lens = make_sensor(SensorType::thin_lens), pinhole = make_sensor(SensorType::perspective);
     const Vec2f film = {7.3f, 16.1f};
-    const CameraSample central = sample_camera_ray(pinhole, film, {0.5f, 0.5f});
+    const CameraSample central = sample_camera_ray<kAllFeatures>(pinhole, film, {0.5f, 0.5f});
     const Vec3f focus = central.o + central.d * ((4 - 0.5f) / dot(central.d, axis_of(lens)));
     Statistics radius2;
     for (uint32_t i = 0; i < 20000; ++i) {
         const Vec4f u = random(3, i);
-        const CameraSample ray = sample_camera_ray(lens, film, {u.x, u.y});
+        const CameraSample ray = sample_camera_ray<kAllFeatures>(lens, film, {u.x, u.y});
         const float t = (4 - 0.5f) / dot(ray.d, axis_of(lens));
         REQUIRE(length(ray.o + ray.d * t - focus) < 1e-5f);
         const Vec3f on_lens = ray.o - ray.d * (0.5f / dot(ray.d, axis_of(lens)));
@@ -149,9 +149,9 @@ TEST_CASE("A thin lens is sharp at its focus distance and a pinhole in the limit
     CHECK(std::fabs(radius2.mean() - 0.045) < 4.5 * radius2.standard_error() + 1e-6);
     Sensor tiny = lens;
     tiny.aperture_radius = 0;
-    CHECK(length(sample_camera_ray(tiny, film, {0.9f, 0.1f}).d - central.d) < 1e-6f);
+    CHECK(length(sample_camera_ray<kAllFeatures>(tiny, film, {0.9f, 0.1f}).d - central.d) < 1e-6f);
     CHECK(camera_delta_position(tiny));
-    CHECK(camera_importance(tiny, 0.9f) == camera_importance(pinhole, 0.9f));
+    CHECK(camera_importance<kAllFeatures>(tiny, 0.9f) == camera_importance<kAllFeatures>(pinhole, 0.9f));
 }
 
 TEST_CASE("B21: projecting a point of a camera ray gives the film position back", "[sensor]") {
@@ -159,21 +159,22 @@ TEST_CASE("B21: projecting a point of a camera ray gives the film position back"
         for (uint32_t i = 0; i < 2000; ++i) {
             const Vec4f u = random(11, i), w = random(11, i, 1);
             const Vec2f film = {u.x * 30, u.y * 20}, lens_u = {u.z, u.w};
-            const CameraSample ray = sample_camera_ray(s, film, lens_u);
+            const CameraSample ray = sample_camera_ray<kAllFeatures>(s, film, lens_u);
             const Vec3f p = ray.o + ray.d * (w.x * w.x * ray.tmax * 0.99f + 1e-3f);
             Vec2f back = {};
-            REQUIRE(project_to_film(s, p, lens_point(s, lens_u), back));
+            REQUIRE(project_to_film<kAllFeatures>(s, p, lens_point(s, lens_u), back));
             REQUIRE(std::fabs(back.x - film.x) < 1e-3f);
             REQUIRE(std::fabs(back.y - film.y) < 1e-3f);
             CameraConnection c;
-            REQUIRE(connect_to_camera(s, p, lens_u, c));
+            REQUIRE(connect_to_camera<kAllFeatures>(s, p, lens_u, c));
             REQUIRE(std::fabs(c.film_position.x - film.x) < 1e-3f);
             REQUIRE(length(c.wi + ray.d) < 1e-4f);
             REQUIRE(length(p + c.wi * c.distance - ray.o) < 1e-4f * (1 + c.distance));
             // Past the clip planes there is nothing.
-            REQUIRE_FALSE(project_to_film(s, ray.o - ray.d * 1e-3f, lens_point(s, lens_u), back));
-            REQUIRE_FALSE(connect_to_camera(s, ray.o - ray.d * 2.0f, lens_u, c));
-            REQUIRE_FALSE(project_to_film(s, ray.o + ray.d * (ray.tmax * 1.01f), lens_point(s, lens_u), back));
+            REQUIRE_FALSE(project_to_film<kAllFeatures>(s, ray.o - ray.d * 1e-3f, lens_point(s, lens_u), back));
+            REQUIRE_FALSE(connect_to_camera<kAllFeatures>(s, ray.o - ray.d * 2.0f, lens_u, c));
+            REQUIRE_FALSE(
+                project_to_film<kAllFeatures>(s, ray.o + ray.d * (ray.tmax * 1.01f), lens_point(s, lens_u), back));
         }
 }
 
@@ -188,13 +189,14 @@ TEST_CASE("B21: sampled directions have the density that is claimed, and We inte
             const Vec4f u = random(21, i);
             const Vec2f lens_u = {u.z, u.w}, film = {u.x * 30, u.y * 20};
             const float h = 0.05f;
-            const Vec3f d = sample_camera_ray(s, film, lens_u).d;
-            const Vec3f dx = sample_camera_ray(s, {film.x + h, film.y}, lens_u).d -
-                             sample_camera_ray(s, {film.x - h, film.y}, lens_u).d;
-            const Vec3f dy = sample_camera_ray(s, {film.x, film.y + h}, lens_u).d -
-                             sample_camera_ray(s, {film.x, film.y - h}, lens_u).d;
+            const Vec3f d = sample_camera_ray<kAllFeatures>(s, film, lens_u).d;
+            const Vec3f dx = sample_camera_ray<kAllFeatures>(s, {film.x + h, film.y}, lens_u).d -
+                             sample_camera_ray<kAllFeatures>(s, {film.x - h, film.y}, lens_u).d;
+            const Vec3f dy = sample_camera_ray<kAllFeatures>(s, {film.x, film.y + h}, lens_u).d -
+                             sample_camera_ray<kAllFeatures>(s, {film.x, film.y - h}, lens_u).d;
             const double solid_angle = double(length(cross(dx, dy))) / (4 * h * h);  // per pixel
-            REQUIRE(camera_pdf_direction_sa(s, dot(d, axis_of(s))) == Approx(1 / solid_angle).epsilon(2e-3));
+            REQUIRE(camera_pdf_direction_sa<kAllFeatures>(s, dot(d, axis_of(s))) ==
+                    Approx(1 / solid_angle).epsilon(2e-3));
         }
         // Over all directions: one per pixel of the film; We with the lens and the cosine likewise.
         Statistics pdf, importance;
@@ -211,10 +213,11 @@ TEST_CASE("B21: sampled directions have the density that is claimed, and We inte
             const Vec3f p = s.to_world.point({lens.x, lens.y, 0}) + d * (10 / cosine);
             Vec2f film;
             double a = 0, b = 0;
-            if (project_to_film(s, p, lens, film) && film.x >= 0 && film.y >= 0 && film.x < 30 && film.y < 20) {
-                a = camera_pdf_direction_sa(s, cosine) / density;
+            if (project_to_film<kAllFeatures>(s, p, lens, film) && film.x >= 0 && film.y >= 0 && film.x < 30 &&
+                film.y < 20) {
+                a = camera_pdf_direction_sa<kAllFeatures>(s, cosine) / density;
                 // The lens is uniform: its area times the density of this point is one.
-                b = camera_importance(s, cosine) * cosine / density / camera_pdf_position(s);
+                b = camera_importance<kAllFeatures>(s, cosine) * cosine / density / camera_pdf_position(s);
             }
             pdf.add(a / 600);
             importance.add(b / 600);
@@ -223,8 +226,9 @@ TEST_CASE("B21: sampled directions have the density that is claimed, and We inte
         CHECK(std::fabs(importance.mean() - 1) < 4.5 * importance.standard_error());
         CHECK(pdf.standard_error() * 4.5 < 0.02);
         // The identity that gives camera rays the weight 1.
-        CHECK(camera_importance(s, 0.7f) * 0.7f == Approx(camera_pdf_position(s) * camera_pdf_direction_sa(s, 0.7f)));
-        CHECK(camera_importance(s, -0.1f) == 0);
+        CHECK(camera_importance<kAllFeatures>(s, 0.7f) * 0.7f ==
+              Approx(camera_pdf_position(s) * camera_pdf_direction_sa<kAllFeatures>(s, 0.7f)));
+        CHECK(camera_importance<kAllFeatures>(s, -0.1f) == 0);
     }
 }
 
@@ -232,7 +236,7 @@ TEST_CASE("B14, B21: light carried to the camera measures what camera rays see",
     // A Lambertian plane of radiance 1, tilted: whatever the film position, rays see 1. Points uniform over the plane,
     // connected to the camera, must give the same per pixel: their flux is L dA, a splat L cos(reference) weight.
     for (const Sensor& s : all_sensors()) {
-        const CameraSample middle = sample_camera_ray(s, {15, 10}, {0.5f, 0.5f});
+        const CameraSample middle = sample_camera_ray<kAllFeatures>(s, {15, 10}, {0.5f, 0.5f});
         const Vec3f center = middle.o + middle.d * 6.0f, n = normalize(axis_of(s) * -1.0f + Vec3f{0.5f, 0.3f, 0.1f});
         const Frame frame = frame_from_normal(n);
         const float half = 3.0f;
@@ -245,8 +249,8 @@ TEST_CASE("B14, B21: light carried to the camera measures what camera rays see",
             CameraConnection c;
             double value = 0;
             int quadrant = -1;
-            if (connect_to_camera(s, p, {w.x, w.y}, c) && c.film_position.x >= 10 && c.film_position.x < 20 &&
-                c.film_position.y >= 6 && c.film_position.y < 14) {
+            if (connect_to_camera<kAllFeatures>(s, p, {w.x, w.y}, c) && c.film_position.x >= 10 &&
+                c.film_position.x < 20 && c.film_position.y >= 6 && c.film_position.y < 14) {
                 value = double(c.weight) * std::max(0.0f, dot(n, c.wi)) * (4.0 * half * half) / 80;
                 quadrant = (c.film_position.x >= 15 ? 1 : 0) + (c.film_position.y >= 10 ? 2 : 0);
             }

@@ -18,9 +18,11 @@ AMBILUX_HD Rgb burley_tint(Rgb color) {
     return l > 0.0f ? color / l : splat(1.0f);
 }
 
-/// `aspect`: root of roughness along t over that along s.
-AMBILUX_HD MicrofacetDistribution burley_microfacets(float roughness, float aspect) {
-    const float alpha = roughness * roughness;
+/// Root of roughness along t over that along s.
+AMBILUX_HD float burley_aspect(float anisotropic) { return sqrtf(1.0f - 0.9f * clamp(anisotropic, 0.0f, 1.0f)); }
+
+AMBILUX_HD MicrofacetDistribution burley_microfacets(float roughness, float anisotropic) {
+    const float alpha = roughness * roughness, aspect = burley_aspect(anisotropic);
     return {Microfacets::ggx, max(alpha / aspect, 1e-3f), max(alpha * aspect, 1e-3f)};
 }
 

@@ -32,7 +32,7 @@ struct ClearcoatDistribution {
 
 template <>
 struct BsdfAt<Principled> : Resolved<Principled> {
-    AMBILUX_HD MicrofacetDistribution microfacets() const { return burley_microfacets(roughness, aspect); }
+    AMBILUX_HD MicrofacetDistribution microfacets() const { return burley_microfacets(roughness, anisotropic); }
     AMBILUX_HD ClearcoatDistribution coating() const { return {clearcoat_alpha * clearcoat_alpha}; }
 
     /// Shares of lobes in sampling, the diffuse one's is the rest: they do not depend on directions.

@@ -15,7 +15,7 @@ template <>
 struct BsdfAt<PrincipledThin> : Resolved<PrincipledThin> {
     /// Those of light that passes: the roughness by which two boundaries look like one (Burley 2015, figure 15).
     AMBILUX_HD MicrofacetDistribution microfacets(bool reflects) const {
-        return burley_microfacets(reflects ? roughness : roughness * (0.65f * ior - 0.35f), aspect);
+        return burley_microfacets(reflects ? roughness : roughness * (0.65f * ior - 0.35f), anisotropic);
     }
     AMBILUX_HD Rgb fresnel(float reflectance, float cosine) const {
         if (!(specular_tint > 0.0f)) return splat(reflectance);

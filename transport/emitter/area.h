@@ -121,6 +121,24 @@ AMBILUX_HD bool area_sample_sphere(const SceneView& view, const Emitter& emitter
     return s.distance > 0.0f;
 }
 
+struct LightGeometry {
+    float distance2;
+    float cosine;  ///< at the light; not positive where its light does not arrive
+};
+
+/// Place, distance and direction of `s` for light that leaves `point` for `reference_p`.
+AMBILUX_HD LightGeometry light_from_point(const SurfacePoint& point, Vec3f reference_p, EmitterSample& s) {
+    const Vec3f to_light = point.p - reference_p;
+    const float d2 = length_squared(to_light);
+    if (!(d2 > 0.0f)) return {d2, 0.0f};
+    s.p = point.p;
+    s.p_error = point.p_error;
+    s.ng = point.ng;
+    s.distance = sqrtf(d2);
+    s.wi = to_light * (1.0f / s.distance);
+    return {d2, -dot(point.ng, s.wi)};
+}
+
 /// Direct light from an area emitter at `reference_p`; false when the sample carries none. Sphere from outside: by
 /// solid angle; everything else: by area.
 template <Features F>
@@ -135,20 +153,12 @@ AMBILUX_HD bool area_sample_direct(const SceneView& view, const Emitter& emitter
         }
     }
     const SurfacePoint point = area_sample_point<F>(view, emitter, u_primitive, u);
-    const Vec3f to_light = point.p - reference_p;
-    const float d2 = length_squared(to_light);
-    if (!(d2 > 0.0f)) return false;
-    s.p = point.p;
+    const LightGeometry light = light_from_point(point, reference_p, s);
+    if (!(light.cosine > 0.0f)) return false;
     s.prim = point.prim;
-    s.p_error = point.p_error;
-    s.ng = point.ng;
-    s.distance = sqrtf(d2);
-    s.wi = to_light * (1.0f / s.distance);
-    const float cos_light = -dot(point.ng, s.wi);
-    if (!(cos_light > 0.0f)) return false;
     s.opacity = area_opacity<F>(view, emitter, point.uv);
     s.radiance = area_radiance<F>(view, emitter, point.uv, s.opacity);
-    s.pdf_sa = emitter.pick_probability * area_pdf_position(view, emitter, point.prim) * d2 / cos_light;
+    s.pdf_sa = emitter.pick_probability * area_pdf_position(view, emitter, point.prim) * light.distance2 / light.cosine;
     return true;
 }
 

@@ -19,18 +19,10 @@ struct EmitterFunctions<HiddenAreaEmitter> {
     AMBILUX_HD static bool sample_direct(const SceneView& view, const Emitter& e, Vec3f reference_p, Vec3f u,
                                          EmitterSample& s) {
         const SurfacePoint point = area_sample_point<F>(view, e, u.z, {u.x, u.y});
-        const Vec3f to_light = point.p - reference_p;
-        const float d2 = length_squared(to_light);
-        if (!(d2 > 0.0f)) return false;
+        const LightGeometry light = light_from_point(point, reference_p, s);
+        if (!(light.cosine > 0.0f)) return false;
         s.delta = true;
-        s.p = point.p;
-        s.p_error = point.p_error;
-        s.ng = point.ng;
-        s.distance = sqrtf(d2);
-        s.wi = to_light * (1.0f / s.distance);
-        const float cos_light = -dot(point.ng, s.wi);
-        if (!(cos_light > 0.0f)) return false;
-        s.radiance = hidden_area_intensity<F>(view, e, point) * (cos_light / d2);
+        s.radiance = hidden_area_intensity<F>(view, e, point) * (light.cosine / light.distance2);
         s.pdf_sa = e.pick_probability;
         return true;
     }

@@ -65,18 +65,27 @@ struct BidirectionalMis {
     // ---- sums along subpaths ----
     // Relative error: 10 roundings a vertex while all factors are within 1e-36 to 1e37.
 
-    /// Density of the first vertex of an eye subpath per solid angle (perspective, thin lens) or per area of the sensor
-    /// plane (orthographic), at density 1 per pixel.
+    /// Density of the first vertex of an eye subpath per solid angle or, of parallel rays, per area of the sensor
+    /// plane, at density 1 per pixel.
+    template <Features F>
     AMBILUX_HD static float camera_pdf(const Sensor& sensor, float cos_camera) {
         return camera_delta_direction(sensor) ? camera_pdf_position(sensor)
-                                              : camera_pdf_direction_sa(sensor, cos_camera);
+                                              : camera_pdf_direction_sa<F>(sensor, cos_camera);
     }
 
     /// Sums and start of a camera ray along unit `d`.
+    template <Features F>
     AMBILUX_HD void start_eye(const SceneView& scene, Vec3f d, MisSums& sums, SubpathStart& start) const {
+        if constexpr (F.latlong)
+            if (is_latlong(scene.sensor.type)) {
+                const float sine = camera_cosine<F>(scene.sensor, d);
+                sums = {masked(kLightStrategies, light_subpaths / camera_pdf<F>(scene.sensor, sine)), 0.0f};
+                start.camera_distance = 0.0f;
+                return;
+            }
         const Vec3f axis = scene.sensor.to_world.vector({0.0f, 0.0f, 1.0f});
         const float scale = length(axis), cos_camera = dot(d, axis) / scale;
-        sums = {masked(kLightStrategies, light_subpaths / camera_pdf(scene.sensor, cos_camera)), 0.0f};
+        sums = {masked(kLightStrategies, light_subpaths / camera_pdf<F>(scene.sensor, cos_camera)), 0.0f};
         start.camera_distance =
             camera_delta_direction(scene.sensor) ? 0.0f : scene.sensor.near_clip * scale / cos_camera;
     }
@@ -250,19 +259,22 @@ struct BidirectionalMis {
 
     /// t = 1: a light vertex with sums `y`, connected with the camera. `cos_y`: between its geometric normal and the
     /// direction to the camera. Equation 16.
+    template <Features F>
     AMBILUX_HD float camera_ratio(const SceneView& scene, MisSums y, bool first, const CameraConnection& c, float cos_y,
                                   float pdf_reverse_sa) const {
         const float fall_off = camera_delta_direction(scene.sensor) ? 1.0f : 1.0f / sqr(c.camera_distance);
-        const float pdf_area = camera_pdf(scene.sensor, c.cos_camera) * cos_y * fall_off / light_subpaths;
+        const float pdf_area = camera_pdf<F>(scene.sensor, c.cos_camera) * cos_y * fall_off / light_subpaths;
         return term(ratio_behind(y, first, pdf_area, pdf_reverse_sa));
     }
 
     /// (1,1): a point of opacity `opacity` sampled on an area emitter with density `pdf_pos` (pick included), connected
     /// with the camera (equation 17).
+    template <Features F>
     AMBILUX_HD float visible_emitter_ratio(const SceneView& scene, const CameraConnection& c, float cos_light,
                                            float pdf_pos, float opacity) const {
         const float fall_off = camera_delta_direction(scene.sensor) ? 1.0f : 1.0f / sqr(c.camera_distance);
-        const float pdf_hit = camera_pdf(scene.sensor, c.cos_camera) * cos_light * fall_off * weight_opacity(opacity);
+        const float pdf_hit =
+            camera_pdf<F>(scene.sensor, c.cos_camera) * cos_light * fall_off * weight_opacity(opacity);
         return masked(kHitStrategies, term(pdf_hit / (light_subpaths * pdf_pos)));
     }
     /// Eye subpaths whose last scattering was this count what their last segment meets.

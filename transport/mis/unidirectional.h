@@ -23,7 +23,10 @@ struct UnidirectionalMis {
     MisHeuristic heuristic;
     bool next_event;  ///< emitters are sampled
 
-    AMBILUX_HD void start_eye(const SceneView&, Vec3f, Sums& sums, Start&) const { sums = {0.0f}; }
+    template <Features>
+    AMBILUX_HD void start_eye(const SceneView&, Vec3f, Sums& sums, Start&) const {
+        sums = {0.0f};
+    }
 
     template <Features F, class Path>
     AMBILUX_HD Sums sums_at(const SceneView&, Side, const Path&, Sums sums, const SurfacePoint&) const {

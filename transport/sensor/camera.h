@@ -1,4 +1,4 @@
-// Camera rays of perspective, thin lens and orthographic sensors (Mitsuba's models).
+// Camera rays of all sensors (Mitsuba's models).
 //
 // Film positions are in pixels of the full film, origin at the top left, x to the right, y down. Camera space: +z is
 // the view direction, +y up, +x left in the image. A film position shifted by principal_offset·size sees what the
@@ -7,10 +7,12 @@
 
 #include "core/sampling.h"
 #include "scene/view.h"
+#include "transport/sensor/latlong.h"
 
 namespace ambilux {
 
-/// Ray from the camera: `o` lies on the near plane, `d` is unit, and the ray ends at the far plane, `tmax` from `o`.
+/// Ray from the camera: `o` lies on the near plane, `d` is unit, and the ray ends at the far plane, `tmax` from `o`
+/// (spherical: it begins at the camera and has no end).
 /// Its radiance counts with weight 1 for a film position sampled by sample_film_position and a lens position uniform
 /// over the aperture.
 struct CameraSample {
@@ -40,7 +42,12 @@ AMBILUX_HD Vec2f lens_point(const Sensor& sensor, Vec2f lens_u) {
 
 /// Ray through `film_position`, for a thin lens through the lens point of `lens_u`. The clip distances count along the
 /// view axis.
+template <Features F>
 AMBILUX_HD CameraSample sample_camera_ray(const Sensor& sensor, Vec2f film_position, Vec2f lens_u) {
+    if constexpr (F.latlong)
+        if (is_latlong(sensor.type))
+            return {sensor.to_world.point({0.0f, 0.0f, 0.0f}),
+                    normalize(sensor.to_world.vector(latlong_direction(sensor, film_position))), kInfinity};
     const Vec2f c = film_to_camera(sensor, film_position);
     if (is_parallel(sensor.type))
         return {sensor.to_world.point({c.x, c.y, sensor.near_clip}),

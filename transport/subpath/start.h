@@ -24,10 +24,10 @@ AMBILUX_HD Subpath<Mis> first_ray(Vec3f origin, Vec3f direction, Rgb throughput)
 }  // namespace detail
 
 /// Eye subpath that begins with the camera ray `c`.
-template <class Mis>
+template <Features F, class Mis>
 AMBILUX_HD Subpath<Mis> start_eye(const SceneView& scene, const Mis& mis, const CameraSample& c) {
     Subpath<Mis> path = detail::first_ray<Mis>(c.o, c.d, {1.0f, 1.0f, 1.0f});
-    mis.start_eye(scene, c.d, path.sums, path.start);
+    mis.template start_eye<F>(scene, c.d, path.sums, path.start);
     return path;
 }
 

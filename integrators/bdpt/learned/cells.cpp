@@ -64,7 +64,7 @@ bool start(const SceneView& scene, const Mis& mis, Side side, const Draws& draws
     const Sensor& s = scene.sensor;
     const Vec2f at = {float(s.crop_x) + pixel.x * float(s.crop_width),
                       float(s.crop_y) + pixel.y * float(s.crop_height)};
-    path = start_eye(scene, mis, sample_camera_ray(s, at, {u.z, u.w}));
+    path = start_eye<F>(scene, mis, sample_camera_ray<F>(s, at, {u.z, u.w}));
     return true;
 }
 

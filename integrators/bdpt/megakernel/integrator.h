@@ -39,7 +39,7 @@ struct MegakernelIntegrator {
         Policy policy;
         Wave wave;
         Megakernel<F, Tracer> megakernel;
-        Splat splat;
+        Splat<F> splat;
 
         Stages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
                const Memory& m, const FilmBuffers& film)
@@ -52,7 +52,7 @@ struct MegakernelIntegrator {
             megakernel = {scene,        tracer,           wave,
                           p.rules,      m.light_vertices, m.splats,
                           film.samples, records,          record(megakernel.kName)};
-            splat = {scene, wave, m.splats, film.splats, {}, record(Splat::kName)};
+            splat = {scene, wave, m.splats, film.splats, {}, record(Splat<F>::kName)};
         }
     };
 

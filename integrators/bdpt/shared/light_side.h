@@ -52,7 +52,7 @@ struct SplatSide {
     OccludeStage occlude;
     WeighStage weigh;
     ConnectCameraQueue<F, Candidates> connect_camera;
-    Splat splat;
+    Splat<F> splat;
 
     SplatSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave, const SplatQueues& q,
               const FilmBuffers& film, const BdptPolicy& p, Lane* raw) {
@@ -63,7 +63,7 @@ struct SplatSide {
         StageRecord* const connects = layout.record(connect_camera.kName);
         connect_camera = {scene, wave, p.rules, q.vertices, {candidates(), connects}, connects};
         const StrategyFilm strategies = {film.strategies, film.strategies_dropped, raw, p.waves.strategy_depth};
-        splat = {scene, wave, q.splats, film.splats, strategies, layout.record(Splat::kName)};
+        splat = {scene, wave, q.splats, film.splats, strategies, layout.record(Splat<F>::kName)};
     }
 
     Candidates candidates() const { return choose<K.weigh>(weigh, weigh.candidates); }

@@ -60,7 +60,7 @@ struct TwoSidesStages {
     Splats splats;
     LightStages<F, Tracer, K> light;
     Source source;
-    GenerateEye<Mis> generate;
+    GenerateEye<F, Mis> generate;
     Extend<F, Tracer, Mis> extend[2];
     EyeVertex<F, Mis, typename Eye::Emission, AtVertex> eye_vertex[2];
     ConnectEmitter<F, Mis, Connect> connect_emitter;

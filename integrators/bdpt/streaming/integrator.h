@@ -64,7 +64,7 @@ struct StreamingIntegrator {
         Wave wave;
         Eye eye;
         Splats splats;
-        StreamBegin begin;
+        StreamBegin<F> begin;
         StreamExtend<F, Tracer> extend;
         StreamEyeVertex<F, typename Eye::Emission> eye_vertex;
         StreamTurn<F, typename Splats::Candidates> turn;
@@ -80,7 +80,8 @@ struct StreamingIntegrator {
             const bool seeds = F.opacity || p.waves.cull > 0.0f;
             // The state is null in the run that tells the bytes.
             uint32_t* const next_path = w.state ? &const_cast<WaveState*>(w.state)->next_path : nullptr;
-            const StreamPool pool = {scene, wave, p.rules, m.rays, m.eye_vertices, m.pending, film.samples, next_path};
+            const StreamPool<F> pool = {scene,          wave,      p.rules,      m.rays,
+                                        m.eye_vertices, m.pending, film.samples, next_path};
             begin = {pool, record(begin)};
             extend = {scene, tracer, pool, m.eye_hits, m.light_hits, record(extend)};
             eye_vertex = {pool, m.eye_hits, eye.emission(), m.eye.vertices, m.turns, record(eye_vertex)};
