@@ -31,7 +31,7 @@ public:
     }
 
     void make() {
-        for (const int node : roots()) visit(node, {}, 1);
+        for (const int node : roots()) visit(node, {}, 1, true);
         if (shown_ == 0) c_.fail("it shows no triangles");
         Object& sensor = sensor_ ? *sensor_ : add_default_camera(c_, lower_, upper_);
         add_child(*c_.document.scene, sensor);
@@ -155,7 +155,14 @@ private:
         return m;
     }
 
-    void visit(int index, const Matrix& outer, uint64_t depth) {
+    /// KHR_node_visibility; true without it.
+    static bool is_visible(const tinygltf::Node& node) {
+        const tinygltf::Value* given = extension(node.extensions, "KHR_node_visibility");
+        return !given || !given->Has("visible") || !given->Get("visible").IsBool() || given->Get("visible").Get<bool>();
+    }
+
+    /// `visible`: all nodes above are. Cameras see all the same where they are not.
+    void visit(int index, const Matrix& outer, uint64_t depth, bool visible) {
         const Limits& limits = c_.document.limits;
         if (index < 0 || size_t(index) >= c_.model.nodes.size()) c_.fail("there is no node " + std::to_string(index));
         if (depth > limits.nesting)
@@ -164,7 +171,8 @@ private:
             c_.fail("it has more nodes than --limits shapes=" + std::to_string(limits.shapes));
         const tinygltf::Node& node = c_.model.nodes[size_t(index)];
         const Matrix to_world = outer * local(node);
-        if (node.mesh >= 0) {
+        visible = visible && is_visible(node);
+        if (node.mesh >= 0 && visible) {
             if (size_t(node.mesh) >= c_.model.meshes.size()) c_.fail("there is no mesh " + std::to_string(node.mesh));
             for (const Matrix& place : instances_of(node)) add_mesh(index, to_world * place);
         }
@@ -174,13 +182,13 @@ private:
                 c_.fail("there is no camera " + std::to_string(node.camera));
             sensor_ = &add_camera(c_, c_.model.cameras[size_t(node.camera)], to_world);
         }
-        if (const tinygltf::Value* light = extension(node.extensions, "KHR_lights_punctual")) {
+        if (const tinygltf::Value* light = extension(node.extensions, "KHR_lights_punctual"); light && visible) {
             const double i = number(light, "light", -1);
             if (!(i >= 0 && i < double(c_.model.lights.size())))
                 c_.fail("node '" + node.name + "' names a light that is not there");
             add_light(c_, c_.model.lights[size_t(i)], to_world);
         }
-        for (const int child : node.children) visit(child, to_world, depth + 1);
+        for (const int child : node.children) visit(child, to_world, depth + 1, visible);
     }
 
     void add_mesh(int at, Matrix to_world) {
@@ -259,7 +267,8 @@ private:
 
 Scene load_gltf(const std::string& path, const LoadOptions& options) {
     return load_by(path, options, [&](mitsuba::Document& document, Report& report) {
-        gltf::Context context{document, report, {path, 0}, {}, {}, {}, {}, false};
+        const mitsuba::Where where{path, 0};
+        gltf::Context context{document, report, where, {}, {}, {}, {}, false};
         gltf::read_model(context, path);
         gltf::SceneMaker(context).make();
     });

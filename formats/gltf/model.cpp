@@ -124,7 +124,8 @@ void read_model(Context& context, const std::string& path) {
                                                 "KHR_materials_ior",          "KHR_materials_clearcoat",
                                                 "KHR_texture_transform",      "KHR_mesh_quantization",
                                                 "KHR_materials_specular",     "KHR_materials_sheen",
-                                                "KHR_materials_unlit",        "EXT_mesh_gpu_instancing"};
+                                                "KHR_materials_unlit",        "EXT_mesh_gpu_instancing",
+                                                "KHR_node_visibility"};
     for (const std::string& name : context.model.extensionsRequired)
         if (!known.contains(name)) context.leave_out(name, "extension '" + name + "'");
     const auto& required = context.model.extensionsRequired;

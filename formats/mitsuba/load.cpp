@@ -1,8 +1,12 @@
 #include "formats/load.h"
+
+#include <algorithm>
+
 #include "core/error.h"
 #include "core/scoped_seconds.h"
 #include "formats/mitsuba/builder.h"
 #include "formats/mitsuba/origin.h"
+#include "formats/mitsuba/transform.h"
 #include "formats/mitsuba/xml.h"
 
 namespace ambilux {
@@ -51,6 +55,26 @@ std::set<const Object*> referenced_emitters(const Document& document) {
     return emitters;
 }
 
+/// Mitsuba 0.x lights a scene without any emitter with one of type sunsky (Scene::initialize()); 2 and 3 do not.
+void build_default_light(Builder& builder, const Document& document) {
+    if (std::any_of(document.storage.begin(), document.storage.end(),
+                    [](const auto& o) { return o->tag == "emitter"; }))
+        return;
+    const Where& at = document.scene->where;
+    if (document.scene->version >= 2) return builder.note(at, "the scene has no emitter: its image is black");
+    builder.note(at, "the scene has no emitter; as in Mitsuba 0.6 one of type sunsky lights it");
+    Object emitter;
+    emitter.tag = "emitter";
+    emitter.type = "sunsky";
+    emitter.where = at;
+    emitter.version = document.scene->version;
+    set_number(emitter, "scale", 2);
+    set_boolean(emitter, "extend", true);
+    set_number(emitter, "sun_radius_scale", 15);
+    set_transform(emitter, "to_world", rotation(0, 1, 0, -120));
+    build_emitter(builder, emitter);
+}
+
 /// All but what finalize_scene() adds, in coordinates about `origin`. `outside`: Builder::outside.
 Scene build_scene(const std::string& path, const Document& document, const LoadOptions& options, Vec3d origin,
                   std::optional<Error>* outside) {
@@ -76,6 +100,7 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     while (const Object* emitter = root.take("emitter"))
         if (!of_shapes.contains(emitter)) build_emitter(builder, *emitter);
     root.finish();
+    build_default_light(builder, document);
     build_shapes(builder, *document.scene);
     if (!sensor) build_default_sensor(builder, *document.scene);
     validate_unused(builder);

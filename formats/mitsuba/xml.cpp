@@ -7,6 +7,7 @@
 #include "core/error.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/text_cursor.h"
+#include "formats/mitsuba/entities.h"
 #include "formats/mitsuba/plugins.h"
 #include "formats/mitsuba/xml_values.h"
 
@@ -132,8 +133,9 @@ struct Parser {
         open_files.pop_back();
     }
 
-    void parse_text(const std::string& path, const std::string& bytes, uint64_t depth) {
-        document.files.push_back({path, bytes});
+    void parse_text(const std::string& path, const std::string& text, uint64_t depth) {
+        document.files.push_back({path, text});
+        const std::string bytes = expand_entities(document, path, text);
         XmlSource source;
         source.path = path;
         for (size_t i = 0; i < bytes.size(); ++i)

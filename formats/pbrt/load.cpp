@@ -100,6 +100,9 @@ void Parser::directive(const Token& word) {
     const Where at = tokens_->where(word);
     if (name == "Include" || name == "Import") return include(at, name == "Import");
     if (transform(name, at) || attribute(name, at) || option(name, at) || material(name, at) || world(name, at)) return;
+    // pbrt-v4 has none; files that once were older end with it.
+    if (name == "WorldEnd" && in_world_ && open_files_.size() == 1 && tokens_->peek().kind == TokenKind::end)
+        return scene_.report.note(at, "WorldEnd is of older versions; the file is read as one of pbrt-v4");
     fail(at, "unknown directive '" + name + "'");
 }
 

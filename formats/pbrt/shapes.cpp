@@ -210,11 +210,27 @@ Placed add_quadric(SceneMaker& scene, const Parameters& in) {
     return out;
 }
 
+/// A sphere or cylinder that its transform stretches or shears into what no quadric here is (make_quadric()).
+bool is_stretched(const SceneMaker& scene, const Parameters& in) {
+    const Surface surface = surface_of(in.type);
+    if (surface != Surface::sphere && surface != Surface::cylinder) return false;
+    constexpr double kTolerance = 1e-3;
+    const Matrix& m = scene.state.ctm;
+    const auto axis = [&m](int i) { return length(Vec3d{m.m[0][i], m.m[1][i], m.m[2][i]}); };
+    const double lx = axis(0), ly = axis(1), lz = axis(2);
+    const double radius = surface == Surface::sphere ? (lx + ly + lz) / 3 : (lx + ly) / 2;
+    const auto differs = [&](double l) { return !(std::fabs(l - radius) < kTolerance * radius); };
+    return !is_orthogonal(m, kTolerance) || differs(lx) || differs(ly) || (surface == Surface::sphere && differs(lz));
+}
+
 Mesh own_mesh(SceneMaker& scene, const Parameters& in, double& exact_area) {
     if (surface_of(in.type) != Surface::mesh) {
         if (is_cut(in))
             scene.report.note(in.where,
                               "parts of spheres, disks and cylinders are triangles: 256 around, 128 from pole to pole");
+        else if (is_stretched(scene, in))
+            scene.report.note(in.where,
+                              "stretched spheres and cylinders are triangles: 256 around, 128 from pole to pole");
         return cut_quadric(in, exact_area);
     }
     if (in.type == "trianglemesh") return triangle_mesh(scene, in);
@@ -303,7 +319,7 @@ void add_back(SceneMaker& scene, const Parameters& in, const Object& shape, cons
 
 void add_shape(SceneMaker& scene, const Parameters& in) {
     const std::string& type = in.type;
-    const bool round = surface_of(type) != Surface::mesh, quadric = round && !is_cut(in);
+    const bool round = surface_of(type) != Surface::mesh, quadric = round && !is_cut(in) && !is_stretched(scene, in);
     if (!round && type != "trianglemesh" && type != "plymesh" && type != "bilinearmesh" && type != "loopsubdiv" &&
         type != "curve")
         return scene.report.refuse(in.where, "shape '" + type + "' is not supported", "it is left out");

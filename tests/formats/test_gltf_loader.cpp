@@ -172,6 +172,28 @@ TEST_CASE("lights along -z of their nodes") {
     check_rgb(point.emitters[0].position, {0, 0, 2});
 }
 
+TEST_CASE("what is below an invisible node is left out, but for cameras") {
+    Json j = quad_scene();
+    j["extensionsUsed"] = j["extensionsRequired"] = {"KHR_lights_punctual", "KHR_node_visibility"};
+    j["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}}};
+    const Json hidden = {{"KHR_node_visibility", {{"visible", false}}}},
+               shown = {{"KHR_node_visibility", {{"visible", true}}}};
+    j["scenes"][0]["nodes"] = {0, 2};
+    j["nodes"][1]["extensions"] = shown;
+    j["nodes"][1]["mesh"] = 0;
+    j["nodes"].push_back({{"children", {1, 3}}, {"extensions", hidden}});
+    j["nodes"].push_back({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+    const Scene without = load(j);
+    CHECK(without.shapes.size() == 1);
+    CHECK(without.environment != kNone);  // since there is no light
+    CHECK(without.sensor.to_world.m[2][3] == 3);
+    j["nodes"][2]["extensions"] = shown;
+    const Scene with = load(j);
+    CHECK(with.shapes.size() == 2);
+    CHECK(with.emitters.size() == 1);
+    CHECK(with.environment == kNone);
+}
+
 TEST_CASE("binary files and files beside") {
     const TempFolder folder;
     Json j = quad_scene();

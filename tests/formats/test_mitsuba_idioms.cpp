@@ -17,6 +17,8 @@ using namespace ambilux::test;
 
 namespace {
 
+const std::string kLight = "<emitter type='constant'/>";
+
 std::string film(const std::string& xml) { return "<sensor type='perspective'>" + xml + "</sensor>"; }
 
 std::string textured(const std::string& texture) {
@@ -131,7 +133,8 @@ TEST_CASE("spectra that are objects, and black bodies") {
 
 TEST_CASE("textures of 0.6: one scale for both coordinates, which are uv; a scaled texture at the top") {
     const auto checkers = [](const std::string& xml) {
-        return load_quietly(textured("<texture name='reflectance' type='checkerboard'>" + xml + "</texture>"), "0.6.0")
+        return load_quietly(textured("<texture name='reflectance' type='checkerboard'>" + xml + "</texture>") + kLight,
+                            "0.6.0")
             .textures.at(0);
     };
     const Texture t = checkers(
@@ -264,7 +267,7 @@ TEST_CASE("checkerboards of numbers have their colours exchanged in format 3") {
 TEST_CASE("bump and normal maps: rules of Mitsuba 3.7 are on in format 3 unless the file says otherwise") {
     const auto rules = [](const std::string& xml, const std::string& version) {
         const Scene s = load_quietly("<shape type='rectangle'><bsdf type='bumpmap'>" + xml +
-                                         "<texture type='checkerboard'/><bsdf type='diffuse'/></bsdf></shape>",
+                                         "<texture type='checkerboard'/><bsdf type='diffuse'/></bsdf></shape>" + kLight,
                                      version);
         CHECK(s.notes.empty());
         CHECK(s.features.map_rules == (s.bsdfs[0].map_rules != 0));

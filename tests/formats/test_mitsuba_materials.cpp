@@ -206,7 +206,8 @@ TEST_CASE("textures: top row at t = 0, decoding, pooling, transforms") {
         "<shape type='rectangle'><bsdf type='diffuse'><texture name='reflectance' type='bitmap'><string "
         "name='filename' value='t.png'/><float name='gamma' value='1'/>"
         "<float name='uscale' value='2'/><float name='voffset' value='0.5'/><string name='filterType' "
-        "value='trilinear'/><string name='wrapMode' value='mirror'/></texture></bsdf></shape>",
+        "value='trilinear'/><string name='wrapMode' value='mirror'/></texture></bsdf></shape><emitter "
+        "type='constant'/>",
         {}, "0.6.0", &folder);
     CHECK(old.tables[old.textures[0].decode_table + 51] == Approx(0.2));
     CHECK(old.textures[0].to_uv[0][0] == 2.0f);

@@ -513,6 +513,31 @@ TEST_CASE("parts of spheres, disks and cylinders are meshes") {
     CHECK(contains(world_error("Shape \"disk\" \"float innerradius\" 1"), "innerradius must be less than radius"));
 }
 
+TEST_CASE("stretched spheres and cylinders are meshes, with their normals") {
+    const auto load_stretched = [](const std::string& world) {
+        const Scene s = load_pbrt_world(world);
+        CHECK(s.quadrics.empty());
+        CHECK(has_note(s, "stretched spheres and cylinders are triangles"));
+        return s;
+    };
+    const Scene egg = load_stretched("Scale 3 0.5 1 Shape \"sphere\" \"float radius\" 2");
+    for (const MeshVertex& v : egg.vertices) {
+        const Vec3f unit = {v.p.x / 6, v.p.y / 1, v.p.z / 2}, n = normalize({v.p.x / 36, v.p.y, v.p.z / 4});
+        CHECK(length(unit) == Approx(1).epsilon(1e-5));
+        CHECK(dot(n, v.n) > 0.9999f);
+    }
+    load_stretched("Scale 1 2 1 Shape \"cylinder\"");
+    load_stretched("ConcatTransform [1 0 0 0  0.5 1 0 0  0 0 1 0  0 0 0 1] Shape \"sphere\"");
+    for (const char* world : {"Scale 2 2 5 Shape \"cylinder\"", "Scale -2 2 2 Rotate 40 1 2 3 Shape \"sphere\"",
+                              "Scale 1 2 1 Shape \"disk\""})
+        CHECK(load_pbrt_world(world).quadrics.size() == 1);
+}
+
+TEST_CASE("WorldEnd may end a file, with a note") {
+    CHECK(has_note(load_pbrt_world(kSphere + "WorldEnd # of pbrt-v3"), "WorldEnd is of older versions"));
+    CHECK(contains(world_error(kSphere + "WorldEnd\n" + kSphere), "unknown directive 'WorldEnd'"));
+}
+
 TEST_CASE("several infinite lights are one") {
     const TempFolder folder;
     write_float_image(folder / "sky.exr", 4, 4, std::vector<float>(48, 2.0f));
