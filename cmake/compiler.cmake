@@ -18,7 +18,8 @@ if(AMBILUX_HAS_CUDA)
   # Device code calls constexpr host functions; line info costs nothing at run time and serves the profiler. Quotients and roots without the branch for rare
   # operands make shading a tenth faster (docs/performance.md); what must be correctly rounded says so (core/math.h, rounded_divide).
   target_compile_options(ambilux_options INTERFACE
-    $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -lineinfo -prec-div=false -prec-sqrt=false>)
+    $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -prec-div=false -prec-sqrt=false>
+    $<$<COMPILE_LANGUAGE:CUDA>:$<IF:$<BOOL:${AMBILUX_CUDA_SMALL}>,--compress-mode=size,-lineinfo>>)
   target_compile_definitions(ambilux_options INTERFACE AMBILUX_HAS_CUDA=1)
   if(NOT AMBILUX_CUDA_OPTIMISE)
     string(REPLACE "-O3" "-O1" CMAKE_CUDA_FLAGS_RELEASE "${CMAKE_CUDA_FLAGS_RELEASE}")  # of the host's part

@@ -18,7 +18,8 @@ fi
 tools="$work/tools/bin"
 
 CMAKE_BUILD_PARALLEL_LEVEL=$(jobs) python3 -m pip wheel --quiet --disable-pip-version-check --no-deps . -w "$work/out" \
-  -Cbuild-dir="$root/build-wheel" -Ccmake.define.AMBILUX_CUDA_ARCHITECTURES="${AMBILUX_CUDA_ARCHITECTURES:-90}"
+  -Cbuild-dir="$root/build-wheel" -Ccmake.define.AMBILUX_CUDA_ARCHITECTURES="${AMBILUX_CUDA_ARCHITECTURES:-90}" \
+  -Ccmake.define.AMBILUX_CUDA_SMALL=ON
 built=("$work"/out/ambilux-*.whl)
 PATH="$tools:$PATH" "$tools/auditwheel" repair --exclude 'libcuda.so.*' -w "$work/out/repaired" "${built[0]}"
 repaired=("$work"/out/repaired/*.whl)
