@@ -128,6 +128,11 @@ struct Expander {
         document.files.push_back({file, content});
         if (content.compare(0, 3, "\xEF\xBB\xBF") == 0) content.erase(0, 3);
         content.erase(0, behind(content, 0, "<?xml", "?>"));
+        // A file that is no XML stays out of values, and so out of messages.
+        const auto first = std::find_if_not(content.begin(), content.end(), is_blank);
+        if (first != content.end() && *first != '<')
+            throw input_error(path, entity.line,
+                              "file '" + entity.text + "' of an entity does not begin with an element");
         return content;
     }
 

@@ -74,6 +74,11 @@ TEST_CASE("entities: what is wrong is an error with its line") {
     CHECK(contains(error_of_declared(folder, "", "\n&nothing;"), "scene.xml:7: entity '&nothing;' is not declared"));
     CHECK(contains(error_of_declared(folder, "<!ENTITY a SYSTEM 'missing.xml'>", "&a;"),
                    "scene.xml:3: file 'missing.xml' does not exist"));
+    folder.write("scenes/secret.txt", " password");
+    const std::string secret =
+        error_of_declared(folder, "<!ENTITY a SYSTEM 'secret.txt'>", "<integer name='n' value='&a;'/>");
+    CHECK(contains(secret, "scene.xml:3: file 'secret.txt' of an entity does not begin with an element"));
+    CHECK(!contains(secret, "password"));
     CHECK(contains(error_of_declared(folder, "<!ENTITY a '&b;'><!ENTITY b '&a;'>", "&a;"),
                    "scene.xml:6: entity '&a;' holds itself"));
     CHECK(contains(error_of_declared(folder, "<!ENTITY % a 'text'>", ""), "entities with % are not supported"));
