@@ -191,6 +191,9 @@ Emitter read_sky(Builder& builder, Reader& in, const Matrix& rotation) {
 
     const bool sun = settings.sun_scale > 0;
     Image image{sun ? kSunWidth : kSkyWidth, sun ? kSunHeight : kSkyHeight, {}};
+    if (image.width * image.height > builder.options.limits.pixels)
+        in.fail("a sky is an image of " + std::to_string(image.width) + "x" + std::to_string(image.height) +
+                " pixels, which is larger than --limits pixels=" + std::to_string(builder.options.limits.pixels));
     builder.take_memory(uint64_t(image.width) * image.height * 4 * sizeof(float), in.where().file);
     image.texels.assign(size_t(image.width) * image.height * 4, 0.0f);
     if (settings.sky_scale > 0) add_sky(image, settings);

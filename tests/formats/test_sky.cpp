@@ -116,5 +116,10 @@ TEST_CASE("sky: what cannot be is refused with its line") {
     CHECK(contains(refused("<float name='hour' value='2'/>"), "the sun is below the horizon"));
     CHECK(contains(refused("<boolean name='complex_sun' value='true'/>"), ":3: complex_sun is not supported"));
     CHECK(contains(refused("<integer name='year' value='999999'/>"), ":3: '999999' is no date"));
+    LoadOptions small;
+    small.limits.pixels = 1 << 20;
+    CHECK(contains(error_of("<emitter type='sky'/>", small), "no error"));
+    CHECK(contains(error_of("\n<emitter type='sunsky'/>", small),
+                   "a sky is an image of 2048x2048 pixels, which is larger than --limits pixels=1048576"));
     CHECK(contains(error_of("<emitter type='sky'/><emitter type='constant'/>"), "only one constant, envmap or sky"));
 }
