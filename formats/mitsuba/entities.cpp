@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <map>
-#include <vector>
 
 #include "core/error.h"
 #include "formats/file_budget.h"

@@ -9,14 +9,7 @@ using namespace ambilux;
 
 namespace {
 
-const Method kFinding[] = {{"all"},
-                           {"all", MisHeuristic::power},
-                           {"all", MisHeuristic::balance, "megakernel"},
-                           {"all", MisHeuristic::balance, "lvc"},
-                           {"all", MisHeuristic::balance, "streaming"},
-                           {"-i light"},
-                           {"light"},
-                           {"next_event"}};
+const std::vector<Method> kFinding = methods_and("next_event");
 
 void check_methods(const Scene& scene, const Image& expected) {
     check_all_estimators(scene, expected, false);

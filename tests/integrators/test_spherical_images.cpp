@@ -8,14 +8,7 @@ using namespace ambilux;
 
 namespace {
 
-const Method kEach[] = {{"all"},
-                        {"all", MisHeuristic::power},
-                        {"all", MisHeuristic::balance, "megakernel"},
-                        {"all", MisHeuristic::balance, "lvc"},
-                        {"all", MisHeuristic::balance, "streaming"},
-                        {"-i light"},
-                        {"light"},
-                        {"hits"}};
+const std::vector<Method> kEach = methods_and("hits");
 
 constexpr Rgb kAlbedo = {0.5f, 0.3f, 0.1f};
 

@@ -1,6 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 120
 // Textures of one value give the image of that number: what vertices in queues keep of a BSDF's inputs is all of them.
+#include "tests/support/film_difference.h"
 #include "tests/support/small_room.h"
 
 using namespace ambilux;
@@ -29,15 +30,6 @@ Scene room(double anisotropic, bool textured) {
                "</bsdf></shape><shape type='rectangle'><transform name='to_world'><scale value='0.6'/><rotate x='1' "
                "angle='70'/><translate x='-0.5' y='0.3' z='0.7'/></transform><bsdf type='principledthin'>" +
                all("spec_trans", 0.5) + "</bsdf></shape>"));
-}
-
-double relative_difference(const FilmMoments& a, const FilmMoments& b) {
-    double difference = 0, size = 0;
-    for (size_t i = 0; i < a.sum.size(); ++i) {
-        difference += (a.sum[i] - b.sum[i]) * (a.sum[i] - b.sum[i]);
-        size += a.sum[i] * a.sum[i];
-    }
-    return std::sqrt(difference / size);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "render/twin/path_sample.h"
 #include "render/twin/scene.h"
 #include "tests/support/closed_forms.h"
+#include "tests/support/film_difference.h"
 #include "tests/support/spherical_scene.h"
 
 using namespace ambilux;
@@ -22,16 +23,6 @@ RenderSettings twin_settings(const Scene& scene, const std::string& integrator =
 RenderSettings single(RenderSettings s) {
     s.precision = Precision::single;
     return s;
-}
-
-/// Sums of squares of differences over those of `a`.
-double relative_difference(const FilmMoments& a, const FilmMoments& b) {
-    double difference = 0, size = 0;
-    for (size_t i = 0; i < a.sum.size(); ++i) {
-        difference += (a.sum[i] - b.sum[i]) * (a.sum[i] - b.sum[i]);
-        size += a.sum[i] * a.sum[i];
-    }
-    return std::sqrt(difference / size);
 }
 
 double relative_difference_of_means(const FilmMoments& a, const FilmMoments& b) {

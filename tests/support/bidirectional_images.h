@@ -25,6 +25,18 @@ struct Method {
 inline const Method kMethods[] = {{"all"},  {"all", MisHeuristic::power}, {"-i light"},
                                   {"hits"}, {"next_event+connections"},   {"light"}};
 
+/// Every variant, light tracing, and the group of strategies `last` alone.
+inline std::vector<Method> methods_and(const char* last) {
+    return {{"all"},
+            {"all", MisHeuristic::power},
+            {"all", MisHeuristic::balance, "megakernel"},
+            {"all", MisHeuristic::balance, "lvc"},
+            {"all", MisHeuristic::balance, "streaming"},
+            {"-i light"},
+            {"light"},
+            {last}};
+}
+
 inline RenderSettings method_settings(const Scene& scene, const Method& method, uint64_t seed) {
     RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
     s.heuristic = method.heuristic;
