@@ -25,7 +25,7 @@ struct CompiledRenderer {
 
     const char *integrator, *variant;
     Features level;
-    Make cpu, cuda;  ///< cuda: null without kernels for this level
+    Make cpu, cuda;  ///< null where the backend is built without this level
 };
 
 /// Levels of one variant follow each other from the smallest on; the last holds all features.
