@@ -96,6 +96,9 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     // What others refer to, used or not.
     for (const char* tag : {"sensor", "bsdf", "texture", "shape", "film", "sampler", "rfilter"})
         while (root.take(tag)) {}
+    // Exporters write media that nothing is made of; what refers to one is refused there.
+    while (const Object* medium = root.take("medium"))
+        builder.note(medium->where, "media are not supported; this one is left out, nothing that loads refers to it");
     const std::set<const Object*> of_shapes = referenced_emitters(document);
     while (const Object* emitter = root.take("emitter"))
         if (!of_shapes.contains(emitter)) build_emitter(builder, *emitter);
