@@ -683,6 +683,25 @@ TEST_CASE("a light of alpha 0 shines unseen; what is no light is gone") {
     for (const Emitter& e : s.emitters) CHECK(e.type == EmitterType::hidden_area);
 }
 
+TEST_CASE("alpha covers what a light emits, too") {
+    const auto load = [](const std::string& before, const std::string& alpha,
+                         const std::string& L = "\"rgb L\" [1 2 3]") {
+        return load_pbrt_world(before + "AreaLightSource \"diffuse\" " + L +
+                               " Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] " +
+                               "\"point2 uv\" [0 0 4 0 0 4] " + alpha);
+    };
+    const ParamRgb full = load("", "").emitters.at(0).radiance;
+    CHECK(load("", "\"float alpha\" .25").emitters.at(0).radiance.value == full.value * 0.25f);
+    CHECK(load("", "\"float alpha\" 3").emitters.at(0).radiance.value == full.value);
+    const Scene s = load("Texture \"m\" \"float\" \"checkerboard\" \"float tex1\" 1 \"float tex2\" .5\n",
+                         "\"texture alpha\" \"m\"");
+    const Emitter& e = s.emitters.at(0);
+    REQUIRE(e.radiance.texture >= 0);
+    const auto at = [&](float u, float v) { return eval_rgb<kAllFeatures>(s.view(), e.radiance, {u, v}); };
+    CHECK(max_component(abs(at(0.5f, 0.5f) - full.value)) < 1e-3f);
+    CHECK(max_component(abs(at(1.5f, 0.5f) - full.value * 0.5f)) < 1e-3f);
+}
+
 TEST_CASE("faces of ptex and tangents of meshes are left out") {
     const Scene s = load_pbrt_world(
         "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] \"integer faceIndices\" "
