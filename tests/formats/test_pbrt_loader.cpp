@@ -147,6 +147,32 @@ TEST_CASE("a mix and a diffuse transmission are blends whose sum is what was ask
               {0.4f, 0.1f, 0.2f});
 }
 
+TEST_CASE("diffuse transmission with images: shares of the blend leave room for the brightest texel") {
+    const TempFolder folder;
+    folder.write("t.png", png_bytes(2, 1, {255, 255, 255, 0, 0, 0}));
+    const auto load = [&](const std::string& scale, const std::string& t) {
+        return load_pbrt_world(
+            "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.png\" \"string filter\" \"point\" "
+            "\"float scale\" " +
+                scale + "\nMaterial \"diffusetransmission\" \"texture reflectance\" \"t\" \"rgb transmittance\" [" + t +
+                "]\n" + kSphere,
+            {}, &folder);
+    };
+    const Scene s = load(".75", ".25 .1 .2");
+    const Material& both = s.materials[s.shapes[0].material];
+    const float w = both.second_weight.value;
+    const ParamRgb& r = s.bsdfs[s.materials[both.first].front].as<Diffuse>().reflectance;
+    Rgb brightest{};
+    for (const float u : {0.25f, 0.75f}) brightest = max(brightest, eval_rgb<kAllFeatures>(s.view(), r, {u, 0.5f}));
+    check_rgb(brightest * (1 - w), splat(0.75f), 1e-3);
+    check_rgb(s.bsdfs[s.materials[both.second].front].as<DiffuseTransmitter>().transmittance.value * w,
+              {0.25f, 0.1f, 0.2f});
+    CHECK(has_note(load("1", ".5 .5 .5"), "add up to more than 1: both are clipped"));
+    CHECK(contains(pbrt_error("WorldBegin Material \"diffusetransmission\" \"rgb reflectance\" [.6 .5 .1] "
+                              "\"rgb transmittance\" [.2 .4 .6] Shape \"sphere\""),
+                   "of diffusetransmission add up to more than 1, which is not supported"));
+}
+
 TEST_CASE("colours: spaces, black bodies, spectra and what lights make of them") {
     const auto light = [](const std::string& parameters, const std::string& before = "") {
         const Scene s = load_pbrt_world(before + "LightSource \"point\" " + parameters);
