@@ -105,6 +105,11 @@ Scene build_scene(const std::string& path, const Document& document, const LoadO
     root.finish();
     build_default_light(builder, document);
     build_shapes(builder, *document.scene);
+    if (integrator && document.scene->version >= 2 && scene.integrator.hide_emitters &&
+        std::any_of(scene.emitters.begin(), scene.emitters.end(),
+                    [](const Emitter& e) { return e.type == EmitterType::area; }))
+        builder.note(integrator->where,
+                     "hide_emitters hides the light of lamps: their surfaces are seen, which rays pass in Mitsuba 3.9");
     if (!sensor) build_default_sensor(builder, *document.scene);
     validate_unused(builder);
     scene.content_hash = content_hash(builder);

@@ -103,6 +103,16 @@ TEST_CASE("integrators of the same equation are the path tracer") {
     CHECK(contains(error_of("<integrator type='aov'/>"), "aov has no nested integrator"));
 }
 
+TEST_CASE("hide_emitters before lamps: a note in formats whose rays pass them") {
+    const std::string hides = "<integrator type='path'><boolean name='hide_emitters' value='true'/></integrator>",
+                      lamp = "<shape type='sphere'><emitter type='area'/></shape>",
+                      note = "hide_emitters hides the light";
+    CHECK(has_note(load(hides + lamp), note));
+    CHECK(!has_note(load(hides + kLight), note));
+    CHECK(!has_note(load(lamp), note));
+    CHECK(!has_note(load(hides + lamp, {}, "0.6.0"), note));
+}
+
 TEST_CASE("several sensors: the first one") {
     const Scene s = load_quietly(
         "<sensor type='perspective'/><sensor type='thinlens'/><film type='hdrfilm' id='f'/>"
