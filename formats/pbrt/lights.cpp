@@ -132,6 +132,21 @@ void add_infinite(SceneMaker& scene, const Described& light) {
     if (!is_zero(more)) add_to_environment(scene, more);
 }
 
+/// A checkerboard as an image, whose texels may be any numbers.
+Texture cells(const Texture& checkerboard) {
+    Texture out = checkerboard;
+    out.kind = Texture::Kind::image;
+    out.filter = "nearest";
+    out.mapping = UvMap{{{0.5, 0, 0}, {0, 0.5, 0}}} * checkerboard.mapping;
+    out.color = splat(1);
+    out.image = std::make_shared<TextureImage>();
+    out.image->is_file = false;
+    out.image->width = out.image->height = 2;
+    const Rgb even = checkerboard.color, odd = checkerboard.odd;
+    out.image->texels = {odd, even, even, odd};
+    return out;
+}
+
 }  // namespace
 
 void add_light(SceneMaker& scene, const Described& light) {
@@ -174,9 +189,9 @@ const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMa
         scene.report.note(in.where, "a light with an image, or of solid alpha, shines where its alpha is 0 too");
     if (masked) {
         Texture texture = alpha;
+        if (alpha.kind == Texture::Kind::checkerboard) texture = cells(alpha);
         texture.color *= radiance;
-        texture.odd *= radiance;
-        add_child(object, scene.textures.object(texture, uv), "radiance");
+        add_child(object, scene.textures.object(texture, uv, [](Rgb c) { return c; }), "radiance");
     } else if (name.empty()) {
         set_rgb(object, "radiance", radiance);
     } else {
