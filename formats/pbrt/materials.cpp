@@ -263,7 +263,6 @@ private:
         return object;
     }
 
-    /// A blend of what reflects and what transmits, each divided by its weight.
     /// Of all places and channels.
     double largest(const Texture& texture) {
         double most = texture.kind == Texture::Kind::image ? 0 : 1;
@@ -273,6 +272,7 @@ private:
         return std::max(max_component(texture.color) * most, odd);
     }
 
+    /// A blend of what reflects and what transmits, each divided by its weight.
     Object& diffuse_transmission() {
         Texture r = reflectance("reflectance", 0.25), t = reflectance("transmittance", 0.25);
         const double scale = in_.number("scale", 1);
