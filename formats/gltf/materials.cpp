@@ -206,33 +206,51 @@ private:
         return out;
     }
 
-    const Object& with_opacity(const Object& inner) {
-        Object& mask = object("bsdf", "mask");
+    /// Alpha of a surface that is not opaque: a number, or a texture where it varies.
+    struct Opacity {
+        double number = 1;
+        const Object* texture = nullptr;
+    };
+
+    Opacity opacity() {
         const bool cut = m_.alphaMode == "MASK";
         if (colors_.alpha_varies) {
             if (cut) c_.note("alpha of vertices is not cut off");
-            add_child(mask, textures_.scaled(attribute("vertex_alpha"), splat(float(alpha_))), "opacity");
-        } else if (base_texture_.index < 0) {
-            set_number(mask, "opacity", cut ? alpha_ >= m_.alphaCutoff : std::clamp(alpha_, 0.0, 1.0));
-        } else if (!cut) {
-            add_child(mask,
-                      textures_.scaled(textures_.bitmap(base_texture_, true, "a"), splat(float(std::min(alpha_, 1.0)))),
-                      "opacity");
-        } else {
-            c_.note("alpha is cut off texel by texel");
-            add_child(mask, textures_.cut_alpha(base_texture_, alpha_, m_.alphaCutoff), "opacity");
+            return {1, &textures_.scaled(attribute("vertex_alpha"), splat(float(alpha_)))};
         }
+        if (base_texture_.index < 0) return {cut ? double(alpha_ >= m_.alphaCutoff) : std::clamp(alpha_, 0.0, 1.0)};
+        if (!cut)
+            return {1,
+                    &textures_.scaled(textures_.bitmap(base_texture_, true, "a"), splat(float(std::min(alpha_, 1.0))))};
+        c_.note("alpha is cut off texel by texel");
+        return {1, &textures_.cut_alpha(base_texture_, alpha_, m_.alphaCutoff)};
+    }
+
+    const Object& with_opacity(const Object& inner) {
+        Object& mask = object("bsdf", "mask");
+        opacity_ = opacity();
+        if (opacity_.texture)
+            add_child(mask, *opacity_.texture, "opacity");
+        else
+            set_number(mask, "opacity", opacity_.number);
         add_child(mask, inner);
         return mask;
     }
 
+    /// Alpha covers what a surface emits, too; a mask leaves that alone.
     const Object* emitter() {
-        const Rgb factor = color_of(m_.emissiveFactor, splat(0));
         const double strength =
             number(extension(m_.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1);
-        if (!(max_component(factor) * strength > 0)) return nullptr;
+        const Rgb radiance = color_of(m_.emissiveFactor, splat(0)) * float(strength * opacity_.number);
+        if (!(max_component(radiance) > 0)) return nullptr;
         Object& out = object("emitter", "area");
-        set_color_or_texture(out, "radiance", factor * float(strength), textures_.with_image(used(m_.emissiveTexture)));
+        const Used texture = textures_.with_image(used(m_.emissiveTexture));
+        if (opacity_.texture && texture.index < 0 && !colors_.alpha_varies) {
+            add_child(out, textures_.scaled(*opacity_.texture, radiance), "radiance");
+        } else {
+            if (opacity_.texture) c_.note("surfaces whose light or alpha varies shine where their alpha is 0 too");
+            set_color_or_texture(out, "radiance", radiance, texture);
+        }
         c_.emits = true;
         return &out;
     }
@@ -246,6 +264,7 @@ private:
     double alpha_ = 1;
     Used base_texture_, rough_texture_, normal_texture_;
     bool transmits_ = false;
+    Opacity opacity_;
 };
 
 }  // namespace

@@ -112,7 +112,10 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
     Reader in(builder, object ? *object : default_film);
     const std::string& type = in.object().type;
     const bool known = is_one_of(film_plugins(), type);
-    if (!known) builder.refuse(in.where(), "film type '" + type + "' is not supported", "hdrfilm is used");
+    // One of another program: how it keeps what it sees does not matter here, its size does.
+    const bool foreign = !known && type != "specfilm";
+    if (foreign) builder.note(in.where(), "film type '" + type + "' is not known; it is read as hdrfilm");
+    if (type == "specfilm") builder.refuse(in.where(), "film type 'specfilm' is not supported", "hdrfilm is used");
     if (known && type != "hdrfilm")
         builder.note(in.where(), "a film of type '" + type + "' gets linear values, as hdrfilm does");
     sensor.film_width = size_parameter(in, "width", 768, 1);
@@ -151,7 +154,7 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
                "reinhard_key",
                "mode",
                "filename"});
-    if (known || !builder.options.lenient) in.finish();
+    if (known) in.finish();
 
     const uint32_t w = builder.options.width ? builder.options.width : sensor.film_width;
     const uint32_t h = builder.options.height ? builder.options.height : sensor.film_height;
@@ -279,7 +282,7 @@ void build_sensor(Builder& builder, const Object& object) {
     }
     // Nothing moves, so that the shutter has no effect.
     in.ignore({"shutter_open", "shutter_close"});
-    if (known || !builder.options.lenient) in.finish();
+    if (known) in.finish();
 }
 
 const Plugins& sensor_plugins() {

@@ -85,6 +85,12 @@ std::string ValueParser::substitute(const std::string& text, const Where& at) {
         while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) || text[end] == '_')) ++end;
         size_t stop = end;
         while (stop > i + 1 && !parameters_.count(text.substr(i + 1, stop - i - 1))) --stop;
+        // Labels of films name what is known after rendering ($scene['renderTime']): no parameters, as in Mitsuba 0.6.
+        if (stop == i + 1 && end > stop && end < text.size() && text[end] == '[') {
+            out += text.substr(i, end - i);
+            i = end;
+            continue;
+        }
         if (stop == i + 1) fail(at, "parameter '" + text.substr(i, end - i) + "' has no value and no <default>");
         const std::string name = text.substr(i + 1, stop - i - 1);
         used_.insert(name);

@@ -132,6 +132,21 @@ void add_infinite(SceneMaker& scene, const Described& light) {
     if (!is_zero(more)) add_to_environment(scene, more);
 }
 
+/// A checkerboard as an image, whose texels may be any numbers.
+Texture cells(const Texture& checkerboard) {
+    Texture out = checkerboard;
+    out.kind = Texture::Kind::image;
+    out.filter = "nearest";
+    out.mapping = UvMap{{{0.5, 0, 0}, {0, 0.5, 0}}} * checkerboard.mapping;
+    out.color = splat(1);
+    out.image = std::make_shared<TextureImage>();
+    out.image->is_file = false;
+    out.image->width = out.image->height = 2;
+    const Rgb even = checkerboard.color, odd = checkerboard.odd;
+    out.image->texels = {odd, even, even, odd};
+    return out;
+}
+
 }  // namespace
 
 void add_light(SceneMaker& scene, const Described& light) {
@@ -153,7 +168,8 @@ void add_light(SceneMaker& scene, const Described& light) {
     light.in.finish(scene.report);
 }
 
-const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area, bool hidden) {
+const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area, bool hidden,
+                           const Texture& alpha) {
     const Parameters& in = light.in;
     if (in.type != "diffuse") fail(in.where, "area light '" + in.type + "' is not known: diffuse is");
     if (in.boolean("twosided", false)) area *= 2;
@@ -166,15 +182,25 @@ const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMa
                             "the power of a light of unequal triangles, of a mesh file or of an image is not supported",
                             "it is left out");
     const double factor = area > 0 && name.empty() ? power_factor(light, "power", M_PI * area) : 1;
-    if (name.empty()) {
-        set_rgb(object, "radiance", e.scaled(factor));
+    const bool masked = !alpha.is_constant() && name.empty() && alpha.kind != Texture::Kind::solid;
+    const Rgb radiance =
+        e.scaled(factor) * (alpha.is_constant() ? min(max(alpha.color, splat(0)), splat(1)) : splat(1));
+    if (!alpha.is_constant() && !masked)
+        scene.report.note(in.where, "a light with an image, or of solid alpha, shines where its alpha is 0 too");
+    if (masked) {
+        Texture texture = alpha;
+        if (alpha.kind == Texture::Kind::checkerboard) texture = cells(alpha);
+        texture.color *= radiance;
+        add_child(object, scene.textures.object(texture, uv, [](Rgb c) { return c; }), "radiance");
+    } else if (name.empty()) {
+        set_rgb(object, "radiance", radiance);
     } else {
         if (in.find("L")) fail(in.where_of("L"), "both 'L' and 'filename' are given");
         Texture texture;
         texture.kind = Texture::Kind::image;
         texture.where = in.where;
         texture.wrap = "clamp";
-        texture.color = e.scaled();
+        texture.color = radiance;
         texture.image = std::make_shared<TextureImage>();
         texture.image->path = resolve(scene.folder, name, in.where_of("filename"));
         add_child(object, scene.textures.object(texture, uv), "radiance");

@@ -263,17 +263,36 @@ private:
         return object;
     }
 
+    /// Of all places and channels.
+    double largest(const Texture& texture) {
+        double most = texture.kind == Texture::Kind::image ? 0 : 1;
+        if (texture.kind == Texture::Kind::image)
+            for (const Rgb& c : textures().texels_of(texture).texels) most = std::max(most, double(max_component(c)));
+        const double odd = texture.kind == Texture::Kind::checkerboard ? max_component(texture.odd) : 0;
+        return std::max(max_component(texture.color) * most, odd);
+    }
+
     /// A blend of what reflects and what transmits, each divided by its weight.
     Object& diffuse_transmission() {
         Texture r = reflectance("reflectance", 0.25), t = reflectance("transmittance", 0.25);
         const double scale = in_.number("scale", 1);
-        const bool plain = r.is_constant() && t.is_constant();
-        const double of_r = max_component(r.color) * scale, of_t = max_component(t.color) * scale;
-        const double weight = plain && of_r + of_t > 0 ? of_t / (of_r + of_t) : 0.5;
+        const double of_r = largest(r) * scale, of_t = largest(t) * scale;
+        const double weight = of_r + of_t > 0 ? of_t / (of_r + of_t) : 0.5;
+        // Each lobe of the blend takes its share of the light, and no surface may reflect more than what arrives.
+        if (of_r + of_t > 1 + 1e-6) {
+            const std::string problem =
+                "the largest values of reflectance and transmittance of diffusetransmission "
+                "add up to more than 1";
+            if (r.is_constant() && t.is_constant())
+                scene_.report.refuse(in_.where, problem + ", which is not supported", "both are clipped");
+            else
+                scene_.report.note(in_.where, problem + ": both are clipped");
+        }
         const auto part = [&](const char* type, const char* name, Texture& texture, double share) -> Object& {
             Object& object = bsdf(type);
             texture.color *= float(share > 0 ? scale / share : 0);
             if (texture.kind == Texture::Kind::checkerboard) texture.odd *= float(share > 0 ? scale / share : 0);
+            if (texture.is_constant()) texture.color = min(texture.color, splat(1));
             textures().set_color(object, name, texture, uv_);
             return object;
         };

@@ -99,7 +99,8 @@ void finish_curves(SceneMaker& scene);
 void add_light(SceneMaker& scene, const Described& light);
 /// The emitter of a shape. `area`: of the shape as pbrt measures it for the parameter power; 0: not known. `hidden`: no
 /// ray meets it.
-const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area, bool hidden);
+const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMap& uv, double area, bool hidden,
+                           const Texture& alpha);
 
 /// BSDF of a material, two-sided unless it transmits light; null material: diffuse.
 const Object* surface_material(SceneMaker& scene, const Shared& material, Surface surface);

@@ -382,7 +382,8 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
     if (scene.state.area_light && scene.open_object)
         scene.report.note(in.where, "shapes of an object do not shine, as in pbrt");
     else if (scene.state.area_light)
-        add_child(shape, area_emitter(scene, *scene.state.area_light, uv, placed.area, hidden));
+        add_child(shape, area_emitter(scene, *scene.state.area_light, uv, placed.area, hidden,
+                                      hidden ? Texture{} : scene.textures.number(in, "alpha", 1)));
     in.finish(scene.report);
     add_child(scene.open_object ? *scene.open_object : *scene.document.scene, shape);
     if (scene.state.area_light && !scene.open_object && scene.state.area_light->in.boolean("twosided", false))

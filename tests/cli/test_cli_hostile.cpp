@@ -34,9 +34,12 @@ bool wait_for(const std::function<bool()>& is) {
     return false;
 }
 
-/// The process catches the signal (proc(5), SigCgt).
+/// The process is the program, no longer a copy of this test, and catches the signal (proc(5), SigCgt).
 bool catches(pid_t process, int signal) {
-    std::ifstream status("/proc/" + std::to_string(process) + "/status");
+    const std::string proc = "/proc/" + std::to_string(process);
+    std::error_code not_yet;
+    if (!fs::equivalent(proc + "/exe", AMBILUX_PROGRAM, not_yet)) return false;
+    std::ifstream status(proc + "/status");
     for (std::string line; std::getline(status, line);)
         if (line.rfind("SigCgt:", 0) == 0) return std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1;
     return false;

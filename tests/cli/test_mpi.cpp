@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "core/ranks.h"
+#include "experiments/disturbed.h"
 #include "film/exr_io.h"
 #include "tests/support/program.h"
 #include "tests/support/result_rows.h"
@@ -295,13 +296,17 @@ TEST_CASE("ranks make disturbed renders again, unless they share cores") {
         return rows;
     };
     CHECK(bool(threadless(sorted_rows(out)) == threadless(expected)));
-    manifest = json::parse(read_file(out + "/manifest.json"));
-    CHECK(manifest["disturbed"].empty());
+    size_t long_enough = 0;  // to be disturbed by what else runs on this machine now
     for (const std::string& name : disturbed) {
         const json stats = json::parse(read_file(out + name));
+        const double seconds = stats["seconds"]["render"];
+        CHECK(seconds < 100);
+        long_enough += seconds >= kShortestJudged;
         CHECK(stats["attempts"].size() == 1);
         CHECK(test::contains(done.err, "is made again: other processes held 100 %"));
     }
+    manifest = json::parse(read_file(out + "/manifest.json"));
+    CHECK(manifest["disturbed"].size() <= long_enough);
     CHECK(read_results(out + "/batches.csv", kBatchHeader).size() == 2 * 2 * 3 * 12);
 }
 

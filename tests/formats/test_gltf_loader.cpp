@@ -104,6 +104,19 @@ TEST_CASE("alpha, emission, glass and panes") {
     const Scene lit = load(j);
     REQUIRE(lit.emitters.size() == 1);
     check_rgb(lit.emitters[0].radiance.value, {4, 2, 1});
+    // Alpha covers light as well: 0.25 of it is left, nothing of what is cut.
+    m["alphaMode"] = "BLEND";
+    check_rgb(load(j).emitters.at(0).radiance.value, {1, 0.5f, 0.25f});
+    m["alphaMode"] = "MASK";
+    CHECK(load(j).emitters.at(0).type != EmitterType::area);
+    m["alphaMode"] = "BLEND";
+    Json of_image = j;
+    add_image(of_image, png_bytes(2, 1, {255, 128, 64, 0, 255, 0}));
+    of_image["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
+    const Scene textured = load(of_image);
+    check_rgb(eval_rgb<kAllFeatures>(textured.view(), textured.emitters.at(0).radiance, {0.25f, 0.5f}),
+              {1, 0.5f, 0.25f}, 1e-3);
+    m["alphaMode"] = "OPAQUE";
     m.erase("emissiveFactor");
     m["extensions"] = {{"KHR_materials_transmission", {{"transmissionFactor", 1.0}}}};
     m["pbrMetallicRoughness"] = {

@@ -39,6 +39,28 @@ TEST_CASE("films: all kinds get linear values, with a note") {
         CHECK(has_note(s, "a film of type '" + std::string(type) + "' gets linear values"));
     }
     CHECK(contains(error_of(film("<film type='specfilm'/>")), "film type 'specfilm' is not supported"));
+    // One of another program.
+    const Scene s =
+        load_quietly(film("<film type='time_film'><integer name='width' value='64'/>"
+                          "<integer name='bins' value='9'/><rfilter type='box'/></film>"));
+    CHECK(s.sensor.film_width == 64);
+    CHECK(s.sensor.filter == FilterType::box);
+    CHECK(has_note(s, "film type 'time_film' is not known; it is read as hdrfilm"));
+}
+
+TEST_CASE("labels of films of 0.6 name what is known after rendering, which is no parameter") {
+    const std::string label =
+        "<film type='hdrfilm'><string name=\"metadata['time']\" value=\"$scene['time']\"/>"
+        "<integer name='width' value='64'/></film>";
+    CHECK(has_note(load_quietly(film(label), "0.6.0"), "parameter 'metadata['time']' of film 'hdrfilm' is not known"));
+    CHECK(contains(error_of(film("<film type='hdrfilm'><integer name='width' value='$scene'/></film>")),
+                   "parameter '$scene' has no value"));
+}
+
+TEST_CASE("a medium that nothing refers to is left out, with a note") {
+    CHECK(
+        has_note(load_quietly("<medium type='homogeneous' id='m'><float name='scale' value='0.1'/></medium>" + kLight),
+                 "media are not supported; this one is left out"));
 }
 
 TEST_CASE("filters with negative lobes become a gaussian, samplers independent, with a note") {
@@ -79,6 +101,16 @@ TEST_CASE("integrators of the same equation are the path tracer") {
         "value='true'/></integrator>",
         "0.5.0");
     CHECK(contains(error_of("<integrator type='aov'/>"), "aov has no nested integrator"));
+}
+
+TEST_CASE("hide_emitters before lamps: a note in formats whose rays pass them") {
+    const std::string hides = "<integrator type='path'><boolean name='hide_emitters' value='true'/></integrator>",
+                      lamp = "<shape type='sphere'><emitter type='area'/></shape>",
+                      note = "hide_emitters hides the light";
+    CHECK(has_note(load(hides + lamp), note));
+    CHECK(!has_note(load(hides + kLight), note));
+    CHECK(!has_note(load(lamp), note));
+    CHECK(!has_note(load(hides + lamp, {}, "0.6.0"), note));
 }
 
 TEST_CASE("several sensors: the first one") {

@@ -147,6 +147,32 @@ TEST_CASE("a mix and a diffuse transmission are blends whose sum is what was ask
               {0.4f, 0.1f, 0.2f});
 }
 
+TEST_CASE("diffuse transmission with images: shares of the blend leave room for the brightest texel") {
+    const TempFolder folder;
+    folder.write("t.png", png_bytes(2, 1, {255, 255, 255, 0, 0, 0}));
+    const auto load = [&](const std::string& scale, const std::string& t) {
+        return load_pbrt_world(
+            "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"t.png\" \"string filter\" \"point\" "
+            "\"float scale\" " +
+                scale + "\nMaterial \"diffusetransmission\" \"texture reflectance\" \"t\" \"rgb transmittance\" [" + t +
+                "]\n" + kSphere,
+            {}, &folder);
+    };
+    const Scene s = load(".75", ".25 .1 .2");
+    const Material& both = s.materials[s.shapes[0].material];
+    const float w = both.second_weight.value;
+    const ParamRgb& r = s.bsdfs[s.materials[both.first].front].as<Diffuse>().reflectance;
+    Rgb brightest{};
+    for (const float u : {0.25f, 0.75f}) brightest = max(brightest, eval_rgb<kAllFeatures>(s.view(), r, {u, 0.5f}));
+    check_rgb(brightest * (1 - w), splat(0.75f), 1e-3);
+    check_rgb(s.bsdfs[s.materials[both.second].front].as<DiffuseTransmitter>().transmittance.value * w,
+              {0.25f, 0.1f, 0.2f});
+    CHECK(has_note(load("1", ".5 .5 .5"), "add up to more than 1: both are clipped"));
+    CHECK(contains(pbrt_error("WorldBegin Material \"diffusetransmission\" \"rgb reflectance\" [.6 .5 .1] "
+                              "\"rgb transmittance\" [.2 .4 .6] Shape \"sphere\""),
+                   "of diffusetransmission add up to more than 1, which is not supported"));
+}
+
 TEST_CASE("colours: spaces, black bodies, spectra and what lights make of them") {
     const auto light = [](const std::string& parameters, const std::string& before = "") {
         const Scene s = load_pbrt_world(before + "LightSource \"point\" " + parameters);
@@ -681,6 +707,25 @@ TEST_CASE("a light of alpha 0 shines unseen; what is no light is gone") {
         "\"zero\"");
     REQUIRE(s.emitters.size() == 2);
     for (const Emitter& e : s.emitters) CHECK(e.type == EmitterType::hidden_area);
+}
+
+TEST_CASE("alpha covers what a light emits, too") {
+    const auto load = [](const std::string& before, const std::string& alpha,
+                         const std::string& L = "\"rgb L\" [1 2 3]") {
+        return load_pbrt_world(before + "AreaLightSource \"diffuse\" " + L +
+                               " Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 2] " +
+                               "\"point2 uv\" [0 0 4 0 0 4] " + alpha);
+    };
+    const ParamRgb full = load("", "").emitters.at(0).radiance;
+    CHECK(load("", "\"float alpha\" .25").emitters.at(0).radiance.value == full.value * 0.25f);
+    CHECK(load("", "\"float alpha\" 3").emitters.at(0).radiance.value == full.value);
+    const Scene s = load("Texture \"m\" \"float\" \"checkerboard\" \"float tex1\" 1 \"float tex2\" .5\n",
+                         "\"texture alpha\" \"m\"");
+    const Emitter& e = s.emitters.at(0);
+    REQUIRE(e.radiance.texture >= 0);
+    const auto at = [&](float u, float v) { return eval_rgb<kAllFeatures>(s.view(), e.radiance, {u, v}); };
+    CHECK(max_component(abs(at(0.5f, 0.5f) - full.value)) < 1e-3f);
+    CHECK(max_component(abs(at(1.5f, 0.5f) - full.value * 0.5f)) < 1e-3f);
 }
 
 TEST_CASE("faces of ptex and tangents of meshes are left out") {

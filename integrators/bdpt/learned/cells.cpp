@@ -172,6 +172,8 @@ DrawCells find_draw_cells(const SceneView& scene, const HostTracer& tracer, cons
     template DrawCells find_draw_cells<F>(const SceneView&, const HostTracer&, const Rules<Mis>&, uint64_t, uint32_t, \
                                           uint32_t);
 AMBILUX_LEVEL(kDiffuseFeatures)
+AMBILUX_LEVEL(kUntexturedFeatures)
+AMBILUX_LEVEL(kTriangleFeatures)
 AMBILUX_LEVEL(kFlatFeatures)
 AMBILUX_LEVEL(kAllFeatures)
 #undef AMBILUX_LEVEL
