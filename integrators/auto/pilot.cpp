@@ -388,7 +388,9 @@ Pilot run_pilot(const Scene& scene, const RenderSettings& settings, bool cuda, b
                 const std::vector<PilotCandidate>& candidates, uint32_t samples) {
     const HostTracer tracer =
         cwbvh ? HostTracer(accels.get<CwbvhAccel>()->tracer()) : HostTracer(accels.get<EmbreeAccel>()->tracer());
-    const auto run = [&]<Features F>() { return PilotRun<F>(scene, settings, cuda, tracer, candidates, samples).run(); };
+    const auto run = [&]<Features F>() {
+        return PilotRun<F>(scene, settings, cuda, tracer, candidates, samples).run();
+    };
     // Three levels: the others' gain over them is not worth their compilation for what runs once.
     if (settings.specialise && kDiffuseFeatures.covers(scene.features)) return run.operator()<kDiffuseFeatures>();
     if (settings.specialise && kCommonFeatures.covers(scene.features)) return run.operator()<kCommonFeatures>();
