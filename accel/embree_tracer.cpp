@@ -141,12 +141,22 @@ void intersect_quadric(const RTCIntersectFunctionNArguments* args) {
     }
 }
 
+/// True if the ray ends on the disk's plane, as far as a crossing of it is known: where the disk is seen nearly
+/// edge-on, that is more along the ray than shadow rays are short of their ends.
+bool ends_on_disk(const Quadric& q, const Ray& ray) {
+    if (q.type != PrimitiveType::disk) return false;
+    const Vec3f row = {q.to_local.m[2][0], q.to_local.m[2][1], q.to_local.m[2][2]}, way = ray.d * ray.tmax,
+                o = ray.o - detail::quadric_origin(q);
+    return fabsf(dot(row, o + way)) <= gamma_bound(8) * dot(abs(row), abs(o) + abs(way));
+}
+
 void occlude_quadric(const RTCOccludedFunctionNArguments* args) {
     const auto& view = *static_cast<const SceneView*>(args->geometryUserPtr);
     const auto& context = ray_context(args->context);
     for (unsigned i = 0; i < args->N; ++i) {
         if (args->valid[i] != -1) continue;
         const Ray& ray = ray_of(context, args->ray, args->N, i);
+        if (ends_on_disk(view.quadrics[args->primID], ray)) continue;
         float t, u, v;
         if (first_crossing(context, view, ray, args->primID, ray.tmax, t, u, v))
             RTCRayN_tfar(args->ray, args->N, i) = -kInfinity;
