@@ -4,6 +4,7 @@
 #include <cstring>
 #include <string>
 
+#include "accel/ends_on_disk.h"
 #include "accel/quadric_intersect.h"
 #include "core/error.h"
 #include "scene/primitive_bounds.h"
@@ -139,15 +140,6 @@ void intersect_quadric(const RTCIntersectFunctionNArguments* args) {
         RTCHitN_geomID(hits, n, i) = args->geomID;
         RTCHitN_instID(hits, n, i, 0) = RTC_INVALID_GEOMETRY_ID;
     }
-}
-
-/// True if the ray ends on the disk's plane, as far as a crossing of it is known: where the disk is seen nearly
-/// edge-on, that is more along the ray than shadow rays are short of their ends.
-bool ends_on_disk(const Quadric& q, const Ray& ray) {
-    if (q.type != PrimitiveType::disk) return false;
-    const Vec3f row = {q.to_local.m[2][0], q.to_local.m[2][1], q.to_local.m[2][2]}, way = ray.d * ray.tmax,
-                o = ray.o - detail::quadric_origin(q);
-    return fabsf(dot(row, o + way)) <= gamma_bound(8) * dot(abs(row), abs(o) + abs(way));
 }
 
 void occlude_quadric(const RTCOccludedFunctionNArguments* args) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "render/twin/in_double/accel/ends_on_disk.h"
 #include "render/twin/in_double/accel/opacity.h"
 #include "render/twin/in_double/scene/primitive_bounds.h"
 
@@ -153,6 +154,7 @@ bool Tracer::trace(const Ray& ray, bool any, Hit& hit) const {
         for (uint32_t i = node.first; i < node.first + node.count; ++i) {
             const uint32_t prim = prims_[i];
             Crossings crossings;
+            if (any && !scene_.is_triangle(prim) && ends_on_disk(scene_.quadric(prim), ray)) continue;
             if (scene_.is_triangle(prim))
                 cross_triangle(scene_, ray, prim, crossings);
             else

@@ -177,6 +177,24 @@ TEST_CASE("Disks are ellipses of any affine map, in both precisions", "[twin]") 
         }
 }
 
+TEST_CASE("A wall lit by a disk that it sees nearly edge-on has the same light in both precisions", "[twin]") {
+    const Scene scene = scene_from_text(scene_xml(
+        2,
+        "<sensor type='orthographic'><transform name='to_world'><scale x='1' y='0.5'/><lookat origin='0,-3.5,0' "
+        "target='8,-3.5,0' up='0,0,1'/></transform>" +
+            square_film(16) +
+            "</sensor><shape type='rectangle'><transform name='to_world'><scale value='16'/><rotate "
+            "y='1' angle='-90'/><translate x='8'/></transform>" +
+            diffuse(kAlbedo) +
+            "</shape><shape type='disk'><transform name='to_world'><scale x='0.6' y='0.8' z='-0.74'/><rotate x='-0.95' "
+            "y='0.24' z='-0.22' angle='87.67'/><translate x='-2.5' y='0.8' z='1.7'/></transform>" +
+            area_light(kLight) + "</shape>"));
+    const RenderSettings s = twin_settings(scene, "path", 5);
+    const FilmMoments twin = render_scene(scene, s, 64).film, floats = render_scene(scene, single(s), 64).film;
+    CHECK(relative_difference(twin, floats) < 1e-3);
+    CHECK(relative_difference(twin, floats) > 1e-9);
+}
+
 TEST_CASE("At other seeds images have the expectation of the renderers", "[twin]") {
     for (const char* name : {"cornell", "furnace", "lights", "materials", "textured"}) {
         INFO(name);
