@@ -296,9 +296,12 @@ TEST_CASE("the same scene in Mitsuba's XML has the same image") {
     const Scene b = load_mitsuba(
         folder.write("scene.xml",
                      R"(<scene version='3.0.0'><sensor type='perspective'><float name='fov' value='51.56620156177409'/>
-<string name='fov_axis' value='y'/><float name='near_clip' value='0.01'/><transform name='to_world'><lookat origin='0,0,3' target='0,0,0' up='0,1,0'/></transform>
-<film type='hdrfilm'/></sensor><emitter type='point'><point name='position' x='1' y='1' z='2'/><rgb name='intensity' value='20'/></emitter>
-<shape type='rectangle'><bsdf type='twosided'><bsdf type='principled'><rgb name='base_color' value='.5 .6 .7'/><float name='roughness' value='.5'/>
+<string name='fov_axis' value='y'/><float name='near_clip' value='0.01'/><transform name='to_world'>
+<lookat origin='0,0,3' target='0,0,0' up='0,1,0'/></transform>
+<film type='hdrfilm'/></sensor><emitter type='point'><point name='position' x='1' y='1' z='2'/>
+<rgb name='intensity' value='20'/></emitter>
+<shape type='rectangle'><bsdf type='twosided'><bsdf type='principled'><rgb name='base_color' value='.5 .6 .7'/>
+<float name='roughness' value='.5'/>
 <float name='metallic' value='.25'/><float name='eta' value='1.5'/></bsdf></bsdf></shape></scene>)"),
         size);
     const auto film = [](const Scene& s) { return render_scene(s, cpu_settings(s, Estimator::mis), 16).film; };

@@ -1,3 +1,4 @@
+// How far two films are apart.
 #pragma once
 
 #include <cmath>

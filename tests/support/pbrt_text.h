@@ -10,6 +10,10 @@
 
 namespace ambilux::test {
 
+inline const std::string kUnitTriangle =
+    "Shape \"trianglemesh\" \"point3 P\" [0 0 0  1 0 0  0 1 0] \"integer indices\" [0 1 2]\n";
+inline const std::string kUnitSphere = "Shape \"sphere\"\n";
+
 inline Scene load_pbrt_text(const std::string& text, const LoadOptions& options = {},
                             const TempFolder* folder = nullptr) {
     const TempFolder own;
@@ -31,6 +35,10 @@ inline std::string pbrt_error(const std::string& text, const LoadOptions& option
         return e.what();
     }
     return "no error";
+}
+
+inline std::string world_error(const std::string& world, const LoadOptions& options = {}) {
+    return pbrt_error("WorldBegin\n" + world + "\n", options);
 }
 
 }  // namespace ambilux::test
