@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "accel/cwbvh_node.h"
+#include "accel/ends_on_disk.h"
 #include "accel/opacity.h"
 #include "accel/quadric_intersect.h"
 #include "accel/traceable.h"
@@ -43,15 +44,18 @@ struct CwbvhTracer {
         return traverse<F>(scene, ray, any_hit, hit);
     }
 
-    /// Tests one entry of `primitives`; updates `hit` and returns true if the ray meets it at 0 < t < hit.t.
-    template <Features F>
+    /// Tests one entry of `primitives`; updates `hit` and returns true if the ray meets it at 0 < t < hit.t. `any_hit`:
+    /// a bool, or a constant; hit.t is where the ray ends then.
+    template <Features F, class AnyHit>
     AMBILUX_HD bool intersect_primitive(const SceneView& scene, const Ray& ray, const RayShear& shear, uint32_t index,
-                                        Hit& hit, uint32_t id_offset = 0) const {
+                                        AnyHit any_hit, Hit& hit, uint32_t id_offset = 0) const {
         const CwbvhPrimitive p = detail::load_record(primitives + index);
         if constexpr (F.has_quadrics()) {
             if (!scene.is_triangle(p.template prim<F>())) {
-                const QuadricCrossings hits =
-                    quadric_crossings<F>(scene.quadric(p.template prim<F>()), ray.o, ray.d, hit.t);
+                const Quadric& quadric = scene.quadric(p.template prim<F>());
+                if (F.has(PrimitiveType::disk) && any_hit && ends_on_disk(quadric, {ray.o, hit.t, ray.d, 0}))
+                    return false;
+                const QuadricCrossings hits = quadric_crossings<F>(quadric, ray.o, ray.d, hit.t);
                 for (int i = 0; i < hits.count; ++i) {
                     if (!accepts<F>(scene, ray, p, hits.u[i], hits.v[i])) continue;
                     hit = {hits.t[i], hits.u[i], hits.v[i], p.template prim<F>()};
@@ -97,7 +101,7 @@ private:
             const uint32_t hits = child_hits(node, box_ray, hit.t);
             group = inner_hits(node, hits, box_ray.order);
             for (CwbvhLeaves leaves = leaf_hits(node, hits); leaves.hits;) {
-                const bool met = intersect_primitive<F>(scene, ray, shear, take_primitive(leaves), hit);
+                const bool met = intersect_primitive<F>(scene, ray, shear, take_primitive(leaves), any_hit, hit);
                 if (any_hit && met) return true;
             }
             if (!(group.hits & kCwbvhInnerBits)) {
@@ -140,7 +144,8 @@ private:
             const uint32_t hits = child_hits(node, box_ray, hit.t);
             group = inner_hits(node, hits, box_ray.order);
             for (CwbvhLeaves leaves = leaf_hits(node, hits); leaves.hits;) {
-                const bool met = intersect_primitive<F>(scene, here, shear, take_primitive(leaves), hit, id_offset);
+                const bool met =
+                    intersect_primitive<F>(scene, here, shear, take_primitive(leaves), any_hit, hit, id_offset);
                 if (any_hit && met) return true;
             }
             if (!(group.hits & kCwbvhInnerBits)) {

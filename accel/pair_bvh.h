@@ -71,10 +71,10 @@ struct PairTracer {
     AMBILUX_HD bool trace(const SceneView& scene, const Ray& ray, bool any_hit, Hit& hit) const {
         return traverse<F>(scene, ray, any_hit, hit);
     }
-    template <Features F>
+    template <Features F, class AnyHit>
     AMBILUX_HD bool intersect_primitive(const SceneView& scene, const Ray& ray, const RayShear& shear, uint32_t index,
-                                        Hit& hit) const {
-        return CwbvhTracer{nullptr, primitives}.intersect_primitive<F>(scene, ray, shear, index, hit);
+                                        AnyHit any_hit, Hit& hit) const {
+        return CwbvhTracer{nullptr, primitives}.intersect_primitive<F>(scene, ray, shear, index, any_hit, hit);
     }
 
 private:
@@ -92,7 +92,7 @@ private:
             if (at & kPairLeaf) {
                 const uint32_t begin = (at & ~kPairLeaf) >> 3, end = begin + (at & 7u);
                 for (uint32_t i = begin; i < end; ++i) {
-                    const bool met = intersect_primitive<F>(scene, ray, shear, i, hit);
+                    const bool met = intersect_primitive<F>(scene, ray, shear, i, any_hit, hit);
                     if (any_hit && met) return true;
                 }
                 at = kNone;

@@ -193,9 +193,10 @@ __device__ __forceinline__ void walk_together(const SceneView& scene, const Trac
                 Hit hit = {t, 0.0f, 0.0f, kNone};
                 bool met;
                 if constexpr (kTwoLevels<F, Tracer>)
-                    met = tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit, walk.id_offset);
+                    met = tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), any_hit, hit,
+                                                                 walk.id_offset);
                 else
-                    met = tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), hit);
+                    met = tracer.template intersect_primitive<F>(scene, ray, shear, walk.take(), any_hit, hit);
                 if (met) {
                     t = hit.t;
                     prim = hit.prim;

@@ -9,7 +9,7 @@
 #include "accel/pair_bvh.h"
 #include "tests/support/accel_scenes.h"
 #include "tests/support/catch.h"
-#include "transport/subpath/subpath.h"
+#include "tests/support/disk_rays.h"
 
 using namespace ambilux;
 using namespace ambilux::accel_test;
@@ -87,37 +87,21 @@ TEST_CASE("Spheres, disks and cylinders are met where their closed forms say, ne
         }
 }
 
-TEST_CASE(
-    "A disk blocks no shadow ray that ends on it, and every one that ends behind it, however nearly edge-on it is "
-    "seen") {
-    int rays = 0, behind = 0;
-    for (uint32_t seed = 51; seed < 61; ++seed) {
-        Random random(seed);
-        Scene scene;
-        add_quadric(scene, PrimitiveType::disk, random.in_box(3.0f), frame_from_normal(random.direction()), 0.7f);
-        const SceneView view = scene.view();
-        const EmbreeAccel accel(scene);
-        for (int i = 0; i < 20000; ++i) {
-            const Vec4f u = random.next();
-            const float r = std::sqrt(u.x) * 0.99f, phi = 2 * kPi * u.y, cosine = std::pow(10.0f, -3 * u.z);
-            const SurfacePoint on = surface_at<kShapes>(view, 0, r * std::cos(phi), r * std::sin(phi));
-            const Vec3f across = normalize(cross(on.ng, random.direction()));
-            const Vec3f origin = on.p + 10.0f * (on.ng * cosine + across * std::sqrt(1 - cosine * cosine));
-            const auto towards = [&](Vec3f end) {
-                const Vec3f way = end - origin;
-                return Ray{origin, length(way) * (1 - gamma_bound(8)), normalize(way), 0};
-            };
-            ++rays;
-            CHECK_FALSE(accel.tracer().occluded<kShapes>(
-                view, towards(offset_ray_origin(on.p, on.p_error, on.ng, origin - on.p))));
-            // Behind it, but not so far that the way goes past its rim.
-            if (r + 1e-4f / cosine > 0.9f) continue;
-            ++behind;
-            CHECK(accel.tracer().occluded<kShapes>(view, towards(on.p - on.ng * 5e-5f)));
+TEMPLATE_TEST_CASE(
+    "A disk blocks no shadow ray that ends on it, and every one that goes through it, however nearly edge-on it is "
+    "seen",
+    "", EmbreeAccel, CwbvhAccel, PairAccel) {
+    int behind = 0;
+    for (uint64_t seed = 51; seed < 61; ++seed) {
+        const DiskRays disk = rays_that_end_on_a_disk(20000, seed);
+        const SceneView view = disk.scene.view();
+        const TestType accel(disk.scene);
+        for (size_t i = 0; i < disk.rays.size(); ++i) {
+            REQUIRE(accel.tracer().template occluded<kShapes>(view, disk.rays[i]) == disk.behind[i]);
+            behind += disk.behind[i];
         }
     }
-    CHECK(rays == 200000);
-    CHECK(behind > 100000);
+    CHECK(behind > 200000);
 }
 
 TEMPLATE_TEST_CASE("Opacity: the share of rays that pass, alike for closest and any hit and for all tracers (B34)", "",

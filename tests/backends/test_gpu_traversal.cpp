@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "tests/support/accel_scenes.h"
 #include "tests/support/catch.h"
+#include "tests/support/disk_rays.h"
 #include "tests/support/render_scene.h"
 
 using namespace ambilux;
@@ -225,6 +226,19 @@ TEST_CASE("Device and host agree on analytic shapes alone and among triangles (G
     Scene mixed = triangle_soup(500, 0.3f, 1.0f, 9);
     add_random_quadrics(mixed, 60, 1.0f, 6);
     check(compare_all(mixed, test_rays(mixed, kMany, 1.0f, 35), kCounts), false);
+}
+
+TEST_CASE("On a device a disk blocks no shadow ray that ends on it, and every one that goes through it") {
+    if (no_device()) return;
+    const DiskRays disk = rays_that_end_on_a_disk(200000, 51);
+    for (const bool persistent : {false, true})
+        for (const bool binary : {false, true}) {
+            const std::vector<Hit> hits = trace_on_device(disk.scene, disk.rays, true, persistent, binary);
+            REQUIRE(hits.size() == disk.rays.size());
+            int different = 0;
+            for (size_t i = 0; i < hits.size(); ++i) different += (hits[i].prim != kNone) != disk.behind[i];
+            CHECK(different == 0);
+        }
 }
 
 TEST_CASE("Device and host let the same rays pass surfaces of partial opacity (G12)") {

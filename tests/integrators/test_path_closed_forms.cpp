@@ -4,6 +4,7 @@
 // The path tracer against closed forms: furnaces, direct light of every emitter through every camera, what is seen
 // directly, and partial opacity.
 #include <array>
+#include <functional>
 
 #include "film/exr_io.h"
 #include "formats/load.h"
@@ -97,6 +98,17 @@ const std::string kRectangleLight =
 
 double rectangle_irradiance(double x, double y) {
     return polygon_irradiance({{-0.4, -0.3, 1.2}, {0.8, -0.3, 1.2}, {0.8, 0.5, 1.2}, {-0.4, 0.5, 1.2}}, x, y);
+}
+
+const std::string kDiskLight =
+    "<shape type='disk'><transform name='to_world'><scale value='0.6'/><rotate x='1' angle='180'/><translate "
+    "x='-0.1' y='0.3' z='1.1'/></transform>" +
+    diffuse({0, 0, 0}) + area_light(kLight) + "</shape>";
+
+/// Parallel disk of radius a at height h, l beside the point.
+double disk_irradiance(double x, double y) {
+    const double a2 = 0.36, h2 = 1.21, l2 = (x + 0.1) * (x + 0.1) + (y - 0.3) * (y - 0.3), s = l2 + h2 + a2;
+    return M_PI / 2 * (1 - (l2 + h2 - a2) / std::sqrt(s * s - 4 * a2 * l2));
 }
 
 std::string lookat(const char* name, const char* value) {
@@ -243,16 +255,43 @@ TEST_CASE("Direct light of a rectangle and of a tilted one", "[path]") {
 }
 
 TEST_CASE("Direct light of a disk", "[path]") {
-    const Scene scene = plane_under(
-        "<shape type='disk'><transform name='to_world'><scale value='0.6'/><rotate x='1' angle='180'/><translate "
-        "x='-0.1' y='0.3' z='1.1'/></transform>" +
-        diffuse({0, 0, 0}) + area_light(kLight) + "</shape>");
-    // Parallel disk of radius a at height h, l beside the point.
-    check_all_estimators(scene, plane_image(kLight, [](double x, double y) {
-                             const double a2 = 0.36, h2 = 1.21, l2 = (x + 0.1) * (x + 0.1) + (y - 0.3) * (y - 0.3),
-                                          s = l2 + h2 + a2;
-                             return M_PI / 2 * (1 - (l2 + h2 - a2) / std::sqrt(s * s - 4 * a2 * l2));
-                         }));
+    check_all_estimators(plane_under(kDiskLight), plane_image(kLight, disk_irradiance));
+}
+
+TEST_CASE("Black shapes take from a sky what they would give as lamps", "[path]") {
+    const std::string sky = "<emitter type='constant'>" + rgb("radiance", kLight) + "</emitter>";
+    const auto without_lamp = [](std::string shape) {
+        return shape.erase(shape.find("<emitter"), area_light(kLight).size());
+    };
+    // A disk across no axis, as a polygon of so many sides that it lacks 2e-6 of its area.
+    const std::string tilted_disk =
+        "<shape type='disk'><transform name='to_world'><scale value='0.6'/><lookat origin='0.3,0.4,1.2' "
+        "target='0.8,0.7,0' up='0,0,1'/></transform>" +
+        diffuse({0, 0, 0}) + area_light(kLight) + "</shape>";
+    const Frame f = frame_from_normal(normalize(Vec3f{0.5f, 0.3f, -1.2f}));
+    std::vector<std::array<double, 3>> rim;
+    for (int k = 0; k < 2000; ++k) {
+        const double a = 0.6 * std::cos(k * M_PI / 1000), b = 0.6 * std::sin(k * M_PI / 1000);
+        rim.push_back({0.3 + a * double(f.s.x) + b * double(f.t.x), 0.4 + a * double(f.s.y) + b * double(f.t.y),
+                       1.2 + a * double(f.s.z) + b * double(f.t.z)});
+    }
+    const std::pair<std::string, std::function<double(double, double)>> shapes[] = {
+        {kSphereLight, sphere_irradiance},
+        {kRectangleLight, rectangle_irradiance},
+        {kDiskLight, disk_irradiance},
+        {tilted_disk, [&](double x, double y) { return polygon_irradiance(rim, x, y); }}};
+    for (const auto& [light, irradiance] : shapes) {
+        const Image expected = plane_image(kLight, [&](double x, double y) { return M_PI - irradiance(x, y); });
+        const Scene scene = plane_under(without_lamp(light) + sky);
+        INFO(light);
+        check_all_estimators(scene, expected);
+        RenderSettings cwbvh = cpu_settings(scene, Estimator::nee, 7),
+                       in_double = cpu_settings(scene, Estimator::nee, 8);
+        cwbvh.accel = "cwbvh";
+        in_double.precision = Precision::in_double;
+        check_expectation(scene, cwbvh, expected);
+        check_expectation(scene, in_double, expected);
+    }
 }
 
 TEST_CASE("B8: direct light of points, spots and suns; rays never meet them", "[path]") {
