@@ -32,6 +32,7 @@ BDPT = ["-i", "bdpt"]
 METHODS = {
     "naive": ["--set", "estimator=naive"], "nee": ["--set", "estimator=nee"], "power": ["--set", "heuristic=power"], "uniform": ["--light-picking", "uniform"],
     "ris": ["--variant", "ris"], "double": ["--precision", "double"], "cwbvh": ["--set", "accel=cwbvh"], "instances": ["--limits", "copies=1"],
+    "bvh2": ["--set", "accel=bvh2"], "on a CPU": [],
     "light": ["-i", "light"], "bdpt": BDPT, "bdpt power": BDPT + ["--set", "heuristic=power"], "bdpt double": BDPT + ["--precision", "double"],
     "bdpt cwbvh": BDPT + ["--set", "accel=cwbvh"], "megakernel": BDPT + ["--variant", "megakernel"], "streaming": BDPT + ["--variant", "streaming"],
     "lvc": BDPT + ["--variant", "lvc", "--set", "light_paths=2"], "learned": BDPT + ["--variant", "learned"],
@@ -75,7 +76,7 @@ def render(options, path, method, first, spp, invalid):
         return np.load(out).astype(np.float64)
     images, out, stats = [], path.with_suffix(".exr"), path.with_suffix(".json")
     for k in range(seeds):
-        run([options.program, "render", str(path), "-o", str(out), "--spp", str(spp), "--seed", str(first + k), "--backend", options.backend, "--json", str(stats),
+        run([options.program, "render", str(path), "-o", str(out), "--spp", str(spp), "--seed", str(first + k), "--json", str(stats), "--backend", "cpu" if method == "on a CPU" else options.backend,
              *METHODS.get(method, [])])
         counts = json.loads(stats.read_text(encoding="utf-8"))["invalid"]
         for cause in ("nan", "inf", "negative"):
@@ -101,18 +102,20 @@ def compare(a, b, a_shares, b_shares, tolerance):
     return largest(*sums), largest(*means), float(means[0][0].mean() / max(means[1][0].mean(), 1e-30) - 1)
 
 
-def methods_of(scene, seed, has_mitsuba):
+def methods_of(scene, seed, options):
     """What is compared with path, and what with bdpt where path lacks some light."""
     has, choose = scene.has, random.Random(seed)
     lacks_light = "beam" in has or {"delta", "delta_light"} <= has
-    path = ["nee", "power", "uniform", "ris", "double", "cwbvh"] + (["instances"] if "instance" in scene.tags else []) + ([] if "delta_light" in has else ["naive"])
-    bidirectional = ["bdpt power", "bdpt double", "bdpt cwbvh", "megakernel", "streaming", "lvc", "learned", "four light paths"]
+    on_cpu, instanced = options.backend == "cpu", "instance" in scene.tags
+    path = ["nee", "power", "uniform", "ris"] + (["instances"] if instanced else []) + ([] if "delta_light" in has else ["naive"])
+    path += ["double", "cwbvh"] if on_cpu else [] if instanced else ["bvh2"]
+    bidirectional = ["bdpt power", "megakernel", "streaming", "lvc", "learned", "four light paths"] + (["bdpt double", "bdpt cwbvh"] if on_cpu else [])
     bidirectional += [] if lacks_light else ["no light images"]
     bidirectional += [] if {"delta", "hidden"} & has else ["light"]  # what it cannot see
     chosen = [(choose.choice(path), "path"), ("bdpt", "path"), (choose.choice(bidirectional), "bdpt" if lacks_light else "path")]
     passes_panes = {"null", "delta_light"} <= has and "thindielectric" in scene.tags  # shadow rays of Mitsuba's volpath
     chosen = [pair for pair in chosen if not (lacks_light and pair == ("bdpt", "path"))]
-    return chosen + ([("mitsuba", "path")] if has_mitsuba and not passes_panes else [])
+    return chosen + ([] if on_cpu else [("on a CPU", "path")]) + ([("mitsuba", "path")] if options.mitsuba and not passes_panes else [])
 
 
 def check_scene(options, seed, totals):
@@ -127,7 +130,7 @@ def check_scene(options, seed, totals):
             images[key] = render(options, path, method, first + 100 * sum(map(ord, method)), spp, invalid)
         return images[key]
 
-    for method, reference in methods_of(scene, seed, options.mitsuba):
+    for method, reference in methods_of(scene, seed, options):
         tolerance = 0 if method != "mitsuba" else 3e-3 if "sun" in scene.has else 4e-4  # halves, and the sun (docs/scenes.md)
         try:
             for factor in (1, 4, 16):
@@ -159,7 +162,7 @@ def main():
     parser.add_argument("--count", type=int, default=20, help="scenes, of consecutive seeds (default: %(default)s)")
     parser.add_argument("--spp", type=int, default=24, help="samples per pixel and image (default: %(default)s)")
     parser.add_argument("--seeds", type=int, default=3, help="images of each (default: %(default)s)")
-    parser.add_argument("--backend", default="cpu", help="of ambilux; methods that it does not have are listed as refused (default: %(default)s)")
+    parser.add_argument("--backend", default="cpu", help="of ambilux; path is compared with that of the cpu too (default: %(default)s)")
     parser.add_argument("--mitsuba", metavar="PYTHON", help="compare path with Mitsuba 3 of this Python")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
