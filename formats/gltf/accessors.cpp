@@ -73,7 +73,7 @@ std::vector<double> accessor_values(const Context& context, int index, int compo
         for (int c = 0; c < components; ++c) to[c] = component(p + c * from.size, a.componentType, a.normalized);
     };
     std::vector<double> out;
-    const bool filled = a.bufferView >= 0 || !a.sparse.isSparse;  // else zeros
+    const bool filled = a.bufferView >= 0;  // else zeros
     Elements dense;
     if (filled) dense = elements(context, a.bufferView, a.byteOffset, a.count, a.componentType, count, what);
     budget.bytes(uint64_t(a.count) * uint64_t(components), sizeof(double));

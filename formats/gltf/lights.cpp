@@ -13,6 +13,7 @@ namespace {
 
 constexpr int64_t kHeight = 720;  // of the image, which glTF does not tell
 constexpr double kFov = 40;       // of the default camera, degrees
+constexpr double kWidestSpot = 89.9 * (M_PI / 180);
 
 Vec3d negated(Vec3d v) { return {-v.x, -v.y, -v.z}; }
 
@@ -63,9 +64,13 @@ void add_light(Context& context, const tinygltf::Light& light, const Matrix& to_
     }
     if (light.type != "spot") context.fail("light '" + light.name + "' is of the unknown type '" + light.type + "'");
     Object& out = add_object(context.document, "emitter", "spot", context.where);
-    const double outer = light.spot.outerConeAngle, inner = light.spot.innerConeAngle;
-    if (!(inner >= 0 && inner <= outer && outer < M_PI / 2))
-        context.fail("the cone of light '" + light.name + "' must be less than pi/2 and hold its inner cone");
+    double outer = light.spot.outerConeAngle, inner = light.spot.innerConeAngle;
+    if (!(inner >= 0 && inner <= outer && outer <= M_PI / 2 + 1e-4))
+        context.fail("the cone of light '" + light.name + "' must be pi/2 at most and hold its inner cone");
+    if (outer > kWidestSpot) {
+        context.note("spots of a half-space are a tenth of a degree narrower");
+        outer = kWidestSpot, inner = std::min(inner, outer);
+    }
     set_transform(out, "to_world", turned(to_world));
     set_number(out, "cutoff_angle", outer * (180 / M_PI));
     set_number(out, "beam_width", outer * (180 / M_PI));

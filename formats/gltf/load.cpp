@@ -1,5 +1,6 @@
 #include "formats/gltf/load.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -141,7 +142,7 @@ private:
             };
             const auto &t = node.translation, &r = node.rotation, &s = node.scale;
             const double x = value(r, 0, 0), y = value(r, 1, 0), z = value(r, 2, 0), w = value(r, 3, 1);
-            const double n = 2 / (x * x + y * y + z * z + w * w);
+            const double l2 = x * x + y * y + z * z + w * w, n = l2 > 0 ? 2 / l2 : 0;
             Matrix q;
             const double rows[3][3] = {{1 - n * (y * y + z * z), n * (x * y - z * w), n * (x * z + y * w)},
                                        {n * (x * y + z * w), 1 - n * (x * x + z * z), n * (y * z - x * w)},
@@ -174,7 +175,12 @@ private:
         visible = visible && is_visible(node);
         if (node.mesh >= 0 && visible) {
             if (size_t(node.mesh) >= c_.model.meshes.size()) c_.fail("there is no mesh " + std::to_string(node.mesh));
-            for (const Matrix& place : instances_of(node)) add_mesh(index, to_world * place);
+            for (const Matrix& place : instances_of(node)) {
+                if (node.skin < 0 && volume(to_world * place) == 0)
+                    c_.note("meshes that are scaled to nothing are left out");
+                else
+                    add_mesh(index, to_world * place);
+            }
         }
         if (node.camera >= 0 && sensor_) c_.note("the first of several cameras is used");
         if (node.camera >= 0 && !sensor_) {
@@ -198,10 +204,12 @@ private:
         const Pose pose = pose_of(node);
         const bool posed = !pose.joints.empty() || !node.weights.empty();
         if (!pose.joints.empty()) to_world = {};  // joints place it
+        const bool in_mirror = volume(to_world) < 0 && has_normal_texture(mesh);
         // Meshes of several nodes become groups, but for what shines or has a pose of its own.
         const bool shared = uses_[size_t(index)] > 1 && !posed;
-        const bool first_use = shared && !groups_.contains(index);
-        if (first_use) groups_[index] = &add_object(c_.document, "shape", "shapegroup", c_.where);
+        const std::pair group{index, in_mirror};
+        const bool first_use = shared && !groups_.contains(group);
+        if (first_use) groups_[group] = &add_object(c_.document, "shape", "shapegroup", c_.where);
         bool any_shared = false;
         for (size_t i = 0; i < mesh.primitives.size(); ++i) {
             const tinygltf::Primitive& primitive = mesh.primitives[i];
@@ -212,36 +220,97 @@ private:
                 c_.note("points and lines have no surface and are left out");
                 continue;
             }
-            ++shown_;
-            const std::string name =
-                c_.where.file + ", " + what + (posed ? ", node " + std::to_string(at) : std::string());
-            const auto [place, is_new] = c_.document.meshes.try_emplace(name);
-            if (is_new) {
-                const VertexColors colors = vertex_colors(c_, primitive, what);
-                surfaces_[name] = surface(c_, primitive.material, colors);
-                place->second = primitive_mesh(c_, primitive, surfaces_[name].tex_coord, pose, colors, what);
+            if (!primitive.attributes.contains("POSITION")) {
+                c_.note("primitives without positions are left out");
+                continue;
             }
-            grow(place->second, to_world);
-            const Context::Surface& s = surfaces_[name];
-            any_shared |= shared && !s.emitter;
-            if (shared && !s.emitter && !first_use) continue;
-            Object& shape = add_object(c_.document, "shape", "mesh", c_.where);
-            set_text(shape, "name", name);
-            add_child(shape, *s.bsdf);
-            if (s.emitter) add_child(shape, *s.emitter);
-            if (shared && !s.emitter) {
-                add_child(*groups_[index], shape);
-            } else {
-                set_transform(shape, "to_world", to_world);
-                add_child(*c_.document.scene, shape);
-                if (s.emitter && s.double_sided) add_child(*c_.document.scene, add_light_back(c_.document, shape));
+            ++shown_;
+            const std::string name = c_.where.file + ", " + what +
+                                     (posed ? ", node " + std::to_string(at) : std::string()) +
+                                     (in_mirror ? ", in a mirror" : "");
+            for (const Part& part : parts_of(primitive, name, what, pose, in_mirror)) {
+                grow(c_.document.meshes.at(part.name), to_world);
+                const Context::Surface& s = part.surface;
+                any_shared |= shared && !s.emitter;
+                if (shared && !s.emitter && !first_use) continue;
+                Object& shape = add_object(c_.document, "shape", "mesh", c_.where);
+                set_text(shape, "name", part.name);
+                add_child(shape, *s.bsdf);
+                if (s.emitter) add_child(shape, *s.emitter);
+                if (shared && !s.emitter) {
+                    add_child(*groups_[group], shape);
+                } else {
+                    set_transform(shape, "to_world", to_world);
+                    add_child(*c_.document.scene, shape);
+                    if (s.emitter && s.double_sided) add_child(*c_.document.scene, add_light_back(c_.document, shape));
+                }
             }
         }
         if (!any_shared) return;
         Object& instance = add_object(c_.document, "shape", "instance", c_.where);
         set_transform(instance, "to_world", to_world);
-        add_child(instance, *groups_[index]);
+        add_child(instance, *groups_[group]);
         add_child(*c_.document.scene, instance);
+    }
+
+    /// A mesh in the document.
+    struct Part {
+        std::string name;
+        Context::Surface surface;
+    };
+
+    /// What a primitive is made into: one mesh for each of its materials.
+    const std::vector<Part>& parts_of(const tinygltf::Primitive& primitive, const std::string& name,
+                                      const std::string& what, const Pose& pose, bool in_mirror) {
+        const auto [place, is_new] = parts_.try_emplace(name);
+        std::vector<Part>& parts = place->second;
+        if (!is_new) return parts;
+        const VertexColors colors = vertex_colors(c_, primitive, what);
+        const Use use{colors, false, primitive.attributes.contains("TANGENT")};
+        if (!has_colored_textures(c_, primitive.material, colors)) {
+            add_part(parts, name, primitive, use, in_mirror,
+                     [&](int tex_coord) { return primitive_mesh(c_, primitive, tex_coord, pose, colors, what); });
+            return parts;
+        }
+        const Mesh whole = primitive_mesh(
+            c_, primitive, surface(c_, primitive.material, {{}, false, use.tangents}).tex_coord, pose, {}, what);
+        if (colors.values.size() != whole.positions.size())
+            c_.fail(what + ", COLOR_0: its size is not that of the primitive");
+        c_.note("of colours of vertices on surfaces with textures the mean of each triangle counts, in steps");
+        for (ColoredPart& part : parts_by_color(whole, colors))
+            add_part(parts, name + ", colour " + std::to_string(parts.size()), primitive,
+                     {part.colors, false, use.tangents}, in_mirror, [&](int) { return std::move(part.mesh); });
+        return parts;
+    }
+
+    template <class Make>
+    void add_part(std::vector<Part>& parts, const std::string& name, const tinygltf::Primitive& primitive, Use use,
+                  bool in_mirror, Make make) {
+        const Context::Surface front = surface(c_, primitive.material, use);
+        Mesh mesh = make(front.tex_coord), mirrored;
+        if (front.has_textures && mesh.uvs.empty()) {
+            c_.note("textures of a mesh without texture coordinates are of one colour");
+            mesh.uvs.assign(mesh.positions.size(), Vec2f{0, 0});
+        }
+        if (front.has_normals) mirrored = take_mirrored(mesh, in_mirror);
+        const auto add = [&](Mesh& given, const std::string& as, const Context::Surface& with) {
+            if (given.faces.empty()) return;
+            c_.document.meshes[as] = std::move(given);
+            parts.push_back({as, with});
+        };
+        add(mesh, name, front);
+        use.mirrored = true;
+        if (!mirrored.faces.empty()) add(mirrored, name + ", mirrored", surface(c_, primitive.material, use));
+    }
+
+    /// Of the unit cube, negative if it is mirrored.
+    static double volume(const Matrix& m) { return dot(cross(column(m, 0), column(m, 1)), column(m, 2)); }
+
+    bool has_normal_texture(const tinygltf::Mesh& mesh) const {
+        return std::any_of(mesh.primitives.begin(), mesh.primitives.end(), [&](const tinygltf::Primitive& p) {
+            return p.material >= 0 && size_t(p.material) < c_.model.materials.size() &&
+                   c_.model.materials[size_t(p.material)].normalTexture.index >= 0;
+        });
     }
 
     void grow(const Mesh& mesh, const Matrix& m) {
@@ -253,10 +322,10 @@ private:
     }
 
     Context& c_;
-    std::vector<uint32_t> uses_;                        ///< of meshes by nodes
-    std::vector<int> parents_;                          ///< of nodes; -1: none
-    std::map<int, Object*> groups_;                     ///< by mesh
-    std::map<std::string, Context::Surface> surfaces_;  ///< by the names of meshes in the document
+    std::vector<uint32_t> uses_;                      ///< of meshes by nodes
+    std::vector<int> parents_;                        ///< of nodes; -1: none
+    std::map<std::pair<int, bool>, Object*> groups_;  ///< by mesh, and whether it is mirrored
+    std::map<std::string, std::vector<Part>> parts_;  ///< by primitive
     Object* sensor_ = nullptr;
     uint64_t visited_ = 0, shown_ = 0, instances_ = 0;
     Vec3f lower_ = splat(kInfinity), upper_ = splat(-kInfinity);

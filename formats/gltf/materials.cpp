@@ -11,15 +11,17 @@ using namespace mitsuba;
 
 namespace {
 
+constexpr const char* kGlossiness = "KHR_materials_pbrSpecularGlossiness";
+
 Rgb color_of(const std::vector<double>& v, Rgb fallback) {
     return v.size() < 3 ? fallback : Rgb{float(v[0]), float(v[1]), float(v[2])};
 }
 
 class MaterialMaker {
 public:
-    MaterialMaker(Context& context, int index, const tinygltf::Material& material, const VertexColors& colors,
+    MaterialMaker(Context& context, int index, const tinygltf::Material& material, const Use& use,
                   const std::string& what)
-        : c_(context), m_(material), colors_(colors), what_(what), textures_(context, index, what) {}
+        : c_(context), m_(material), colors_(use.colors), use_(use), textures_(context, index, what) {}
 
     Context::Surface make() {
         check_extensions();
@@ -28,10 +30,11 @@ public:
         alpha_ = pbr.baseColorFactor.size() > 3 ? pbr.baseColorFactor[3] : 1;
         base_texture_ = textures_.with_image(used(pbr.baseColorTexture));
         rough_texture_ = textures_.with_image(used(pbr.metallicRoughnessTexture));
+        rough_ = pbr.roughnessFactor, metallic_ = pbr.metallicFactor;
+        if (const auto* given = extension(m_.extensions, kGlossiness)) convert(*given);
         normal_texture_ = textures_.with_image(used(m_.normalTexture));
         if (!colors_.varies) base_ *= colors_.color;
         if (!colors_.alpha_varies) alpha_ *= colors_.alpha;
-        if (colors_.varies || (colors_.alpha_varies && m_.alphaMode != "OPAQUE")) check_colors();
         const Object* bsdf = &with_transmission();
         if (normal_texture_.index >= 0) bsdf = &with_normals(*bsdf);
         if (!transmits_) {
@@ -47,33 +50,46 @@ public:
         if (light)
             c_.note(double_sided ? "two-sided surfaces that shine are two, a hundred-thousandth of their extent apart"
                                  : "surfaces that shine do so on their front side");
-        return {bsdf, light, textures_.tex_coord(), double_sided};
+        return {bsdf, light, textures_.tex_coord(), double_sided, normal_texture_.index >= 0, textures_.any()};
     }
 
 private:
     Object& object(const char* tag, const char* type) { return add_object(c_.document, tag, type, c_.where); }
 
+    /// The extension takes the place of the metallic-roughness part, which is for programs that do not know it.
+    void convert(const tinygltf::Value& given) {
+        SpecularGlossiness from;
+        from.diffuse = color_in(given, "diffuseFactor", splat(1));
+        from.specular = color_in(given, "specularFactor", splat(1));
+        from.glossiness = number(&given, "glossinessFactor", 1);
+        from.diffuse_texture = textures_.with_image(used(&given, "diffuseTexture"));
+        from.texture = textures_.with_image(used(&given, "specularGlossinessTexture"));
+        alpha_ = 1;
+        if (given.Has("diffuseFactor") && given.Get("diffuseFactor").ArrayLen() > 3)
+            alpha_ = given.Get("diffuseFactor").Get(3).GetNumberAsDouble();
+        base_ = splat(1), rough_ = metallic_ = 1;
+        base_texture_ = rough_texture_ = {};
+        if (from.diffuse_texture.index >= 0 || from.texture.index >= 0) {
+            textures_.convert(from, base_texture_, rough_texture_);
+        } else {
+            const BaseAndMetal as = base_and_metal(from.diffuse, from.specular);
+            base_ = as.base, metallic_ = as.metallic, rough_ = 1 - from.glossiness;
+        }
+        c_.note("specular-glossiness materials are converted to metallic-roughness");
+    }
+
     void check_extensions() {
         for (const auto& [name, value] : m_.extensions) {
             if (name == "KHR_materials_emissive_strength" || name == "KHR_materials_transmission" ||
                 name == "KHR_materials_volume" || name == "KHR_materials_ior" || name == "KHR_materials_clearcoat" ||
-                name == "KHR_materials_specular" || name == "KHR_materials_sheen")
+                name == "KHR_materials_specular" || name == "KHR_materials_sheen" ||
+                name == "KHR_materials_anisotropy" || name == kGlossiness)
                 continue;
             if (name == "KHR_materials_unlit")
                 c_.note("unlit surfaces are lit, as by programs that do not know the extension");
             else if (name.starts_with("KHR_materials_") || name.starts_with("EXT_") || name.starts_with("MSFT_"))
                 c_.leave_out(name, "extension '" + name + "'");
         }
-    }
-
-    /// Values of vertices need coordinates of their own, and there is one set for all textures.
-    void check_colors() {
-        const bool other = rough_texture_.index >= 0 || normal_texture_.index >= 0 || base_texture_.index >= 0 ||
-                           m_.emissiveTexture.index >= 0;
-        if (!other) return;
-        c_.refuse(what_ + ": colours of vertices that differ, on a surface with textures, are not supported",
-                  "they are left out");
-        colors_.varies = colors_.alpha_varies = false;
     }
 
     const Object& attribute(const char* name) {
@@ -139,12 +155,29 @@ private:
         c_.note("sheen is approximated by that of the principled BSDF, which is white");
     }
 
+    /// glTF's roughness along the tangent is mix(a, 1, strength²), across it a, the square of what it calls roughness.
+    /// The principled BSDF has a²/s and a²·s with s² = 1 - 0.9·anisotropic.
+    bool set_anisotropy(Object& out) {
+        const tinygltf::Value* given = extension(m_.extensions, "KHR_materials_anisotropy");
+        const double strength = std::clamp(number(given, "anisotropyStrength", 0), 0.0, 1.0);
+        if (!(strength > 0)) return false;
+        if (given->Has("anisotropyTexture")) c_.note("anisotropyTexture is left out: the strength counts");
+        if (number(given, "anisotropyRotation", 0) != 0)
+            c_.note("anisotropy lies along the texture coordinates, whatever its rotation is");
+        const double mean = rough_texture_.index >= 0 ? double(textures_.mean(rough_texture_, true).y) : 1,
+                     rough = rough_ * mean, across = std::max(rough * rough, 1e-3),
+                     along = across + (1 - across) * strength * strength, anisotropic = (1 - across / along) / 0.9;
+        if (anisotropic > 1) c_.note("the ratio of the two roughnesses of an anisotropic surface is 10 at most");
+        set_number(out, "anisotropic", std::min(anisotropic, 1.0));
+        set_number_or_texture(out, "roughness", std::pow(along * across, 0.25) / mean, rough_texture_, "g");
+        return true;
+    }
+
     const Object& principled() {
         Object& out = object("bsdf", "principled");
-        const auto& pbr = m_.pbrMetallicRoughness;
         set_base(out, "base_color");
-        set_number_or_texture(out, "roughness", pbr.roughnessFactor, rough_texture_, "g");
-        set_number_or_texture(out, "metallic", pbr.metallicFactor, rough_texture_, "b");
+        set_number_or_texture(out, "metallic", metallic_, rough_texture_, "b");
+        if (!set_anisotropy(out)) set_number_or_texture(out, "roughness", rough_, rough_texture_, "g");
         set_number(out, "eta", opaque_ior());
         set_sheen(out);
         c_.note("metallic-roughness materials are Mitsuba's principled BSDF, whose diffuse lobe is Burley's");
@@ -162,6 +195,19 @@ private:
         return out;
     }
 
+    /// What is left behind one of the two boundaries that light crosses.
+    Rgb attenuation_at_boundary(const tinygltf::Value& volume) {
+        const double distance = number(&volume, "attenuationDistance", INFINITY);
+        const Rgb color = color_in(volume, "attenuationColor", splat(1));
+        if (!(distance > 0 && distance < 1e30) || color == splat(1)) return splat(1);
+        c_.note("attenuation in a volume goes by the thickness that the file gives, half of it at each boundary");
+        const double passed =
+            number(&volume, "thicknessFactor", 0) * double(mean_of(&volume, "thicknessTexture", true).y) / distance / 2;
+        Rgb out;
+        for (int k = 0; k < 3; ++k) out[k] = float(std::pow(std::clamp(double(color[k]), 0.0, 1.0), passed));
+        return out;
+    }
+
     /// Light passes with the weight of the transmission: through a thin pane, or with a thickness into a volume.
     const Object& with_transmission() {
         const Object& opaque = principled();
@@ -172,23 +218,23 @@ private:
         transmits_ = true;
         const tinygltf::Value* volume = extension(m_.extensions, "KHR_materials_volume");
         const bool thick = number(volume, "thicknessFactor", 0) > 0;
-        if (number(volume, "attenuationDistance", INFINITY) < 1e30)
-            c_.leave_out("KHR_materials_volume", "attenuation in a volume");
-        const double rough = m_.pbrMetallicRoughness.roughnessFactor, alpha = rough * rough;
+        const double alpha = rough_ * rough_;
         const bool smooth = !thick || alpha < 1e-3 || ior() == 1;
         if (!thick && alpha >= 1e-3) c_.note("thin panes that transmit are smooth");
         if (!smooth && rough_texture_.index >= 0) c_.note("of rough glass the roughness is a number, no texture");
         Object& glass = object("bsdf", !thick ? "thindielectric" : smooth ? "dielectric" : "roughdielectric");
         set_number(glass, "int_ior", ior());
         set_number(glass, "ext_ior", 1);
+        const Rgb base = base_;
+        if (thick) base_ *= attenuation_at_boundary(*volume);
         set_base(glass, "specular_transmittance");
+        base_ = base;
         if (!smooth) {
             set_text(glass, "distribution", "ggx");
             set_number(glass, "alpha", alpha);
         }
-        if (weight >= 1 && texture.index < 0 && m_.pbrMetallicRoughness.metallicFactor == 0) return glass;
-        if (m_.pbrMetallicRoughness.metallicFactor > 0)
-            c_.note("materials that transmit and are metallic are a blend by their transmission alone");
+        if (weight >= 1 && texture.index < 0 && metallic_ == 0) return glass;
+        if (metallic_ > 0) c_.note("materials that transmit and are metallic are a blend by their transmission alone");
         Object& blend = object("bsdf", "blendbsdf");
         set_number_or_texture(blend, "weight", std::min(weight, 1.0), texture, "r");
         Object& both = object("bsdf", "twosided");
@@ -200,9 +246,9 @@ private:
 
     const Object& with_normals(const Object& inner) {
         Object& out = object("bsdf", "normalmap");
-        add_child(out, textures_.normals(normal_texture_, m_.normalTexture.scale));
+        add_child(out, textures_.normals(normal_texture_, m_.normalTexture.scale, use_.mirrored, !use_.tangents));
         add_child(out, inner);
-        c_.note("tangents of normal maps follow the texture coordinates");
+        if (use_.tangents) c_.note("tangents of normal maps follow the texture coordinates, not those of the file");
         return out;
     }
 
@@ -258,10 +304,10 @@ private:
     Context& c_;
     const tinygltf::Material& m_;
     VertexColors colors_;
-    std::string what_;
+    Use use_;
     TextureMaker textures_;
     Rgb base_{};
-    double alpha_ = 1;
+    double alpha_ = 1, rough_ = 1, metallic_ = 1;
     Used base_texture_, rough_texture_, normal_texture_;
     bool transmits_ = false;
     Opacity opacity_;
@@ -269,9 +315,23 @@ private:
 
 }  // namespace
 
-Context::Surface surface(Context& context, int index, const VertexColors& colors) {
-    const std::string key = fmt::format("{}|{}|{}|{}|{}|{}|{}", index, colors.color.x, colors.color.y, colors.color.z,
-                                        colors.alpha, colors.varies, colors.alpha_varies);
+bool has_colored_textures(const Context& context, int index, const VertexColors& colors) {
+    if (index < 0 || size_t(index) >= context.model.materials.size()) return false;
+    const tinygltf::Material& m = context.model.materials[size_t(index)];
+    if (!colors.varies && !(colors.alpha_varies && m.alphaMode != "OPAQUE")) return false;
+    const auto& pbr = m.pbrMetallicRoughness;
+    return pbr.baseColorTexture.index >= 0 || pbr.metallicRoughnessTexture.index >= 0 || m.normalTexture.index >= 0 ||
+           m.emissiveTexture.index >= 0 ||
+           used(extension(m.extensions, "KHR_materials_transmission"), "transmissionTexture").index >= 0 ||
+           used(extension(m.extensions, kGlossiness), "diffuseTexture").index >= 0 ||
+           used(extension(m.extensions, kGlossiness), "specularGlossinessTexture").index >= 0;
+}
+
+Context::Surface surface(Context& context, int index, const Use& use) {
+    const VertexColors& colors = use.colors;
+    const std::string key =
+        fmt::format("{}|{}|{}|{}|{}|{}|{}|{}|{}", index, colors.color.x, colors.color.y, colors.color.z, colors.alpha,
+                    colors.varies, colors.alpha_varies, use.mirrored, use.tangents);
     const auto known = context.materials.find(key);
     if (known != context.materials.end()) return known->second;
     static const tinygltf::Material plain;
@@ -280,7 +340,7 @@ Context::Surface surface(Context& context, int index, const VertexColors& colors
     const tinygltf::Material& material = index < 0 ? plain : context.model.materials[size_t(index)];
     const std::string what =
         "material " + std::to_string(index) + (material.name.empty() ? "" : " '" + material.name + "'");
-    return context.materials[key] = MaterialMaker(context, index, material, colors, what).make();
+    return context.materials[key] = MaterialMaker(context, index, material, use, what).make();
 }
 
 }  // namespace ambilux::gltf

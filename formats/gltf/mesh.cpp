@@ -21,8 +21,8 @@ std::vector<Vec3f> triples_of(const Context& context, int accessor, const std::s
     return out;
 }
 
-void add_morphs(const Context& context, Mesh& mesh, const tinygltf::Primitive& primitive,
-                const std::vector<double>& weights, const std::string& what) {
+void add_morphs(Context& context, Mesh& mesh, const tinygltf::Primitive& primitive, const std::vector<double>& weights,
+                int tex_coord, const std::string& what) {
     for (size_t i = 0; i < std::min(weights.size(), primitive.targets.size()); ++i) {
         if (weights[i] == 0) continue;
         const auto add = [&](std::vector<Vec3f>& to, const char* name) {
@@ -34,6 +34,12 @@ void add_morphs(const Context& context, Mesh& mesh, const tinygltf::Primitive& p
         };
         add(mesh.positions, "POSITION");
         add(mesh.normals, "NORMAL");
+        if (attribute(primitive.targets[i], "COLOR_0") >= 0) context.note("morph targets of colours are left out");
+        const int moved = attribute(primitive.targets[i], "TEXCOORD_" + std::to_string(tex_coord));
+        if (moved < 0) continue;
+        const std::vector<double> by = accessor_values(context, moved, 2, what + ", texture coordinates of a target");
+        for (size_t k = 0; k < std::min(mesh.uvs.size(), by.size() / 2); ++k)
+            mesh.uvs[k] = mesh.uvs[k] + Vec2f{float(by[2 * k]), float(by[2 * k + 1])} * float(weights[i]);
     }
 }
 
@@ -125,7 +131,7 @@ Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int 
         const std::vector<double> v = accessor_values(context, find(uv), 2, what + ", " + uv);
         for (size_t i = 0; i + 1 < v.size(); i += 2) mesh.uvs.push_back({float(v[i]), float(v[i + 1])});
     }
-    add_morphs(context, mesh, primitive, pose.weights, what);
+    add_morphs(context, mesh, primitive, pose.weights, tex_coord, what);
     if (!pose.joints.empty()) put_on_skin(context, mesh, primitive, pose.joints, what);
     if (colors.varies) mesh.attributes.push_back({"vertex_color", false, 3, colors.values});
     if (colors.alpha_varies) mesh.attributes.push_back({"vertex_alpha", false, 1, colors.alphas});

@@ -114,6 +114,8 @@ void read_model(Context& context, const std::string& path) {
     }
     if (!files.problem.empty()) context.fail(files.problem);
     std::replace(error.begin(), error.end(), '\n', ' ');
+    constexpr size_t kLongest = 300;  // an error may quote a whole buffer
+    if (error.size() > kLongest) error = error.substr(0, kLongest) + " ...";
     if (!read) context.fail("it is no sound glTF 2.0: " + (error.empty() ? "unknown reason" : error));
     if (!context.model.asset.version.starts_with("2"))
         context.fail("it is glTF " + context.model.asset.version + ", not 2.0");
@@ -125,7 +127,8 @@ void read_model(Context& context, const std::string& path) {
                                                 "KHR_texture_transform",      "KHR_mesh_quantization",
                                                 "KHR_materials_specular",     "KHR_materials_sheen",
                                                 "KHR_materials_unlit",        "EXT_mesh_gpu_instancing",
-                                                "KHR_node_visibility"};
+                                                "KHR_node_visibility",        "KHR_materials_pbrSpecularGlossiness",
+                                                "KHR_materials_anisotropy"};
     for (const std::string& name : context.model.extensionsRequired)
         if (!known.contains(name)) context.leave_out(name, "extension '" + name + "'");
     const auto& required = context.model.extensionsRequired;

@@ -26,6 +26,8 @@ struct Context {
         const Object* emitter = nullptr;
         int tex_coord = 0;          ///< set of texture coordinates that all its textures use
         bool double_sided = false;  ///< opaque, and what shines does so on both sides
+        bool has_normals = false;   ///< of a texture
+        bool has_textures = false;
     };
     std::map<std::string, Surface> materials;  ///< by index and colours of vertices
     bool emits = false;
@@ -69,8 +71,27 @@ VertexColors vertex_colors(const Context& context, const tinygltf::Primitive& pr
 Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int tex_coord, const Pose& pose,
                     const VertexColors& colors, const std::string& what);
 
+/// The faces that show their texture in a mirror, as a mesh of their own; they leave `mesh`. `in_mirror`: it stands in
+/// a place that mirrors it.
+Mesh take_mirrored(Mesh& mesh, bool in_mirror);
+
+/// Triangles of about one colour each, whose mean `colors` is.
+struct ColoredPart {
+    Mesh mesh;
+    VertexColors colors;
+};
+std::vector<ColoredPart> parts_by_color(const Mesh& mesh, const VertexColors& colors);
+
+/// What a material has to know of the mesh.
+struct Use {
+    VertexColors colors;
+    bool mirrored = false;  ///< it shows its textures in a mirror
+    bool tangents = false;  ///< they are given, and do not follow KHR_texture_transform
+};
 /// Material -1 is the default.
-Context::Surface surface(Context& context, int material, const VertexColors& colors);
+Context::Surface surface(Context& context, int material, const Use& use);
+/// True if it has textures, and colours of vertices that would have to have coordinates of their own.
+bool has_colored_textures(const Context& context, int material, const VertexColors& colors);
 
 /// Numbers in extensions of objects.
 const tinygltf::Value* extension(const tinygltf::ExtensionMap& extensions, const char* name);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "formats/srgb.h"
@@ -21,12 +22,21 @@ const char* wrap_of(int mode) {
                                                            : "repeat";
 }
 
+/// Two numbers of an extension.
+std::array<double, 2> pair_in(const tinygltf::Value& of, const char* key, double fallback) {
+    std::array<double, 2> out{fallback, fallback};
+    if (!of.Has(key) || !of.Get(key).IsArray() || of.Get(key).ArrayLen() < 2) return out;
+    for (int i = 0; i < 2; ++i)
+        if (of.Get(key).Get(i).IsNumber()) out[size_t(i)] = of.Get(key).Get(i).GetNumberAsDouble();
+    return out;
+}
+
 }  // namespace
 
 Used used(const tinygltf::Value* object, const char* name) {
     if (!object || !object->Has(name)) return {};
     const tinygltf::Value& info = object->Get(name);
-    Used out{integer(&info, "index", -1), integer(&info, "texCoord", 0), nullptr};
+    Used out{integer(&info, "index", -1), integer(&info, "texCoord", 0), nullptr, {}};
     if (info.Has("extensions") && info.Get("extensions").Has("KHR_texture_transform"))
         out.transform = &info.Get("extensions").Get("KHR_texture_transform");
     return out;
@@ -59,8 +69,12 @@ const std::string& TextureMaker::image(int index) {
     return name = wanted;
 }
 
+const std::string& TextureMaker::image_of(const Used& use) {
+    return use.image.empty() ? image(c_.model.textures[size_t(use.index)].source) : use.image;
+}
+
 Object& TextureMaker::bitmap(const Used& use, bool raw, const char* channel) {
-    Object& out = bitmap_of(use, image(c_.model.textures[size_t(use.index)].source));
+    Object& out = bitmap_of(use, image_of(use));
     if (raw) set_boolean(out, "raw", true);
     if (*channel) set_text(out, "channel", channel);
     return out;
@@ -71,19 +85,16 @@ Object& TextureMaker::bitmap_of(const Used& use, std::string name) {
     Matrix to_uv;
     int tex_coord = use.tex_coord;
     if (const tinygltf::Value* t = use.transform) {
-        const auto pair = [&](const char* key, int i, double fallback) {
-            if (!t->Has(key) || !t->Get(key).IsArray() || t->Get(key).ArrayLen() < 2) return fallback;
-            const tinygltf::Value& v = t->Get(key).Get(i);
-            return v.IsNumber() ? v.GetNumberAsDouble() : fallback;
-        };
-        const double a = number(t, "rotation", 0), x = pair("scale", 0, 1), y = pair("scale", 1, 1);
-        to_uv.m[0][0] = std::cos(a) * x, to_uv.m[0][1] = std::sin(a) * y, to_uv.m[0][3] = pair("offset", 0, 0);
-        to_uv.m[1][0] = -std::sin(a) * x, to_uv.m[1][1] = std::cos(a) * y, to_uv.m[1][3] = pair("offset", 1, 0);
+        const auto [x, y] = pair_in(*t, "scale", 1);
+        const auto [right, down] = pair_in(*t, "offset", 0);
+        const double a = number(t, "rotation", 0);
+        to_uv.m[0][0] = std::cos(a) * x, to_uv.m[0][1] = std::sin(a) * y, to_uv.m[0][3] = right;
+        to_uv.m[1][0] = -std::sin(a) * x, to_uv.m[1][1] = std::cos(a) * y, to_uv.m[1][3] = down;
         tex_coord = integer(t, "texCoord", tex_coord);
     }
-    if (tex_coord_ >= 0 && tex_coord != tex_coord_)
+    if (tex_coord_ >= 0 && tex_coord != tex_coord_ && !same_coordinates(tex_coord, tex_coord_))
         c_.refuse(what_ + " uses several sets of texture coordinates", "the first of them is used");
-    else
+    else if (tex_coord_ < 0)
         tex_coord_ = tex_coord;
     std::string wrap_u = "repeat", wrap_v = "repeat";
     bool nearest = false;
@@ -126,6 +137,21 @@ bool TextureMaker::lies_in_unit(int set, int axis) const {
     return true;
 }
 
+/// True if two sets hold the same values in all meshes of the material, as exporters write them.
+bool TextureMaker::same_coordinates(int a, int b) const {
+    for (const tinygltf::Mesh& mesh : c_.model.meshes)
+        for (const tinygltf::Primitive& primitive : mesh.primitives) {
+            if (primitive.material != material_) continue;
+            const auto values = [&](int set) {
+                const auto it = primitive.attributes.find("TEXCOORD_" + std::to_string(set));
+                return it == primitive.attributes.end() ? std::vector<double>{}
+                                                        : accessor_values(c_, it->second, 2, what_ + ", " + it->first);
+            };
+            if (values(a) != values(b)) return false;
+        }
+    return true;
+}
+
 /// The image of this name, without texels if it is new.
 Texels& TextureMaker::derived(const std::string& name, const Texels& source, uint32_t width, uint32_t height,
                               bool is_8bit) {
@@ -156,15 +182,17 @@ std::string TextureMaker::mirrored(const std::string& name, int axis) {
     return out_name;
 }
 
-/// Normals of the image, their slopes `scale` times as steep.
-std::string TextureMaker::steeper(const std::string& name, double scale) {
-    const std::string out_name = fmt::format("{}, normals scaled by {}", name, scale);
+/// Normals of the image, their slopes `scale` times as steep, and turned.
+std::string TextureMaker::turned_normals(const std::string& name, double scale, const Matrix& turn) {
+    const std::string out_name = fmt::format("{}, normals scaled by {}, turned by {} {} {} {}", name, scale,
+                                             turn.m[0][0], turn.m[0][1], turn.m[1][0], turn.m[1][1]);
     const Texels& source = c_.document.images.at(name);
     Texels& out = derived(out_name, source, source.width, source.height, false);
     if (!out.floats.empty()) return out_name;
     for (size_t i = 0; i < 4 * size_t(out.width) * out.height; i += 4) {
-        double n[3];
-        for (size_t k = 0; k < 3; ++k) n[k] = (2 * texel(source, i + k) - 1) * (k < 2 ? scale : 1);
+        const auto value = [&](size_t k) { return 2 * texel(source, i + k) - 1; };
+        const double x = value(0) * scale, y = value(1) * scale, z = value(2);
+        const double n[3] = {turn.m[0][0] * x + turn.m[0][1] * y, turn.m[1][0] * x + turn.m[1][1] * y, z};
         const double l = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         for (const double v : n) out.floats.push_back(float(l > 0 ? 0.5 + v / l / 2 : 0.5));
         out.floats.push_back(1);
@@ -172,15 +200,29 @@ std::string TextureMaker::steeper(const std::string& name, double scale) {
     return out_name;
 }
 
-Object& TextureMaker::normals(const Used& use, double scale) {
-    const std::string& name = image(c_.model.textures[size_t(use.index)].source);
-    Object& out = bitmap_of(use, scale == 1 ? name : steeper(name, scale));
+Object& TextureMaker::normals(const Used& use, double scale, bool mirrored, bool turned) {
+    // The frame of a texel has its first axis along u and the second one across the normal and that. In the texture's
+    // own frame, which KHR_texture_transform turns and mirrors, green is up: against v, which runs downwards.
+    double a = 0, up = 1;
+    if (use.transform && turned) {
+        const auto [x, y] = pair_in(*use.transform, "scale", 1);
+        const double angle = number(use.transform, "rotation", 0);
+        up = x * y < 0 ? -1 : 1;
+        if (x != 0 && y != 0) a = std::atan2(std::sin(angle) / y, std::cos(angle) / x);
+    }
+    Matrix turn;
+    turn.m[0][0] = std::cos(a), turn.m[0][1] = std::sin(a) * up;
+    turn.m[1][0] = -std::sin(a), turn.m[1][1] = std::cos(a) * up;
+    if (mirrored)
+        for (double& v : turn.m[1]) v = -v;
+    const bool plain = scale == 1 && a == 0 && turn.m[1][1] == 1;
+    Object& out = bitmap_of(use, plain ? image_of(use) : turned_normals(image_of(use), scale, turn));
     set_boolean(out, "raw", true);
     return out;
 }
 
 Object& TextureMaker::cut_alpha(const Used& use, double factor, double cutoff) {
-    const std::string& name = image(c_.model.textures[size_t(use.index)].source);
+    const std::string& name = image_of(use);
     const std::string out_name = fmt::format("{}, cut at {} of {}", name, cutoff, factor);
     const Texels& source = c_.document.images.at(name);
     Texels& out = derived(out_name, source, source.width, source.height, true);
@@ -203,7 +245,7 @@ const Object& TextureMaker::scaled(const Object& texture, Rgb factor) {
 }
 
 Rgb TextureMaker::mean(const Used& use, bool raw) {
-    const Texels& source = c_.document.images[image(c_.model.textures[size_t(use.index)].source)];
+    const Texels& source = c_.document.images[image_of(use)];
     const size_t count = size_t(source.width) * source.height;
     double sum[3] = {0, 0, 0};
     for (size_t i = 0; i < count; ++i)

@@ -143,7 +143,21 @@ TEST_CASE("colours of vertices are factors of the base colour") {
     j["images"] = {{{"uri", data_uri("image/png", grey_png(10, 200))}}};
     j["textures"] = {{{"source", 0}}};
     j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
-    CHECK(contains(error_of(j), "colours of vertices that differ, on a surface with textures"));
+    // Beside a texture, by the mean of each triangle: (1, 0, 0), (0, 1, 0), (0, 0, 1) and (1, 0, 0), (0, 0, 1), white.
+    const Scene beside = load(j);
+    CHECK(has_note(beside, "the mean of each triangle counts"));
+    REQUIRE(beside.shapes.size() == 2);
+    std::vector<Rgb> colors;
+    for (const Shape& shape : beside.shapes) {
+        const ParamRgb& c = beside.bsdfs[beside.materials[shape.material].front].as<Principled>().base_color;
+        CHECK(c.texture >= 0);
+        colors.push_back(c.value);
+    }
+    if (colors[0].x > colors[1].x) std::swap(colors[0], colors[1]);
+    check_rgb(colors[0], {0.5f / 3, 0.6f / 3, 0.7f / 3});
+    check_rgb(colors[1], {0.5f * 2 / 3, 0.6f / 3, 0.7f * 2 / 3});
+    attributes(j)["COLOR_0"] = add_accessor<float>(j, {1, 0, 0, 0, 1, 0}, "VEC3", kFloat, 2);
+    CHECK(contains(error_of(j), "COLOR_0: its size is not that of the primitive"));
 }
 
 TEST_CASE("instances of a mesh, lines beside triangles, nodes without a scene") {
