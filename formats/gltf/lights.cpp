@@ -103,12 +103,16 @@ Object& add_camera(Context& context, const tinygltf::Camera& camera, Matrix to_w
 }
 
 Object& add_default_camera(Context& context, Vec3f lower, Vec3f upper) {
-    context.note("the file has no camera: one that looks along -z at all of it is used");
     const Vec3f c = (lower + upper) * 0.5f, half = (upper - lower) * 0.5f;
     const double radius = std::max(double(length(half)), 1e-6);
-    Object& out =
-        sensor(context, "perspective",
-               translation(c.x, c.y, c.z + radius / std::sin(kFov * (M_PI / 360))) * scaling(-1, 1, -1), 16.0 / 9);
+    const bool lies = half.y < 1e-3f * radius;  // and is a line to those who look along it
+    context.note(lies ? "the file has no camera: one that looks down at all of it by 45 degrees is used"
+                      : "the file has no camera: one that looks along -z at all of it is used");
+    const Matrix tilt = lies ? rotation(1, 0, 0, -45) : Matrix{};
+    Object& out = sensor(context, "perspective",
+                         translation(c.x, c.y, c.z) * tilt * translation(0, 0, radius / std::sin(kFov * (M_PI / 360))) *
+                             scaling(-1, 1, -1),
+                         16.0 / 9);
     set_number(out, "fov", kFov);
     set_text(out, "fov_axis", "y");
     set_clips(out, radius * 1e-3, radius * 1e3);

@@ -176,7 +176,7 @@ private:
         if (node.mesh >= 0 && visible) {
             if (size_t(node.mesh) >= c_.model.meshes.size()) c_.fail("there is no mesh " + std::to_string(node.mesh));
             for (const Matrix& place : instances_of(node)) {
-                if (node.skin < 0 && volume(to_world * place) == 0)
+                if (node.skin < 0 && determinant(to_world * place) == 0)
                     c_.note("meshes that are scaled to nothing are left out");
                 else
                     add_mesh(index, to_world * place);
@@ -204,7 +204,7 @@ private:
         const Pose pose = pose_of(node);
         const bool posed = !pose.joints.empty() || !node.weights.empty();
         if (!pose.joints.empty()) to_world = {};  // joints place it
-        const bool in_mirror = volume(to_world) < 0 && has_normal_texture(mesh);
+        const bool in_mirror = determinant(to_world) < 0 && has_normal_texture(mesh);
         // Meshes of several nodes become groups, but for what shines or has a pose of its own.
         const bool shared = uses_[size_t(index)] > 1 && !posed;
         const std::pair group{index, in_mirror};
@@ -302,9 +302,6 @@ private:
         use.mirrored = true;
         if (!mirrored.faces.empty()) add(mirrored, name + ", mirrored", surface(c_, primitive.material, use));
     }
-
-    /// Of the unit cube, negative if it is mirrored.
-    static double volume(const Matrix& m) { return dot(cross(column(m, 0), column(m, 1)), column(m, 2)); }
 
     bool has_normal_texture(const tinygltf::Mesh& mesh) const {
         return std::any_of(mesh.primitives.begin(), mesh.primitives.end(), [&](const tinygltf::Primitive& p) {

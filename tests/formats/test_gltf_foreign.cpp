@@ -164,6 +164,21 @@ TEST_CASE("anisotropy and attenuation as the principled BSDF and glass have them
               {1, 0.5f, 0.25f}, 1e-5);
 }
 
+TEST_CASE("mapped normals that face away are turned, and what lies flat is seen from above") {
+    const Scene mapped = load(leaning());
+    CHECK(mapped.bsdfs[mapped.materials[mapped.shapes[0].material].front].map_rules == kTurnNormals);
+
+    Json flat = quad_scene();
+    flat["scenes"][0]["nodes"] = {0};
+    CHECK(has_note(load(flat), "looks along -z"));
+    flat["nodes"][0]["rotation"] = {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)};
+    const Scene s = load(flat);
+    CHECK(has_note(s, "looks down at all of it by 45 degrees"));
+    const Vec3f forward = s.sensor.to_world.vector({0, 0, 1});
+    CHECK(forward.y == Approx(forward.z));
+    CHECK(forward.y < 0);
+}
+
 TEST_CASE("what is not quite right is left out or read as it is meant") {
     Json hidden = quad_scene();
     hidden["nodes"].push_back({{"mesh", 0}, {"scale", {0, 0, 0}}});
