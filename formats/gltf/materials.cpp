@@ -83,7 +83,8 @@ private:
             if (name == "KHR_materials_emissive_strength" || name == "KHR_materials_transmission" ||
                 name == "KHR_materials_volume" || name == "KHR_materials_ior" || name == "KHR_materials_clearcoat" ||
                 name == "KHR_materials_specular" || name == "KHR_materials_sheen" ||
-                name == "KHR_materials_anisotropy" || name == kGlossiness)
+                name == "KHR_materials_anisotropy" || name == "KHR_materials_diffuse_transmission" ||
+                name == kGlossiness)
                 continue;
             if (name == "KHR_materials_unlit")
                 c_.note("unlit surfaces are lit, as by programs that do not know the extension");
@@ -208,13 +209,35 @@ private:
         return out;
     }
 
+    /// A share of the light that is scattered passes; that share reflects nothing.
+    const Object* with_diffuse_transmission(const Object& opaque) {
+        const tinygltf::Value* given = extension(m_.extensions, "KHR_materials_diffuse_transmission");
+        const double weight = number(given, "diffuseTransmissionFactor", 0);
+        if (!(weight > 0)) return nullptr;
+        transmits_ = true;
+        c_.note("what KHR_materials_diffuse_transmission lets pass is taken from the highlight, too");
+        Object &blend = object("bsdf", "blendbsdf"), &both = object("bsdf", "twosided"),
+               &through = object("bsdf", "difftrans");
+        set_number_or_texture(blend, "weight", std::min(weight, 1.0),
+                              textures_.with_image(used(given, "diffuseTransmissionTexture")), "a");
+        set_color_or_texture(through, "transmittance", color_in(*given, "diffuseTransmissionColorFactor", splat(1)),
+                             textures_.with_image(used(given, "diffuseTransmissionColorTexture")));
+        add_child(both, opaque);
+        add_child(blend, both);
+        add_child(blend, through);
+        return &blend;
+    }
+
     /// Light passes with the weight of the transmission: through a thin pane, or with a thickness into a volume.
     const Object& with_transmission() {
         const Object& opaque = principled();
         const tinygltf::Value* transmission = extension(m_.extensions, "KHR_materials_transmission");
         const Used texture = textures_.with_image(used(transmission, "transmissionTexture"));
         const double weight = number(transmission, "transmissionFactor", 0);
-        if (weight <= 0) return opaque;
+        if (weight <= 0) {
+            const Object* leaf = with_diffuse_transmission(opaque);
+            return leaf ? *leaf : opaque;
+        }
         transmits_ = true;
         const tinygltf::Value* volume = extension(m_.extensions, "KHR_materials_volume");
         const bool thick = number(volume, "thicknessFactor", 0) > 0;
@@ -321,11 +344,16 @@ bool has_colored_textures(const Context& context, int index, const VertexColors&
     const tinygltf::Material& m = context.model.materials[size_t(index)];
     if (!colors.varies && !(colors.alpha_varies && m.alphaMode != "OPAQUE")) return false;
     const auto& pbr = m.pbrMetallicRoughness;
-    return pbr.baseColorTexture.index >= 0 || pbr.metallicRoughnessTexture.index >= 0 || m.normalTexture.index >= 0 ||
-           m.emissiveTexture.index >= 0 ||
-           used(extension(m.extensions, "KHR_materials_transmission"), "transmissionTexture").index >= 0 ||
-           used(extension(m.extensions, kGlossiness), "diffuseTexture").index >= 0 ||
-           used(extension(m.extensions, kGlossiness), "specularGlossinessTexture").index >= 0;
+    for (const int texture : {pbr.baseColorTexture.index, pbr.metallicRoughnessTexture.index, m.normalTexture.index,
+                              m.emissiveTexture.index})
+        if (texture >= 0) return true;
+    for (const auto& [of, name] :
+         {std::pair{"KHR_materials_transmission", "transmissionTexture"},
+          std::pair{"KHR_materials_diffuse_transmission", "diffuseTransmissionTexture"},
+          std::pair{"KHR_materials_diffuse_transmission", "diffuseTransmissionColorTexture"},
+          std::pair{kGlossiness, "diffuseTexture"}, std::pair{kGlossiness, "specularGlossinessTexture"}})
+        if (used(extension(m.extensions, of), name).index >= 0) return true;
+    return false;
 }
 
 Context::Surface surface(Context& context, int index, const Use& use) {

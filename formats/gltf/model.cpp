@@ -128,7 +128,7 @@ void read_model(Context& context, const std::string& path) {
                                                 "KHR_materials_specular",     "KHR_materials_sheen",
                                                 "KHR_materials_unlit",        "EXT_mesh_gpu_instancing",
                                                 "KHR_node_visibility",        "KHR_materials_pbrSpecularGlossiness",
-                                                "KHR_materials_anisotropy"};
+                                                "KHR_materials_anisotropy",   "KHR_materials_diffuse_transmission"};
     for (const std::string& name : context.model.extensionsRequired)
         if (!known.contains(name)) context.leave_out(name, "extension '" + name + "'");
     const auto& required = context.model.extensionsRequired;

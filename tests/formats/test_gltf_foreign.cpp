@@ -140,7 +140,7 @@ TEST_CASE("specular-glossiness is converted") {
     CHECK(contains(error_of(j), "several sets of texture coordinates"));
 }
 
-TEST_CASE("anisotropy and attenuation as the principled BSDF and glass have them") {
+TEST_CASE("anisotropy, light that passes and attenuation as the principled BSDF and glass have them") {
     Json j = quad_scene();
     j["extensionsUsed"] = {"KHR_materials_anisotropy"};
     material(j)["extensions"]["KHR_materials_anisotropy"] = {{"anisotropyStrength", 0.5}};
@@ -150,6 +150,17 @@ TEST_CASE("anisotropy and attenuation as the principled BSDF and glass have them
     const double aspect = std::sqrt(1 - 0.9 * p.anisotropic.value), r2 = p.roughness.value * p.roughness.value;
     CHECK(r2 / aspect == Approx(0.4375).epsilon(1e-4));
     CHECK(r2 * aspect == Approx(0.25).epsilon(1e-4));
+
+    Json leaf = quad_scene();
+    leaf["extensionsUsed"] = {"KHR_materials_diffuse_transmission"};
+    material(leaf)["extensions"]["KHR_materials_diffuse_transmission"] = {
+        {"diffuseTransmissionFactor", 0.25}, {"diffuseTransmissionColorFactor", {0.5, 0.6, 0.1}}};
+    const Scene l = load(leaf);
+    REQUIRE(l.bsdfs.size() >= 2);
+    const auto through = std::find_if(l.bsdfs.begin(), l.bsdfs.end(),
+                                      [](const BsdfRecord& r) { return r.type == BsdfType::diffuse_transmitter; });
+    REQUIRE(through != l.bsdfs.end());
+    check_rgb(through->as<DiffuseTransmitter>().transmittance.value, {0.5f, 0.6f, 0.1f});
 
     Json glass = quad_scene();
     glass["extensionsUsed"] = {"KHR_materials_transmission", "KHR_materials_volume"};
