@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "formats/file_budget.h"
+#include "formats/gltf/meshopt.h"
 
 namespace ambilux::gltf {
 
@@ -92,8 +93,9 @@ Callbacks callbacks(Files& files) {
 }  // namespace
 
 void read_model(Context& context, const std::string& path) {
-    const std::string bytes = read_input(path, context.document.limits);
-    context.document.file_digests.push_back({path, sha256(bytes)});
+    const std::string whole = read_input(path, context.document.limits);
+    context.document.file_digests.push_back({path, sha256(whole)});
+    const std::string bytes = with_fallback_buffers(whole);
     if (bytes.size() > size_t(INT32_MAX)) context.fail("a glTF file may have 2 GiB at most");
     Files files{context, ""};
     tinygltf::TinyGLTF reader;
@@ -119,6 +121,7 @@ void read_model(Context& context, const std::string& path) {
     if (!read) context.fail("it is no sound glTF 2.0: " + (error.empty() ? "unknown reason" : error));
     if (!context.model.asset.version.starts_with("2"))
         context.fail("it is glTF " + context.model.asset.version + ", not 2.0");
+    unpack_views(context);
     context.image_bytes.resize(context.model.images.size());
     image_views(context);
     static const std::set<std::string> known = {"KHR_lights_punctual",        "KHR_materials_emissive_strength",
@@ -128,7 +131,8 @@ void read_model(Context& context, const std::string& path) {
                                                 "KHR_materials_specular",     "KHR_materials_sheen",
                                                 "KHR_materials_unlit",        "EXT_mesh_gpu_instancing",
                                                 "KHR_node_visibility",        "KHR_materials_pbrSpecularGlossiness",
-                                                "KHR_materials_anisotropy",   "KHR_materials_diffuse_transmission"};
+                                                "KHR_materials_anisotropy",   "KHR_materials_diffuse_transmission",
+                                                "EXT_meshopt_compression"};
     for (const std::string& name : context.model.extensionsRequired)
         if (!known.contains(name)) context.leave_out(name, "extension '" + name + "'");
     const auto& required = context.model.extensionsRequired;
