@@ -43,8 +43,8 @@ void add_morphs(Context& context, Mesh& mesh, const tinygltf::Primitive& primiti
     }
 }
 
-/// Every vertex to where the weighted mean of its joints takes it.
-void put_on_skin(Context& context, Mesh& mesh, const tinygltf::Primitive& primitive, const std::vector<Matrix>& joints,
+/// Every vertex to where the weighted mean of its joints takes it. True if they mirror the mesh.
+bool put_on_skin(Context& context, Mesh& mesh, const tinygltf::Primitive& primitive, const std::vector<Matrix>& joints,
                  const std::string& what) {
     const size_t n = mesh.positions.size();
     std::vector<Matrix> sums(n);
@@ -70,6 +70,7 @@ void put_on_skin(Context& context, Mesh& mesh, const tinygltf::Primitive& primit
             total[i / 4] += weight[i];
         }
     }
+    bool mirrored = false;
     for (size_t i = 0; i < n; ++i) {
         Matrix m = sums[i];
         if (!(total[i] > 0)) {
@@ -80,15 +81,18 @@ void put_on_skin(Context& context, Mesh& mesh, const tinygltf::Primitive& primit
         for (int r = 0; r < 3; ++r)
             for (double& v : m.m[r]) v /= total[i];
         for (int c = 0; c < 4; ++c) m.m[3][c] = c == 3;
+        const float side = mitsuba::determinant(m) < 0 ? -1.0f : 1.0f;
+        if (i == 0) mirrored = side < 0;
         mesh.positions[i] = mitsuba::to_affine(m).point(mesh.positions[i]);
         if (mesh.normals.empty()) continue;
-        // By the cofactors, so that it stays perpendicular to the surface.
+        // By the cofactors, so that it stays perpendicular to the surface, and on its side.
         const mitsuba::Vec3d x = mitsuba::column(m, 0), y = mitsuba::column(m, 1), z = mitsuba::column(m, 2),
                              a = cross(y, z), b = cross(z, x), c = cross(x, y);
-        const Vec3f v = mesh.normals[i];
+        const Vec3f v = mesh.normals[i] * side;
         mesh.normals[i] = {float(a.x * v.x + b.x * v.y + c.x * v.z), float(a.y * v.x + b.y * v.y + c.y * v.z),
                            float(a.z * v.x + b.z * v.y + c.z * v.z)};
     }
+    return mirrored;
 }
 
 }  // namespace
@@ -132,7 +136,7 @@ Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int 
         for (size_t i = 0; i + 1 < v.size(); i += 2) mesh.uvs.push_back({float(v[i]), float(v[i + 1])});
     }
     add_morphs(context, mesh, primitive, pose.weights, tex_coord, what);
-    if (!pose.joints.empty()) put_on_skin(context, mesh, primitive, pose.joints, what);
+    const bool turn = !pose.joints.empty() && put_on_skin(context, mesh, primitive, pose.joints, what);
     if (colors.varies) mesh.attributes.push_back({"vertex_color", false, 3, colors.values});
     if (colors.alpha_varies) mesh.attributes.push_back({"vertex_alpha", false, 1, colors.alphas});
     std::vector<uint32_t> indices;
@@ -151,6 +155,8 @@ Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int 
         for (size_t i = 0; i + 2 < indices.size(); i += 3)
             mesh.faces.push_back({indices[i], indices[i + 1], indices[i + 2]});
     }
+    if (turn)
+        for (auto& face : mesh.faces) std::swap(face[1], face[2]);
     check_mesh(context.where.file + ": " + what, mesh);
     return mesh;
 }

@@ -107,6 +107,27 @@ TEST_CASE("a mesh that shows its map in a mirror on one half is two, of two node
     CHECK(s.bsdfs.size() == 2);
 }
 
+TEST_CASE("joints that mirror keep the outside of a mesh") {
+    Json j = quad_scene();
+    const uint8_t first[16] = {};
+    const std::string bytes(reinterpret_cast<const char*>(first), sizeof first);
+    j["buffers"].push_back({{"byteLength", 16}, {"uri", data_uri("application/octet-stream", bytes)}});
+    j["bufferViews"].push_back({{"buffer", j["buffers"].size() - 1}, {"byteLength", 16}});
+    j["accessors"].push_back(
+        {{"bufferView", j["bufferViews"].size() - 1}, {"componentType", 5121}, {"count", 4}, {"type", "VEC4"}});
+    attributes(j)["JOINTS_0"] = j["accessors"].size() - 1;
+    attributes(j)["WEIGHTS_0"] = add_floats(j, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4", 4);
+    j["skins"] = {{{"joints", {2}}}};
+    j["nodes"].push_back({{"scale", {-1, 1, 1}}});
+    j["scenes"][0]["nodes"].push_back(2);
+    j["nodes"][0]["skin"] = 0;
+    const Scene s = load(j);
+    check_rgb(s.vertices[0].p, {1, -1, 0});
+    check_rgb(s.vertices[0].n, {0, 0, 1});
+    const Triangle& t = s.triangles[0];
+    CHECK(cross(s.vertices[t.v1].p - s.vertices[t.v0].p, s.vertices[t.v2].p - s.vertices[t.v0].p).z > 0);
+}
+
 TEST_CASE("specular-glossiness is converted") {
     Json j = quad_scene();
     j["extensionsUsed"] = j["extensionsRequired"] = {"KHR_materials_pbrSpecularGlossiness"};
