@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <cctype>
 #include <charconv>
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 
 #include "cli/commands.h"
@@ -101,6 +103,16 @@ RenderSettings RenderOptions::settings(const Scene& scene) const {
 }
 
 std::string refuse_negative(const std::string& text) { return text.starts_with("-") ? "it must not be negative" : ""; }
+
+void check_image_name(const std::string& option, const std::string& path, const std::string& ending) {
+    std::string has = std::filesystem::path(path).extension();
+    for (char& c : has) c = char(std::tolower(static_cast<unsigned char>(c)));
+    for (const char* other : {".bmp", ".exr", ".hdr", ".jpeg", ".jpg", ".pfm", ".png", ".ppm", ".tga", ".tif", ".tiff"})
+        if (has == other && has != ending)
+            throw Error(ExitCode::usage,
+                        fmt::format("{} {}: what is written there is no {}; name it {}{}", option, path, has, ending,
+                                    ending == ".exr" ? ", and ask for a PNG with --png" : ""));
+}
 
 LoadedScene load_scene(const SceneOptions& options, const std::vector<Output>& outputs) {
     check_outputs(outputs);

@@ -41,6 +41,12 @@ std::string roulette_warning(const Scene& scene, const RenderSettings& settings)
         albedo, 1.0 / (1.0 - double(settings.rr_cap)), std::min(0.999, std::max(albedo, double(settings.rr_cap))));
 }
 
+std::string depth_warning(const RenderSettings& settings) {
+    return settings.max_depth == 0 ? "max_depth=0: the shortest path has one segment, so that the image is black; 1 is "
+                                     "emission alone, -1 no limit"
+                                   : "";
+}
+
 std::string range_warning(const Scene& scene) {
     for (size_t i = 0; i < scene.emitters.size(); ++i) {
         const float most = max_component(scene.emitters[i].radiance.value);
@@ -58,8 +64,8 @@ std::string range_warning(const Scene& scene) {
 
 std::vector<std::string> render_warnings(const Scene& scene, const RenderSettings& settings) {
     std::vector<std::string> warnings;
-    for (const std::string& text :
-         {missing_light(scene.features, settings), roulette_warning(scene, settings), range_warning(scene)})
+    for (const std::string& text : {missing_light(scene.features, settings), roulette_warning(scene, settings),
+                                    range_warning(scene), depth_warning(settings)})
         if (!text.empty()) warnings.push_back(text);
     return warnings;
 }

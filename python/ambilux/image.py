@@ -126,7 +126,7 @@ class Image:
 
 def pixels(value: Any) -> np.ndarray:
     array = np.ascontiguousarray(value, dtype=np.float32)
-    if array.ndim != 3 or array.shape[2] != 3:
+    if array.ndim != 3 or array.shape[2] != 3 or array.size == 0:
         raise UsageError(f"an image has the shape (height, width, 3), not {array.shape}")
     return array
 
@@ -161,5 +161,5 @@ def compare(image: Any, reference: Any) -> dict[str, float | None]:
     """
     one, other = as_image(image), as_image(reference)
     if one.shape != other.shape:
-        raise UsageError(f"the image is {one.shape[1]}x{one.shape[0]}, the reference {other.shape[1]}x{other.shape[0]}")
+        raise UsageError(f"the image is {one.shape[1]}x{one.shape[0]}, the reference {other.shape[1]}x{other.shape[0]}: render both at the same size")
     return json.loads(_core.compare(one.rgb, other.rgb, other.stderr, other.samples))

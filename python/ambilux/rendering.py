@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import numbers
 import os
 import warnings
 from collections.abc import Iterator, Mapping
@@ -12,25 +13,29 @@ from typing import Any
 from ambilux import _core
 from ambilux.errors import AmbiluxWarning, UsageError
 from ambilux.image import DeviceArray, Image
-from ambilux.scene import Scene, load, setting_text
+from ambilux.scene import Scene, checked_size, load, setting_text
 
 
 def scene_of(scene: Scene | str | os.PathLike[str], size: tuple[int, int] | None) -> Scene:
     if not isinstance(scene, Scene):
         return load(scene, size=size)
-    return scene if size is None or tuple(size) == scene.size else scene.resized(size)
+    return scene if size is None or checked_size(size) == scene.size else scene.resized(size)
 
 
 def assignments(settings: Mapping[str, Any] | None, **named: Any) -> list[tuple[str, str]]:
     """Settings in the order in which they are set; `settings` has the last word."""
     given = {k: v for k, v in named.items() if v is not None}
-    return [(k, setting_text(v)) for k, v in [*given.items(), *(settings or {}).items()]]
+    if not isinstance(settings or {}, Mapping):
+        raise UsageError(f"settings {settings!r}: a dictionary is needed, such as {{'rr_depth': 3}}")
+    return [(str(k), setting_text(v)) for k, v in [*given.items(), *(settings or {}).items()]]
 
 
 def count(name: str, value: int | None) -> int | None:
-    if value is not None and (isinstance(value, bool) or int(value) != value or value < 0):
-        raise UsageError(f"{name} {value}: a whole number that is not negative is needed")
-    return None if value is None else int(value)
+    if value is None:
+        return None
+    if not isinstance(value, numbers.Real) or isinstance(value, bool) or value != value // 1 or not 0 <= value < 2**64:
+        raise UsageError(f"{name} {value}: a whole number that is not negative, below 2**64, is needed")
+    return int(value)
 
 
 def begin(scene: Scene | str | os.PathLike[str], size: tuple[int, int] | None, settings: Mapping[str, Any] | None, spp: int | None, time: float | None,

@@ -52,8 +52,8 @@ def test_errors_name_file_and_line(tmp_path):
 
 
 def test_usage_errors_are_value_errors():
-    for arguments in ({"size": (0, 4)}, {"light_picking": "best"}, {"limits": {"pixels": "many"}}):
-        with pytest.raises(ValueError):
+    for arguments in ({"size": (0, 4)}, {"size": 4}, {"size": "4x4"}, {"size": (4.5, 4)}, {"size": (4, 4, 3)}, {"light_picking": "best"}, {"limits": {"pixels": "many"}}):
+        with pytest.raises(ambilux.UsageError):
             ambilux.load(SCENES / "cornell.xml", **arguments)
 
 
