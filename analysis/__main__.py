@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from analysis import experiment as experiments
-from analysis import figures, flip_maps, latex, pack, pyramid, remarks, report, summary, tables
+from analysis import comparison, figures, flip_maps, latex, pack, pyramid, remarks, report, summary, tables
 
 
 def write(path, text):
@@ -74,6 +74,8 @@ def main(arguments=None):
     insets = {}
     for scene, inset in options.inset:
         insets.setdefault(scene, []).append(inset)
+        if len(insets[scene]) > comparison.INSETS:
+            parser.error(f"--inset {scene}: at most {comparison.INSETS} of a scene")
     try:
         said, made = analyse(options.results, options.output, insets, options.full_size)
     except experiments.InputError as e:
