@@ -42,9 +42,10 @@ std::string roulette_warning(const Scene& scene, const RenderSettings& settings)
 }
 
 std::string depth_warning(const RenderSettings& settings) {
-    return settings.max_depth == 0 ? "max_depth=0: the shortest path has one segment, so that the image is black; 1 is "
-                                     "emission alone, -1 no limit"
-                                   : "";
+    if (settings.max_depth != 0) return {};
+    return fmt::format(
+        "max_depth={}: the shortest path has one segment, so that the image is black; 1 is emission alone, -1 no limit",
+        settings.max_depth);
 }
 
 std::string range_warning(const Scene& scene) {
@@ -64,9 +65,13 @@ std::string range_warning(const Scene& scene) {
 
 std::vector<std::string> render_warnings(const Scene& scene, const RenderSettings& settings) {
     std::vector<std::string> warnings;
-    for (const std::string& text : {missing_light(scene.features, settings), roulette_warning(scene, settings),
-                                    range_warning(scene), depth_warning(settings)})
-        if (!text.empty()) warnings.push_back(text);
+    const auto add = [&](std::string text) {
+        if (!text.empty()) warnings.push_back(std::move(text));
+    };
+    add(missing_light(scene.features, settings));
+    add(roulette_warning(scene, settings));
+    add(range_warning(scene));
+    add(depth_warning(settings));
     return warnings;
 }
 

@@ -144,8 +144,9 @@ void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
             xml_node node = add_object(parent, "emitter", "envmap");
             add_text(node, "filename", float_image(w, w.scene.textures[size_t(e.radiance.texture)], splat(1)));
             add_number(node, "scale", e.radiance.value.x);
-            add_transform(node, "to_world", e.to_world);
+            return add_transform(node, "to_world", e.to_world);
         }
+        case EmitterType::count: return;
     }
 }
 

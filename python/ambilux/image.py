@@ -67,6 +67,8 @@ class Image:
         self.rgb = pixels(rgb)
         #: Standard error of every value; None where it is not known.
         self.stderr = None if stderr is None else pixels(stderr)
+        if stderr is not None and self.stderr.shape != self.rgb.shape:
+            raise UsageError(f"standard errors of shape {self.stderr.shape} do not belong to an image of {self.rgb.shape}")
         #: Per pixel; 0 if it is not known.
         self.samples = samples
         #: Of the render, as `ambilux render --json` writes them.

@@ -40,6 +40,8 @@ def count(name: str, value: int | None) -> int | None:
 
 def begin(scene: Scene | str | os.PathLike[str], size: tuple[int, int] | None, settings: Mapping[str, Any] | None, spp: int | None, time: float | None,
           **named: Any) -> _core.Render:
+    if not isinstance(time, (numbers.Real, type(None))):
+        raise UsageError(f"time {time!r}: seconds are needed")
     core = _core.Render(scene_of(scene, size)._core, assignments(settings, **named), count("spp", spp), time)
     for text in core.warnings:
         warnings.warn(text, AmbiluxWarning, stacklevel=4)
@@ -112,7 +114,7 @@ def progressive(scene: Scene | str | os.PathLike[str], integrator: str = "path",
     >>> steps[-1].samples, all(a.samples < b.samples for a, b in zip(steps, steps[1:]))
     (64, True)
     """
-    if not every > 0:
+    if not isinstance(every, numbers.Real) or not every > 0:
         raise UsageError(f"every {every}: more than zero seconds are needed")
     backend = backend_of(device, backend, settings)
     core = begin(scene, size, settings, spp, time, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend)
@@ -133,6 +135,8 @@ def reference(scene: Scene | str | os.PathLike[str], path: str | os.PathLike[str
               size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
               settings: Mapping[str, Any] | None = None) -> Image:
     """Ground truth with its standard error, in the file at `path`, which is continued if it exists. An interrupt saves what is finished."""
+    if os.fspath(path).lower().endswith(".png"):
+        raise UsageError(f"{os.fspath(path)}: a reference is an EXR file, whose name ends in .exr")
     core, attributes = _core.reference(scene_of(scene, size)._core, os.fspath(path), count("spp", spp),
                                        assignments(settings, seed=seed, max_depth=max_depth, backend=backend))
     return Image._of(core, attributes=json.loads(attributes))

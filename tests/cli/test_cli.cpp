@@ -222,6 +222,8 @@ TEST_CASE("light that no strategy in use can find is named, in the warning and b
     CHECK(contains(render_with({"-i", "bdpt"}).err, "no strategy finds"));
     // The lamp of the Cornell box has extent, and its surfaces are diffuse.
     CHECK_FALSE(contains(run(folder, render(folder, {"-i", "path", "--spp", "1"})).err, "warning"));
+    CHECK(contains(run(folder, render(folder, {"--max-depth", "0", "--spp", "1"})).err, "max_depth=0: the shortest"));
+    CHECK(contains(run(folder, render(folder, {"--resume", "--spp", "1"})).err, "is not there: the render begins anew"));
 
     const json choice =
         json::parse(render_with({"-i", "bdpt", "--set", "bdpt.auto=true", "--json", "-"}).out)["choice"];
