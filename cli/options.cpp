@@ -105,6 +105,8 @@ RenderSettings RenderOptions::settings(const Scene& scene) const {
 std::string refuse_negative(const std::string& text) { return text.starts_with("-") ? "it must not be negative" : ""; }
 
 void check_image_name(const std::string& option, const std::string& path, const std::string& ending) {
+    if (path == "-")
+        throw Error(ExitCode::usage, fmt::format("{} -: give a name; /dev/stdout is standard output", option));
     std::string has = std::filesystem::path(path).extension();
     for (char& c : has) c = char(std::tolower(static_cast<unsigned char>(c)));
     for (const char* other : {".bmp", ".exr", ".hdr", ".jpeg", ".jpg", ".pfm", ".png", ".ppm", ".tga", ".tif", ".tiff"})

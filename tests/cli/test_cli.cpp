@@ -48,6 +48,7 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {{"render", "-o", "x.exr"}, "SCENE is required"},
         {render(folder, {"--frob"}), "--frob"},
         {render(folder, {"--spp", "many"}), "error: Could not convert: --spp = many: that is no value"},
+        {{"render", kCornell, "-o", "-"}, "-o -: give a name"},
         {render(folder, {"--png", folder / "a.jpg"}), "no .jpg; name it .png"},
         {render(folder, {}, "a.png"), "name it .exr, and ask for a PNG with --png"},
         {render(folder, {"--range-size", "0"}), "at least one sample"},
@@ -223,7 +224,8 @@ TEST_CASE("light that no strategy in use can find is named, in the warning and b
     // The lamp of the Cornell box has extent, and its surfaces are diffuse.
     CHECK_FALSE(contains(run(folder, render(folder, {"-i", "path", "--spp", "1"})).err, "warning"));
     CHECK(contains(run(folder, render(folder, {"--max-depth", "0", "--spp", "1"})).err, "max_depth=0: the shortest"));
-    CHECK(contains(run(folder, render(folder, {"--resume", "--spp", "1"})).err, "is not there: the render begins anew"));
+    CHECK(
+        contains(run(folder, render(folder, {"--resume", "--spp", "1"})).err, "is not there: the render begins anew"));
 
     const json choice =
         json::parse(render_with({"-i", "bdpt", "--set", "bdpt.auto=true", "--json", "-"}).out)["choice"];
