@@ -34,7 +34,7 @@ def test_pbrt_and_gltf_are_told_by_their_endings(tmp_path):
     with pytest.raises(ambilux.SceneError, match="a.pbrt:2: shape 'torus' is not supported"):
         ambilux.load(path)
     (tmp_path / "b.gltf").write_text("{}")
-    with pytest.raises(ambilux.SceneError, match="no sound glTF"):
+    with pytest.raises(ambilux.SceneError, match="not valid glTF"):
         ambilux.load(tmp_path / "b.gltf")
 
 
