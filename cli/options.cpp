@@ -82,7 +82,8 @@ void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
     command.add_option("--seed", seed, help_of("seed"))->check(refuse_negative)->capture_default_str();
     command.add_option("--max-depth", max_depth, help_of("max_depth"));
     command.add_flag("--deterministic", deterministic, find_general_setting("deterministic")->what.help);
-    command.add_option("--set", set, "Any setting of `ambilux help settings`, such as estimator=nee")
+    command
+        .add_option("--set", set, "Any setting of `ambilux help settings`, such as estimator=nee; it has the last word")
         ->allow_extra_args(false)
         ->type_name("KEY=VALUE");
 }
