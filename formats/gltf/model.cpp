@@ -114,7 +114,7 @@ void read_model(Context& context, const std::string& path) {
     }
     if (!files.problem.empty()) context.fail(files.problem);
     std::replace(error.begin(), error.end(), '\n', ' ');
-    if (!read) context.fail("it is no sound glTF 2.0: " + (error.empty() ? "unknown reason" : error));
+    if (!read) context.fail("it is not valid glTF 2.0: " + (error.empty() ? "unknown reason" : error));
     if (!context.model.asset.version.starts_with("2"))
         context.fail("it is glTF " + context.model.asset.version + ", not 2.0");
     context.image_bytes.resize(context.model.images.size());
