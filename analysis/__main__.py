@@ -1,7 +1,7 @@
 """python -m analysis RESULTS -o OUT, python -m analysis pack RESULTS -o FILE.zip: see docs/experiments.md.
 
 Writes figures (.pdf, .png, .caption.txt), tables (.csv, .tex) and report.html into OUT. Exit codes: 0 done, 2 usage, 3 bad input (what does not depend on it
-is made all the same).
+is made all the same), 4 a file that cannot be written.
 """
 
 import argparse
@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from analysis import experiment as experiments
-from analysis import figures, flip_maps, latex, pack, pyramid, remarks, report, summary, tables
+from analysis import comparison, figures, flip_maps, latex, pack, pyramid, remarks, report, summary, tables
 
 
 def write(path, text):
@@ -28,6 +28,9 @@ def strategy_rows(data):
 def analyse(results, out, insets=None, full_size=False):
     """Reads the experiment folder `results` and writes everything into the folder `out`. Returns (remarks, figures.Made)."""
     data = experiments.load(results)
+    for scene in insets or {}:
+        if scene not in data.scenes:
+            raise experiments.InputError(f"--inset {scene}: there is no such scene; there are {', '.join(data.scenes)}")
     out.mkdir(parents=True, exist_ok=True)
     lines = summary.lines(data, flip_maps.of_runs(data))
     said = remarks.remarks(data, lines)
@@ -71,11 +74,16 @@ def main(arguments=None):
     insets = {}
     for scene, inset in options.inset:
         insets.setdefault(scene, []).append(inset)
+        if len(insets[scene]) > comparison.INSETS:
+            parser.error(f"--inset {scene}: at most {comparison.INSETS} of a scene")
     try:
         said, made = analyse(options.results, options.output, insets, options.full_size)
     except experiments.InputError as e:
         print(f"error: {e}", file=sys.stderr)
         return 3
+    except OSError as e:
+        print(f"error: {e.filename or options.output}: {e.strerror}", file=sys.stderr)
+        return 4
     for remark in said:
         print(f"note: {remark}", file=sys.stderr)
     for name, reason in made.missing:

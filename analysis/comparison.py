@@ -11,6 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.patches import Rectangle
 
 from analysis import images, style
+from analysis.experiment import InputError
 
 BESIDE = 6  # runs beside the reference; more stand below it
 ACROSS = 7
@@ -144,6 +145,10 @@ def load(experiment, scene):
 def make(experiment, scene, insets=None):
     """Yields the scene's figures, RUNS_PER_FIGURE runs in each. `insets`: [(x, y, size)] in pixels, or None to choose them."""
     reference, shown = load(experiment, scene)
+    height, width = reference.shape[:2]
+    for x, y, size in insets or []:
+        if x + size > width or y + size > height:
+            raise InputError(f"--inset {scene}={x},{y},{size}: the image has {width}x{height} pixels")
     chosen = insets or choose_insets(reference, [image for _, _, image in shown])
     how = "chosen by hand" if insets else "chosen where the runs' errors differ most from each other and the reference has contrast"
     yield style.Picture(

@@ -103,4 +103,4 @@ def remarks(experiment):
         low, high = min(clocks, key=clocks.get), max(clocks, key=clocks.get)
         yield f"clocks of the CPU moved: {clocks[low]:.0f} MHz at {low}, {clocks[high]:.0f} at {high}"
     if silent == len(experiment.scenes) * len(experiment.runs):
-        yield "what else ran on the machine was not recorded (an older version): a busy machine would not show"
+        yield "what else ran on the machine was not recorded (no render is complete, or an older version made them): a busy machine would not show"

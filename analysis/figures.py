@@ -33,7 +33,7 @@ def plan(experiment, insets):
     recorded = [(s, r) for s in experiment.scenes for r in experiment.runs if experiment.techniques(s, r)]
     if not recorded:
         def none():
-            raise style.NotMade("no techniques/SCENE/RUN_SEED/techniques.json (ambilux render --technique-images)")
+            raise style.NotMade("no techniques/SCENE/RUN_SEED/techniques.json (techniques = 6 in a [[run]])")
         yield "techniques, strategy_variance", none
     for scene, run in recorded:
         yield f"techniques_{scene}_{run}", lambda scene=scene, run=run: pyramid.make(experiment, scene, run)

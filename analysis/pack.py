@@ -70,10 +70,15 @@ def main(arguments):
     parser.add_argument("-o", "--output", type=Path, required=True, help="archive to write (.zip)")
     parser.add_argument("--no-images", action="store_true", help="leave images out; figures that show them cannot be made again then")
     options = parser.parse_args(arguments)
+    if options.output.is_dir():
+        parser.error(f"{options.output} is a folder; name the archive")
     try:
         contents = pack(options.results, options.output, not options.no_images)
     except experiment.InputError as e:
         print(f"error: {e}", file=sys.stderr)
         return 3
+    except OSError as e:
+        print(f"error: {e.filename or options.output}: {e.strerror}", file=sys.stderr)
+        return 4
     print(f"{len(contents['files'])} files of {contents['experiment']} in {options.output}")
     return 0

@@ -109,7 +109,7 @@ def make(experiment, scene, run):
     """Yields the weighted and the raw pyramid of the lowest seed of a run."""
     found = experiment.techniques(scene, run)
     if not found:
-        raise style.NotMade(f"no techniques/{scene}/{run}_SEED/techniques.json (ambilux render --technique-images)")
+        raise style.NotMade(f"no techniques/{scene}/{run}_SEED/techniques.json (techniques = 6 in a [[run]])")
     seed, folder = found[0]
     techniques = read(folder)
     for kind in KINDS:

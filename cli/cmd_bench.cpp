@@ -30,12 +30,8 @@ struct Options {
     uint32_t frames = 100;
 };
 
-/// Columns of the rows in `rows`, as far as they are numbers or text.
+/// A table of objects that hold numbers or text.
 void print_rows(const nlohmann::json& rows) {
-    if (!rows.is_array() || rows.empty() || !rows[0].is_object()) {
-        std::cout << rows.dump(2) << "\n";
-        return;
-    }
     for (const auto& [key, value] : rows[0].items()) std::cout << fmt::format("{:>18}", key);
     std::cout << "\n";
     for (const auto& row : rows) {
@@ -51,7 +47,7 @@ int report(const Options& o, const nlohmann::json& json) {
     if (!o.json.empty()) write_json(o.json, json);
     if (o.json == "-") return int(ExitCode::done);
     for (const auto& [key, value] : json.items()) {
-        if (value.is_array()) {
+        if (value.is_array() && !value.empty() && value[0].is_object()) {
             std::cout << key << ":\n";
             print_rows(value);
         } else {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iostream>
 
 #include "cli/commands.h"
@@ -10,13 +11,22 @@
 namespace ambilux {
 namespace {
 
-/// Of all commands if `name` is empty.
-std::string help_of_command(const CLI::App& app, const std::string& name) {
+/// Of all commands if `names` is empty; of {"bench", "rays"} that of `bench rays`.
+std::string help_of_command(const CLI::App& app, const std::vector<std::string>& names) {
     // app.help() would be that of the command `help`.
-    if (name.empty()) return app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
-    for (const CLI::App* const command : app.get_subcommands([](const CLI::App*) { return true; }))
-        if (command->get_name() == name) return command->help(app.get_name());
-    throw Error(ExitCode::usage, fmt::format("help: there is no command '{}'", name));
+    if (names.empty()) return app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
+    const CLI::App* command = &app;
+    std::string path;
+    for (const std::string& name : names) {
+        path += (path.empty() ? "" : " ") + command->get_name();
+        const auto below = commands_of(*command);
+        const auto found = std::find_if(below.begin(), below.end(), [&](auto* c) { return c->get_name() == name; });
+        if (found == below.end())
+            throw Error(ExitCode::usage,
+                        fmt::format("help: there is no command '{}'; {} --help lists them", name, path));
+        command = *found;
+    }
+    return command->help(path);
 }
 
 }  // namespace
@@ -26,8 +36,8 @@ void add_help(CLI::App& app, Run& run) {
         "help",
         "Options of a command; settings and integrators with their values and defaults; manual page, completion");
     command.require_subcommand(0, 1);
-    auto asked = std::make_shared<std::string>();
-    command.add_option("COMMAND", *asked, "A command whose options to print, such as render");
+    auto asked = std::make_shared<std::vector<std::string>>();
+    command.add_option("COMMAND", *asked, "A command whose options to print, such as render or bench rays");
     command.callback([&app, &command, asked, &run] {
         if (!command.get_subcommands().empty()) return;
         run = [&app, asked] {

@@ -19,7 +19,9 @@ void print(const nlohmann::json& value, int indent) {
     for (const auto& [key, v] : value.items()) {
         const bool list_of_objects = v.is_array() && !v.empty() && v[0].is_structured();
         std::cout << fmt::format("{:{}}{}:", "", indent, key);
-        if (v.is_object() || list_of_objects) {
+        if (v.is_object() && v.empty()) {
+            std::cout << " none\n";
+        } else if (v.is_object() || list_of_objects) {
             std::cout << "\n";
             if (v.is_object()) {
                 print(v, indent + 2);

@@ -24,6 +24,8 @@ struct Options {
 
 int reference(const Options& o) {
     if (o.output.empty()) throw Error(ExitCode::usage, "-o: the reference needs a name");
+    check_image_name("-o", o.output, ".exr");
+    check_image_name("--png", o.png, ".png");
     const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
     ReferenceRequest request = reference_request(o.output, o.spp, o.render.settings(loaded.scene));
     const ReferenceLock lock(o.output, nullptr);

@@ -59,15 +59,19 @@ void check(const Options& o) {
     if (o.exposure && o.png.empty())
         throw Error(ExitCode::usage, "--exposure changes only the PNG: give --png FILE as well");
     if (o.output.empty()) throw Error(ExitCode::usage, "-o: the image needs a name");
+    check_image_name("-o", o.output, ".exr");
+    check_image_name("--png", o.png, ".png");
     check_aovs(o.aovs);
     if (!o.techniques.empty()) {
         make_folders(o.techniques);
         check_writable(o.techniques + "/techniques.json");
     }
     if (!o.by_ranges()) return;
-    if (o.range_size && *o.range_size == 0) throw Error(ExitCode::usage, "--range-size: a range has samples");
-    if (o.block_films && *o.block_films == 0) throw Error(ExitCode::usage, "--block-films: a block has films");
-    if (o.checkpoint && !(*o.checkpoint > 0)) throw Error(ExitCode::usage, "--checkpoint: seconds between two states");
+    if (o.range_size && *o.range_size == 0) throw Error(ExitCode::usage, "--range-size: at least one sample is needed");
+    if (o.block_films && *o.block_films == 0)
+        throw Error(ExitCode::usage, "--block-films: at least one film is needed");
+    if (o.checkpoint && !(*o.checkpoint > 0))
+        throw Error(ExitCode::usage, "--checkpoint: more than zero seconds are needed");
     for (const auto& [option, given] : {std::pair("--outliers", o.outliers > 0),
                                         {"--technique-images", !o.techniques.empty()},
                                         {"--tev", !o.tev.empty()}})
@@ -161,10 +165,9 @@ int render_by_ranges(const Options& o) {
     }
     reserve.release();
     if (!result.state_path.empty())
-        log_error(
-            fmt::format("stopped by a signal, or because another rank ended: {} samples per pixel are in {}; the "
-                        "same command with --resume goes on",
-                        result.position.samples, result.state_path));
+        log_error(fmt::format(
+            "stopped by a signal{}: {} samples per pixel are in {}; the same command with --resume goes on",
+            ranks().size() > 1 ? ", or because another rank ended" : "", result.position.samples, result.state_path));
     for (const std::string& warning : render_warnings(loaded.scene, used_settings(request.settings, result.stats)))
         log_warning(warning);
     if (result.position.samples > 0) write_images(o, loaded.scene, request.settings, result.stats, result.film);

@@ -3,16 +3,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <vector>
-
 #include "core/version.h"
 
 namespace ambilux {
 namespace {
-
-std::vector<const CLI::App*> commands_of(const CLI::App& app) {
-    return app.get_subcommands([](const CLI::App*) { return true; });
-}
 
 std::vector<const CLI::Option*> options_of(const CLI::App& app) {
     return app.get_options([](const CLI::Option*) { return true; });
@@ -83,6 +77,10 @@ void add_words(const CLI::App& app, const std::string& path, std::string& known,
 
 }  // namespace
 
+std::vector<const CLI::App*> commands_of(const CLI::App& app) {
+    return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
 std::string manual_page(const CLI::App& app) {
     std::string page = fmt::format(
         ".TH AMBILUX 1 \"\" \"ambilux {0}\"\n.SH NAME\nambilux \\- a testbed for bidirectional light transport\n"
@@ -93,7 +91,8 @@ std::string manual_page(const CLI::App& app) {
     add_commands(app, "ambilux", page);
     page +=
         ".SH EXIT STATUS\n.TP\n0\ndone\n.TP\n2\nwrong use\n.TP\n3\nbad input: the message names file and line\n"
-        ".TP\n4\na device or a resource failed\n.TP\n5\ninterrupted; what was finished is saved\n";
+        ".TP\n4\na device or a resource failed\n.TP\n5\ninterrupted; what was finished is saved\n.TP\n6\nstress: some "
+        "rows failed, are invalid or were refused\n";
     return page;
 }
 

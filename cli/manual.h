@@ -3,8 +3,12 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <vector>
 
 namespace ambilux {
+
+/// All commands below `app`, given or not.
+std::vector<const CLI::App*> commands_of(const CLI::App& app);
 
 /// A page of man(7) macros.
 std::string manual_page(const CLI::App& app);

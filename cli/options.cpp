@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include <cctype>
 #include <charconv>
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 
 #include "cli/commands.h"
@@ -31,17 +33,19 @@ static std::string help_of(const std::string& key) {
 void SceneOptions::add_to(CLI::App& command) {
     command.add_option("SCENE", path, "Scene: Mitsuba XML, pbrt-v4 (.pbrt, .pbrt.gz) or glTF 2.0 (.gltf, .glb)")
         ->required();
-    command.add_option("--size", size, "Film size WxH instead of the scene's");
+    command.add_option("--size", size, "Film size instead of the scene's")->type_name("WxH");
     command.add_flag("--lenient", lenient,
                      "Replace what is not known and list each substitution, instead of refusing the scene");
-    command.add_option("-D,--define", parameters, "Value NAME=VALUE of a $parameter of the scene")
-        ->allow_extra_args(false);
+    command.add_option("-D,--define", parameters, "Value of a $parameter of the scene")
+        ->allow_extra_args(false)
+        ->type_name("NAME=VALUE");
     command.add_option("--light-picking", light_picking, "How light sampling chooses an emitter: power or uniform")
         ->capture_default_str();
     command
         .add_option("--limits", limits,
-                    "KEY=N: what the scene may ask for at most; defaults are " + limits_text({}) + " (docs/limits.md)")
-        ->allow_extra_args(false);
+                    "What the scene may ask for at most; defaults are " + limits_text({}) + " (docs/limits.md)")
+        ->allow_extra_args(false)
+        ->type_name("KEY=N");
 }
 
 LoadOptions SceneOptions::load_options() const {
@@ -77,9 +81,11 @@ void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
     command.add_option("--textures", textures, help_of("textures"))->capture_default_str();
     command.add_option("--seed", seed, help_of("seed"))->check(refuse_negative)->capture_default_str();
     command.add_option("--max-depth", max_depth, help_of("max_depth"));
-    command.add_flag("--deterministic", deterministic, help_of("deterministic"));
-    command.add_option("--set", set, "KEY=VALUE: any setting of `ambilux help settings`, such as estimator=nee")
-        ->allow_extra_args(false);
+    command.add_flag("--deterministic", deterministic, find_general_setting("deterministic")->what.help);
+    command
+        .add_option("--set", set, "Any setting of `ambilux help settings`, such as estimator=nee; it has the last word")
+        ->allow_extra_args(false)
+        ->type_name("KEY=VALUE");
 }
 
 RenderSettings RenderOptions::settings(const Scene& scene) const {
@@ -101,6 +107,18 @@ RenderSettings RenderOptions::settings(const Scene& scene) const {
 }
 
 std::string refuse_negative(const std::string& text) { return text.starts_with("-") ? "it must not be negative" : ""; }
+
+void check_image_name(const std::string& option, const std::string& path, const std::string& ending) {
+    if (path == "-")
+        throw Error(ExitCode::usage, fmt::format("{} -: give a name; /dev/stdout is standard output", option));
+    std::string has = std::filesystem::path(path).extension();
+    for (char& c : has) c = char(std::tolower(static_cast<unsigned char>(c)));
+    for (const char* other : {".bmp", ".exr", ".hdr", ".jpeg", ".jpg", ".pfm", ".png", ".ppm", ".tga", ".tif", ".tiff"})
+        if (has == other && has != ending)
+            throw Error(ExitCode::usage,
+                        fmt::format("{} {}: what is written there is no {}; name it {}{}", option, path, has, ending,
+                                    ending == ".exr" ? ", and ask for a PNG with --png" : ""));
+}
 
 LoadedScene load_scene(const SceneOptions& options, const std::vector<Output>& outputs) {
     check_outputs(outputs);

@@ -7,6 +7,7 @@
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/manual.h"
 #include "core/error.h"
 #include "core/log.h"
 #include "core/ranks.h"
@@ -21,6 +22,26 @@ int flushed(int code) {
     if (std::cout) return code;
     log_error("cannot write to standard output");
     return code == int(ExitCode::done) ? int(ExitCode::device) : code;
+}
+
+std::string names_of(const std::vector<const CLI::App*>& commands) {
+    std::string names;
+    for (const CLI::App* c : commands) names += (names.empty() ? "" : ", ") + c->get_name();
+    return names;
+}
+
+/// What CLI11 says of wrong options, and where to read on.
+std::string wrong_use(const CLI::App* app, const CLI::Error& e) {
+    std::string path = app->get_name();
+    while (!app->get_subcommands().empty()) {
+        app = app->get_subcommands().front();
+        path += " " + app->get_name();
+    }
+    std::string what = e.what();
+    if (e.get_name() == "ConversionError") what += ": that is no value of this option";
+    if (const auto below = commands_of(*app); e.get_name() == "RequiredError" && !below.empty())
+        what = "one of these is needed: " + names_of(below);
+    return fmt::format("error: {}. See {} --help\n", what, path);
 }
 
 /// Each rank would do all of the work, and write the same files.
@@ -38,10 +59,11 @@ void check_ranks(const std::string& command) {
 
 int run_program(int argc, const char* const* argv) {
     install_interrupt_handler();
-    CLI::App app{"Ambilux: a testbed for bidirectional light transport"};
+    CLI::App app{"Ambilux: a testbed for bidirectional light transport", "ambilux"};
     app.set_version_flag("--version", fmt::format("ambilux {} ({})", version(), git_revision()));
     app.require_subcommand(1);
     app.fallthrough();
+    app.failure_message(wrong_use);
     bool quiet = false;
     app.add_flag("--quiet", quiet, "No progress and no messages but errors");
     Run run;
@@ -58,11 +80,7 @@ int run_program(int argc, const char* const* argv) {
     add_help(app, run);
     const auto named = [&](CLI::App* command) { return argc > 1 && command->check_name(argv[1]); };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(named).empty()) {
-        log_error(
-            fmt::format("unknown command '{}': render, info, convert, reference, compare, experiment, stress, bench, "
-                        "trace, view and help are "
-                        "known",
-                        argv[1]));
+        log_error(fmt::format("unknown command '{}': {} are known", argv[1], names_of(commands_of(app))));
         return int(ExitCode::usage);
     }
     try {

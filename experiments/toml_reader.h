@@ -52,7 +52,8 @@ struct TomlReader {
     }
     const toml::array& array(const toml::node& node, std::string_view key) const {
         if (!node.is_array() || node.as_array()->empty())
-            throw error(node, fmt::format("'{}' must be a list that is not empty", key));
+            throw error(node, node.is_table() ? fmt::format("one of several: write [[{}]]", key)
+                                              : fmt::format("'{}' must be a list that is not empty", key));
         return *node.as_array();
     }
     /// A value of any simple type as the text that --set would take.

@@ -13,7 +13,7 @@ struct Estimate {
     uint64_t samples = 0;  ///< 0: exactly known means (all variances zero)
     std::vector<double> mean, variance_of_mean;
     /// Means of independent parts of equal weight, for images whose pixels are not independent of each other (one light
-    /// walk splats onto many): the variance of a block then comes from the parts. Empty: pixels are independent.
+    /// subpath splats onto many): the variance of a block then comes from the parts. Empty: pixels are independent.
     std::vector<std::vector<double>> batches = {};
 };
 

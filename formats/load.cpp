@@ -1,5 +1,7 @@
 #include "formats/load.h"
 
+#include <filesystem>
+
 #include "core/error.h"
 #include "formats/gltf/load.h"
 
@@ -19,6 +21,7 @@ bool ends_with(const std::string& path, std::string_view ending) {
 }  // namespace
 
 Scene load_scene_file(const std::string& path, const LoadOptions& options) {
+    if (std::filesystem::is_directory(path)) throw input_error(path, 0, "it is a folder: name the scene's file in it");
     const bool pbrt = ends_with(path, ".pbrt") || ends_with(path, ".pbrt.gz");
     const bool gltf = ends_with(path, ".gltf") || ends_with(path, ".glb");
     if (!pbrt && !gltf) return load_mitsuba(path, options);

@@ -100,8 +100,8 @@ namespace {
 
 std::string lacking(const std::string& path, const std::string& why) {
     return fmt::format(
-        "the image lacks light of paths such as {} (Ld: point, spot, directional or hiddenarea emitter, "
-        "Lb: collimated or directionalarea, S: delta lobe, D: another one, E: camera), which {}",
+        "the image lacks light of paths such as {} (L: emitter; Ld: point, spot, directional or hiddenarea; "
+        "Lb: collimated or directionalarea; S: delta lobe, D: another one; E: camera), which {}",
         path, why);
 }
 

@@ -41,6 +41,13 @@ std::string roulette_warning(const Scene& scene, const RenderSettings& settings)
         albedo, 1.0 / (1.0 - double(settings.rr_cap)), std::min(0.999, std::max(albedo, double(settings.rr_cap))));
 }
 
+std::string depth_warning(const RenderSettings& settings) {
+    if (settings.max_depth != 0) return {};
+    return fmt::format(
+        "max_depth={}: the shortest path has one segment, so that the image is black; 1 is emission alone, -1 no limit",
+        settings.max_depth);
+}
+
 std::string range_warning(const Scene& scene) {
     for (size_t i = 0; i < scene.emitters.size(); ++i) {
         const float most = max_component(scene.emitters[i].radiance.value);
@@ -58,9 +65,13 @@ std::string range_warning(const Scene& scene) {
 
 std::vector<std::string> render_warnings(const Scene& scene, const RenderSettings& settings) {
     std::vector<std::string> warnings;
-    for (const std::string& text :
-         {missing_light(scene.features, settings), roulette_warning(scene, settings), range_warning(scene)})
-        if (!text.empty()) warnings.push_back(text);
+    const auto add = [&](std::string text) {
+        if (!text.empty()) warnings.push_back(std::move(text));
+    };
+    add(missing_light(scene.features, settings));
+    add(roulette_warning(scene, settings));
+    add(range_warning(scene));
+    add(depth_warning(settings));
     return warnings;
 }
 

@@ -59,7 +59,8 @@ public:
             // All waves of a pass are queued at once; the host waits for the last. Of parts, those of one sample:
             // behind one that failed, those of the next sample would overwrite what is done of this one.
             const bool one = plan_.in_parts() || is_set(interrupt);
-            const uint32_t pass = one ? 1 : std::min(count - done, preferred_batch());
+            uint32_t pass = one ? 1 : std::min(count - done, preferred_batch());
+            if (kLearns) pass = learning_pass(pass, samples_, plan_.wave.samples);
             const auto pass_start = Clock::now();
             const uint32_t waves_before = read_state().done, first_tile = next_tile_;
             film_is_whole_ = false;

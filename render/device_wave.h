@@ -1,6 +1,8 @@
 // How large the waves of a device are.
 #pragma once
 
+#include <algorithm>
+
 #include "integrators/integrator.h"
 
 namespace ambilux {
@@ -52,6 +54,12 @@ WaveProgress progress_of(const Wave& wave, uint32_t first_tile, uint32_t waves);
 /// as for many.
 inline uint32_t whole_waves(uint32_t batch, uint32_t wave_samples) {
     return (batch + wave_samples - 1) / wave_samples * wave_samples;
+}
+
+/// Samples of the next waves, at most `pass`, where waves learn from those before them, after `done` samples: the first
+/// waves are small.
+inline uint32_t learning_pass(uint32_t pass, uint64_t done, uint32_t wave_samples) {
+    return done >= wave_samples ? pass : std::min(pass, std::max(1u, uint32_t(done)));
 }
 
 }  // namespace ambilux

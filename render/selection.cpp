@@ -165,7 +165,7 @@ std::vector<SelectionCandidate> selection_candidates(const RenderSettings& setti
 }
 
 double selection_work(const PilotWork& w, const SelectionCandidate& candidate, bool cuda) {
-    // Fitted to renders (docs/performance.md): shadow rays and connections in rays of walks; what the longer records
+    // Fitted to renders (docs/performance.md): shadow rays and connections in rays of subpaths; what the longer records
     // and further launches of bidirectional methods cost.
     const double eye = w.eye_rays + kShadowWork * w.next_events,
                  light = double(candidate.pilot.light_subpaths) * (w.light_rays + kShadowWork * w.splats);

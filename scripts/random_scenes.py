@@ -109,8 +109,9 @@ def methods_of(scene, seed, options):
     on_cpu, instanced = options.backend == "cpu", "instance" in scene.tags
     path = ["nee", "power", "uniform", "ris"] + (["instances"] if instanced else []) + ([] if "delta_light" in has else ["naive"])
     path += ["double", "cwbvh"] if on_cpu else [] if instanced else ["bvh2"]
-    bidirectional = ["bdpt power", "megakernel", "streaming", "lvc", "learned", "four light paths"] + (["bdpt double", "bdpt cwbvh"] if on_cpu else [])
+    bidirectional = ["bdpt power", "megakernel", "streaming", "lvc", "learned"] + (["bdpt double", "bdpt cwbvh"] if on_cpu else [])
     bidirectional += [] if lacks_light else ["no light images"]
+    bidirectional += [] if lacks_light and "delta" in has else ["four light paths"]  # caustics seen through glass are for connections
     bidirectional += [] if {"delta", "hidden"} & has else ["light"]  # what it cannot see
     chosen = [(choose.choice(path), "path"), ("bdpt", "path"), (choose.choice(bidirectional), "bdpt" if lacks_light else "path")]
     passes_panes = {"null", "delta_light"} <= has and "thindielectric" in scene.tags  # shadow rays of Mitsuba's volpath

@@ -37,13 +37,20 @@ struct LearnDraws {
     }
 };
 
-/// The light vertices of a wave by clusters.
+/// The light vertices of a wave by clusters. Each cluster is counted in parts, since threads that add to one counter
+/// wait for each other.
 struct ClusteredVertices {
+    static constexpr uint32_t kParts = 16;
+
     uint32_t* first;    ///< by cluster: in `sorted`; one more at the end
-    uint32_t* counts;   ///< by cluster, while they are counted
-    uint32_t* place;    ///< by light vertex: its cluster, and which of it
+    uint32_t* counts;   ///< by cluster and part, while they are counted
+    uint32_t* starts;   ///< by cluster and part: in `sorted`
+    uint32_t* place;    ///< by light vertex: which of its part
     uint16_t* cluster;  ///< by light vertex
     uint32_t* sorted;   ///< light vertices
+
+    /// Of light vertex i: those of a warp have one part, warps at work have all.
+    AMBILUX_HD uint32_t part(uint32_t i) const { return cluster[i] * kParts + i / 32 % kParts; }
 };
 
 struct LearnedSearch;
@@ -71,7 +78,7 @@ struct LearnedSource {
 /// A light vertex that an eye vertex of `cell` has drawn.
 struct LearnedDraw {
     const LearnedSource& source;
-    uint32_t cell, cluster;
+    uint32_t cell, cluster, place;
 
     AMBILUX_HD bool from_cache() const { return true; }
     /// One over the probability of the vertex in a draw.
@@ -88,8 +95,11 @@ struct LearnedDraw {
     }
     /// Notes in `c`, whose value is not scaled yet, what is to be learned from it: the second moment of what this draw
     /// would bring if its cluster were certain, without the throughput of the eye subpath. The least variance has
-    /// draws in proportion to its root.
+    /// draws in proportion to its root. Of a wave of many subpaths, some light vertices teach for the others.
     AMBILUX_HD void mark(Candidate<BidirectionalMis>& c, Rgb throughput, const WaveState& state) const;
+
+private:
+    static constexpr uint32_t kTeachers = 1u << 20;  ///< light subpaths of a wave whose vertices teach
 };
 
 /// LightVertexSearch.
@@ -100,7 +110,9 @@ struct LearnedSearch {
     const BidirectionalVertex& z;
     uint32_t max_depth, cell;
 
-    AMBILUX_HD LearnedDraw draw(uint32_t place) const { return {source, cell, source.by_cluster.cluster[place]}; }
+    AMBILUX_HD LearnedDraw draw(uint32_t place) const {
+        return {source, cell, source.by_cluster.cluster[place], place};
+    }
 
     AMBILUX_HD uint32_t find(uint32_t& next) const {
         const uint32_t size = source.vertices.counter->size();
@@ -138,12 +150,15 @@ AMBILUX_HD LearnedSearch LearnedSource::search(const RngKey& key, uint32_t depth
 
 AMBILUX_HD void LearnedDraw::mark(Candidate<BidirectionalMis>& c, Rgb throughput, const WaveState& state) const {
     const DrawTable& table = source.table;
+    c.film = {bits_float(kNone), 0.0f};
+    const uint32_t taught = 1 + state.light_subpaths / kTeachers;
+    if (place % taught != 0) return;
     const uint32_t* first = source.by_cluster.first + cluster;
     const float y = luminance(c.value) * mis_weight(c.ratio) / luminance(throughput);
     const float n = float(first[1] - first[0]), N = float(state.light_subpaths);
     float score = y * inverse_probability() / (N * float(source.draws));  // of a light subpath
-    score *= y * n / N * table.inverse_unit;
-    c.film = {bits_float(score >= 1.0f ? table.row(cell) + cluster : kNone), score < 0x1p44f ? score : 0x1p44f};
+    score *= y * n / N * table.inverse_unit * float(taught);
+    if (score >= 1.0f) c.film = {bits_float(table.row(cell) + cluster), score < 0x1p44f ? score : 0x1p44f};
 }
 
 }  // namespace ambilux

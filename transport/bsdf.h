@@ -1,16 +1,16 @@
 // The BSDF interface: a value type with resolved parameters, evaluated in the local shading frame.
 //
 // Conventions (Mitsuba's, Veach 1997 chapter 5 for the two modes):
-// - wi points to where the walk came from, wo to where it goes; both point away from the surface, unit, local frame, z
-// = shading normal.
+// - wi points to where the subpath came from, wo to where it goes; both point away from the surface, unit, local frame,
+// z = shading normal.
 // - eval returns f(wi,wo)·|cos(wo)|, without delta lobes. sample returns eval/pdf as `weight`; for delta lobes the
 // ratio in the limit.
-// - TransportMode::radiance: walk from the camera; importance: walk from a light. They differ by eta² on refraction
+// - TransportMode::radiance: subpath from the camera; importance: from a light. They differ by eta² on refraction
 // only; the factor for
 //   shading normals is applied outside, once around all BSDFs (transport/surface_scattering.h).
 // - pdf_sa is the density of wo per solid angle that sample uses; it is the same in both modes up to the swap of roles.
 // - sample takes u.x for the choice of a lobe and (u.y, u.z) for the direction, uniform in [0,1); false means that the
-// walk ends.
+// subpath ends.
 //
 // A new BSDF is a model in models/bsdf/, its functions in transport/bsdf/, and a line in models/bsdf_list.h.
 #pragma once

@@ -13,7 +13,7 @@ struct Scattering {
     Frame frame;     ///< shading frame of the BSDF, bump or normal map applied; n points to the side of the ray when
                      ///< `flipped`
     Vec3f ng;        ///< unit geometric normal, flipped with frame.n
-    Vec3f wi_world;  ///< unit, to where the walk came from
+    Vec3f wi_world;  ///< unit, to where the subpath came from
     Vec3f wi;        ///< the same in `frame`
     Bsdf bsdf;
     uint32_t record;     ///< place of its BsdfRecord in SceneView::bsdfs
@@ -49,8 +49,8 @@ AMBILUX_HD Vec3f perturbed_normal(const SceneView& scene, const BsdfRecord& reco
     return l2 > 0.0f && l2 < kInfinity ? n * inverse_sqrt(l2) : point.ns;
 }
 
-/// Prepares scattering of a walk that arrived from unit direction `wi_world` (pointing away from the surface). The side
-/// is that of the geometric normal: where the shading normal disagrees, nothing is scattered at all.
+/// Prepares scattering of a subpath that arrived from unit direction `wi_world` (pointing away from the surface). The
+/// side is that of the geometric normal: where the shading normal disagrees, nothing is scattered at all.
 template <Features F>
 AMBILUX_HD Scattering make_scattering(const SceneView& scene, const SurfacePoint& point, Vec3f wi_world) {
     const Material& material = material_at<F>(scene, point);

@@ -27,7 +27,7 @@ AMBILUX_HD float scatter_pdf(const Scattering& s, Vec3f wo_world) {
     return bsdf_pdf<F>(s.bsdf, frame.to_local(s.wi_world), frame.to_local(wo_world), TransportMode::radiance);
 }
 
-/// Draws a direction (u as for bsdf_sample); weight = scatter_eval/scatter_pdf. False when the walk ends here.
+/// Draws a direction (u as for bsdf_sample); weight = scatter_eval/scatter_pdf. False when the subpath ends here.
 template <Features F>
 AMBILUX_HD bool scatter_sample(const Scattering& s, Vec3f u, TransportMode mode, ScatterSample& out) {
     if constexpr (F.map_rules)

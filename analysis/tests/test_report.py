@@ -103,6 +103,22 @@ def test_folders_of_other_formats_are_refused(folder, tmp_path, capsys):
     assert "'format' is 99; this version reads formats 1 to 2" in capsys.readouterr().err
 
 
+def test_what_cannot_be_written_or_shown_is_an_error(folder, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert program.main([str(folder), "-o", str(tmp_path / "file")]) == 4
+    assert program.main(["pack", str(folder), "-o", str(tmp_path / "none" / "a.zip")]) == 4
+    assert program.main([str(folder), "-o", str(tmp_path / "out"), "--inset", "no_such=0,0,4"]) == 3
+    assert "--inset no_such: there is no such scene; there are box" in capsys.readouterr().err
+    assert program.main([str(folder), "-o", str(tmp_path / "out"), "--inset", "box=0,0,9999"]) == 3
+    assert "--inset box=0,0,9999: the image has" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as ended:
+        program.main([str(folder), "-o", str(tmp_path / "out"), *["--inset", "box=0,0,4"] * 3])
+    assert ended.value.code == 2 and "at most 2 of a scene" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as ended:
+        program.main(["pack", str(folder), "-o", str(tmp_path)])
+    assert ended.value.code == 2 and "name the archive" in capsys.readouterr().err
+
+
 def test_curve_is_the_arithmetic_mean(folder):
     data = experiment.load(folder)
     c = summary.curve(data, "box", "nee")

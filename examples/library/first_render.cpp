@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
         LoadOptions options;
         options.width = 64;
         options.height = 48;
-        const Scene scene = load_mitsuba(argv[1], options);
+        const Scene scene = load_scene_file(argv[1], options);
         RenderSettings settings = default_settings(scene);
         apply_setting(settings, "integrator", "bdpt");
         const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);

@@ -72,7 +72,10 @@ private:
         const uint64_t pixels = uint64_t(scene_.sensor.crop_width) * scene_.sensor.crop_height;
         ranges_ = {request_.range_size, request_.budget.samples};
         if (ranges_.size == 0 && ranges_.samples) ranges_.size = default_range_size(ranges_.samples, pixels, cuda);
-        if (!state_.exists()) return;
+        if (!state_.exists()) {
+            if (request_.resume) log_info(fmt::format("{} is not there: the render begins anew", state_.path()));
+            return;
+        }
         if (!request_.resume)
             throw Error(ExitCode::usage, fmt::format("{} holds a render that was stopped: go on with it with --resume, "
                                                      "or remove the file",

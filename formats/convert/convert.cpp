@@ -140,12 +140,13 @@ void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
             irradiance.value = irradiance.value * float(1 / M_PI);  // the loader multiplies, as Mitsuba does
             return add_color(w, node, "irradiance", irradiance);
         }
-        default: {
+        case EmitterType::envmap: {
             xml_node node = add_object(parent, "emitter", "envmap");
             add_text(node, "filename", float_image(w, w.scene.textures[size_t(e.radiance.texture)], splat(1)));
             add_number(node, "scale", e.radiance.value.x);
-            add_transform(node, "to_world", e.to_world);
+            return add_transform(node, "to_world", e.to_world);
         }
+        case EmitterType::count: return;
     }
 }
 

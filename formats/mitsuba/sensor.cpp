@@ -127,9 +127,12 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
     if (sensor.crop_x + sensor.crop_width > sensor.film_width ||
         sensor.crop_y + sensor.crop_height > sensor.film_height)
         in.fail(in.where("crop_width"), "the crop window is not inside of the film");
-    if (uint64_t(sensor.crop_width) * sensor.crop_height > kMostPixels && !builder.options.width)
-        in.fail(in.where("width"), fmt::format("a film of {}x{} has more pixels than can be numbered ({})",
-                                               sensor.crop_width, sensor.crop_height, kMostPixels));
+    const uint64_t pixels = uint64_t(sensor.crop_width) * sensor.crop_height, most = builder.options.limits.pixels;
+    if (!builder.options.width && pixels > std::min(most, kMostPixels))
+        in.fail(in.where("width"),
+                fmt::format("a film of {}x{} has more pixels than {}", sensor.crop_width, sensor.crop_height,
+                            pixels > most ? fmt::format("--limits pixels={}; --size gives it another size", most)
+                                          : "can be numbered"));
     read_filter(builder, in, sensor);
     // How files are written and shown; our images are linear and complete.
     in.ignore({"gamma",

@@ -42,9 +42,7 @@ struct PathIntegrator {
         return {p.rules, p.waves, SamplingSettings::plan(settings)};
     }
     static std::vector<std::string> skipped(const Scene& scene, const Policy& policy) {
-        std::vector<std::string> parts = skipped_path_parts(scene, policy.rules);
-        skipped_features(F, parts);
-        return parts;
+        return skipped_path_parts(scene, policy.rules);
     }
 
     struct Memory {

@@ -67,15 +67,19 @@ def transform_steps(value: Any, path: str) -> Iterator[str]:
             fail(path, f"a transform has 16 or 9 numbers, not {len(matrix)}")
         yield element("matrix", value=joined(matrix))
         return
+    if isinstance(value, str) or not hasattr(value, "__iter__"):
+        fail(path, f"a transform is a matrix or steps such as {{'translate': [0, 1, 0]}}, not {value!r}")
     for step in [value] if isinstance(value, Mapping) else value:
         if not isinstance(step, Mapping):
             yield from transform_steps(step, path)
             continue
         for name, argument in step.items():
             if name == "look_at":
+                if not isinstance(argument, Mapping):
+                    fail(f"{path}.look_at", "write it as {'origin': [x, y, z], 'target': [x, y, z], 'up': [x, y, z]}")
                 yield element("lookat", **{k: joined(number_list(v) or []) for k, v in argument.items()})
             elif name == "rotate":
-                if not isinstance(argument, Mapping) or set(argument) != {"axis", "angle"}:
+                if not isinstance(argument, Mapping) or set(argument) != {"axis", "angle"} or not isinstance(argument["angle"], numbers.Real):
                     fail(f"{path}.rotate", "write it as {'axis': [x, y, z], 'angle': degrees}")
                 yield element("rotate", value=joined(number_list(argument["axis"]) or []), angle=repr(float(argument["angle"])))
             elif name in ("translate", "scale"):
@@ -96,7 +100,7 @@ def add_colour(lines: Lines, name: str, value: Mapping[str, Any], path: str) -> 
         lines.add(element(value["type"], name=name, value=content), path)
     elif isinstance(content, numbers.Real):
         lines.add(element(value["type"], name=name, value=repr(float(content))), path)
-    elif value["type"] == "spectrum" and content is not None and all(len(pair) == 2 for pair in content):
+    elif value["type"] == "spectrum" and content is not None and all(hasattr(pair, "__len__") and len(pair) == 2 for pair in content):
         lines.add(element("spectrum", name=name, value=", ".join(f"{float(w)!r}:{float(v)!r}" for w, v in content)), path)
     elif (values := number_list(content)) is not None:
         lines.add(element(value["type"], name=name, value=joined(values)), path)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ambilux import _core
+from ambilux.errors import SceneError
 
 
 class Results:
@@ -16,9 +17,12 @@ class Results:
         self.folder = Path(folder)
 
     def _frame(self, name: str) -> Any:
-        from analysis import frames
+        from analysis import experiment, frames
 
-        return getattr(frames, name)(self.folder)
+        try:
+            return getattr(frames, name)(self.folder)
+        except experiment.InputError as e:
+            raise SceneError(str(e)) from None
 
     @property
     def runs(self) -> Any:

@@ -67,6 +67,8 @@ class Image:
         self.rgb = pixels(rgb)
         #: Standard error of every value; None where it is not known.
         self.stderr = None if stderr is None else pixels(stderr)
+        if stderr is not None and self.stderr.shape != self.rgb.shape:
+            raise UsageError(f"standard errors of shape {self.stderr.shape} do not belong to an image of {self.rgb.shape}")
         #: Per pixel; 0 if it is not known.
         self.samples = samples
         #: Of the render, as `ambilux render --json` writes them.
@@ -126,7 +128,7 @@ class Image:
 
 def pixels(value: Any) -> np.ndarray:
     array = np.ascontiguousarray(value, dtype=np.float32)
-    if array.ndim != 3 or array.shape[2] != 3:
+    if array.ndim != 3 or array.shape[2] != 3 or array.size == 0:
         raise UsageError(f"an image has the shape (height, width, 3), not {array.shape}")
     return array
 
@@ -161,5 +163,5 @@ def compare(image: Any, reference: Any) -> dict[str, float | None]:
     """
     one, other = as_image(image), as_image(reference)
     if one.shape != other.shape:
-        raise UsageError(f"the image is {one.shape[1]}x{one.shape[0]}, the reference {other.shape[1]}x{other.shape[0]}")
+        raise UsageError(f"the image is {one.shape[1]}x{one.shape[0]}, the reference {other.shape[1]}x{other.shape[0]}: render both at the same size")
     return json.loads(_core.compare(one.rgb, other.rgb, other.stderr, other.samples))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import numbers
 import os
 import warnings
 from collections.abc import Iterator, Mapping
@@ -12,29 +13,35 @@ from typing import Any
 from ambilux import _core
 from ambilux.errors import AmbiluxWarning, UsageError
 from ambilux.image import DeviceArray, Image
-from ambilux.scene import Scene, load, setting_text
+from ambilux.scene import Scene, checked_size, load, setting_text
 
 
 def scene_of(scene: Scene | str | os.PathLike[str], size: tuple[int, int] | None) -> Scene:
     if not isinstance(scene, Scene):
         return load(scene, size=size)
-    return scene if size is None or tuple(size) == scene.size else scene.resized(size)
+    return scene if size is None or checked_size(size) == scene.size else scene.resized(size)
 
 
 def assignments(settings: Mapping[str, Any] | None, **named: Any) -> list[tuple[str, str]]:
     """Settings in the order in which they are set; `settings` has the last word."""
     given = {k: v for k, v in named.items() if v is not None}
-    return [(k, setting_text(v)) for k, v in [*given.items(), *(settings or {}).items()]]
+    if not isinstance(settings or {}, Mapping):
+        raise UsageError(f"settings {settings!r}: a dictionary is needed, such as {{'rr_depth': 3}}")
+    return [(str(k), setting_text(v)) for k, v in [*given.items(), *(settings or {}).items()]]
 
 
 def count(name: str, value: int | None) -> int | None:
-    if value is not None and (isinstance(value, bool) or int(value) != value or value < 0):
-        raise UsageError(f"{name} {value}: a whole number that is not negative is needed")
-    return None if value is None else int(value)
+    if value is None:
+        return None
+    if not isinstance(value, numbers.Real) or isinstance(value, bool) or value != value // 1 or not 0 <= value < 2**64:
+        raise UsageError(f"{name} {value}: a whole number that is not negative, below 2**64, is needed")
+    return int(value)
 
 
 def begin(scene: Scene | str | os.PathLike[str], size: tuple[int, int] | None, settings: Mapping[str, Any] | None, spp: int | None, time: float | None,
           **named: Any) -> _core.Render:
+    if not isinstance(time, (numbers.Real, type(None))):
+        raise UsageError(f"time {time!r}: seconds are needed")
     core = _core.Render(scene_of(scene, size)._core, assignments(settings, **named), count("spp", spp), time)
     for text in core.warnings:
         warnings.warn(text, AmbiluxWarning, stacklevel=4)
@@ -107,7 +114,7 @@ def progressive(scene: Scene | str | os.PathLike[str], integrator: str = "path",
     >>> steps[-1].samples, all(a.samples < b.samples for a, b in zip(steps, steps[1:]))
     (64, True)
     """
-    if not every > 0:
+    if not isinstance(every, numbers.Real) or not every > 0:
         raise UsageError(f"every {every}: more than zero seconds are needed")
     backend = backend_of(device, backend, settings)
     core = begin(scene, size, settings, spp, time, integrator=integrator, variant=variant, seed=seed, max_depth=max_depth, backend=backend)
@@ -128,6 +135,8 @@ def reference(scene: Scene | str | os.PathLike[str], path: str | os.PathLike[str
               size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
               settings: Mapping[str, Any] | None = None) -> Image:
     """Ground truth with its standard error, in the file at `path`, which is continued if it exists. An interrupt saves what is finished."""
+    if os.fspath(path).lower().endswith(".png"):
+        raise UsageError(f"{os.fspath(path)}: a reference is an EXR file, whose name ends in .exr")
     core, attributes = _core.reference(scene_of(scene, size)._core, os.fspath(path), count("spp", spp),
                                        assignments(settings, seed=seed, max_depth=max_depth, backend=backend))
     return Image._of(core, attributes=json.loads(attributes))

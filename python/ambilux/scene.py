@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
 import warnings
 from collections.abc import Mapping
@@ -15,10 +16,13 @@ from ambilux.errors import AmbiluxWarning, SceneError, UsageError
 def checked_size(size: tuple[int, int] | None) -> tuple[int, int]:
     if size is None:
         return 0, 0
-    width, height = size
-    if not (1 <= int(width) <= 65536 and 1 <= int(height) <= 65536):
+    try:
+        width, height = (operator.index(n) for n in size)
+    except (TypeError, ValueError):
+        raise UsageError(f"size {size!r}: two integers are needed, (width, height)") from None
+    if not (1 <= width <= 65536 and 1 <= height <= 65536):
         raise UsageError(f"size {width}x{height}: from 1 to 65536 pixels a side")
-    return int(width), int(height)
+    return width, height
 
 
 class Scene:

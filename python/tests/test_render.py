@@ -95,9 +95,19 @@ def test_a_spherical_sensor_sees_all_around():
 
 def test_usage_errors(scene):
     for arguments in ({"integrator": "magic"}, {"spp": 0}, {"spp": -1}, {"spp": 1.5}, {"spp": 1, "time": 1.0}, {"time": -1.0}, {"settings": {"no_such": 1}},
-                      {"variant": "lvc"}, {"size": (0, 1)}, {"backend": "tpu"}):
-        with pytest.raises(ValueError):
+                      {"variant": "lvc"}, {"size": (0, 1)}, {"backend": "tpu"}, {"spp": 2**64}, {"spp": "4"}, {"size": 16}, {"settings": ["rr_depth"]},
+                      {"settings": {1: 2}}, {"time": "long"}):
+        with pytest.raises(ambilux.UsageError):
             ambilux.render(scene, **arguments)
+    for shape in ((0, 0, 3), (2, 3), (2, 3, 4)):
+        with pytest.raises(ambilux.UsageError, match="height, width, 3"):
+            ambilux.compare(np.zeros(shape), np.zeros(shape))
+    with pytest.raises(ambilux.UsageError, match="name ends in .exr"):
+        ambilux.reference(scene, "r.png", spp=4)
+    with pytest.raises(ambilux.UsageError, match="do not belong"):
+        ambilux.Image(np.zeros((2, 2, 3)), stderr=np.zeros((3, 2, 3)))
+    with pytest.raises(ambilux.SceneError, match="no_such: is no folder"):
+        ambilux.Results("no_such").runs
     with pytest.raises(ValueError, match="every"):
         ambilux.progressive(scene, spp=1, every=0)
     if not ambilux.cuda_available():

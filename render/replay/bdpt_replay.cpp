@@ -90,8 +90,9 @@ public:
         if (!exists(number))
             throw Error(ExitCode::usage,
                         fmt::format("--light-subpath {}: {}", number,
-                                    light_subpaths() == 0 ? "no strategy of this render needs light subpaths"
-                                                          : "no light subpath of a sample has this number"));
+                                    light_subpaths() == 0
+                                        ? "no strategy of this render needs light subpaths"
+                                        : fmt::format("those of a sample have numbers below {}", light_subpaths())));
         ReplayLightRequest request = light(number, sample);
         request.details = details;
         ReplayLight found = replay_light(ctx_, request);

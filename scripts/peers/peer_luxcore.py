@@ -169,7 +169,7 @@ def start(job, build=True):
         import luxcore_scene
         import pyluxcore as lc
     except ImportError as error:
-        raise Missing(f"pyluxcore cannot be imported ({error})") from error
+        raise Missing(f"pyluxcore cannot be imported by {sys.executable} ({error}); AMBILUX_PEERS_PYTHON names another Python") from error
 
     if job["integrator"] == "PATHOCL" and not importlib.util.find_spec("nvidia"):
         load_nvrtc()

@@ -24,7 +24,7 @@ def start(job):
     try:
         import mitsuba as mi
     except ImportError as error:
-        raise Missing(f"mitsuba cannot be imported ({error})") from error
+        raise Missing(f"mitsuba cannot be imported by {sys.executable} ({error}); AMBILUX_PEERS_PYTHON names another Python") from error
     import drjit as dr
     import numpy as np
 

@@ -181,6 +181,8 @@ class RandomScene:
 
     def map(self, inner, transmits=False):
         kind = self.one("bumpmap", "normalmap")
+        if self.mitsuba and ("anisotropic" in inner or "alpha_u" in inner):
+            kind = "normalmap"  # Mitsuba's bump maps turn tangents
         if kind == "bumpmap":  # Mitsuba's derivatives of turned bitmaps are wrong, and it loses light of bounces without interpolation
             t = self.bitmap("arbitrary", "heights.png", True, not self.mitsuba) + num("scale", self.u(-0.4, 0.4))
         else:
@@ -191,7 +193,7 @@ class RandomScene:
     def twosided(self, level, smooth=False):
         while True:
             inside = self.opaque(level, smooth) + self.some(self.opaque(level, smooth))
-            if not self.mitsuba or "bumpmap" not in inside:  # Mitsuba mirrors bumps on the back
+            if not self.mitsuba or not ("bumpmap" in inside or "normalmap" in inside):  # Mitsuba mirrors maps on the back
                 return self.wrap("twosided", inside)
 
     def material(self, level=2):
@@ -230,7 +232,17 @@ class RandomScene:
             elif self.p(0.25) and not self.mitsuba:
                 light = self.one(self.bitmap("radiance", "tiles.png", True), self.checker("radiance", self.colour(0, 1), self.colour(0, 1)))
             return f'<shape type="{k}">{t}{self.opaque(0)}<emitter type="{emits}">{light}</emitter></shape>\n'
-        return f'<shape type="{k}">{t}{self.material(2 if quadrics else 1)}</shape>\n'
+        material = self.material(2 if quadrics else 1)
+        if self.mitsuba and k in ("rectangle", "cube", "obj", "ply", "serialized") and '="-1"/>' in t:  # Mitsuba turns bump maps round there
+            material = self.without_bumps(material, lambda: self.material(2 if quadrics else 1))
+        if self.mitsuba and k in ("obj", "ply", "serialized") and "mask" in material and "face_normals" not in t:
+            t += flag("face_normals")  # Mitsuba's vertex normals scatter light from behind the surface
+        return f'<shape type="{k}">{t}{material}</shape>\n'
+
+    def without_bumps(self, material, again):
+        while "bumpmap" in material:
+            material = again()
+        return material
 
     def instances(self):
         self.tags.add("instance")
@@ -299,8 +311,13 @@ class RandomScene:
         """A floor, or a box of six walls."""
         away = 8 if closed else self.u(1.3, 2)
         turns = ["", *(f'<rotate x="1" angle="{90 * i}"/>' for i in (1, 2, 3)), '<rotate y="1" angle="90"/>', '<rotate y="1" angle="-90"/>']
-        return "".join(f'<shape type="rectangle"><transform name="to_world"><scale value="8"/><translate z="{-away:.3f}"/>{t}</transform>{self.opaque(1)}</shape>\n'
-                       for t in turns[:6 if closed else 1])
+        text = ""
+        for t in turns[:6 if closed else 1]:
+            bsdf = self.opaque(1)
+            if self.mitsuba and 'y="1"' in t:  # Mitsuba's bump maps have no tangent there
+                bsdf = self.without_bumps(bsdf, lambda: self.opaque(1))
+            text += f'<shape type="rectangle"><transform name="to_world"><scale value="8"/><translate z="{-away:.3f}"/>{t}</transform>{bsdf}</shape>\n'
+        return text
 
     def scene(self):
         closed, kinds = self.p(0.15), ["area"] * 4

@@ -47,7 +47,11 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {{"render", kCornell}, "--output is required"},
         {{"render", "-o", "x.exr"}, "SCENE is required"},
         {render(folder, {"--frob"}), "--frob"},
-        {render(folder, {"--spp", "many"}), "--spp"},
+        {render(folder, {"--spp", "many"}), "error: Could not convert: --spp = many: that is no value"},
+        {{"render", kCornell, "-o", "-"}, "-o -: give a name"},
+        {render(folder, {"--png", folder / "a.jpg"}), "no .jpg; name it .png"},
+        {render(folder, {}, "a.png"), "name it .exr, and ask for a PNG with --png"},
+        {render(folder, {"--range-size", "0"}), "at least one sample"},
         {render(folder, {"--spp", "0"}), "at least one sample"},
         {render(folder, {"--spp", "1", "--time", "1"}), "exclude each other"},
         {render(folder, {"--time", "-1"}), "more than zero seconds"},
@@ -74,7 +78,9 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {{"bench", "queues", kCornell, "--items", "-1"}, "--items"},
         {{"bench", "queues", kCornell, "--items", "300000000"}, "at most"},
         {{"bench", "queues", kCornell, "--backend", "abacus"}, "auto, cpu, cuda"},
-        {{"bench", "queues"}, "SCENE is required"},
+        {{"bench", "queues"}, "SCENE is required. See ambilux bench queues --help"},
+        {{"bench", "cues", kCornell}, "one of these is needed: rays, queues, frames, stages"},
+        {{"reference", kCornell, "-o", folder / "r.png", "--spp", "4"}, "name it .exr"},
         {{"trace", kCornell, "--pixel", "1,2"}, "--sample is required"},
         {{"trace", kCornell, "--sample", "0"}, "--pixel X,Y or --light-subpath N"},
         {{"trace", kCornell, "--sample", "0", "--light-subpath", "3", "--compare"}, "--compare: --pixel"},
@@ -82,7 +88,7 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
         {{"trace", kCornell, "--sample", "0", "--pixel", "24,1", "--size", "24x16"}, "24x16 pixels"},
         {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "--strategy", "s1"}, "s1t3"},
         {{"trace", kCornell, "--sample", "0", "--light-subpath", "3"}, "has no light subpaths"},
-        {{"trace", kCornell, "--sample", "0", "--light-subpath", "99999999", "-i", "light"}, "99999999"},
+        {{"trace", kCornell, "--sample", "0", "--light-subpath", "99999999", "-i", "light"}, "below 65536"},
         {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "-i", "toy"}, "there is no replay"},
         {render(folder, {"-i", "toy", "--outliers", "1"}), "there is no replay"},
         {{"trace", kCornell, "--sample", "0", "--pixel", "1,2", "-i", "bdpt", "--set", "bdpt.auto=true"}, "printed"},
@@ -103,6 +109,8 @@ TEST_CASE("wrong use ends with code 2 and says what is right") {
     CHECK(run(folder, {"help", "render"}).out == run(folder, {"render", "--help"}).out);
     CHECK(contains(run(folder, {"help"}).out, "stress"));
     CHECK(contains(run(folder, {"help", "rnder"}).err, "there is no command 'rnder'"));
+    CHECK(run(folder, {"help", "bench", "rays"}).out == run(folder, {"bench", "rays", "--help"}).out);
+    CHECK(contains(help.out, "Usage: ambilux [OPTIONS] SUBCOMMAND"));
     CHECK(contains(run(folder, {"--version"}).out, "ambilux "));
 }
 
@@ -215,6 +223,9 @@ TEST_CASE("light that no strategy in use can find is named, in the warning and b
     CHECK(contains(render_with({"-i", "bdpt"}).err, "no strategy finds"));
     // The lamp of the Cornell box has extent, and its surfaces are diffuse.
     CHECK_FALSE(contains(run(folder, render(folder, {"-i", "path", "--spp", "1"})).err, "warning"));
+    CHECK(contains(run(folder, render(folder, {"--max-depth", "0", "--spp", "1"})).err, "max_depth=0: the shortest"));
+    CHECK(
+        contains(run(folder, render(folder, {"--resume", "--spp", "1"})).err, "is not there: the render begins anew"));
 
     const json choice =
         json::parse(render_with({"-i", "bdpt", "--set", "bdpt.auto=true", "--json", "-"}).out)["choice"];

@@ -81,7 +81,7 @@ TEST_CASE("outputs are checked before work begins, and inputs are not written ov
         {{"render", with_mesh, "-o", folder / "m.obj"}, 2, "would replace a file that is read"},
         {{"info", scene, "--json", scene}, 2, "would replace a file that is read"},
         {{"render", scene, "-o", a, "--json", a}, 2, "-o and --json name the same file"},
-        {{"render", scene, "-o", a, "--png", folder / "./a.exr"}, 2, "-o and --png name the same file"},
+        {{"render", scene, "-o", folder / "a", "--png", folder / "./a"}, 2, "-o and --png name the same file"},
         {{"render", scene, "-o", locked}, 4, "it is write-protected"},
         {{"render", scene, "-o", a, "--exposure", "nan", "--png", folder / "a.png"}, 2, "--exposure"},
         {{"render", scene, "-o", a, "--seed", "-1"}, 2, "--seed"},

@@ -138,6 +138,8 @@ TEST_CASE("budgets of samples and of seconds stand side by side; --reduced repla
     CHECK(read(folder, "metric = \"mse\"\n" + text).metric == "mse");
     CHECK(contains(resolved_toml(read(folder, "metric = \"mse\"\n" + text)), "metric = 'mse'"));
     CHECK(config.random_order == false);
+    CHECK(contains(error_of([&] { read(folder, "seeds = [1]\n[reference]\nspp = 8\n[budget]\nspp = [1]\n[scene]\n"); }),
+                   "e.toml:6: one of several: write [[scene]]"));
     CHECK(contains(error_of([&] { read(folder, changed("\"listed\"", "\"sorted\"")); }),
                    "e.toml:3: order 'sorted': must be random or listed"));
     CHECK(contains(error_of([&] { read(folder, "metric = \"ssim\"\n" + text); }),

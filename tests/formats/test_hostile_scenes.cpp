@@ -252,7 +252,7 @@ TEST_CASE("values that only doubles hold are refused with their line") {
                    "scene.xml:3: 'alpha' is too large for a float"));
     CHECK(contains(body_error("<sensor type='perspective'><film type='hdrfilm'>\n<integer name='width' "
                               "value='65536'/><integer name='height' value='65536'/></film></sensor>"),
-                   "scene.xml:3: a film of 65536x65536 has more pixels than can be numbered"));
+                   "scene.xml:3: a film of 65536x65536 has more pixels than --limits pixels=268435456"));
     CHECK(contains(body_error("<integrator type='path'>\n<integer name='max_depth' value='1000000000'/></integrator>"),
                    "scene.xml:3: max_depth may be 16382 at most"));
 }

@@ -114,7 +114,7 @@ TEST_CASE("a draw finds a vertex with the probability that its contribution is d
     LearnedSource source = {};
     source.vertices.counter = &counter;
     source.draws = kDraws;
-    source.by_cluster = {first.data(), nullptr, nullptr, cluster.data(), sorted.data()};
+    source.by_cluster = {first.data(), nullptr, nullptr, nullptr, cluster.data(), sorted.data()};
     source.table = {{splits.data(), 0}, {splits.data(), kLevels}, tickets.data(), nullptr, 1.0f};
     std::vector<uint64_t> counts(kVertices);
     uint64_t none = 0;
@@ -129,7 +129,7 @@ TEST_CASE("a draw finds a vertex with the probability that its contribution is d
     }
     double probability = 0;
     for (uint32_t i = 0; i < kVertices; ++i) {
-        const double p = 1.0 / double(LearnedDraw{source, 0, cluster[i]}.inverse_probability());
+        const double p = 1.0 / double(LearnedDraw{source, 0, cluster[i], i}.inverse_probability());
         const double expected = p * kKeys * kDraws;
         INFO("vertex " << i << ": " << counts[i] << ", expected " << expected);
         CHECK(std::fabs(double(counts[i]) - expected) < 5 * std::sqrt(expected));

@@ -23,12 +23,12 @@ struct BsdfSample {
     float pdf_sa;          ///< density per solid angle of all smooth lobes together; for a delta lobe its probability
     float pdf_reverse_sa;  ///< BsdfValue::pdf_reverse_sa; of a delta lobe unspecified
     Rgb weight;            ///< f·|cos(wo)|/pdf
-    float eta;       ///< relative index passed through (interior/exterior seen along the walk); 1 without refraction
+    float eta;       ///< relative index passed through (interior/exterior seen along the subpath); 1 without refraction
     uint32_t flags;  ///< ScatterFlags
 };
 
 /// f·|cos(wo)| and the densities of both directions together: sample, eval and pdf of a BSDF share one formula, and
-/// walks that are connected need all three.
+/// subpaths that are connected need all three.
 struct BsdfValue {
     Rgb value;
     float pdf_sa;          ///< density of wo per solid angle at wi

@@ -1,4 +1,4 @@
-// Light that leaves emitters, for walks that start there (light tracing, bidirectional path tracing; Veach 1997,
+// Light that leaves emitters, for subpaths that start there (light tracing, bidirectional path tracing; Veach 1997,
 // section 8.3.2).
 //
 // Position and direction are sampled one after the other and carry their own measures. For all emitters alike the flux

@@ -35,7 +35,7 @@ struct EmitterSample {
 
 /// Light that leaves an emitter (transport/emitter/emission.h).
 struct EmissionSample {
-    Vec3f p;          ///< where the walk starts; infinite: outside of the scene's bounding sphere
+    Vec3f p;          ///< where the subpath starts; infinite: outside of the scene's bounding sphere
     Vec3f p_error;    ///< bound of the absolute error of each coordinate of p; zero unless p lies on a surface
     Vec3f ng;         ///< unit normal of the emitting side; d where there is no surface
     Vec3f d;          ///< unit, direction in which light leaves

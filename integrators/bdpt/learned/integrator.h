@@ -58,10 +58,11 @@ struct LearnedIntegrator {
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
         Memory m;
         m.two_sides = TwoSidesMemoryOf<ScoredShadowItem>::template lay_out<kFusion, F>(layout, p, n);
-        const uint32_t kept = p.rules.connect ? n.kept : 0, clusters = p.rules.connect ? kClusters : 0;
-        m.by_cluster = {layout.allocate<uint32_t>(clusters + 1), layout.allocate<uint32_t>(clusters),
-                        layout.allocate<uint32_t>(kept), layout.allocate<uint16_t>(kept),
-                        layout.allocate<uint32_t>(kept)};
+        const uint32_t kept = p.rules.connect ? n.kept : 0, clusters = p.rules.connect ? kClusters : 0,
+                       parts = clusters * ClusteredVertices::kParts;
+        m.by_cluster = {layout.allocate<uint32_t>(clusters + 1), layout.allocate<uint32_t>(parts),
+                        layout.allocate<uint32_t>(parts),        layout.allocate<uint32_t>(kept),
+                        layout.allocate<uint16_t>(kept),         layout.allocate<uint32_t>(kept)};
         return m;
     }
     /// What all waves share and keep from one to the next.
