@@ -339,7 +339,7 @@ TEST_CASE("what single strategies do not find is said") {
         if (text.empty()) return text;
         CHECK(text.find("these single strategies do not find") != std::string::npos);
         const size_t begin = text.find("such as ") + 8;
-        return text.substr(begin, text.find(" (Ld") - begin);
+        return text.substr(begin, text.find(" (L: ") - begin);
     };
     const uint32_t diffuse = bit(BsdfType::diffuse), glass = bit(BsdfType::dielectric) | diffuse,
                    area = 1u << uint32_t(EmitterType::area), point = 1u << uint32_t(EmitterType::point);
