@@ -29,6 +29,12 @@ constexpr double kTrimmedBlocks = 0.01;
 /// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this
 /// factor of the best are timed.
 constexpr double kDoubt = 1.3;
+/// Four learned draws are taken to be worth as many uniform ones, for that much more work of all kinds: what ten scenes
+/// show (docs/lab/2026-11-25-learned-draws.md).
+constexpr uint32_t kLearnedDraws = 4, kLearnedWorth = 12;
+constexpr double kLearnedWork = 1.25;
+/// Eye subpaths of a render from which on enough is learned.
+constexpr double kLearnedSubpaths = 1 << 18;
 constexpr uint32_t kFirstTimedSample = 0xffff0000u;  ///< far from those of the image
 
 using Clock = std::chrono::steady_clock;
@@ -145,7 +151,8 @@ std::vector<SelectionCandidate> selection_candidates(const RenderSettings& setti
     const auto add = [&](std::string name, const PilotCandidate& pilot, const std::string& of,
                          const std::string& strategies) {
         all.push_back({std::move(name), pilot, {{"integrator", "bdpt"}, {"variant", of}, {"strategies", strategies}}});
-        if (pilot.draws > 0) all.back().settings.emplace_back("connections", std::to_string(pilot.draws));
+        if (of == "lvc" && pilot.draws > 0)
+            all.back().settings.emplace_back("connections", std::to_string(pilot.draws));
         if (pilot.light_subpaths != 1.0f) {
             all.back().name += fmt::format(", {} light paths per pixel", pilot.light_subpaths);
             all.back().settings.emplace_back("light_paths", fmt::format("{}", pilot.light_subpaths));
@@ -160,6 +167,13 @@ std::vector<SelectionCandidate> selection_candidates(const RenderSettings& setti
         if (light_paths == 1.0f && !asked.draws) add("bdpt, " + variant, {1.0f, true, 0}, variant, "all");
         for (uint32_t k = 1; cache && k <= 16; k *= 2)
             add(fmt::format("bdpt, lvc, {} connection{}", k, k > 1 ? "s" : ""), {light_paths, true, k}, "lvc", "all");
+        // On a device it was not tried. It gathers no images of strategies.
+        const bool learns = cache && !cuda && variant != "lvc" && settings.technique_depth == 0;
+        if (!learns) continue;
+        add(fmt::format("bdpt, learned, {} connections", kLearnedDraws), {light_paths, true, kLearnedWorth}, "learned",
+            "all");
+        all.back().learned_draws = kLearnedDraws;
+        all.back().settings.emplace_back("connections", std::to_string(kLearnedDraws));
     }
     return all;
 }
@@ -175,7 +189,9 @@ double selection_work(const PilotWork& w, const SelectionCandidate& candidate, b
     if (c.light_subpaths == 0.0f && !c.connect) return eye;
     double work = eye + light;
     if (c.connect && c.draws == 0) work += pair * w.pairs + ray * w.pair_rays;
-    if (c.connect && c.draws > 0) work += c.draws * (draw * w.draws + ray * w.draw_rays);
+    const uint32_t draws = candidate.learned_draws ? candidate.learned_draws : c.draws;
+    if (c.connect && draws > 0) work += draws * (draw * w.draws + ray * w.draw_rays);
+    if (candidate.learned_draws) work *= kLearnedWork;
     const bool streaming = variant_of(settings_of({}, candidate)).traits.streams;
     // A light subpath for every vertex of an eye subpath.
     if (c.connect && streaming) work += std::max(0.0, w.vertices - 1.0) * w.light_rays;
@@ -225,7 +241,8 @@ public:
         if (head_start_) head_start_->stop();
         variance_ = selection_variances(pilot);
         for (size_t c = 0; c < candidates_.size(); ++c)
-            if (!unreachable_[c].empty()) variance_[c] = double(kInfinity);
+            if (!unreachable_[c].empty() || (candidates_[c].learned_draws && !learns_enough(pilot)))
+                variance_[c] = double(kInfinity);
         for (const SelectionCandidate& c : candidates_) work_.push_back(selection_work(pilot.work, c, cuda_));
         cost_ = work_;
         rank();
@@ -244,6 +261,9 @@ public:
     }
 
 private:
+    bool learns_enough(const Pilot& pilot) const {
+        return pilot.expected_samples * scene_.sensor.crop_width * scene_.sensor.crop_height >= kLearnedSubpaths;
+    }
     double score(size_t c) const { return variance_[c] * cost_[c]; }
 
     void rank() {

@@ -11,8 +11,9 @@ namespace ambilux {
 /// What `settings` leave to choose from, the path tracer first.
 struct SelectionCandidate {
     std::string name;
-    PilotCandidate pilot;
+    PilotCandidate pilot;  ///< of variant learned: the uniform draws that its own are taken to be worth
     std::vector<std::pair<std::string, std::string>> settings;
+    uint32_t learned_draws = 0;  ///< that variant learned makes
 };
 std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda);
 
