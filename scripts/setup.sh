@@ -18,7 +18,7 @@ esac
 # Tools count as present when the command is, wherever it came from; libraries when the package is.
 declare -A tools=([g++]=g++ [cmake]=cmake [ninja]=ninja-build [git]=git)
 libraries=(
-  libembree-dev libtbb-dev libopenexr-dev libimath-dev libpng-dev libjpeg-dev libpugixml-dev libtinygltf-dev zlib1g-dev libboost-dev libssl-dev
+  libembree-dev libtbb-dev libopenexr-dev libimath-dev libpng-dev libjpeg-dev libpugixml-dev libtinygltf-dev libmeshoptimizer-dev zlib1g-dev libboost-dev libssl-dev
   libcli11-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libtomlplusplus-dev libcpp-httplib-dev
 )
 requirements=(requirements.txt)
