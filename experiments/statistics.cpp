@@ -32,8 +32,7 @@ nlohmann::json choice_json(const SelectionStats& choice) {
              {"work", c.work},
              {"seconds_per_sample", c.seconds > 0 ? nlohmann::json(c.seconds) : nlohmann::json(nullptr)},
              {"efficiency", c.efficiency},
-             {"excluded", c.excluded.empty() ? nlohmann::json(nullptr)
-                                             : nlohmann::json("cannot find paths such as " + c.excluded)}});
+             {"excluded", c.excluded.empty() ? nlohmann::json(nullptr) : nlohmann::json(c.excluded)}});
     for (const auto& [key, value] : choice.settings) settings[key] = value;
     return {{"name", choice.name},
             {"settings", settings},

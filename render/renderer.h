@@ -46,7 +46,7 @@ struct SelectionStats {
         double work;           ///< of one sample, in rays
         double seconds;        ///< of one sample of all pixels; 0 where it was not measured
         double efficiency;     ///< 1 / (variance · cost) over that of the choice
-        std::string excluded;  ///< a path that it cannot find and others do (integrators/reachability.h); else empty
+        std::string excluded;  ///< why it cannot be selected (render/selection.cpp); empty if it can
     };
     std::string name;                                           ///< of the choice; empty if there was none
     std::vector<std::pair<std::string, std::string>> settings;  ///< with them the same estimator runs again

@@ -224,15 +224,17 @@ public:
     Selection(const Scene& scene, const RenderSettings& settings, bool cuda, const MakeRenderer& make)
         : scene_(scene), settings_(settings), cuda_(cuda), make_(make),
           candidates_(selection_candidates(settings, cuda)), seconds_(candidates_.size(), 0.0) {
-        for (const SelectionCandidate& c : candidates_)
-            unreachable_.push_back(unreachable_path(scene.features, sampled_strategies(settings_of(settings, c)),
-                                                    kAllStrategies, settings.max_depth));
+        for (const SelectionCandidate& c : candidates_) {
+            const std::string path = excluded_path(scene.features, sampled_strategies(settings_of(settings, c)),
+                                                   kAllStrategies, settings.max_depth);
+            excluded_.push_back(path.empty() ? "" : "cannot find paths such as " + path);
+        }
     }
 
     std::unique_ptr<Renderer> run(SharedAccels& accels, bool cwbvh) {
         // A budget holds one renderer at a time.
         const bool ahead = cuda_ && settings_.memory == 0 && settings_.expected_seconds > 0;
-        if (ahead && settings_.expected_samples == 0 && unreachable_[0].empty())
+        if (ahead && settings_.expected_samples == 0 && excluded_[0].empty())
             head_start_.emplace(settings_of(settings_, candidates_[0]), make_);
         std::vector<PilotCandidate> predicted;
         for (const SelectionCandidate& c : candidates_) predicted.push_back(c.pilot);
@@ -240,9 +242,11 @@ public:
             run_pilot(scene_, settings_, cuda_, cwbvh, accels, predicted, cuda_ ? kPilotSamplesCuda : kPilotSamplesCpu);
         if (head_start_) head_start_->stop();
         variance_ = selection_variances(pilot);
-        for (size_t c = 0; c < candidates_.size(); ++c)
-            if (!unreachable_[c].empty() || (candidates_[c].learned_draws && !learns_enough(pilot)))
-                variance_[c] = double(kInfinity);
+        for (size_t c = 0; c < candidates_.size(); ++c) {
+            if (candidates_[c].learned_draws && !learns_enough(pilot))
+                excluded_[c] = "has too few samples to learn from";
+            if (!excluded_[c].empty()) variance_[c] = double(kInfinity);
+        }
         for (const SelectionCandidate& c : candidates_) work_.push_back(selection_work(pilot.work, c, cuda_));
         cost_ = work_;
         rank();
@@ -349,7 +353,7 @@ private:
         for (size_t c = 0; c < candidates_.size(); ++c)
             choice.candidates.push_back({candidates_[c].name, joined(candidates_[c].settings), variance_[c], work_[c],
                                          seconds_[c], std::isfinite(variance_[c]) ? score(chosen) / score(c) : 0.0,
-                                         unreachable_[c]});
+                                         excluded_[c]});
         return choice;
     }
 
@@ -361,7 +365,7 @@ private:
     const std::vector<SelectionCandidate> candidates_;
     std::optional<HeadStart> head_start_;
     // By candidate.
-    std::vector<std::string> unreachable_;  ///< a path that only others find; empty if there is none
+    std::vector<std::string> excluded_;  ///< why; empty if it is not
     std::vector<double> variance_, work_;
     std::vector<double> cost_;     ///< of a sample, in any unit; smaller is better in product with the variance
     std::vector<double> seconds_;  ///< of a sample, where it was timed
