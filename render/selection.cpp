@@ -225,7 +225,7 @@ public:
         : scene_(scene), settings_(settings), cuda_(cuda), make_(make),
           candidates_(selection_candidates(settings, cuda)), seconds_(candidates_.size(), 0.0) {
         for (const SelectionCandidate& c : candidates_) {
-            const std::string path = excluded_path(scene.features, sampled_strategies(settings_of(settings, c)),
+            const std::string path = unreachable_path(scene.features, sampled_strategies(settings_of(settings, c)),
                                                    kAllStrategies, settings.max_depth);
             excluded_.push_back(path.empty() ? "" : "cannot find paths such as " + path);
         }
