@@ -136,7 +136,7 @@ class RandomScene:
         elif k in ("dielectric", "thindielectric", "roughdielectric"):
             t = self.boundary() + some(s("specular_reflectance")) + some(s("specular_transmittance")) + (self.roughness() if k[0] == "r" else "")
         elif k in ("plastic", "roughplastic"):
-            t = some(num("int_ior", self.u(1.05, 2.2))) + s("diffuse_reflectance") + some(s("specular_reflectance")) + some(flag("nonlinear"))
+            t = some(num("int_ior", self.u(1.05, 1.9 if self.mitsuba else 2.2))) + s("diffuse_reflectance") + some(s("specular_reflectance")) + some(flag("nonlinear"))
             t += string("distribution", self.one("ggx", "beckmann")) + self.alpha() if k == "roughplastic" else ""
         elif k == "principled":
             t = s("base_color") + self.number("roughness", 0.1, 1) + some(self.number("metallic", 0, 1)) + shares
