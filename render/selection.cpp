@@ -226,7 +226,7 @@ public:
           candidates_(selection_candidates(settings, cuda)), seconds_(candidates_.size(), 0.0) {
         for (const SelectionCandidate& c : candidates_) {
             const std::string path = unreachable_path(scene.features, sampled_strategies(settings_of(settings, c)),
-                                                   kAllStrategies, settings.max_depth);
+                                                      kAllStrategies, settings.max_depth);
             excluded_.push_back(path.empty() ? "" : "cannot find paths such as " + path);
         }
     }
