@@ -151,8 +151,9 @@ std::vector<SelectionCandidate> selection_candidates(const RenderSettings& setti
     const auto add = [&](std::string name, const PilotCandidate& pilot, const std::string& of,
                          const std::string& strategies) {
         all.push_back({std::move(name), pilot, {{"integrator", "bdpt"}, {"variant", of}, {"strategies", strategies}}});
-        if (of == "lvc" && pilot.draws > 0)
-            all.back().settings.emplace_back("connections", std::to_string(pilot.draws));
+        if (of == "learned") all.back().learned_draws = kLearnedDraws;
+        if (const uint32_t draws = all.back().draws())
+            all.back().settings.emplace_back("connections", std::to_string(draws));
         if (pilot.light_subpaths != 1.0f) {
             all.back().name += fmt::format(", {} light paths per pixel", pilot.light_subpaths);
             all.back().settings.emplace_back("light_paths", fmt::format("{}", pilot.light_subpaths));
@@ -172,8 +173,6 @@ std::vector<SelectionCandidate> selection_candidates(const RenderSettings& setti
         if (!learns) continue;
         add(fmt::format("bdpt, learned, {} connections", kLearnedDraws), {light_paths, true, kLearnedWorth}, "learned",
             "all");
-        all.back().learned_draws = kLearnedDraws;
-        all.back().settings.emplace_back("connections", std::to_string(kLearnedDraws));
     }
     return all;
 }
@@ -189,8 +188,7 @@ double selection_work(const PilotWork& w, const SelectionCandidate& candidate, b
     if (c.light_subpaths == 0.0f && !c.connect) return eye;
     double work = eye + light;
     if (c.connect && c.draws == 0) work += pair * w.pairs + ray * w.pair_rays;
-    const uint32_t draws = candidate.learned_draws ? candidate.learned_draws : c.draws;
-    if (c.connect && draws > 0) work += draws * (draw * w.draws + ray * w.draw_rays);
+    if (c.connect && candidate.draws() > 0) work += candidate.draws() * (draw * w.draws + ray * w.draw_rays);
     if (candidate.learned_draws) work *= kLearnedWork;
     const bool streaming = variant_of(settings_of({}, candidate)).traits.streams;
     // A light subpath for every vertex of an eye subpath.

@@ -14,6 +14,9 @@ struct SelectionCandidate {
     PilotCandidate pilot;  ///< of variant learned: the uniform draws that its own are taken to be worth
     std::vector<std::pair<std::string, std::string>> settings;
     uint32_t learned_draws = 0;  ///< that variant learned makes
+
+    /// Of each eye vertex from the cache, as they are made.
+    uint32_t draws() const { return learned_draws ? learned_draws : pilot.draws; }
 };
 std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda);
 

@@ -154,10 +154,9 @@ bool Tracer::trace(const Ray& ray, bool any, Hit& hit) const {
         for (uint32_t i = node.first; i < node.first + node.count; ++i) {
             const uint32_t prim = prims_[i];
             Crossings crossings;
-            if (any && !scene_.is_triangle(prim) && ends_on_disk(scene_.quadric(prim), ray)) continue;
             if (scene_.is_triangle(prim))
                 cross_triangle(scene_, ray, prim, crossings);
-            else
+            else if (!any || !ends_on_disk(scene_.quadric(prim), ray))
                 cross_quadric(scene_, ray, prim, crossings);
             for (int k = 0; k < crossings.count; ++k) {
                 const Hit& h = crossings.hit[k];

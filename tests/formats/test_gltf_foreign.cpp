@@ -15,19 +15,6 @@ using test::has_note;
 
 namespace {
 
-int add_floats(Json& j, const std::vector<float>& values, const char* type, size_t count) {
-    const std::string bytes(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
-    const auto add = [&j](const char* list, Json what) {
-        j[list].push_back(std::move(what));
-        return j[list].size() - 1;
-    };
-    const size_t buffer =
-        add("buffers", {{"byteLength", bytes.size()}, {"uri", data_uri("application/octet-stream", bytes)}});
-    const size_t view = add("bufferViews", {{"buffer", buffer}, {"byteLength", bytes.size()}});
-    return int(add("accessors", {{"bufferView", view}, {"componentType", 5126}, {"count", count}, {"type", type}}));
-}
-
-Json& attributes(Json& j) { return j["meshes"][0]["primitives"][0]["attributes"]; }
 Json& material(Json& j) { return j["materials"][0]; }
 
 void add_texture(Json& j, const std::string& png) {
@@ -63,14 +50,14 @@ TEST_CASE("normal maps lean as their image does, also in a mirror, turned, and a
 
     // Texture coordinates that show the image in a mirror: its right is left, its up is up.
     Json mirrored = leaning();
-    attributes(mirrored)["TEXCOORD_0"] = add_floats(mirrored, {1, 1, 0, 1, 0, 0, 1, 0}, "VEC2", 4);
+    attributes(mirrored)["TEXCOORD_0"] = add_accessor<float>(mirrored, {1, 1, 0, 1, 0, 0, 1, 0}, "VEC2", kFloat, 4);
     const Vec3f m = mapped_normal(load(mirrored));
     CHECK(m.x == Approx(-n.x).margin(0.005));
     CHECK(m.y == Approx(n.y).margin(0.005));
 
     // Upside down.
     Json down = leaning();
-    attributes(down)["TEXCOORD_0"] = add_floats(down, {0, 0, 1, 0, 1, 1, 0, 1}, "VEC2", 4);
+    attributes(down)["TEXCOORD_0"] = add_accessor<float>(down, {0, 0, 1, 0, 1, 1, 0, 1}, "VEC2", kFloat, 4);
     const Vec3f d = mapped_normal(load(down));
     CHECK(d.x == Approx(n.x).margin(0.005));
     CHECK(d.y == Approx(-n.y).margin(0.005));
@@ -90,14 +77,15 @@ TEST_CASE("normal maps lean as their image does, also in a mirror, turned, and a
     // u' = v and v' = -u: the image's right is where v grows, down; its up is where u grows, right.
     CHECK(t.x == Approx(n.y).margin(0.005));
     CHECK(t.y == Approx(-n.x).margin(0.005));
-    attributes(turned)["TANGENT"] = add_floats(turned, {1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1}, "VEC4", 4);
+    attributes(turned)["TANGENT"] =
+        add_accessor<float>(turned, {1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1}, "VEC4", kFloat, 4);
     CHECK(mapped_normal(load(turned)).x == Approx(n.x).margin(0.005));
 }
 
 TEST_CASE("a mesh that shows its map in a mirror on one half is two, of two nodes two each where one mirrors") {
     Json j = leaning();
     attributes(j)["TEXCOORD_0"] =
-        add_floats(j, {0, 1, 1, 1, 1, 0, 2, 1}, "VEC2", 4);  // the second triangle's u is turned
+        add_accessor<float>(j, {0, 1, 1, 1, 1, 0, 2, 1}, "VEC2", kFloat, 4);  // the second triangle's u is turned
     CHECK(load(j).shapes.size() == 2);
     CHECK(load(j).triangles.size() == 2);
     j["nodes"].push_back({{"mesh", 0}, {"scale", {-1, 1, 1}}, {"translation", {5, 0, 0}}});
@@ -116,7 +104,8 @@ TEST_CASE("joints that mirror keep the outside of a mesh") {
     j["accessors"].push_back(
         {{"bufferView", j["bufferViews"].size() - 1}, {"componentType", 5121}, {"count", 4}, {"type", "VEC4"}});
     attributes(j)["JOINTS_0"] = j["accessors"].size() - 1;
-    attributes(j)["WEIGHTS_0"] = add_floats(j, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4", 4);
+    attributes(j)["WEIGHTS_0"] =
+        add_accessor<float>(j, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4", kFloat, 4);
     j["skins"] = {{{"joints", {2}}}};
     j["nodes"].push_back({{"scale", {-1, 1, 1}}});
     j["scenes"][0]["nodes"].push_back(2);
@@ -241,12 +230,12 @@ TEST_CASE("what is not quite right is left out or read as it is meant") {
 TEST_CASE("sets of texture coordinates: two of one content, none, and one that a target moves") {
     Json j = quad_scene();
     add_texture(j, png_bytes(2, 1, {255, 0, 0, 0, 0, 255}));
-    attributes(j)["TEXCOORD_1"] = add_floats(j, {0, 1, 1, 1, 1, 0, 0, 0}, "VEC2", 4);
+    attributes(j)["TEXCOORD_1"] = add_accessor<float>(j, {0, 1, 1, 1, 1, 0, 0, 0}, "VEC2", kFloat, 4);
     material(j)["pbrMetallicRoughness"] = {{"baseColorTexture", {{"index", 0}}},
                                            {"metallicRoughnessTexture", {{"index", 0}, {"texCoord", 1}}}};
     CHECK(load(j).triangles.size() == 2);
     Json other = j;
-    attributes(other)["TEXCOORD_1"] = add_floats(other, {0, 1, 1, 1, 1, 0, 0, 0.5f}, "VEC2", 4);
+    attributes(other)["TEXCOORD_1"] = add_accessor<float>(other, {0, 1, 1, 1, 1, 0, 0, 0.5f}, "VEC2", kFloat, 4);
     CHECK(contains(error_of(other), "several sets of texture coordinates"));
 
     Json none = j;
@@ -258,7 +247,7 @@ TEST_CASE("sets of texture coordinates: two of one content, none, and one that a
 
     Json moved = quad_scene();
     moved["meshes"][0]["primitives"][0]["targets"] = {
-        {{"TEXCOORD_0", add_floats(moved, {1, 0, 1, 0, 1, 0, 1, 0}, "VEC2", 4)}}};
+        {{"TEXCOORD_0", add_accessor<float>(moved, {1, 0, 1, 0, 1, 0, 1, 0}, "VEC2", kFloat, 4)}}};
     moved["meshes"][0]["weights"] = {0.5};
     CHECK(load(moved).vertices[0].uv().x == Approx(0.5));
 }

@@ -13,28 +13,6 @@ using test::has_note;
 
 namespace {
 
-constexpr int kFloat = 5126, kByte = 5121, kShort = 5123;
-
-template <class T>
-int add_accessor(Json& j, const std::vector<T>& values, const char* type, int component, size_t count,
-                 bool normalized = false) {
-    const std::string bytes(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
-    const auto add = [&j](const char* list, Json what) {
-        j[list].push_back(std::move(what));
-        return j[list].size() - 1;
-    };
-    const size_t buffer =
-        add("buffers", {{"byteLength", bytes.size()}, {"uri", data_uri("application/octet-stream", bytes)}});
-    const size_t view = add("bufferViews", {{"buffer", buffer}, {"byteLength", bytes.size()}});
-    return int(add("accessors", {{"bufferView", view},
-                                 {"componentType", component},
-                                 {"count", count},
-                                 {"type", type},
-                                 {"normalized", normalized}}));
-}
-
-Json& attributes(Json& j) { return j["meshes"][0]["primitives"][0]["attributes"]; }
-
 Vec3f position(const Scene& s, size_t i) { return s.vertices[i].p; }
 
 const BsdfRecord& bsdf(const Scene& s) { return s.bsdfs[s.materials[s.shapes[0].material].front]; }

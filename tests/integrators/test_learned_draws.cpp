@@ -7,6 +7,7 @@
 
 #include "core/rng.h"
 #include "integrators/bdpt/learned/cells.h"
+#include "render/device_wave.h"
 #include "stages/learned_draws.h"
 #include "tests/support/bidirectional_images.h"
 
@@ -137,6 +138,43 @@ TEST_CASE("a draw finds a vertex with the probability that its contribution is d
     }
     const double missing = (1.0 - probability) * kKeys * kDraws;
     CHECK(std::fabs(double(none) - missing) < 5 * std::sqrt(missing));
+}
+
+TEST_CASE("of a wave of many light subpaths every n-th vertex teaches, for n") {
+    // One cluster of eight vertices and no tickets: every vertex has the probability 1/8 in a draw.
+    constexpr uint32_t kVertices = 8, kDraws = 2;
+    std::vector<DrawSplit> splits(1);
+    std::vector<uint16_t> tickets(1), cluster(kVertices);
+    std::vector<uint32_t> first = {0, kVertices};
+    QueueCounter counter = {};
+    counter.count = counter.capacity = kVertices;
+    LearnedSource source = {};
+    source.vertices.counter = &counter;
+    source.draws = kDraws;
+    source.by_cluster = {first.data(), nullptr, nullptr, nullptr, cluster.data(), nullptr};
+    source.table = {{splits.data(), 0}, {splits.data(), 0}, tickets.data(), nullptr, 1e15f};
+    for (const uint32_t teaching_for : {1u, 3u}) {
+        WaveState state = {};
+        state.light_subpaths = ((teaching_for - 1) << 20) + 1000;
+        const double n = kVertices, paths = state.light_subpaths;
+        for (uint32_t place = 0; place < kVertices; ++place) {
+            Candidate<BidirectionalMis> c = {};
+            c.value = {1, 1, 1};
+            LearnedDraw{source, 0, 0, place}.mark(c, {1, 1, 1}, state);
+            INFO("vertex " << place << ", one of " << teaching_for);
+            const bool teaches = place % teaching_for == 0;
+            CHECK((float_bits(c.film.x) == 0) == teaches);
+            CHECK((float_bits(c.film.x) == kNone) == !teaches);
+            // n_l y² / (N² k P_c(v)) of docs/theory.md, section 3, with y = 1 and P_c(v) = 1/n.
+            if (teaches) CHECK(double(c.film.y) == Approx(teaching_for * 1e15 * n * n / (paths * paths * kDraws)));
+        }
+    }
+}
+
+TEST_CASE("waves that learn are as large as all before them together, until they are whole") {
+    for (const auto& [done, samples] : {std::pair{0u, 1u}, {1u, 1u}, {2u, 2u}, {32u, 32u}, {63u, 63u}, {64u, 500u}})
+        CHECK(learning_pass(500, done, 64) == samples);
+    CHECK(learning_pass(3, 32, 64) == 3);
 }
 
 TEST_CASE("leaves of a tree of cells hold as many points each, and some where many points share a coordinate") {
