@@ -2,15 +2,10 @@
 
 #include <cmath>
 
+#include "core/srgb.h"
 #include "formats/images/image_write.h"
 
 namespace ambilux {
-
-float linear_to_srgb(float linear) {
-    if (!(linear > 0.0f)) return 0.0f;
-    if (linear >= 1.0f) return 1.0f;
-    return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
-}
 
 void write_png(const std::string& path, const Image& image, float exposure) {
     const float scale = std::exp2(exposure);

@@ -8,9 +8,9 @@
 
 #include "core/error.h"
 #include "core/flag.h"
+#include "core/srgb.h"
 #include "experiments/statistics.h"
 #include "film/metrics.h"
-#include "film/png_io.h"
 #include "integrators/registry.h"
 #include "integrators/warnings.h"
 

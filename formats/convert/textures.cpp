@@ -4,9 +4,9 @@
 #include <cstring>
 
 #include "core/half.h"
+#include "core/srgb.h"
 #include "formats/convert/writer.h"
 #include "formats/images/image_write.h"
-#include "formats/srgb.h"
 
 namespace ambilux::convert {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/srgb.h"
 #include "formats/gltf/textures.h"
-#include "formats/srgb.h"
 
 namespace ambilux::gltf {
 
@@ -18,8 +18,6 @@ double brightness(Rgb c) { return std::sqrt(0.299 * c.x * c.x + 0.587 * c.y * c.
 
 /// Of an 8-bit image as it is, of others scaled.
 uint8_t byte_of(double v) { return uint8_t(std::lround(std::clamp(v, 0.0, 1.0) * 255)); }
-
-double encoded(double v) { return v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055; }
 
 /// A texel of an image of any size at a place in [0, 1)²: colour decoded, and alpha.
 struct Sample {
@@ -83,7 +81,7 @@ void TextureMaker::convert(const SpecularGlossiness& from, Used& base, Used& rou
             const double u = (x + 0.5) / width, v = (y + 0.5) / height;
             const Sample d = sample(diffuse, u, v), s = sample(specular, u, v);
             const BaseAndMetal as = base_and_metal(d.color * from.diffuse, s.color * from.specular);
-            for (int k = 0; k < 3; ++k) colors.bytes.push_back(byte_of(encoded(as.base[k])));
+            for (int k = 0; k < 3; ++k) colors.bytes.push_back(byte_of(linear_to_srgb(as.base[k])));
             colors.bytes.push_back(byte_of(d.alpha));
             numbers.bytes.insert(numbers.bytes.end(),
                                  {0, byte_of(1 - s.alpha * from.glossiness), byte_of(as.metallic), 255});

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "formats/srgb.h"
+#include "core/srgb.h"
 
 namespace ambilux::gltf {
 

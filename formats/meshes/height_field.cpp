@@ -4,9 +4,9 @@
 
 #include "core/error.h"
 #include "core/math.h"
+#include "core/srgb.h"
 #include "formats/file_budget.h"
 #include "formats/images/image_io.h"
-#include "formats/srgb.h"
 
 namespace ambilux {
 

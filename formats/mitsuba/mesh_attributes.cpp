@@ -4,9 +4,9 @@
 
 #include "core/error.h"
 #include "core/scoped_seconds.h"
+#include "core/srgb.h"
 #include "formats/file_budget.h"
 #include "formats/mitsuba/shape_jobs.h"
-#include "formats/srgb.h"
 
 namespace ambilux::mitsuba {
 

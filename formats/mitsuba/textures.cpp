@@ -5,11 +5,11 @@
 #include "core/error.h"
 #include "core/half.h"
 #include "core/scoped_seconds.h"
+#include "core/srgb.h"
 #include "formats/file_budget.h"
 #include "formats/images/image_io.h"
 #include "formats/mitsuba/builder.h"
 #include "formats/mitsuba/plugins.h"
-#include "formats/srgb.h"
 
 namespace ambilux::mitsuba {
 

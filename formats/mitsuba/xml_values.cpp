@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/srgb.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/text_cursor.h"
-#include "formats/srgb.h"
 
 namespace ambilux::mitsuba {
 namespace {

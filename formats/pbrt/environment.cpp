@@ -5,8 +5,8 @@
 
 #include "core/math.h"
 #include "core/parallel.h"
+#include "core/srgb.h"
 #include "formats/file_budget.h"
-#include "formats/srgb.h"
 
 namespace ambilux::pbrt {
 

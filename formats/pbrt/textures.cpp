@@ -1,5 +1,5 @@
 #include "formats/pbrt/textures.h"
-#include "formats/srgb.h"
+#include "core/srgb.h"
 
 #include <algorithm>
 #include <cmath>

@@ -10,6 +10,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/srgb.h"
 #include "film/exr_io.h"
 #include "film/metrics.h"
 #include "film/png_io.h"
