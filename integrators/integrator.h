@@ -15,6 +15,7 @@
 //   run_paths(stage, n)   a stage that claims its slots by itself
 //   set_depth(d), next_depth(n), clear(queue), fail_on_overflow(queue, queue)
 //   repeat_while(queue, body)  until the queue is found empty
+//   store(place, value)   of one number that stages share
 #pragma once
 
 #include <algorithm>
@@ -37,7 +38,9 @@ struct WavePolicy {
     float cull = 0;                   ///< cull_factor; 0: none
     uint32_t strategy_depth = 0;      ///< segments up to which images of single strategies are gathered; 0: none
     bool deterministic = false;
-    uint32_t slots_in_flight = 0;          ///< variant streaming: paths that are worked on at once; 0: all of a wave
+    uint32_t slots_in_flight = 0;          ///< that take one path of a wave after the other, as many as the renderer
+                                           ///< finds right; 0: every path has a slot of its own
+    uint32_t most_paths = ~0u;             ///< of a wave, as items can number them
     uint32_t light_subpaths_per_tile = 0;  ///< of kTilePixels pixels, in one sample; 0: none
     bool keeps_light_vertices = false;     ///< queues of light vertices or splats hold those of a whole wave
 

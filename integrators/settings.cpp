@@ -7,6 +7,7 @@
 #include "film/strategy_film.h"
 #include "integrators/registry.h"
 #include "integrators/strategies_setting.h"
+#include "stages/cache_draw.h"
 
 namespace ambilux {
 namespace {

@@ -20,7 +20,6 @@ struct WaveState {
     uint32_t failed;          ///< a wave ran out of memory: it and all after it do nothing until the host has made room
     uint32_t done;            ///< waves that did not fail
     uint32_t light_subpaths;  ///< of this wave
-    alignas(128) uint32_t next_path = 0;  ///< variant streaming: the next that a slot claims
     alignas(128) uint32_t next =
         0;  ///< slots that threads of a launch have claimed; away from what is read all the time
 };
@@ -114,14 +113,6 @@ inline uint32_t light_subpaths_in(const Wave& wave, uint32_t first_tile, uint32_
         if (whole) count += per_tile;
     }
     return count;
-}
-
-/// Most light vertices that an eye vertex draws from a cache.
-constexpr uint32_t kMaxCacheDraws = 256;
-
-/// Random numbers of a light vertex that an eye vertex at `depth` draws.
-AMBILUX_HD Uint4 cache_draw(const RngKey& key, uint32_t depth, uint32_t draw) {
-    return random_bits(key, 0x10000u + depth * kMaxCacheDraws + draw);
 }
 
 }  // namespace ambilux

@@ -272,14 +272,7 @@ private:
         CpuExecutor executor(w.state, view_, w.order);
         for (uint32_t s = 0; s < count; s += wave_.samples) {
             const uint32_t samples = std::min(wave_.samples, count - s);
-            *w.state = {first_tile,
-                        first_sample + s,
-                        samples,
-                        0,
-                        0,
-                        0,
-                        samples * light_subpaths,
-                        policy_.waves.slots_in_flight};
+            *w.state = {first_tile, first_sample + s, samples, 0, 0, 0, samples * light_subpaths};
             Integrator::schedule(executor, stages);
             if (w.state->failed) {
                 if (grow(w, tiles)) return render_tiles(first_tile, tiles, first_sample + s, count - s);

@@ -306,14 +306,13 @@ private:
     }
     /// After the last part of a sample; nothing if one of them failed.
     void finish_whole_sample(uint32_t sample) {
-        const WaveState state = {0, sample, 1, 0, 0, 0, 0, 0};
+        const WaveState state = {0, sample, 1, 0, 0, 0, 0};
         detail::set_wave<<<1, 1, 0, stream_.get()>>>(state_, state);
         cuda_check(cudaGetLastError(), "film");
         executor_->launch([&](Executor& exec) { finish_samples(exec); });
     }
     void launch_wave(uint32_t tile, uint32_t sample, uint32_t samples) {
-        const WaveState state = {
-            tile, sample, samples, 0, 0, 0, samples * plan_.light_subpaths(tile), policy_.waves.slots_in_flight};
+        const WaveState state = {tile, sample, samples, 0, 0, 0, samples * plan_.light_subpaths(tile)};
         detail::set_wave<<<1, 1, 0, stream_.get()>>>(state_, state);
         cuda_check(cudaGetLastError(), "wave");
         if (graph_)

@@ -4,7 +4,6 @@
 
 #include "core/error.h"
 #include "render/wave_plan.h"
-#include "stages/streaming.h"
 
 namespace ambilux {
 
@@ -36,7 +35,7 @@ void DevicePlan::shape(uint32_t size) {
         wave.tiles = all;
         waves_.slots_in_flight = size;
         wave.samples = film_wave.samples =
-            stream_samples(size, all * kTilePixels, settings_.expected_samples, kLightRay - 1);
+            stream_samples(size, all * kTilePixels, settings_.expected_samples, waves_.most_paths);
     }
     light_subpaths_ = light_subpaths_in(wave, 0, wave.tiles, waves_.light_subpaths_per_tile);
     waves_.multi_bounce_below = multi_bounce_below(settings_, wave.slot_count());

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/warp.h"
+#include "stages/cache_draw.h"
 #include "stages/occlude.h"
 #include "stages/stage.h"
 

@@ -30,7 +30,7 @@ struct StreamPool {
                                       ///< is for the camera only
     LaneArray<SubpathRay> pending;    ///< by slot: the ray with which the eye subpath goes on; depth 0: it has ended
     Lane* samples;                    ///< per path
-    uint32_t* next_path;              ///< WaveState::next_path
+    uint32_t* next_path;              ///< of the wave, that no slot has claimed
 
     /// Random numbers of the light subpath for an eye vertex: another one for each depth.
     AMBILUX_HD Draws light_draws(uint32_t path, const ConnectionVertexFront& vertex) const {

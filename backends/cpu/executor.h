@@ -77,6 +77,7 @@ public:
     void clear(const Queue<Item>& queue) {
         queue.counter->finish();
     }
+    static void store(uint32_t* place, uint32_t value) { *place = value; }
     void set_depth(uint32_t depth) { state_->depth = depth; }
     void next_depth(uint32_t depths) { state_->depth += depths; }
 

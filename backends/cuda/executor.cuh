@@ -131,6 +131,7 @@ public:
     void clear(const Queue<Item>& queue) {
         detail::clear_queue<<<1, 1, 0, stream()>>>(queue.counter);
     }
+    void store(uint32_t* place, uint32_t value) { detail::store<<<1, 1, 0, stream()>>>(place, value); }
     void finish_wave() { detail::finish_wave<<<1, 1, 0, stream()>>>(state_); }
 
     /// While there are `least` items.

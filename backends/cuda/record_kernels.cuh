@@ -114,6 +114,8 @@ __global__ inline void fail_on_overflow(WaveState* state, QueueCounter* a, Queue
 
 __global__ inline void clear_queue(QueueCounter* counter) { counter->finish(); }
 
+__global__ inline void store(uint32_t* place, uint32_t value) { *place = value; }
+
 __global__ inline void finish_wave(WaveState* state) {
     if (!state->failed) ++state->done;
 }

@@ -11,6 +11,7 @@
 #include "integrators/auto/variance_prediction.h"
 #include "integrators/bdpt/shared/policy.h"
 #include "integrators/feature_levels.h"
+#include "stages/cache_draw.h"
 #include "stages/generate.h"
 #include "transport/subpath/connection.h"
 #include "transport/subpath/next_event.h"

@@ -23,6 +23,7 @@ struct StreamingIntegrator {
         need_one_light_subpath(settings, "variant streaming has one light subpath per eye vertex; use variant lvc");
         p.waves.keeps_light_vertices = false;
         p.waves.slots_in_flight = 1;  // the renderer says how many
+        p.waves.most_paths = kLightRay - 1;
         return p;
     }
     static double pilot(Policy&, const SceneView&, const HostTracer&, uint64_t) { return 0.0; }
@@ -39,6 +40,7 @@ struct StreamingIntegrator {
         Queue<ConnectionVertex> pairs;
         EyeQueues eye;
         SplatQueues splats;
+        uint32_t* next_path;
     };
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
         const uint32_t slots = p.waves.slots_in_flight, lanes = ConnectionVertex::lanes<F>();
@@ -52,6 +54,7 @@ struct StreamingIntegrator {
         m.pairs = layout.queue<ConnectionVertex>("pairs", p.rules.connect ? slots : 0, false, lanes);
         m.eye = EyeQueues::lay_out<kFusion, F>(layout, slots, n.slots, p.rules, p.waves);
         m.splats = SplatQueues::lay_out<kFusion, F>(layout, slots, with_holes(slots), p);
+        m.next_path = layout.allocate<uint32_t>(1);
         return m;
     }
 
@@ -78,10 +81,8 @@ struct StreamingIntegrator {
               splats(layout, scene, tracer, w, m.splats, film, p, m.eye.raw) {
             const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
             const bool seeds = F.opacity || p.waves.cull > 0.0f;
-            // The state is null in the run that tells the bytes.
-            uint32_t* const next_path = w.state ? &const_cast<WaveState*>(w.state)->next_path : nullptr;
             const StreamPool<F> pool = {scene,          wave,      p.rules,      m.rays,
-                                        m.eye_vertices, m.pending, film.samples, next_path};
+                                        m.eye_vertices, m.pending, film.samples, m.next_path};
             begin = {pool, record(begin)};
             extend = {scene, tracer, pool, m.eye_hits, m.light_hits, record(extend)};
             eye_vertex = {pool, m.eye_hits, eye.emission(), m.eye.vertices, m.turns, record(eye_vertex)};
@@ -101,6 +102,7 @@ struct StreamingIntegrator {
     static void schedule(Executor& exec, const Stages& s) {
         const Rules<Mis>& rules = s.policy.rules;
         if (rules.max_depth == 0) return;
+        exec.store(s.begin.pool.next_path, s.policy.waves.slots_in_flight);
         exec.run_slots(s.begin, s.policy.waves.slots_in_flight, 1);
         exec.repeat_while(s.extend.items(), [&] {
             exec.trace(s.extend);
