@@ -8,7 +8,7 @@ from matplotlib import colors
 from matplotlib.patches import Patch
 
 from analysis import style
-from analysis.stress import VERDICTS, backend_differences, measured
+from analysis.stress_sweep import VERDICTS, backend_differences, measured
 
 # Letters tell states apart without colour.
 STATES = {"failed": ("B", style.COLOURS[1], "biased, no known limit"), "invalid": ("I", style.COLOURS[3], "invalid or lost values, counted"),

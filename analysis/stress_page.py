@@ -3,8 +3,8 @@
 import html
 
 from analysis.report import figure, page_file
-from analysis.stress import VERDICTS, backend_differences, disagreeing, limits, measured
 from analysis.stress_maps import STATES
+from analysis.stress_sweep import VERDICTS, backend_differences, disagreeing, limits, measured
 from analysis.tables import minus
 
 CSS = """

@@ -9,10 +9,10 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
-#include "experiments/bench_frames.h"
-#include "experiments/drive.h"
-#include "experiments/statistics.h"
 #include "render/fused_shares.h"
+#include "session/bench_frames.h"
+#include "session/drive.h"
+#include "session/statistics.h"
 
 namespace ambilux {
 namespace {

@@ -7,10 +7,10 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
-#include "experiments/reference.h"
 #include "experiments/reference_store.h"
-#include "experiments/statistics.h"
 #include "film/png_io.h"
+#include "session/reference.h"
+#include "session/statistics.h"
 
 namespace ambilux {
 namespace {

@@ -16,14 +16,14 @@
 #include "core/outputs.h"
 #include "core/progress.h"
 #include "core/ranks.h"
-#include "experiments/kept_film.h"
-#include "experiments/parallel/parallel_render.h"
-#include "experiments/render_plan.h"
-#include "experiments/statistics.h"
-#include "experiments/technique_files.h"
 #include "film/exr_io.h"
 #include "film/png_io.h"
 #include "integrators/warnings.h"
+#include "session/kept_film.h"
+#include "session/parallel/parallel_render.h"
+#include "session/render_plan.h"
+#include "session/statistics.h"
+#include "session/technique_files.h"
 
 namespace ambilux {
 namespace {
@@ -43,7 +43,7 @@ struct Options {
     std::optional<double> checkpoint;
     bool resume = false;
 
-    /// By ranges of samples, on several devices or with checkpoints (experiments/parallel/).
+    /// By ranges of samples, on several devices or with checkpoints (session/parallel/).
     bool by_ranges() const {
         return !devices.empty() || range_size || block_films || checkpoint || resume || ranks().launched();
     }

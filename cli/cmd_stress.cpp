@@ -7,10 +7,10 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/log.h"
-#include "experiments/stress/elsewhere.h"
-#include "experiments/stress/families.h"
-#include "experiments/stress/folder.h"
-#include "experiments/stress/runner.h"
+#include "stress/elsewhere.h"
+#include "stress/families.h"
+#include "stress/folder.h"
+#include "stress/runner.h"
 
 namespace ambilux {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/outputs.h"
-#include "experiments/hooks.h"
 #include "formats/load.h"
+#include "session/hooks.h"
 
 namespace ambilux {
 

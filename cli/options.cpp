@@ -11,9 +11,9 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/progress.h"
-#include "experiments/render_plan.h"
 #include "formats/load.h"
 #include "integrators/registry.h"
+#include "session/render_plan.h"
 
 namespace ambilux {
 

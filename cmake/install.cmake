@@ -3,12 +3,12 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 add_library(ambilux_library INTERFACE)
-target_link_libraries(ambilux_library INTERFACE ambilux_experiments ambilux_convert)
+target_link_libraries(ambilux_library INTERFACE ambilux_stress ambilux_convert)
 set_target_properties(ambilux_library PROPERTIES EXPORT_NAME library)
 
 set(libraries ambilux_options ambilux_core ambilux_models ambilux_scene ambilux_transport ambilux_accel ambilux_images
   ambilux_formats ambilux_convert ambilux_items ambilux_queues ambilux_stages ambilux_film ambilux_integrators ambilux_backends
-  ambilux_render ambilux_experiments ambilux_library)
+  ambilux_render ambilux_session ambilux_experiments ambilux_stress ambilux_library)
 install(TARGETS ${libraries} EXPORT AmbiluxTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/ambilux
   INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ambilux)
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/Ambilux)
@@ -19,7 +19,7 @@ write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/AmbiluxConfigVersio
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/AmbiluxConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/AmbiluxConfigVersion.cmake
   DESTINATION ${package})
 install(DIRECTORY core models scene transport accel formats items queues film stages integrators backends render
-  experiments DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ambilux FILES_MATCHING PATTERN "*.h")
+  session experiments stress DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ambilux FILES_MATCHING PATTERN "*.h")
 
 install(TARGETS ambilux)
 foreach(kind man completion)

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "experiments/config.h"
-#include "experiments/drive.h"
 #include "experiments/results.h"
 #include "film/image.h"
 #include "film/moments.h"
+#include "session/drive.h"
 
 namespace ambilux {
 

@@ -8,13 +8,13 @@
 #include <map>
 
 #include "core/progress.h"
-#include "experiments/drive.h"
 #include "experiments/experiment_folder.h"
 #include "experiments/prepare.h"
 #include "experiments/reference_store.h"
 #include "experiments/render_task.h"
 #include "experiments/results.h"
 #include "experiments/work_estimate.h"
+#include "session/drive.h"
 
 namespace ambilux {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "experiments/hooks.h"
 #include "experiments/runner.h"
+#include "session/hooks.h"
 
 namespace ambilux {
 

@@ -9,10 +9,10 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/ranks.h"
-#include "experiments/machine.h"
-#include "experiments/parallel/task_dealer.h"
-#include "experiments/statistics.h"
+#include "experiments/task_dealer.h"
 #include "film/metrics.h"
+#include "session/machine.h"
+#include "session/statistics.h"
 
 namespace ambilux {
 

@@ -25,7 +25,7 @@ class ExperimentFolder {
 public:
     /// Makes the folder, or with `resume` continues one of the same configuration and scenes. `references`: where they
     /// are kept; empty: inside. Of several ranks the first one holds it; tables of the others tell it what they would
-    /// write (experiments/parallel/task_dealer.h). Throws Error.
+    /// write (experiments/task_dealer.h). Throws Error.
     ExperimentFolder(const std::string& path, const std::string& references, bool resume, const Prepared& prepared);
 
     const std::string& path() const { return path_; }

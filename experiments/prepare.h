@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "experiments/config.h"
-#include "experiments/hooks.h"
+#include "session/hooks.h"
 
 namespace ambilux {
 

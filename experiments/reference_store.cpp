@@ -13,7 +13,7 @@
 #include "core/flag.h"
 #include "core/log.h"
 #include "core/sha256.h"
-#include "experiments/statistics.h"
+#include "session/statistics.h"
 
 namespace ambilux {
 

@@ -5,8 +5,8 @@
 
 #include "core/file_lock.h"
 #include "experiments/config.h"
-#include "experiments/hooks.h"
-#include "experiments/reference.h"
+#include "session/hooks.h"
+#include "session/reference.h"
 
 namespace ambilux {
 

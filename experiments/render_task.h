@@ -7,7 +7,7 @@
 #include "experiments/experiment_folder.h"
 #include "experiments/reference_store.h"
 #include "experiments/run_maker.h"
-#include "experiments/state.h"
+#include "session/state.h"
 
 namespace ambilux {
 

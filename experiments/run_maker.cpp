@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "experiments/statistics.h"
+#include "session/statistics.h"
 
 namespace ambilux {
 

@@ -3,9 +3,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "experiments/hooks.h"
 #include "experiments/prepare.h"
 #include "film/exr_io.h"
+#include "session/hooks.h"
 
 namespace ambilux {
 

@@ -9,7 +9,7 @@
 #include "core/ranks.h"
 #include "experiments/batches.h"
 #include "experiments/disturbed.h"
-#include "experiments/parallel/task_dealer.h"
+#include "experiments/task_dealer.h"
 #include "experiments/task_runner.h"
 #include "film/png_io.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "experiments/hooks.h"
+#include "session/hooks.h"
 
 namespace ambilux {
 

@@ -10,11 +10,11 @@
 #include "core/log.h"
 #include "core/ranks.h"
 #include "experiments/batches.h"
-#include "experiments/load.h"
-#include "experiments/machine.h"
-#include "experiments/stats_sum.h"
-#include "experiments/technique_files.h"
 #include "film/png_io.h"
+#include "session/load.h"
+#include "session/machine.h"
+#include "session/stats_sum.h"
+#include "session/technique_files.h"
 
 namespace ambilux {
 

@@ -3,11 +3,11 @@
 
 #include "experiments/disturbed.h"
 #include "experiments/experiment_folder.h"
-#include "experiments/gpu_watch.h"
 #include "experiments/peers/peer_runs.h"
 #include "experiments/render_task.h"
 #include "experiments/runner.h"
 #include "experiments/work_estimate.h"
+#include "session/gpu_watch.h"
 
 namespace ambilux {
 

@@ -5,20 +5,20 @@
 namespace ambilux {
 
 Scene load_by(const std::string& path, const LoadOptions& options,
-              const std::function<void(mitsuba::Document&, Report&)>& read) {
-    mitsuba::Document document;
+              const std::function<void(document::Document&, Report&)>& read) {
+    document::Document document;
     document.limits = options.limits;
     document.smooth_normals = false;
     document.mirrors_turn_in = false;
-    document.scene = &mitsuba::add_object(document, "scene", "", {path, 0});
+    document.scene = &document::add_object(document, "scene", "", {path, 0});
     {
         const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
         Report report(options.lenient);
         read(document, report);
         report.write(document);
-        mitsuba::check_references(document);
+        document::check_references(document);
     }
-    return mitsuba::load_document(path, document, options);
+    return document::load_document(path, document, options);
 }
 
 }  // namespace ambilux

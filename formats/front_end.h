@@ -10,6 +10,6 @@ namespace ambilux {
 /// The scene of the document that `read` fills, for a file at `path`. Meshes without normals stay flat. What is thrown
 /// by `read` and load_document passes through.
 Scene load_by(const std::string& path, const LoadOptions& options,
-              const std::function<void(mitsuba::Document&, Report&)>& read);
+              const std::function<void(document::Document&, Report&)>& read);
 
 }  // namespace ambilux

@@ -4,7 +4,7 @@
 
 namespace ambilux {
 
-using mitsuba::Where;
+using document::Where;
 
 void Report::List::add(const Where& where, const std::string& text) {
     const auto [place, is_new] = places.try_emplace(text, entries.size());
@@ -27,7 +27,7 @@ void Report::refuse(const Where& where, const std::string& problem, const std::s
     warnings_.add(where, problem + "; " + instead);
 }
 
-void Report::write(mitsuba::Document& document) const {
+void Report::write(document::Document& document) const {
     document.notes = notes_.lines();
     document.warnings = warnings_.lines();
 }

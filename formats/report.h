@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/mitsuba/document.h"
+#include "formats/document/document.h"
 
 namespace ambilux {
 
@@ -15,23 +15,23 @@ public:
     explicit Report(bool lenient) : lenient_(lenient) {}
 
     /// Something done in our own way.
-    void note(const mitsuba::Where& where, const std::string& text);
+    void note(const document::Where& where, const std::string& text);
     /// Something we cannot do: an error, or with --lenient a warning that says what is done instead.
-    void refuse(const mitsuba::Where& where, const std::string& problem, const std::string& instead);
+    void refuse(const document::Where& where, const std::string& problem, const std::string& instead);
     /// Hands all over.
-    void write(mitsuba::Document& document) const;
+    void write(document::Document& document) const;
 
 private:
     struct Entry {
         std::string text;
-        mitsuba::Where where;
+        document::Where where;
         uint64_t count = 0;
     };
     struct List {
         std::vector<Entry> entries;
         std::map<std::string, size_t> places;
 
-        void add(const mitsuba::Where& where, const std::string& text);
+        void add(const document::Where& where, const std::string& text);
         std::vector<std::string> lines() const;
     };
 

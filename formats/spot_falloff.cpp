@@ -5,7 +5,7 @@
 
 namespace ambilux {
 
-void add_spot_falloff(mitsuba::Document& document, mitsuba::Object& spot, double outer, double inner,
+void add_spot_falloff(document::Document& document, document::Object& spot, double outer, double inner,
                       const std::function<double(double)>& profile) {
     constexpr int kRing = 96, kLeast = 64, kMost = 2048;  // texels
     const double c0 = std::cos(outer), c1 = std::cos(inner), edge = std::tan(outer);
@@ -24,11 +24,11 @@ void add_spot_falloff(mitsuba::Document& document, mitsuba::Object& spot, double
                 float(profile(std::clamp((1 / std::sqrt(1 + a * a + b * b) - c0) / (c1 - c0), 0.0, 1.0)));
             image.floats.insert(image.floats.end(), {value, value, value, 1.0f});
         }
-    mitsuba::Object& texture = mitsuba::add_object(document, "texture", "bitmap", spot.where);
-    mitsuba::set_text(texture, "image", name);
-    mitsuba::set_boolean(texture, "raw", true);
-    mitsuba::set_text(texture, "wrap_mode", "clamp");
-    mitsuba::add_child(spot, texture, "texture");
+    document::Object& texture = document::add_object(document, "texture", "bitmap", spot.where);
+    document::set_text(texture, "image", name);
+    document::set_boolean(texture, "raw", true);
+    document::set_text(texture, "wrap_mode", "clamp");
+    document::add_child(spot, texture, "texture");
 }
 
 }  // namespace ambilux

@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "formats/mitsuba/document.h"
+#include "formats/document/document.h"
 
 namespace ambilux {
 
@@ -12,7 +12,7 @@ constexpr const char* kSpotNote =
 
 /// Gives the spot, an emitter whose beam is as wide as its cone, a texture by which it falls off between `inner` and
 /// `outer`, angles to its axis in radians: by `profile` of the share of cosines, 0 at `outer` and 1 at `inner`.
-void add_spot_falloff(mitsuba::Document& document, mitsuba::Object& spot, double outer, double inner,
+void add_spot_falloff(document::Document& document, document::Object& spot, double outer, double inner,
                       const std::function<double(double)>& profile);
 
 }  // namespace ambilux

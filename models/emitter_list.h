@@ -6,7 +6,7 @@
 //   by chance; a hidden area draws that point anew for each sample;
 // - infinite: its light comes from outside of the scene.
 //
-// Functions are in transport/emitter/, plugins in formats/mitsuba/emitters.cpp, powers in formats/finalize.cpp.
+// Functions are in transport/emitter/, plugins in formats/document/emitters.cpp, powers in formats/finalize.cpp.
 #pragma once
 
 #include <concepts>

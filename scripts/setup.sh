@@ -3,7 +3,7 @@
 # a Python environment in .venv. Prints nothing when all is there. Safe to run again.
 #   scripts/setup.sh         everything
 #   scripts/setup.sh demo    what scripts/demo.sh needs: no tools of tests, of formats and of the Python module
-#   scripts/setup.sh fuzz    everything, and what scripts/fuzz.sh needs
+#   scripts/setup.sh fuzz    everything, and what scripts/checks/fuzz.sh needs
 # Exit code 4: something is missing and could not be installed; the message says what, and which command installs it.
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 

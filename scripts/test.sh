@@ -31,5 +31,5 @@ if [[ -d $build/python/ambilux ]]; then
 fi
 wait "$analysis_tests" || status=$?
 cat "$results/pytest.log"
-"$python" scripts/count_tests.py "$results/ctest.xml" "$results/pytest.xml" "${python_tests[@]}" || status=1
+"$python" scripts/checks/count_tests.py "$results/ctest.xml" "$results/pytest.xml" "${python_tests[@]}" || status=1
 exit "$status"

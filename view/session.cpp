@@ -9,10 +9,10 @@
 #include "core/error.h"
 #include "core/flag.h"
 #include "core/srgb.h"
-#include "experiments/statistics.h"
 #include "film/metrics.h"
 #include "integrators/registry.h"
 #include "integrators/warnings.h"
+#include "session/statistics.h"
 
 namespace ambilux {
 namespace {

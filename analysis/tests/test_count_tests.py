@@ -1,11 +1,11 @@
-"""scripts/count_tests.py on files as ctest and pytest write them."""
+"""scripts/checks/count_tests.py on files as ctest and pytest write them."""
 
 import importlib.util
 from pathlib import Path
 
 import pytest
 
-path = Path(__file__).parents[2] / "scripts" / "count_tests.py"
+path = Path(__file__).parents[2] / "scripts" / "checks" / "count_tests.py"
 spec = importlib.util.spec_from_file_location("count_tests", path)
 count_tests = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(count_tests)

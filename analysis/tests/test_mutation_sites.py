@@ -1,10 +1,10 @@
-"""Places for faults that scripts/mutation_sites.py finds, and what it makes of them."""
+"""Places for faults that scripts/checks/mutation_sites.py finds, and what it makes of them."""
 
 import random
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts" / "checks"))
 
 import mutation_sites  # noqa: E402
 

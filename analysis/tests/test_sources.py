@@ -1,5 +1,7 @@
-"""Rules for the C++ and CUDA sources: who includes whom, lengths, format."""
+"""Rules for the sources: who includes and imports whom, lengths, format."""
 
+import ast
+import graphlib
 import re
 import subprocess
 from pathlib import Path
@@ -11,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 # A folder includes those above it, and none below or beside it (docs/architecture.md, "Who may include whom").
 ORDER = [
     ["core"], ["models"], ["scene"], ["transport"], ["accel"], ["formats"], ["items", "queues", "film"], ["stages"],
-    ["integrators"], ["backends"], ["render"], ["experiments"], ["view"], ["cli"], ["python"],
+    ["integrators"], ["backends"], ["render"], ["session"], ["experiments"], ["stress"], ["view"], ["cli"], ["python"],
 ]
 RANK = {folder: rank for rank, folders in enumerate(ORDER) for folder in folders}
 # (file, included file): why it is right all the same. docs/architecture.md lists them too.
@@ -112,8 +114,25 @@ def test_arrows_are_judged_by_their_folders(path, line, wrong):
     assert len(wrong_arrows(path, f"// x\n{line}\n")) == wrong
 
 
+def imports(path):
+    """Modules of the package analysis that a file of it imports, wherever in the file."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module == "analysis":
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("analysis."):
+            yield node.module.split(".")[1]
+        elif isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[1] for alias in node.names if alias.name.startswith("analysis."))
+
+
+def test_modules_of_the_analysis_import_each_other_in_no_circle():
+    modules = {path.stem: set(imports(path)) for path in (ROOT / "analysis").glob("*.py")}
+    assert modules["stress"] >= {"stress_maps", "stress_page"}
+    graphlib.TopologicalSorter(modules).prepare()  # throws CycleError with the circle
+
+
 def test_sources_are_formatted():
     if not (ROOT / ".git").exists():
         pytest.skip("no git checkout")
-    done = subprocess.run([ROOT / "scripts" / "check_format.sh"], capture_output=True, text=True, check=False)
+    done = subprocess.run([ROOT / "scripts" / "checks" / "check_format.sh"], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from analysis import stress
+from analysis import stress, stress_sweep
 from analysis.experiment import InputError
 
 HEADER = ["cell", "family", "value", "method", "backend", "verdict", "mean", "standard_error", "dof", "expected", "expected_error", "relative_bias", "z", "box_z", "p",
@@ -37,10 +37,10 @@ ROWS = [row("size_100"), row("size_1", "path-nee", verdict="noisy"), row("size_1
 
 
 def test_rows_stand_by_family_and_value(tmp_path):
-    sweep = stress.load([sweep_of(tmp_path / "a", ROWS)])
+    sweep = stress_sweep.load([sweep_of(tmp_path / "a", ROWS)])
     assert sweep.families == {"size": ["size_1", "size_100"], "pane": ["pane_1e-07", "pane_1e-06", "pane_1"]}
     assert sweep.count("failed") == 1 and sweep.count("limit", "cpu", "pane") == 2 and sweep.count("ok", "cuda") == 0
-    (name, family, backend, cells, worst), = stress.limits(sweep)
+    (name, family, backend, cells, worst), = stress_sweep.limits(sweep)
     assert (name, family, backend, cells) == ("Contact shadows and thin panes", "pane", "cpu", ["pane_1e-07", "pane_1e-06"])
     assert worst == pytest.approx(0.4)
 
@@ -50,20 +50,20 @@ def test_rows_stand_by_family_and_value(tmp_path):
     ([row("size_1", verdict="fine")], "", "stress.csv:2: column 'verdict' holds 'fine'"), ([row("size_1", mean="much")], "", "column 'mean' holds 'much'"), ([], "", "no rows yet")])
 def test_bad_input_is_named(tmp_path, rows, tail, message):
     with pytest.raises(InputError) as e:
-        stress.load([sweep_of(tmp_path / "a", rows, tail)])
+        stress_sweep.load([sweep_of(tmp_path / "a", rows, tail)])
     assert message in str(e.value)
 
 
 def test_backends_that_differ_are_found_and_those_that_do_not_are_not(tmp_path):
     rng = np.random.default_rng(5)
     rows = [row(f"size_{i}", backend=b, mean=1 + 0.001 * rng.normal()) for i in range(300) for b in ("cpu", "cuda")]
-    sweep = stress.load([sweep_of(tmp_path / "a", rows)])
-    assert len(stress.backend_differences(sweep)) == 300
-    assert stress.disagreeing(stress.backend_differences(sweep)) == []
+    sweep = stress_sweep.load([sweep_of(tmp_path / "a", rows)])
+    assert len(stress_sweep.backend_differences(sweep)) == 300
+    assert stress_sweep.disagreeing(stress_sweep.backend_differences(sweep)) == []
     rows[7]["mean"] += 0.02
     rows[9]["standard_error"] = rows[8]["standard_error"] = 0
     rows[9]["mean"] = rows[8]["mean"] * (1 + 1e-3)
-    found = stress.disagreeing(stress.backend_differences(stress.load([sweep_of(tmp_path / "b", rows)])))
+    found = stress_sweep.disagreeing(stress_sweep.backend_differences(stress_sweep.load([sweep_of(tmp_path / "b", rows)])))
     assert sorted(cell for _, cell, *_ in found) == ["size_3", "size_4"]
 
 

@@ -1,4 +1,4 @@
-"""Gains that scripts/tile_bound.py finds in figures whose best numbers are known."""
+"""Gains that scripts/bench/tile_bound.py finds in figures whose best numbers are known."""
 
 import sys
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts" / "bench"))
 
 import tile_bound  # noqa: E402
 

@@ -2,9 +2,9 @@
 #include <cstdio>
 
 #include "core/error.h"
-#include "experiments/render_plan.h"
 #include "film/exr_io.h"
 #include "formats/load.h"
+#include "session/render_plan.h"
 
 int main(int argc, char** argv) {
     using namespace ambilux;

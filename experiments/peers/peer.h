@@ -7,8 +7,8 @@
 
 #include "core/error.h"
 #include "experiments/config.h"
-#include "experiments/drive.h"
 #include "scene/scene.h"
+#include "session/drive.h"
 
 namespace ambilux {
 

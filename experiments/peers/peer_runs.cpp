@@ -8,8 +8,8 @@
 #include "core/error.h"
 #include "core/log.h"
 #include "core/version.h"
-#include "experiments/statistics.h"
 #include "film/png_io.h"
+#include "session/statistics.h"
 
 namespace ambilux {
 namespace {

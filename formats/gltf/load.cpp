@@ -13,7 +13,7 @@ namespace ambilux {
 namespace gltf {
 namespace {
 
-using namespace mitsuba;
+using namespace document;
 
 /// What an instance takes until the scene is built, measured.
 constexpr uint64_t kBytesOfInstance = 1600;
@@ -332,8 +332,8 @@ private:
 }  // namespace gltf
 
 Scene load_gltf(const std::string& path, const LoadOptions& options) {
-    return load_by(path, options, [&](mitsuba::Document& document, Report& report) {
-        const mitsuba::Where where{path, 0};
+    return load_by(path, options, [&](document::Document& document, Report& report) {
+        const document::Where where{path, 0};
         gltf::Context context{document, report, where, {}, {}, {}, {}, false};
         gltf::read_model(context, path);
         gltf::SceneMaker(context).make();

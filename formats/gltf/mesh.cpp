@@ -81,13 +81,13 @@ bool put_on_skin(Context& context, Mesh& mesh, const tinygltf::Primitive& primit
         for (int r = 0; r < 3; ++r)
             for (double& v : m.m[r]) v /= total[i];
         for (int c = 0; c < 4; ++c) m.m[3][c] = c == 3;
-        const float side = mitsuba::determinant(m) < 0 ? -1.0f : 1.0f;
+        const float side = document::determinant(m) < 0 ? -1.0f : 1.0f;
         if (i == 0) mirrored = side < 0;
-        mesh.positions[i] = mitsuba::to_affine(m).point(mesh.positions[i]);
+        mesh.positions[i] = document::to_affine(m).point(mesh.positions[i]);
         if (mesh.normals.empty()) continue;
         // By the cofactors, so that it stays perpendicular to the surface, and on its side.
-        const mitsuba::Vec3d x = mitsuba::column(m, 0), y = mitsuba::column(m, 1), z = mitsuba::column(m, 2),
-                             a = cross(y, z), b = cross(z, x), c = cross(x, y);
+        const document::Vec3d x = document::column(m, 0), y = document::column(m, 1), z = document::column(m, 2),
+                              a = cross(y, z), b = cross(z, x), c = cross(x, y);
         const Vec3f v = mesh.normals[i] * side;
         mesh.normals[i] = {float(a.x * v.x + b.x * v.y + c.x * v.z), float(a.y * v.x + b.y * v.y + c.y * v.z),
                            float(a.z * v.x + b.z * v.y + c.z * v.z)};

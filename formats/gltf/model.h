@@ -9,10 +9,10 @@
 
 namespace ambilux::gltf {
 
-using mitsuba::Document;
-using mitsuba::Matrix;
-using mitsuba::Object;
-using mitsuba::Where;
+using document::Document;
+using document::Matrix;
+using document::Object;
+using document::Where;
 
 struct Context {
     Document& document;

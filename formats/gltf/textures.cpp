@@ -10,7 +10,7 @@
 
 namespace ambilux::gltf {
 
-using namespace mitsuba;
+using namespace document;
 
 namespace {
 

@@ -56,7 +56,7 @@ public:
     bool any() const { return tex_coord_ >= 0; }
 
 private:
-    Object& object(const char* tag, const char* type) { return mitsuba::add_object(c_.document, tag, type, c_.where); }
+    Object& object(const char* tag, const char* type) { return document::add_object(c_.document, tag, type, c_.where); }
     const std::string& image(int index);
     /// Of a texture that is there.
     const std::string& image_of(const Used& use);

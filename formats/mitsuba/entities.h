@@ -3,9 +3,11 @@
 
 #include <string>
 
-#include "formats/mitsuba/document.h"
+#include "formats/document/document.h"
 
 namespace ambilux::mitsuba {
+
+using namespace document;
 
 /// The text of the file at `path` with its `&name;` replaced: by the texts that its DOCTYPE declares or, with SYSTEM,
 /// by files, which become files of the document. Lines keep their numbers. Throws Error(bad_input) with file and line.

@@ -5,10 +5,10 @@
 #include <set>
 
 #include "core/error.h"
+#include "formats/document/plugins.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/text_cursor.h"
 #include "formats/mitsuba/entities.h"
-#include "formats/mitsuba/plugins.h"
 #include "formats/mitsuba/xml_values.h"
 
 namespace ambilux::mitsuba {

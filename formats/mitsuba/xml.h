@@ -1,9 +1,11 @@
 // Mitsuba's XML as a tree of objects: includes, parameters, search folders, aliases and references are resolved.
 #pragma once
 
-#include "formats/mitsuba/document.h"
+#include "formats/document/document.h"
 
 namespace ambilux::mitsuba {
+
+using namespace document;
 
 /// Parses the file, or `text` as if the file held it. `parameters` replace <default>s; one that the file does not use
 /// is an error. Throws Error(bad_input) with file and line.

@@ -1,8 +1,8 @@
 // Spectra that are objects: <spectrum type="..."> of format 3 and <blackbody> of the older generation.
 #include <cmath>
 
-#include "formats/mitsuba/plugins.h"
-#include "formats/mitsuba/spectrum.h"
+#include "formats/document/plugins.h"
+#include "formats/document/spectrum.h"
 #include "formats/mitsuba/xml_values.h"
 
 namespace ambilux::mitsuba {

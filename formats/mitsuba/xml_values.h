@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/document/numbers.h"
 #include "formats/mitsuba/xml.h"
 
 namespace ambilux::mitsuba {
@@ -22,10 +23,6 @@ Where where(const XmlSource& source, ptrdiff_t offset);
 Where where(const XmlSource& source, const pugi::xml_node& node);
 
 [[noreturn]] void fail(const Where& where, const std::string& message);
-
-double parse_number(const std::string& text, const Where& where, const std::string& what);
-/// Numbers separated by commas or blanks.
-std::vector<double> parse_list(const std::string& text, const Where& where, const std::string& what);
 
 class ValueParser {
 public:

@@ -24,7 +24,7 @@ std::pair<double, double> square_of(double x, double y, double z) {
 }
 
 /// Its inverse.
-mitsuba::Vec3d direction_of(double s, double t) {
+document::Vec3d direction_of(double s, double t) {
     const double u = 2 * s - 1, v = 2 * t - 1, a = std::fabs(u), b = std::fabs(v), distance = 1 - (a + b),
                  r = 1 - std::fabs(distance), phi = (r == 0 ? 1 : (b - a) / r + 1) * M_PI / 4,
                  z = std::copysign(1 - r * r, distance), sine = r * std::sqrt(std::max(0.0, 2 - r * r));
@@ -39,7 +39,7 @@ Rgb SphereImage::at(double x, double y, double z) const {
     return texels[v * size + u];
 }
 
-SphereImage read_sphere_image(mitsuba::Document& document, const std::string& path, const Where& where,
+SphereImage read_sphere_image(document::Document& document, const std::string& path, const Where& where,
                               const char* light) {
     const std::string bytes = read_input(path, document.limits);
     document.file_digests.push_back({path, sha256(bytes)});
@@ -59,7 +59,7 @@ SphereImage read_sphere_image(mitsuba::Document& document, const std::string& pa
     return out;
 }
 
-Environment read_environment(mitsuba::Document& document, const std::string& path, const Where& where) {
+Environment read_environment(document::Document& document, const std::string& path, const Where& where) {
     const SphereImage sphere = read_sphere_image(document, path, where, "an infinite light");
     const size_t n = sphere.size;
     const std::vector<Rgb>& colors = sphere.texels;

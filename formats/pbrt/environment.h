@@ -19,10 +19,10 @@ struct SphereImage {
 
     Rgb at(double x, double y, double z) const;  ///< of the texel that unit (x,y,z) falls into
 };
-SphereImage read_sphere_image(mitsuba::Document& document, const std::string& path, const Where& where,
+SphereImage read_sphere_image(document::Document& document, const std::string& path, const Where& where,
                               const char* light);
 
 /// Reads the image of an infinite light.
-Environment read_environment(mitsuba::Document& document, const std::string& path, const Where& where);
+Environment read_environment(document::Document& document, const std::string& path, const Where& where);
 
 }  // namespace ambilux::pbrt

@@ -29,7 +29,7 @@ inline double power_factor(const Described& light, const char* name, double of_o
 
 /// Rotation of the world's transform; a uniform scale is nothing to what is infinitely far away.
 inline Matrix rotation_part(Matrix m) {
-    const double scale = std::cbrt(std::fabs(mitsuba::determinant(m)));
+    const double scale = std::cbrt(std::fabs(document::determinant(m)));
     for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 3; ++j) m.m[i][j] /= scale > 0 ? scale : 1;
         m.m[i][3] = 0;

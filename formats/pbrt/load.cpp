@@ -13,7 +13,7 @@ namespace ambilux {
 namespace pbrt {
 namespace {
 
-using namespace mitsuba;
+using namespace document;
 
 class Parser {
 public:
@@ -381,7 +381,7 @@ void Parser::include(const Where& at, bool import) {
 }  // namespace pbrt
 
 Scene load_pbrt(const std::string& path, const LoadOptions& options) {
-    return load_by(path, options, [&](mitsuba::Document& document, Report& report) {
+    return load_by(path, options, [&](document::Document& document, Report& report) {
         pbrt::SceneMaker scene(document, report, std::filesystem::path(path).parent_path().string());
         pbrt::Parser parser(scene);
         parser.parse_file(path, {path, 0}, 1);

@@ -1,13 +1,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "formats/mitsuba/named_media.h"
+#include "formats/document/named_media.h"
 #include "formats/pbrt/coating.h"
 #include "formats/pbrt/scene.h"
 
 namespace ambilux::pbrt {
 
-using namespace mitsuba;
+using namespace document;
 
 namespace {
 

@@ -5,7 +5,7 @@
 
 namespace ambilux::pbrt {
 
-using mitsuba::Vec3d;
+using document::Vec3d;
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 namespace ambilux::pbrt {
 
-using namespace mitsuba;
+using namespace document;
 
 namespace {
 

@@ -10,7 +10,7 @@
 
 namespace ambilux::pbrt {
 
-using mitsuba::Vec3d;
+using document::Vec3d;
 
 struct Parameter {
     std::string type, name;

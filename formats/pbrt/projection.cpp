@@ -6,8 +6,8 @@ namespace ambilux::pbrt {
 
 namespace {
 
-using mitsuba::Matrix;
-using mitsuba::Vec3d;
+using document::Matrix;
+using document::Vec3d;
 
 Vec3d placed(const Matrix& m, Vec3f p) { return transformed(m, {p.x, p.y, p.z}); }
 

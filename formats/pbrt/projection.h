@@ -1,26 +1,26 @@
 // Texture mappings by places instead of coordinates of the shape: cylindrical, spherical, planar.
 #pragma once
 
+#include "formats/document/transform.h"
 #include "formats/meshes/mesh.h"
-#include "formats/mitsuba/transform.h"
 
 namespace ambilux::pbrt {
 
 struct Projection {
     enum class Kind { cylindrical, spherical, planar };
     Kind kind = Kind::planar;
-    mitsuba::Matrix to_texture;  ///< from the world
-    mitsuba::Vec3d v1{1, 0, 0}, v2{0, 1, 0};
+    document::Matrix to_texture;  ///< from the world
+    document::Vec3d v1{1, 0, 0}, v2{0, 1, 0};
     double ds = 0, dt = 0;
 
     bool same(const Projection& other) const;
 };
 
 /// (s,t) of a place in the world.
-Vec2f coordinates(const Projection& projection, mitsuba::Vec3d world);
+Vec2f coordinates(const Projection& projection, document::Vec3d world);
 
 /// The mesh with the (s,t) that its corners have in the world, linear over each triangle. Those of cylinders and
 /// spheres do not jump back within a triangle.
-Mesh projected(const Mesh& mesh, const mitsuba::Matrix& to_world, const Projection& projection);
+Mesh projected(const Mesh& mesh, const document::Matrix& to_world, const Projection& projection);
 
 }  // namespace ambilux::pbrt

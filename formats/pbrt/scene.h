@@ -8,8 +8,8 @@
 
 namespace ambilux::pbrt {
 
-using mitsuba::Document;
-using mitsuba::Matrix;
+using document::Document;
+using document::Matrix;
 
 /// Parameters and the colour space that held where they stood.
 struct Described {

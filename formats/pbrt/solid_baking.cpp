@@ -9,7 +9,7 @@
 
 namespace ambilux::pbrt {
 
-using namespace mitsuba;
+using namespace document;
 
 namespace {
 

@@ -9,8 +9,8 @@
 
 namespace ambilux::pbrt {
 
-using mitsuba::Matrix;
-using mitsuba::transformed;
+using document::Matrix;
+using document::transformed;
 
 namespace {
 
@@ -34,8 +34,8 @@ double finest(int octaves) { return std::pow(kLacunarity, 1 - octaves); }
 }  // namespace
 
 Texture Textures::solid(bool is_float, const Parameters& in, ColorSpace space) {
-    if (!(std::fabs(mitsuba::determinant(ctm_)) > 0)) fail(in.where, "the transform of the texture is singular");
-    const Matrix to_texture = mitsuba::affine_inverse(ctm_);
+    if (!(std::fabs(document::determinant(ctm_)) > 0)) fail(in.where, "the transform of the texture is singular");
+    const Matrix to_texture = document::affine_inverse(ctm_);
     const auto part = [&](const char* name, double fallback) {
         return is_float ? number(in, name, fallback)
                         : color(in, name, splat(float(fallback)), ColorUse::reflectance, space);
@@ -47,16 +47,16 @@ Texture Textures::solid(bool is_float, const Parameters& in, ColorSpace space) {
                                    const double sum = std::floor(p.x) + std::floor(p.y) + std::floor(p.z);
                                    return std::fmod(sum, 2) == 0 ? c[0] : c[1];
                                });
-        out.detail = std::min(out.detail, std::cbrt(std::fabs(mitsuba::determinant(ctm_))) / 4);
+        out.detail = std::min(out.detail, std::cbrt(std::fabs(document::determinant(ctm_))) / 4);
         return out;
     }
     if (in.type == "directionmix") {
         Vec3d axis = transformed(ctm_, in.point("dir", {0, 1, 0}), 0);
-        if (!(mitsuba::length(axis) > 0)) fail(in.where_of("dir"), "a directionmix needs a direction");
-        axis = (1 / mitsuba::length(axis)) * axis;
+        if (!(document::length(axis) > 0)) fail(in.where_of("dir"), "a directionmix needs a direction");
+        axis = (1 / document::length(axis)) * axis;
         return solid_of(in.where, {part("tex1", 0), part("tex2", 1)},
                         [axis](const std::vector<Rgb>& c, const SurfacePlace& place) {
-                            const float amount = float(std::fabs(mitsuba::dot(place.n, axis)));
+                            const float amount = float(std::fabs(document::dot(place.n, axis)));
                             return c[0] * amount + c[1] * (1 - amount);
                         });
     }
@@ -68,7 +68,7 @@ Texture Textures::solid(bool is_float, const Parameters& in, ColorSpace space) {
     Texture out;
     out.kind = Texture::Kind::solid;
     out.where = in.where;
-    out.detail = std::cbrt(std::fabs(mitsuba::determinant(ctm_))) * finest(octaves) / std::max(std::fabs(scale), 1e-9);
+    out.detail = std::cbrt(std::fabs(document::determinant(ctm_))) * finest(octaves) / std::max(std::fabs(scale), 1e-9);
     out.solid = std::make_shared<const SolidFunction>([=](const SurfacePlace& place) {
         const Vec3d p = scale * transformed(to_texture, place.p, 1);
         if (type == "fbm") return splat(float(fbm(p, omega, octaves)));
@@ -115,7 +115,7 @@ double Textures::mean_of_solid(const Texture& texture) {
 
 bool Textures::has_solid(const Object& object) const {
     bool found = false;
-    mitsuba::for_all_below(object, [&](const Object& o) { found |= o.tag == "texture" && o.type == "solid"; });
+    document::for_all_below(object, [&](const Object& o) { found |= o.tag == "texture" && o.type == "solid"; });
     return found;
 }
 

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <filesystem>
 
-#include "formats/mitsuba/named_media.h"
-#include "formats/mitsuba/spectrum.h"
+#include "formats/document/named_media.h"
+#include "formats/document/spectrum.h"
 
 namespace ambilux::pbrt {
 
-using mitsuba::spectrum_to_rgb;
-using mitsuba::SpectrumUse;
+using document::spectrum_to_rgb;
+using document::SpectrumUse;
 
 namespace {
 
@@ -33,7 +33,7 @@ const Primaries& primaries(ColorSpace space) {
     }
 }
 
-using mitsuba::Matrix;
+using document::Matrix;
 
 /// From RGB of these primaries to XYZ, white having Y = 1.
 Matrix to_xyz(const Primaries& p) {
@@ -43,7 +43,7 @@ Matrix to_xyz(const Primaries& p) {
         m.m[0][j] = x, m.m[1][j] = y, m.m[2][j] = 1 - x - y;
     }
     const double x = p.xy[3][0], y = p.xy[3][1], white[3] = {x / y, 1, (1 - x - y) / y};
-    const Matrix inverse = mitsuba::affine_inverse(m);
+    const Matrix inverse = document::affine_inverse(m);
     for (int j = 0; j < 3; ++j) {
         double scale = 0;
         for (int k = 0; k < 3; ++k) scale += inverse.m[j][k] * white[k];
@@ -90,11 +90,11 @@ constexpr Illuminant kIlluminants[] = {
 Rgb named_illuminant(const std::string& name, const Where& where) {
     if (name == "stdillum-D65") return splat(1);
     if (name == "stdillum-A")
-        return of_luminance_1(spectrum_to_rgb(mitsuba::planck(2856, 1), SpectrumUse::emission), where);
+        return of_luminance_1(spectrum_to_rgb(document::planck(2856, 1), SpectrumUse::emission), where);
     Primaries white = kRec709;
     const auto white_of = [&](double x, double y) {
         const double xyz[3] = {x / y, 1, (1 - x - y) / y};
-        const Matrix m = mitsuba::affine_inverse(to_xyz(white));
+        const Matrix m = document::affine_inverse(to_xyz(white));
         Rgb rgb;
         for (int i = 0; i < 3; ++i)
             rgb[i] = float(std::max(0.0, m.m[i][0] * xyz[0] + m.m[i][1] * xyz[1] + m.m[i][2] * xyz[2]));
@@ -158,7 +158,7 @@ Rgb SpectrumReader::color(const Parameter& p, ColorUse use, ColorSpace space) co
     } else if (p.type == "rgb") {
         count(3);
         const Matrix m =
-            space == ColorSpace::srgb ? Matrix{} : mitsuba::affine_inverse(to_xyz(kRec709)) * to_xyz(primaries(space));
+            space == ColorSpace::srgb ? Matrix{} : document::affine_inverse(to_xyz(kRec709)) * to_xyz(primaries(space));
         bool clipped = false;
         for (int i = 0; i < 3; ++i) {
             const double c = m.m[i][0] * p.numbers[0] + m.m[i][1] * p.numbers[1] + m.m[i][2] * p.numbers[2];
@@ -170,7 +170,7 @@ Rgb SpectrumReader::color(const Parameter& p, ColorUse use, ColorSpace space) co
     } else if (p.type == "blackbody") {
         count(1);
         if (!(p.numbers[0] > 0)) fail(p.where, "the temperature of '" + p.name + "' must be positive");
-        color = spectrum_to_rgb(mitsuba::planck(p.numbers[0], 1), SpectrumUse::emission);
+        color = spectrum_to_rgb(document::planck(p.numbers[0], 1), SpectrumUse::emission);
         color = color / std::max(max_component(color), 1e-30f);
     } else if (p.type == "spectrum") {
         const std::string name = p.strings.size() == 1 && p.numbers.empty() ? p.strings[0] : "";

@@ -17,7 +17,7 @@ enum class ColorUse {
 
 struct SpectrumReader {
     const std::string& folder;  ///< of the main file
-    mitsuba::Document& document;
+    document::Document& document;
     Report& report;
 
     /// Colour of a parameter of type rgb, spectrum, blackbody or, if grey, float.

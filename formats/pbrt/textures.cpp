@@ -16,7 +16,7 @@ UvMap operator*(const UvMap& a, const UvMap& b) {
 }
 
 void Textures::define(const std::string& name, bool is_float, const Parameters& in, ColorSpace space,
-                      const mitsuba::Matrix& ctm) {
+                      const document::Matrix& ctm) {
     ctm_ = ctm;
     auto& known = is_float ? numbers_ : colors_;
     if (known.contains(name)) fail(in.where, "texture '" + name + "' is defined twice");
@@ -72,8 +72,8 @@ void Textures::set_mapping(Texture& texture, const Parameters& in) const {
     } else {
         fail(in.where_of("mapping"), "unknown texture mapping '" + kind + "': uv, planar, cylindrical, spherical");
     }
-    if (!(std::fabs(mitsuba::determinant(ctm_)) > 0)) fail(in.where, "the transform of the texture is singular");
-    projection.to_texture = mitsuba::affine_inverse(ctm_);
+    if (!(std::fabs(document::determinant(ctm_)) > 0)) fail(in.where, "the transform of the texture is singular");
+    projection.to_texture = document::affine_inverse(ctm_);
     if (kind != "planar")
         report_.note(in.where, "coordinates of cylindrical and spherical mappings are linear over each triangle");
     texture.projection = std::make_shared<const Projection>(projection);
@@ -82,7 +82,7 @@ void Textures::set_mapping(Texture& texture, const Parameters& in) const {
 std::shared_ptr<const Projection> Textures::projection_of(const Object& object) const {
     std::shared_ptr<const Projection> found;
     bool any = false, mixed = false;
-    mitsuba::for_all_below(object, [&](const Object& o) {
+    document::for_all_below(object, [&](const Object& o) {
         const auto it = projections_.find(&o);
         if (it == projections_.end()) return;
         const bool same = found && it->second ? found->same(*it->second) : found == it->second;
@@ -225,7 +225,7 @@ void Textures::load_texels(TextureImage& image) const {
 std::string Textures::bake(const Texture& texture, const ColorMap& map) {
     load_texels(*texture.image);
     const TextureImage& image = *texture.image;
-    mitsuba::take_texels(document_, texture.where, image.texels.size(), 16);
+    document::take_texels(document_, texture.where, image.texels.size(), 16);
     const std::string name =
         texture.where.file + ":" + std::to_string(texture.where.line) + "#" + std::to_string(document_.images.size());
     Texels& out = document_.images[name];
@@ -241,7 +241,7 @@ std::string Textures::bake(const Texture& texture, const ColorMap& map) {
 }
 
 const Object& Textures::object(const Texture& texture, const UvMap& uv, const ColorMap& map) {
-    using namespace mitsuba;
+    using namespace document;
     UvMap to_uv = texture.projection ? texture.mapping : texture.mapping * uv;
     Object* object = nullptr;
     Rgb factor = splat(1);
@@ -256,7 +256,7 @@ const Object& Textures::object(const Texture& texture, const UvMap& uv, const Co
         object = &add_object(document_, "texture", "bitmap", texture.where);
         if (texture.image->is_file && !map) {
             set_text(*object, "filename", texture.image->path);
-            mitsuba::set_number(*object, "gamma", texture.image->gamma);
+            document::set_number(*object, "gamma", texture.image->gamma);
             factor = texture.color;
         } else {
             set_text(*object, "image", bake(texture, map));
@@ -296,18 +296,18 @@ void Textures::set_number(Object& object, const std::string& name, const Texture
                           const std::function<double(double)>& map) {
     if (texture.is_constant()) {
         const double value = texture.color.x;
-        return mitsuba::set_number(object, name, map ? map(value) : value);
+        return document::set_number(object, name, map ? map(value) : value);
     }
     const ColorMap each = [&](Rgb c) { return splat(float(map(c.x))); };
-    mitsuba::add_child(object, this->object(texture, uv, map ? each : ColorMap{}), name);
+    document::add_child(object, this->object(texture, uv, map ? each : ColorMap{}), name);
 }
 
 void Textures::set_color(Object& object, const std::string& name, const Texture& texture, const UvMap& uv) {
-    if (texture.is_constant()) return mitsuba::set_rgb(object, name, texture.color);
+    if (texture.is_constant()) return document::set_rgb(object, name, texture.color);
     const bool beyond = texture.kind == Texture::Kind::solid ||
                         (texture.kind == Texture::Kind::image && max_component(texture.color) > 1);
     const ColorMap clip = [](Rgb c) { return max(min(c, splat(1)), splat(0)); };
-    mitsuba::add_child(object, this->object(texture, uv, beyond ? clip : ColorMap{}), name);
+    document::add_child(object, this->object(texture, uv, beyond ? clip : ColorMap{}), name);
 }
 
 const TextureImage& Textures::texels_of(const Texture& texture) const {

@@ -8,7 +8,7 @@
 
 namespace ambilux::pbrt {
 
-using mitsuba::Object;
+using document::Object;
 
 /// Affine map of the plane, by rows.
 struct UvMap {
@@ -69,14 +69,14 @@ Rgb evaluate(const Texture& texture, const SurfacePlace& place);
 
 class Textures {
 public:
-    Textures(SpectrumReader spectra, mitsuba::Document& document, Report& report)
+    Textures(SpectrumReader spectra, document::Document& document, Report& report)
         : spectra_(spectra), document_(document), report_(report) {}
 
     const SpectrumReader& spectra() const { return spectra_; }
 
     /// Directive Texture; `ctm` places it in the world.
     void define(const std::string& name, bool is_float, const Parameters& in, ColorSpace space,
-                const mitsuba::Matrix& ctm);
+                const document::Matrix& ctm);
 
     /// Parameters that are numbers or textures of them, colours or textures of them.
     Texture number(const Parameters& in, const std::string& name, double fallback) const;
@@ -120,13 +120,13 @@ private:
     std::string bake(const Texture& texture, const ColorMap& map);
 
     SpectrumReader spectra_;
-    mitsuba::Document& document_;
+    document::Document& document_;
     Report& report_;
     std::map<std::string, Texture> colors_, numbers_;
     std::map<std::string, std::shared_ptr<TextureImage>> images_;
     std::map<const Object*, std::shared_ptr<const Projection>> projections_;  ///< of textures as objects
     std::map<const Object*, MadeTexture> made_;
-    mitsuba::Matrix ctm_;  ///< of the texture being defined
+    document::Matrix ctm_;  ///< of the texture being defined
 };
 
 }  // namespace ambilux::pbrt

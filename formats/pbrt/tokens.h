@@ -4,11 +4,11 @@
 #include <string>
 #include <string_view>
 
-#include "formats/mitsuba/document.h"
+#include "formats/document/document.h"
 
 namespace ambilux::pbrt {
 
-using mitsuba::Where;
+using document::Where;
 
 [[noreturn]] void fail(const Where& where, const std::string& message);
 

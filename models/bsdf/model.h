@@ -8,7 +8,7 @@
 // - Inputs<Color, Number>: parameters that textures may set, first the colours, then the numbers;
 // - Constants: parameters that are the same at all points of a surface.
 //
-// Its functions are in transport/bsdf/, its plugin in formats/mitsuba/bsdf_plugins.cpp.
+// Its functions are in transport/bsdf/, its plugin in formats/document/bsdf_plugins.cpp.
 #pragma once
 
 #include <concepts>

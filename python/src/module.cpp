@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "core/flag.h"
 #include "core/version.h"
-#include "formats/mitsuba/plugins.h"
+#include "formats/document/plugins.h"
 #include "integrators/settings_help.h"
 #include "python/src/bindings.h"
 #include "render/renderer.h"
@@ -94,7 +94,7 @@ NB_MODULE(_core, m) {
     m.attr("git_revision") = git_revision();
     m.def("cuda_available", &cuda_available, "True if this build has the CUDA backend and a device answers.");
     m.def("settings_help", &settings_help, "All settings and variants, as `ambilux help settings`.");
-    m.def("plugins", &mitsuba::plugins, "Tags of the objects that scene files can have, by their types.");
+    m.def("plugins", &document::plugins, "Tags of the objects that scene files can have, by their types.");
     m.def("main", &main_with, nb::arg("arguments"), "Runs the program; returns its exit code.");
     bind_images(m);
     bind_renders(m);

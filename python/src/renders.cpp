@@ -13,13 +13,13 @@
 #include "core/log.h"
 #include "core/outputs.h"
 #include "experiments/reference_store.h"
-#include "experiments/render_plan.h"
 #include "experiments/runner.h"
-#include "experiments/statistics.h"
 #include "formats/load.h"
 #include "integrators/warnings.h"
 #include "python/src/bindings.h"
 #include "scene/info.h"
+#include "session/render_plan.h"
+#include "session/statistics.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;

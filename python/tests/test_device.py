@@ -27,6 +27,6 @@ def test_without_a_device_it_is_refused(scene):
 
 @pytest.mark.skipif(not ambilux.cuda_available(), reason="no CUDA device")
 def test_arrays_on_the_device_are_the_image():
-    check = SCENES.parent / "scripts/check_device_arrays.py"
+    check = SCENES.parent / "scripts/checks/check_device_arrays.py"
     done = subprocess.run([sys.executable, check, SCENES / "cornell.xml"], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr

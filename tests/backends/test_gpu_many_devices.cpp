@@ -1,12 +1,12 @@
-// libs: ambilux_experiments
+// libs: ambilux_session
 // labels: gpu
 // timeout: 300
 // One render on several CUDA devices, or several times on one: the same bits where they are asked for, else the same
 // estimate.
 #include "backends/cuda_device.h"
 #include "core/error.h"
-#include "experiments/parallel/parallel_render.h"
 #include "film/ztest.h"
+#include "session/parallel/parallel_render.h"
 #include "tests/support/gpu_device.h"
 #include "tests/support/render_scene.h"
 

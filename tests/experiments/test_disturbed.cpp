@@ -3,8 +3,8 @@
 // Renders that others disturbed: noticed by what was recorded of them, made again, up to a limit.
 #include "experiments/disturbed.h"
 
-#include "experiments/drive.h"
-#include "experiments/gpu_watch.h"
+#include "session/drive.h"
+#include "session/gpu_watch.h"
 #include "tests/support/experiment_fakes.h"
 
 using namespace ambilux;

@@ -6,12 +6,12 @@
 #include "backends/cuda_device.h"
 #include "core/log.h"
 #include "experiments/batches.h"
-#include "experiments/load.h"
-#include "experiments/machine.h"
-#include "experiments/reference.h"
-#include "experiments/state.h"
 #include "experiments/work_estimate.h"
 #include "film/ztest.h"
+#include "session/load.h"
+#include "session/machine.h"
+#include "session/reference.h"
+#include "session/state.h"
 #include "tests/support/experiment_fakes.h"
 
 using namespace ambilux;

@@ -6,14 +6,14 @@
 #include <thread>
 
 #include "core/flag.h"
-#include "experiments/drive.h"
-#include "experiments/load.h"
 #include "experiments/peers/agreement.h"
 #include "experiments/peers/child_process.h"
 #include "experiments/peers/command_peer.h"
 #include "experiments/peers/image_peer.h"
 #include "experiments/peers/pass_film.h"
 #include "film/exr_io.h"
+#include "session/drive.h"
+#include "session/load.h"
 #include "tests/support/experiment_fakes.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/skip.h"

@@ -1,7 +1,7 @@
 // libs: ambilux_formats ambilux_accel
 // timeout: 120
 // Sky and sun. Numbers marked "Mitsuba" were read from Mitsuba 3.9.1.
-#include "formats/mitsuba/sky.h"
+#include "formats/document/sky.h"
 
 #include <cmath>
 
@@ -11,7 +11,7 @@
 
 using namespace ambilux;
 using namespace ambilux::test;
-using namespace ambilux::mitsuba;
+using namespace ambilux::document;
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "experiments/state.h"
+#include "session/state.h"
 #include "tests/fuzz/target.h"
 
 void ambilux::fuzz::read(std::string_view bytes) {

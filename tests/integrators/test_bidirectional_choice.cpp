@@ -1,4 +1,4 @@
-// libs: ambilux_experiments ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// libs: ambilux_session ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // data: tagged
 // timeout: 900
 // seconds: 71
@@ -7,9 +7,9 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "experiments/stats_sum.h"
 #include "integrators/reachability.h"
 #include "render/selection.h"
+#include "session/stats_sum.h"
 #include "tests/support/bidirectional_images.h"
 
 using namespace ambilux;

@@ -1,7 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 120
 // G10: the wavefront of the CPU against a plain loop over pixels and samples that calls the same functions: the same
-// image here, the same time in scripts/bench_guard.py, which runs the hidden case [.bench].
+// image here, the same time in scripts/bench/bench_guard.py, which runs the hidden case [.bench].
 #include <chrono>
 #include <cmath>
 #include <cstdio>

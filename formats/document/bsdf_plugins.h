@@ -1,0 +1,15 @@
+// BSDF plugins without adapters.
+#pragma once
+
+#include "formats/document/builder.h"
+
+namespace ambilux::document {
+
+/// The record of a BSDF object.
+BsdfRecord read_bsdf(Builder& builder, const Object& object);
+/// That of a diffuse surface.
+BsdfRecord diffuse_record(float reflectance);
+/// A thin plate of index 1, which changes nothing.
+BsdfRecord clear_pane_record();
+
+}  // namespace ambilux::document

@@ -1,0 +1,114 @@
+#include "formats/document/document.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "core/error.h"
+#include "formats/file_budget.h"
+
+namespace ambilux::document {
+
+namespace fs = std::filesystem;
+
+const Value* Object::find(const std::string& name) const {
+    for (const Value& value : values)
+        if (value.name == name) return &value;
+    return nullptr;
+}
+
+std::string Document::resolve(const std::string& name, const Where& where) const {
+    std::error_code ignored;
+    std::vector<fs::path> folders = {fs::path(where.file).parent_path()};
+    folders.insert(folders.end(), search_folders.begin(), search_folders.end());
+    if (!files.empty()) folders.push_back(fs::path(files[0].first).parent_path());
+    std::string slashed = name;  // backslashes are what exporters on Windows write
+    std::replace(slashed.begin(), slashed.end(), '\\', '/');
+    for (const fs::path path : {name, slashed}) {
+        if (path.is_absolute() && fs::exists(path, ignored)) return path.string();
+        for (const fs::path& folder : folders)
+            if (fs::path candidate = folder / path; fs::exists(candidate, ignored)) return candidate.string();
+    }
+    throw input_error(where.file, where.line, "file '" + name + "' does not exist");
+}
+
+namespace {
+
+Value& add_value(Object& object, const std::string& name, ValueKind kind) {
+    Value& value = object.values.emplace_back();
+    value.name = name;
+    value.kind = kind;
+    value.where = object.where;
+    return value;
+}
+
+}  // namespace
+
+void for_all_below(const Object& object, const std::function<void(const Object&)>& f) {
+    std::set<const Object*> seen;
+    const std::function<void(const Object&)> visit = [&](const Object& o) {
+        if (!seen.insert(&o).second) return;
+        f(o);
+        for (const Child& child : o.children)
+            if (child.object) visit(*child.object);
+    };
+    visit(object);
+}
+
+void take_texels(Document& document, const Where& where, uint64_t texels, uint64_t bytes_each) {
+    FileBudget(where.file, document.limits).bytes(texels, bytes_each);
+    document.made_texels += texels * bytes_each;
+    if (document.made_texels > document.limits.total_bytes)
+        throw input_error(where.file, where.line,
+                          "with it, textures take more memory than --limits total_bytes=" +
+                              std::to_string(document.limits.total_bytes));
+}
+
+Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where) {
+    document.storage.push_back(std::make_unique<Object>());
+    Object& object = *document.storage.back();
+    object.tag = tag;
+    object.type = type;
+    object.where = where;
+    object.version = 2;
+    return object;
+}
+
+Object& add_light_back(Document& document, const Object& shape) {
+    Object& back = add_object(document, shape.tag, shape.type, shape.where);
+    back.values = shape.values;
+    back.children = shape.children;
+    const Value* flip = shape.find("flip_normals");
+    const bool flipped = flip && flip->number != 0;
+    std::erase_if(back.values, [](const Value& v) { return v.name == "flip_normals"; });
+    set_boolean(back, "flip_normals", !flipped);
+    document.light_backs.insert(&back);
+    return back;
+}
+
+void add_child(Object& parent, const Object& child, const std::string& name) {
+    parent.children.push_back({name, child.where, "", &child});
+}
+
+void set_boolean(Object& object, const std::string& name, bool value) {
+    add_value(object, name, ValueKind::boolean).number = value;
+}
+void set_integer(Object& object, const std::string& name, int64_t value) {
+    add_value(object, name, ValueKind::integer).number = double(value);
+}
+void set_number(Object& object, const std::string& name, double value) {
+    add_value(object, name, ValueKind::number).number = value;
+}
+void set_text(Object& object, const std::string& name, const std::string& value) {
+    add_value(object, name, ValueKind::text).text = value;
+}
+void set_rgb(Object& object, const std::string& name, Rgb value) {
+    add_value(object, name, ValueKind::rgb).rgb = value;
+}
+void set_vector(Object& object, const std::string& name, Vec3d value) {
+    add_value(object, name, ValueKind::vector).vector = value;
+}
+void set_transform(Object& object, const std::string& name, const Matrix& value) {
+    add_value(object, name, ValueKind::transform).transform = value;
+}
+
+}  // namespace ambilux::document

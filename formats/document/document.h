@@ -1,0 +1,115 @@
+// A scene as a tree of objects, as Mitsuba's XML has it: what the readers of all formats make, and what a Scene is
+// built from. Plugins and parameters are Mitsuba's, in the snake_case of format 2 and later.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/sha256.h"
+#include "core/vec.h"
+#include "formats/document/transform.h"
+#include "formats/images/image_io.h"
+#include "formats/limits.h"
+#include "formats/load.h"
+#include "formats/meshes/mesh.h"
+
+namespace ambilux::document {
+
+/// Where something stands in the input.
+struct Where {
+    std::string file;
+    int line = 0;
+};
+
+enum class ValueKind { boolean, integer, number, text, vector, rgb, spectrum, transform };
+
+/// One parameter of an object.
+struct Value {
+    std::string name;
+    ValueKind kind = ValueKind::text;
+    Where where;
+    std::string text;   ///< text
+    double number = 0;  ///< number; integer; boolean (0 or 1); spectrum with a single value
+    Rgb rgb{};
+    Vec3d vector{};
+    std::vector<std::pair<double, double>> samples;  ///< spectrum: (wavelength in nm, value), rising
+    bool equal_energy = false;  ///< spectrum: `number` at all wavelengths, which is no white as a light
+    Matrix transform;
+};
+
+struct Object;
+
+/// An object inside of another, or a reference to one.
+struct Child {
+    std::string name;  ///< may be empty
+    Where where;
+    std::string ref;  ///< id of the object, until it is resolved
+    const Object* object = nullptr;
+};
+
+/// scene, sensor, film, rfilter, sampler, integrator, shape, bsdf, texture, emitter, ...
+struct Object {
+    std::string tag, type, id;
+    Where where;
+    int version = 3;  ///< major version of the file it came from; 0 and 1 are the older generation
+    std::vector<Value> values;
+    std::vector<Child> children;
+
+    const Value* find(const std::string& name) const;
+};
+
+/// A parsed scene file with all that it includes.
+struct Document {
+    std::vector<std::unique_ptr<Object>> storage;
+    Object* scene = nullptr;
+    std::map<std::string, const Object*> ids;
+    std::vector<std::string> search_folders;                 ///< of <path>, in order
+    std::vector<std::pair<std::string, std::string>> files;  ///< path and text of the scene files read
+    Limits limits;
+
+    // What front ends of other formats hand over (formats/pbrt, formats/gltf).
+    std::map<std::string, Mesh> meshes;    ///< of shapes of type "mesh", by their "name"
+    std::map<std::string, Texels> images;  ///< of textures of type "image" and emitters of type "envmap", by "image"
+    std::vector<std::pair<std::string, Sha256Digest>> file_digests;  ///< of other files that were read
+    std::vector<std::string> warnings, notes;
+    uint64_t made_texels = 0;             ///< bytes of images that front ends made (take_texels)
+    std::set<const Object*> light_backs;  ///< shapes that are the other side of another one's light, just behind it
+    bool smooth_normals = true;           ///< meshes without normals get smooth ones, as in Mitsuba
+    bool mirrors_turn_in = true;          ///< mirrored meshes of files, and spheres, turn in, as in Mitsuba 2 and 3
+
+    /// Path of a file named in `where.file`: relative to that file's folder, then to the <path> folders, then to the
+    /// main file's. Throws Error(bad_input) if there is none.
+    std::string resolve(const std::string& name, const Where& where) const;
+};
+
+/// Throws Error(bad_input) if objects contain themselves or, each counted as often as it is referred to, are more or
+/// nested deeper than the limits allow.
+void check_references(const Document& document);
+
+/// A new object of the document, of format 2.
+Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where);
+/// Calls f once for the object and each below it.
+void for_all_below(const Object& object, const std::function<void(const Object&)>& f);
+/// Before a front end makes an image of its own: throws Error(bad_input) where one or all are more than the limits
+/// allow.
+void take_texels(Document& document, const Where& where, uint64_t texels, uint64_t bytes_each);
+/// The same shape turned over, for a light of two sides; to be added behind the shape, once that is complete.
+Object& add_light_back(Document& document, const Object& shape);
+void add_child(Object& parent, const Object& child, const std::string& name = "");
+void set_boolean(Object& object, const std::string& name, bool value);
+void set_integer(Object& object, const std::string& name, int64_t value);
+void set_number(Object& object, const std::string& name, double value);
+void set_text(Object& object, const std::string& name, const std::string& value);
+void set_rgb(Object& object, const std::string& name, Rgb value);
+void set_vector(Object& object, const std::string& name, Vec3d value);
+void set_transform(Object& object, const std::string& name, const Matrix& value);
+
+/// The finished scene. `path` is for messages.
+Scene load_document(const std::string& path, const Document& document, const LoadOptions& options);
+
+}  // namespace ambilux::document

@@ -1,0 +1,128 @@
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "core/error.h"
+#include "core/scoped_seconds.h"
+#include "core/srgb.h"
+#include "formats/document/shape_jobs.h"
+#include "formats/file_budget.h"
+
+namespace ambilux::document {
+
+namespace {
+
+bool is_attribute(const Object& texture) { return texture.type == "mesh_attribute" || texture.type == "vertexcolors"; }
+
+/// Textures of a BSDF: are there some that take values from the mesh, and some that depend on coordinates?
+struct AttributeUse {
+    bool attributes = false, others = false;
+    std::set<const Object*> seen = {};  ///< objects are shared: what is twice in each of n levels is there 2^n times
+
+    void look_into(const Object& object) {
+        if (!seen.insert(&object).second) return;
+        for (const Child& child : object.children) {
+            const Object& inner = *child.object;
+            if (inner.tag == "texture" && is_attribute(inner))
+                attributes = true;
+            else if (inner.tag == "texture" && inner.type != "scale" && inner.type != "rawconstant")
+                others = true;
+            look_into(inner);
+        }
+    }
+};
+
+struct Atlas {
+    uint32_t columns, width, height;
+
+    explicit Atlas(size_t triangles) {
+        columns = uint32_t(std::ceil(std::sqrt(double(std::max<size_t>(triangles, 1)))));
+        width = 2 * columns;
+        height = 2 * uint32_t((triangles + columns - 1) / columns);
+    }
+    uint32_t x(size_t triangle) const { return 2 * uint32_t(triangle % columns); }
+    uint32_t y(size_t triangle) const { return 2 * uint32_t(triangle / columns); }
+};
+
+/// Texels (0,0), (1,0), (0,1) and (1,1) that are linear between the values of three corners. Coordinates are off by
+/// width·2^-23 texels, so that values stay by so much of the largest above 0.
+std::array<Rgb, 4> linear_block(std::array<Rgb, 3> v, uint32_t width) {
+    const float margin = float(width) * 0x1p-22f;
+    for (int c = 0; c < 3; ++c) {
+        const float most = std::max({v[0][c], v[1][c], v[2][c]});
+        for (Rgb& value : v) value[c] = std::max(value[c], margin * most);
+    }
+    return {v[0], v[1], v[2], v[1] + v[2] - v[0]};
+}
+
+std::vector<float> texels_of(const Atlas& atlas, const Mesh& mesh, const MeshAttribute& a, Rgb& mean) {
+    std::vector<float> texels(size_t(atlas.width) * atlas.height * 4, 0.0f);
+    for (size_t t = 0; t < mesh.faces.size(); ++t) {
+        std::array<Rgb, 3> v;
+        for (size_t k = 0; k < 3; ++k) v[k] = a.values[a.per_face ? t : mesh.faces[t][k]];
+        const std::array<Rgb, 4> block = linear_block(v, atlas.width);
+        for (uint32_t k = 0; k < 4; ++k) {
+            float* texel = &texels[4 * (size_t(atlas.y(t) + k / 2) * atlas.width + atlas.x(t) + k % 2)];
+            for (int c = 0; c < 3; ++c) texel[c] = block[k][c];
+            texel[3] = 1;
+        }
+        mean += (v[0] + v[1] + v[2]) * (1.0f / (3 * float(mesh.faces.size())));
+    }
+    return texels;
+}
+
+}  // namespace
+
+bool has_mesh_attributes(const Object& bsdf) {
+    AttributeUse use;
+    use.look_into(bsdf);
+    if (use.attributes && use.others)
+        throw input_error(bsdf.where.file, bsdf.where.line,
+                          "mesh attributes together with other textures in one BSDF are not supported");
+    return use.attributes;
+}
+
+Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source) {
+    const ScopedSeconds clock(&builder.options.times->read);
+    const std::string bytes = read_input(source.path, builder.options.limits);
+    builder.file_digests.push_back({source.path, sha256(bytes)});
+    Mesh mesh = read_ply(source.path, bytes, source.flip_v, builder.options.limits, true);
+    if (in.object().version >= 2 || !in.boolean("srgb", true)) return mesh;
+    for (MeshAttribute& a : mesh.attributes)
+        if (a.name == "vertex_color")
+            for (Rgb& value : a.values)
+                for (int c = 0; c < 3; ++c) value[c] = float(srgb_to_linear(value[c]));
+    return mesh;
+}
+
+Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh& mesh,
+                          std::map<std::string, int32_t>& textures) {
+    const Atlas atlas(mesh.faces.size());
+    for (const MeshAttribute& a : mesh.attributes) {
+        if (a.values.size() != (a.per_face ? mesh.faces.size() : mesh.positions.size()))
+            throw input_error(path, 0, "attribute '" + a.name + "' is not given everywhere");
+        for (const Rgb& value : a.values)
+            if (min_component(value) < 0) throw input_error(path, 0, "attribute '" + a.name + "' is negative");
+        builder.take_memory(uint64_t(atlas.width) * atlas.height * 16, path);
+        Rgb mean{};
+        const std::vector<float> texels = texels_of(atlas, mesh, a, mean);
+        textures[a.name] = add_atlas(builder, atlas.width, atlas.height, texels, mean);
+    }
+    builder.take_memory(mesh_bytes(3 * mesh.faces.size(), mesh.faces.size()), path);
+    Mesh out;
+    // Vertices that were shared keep the normal that they would have got.
+    const bool flat = mesh.normals.empty() && !builder.document.smooth_normals;
+    const std::vector<Vec3f> normals = mesh.normals.empty() && !flat ? smooth_normals(mesh) : mesh.normals;
+    for (size_t t = 0; t < mesh.faces.size(); ++t)
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t v = mesh.faces[t][k];
+            out.positions.push_back(mesh.positions[v]);
+            if (!flat) out.normals.push_back(normals[v]);
+            const double x = atlas.x(t) + (k == 1 ? 1.5 : 0.5), y = atlas.y(t) + (k == 2 ? 1.5 : 0.5);
+            out.uvs.push_back({float(x / atlas.width), float(y / atlas.height)});
+            if (k == 2) out.faces.push_back({uint32_t(3 * t), uint32_t(3 * t + 1), uint32_t(3 * t + 2)});
+        }
+    return out;
+}
+
+}  // namespace ambilux::document

@@ -1,0 +1,27 @@
+// Types of objects that scene files can have. Each list stands beside the builder that knows them.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace ambilux::document {
+
+using Plugins = std::vector<std::string>;
+
+const Plugins& bsdf_plugins();
+const Plugins& emitter_plugins();
+const Plugins& film_plugins();
+const Plugins& filter_plugins();
+const Plugins& integrator_plugins();
+const Plugins& sampler_plugins();
+const Plugins& sensor_plugins();
+const Plugins& shape_plugins();
+const Plugins& texture_plugins();
+
+bool is_one_of(const Plugins& plugins, const std::string& type);
+
+/// The tag of each type: no two tags share one.
+std::map<std::string, std::string> plugins();
+
+}  // namespace ambilux::document

@@ -1,0 +1,244 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+
+#include "accel/range.h"
+#include "core/error.h"
+#include "formats/document/builder.h"
+#include "formats/document/named_media.h"
+#include "formats/document/plugins.h"
+
+namespace ambilux::document {
+
+/// Marks of objects for manifold sampling (Zeltner et al. 2020) and what came after it: they choose samples only.
+static const Plugins kMarks = {"caustic_caster_single", "caustic_caster_multi",   "caustic_receiver",
+                               "caustic_bouncer",       "caustic_emitter_single", "caustic_emitter_multi"};
+
+void Builder::refuse(const Where& where, const std::string& problem, const std::string& instead) {
+    if (!options.lenient) throw input_error(where.file, where.line, problem);
+    const std::string message = where.file + ":" + std::to_string(where.line) + ": " + problem + "; " + instead;
+    if (reported.insert(message).second) scene.warnings.push_back(message);
+}
+
+void Builder::note(const Where& where, const std::string& text) {
+    if (reported.insert(text).second)
+        scene.notes.push_back(where.file + ":" + std::to_string(where.line) + ": " + text);
+}
+
+void Builder::take_memory(uint64_t bytes, const std::string& path) {
+    memory += std::min(bytes, UINT64_MAX - memory);
+    if (memory > options.limits.total_bytes)
+        throw input_error(path, 0,
+                          "with it, meshes and textures take more memory than --limits total_bytes=" +
+                              std::to_string(options.limits.total_bytes));
+}
+
+void Builder::fail_unless_moved(const Error& error) const {
+    if (!outside) throw error;
+    static std::mutex mutex;
+    const std::lock_guard lock(mutex);
+    if (!*outside) outside->emplace(error);
+}
+
+void Builder::check_range(const Where& where, const std::string& what, std::initializer_list<Vec3d> points) const {
+    for (const Vec3d& p : points)
+        for (const double c : {p.x, p.y, p.z}) {
+            if (std::fabs(c) <= double(kMostCoordinate)) continue;
+            const Error error = input_error(where.file, where.line,
+                                            fmt::format("{} reaches to {:g}; rays are traced between -{:g} and {:g}",
+                                                        what, c, kMostCoordinate, kMostCoordinate));
+            // What is no float cannot be moved either.
+            if (!(std::fabs(c) <= double(std::numeric_limits<float>::max()))) throw error;
+            return fail_unless_moved(error);
+        }
+}
+
+void Reader::fail(const std::string& message) const { fail(object_.where, message); }
+void Reader::fail(const Where& where, const std::string& message) const {
+    throw input_error(where.file, where.line, message);
+}
+
+const Child* Reader::child_named(const std::string& name) const {
+    for (const Child& child : object_.children)
+        if (child.name == name) return &child;
+    return nullptr;
+}
+
+const Value* Reader::value(const std::string& name, std::initializer_list<ValueKind> kinds, const char* expected) {
+    const Value* v = object_.find(name);
+    if (!v) {
+        if (const Child* child = child_named(name))
+            fail(child->where, "parameter '" + name + "' of " + object_.type + " must be " + expected + ", not a " +
+                                   child->object->tag);
+        return nullptr;
+    }
+    if (std::find(kinds.begin(), kinds.end(), v->kind) == kinds.end())
+        fail(v->where, "parameter '" + name + "' of " + object_.type + " must be " + expected);
+    used_values_.insert(v);
+    return v;
+}
+
+bool Reader::boolean(const std::string& name, bool fallback) {
+    const Value* v = value(name, {ValueKind::boolean}, "a boolean");
+    return v ? v->number != 0 : fallback;
+}
+
+int64_t Reader::integer(const std::string& name, int64_t fallback) {
+    const Value* v = value(name, {ValueKind::integer}, "an integer");
+    return v ? int64_t(v->number) : fallback;
+}
+
+double Reader::number(const std::string& name, double fallback) {
+    const Value* v = value(name, {ValueKind::number, ValueKind::integer}, "a number");
+    return v ? v->number : fallback;
+}
+
+std::string Reader::text(const std::string& name, const std::string& fallback) {
+    const Value* v = value(name, {ValueKind::text}, "a string");
+    return v ? v->text : fallback;
+}
+
+Vec3d Reader::vector(const std::string& name, Vec3d fallback) {
+    const Value* v = value(name, {ValueKind::vector}, "a point or vector");
+    return v ? v->vector : fallback;
+}
+
+Matrix Reader::transform(const std::string& name) {
+    const Value* v = value(name, {ValueKind::transform}, "a transform");
+    return v ? v->transform : Matrix{};
+}
+
+float Reader::ior(const std::string& name, const std::string& fallback) {
+    const Value* v =
+        value(name, {ValueKind::number, ValueKind::integer, ValueKind::text}, "a number or the name of a material");
+    float result = 1;
+    if (v && v->kind != ValueKind::text) {
+        result = float(v->number);
+    } else if (!find_ior(v ? v->text : fallback, result)) {
+        builder_.refuse(v->where, "no index of refraction is known for '" + v->text + "' (known: " + ior_names() + ")",
+                        "bk7 is used");
+        find_ior("bk7", result);
+    }
+    if (!(result > 0)) fail(v->where, "index of refraction '" + name + "' must be positive");
+    return result;
+}
+
+Where Reader::where(const std::string& name) const {
+    if (const Value* v = object_.find(name)) return v->where;
+    if (const Child* child = child_named(name)) return child->where;
+    return object_.where;
+}
+
+Rgb Reader::color(const std::string& name, Rgb fallback, SpectrumUse use) {
+    const Value* v =
+        value(name, {ValueKind::rgb, ValueKind::spectrum, ValueKind::number, ValueKind::integer}, "a colour");
+    if (!v) return fallback;
+    Rgb rgb = splat(float(v->number));
+    if (v->kind == ValueKind::rgb)
+        rgb = v->rgb;
+    else if (!v->samples.empty())
+        rgb = spectrum_to_rgb(v->samples, use);
+    else if (v->equal_energy && use == SpectrumUse::emission)
+        rgb *= kEqualEnergy;  // as Mitsuba 3; its D65 is white
+    if (!is_finite(rgb)) fail(v->where, "'" + name + "' is not finite");
+    if (min_component(rgb) < 0) fail(v->where, "'" + name + "' is negative");
+    if (use == SpectrumUse::reflectance && max_component(rgb) > 1) {
+        builder_.refuse(v->where, "'" + name + "' is larger than 1, the surface would create energy",
+                        "it is clipped at 1");
+        rgb = min(rgb, splat(1));
+    }
+    return rgb;
+}
+
+ParamRgb Reader::textured_color(const std::string& name, Rgb fallback, SpectrumUse use) {
+    if (const Object* texture = take_named(name)) {
+        if (texture->tag != "texture")
+            fail(where(name), "'" + name + "' must be a colour or a texture, not a " + texture->tag);
+        const ScaledTexture scaled = load_scaled_texture(builder_, *texture);
+        return {scaled.scale, scaled.texture};
+    }
+    return {color(name, fallback, use), -1};
+}
+
+ParamFloat Reader::textured_number(const std::string& name, float fallback) {
+    if (const Object* texture = take_named(name)) {
+        if (texture->tag != "texture")
+            fail(where(name), "'" + name + "' must be a number or a texture, not a " + texture->tag);
+        const ScaledTexture scaled = load_scaled_texture(builder_, *texture, TextureUse::number);
+        if (scaled.scale.x != scaled.scale.y || scaled.scale.x != scaled.scale.z)
+            fail(texture->where, "a number cannot come from a texture that is scaled by a colour");
+        return {scaled.scale.x, scaled.texture};
+    }
+    const Value* v = object_.find(name);
+    // A colour is the mean of its channels, as in Mitsuba 3.
+    const bool colored = v && (v->kind == ValueKind::rgb || (v->kind == ValueKind::spectrum && v->samples.empty()));
+    if (colored) used_values_.insert(v);
+    const Rgb rgb = colored && v->kind == ValueKind::rgb ? v->rgb : splat(colored ? float(v->number) : 0);
+    const float value = colored ? (rgb.x + rgb.y + rgb.z) / 3 : float(number(name, fallback));
+    if (!std::isfinite(value)) fail(where(name), "'" + name + "' is too large for a float");
+    return {value, -1};
+}
+
+const Object* Reader::take(const std::string& tag) {
+    // From where the last one of this tag was found: scenes may have a million emitters.
+    for (size_t& i = next_child_[tag]; i < object_.children.size();) {
+        const Child& child = object_.children[i++];
+        if (child.object->tag == tag && used_children_.insert(&child).second) return child.object;
+    }
+    return nullptr;
+}
+
+const Object* Reader::take_named(const std::string& name) {
+    const Child* child = child_named(name);
+    if (!child) return nullptr;
+    used_children_.insert(child);
+    return child->object;
+}
+
+void Reader::ignore(std::initializer_list<const char*> names) {
+    for (const char* name : names) {
+        if (const Value* v = object_.find(name)) used_values_.insert(v);
+        if (const Child* child = child_named(name)) used_children_.insert(child);
+    }
+}
+
+void Reader::finish() {
+    for (const Value& v : object_.values)
+        if (used_values_.count(&v))
+            continue;
+        else if (object_.version < 2 || is_one_of(kMarks, v.name))
+            builder_.note(v.where, fmt::format("parameter '{}' of {}{} is not known and left out{}", v.name,
+                                               object_.tag, object_.type.empty() ? "" : " '" + object_.type + "'",
+                                               object_.version < 2 ? ", as Mitsuba 0.6 does" : ""));
+        else
+            builder_.refuse(v.where, "unknown parameter '" + v.name + "' of " + object_.tag + " '" + object_.type + "'",
+                            "it is ignored");
+    for (const Child& child : object_.children)
+        if (!used_children_.count(&child))
+            builder_.refuse(child.where,
+                            "unexpected " + child.object->tag + " '" + child.object->type + "'" +
+                                (child.name.empty() ? "" : " (name '" + child.name + "')") + " in " + object_.tag +
+                                " '" + object_.type + "'",
+                            "it is ignored");
+}
+
+Matrix rigid_part(const Matrix& m, bool& problem) {
+    const Vec3d x = column(m, 0), y = column(m, 1), z = column(m, 2);
+    // Published matrices have six digits.
+    problem = !is_orthogonal(m, 1e-3);
+    for (const Vec3d& c : {x, y, z}) problem |= !(std::abs(length(c) - 1) < 1e-3);
+    const auto scaled = [](Vec3d a, double s) { return Vec3d{a.x * s, a.y * s, a.z * s}; };
+    // Gram-Schmidt from z, the view direction; a reflection stays one.
+    const Vec3d uz = scaled(z, 1 / length(z));
+    const Vec3d py = y - scaled(uz, dot(y, uz)), uy = scaled(py, 1 / length(py));
+    const Vec3d right = cross(uy, uz), ux = scaled(right, dot(right, x) < 0 ? -1 : 1);
+    Matrix r = m;
+    const Vec3d columns[3] = {ux, uy, uz};
+    for (int j = 0; j < 3; ++j) r.m[0][j] = columns[j].x, r.m[1][j] = columns[j].y, r.m[2][j] = columns[j].z;
+    return r;
+}
+
+}  // namespace ambilux::document

@@ -1,0 +1,399 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/scoped_seconds.h"
+#include "formats/document/builder.h"
+#include "formats/document/plugins.h"
+#include "formats/document/shape_jobs.h"
+#include "formats/file_budget.h"
+#include "formats/gzip.h"
+#include "formats/meshes/curves.h"
+#include "formats/meshes/height_field.h"
+#include "formats/meshes/mesh.h"
+#include "formats/meshes/sdf_grid.h"
+
+namespace ambilux::document {
+
+namespace {
+
+struct ShapeBuilder {
+    Builder& builder;
+    std::vector<MeshSource> sources;
+    std::map<std::string, int> source_by_key;
+    std::vector<Job> jobs;
+    std::vector<GroupJobs> groups;
+    std::map<const Object*, int> group_of;
+
+    int add_source(MeshSource source, const std::string& key) {
+        const auto [it, added] = source_by_key.try_emplace(key, int(sources.size()));
+        if (added) sources.push_back(std::move(source));
+        return it->second;
+    }
+
+    void add_shape(const Object& object, const Matrix& outer, bool in_instance, bool in_group);
+    void add_instance(const Object& object, const Matrix& outer);
+    void read_geometry(Reader& in, Job& job);
+    void read_mesh_file(Reader& in, Job& job);
+    void read_tessellated(Reader& in, Job& job, const Matrix& outer);
+    uint32_t add_emitter(const Object& object);
+    uint32_t material_of_attributes(Job& job, Reader& in, const Object& bsdf);
+};
+
+bool is_quadric(const std::string& type) { return type == "sphere" || type == "disk" || type == "cylinder"; }
+/// Made of triangles when they are read, because they are no primitives of ours.
+bool is_tessellated(const std::string& type) {
+    return type == "sdfgrid" || type == "linearcurve" || type == "bsplinecurve" || type == "heightfield";
+}
+bool is_mesh_file(const std::string& type) { return type == "obj" || type == "ply" || type == "serialized"; }
+
+/// Transform of a sphere (center, radius) or cylinder (p0, p1, radius) in its own space.
+Matrix local_form(Reader& in, const std::string& type) {
+    const double radius = type == "disk" ? 1 : in.number("radius", 1);
+    if (!(radius > 0)) in.fail(in.where("radius"), "radius must be positive");
+    if (type == "sphere") {
+        const Vec3d c = in.vector("center", {0, 0, 0});
+        return translation(c.x, c.y, c.z) * scaling(radius, radius, radius);
+    }
+    if (type == "disk") return {};
+    const Vec3d p0 = in.vector("p0", {0, 0, 0}), p1 = in.vector("p1", {0, 0, 1});
+    const Vec3d axis = {p1.x - p0.x, p1.y - p0.y, p1.z - p0.z};
+    const double l = length(axis);
+    if (!(l > 0)) in.fail("cylinder has no length: p0 equals p1");
+    // The frame of core/math.h (and of Mitsuba), in double: it decides where the azimuth starts.
+    const Vec3d n = {axis.x / l, axis.y / l, axis.z / l};
+    const double sign = std::copysign(1.0, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
+    const Vec3d columns[4] = {
+        {1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}, n, {p0.x, p0.y, p0.z}};
+    Matrix frame;
+    for (int j = 0; j < 4; ++j)
+        frame.m[0][j] = columns[j].x, frame.m[1][j] = columns[j].y, frame.m[2][j] = columns[j].z;
+    return frame * scaling(radius, radius, l);
+}
+
+void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_instance, bool in_group) {
+    Reader in(builder, object);
+    if (object.type == "shapegroup") {
+        if (in_group) in.fail("a shapegroup inside of a shapegroup is not supported");
+        return;  // shown by its instances
+    }
+    if (object.type == "instance") {
+        if (in_instance) in.fail("an instance inside of a shapegroup is not supported");
+        add_instance(object, outer);
+        return;
+    }
+    if (object.type == "merge") {  // one mesh of those inside, which looks the same
+        while (const Object* shape = in.take("shape")) add_shape(*shape, outer, in_instance, in_group);
+        in.finish();
+        return;
+    }
+    const std::string& type = object.type;
+    const bool given = type == "mesh" && !builder.document.meshes.empty();
+    if (!is_one_of(shape_plugins(), type) && !given) {
+        builder.refuse(object.where, "shape type '" + type + "' is not supported", "the shape is left out");
+        return;
+    }
+
+    Job job;
+    job.where = object.where;
+    job.type = type;
+    job.to_world = outer * in.transform("to_world");
+    if (!(std::fabs(determinant(job.to_world)) > 0))
+        in.fail(in.where("to_world"), "the transform of the shape is singular");
+    job.flip = in.boolean("flip_normals", false);
+    job.light_back = builder.document.light_backs.contains(&object);
+    job.reverse = determinant(job.to_world) < 0;
+    if (builder.document.mirrors_turn_in && object.version >= 2 && (is_mesh_file(type) || type == "sphere")) {
+        // In Mitsuba 3 a mirrored mesh keeps the order of its corners, whose outside so turns in, and so does that of a
+        // sphere. An instance keeps it.
+        const bool mirrored = determinant(in.transform("to_world")) < 0;
+        job.reverse = job.reverse != mirrored;
+        if (type == "sphere") job.flip = job.flip != mirrored;
+    }
+    const Object* bsdf = in.take("bsdf");
+    const bool attributes = bsdf && has_mesh_attributes(*bsdf);
+    if (attributes && type != "ply" && type != "mesh") in.fail("mesh attributes are read from ply files only");
+    if (is_tessellated(type))
+        read_tessellated(in, job, outer);
+    else
+        read_geometry(in, job);
+    const Object* emitter = in.take("emitter");
+    if (emitter && in_instance)
+        builder.refuse(emitter->where, "an emitter inside of a shapegroup is not supported", "the shape does not emit");
+    else if (emitter)
+        job.emitter = add_emitter(*emitter);
+    if (attributes)
+        job.material = material_of_attributes(job, in, *bsdf);
+    else
+        job.material = shape_material(builder, bsdf, emitter, job.where);
+    in.ignore({"silhouette_sampling_weight", "shutter_open", "shutter_close"});
+    if (type == "ply" && object.version < 2) in.ignore({"srgb"});  // of colours that nothing uses
+    in.finish();
+    if (jobs.size() >= builder.options.limits.shapes)
+        in.fail("the scene has more shapes than --limits shapes=" + std::to_string(builder.options.limits.shapes));
+    jobs.push_back(std::move(job));
+}
+
+/// Reads the mesh now, and gives the shape a copy of it that its textures are made for.
+uint32_t ShapeBuilder::material_of_attributes(Job& job, Reader& in, const Object& bsdf) {
+    MeshSource source = sources[size_t(job.source)];
+    const Mesh mesh = source.given ? *source.given : read_with_attributes(builder, in, source);
+    source.given = nullptr;
+    std::map<std::string, int32_t> textures;
+    source.mesh = with_attribute_atlas(builder, source.path.empty() ? job.where.file : source.path, mesh, textures);
+    source.path.clear();
+    job.source = add_source(std::move(source), "attributes " + std::to_string(jobs.size()));
+    builder.attribute_textures = &textures;
+    const uint32_t material = build_own_material(builder, bsdf);
+    builder.attribute_textures = nullptr;
+    return material;
+}
+
+void ShapeBuilder::read_geometry(Reader& in, Job& job) {
+    if (is_mesh_file(job.type)) {
+        read_mesh_file(in, job);
+    } else if (is_quadric(job.type)) {
+        job.to_world = job.to_world * local_form(in, job.type);
+    } else if (job.type == "mesh") {
+        const std::string name = in.text("name", "");
+        const auto mesh = builder.document.meshes.find(name);
+        if (mesh == builder.document.meshes.end()) in.fail("the document has no mesh '" + name + "'");
+        MeshSource source;
+        source.type = job.type;
+        source.given = &mesh->second;
+        job.source = add_source(std::move(source), "mesh " + name);
+    } else {
+        MeshSource source;
+        source.type = job.type;
+        source.mesh = job.type == "rectangle" ? make_rectangle() : make_cube();
+        job.source = add_source(std::move(source), job.type);
+        job.face_normals = true;
+    }
+}
+
+void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
+    MeshSource source;
+    const std::string name = in.text("filename", "");
+    if (name.empty()) in.fail(job.type + " shape has no filename");
+    source.path = builder.document.resolve(name, in.where("filename"));
+    source.type = job.type;
+    source.flip_v = in.boolean("flip_tex_coords", job.type == "obj");
+    if (job.type == "serialized")
+        source.shape_index = int(std::clamp<int64_t>(in.integer("shape_index", 0), -1, 1 << 30));
+    job.face_normals = in.boolean("face_normals", false);
+    job.smooth_angle = in.number("max_smooth_angle", -1);
+    if (in.has("max_smooth_angle") && !(job.smooth_angle >= 0 && job.smooth_angle <= 180))
+        in.fail(in.where("max_smooth_angle"), "max_smooth_angle must lie between 0 and 180 degrees");
+    if (job.type == "obj") read_obj_parts(builder, in, source);
+    const std::string key = source.path + "|" + std::to_string(source.flip_v) + "|" +
+                            std::to_string(source.shape_index) + "|" + std::to_string(source.lacks_materials);
+    job.source = add_source(std::move(source), key);
+}
+
+void ShapeBuilder::read_tessellated(Reader& in, Job& job, const Matrix& outer) {
+    const std::string name = in.text("filename", "");
+    if (name.empty()) in.fail(job.type + " shape has no filename");
+    const std::string path = builder.document.resolve(name, in.where("filename"));
+    const bool grid = job.type == "sdfgrid", field = job.type == "heightfield";
+    const double scale = field ? in.number("scale", 1) : 1;
+    const bool smooth = field && in.boolean("shading_normals", true);
+    job.face_normals = field && !smooth;
+    const std::string normals = grid ? in.text("normals", "smooth") : "";
+    if (grid && normals != "smooth" && normals != "analytic")
+        in.fail(in.where("normals"), "'" + normals + "' are no normals of an sdfgrid: smooth or analytic");
+    // Radii of curves do not follow the shape's own transform, its points do.
+    const bool follows = grid || field;
+    const Matrix placed = follows ? Matrix{} : in.transform("to_world");
+    if (!follows) job.to_world = outer;
+    std::string key = path + "|" + job.type + normals + std::to_string(scale) + std::to_string(smooth);
+    for (const auto& row : placed.m)
+        for (double m : row) (key += '|') += std::to_string(float_bits(float(m)));
+    if (const auto known = source_by_key.find(key); known != source_by_key.end()) {
+        job.source = known->second;
+        return;
+    }
+    const Limits& limits = builder.options.limits;
+    const std::string bytes = read_input(path, limits);
+    builder.file_digests.push_back({path, sha256(bytes)});
+    MeshSource source;
+    source.type = job.type;
+    if (field) {
+        source.mesh = read_height_field(path, bytes, scale, smooth, limits);
+    } else if (grid) {
+        source.mesh = mesh_of_grid(path, read_distance_grid(path, bytes, limits),
+                                   normals == "smooth" ? GridNormals::smooth : GridNormals::analytic);
+    } else {
+        std::vector<Curve> curves = read_curves(path, bytes, limits);
+        for (Curve& curve : curves)
+            for (CurvePoint& c : curve) {
+                const Vec3d p = column(placed * translation(c.p[0], c.p[1], c.p[2]), 3);
+                c.p[0] = p.x, c.p[1] = p.y, c.p[2] = p.z;
+            }
+        source.mesh = job.type == "linearcurve" ? mesh_of_linear_curves(curves) : mesh_of_bspline_curves(path, curves);
+    }
+    builder.note(in.where(), "shapes of type '" + job.type +
+                                 "' are triangles: " + std::to_string(source.mesh.faces.size()) + " of them here");
+    job.source = add_source(std::move(source), key);
+}
+
+uint32_t ShapeBuilder::add_emitter(const Object& object) {
+    Emitter e = read_emitter(builder, object, true);
+    if (e.type == EmitterType::count) {
+        builder.refuse(object.where, "emitter type '" + object.type + "' on a shape is not supported",
+                       "the shape does not emit");
+        e.type = EmitterType::area;
+    }
+    builder.scene.emitters.push_back(e);
+    return uint32_t(builder.scene.emitters.size() - 1);
+}
+
+void ShapeBuilder::add_instance(const Object& object, const Matrix& outer) {
+    Reader in(builder, object);
+    const Object* group = in.take("shape");
+    if (!group || group->type != "shapegroup") in.fail("instance has no shapegroup");
+    Job job;
+    job.where = object.where;
+    job.type = object.type;
+    job.to_world = outer * in.transform("to_world");
+    if (!(std::fabs(determinant(job.to_world)) > 0))
+        in.fail(in.where("to_world"), "the transform of the instance is singular");
+    in.finish();
+    const auto [known, is_new] = group_of.try_emplace(group, int(groups.size()));
+    if (is_new) {
+        std::vector<Job> others = std::exchange(jobs, {});
+        Reader group_in(builder, *group);
+        while (const Object* shape = group_in.take("shape")) add_shape(*shape, {}, true, true);
+        group_in.finish();
+        groups.push_back({std::exchange(jobs, std::move(others)), {}, {}});
+    }
+    job.group = known->second;
+    if (jobs.size() >= builder.options.limits.shapes)
+        in.fail("the scene has more shapes than --limits shapes=" + std::to_string(builder.options.limits.shapes));
+    jobs.push_back(std::move(job));
+}
+
+uint64_t memory_of(const Mesh& mesh) { return mesh_bytes(mesh.positions.size(), mesh.faces.size()); }
+
+/// Reads the files of meshes, on all threads.
+void load_sources(Builder& builder, std::vector<MeshSource>& sources) {
+    const ScopedSeconds clock(&builder.options.times->read);
+    parallel_for(sources.size(), [&](size_t i) {
+        MeshSource& s = sources[i];
+        if (s.path.empty()) return;
+        const Limits& limits = builder.options.limits;
+        const std::string bytes = gunzip_if_packed(s.path, read_input(s.path, limits), limits);
+        s.lacks_materials = s.lacks_materials && bytes.find("mtllib ") != std::string::npos;
+        const auto read = [&] {
+            if (s.type == "obj") return read_obj(s.path, bytes, s.flip_v, limits);
+            if (s.type == "ply") return read_ply(s.path, bytes, s.flip_v, limits);
+            return read_serialized(s.path, bytes, s.shape_index, s.flip_v, limits);
+        };
+        parallel_for(2, [&](int task) {
+            if (task == 0)
+                s.digest = sha256(bytes);
+            else
+                s.mesh = read();
+        });
+    });
+    for (const MeshSource& s : sources) {
+        if (s.path.empty()) continue;
+        builder.file_digests.push_back({s.path, s.digest});
+        if (s.lacks_materials)
+            builder.note({s.path, 1}, "materials of obj files are not read; such shapes without a BSDF are diffuse");
+    }
+}
+
+void reserve_meshes(const std::vector<Job>& jobs, Scene& scene) {
+    size_t vertices = 0, triangles = 0;
+    for (const Job& job : jobs) {
+        vertices += job.world.positions.size();
+        triangles += job.world.faces.size();
+    }
+    if (vertices >= kNone || triangles >= kNone / 2)
+        throw input_error(scene.path, 0, "the scene has too many vertices or triangles");
+    scene.vertices.reserve(vertices);
+    scene.triangles.reserve(triangles);
+}
+
+void add_mesh(Builder& builder, const Job& job, uint32_t index, Shape& shape) {
+    Scene& scene = builder.scene;
+    const Mesh& mesh = job.world;
+    if (job.emitter != kNone && mesh.faces.empty())
+        builder.fail_unless_moved(input_error(job.where.file, job.where.line, "the shape emits light but has no area"));
+    const std::string problem = "the shape of type '" + job.type + "' has no area: its transform leaves it none";
+    if (job.vanished && builder.options.lenient)
+        builder.refuse(job.where, problem, "it is left out");
+    else if (job.vanished)
+        builder.fail_unless_moved(input_error(job.where.file, job.where.line, problem));
+    const uint32_t first = uint32_t(scene.vertices.size());
+    shape.first_primitive = uint32_t(scene.triangles.size());
+    shape.primitive_count = uint32_t(mesh.faces.size());
+    if (!mesh.normals.empty()) shape.flags |= kShapeHasNormals;
+    if (!mesh.uvs.empty()) shape.flags |= kShapeHasUvs;
+    for (size_t v = 0; v < mesh.positions.size(); ++v) {
+        const Vec2f uv = mesh.uvs.empty() ? Vec2f{0, 0} : mesh.uvs[v];
+        scene.vertices.push_back(
+            {mesh.positions[v], uv.x, mesh.normals.empty() ? Vec3f{0, 0, 0} : mesh.normals[v], uv.y});
+    }
+    for (const auto& f : mesh.faces) scene.triangles.push_back({first + f[0], first + f[1], first + f[2], index});
+    scene.degenerate_triangles += job.dropped;
+}
+
+}  // namespace
+
+void build_shapes(Builder& builder, const Object& root) {
+    ShapeBuilder shapes{builder, {}, {}, {}, {}, {}};
+    for (const Child& child : root.children) {
+        if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false, false);
+    }
+    load_sources(builder, shapes.sources);
+    place_instances(builder, shapes.groups, shapes.sources, shapes.jobs);
+    // Shapes get meshes of their own, and so does the scene.
+    for (const MeshSource& s : shapes.sources) builder.take_memory(memory_of(s.content()), s.path);
+    for (const Job& job : shapes.jobs)
+        if (job.source >= 0) {
+            const Mesh& mesh = shapes.sources[size_t(job.source)].content();
+            const uint64_t split = job.smooth_angle >= 0 ? mesh_bytes(3 * mesh.faces.size(), mesh.faces.size()) : 0;
+            builder.take_memory(2 * (memory_of(mesh) + split), job.where.file + ":" + std::to_string(job.where.line));
+        }
+    parallel_for(shapes.jobs.size(), [&](size_t i) {
+        Job& job = shapes.jobs[i];
+        if (job.source >= 0) transform_mesh(builder, job, shapes.sources[size_t(job.source)].content());
+    });
+
+    Scene& scene = builder.scene;
+    reserve_meshes(shapes.jobs, scene);
+    std::vector<uint32_t> group_ends;
+    int group = -1;
+    for (Job& job : shapes.jobs) {
+        const uint32_t index = uint32_t(scene.shapes.size());
+        if (job.group != group) group = job.group, group_ends.push_back(uint32_t(scene.triangles.size()));
+        Shape shape{job.material, job.emitter, 0, 0, 0, 0};
+        if (job.emitter != kNone) scene.emitters[job.emitter].shape = index;
+        if (job.source >= 0) {
+            add_mesh(builder, job, index, shape);
+            job.world = {};
+        } else {
+            Quadric q = make_quadric(builder, job);
+            q.shape = index;
+            shape.first_primitive = uint32_t(scene.quadrics.size());  // moved behind the triangles below
+            shape.primitive_count = 1;
+            scene.quadrics.push_back(q);
+        }
+        scene.shapes.push_back(shape);
+    }
+    for (const Quadric& q : scene.quadrics) scene.shapes[q.shape].first_primitive += uint32_t(scene.triangles.size());
+    group_ends.push_back(uint32_t(scene.triangles.size()));
+    add_instances(builder, shapes.groups, group_ends);
+}
+
+const Plugins& shape_plugins() {
+    static const Plugins known = {"obj",    "ply",     "serialized",  "rectangle",    "cube",
+                                  "sphere", "disk",    "cylinder",    "shapegroup",   "instance",
+                                  "merge",  "sdfgrid", "linearcurve", "bsplinecurve", "heightfield"};
+    return known;
+}
+
+}  // namespace ambilux::document

@@ -1,0 +1,392 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "core/error.h"
+#include "core/half.h"
+#include "core/scoped_seconds.h"
+#include "core/srgb.h"
+#include "formats/document/builder.h"
+#include "formats/document/plugins.h"
+#include "formats/file_budget.h"
+#include "formats/images/image_io.h"
+
+namespace ambilux::document {
+
+namespace {
+
+/// How stored values become linear ones: gamma 1 linear, -1 sRGB, other values a power.
+float decode(float value, double gamma) {
+    if (gamma == 1) return value;
+    const double v = value;
+    if (gamma == -1) return float(srgb_to_linear(v));
+    return float(std::pow(v, gamma));
+}
+
+uint32_t decode_table(Builder& builder, double gamma) {
+    const std::string key = "decode " + std::to_string(gamma);
+    const auto it = builder.table_pool.find(key);
+    if (it != builder.table_pool.end()) return it->second;
+    const uint32_t offset = uint32_t(builder.scene.tables.size());
+    for (int i = 0; i < 256; ++i) builder.scene.tables.push_back(decode(float(i) / 255.0f, gamma));
+    builder.table_pool[key] = offset;
+    return offset;
+}
+
+/// Appends bytes at the next multiple of 16.
+uint64_t append_texels(Scene& scene, const void* data, size_t size) {
+    const uint64_t offset = (scene.texels.size() + 15) / 16 * 16;
+    scene.texels.resize(offset + size);
+    memcpy(scene.texels.data() + offset, data, size);
+    return offset;
+}
+
+/// True if all colours keep a precision of 2^-11 as halves: none is too large, and none that is not zero too small.
+bool fits_half(const std::vector<float>& texels) {
+    for (size_t i = 0; i < texels.size(); ++i) {
+        if (i % 4 == 3) continue;
+        const float f = texels[i];
+        if (!(std::fabs(f) <= kMaxHalf) || !(std::fabs(half_to_float(float_to_half(f)) - f) <= 0x1p-11f * std::fabs(f)))
+            return false;
+    }
+    return true;
+}
+
+/// Appends RGBA texels, as halves where that is allowed and loses nothing.
+uint64_t append_floats(Scene& scene, const std::vector<float>& texels, bool allow_half, TexelFormat& format) {
+    if (!allow_half || !fits_half(texels)) {
+        format = TexelFormat::rgba32f;
+        return append_texels(scene, texels.data(), texels.size() * sizeof(float));
+    }
+    format = TexelFormat::rgba16f;
+    std::vector<uint16_t> halves(texels.size());
+    for (size_t i = 0; i < texels.size(); ++i) halves[i] = uint16_t(float_to_half(i % 4 == 3 ? 1.0f : texels[i]));
+    return append_texels(scene, halves.data(), halves.size() * sizeof halves[0]);
+}
+
+/// Makes all colours equal to one channel.
+void spread_channel(Texels& image, size_t channel) {
+    const auto spread = [&](auto& texels) {
+        for (size_t i = 0; i + 3 < texels.size(); i += 4)
+            for (size_t c = 0; c < 3; ++c) texels[i + c] = texels[i + channel];
+    };
+    spread(image.bytes), spread(image.floats);
+}
+
+/// Puts the image's texels into the scene, once per file and decoding. `gamma` 0 takes what the file format implies;
+/// `as_float` stores floats (environment maps), as halves where nothing is lost by that; alpha, which no one reads
+/// there, is 1 then.
+/// `channel` 0 to 3 puts that one of red, green, blue and alpha into all colours; alpha is linear.
+/// `given`: of the document, not of a file.
+LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, int channel = -1,
+                       const Texels* given = nullptr) {
+    const std::string key = (given ? "given|" : "") + path + "|" + std::to_string(gamma) + (as_float ? "|float" : "") +
+                            std::to_string(channel);
+    const auto known = builder.images.find(key);
+    if (known != builder.images.end()) return known->second;
+
+    const ScopedSeconds clock(&builder.options.times->read);
+    Texels own;
+    if (!given) {
+        const std::string bytes = read_input(path, builder.options.limits);
+        builder.file_digests.push_back({path, sha256(bytes)});
+        own = read_image(path, bytes, builder.options.limits);
+    } else if (channel >= 0) {
+        own = *given;
+    }
+    const Texels& image = given && channel < 0 ? *given : own;
+    if (channel >= 0) spread_channel(own, size_t(channel));
+    if (channel == 3) gamma = 1;
+    const double used_gamma = gamma != 0 ? gamma : (image.is_linear ? 1 : -1);
+    LoadedImage out;
+    out.width = image.width;
+    out.height = image.height;
+    double mean[3] = {0, 0, 0};
+    const size_t count = size_t(image.width) * image.height;
+    builder.take_memory(count * (image.is_8bit && !as_float ? 4 : 16), path);
+    if (image.is_8bit && !as_float) {
+        out.format = TexelFormat::rgba8;
+        out.decode_table = decode_table(builder, used_gamma);
+        const auto [it, added] =
+            builder.texel_pool.try_emplace((given ? "given|" : "") + path + "|" + std::to_string(channel), 0);
+        if (added) it->second = append_texels(builder.scene, image.bytes.data(), image.bytes.size());
+        out.offset = it->second;
+        const float* table = builder.scene.tables.data() + out.decode_table;
+        for (size_t i = 0; i < count; ++i)
+            for (int c = 0; c < 3; ++c) mean[c] += table[image.bytes[4 * i + c]];
+    } else {
+        std::vector<float> texels(count * 4);
+        for (size_t i = 0; i < texels.size(); ++i) {
+            const float stored = image.is_8bit ? float(image.bytes[i]) / 255.0f : image.floats[i];
+            texels[i] = i % 4 == 3 ? stored : decode(stored, used_gamma);
+            if (!std::isfinite(texels[i]))
+                throw input_error(path, 0,
+                                  "texel (" + std::to_string(i / 4 % image.width) + ", " +
+                                      std::to_string(i / 4 / image.width) + ") is not finite");
+            if (i % 4 < 3) mean[i % 4] += texels[i], out.largest = std::max(out.largest, texels[i]);
+        }
+        out.offset = append_floats(builder.scene, texels, as_float, out.format);
+    }
+    out.mean = {float(mean[0] / double(count)), float(mean[1] / double(count)), float(mean[2] / double(count))};
+    builder.images[key] = out;
+    return out;
+}
+
+/// How the values of an image are stored; 0: as its format implies.
+double read_gamma(Reader& in) {
+    const double gamma = in.number("gamma", 0);
+    if (!(gamma >= 0 && gamma <= 100) && gamma != -1)
+        in.fail(in.where("gamma"), "gamma must lie between 0 and 100, or be -1 for sRGB");
+    return gamma;
+}
+
+/// The image of the document that the object names, if it does.
+const Texels* given_image(Builder& builder, Reader& in) {
+    if (builder.document.images.empty() || !in.has("image")) return nullptr;
+    const auto image = builder.document.images.find(in.text("image", ""));
+    if (image == builder.document.images.end()) in.fail("the document has no image of that name");
+    return &image->second;
+}
+
+/// uv transform: `to_uv` of the newer format, scale and offset of the older one.
+void read_to_uv(Reader& in, float out[2][3]) {
+    const Matrix m = in.transform("to_uv");
+    if (in.text("coordinates", "uv") != "uv") in.fail(in.where("coordinates"), "textures have coordinates uv only");
+    const double both = in.number("uvscale", 1), su = in.number("uscale", both), sv = in.number("vscale", both),
+                 ou = in.number("uoffset", 0), ov = in.number("voffset", 0);
+    const int columns[3] = {0, 1, 3};
+    for (int j = 0; j < 3; ++j) {
+        out[0][j] = float(su * m.m[0][columns[j]] + (j == 2 ? ou : 0));
+        out[1][j] = float(sv * m.m[1][columns[j]] + (j == 2 ? ov : 0));
+        if (!std::isfinite(out[0][j]) || !std::isfinite(out[1][j]))
+            in.fail("the transform of the texture is not finite");
+    }
+}
+
+WrapMode wrap_mode(Builder& builder, Reader& in) {
+    std::string mode = in.text("wrap_mode", "repeat");
+    const std::string u = in.text("wrap_mode_u", mode), v = in.text("wrap_mode_v", mode);
+    if (u != v)
+        builder.refuse(in.where("wrap_mode_v"), "different wrap modes for u and v are not supported",
+                       "that of u is used for both");
+    mode = u;
+    if (mode == "repeat") return WrapMode::repeat;
+    if (mode == "mirror") return WrapMode::mirror;
+    if (mode == "clamp") return WrapMode::clamp;
+    builder.refuse(in.where(in.has("wrap_mode") ? "wrap_mode" : "wrap_mode_u"), "unknown wrap mode '" + mode + "'",
+                   "repeat is used");
+    return WrapMode::repeat;
+}
+
+TextureFilter texture_filter(Builder& builder, Reader& in) {
+    const std::string filter = in.text("filter_type", "bilinear");
+    if (filter == "nearest") return TextureFilter::nearest;
+    // The older generation's prefiltered lookups have no counterpart for paths without differentials.
+    if (filter != "bilinear" && filter != "trilinear" && filter != "ewa")
+        builder.refuse(in.where("filter_type"), "unknown filter type '" + filter + "'", "bilinear is used");
+    return TextureFilter::bilinear;
+}
+
+int32_t add_texture(Builder& builder, const Texture& texture, Rgb mean) {
+    const std::string key(reinterpret_cast<const char*>(&texture), sizeof texture);
+    const auto [it, added] = builder.texture_pool.try_emplace(key, int32_t(builder.scene.textures.size()));
+    if (added) {
+        builder.scene.textures.push_back(texture);
+        builder.texture_means.push_back(mean);
+    }
+    return it->second;
+}
+
+/// Value of a rawconstant: a number or three of them, which need be no colour.
+Rgb raw_value(Reader& in) {
+    const Value* value = in.object().find("value");
+    if (!value) in.fail("rawconstant has no value");
+    if (value->kind != ValueKind::vector) return in.color("value", {}, SpectrumUse::unbounded);
+    const Vec3d v = in.vector("value", {});
+    return {float(v.x), float(v.y), float(v.z)};
+}
+
+/// Grid of lines on a ground: a bitmap of one period, as fine as the lines need.
+void read_grid(Builder& builder, Reader& in, Texture& texture, Rgb& mean) {
+    constexpr uint32_t kMost = 1024;
+    const Rgb ground = in.color("color0", splat(0.2f), SpectrumUse::reflectance),
+              line = in.color("color1", splat(0.4f), SpectrumUse::reflectance);
+    const double width = in.number("line_width", 0.01);
+    if (!(width > 0 && width < 0.5)) in.fail(in.where("line_width"), "line_width must lie between 0 and 0.5");
+    read_to_uv(in, texture.to_uv);
+    if (builder.validate_only) return;
+    // The first number of texels of which whole ones are as wide as a line, or the best one.
+    uint32_t n = 2;
+    for (uint32_t k = 2; k <= kMost; ++k) {
+        const auto error = [&](uint32_t m) { return std::fabs(width - std::max(std::round(width * m), 1.0) / m); };
+        if (error(k) < 0.999 * error(n) && error(n) > 1e-9) n = k;
+    }
+    const uint32_t lines = uint32_t(std::max(std::round(width * n), 1.0));
+    std::vector<float> texels;
+    const auto is_line = [&](uint32_t i) { return i < lines || i >= n - lines; };
+    for (uint32_t y = 0; y < n; ++y)
+        for (uint32_t x = 0; x < n; ++x) {
+            const Rgb c = is_line(x) || is_line(y) ? line : ground;
+            mean += c * (1.0f / (float(n) * float(n)));
+            texels.insert(texels.end(), {c.x, c.y, c.z, 1.0f});
+        }
+    builder.take_memory(texels.size() * sizeof(float), in.where().file);
+    texture.type = TextureType::bitmap;
+    texture.format = TexelFormat::rgba32f;
+    texture.wrap = WrapMode::repeat;
+    texture.filter = TextureFilter::nearest;
+    texture.width = texture.height = n;
+    texture.offset = append_texels(builder.scene, texels.data(), texels.size() * sizeof(float));
+}
+
+}  // namespace
+
+ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use) {
+    Rgb scale = splat(1);
+    const Object* inner = &object;
+    while (inner->type == "scale") {
+        Reader in(builder, *inner);
+        scale = scale * in.color("scale", splat(1), SpectrumUse::unbounded);
+        const Object* nested = in.take("texture");
+        if (!nested) in.fail("a texture of type 'scale' has no nested texture");
+        in.finish();
+        inner = nested;
+    }
+    return {load_texture(builder, *inner, use), scale};
+}
+
+int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
+    Reader in(builder, object);
+    Texture texture;
+    memset(&texture, 0, sizeof texture);  // padding too, because the record is its own key
+    Rgb mean{};
+    if (object.type == "bitmap") {
+        texture.type = TextureType::bitmap;
+        const Texels* given = given_image(builder, in);
+        const std::string name = in.text(given ? "image" : "filename", "");
+        if (name.empty()) in.fail("bitmap texture has no filename");
+        const std::string path = given ? name : builder.document.resolve(name, in.where("filename"));
+        const bool raw = in.boolean("raw", false);
+        const double given_gamma = read_gamma(in), gamma = raw ? 1 : given_gamma;
+        const std::string channel = in.text("channel", "");
+        if (channel.size() > 1 || std::string("rgba").find(channel) == std::string::npos)
+            in.fail(in.where("channel"), "'" + channel + "' is no channel: r, g, b or a");
+        texture.wrap = wrap_mode(builder, in);
+        texture.filter = texture_filter(builder, in);
+        read_to_uv(in, texture.to_uv);
+        in.ignore({"format", "accel", "max_anisotropy", "cache"});  // storage and prefiltering of other renderers
+        in.finish();
+        if (builder.validate_only) return 0;
+        const LoadedImage image = load_image(builder, path, gamma, false,
+                                             channel.empty() ? -1 : int(std::string("rgba").find(channel)), given);
+        texture.format = image.format;
+        texture.width = image.width;
+        texture.height = image.height;
+        texture.offset = image.offset;
+        texture.decode_table = image.decode_table;
+        mean = image.mean;
+    } else if (object.type == "checkerboard") {
+        texture.type = TextureType::checkerboard;
+        texture.color0 = in.color("color0", splat(0.4f), SpectrumUse::reflectance);
+        texture.color1 = in.color("color1", splat(0.2f), SpectrumUse::reflectance);
+        read_to_uv(in, texture.to_uv);
+        in.finish();
+        if (builder.validate_only) return 0;
+        if (use == TextureUse::number && object.version >= 3) {
+            std::swap(texture.color0, texture.color1);
+            builder.note(object.where, "a checkerboard of numbers has its colours exchanged, as in Mitsuba 3");
+        }
+        mean = (texture.color0 + texture.color1) * 0.5f;
+    } else if (object.type == "rawconstant") {
+        texture.type = TextureType::checkerboard;
+        texture.color0 = texture.color1 = mean = raw_value(in);
+        in.finish();
+        if (builder.validate_only) return 0;
+    } else if (object.type == "mesh_attribute" || object.type == "vertexcolors") {
+        const std::string name = object.type == "vertexcolors" ? "vertex_color" : in.text("name", "");
+        if (in.number("scale", 1) != 1) in.fail(in.where("scale"), "a scale of mesh_attribute is not supported");
+        in.finish();
+        if (builder.validate_only) return 0;
+        const auto* known = builder.attribute_textures;
+        if (!known || !known->count(name)) in.fail("the shape has no attribute '" + name + "'");
+        return known->at(name);
+    } else if (object.type == "gridtexture") {
+        read_grid(builder, in, texture, mean);
+        in.finish();
+        if (builder.validate_only) return 0;
+    } else {
+        builder.refuse(object.where, "texture type '" + object.type + "' is not supported", "a grey of 0.5 is used");
+        if (builder.validate_only) return 0;
+        texture.type = TextureType::checkerboard;
+        texture.color0 = texture.color1 = mean = splat(0.5f);
+    }
+    return add_texture(builder, texture, mean);
+}
+
+namespace {
+
+int32_t add_plain_texture(Builder& builder, const LoadedImage& image) {
+    Texture texture;
+    memset(&texture, 0, sizeof texture);
+    texture.type = TextureType::bitmap;
+    texture.format = image.format;
+    texture.wrap = WrapMode::repeat;
+    texture.filter = TextureFilter::bilinear;
+    texture.width = image.width;
+    texture.height = image.height;
+    texture.offset = image.offset;
+    texture.to_uv[0][0] = texture.to_uv[1][1] = 1;
+    return add_texture(builder, texture, image.mean);
+}
+
+}  // namespace
+
+int32_t load_environment_image(Builder& builder, Reader& in, const std::string& path, float& largest) {
+    const double gamma = in.object().version < 2 ? read_gamma(in) : 0;
+    const LoadedImage image = load_image(builder, path, gamma, true);
+    largest = image.largest;
+    return add_plain_texture(builder, image);
+}
+
+int32_t add_environment_image(Builder& builder, const std::string& name, const Texels& texels, float& largest) {
+    const LoadedImage image = load_image(builder, name, 1, true, -1, &texels);
+    largest = image.largest;
+    return add_plain_texture(builder, image);
+}
+
+int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels, Rgb mean) {
+    LoadedImage image;
+    image.width = width;
+    image.height = height;
+    image.mean = mean;
+    image.offset = append_floats(builder.scene, texels, false, image.format);
+    return add_plain_texture(builder, image);
+}
+
+int32_t add_baked_texture(Builder& builder, const Texture& settings, const std::vector<float>& texels, Rgb mean) {
+    Texture texture = settings;
+    texture.offset = append_floats(builder.scene, texels, false, texture.format);
+    return add_texture(builder, texture, mean);
+}
+
+int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels) {
+    LoadedImage image;
+    image.width = width;
+    image.height = height;
+    image.offset = append_floats(builder.scene, texels, true, image.format);
+    return add_plain_texture(builder, image);
+}
+
+Rgb mean_color(const Builder& builder, const ParamRgb& parameter) {
+    return parameter.texture >= 0 && !builder.validate_only
+               ? parameter.value * builder.texture_means[size_t(parameter.texture)]
+               : parameter.value;
+}
+
+const Plugins& texture_plugins() {
+    static const Plugins known = {"bitmap",         "checkerboard", "gridtexture", "rawconstant",
+                                  "mesh_attribute", "vertexcolors", "scale"};
+    return known;
+}
+
+}  // namespace ambilux::document

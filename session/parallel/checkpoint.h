@@ -1,0 +1,31 @@
+// The state of a render by ranges: whoever rendered which, any number of devices and ranks goes on from it.
+#pragma once
+
+#include <future>
+
+#include "film/merge_tree.h"
+#include "session/state.h"
+
+namespace ambilux {
+
+/// Writes states while the render goes on.
+class CheckpointFile {
+public:
+    explicit CheckpointFile(std::string path) : path_(std::move(path)) {}
+
+    bool exists() const;
+    /// Notes of the state, and `tree` filled; null if there is none or it is damaged (read_state).
+    nlohmann::json read(MergeTree& tree) const;
+    /// Begins to write; waits for an earlier one to end.
+    void write(const MergeTree& tree, nlohmann::json notes);
+    /// Throws what writing threw.
+    void wait();
+    void remove();
+    const std::string& path() const { return path_; }
+
+private:
+    const std::string path_;
+    std::future<void> writing_;
+};
+
+}  // namespace ambilux

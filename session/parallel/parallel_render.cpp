@@ -1,0 +1,388 @@
+#include "session/parallel/parallel_render.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "core/error.h"
+#include "core/flag.h"
+#include "core/log.h"
+#include "render/shared_renderer.h"
+#include "session/parallel/checkpoint.h"
+#include "session/parallel/collector.h"
+#include "session/parallel/wire.h"
+#include "session/statistics.h"
+#include "session/stats_sum.h"
+
+namespace ambilux {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Other ranks are looked at as often; a film of theirs is seconds of work, and a look costs a core 25 us.
+constexpr double kPollSeconds = 5e-3, kPatience = 0.05;
+/// A render in seconds begins with a range of one device: this long, or this share of its time.
+constexpr double kTrialSeconds = 1, kTrialShare = 1.0 / 64;
+
+class ParallelRender {
+public:
+    ParallelRender(const Scene& scene, const ParallelRequest& request, Ranks& ranks)
+        : scene_(scene), request_(request), ranks_(ranks), settings_(request.settings), state_(request.state_path) {
+        host_.emplace(scene);
+    }
+
+    ParallelResult run() {
+        identity_ = identity();
+        restore();
+        choose();
+        gather();
+        start_ = Clock::now();
+        saved_ = start_;
+        try {
+            if (ranges_.size == 0) find_range_size();
+            if (!interrupted_) render();
+        } catch (const Error& fault) {
+            if (fault.code == ExitCode::device) save_after_fault(fault);
+            throw;
+        }
+        return end();
+    }
+
+private:
+    /// A rank with its devices.
+    struct Party {
+        int rank = 0;
+        std::string host;
+        std::vector<DeviceWork> devices;
+        uint64_t open = 0;     ///< nodes that it has not rendered
+        size_t wanted = 0;     ///< ranges that it could begin
+        double per_range = 0;  ///< seconds of one of its devices, as last measured; 0: unknown
+    };
+
+    /// What must be the same for a state to be continued.
+    nlohmann::json identity() const {
+        nlohmann::json settings = settings_json(request_.settings);
+        return {{"scene_hash", scene_hash(scene_)}, {"spp", request_.budget.samples}, {"settings", settings}};
+    }
+
+    void restore() {
+        const bool cuda = choose_devices(request_.devices, settings_, ranks_)[0].cuda >= 0;
+        const uint64_t pixels = uint64_t(scene_.sensor.crop_width) * scene_.sensor.crop_height;
+        ranges_ = {request_.range_size, request_.budget.samples};
+        if (ranges_.size == 0 && ranges_.samples) ranges_.size = default_range_size(ranges_.samples, pixels, cuda);
+        if (!state_.exists()) {
+            if (request_.resume) log_info(fmt::format("{} is not there: the render begins anew", state_.path()));
+            return;
+        }
+        if (!request_.resume)
+            throw Error(ExitCode::usage, fmt::format("{} holds a render that was stopped: go on with it with --resume, "
+                                                     "or remove the file",
+                                                     state_.path()));
+        const nlohmann::json notes = state_.read(tree_);
+        if (notes.is_null()) return;
+        const auto refuse = [&](const std::string& what) {
+            throw input_error(
+                state_.path(), 0,
+                fmt::format("holds another render: its {} differs. Give another -o, or remove the file", what));
+        };
+        for (const char* key : {"scene_hash", "spp"})
+            if (notes.at("identity").at(key) != identity_.at(key)) refuse(key);
+        for (const auto& [key, value] : identity_.at("settings").items())
+            if (notes.at("identity").at("settings").value(key, nlohmann::json()) != value) refuse(key);
+        if (request_.range_size && notes.at("range_size") != request_.range_size) refuse("range size");
+        ranges_.size = notes.at("range_size");
+        earlier_ = restore_stats(notes.at("stats"));
+        earlier_seconds_ = notes.at("seconds");
+        log_info(fmt::format("{}: {} samples per pixel were rendered earlier", state_.path(), tree_.samples()));
+    }
+
+    /// bdpt.auto chooses once, for all.
+    void choose() {
+        choice_ = earlier_.choice;
+        if (settings_.automatic && choice_.name.empty()) {
+            RenderSettings probe = settings_;
+            const Device device = choose_devices(request_.devices, settings_, ranks_)[0];
+            probe.backend = device.cuda >= 0 ? Backend::cuda : Backend::cpu;
+            SharedAccels accels(scene_, *host_);
+            choice_ = make_renderer(scene_, probe, accels)->stats().choice;
+            earlier_seconds_ += choice_.seconds;
+        }
+        settings_.automatic = false;
+        for (const auto& [key, value] : choice_.settings) apply_setting(settings_, key, value);
+        settings_.expected_samples = ranges_.size;  // each range by itself
+    }
+
+    /// Until all ranks have their renderers: the clock of a budget starts then.
+    void gather() {
+        for (int rank = 1; rank < ranks_.size(); ++rank)
+            tell(ranks_, rank, Say::setup,
+                 {{"scene_hash", identity_["scene_hash"]},
+                  {"expected_samples", settings_.expected_samples},
+                  {"choice", choice_.settings}});
+        crew_.emplace(scene_, settings_, choose_devices(request_.devices, settings_, ranks_), *host_);
+        host_.reset();
+        parties_.resize(size_t(ranks_.size()));
+        parties_[0].host = host_name();
+        parties_[0].devices = crew_->work();
+        for (int ready = 1; ready < ranks_.size();) {
+            const std::optional<Told> told = hear(ranks_);
+            if (!told) {
+                std::this_thread::sleep_for(std::chrono::duration<double>(kPollSeconds));
+                if (is_set(request_.interrupt)) {
+                    interrupted_ = true;
+                    return;
+                }
+                continue;
+            }
+            Party& party = parties_[size_t(told->from)];
+            party.rank = told->from;
+            party.host = told->text.at("host");
+            party.devices = restore_work(told->text.at("devices"));
+            party.wanted = party.devices.size();
+            ++ready;
+        }
+    }
+
+    double elapsed() const { return earlier_seconds_ + seconds_since(start_); }
+
+    void find_range_size() {
+        const double seconds = std::min(kTrialSeconds, kTrialShare * request_.budget.seconds);
+        ++parties_[0].open;
+        crew_->give({{1, 0}, {}, 0, seconds});
+        while (ranges_.size == 0 && !interrupted_) {
+            for (Finished& f : crew_->take(kPatience)) {
+                ranges_.size = f.order.ranges.size;
+                rendered(parties_[0], f.order.node, f.seconds, crew_->work());
+                arrived(f.order.node, std::move(f.film));
+            }
+            interrupted_ = is_set(request_.interrupt);
+        }
+    }
+
+    /// Ranges a second of all together, those that are not known yet as fast as the mean.
+    double rate() const {
+        double sum = 0;
+        size_t known = 0, all = 0;
+        for (const Party& p : parties_) {
+            all += p.devices.size();
+            if (p.per_range <= 0) continue;
+            sum += double(p.devices.size()) / p.per_range;
+            known += p.devices.size();
+        }
+        return known ? sum * double(all) / double(known) : 0;
+    }
+
+    /// Gives a party what it could begin; what it does not get it will not get later either.
+    void deal(Dealer& dealer, Party& party) {
+        std::vector<Order> orders;
+        for (size_t given = 0; given < party.wanted;) {
+            const auto node = dealer.next(elapsed(), party.per_range, rate(), party.devices.size());
+            if (!node) break;
+            const double left = request_.budget.seconds > 0 ? request_.budget.seconds - elapsed() : 0;
+            const int collector = collector_of(dealer.block(), *node, ranks_.size());
+            orders.push_back({ranges_, *node, left, 0, dealer.block(), collector});
+            given += node->end() - node->first();
+            if (collector) collected_later_ += node->end() - node->first();
+        }
+        party.wanted = 0;
+        party.open += orders.size();
+        for (const Order& order : orders) {
+            if (party.rank == 0)
+                crew_->give(order);
+            else
+                tell(ranks_, party.rank, Say::order, order_text(order, &order == &orders.back()));
+        }
+    }
+
+    void render() {
+        const unsigned nodes = request_.block_nodes ? request_.block_nodes : default_block_nodes(ranks_.size());
+        Dealer dealer(ranges_, request_.budget.seconds, tree_, nodes);
+        bool last = false;
+        for (;;) {
+            parties_[0].wanted = crew_->wanted();
+            bool working = false;
+            for (Party& party : parties_) {
+                deal(dealer, party);
+                working |= party.open > 0;
+            }
+            if (!working && collected_later_ == 0) return;
+            if (!working && !std::exchange(last, true)) want_collected(true);
+            take();
+            // Films of all parties take half of this thread's time at most.
+            dealer.set_node_seconds(
+                std::max(Dealer::kNodeSeconds, 2 * double(parties_.size()) / nodes * film_seconds()));
+            if (is_set(request_.interrupt)) {
+                interrupted_ = true;
+                return;
+            }
+            checkpoint();
+        }
+    }
+
+    /// What was finished half an interval before is in a state, be its block whole or not.
+    void checkpoint() {
+        const double since = seconds_since(saved_);
+        if (since >= 0.5 * request_.checkpoint_seconds && !wanted_collected_ && collected_later_ > 0)
+            want_collected(false);
+        if (since < request_.checkpoint_seconds) return;
+        state_.write(tree_, notes());
+        saved_ = Clock::now();
+        wanted_collected_ = false;
+    }
+
+    void want_collected(bool last) {
+        wanted_collected_ = true;
+        for (int rank = 1; rank < ranks_.size(); ++rank) tell(ranks_, rank, Say::hand_over, {{"last", last}});
+    }
+
+    /// That a film costs this thread.
+    double film_seconds() const { return films_ ? (merge_seconds_ + receive_seconds_) / double(films_) : 0; }
+
+    std::optional<Told> hear_timed() {
+        const auto start = Clock::now();
+        std::optional<Told> told = hear(ranks_, &memory_);
+        if (told) receive_seconds_ += seconds_since(start);
+        return told;
+    }
+
+    void take() {
+        for (Finished& f : crew_->take(ranks_.size() > 1 ? kPollSeconds : kPatience)) {
+            rendered(parties_[0], f.order.node, f.seconds, crew_->work());
+            if (f.order.collector)
+                tell_part(ranks_, f);
+            else
+                arrived(f.order.node, std::move(f.film));
+        }
+        while (std::optional<Told> told = hear_timed()) {
+            const nlohmann::json& t = told->text;
+            Party& party = parties_[size_t(told->from)];
+            if (told->kind == Say::wanted) {
+                party.wanted = t.at("ranges");
+                continue;
+            }
+            const RangeNode node = read_node(t.at("node"));
+            if (told->kind == Say::collected)
+                collected_later_ -= node.end() - node.first();
+            else
+                rendered(party, node, t.at("seconds"), restore_work(t.at("devices")));
+            if (told->film.samples) arrived(node, std::move(told->film));
+        }
+    }
+
+    void rendered(Party& party, RangeNode node, double seconds, std::vector<DeviceWork> devices) const {
+        --party.open;
+        party.per_range = seconds / double(std::min(node.end(), ranges_.count()) - node.first());
+        party.devices = std::move(devices);
+    }
+
+    void arrived(RangeNode node, FilmMoments film) {
+        ++films_;
+        const auto start = Clock::now();
+        tree_.add(node, std::move(film));
+        if (memory_.empty() && ranks_.size() > 1) memory_ = memory_of(tree_.take_spare());
+        merge_seconds_ += seconds_since(start);
+        if (request_.on_progress) request_.on_progress(position(), total());
+    }
+
+    RenderPosition position() const { return {tree_.samples(), elapsed(), interrupted_}; }
+
+    /// Of all devices, and of what an earlier part did.
+    RenderStats total() const {
+        RenderStats sum = earlier_;
+        uint64_t bytes = 0, predicted = 0, peak = 0;
+        double build = 0;
+        std::map<std::string, int> devices;
+        for (const Party& p : parties_)
+            for (const DeviceWork& d : p.devices) {
+                add_part(sum, {}, d.stats);
+                bytes += d.stats.memory_bytes;
+                predicted += d.stats.memory_bytes_predicted;
+                peak += d.stats.memory_bytes_peak;
+                build = std::max(build, d.stats.build_seconds);
+                ++devices[p.host + ": " + d.stats.device];
+            }
+        sum.device.clear();
+        for (const auto& [name, count] : devices)
+            sum.device +=
+                fmt::format("{}{}{}", sum.device.empty() ? "" : "; ", count > 1 ? fmt::format("{} x ", count) : "",
+                            devices.size() > 1 || ranks_.size() > 1 ? name : parties_[0].devices[0].stats.device);
+        sum.memory_bytes = bytes;
+        sum.memory_bytes_predicted = predicted;
+        sum.memory_bytes_peak = peak;
+        sum.build_seconds = build;
+        sum.choice = choice_;
+        sum.samples = tree_.samples();
+        sum.render_seconds = elapsed();
+        return sum;
+    }
+
+    nlohmann::json notes() const {
+        return {{"identity", identity_},
+                {"range_size", ranges_.size},
+                {"seconds", elapsed()},
+                {"stats", save_stats(total())}};
+    }
+
+    /// A device failed, which ends the render: whole nodes are saved, and the message says so.
+    void save_after_fault(const Error& fault) {
+        if (tree_.samples() == 0) return;
+        state_.write(tree_, notes());
+        state_.wait();
+        throw Error(fault.code,
+                    fmt::format("{}. {} samples per pixel are in {}; the same command with --resume goes on",
+                                fault.what(), tree_.samples(), state_.path()));
+    }
+
+    ParallelResult end() {
+        ParallelResult result;
+        result.position = position();
+        result.stats = total();
+        if (interrupted_ && tree_.samples()) {
+            state_.write(tree_, notes());
+            state_.wait();
+            result.state_path = state_.path();
+        }
+        for (int rank = 1; rank < ranks_.size(); ++rank) tell(ranks_, rank, Say::stop, {});
+        crew_.reset();
+        result.film = tree_.sum();
+        result.ranges = ranges_;
+        for (const Party& p : parties_)
+            for (const DeviceWork& d : p.devices)
+                result.workers.push_back({p.rank, p.host, d.stats.device, d.samples, d.ranges, d.seconds});
+        result.merge_seconds = merge_seconds_;
+        result.receive_seconds = receive_seconds_;
+        if (!interrupted_) state_.remove();
+        return result;
+    }
+
+    const Scene& scene_;
+    const ParallelRequest& request_;
+    Ranks& ranks_;
+    RenderSettings settings_;
+    CheckpointFile state_;
+    nlohmann::json identity_;
+    Ranges ranges_;
+    MergeTree tree_;
+    RenderStats earlier_;
+    double earlier_seconds_ = 0, merge_seconds_ = 0, receive_seconds_ = 0;
+    uint64_t films_ = 0;            ///< that came here
+    uint64_t collected_later_ = 0;  ///< ranges whose films other ranks add up before they come here
+    bool wanted_collected_ = false;
+    Arrays memory_;  ///< for the next film
+    SelectionStats choice_;
+    std::optional<SharedAccels> host_;  ///< of all devices here, until they have made what they need of it
+    std::optional<Crew> crew_;
+    std::vector<Party> parties_;  ///< by rank
+    Clock::time_point start_, saved_;
+    bool interrupted_ = false;
+};
+
+}  // namespace
+
+ParallelResult render_parallel(const Scene& scene, const ParallelRequest& request, Ranks& ranks) {
+    return ParallelRender(scene, request, ranks).run();
+}
+
+}  // namespace ambilux

@@ -1,0 +1,216 @@
+// libs: ambilux_session
+// timeout: 120
+// Several workers in one process: the image of a render does not depend on how many there are, nor on interrupts.
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "accel/embree_tracer.h"
+#include "core/error.h"
+#include "core/flag.h"
+#include "film/ztest.h"
+#include "session/parallel/parallel_render.h"
+#include "tests/support/render_scene.h"
+
+using namespace ambilux;
+
+namespace {
+
+ParallelRequest request_for(const Scene& scene, const test::TempFolder& folder, const std::string& integrator,
+                            const std::string& variant, size_t workers) {
+    ParallelRequest request;
+    request.settings = cpu_settings(scene, Estimator::mis);
+    apply_setting(request.settings, "integrator", integrator);
+    apply_setting(request.settings, "variant", variant);
+    request.budget = {50, 0};
+    request.devices = std::vector<std::string>(workers, "cpu");
+    request.range_size = 3;
+    request.state_path = folder / "state";
+    return request;
+}
+
+bool same(const FilmMoments& a, const FilmMoments& b) {
+    return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares;
+}
+
+}  // namespace
+
+TEST_CASE("sums and second moments have the same bits for 1, 2 and 3 workers") {
+    const Scene scene = project_scene("glass", 40, 30);
+    const test::TempFolder folder;
+    for (const auto& [integrator, variant] : std::vector<std::pair<std::string, std::string>>{{"path", "wavefront"},
+                                                                                              {"light", "wavefront"},
+                                                                                              {"bdpt", "wavefront"},
+                                                                                              {"bdpt", "streaming"},
+                                                                                              {"bdpt", "lvc"}}) {
+        CAPTURE(integrator, variant);
+        std::optional<ParallelResult> first;
+        for (const size_t workers : {1, 2, 3}) {
+            const ParallelResult result =
+                render_parallel(scene, request_for(scene, folder, integrator, variant, workers), ranks());
+            CHECK(result.film.samples == 50);
+            CHECK(result.stats.samples == 50);
+            CHECK(result.workers.size() == workers);
+            if (!first) first = result;
+            CHECK(same(result.film, first->film));
+            CHECK(result.stats.rays_extend == first->stats.rays_extend);
+        }
+        CHECK(!std::filesystem::exists(folder / "state"));
+    }
+}
+
+TEST_CASE("a render by ranges is the estimate of a plain one, lvc with a cache per worker included") {
+    const Scene scene = project_scene("cornell", 32, 24);
+    const test::TempFolder folder;
+    for (const std::string variant : {"wavefront", "lvc"}) {
+        CAPTURE(variant);
+        ParallelRequest request = request_for(scene, folder, "bdpt", variant, 2);
+        request.budget.samples = 400;
+        request.range_size = 16;
+        request.settings.seed = 7;
+        const ParallelResult parts = render_parallel(scene, request, ranks());
+        request.settings.seed = 8;
+        const RenderResult plain = render_scene(scene, request.settings, 400);
+        const ZTestResult z = z_test(to_estimate(parts.film), to_estimate(plain.film), {});
+        INFO(z.report());
+        CHECK(z.pass);
+    }
+}
+
+TEST_CASE("interrupted and resumed with other workers: the same bits, and the state is gone") {
+    const Scene scene = project_scene("cornell", 40, 30);
+    const test::TempFolder folder;
+    const FilmMoments expected =
+        render_parallel(scene, request_for(scene, folder, "bdpt", "wavefront", 1), ranks()).film;
+    volatile bool interrupt = false;
+    ParallelRequest request = request_for(scene, folder, "bdpt", "wavefront", 2);
+    request.interrupt = &interrupt;
+    request.checkpoint_seconds = 1e-3;
+    request.on_progress = [&](const RenderPosition& p, const RenderStats&) {
+        if (p.samples > 10) set_flag(&interrupt);
+    };
+    const ParallelResult part = render_parallel(scene, request, ranks());
+    CHECK(part.position.interrupted);
+    REQUIRE(part.state_path == folder / "state");
+    REQUIRE(part.film.samples > 10);
+    REQUIRE(part.film.samples < 50);
+
+    request = request_for(scene, folder, "bdpt", "wavefront", 3);
+    CHECK_THROWS_AS(render_parallel(scene, request, ranks()), Error);  // without resume
+    request.resume = true;
+    for (const char* other : {"seed", "spp", "range"}) {
+        CAPTURE(other);
+        ParallelRequest changed = request;
+        if (other == std::string("seed")) changed.settings.seed = 99;
+        if (other == std::string("spp")) changed.budget.samples = 51;
+        if (other == std::string("range")) changed.range_size = 4;
+        CHECK_THROWS_AS(render_parallel(scene, changed, ranks()), Error);
+    }
+    const ParallelResult whole = render_parallel(scene, request, ranks());
+    CHECK(same(whole.film, expected));
+    uint64_t rendered = 0;
+    for (const WorkerShare& w : whole.workers) rendered += w.samples;
+    CHECK(rendered == 50 - part.film.samples);
+    CHECK(!std::filesystem::exists(folder / "state"));
+}
+
+TEST_CASE("a budget in seconds holds for all workers together") {
+    const Scene scene = project_scene("cornell", 64, 48);
+    const test::TempFolder folder;
+    ParallelRequest request = request_for(scene, folder, "path", "wavefront", 2);
+    request.budget = {0, 1.0};
+    request.range_size = 0;
+    const ParallelResult result = render_parallel(scene, request, ranks());
+    // A range is a sixty-fourth of a second for one worker alone; the machine may be busy.
+    CHECK(result.position.seconds > 0.8);
+    CHECK(result.position.seconds < 3.0);
+    CHECK(result.film.samples > result.ranges.size);
+    CHECK(result.film.samples % result.ranges.size == 0);
+}
+
+TEST_CASE("what a worker throws ends the render") {
+    const Scene scene = project_scene("cornell", 16, 16);
+    const test::TempFolder folder;
+    ParallelRequest request = request_for(scene, folder, "path", "wavefront", 2);
+    request.settings.accel = AccelKind::bvh2;  // not on the CPU
+    CHECK_THROWS_AS(render_parallel(scene, request, ranks()), Error);
+}
+
+TEST_CASE("a crew renders a node on all of its devices, hands over one film for it, and has one structure for rays") {
+    const Scene scene = project_scene("glass", 24, 16);
+    const RenderSettings settings = cpu_settings(scene, Estimator::mis);
+    const Ranges ranges = {3, 40};  // 14 ranges, of which the last has one sample
+    SharedAccels host(scene);
+    Crew crew(scene, settings, std::vector<Device>(3), host);
+    CHECK(host.get<EmbreeAccel>().use_count() == 1 + 3 + 1);  // here, each renderer, and the question
+    CHECK(crew.wanted() == 3);
+    const std::vector<RangeNode> nodes = {{3, 0}, {2, 2}, {1, 6}};
+    for (const RangeNode& node : nodes) crew.give({ranges, node});
+    std::vector<Finished> finished;
+    while (finished.size() < nodes.size())
+        for (Finished& f : crew.take(1)) finished.push_back(std::move(f));
+    CHECK(crew.wanted() == 3);
+    MergeTree together, apart;
+    for (Finished& f : finished) together.add(f.order.node, std::move(f.film));
+    const std::unique_ptr<Renderer> one = make_renderer(scene, settings);
+    for (uint64_t range = 0; range < ranges.count(); ++range) {
+        one->clear_film();
+        REQUIRE(one->render(ranges.first_sample(range), ranges.length(range)) == ranges.length(range));
+        apart.add({0, range}, one->film());
+    }
+    CHECK(same(together.sum(), apart.sum()));
+    uint64_t samples = 0, rendered = 0;
+    for (const DeviceWork& d : crew.work()) samples += d.samples, rendered += d.ranges;
+    CHECK(samples == 40);
+    CHECK(rendered == 14);
+}
+
+TEST_CASE("a crew whose films nobody takes ends when it is given up") {
+    const Scene scene = project_scene("glass", 8, 8);
+    SharedAccels host(scene);
+    Crew crew(scene, cpu_settings(scene, Estimator::mis), std::vector<Device>(2), host);
+    crew.give({{1, 32}, {5, 0}});
+    // Each worker renders on until two of its films wait and one cannot be handed over.
+    const auto ranges = [&] {
+        uint64_t sum = 0;
+        for (const DeviceWork& d : crew.work()) sum += d.ranges;
+        return sum;
+    };
+    for (int i = 0; i < 1000 && ranges() < 4; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    CHECK(ranges() == 4);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+}
+
+TEST_CASE("ranks of a host share its devices") {
+    struct Some : Ranks {
+        int rank_of_host = 0, on_host = 1;
+        int local_rank() const override { return rank_of_host; }
+        int local_size() const override { return on_host; }
+    };
+    const auto names = [](int rank, int size) {
+        Some some;
+        some.rank_of_host = rank;
+        some.on_host = size;
+        std::string text;
+        for (const Device& d : choose_devices({"0", "1", "2"}, {}, some)) text += d.name();
+        return text;
+    };
+    CHECK(names(0, 1) == "012");
+    CHECK(names(0, 2) == "02");
+    CHECK(names(1, 2) == "1");
+    CHECK(names(3, 5) == "0");
+}
+
+TEST_CASE("devices are numbers or cpu, and agree with the other options") {
+    const Ranks alone;
+    RenderSettings settings;
+    CHECK(choose_devices({"0", "2", "cpu"}, settings, alone).size() == 3);
+    CHECK(choose_devices({"0", "2", "cpu"}, settings, alone)[1].cuda == 2);
+    for (const std::string name : {"gpu", "-1", "1x", ""})
+        CHECK_THROWS_AS(choose_devices({name}, settings, alone), Error);
+    settings.deterministic = true;
+    CHECK_THROWS_AS(choose_devices({"0", "cpu"}, settings, alone), Error);
+    settings.backend = Backend::cpu;
+    CHECK(choose_devices({}, settings, alone)[0].name() == "cpu");
+    CHECK_THROWS_AS(choose_devices({"0"}, settings, alone), Error);
+}

@@ -1,0 +1,170 @@
+// libs: ambilux_session ambilux_render ambilux_integrators ambilux_formats ambilux_film ambilux_core
+// A setting is declared once: what follows from its declaration is complete and agrees.
+#include "integrators/settings_help.h"
+
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "integrators/registry.h"
+#include "session/statistics.h"
+#include "session/stats_sum.h"
+#include "tests/support/render_scene.h"
+
+using namespace ambilux;
+
+namespace {
+
+std::string refusal(const std::function<void()>& f) {
+    try {
+        f();
+    } catch (const Error& e) {
+        CHECK(e.code == ExitCode::usage);
+        return e.what();
+    }
+    FAIL("accepted");
+    return "";
+}
+
+/// Another value than the default, as text.
+std::string another(const Setting& s) {
+    const std::string standard = s.default_text();
+    for (const char* value : {"true", "false", "light", "lvc", "cpu", "nee", "power", "hits", "coherent", "cwbvh",
+                              "none", "select", "double", "pinned", "0.25", "2", "1"}) {
+        RenderSettings settings;
+        try {
+            s.what.set(settings, value);
+            if (s.text(settings) != standard) return value;
+        } catch (const Error&) {}
+    }
+    FAIL("no other value for " << s.what.key);
+    return "";
+}
+
+const char* const kReference = AMBILUX_SOURCE_DIR "/docs/reference.md";
+
+}  // namespace
+
+TEST_CASE("docs/reference.md is what the declarations say") {
+    INFO("make it anew: build/cli/ambilux help settings --markdown > docs/reference.md");
+    CHECK(bool(read_file(kReference) == settings_reference()));
+}
+
+TEST_CASE("every setting is parsed, printed, explained and known to the message for unknown keys") {
+    const std::string unknown = refusal([] {
+        RenderSettings s;
+        apply_setting(s, "no_such_key", "1");
+    });
+    const std::string help = settings_help();
+    for (const Setting& s : general_settings()) {
+        INFO(s.what.key);
+        const std::string value = another(s);
+        RenderSettings settings;
+        apply_setting(settings, s.what.key, value);
+        CHECK(setting_text(settings, s.what.key) == value);
+        CHECK_FALSE(s.is_default(settings));
+        apply_setting(settings, s.what.key, s.default_text());
+        CHECK(s.is_default(settings));
+        CHECK(unknown.find(s.what.key) != std::string::npos);
+        CHECK(help.find("\n" + s.what.key + "=" + s.default_text()) != std::string::npos);
+        CHECK_FALSE(s.what.help.empty());
+        const std::string message = refusal([&] { apply_setting(settings, s.what.key, "no such value"); });
+        CHECK(message.find(s.what.key + "=no such value: ") == 0);
+    }
+}
+
+TEST_CASE("what a variant declares for itself is refused elsewhere by name") {
+    for (const Variant& owner : variants())
+        for (const Setting& own : owner.own) {
+            RenderSettings s;
+            s.integrator = owner.integrator;
+            s.variant = owner.variant;
+            apply_setting(s, own.what.key, another(own));
+            CHECK_NOTHROW(check_settings(s, owner, false));
+            for (const Variant& v : variants()) {
+                if (v.find_own(own.what.key)) continue;
+                const std::string message = refusal([&] { check_settings(s, v, false); });
+                INFO(message);
+                CHECK(message.find(own.what.key + "=" + another(own)) == 0);
+                CHECK(message.find(v.integrator) != std::string::npos);
+                CHECK(message.find(owner.name()) != std::string::npos);
+            }
+        }
+}
+
+TEST_CASE("a setting without an effect is refused with key, value, place and where it has one") {
+    const auto refused = [](const char* integrator, const char* variant, const char* key, const char* value,
+                            bool cuda) {
+        RenderSettings s;
+        apply_setting(s, key, value);
+        return refusal([&] { check_settings(s, *find_variant(integrator, variant), cuda); });
+    };
+    CHECK(refused("bdpt", "megakernel", "compaction", "select", false) ==
+          "compaction=select: there are no queues of one item per path; this is integrator bdpt, variant megakernel, "
+          "backend cpu. It has an effect on " +
+              applies_text([](const VariantTraits& v, bool) { return v.compacts; }));
+    CHECK(refused("path", "wavefront", "strategies", "hits", false).find("bdpt") != std::string::npos);
+    CHECK(refused("bdpt", "lvc", "deterministic", "true", true).find("deterministic=true") == 0);
+    CHECK(refused("bdpt", "lvc", "accel", "bvh2", true).find("accel=bvh2") == 0);
+    CHECK(refused("path", "wavefront", "accel", "embree", true).find("cwbvh") != std::string::npos);
+    RenderSettings s;
+    apply_setting(s, "deterministic", "true");
+    CHECK_NOTHROW(check_settings(s, *find_variant("bdpt", "lvc"), false));
+    apply_setting(s, "ordering", "none");
+    CHECK_NOTHROW(check_settings(s, *find_variant("bdpt", "megakernel"), true));
+    CHECK(refusal([] {
+              RenderSettings wrong;
+              wrong.variant = "lvc";
+              variant_of(wrong);
+          }).find("variant=lvc: integrator path has ") == 0);
+}
+
+TEST_CASE("statistics name every setting as used and as asked for, images those that apply") {
+    const Scene scene = project_scene("cornell", 16, 16);
+    RenderSettings asked = cpu_settings(scene, Estimator::mis);
+    asked.integrator = "bdpt";
+    asked.automatic = true;
+    const RenderResult r = render_scene(scene, asked, 4);
+    REQUIRE_FALSE(r.stats.choice.name.empty());
+    const nlohmann::json json = stats_json(scene, asked, r.stats, 0);
+    for (const Setting& s : general_settings()) {
+        INFO(s.what.key);
+        CHECK(json.contains(s.what.key));
+        CHECK(json["asked"].contains(s.what.key));
+    }
+    CHECK(json["asked"]["bdpt.auto"] == true);
+    CHECK(json["bdpt.auto"] == false);
+    CHECK(json["asked"]["ordering"] == "auto");
+    CHECK(json["ordering"] == "none");
+    for (const auto& [key, value] : r.stats.choice.settings) {
+        const RenderSettings used = used_settings(asked, r.stats);
+        CHECK(setting_text(used, key) == value);
+    }
+    const Attributes attributes = image_attributes(scene, asked, r.stats);
+    CHECK(attributes.at("integrator") == json["integrator"]);
+    CHECK(attributes.at("method") == json["method"]);
+    CHECK(json["light_picking"] == "power");
+    CHECK(attributes.at("light_picking") == "power");
+    // Asked for as 0, which leaves it open.
+    CHECK(json["asked"]["wave_size"] == 0);
+    CHECK(json["wave_paths"] >= kTilePixels);
+    CHECK(attributes.at("wave_paths") == json["wave_paths"]);
+    CHECK(restore_stats(save_stats(r.stats)).wave_paths == r.stats.wave_paths);
+    RenderSettings lvc;
+    lvc.integrator = "bdpt";
+    lvc.variant = "lvc";
+    apply_setting(lvc, "connections", "16");
+    apply_setting(lvc, "light_paths", "0.25");
+    CHECK(method_text(lvc).starts_with("bdpt lvc "));
+    CHECK(method_text(lvc).find(" connections=16") != std::string::npos);
+    CHECK(method_text(lvc).find(" light_paths=0.25") != std::string::npos);
+    RenderSettings plain;
+    plain.integrator = "bdpt";
+    plain.variant = "lvc";
+    CHECK(method_text(plain) == "bdpt lvc connections=3");
+    RenderSettings path;
+    path.integrator = "path";
+    path.variant = "wavefront";
+    CHECK(method_text(path).find("estimator=mis") != std::string::npos);
+    CHECK(method_text(path).find("seed") == std::string::npos);
+    CHECK(attributes.contains("choice"));
+    CHECK(attributes.contains("estimator") == (json["integrator"] == "path"));
+}
