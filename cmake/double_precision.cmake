@@ -57,5 +57,6 @@ foreach(header ${HEADERS})
                           "(compile_in_double) and not named in cmake/double_precision.cmake as one that stays single")
     endif()
   endforeach()
-  file(WRITE ${OUTPUT}/${PREFIX}/${header} "#line 1 \"${SOURCE}/${header}\"\n${text}")
+  # A copy that stays as it is rebuilds nothing.
+  file(CONFIGURE OUTPUT ${OUTPUT}/${PREFIX}/${header} CONTENT "#line 1 \"${SOURCE}/${header}\"\n${text}" @ONLY)
 endforeach()

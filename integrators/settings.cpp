@@ -8,6 +8,8 @@
 #include "integrators/registry.h"
 #include "integrators/strategies_setting.h"
 #include "stages/cache_draw.h"
+#include "transport/mis/heuristic.h"
+#include "transport/subpath/subpath.h"
 
 namespace ambilux {
 namespace {

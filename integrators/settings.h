@@ -9,8 +9,9 @@
 #include "queues/order.h"
 #include "queues/wave.h"
 #include "scene/texture_memory.h"
+#include "transport/mis/estimator.h"
+#include "transport/mis/heuristic_name.h"
 #include "transport/mis/strategy.h"
-#include "transport/mis/unidirectional.h"
 
 namespace ambilux {
 

@@ -1,6 +1,7 @@
 // Light on its way to a pixel, as queues keep it.
 #pragma once
 
+#include "models/parameters.h"
 #include "transport/mis/strategy.h"
 #include "transport/subpath/subpath.h"
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "items/subpath_items.h"
-#include "transport/subpath/connection.h"
+#include "transport/subpath/vertex.h"
 
 namespace ambilux {
 

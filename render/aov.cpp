@@ -8,6 +8,7 @@
 #include "transport/sensor/camera.h"
 #include "transport/sensor/filter.h"
 #include "transport/subpath/subpath.h"
+#include "transport/surface_scattering.h"
 
 namespace ambilux {
 namespace {

@@ -7,6 +7,7 @@
 #include "stages/light_vertex_search.h"
 #include "stages/mis_weight.h"
 #include "stages/occlude.h"
+#include "transport/subpath/connection.h"
 
 namespace ambilux {
 

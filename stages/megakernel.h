@@ -10,6 +10,7 @@
 #include "stages/generate.h"
 #include "stages/stage.h"
 #include "transport/mis/heuristic.h"
+#include "transport/subpath/connection.h"
 #include "transport/subpath/next_event.h"
 #include "transport/subpath/visit.h"
 

@@ -10,7 +10,7 @@
 // Subpaths from light and from the camera so use the same function; what differs are densities.
 #pragma once
 
-#include "transport/scattering.h"
+#include "transport/frame_scattering.h"
 
 namespace ambilux {
 

@@ -1,6 +1,7 @@
 // path: the unidirectional path tracer. Hits of emitters, next event estimation, or both with weights.
 #pragma once
 
+#include "integrators/path/policy.h"
 #include "integrators/shared/eye_side.h"
 #include "integrators/shared/subpath_queues.h"
 #include "stages/connect_emitter.h"
@@ -10,15 +11,6 @@
 #include "stages/generate.h"
 
 namespace ambilux {
-
-struct PathPolicy {
-    Rules<UnidirectionalMis> rules;
-    WavePolicy waves;
-};
-/// Throws Error(usage) when paths might never end.
-PathPolicy plan_path(const Scene& scene, const RenderSettings& settings);
-/// Names of stages that this render does without.
-std::vector<std::string> skipped_path_parts(const Scene& scene, const Rules<UnidirectionalMis>& rules);
 
 /// Of a Sampling that is told nothing.
 struct NoSettings {

@@ -1,7 +1,6 @@
-#include <algorithm>
+#include "integrators/path/policy.h"
 
-#include "integrators/path/integrator.h"
-#include "transport/emitter.h"
+#include <algorithm>
 
 namespace ambilux {
 

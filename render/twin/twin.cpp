@@ -8,7 +8,7 @@
 #include "core/flag.h"
 #include "core/parallel.h"
 #include "integrators/bdpt/shared/policy.h"
-#include "integrators/path/integrator.h"
+#include "integrators/path/policy.h"
 #include "integrators/setting.h"
 #include "render/statistics.h"
 #include "render/twin/convert.h"

@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "tests/support/bidirectional_images.h"
+#include "transport/mis/heuristic.h"
 
 using namespace ambilux;
 

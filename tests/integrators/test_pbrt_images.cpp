@@ -5,6 +5,7 @@
 #include "formats/convert/convert.h"
 #include "formats/images/image_write.h"
 #include "scene/info.h"
+#include "scene/surface.h"
 #include "tests/support/closed_forms.h"
 #include "tests/support/image_files.h"
 #include "tests/support/mitsuba_text.h"

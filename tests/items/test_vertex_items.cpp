@@ -9,7 +9,7 @@
 #include "queues/layout.h"
 #include "stages/vertex_queues.h"
 #include "tests/support/bidirectional_images.h"
-#include "transport/subpath/vertex.h"
+#include "transport/subpath/connection.h"
 
 using namespace ambilux;
 

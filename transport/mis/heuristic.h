@@ -5,6 +5,7 @@
 #pragma once
 
 #include "core/math.h"
+#include "transport/mis/heuristic_name.h"
 
 namespace ambilux {
 
@@ -43,9 +44,6 @@ struct HeuristicList {
     }
 };
 using Heuristics = HeuristicList<BalanceHeuristic, PowerHeuristic>;
-
-/// Index in Heuristics.
-enum class MisHeuristic : uint32_t { balance, power };
 
 AMBILUX_HD float heuristic_term(MisHeuristic heuristic, float ratio) {
     return Heuristics::term(uint32_t(heuristic), ratio);

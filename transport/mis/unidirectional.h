@@ -2,13 +2,11 @@
 #pragma once
 
 #include "transport/emitter.h"
+#include "transport/mis/estimator.h"
 #include "transport/mis/heuristic.h"
 #include "transport/subpath/subpath.h"
 
 namespace ambilux {
-
-/// Strategies of the path tracer: hits only, next event estimation wherever it can find the light, both with weights.
-enum class Estimator : uint32_t { naive, nee, mis };
 
 struct UnidirectionalMis {
     /// Density of the ray's direction by BSDF sampling; after a delta a probability.

@@ -4,6 +4,7 @@
 #include "transport/sensor/importance.h"
 #include "transport/subpath/rules.h"
 #include "transport/subpath/vertex.h"
+#include "transport/surface_scattering.h"
 
 namespace ambilux {
 

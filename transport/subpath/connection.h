@@ -4,16 +4,9 @@
 #include "transport/mis/bidirectional.h"
 #include "transport/subpath/rules.h"
 #include "transport/subpath/vertex.h"
+#include "transport/surface_scattering.h"
 
 namespace ambilux {
-
-/// An end of a connection: the vertex at the end of `depth` segments, and the throughput of its subpath up to there.
-template <class Mis>
-struct SubpathEnd {
-    Vertex<Mis> vertex;
-    Rgb throughput;
-    uint32_t depth;
-};
 
 /// False if no light can pass between two vertices, told from places and types of BSDFs: most pairs in a room face away
 /// from each other.

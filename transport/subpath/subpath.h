@@ -1,11 +1,10 @@
-// Subpaths from the camera and from emitters, their vertices, and what strategies make of them. `Mis` says which sums
-// travel along a subpath and which ratios follow from them: UnidirectionalMis, BidirectionalMis or a model of an
-// integrator's own.
+// Subpaths from the camera and from emitters, and what strategies make of them. `Mis` says which sums travel along a
+// subpath and which ratios follow from them: UnidirectionalMis, BidirectionalMis or a model of an integrator's own.
 #pragma once
 
 #include "core/rng.h"
+#include "transport/bsdf/sample.h"
 #include "transport/mis/strategy.h"
-#include "transport/surface_scattering.h"
 
 namespace ambilux {
 
@@ -31,16 +30,6 @@ struct Subpath {
     float roulette_scale;  ///< roulette sees throughput · scale². Eye: product of the relative indices passed through;
                            ///< light: 1/sqrt of the flux at the start
     bool delta;            ///< the last scattering was a delta (true for first rays)
-};
-
-/// A surface point met by a subpath.
-template <class Mis>
-struct Vertex {
-    SurfacePoint point;  ///< of a vertex that comes from a queue: p and ng only
-    float offset;        ///< ray_offset
-    Scattering scattering;
-    typename Mis::Sums sums;
-    bool first;  ///< met by the first ray of its subpath
 };
 
 /// What a strategy found, without its weight, and the segment that must be free for it.

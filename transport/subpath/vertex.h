@@ -1,9 +1,28 @@
 // Vertices of subpaths.
 #pragma once
 
+#include "transport/scattering.h"
 #include "transport/subpath/subpath.h"
 
 namespace ambilux {
+
+/// A surface point met by a subpath.
+template <class Mis>
+struct Vertex {
+    SurfacePoint point;  ///< of a vertex that comes from a queue: p and ng only
+    float offset;        ///< ray_offset
+    Scattering scattering;
+    typename Mis::Sums sums;
+    bool first;  ///< met by the first ray of its subpath
+};
+
+/// An end of a connection: the vertex at the end of `depth` segments, and the throughput of its subpath up to there.
+template <class Mis>
+struct SubpathEnd {
+    Vertex<Mis> vertex;
+    Rgb throughput;
+    uint32_t depth;
+};
 
 /// The vertex `point` that the ray of `path` met, which has `sums` there.
 template <Features F, class Mis>
