@@ -1,4 +1,4 @@
-# instantiate(TARGET TABLE): a translation unit for each unit of the registry, level of features and backend, so that
+# instantiate(TARGET TABLE): a translation unit for each unit of the registries, level of features and backend, so that
 # they compile side by side and a change of one rebuilds its own; and the file TABLE with the list of all renderers.
 include(${PROJECT_SOURCE_DIR}/cmake/registry.cmake)
 
@@ -32,7 +32,7 @@ function(instantiate target table)
   set(ROWS "")
   foreach(entry ${entries})
     split_entry("${entry}")
-    string(APPEND TABLE_INCLUDES "#include \"integrators/${FOLDER}/variant.h\"\n")
+    string(APPEND TABLE_INCLUDES "#include \"${FOLDER}/variant.h\"\n")
     foreach(level ${LEVELS})
       set(unit ${UNIT}_${level})
       foreach(backend cpu cuda)
@@ -47,8 +47,8 @@ function(instantiate target table)
       endforeach()
       string(APPEND ROWS
         "        compiled<${NAME}Variant, k${level}Features, ${on_cpu}, ${on_cuda}>(\"${INTEGRATOR}\", \"${VARIANT}\"),\n")
-      string(APPEND headers_${unit} "#include \"integrators/${FOLDER}/integrator.h\"\n")
-      string(APPEND variants_${unit} "#include \"integrators/${FOLDER}/variant.h\"\n")
+      string(APPEND headers_${unit} "#include \"${FOLDER}/integrator.h\"\n")
+      string(APPEND variants_${unit} "#include \"${FOLDER}/variant.h\"\n")
       string(APPEND traits_${unit}
         "struct ${NAME}Variant;\ntemplate <>\nstruct IntegratorOf<${NAME}Variant> {\n"
         "    template <Features F, class Tracer, Fusion K>\n"

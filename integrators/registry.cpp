@@ -8,21 +8,22 @@
 namespace ambilux {
 namespace {
 
-std::vector<std::string> names_of(std::string Variant::* name) {
+std::vector<std::string> names_of(std::string Variant::* name, bool in_tree = false) {
     std::vector<std::string> names;
     for (const Variant& v : variants())
-        if (std::find(names.begin(), names.end(), v.*name) == names.end()) names.push_back(v.*name);
+        if (!(in_tree && v.outside) && std::find(names.begin(), names.end(), v.*name) == names.end())
+            names.push_back(v.*name);
     return names;
 }
 
 /// "path, bdpt (lvc, streaming)": all variants of an integrator, or some.
-std::string list_variants(Applies applies, bool cuda) {
+std::string list_variants(Applies applies, bool cuda, bool in_tree) {
     std::vector<std::string> parts;
-    for (const std::string& integrator : integrator_names()) {
+    for (const std::string& integrator : names_of(&Variant::integrator, in_tree)) {
         std::vector<std::string> some;
         bool all = true;
         for (const Variant& v : variants()) {
-            if (v.integrator != integrator) continue;
+            if (v.integrator != integrator || (in_tree && v.outside)) continue;
             if (applies(v.traits, cuda))
                 some.push_back(v.variant);
             else
@@ -103,13 +104,14 @@ const Variant& variant_of(const RenderSettings& settings) {
                                                               : fmt::format("the variant {} only", names[0])));
 }
 
-std::string applies_text(Applies applies) {
+std::string applies_text(Applies applies, bool in_tree) {
     const auto never = [](const VariantTraits&, bool) { return false; };
     const auto always = [](const VariantTraits&, bool) { return true; };
     if (!applies) applies = always;
-    const std::string cpu = list_variants(applies, false), cuda = list_variants(applies, true);
-    const std::string all = list_variants(always, false), none = list_variants(never, false);
-    const auto text = [&](const std::string& list) { return list == all ? std::string("all integrators") : list; };
+    const auto list = [in_tree](Applies a, bool on_cuda) { return list_variants(a, on_cuda, in_tree); };
+    const std::string cpu = list(applies, false), cuda = list(applies, true);
+    const std::string all = list(always, false), none = list(never, false);
+    const auto text = [&](const std::string& some) { return some == all ? std::string("all integrators") : some; };
     if (cpu == cuda) return text(cpu);
     if (cpu == none) return text(cuda) + " on cuda";
     if (cuda == none) return text(cpu) + " on cpu";

@@ -15,6 +15,7 @@ struct Variant {
     VariantTraits traits;
     std::string help;          ///< one sentence
     std::vector<Setting> own;  ///< settings that only this variant has
+    bool outside = false;      ///< of the tree (AMBILUX_EXTENSIONS)
 
     std::string name() const { return integrator + " " + variant; }
     /// Null if it declares no setting of this key.
@@ -24,13 +25,19 @@ struct Variant {
 /// What `Description` (a folder's variant.h) says of itself.
 template <class Description>
 Variant describe(std::string integrator, std::string variant) {
-    Variant v = {std::move(integrator), std::move(variant), Description::kTraits, Description::kHelp, {}};
+    Variant v = {std::move(integrator), std::move(variant), Description::kTraits, Description::kHelp};
     if constexpr (requires { Description::settings(); })
         for (const auto& declaration : Description::settings()) v.own.push_back(own_setting(declaration));
     return v;
 }
 
-/// In the order of integrators/registry.list.
+/// `v` as one outside of the tree.
+inline Variant outside(Variant v) {
+    v.outside = true;
+    return v;
+}
+
+/// In the order of integrators/registry.list, then those of AMBILUX_EXTENSIONS.
 const std::vector<Variant>& variants();
 
 /// Names, each once.
@@ -46,8 +53,8 @@ const Variant* find_variant(const std::string& integrator, const std::string& va
 /// The variant that `settings` name. Throws Error(usage).
 const Variant& variant_of(const RenderSettings& settings);
 
-/// Where a setting has an effect: "everywhere", or which variants on which backend.
-std::string applies_text(Applies applies);
+/// Where a setting has an effect: "everywhere", or which variants on which backend. `in_tree`: names none outside.
+std::string applies_text(Applies applies, bool in_tree = false);
 
 /// Throws Error(usage) that names the first setting, or value, without an effect on `variant`: whoever sets it expects
 /// one.

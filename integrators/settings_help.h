@@ -7,7 +7,7 @@ namespace ambilux {
 
 /// A block of lines for each setting.
 std::string settings_help();
-/// The same as tables in Markdown: docs/reference.md.
+/// The same as tables in Markdown, of variants in the tree: docs/reference.md.
 std::string settings_reference();
 
 }  // namespace ambilux
