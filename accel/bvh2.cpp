@@ -126,12 +126,9 @@ uint32_t flatten(const BuildNode* root, Bvh2& out) {
     return first;
 }
 
-}  // namespace
-
-Bvh2 build_bvh2(const SceneView& scene, const Group* group) {
-    Bvh2 out;
+/// Boxes of what a tree holds; `group`: of its triangles alone. What has no extent or no finite vertices is left out.
+std::vector<RTCBuildPrimitive> primitives_of(const SceneView& scene, const Group* group) {
     std::vector<RTCBuildPrimitive> primitives;
-    const bool instances = !group && scene.instance_count > 0;
     const uint32_t first = group ? group->first_triangle : 0,
                    count = group ? first + group->triangle_count : scene.primitive_count() + scene.instance_count;
     primitives.reserve(size_t(count - first) * 2);
@@ -155,6 +152,14 @@ Bvh2 build_bvh2(const SceneView& scene, const Group* group) {
         p.upper_x = b.upper.x, p.upper_y = b.upper.y, p.upper_z = b.upper.z, p.primID = i;
         primitives.push_back(p);
     }
+    return primitives;
+}
+
+}  // namespace
+
+Bvh2 build_bvh2(const SceneView& scene, const Group* group) {
+    Bvh2 out;
+    std::vector<RTCBuildPrimitive> primitives = primitives_of(scene, group);
     if (primitives.empty()) return out;
 
     const size_t used = primitives.size();
@@ -164,6 +169,7 @@ Bvh2 build_bvh2(const SceneView& scene, const Group* group) {
     RTCBVH bvh = rtcNewBVH(device);
     BuildInput input{scene};
     RTCBuildArguments args = rtcDefaultBuildArguments();
+    const bool instances = !group && scene.instance_count > 0;
     args.buildQuality = instances ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH;
     args.maxBranchingFactor = 2;
     args.maxDepth = 64;

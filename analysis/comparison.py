@@ -66,6 +66,13 @@ def numbers_below(experiment, scene, run, seed):
     return f"relMSE {style.short_number(last.relative_error)}\nRMSE {style.short_number(last.error)}\n{last.spp} spp\n{style.short_number(last.time)} s"
 
 
+def add_scale(figure, axes, highest, width):
+    """The colours of the error maps, below a title of at most `width` inches."""
+    figure.colorbar(ScalarMappable(Normalize(0, highest), style.ERROR_COLOURS), cax=axes, orientation="horizontal", extend="max")
+    axes.tick_params(labelsize=6.5)
+    axes.set_title(style.fit("relative error |x − r| / (|r| + 0.01)", width, 7), fontsize=7, pad=3)
+
+
 def draw(experiment, scene, reference, shown, insets):
     """`shown`: [(run, seed, image)]: two insets of each, its error map and its numbers, beside the reference or, of more than BESIDE runs, in even rows below it.
     One exposure and one colour scale for all."""
@@ -124,9 +131,7 @@ def draw(experiment, scene, reference, shown, insets):
         room = style.PAGE - left - unit if below else big_width
         bar = (place(left + unit + 0.15 * room, top + 0.45 * rows * unit, 0.7 * room, 0.09) if below
                else place(big_width * 0.2, top + rows * unit + 0.02 + max(map_height / 2, 0.2), big_width * 0.6, 0.09))
-        figure.colorbar(ScalarMappable(Normalize(0, highest), style.ERROR_COLOURS), cax=bar, orientation="horizontal", extend="max")
-        bar.tick_params(labelsize=6.5)
-        bar.set_title(style.fit("relative error |x − r| / (|r| + 0.01)", 1.2 * room, 7), fontsize=7, pad=3)
+        add_scale(figure, bar, highest, 1.2 * room)
     return figure
 
 

@@ -60,7 +60,7 @@ def wholes(experiment, scene, run, batches, metric):
 def selection(experiment, scene, run, rows):
     """{seed: seconds of one sample that went into selecting a method (bdpt.auto), which no batch holds}, up to the checkpoint of `rows`."""
     samples = {r.seed: r.spp for r in rows}
-    seconds = {seed: (stats.get("choice") or {}).get("seconds", 0.0) for seed, stats in experiment.stats_by_seed(scene, run).items()}
+    seconds = {seed: (stats.get("selection") or {}).get("seconds", 0.0) for seed, stats in experiment.stats_by_seed(scene, run).items()}
     return {seed: s / samples[seed] for seed, s in seconds.items() if s and seed in samples}
 
 

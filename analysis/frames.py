@@ -63,14 +63,14 @@ def queues(data):
                             columns=["scene", "run", "seed", "queue", "capacity", "peak", "overflow"])
 
 
-def choices(data):
+def selections(data):
     """A row per scene, run, seed and candidate of bdpt.auto: what it predicted and timed, and which one ran (`chosen`)."""
     columns = ["scene", "run", "seed", "candidate", "chosen", "variance", "work", "seconds_per_sample", "efficiency", "excluded"]
     rows = []
     for scene, run, seed, stats in renders(data):
-        choice = stats.get("choice") or {}
-        for c in choice.get("candidates", ()):
-            rows.append((scene, run, seed, c["name"], c["name"] == choice["name"], *(c.get(k) for k in columns[5:])))
+        selection = stats.get("selection") or {}
+        for c in selection.get("candidates", ()):
+            rows.append((scene, run, seed, c["name"], c["name"] == selection["name"], *(c.get(k) for k in columns[5:])))
     return pandas.DataFrame(rows, columns=columns)
 
 

@@ -185,80 +185,123 @@ int render_by_ranges(const Options& o) {
                                         o.output, finished.film.samples));
 }
 
+/// A renderer, and what looks at its samples on the way.
+struct Watched {
+    std::unique_ptr<Renderer> renderer;
+    InvalidWatch* invalid = nullptr;
+    const SampleWatch* samples = nullptr;  ///< with --outliers
+};
+
+Watched make_watched(const Options& o, const Scene& scene, const RenderSettings& settings) {
+    auto invalid = std::make_unique<InvalidWatch>(make_renderer(scene, settings));
+    Watched watched;
+    watched.invalid = invalid.get();
+    watched.renderer = std::move(invalid);
+    if (o.outliers == 0) return watched;
+    check_replay(used_settings(settings, watched.renderer->stats()));
+    auto samples = std::make_unique<SampleWatch>(std::move(watched.renderer));
+    watched.samples = samples.get();
+    watched.renderer = std::move(samples);
+    return watched;
+}
+
+/// With --tev: the image so far, now and then.
+class Preview {
+public:
+    Preview(const Options& o, const Sensor& sensor) {
+        if (!o.tev.empty()) tev_.emplace(o.tev, o.output, sensor.crop_width, sensor.crop_height);
+    }
+    void look(Renderer& renderer) {
+        const auto now = std::chrono::steady_clock::now();
+        if (!tev_ || now - sent_ <= kStreamPeriod) return;
+        tev_->send(mean_image(renderer.film()));
+        sent_ = now;
+    }
+    void show(const FilmMoments& film) {
+        if (tev_) tev_->send(mean_image(film));
+    }
+
+private:
+    std::optional<TevStream> tev_;
+    std::chrono::steady_clock::time_point sent_ = std::chrono::steady_clock::now();
+};
+
+struct Rendered {
+    RenderPosition position;
+    RenderStats stats;
+    FilmMoments film;
+};
+
+Rendered render_samples(const Options& o, const Scene& scene, const RenderSettings& settings, const Budget& budget,
+                        Renderer& renderer, Preview& preview) {
+    MemoryReserve reserve(bytes_to_save(scene));
+    const volatile bool* const interrupt = save_when_interrupted();
+    Rendered out;
+    out.position = first_position(renderer);
+    out.stats = renderer.stats();
+    if (const SelectionStats& selection = out.stats.selection; !selection.name.empty())
+        log_info(fmt::format("bdpt.auto: {}, after {}. To repeat it: {}", selection.name,
+                             format_duration(selection.seconds), selection_line(selection)));
+    KeptFilm kept(renderer);
+    const bool on_device = out.stats.backend == "cuda";
+    try {
+        Progress progress("render");
+        out.position = drive(renderer, out.position, budget, interrupt, [&](const RenderPosition& p) {
+            out.stats = renderer.stats();
+            show_progress(progress, budget, p, out.stats);
+            if (on_device) kept.look(out.stats);
+            preview.look(renderer);
+        });
+        reserve.release();
+        out.stats = renderer.stats();
+        if (out.position.samples > 0) out.film = renderer.film();
+    } catch (const Error& fault) {
+        if (!on_device || fault.code != ExitCode::device) throw;
+        reserve.release();
+        save_after_fault(o, scene, settings, kept, fault);
+    }
+    return out;
+}
+
+/// What the watches found, for the statistics. Invalid values are no reason to fail.
+nlohmann::json find(const Options& o, const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
+                    const Watched& watched) {
+    if (!watched.samples && watched.invalid->batches().empty()) return nlohmann::json::object();
+    FinishedRender finished = {o.scene, scene, used_settings(settings, stats), *watched.invalid, watched.samples};
+    apply_setting(finished.used, "backend", stats.backend);
+    try {
+        return report_findings(finished, o.outliers, o.json == "-", save_when_interrupted());
+    } catch (const Error& e) {
+        if (watched.samples) throw;
+        log_warning(e.what());
+        return nlohmann::json::object();
+    }
+}
+
 int render(const Options& o) {
     check(o);
     if (o.by_ranges()) return render_by_ranges(o);
     const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
-    RenderSettings settings = o.render.settings(loaded.scene);
+    const Scene& scene = loaded.scene;
+    RenderSettings settings = o.render.settings(scene);
     if (!o.techniques.empty() && settings.technique_depth == 0) settings.technique_depth = kDefaultTechniqueDepth;
-    const Budget budget = render_budget(o.spp, o.time, loaded.scene, "--");
+    const Budget budget = render_budget(o.spp, o.time, scene, "--");
     expect(settings, budget);
-    auto watched = std::make_unique<InvalidWatch>(make_renderer(loaded.scene, settings));
-    InvalidWatch& watch = *watched;
-    std::unique_ptr<Renderer> renderer = std::move(watched);
-    const SampleWatch* samples = nullptr;
-    if (o.outliers > 0) {
-        check_replay(used_settings(settings, renderer->stats()));
-        auto looked_at = std::make_unique<SampleWatch>(std::move(renderer));
-        samples = looked_at.get();
-        renderer = std::move(looked_at);
-    }
-
-    std::optional<TevStream> tev;
-    if (!o.tev.empty()) tev.emplace(o.tev, o.output, loaded.scene.sensor.crop_width, loaded.scene.sensor.crop_height);
-    auto streamed = std::chrono::steady_clock::now();
-
-    for (const std::string& warning : render_warnings(loaded.scene, used_settings(settings, renderer->stats())))
+    const Watched watched = make_watched(o, scene, settings);
+    Preview preview(o, scene.sensor);
+    for (const std::string& warning : render_warnings(scene, used_settings(settings, watched.renderer->stats())))
         log_warning(warning);
 
-    MemoryReserve reserve(bytes_to_save(loaded.scene));
-    const volatile bool* const interrupt = save_when_interrupted();
-    RenderPosition position = first_position(*renderer);
-    if (const SelectionStats choice = renderer->stats().choice; !choice.name.empty())
-        log_info(fmt::format("bdpt.auto: {}, after {}. To repeat it: {}", choice.name, format_duration(choice.seconds),
-                             choice_line(choice)));
-    KeptFilm kept(*renderer);
-    RenderStats stats = renderer->stats();
-    FilmMoments film;
-    const bool on_device = stats.backend == "cuda";
-    try {
-        Progress progress("render");
-        position = drive(*renderer, position, budget, interrupt, [&](const RenderPosition& p) {
-            stats = renderer->stats();
-            show_progress(progress, budget, p, stats);
-            if (on_device) kept.look(stats);
-            if (const auto now = std::chrono::steady_clock::now(); tev && now - streamed > kStreamPeriod) {
-                tev->send(mean_image(renderer->film()));
-                streamed = now;
-            }
-        });
-        reserve.release();
-        stats = renderer->stats();
-        if (position.samples > 0) film = renderer->film();
-    } catch (const Error& fault) {
-        if (!on_device || fault.code != ExitCode::device) throw;
-        reserve.release();
-        save_after_fault(o, loaded.scene, settings, kept, fault);
-    }
-
-    if (position.samples > 0) {
-        if (tev) tev->send(mean_image(film));
-        write_images(o, loaded.scene, settings, stats, film);
-    }
-    if (position.samples > 0 && !o.techniques.empty())
-        write_technique_images(o.techniques, loaded.scene, settings, stats, renderer->strategy_images());
-    if (const std::string text = lost_values(stats); !o.strict && !text.empty()) log_warning(text);
+    const auto [position, stats, film] = render_samples(o, scene, settings, budget, *watched.renderer, preview);
     nlohmann::json found = nlohmann::json::object();
-    if (position.samples > 0 && (samples || !watch.batches().empty())) {
-        FinishedRender finished = {o.scene, loaded.scene, used_settings(settings, stats), watch, samples};
-        apply_setting(finished.used, "backend", stats.backend);
-        try {
-            found = report_findings(finished, o.outliers, o.json == "-", interrupt);
-        } catch (const Error& e) {
-            if (samples) throw;
-            log_warning(e.what());
-        }
+    if (position.samples > 0) {
+        preview.show(film);
+        write_images(o, scene, settings, stats, film);
+        if (!o.techniques.empty())
+            write_technique_images(o.techniques, scene, settings, stats, watched.renderer->strategy_images());
     }
+    if (const std::string text = lost_values(stats); !o.strict && !text.empty()) log_warning(text);
+    if (position.samples > 0) found = find(o, scene, settings, stats, watched);
     return conclude(o, loaded, settings, stats, position, found);
 }
 

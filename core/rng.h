@@ -5,7 +5,7 @@
 
 namespace ambilux {
 
-/// Which walk a number belongs to; light walks of the same index never share numbers with eye walks.
+/// Which subpath a number belongs to; light subpaths of the same index never share numbers with eye subpaths.
 enum class Stream : uint32_t { eye = 0, light = 1, bench = 2, test = 3, pilot = 4 };
 
 /// Names a sequence of random blocks. `index`: pixel or light path; `sample`: sample of that pixel.

@@ -83,7 +83,7 @@ struct WholeBlock {
 struct SameKey {
     uint32_t lanes = 1;  ///< as bits
 
-    AMBILUX_HD bool several() const { return lanes & (lanes - 1); }
+    AMBILUX_HD bool has_several_lanes() const { return lanes & (lanes - 1); }
     AMBILUX_HD bool is_first() const {
 #if defined(__CUDA_ARCH__)
         return (threadIdx.x & 31u) == uint32_t(__ffs(int(lanes)) - 1);

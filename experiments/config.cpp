@@ -247,6 +247,24 @@ Reduction read_reduction(const Reader& r, const toml::table& t, ExperimentConfig
     return reduction;
 }
 
+/// A text that is one of two.
+std::string one_of(const Reader& r, const toml::node& node, const char* key, const char* a, const char* b) {
+    const std::string text = r.text(node, key);
+    if (text != a && text != b) throw r.error(node, fmt::format("{} '{}': must be {} or {}", key, text, a, b));
+    return text;
+}
+
+/// What is said of all runs on all scenes, and has a default.
+void read_general(const Reader& r, const toml::table& root, ExperimentConfig& config) {
+    if (const toml::node* backend = root.get("backend")) config.backend = read_backend(r, *backend);
+    if (const toml::node* metric = root.get("metric")) config.metric = one_of(r, *metric, "metric", "relmse", "mse");
+    if (const toml::node* order = root.get("order"))
+        config.random_order = one_of(r, *order, "order", "random", "listed") == "random";
+    if (const toml::node* repeats = root.get("repeats"))
+        config.repeats = uint64_t(r.integer(*repeats, "repeats", 0, 100));
+    if (const toml::node* spp = root.get("agreement_spp")) config.agreement_spp = read_agreement_spp(r, *spp);
+}
+
 }  // namespace
 
 std::vector<Checkpoint> ExperimentConfig::checkpoints() const {
@@ -270,21 +288,7 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     config.file = path;
     config.name =
         root.contains("name") ? r.name(root, "the configuration") : std::filesystem::path(path).stem().string();
-    if (const toml::node* backend = root.get("backend")) config.backend = read_backend(r, *backend);
-    if (const toml::node* metric = root.get("metric")) {
-        config.metric = r.text(*metric, "metric");
-        if (config.metric != "relmse" && config.metric != "mse")
-            throw r.error(*metric, fmt::format("metric '{}': must be relmse or mse", config.metric));
-    }
-    if (const toml::node* order = root.get("order")) {
-        const std::string text = r.text(*order, "order");
-        if (text != "random" && text != "listed")
-            throw r.error(*order, fmt::format("order '{}': must be random or listed", text));
-        config.random_order = text == "random";
-    }
-    if (const toml::node* repeats = root.get("repeats"))
-        config.repeats = uint64_t(r.integer(*repeats, "repeats", 0, 100));
-    if (const toml::node* spp = root.get("agreement_spp")) config.agreement_spp = read_agreement_spp(r, *spp);
+    read_general(r, root, config);
     read_seeds(r, need("seeds"), config);
     const toml::table& reference = r.table(need("reference"), "reference");
     r.check_keys(reference, "[reference]", {"spp", "seed", "integrator", "variant", "set"});
@@ -306,13 +310,6 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
     } else if (reduced) {
         throw input_error(path, 0, "--reduced: it has no section [reduced] that says what is smaller");
     }
-    bool box_filter = false;
-    if (const toml::node* filter = root.get("filter")) {
-        const std::string text = r.text(*filter, "filter");
-        if (text != "scene" && text != "box")
-            throw r.error(*filter, fmt::format("filter '{}': must be scene or box", text));
-        box_filter = text == "box";
-    }
     Names scene_names, run_names;
     for (const toml::node& node : r.array(need("scene"), "scene")) {
         if (is_left_out(r, r.table(node, "scene"))) continue;
@@ -320,7 +317,10 @@ ExperimentConfig read_experiment(const std::string& path, bool reduced) {
             config.scenes.push_back(std::move(scene));
     }
     if (config.scenes.empty()) throw input_error(path, 0, "none of its scenes is there; all of them are optional");
-    for (SceneEntry& scene : config.scenes) scene.box_filter = box_filter;
+    if (const toml::node* filter = root.get("filter")) {
+        const bool box = one_of(r, *filter, "filter", "scene", "box") == "box";
+        for (SceneEntry& scene : config.scenes) scene.box_filter = box;
+    }
     for (const toml::node& node : r.array(need("run"), "run"))
         for (RunEntry& run : read_run(r, r.table(node, "run"), run_names)) config.runs.push_back(std::move(run));
     if (const toml::node* ablation = root.get("ablation"))

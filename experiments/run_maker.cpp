@@ -9,9 +9,9 @@ namespace ambilux {
 std::unique_ptr<Renderer> OwnRuns::make(const RenderOf& render, const RenderStats& earlier) {
     RenderSettings made = render.settings;
     // What the first part chose, even if this machine is another or busier.
-    if (made.automatic && !earlier.choice.name.empty()) {
+    if (made.automatic && !earlier.selection.name.empty()) {
         made.automatic = false;
-        for (const auto& [key, value] : earlier.choice.settings) hooks_.apply_setting(made, key, value);
+        for (const auto& [key, value] : earlier.selection.settings) hooks_.apply_setting(made, key, value);
     }
     for (const Checkpoint& c : config_.checkpoints()) {
         made.expected_samples = std::max(made.expected_samples, c.samples);

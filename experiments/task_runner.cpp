@@ -139,7 +139,7 @@ bool TaskRunner::pass_checkpoints(RenderTask& task, Renderer& renderer) {
     RenderState& state = task.state;
     RenderPosition position{state.moments.samples, state.notes["seconds"].get<double>(), false};
     // Choosing is part of the method: its time counts.
-    position.seconds += renderer.stats().choice.seconds;
+    position.seconds += renderer.stats().selection.seconds;
     p_.work.begin(task.work, work_after(config_, task.scene, position));
     RenderStats counted = renderer.stats();
     while (!task.pending.empty()) {

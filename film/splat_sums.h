@@ -12,7 +12,7 @@ namespace ambilux {
 /// true for the lane that is left with the sum.
 AMBILUX_HD bool gather_light([[maybe_unused]] SameKey same, [[maybe_unused]] Rgb& light) {
 #if defined(__CUDA_ARCH__)
-    if (!same.several()) return true;
+    if (!same.has_several_lanes()) return true;
     // Whole numbers below 2^42, in units that follow the largest value. Bits of positive floats are in their order.
     const uint32_t exponent = __reduce_max_sync(same.lanes, float_bits(max_component(light))) >> 23;
     const double scale = __hiloint2double(int(1023 + 41 + 126 - exponent) << 20, 0);

@@ -125,7 +125,7 @@ constexpr bool is_on_surface(EmitterType type) {
 AMBILUX_HD constexpr bool is_infinite(EmitterType type) {
     return EmitterModels::contains<detail::kInfiniteEmitters>(uint32_t(type));
 }
-/// It surrounds the scene: what rays see that meet nothing. A scene has one at most.
+/// It surrounds the scene: what rays that miss see. A scene has one at most.
 constexpr bool is_environment(EmitterType type) {
     return EmitterModels::contains<detail::kEnvironmentEmitters>(uint32_t(type));
 }

@@ -11,8 +11,8 @@ namespace ambilux {
 /// A renderer that also tells how it was chosen. `ready`: samples that are in its film.
 class Chosen final : public Renderer {
 public:
-    Chosen(std::unique_ptr<Renderer> renderer, uint32_t ready, SelectionStats choice)
-        : renderer_(std::move(renderer)), ready_(ready), choice_(std::move(choice)) {}
+    Chosen(std::unique_ptr<Renderer> renderer, uint32_t ready, SelectionStats selection)
+        : renderer_(std::move(renderer)), ready_(ready), selection_(std::move(selection)) {}
 
     uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
         if (first != 0 || count < ready_) drop();
@@ -33,7 +33,7 @@ public:
     uint32_t ready() const override { return ready_; }
     RenderStats stats() override {
         RenderStats s = renderer_->stats();
-        s.choice = choice_;
+        s.selection = selection_;
         return s;
     }
     std::vector<StrategyImage> strategy_images() override { return renderer_->strategy_images(); }
@@ -46,7 +46,7 @@ private:
 
     std::unique_ptr<Renderer> renderer_;
     uint32_t ready_;
-    SelectionStats choice_;
+    SelectionStats selection_;
 };
 
 }  // namespace ambilux

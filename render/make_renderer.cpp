@@ -14,11 +14,11 @@ namespace {
 /// What settings that are left open stand for (docs/performance.md).
 RenderSettings settled(const RenderSettings& settings, const Variant& variant, bool cuda, const Scene& scene) {
     RenderSettings s = settings;
-    const bool several = scene.features.several_bsdfs();
+    const bool several_bsdfs = scene.features.several_bsdfs();
     if (s.queues.ordering == Ordering::automatic)
-        s.queues.ordering = cuda && variant.traits.sorts && several ? Ordering::material : Ordering::none;
+        s.queues.ordering = cuda && variant.traits.sorts && several_bsdfs ? Ordering::material : Ordering::none;
     s.queues.keyed_hits =
-        s.queues.ordering == Ordering::material && s.queues.compaction == Compaction::atomic && several;
+        s.queues.ordering == Ordering::material && s.queues.compaction == Compaction::atomic && several_bsdfs;
     if (s.draws == CacheDraws::automatic && variant.traits.draws_together)
         s.draws = cuda ? CacheDraws::coherent : CacheDraws::independent;
     return s;

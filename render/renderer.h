@@ -45,12 +45,12 @@ struct SelectionStats {
         double variance;       ///< of one sample of a pixel, relative to its squared mean; infinite if it is excluded
         double work;           ///< of one sample, in rays
         double seconds;        ///< of one sample of all pixels; 0 where it was not measured
-        double efficiency;     ///< 1 / (variance · cost) over that of the choice
+        double efficiency;     ///< 1 / (variance · cost) over that of the selection
         std::string excluded;  ///< why it cannot be selected (render/selection.cpp); empty if it can
     };
-    std::string name;                                           ///< of the choice; empty if there was none
+    std::string name;                                           ///< of the selection; empty if there was none
     std::vector<std::pair<std::string, std::string>> settings;  ///< with them the same estimator runs again
-    double seconds = 0;                                         ///< that the choice took
+    double seconds = 0;                                         ///< that the selection took
     uint32_t pilot_samples = 0;
     double expected_samples = 0;  ///< of every pixel: what was optimised for (integrators/auto/pilot.h)
     std::vector<Candidate> candidates;
@@ -72,7 +72,7 @@ struct RenderStats {
     uint64_t memory_bytes_predicted = 0;  ///< computed before the allocation
     uint64_t memory_bytes_peak = 0;       ///< the most at any time
     std::vector<std::string> features;    ///< what the kernels contain
-    SelectionStats choice;
+    SelectionStats selection;
     std::vector<std::string> skipped;  ///< stages and kernel parts that this scene does not need
 };
 

@@ -20,7 +20,7 @@
 namespace ambilux {
 namespace {
 
-/// Pilots: a few hundredths of the shortest renders that are worth a choice, on 2 cores and on the 16 beside a GPU.
+/// Pilots: a few hundredths of the shortest renders that are worth a selection, on 2 cores and on the 16 beside a GPU.
 /// With half of the latter, one seed in ten (water-caustic) or two (veach-ajar) put a candidate first that is 1.1
 /// to 1.5 times worse.
 constexpr uint32_t kPilotSamplesCpu = 8192, kPilotSamplesCuda = 32768;
@@ -145,7 +145,7 @@ private:
 std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda) {
     const VariantTraits& asked = variant_of(settings).traits;
     const std::string& variant = settings.variant;
-    const bool paired = is_paired(settings);  // else the choice is restricted to the variant that was asked for
+    const bool paired = is_paired(settings);  // else the selection is restricted to the variant that was asked for
     std::vector<SelectionCandidate> all = {
         {"path", {0.0f, false, 0}, {{"integrator", "path"}, {"variant", "wavefront"}, {"estimator", "mis"}}}};
     const auto add = [&](std::string name, const PilotCandidate& pilot, const std::string& of,
@@ -155,7 +155,7 @@ std::vector<SelectionCandidate> selection_candidates(const RenderSettings& setti
         if (const uint32_t draws = all.back().draws())
             all.back().settings.emplace_back("connections", std::to_string(draws));
         if (pilot.light_subpaths != 1.0f) {
-            all.back().name += fmt::format(", {} light paths per pixel", pilot.light_subpaths);
+            all.back().name += fmt::format(", {} light subpaths per pixel", pilot.light_subpaths);
             all.back().settings.emplace_back("light_paths", fmt::format("{}", pilot.light_subpaths));
         }
     };
@@ -216,7 +216,7 @@ std::vector<double> selection_variances(const Pilot& pilot) {
 
 namespace {
 
-/// One choice: a pilot predicts, what it cannot tell apart is timed, and the best that finds memory is made.
+/// One selection: a pilot predicts, what it cannot tell apart is timed, and the best that finds memory is made.
 class Selection {
 public:
     Selection(const Scene& scene, const RenderSettings& settings, bool cuda, const MakeRenderer& make)
@@ -322,7 +322,7 @@ private:
     std::unique_ptr<Renderer> take_head_start() {
         if (!head_start_ || ranked_[0] != 0) return nullptr;
         std::unique_ptr<Renderer> renderer = head_start_->take();
-        // Building it is no cost of the choice either: any render does.
+        // Building it is no cost of the selection either: any render does.
         if (renderer) choosing_ = std::max(0.0, choosing_ - head_start_->build_seconds());
         return renderer;
     }
@@ -342,17 +342,17 @@ private:
     }
 
     SelectionStats describe(const Pilot& pilot, size_t chosen) const {
-        SelectionStats choice;
-        choice.name = candidates_[chosen].name;
-        choice.settings = candidates_[chosen].settings;
-        choice.seconds = choosing_;
-        choice.pilot_samples = pilot.samples;
-        choice.expected_samples = pilot.expected_samples;
+        SelectionStats selection;
+        selection.name = candidates_[chosen].name;
+        selection.settings = candidates_[chosen].settings;
+        selection.seconds = choosing_;
+        selection.pilot_samples = pilot.samples;
+        selection.expected_samples = pilot.expected_samples;
         for (size_t c = 0; c < candidates_.size(); ++c)
-            choice.candidates.push_back({candidates_[c].name, joined(candidates_[c].settings), variance_[c], work_[c],
-                                         seconds_[c], std::isfinite(variance_[c]) ? score(chosen) / score(c) : 0.0,
-                                         excluded_[c]});
-        return choice;
+            selection.candidates.push_back(
+                {candidates_[c].name, joined(candidates_[c].settings), variance_[c], work_[c], seconds_[c],
+                 std::isfinite(variance_[c]) ? score(chosen) / score(c) : 0.0, excluded_[c]});
+        return selection;
     }
 
     const Scene& scene_;
@@ -375,7 +375,7 @@ private:
 
 std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda,
                                          SharedAccels& accels, const MakeRenderer& make) {
-    // Any render builds this, and wakes the device: it is no cost of the choice.
+    // Any render builds this, and wakes the device: it is no cost of the selection.
     if (cuda) cuda_device_present();
     const bool cwbvh = cuda || settings.accel == AccelKind::cwbvh;
     if (cwbvh)

@@ -30,7 +30,7 @@ std::vector<double> selection_variances(const Pilot& pilot);
 /// Makes a renderer of given settings, which are not automatic.
 using MakeRenderer = std::function<std::unique_ptr<Renderer>(const RenderSettings&)>;
 
-/// Runs the pilot, times what it cannot tell apart, and makes the renderer of the choice.
+/// Runs the pilot, times what it cannot tell apart, and makes the renderer of the selection.
 std::unique_ptr<Renderer> make_automatic(const Scene& scene, const RenderSettings& settings, bool cuda,
                                          SharedAccels& accels, const MakeRenderer& make);
 

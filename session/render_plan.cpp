@@ -33,7 +33,8 @@ void expect(RenderSettings& settings, const Budget& budget) {
 
 RenderPosition first_position(Renderer& renderer) {
     RenderPosition position;
-    if (const SelectionStats choice = renderer.stats().choice; !choice.name.empty()) position.seconds = choice.seconds;
+    if (const SelectionStats selection = renderer.stats().selection; !selection.name.empty())
+        position.seconds = selection.seconds;
     return position;
 }
 

@@ -21,10 +21,10 @@ nlohmann::json to_json(const SettingValue& value) {
 }
 
 /// Null where nothing was chosen.
-nlohmann::json choice_json(const SelectionStats& choice) {
-    if (choice.name.empty()) return nullptr;
+nlohmann::json selection_json(const SelectionStats& selection) {
+    if (selection.name.empty()) return nullptr;
     nlohmann::json candidates = nlohmann::json::array(), settings = nlohmann::json::object();
-    for (const SelectionStats::Candidate& c : choice.candidates)
+    for (const SelectionStats::Candidate& c : selection.candidates)
         candidates.push_back(
             {{"name", c.name},
              {"settings", c.settings},
@@ -33,20 +33,20 @@ nlohmann::json choice_json(const SelectionStats& choice) {
              {"seconds_per_sample", c.seconds > 0 ? nlohmann::json(c.seconds) : nlohmann::json(nullptr)},
              {"efficiency", c.efficiency},
              {"excluded", c.excluded.empty() ? nlohmann::json(nullptr) : nlohmann::json(c.excluded)}});
-    for (const auto& [key, value] : choice.settings) settings[key] = value;
-    return {{"name", choice.name},
+    for (const auto& [key, value] : selection.settings) settings[key] = value;
+    return {{"name", selection.name},
             {"settings", settings},
-            {"seconds", choice.seconds},
-            {"pilot_samples", choice.pilot_samples},
-            {"expected_samples", choice.expected_samples},
+            {"seconds", selection.seconds},
+            {"pilot_samples", selection.pilot_samples},
+            {"expected_samples", selection.expected_samples},
             {"candidates", candidates}};
 }
 
 }  // namespace
 
-std::string choice_line(const SelectionStats& choice) {
+std::string selection_line(const SelectionStats& selection) {
     std::string line;
-    for (const auto& [key, value] : choice.settings) line += " --set " + key + "=" + value;
+    for (const auto& [key, value] : selection.settings) line += " --set " + key + "=" + value;
     return line.empty() ? line : line.substr(1);
 }
 
@@ -54,8 +54,8 @@ std::string scene_hash(const Scene& scene) { return to_hex(scene.content_hash); 
 
 RenderSettings used_settings(const RenderSettings& asked, const RenderStats& stats) {
     RenderSettings used = asked;
-    if (!stats.choice.name.empty()) used.automatic = false;
-    for (const auto& [key, value] : stats.choice.settings) apply_setting(used, key, value);
+    if (!stats.selection.name.empty()) used.automatic = false;
+    for (const auto& [key, value] : stats.selection.settings) apply_setting(used, key, value);
     // What was left open is what the renderer made of it.
     for (const Setting& s : general_settings())
         if (s.text(used) == "auto") s.what.set(used, s.text(stats.settings));
@@ -132,7 +132,7 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const
          {"memory_bytes_peak", stats.memory_bytes_peak},
          {"features", stats.features},
          {"skipped", stats.skipped},
-         {"choice", choice_json(stats.choice)},
+         {"selection", selection_json(stats.selection)},
          {"version", version()},
          {"git_revision", git_revision()}});
     return json;
@@ -166,7 +166,7 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& asked, con
     for (const Setting& s : general_settings()) add(s);
     if (variant)
         for (const Setting& s : variant->own) add(s);
-    if (!stats.choice.name.empty()) attributes["choice"] = choice_line(stats.choice);
+    if (!stats.selection.name.empty()) attributes["selection"] = selection_line(stats.selection);
     return attributes;
 }
 

@@ -31,8 +31,8 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& settings, co
 /// What every image file says about its making.
 Attributes image_attributes(const Scene& scene, const RenderSettings& settings, const RenderStats& stats);
 
-/// The settings with which the choice of bdpt.auto runs again, as options; empty if nothing was chosen.
-std::string choice_line(const SelectionStats& choice);
+/// The settings with which the selection of bdpt.auto runs again, as options; empty if nothing was chosen.
+std::string selection_line(const SelectionStats& selection);
 
 /// The stages as a table for a person: share of time, items, launches, time per item.
 std::string stage_table(const RenderStats& stats);

@@ -49,7 +49,7 @@ nlohmann::json save(const SelectionStats& c) {
     return {c.name, c.settings, c.seconds, c.pilot_samples, c.expected_samples, candidates};
 }
 
-SelectionStats restore_choice(const nlohmann::json& j) {
+SelectionStats restore_selection(const nlohmann::json& j) {
     SelectionStats c;
     c.name = j.at(0);
     c.settings = j.at(1).get<std::vector<std::pair<std::string, std::string>>>();
@@ -68,7 +68,7 @@ SelectionStats restore_choice(const nlohmann::json& j) {
 void add_part(RenderStats& total, const RenderStats& before, const RenderStats& now) {
     RenderStats sum = now;
     // A resumed render goes on with what its first part chose.
-    if (sum.choice.name.empty()) sum.choice = total.choice;
+    if (sum.selection.name.empty()) sum.selection = total.selection;
     sum.stages = total.stages;
     sum.queues = total.queues;
     sum.invalid = total.invalid;
@@ -127,7 +127,7 @@ nlohmann::json save_stats(const RenderStats& s) {
             {"memory", {s.memory_bytes, s.memory_bytes_predicted, s.memory_bytes_peak}},
             {"features", s.features},
             {"skipped", s.skipped},
-            {"choice", save(s.choice)}};
+            {"selection", save(s.selection)}};
 }
 
 RenderStats restore_stats(const nlohmann::json& j) {
@@ -154,7 +154,7 @@ RenderStats restore_stats(const nlohmann::json& j) {
     s.memory_bytes_peak = j.at("memory").at(2);
     s.features = j.at("features").get<std::vector<std::string>>();
     s.skipped = j.at("skipped").get<std::vector<std::string>>();
-    s.choice = restore_choice(j.at("choice"));
+    s.selection = restore_selection(j.at("selection"));
     return s;
 }
 

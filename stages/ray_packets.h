@@ -28,12 +28,12 @@ public:
     explicit RayPackets(const Stage& stage, bool coherent = false) : stage_(stage), coherent_(coherent) {}
 
     void add(uint32_t i) {
-        bool some;
+        bool valid;
         if constexpr (Stage::kAnyHit)
-            some = stage_.fetch(i, rays_[count_], kept_[count_]);
+            valid = stage_.fetch(i, rays_[count_], kept_[count_]);
         else
-            some = stage_.fetch(i, rays_[count_]);
-        if (!some) return;
+            valid = stage_.fetch(i, rays_[count_]);
+        if (!valid) return;
         places_[count_++] = i;
         if (count_ == kMostPacketRays) trace();
     }

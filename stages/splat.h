@@ -41,7 +41,7 @@ private:
         const uint64_t first = uint64_t(wave.sample_of(item.path)) * wave.height * wave.width;
         // Looked for once, since it costs as much as the rest: splats of a warp that share a pixel most often share
         // all.
-        const bool alone = !same_key(uint32_t(first) + uint32_t(y0) * wave.width + uint32_t(x0)).several();
+        const bool alone = !same_key(uint32_t(first) + uint32_t(y0) * wave.width + uint32_t(x0)).has_several_lanes();
         with_filter(scene, [&](auto filter) {
             for (int32_t py = y0; py <= y1; ++py) {
                 const float row = filter(y - (float(py) + 0.5f));

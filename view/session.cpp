@@ -200,7 +200,7 @@ nlohmann::json Session::facts(const FilmMoments& film, const Wish& wish) {
     const RenderStats stats = renderer_->stats();
     out["seconds"] = stats.render_seconds;
     out["device"] = stats.device;
-    out["method"] = stats.choice.name.empty() ? shown_.integrator + " " + shown_.variant : stats.choice.name;
+    out["method"] = stats.selection.name.empty() ? shown_.integrator + " " + shown_.variant : stats.selection.name;
     const double rays = double(stats.rays_extend) + double(stats.rays_occlude);
     out["rays_per_second"] = stats.render_seconds > 0 ? rays / stats.render_seconds : 0;
     out["invalid"] = stats.invalid.total();

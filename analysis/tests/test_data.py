@@ -18,7 +18,7 @@ def folder(tmp_path_factory):
     stats = json.loads(path.read_text())
     stats["stages"][0]["items_by_depth"] = [5, 3]
     stats["queues"] = [{"name": "rays", "capacity": 8, "peak": 6, "overflow": 0}]
-    stats["choice"] = {"name": "b", "candidates": [{"name": "a", "variance": 2.0, "efficiency": 0.5}, {"name": "b", "variance": 1.0, "efficiency": 1.0}]}
+    stats["selection"] = {"name": "b", "candidates": [{"name": "a", "variance": 2.0, "efficiency": 0.5}, {"name": "b", "variance": 1.0, "efficiency": 1.0}]}
     path.write_text(json.dumps(stats))
     return folder
 
@@ -34,8 +34,8 @@ def test_frames_hold_what_the_files_hold(folder):
     assert table.ratio_seeds_doubt["mis"] == "3 seeds"
     assert len(frames.stages(folder)) == 2 * 3 * len(synthetic.STAGES)
     assert list(frames.depths(folder)["items"]) == [5, 3] and list(frames.queues(folder).peak) == [6]
-    choices = frames.choices(folder)
-    assert list(choices.candidate) == ["a", "b"] and list(choices.chosen) == [False, True]
+    selections = frames.selections(folder)
+    assert list(selections.candidate) == ["a", "b"] and list(selections.chosen) == [False, True]
     assert set(frames.strategies(folder).columns) >= {"s", "t", "variance", "share"} and len(frames.strategies(folder)) == 8
 
 
@@ -80,7 +80,7 @@ def test_selecting_a_method_counts_as_time_of_its_run(tmp_path):
     before = {line.run: line.efficiency_batches.value for line in summary.lines(experiment.load(folder))}
     for seed in (1, 2, 3):
         path = folder / "stats" / "box" / f"auto_{seed}.json"
-        path.write_text(json.dumps(json.loads(path.read_text()) | {"choice": {"name": "b", "seconds": 0.128, "candidates": []}}))
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"selection": {"name": "b", "seconds": 0.128, "candidates": []}}))
     after = {line.run: line.efficiency_batches.value for line in summary.lines(experiment.load(folder))}
     assert after["nee"] == before["nee"]
     assert after["auto"] == pytest.approx(before["auto"] / 2)  # 0.128 s beside 64 samples of 2 ms

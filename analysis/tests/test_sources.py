@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from analysis.tests.function_lengths import functions
+
 ROOT = Path(__file__).parents[2]
 
 # A folder includes those above it, and none below or beside it (docs/architecture.md, "Who may include whom").
@@ -15,14 +17,18 @@ ORDER = [
     ["core"], ["models"], ["scene"], ["transport"], ["accel"], ["formats"], ["items", "queues", "film"], ["stages"],
     ["integrators"], ["backends"], ["render"], ["session"], ["experiments"], ["stress"], ["view"], ["cli"], ["python"],
 ]
+# The same of the folders of formats/: what reads a format does not know the others.
+FORMATS = [["images"], ["meshes"], ["document"], ["mitsuba", "pbrt", "gltf", "convert"]]
 RANK = {folder: rank for rank, folders in enumerate(ORDER) for folder in folders}
 # (file, included file): why it is right all the same. docs/architecture.md lists them too.
 EXCEPTIONS: dict[tuple[str, str], str] = {}
 
 MAX_COLUMNS = 120
 MAX_LINES = 400
-# Longer ones that are yet to be split.
+MAX_FUNCTION_LINES = 60
+# Longer files, and functions as "file: name", that are yet to be split.
 LONG_FILES: set[str] = set()
+LONG_FUNCTIONS: set[str] = set()
 SUFFIXES = (".h", ".cpp", ".cu", ".cuh", ".cpp.in", ".cu.in", ".h.in")
 # Templates of cmake/ become files of these folders.
 GENERATED_IN = {"cmake/registry.cpp.in": "integrators"}
@@ -59,12 +65,26 @@ def wrong_arrows(path, text):
     return wrong
 
 
+def wrong_arrows_of_formats(path, text):
+    if not path.startswith("formats/") or path.count("/") < 2:
+        return []
+    rank = {folder: rank for rank, folders in enumerate(FORMATS) for folder in folders}
+    own = path.split("/")[1]
+    others = [included.split("/")[1] for included in includes(text) if included.startswith("formats/") and included.count("/") > 1]
+    return [f"{path} includes formats/{other}/" for other in others if other != own and rank[other] >= rank[own]]
+
+
 def too_long(path, text):
     lines = text.splitlines()
     wrong = [f"{path}:{i} has {len(line)} columns" for i, line in enumerate(lines, 1) if len(line) > MAX_COLUMNS]
     if len(lines) > MAX_LINES and path not in LONG_FILES:
         wrong.append(f"{path} has {len(lines)} lines")
     return wrong
+
+
+def long_functions(path, text):
+    """"file: name" of functions with too many lines."""
+    return [f"{path}: {name}" for _, name, lines in functions(text) if lines > MAX_FUNCTION_LINES]
 
 
 def all_wrong(check):
@@ -75,6 +95,11 @@ def all_wrong(check):
 
 def test_a_folder_includes_only_those_above_it():
     wrong = all_wrong(wrong_arrows)
+    assert not wrong, "\n".join(["", *wrong])
+
+
+def test_formats_know_their_tree_and_not_each_other():
+    wrong = all_wrong(wrong_arrows_of_formats)
     assert not wrong, "\n".join(["", *wrong])
 
 
@@ -89,6 +114,33 @@ def test_exceptions_are_still_needed():
 def test_no_line_and_no_file_is_too_long():
     wrong = all_wrong(too_long)
     assert not wrong, "\n".join(["", *wrong])
+
+
+def python_functions():
+    """(file, name, lines) of what is no test."""
+    for folder in ("analysis", "python", "scripts"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            if "tests" not in path.parts:
+                for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                    if isinstance(node, ast.FunctionDef):
+                        yield path.relative_to(ROOT).as_posix(), node.name, node.end_lineno - node.lineno + 1
+
+
+def test_no_function_is_too_long():
+    assert set(all_wrong(long_functions)) == LONG_FUNCTIONS
+    assert not [f"{path}: {name}" for path, name, lines in python_functions() if lines > MAX_FUNCTION_LINES]
+
+
+@pytest.mark.parametrize(("text", "found"), [
+    ("int f() { return 1; }", [(1, "f", 1)]),
+    ("struct S {\n    S() : a_{1}, b_(2) {\n        g();\n    }\n    int a_{0}, b_;\n};\nint h(S s = {}) {\n}", [(2, "S", 3), (7, "h", 2)]),
+    ("namespace n {\ntemplate <class T>\n    requires(T::k > 0)\nvoid S<T>::operator()(int i) const {\n    if (i) {\n    }\n    auto l = [] {\n    };\n}\n}",
+     [(2, "S<T>::operator()", 8)]),
+    ('const char* a[] = {\n"}", R"x({{)x"};\n// {\nconstexpr int b = 1\'000, c = \'{\';\n#define M {\nint f() {\n}', [(6, "f", 2)]),
+    ("struct A {\n    enum class E { a };\n    int x = 0;\n    bool operator==(const A&) const = default;\n    A operator+(A a) const { return a; }\n};", [(5, "operator+", 1)]),
+])
+def test_functions_are_found_by_their_braces(text, found):
+    assert list(functions(text)) == found
 
 
 def test_every_folder_of_sources_has_its_place_in_the_order():

@@ -148,14 +148,14 @@ struct WarpItems {
     uint32_t begin = 0, end = 0;
 
     /// The next item of each of the lanes `idle`, which may lie past the last of all, from `*counter` on if none are
-    /// left: then `stretch` of them, at least 32. The whole warp calls it.
-    __device__ uint32_t claim(uint32_t idle, uint32_t* counter, uint32_t stretch) {
+    /// left: then `batch` of them, at least 32. The whole warp calls it.
+    __device__ uint32_t claim(uint32_t idle, uint32_t* counter, uint32_t batch) {
         const uint32_t wanted = uint32_t(__popc(idle)), kept = end - begin, rank = lane_rank(idle);
         uint32_t fresh = begin;
         if (wanted > kept) {
-            if ((threadIdx.x & 31u) == 0) fresh = atomicAdd(counter, stretch);
+            if ((threadIdx.x & 31u) == 0) fresh = atomicAdd(counter, batch);
             fresh = __shfl_sync(0xffffffffu, fresh, 0);
-            end = fresh + stretch;
+            end = fresh + batch;
             fresh -= kept;
         }
         const uint32_t next = (rank < kept ? begin : fresh) + rank;
@@ -219,9 +219,9 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
     // Of many rays a warp takes more at a time, since all warps add to the counter, one after the other. What is
     // visible or not is known so fast that waiting for it shows earlier.
     const uint32_t ray_count = *count, per_thread = ray_count / (gridDim.x * blockDim.x),
-                   stretch = per_thread >= 32             ? 128
-                             : AnyHit && per_thread >= 16 ? 64
-                                                          : 32;
+                   batch = per_thread >= 32             ? 128
+                           : AnyHit && per_thread >= 16 ? 64
+                                                        : 32;
     Walk<F, Tracer, AnyHit> walk;
     typename Walk<F, Tracer, AnyHit>::Entry stack[Walk<F, Tracer, AnyHit>::kEntries];
     Ray ray = {};
@@ -242,7 +242,7 @@ __device__ void trace_persistent(const SceneView& scene, const Tracer& tracer, F
                 index = kNone;
             }
             if (drained) return;
-            const uint32_t next = rays.claim(idle, next_ray, stretch);
+            const uint32_t next = rays.claim(idle, next_ray, batch);
             drained = rays.begin >= ray_count;
             if (done && next < ray_count && fetch(next, ray)) {
                 if (is_traceable(ray)) {

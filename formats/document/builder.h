@@ -121,6 +121,8 @@ private:
 enum class TextureUse { color, number };
 /// Texture object as index into Scene::textures (0 when only validating).
 int32_t load_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
+/// The texture that stands for an attribute of the mesh (Builder::attribute_textures).
+int32_t attribute_texture(const Builder& builder, Reader& in);
 /// A texture inside of textures of type `scale`, and their factors.
 struct ScaledTexture {
     int32_t texture;

@@ -125,4 +125,14 @@ Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh&
     return out;
 }
 
+int32_t attribute_texture(const Builder& builder, Reader& in) {
+    const std::string name = in.object().type == "vertexcolors" ? "vertex_color" : in.text("name", "");
+    if (in.number("scale", 1) != 1) in.fail(in.where("scale"), "a scale of mesh_attribute is not supported");
+    in.finish();
+    if (builder.validate_only) return 0;
+    const auto* known = builder.attribute_textures;
+    if (!known || !known->count(name)) in.fail("the shape has no attribute '" + name + "'");
+    return known->at(name);
+}
+
 }  // namespace ambilux::document

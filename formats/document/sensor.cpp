@@ -102,6 +102,40 @@ uint32_t size_parameter(Reader& in, const char* name, int64_t fallback, int64_t 
     return uint32_t(n);
 }
 
+/// Size of the film, and the part of it that is rendered.
+void read_film_size(const Builder& builder, Reader& in, Sensor& sensor) {
+    sensor.film_width = size_parameter(in, "width", 768, 1);
+    sensor.film_height = size_parameter(in, "height", 576, 1);
+    sensor.crop_x = size_parameter(in, "crop_offset_x", 0, 0);
+    sensor.crop_y = size_parameter(in, "crop_offset_y", 0, 0);
+    sensor.crop_width = size_parameter(in, "crop_width", int64_t(sensor.film_width) - sensor.crop_x, 1);
+    sensor.crop_height = size_parameter(in, "crop_height", int64_t(sensor.film_height) - sensor.crop_y, 1);
+    if (sensor.crop_x + sensor.crop_width > sensor.film_width ||
+        sensor.crop_y + sensor.crop_height > sensor.film_height)
+        in.fail(in.where("crop_width"), "the crop window is not inside of the film");
+    const uint64_t pixels = uint64_t(sensor.crop_width) * sensor.crop_height, most = builder.options.limits.pixels;
+    if (!builder.options.width && pixels > std::min(most, kMostPixels))
+        in.fail(in.where("width"),
+                fmt::format("a film of {}x{} has more pixels than {}", sensor.crop_width, sensor.crop_height,
+                            pixels > most ? fmt::format("--limits pixels={}; --size gives it another size", most)
+                                          : "can be numbered"));
+}
+
+/// Gives the film another size; the crop window is scaled with it.
+void resize_film(uint32_t width, uint32_t height, Sensor& sensor) {
+    const auto rescale = [](uint32_t& offset, uint32_t& size, uint32_t from, uint32_t to) {
+        const double s = double(to) / from;
+        const uint32_t begin = std::min(uint32_t(std::lround(offset * s)), to - 1),
+                       end = std::min(uint32_t(std::lround((double(offset) + size) * s)), to);
+        offset = begin;
+        size = std::max(end, begin + 1) - begin;
+    };
+    rescale(sensor.crop_x, sensor.crop_width, sensor.film_width, width);
+    rescale(sensor.crop_y, sensor.crop_height, sensor.film_height, height);
+    sensor.film_width = width;
+    sensor.film_height = height;
+}
+
 void read_film(Builder& builder, const Object* object, Sensor& sensor) {
     static const Object default_film = [] {
         Object film;
@@ -118,21 +152,7 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
     if (type == "specfilm") builder.refuse(in.where(), "film type 'specfilm' is not supported", "hdrfilm is used");
     if (known && type != "hdrfilm")
         builder.note(in.where(), "a film of type '" + type + "' gets linear values, as hdrfilm does");
-    sensor.film_width = size_parameter(in, "width", 768, 1);
-    sensor.film_height = size_parameter(in, "height", 576, 1);
-    sensor.crop_x = size_parameter(in, "crop_offset_x", 0, 0);
-    sensor.crop_y = size_parameter(in, "crop_offset_y", 0, 0);
-    sensor.crop_width = size_parameter(in, "crop_width", int64_t(sensor.film_width) - sensor.crop_x, 1);
-    sensor.crop_height = size_parameter(in, "crop_height", int64_t(sensor.film_height) - sensor.crop_y, 1);
-    if (sensor.crop_x + sensor.crop_width > sensor.film_width ||
-        sensor.crop_y + sensor.crop_height > sensor.film_height)
-        in.fail(in.where("crop_width"), "the crop window is not inside of the film");
-    const uint64_t pixels = uint64_t(sensor.crop_width) * sensor.crop_height, most = builder.options.limits.pixels;
-    if (!builder.options.width && pixels > std::min(most, kMostPixels))
-        in.fail(in.where("width"),
-                fmt::format("a film of {}x{} has more pixels than {}", sensor.crop_width, sensor.crop_height,
-                            pixels > most ? fmt::format("--limits pixels={}; --size gives it another size", most)
-                                          : "can be numbered"));
+    read_film_size(builder, in, sensor);
     read_filter(builder, in, sensor);
     // How files are written and shown; our images are linear and complete.
     in.ignore({"gamma",
@@ -158,20 +178,7 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
                "mode",
                "filename"});
     if (known) in.finish();
-
-    const uint32_t w = builder.options.width ? builder.options.width : sensor.film_width;
-    const uint32_t h = builder.options.height ? builder.options.height : sensor.film_height;
-    const auto rescale = [](uint32_t& offset, uint32_t& size, uint32_t from, uint32_t to) {
-        const double s = double(to) / from;
-        const uint32_t begin = std::min(uint32_t(std::lround(offset * s)), to - 1),
-                       end = std::min(uint32_t(std::lround((double(offset) + size) * s)), to);
-        offset = begin;
-        size = std::max(end, begin + 1) - begin;
-    };
-    rescale(sensor.crop_x, sensor.crop_width, sensor.film_width, w);
-    rescale(sensor.crop_y, sensor.crop_height, sensor.film_height, h);
-    sensor.film_width = w;
-    sensor.film_height = h;
+    if (builder.options.width) resize_film(builder.options.width, builder.options.height, sensor);
 }
 
 void read_sampler(Builder& builder, const Object* object) {

@@ -167,4 +167,40 @@ Quadric make_quadric(Builder& builder, const Job& job) {
     return q;
 }
 
+void reserve_meshes(const std::vector<Job>& jobs, Scene& scene) {
+    size_t vertices = 0, triangles = 0;
+    for (const Job& job : jobs) {
+        vertices += job.world.positions.size();
+        triangles += job.world.faces.size();
+    }
+    if (vertices >= kNone || triangles >= kNone / 2)
+        throw input_error(scene.path, 0, "the scene has too many vertices or triangles");
+    scene.vertices.reserve(vertices);
+    scene.triangles.reserve(triangles);
+}
+
+void add_mesh(Builder& builder, const Job& job, uint32_t index, Shape& shape) {
+    Scene& scene = builder.scene;
+    const Mesh& mesh = job.world;
+    if (job.emitter != kNone && mesh.faces.empty())
+        builder.fail_unless_moved(input_error(job.where.file, job.where.line, "the shape emits light but has no area"));
+    const std::string problem = "the shape of type '" + job.type + "' has no area: its transform leaves it none";
+    if (job.vanished && builder.options.lenient)
+        builder.refuse(job.where, problem, "it is left out");
+    else if (job.vanished)
+        builder.fail_unless_moved(input_error(job.where.file, job.where.line, problem));
+    const uint32_t first = uint32_t(scene.vertices.size());
+    shape.first_primitive = uint32_t(scene.triangles.size());
+    shape.primitive_count = uint32_t(mesh.faces.size());
+    if (!mesh.normals.empty()) shape.flags |= kShapeHasNormals;
+    if (!mesh.uvs.empty()) shape.flags |= kShapeHasUvs;
+    for (size_t v = 0; v < mesh.positions.size(); ++v) {
+        const Vec2f uv = mesh.uvs.empty() ? Vec2f{0, 0} : mesh.uvs[v];
+        scene.vertices.push_back(
+            {mesh.positions[v], uv.x, mesh.normals.empty() ? Vec3f{0, 0, 0} : mesh.normals[v], uv.y});
+    }
+    for (const auto& f : mesh.faces) scene.triangles.push_back({first + f[0], first + f[1], first + f[2], index});
+    scene.degenerate_triangles += job.dropped;
+}
+
 }  // namespace ambilux::document

@@ -72,6 +72,11 @@ Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source
 Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh& mesh,
                           std::map<std::string, int32_t>& textures);
 
+/// Before the first add_mesh().
+void reserve_meshes(const std::vector<Job>& jobs, Scene& scene);
+/// Puts the mesh of a job into the scene, as that of the shape with this index.
+void add_mesh(Builder& builder, const Job& job, uint32_t index, Shape& shape);
+
 /// Sphere, disk or cylinder.
 Quadric make_quadric(Builder& builder, const Job& job);
 

@@ -34,6 +34,8 @@ struct ShapeBuilder {
     }
 
     void add_shape(const Object& object, const Matrix& outer, bool in_instance, bool in_group);
+    bool add_shapes_inside(Reader& in, const Matrix& outer, bool in_instance, bool in_group);
+    void read_placement(Reader& in, const Matrix& outer, Job& job);
     void add_instance(const Object& object, const Matrix& outer);
     void read_geometry(Reader& in, Job& job);
     void read_mesh_file(Reader& in, Job& job);
@@ -73,45 +75,56 @@ Matrix local_form(Reader& in, const std::string& type) {
     return frame * scaling(radius, radius, l);
 }
 
-void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_instance, bool in_group) {
-    Reader in(builder, object);
-    if (object.type == "shapegroup") {
+/// Of an object that is made of others. False if it is none.
+bool ShapeBuilder::add_shapes_inside(Reader& in, const Matrix& outer, bool in_instance, bool in_group) {
+    const std::string& type = in.object().type;
+    if (type == "shapegroup") {
         if (in_group) in.fail("a shapegroup inside of a shapegroup is not supported");
-        return;  // shown by its instances
+        return true;  // shown by its instances
     }
-    if (object.type == "instance") {
+    if (type == "instance") {
         if (in_instance) in.fail("an instance inside of a shapegroup is not supported");
-        add_instance(object, outer);
-        return;
+        add_instance(in.object(), outer);
+        return true;
     }
-    if (object.type == "merge") {  // one mesh of those inside, which looks the same
-        while (const Object* shape = in.take("shape")) add_shape(*shape, outer, in_instance, in_group);
-        in.finish();
-        return;
-    }
-    const std::string& type = object.type;
-    const bool given = type == "mesh" && !builder.document.meshes.empty();
-    if (!is_one_of(shape_plugins(), type) && !given) {
-        builder.refuse(object.where, "shape type '" + type + "' is not supported", "the shape is left out");
-        return;
-    }
+    if (type != "merge") return false;
+    // One mesh of those inside, which looks the same.
+    while (const Object* shape = in.take("shape")) add_shape(*shape, outer, in_instance, in_group);
+    in.finish();
+    return true;
+}
 
-    Job job;
-    job.where = object.where;
-    job.type = type;
+/// Where the shape stands, and which of its sides is the outside.
+void ShapeBuilder::read_placement(Reader& in, const Matrix& outer, Job& job) {
+    const Object& object = in.object();
     job.to_world = outer * in.transform("to_world");
     if (!(std::fabs(determinant(job.to_world)) > 0))
         in.fail(in.where("to_world"), "the transform of the shape is singular");
     job.flip = in.boolean("flip_normals", false);
     job.light_back = builder.document.light_backs.contains(&object);
     job.reverse = determinant(job.to_world) < 0;
-    if (builder.document.mirrors_turn_in && object.version >= 2 && (is_mesh_file(type) || type == "sphere")) {
+    if (builder.document.mirrors_turn_in && object.version >= 2 && (is_mesh_file(job.type) || job.type == "sphere")) {
         // In Mitsuba 3 a mirrored mesh keeps the order of its corners, whose outside so turns in, and so does that of a
         // sphere. An instance keeps it.
         const bool mirrored = determinant(in.transform("to_world")) < 0;
         job.reverse = job.reverse != mirrored;
-        if (type == "sphere") job.flip = job.flip != mirrored;
+        if (job.type == "sphere") job.flip = job.flip != mirrored;
     }
+}
+
+void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_instance, bool in_group) {
+    Reader in(builder, object);
+    if (add_shapes_inside(in, outer, in_instance, in_group)) return;
+    const std::string& type = object.type;
+    const bool given = type == "mesh" && !builder.document.meshes.empty();
+    if (!is_one_of(shape_plugins(), type) && !given) {
+        builder.refuse(object.where, "shape type '" + type + "' is not supported", "the shape is left out");
+        return;
+    }
+    Job job;
+    job.where = object.where;
+    job.type = type;
+    read_placement(in, outer, job);
     const Object* bsdf = in.take("bsdf");
     const bool attributes = bsdf && has_mesh_attributes(*bsdf);
     if (attributes && type != "ply" && type != "mesh") in.fail("mesh attributes are read from ply files only");
@@ -303,42 +316,6 @@ void load_sources(Builder& builder, std::vector<MeshSource>& sources) {
         if (s.lacks_materials)
             builder.note({s.path, 1}, "materials of obj files are not read; such shapes without a BSDF are diffuse");
     }
-}
-
-void reserve_meshes(const std::vector<Job>& jobs, Scene& scene) {
-    size_t vertices = 0, triangles = 0;
-    for (const Job& job : jobs) {
-        vertices += job.world.positions.size();
-        triangles += job.world.faces.size();
-    }
-    if (vertices >= kNone || triangles >= kNone / 2)
-        throw input_error(scene.path, 0, "the scene has too many vertices or triangles");
-    scene.vertices.reserve(vertices);
-    scene.triangles.reserve(triangles);
-}
-
-void add_mesh(Builder& builder, const Job& job, uint32_t index, Shape& shape) {
-    Scene& scene = builder.scene;
-    const Mesh& mesh = job.world;
-    if (job.emitter != kNone && mesh.faces.empty())
-        builder.fail_unless_moved(input_error(job.where.file, job.where.line, "the shape emits light but has no area"));
-    const std::string problem = "the shape of type '" + job.type + "' has no area: its transform leaves it none";
-    if (job.vanished && builder.options.lenient)
-        builder.refuse(job.where, problem, "it is left out");
-    else if (job.vanished)
-        builder.fail_unless_moved(input_error(job.where.file, job.where.line, problem));
-    const uint32_t first = uint32_t(scene.vertices.size());
-    shape.first_primitive = uint32_t(scene.triangles.size());
-    shape.primitive_count = uint32_t(mesh.faces.size());
-    if (!mesh.normals.empty()) shape.flags |= kShapeHasNormals;
-    if (!mesh.uvs.empty()) shape.flags |= kShapeHasUvs;
-    for (size_t v = 0; v < mesh.positions.size(); ++v) {
-        const Vec2f uv = mesh.uvs.empty() ? Vec2f{0, 0} : mesh.uvs[v];
-        scene.vertices.push_back(
-            {mesh.positions[v], uv.x, mesh.normals.empty() ? Vec3f{0, 0, 0} : mesh.normals[v], uv.y});
-    }
-    for (const auto& f : mesh.faces) scene.triangles.push_back({first + f[0], first + f[1], first + f[2], index});
-    scene.degenerate_triangles += job.dropped;
 }
 
 }  // namespace

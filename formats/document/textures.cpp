@@ -239,6 +239,47 @@ void read_grid(Builder& builder, Reader& in, Texture& texture, Rgb& mean) {
     texture.offset = append_texels(builder.scene, texels.data(), texels.size() * sizeof(float));
 }
 
+/// An image of a file or of the document.
+void read_bitmap(Builder& builder, Reader& in, Texture& texture, Rgb& mean) {
+    texture.type = TextureType::bitmap;
+    const Texels* given = given_image(builder, in);
+    const std::string name = in.text(given ? "image" : "filename", "");
+    if (name.empty()) in.fail("bitmap texture has no filename");
+    const std::string path = given ? name : builder.document.resolve(name, in.where("filename"));
+    const bool raw = in.boolean("raw", false);
+    const double given_gamma = read_gamma(in), gamma = raw ? 1 : given_gamma;
+    const std::string channel = in.text("channel", "");
+    if (channel.size() > 1 || std::string("rgba").find(channel) == std::string::npos)
+        in.fail(in.where("channel"), "'" + channel + "' is no channel: r, g, b or a");
+    texture.wrap = wrap_mode(builder, in);
+    texture.filter = texture_filter(builder, in);
+    read_to_uv(in, texture.to_uv);
+    in.ignore({"format", "accel", "max_anisotropy", "cache"});  // storage and prefiltering of other renderers
+    in.finish();
+    if (builder.validate_only) return;
+    const LoadedImage image =
+        load_image(builder, path, gamma, false, channel.empty() ? -1 : int(std::string("rgba").find(channel)), given);
+    texture.format = image.format;
+    texture.width = image.width;
+    texture.height = image.height;
+    texture.offset = image.offset;
+    texture.decode_table = image.decode_table;
+    mean = image.mean;
+}
+
+void read_checkerboard(Builder& builder, Reader& in, TextureUse use, Texture& texture, Rgb& mean) {
+    texture.type = TextureType::checkerboard;
+    texture.color0 = in.color("color0", splat(0.4f), SpectrumUse::reflectance);
+    texture.color1 = in.color("color1", splat(0.2f), SpectrumUse::reflectance);
+    read_to_uv(in, texture.to_uv);
+    in.finish();
+    if (!builder.validate_only && use == TextureUse::number && in.object().version >= 3) {
+        std::swap(texture.color0, texture.color1);
+        builder.note(in.where(), "a checkerboard of numbers has its colours exchanged, as in Mitsuba 3");
+    }
+    mean = (texture.color0 + texture.color1) * 0.5f;
+}
+
 }  // namespace
 
 ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use) {
@@ -257,70 +298,27 @@ ScaledTexture load_scaled_texture(Builder& builder, const Object& object, Textur
 
 int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
     Reader in(builder, object);
+    if (object.type == "mesh_attribute" || object.type == "vertexcolors") return attribute_texture(builder, in);
     Texture texture;
     memset(&texture, 0, sizeof texture);  // padding too, because the record is its own key
     Rgb mean{};
     if (object.type == "bitmap") {
-        texture.type = TextureType::bitmap;
-        const Texels* given = given_image(builder, in);
-        const std::string name = in.text(given ? "image" : "filename", "");
-        if (name.empty()) in.fail("bitmap texture has no filename");
-        const std::string path = given ? name : builder.document.resolve(name, in.where("filename"));
-        const bool raw = in.boolean("raw", false);
-        const double given_gamma = read_gamma(in), gamma = raw ? 1 : given_gamma;
-        const std::string channel = in.text("channel", "");
-        if (channel.size() > 1 || std::string("rgba").find(channel) == std::string::npos)
-            in.fail(in.where("channel"), "'" + channel + "' is no channel: r, g, b or a");
-        texture.wrap = wrap_mode(builder, in);
-        texture.filter = texture_filter(builder, in);
-        read_to_uv(in, texture.to_uv);
-        in.ignore({"format", "accel", "max_anisotropy", "cache"});  // storage and prefiltering of other renderers
-        in.finish();
-        if (builder.validate_only) return 0;
-        const LoadedImage image = load_image(builder, path, gamma, false,
-                                             channel.empty() ? -1 : int(std::string("rgba").find(channel)), given);
-        texture.format = image.format;
-        texture.width = image.width;
-        texture.height = image.height;
-        texture.offset = image.offset;
-        texture.decode_table = image.decode_table;
-        mean = image.mean;
+        read_bitmap(builder, in, texture, mean);
     } else if (object.type == "checkerboard") {
-        texture.type = TextureType::checkerboard;
-        texture.color0 = in.color("color0", splat(0.4f), SpectrumUse::reflectance);
-        texture.color1 = in.color("color1", splat(0.2f), SpectrumUse::reflectance);
-        read_to_uv(in, texture.to_uv);
-        in.finish();
-        if (builder.validate_only) return 0;
-        if (use == TextureUse::number && object.version >= 3) {
-            std::swap(texture.color0, texture.color1);
-            builder.note(object.where, "a checkerboard of numbers has its colours exchanged, as in Mitsuba 3");
-        }
-        mean = (texture.color0 + texture.color1) * 0.5f;
+        read_checkerboard(builder, in, use, texture, mean);
     } else if (object.type == "rawconstant") {
         texture.type = TextureType::checkerboard;
         texture.color0 = texture.color1 = mean = raw_value(in);
         in.finish();
-        if (builder.validate_only) return 0;
-    } else if (object.type == "mesh_attribute" || object.type == "vertexcolors") {
-        const std::string name = object.type == "vertexcolors" ? "vertex_color" : in.text("name", "");
-        if (in.number("scale", 1) != 1) in.fail(in.where("scale"), "a scale of mesh_attribute is not supported");
-        in.finish();
-        if (builder.validate_only) return 0;
-        const auto* known = builder.attribute_textures;
-        if (!known || !known->count(name)) in.fail("the shape has no attribute '" + name + "'");
-        return known->at(name);
     } else if (object.type == "gridtexture") {
         read_grid(builder, in, texture, mean);
         in.finish();
-        if (builder.validate_only) return 0;
     } else {
         builder.refuse(object.where, "texture type '" + object.type + "' is not supported", "a grey of 0.5 is used");
-        if (builder.validate_only) return 0;
         texture.type = TextureType::checkerboard;
         texture.color0 = texture.color1 = mean = splat(0.5f);
     }
-    return add_texture(builder, texture, mean);
+    return builder.validate_only ? 0 : add_texture(builder, texture, mean);
 }
 
 namespace {

@@ -110,14 +110,14 @@ VertexColors vertex_colors(const Context& context, const tinygltf::Primitive& pr
     for (const std::vector<Rgb>* list : {&out.values, &out.alphas})
         for (const Rgb& c : *list)
             if (!is_finite(c) || min_component(c) < 0) context.fail(what + ": a colour is negative or not finite");
-    const auto settle = [](const std::vector<Rgb>& all, Rgb& one, bool& varies) {
+    const auto merge_equal = [](const std::vector<Rgb>& all, Rgb& one, bool& varies) {
         if (all.empty()) return;
         one = all[0];
         varies = std::any_of(all.begin(), all.end(), [&](Rgb c) { return !(c == all[0]); });
     };
     Rgb alpha = splat(1);
-    settle(out.values, out.color, out.varies);
-    settle(out.alphas, alpha, out.alpha_varies);
+    merge_equal(out.values, out.color, out.varies);
+    merge_equal(out.alphas, alpha, out.alpha_varies);
     out.alpha = alpha.x;
     return out;
 }

@@ -70,6 +70,23 @@ struct ObjReader {
     }
 };
 
+/// Corners without a normal in a file that has some: those faces are flat, with vertices of their own. `corners`: of
+/// each vertex.
+void flatten_faces(Mesh& mesh, std::vector<Corner>& corners) {
+    for (auto& face : mesh.faces) {
+        const Vec3f n =
+            cross(mesh.positions[face[1]] - mesh.positions[face[0]], mesh.positions[face[2]] - mesh.positions[face[0]]);
+        for (uint32_t& v : face) {
+            if (corners[v].vn != kAbsent) continue;
+            corners.push_back(corners[v]);
+            mesh.positions.push_back(mesh.positions[v]);
+            mesh.normals.push_back(n);
+            if (!mesh.uvs.empty()) mesh.uvs.push_back(mesh.uvs[v]);
+            v = uint32_t(mesh.positions.size() - 1);
+        }
+    }
+}
+
 }  // namespace
 
 Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits) {
@@ -116,20 +133,7 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
         if (some_uvs) mesh.uvs.push_back(c.vt == kAbsent ? Vec2f{0, 0} : in.uvs[c.vt]);
         if (some_normals) mesh.normals.push_back(c.vn == kAbsent ? Vec3f{0, 0, 0} : in.normals[c.vn]);
     }
-    // Corners without a normal in a file that has some: those faces are flat, with vertices of their own.
-    if (some_normals && lacks_normals)
-        for (auto& face : mesh.faces) {
-            const Vec3f n = cross(mesh.positions[face[1]] - mesh.positions[face[0]],
-                                  mesh.positions[face[2]] - mesh.positions[face[0]]);
-            for (uint32_t& v : face) {
-                if (corners[v].vn != kAbsent) continue;
-                corners.push_back(corners[v]);
-                mesh.positions.push_back(mesh.positions[v]);
-                mesh.normals.push_back(n);
-                if (some_uvs) mesh.uvs.push_back(mesh.uvs[v]);
-                v = uint32_t(mesh.positions.size() - 1);
-            }
-        }
+    if (some_normals && lacks_normals) flatten_faces(mesh, corners);
     check_mesh(path, mesh);
     return mesh;
 }

@@ -80,6 +80,26 @@ uint32_t grid_size(const std::vector<Texture>& parts, const std::vector<Placed>&
     return uint32_t(std::max(cells, wanted / cells * cells));
 }
 
+/// One period of `parts`, put together by `f`.
+TextureImage image_of(const std::vector<Texture>& parts, const std::vector<Placed>& places, FileBudget budget,
+                      const std::function<Rgb(const std::vector<Rgb>&)>& f) {
+    TextureImage image;
+    image.is_file = false;
+    image.width = grid_size(parts, places, &Placed::s, &TextureImage::width);
+    image.height = grid_size(parts, places, &Placed::t, &TextureImage::height);
+    budget.bytes(uint64_t(image.width) * image.height, sizeof(Rgb));
+    std::vector<Rgb> values(parts.size());
+    for (uint32_t y = 0; y < image.height; ++y)
+        for (uint32_t x = 0; x < image.width; ++x) {
+            const double s = (x + 0.5) / image.width, t = 1 - (y + 0.5) / image.height;
+            for (size_t i = 0; i < parts.size(); ++i)
+                values[i] = lookup(parts[i], places[i].s.scale * s + places[i].s.shift,
+                                   places[i].t.scale * t + places[i].t.shift);
+            image.texels.push_back(f(values));
+        }
+    return image;
+}
+
 }  // namespace
 
 Rgb evaluate(const Texture& texture, const SurfacePlace& place) {
@@ -167,8 +187,8 @@ Texture Textures::on_one_grid(const Parameters& in, const std::vector<Texture>& 
             in.where,
             "a texture of type '" + in.type + "' of textures whose periods do not fit into each other is not supported",
             "constants are put in for them");
-    std::vector<Rgb> values(parts.size());
     if (!fits) {
+        std::vector<Rgb> values(parts.size());
         for (size_t i = 0; i < parts.size(); ++i) values[i] = parts[i].color;
         out.color = f(values);
         return out;
@@ -180,20 +200,7 @@ Texture Textures::on_one_grid(const Parameters& in, const std::vector<Texture>& 
     out.projection = longest->projection;
     out.wrap = longest->wrap;
     out.filter = nearest ? "nearest" : "bilinear";
-    out.image = std::make_shared<TextureImage>();
-    TextureImage& image = *out.image;
-    image.is_file = false;
-    image.width = grid_size(parts, places, &Placed::s, &TextureImage::width);
-    image.height = grid_size(parts, places, &Placed::t, &TextureImage::height);
-    FileBudget(in.where.file, document_.limits).bytes(uint64_t(image.width) * image.height, sizeof(Rgb));
-    for (uint32_t y = 0; y < image.height; ++y)
-        for (uint32_t x = 0; x < image.width; ++x) {
-            const double s = (x + 0.5) / image.width, t = 1 - (y + 0.5) / image.height;
-            for (size_t i = 0; i < parts.size(); ++i)
-                values[i] = lookup(parts[i], places[i].s.scale * s + places[i].s.shift,
-                                   places[i].t.scale * t + places[i].t.shift);
-            image.texels.push_back(f(values));
-        }
+    out.image = std::make_shared<TextureImage>(image_of(parts, places, FileBudget(in.where.file, document_.limits), f));
     return out;
 }
 

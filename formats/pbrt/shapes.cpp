@@ -1,11 +1,8 @@
-#include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 
 #include "formats/gzip.h"
-#include "formats/meshes/loop_subdivision.h"
 #include "formats/pbrt/cut_quadrics.h"
+#include "formats/pbrt/meshes.h"
 #include "formats/pbrt/scene.h"
 #include "formats/pbrt/solid_baking.h"
 
@@ -15,143 +12,6 @@ using namespace document;
 
 namespace {
 
-/// Cells a side of a bilinear patch that is no parallelogram.
-constexpr uint32_t kPatchCells = 8;
-
-std::vector<Vec3f> triples(const Parameters& in, const char* name, size_t vertices = 0) {
-    const std::vector<double>& numbers = in.numbers(name, 3);
-    if (vertices && !numbers.empty() && numbers.size() != 3 * vertices)
-        fail(in.where_of(name), std::string("'") + name + "' is given for " + std::to_string(numbers.size() / 3) +
-                                    " of " + std::to_string(vertices) + " vertices");
-    std::vector<Vec3f> out(numbers.size() / 3);
-    for (size_t i = 0; i < out.size(); ++i)
-        out[i] = {float(numbers[3 * i]), float(numbers[3 * i + 1]), float(numbers[3 * i + 2])};
-    return out;
-}
-
-std::vector<uint32_t> indices_of(const Parameters& in, size_t corners, size_t vertices) {
-    std::vector<uint32_t> out;
-    for (double i : in.numbers("indices", corners)) {
-        if (!(i >= 0 && i < double(vertices)))
-            fail(in.where_of("indices"),
-                 "index " + std::to_string(int64_t(i)) + " of " + std::to_string(vertices) + " vertices");
-        out.push_back(uint32_t(i));
-    }
-    if (out.empty() && vertices == corners)
-        for (uint32_t i = 0; i < corners; ++i) out.push_back(i);
-    if (out.empty()) fail(in.where, in.type + " has no indices");
-    return out;
-}
-
-Mesh vertices_of(const Parameters& in) {
-    Mesh mesh;
-    mesh.positions = triples(in, "P");
-    if (mesh.positions.empty()) fail(in.where, in.type + " has no vertices 'P'");
-    mesh.normals = triples(in, "N", mesh.positions.size());
-    const char* name = in.find("uv") ? "uv" : "st";
-    const std::vector<double>& uvs = in.numbers(name, 2);
-    if (!uvs.empty() && uvs.size() != 2 * mesh.positions.size())
-        fail(in.where_of(name), "texture coordinates are given for " + std::to_string(uvs.size() / 2) + " of " +
-                                    std::to_string(mesh.positions.size()) + " vertices");
-    for (size_t i = 0; i < uvs.size(); i += 2) mesh.uvs.push_back({float(uvs[i]), float(uvs[i + 1])});
-    return mesh;
-}
-
-Mesh triangle_mesh(SceneMaker& scene, const Parameters& in) {
-    Mesh mesh = vertices_of(in);
-    if (in.find("S"))
-        scene.report.note(in.where_of("S"), "tangents S are left out: rough surfaces turn with texture coordinates");
-    in.ignore({"faceIndices"});  // of ptex
-    const std::vector<uint32_t> indices = indices_of(in, 3, mesh.positions.size());
-    for (size_t i = 0; i < indices.size(); i += 3) mesh.faces.push_back({indices[i], indices[i + 1], indices[i + 2]});
-    return mesh;
-}
-
-/// Every triangle gets vertices of its own with pbrt's default coordinates.
-Mesh with_default_uvs(const Mesh& mesh) {
-    Mesh out;
-    constexpr Vec2f uvs[3] = {{0, 0}, {1, 0}, {1, 1}};
-    for (const auto& face : mesh.faces) {
-        const uint32_t first = uint32_t(out.positions.size());
-        for (int i = 0; i < 3; ++i) {
-            out.positions.push_back(mesh.positions[face[size_t(i)]]);
-            if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[face[size_t(i)]]);
-            out.uvs.push_back(uvs[i]);
-        }
-        out.faces.push_back({first, first + 1, first + 2});
-    }
-    return out;
-}
-
-Mesh bilinear_mesh(SceneMaker& scene, const Parameters& in) {
-    const Mesh corners = vertices_of(in);
-    in.ignore({"emissionfilename"});  // how pbrt samples the light of an image, which the light has itself
-    const std::vector<uint32_t> indices = indices_of(in, 4, corners.positions.size());
-    FileBudget budget(in.where.file, scene.document.limits);
-    Mesh out;
-    for (size_t first = 0; first < indices.size(); first += 4) {
-        const uint32_t* q = indices.data() + first;  // at (u,v) = 00, 10, 01, 11
-        const auto& p = corners.positions;
-        const Vec3f twist = p[q[0]] + p[q[3]] - p[q[1]] - p[q[2]];
-        const bool flat = length(twist) <= 1e-6f * length(p[q[3]] - p[q[0]]);
-        const uint32_t n = flat && corners.normals.empty() ? 1 : kPatchCells;
-        if (!flat)
-            scene.report.note(in.where, "bilinear patches that are no parallelograms are 8x8 cells of two triangles");
-        const uint32_t base = uint32_t(out.positions.size());
-        budget.bytes(base + uint64_t(n + 1) * (n + 1), sizeof(Vec3f));
-        for (uint32_t j = 0; j <= n; ++j)
-            for (uint32_t i = 0; i <= n; ++i) {
-                const float u = float(i) / float(n), v = float(j) / float(n);
-                const float w[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
-                Vec3f position{}, normal{};
-                Vec2f uv{};
-                for (int k = 0; k < 4; ++k) {
-                    position += p[q[k]] * w[k];
-                    if (!corners.normals.empty()) normal += corners.normals[q[k]] * w[k];
-                    if (!corners.uvs.empty()) uv.x += corners.uvs[q[k]].x * w[k], uv.y += corners.uvs[q[k]].y * w[k];
-                }
-                out.positions.push_back(position);
-                if (!corners.normals.empty()) out.normals.push_back(normal);
-                out.uvs.push_back(corners.uvs.empty() ? Vec2f{u, v} : uv);
-            }
-        for (uint32_t j = 0; j < n; ++j)
-            for (uint32_t i = 0; i < n; ++i) {
-                const uint32_t a = base + j * (n + 1) + i, b = a + 1, c = a + n + 1, d = c + 1;
-                out.faces.push_back({a, b, d});
-                out.faces.push_back({a, d, c});
-            }
-    }
-    return out;
-}
-
-Mesh loop_subdivision(SceneMaker& scene, const Parameters& in) {
-    Mesh mesh = triangle_mesh(scene, in);
-    const int64_t levels = in.integer("levels", 3);
-    if (levels < 0 || levels > 12) fail(in.where_of("levels"), "levels must lie between 0 and 12");
-    scene.report.note(in.where,
-                      "a loopsubdiv is refined as often as it says, and its vertices moved to the limit surface");
-    return subdivide_loop(in.where.file + ":" + std::to_string(in.where.line), mesh, int(levels),
-                          scene.document.limits);
-}
-
-/// Whether a PLY file gives texture coordinates, as its header tells; what cannot be told counts as yes.
-bool has_uvs(const std::string& path) {
-    std::error_code ignored;
-    if (!std::filesystem::is_regular_file(path, ignored)) return true;  // read_input says what is wrong with it
-    std::ifstream file(path, std::ios::binary);
-    std::string head(1 << 16, '\0');
-    file.read(head.data(), std::streamsize(head.size()));
-    head.resize(size_t(std::max<std::streamsize>(file.gcount(), 0)));
-    if (!head.starts_with("ply")) return false;  // packed
-    const size_t end = head.find("end_header");
-    if (end == std::string::npos) return true;
-    for (const char* name : {" u", " s", " texture_u"})
-        for (const char* line : {"\n", "\r"})
-            if (head.find(name + std::string(line)) < end) return true;
-    return false;
-}
-
-/// `seen`: what was looked into; objects are shared, and a mix of mixes may hold one 2^n times.
 bool has_texture(const Object& object) {
     bool found = false;
     for_all_below(object, [&](const Object& o) { found |= o.tag == "texture"; });
@@ -315,6 +175,70 @@ void add_back(SceneMaker& scene, const Parameters& in, const Object& shape, cons
     add_child(*scene.document.scene, add_light_back(scene.document, shape));
 }
 
+/// What decides how a shape is made: with coordinates that textures need it becomes a mesh.
+struct Look {
+    Surface surface;
+    bool hidden = false, solid = false;  ///< a light that no ray meets; solid textures
+    const Object* bsdf = nullptr;
+    std::shared_ptr<const Projection> projection;
+};
+
+Look look_of(SceneMaker& scene, const Parameters& in, Surface surface) {
+    Look look{surface, shines_unseen(scene, in)};
+    const auto surface_bsdf = [&]() -> const Object* {
+        if (look.hidden) return &add_object(scene.document, "bsdf", "null", in.where);
+        return masked(scene, in, surface_material(scene, scene.state.material, look.surface), uv_map(look.surface));
+    };
+    look.bsdf = surface_bsdf();
+    look.solid = scene.textures.has_solid(*look.bsdf);
+    // Images that stand for solid textures have coordinates of their own.
+    if (!look.solid || look.surface != Surface::mesh) look.projection = scene.textures.projection_of(*look.bsdf);
+    if (scene.open_object && look.solid)
+        scene.report.refuse(in.where, "solid textures inside of an object are not supported",
+                            "they stand as where the object does");
+    else if (scene.open_object && look.projection)
+        scene.report.refuse(in.where, "texture mappings other than uv inside of an object are not supported",
+                            "they stand as where the object does");
+    if (look.projection && look.surface != Surface::mesh) look.surface = Surface::mesh, look.bsdf = surface_bsdf();
+    if (look.solid) look.projection = nullptr;
+    return look;
+}
+
+/// Nothing where the curve has no length.
+Placed add_curve(SceneMaker& scene, const Parameters& in, Look& look) {
+    const std::vector<Curve> curves = read_curve(scene, in);
+    if (look.projection)
+        scene.report.refuse(in.where, "texture mappings other than uv on curves are not supported", "uv is used");
+    if (look.solid) {
+        scene.report.refuse(in.where, "solid textures on curves are not supported", "the curve is grey");
+        look.bsdf = surface_material(scene, nullptr, look.surface);
+    }
+    const bool textured = has_texture(*look.bsdf);
+    if (textured)
+        scene.report.note(in.where, "textures on curves go round them, not from edge to edge as they are seen");
+    Placed placed;
+    if (!curves.empty())
+        placed.object =
+            add_curves(scene, in, curves, look.bsdf, textured || in.find("alpha") || scene.state.area_light);
+    return placed;
+}
+
+Placed add_surface(SceneMaker& scene, const Parameters& in, Look& look) {
+    if (in.type == "curve" && in.text("type", "flat") != "ribbon") return add_curve(scene, in, look);
+    if (look.surface != Surface::mesh) {
+        const Placed placed = add_quadric(scene, in);
+        if (look.solid)
+            look.bsdf = bake_solids(scene, in.where, look.surface, scene.state.ctm * placed.local, *look.bsdf);
+        return placed;
+    }
+    const bool shines = scene.state.area_light && scene.state.area_light->in.find("filename");
+    if (shines && look.solid)
+        scene.report.refuse(in.where, "a light with an image on a mesh with solid textures is not supported",
+                            "the image lies wrong");
+    return add_mesh(scene, in, shines || has_texture(*look.bsdf), look.projection.get(),
+                    look.solid ? &look.bsdf : nullptr);
+}
+
 }  // namespace
 
 void add_shape(SceneMaker& scene, const Parameters& in) {
@@ -326,68 +250,22 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
     if (++scene.shape_count > scene.document.limits.shapes)
         fail(in.where,
              "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
-    Surface surface = quadric ? surface_of(type) : Surface::mesh;
-    const bool hidden = shines_unseen(scene, in);
-    const auto surface_bsdf = [&]() -> const Object* {
-        if (hidden) return &add_object(scene.document, "bsdf", "null", in.where);
-        return masked(scene, in, surface_material(scene, scene.state.material, surface), uv_map(surface));
-    };
-    const Object* bsdf = surface_bsdf();
-    const bool solid = scene.textures.has_solid(*bsdf);
-    // Images that stand for solid textures have coordinates of their own.
-    std::shared_ptr<const Projection> projection =
-        solid && surface == Surface::mesh ? nullptr : scene.textures.projection_of(*bsdf);
-    if (solid) {
-        if (scene.open_object)
-            scene.report.refuse(in.where, "solid textures inside of an object are not supported",
-                                "they stand as where the object does");
-        if (projection) projection = nullptr, surface = Surface::mesh, bsdf = surface_bsdf();
-    }
-    if (projection) {
-        if (scene.open_object)
-            scene.report.refuse(in.where, "texture mappings other than uv inside of an object are not supported",
-                                "they stand as where the object does");
-        if (surface != Surface::mesh) surface = Surface::mesh, bsdf = surface_bsdf();
-    }
-    Placed placed;
-    if (type == "curve" && in.text("type", "flat") != "ribbon") {
-        const std::vector<Curve> curves = read_curve(scene, in);
-        if (projection)
-            scene.report.refuse(in.where, "texture mappings other than uv on curves are not supported", "uv is used");
-        if (solid) {
-            scene.report.refuse(in.where, "solid textures on curves are not supported", "the curve is grey");
-            bsdf = surface_material(scene, nullptr, surface);
-        }
-        const bool textured = has_texture(*bsdf);
-        if (textured)
-            scene.report.note(in.where, "textures on curves go round them, not from edge to edge as they are seen");
-        if (!curves.empty())
-            placed.object = add_curves(scene, in, curves, bsdf, textured || in.find("alpha") || scene.state.area_light);
-        if (!placed.object) return in.finish(scene.report);
-    } else if (surface != Surface::mesh) {
-        placed = add_quadric(scene, in);
-        if (solid) bsdf = bake_solids(scene, in.where, surface, scene.state.ctm * placed.local, *bsdf);
-    } else {
-        const bool shines = scene.state.area_light && scene.state.area_light->in.find("filename");
-        if (shines && solid)
-            scene.report.refuse(in.where, "a light with an image on a mesh with solid textures is not supported",
-                                "the image lies wrong");
-        placed = add_mesh(scene, in, shines || has_texture(*bsdf), projection.get(), solid ? &bsdf : nullptr);
-    }
+    Look look = look_of(scene, in, quadric ? surface_of(type) : Surface::mesh);
+    const Placed placed = add_surface(scene, in, look);
+    if (!placed.object) return in.finish(scene.report);
     Object& shape = *placed.object;
-    const UvMap uv = uv_map(surface);
     set_transform(shape, "to_world", scene.state.ctm * placed.local);
     if (scene.state.reverse_orientation) set_boolean(shape, "flip_normals", true);
-    add_child(shape, *bsdf);
+    add_child(shape, *look.bsdf);
     if (scene.state.area_light && scene.open_object)
         scene.report.note(in.where, "shapes of an object do not shine, as in pbrt");
     else if (scene.state.area_light)
-        add_child(shape, area_emitter(scene, *scene.state.area_light, uv, placed.area, hidden,
-                                      hidden ? Texture{} : scene.textures.number(in, "alpha", 1)));
+        add_child(shape, area_emitter(scene, *scene.state.area_light, uv_map(look.surface), placed.area, look.hidden,
+                                      look.hidden ? Texture{} : scene.textures.number(in, "alpha", 1)));
     in.finish(scene.report);
     add_child(scene.open_object ? *scene.open_object : *scene.document.scene, shape);
     if (scene.state.area_light && !scene.open_object && scene.state.area_light->in.boolean("twosided", false))
-        add_back(scene, in, shape, *bsdf);
+        add_back(scene, in, shape, *look.bsdf);
 }
 
 }  // namespace ambilux::pbrt

@@ -37,7 +37,7 @@ void check_replay(const RenderSettings& settings) {
     if (settings.automatic)
         throw Error(ExitCode::usage,
                     "bdpt.auto=true: which integrator made the sample is up to a pilot; give the settings that "
-                    "`ambilux render` printed as its choice");
+                    "`ambilux render` printed as its selection");
     for (const char* name : {"path", "light", "bdpt"})
         if (settings.integrator == name) return;
     throw Error(ExitCode::usage, fmt::format("integrator {}: there is no replay of it; path, light and bdpt have one",

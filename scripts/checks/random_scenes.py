@@ -36,7 +36,7 @@ METHODS = {
     "light": ["-i", "light"], "bdpt": BDPT, "bdpt power": BDPT + ["--set", "heuristic=power"], "bdpt double": BDPT + ["--precision", "double"],
     "bdpt cwbvh": BDPT + ["--set", "accel=cwbvh"], "megakernel": BDPT + ["--variant", "megakernel"], "streaming": BDPT + ["--variant", "streaming"],
     "lvc": BDPT + ["--variant", "lvc", "--set", "light_paths=2"], "learned": BDPT + ["--variant", "learned"],
-    "four light paths": BDPT + ["--set", "strategies=hits+next_event+light", "--set", "light_paths=4"],
+    "four light subpaths": BDPT + ["--set", "strategies=hits+next_event+light", "--set", "light_paths=4"],
     "no light images": BDPT + ["--set", "strategies=hits+next_event+connections"],
 }
 MITSUBA = """
@@ -112,7 +112,7 @@ def methods_of(scene, seed, options):
     path += ["double", "cwbvh"] if on_cpu else [] if instanced else ["bvh2"]
     bidirectional = ["bdpt power", "megakernel", "streaming", "lvc", "learned"] + (["bdpt double", "bdpt cwbvh"] if on_cpu else [])
     bidirectional += [] if lacks_light else ["no light images"]
-    bidirectional += [] if lacks_light and "delta" in has else ["four light paths"]  # caustics seen through glass are for connections
+    bidirectional += [] if lacks_light and "delta" in has else ["four light subpaths"]  # caustics seen through glass are for connections
     bidirectional += [] if {"delta", "hidden"} & has else ["light"]  # what it cannot see
     chosen = [(choose.choice(path), "path"), ("bdpt", "path"), (choose.choice(bidirectional), "bdpt" if lacks_light else "path")]
     passes_panes = {"null", "delta_light"} <= has and "thindielectric" in scene.tags  # shadow rays of Mitsuba's volpath

@@ -94,8 +94,8 @@ METAL = rgb("eta", "0.2, 0.92, 1.1") + rgb("k", "3.9, 2.45, 2.14")
 BUMPY = number("scale", 0.2) + bsdf("roughplastic", number("alpha", 0.2))
 
 
-def catalogue():
-    """Scenes by name."""
+def plain_bsdfs():
+    """BSDFs that hold no other."""
     s = {}
     s["diffuse"] = sphere(bsdf("diffuse", rgb("reflectance", "0.8, 0.3, 0.1")))
     s["conductor"] = sphere(bsdf("conductor", METAL))
@@ -122,6 +122,12 @@ def catalogue():
         "sheen_tint": 0.4, "flatness": 0.4}.items())))
     s["principledthin textures"] = panel(bsdf("principledthin", bitmap("base_color") + bitmap("spec_trans", "heights.png", yes("raw"))
                                               + number("roughness", 0.25) + number("diff_trans", 1.5)))
+    return s
+
+
+def nested_bsdfs():
+    """BSDFs inside of BSDFs, masks and maps."""
+    s = {}
     two = bsdf("diffuse", rgb("reflectance", "0.8, 0.1, 0.1")) + bsdf("roughconductor", METAL + number("alpha", 0.2))
     s["blendbsdf"] = sphere(bsdf("blendbsdf", number("weight", 0.3) + two))
     s["blendbsdf texture"] = panel(bsdf("blendbsdf", bitmap("weight", "heights.png", yes("raw")) + two))
@@ -156,7 +162,11 @@ def catalogue():
     s["normalmap plain"] = panel(bsdf("normalmap", bitmap("normalmap", "normals.png", yes("raw")) + yes("flip_invalid_normals", "false")
                                       + yes("use_shadowing_function", "false") + bsdf("diffuse")))
     s["normalmap glass"] = panel(bsdf("normalmap", bitmap("normalmap", "normals.png", yes("raw")) + bsdf("roughdielectric", number("alpha", 0.2))))
+    return s
 
+
+def textures():
+    s = {}
     s["bitmap"] = panel(DIFFUSE_TILES)
     s["bitmap nearest"] = panel(bsdf("diffuse", bitmap("reflectance", more=string("filter_type", "nearest"))))
     turned = '<transform name="to_uv"><rotate z="1" angle="20"/><scale x="2" y="2.5"/><translate x="0.3" y="-0.6"/></transform>'
@@ -167,7 +177,11 @@ def catalogue():
     for kind in ("vertex", "face"):
         texture = f'<texture type="mesh_attribute" name="reflectance">{string("name", kind + "_color")}</texture>'
         s[f"mesh_attribute {kind}"] = shape(file("ply", f"{kind}.ply", yes("face_normals")) + bsdf("diffuse", texture) + "</shape>")
+    return s
 
+
+def emitters():
+    s = {}
     s["area"] = lit(LIGHT)
     s["area textured"] = lit(LIGHT.replace(rgb("radiance", "6, 5, 4"), bitmap("radiance", more=yes("raw"))))
     s["area sphere"] = lit(f"""<shape type="sphere"><point name="center" x="-1.5" y="-1" z="2.5"/><float name="radius" value="0.5"/>
@@ -197,7 +211,11 @@ def catalogue():
     date += "".join(number(k, v) for k, v in {"hour": 9, "minute": 30, "latitude": 48.1, "longitude": 11.6, "timezone": 2}.items())
     s["sky date"] = lit(f'<emitter type="sunsky">{date}{number("sun_scale", 0)}</emitter>')
     s["sun"] = lit(f'<emitter type="sunsky">{SUN}{number("sky_scale", 0)}{number("sun_scale", 0.1)}</emitter>')
+    return s
 
+
+def shapes():
+    s = {}
     up = '<transform name="to_world"><rotate z="1" angle="30"/><rotate x="1" angle="50"/><translate z="1.3"/></transform>'
     mirror = '<transform name="to_world"><scale x="-1"/><rotate x="1" angle="60"/><translate z="1.3"/></transform>'
     for kind in ("rectangle", "cube", "disk", "sphere"):
@@ -221,7 +239,12 @@ def catalogue():
 <transform name="to_world"><translate x="-0.5" y="-0.5" z="-0.5"/><scale value="2.4"/><rotate x="1" angle="50"/><translate z="1.1"/></transform></shape>""")
     for kind in ("bsplinecurve", "linearcurve"):
         s[kind] = shape(f'<shape type="{kind}">{string("filename", "curves.txt")}{bsdf("twosided", GREY)}</shape>')
+    return s
 
+
+def sensors():
+    """Sensors, films and integrators."""
+    s = {}
     ball = f'<shape type="sphere"><point name="center" x="0" y="0" z="1"/>{DIFFUSE_TILES}</shape>' + GROUND + LIGHT + DIM
     s["thinlens"] = scene(ball, "thinlens", number("aperture_radius", 0.2) + number("focus_distance", 5))
     s["orthographic"] = scene(ball, "orthographic", view=VIEW.replace("<lookat", '<scale value="2.2"/><lookat'))
@@ -233,6 +256,11 @@ def catalogue():
     s["direct"] = scene(ball, integrator="direct", depth=0)
     s["volpath"] = scene(ball, integrator="volpath")
     return s
+
+
+def catalogue():
+    """Scenes by name."""
+    return {**plain_bsdfs(), **nested_bsdfs(), **textures(), **emitters(), **shapes(), **sensors()}
 
 
 def torus(across=14, along=22):

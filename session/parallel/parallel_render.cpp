@@ -100,17 +100,17 @@ private:
 
     /// bdpt.auto chooses once, for all.
     void choose() {
-        choice_ = earlier_.choice;
-        if (settings_.automatic && choice_.name.empty()) {
+        selection_ = earlier_.selection;
+        if (settings_.automatic && selection_.name.empty()) {
             RenderSettings probe = settings_;
             const Device device = choose_devices(request_.devices, settings_, ranks_)[0];
             probe.backend = device.cuda >= 0 ? Backend::cuda : Backend::cpu;
             SharedAccels accels(scene_, *host_);
-            choice_ = make_renderer(scene_, probe, accels)->stats().choice;
-            earlier_seconds_ += choice_.seconds;
+            selection_ = make_renderer(scene_, probe, accels)->stats().selection;
+            earlier_seconds_ += selection_.seconds;
         }
         settings_.automatic = false;
-        for (const auto& [key, value] : choice_.settings) apply_setting(settings_, key, value);
+        for (const auto& [key, value] : selection_.settings) apply_setting(settings_, key, value);
         settings_.expected_samples = ranges_.size;  // each range by itself
     }
 
@@ -120,7 +120,7 @@ private:
             tell(ranks_, rank, Say::setup,
                  {{"scene_hash", identity_["scene_hash"]},
                   {"expected_samples", settings_.expected_samples},
-                  {"choice", choice_.settings}});
+                  {"selection", selection_.settings}});
         crew_.emplace(scene_, settings_, choose_devices(request_.devices, settings_, ranks_), *host_);
         host_.reset();
         parties_.resize(size_t(ranks_.size()));
@@ -312,7 +312,7 @@ private:
         sum.memory_bytes_predicted = predicted;
         sum.memory_bytes_peak = peak;
         sum.build_seconds = build;
-        sum.choice = choice_;
+        sum.selection = selection_;
         sum.samples = tree_.samples();
         sum.render_seconds = elapsed();
         return sum;
@@ -371,7 +371,7 @@ private:
     uint64_t collected_later_ = 0;  ///< ranges whose films other ranks add up before they come here
     bool wanted_collected_ = false;
     Arrays memory_;  ///< for the next film
-    SelectionStats choice_;
+    SelectionStats selection_;
     std::optional<SharedAccels> host_;  ///< of all devices here, until they have made what they need of it
     std::optional<Crew> crew_;
     std::vector<Party> parties_;  ///< by rank

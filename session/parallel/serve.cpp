@@ -61,7 +61,7 @@ void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& r
     RenderSettings settings = request.settings;
     settings.automatic = false;
     settings.expected_samples = setup.text.at("expected_samples");
-    for (const auto& [key, value] : setup.text.at("choice").get<std::vector<std::pair<std::string, std::string>>>())
+    for (const auto& [key, value] : setup.text.at("selection").get<std::vector<std::pair<std::string, std::string>>>())
         apply_setting(settings, key, value);
     std::optional<SharedAccels> host(scene);
     std::optional<Crew> crew(std::in_place, scene, settings, choose_devices(request.devices, settings, ranks), *host);

@@ -166,7 +166,7 @@ TEST_CASE("device memory runs out at any allocation of any render") {
     }
 }
 
-TEST_CASE("a choice by bdpt.auto survives or reports memory that runs out at any allocation") {
+TEST_CASE("a selection by bdpt.auto survives or reports memory that runs out at any allocation") {
     if (!device()) return;
     const Scene scene = project_scene("cornell", 32, 24);
     RenderSettings s = settings_of(scene, {"auto", {{"integrator", "bdpt"}, {"bdpt.auto", "true"}}});

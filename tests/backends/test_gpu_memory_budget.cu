@@ -183,7 +183,7 @@ TEST_CASE(
     CHECK(bool(parts.film.sum_squares == whole.film.sum_squares));
 }
 
-TEST_CASE("images of single strategies and a choice keep to the budget") {
+TEST_CASE("images of single strategies and a selection keep to the budget") {
     if (!device()) return;
     const Scene scene = project_scene("materials", 160, 90);
     RenderSettings s = settings_of(scene, "bdpt", "wavefront");

@@ -66,13 +66,13 @@ TEST_CASE("what is chosen on a device renders as if its settings had been given,
         s.integrator = "bdpt";
         s.automatic = true;
         const RenderResult chosen = render_scene(scene, s, 4);
-        const SelectionStats& choice = chosen.stats.choice;
-        INFO(name << ": " << choice.name);
-        REQUIRE_FALSE(choice.name.empty());
-        for (const SelectionStats::Candidate& c : choice.candidates)
+        const SelectionStats& selection = chosen.stats.selection;
+        INFO(name << ": " << selection.name);
+        REQUIRE_FALSE(selection.name.empty());
+        for (const SelectionStats::Candidate& c : selection.candidates)
             CHECK(c.seconds == 0);  // their work tells more than short waves would
         s.automatic = false;
-        for (const auto& [key, value] : choice.settings) apply_setting(s, key, value);
+        for (const auto& [key, value] : selection.settings) apply_setting(s, key, value);
         const RenderResult again = render_scene(scene, s, 4);
         CHECK(again.stats.rays_extend == chosen.stats.rays_extend);
         CHECK(again.stats.memory_bytes == chosen.stats.memory_bytes);
@@ -95,12 +95,12 @@ TEST_CASE("a path tracer that renders while the pilot runs is the render that wa
     s.automatic = true;
     s.expected_seconds = 1;
     const auto renderer = make_renderer(scene, s);
-    REQUIRE(renderer->stats().choice.name == "path");
+    REQUIRE(renderer->stats().selection.name == "path");
     const uint32_t ready = renderer->ready();
     REQUIRE(ready > 0);
     RenderSettings path = s;
     path.automatic = false;
-    for (const auto& [key, value] : renderer->stats().choice.settings) apply_setting(path, key, value);
+    for (const auto& [key, value] : renderer->stats().selection.settings) apply_setting(path, key, value);
     REQUIRE(renderer->render(0, ready + 3) == ready + 3);
     CHECK(renderer->film().samples == ready + 3);
     CHECK(renderer->ready() == 0);

@@ -227,10 +227,10 @@ TEST_CASE("light that no strategy in use can find is named, in the warning and b
     CHECK(
         contains(run(folder, render(folder, {"--resume", "--spp", "1"})).err, "is not there: the render begins anew"));
 
-    const json choice =
-        json::parse(render_with({"-i", "bdpt", "--set", "bdpt.auto=true", "--json", "-"}).out)["choice"];
+    const json selection =
+        json::parse(render_with({"-i", "bdpt", "--set", "bdpt.auto=true", "--json", "-"}).out)["selection"];
     int excluded = 0, open = 0;
-    for (const json& c : choice["candidates"]) {
+    for (const json& c : selection["candidates"]) {
         INFO(c.dump());
         ++(c["excluded"].is_null() ? open : excluded);
         if (c["name"] == "path") CHECK(c["excluded"] == "cannot find paths such as Ld S D E");

@@ -155,18 +155,19 @@ TEST_CASE("a resumed render goes on with what its first part chose, and choosing
                    "name = \"chosen\"\nintegrator = \"bdpt\"\nset = { \"bdpt.auto\" = true }\n");
     config.replace(config.find("seeds = [1, 2]"), 14, "seeds = [1]");
     write_inputs(folder, config);
-    /// Each choice is another one.
+    /// Each selection is another one.
     struct Choosing : FakeRenderer {
         Choosing(const Scene& scene, const RenderSettings& settings, World& world, int number)
             : FakeRenderer(scene, settings, world) {
-            if (settings.automatic) choice = {"choice", {{"connections", std::to_string(number)}}, 1000.0, 1, 0, {}};
+            if (settings.automatic)
+                selection = {"selection", {{"connections", std::to_string(number)}}, 1000.0, 1, 0, {}};
         }
         RenderStats stats() override {
             RenderStats s = FakeRenderer::stats();
-            s.choice = choice;
+            s.selection = selection;
             return s;
         }
-        SelectionStats choice;
+        SelectionStats selection;
     };
     World world;
     Hooks hooks = fake_hooks(world);
@@ -195,8 +196,8 @@ TEST_CASE("a resumed render goes on with what its first part chose, and choosing
     for (const auto& row : table(folder / "out/runs.csv"))
         if (row[column("run")] == "chosen") CHECK(std::stod(row[column("time")]) >= 1000.0);
     const auto stats = nlohmann::json::parse(read_file(folder / "out/stats/a/chosen_1.json"));
-    CHECK(stats["choice"]["settings"]["connections"] == std::to_string(first));
-    CHECK(stats["choice"]["seconds"] == 1000.0);
+    CHECK(stats["selection"]["settings"]["connections"] == std::to_string(first));
+    CHECK(stats["selection"]["seconds"] == 1000.0);
     // What ran is in the rows and in the statistics, and not what was asked for.
     for (const auto& row : table(folder / "out/runs.csv"))
         if (row[column("run")] == "chosen" && row[column("scene")] == "a") {

@@ -130,13 +130,13 @@ TEST_CASE("what is chosen renders as if its settings had been given: the pilot l
         const Scene scene = project_scene(name, 40, 30);
         const RenderSettings s = automatic_settings(scene, 5);
         const RenderResult chosen = render_scene(scene, s, 4);
-        const SelectionStats& choice = chosen.stats.choice;
-        INFO(name << ": " << choice.name);
-        REQUIRE_FALSE(choice.name.empty());
-        CHECK(choice.seconds > 0);
-        CHECK(choice.candidates.size() == 23);
-        const RenderResult again = render_scene(scene, fixed(s, choice.settings), 4);
-        CHECK(again.stats.choice.name.empty());
+        const SelectionStats& selection = chosen.stats.selection;
+        INFO(name << ": " << selection.name);
+        REQUIRE_FALSE(selection.name.empty());
+        CHECK(selection.seconds > 0);
+        CHECK(selection.candidates.size() == 23);
+        const RenderResult again = render_scene(scene, fixed(s, selection.settings), 4);
+        CHECK(again.stats.selection.name.empty());
         CHECK(worst_difference(again.film, mean_image(chosen.film)) < 1e-5);
         CHECK(again.stats.rays_extend == chosen.stats.rays_extend);
         CHECK(again.stats.samples == chosen.stats.samples);
@@ -155,7 +155,7 @@ TEST_CASE("light subpaths run where they find what eye subpaths do not, and only
     const auto name_of = [](const Scene& scene, uint64_t seed) {
         RenderSettings s = automatic_settings(scene, seed);
         s.deterministic = true;
-        return make_renderer(scene, s)->stats().choice.name;
+        return make_renderer(scene, s)->stats().selection.name;
     };
     for (uint64_t seed = 1; seed <= 4; ++seed) {
         INFO("seed " << seed);
@@ -196,12 +196,12 @@ TEST_CASE("the error is predicted for the samples that the render will take") {
     for (const uint64_t samples : {64u, 2000u}) {
         s = automatic_settings(scene);
         s.expected_samples = samples;
-        const SelectionStats choice = make_renderer(scene, s)->stats().choice;
-        INFO(samples << " samples: " << choice.name);
-        REQUIRE(choice.candidates[0].name == "path");
-        CHECK(choice.expected_samples == double(samples));
-        CHECK(choice.candidates[0].variance > before);
-        before = choice.candidates[0].variance;
+        const SelectionStats selection = make_renderer(scene, s)->stats().selection;
+        INFO(samples << " samples: " << selection.name);
+        REQUIRE(selection.candidates[0].name == "path");
+        CHECK(selection.expected_samples == double(samples));
+        CHECK(selection.candidates[0].variance > before);
+        before = selection.candidates[0].variance;
     }
 }
 
@@ -214,9 +214,9 @@ TEST_CASE(
         RenderSettings s = automatic_settings(*scene, seed);
         s.deterministic = true;
         s.expected_samples = 100;
-        const SelectionStats few = make_renderer(*scene, s)->stats().choice;
+        const SelectionStats few = make_renderer(*scene, s)->stats().selection;
         s.expected_samples = 20000;
-        const SelectionStats many = make_renderer(*scene, s)->stats().choice;
+        const SelectionStats many = make_renderer(*scene, s)->stats().selection;
         INFO("seed " << seed << ": " << few.name << ", " << many.name);
         CHECK(few.candidates[0].efficiency > 0.6);
         // Equal time: 0.19 on an H200 at 640x360 (docs/performance.md).
@@ -231,9 +231,9 @@ TEST_CASE("behind a door ajar draws learn, if the render is long enough for it a
     for (uint64_t seed = 1; seed <= 4; ++seed) {
         RenderSettings s = automatic_settings(*scene, seed);
         s.expected_samples = 64;
-        const SelectionStats choice = make_renderer(*scene, s)->stats().choice;
-        INFO("seed " << seed << ": " << choice.name);
-        CHECK(choice.name.find("learned") != std::string::npos);
+        const SelectionStats selection = make_renderer(*scene, s)->stats().selection;
+        INFO("seed " << seed << ": " << selection.name);
+        CHECK(selection.name.find("learned") != std::string::npos);
     }
     RenderSettings s = automatic_settings(*scene);
     const auto learning = [&](bool cuda) {
@@ -247,7 +247,7 @@ TEST_CASE("behind a door ajar draws learn, if the render is long enough for it a
     const Scene small = *published_scene("veach-ajar", 32, 18);
     s = automatic_settings(small);
     s.expected_samples = 64;
-    for (const auto& c : make_renderer(small, s)->stats().choice.candidates)
+    for (const auto& c : make_renderer(small, s)->stats().selection.candidates)
         CHECK((c.excluded == "has too few samples to learn from") == (c.name.find("learned") != std::string::npos));
 }
 
@@ -256,14 +256,14 @@ TEST_CASE("a candidate that cannot find some of the light is never chosen") {
                                                          "<emitter type='point'><point name='position' x='0.5' y='0.2' "
                                                          "z='3'/><rgb name='intensity' value='5,5,5'/></emitter>"));
     RenderSettings s = automatic_settings(scene);
-    const SelectionStats choice = make_renderer(scene, s)->stats().choice;
-    REQUIRE(choice.candidates[0].name == "path");
-    CHECK(std::isinf(choice.candidates[0].variance));
-    CHECK(choice.candidates[0].efficiency == 0);
-    CHECK(choice.candidates[0].excluded == "cannot find paths such as Ld S D E");
-    REQUIRE(choice.candidates[1].name.find("bdpt without connections") == 0);
-    CHECK(choice.candidates[1].excluded == "cannot find paths such as Ld S D D S E");
-    CHECK(choice.name != "path");
+    const SelectionStats selection = make_renderer(scene, s)->stats().selection;
+    REQUIRE(selection.candidates[0].name == "path");
+    CHECK(std::isinf(selection.candidates[0].variance));
+    CHECK(selection.candidates[0].efficiency == 0);
+    CHECK(selection.candidates[0].excluded == "cannot find paths such as Ld S D E");
+    REQUIRE(selection.candidates[1].name.find("bdpt without connections") == 0);
+    CHECK(selection.candidates[1].excluded == "cannot find paths such as Ld S D D S E");
+    CHECK(selection.name != "path");
 }
 
 namespace {
@@ -286,14 +286,14 @@ Scene bead_scene() {
 
 }  // namespace
 
-TEST_CASE("a spot lamp behind a glass bead: no seed chooses a path tracer, and the choice finds all light") {
+TEST_CASE("a spot lamp behind a glass bead: no seed chooses a path tracer, and the selection finds all light") {
     const Scene scene = bead_scene();
     for (uint64_t seed = 1; seed <= 8; ++seed) {
         RenderSettings s = automatic_settings(scene, seed);
         s.deterministic = true;
-        const SelectionStats choice = make_renderer(scene, s)->stats().choice;
+        const SelectionStats selection = make_renderer(scene, s)->stats().selection;
         INFO("seed " << seed);
-        CHECK(choice.name != "path");
+        CHECK(selection.name != "path");
     }
     RenderSettings s = automatic_settings(scene, 1), all = cpu_settings(scene, Estimator::mis, 99);
     all.integrator = "bdpt";
@@ -381,15 +381,15 @@ TEST_CASE("what single strategies do not find is said") {
     CHECK(lost(glass, point, "s0t3", 2) == "Ld D E");
 }
 
-TEST_CASE("the choice repeats: it depends on the seed, and on clocks only where it says so") {
+TEST_CASE("the selection repeats: it depends on the seed, and on clocks only where it says so") {
     const Scene scene = project_scene("materials", 40, 30);
     RenderSettings s = automatic_settings(scene, 3);
     s.deterministic = true;
-    const SelectionStats a = make_renderer(scene, s)->stats().choice, b = make_renderer(scene, s)->stats().choice;
+    const SelectionStats a = make_renderer(scene, s)->stats().selection, b = make_renderer(scene, s)->stats().selection;
     s.accel = "cwbvh";
-    const SelectionStats other_rays = make_renderer(scene, s)->stats().choice;
+    const SelectionStats other_rays = make_renderer(scene, s)->stats().selection;
     s.seed = 4;
-    const SelectionStats other_seed = make_renderer(scene, s)->stats().choice;
+    const SelectionStats other_seed = make_renderer(scene, s)->stats().selection;
     CHECK(a.name == b.name);
     for (size_t c = 0; c < a.candidates.size(); ++c) {
         CHECK(a.candidates[c].variance == b.candidates[c].variance);
@@ -432,20 +432,20 @@ TEST_CASE("a path tracer that renders while the pilot runs makes room for a cand
                 return std::make_unique<Counted>(make_renderer(scene, chosen), living);
             };
             const auto renderer = make_automatic(scene, s, true, accels, make);
-            const SelectionStats choice = renderer->stats().choice;
-            INFO(name << (small ? ", small: " : ", large: ") << choice.name << ", ready " << renderer->ready());
-            const bool timed = std::any_of(choice.candidates.begin(), choice.candidates.end(),
+            const SelectionStats selection = renderer->stats().selection;
+            INFO(name << (small ? ", small: " : ", large: ") << selection.name << ", ready " << renderer->ready());
+            const bool timed = std::any_of(selection.candidates.begin(), selection.candidates.end(),
                                            [](const SelectionStats::Candidate& c) { return c.seconds > 0; });
             some_timed |= timed;
             CHECK(living == 1);
             CHECK(refused == (small && timed ? 1 : 0));
-            CHECK((renderer->ready() > 0) == (choice.name == "path" && !(small && timed)));
-            CHECK(choice.seconds >= 0);
+            CHECK((renderer->ready() > 0) == (selection.name == "path" && !(small && timed)));
+            CHECK(selection.seconds >= 0);
             const uint32_t samples = renderer->ready() + 2;
             REQUIRE(renderer->render(0, samples) == samples);
             const FilmMoments film = renderer->film();
             CHECK(film.samples == samples);
-            CHECK(worst_difference(render_scene(scene, fixed(s, choice.settings), samples).film, mean_image(film)) <
+            CHECK(worst_difference(render_scene(scene, fixed(s, selection.settings), samples).film, mean_image(film)) <
                   1e-5);
         }
     }
@@ -462,13 +462,13 @@ TEST_CASE("what a device has no room for is not chosen: the next best runs") {
         return make_renderer(scene, chosen);
     };
     const auto renderer = make_automatic(scene, s, true, accels, make);
-    const SelectionStats choice = renderer->stats().choice;
-    INFO(choice.name);
+    const SelectionStats selection = renderer->stats().selection;
+    INFO(selection.name);
     CHECK(asked == 2);
-    CHECK(std::count_if(choice.candidates.begin(), choice.candidates.end(),
+    CHECK(std::count_if(selection.candidates.begin(), selection.candidates.end(),
                         [](const SelectionStats::Candidate& c) { return c.efficiency > 1; }) == 1);
     REQUIRE(renderer->render(0, 2) == 2);
-    CHECK(worst_difference(render_scene(scene, fixed(s, choice.settings), 2).film, mean_image(renderer->film())) <
+    CHECK(worst_difference(render_scene(scene, fixed(s, selection.settings), 2).film, mean_image(renderer->film())) <
           1e-5);
     CHECK_THROWS_WITH(make_automatic(scene, s, true, accels,
                                      [](const RenderSettings&) -> std::unique_ptr<Renderer> {
@@ -477,14 +477,14 @@ TEST_CASE("what a device has no room for is not chosen: the next best runs") {
                       ContainsSubstring("no room at all"));
 }
 
-TEST_CASE("variants restrict the choice; other settings that it would make are refused by name") {
+TEST_CASE("variants restrict the selection; other settings that it would make are refused by name") {
     const Scene scene = project_scene("cornell", 24, 24);
     RenderSettings s = automatic_settings(scene);
     s.variant = "lvc";
     CHECK(selection_candidates(s, false).size() == 19);
     s.variant = "streaming";
     REQUIRE(selection_candidates(s, false).size() == 3);
-    CHECK(make_renderer(scene, s)->stats().choice.candidates[2].name == "bdpt, streaming");
+    CHECK(make_renderer(scene, s)->stats().selection.candidates[2].name == "bdpt, streaming");
     s.variant = "wavefront";
     s.deterministic = true;
     CHECK(selection_candidates(s, false).size() == 23);
@@ -511,7 +511,7 @@ TEST_CASE("variants restrict the choice; other settings that it would make are r
     CHECK_THROWS_AS(apply_setting(s, "bdpt.auto", "yes"), Error);
 }
 
-TEST_CASE("how light vertices are drawn can be set beside the choice, whichever candidate that is") {
+TEST_CASE("how light vertices are drawn can be set beside the selection, whichever candidate that is") {
     const Scene glass = project_scene("glass", 48, 32);
     const Scene sky = scene_from_text(
         scene_xml(4, kView + kGround + "<emitter type='constant'><rgb name='radiance' value='1,1,1'/></emitter>"));
@@ -519,38 +519,38 @@ TEST_CASE("how light vertices are drawn can be set beside the choice, whichever 
         RenderSettings s = automatic_settings(*scene, 2);
         s.deterministic = true;
         const RenderResult chosen = render_scene(*scene, s, 2);
-        INFO(chosen.stats.choice.name);
+        INFO(chosen.stats.selection.name);
         s.draws = CacheDraws::independent;  // what the CPU does anyway
         const RenderResult set = render_scene(*scene, s, 2);
-        CHECK(set.stats.choice.name == chosen.stats.choice.name);
+        CHECK(set.stats.selection.name == chosen.stats.selection.name);
         CHECK(set.film.sum == chosen.film.sum);
     }
 }
 
 TEST_CASE("nothing to see: scenes without emitters and films of one pixel") {
     const Scene dark = scene_from_text(scene_xml(4, kView + kGround));
-    CHECK(render_scene(dark, automatic_settings(dark), 2).stats.choice.name == "path");
+    CHECK(render_scene(dark, automatic_settings(dark), 2).stats.selection.name == "path");
     const Scene pixel = project_scene("cornell", 1, 1);
-    CHECK(render_scene(pixel, automatic_settings(pixel), 2).stats.choice.candidates.size() == 23);
+    CHECK(render_scene(pixel, automatic_settings(pixel), 2).stats.selection.candidates.size() == 23);
 }
 
-TEST_CASE("saved statistics keep the choice, and a later part does not lose it") {
+TEST_CASE("saved statistics keep the selection, and a later part does not lose it") {
     RenderStats first;
-    first.choice = {"bdpt, lvc, 2 connections",
-                    {{"integrator", "bdpt"}, {"connections", "2"}},
-                    0.25,
-                    8192,
-                    640,
-                    {{"path", "integrator=path", std::numeric_limits<double>::infinity(), 3, 0, 0, "Ld S D E"}}};
+    first.selection = {"bdpt, lvc, 2 connections",
+                       {{"integrator", "bdpt"}, {"connections", "2"}},
+                       0.25,
+                       8192,
+                       640,
+                       {{"path", "integrator=path", std::numeric_limits<double>::infinity(), 3, 0, 0, "Ld S D E"}}};
     RenderStats total;
     add_part(total, {}, first);
     total = restore_stats(nlohmann::json::parse(save_stats(total).dump()));
     add_part(total, {}, {});
-    CHECK(total.choice.name == first.choice.name);
-    CHECK(total.choice.settings == first.choice.settings);
-    CHECK(total.choice.seconds == 0.25);
-    CHECK(total.choice.expected_samples == 640);
-    REQUIRE(total.choice.candidates.size() == 1);
-    CHECK(std::isinf(total.choice.candidates[0].variance));
-    CHECK(total.choice.candidates[0].excluded == "Ld S D E");
+    CHECK(total.selection.name == first.selection.name);
+    CHECK(total.selection.settings == first.selection.settings);
+    CHECK(total.selection.seconds == 0.25);
+    CHECK(total.selection.expected_samples == 640);
+    REQUIRE(total.selection.candidates.size() == 1);
+    CHECK(std::isinf(total.selection.candidates[0].variance));
+    CHECK(total.selection.candidates[0].excluded == "Ld S D E");
 }

@@ -2,7 +2,7 @@
 // timeout: 300
 // seconds: 45
 // bdpt.auto=true is unbiased whatever it chooses: over emitters of every type and bodies of glass and metal, each
-// candidate that the choice may take has the image of all strategies.
+// candidate that the selection may take has the image of all strategies.
 #include "render/selection.h"
 #include "tests/support/bidirectional_images.h"
 
@@ -60,9 +60,9 @@ TEST_CASE("each candidate that bdpt.auto may choose finds all light, for every e
             RenderSettings all = automatic;
             automatic.automatic = automatic.deterministic = true;
             const Estimate truth = render_batches(scene, all, 4 * kSamples);
-            const SelectionStats choice = make_renderer(scene, automatic)->stats().choice;
+            const SelectionStats selection = make_renderer(scene, automatic)->stats().selection;
             const std::vector<SelectionCandidate> candidates = selection_candidates(automatic, false);
-            REQUIRE(candidates.size() == choice.candidates.size());
+            REQUIRE(candidates.size() == selection.candidates.size());
             for (size_t c = 0; c < candidates.size(); ++c) {
                 INFO(lamp.name << ", " << type << ": " << candidates[c].name);
                 RenderSettings s = automatic;
@@ -70,7 +70,7 @@ TEST_CASE("each candidate that bdpt.auto may choose finds all light, for every e
                 s.seed = 100 + seed++;
                 for (const auto& [key, value] : candidates[c].settings) apply_setting(s, key, value);
                 const Estimate image = render_batches(scene, s, kSamples);
-                if (choice.candidates[c].excluded.empty()) {
+                if (selection.candidates[c].excluded.empty()) {
                     check_agreement(image, truth, 0.15, options);
                 } else {
                     ++excluded;

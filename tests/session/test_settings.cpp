@@ -123,7 +123,7 @@ TEST_CASE("statistics name every setting as used and as asked for, images those 
     asked.integrator = "bdpt";
     asked.automatic = true;
     const RenderResult r = render_scene(scene, asked, 4);
-    REQUIRE_FALSE(r.stats.choice.name.empty());
+    REQUIRE_FALSE(r.stats.selection.name.empty());
     const nlohmann::json json = stats_json(scene, asked, r.stats, 0);
     for (const Setting& s : general_settings()) {
         INFO(s.what.key);
@@ -134,7 +134,7 @@ TEST_CASE("statistics name every setting as used and as asked for, images those 
     CHECK(json["bdpt.auto"] == false);
     CHECK(json["asked"]["ordering"] == "auto");
     CHECK(json["ordering"] == "none");
-    for (const auto& [key, value] : r.stats.choice.settings) {
+    for (const auto& [key, value] : r.stats.selection.settings) {
         const RenderSettings used = used_settings(asked, r.stats);
         CHECK(setting_text(used, key) == value);
     }
@@ -165,6 +165,6 @@ TEST_CASE("statistics name every setting as used and as asked for, images those 
     path.variant = "wavefront";
     CHECK(method_text(path).find("estimator=mis") != std::string::npos);
     CHECK(method_text(path).find("seed") == std::string::npos);
-    CHECK(attributes.contains("choice"));
+    CHECK(attributes.contains("selection"));
     CHECK(attributes.contains("estimator") == (json["integrator"] == "path"));
 }
