@@ -5,9 +5,7 @@
 #include "accel/host_tracer.h"
 #include "accel/shared_accels.h"
 #include "core/parallel.h"
-#include "transport/sensor/camera.h"
-#include "transport/sensor/filter.h"
-#include "transport/subpath/subpath.h"
+#include "transport/subpath/start.h"
 #include "transport/surface_scattering.h"
 
 namespace ambilux {
@@ -31,9 +29,7 @@ public:
 
     void add(uint32_t x, uint32_t y, uint32_t sample, PixelSums& sums) const {
         const Draws draws = {{seed_, y * view_.sensor.crop_width + x, sample, Stream::eye}};
-        const Vec4f u = draws.camera();
-        const CameraSample camera =
-            sample_camera_ray<kAllFeatures>(view_.sensor, sample_film_position(view_, x, y, {u.x, u.y}), {u.z, u.w});
+        const CameraSample camera = camera_sample<kAllFeatures>(view_, x, y, draws);
         Ray ray = {camera.o, camera.tmax, camera.d, 0};
         Rgb seen = {1.0f, 1.0f, 1.0f};
         for (uint32_t depth = 1; depth <= kMostDeltas; ++depth) {

@@ -2,18 +2,9 @@
 #pragma once
 
 #include "stages/stage.h"
-#include "transport/sensor/filter.h"
-#include "transport/subpath/camera_connection.h"
 #include "transport/subpath/start.h"
 
 namespace ambilux {
-
-/// Camera ray of a path.
-template <Features F>
-AMBILUX_HD CameraSample camera_sample(const SceneView& scene, const PathSlot& p, const Draws& draws) {
-    const Vec4f u = draws.camera();
-    return sample_camera_ray<F>(scene.sensor, sample_film_position(scene, p.x, p.y, {u.x, u.y}), {u.z, u.w});
-}
 
 template <Features F, class Mis>
 struct GenerateEye {
@@ -36,28 +27,28 @@ struct GenerateEye {
         samples[slot] = {};
         const PathSlot p = wave.locate(slot);
         if (!p.active) return false;
-        const CameraSample c = camera_sample<F>(scene, p, {wave.key(p)});
-        ray = Items::pack(start_eye<F>(scene, mis, c), Side::eye, slot, c.tmax);
+        float tmax;
+        const Subpath<Mis> path = start_eye_subpath<F>(scene, mis, p.x, p.y, {wave.key(p)}, tmax);
+        ray = Items::pack(path, Side::eye, slot, tmax);
         return true;
     }
 };
 
-/// Starts a light subpath; the first of a path also shows the emitter itself to the camera, by `splats`. False if there
-/// is no first ray.
+/// Where the start of a light subpath goes: what the camera sees of the emitter itself to `splats`.
 template <Features F, class Out>
-AMBILUX_HD bool start_light_subpath(const SceneView& scene, const Rules<BidirectionalMis>& rules, const Draws& draws,
-                                    uint32_t slot, const Out& splats, StageRecord* record,
-                                    Subpath<BidirectionalMis>& path) {
-    EmissionSample e;
-    if (!sample_start<F>(scene, draws, e)) return false;
-    path = start_light(rules.mis, e);
-    if (!is_valid_radiance(path.throughput, record)) return false;
-    const Vec4f u = draws.emission_direction();
-    Candidate<BidirectionalMis> c;
-    if (draws.number == 0 && visible_emitter<F>(scene, rules, e, {u.z, u.w}, c) && is_valid_radiance(c.value, record))
-        splats.push(pack_candidate(c, slot, F.opacity ? draws.shadow_seed(0) : 0));
-    return rules.max_depth >= 2;
-}
+struct LightStartSink {
+    const Out& splats;
+    uint32_t slot;
+    const Draws& draws;
+    StageRecord* record;
+
+    AMBILUX_HD bool valid(Rgb flux) const { return is_valid_radiance(flux, record); }
+    template <class Mis>
+    AMBILUX_HD void add(const Candidate<Mis>& c) const {
+        if (is_valid_radiance(c.value, record))
+            splats.push(pack_candidate(c, slot, F.opacity ? draws.shadow_seed(0) : 0));
+    }
+};
 
 /// A light subpath in each slot that has one in this round. `Out` takes splat candidates.
 template <Features F, class Out>
@@ -77,8 +68,10 @@ struct GenerateLight {
     AMBILUX_HD void operator()(uint32_t slot) const {
         if (last_vertex) last_vertex[slot] = kNone;
         if (round >= light_subpaths_of(slot, per_tile) || !wave.locate(slot).active) return;
+        const Draws draws = {wave.key(slot, Stream::light)};
+        EmissionSample e;
         Subpath<BidirectionalMis> path;
-        if (start_light_subpath<F>(scene, rules, {wave.key(slot, Stream::light)}, slot, splats, record, path))
+        if (start_light_subpath<F>(scene, rules, draws, LightStartSink<F, Out>{splats, slot, draws, record}, e, path))
             rays.push(SubpathItems<BidirectionalMis>::pack(path, Side::light, slot, kInfinity));
     }
 };

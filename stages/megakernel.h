@@ -142,24 +142,28 @@ private:
         if (rules.splat || rules.connect) begin_light(s);
     }
 
+    struct LightStart {
+        const Megakernel& kernel;
+        State& s;
+        const Draws& draws;
+
+        AMBILUX_HD bool valid(Rgb flux) const { return is_valid_radiance(flux, kernel.records.light_generate); }
+        AMBILUX_HD void add(const Candidate<Mis>& c) const {
+            kernel.test(s, c, draws, 0, kernel.records.light_generate);
+        }
+    };
+
     AMBILUX_HD void begin_light(State& s) const {
         const Draws d = draws(s);
         EmissionSample e;
-        if (!sample_start<F>(scene, d, e)) return;
-        s.path = start_light(rules.mis, e);
         s.tmax = kInfinity;
-        if (!is_valid_radiance(s.path.throughput, records.light_generate)) return;
-        const Vec4f u = d.emission_direction();
-        Candidate<Mis> c;
-        if (visible_emitter<F>(scene, rules, e, {u.z, u.w}, c)) test(s, c, d, 0, records.light_generate);
-        s.going = rules.max_depth >= 2;
+        s.going = start_light_subpath<F>(scene, rules, d, LightStart{*this, s, d}, e, s.path);
     }
 
     AMBILUX_HD void begin_eye(State& s) const {
         s.side = Side::eye;
-        const CameraSample camera = camera_sample<F>(scene, wave.locate(s.slot), draws(s));
-        s.path = start_eye<F>(scene, rules.mis, camera);
-        s.tmax = camera.tmax;
+        const PathSlot p = wave.locate(s.slot);
+        s.path = start_eye_subpath<F>(scene, rules.mis, p.x, p.y, draws(s), s.tmax);
         s.going = true;
         s.sum = {0.0f, 0.0f, 0.0f};
     }

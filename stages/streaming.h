@@ -49,8 +49,9 @@ struct StreamPool {
             samples[path] = {};
             const PathSlot p = wave.locate(path);
             if (!p.active) continue;
-            const CameraSample c = camera_sample<F>(scene, p, {wave.key(p)});
-            rays.put(slot, Items::pack(start_eye<F>(scene, rules.mis, c), Side::eye, path, c.tmax));
+            float tmax;
+            const auto first = start_eye_subpath<F>(scene, rules.mis, p.x, p.y, {wave.key(p)}, tmax);
+            rays.put(slot, Items::pack(first, Side::eye, path, tmax));
             return;
         }
     }
@@ -195,12 +196,18 @@ struct StreamTurn {
     AMBILUX_HD void operator()(uint32_t i) const {
         const TurnItem turn = turns.load(i);
         Subpath<BidirectionalMis> path;
-        if (turn.light_subpath &&
-            start_light_subpath<F>(pool.scene, pool.rules, pool.light_draws(turn.path, pool.eye.load_front(turn.slot)),
-                                   turn.path, splats, record, path))
+        if (turn.light_subpath && start(turn, path))
             pool.rays.put(turn.slot, StreamPool<F>::Items::pack(path, Side::light, turn.path | kLightRay, kInfinity));
         else
             pool.advance(turn.slot);
+    }
+
+private:
+    AMBILUX_HD bool start(const TurnItem& turn, Subpath<BidirectionalMis>& path) const {
+        const Draws draws = pool.light_draws(turn.path, pool.eye.load_front(turn.slot));
+        EmissionSample e;
+        return start_light_subpath<F>(pool.scene, pool.rules, draws,
+                                      LightStartSink<F, Splats>{splats, turn.path, draws, record}, e, path);
     }
 };
 

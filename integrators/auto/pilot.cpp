@@ -12,10 +12,10 @@
 #include "integrators/bdpt/shared/policy.h"
 #include "integrators/feature_levels.h"
 #include "stages/cache_draw.h"
-#include "stages/generate.h"
 #include "transport/subpath/connection.h"
 #include "transport/subpath/next_event.h"
-#include "transport/subpath/visit.h"
+#include "transport/subpath/start.h"
+#include "transport/subpath/trace.h"
 
 namespace ambilux {
 namespace {
@@ -137,9 +137,15 @@ private:
 
     static bool counts(Rgb value) { return is_finite(value) && min_component(value) >= 0.0f && !is_zero(value); }
 
-    bool closest(const PilotSubpath& path, float tmax, const Draws& draws, Hit& hit) const {
-        const uint32_t seed = F.opacity ? draws.opacity_seed(path.depth) : 0;
-        return tracer_.closest<F>(view_, Ray{path.origin, tmax, path.direction, seed}, hit);
+    /// `rays` are counted.
+    template <class Sink>
+    void trace(Side side, const PilotSubpath& first, float tmax, const Draws& draws, const Sink& sink,
+               double& rays) const {
+        const auto extend = [&](const PilotSubpath& path, float at_most) {
+            rays += 1;
+            return end_of_ray<F>(view_, tracer_, path, at_most, draws);
+        };
+        trace_subpath<F>(view_, rules_, side, rules_.longest(side), first, tmax, extend, sink);
     }
     bool is_free(const PilotCandidatePath& c, const Draws& draws, uint32_t which) const {
         if (!is_finite(c.origin) || !is_finite(c.direction)) return false;
@@ -163,15 +169,15 @@ private:
         const PilotRun& pilot;
         LightTask& task;
         const Draws& subpath_draws;
-        Rgb emitted;
+        const EmissionSample& start;
 
         Draws draws() const { return subpath_draws; }
-        void add(const PilotCandidatePath&) const {}
+        void add(const PilotCandidatePath& c) const { pilot.splat(task, c, subpath_draws, 0, start.radiance); }
         void at(const Vertex<PilotMis>& y, const PilotSubpath& path, const Draws& draws) const {
             const Vec4f u = draws.lens(path.depth);
             PilotCandidatePath c;
             if (camera_connection<F>(pilot.view_, pilot.rules_, y, path.throughput, path.depth, {u.x, u.y}, c))
-                pilot.splat(task, c, draws, path.depth, emitted);
+                pilot.splat(task, c, draws, path.depth, start.radiance);
             if (pilot.rules_.connect && path.depth + 2 <= pilot.rules_.max_depth)
                 task.vertices.push_back({y, path.throughput, path.depth});
         }
@@ -181,18 +187,10 @@ private:
     void light_subpath(uint32_t i, LightTask& task) const {
         const Draws draws = {{settings_.seed, i, 2, Stream::pilot}};
         EmissionSample e;
-        if (!sample_start<F>(view_, draws, e)) return;
-        const Vec4f u = draws.emission_direction();
-        PilotCandidatePath c;
-        if (visible_emitter<F>(view_, rules_, e, {u.z, u.w}, c)) splat(task, c, draws, 0, e.radiance);
-        PilotSubpath path = start_light(rules_.mis, e);
-        if (rules_.max_depth < 2 || !is_finite(path.throughput)) return;
-        Hit hit;
-        do {
-            task.rays += 1;
-            closest(path, kInfinity, draws, hit);
-        } while (visit<F>(view_, rules_, Side::light, rules_.longest(Side::light), hit, path,
-                          LightSink{*this, task, draws, e.radiance}));
+        PilotSubpath first;
+        const LightSink sink = {*this, task, draws, e};
+        if (start_light_subpath<F>(view_, rules_, draws, sink, e, first))
+            trace(Side::light, first, kInfinity, draws, sink, task.rays);
     }
 
     /// Vertices and splats stay where they are: they are large.
@@ -278,13 +276,9 @@ private:
 
     void eye_subpath(Eye& eye, uint32_t x, uint32_t y) const {
         if (rules_.max_depth == 0) return;
-        const CameraSample camera = camera_sample<F>(view_, PathSlot{x, y, 0, 0, true}, eye.draws);
-        PilotSubpath path = start_eye<F>(view_, rules_.mis, camera);
-        Hit hit;
-        do {
-            eye.work.eye_rays += 1;
-            closest(path, path.depth == 1 ? camera.tmax : kInfinity, eye.draws, hit);
-        } while (visit<F>(view_, rules_, Side::eye, rules_.longest(Side::eye), hit, path, EyeSink{*this, eye}));
+        float tmax;
+        const PilotSubpath first = start_eye_subpath<F>(view_, rules_.mis, x, y, eye.draws, tmax);
+        trace(Side::eye, first, tmax, eye.draws, EyeSink{*this, eye}, eye.work.eye_rays);
     }
 
     void first_smooth(Eye& eye, const PilotVertex& z) const {

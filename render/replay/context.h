@@ -6,6 +6,7 @@
 #include "render/replay/replay.h"
 #include "stages/stage.h"
 #include "stages/update_film.h"
+#include "transport/subpath/trace.h"
 
 namespace ambilux {
 
@@ -61,11 +62,8 @@ inline void finish(ReplaySample& s) {
 template <class Mis>
 Hit replay_extend(const ReplayContext<Mis>& ctx, const Subpath<Mis>& path, float tmax, const Draws& draws,
                   StageRecord* record) {
-    Hit hit = {tmax, 0.0f, 0.0f, kNone};
-    if (is_valid_ray(path.origin, path.direction, record))
-        ctx.tracer.template closest<kReplayFeatures>(
-            ctx.view, Ray{path.origin, tmax, path.direction, draws.opacity_seed(path.depth)}, hit);
-    return hit;
+    if (!is_valid_ray(path.origin, path.direction, record)) return {tmax, 0.0f, 0.0f, kNone};
+    return end_of_ray<kReplayFeatures>(ctx.view, ctx.tracer, path, tmax, draws);
 }
 
 }  // namespace ambilux

@@ -4,7 +4,7 @@
 #include "render/replay/context.h"
 #include "render/replay/record.h"
 #include "transport/subpath/connection.h"
-#include "transport/subpath/visit.h"
+#include "transport/subpath/trace.h"
 
 namespace ambilux {
 
@@ -88,15 +88,25 @@ void describe_departure(const ReplayContext<Mis>& ctx, Side side, uint32_t longe
     if (!goes_on) v.end = why_scattering_ends(ctx, before, v.scatter);
 }
 
-/// visit, and its description in `record`, which may be null.
+/// trace_subpath, and with `details` what happened, in `out`. sink.arrived(path, hit) is called where each ray ends.
 template <class Mis, class Sink>
-bool replay_step(const ReplayContext<Mis>& ctx, Side side, uint32_t longest, const Hit& hit, Subpath<Mis>& path,
-                 const Sink& sink, ReplaySubpath* record) {
-    const Subpath<Mis> before = path;
-    if (record) record->vertices.push_back(describe_arrival(ctx, side, path, hit));
-    const bool goes_on = visit<kReplayFeatures>(ctx.view, ctx.rules, side, longest, hit, path, sink);
-    if (record) describe_departure(ctx, side, longest, hit, sink.draws(), before, goes_on, record->vertices.back());
-    return goes_on;
+void replay_subpath(const ReplayContext<Mis>& ctx, uint32_t longest, const Subpath<Mis>& first, float tmax,
+                    const Sink& sink, bool details, ReplaySubpath& out) {
+    std::vector<std::pair<Subpath<Mis>, Hit>> steps;
+    DropWatch watch;
+    const auto extend = [&](const Subpath<Mis>& path, float at_most) {
+        const Hit hit = replay_extend(ctx, path, at_most, sink.draws(), watch.record());
+        watch.dropped(out.side == Side::eye ? "extend" : "light_extend", out.drop);
+        if (details) steps.emplace_back(path, hit);
+        sink.arrived(path, hit);
+        return hit;
+    };
+    trace_subpath<kReplayFeatures>(ctx.view, ctx.rules, out.side, longest, first, tmax, extend, sink);
+    for (const auto& [path, hit] : steps) {
+        out.vertices.push_back(describe_arrival(ctx, out.side, path, hit));
+        const bool goes_on = out.vertices.size() < steps.size();
+        describe_departure(ctx, out.side, longest, hit, sink.draws(), path, goes_on, out.vertices.back());
+    }
 }
 
 // ---- densities behind a candidate ----

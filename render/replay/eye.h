@@ -6,7 +6,7 @@
 #include "render/replay/arrival.h"
 #include "render/replay/describe.h"
 #include "stages/connect_emitter.h"
-#include "stages/generate.h"
+#include "transport/subpath/start.h"
 
 namespace ambilux {
 
@@ -61,6 +61,10 @@ struct ReplayEyeSink {
     ReplayEye<Mis>& eye;
 
     Draws draws() const { return eye.draws; }
+    void arrived(const Subpath<Mis>& path, const Hit& hit) const {
+        eye.ray = path;
+        eye.hit = hit;
+    }
     void add(const Candidate<Mis>& c) const { eye.found(c); }
     void at(const Vertex<Mis>& z, const Subpath<Mis>& path, const Draws&) const {
         eye.next_event(z, path);
@@ -98,17 +102,10 @@ void replay_eye(const ReplayContext<Mis>& ctx, const typename ReplayEye<Mis>::Sa
     out.eye.side = Side::eye;
     out.eye.number = pixel;
     const Draws draws = {{out.seed, pixel, out.sample, Stream::eye}};
-    const CameraSample camera =
-        camera_sample<kReplayFeatures>(ctx.view, PathSlot{out.x, out.y, pixel, out.sample, true}, draws);
     ReplayEye<Mis> eye{ctx, sample_emitter, connect, details, draws, out, EyeArrival<Mis>(ctx)};
-    Subpath<Mis> path = start_eye<kReplayFeatures>(ctx.view, ctx.rules.mis, camera);
-    DropWatch watch;
-    do {
-        eye.ray = path;
-        eye.hit = replay_extend(ctx, path, path.depth == 1 ? camera.tmax : kInfinity, draws, watch.record());
-        watch.dropped("extend", out.eye.drop);
-    } while (replay_step(ctx, Side::eye, ctx.rules.longest(Side::eye), eye.hit, path, ReplayEyeSink<Mis>{eye},
-                         details ? &out.eye : nullptr));
+    float tmax;
+    const auto first = start_eye_subpath<kReplayFeatures>(ctx.view, ctx.rules.mis, out.x, out.y, draws, tmax);
+    replay_subpath(ctx, ctx.rules.longest(Side::eye), first, tmax, ReplayEyeSink<Mis>{eye}, details, out.eye);
     out.eye_sum = eye.arrival.sum();
 }
 

@@ -64,6 +64,7 @@ struct ReplayLightSink {
     const ReplaySplats& splats;
 
     Draws draws() const { return splats.request.draws(); }
+    void arrived(const Subpath<BidirectionalMis>&, const Hit&) const {}
     void add(const Candidate<BidirectionalMis>&) const {}
     void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& path, const Draws& d) const {
         const auto& [ctx, request, light] = splats;
@@ -89,9 +90,8 @@ struct ReplayLightSink {
 };
 
 /// The emission that the subpath begins with, in words.
-inline void describe_start(const ReplayContext<BidirectionalMis>& ctx, const Draws& draws, ReplaySubpath& subpath) {
-    EmissionSample e;
-    if (!sample_start<kReplayFeatures>(ctx.view, draws, e)) return;
+inline void describe_start(const ReplayContext<BidirectionalMis>& ctx, const EmissionSample& e,
+                           ReplaySubpath& subpath) {
     subpath.emitter = name_of(ctx.view.emitters[e.emitter].type);
     subpath.start = e.radiance;
     subpath.start_densities = {{"emitter", double(e.emitter)},
@@ -108,13 +108,14 @@ inline ReplayLight replay_light(const ReplayContext<BidirectionalMis>& ctx, cons
     subpath.number = request.number;
     subpath.part = request.part;
     const Draws draws = request.draws();
-    if (request.details) describe_start(ctx, draws, subpath);
     const ReplaySplats splats = {ctx, request, light};
     DropWatch watch;
-    Subpath<BidirectionalMis> path{};
-    const bool starts =
-        start_light_subpath<kReplayFeatures>(ctx.view, ctx.rules, draws, 0, splats, watch.record(), path);
-    const bool valid = is_valid_radiance(path.throughput);
+    const LightStartSink<kReplayFeatures, ReplaySplats> start = {splats, 0, draws, watch.record()};
+    EmissionSample e;
+    Subpath<BidirectionalMis> first{};  // depth 0
+    const bool starts = start_light_subpath<kReplayFeatures>(ctx.view, ctx.rules, draws, start, e, first);
+    if (request.details && first.depth > 0) describe_start(ctx, e, subpath);
+    const bool valid = is_valid_radiance(first.throughput);
     ReplayDrop drop;
     if (watch.dropped("light_generate", drop)) {
         if (valid)
@@ -128,12 +129,7 @@ inline ReplayLight replay_light(const ReplayContext<BidirectionalMis>& ctx, cons
                                                 : "the emitter sample carries no light";
         return light;
     }
-    const ReplayLightSink sink = {splats};
-    Hit hit;
-    do {
-        hit = replay_extend(ctx, path, kInfinity, draws, watch.record());
-        watch.dropped("light_extend", subpath.drop);
-    } while (replay_step(ctx, Side::light, request.longest, hit, path, sink, request.details ? &subpath : nullptr));
+    replay_subpath(ctx, request.longest, first, kInfinity, ReplayLightSink{splats}, request.details, subpath);
     return light;
 }
 

@@ -8,12 +8,10 @@
 #include "render/renderer.h"
 #include "render/twin/in_double/transport/mis/bidirectional.h"
 #include "render/twin/in_double/transport/mis/unidirectional.h"
-#include "render/twin/in_double/transport/sensor/filter.h"
-#include "render/twin/in_double/transport/subpath/camera_connection.h"
 #include "render/twin/in_double/transport/subpath/connection.h"
 #include "render/twin/in_double/transport/subpath/next_event.h"
 #include "render/twin/in_double/transport/subpath/start.h"
-#include "render/twin/in_double/transport/subpath/visit.h"
+#include "render/twin/in_double/transport/subpath/trace.h"
 #include "render/twin/tracer.h"
 
 namespace ambilux::twin {
@@ -54,10 +52,9 @@ public:
             if (rules_.splat || rules_.connect) light_subpath({{seed, pixel, sample, Stream::light}});
         }
         const Draws draws = {{seed, pixel, sample, Stream::eye}};
-        const Vec4f u = draws.camera();
-        const Vec2f film = sample_film_position(scene_, x, y, {u.x, u.y});
-        const CameraSample c = sample_camera_ray<kFeatures>(scene_.sensor, film, {u.z, u.w});
-        follow(Side::eye, draws, start_eye<kFeatures>(scene_, rules_.mis, c), c.tmax);
+        double tmax;
+        const Path first = start_eye_subpath<kFeatures>(scene_, rules_.mis, x, y, draws, tmax);
+        follow(first, tmax, Sink{*this, Side::eye, draws});
         return sum_;
     }
 
@@ -67,26 +64,9 @@ private:
 
     void light_subpath(const Draws& draws) {
         EmissionSample e;
-        if (!sample_start<kFeatures>(scene_, draws, e)) return;
-        const Path path = start_light(rules_.mis, e);
-        if (!valid(path.throughput)) return;
-        const Vec4f u = draws.emission_direction();
-        Candidate<Mis> c;
-        if (visible_emitter<kFeatures>(scene_, rules_, e, {u.z, u.w}, c)) splat(c, draws.shadow_seed(0));
-        if (rules_.max_depth >= 2) follow(Side::light, draws, path, kInfinity);
-    }
-
-    void follow(Side side, const Draws& draws, Path path, double tmax) {
-        const Sink sink = {*this, side, draws};
-        for (;; tmax = kInfinity) {
-            if (!is_finite(path.origin) || !is_finite(path.direction)) {
-                ++counts_.invalid.nan;
-                return;
-            }
-            ++counts_.rays_extend;
-            const Hit hit = tracer_.closest({path.origin, tmax, path.direction, draws.opacity_seed(path.depth)});
-            if (!visit<kFeatures>(scene_, rules_, side, rules_.longest(side), hit, path, sink)) return;
-        }
+        Path first;
+        const Sink sink = {*this, Side::light, draws};
+        if (start_light_subpath<kFeatures>(scene_, rules_, draws, sink, e, first)) follow(first, kInfinity, sink);
     }
 
     /// Of visit().
@@ -97,6 +77,7 @@ private:
 
         Draws draws() const { return subpath_draws; }
         void add(const Candidate<Mis>& c) const {
+            if (side == Side::light) return sample.splat(c, subpath_draws.shadow_seed(0));
             Rgb value;
             if (sample.weigh(c, value)) sample.sum_ += value;
         }
@@ -108,6 +89,20 @@ private:
         }
         bool valid(Rgb throughput) const { return sample.valid(throughput); }
     };
+
+    /// A ray that is invalid meets nothing, and is counted.
+    void follow(const Path& first, double tmax, const Sink& sink) {
+        const auto extend = [&](const Path& path, double at_most) -> Hit {
+            if (is_finite(path.origin) && is_finite(path.direction)) {
+                ++counts_.rays_extend;
+                const uint32_t seed = sink.subpath_draws.opacity_seed(path.depth);
+                return tracer_.closest({path.origin, at_most, path.direction, seed});
+            }
+            ++counts_.invalid.nan;
+            return {at_most, 0.0, 0.0, kNone};
+        };
+        trace_subpath<kFeatures>(scene_, rules_, sink.side, rules_.longest(sink.side), first, tmax, extend, sink);
+    }
 
     void eye_vertex(const Vertex<Mis>& v, const Path& path, const Draws& draws) {
         Candidate<Mis> c;

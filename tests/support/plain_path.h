@@ -2,8 +2,9 @@
 #pragma once
 
 #include "accel/embree_tracer.h"
-#include "stages/generate.h"
+#include "queues/wave.h"
 #include "transport/subpath/next_event.h"
+#include "transport/subpath/start.h"
 #include "transport/subpath/visit.h"
 
 namespace ambilux::test {
@@ -39,7 +40,7 @@ Rgb plain_sample(const SceneView& scene, const EmbreeTracer& tracer, const Rules
                  const PathSlot& p, const RngKey& key) {
     Rgb sample = {0, 0, 0};
     const Draws draws = {key};
-    const CameraSample camera = camera_sample<F>(scene, p, draws);
+    const CameraSample camera = camera_sample<F>(scene, p.x, p.y, draws);
     Subpath<UnidirectionalMis> path = start_eye<F>(scene, rules.mis, camera);
     const PlainSink<F> sink = {scene, tracer, rules, draws, sample};
     float tmax = camera.tmax;

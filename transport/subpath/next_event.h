@@ -8,6 +8,22 @@
 
 namespace ambilux {
 
+/// Completes the candidate of the emitter sample `light`, whose value is known: ratio, strategy and segment. `f`: how
+/// `z` scatters its light. False if nothing lies between.
+template <Features F, class Mis>
+AMBILUX_HD bool complete_next_event(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& z,
+                                    uint32_t depth, const EmitterSample& light, const BsdfValue& f, Candidate<Mis>& c) {
+    const float cos_z = fabsf(dot(z.point.ng, light.wi));
+    c.ratio = rules.counted(rules.mis.template next_event_ratio<F>(scene, z.sums, z.first, light, f, cos_z));
+    c.strategy = Strategy::make(1, depth + 1);
+    if (light.distance < kInfinity)
+        return set_segment(c, z, light.wi, light.p, ray_offset(light.p, light.p_error, light.ng), light.ng);
+    c.origin = offset_ray_origin(z.point.p, z.offset, z.point.ng, light.wi);
+    c.direction = light.wi;
+    c.tmax = kInfinity;
+    return true;
+}
+
 /// The vertex `z` of an eye subpath of `depth` segments and `throughput` up to there samples an emitter with `u`. False
 /// if that gives nothing.
 template <Features F, class Mis>
@@ -20,16 +36,7 @@ AMBILUX_HD bool next_event(const SceneView& scene, const Rules<Mis>& rules, cons
     if (is_zero(f.value)) return false;
     c.environment = is_environment<F>(scene, light.emitter);
     c.value = throughput * f.value * ((c.environment ? splat(1.0f) : light.radiance) / light.pdf_sa);
-    if (is_zero(c.value)) return false;
-    const float cos_z = fabsf(dot(z.point.ng, light.wi));
-    c.ratio = rules.counted(rules.mis.template next_event_ratio<F>(scene, z.sums, z.first, light, f, cos_z));
-    c.strategy = Strategy::make(1, depth + 1);
-    if (light.distance < kInfinity)
-        return set_segment(c, z, light.wi, light.p, ray_offset(light.p, light.p_error, light.ng), light.ng);
-    c.origin = offset_ray_origin(z.point.p, z.offset, z.point.ng, light.wi);
-    c.direction = light.wi;
-    c.tmax = kInfinity;
-    return true;
+    return !is_zero(c.value) && complete_next_event<F>(scene, rules, z, depth, light, f, c);
 }
 
 }  // namespace ambilux

@@ -3,6 +3,8 @@
 
 #include "transport/emitter/emission.h"
 #include "transport/sensor/camera.h"
+#include "transport/sensor/filter.h"
+#include "transport/subpath/camera_connection.h"
 #include "transport/subpath/roulette.h"
 
 namespace ambilux {
@@ -23,6 +25,13 @@ AMBILUX_HD Subpath<Mis> first_ray(Vec3f origin, Vec3f direction, Rgb throughput)
 
 }  // namespace detail
 
+/// Camera ray through pixel (x,y) of the crop.
+template <Features F>
+AMBILUX_HD CameraSample camera_sample(const SceneView& scene, uint32_t x, uint32_t y, const Draws& draws) {
+    const Vec4f u = draws.camera();
+    return sample_camera_ray<F>(scene.sensor, sample_film_position(scene, x, y, {u.x, u.y}), {u.z, u.w});
+}
+
 /// Eye subpath that begins with the camera ray `c`.
 template <Features F, class Mis>
 AMBILUX_HD Subpath<Mis> start_eye(const SceneView& scene, const Mis& mis, const CameraSample& c) {
@@ -42,11 +51,28 @@ AMBILUX_HD Subpath<Mis> start_light(const Mis& mis, const EmissionSample& e) {
     return path;
 }
 
-/// The emission with which a light subpath begins. False if it carries no light.
-template <Features F>
-AMBILUX_HD bool sample_start(const SceneView& scene, const Draws& draws, EmissionSample& e) {
-    const Vec4f direction = draws.emission_direction();
-    return sample_emission<F>(scene, draws.emission_position(), {direction.x, direction.y}, e);
+/// Eye subpath through pixel (x,y) of the crop. `tmax`: of its first ray.
+template <Features F, class Mis>
+AMBILUX_HD Subpath<Mis> start_eye_subpath(const SceneView& scene, const Mis& mis, uint32_t x, uint32_t y,
+                                          const Draws& draws, float& tmax) {
+    const CameraSample c = camera_sample<F>(scene, x, y, draws);
+    tmax = c.tmax;
+    return start_eye<F>(scene, mis, c);
+}
+
+/// Light subpath that begins with the emission `e`, which it draws. sink.valid(flux) may end it; sink.add(candidate) is
+/// called where the camera sees the emitter itself: of a key's first light subpath. False if there is no first ray;
+/// `path` is left alone if the emission carries no light.
+template <Features F, class Mis, class Sink>
+AMBILUX_HD bool start_light_subpath(const SceneView& scene, const Rules<Mis>& rules, const Draws& draws,
+                                    const Sink& sink, EmissionSample& e, Subpath<Mis>& path) {
+    const Vec4f u = draws.emission_direction();
+    if (!sample_emission<F>(scene, draws.emission_position(), {u.x, u.y}, e)) return false;
+    path = start_light(rules.mis, e);
+    if (!sink.valid(path.throughput)) return false;
+    Candidate<Mis> c;
+    if (draws.number == 0 && visible_emitter<F>(scene, rules, e, {u.z, u.w}, c)) sink.add(c);
+    return rules.max_depth >= 2;
 }
 
 }  // namespace ambilux

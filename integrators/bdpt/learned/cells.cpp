@@ -6,9 +6,9 @@
 
 #include "core/parallel.h"
 #include "integrators/feature_levels.h"
-#include "stages/generate.h"
 #include "transport/subpath/connection.h"
-#include "transport/subpath/visit.h"
+#include "transport/subpath/start.h"
+#include "transport/subpath/trace.h"
 
 namespace ambilux {
 namespace {
@@ -53,18 +53,15 @@ struct KeepEnds {
 
 /// Keys of light subpaths come after those of eye subpaths.
 template <Features F>
-bool start(const SceneView& scene, const Mis& mis, Side side, const Draws& draws, Subpath<Mis>& path) {
-    if (side == Side::light) {
-        EmissionSample e;
-        if (!sample_start<F>(scene, draws, e)) return false;
-        path = start_light(mis, e);
-        return true;
-    }
+bool start(const SceneView& scene, const Rules<Mis>& rules, Side side, const KeepEnds& sink, Subpath<Mis>& path) {
+    const Draws draws = sink.draws();
+    EmissionSample e;
+    if (side == Side::light) return start_light_subpath<F>(scene, rules, draws, sink, e, path);
     const Vec4f u = draws.camera(), pixel = draws.block(0x8000);
     const Sensor& s = scene.sensor;
     const Vec2f at = {float(s.crop_x) + pixel.x * float(s.crop_width),
                       float(s.crop_y) + pixel.y * float(s.crop_height)};
-    path = start_eye<F>(scene, mis, sample_camera_ray<F>(s, at, {u.z, u.w}));
+    path = start_eye<F>(scene, rules.mis, sample_camera_ray<F>(s, at, {u.z, u.w}));
     return true;
 }
 
@@ -75,14 +72,12 @@ Ends trace(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& r
         kSubpaths,
         [&](uint32_t i) {
             const Draws draws = {{seed, side == Side::light ? i : kSubpaths + i, 0, Stream::pilot}};
-            Subpath<Mis> path;
-            if (!start<F>(scene, rules.mis, side, draws, path)) return;
-            Hit hit;
-            do {
-                const Ray ray = {path.origin, kInfinity, path.direction, draws.opacity_seed(path.depth)};
-                tracer.closest<F>(scene, ray, hit);
-            } while (visit<F>(scene, rules, side, rules.longest(side), hit, path,
-                              KeepEnds{ends[i], i < kWhole, rules.max_depth, draws}));
+            const KeepEnds sink = {ends[i], i < kWhole, rules.max_depth, draws};
+            Subpath<Mis> first;
+            if (!start<F>(scene, rules, side, sink, first)) return;
+            trace_subpath<F>(
+                scene, rules, side, rules.longest(side), first, kInfinity,
+                [&](const auto& path, float tmax) { return end_of_ray<F>(scene, tracer, path, tmax, draws); }, sink);
         },
         64u);
     Ends all;

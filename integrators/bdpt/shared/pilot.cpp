@@ -5,7 +5,7 @@
 #include "core/parallel.h"
 #include "integrators/feature_levels.h"
 #include "transport/subpath/start.h"
-#include "transport/subpath/visit.h"
+#include "transport/subpath/trace.h"
 
 namespace ambilux {
 namespace {
@@ -34,16 +34,14 @@ double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, con
         kPilotSubpaths,
         [&](uint32_t i) {
             const Draws draws = {{seed, i, 0, Stream::pilot}};
-            EmissionSample e;
-            if (!sample_start<F>(scene, draws, e)) return;
-            Subpath<BidirectionalMis> path = start_light(rules.mis, e);
             uint32_t count = 0;
-            Hit hit;
-            do {
-                const Ray ray = {path.origin, kInfinity, path.direction, draws.opacity_seed(path.depth)};
-                tracer.closest<F>(scene, ray, hit);
-            } while (visit<F>(scene, rules, Side::light, rules.longest(Side::light), hit, path,
-                              CountVertices{count, rules.max_depth, draws}));
+            const CountVertices sink = {count, rules.max_depth, draws};
+            EmissionSample e;
+            Subpath<BidirectionalMis> first;
+            if (!start_light_subpath<F>(scene, rules, draws, sink, e, first)) return;
+            trace_subpath<F>(
+                scene, rules, Side::light, rules.longest(Side::light), first, kInfinity,
+                [&](const auto& path, float tmax) { return end_of_ray<F>(scene, tracer, path, tmax, draws); }, sink);
             vertices.fetch_add(count, std::memory_order_relaxed);
         },
         64u);

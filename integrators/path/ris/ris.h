@@ -79,19 +79,8 @@ private:
         const LightCandidate& y = reservoir.kept;
         const float scale = reservoir.sum / (float(settings.candidates) * reservoir.target);
         c.value = path.throughput * y.f.value * (y.light.radiance * scale);
-        const float cos_z = fabsf(dot(v.point.ng, y.light.wi));
-        c.ratio = rules.counted(rules.mis.template next_event_ratio<F>(scene, v.sums, v.first, y.light, y.f, cos_z));
-        c.strategy = Strategy::make(1, path.depth + 1);
         c.environment = false;  // its radiance is in the value
-        return !is_zero(c.value) && set_shadow_ray(v, y.light, c);
-    }
-    AMBILUX_HD static bool set_shadow_ray(const Vertex<Mis>& v, const EmitterSample& light, Candidate<Mis>& c) {
-        if (light.distance < kInfinity)
-            return set_segment(c, v, light.wi, light.p, ray_offset(light.p, light.p_error, light.ng), light.ng);
-        c.origin = offset_ray_origin(v.point.p, v.offset, v.point.ng, light.wi);
-        c.direction = light.wi;
-        c.tmax = kInfinity;
-        return true;
+        return !is_zero(c.value) && complete_next_event<F>(scene, rules, v, path.depth, y.light, y.f, c);
     }
 };
 
