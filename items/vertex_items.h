@@ -208,6 +208,32 @@ AMBILUX_HD BidirectionalEnd unpack_end(const SceneView& scene, const ConnectionV
                                                    item.throughput);
 }
 
+/// What pack_connection_vertex and unpack_end make of `v` together, for a host that connects it where it is made:
+/// rounded as in a queue, so that images do not depend on which stages are fused, with the BSDF that it has.
+template <Features F>
+AMBILUX_HD BidirectionalEnd rounded_end(const SceneView& scene, const BidirectionalVertex& v,
+                                        const Subpath<BidirectionalMis>& path) {
+    const auto rounded = [](Vec3f d) { return octahedral_decode(octahedral_encode(d)); };
+    const VertexBits bits = VertexBits::make(path.depth, v);
+    const Vec3f wi_world = -rounded(path.direction);
+    ScatteringParts parts = parts_of(v.scattering);
+    parts.ng = rounded(parts.ng);
+    parts.n = rounded(parts.n);
+    BidirectionalEnd end = {v, path.throughput, path.depth};
+    end.vertex.point.ng = parts.ng;
+    end.vertex.offset = bits.offset();
+    Scattering& s = end.vertex.scattering;
+    if (bits.template diffuse<F>()) {
+        end.throughput *= parts.inputs.colors[0];
+        parts.inputs.colors[0] = splat(1.0f);
+        s = diffuse_scattering(parts, wi_world);
+    } else {
+        s = frame_of<F>(scene, parts, wi_world);
+        s.bsdf = v.scattering.bsdf;
+    }
+    return end;
+}
+
 /// False if no light can pass between a vertex that is in a queue and `z`, of the other subpath.
 AMBILUX_HD bool may_connect(const ConnectionVertexFront& y, const BidirectionalVertex& z) {
     const Vec3f w = z.point.p - y.p;

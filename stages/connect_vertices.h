@@ -66,7 +66,7 @@ struct NextEventAndConnections {
         const auto lights = source.search(draws.key, path.depth, v, rules.max_depth, source.link(v, slot));
         uint32_t next = source.first(slot), found = lights.find(next);
         if (found == kNone) return;
-        const BidirectionalEnd end = unpack_end<F>(scene, pack_connection_vertex(v, path, slot));
+        const BidirectionalEnd end = rounded_end<F>(scene, v, path);
         for (; found != kNone; found = lights.find(next)) {
             record->count_item(path.depth);
             push_connection<F>(scene, rules, lights.draw(found), *state, draws, end, slot,

@@ -21,6 +21,34 @@ AMBILUX_HD Result visit_emitter(EmitterType type, Result otherwise, Op op) {
     return EmitterModels::visit<F.emitters>(uint32_t(type), otherwise, op);
 }
 
+namespace detail {
+
+template <Features F, LightStart Start>
+AMBILUX_HD constexpr bool starts_at(EmitterType type) {
+    return EmitterModels::contains<(F.emitters & kEmittersFrom<Start>)>(uint32_t(type));
+}
+
+}  // namespace detail
+
+/// Where light of an emitter starts that kernels of features F know. Comparisons, the commonest first.
+template <Features F>
+AMBILUX_HD constexpr LightStart light_start(EmitterType type) {
+    static_assert((kEmittersFrom<LightStart::surface> | kEmittersFrom<LightStart::point> |
+                   kEmittersFrom<LightStart::distant> | kEmittersFrom<LightStart::hidden_surface> |
+                   kEmittersFrom<LightStart::beam> | kEmittersFrom<LightStart::environment>) == EmitterModels::kAll,
+                  "a new LightStart needs a comparison here and its densities in transport/mis/bidirectional.h");
+    if (detail::starts_at<F, LightStart::surface>(type)) return LightStart::surface;
+    if (detail::starts_at<F, LightStart::point>(type)) return LightStart::point;
+    if (detail::starts_at<F, LightStart::distant>(type)) return LightStart::distant;
+    if (detail::starts_at<F, LightStart::hidden_surface>(type)) return LightStart::hidden_surface;
+    if (detail::starts_at<F, LightStart::beam>(type)) return LightStart::beam;
+    return LightStart::environment;
+}
+
+// The functions below compare types: one that starts where these do has to be added there.
+static_assert(kEmittersFrom<LightStart::surface> == bit(EmitterType::area));
+static_assert(kEmittersFrom<LightStart::environment> == (bit(EmitterType::constant) | bit(EmitterType::envmap)));
+
 /// sample_emitter_direct without the lookup of an environment map, which costs more than the rest: s.radiance is to be
 /// replaced by emitter_sample_radiance once it is clear that the sample matters. True does not promise light then.
 template <Features F>

@@ -110,22 +110,29 @@ AMBILUX_HD ScatteringParts parts_of(const Scattering& s) {
             s.bsdf.inputs};
 }
 
+/// All but the BSDF.
 template <Features F>
-AMBILUX_HD Scattering scattering_of(const SceneView& scene, const ScatteringParts& parts, Vec3f wi_world) {
+AMBILUX_HD Scattering frame_of(const SceneView& scene, const ScatteringParts& parts, Vec3f wi_world) {
     Scattering s;
     s.record = parts.record & 0x7fffffffu;
     s.flipped = parts.record >> 31;
-    const BsdfRecord& record = scene.bsdfs[s.record];
     Vec3f tangent = parts.tangent;
     s.map_rules = 0;
     if constexpr (F.map_rules) {
-        s.map_rules = record.map_rules;
+        s.map_rules = scene.bsdfs[s.record].map_rules;
         if (s.map_rules) unpack_base(parts.tangent, parts.n, s.base, tangent);
     }
     s.frame = {tangent, cross(s.flipped ? -parts.n : parts.n, tangent), parts.n};
     s.ng = parts.ng;
     s.wi_world = wi_world;
     s.wi = s.frame.to_local(wi_world);
+    return s;
+}
+
+template <Features F>
+AMBILUX_HD Scattering scattering_of(const SceneView& scene, const ScatteringParts& parts, Vec3f wi_world) {
+    Scattering s = frame_of<F>(scene, parts, wi_world);
+    const BsdfRecord& record = scene.bsdfs[s.record];
     if constexpr (F.textures)
         s.bsdf = resolve_bsdf<F>(scene, record, parts.inputs);
     else

@@ -27,9 +27,7 @@ struct ReplayConnections {
     float scale = 1.0f;
 
     BidirectionalEnd exact_end() const { return {vertex, path.throughput, path.depth}; }
-    BidirectionalEnd packed_end() const {
-        return unpack_end<kReplayFeatures>(eye.ctx.view, pack_connection_vertex(vertex, path, 0));
-    }
+    BidirectionalEnd packed_end() const { return rounded_end<kReplayFeatures>(eye.ctx.view, vertex, path); }
 
     /// The vertices that a search of the render's stages finds.
     void searched() const {

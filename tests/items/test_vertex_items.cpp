@@ -27,6 +27,19 @@ bool same_parameters(const Bsdf& a, const Bsdf& b) {
            });
 }
 
+/// To the bit, in all that connections ask of an end.
+void check_rounded(const BidirectionalEnd& a, const BidirectionalEnd& b) {
+    const auto same = [](Vec3f x, Vec3f y) { return std::memcmp(&x, &y, sizeof x) == 0; };
+    const BidirectionalVertex &v = a.vertex, &w = b.vertex;
+    const Scattering &s = v.scattering, &t = w.scattering;
+    REQUIRE((a.depth == b.depth && same(a.throughput, b.throughput) && v.first == w.first));
+    REQUIRE((same(v.point.p, w.point.p) && same(v.point.ng, w.point.ng) && v.offset == w.offset));
+    REQUIRE((v.sums.dvcm == w.sums.dvcm && v.sums.dvc == w.sums.dvc));
+    REQUIRE((same(s.frame.s, t.frame.s) && same(s.frame.t, t.frame.t) && same(s.frame.n, t.frame.n)));
+    REQUIRE((same(s.ng, t.ng) && same(s.wi_world, t.wi_world) && same(s.wi, t.wi) && s.map_rules == t.map_rules));
+    REQUIRE((same_parameters(s.bsdf, t.bsdf) && s.bsdf.coat == t.bsdf.coat));
+}
+
 using BidirectionalSubpath = Subpath<BidirectionalMis>;
 
 /// A ray along `d` of `depth` segments that brings `throughput`.
@@ -185,6 +198,8 @@ TEST_CASE("A vertex that comes from a queue is the one that went in, surface, fr
             const BidirectionalVertex back = vertex_of(unpack_end<kAllFeatures>(view, light), light.throughput);
             REQUIRE((back.offset >= v.offset && back.offset <= v.offset * (1.0f + 1.0f / 128.0f)));
             check(light, back, {1, 1, 1});
+            check_rounded(rounded_end<kAllFeatures>(view, v, path), unpack_end<kAllFeatures>(view, light));
+            if (!textured) check_rounded(rounded_end<kUntextured>(view, v, path), unpack_end<kUntextured>(view, light));
             if (!textured) check(light, vertex_of(unpack_end<kUntextured>(view, light), light.throughput), {1, 1, 1});
         }
         CHECK(vertices > 1000);

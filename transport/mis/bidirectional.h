@@ -138,16 +138,10 @@ struct BidirectionalMis {
     AMBILUX_HD MisSums first_light_sums(const SceneView& scene, const Path& path, Vec3f p, float cos_in) const {
         const SubpathStart& start = path.start;
         const Emitter& e = scene.emitters[start.emitter];
-        if constexpr (F.has_beams())
-            if (is_beam(e.type)) return {0.0f, 0.0f};  // no other strategy samples its light
         const float scale = start.inv_pdf / cos_in;
-        if constexpr (F.has(EmitterType::hidden_area))
-            if (e.type == EmitterType::hidden_area)
-                return {masked(kNextEventStrategies, e.pick_probability * length_squared(p - path.origin) * scale),
-                        0.0f};
         float next_event = 0.0f, hit = 0.0f;  // densities of the light vertex from the other side times scale
-        switch (e.type) {
-            case EmitterType::area: {
+        switch (light_start<F>(e.type)) {
+            case LightStart::surface: {
                 // Only the cosine at the emitter counts: a normal of that length along the ray has it.
                 SurfacePoint light{};
                 light.p = path.origin;
@@ -159,11 +153,13 @@ struct BidirectionalMis {
                 if constexpr (F.opacity) hit *= step_opacity(start.opacity_step);
                 break;
             }
-            case EmitterType::point:
-            case EmitterType::projector:
-            case EmitterType::spot: next_event = e.pick_probability * length_squared(p - path.origin) * scale; break;
-            case EmitterType::directional: next_event = e.pick_probability * scale; break;
-            default:
+            case LightStart::point:
+            case LightStart::hidden_surface:
+                next_event = e.pick_probability * length_squared(p - path.origin) * scale;
+                break;
+            case LightStart::distant: next_event = e.pick_probability * scale; break;
+            case LightStart::beam: break;  // no other strategy samples its light
+            case LightStart::environment:
                 next_event = start.direction * scale;  // samples its direction likewise
                 hit = scale;
         }
@@ -222,23 +218,20 @@ struct BidirectionalMis {
         if constexpr (F.opacity) pdf_hit_sa *= sample_opacity(scene, light);
         const float fewer = light.delta ? 0.0f : masked(kHitStrategies, term(pdf_hit_sa / light.pdf_sa));
         float more = cos_z;  // density of a light subpath to here over that of this sample
-        if constexpr (F.has(EmitterType::hidden_area))
-            if (e.type == EmitterType::hidden_area) {
-                more *= pdf_emission_direction<F>(scene, light.emitter, light.ng, -light.wi) / sqr(light.distance);
-                return term(ratio_behind(z, first, more, f.pdf_reverse_sa));
-            }
-        switch (e.type) {
-            case EmitterType::area:  // the cosine at the light is in both
+        switch (light_start<F>(e.type)) {
+            case LightStart::surface:  // the cosine at the light is in both
                 more *= e.pick_probability * pdf_emission_position<F>(scene, light.emitter, light.prim) * kInvPi /
                         light.pdf_sa;
                 break;
-            case EmitterType::point:
-            case EmitterType::projector:
-            case EmitterType::spot:
+            case LightStart::point:
+            case LightStart::hidden_surface:
                 more *= pdf_emission_direction<F>(scene, light.emitter, light.ng, -light.wi) / sqr(light.distance);
                 break;
-            default:  // light subpaths draw the direction as this sample was
+            case LightStart::distant:
+            case LightStart::environment:  // light subpaths draw the direction as this sample was
                 more *= pdf_emission_position<F>(scene, light.emitter, kNone);
+                break;
+            case LightStart::beam: break;  // has no such samples
         }
         return fewer + term(ratio_behind(z, first, more, f.pdf_reverse_sa));
     }

@@ -4,10 +4,20 @@
 // themselves, where a squared density overflows from lengths of 1e9 on.
 #pragma once
 
+#include <concepts>
+
 #include "core/math.h"
 #include "transport/mis/heuristic_name.h"
 
 namespace ambilux {
+
+/// What a member of Heuristics has. HeuristicList says which of it is missing.
+template <class H>
+concept Heuristic = requires(float x) {
+    { (H::kName) } -> std::same_as<const char* const&>;
+    { H::term(x) } -> std::same_as<float>;
+    { H::norm(x, x) } -> std::same_as<float>;
+};
 
 struct BalanceHeuristic {
     static constexpr const char* kName = "balance";
@@ -28,6 +38,11 @@ struct PowerHeuristic {
 /// All heuristics, in the order of MisHeuristic.
 template <class... H>
 struct HeuristicList {
+    static_assert((requires { (H::kName)[0]; } && ...), "a heuristic lacks kName, its name in settings");
+    static_assert((requires(float ratio) { H::term(ratio); } && ...), "a heuristic lacks term(ratio)");
+    static_assert((requires(float a) { H::norm(a, a); } && ...), "a heuristic lacks norm(a, b)");
+    static_assert((Heuristic<H> && ...), "kName is a const char*, term and norm take and return float");
+
     static constexpr const char* kNames[] = {H::kName...};
 
     AMBILUX_HD static float term(uint32_t which, float ratio) {

@@ -9,7 +9,11 @@
 namespace ambilux {
 
 /// False if no light can pass between two vertices, told from places and types of BSDFs: most pairs in a room face away
-/// from each other.
+/// from each other. Searches ask the same of the 32 bytes that a queue's vertex begins with (items/vertex_items.h), to
+/// load no more of these pairs. connection() asks again, since that answer is another one where they graze: it knows
+/// the searching vertex before a queue rounds it, compares signs instead of products, and streaming asks whether the
+/// eye vertex lies in the plane of the light vertex. So what decides is the same for all schedules, and for those that
+/// search nothing.
 template <class Mis>
 AMBILUX_HD bool may_connect(const Vertex<Mis>& y, const Vertex<Mis>& z) {
     const Vec3f w = z.point.p - y.point.p;
