@@ -43,9 +43,9 @@ template <class Function>
 void for_pushed_items(Function f) {
     f("PairItem", std::type_identity<PairItem>());
     f("ShadowItem", std::type_identity<ShadowItem>());
-    f("SubpathRay", std::type_identity<SubpathRay>());
-    f("SubpathHit", std::type_identity<SubpathHit>());
-    f("ConnectionVertex", std::type_identity<ConnectionVertex>());
+    f("SubpathRay", std::type_identity<SubpathRay<BidirectionalMis>>());
+    f("SubpathHit", std::type_identity<HitItem<SubpathRay<BidirectionalMis>>>());
+    f("ConnectionVertex", std::type_identity<ConnectionVertex<BidirectionalMis>>());
 }
 
 constexpr uint32_t kPushShares[] = {1, 2, 4, 16};  ///< one thread in so many pushes
@@ -54,7 +54,7 @@ constexpr Compaction kCompactions[] = {Compaction::atomic, Compaction::select, C
 /// Whether renders have queues of `Item` with this compaction: vertices are always appended.
 template <class Item>
 constexpr bool is_compacted(Compaction compaction) {
-    return compaction == Compaction::atomic || !std::is_same_v<Item, ConnectionVertex>;
+    return compaction == Compaction::atomic || !std::is_same_v<Item, ConnectionVertex<BidirectionalMis>>;
 }
 
 /// A word that looks like any other (Wellons' "lowbias32").

@@ -28,7 +28,7 @@ struct SceneItems {
 };
 
 PathRay ray_item(const Ray& ray, uint32_t path, uint32_t depth) {
-    return {ray.o, path, ray.d, SubpathBits::make(depth, false, 1.0f), splat(1.0f), 1.0f};
+    return {ray.o, path, ray.d, SubpathBits::make(depth, false, 1.0f), splat(1.0f), 1.0f, {}};
 }
 
 /// Of a film of the least power of two pixels a side that has `items` pixels, but for kMostSide, the first `items`.

@@ -1,6 +1,7 @@
 // Rays of subpaths and where they end, as queues keep them.
 #pragma once
 
+#include "items/packed_sums.h"
 #include "scene/ray.h"
 #include "transport/mis/bidirectional.h"
 #include "transport/mis/unidirectional.h"
@@ -22,9 +23,11 @@ struct SubpathBits {
 static_assert(kDepthBits + 1 <= 16, "depth and flag share the lower half of a word");
 
 /// A ray of a path tracer.
-struct PathRay {
+template <class Mis>
+struct PathRayOf {
+    using Sums = PackedSums<1, ray_words<typename Mis::Sums>()>;
     static constexpr uint32_t kPairedLanes = 2;
-    /// Of camera rays whose far plane has been looked at: throughput 1, and a density that nobody asks for.
+    /// Of camera rays whose far plane has been looked at: throughput 1, and a sum that nobody asks for.
     static constexpr uint32_t kCameraLane = 2;
 
     Vec3f origin;
@@ -32,11 +35,16 @@ struct PathRay {
     Vec3f direction;
     SubpathBits bits;  ///< depth counts this segment
     Rgb throughput;
-    float pdf_sa_or_tmax;  ///< density of the direction by BSDF sampling; of camera rays the distance of the far plane
+    float sum_or_tmax;  ///< word 0 of the sums; of camera rays the distance of the far plane
+    [[no_unique_address]] typename Sums::More more;
 };
+using PathRay = PathRayOf<UnidirectionalMis>;
 
 /// A ray of a bidirectional path tracer.
+template <class Mis>
 struct SubpathRay {
+    using Sums = PackedSums<3, ray_words<typename Mis::Sums>()>;
+    static_assert(std::is_same_v<typename Mis::Start, SubpathStart>);
     static constexpr uint32_t kPairedLanes = 4;
 
     Vec3f origin;
@@ -45,8 +53,11 @@ struct SubpathRay {
     SubpathBits bits;
     Rgb throughput;
     float tmax;              ///< of camera rays
-    float sums_or_start[2];  ///< MisSums; first ray of a light subpath: SubpathStart::inv_pdf and direction
-    uint32_t start[2];       ///< first rays: camera_distance (eye), prim, emitter and opacity (light) of SubpathStart
+    float sums_or_start[2];  ///< words 0 and 1 of the sums; first ray of a light subpath, which has no sums yet:
+                             ///< SubpathStart::inv_pdf and direction
+    uint32_t start;          ///< first rays: camera_distance (eye), prim (light) of SubpathStart
+    uint32_t sum_or_start;   ///< word 2 of the sums; first ray of a light subpath: emitter and opacity_step
+    [[no_unique_address]] typename Sums::More more;
 };
 
 /// Where a ray ended: the last lane of a HitItem.
@@ -69,7 +80,6 @@ struct HitItem {
     AMBILUX_HD Hit hit() const { return {0.0f, u, v, prim}; }
 };
 using PathHit = HitItem<PathRay>;
-using SubpathHit = HitItem<SubpathRay>;
 
 /// Where the ray of a slot ended (variant streaming).
 struct SlotHit {
@@ -78,61 +88,77 @@ struct SlotHit {
     uint32_t slot;
 };
 
-/// The items of a subpath that carries the sums of `Mis`.
-template <class Mis>
+/// How the subpaths of `Mis` become rays in queues.
+template <class Mis, bool kBidirectional = Mis::kBidirectional>
 struct SubpathItems;
 
-template <>
-struct SubpathItems<UnidirectionalMis> {
-    using Path = Subpath<UnidirectionalMis>;
-    using Ray = PathRay;
+template <class Mis>
+struct SubpathItems<Mis, false> {
+    using Path = Subpath<Mis>;
+    using Ray = PathRayOf<Mis>;
 
     /// `tmax`: of a camera ray.
     AMBILUX_HD static Ray pack(const Path& p, Side, uint32_t path, float tmax) {
+        const auto sums = Ray::Sums::pack(p.sums);
         return {p.origin,     path,
                 p.direction,  SubpathBits::make(p.depth, p.delta, p.roulette_scale),
-                p.throughput, p.depth == 1 ? tmax : p.sums.pdf_sa};
+                p.throughput, p.depth == 1 ? tmax : sums.word[0],
+                sums.more};
     }
     AMBILUX_HD static Path unpack(const Ray& r) {
-        return {
-            r.origin,      r.direction, r.throughput, {r.pdf_sa_or_tmax}, {}, r.bits.depth(), r.bits.roulette_scale(),
-            r.bits.delta()};
+        const typename Ray::Sums sums = {{r.sum_or_tmax}, r.more};
+        return {r.origin,
+                r.direction,
+                r.throughput,
+                sums.template unpack<typename Mis::Sums>(),
+                {},
+                r.bits.depth(),
+                r.bits.roulette_scale(),
+                r.bits.delta()};
     }
-    AMBILUX_HD static float tmax(const Ray& r) { return r.bits.depth() == 1 ? r.pdf_sa_or_tmax : kInfinity; }
+    AMBILUX_HD static float tmax(const Ray& r) { return r.bits.depth() == 1 ? r.sum_or_tmax : kInfinity; }
 };
 
-template <>
-struct SubpathItems<BidirectionalMis> {
-    using Path = Subpath<BidirectionalMis>;
-    using Ray = SubpathRay;
+template <class Mis>
+struct SubpathItems<Mis, true> {
+    using Path = Subpath<Mis>;
+    using Ray = SubpathRay<Mis>;
 
     AMBILUX_HD static Ray pack(const Path& p, Side side, uint32_t path, float tmax) {
+        const auto sums = Ray::Sums::pack(p.sums);
         Ray r = {p.origin,
                  path,
                  p.direction,
                  SubpathBits::make(p.depth, p.delta, p.roulette_scale),
                  p.throughput,
                  tmax,
-                 {p.sums.dvcm, p.sums.dvc},
-                 {0, 0}};
+                 {sums.word[0], sums.word[1]},
+                 0,
+                 float_bits(sums.word[2]),
+                 sums.more};
         if (p.depth == 1 && side == Side::light) {
             r.sums_or_start[0] = p.start.inv_pdf;
             r.sums_or_start[1] = p.start.direction;
-            r.start[0] = p.start.prim;
-            r.start[1] = p.start.emitter | p.start.opacity_step << kTicketBits;
+            r.start = p.start.prim;
+            r.sum_or_start = p.start.emitter | p.start.opacity_step << kTicketBits;
         } else if (p.depth == 1) {
-            r.start[0] = float_bits(p.start.camera_distance);
+            r.start = float_bits(p.start.camera_distance);
         }
         return r;
     }
     AMBILUX_HD static Path unpack(const Ray& r) {
+        const typename Ray::Sums sums = {{r.sums_or_start[0], r.sums_or_start[1], bits_float(r.sum_or_start)}, r.more};
         Path p{};
         p.origin = r.origin;
         p.direction = r.direction;
         p.throughput = r.throughput;
-        p.sums = {r.sums_or_start[0], r.sums_or_start[1]};
-        p.start = {r.sums_or_start[0],          r.sums_or_start[1],        r.start[0],
-                   r.start[1] & (kTickets - 1), r.start[1] >> kTicketBits, bits_float(r.start[0])};
+        p.sums = sums.template unpack<typename Mis::Sums>();
+        p.start = {r.sums_or_start[0],
+                   r.sums_or_start[1],
+                   r.start,
+                   r.sum_or_start & (kTickets - 1),
+                   r.sum_or_start >> kTicketBits,
+                   bits_float(r.start)};
         p.depth = r.bits.depth();
         p.roulette_scale = r.bits.roulette_scale();
         p.delta = r.bits.delta();
@@ -140,5 +166,10 @@ struct SubpathItems<BidirectionalMis> {
     }
     AMBILUX_HD static float tmax(const Ray& r) { return r.bits.depth() == 1 ? r.tmax : kInfinity; }
 };
+
+// A third sum has a place in a ray; docs/architecture.md lists the words that are free.
+static_assert(sizeof(PathRay) == 3 * 16 && sizeof(PathHit) == 4 * 16);
+static_assert(sizeof(SubpathRay<BidirectionalMis>) == 4 * 16 &&
+              sizeof(HitItem<SubpathRay<BidirectionalMis>>) == 5 * 16);
 
 }  // namespace ambilux

@@ -53,19 +53,22 @@ struct ConnectionVertexFront {
     Vec2f ng;       ///< octahedral map of Scattering::ng
     uint32_t link;  ///< of vertices that are kept over a wave: the one before it of the same subpath, or kNone; else
                     ///< the path
-    float dvc;
+    float sum1;     ///< word 1 of the sums
 };
 
 /// A vertex to be connected with one of the other subpath, in few bytes: kernels that do so wait for memory. Directions
 /// are octahedral maps in whole floats, right to 5e-7.
+template <class Mis>
 struct ConnectionVertex {
+    using Sums = PackedSums<2, vertex_words<typename Mis::Sums>()>;
     static constexpr uint32_t kPairedLanes = 6;
-    static constexpr uint32_t kDiffuseLanes = 4;  ///< what there is of a diffuse one
+    static constexpr uint32_t kDiffuseLanes = 4 + Sums::More::kLanes;  ///< what there is of a diffuse one
 
     ConnectionVertexFront front;
     Rgb throughput;  ///< of a diffuse vertex: times its reflectance
-    float dvcm;
-    Vec2f d, n;     ///< of the ray that met it; frame.n
+    float sum0;
+    Vec2f d, n;  ///< of the ray that met it; frame.n
+    [[no_unique_address]] typename Sums::More more;
     Vec3f tangent;  ///< ScatteringParts
     uint32_t record;
     Rgb color0;  ///< BsdfInputs, where there are textures
@@ -76,7 +79,7 @@ struct ConnectionVertex {
     /// Lanes that kernels of features F use.
     template <Features F>
     static constexpr uint32_t lanes() {
-        return F.bsdfs == bit(BsdfType::diffuse) ? kDiffuseLanes : F.textures ? 7 : 5;
+        return F.bsdfs == bit(BsdfType::diffuse) ? kDiffuseLanes : kDiffuseLanes + (F.textures ? 3 : 1);
     }
     AMBILUX_HD VertexBits bits() const { return front.bits; }
     AMBILUX_HD uint32_t path() const { return front.link; }
@@ -84,22 +87,25 @@ struct ConnectionVertex {
 
 /// A vertex for a stage that connects it with emitters or the camera where shade does not: as it is, so that images do
 /// not depend on that.
+template <class Mis>
 struct VertexItem {
+    using Sums = PackedSums<2, vertex_words<typename Mis::Sums>()>;
     static constexpr uint32_t kPairedLanes = 8;
-    static constexpr uint32_t kDiffuseLanes = 6;
+    static constexpr uint32_t kDiffuseLanes = 6 + Sums::More::kLanes;
 
     Vec3f p;
     VertexBits head;
     Vec3f d;
     uint32_t path;
     Rgb throughput;
-    float dvcm;
+    float sum0;
     Vec3f ng;
-    float dvc;
+    float sum1;
     Vec3f n;
     float offset;
     Rgb color0;  ///< BsdfInputs
     uint32_t record;
+    [[no_unique_address]] typename Sums::More more;
     Vec3f tangent;
     float number0;
     Rgb color1;
@@ -107,7 +113,7 @@ struct VertexItem {
 
     template <Features F>
     static constexpr uint32_t lanes() {
-        return F.bsdfs == bit(BsdfType::diffuse) ? kDiffuseLanes : F.textures ? 8 : 7;
+        return F.bsdfs == bit(BsdfType::diffuse) ? kDiffuseLanes : kDiffuseLanes + (F.textures ? 2 : 1);
     }
     AMBILUX_HD VertexBits bits() const { return head; }
 };
@@ -120,23 +126,17 @@ AMBILUX_HD uint32_t lanes_of(const Item& item) {
 
 namespace detail {
 
-AMBILUX_HD MisSums packed_sums(MisSums sums) { return sums; }
-AMBILUX_HD MisSums packed_sums(UnidirectionalMis::Sums) {
-    return {0.0f, 0.0f};
-}  // nothing is asked of them at a vertex
-AMBILUX_HD void unpack_sums(MisSums packed, MisSums& sums) { sums = packed; }
-AMBILUX_HD void unpack_sums(MisSums, UnidirectionalMis::Sums&) {}
-
 template <Features F, class Mis>
 AMBILUX_HD SubpathEnd<Mis> unpack_end(const SceneView& scene, Vec3f p, VertexBits bits, float offset,
-                                      const ScatteringParts& parts, Vec3f d, MisSums sums, Rgb throughput) {
+                                      const ScatteringParts& parts, Vec3f d, const typename Mis::Sums& sums,
+                                      Rgb throughput) {
     SubpathEnd<Mis> end = {{}, throughput, bits.depth()};
     Vertex<Mis>& v = end.vertex;
     v.point.p = p;
     v.point.ng = parts.ng;
     v.offset = offset;
     v.scattering = bits.template diffuse<F>() ? diffuse_scattering(parts, -d) : scattering_of<F>(scene, parts, -d);
-    unpack_sums(sums, v.sums);
+    v.sums = sums;
     v.first = end.depth == 1;
     return end;
 }
@@ -145,21 +145,22 @@ AMBILUX_HD SubpathEnd<Mis> unpack_end(const SceneView& scene, Vec3f p, VertexBit
 
 /// The vertex `v` that the ray of `path` met; `slot`: of the subpath.
 template <class Mis>
-AMBILUX_HD VertexItem pack_vertex(const Vertex<Mis>& v, const Subpath<Mis>& path, uint32_t slot) {
+AMBILUX_HD VertexItem<Mis> pack_vertex(const Vertex<Mis>& v, const Subpath<Mis>& path, uint32_t slot) {
     const ScatteringParts s = parts_of(v.scattering);
-    const MisSums sums = detail::packed_sums(v.sums);
+    const auto sums = VertexItem<Mis>::Sums::pack(v.sums);
     return {v.point.p,
             VertexBits::make(path.depth, v),
             path.direction,
             slot,
             path.throughput,
-            sums.dvcm,
+            sums.word[0],
             s.ng,
-            sums.dvc,
+            sums.word[1],
             s.n,
             v.offset,
             s.inputs.colors[0],
             s.record,
+            sums.more,
             s.tangent,
             s.inputs.numbers[0],
             s.inputs.colors[1],
@@ -167,16 +168,18 @@ AMBILUX_HD VertexItem pack_vertex(const Vertex<Mis>& v, const Subpath<Mis>& path
 }
 
 /// The vertex `v` that the ray of `path` met. `link`: ConnectionVertexFront.
-AMBILUX_HD ConnectionVertex pack_connection_vertex(const BidirectionalVertex& v, const Subpath<BidirectionalMis>& path,
-                                                   uint32_t link) {
+template <class Mis>
+AMBILUX_HD ConnectionVertex<Mis> pack_connection_vertex(const Vertex<Mis>& v, const Subpath<Mis>& path, uint32_t link) {
     const ScatteringParts s = parts_of(v.scattering);
+    const auto sums = ConnectionVertex<Mis>::Sums::pack(v.sums);
     Rgb throughput = path.throughput;
     if (v.scattering.plain_diffuse()) throughput *= s.inputs.colors[0];
-    return {{v.point.p, VertexBits::make(path.depth, v), octahedral_encode(s.ng), link, v.sums.dvc},
+    return {{v.point.p, VertexBits::make(path.depth, v), octahedral_encode(s.ng), link, sums.word[1]},
             throughput,
-            v.sums.dvcm,
+            sums.word[0],
             octahedral_encode(path.direction),
             octahedral_encode(s.n),
+            sums.more,
             s.tangent,
             s.record,
             s.inputs.colors[0],
@@ -187,39 +190,40 @@ AMBILUX_HD ConnectionVertex pack_connection_vertex(const BidirectionalVertex& v,
 
 /// The end of a subpath that was packed; of its point p and ng only, and of diffuse ones no tangents.
 template <Features F, class Mis>
-AMBILUX_HD SubpathEnd<Mis> unpack_end(const SceneView& scene, const VertexItem& item) {
+AMBILUX_HD SubpathEnd<Mis> unpack_end(const SceneView& scene, const VertexItem<Mis>& item) {
+    const typename VertexItem<Mis>::Sums sums = {{item.sum0, item.sum1}, item.more};
     return detail::unpack_end<F, Mis>(
         scene, item.p, item.head, item.offset,
         {item.ng, item.n, item.tangent, item.record, {{item.color0, item.color1}, {item.number0, item.number1}}},
-        item.d, {item.dvcm, item.dvc}, item.throughput);
+        item.d, sums.template unpack<typename Mis::Sums>(), item.throughput);
 }
 /// The same, with an offset that is rounded up; diffuse ones have reflectance 1.
-template <Features F>
-AMBILUX_HD BidirectionalEnd unpack_end(const SceneView& scene, const ConnectionVertex& item) {
+template <Features F, class Mis>
+AMBILUX_HD SubpathEnd<Mis> unpack_end(const SceneView& scene, const ConnectionVertex<Mis>& item) {
     const VertexBits bits = item.front.bits;
     const Rgb color = bits.template diffuse<F>() ? splat(1.0f) : item.color0;
-    return detail::unpack_end<F, BidirectionalMis>(scene, item.front.p, bits, bits.offset(),
-                                                   {octahedral_decode(item.front.ng),
-                                                    octahedral_decode(item.n),
-                                                    item.tangent,
-                                                    item.record,
-                                                    {{color, item.color1}, {item.number0, item.number1}}},
-                                                   octahedral_decode(item.d), {item.dvcm, item.front.dvc},
-                                                   item.throughput);
+    const typename ConnectionVertex<Mis>::Sums sums = {{item.sum0, item.front.sum1}, item.more};
+    return detail::unpack_end<F, Mis>(scene, item.front.p, bits, bits.offset(),
+                                      {octahedral_decode(item.front.ng),
+                                       octahedral_decode(item.n),
+                                       item.tangent,
+                                       item.record,
+                                       {{color, item.color1}, {item.number0, item.number1}}},
+                                      octahedral_decode(item.d), sums.template unpack<typename Mis::Sums>(),
+                                      item.throughput);
 }
 
 /// What pack_connection_vertex and unpack_end make of `v` together, for a host that connects it where it is made:
 /// rounded as in a queue, so that images do not depend on which stages are fused, with the BSDF that it has.
-template <Features F>
-AMBILUX_HD BidirectionalEnd rounded_end(const SceneView& scene, const BidirectionalVertex& v,
-                                        const Subpath<BidirectionalMis>& path) {
+template <Features F, class Mis>
+AMBILUX_HD SubpathEnd<Mis> rounded_end(const SceneView& scene, const Vertex<Mis>& v, const Subpath<Mis>& path) {
     const auto rounded = [](Vec3f d) { return octahedral_decode(octahedral_encode(d)); };
     const VertexBits bits = VertexBits::make(path.depth, v);
     const Vec3f wi_world = -rounded(path.direction);
     ScatteringParts parts = parts_of(v.scattering);
     parts.ng = rounded(parts.ng);
     parts.n = rounded(parts.n);
-    BidirectionalEnd end = {v, path.throughput, path.depth};
+    SubpathEnd<Mis> end = {v, path.throughput, path.depth};
     end.vertex.point.ng = parts.ng;
     end.vertex.offset = bits.offset();
     Scattering& s = end.vertex.scattering;
@@ -235,9 +239,14 @@ AMBILUX_HD BidirectionalEnd rounded_end(const SceneView& scene, const Bidirectio
 }
 
 /// False if no light can pass between a vertex that is in a queue and `z`, of the other subpath.
-AMBILUX_HD bool may_connect(const ConnectionVertexFront& y, const BidirectionalVertex& z) {
+template <class Mis>
+AMBILUX_HD bool may_connect(const ConnectionVertexFront& y, const Vertex<Mis>& z) {
     const Vec3f w = z.point.p - y.p;
     return y.bits.reaches(octahedral_direction(y.ng), w) && may_scatter(z.scattering, -w) && !in_plane(z, w);
 }
+
+// A third sum of a vertex begins a lane, whose other words are free (docs/architecture.md).
+static_assert(sizeof(ConnectionVertexFront) == 2 * 16 && sizeof(ConnectionVertex<BidirectionalMis>) == 7 * 16);
+static_assert(sizeof(VertexItem<BidirectionalMis>) == 8 * 16 && sizeof(VertexItem<UnidirectionalMis>) == 8 * 16);
 
 }  // namespace ambilux

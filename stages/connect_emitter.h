@@ -30,14 +30,14 @@ struct ConnectEmitter {
     SceneView scene;
     Wave wave;
     Rules<Mis> rules;
-    Queue<VertexItem> vertices;
+    Queue<VertexItem<Mis>> vertices;
     AtVertex connect;
     StageRecord* record;
 
-    const Queue<VertexItem>& items() const { return vertices; }
+    const Queue<VertexItem<Mis>>& items() const { return vertices; }
     AMBILUX_HD void operator()(uint32_t i) const {
-        const VertexItem item = load_vertex<F>(vertices, i);
-        const SubpathEnd<Mis> end = unpack_end<F, Mis>(scene, item);
+        const VertexItem<Mis> item = load_vertex<F>(vertices, i);
+        const SubpathEnd<Mis> end = unpack_end<F>(scene, item);
         Subpath<Mis> path{};
         path.direction = item.d;
         path.throughput = end.throughput;

@@ -13,13 +13,13 @@ namespace ambilux {
 
 /// The eye end `z` of `slot` and light vertex `light`, which lies at `place`. `Out` takes candidates. The scale of the
 /// `Draw` is asked for last: until then no register keeps it.
-template <Features F, class Draw, class Out>
-AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Rules<BidirectionalMis>& rules, const Draw& draw,
-                                     const WaveState& state, const Draws& draws, const BidirectionalEnd& z,
-                                     uint32_t slot, const ConnectionVertex& light, uint32_t place, bool seeds,
+template <Features F, class Mis, class Draw, class Out>
+AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Rules<Mis>& rules, const Draw& draw,
+                                     const WaveState& state, const Draws& draws, const SubpathEnd<Mis>& z,
+                                     uint32_t slot, const ConnectionVertex<Mis>& light, uint32_t place, bool seeds,
                                      const Out& candidates, StageRecord* record) {
-    const BidirectionalEnd y = unpack_end<F>(scene, light);
-    Candidate<BidirectionalMis> c;
+    const SubpathEnd<Mis> y = unpack_end<F>(scene, light);
+    Candidate<Mis> c;
     if (!connection<F>(rules, z, y, c)) return;
     if constexpr (requires { draw.mark(c, z.throughput, state); }) draw.mark(c, z.throughput, state);
     c.value *= draw.scale(state);
@@ -29,15 +29,17 @@ AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Rules<Bidirec
 }
 
 /// At an eye vertex: next event estimation, and the first pair for connect_vertices.
-template <Features F, class Out, class Source = LightVertexSource>
+template <Features F, class Out, class Source>
 struct NextEventAndPair {
-    NextEvent<F, BidirectionalMis, Out> next_event;
+    using Mis = typename Source::Mis;
+
+    NextEvent<F, Mis, Out> next_event;
     Source source;
-    Queue<ConnectionVertex> eye_vertices;
+    Queue<ConnectionVertex<Mis>> eye_vertices;
     Queue<PairItem> pairs;
 
-    AMBILUX_HD void at(const SceneView& scene, const Rules<BidirectionalMis>& rules, const BidirectionalVertex& v,
-                       const Subpath<BidirectionalMis>& path, uint32_t slot, const Draws& draws) const {
+    AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
+                       uint32_t slot, const Draws& draws) const {
         next_event.at(scene, rules, v, path, slot, draws);
         if (!rules.connect) return;
         const Warp warp;
@@ -51,22 +53,24 @@ struct NextEventAndPair {
 };
 
 /// At an eye vertex of a host: next event estimation and all pairs, in the same order and of the same vertices.
-template <Features F, class Out, class Source = LightVertexSource>
+template <Features F, class Out, class Source>
 struct NextEventAndConnections {
-    Clocked<NextEvent<F, BidirectionalMis, Out>> next_event;
+    using Mis = typename Source::Mis;
+
+    Clocked<NextEvent<F, Mis, Out>> next_event;
     Source source;
     const WaveState* state;
     StageRecord* record;  ///< of connect_vertices
 
-    AMBILUX_HD void at(const SceneView& scene, const Rules<BidirectionalMis>& rules, const BidirectionalVertex& v,
-                       const Subpath<BidirectionalMis>& path, uint32_t slot, const Draws& draws) const {
+    AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
+                       uint32_t slot, const Draws& draws) const {
         if (rules.next_event) next_event.at(scene, rules, v, path, slot, draws);
         if (!rules.connect) return;
         const FusedClock clock(record, true);
         const auto lights = source.search(draws.key, path.depth, v, rules.max_depth, source.link(v, slot));
         uint32_t next = source.first(slot), found = lights.find(next);
         if (found == kNone) return;
-        const BidirectionalEnd end = rounded_end<F>(scene, v, path);
+        const SubpathEnd<Mis> end = rounded_end<F>(scene, v, path);
         for (; found != kNone; found = lights.find(next)) {
             record->count_item(path.depth);
             push_connection<F>(scene, rules, lights.draw(found), *state, draws, end, slot,
@@ -77,15 +81,16 @@ struct NextEventAndConnections {
 };
 
 /// The pairs of an eye vertex one after the other. Pairs for whose candidates there is no capacity are deferred.
-template <Features F, class Out, class Source = LightVertexSource>
+template <Features F, class Out, class Source>
 struct ConnectVertices {
     static constexpr const char* kName = "connect_vertices";
+    using Mis = typename Source::Mis;
 
     SceneView scene;
     Wave wave;
-    Rules<BidirectionalMis> rules;
+    Rules<Mis> rules;
     Queue<PairItem> pairs, deferred;
-    Queue<ConnectionVertex> vertices;
+    Queue<ConnectionVertex<Mis>> vertices;
     Source source;
     Out candidates;
     uint32_t candidate_capacity;
@@ -131,9 +136,9 @@ struct ConnectVertices {
     AMBILUX_HD bool step(PairItem& pair, LoopCount& count, const Sink& out) const {
         const uint32_t place = pair.light;
         // Before anything waits for the eye vertex.
-        const ConnectionVertex light = load_vertex<F>(source.vertices, place);
-        const ConnectionVertex eye = load_vertex<F>(vertices, pair.vertex);
-        const BidirectionalEnd z = unpack_end<F>(scene, eye);
+        const ConnectionVertex<Mis> light = load_vertex<F>(source.vertices, place);
+        const ConnectionVertex<Mis> eye = load_vertex<F>(vertices, pair.vertex);
+        const SubpathEnd<Mis> z = unpack_end<F>(scene, eye);
         const Draws draws = {wave.key(pair.path)};
         const Warp warp;
         const auto search = source.search(draws.key, z.depth, z.vertex, rules.max_depth, eye.front.link);
@@ -157,11 +162,11 @@ private:
 
 /// connect_vertices and occlude as one stage: for structures so small that tracing a shadow ray takes less than the
 /// memory that it would go through. A thread adds what all pairs of a vertex bring to the sample of its path at once.
-template <Features F, class Tracer, class Shadows>
+template <Features F, class Tracer, class Shadows, class Source>
 struct ConnectAndOcclude {
     static constexpr const char* kName = "connect_vertices";
 
-    ConnectVertices<F, WeighCandidates<Shadows>> connect;
+    ConnectVertices<F, WeighCandidates<Shadows>, Source> connect;
     Occlude<F, Tracer, Accumulate> occlude;
     StageRecord* record;
 

@@ -9,7 +9,7 @@ namespace ambilux {
 /// Vertices wait in a queue for the stage that connects them.
 template <Features F, class Mis>
 struct QueueVertex {
-    Queue<VertexItem> vertices;
+    Queue<VertexItem<Mis>> vertices;
 
     AMBILUX_HD void at(const SceneView&, const Rules<Mis>&, const Vertex<Mis>& v, const Subpath<Mis>& path,
                        uint32_t slot, const Draws&) const {

@@ -51,14 +51,15 @@ struct LightStartSink {
 };
 
 /// A light subpath in each slot that has one in this round. `Out` takes splat candidates.
-template <Features F, class Out>
+template <Features F, class Mis, class Out>
 struct GenerateLight {
     static constexpr const char* kName = "light_generate";
+    using Items = SubpathItems<Mis>;
 
     SceneView scene;
     Wave wave;
-    Rules<BidirectionalMis> rules;
-    Queue<SubpathRay> rays;
+    Rules<Mis> rules;
+    Queue<typename Items::Ray> rays;
     Out splats;
     uint32_t* last_vertex;  ///< per slot: the last vertex of its light subpath; null if nobody asks
     StageRecord* record;
@@ -70,9 +71,9 @@ struct GenerateLight {
         if (round >= light_subpaths_of(slot, per_tile) || !wave.locate(slot).active) return;
         const Draws draws = {wave.key(slot, Stream::light)};
         EmissionSample e;
-        Subpath<BidirectionalMis> path;
+        Subpath<Mis> path;
         if (start_light_subpath<F>(scene, rules, draws, LightStartSink<F, Out>{splats, slot, draws, record}, e, path))
-            rays.push(SubpathItems<BidirectionalMis>::pack(path, Side::light, slot, kInfinity));
+            rays.push(Items::pack(path, Side::light, slot, kInfinity));
     }
 };
 

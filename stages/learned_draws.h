@@ -57,9 +57,10 @@ struct LearnedSearch;
 
 /// LightVertexSource.
 struct LearnedSource {
+    using Mis = BidirectionalMis;
     using Learn = LearnDraws;
 
-    LightVertices vertices;
+    LightVertices<Mis> vertices;
     uint32_t draws;
     ClusteredVertices by_cluster;
     DrawTable table;

@@ -8,15 +8,15 @@
 namespace ambilux {
 
 /// t = 1 at a light vertex. `Out` takes splat candidates.
-template <Features F, class Out>
+template <Features F, class Mis, class Out>
 struct ConnectCamera {
     Out splats;
     StageRecord* record;
 
-    AMBILUX_HD void at(const SceneView& scene, const Rules<BidirectionalMis>& rules, const BidirectionalVertex& y,
-                       const Subpath<BidirectionalMis>& path, uint32_t slot, const Draws& draws) const {
+    AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& y, const Subpath<Mis>& path,
+                       uint32_t slot, const Draws& draws) const {
         const Vec4f u = draws.lens(path.depth);
-        Candidate<BidirectionalMis> c;
+        Candidate<Mis> c;
         if (camera_connection<F>(scene, rules, y, path.throughput, path.depth, {u.x, u.y}, c) &&
             is_valid_radiance(c.value, record))
             splats.push(pack_candidate(c, slot, F.opacity ? draws.shadow_seed(path.depth) : 0));
@@ -24,22 +24,22 @@ struct ConnectCamera {
 };
 
 /// The same over vertices that wait in a queue.
-template <Features F, class Out>
+template <Features F, class Mis, class Out>
 struct ConnectCameraQueue {
     static constexpr const char* kName = "connect_camera";
 
     SceneView scene;
     Wave wave;
-    Rules<BidirectionalMis> rules;
-    Queue<VertexItem> vertices;
-    ConnectCamera<F, Out> connect;
+    Rules<Mis> rules;
+    Queue<VertexItem<Mis>> vertices;
+    ConnectCamera<F, Mis, Out> connect;
     StageRecord* record;
 
-    const Queue<VertexItem>& items() const { return vertices; }
+    const Queue<VertexItem<Mis>>& items() const { return vertices; }
     AMBILUX_HD void operator()(uint32_t i) const {
-        const VertexItem item = load_vertex<F>(vertices, i);
-        const BidirectionalEnd end = unpack_end<F, BidirectionalMis>(scene, item);
-        Subpath<BidirectionalMis> path{};
+        const VertexItem<Mis> item = load_vertex<F>(vertices, i);
+        const SubpathEnd<Mis> end = unpack_end<F>(scene, item);
+        Subpath<Mis> path{};
         path.throughput = end.throughput;
         path.depth = end.depth;
         connect.at(scene, rules, end.vertex, path, item.path, {wave.key(item.path, Stream::light)});
@@ -47,39 +47,39 @@ struct ConnectCameraQueue {
 };
 
 /// Kept for connections, connected with the camera by `AtVertex`, and left again.
-template <Features F, class AtVertex>
+template <Features F, class Mis, class AtVertex>
 struct LightVertex {
     static constexpr const char* kName = "light_shade";
-    using Items = SubpathItems<BidirectionalMis>;
+    using Items = SubpathItems<Mis>;
+    using RayItem = typename Items::Ray;
 
     SceneView scene;
     Wave wave;
-    Rules<BidirectionalMis> rules;
-    Queue<SubpathHit> hits;
-    Queue<SubpathRay> rays;
-    LightVertices vertices;  ///< all vertices of all light subpaths of the wave
-    uint32_t* last_vertex;   ///< per slot: to link the vertices of a subpath; null if nobody asks
+    Rules<Mis> rules;
+    Queue<HitItem<RayItem>> hits;
+    Queue<RayItem> rays;
+    LightVertices<Mis> vertices;  ///< all vertices of all light subpaths of the wave
+    uint32_t* last_vertex;        ///< per slot: to link the vertices of a subpath; null if nobody asks
     AtVertex camera;
     StageRecord* record;
 
-    const Queue<SubpathHit>& items() const { return hits; }
+    const Queue<HitItem<RayItem>>& items() const { return hits; }
     AMBILUX_HD bool skips_misses() const { return true; }
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        SubpathRay next;
+        RayItem next;
         if (step(hit(i), next)) rays.push(next);
     }
-    AMBILUX_HD SubpathHit hit(uint32_t i) const { return hits.load(i); }
+    AMBILUX_HD HitItem<RayItem> hit(uint32_t i) const { return hits.load(i); }
 
     struct Sink {
         const LightVertex& stage;
         uint32_t slot;
 
         AMBILUX_HD Draws draws() const { return {stage.wave.key(slot, Stream::light)}; }
-        AMBILUX_HD void add(const Candidate<BidirectionalMis>&) const {}
-        AMBILUX_HD void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& path,
-                           const Draws& draws) const {
-            const Rules<BidirectionalMis>& rules = stage.rules;
+        AMBILUX_HD void add(const Candidate<Mis>&) const {}
+        AMBILUX_HD void at(const Vertex<Mis>& y, const Subpath<Mis>& path, const Draws& draws) const {
+            const Rules<Mis>& rules = stage.rules;
             if (rules.splat && rules.wants(path.depth + 1, 1))
                 stage.camera.at(stage.scene, rules, y, path, slot, draws);
             if (!rules.connect || path.depth + 2 > rules.max_depth) return;
@@ -91,8 +91,8 @@ struct LightVertex {
     };
 
     /// True if the subpath goes on with the ray `next`.
-    AMBILUX_HD bool step(const SubpathHit& h, SubpathRay& next) const {
-        Subpath<BidirectionalMis> path = Items::unpack(h.ray);
+    AMBILUX_HD bool step(const HitItem<RayItem>& h, RayItem& next) const {
+        Subpath<Mis> path = Items::unpack(h.ray);
         if (!visit<F>(scene, rules, Side::light, rules.longest(Side::light), h.hit(), path, Sink{*this, h.ray.path}))
             return false;
         next = Items::pack(path, Side::light, h.ray.path, kInfinity);

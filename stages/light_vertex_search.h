@@ -9,13 +9,16 @@
 
 namespace ambilux {
 
+template <class Mis>
 struct LightVertexSearch;
 
 /// The light vertices of a wave.
+template <class MisModel>
 struct LightVertexSource {
+    using Mis = MisModel;
     using Learn = LearnNothing;
 
-    LightVertices vertices;
+    LightVertices<Mis> vertices;
     const uint32_t* last_vertex;  ///< per slot: of its light subpath. Not used by draws
     uint32_t draws;               ///< of an eye vertex from all vertices; 0: those of the light subpath of its slot
     bool coherent;                ///< lanes of a warp draw vertices that lie together; else each draws by itself
@@ -26,9 +29,11 @@ struct LightVertexSource {
     AMBILUX_HD bool from_cache() const { return draws > 0; }
     static LearnNothing learn() { return {}; }
     /// What the queue of eye vertices keeps of the vertex `v` of a slot (ConnectionVertexFront::link).
-    AMBILUX_HD static uint32_t link(const BidirectionalVertex&, uint32_t slot) { return slot; }
-    AMBILUX_HD LightVertexSearch search(const RngKey& key, uint32_t depth, const BidirectionalVertex& z,
-                                        uint32_t max_depth, uint32_t link) const;
+    AMBILUX_HD static uint32_t link(const Vertex<Mis>&, uint32_t slot) { return slot; }
+    AMBILUX_HD LightVertexSearch<Mis> search(const RngKey& key, uint32_t depth, const Vertex<Mis>& z,
+                                             uint32_t max_depth, uint32_t) const {
+        return {*this, key, depth, z, max_depth};
+    }
 
     /// What a connection is worth: M vertices of N subpaths are in a cache, and k draws estimate the sum over a
     /// subpath's vertices by M / (N k) times theirs.
@@ -51,15 +56,16 @@ AMBILUX_HD uint32_t drawn_vertex(RngKey key, uint32_t depth, uint32_t draw, uint
 }
 
 /// Goes through the light vertices that an eye vertex may be connected with.
+template <class Mis>
 struct LightVertexSearch {
-    const LightVertexSource& source;
+    const LightVertexSource<Mis>& source;
     const RngKey& key;  ///< of the eye subpath
     uint32_t depth;     ///< of the eye vertex `z`
-    const BidirectionalVertex& z;
+    const Vertex<Mis>& z;
     uint32_t max_depth;  ///< of a path
 
     /// How the light vertex at `place` was found.
-    AMBILUX_HD const LightVertexSource& draw([[maybe_unused]] uint32_t place) const { return source; }
+    AMBILUX_HD const LightVertexSource<Mis>& draw([[maybe_unused]] uint32_t place) const { return source; }
 
     /// The next one, kNone if there is none, from `next` on, which goes on: a vertex of the light subpath of the same
     /// slot, or, over a cache, the number of draws that are left.
@@ -80,10 +86,5 @@ struct LightVertexSearch {
         return kNone;
     }
 };
-
-AMBILUX_HD LightVertexSearch LightVertexSource::search(const RngKey& key, uint32_t depth, const BidirectionalVertex& z,
-                                                       uint32_t max_depth, uint32_t) const {
-    return {*this, key, depth, z, max_depth};
-}
 
 }  // namespace ambilux

@@ -22,18 +22,18 @@ struct MegakernelRecords {
         *connect_vertices, *mis_weight, *occlude;
 };
 
-template <Features F, class Tracer>
+template <Features F, class Tracer, class Mis>
 struct Megakernel {
     static constexpr const char* kName = "megakernel";
     static constexpr uint32_t kBeginTogether = 8;  ///< lanes without a path wait for as many before they begin new ones
     static constexpr uint32_t kStepTogether = 256;  ///< threads whose ray has ended wait for as many of their block
-    using Mis = BidirectionalMis;
 
     SceneView scene;
     Tracer tracer;
     Wave wave;
     Rules<Mis> rules;
-    LightVertices light_vertices;  ///< memory for the vertices of all light subpaths; used by links, never as a queue
+    LightVertices<Mis>
+        light_vertices;  ///< memory for the vertices of all light subpaths; used by links, never as a queue
     Queue<SplatItem> splats;
     Lane* samples;
     MegakernelRecords records;
@@ -101,7 +101,7 @@ private:
         uint32_t prim;
         uint32_t next;  ///< the light vertex to connect next
         Rgb throughput;
-        MisSums sums;
+        typename Mis::Sums sums;
     };
 
     /// What a thread works on. Its next ray is the shadow ray if there is one, else, when the vertex has no connections
@@ -217,7 +217,7 @@ private:
             const Rgb weighted = c.value * mis_weight(c.ratio);
             if (is_valid_radiance(weighted, kernel.records.mis_weight)) s.sum += weighted;
         }
-        AMBILUX_HD void at(const BidirectionalVertex& x, const Subpath<Mis>& path, const Draws& draws) const {
+        AMBILUX_HD void at(const Vertex<Mis>& x, const Subpath<Mis>& path, const Draws& draws) const {
             kernel.connect_end(s, x, path, hit, draws);
         }
         AMBILUX_HD bool valid(Rgb throughput) const {
@@ -233,7 +233,7 @@ private:
     }
 
     /// A vertex and the camera or an emitter; and it is kept, or waits, for connections.
-    AMBILUX_HD void connect_end(State& s, const BidirectionalVertex& x, const Subpath<Mis>& path, const Hit& hit,
+    AMBILUX_HD void connect_end(State& s, const Vertex<Mis>& x, const Subpath<Mis>& path, const Hit& hit,
                                 const Draws& d) const {
         const bool light = s.side == Side::light;
         Candidate<Mis> c;
@@ -264,7 +264,7 @@ private:
             z.next = front.link;
         } while (z.depth + light_depth + 1 > rules.max_depth);
         const SurfacePoint point = surface_at<F>(scene, z.prim, z.u, z.v);
-        const BidirectionalEnd eye = {vertex_with<F, Mis>(scene, z.d, z.depth, point, z.sums), z.throughput, z.depth};
+        const SubpathEnd<Mis> eye = {vertex_with<F, Mis>(scene, z.d, z.depth, point, z.sums), z.throughput, z.depth};
         Candidate<Mis> c;
         if (connection<F>(rules, eye, unpack_end<F>(scene, load_vertex<F>(light_vertices, place)), c))
             test(s, c, draws(s), connection_ray(z.depth, light_depth), records.connect_vertices);

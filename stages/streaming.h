@@ -18,27 +18,28 @@ constexpr uint32_t kLightRay = 0x80000000u;
 
 /// The slots, and what each of them keeps. A slot goes on with whichever path is next when it is done with one, so that
 /// all are at work until there are no more.
-template <Features F>
+template <Features F, class Mis>
 struct StreamPool {
-    using Items = SubpathItems<BidirectionalMis>;
+    using Items = SubpathItems<Mis>;
 
     SceneView scene;
     Wave wave;
-    Rules<BidirectionalMis> rules;
-    Queue<SubpathRay> rays;           ///< by slot: of its eye subpath or of the light subpath for it
-    LaneArray<ConnectionVertex> eye;  ///< by slot: the vertex that the light subpath is for; its path is kNoPath if it
-                                      ///< is for the camera only
-    LaneArray<SubpathRay> pending;    ///< by slot: the ray with which the eye subpath goes on; depth 0: it has ended
-    Lane* samples;                    ///< per path
-    uint32_t* next_path;              ///< of the wave, that no slot has claimed
+    Rules<Mis> rules;
+    Queue<SubpathRay<Mis>> rays;           ///< by slot: of its eye subpath or of the light subpath for it
+    LaneArray<ConnectionVertex<Mis>> eye;  ///< by slot: the vertex that the light subpath is for; its path is kNoPath
+                                           ///< if it is for the camera only
+    LaneArray<SubpathRay<Mis>> pending;    ///< by slot: the ray with which the eye subpath goes on; depth 0: it has
+                                           ///< ended
+    Lane* samples;                         ///< per path
+    uint32_t* next_path;                   ///< of the wave, that no slot has claimed
 
     /// Random numbers of the light subpath for an eye vertex: another one for each depth.
     AMBILUX_HD Draws light_draws(uint32_t path, const ConnectionVertexFront& vertex) const {
         return {wave.key(path, Stream::light), vertex.bits.depth() - 1};
     }
     /// The hit of a slot's ray, and whose it is.
-    AMBILUX_HD SubpathHit hit_of(const SlotHit& end) const {
-        SubpathHit h = {rays.load(end.slot), end.u, end.v, end.prim, 0};
+    AMBILUX_HD HitItem<SubpathRay<Mis>> hit_of(const SlotHit& end) const {
+        HitItem<SubpathRay<Mis>> h = {rays.load(end.slot), end.u, end.v, end.prim, 0};
         h.ray.path &= ~kLightRay;
         return h;
     }
@@ -57,7 +58,7 @@ struct StreamPool {
     }
     /// The light subpath of a slot has ended.
     AMBILUX_HD void advance(uint32_t slot) const {
-        const SubpathRay next = pending.load(slot);
+        const SubpathRay<Mis> next = pending.load(slot);
         if (next.bits.depth() > 0)
             rays.put(slot, next);
         else
@@ -65,18 +66,18 @@ struct StreamPool {
     }
 };
 
-template <Features F>
+template <Features F, class Mis>
 struct StreamBegin {
     static constexpr const char* kName = "generate";
 
-    StreamPool<F> pool;
+    StreamPool<F, Mis> pool;
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t slot) const { pool.begin(slot, slot); }
 };
 
 /// extend of eye rays and light rays together. Every ray has a hit, misses too: their slots have to go on.
-template <Features F, class Tracer>
+template <Features F, class Tracer, class Mis>
 struct StreamExtend {
     static constexpr const char* kName = "extend";
     static constexpr Features kFeatures = F;
@@ -84,15 +85,15 @@ struct StreamExtend {
 
     SceneView scene;
     Tracer tracer;
-    StreamPool<F> pool;
+    StreamPool<F, Mis> pool;
     Queue<SlotHit> eye_hits, light_hits;
     StageRecord* record;
 
-    const Queue<SubpathRay>& items() const { return pool.rays; }
+    const Queue<SubpathRay<Mis>>& items() const { return pool.rays; }
 
     AMBILUX_HD bool fetch(uint32_t slot, Ray& ray) const {
-        const SubpathRay item = pool.rays.load(slot);
-        ray = {item.origin, StreamPool<F>::Items::tmax(item), item.direction, 0};
+        const SubpathRay<Mis> item = pool.rays.load(slot);
+        ray = {item.origin, StreamPool<F, Mis>::Items::tmax(item), item.direction, 0};
         if constexpr (F.opacity) {
             const uint32_t path = item.path & ~kLightRay;
             const Draws draws =
@@ -128,14 +129,14 @@ struct TurnItem {
 };
 
 /// An eye vertex waits: for connect_emitter in a queue, for its light subpath at its slot.
-template <Features F, class EmissionOut>
+template <Features F, class Mis, class EmissionOut>
 struct StreamEyeVertex {
     static constexpr const char* kName = "shade";
 
-    StreamPool<F> pool;
+    StreamPool<F, Mis> pool;
     Queue<SlotHit> hits;
     EmissionOut emission;
-    Queue<VertexItem> vertices;
+    Queue<VertexItem<Mis>> vertices;
     Queue<TurnItem> turns;
     StageRecord* record;
 
@@ -144,16 +145,16 @@ struct StreamEyeVertex {
     struct Sink {
         const StreamEyeVertex& stage;
         uint32_t path;
-        ConnectionVertex& waiting;
+        ConnectionVertex<Mis>& waiting;
         bool& connects;
 
         AMBILUX_HD Draws draws() const { return {stage.pool.wave.key(path)}; }
-        AMBILUX_HD void add(const Candidate<BidirectionalMis>& c) const {
+        AMBILUX_HD void add(const Candidate<Mis>& c) const {
             if (is_valid_radiance(c.value, stage.record))
                 stage.emission.push(EmissionItem{c.value, path, c.ratio, c.strategy, {}});
         }
-        AMBILUX_HD void at(const BidirectionalVertex& z, const Subpath<BidirectionalMis>& s, const Draws&) const {
-            const Rules<BidirectionalMis>& rules = stage.pool.rules;
+        AMBILUX_HD void at(const Vertex<Mis>& z, const Subpath<Mis>& s, const Draws&) const {
+            const Rules<Mis>& rules = stage.pool.rules;
             if (rules.next_event) push_vertex<F>(stage.vertices, pack_vertex(z, s, path));
             connects = rules.connect && s.depth + 2 <= rules.max_depth;
             if (connects) waiting = pack_connection_vertex(z, s, path);
@@ -163,18 +164,18 @@ struct StreamEyeVertex {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const SlotHit end = hits.load(i);
-        const SubpathHit h = pool.hit_of(end);
-        const Rules<BidirectionalMis>& rules = pool.rules;
+        const HitItem<SubpathRay<Mis>> h = pool.hit_of(end);
+        const Rules<Mis>& rules = pool.rules;
         const uint32_t depth = h.ray.bits.depth();
-        ConnectionVertex vertex = {};
+        ConnectionVertex<Mis> vertex = {};
         vertex.front.bits = {depth};
         vertex.front.link = kNoPath;
         bool connects = false;
-        Subpath<BidirectionalMis> path = StreamPool<F>::Items::unpack(h.ray);
-        SubpathRay next = {};  // depth 0
+        Subpath<Mis> path = StreamPool<F, Mis>::Items::unpack(h.ray);
+        SubpathRay<Mis> next = {};  // depth 0
         if (visit<F>(pool.scene, rules, Side::eye, rules.longest(Side::eye), h.hit(), path,
                      Sink{*this, h.ray.path, vertex, connects}))
-            next = StreamPool<F>::Items::pack(path, Side::eye, h.ray.path, kInfinity);
+            next = StreamPool<F, Mis>::Items::pack(path, Side::eye, h.ray.path, kInfinity);
         pool.pending.store(end.slot, next);
         pool.eye.store(end.slot, vertex, lanes_of<F>(vertex));
         turns.push({h.ray.path, end.slot, connects || (rules.splat && depth == 1) ? 1u : 0u, 0});
@@ -182,11 +183,11 @@ struct StreamEyeVertex {
 };
 
 /// light_generate: starts the light subpath for an eye vertex, or lets the eye subpath go on at once.
-template <Features F, class Splats>
+template <Features F, class Mis, class Splats>
 struct StreamTurn {
     static constexpr const char* kName = "light_generate";
 
-    StreamPool<F> pool;
+    StreamPool<F, Mis> pool;
     Queue<TurnItem> turns;
     Splats splats;
     StageRecord* record;
@@ -195,15 +196,15 @@ struct StreamTurn {
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const TurnItem turn = turns.load(i);
-        Subpath<BidirectionalMis> path;
+        Subpath<Mis> path;
         if (turn.light_subpath && start(turn, path))
-            pool.rays.put(turn.slot, StreamPool<F>::Items::pack(path, Side::light, turn.path | kLightRay, kInfinity));
+            pool.rays.put(turn.slot, StreamPool<F, Mis>::Items::pack(path, Side::light, turn.path | kLightRay, kInfinity));
         else
             pool.advance(turn.slot);
     }
 
 private:
-    AMBILUX_HD bool start(const TurnItem& turn, Subpath<BidirectionalMis>& path) const {
+    AMBILUX_HD bool start(const TurnItem& turn, Subpath<Mis>& path) const {
         const Draws draws = pool.light_draws(turn.path, pool.eye.load_front(turn.slot));
         EmissionSample e;
         return start_light_subpath<F>(pool.scene, pool.rules, draws,
@@ -212,14 +213,14 @@ private:
 };
 
 /// light_shade: a light vertex, for the camera and for the eye vertex that waits.
-template <Features F>
+template <Features F, class Mis>
 struct StreamLightVertex {
     static constexpr const char* kName = "light_shade";
 
-    StreamPool<F> pool;
+    StreamPool<F, Mis> pool;
     Queue<SlotHit> hits;
-    Queue<VertexItem> camera_vertices;
-    Queue<ConnectionVertex> pairs;  ///< light vertices, whose `link` is the slot of the eye vertex
+    Queue<VertexItem<Mis>> camera_vertices;
+    Queue<ConnectionVertex<Mis>> pairs;  ///< light vertices, whose `link` is the slot of the eye vertex
     StageRecord* record;
 
     const Queue<SlotHit>& items() const { return hits; }
@@ -232,8 +233,8 @@ struct StreamLightVertex {
         uint32_t slot, path;
 
         AMBILUX_HD Draws draws() const { return subpath_draws; }
-        AMBILUX_HD void add(const Candidate<BidirectionalMis>&) const {}
-        AMBILUX_HD void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& s, const Draws&) const {
+        AMBILUX_HD void add(const Candidate<Mis>&) const {}
+        AMBILUX_HD void at(const Vertex<Mis>& y, const Subpath<Mis>& s, const Draws&) const {
             if (splat && stage.pool.rules.wants(s.depth + 1, 1))
                 push_vertex<F>(stage.camera_vertices, pack_vertex(y, s, path));
             if (eye.link != kNoPath && s.depth + eye.bits.depth() + 1 <= stage.pool.rules.max_depth &&
@@ -246,42 +247,43 @@ struct StreamLightVertex {
     AMBILUX_HD void operator()(uint32_t i) const {
         const SlotHit end = hits.load(i);
         if (end.prim == kNone) return pool.advance(end.slot);
-        const SubpathHit h = pool.hit_of(end);
-        const Rules<BidirectionalMis>& rules = pool.rules;
+        const HitItem<SubpathRay<Mis>> h = pool.hit_of(end);
+        const Rules<Mis>& rules = pool.rules;
         const ConnectionVertexFront eye = pool.eye.load_front(end.slot);
         const Draws draws = pool.light_draws(h.ray.path, eye);
         const bool splat = rules.splat && draws.number == 0;
         // A path has one segment more than its light subpath, and those of the eye subpath if there is one.
         const uint32_t longest = splat ? rules.max_depth - 1 : rules.max_depth - 1 - eye.bits.depth();
-        Subpath<BidirectionalMis> path = StreamPool<F>::Items::unpack(h.ray);
+        Subpath<Mis> path = StreamPool<F, Mis>::Items::unpack(h.ray);
         if (!visit<F>(pool.scene, rules, Side::light, longest, h.hit(), path,
                       Sink{*this, eye, draws, splat, end.slot, h.ray.path}))
             return pool.advance(end.slot);
-        pool.rays.put(end.slot, StreamPool<F>::Items::pack(path, Side::light, h.ray.path | kLightRay, kInfinity));
+        pool.rays.put(end.slot, StreamPool<F, Mis>::Items::pack(path, Side::light, h.ray.path | kLightRay, kInfinity));
     }
 };
 
 /// connect_vertices: a light vertex and the eye vertex that waits for it. `Out` takes candidates.
-template <Features F, class Out>
+template <Features F, class Mis, class Out>
 struct StreamConnect {
     static constexpr const char* kName = "connect_vertices";
+    using Item = ConnectionVertex<Mis>;
 
-    StreamPool<F> pool;
-    Queue<ConnectionVertex> pairs;
-    LightVertexSource source;
+    StreamPool<F, Mis> pool;
+    Queue<ConnectionVertex<Mis>> pairs;
+    LightVertexSource<Mis> source;
     Out candidates;
     StageRecord* record;
     bool seeds;
 
-    const Queue<ConnectionVertex>& items() const { return pairs; }
+    const Queue<ConnectionVertex<Mis>>& items() const { return pairs; }
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const ConnectionVertex light = load_vertex<F>(pairs, i);
+        const Item light = load_vertex<F>(pairs, i);
         const uint32_t slot = light.front.link;
-        ConnectionVertex eye = pool.eye.load(slot, ConnectionVertex::kDiffuseLanes);
-        if constexpr (ConnectionVertex::lanes<F>() > ConnectionVertex::kDiffuseLanes)
+        Item eye = pool.eye.load(slot, Item::kDiffuseLanes);
+        if constexpr (Item::template lanes<F>() > Item::kDiffuseLanes)
             if (!eye.bits().template diffuse<F>())
-                pool.eye.load_more(slot, eye, ConnectionVertex::kDiffuseLanes, ConnectionVertex::lanes<F>());
+                pool.eye.load_more(slot, eye, Item::kDiffuseLanes, Item::template lanes<F>());
         push_connection<F>(pool.scene, pool.rules, source, *pool.wave.state, Draws{pool.wave.key(eye.path())},
                            unpack_end<F>(pool.scene, eye), eye.path(), light, kNone, seeds, candidates, record);
     }

@@ -7,7 +7,8 @@
 namespace ambilux {
 
 /// Vertices of light subpaths, kept over a wave.
-using LightVertices = Queue<ConnectionVertex>;
+template <class Mis>
+using LightVertices = Queue<ConnectionVertex<Mis>>;
 
 template <Features F, class Item>
 AMBILUX_HD uint32_t push_vertex(const Queue<Item>& vertices, const Item& item) {

@@ -29,25 +29,25 @@ struct BlocksPerSm {
 constexpr bool is_diffuse(Features f) { return f.bsdfs == bit(BsdfType::diffuse); }
 constexpr bool needs_no_misses(Features f) { return !f.several_bsdfs() && !f.has_environment(); }
 
-template <Features F, class EmissionOut, class AtVertex>
-struct LaunchTraits<EyeVertex<F, UnidirectionalMis, EmissionOut, AtVertex>> : BlocksPerSm<is_diffuse(F) ? 6
-                                                                                          : F.textures  ? 4
-                                                                                                        : 5,
-                                                                                          needs_no_misses(F)> {};
-template <Features F, class EmissionOut, class AtVertex>
-struct LaunchTraits<EyeVertex<F, BidirectionalMis, EmissionOut, AtVertex>>
-    : BlocksPerSm<is_diffuse(F) ? 5 : 4, needs_no_misses(F)> {};
-template <Features F, class AtVertex>
-struct LaunchTraits<LightVertex<F, AtVertex>> : BlocksPerSm<is_diffuse(F) ? 5 : 4> {};
-template <Features F, class Out>
-struct LaunchTraits<ConnectVertices<F, Out>> : BlocksPerSm<is_diffuse(F) ? 7 : 4> {};
-template <Features F, class Tracer, class Shadows>
-struct LaunchTraits<ConnectAndOcclude<F, Tracer, Shadows>> : BlocksPerSm<8> {};
-template <Features F, class EmissionOut>
-struct LaunchTraits<StreamEyeVertex<F, EmissionOut>> : BlocksPerSm<is_diffuse(F) ? 5 : 4> {};
-template <Features F>
-struct LaunchTraits<StreamLightVertex<F>> : BlocksPerSm<is_diffuse(F) ? 5 : 4> {};
-template <Features F, class Out>
-struct LaunchTraits<StreamConnect<F, Out>> : BlocksPerSm<is_diffuse(F) ? 7 : 4> {};
+/// Of an eye vertex.
+constexpr uint32_t eye_blocks(Features f, bool bidirectional) {
+    return (is_diffuse(f) ? 5 : 4) + (!bidirectional && (is_diffuse(f) || !f.textures));
+}
+
+template <Features F, class Mis, class EmissionOut, class AtVertex>
+struct LaunchTraits<EyeVertex<F, Mis, EmissionOut, AtVertex>>
+    : BlocksPerSm<eye_blocks(F, Mis::kBidirectional), needs_no_misses(F)> {};
+template <Features F, class Mis, class AtVertex>
+struct LaunchTraits<LightVertex<F, Mis, AtVertex>> : BlocksPerSm<is_diffuse(F) ? 5 : 4> {};
+template <Features F, class Out, class Mis>
+struct LaunchTraits<ConnectVertices<F, Out, LightVertexSource<Mis>>> : BlocksPerSm<is_diffuse(F) ? 7 : 4> {};
+template <Features F, class Tracer, class Shadows, class Source>
+struct LaunchTraits<ConnectAndOcclude<F, Tracer, Shadows, Source>> : BlocksPerSm<8> {};
+template <Features F, class Mis, class EmissionOut>
+struct LaunchTraits<StreamEyeVertex<F, Mis, EmissionOut>> : BlocksPerSm<is_diffuse(F) ? 5 : 4> {};
+template <Features F, class Mis>
+struct LaunchTraits<StreamLightVertex<F, Mis>> : BlocksPerSm<is_diffuse(F) ? 5 : 4> {};
+template <Features F, class Mis, class Out>
+struct LaunchTraits<StreamConnect<F, Mis, Out>> : BlocksPerSm<is_diffuse(F) ? 7 : 4> {};
 
 }  // namespace ambilux

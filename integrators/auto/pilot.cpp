@@ -130,9 +130,7 @@ private:
         all.heuristic = MisHeuristic::balance;
         all.strategies = kAllStrategies;
         all.singles = {};
-        const Rules<BidirectionalMis> r = plan_bdpt(scene, all).rules;
-        rules_ = {PilotMis(r.mis),     r.max_depth,  r.rr_depth, r.rr_cap,  r.hide_emitters,   r.count_hits,
-                  r.count_environment, r.next_event, r.splat,    r.connect, r.background_only, r.singles};
+        rules_ = plan_bdpt<PilotMis>(scene, all).rules;
     }
 
     static bool counts(Rgb value) { return is_finite(value) && min_component(value) >= 0.0f && !is_zero(value); }

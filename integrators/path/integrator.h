@@ -39,13 +39,13 @@ struct PathIntegrator {
 
     struct Memory {
         SubpathQueues<PathRay> subpaths;
-        EyeQueues eye;
+        EyeQueues<Mis> eye;
     };
     /// Every queue holds the most it can ever be given: a slot has at most one item of each kind at a time.
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
         Memory m;
         m.subpaths = {layout, n.slots, p.waves.queues};
-        m.eye = EyeQueues::lay_out<kFusion, F>(layout, n.slots, n.slots, p.rules, p.waves);
+        m.eye = EyeQueues<Mis>::template lay_out<kFusion, F>(layout, n.slots, n.slots, p.rules, p.waves);
         return m;
     }
 

@@ -11,9 +11,9 @@
 namespace ambilux {
 
 /// Queues that lie between the stages of one depth. `Shadow`: Occlude::Item.
-template <class Shadow>
-struct EyeQueuesOf {
-    Queue<VertexItem> vertices;
+template <class Mis, class Shadow = ShadowItem>
+struct EyeQueues {
+    Queue<VertexItem<Mis>> vertices;
     Queue<EmissionItem> emission;
     Queue<Contribution> emission_contributions;
     Queue<CandidateItem> candidates;
@@ -21,16 +21,17 @@ struct EyeQueuesOf {
     Queue<Contribution> shadow_contributions;
     Lane* raw;  ///< StrategyFilm
 
-    EyeQueuesOf() = default;
+    EyeQueues() = default;
     /// `slots`: items of a depth; `paths`: of the wave; `connects`: rules let vertices be connected with anything.
-    template <Fusion K, Features F, class Mis>
-    static EyeQueuesOf lay_out(Layout& layout, uint32_t slots, uint32_t paths, const Rules<Mis>& rules,
-                               const WavePolicy& waves) {
+    template <Fusion K, Features F>
+    static EyeQueues lay_out(Layout& layout, uint32_t slots, uint32_t paths, const Rules<Mis>& rules,
+                             const WavePolicy& waves) {
         const bool by_path = waves.queues.fixed_places(),
                    hits = !K.weigh && (rules.count_hits || rules.count_environment);
         const uint32_t connects = rules.next_event || rules.connect ? slots : 0, emits = hits ? slots : 0;
-        EyeQueuesOf q;
-        q.vertices = layout.queue<VertexItem>("vertices", K.connect ? 0 : connects, by_path, VertexItem::lanes<F>());
+        EyeQueues q;
+        q.vertices = layout.queue<VertexItem<Mis>>("vertices", K.connect ? 0 : connects, by_path,
+                                                   VertexItem<Mis>::template lanes<F>());
         q.emission = layout.queue<EmissionItem>("emission", emits, by_path);
         q.emission_contributions = layout.queue<Contribution>("emission_contributions", emits, by_path);
         q.candidates = layout.queue<CandidateItem>("candidates", K.weigh ? 0 : connects, by_path);
@@ -41,12 +42,9 @@ struct EyeQueuesOf {
     }
 };
 
-using EyeQueues = EyeQueuesOf<ShadowItem>;
-
 /// The stages behind the vertex stages. `Learn`: see Occlude.
 template <Features F, class Tracer, Fusion K, class Learn = LearnNothing>
 struct EyeSide {
-    using Queues = EyeQueuesOf<typename Learn::Item>;
     using Contributions = std::conditional_t<K.weigh, Accumulate, Queue<Contribution>>;
     using EmissionStage = WeighEmission<Contributions>;
     using OccludeStage = Occlude<F, Tracer, Contributions, Learn>;
@@ -60,8 +58,10 @@ struct EyeSide {
     OccludeStage occlude;
     WeighStage weigh;
 
-    EyeSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave, const Queues& q,
-            const FilmBuffers& film, const WavePolicy& waves, const Learn& learn = {}) {
+    template <class Mis>
+    EyeSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave,
+            const EyeQueues<Mis, typename Learn::Item>& q, const FilmBuffers& film, const WavePolicy& waves,
+            const Learn& learn = {}) {
         const StrategyFilm strategies = {film.strategies, film.strategies_dropped, q.raw, waves.strategy_depth};
         StageRecord* const accumulates = layout.record(Accumulate::kName);
         StageRecord* const weighs = layout.record(WeighStage::kName);

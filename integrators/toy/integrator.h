@@ -34,12 +34,12 @@ struct ToyIntegrator {
     /// The queues of a wave.
     struct Memory {
         SubpathQueues<PathRay> subpaths;
-        EyeQueues eye;
+        EyeQueues<Mis> eye;
     };
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
         Memory m;
         m.subpaths = {layout, n.slots, p.waves.queues};
-        m.eye = EyeQueues::lay_out<kFusion, F>(layout, n.slots, n.slots, p.rules, p.waves);
+        m.eye = EyeQueues<Mis>::template lay_out<kFusion, F>(layout, n.slots, n.slots, p.rules, p.waves);
         return m;
     }
 

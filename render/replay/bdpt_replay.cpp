@@ -211,7 +211,7 @@ private:
             const uint32_t most = ctx_.rules.max_depth, depth = path.depth;
             if (depth + 2 > most) return;
             const uint32_t pixel = request.y * wave_.width + request.x;
-            const ConnectionVertex waiting = pack_connection_vertex(z, path, 0);
+            const ConnectionVertex<BidirectionalMis> waiting = pack_connection_vertex(z, path, 0);
             ReplayLightRequest r = for_connections(pixel, request);
             r.part = depth - 1;
             if (!(ctx_.rules.splat && r.part == 0)) r.longest = most - 1 - depth;

@@ -22,7 +22,7 @@ struct ReplayConnections {
     const BidirectionalVertex& vertex;
     const Subpath<BidirectionalMis>& path;
     const ReplayVertices& lights;
-    LightVertexSource source;
+    LightVertexSource<BidirectionalMis> source;
     WaveState state{};
     float scale = 1.0f;
 
@@ -31,7 +31,8 @@ struct ReplayConnections {
 
     /// The vertices that a search of the render's stages finds.
     void searched() const {
-        const LightVertexSearch search = {source, eye.draws.key, path.depth, vertex, eye.ctx.rules.max_depth};
+        const LightVertexSearch<BidirectionalMis> search = {source, eye.draws.key, path.depth, vertex,
+                                                            eye.ctx.rules.max_depth};
         uint32_t next = source.first(0), found = search.find(next);
         if (found == kNone) return;
         const BidirectionalEnd end = packed_end();
@@ -49,7 +50,7 @@ struct ReplayConnections {
 private:
     void pair(const BidirectionalEnd& end, uint32_t place) const {
         const auto& ctx = eye.ctx;
-        const ConnectionVertex light = load_vertex<kReplayFeatures>(source.vertices, place);
+        const ConnectionVertex<BidirectionalMis> light = load_vertex<kReplayFeatures>(source.vertices, place);
         CandidateItem item;
         bool pushed = false;
         DropWatch watch;

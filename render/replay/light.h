@@ -12,7 +12,7 @@ namespace ambilux {
 
 struct ReplayLight {
     ReplaySubpath subpath;
-    std::vector<ConnectionVertex> vertices;  ///< as a wave keeps them, without links
+    std::vector<ConnectionVertex<BidirectionalMis>> vertices;  ///< as a wave keeps them, without links
     std::vector<ReplayCandidate> splats;
 };
 
@@ -72,7 +72,8 @@ struct ReplayLightSink {
             DropWatch watch;
             ReplayDrop drop;
             const size_t before = light.splats.size();
-            ConnectCamera<kReplayFeatures, ReplaySplats>{splats, watch.record()}.at(ctx.view, ctx.rules, y, path, 0, d);
+            ConnectCamera<kReplayFeatures, BidirectionalMis, ReplaySplats>{splats, watch.record()}.at(
+                ctx.view, ctx.rules, y, path, 0, d);
             if (watch.dropped("connect_camera", drop)) splats.invalid(drop, Strategy::make(path.depth + 1, 1));
             const Vec4f u = d.lens(path.depth);
             if (request.details && light.splats.size() > before)

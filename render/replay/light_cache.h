@@ -11,8 +11,8 @@ namespace ambilux {
 class ReplayVertices {
 public:
     /// `link`: each vertex follows the one before it.
-    ReplayVertices(std::vector<ConnectionVertex> vertices, std::vector<uint32_t> owners, bool link)
-        : lanes_(vertices.size() * LaneArray<ConnectionVertex>::kLanes), owners_(std::move(owners)) {
+    ReplayVertices(std::vector<ConnectionVertex<BidirectionalMis>> vertices, std::vector<uint32_t> owners, bool link)
+        : lanes_(vertices.size() * LaneArray<ConnectionVertex<BidirectionalMis>>::kLanes), owners_(std::move(owners)) {
         queue_.items = {lanes_.data(), uint32_t(vertices.size())};
         counter_.count = counter_.capacity = uint32_t(vertices.size());
         for (uint32_t i = 0; i < vertices.size(); ++i) {
@@ -28,13 +28,13 @@ public:
     uint32_t size() const { return counter_.count; }
     uint32_t owner(uint32_t place) const { return owners_[place]; }
     /// `draws`: of an eye vertex; 0: those of the subpath one after the other, from the last on.
-    LightVertexSource source(uint32_t draws) const { return {queue_, &last_, draws, false}; }
+    LightVertexSource<BidirectionalMis> source(uint32_t draws) const { return {queue_, &last_, draws, false}; }
 
 private:
     std::vector<Lane> lanes_;
     std::vector<uint32_t> owners_;
     mutable QueueCounter counter_{};
-    LightVertices queue_;
+    LightVertices<BidirectionalMis> queue_;
     uint32_t last_ = kNone;
 };
 
@@ -56,15 +56,15 @@ inline std::unique_ptr<ReplayVertices> replay_cache(const ReplayContext<Bidirect
     state.samples = 1;
     wave.state = &state;
     request.details = request.splats = false;
-    std::vector<ConnectionVertex> all;
+    std::vector<ConnectionVertex<BidirectionalMis>> all;
     std::vector<uint32_t> owners;
     for (uint32_t round = 0; round < rounds; ++round) {
-        std::vector<std::vector<std::pair<ConnectionVertex, uint32_t>>> by_depth;
+        std::vector<std::vector<std::pair<ConnectionVertex<BidirectionalMis>, uint32_t>>> by_depth;
         for (uint32_t slot = 0; slot < wave.tiles * kTilePixels; ++slot) {
             const PathSlot p = wave.locate(slot);
             if (!p.active || round >= light_subpaths_of(slot, per_tile)) continue;
             request.number = round * wave.width * wave.height + p.pixel;
-            for (const ConnectionVertex& v : replay_light(ctx, request).vertices) {
+            for (const ConnectionVertex<BidirectionalMis>& v : replay_light(ctx, request).vertices) {
                 by_depth.resize(std::max<size_t>(by_depth.size(), v.bits().depth() + 1));
                 by_depth[v.bits().depth()].emplace_back(v, request.number);
             }

@@ -162,9 +162,9 @@ TEST_CASE("Vertices of connections keep positions, throughput and sums exactly, 
         path.direction = d;
         path.depth = 3;
         path.throughput = any_vector(numbers);
-        const ConnectionVertex item = pack_connection_vertex(v, path, 5);
+        const ConnectionVertex<BidirectionalMis> item = pack_connection_vertex(v, path, 5);
         REQUIRE((same_bits(item.front.p, v.point.p) && same_bits(item.throughput, path.throughput)));
-        REQUIRE((same_bits(item.dvcm, v.sums.dvcm) && same_bits(item.front.dvc, v.sums.dvc)));
+        REQUIRE((same_bits(item.sum0, v.sums.dvcm) && same_bits(item.front.sum1, v.sums.dvc)));
         REQUIRE(norm(Exact3(octahedral_decode(item.d)) - Exact3(d)) <= 5e-7);
         REQUIRE(norm(Exact3(octahedral_decode(item.front.ng)) - Exact3(v.scattering.ng)) <= 5e-7);
         REQUIRE(norm(Exact3(octahedral_decode(item.n)) - Exact3(v.scattering.frame.n)) <= 5e-7);

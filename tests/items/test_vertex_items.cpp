@@ -168,32 +168,29 @@ TEST_CASE("A vertex that comes from a queue is the one that went in, surface, fr
                 REQUIRE((a.record == b.record && a.flipped == b.flipped && same_parameters(f, g)));
             };
             const Subpath<UnidirectionalMis> unidirectional = {{}, d, {1, 2, 3}, {0.5f}, {}, depth, 1.0f, false};
-            const VertexItem without_sums =
+            const VertexItem<UnidirectionalMis> without_sums =
                 pack_vertex(vertex_with<kAllFeatures, UnidirectionalMis>(
                                 view, d, depth, surface_at<kAllFeatures>(view, hit.prim, hit.u, hit.v), {0.5f}),
                             unidirectional, 7);
             const bool textured = scene.features.textures || scene.features.bumps;
             const BidirectionalSubpath path = ray_along(d, depth, {1, 2, 3});
-            const VertexItem eye = pack_vertex(v, path, 7);
+            const VertexItem<BidirectionalMis> eye = pack_vertex(v, path, 7);
             REQUIRE(same(eye.throughput, {1, 2, 3}));
             // That of a path tracer, which asks for no sums, is the same without them.
-            VertexItem expected = eye;
-            expected.dvcm = expected.dvc = 0.0f;
-            REQUIRE(std::memcmp(&expected, &without_sums, sizeof(VertexItem)) == 0);
+            VertexItem<BidirectionalMis> expected = eye;
+            expected.sum0 = expected.sum1 = 0.0f;
+            REQUIRE(std::memcmp(&expected, &without_sums, sizeof(expected)) == 0);
             const auto vertex_of = [&](const BidirectionalEnd& end, Rgb throughput) {
                 REQUIRE((end.depth == depth && same(end.throughput, throughput)));
                 return end.vertex;
             };
-            const BidirectionalVertex exact =
-                vertex_of(unpack_end<kAllFeatures, BidirectionalMis>(view, eye), {1, 2, 3});
+            const BidirectionalVertex exact = vertex_of(unpack_end<kAllFeatures>(view, eye), {1, 2, 3});
             REQUIRE((exact.offset == v.offset && same(exact.scattering.wi_world, v.scattering.wi_world) &&
                      same(exact.scattering.ng, v.scattering.ng) &&
                      same(exact.scattering.frame.n, v.scattering.frame.n)));
             check(eye, exact, reflectance_of(f));
-            if (!textured)
-                check(eye, vertex_of(unpack_end<kUntextured, BidirectionalMis>(view, eye), {1, 2, 3}),
-                      reflectance_of(f));
-            const ConnectionVertex light = pack_connection_vertex(v, path, 7);
+            if (!textured) check(eye, vertex_of(unpack_end<kUntextured>(view, eye), {1, 2, 3}), reflectance_of(f));
+            const ConnectionVertex<BidirectionalMis> light = pack_connection_vertex(v, path, 7);
             REQUIRE(same(light.throughput, diffuse ? Rgb{1, 2, 3} * reflectance_of(f) : Rgb{1, 2, 3}));
             const BidirectionalVertex back = vertex_of(unpack_end<kAllFeatures>(view, light), light.throughput);
             REQUIRE((back.offset >= v.offset && back.offset <= v.offset * (1.0f + 1.0f / 128.0f)));
@@ -233,7 +230,7 @@ TEST_CASE("Queues hold of a vertex what its BSDF needs, and give it back") {
             v.scattering.record = 5;
             v.sums = {11, 12};
             const BidirectionalSubpath path = ray_along({0, 0, -1}, 3);
-            if constexpr (std::is_same_v<Item, VertexItem>)
+            if constexpr (std::is_same_v<Item, VertexItem<BidirectionalMis>>)
                 item = pack_vertex(v, path, 13);
             else
                 item = pack_connection_vertex(v, path, 13);
@@ -245,8 +242,8 @@ TEST_CASE("Queues hold of a vertex what its BSDF needs, and give it back") {
         CHECK(queue.counter->count == (F.bsdfs == bit(BsdfType::diffuse) ? 2 : 3));
     };
     const auto both = [&](auto features) {
-        check(features, VertexItem{});
-        check(features, ConnectionVertex{});
+        check(features, VertexItem<BidirectionalMis>{});
+        check(features, ConnectionVertex<BidirectionalMis>{});
     };
     both(std::integral_constant<Features, kPlain>{});
     both(std::integral_constant<Features, kUntextured>{});

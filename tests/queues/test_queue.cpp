@@ -249,7 +249,7 @@ TEST_CASE("queue by path: an item lies where its path says; a second one for the
     CHECK(counter.overflow == 2);
     CHECK(flags == std::vector<uint8_t>{1, 0, 0, 1, 1});
     // The path of a hit is that of its ray.
-    SubpathHit hit{};
+    HitItem<SubpathRay<BidirectionalMis>> hit{};
     hit.ray.path = 7;
     CHECK(path_of(hit) == 7);
 }

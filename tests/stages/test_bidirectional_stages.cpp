@@ -253,8 +253,8 @@ TEST_CASE("G9: light_generate counts emission that is none", "[bidirectional]") 
 TEST_CASE("G9: light_extend counts rays that are not finite", "[bidirectional]") {
     Bench b(cornell());
     b.run("light_extend", [](Bench& x) {
-        edit<SubpathRay>(x.memory.subpaths.rays[0], 3, [](SubpathRay& r) { r.direction.y = kNan; });
-        edit<SubpathRay>(x.memory.subpaths.rays[0], 5, [](SubpathRay& r) { r.origin.x = kInf; });
+        edit<SubpathRay<BidirectionalMis>>(x.memory.subpaths.rays[0], 3, [](auto& r) { r.direction.y = kNan; });
+        edit<SubpathRay<BidirectionalMis>>(x.memory.subpaths.rays[0], 5, [](auto& r) { r.origin.x = kInf; });
     });
     b.check_counts("light_extend", 2, 0, 0);
 }
@@ -265,7 +265,8 @@ TEST_CASE("G9: light_shade counts throughput that is no light, and neither of it
         Bench b(cornell(), {"-i light"});
         b.run("light_shade", [v = value](Bench& x) {
             for (uint32_t i = 0; i < x.memory.subpaths.hits[0].counter->size(); ++i)
-                edit<SubpathHit>(x.memory.subpaths.hits[0], i, [v](SubpathHit& h) { h.ray.throughput.z = v; });
+                edit<HitItem<SubpathRay<BidirectionalMis>>>(x.memory.subpaths.hits[0], i,
+                                                            [v](auto& h) { h.ray.throughput.z = v; });
         });
         CHECK(b.count("light_shade", which) > 50);
         CHECK(b.count("connect_camera", which) > 50);
@@ -278,7 +279,7 @@ TEST_CASE("G9: connect_camera counts vertices whose light is none", "[bidirectio
         Bench b(cornell());
         b.run("connect_camera", [v = value](Bench& x) {
             for (uint32_t i = 0; i < x.memory.splats.vertices.counter->size(); i += 2)
-                edit<VertexItem>(x.memory.splats.vertices, i, [v](VertexItem& y) { y.throughput.x = v; });
+                edit<VertexItem<BidirectionalMis>>(x.memory.splats.vertices, i, [v](auto& y) { y.throughput.x = v; });
         });
         const uint64_t counted = b.count("connect_camera", which);
         CHECK(counted > 20);
@@ -292,7 +293,8 @@ TEST_CASE("G9: connect and connect_vertices count pairs whose light is none", "[
         Bench b(cornell());
         b.run("generate", [v = value](Bench& x) {
             for (uint32_t i = 0; i < x.memory.light_vertices.counter->size(); i += 2)
-                edit<ConnectionVertex>(x.memory.light_vertices, i, [v](ConnectionVertex& y) { y.throughput.x = v; });
+                edit<ConnectionVertex<BidirectionalMis>>(x.memory.light_vertices, i,
+                                                         [v](auto& y) { y.throughput.x = v; });
         });
         const uint64_t counted = b.count("connect_vertices", which);
         CHECK(counted > 100);
@@ -303,7 +305,7 @@ TEST_CASE("G9: connect and connect_vertices count pairs whose light is none", "[
         Bench e(cornell(), {"next_event"});
         e.run("connect", [v = value](Bench& x) {
             for (uint32_t i = 0; i < x.memory.eye.vertices.counter->size(); i += 2)
-                edit<VertexItem>(x.memory.eye.vertices, i, [v](VertexItem& z) { z.throughput.x = v; });
+                edit<VertexItem<BidirectionalMis>>(x.memory.eye.vertices, i, [v](auto& z) { z.throughput.x = v; });
         });
         const uint64_t sampled = e.count("connect", which);
         CHECK(sampled > 20);

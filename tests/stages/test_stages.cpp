@@ -253,7 +253,8 @@ TEST_CASE("G9: connect counts light that is none", "[stages]") {
         const uint32_t n = b.memory.eye.vertices.counter->size();
         REQUIRE(n > 100);
         for (uint32_t i = 0; i < n; i += 2)
-            change<VertexItem>(b.memory.eye.vertices, i, [v = value](VertexItem& x) { x.throughput.z = v; });
+            change<VertexItem<UnidirectionalMis>>(b.memory.eye.vertices, i,
+                                                  [v = value](auto& x) { x.throughput.z = v; });
         b.finish_contributions();
         b.update_film();
         const StageRecord& r = b.record("connect");
@@ -427,7 +428,7 @@ TEST_CASE("G3: queues of any size hold what fits and count what does not", "[sta
         const Queue<PathHit> queue = {{lanes.data(), capacity}, &counter};
         for (uint32_t i = 0; i < capacity + 5; ++i)
             queue.push(
-                {{{float(i), 1, 2}, i, {3, 4, 5}, SubpathBits::make(i % 16384, i & 1, 1), {6, 7, 8}, float(i) / 2},
+                {{{float(i), 1, 2}, i, {3, 4, 5}, SubpathBits::make(i % 16384, i & 1, 1), {6, 7, 8}, float(i) / 2, {}},
                  0.25f,
                  0.5f,
                  i + 1,
@@ -438,7 +439,7 @@ TEST_CASE("G3: queues of any size hold what fits and count what does not", "[sta
             CHECK(h.ray.origin.x == float(i));
             CHECK(path_of(h) == i);
             CHECK(h.ray.bits.depth() == i % 16384);
-            CHECK(h.ray.pdf_sa_or_tmax == float(i) / 2);
+            CHECK(h.ray.sum_or_tmax == float(i) / 2);
             CHECK(h.prim == i + 1);
         }
         for (uint32_t g = 0; g < kGuard; ++g) CHECK(lanes[lanes.size() - 1 - g].word[0] == 7);

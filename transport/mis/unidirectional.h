@@ -11,6 +11,7 @@ namespace ambilux {
 struct UnidirectionalMis {
     /// Density of the ray's direction by BSDF sampling; after a delta a probability.
     struct Sums {
+        static constexpr uint32_t kVertexWords = 0;  ///< nothing is asked of it at a vertex
         float pdf_sa;
     };
     struct Start {};

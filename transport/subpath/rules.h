@@ -22,6 +22,12 @@ struct Rules {
                            ///< no light subpath finds
     SingleStrategies singles;
 
+    /// The same with another model.
+    template <class Other>
+    Rules<Other> with(const Other& other) const {
+        return {other,      max_depth, rr_depth, rr_cap,          hide_emitters, count_hits, count_environment,
+                next_event, splat,     connect,  background_only, singles};
+    }
     /// Eye subpaths of `depth` segments count the environment that they reach: beyond the first segment as hits only.
     AMBILUX_HD bool counts_environment(uint32_t depth) const {
         if constexpr (Mis::kBidirectional)

@@ -21,7 +21,7 @@ struct LearnedIntegrator {
         DrawTable table;
     };
     struct Memory {
-        TwoSidesMemoryOf<ScoredShadowItem> two_sides;
+        TwoSidesMemory<BidirectionalMis, ScoredShadowItem> two_sides;
         ClusteredVertices by_cluster;
     };
     struct Stages {
@@ -57,7 +57,7 @@ struct LearnedIntegrator {
     }
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
         Memory m;
-        m.two_sides = TwoSidesMemoryOf<ScoredShadowItem>::template lay_out<kFusion, F>(layout, p, n);
+        m.two_sides = decltype(m.two_sides)::template lay_out<kFusion, F>(layout, p, n);
         const uint32_t kept = p.rules.connect ? n.kept : 0, clusters = p.rules.connect ? kClusters : 0,
                        parts = clusters * ClusteredVertices::kParts;
         m.by_cluster = {layout.allocate<uint32_t>(clusters + 1), layout.allocate<uint32_t>(parts),

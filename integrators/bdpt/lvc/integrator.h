@@ -6,15 +6,15 @@
 
 namespace ambilux {
 
-template <Features F, class Tracer, Fusion kFusion>
-struct LvcIntegrator {
-    using Policy = BdptPolicy;
-    using Memory = TwoSidesMemory;
-    using Stages = TwoSidesStages<F, Tracer, kFusion>;
+template <Features F, class Tracer, Fusion kFusion, class Mis>
+struct LvcOf {
+    using Policy = BdptPolicyOf<Mis>;
+    using Memory = TwoSidesMemory<Mis>;
+    using Stages = TwoSidesStages<F, Tracer, kFusion, LightVertexSource<Mis>>;
     static constexpr bool kFilmWide = true;
 
     static Policy plan(const Scene& scene, const RenderSettings& settings) {
-        Policy p = plan_bdpt(scene, settings);
+        Policy p = plan_bdpt<Mis>(scene, settings);
         if (!p.rules.connect) return p;
         p.cache_draws = settings.connections;
         p.coherent_draws = settings.draws == CacheDraws::coherent;
@@ -30,7 +30,7 @@ struct LvcIntegrator {
         return mean;
     }
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
-        return Memory::lay_out<kFusion, F>(layout, p, n);
+        return Memory::template lay_out<kFusion, F>(layout, p, n);
     }
     static std::vector<std::string> skipped(const Scene& scene, const Policy& p) {
         return skipped_strategies(scene, p);
@@ -40,5 +40,7 @@ struct LvcIntegrator {
         run_two_sides(exec, s);
     }
 };
+template <Features F, class Tracer, Fusion kFusion>
+using LvcIntegrator = LvcOf<F, Tracer, kFusion, BidirectionalMis>;
 
 }  // namespace ambilux

@@ -7,14 +7,14 @@
 
 namespace ambilux {
 
-template <Features F, class Tracer, Fusion kFusion>
-struct MegakernelIntegrator {
-    using Policy = BdptPolicy;
+template <Features F, class Tracer, class Mis>
+struct MegakernelOf {
+    using Policy = BdptPolicyOf<Mis>;
     static constexpr bool kFilmWide = true;
 
     static Policy plan(const Scene& scene, const RenderSettings& settings) {
         need_one_light_subpath(settings, "variant megakernel has one light subpath per eye subpath; use variant lvc");
-        return plan_bdpt(scene, settings);
+        return plan_bdpt<Mis>(scene, settings);
     }
     static double pilot(Policy& p, const SceneView& scene, const HostTracer& tracer, uint64_t seed) {
         return p.light_subpaths() ? mean_light_vertices<F>(scene, tracer, p.rules, seed) : 0.0;
@@ -24,13 +24,13 @@ struct MegakernelIntegrator {
     }
 
     struct Memory {
-        LightVertices light_vertices;
+        LightVertices<Mis> light_vertices;
         Queue<SplatItem> splats;
     };
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
         Memory m;
-        m.light_vertices = layout.queue<ConnectionVertex>("light_vertices", p.rules.connect ? n.kept : 0, false,
-                                                          ConnectionVertex::lanes<F>());
+        m.light_vertices = layout.queue<ConnectionVertex<Mis>>("light_vertices", p.rules.connect ? n.kept : 0, false,
+                                                               ConnectionVertex<Mis>::template lanes<F>());
         m.splats = layout.queue<SplatItem>("splats", p.rules.splat ? n.kept + n.slots : 0);
         return m;
     }
@@ -38,7 +38,7 @@ struct MegakernelIntegrator {
     struct Stages {
         Policy policy;
         Wave wave;
-        Megakernel<F, Tracer> megakernel;
+        Megakernel<F, Tracer, Mis> megakernel;
         Splat<F> splat;
 
         Stages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
@@ -65,5 +65,7 @@ struct MegakernelIntegrator {
         if (s.policy.rules.connect) exec.clear(s.megakernel.light_vertices);
     }
 };
+template <Features F, class Tracer, Fusion>
+using MegakernelIntegrator = MegakernelOf<F, Tracer, BidirectionalMis>;
 
 }  // namespace ambilux

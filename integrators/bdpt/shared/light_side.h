@@ -17,19 +17,21 @@ namespace ambilux {
 
 /// Queues of splats. Those that arrived are kept until the end of the wave; their number is not known before, and a
 /// wave for which there is no room is done again with more.
+template <class Mis>
 struct SplatQueues {
-    Queue<VertexItem> vertices;  ///< of one depth, for a stage that connects them with the camera
+    Queue<VertexItem<Mis>> vertices;  ///< of one depth, for a stage that connects them with the camera
     Queue<CandidateItem> candidates, weighted;
     Queue<SplatItem> splats;
 
     SplatQueues() = default;
     /// `slots`: items of a depth; `kept`: splats of the wave.
     template <Fusion K, Features F>
-    static SplatQueues lay_out(Layout& layout, uint32_t slots, uint64_t kept, const BdptPolicy& p) {
+    static SplatQueues lay_out(Layout& layout, uint32_t slots, uint64_t kept, const BdptPolicyOf<Mis>& p) {
         const bool by_path = p.waves.queues.fixed_places();
         const uint32_t n = p.rules.splat ? slots : 0;
         SplatQueues q;
-        q.vertices = layout.queue<VertexItem>("camera_vertices", K.connect ? 0 : n, by_path, VertexItem::lanes<F>());
+        q.vertices = layout.queue<VertexItem<Mis>>("camera_vertices", K.connect ? 0 : n, by_path,
+                                                   VertexItem<Mis>::template lanes<F>());
         q.candidates = layout.queue<CandidateItem>("splat_candidates", K.weigh ? 0 : n, by_path);
         q.weighted = layout.queue<CandidateItem>("weighted_splats", n, by_path && !K.occlude);
         q.splats =
@@ -39,23 +41,23 @@ struct SplatQueues {
 };
 
 /// The stages behind the vertices of light subpaths.
-template <Features F, class Tracer, Fusion K>
+template <Features F, class Tracer, Fusion K, class Mis>
 struct SplatSide {
     using OccludeStage = OccludeSplats<F, Tracer>;
     using Weighted = std::conditional_t<K.occlude, Gathered<OccludeStage>, Queue<CandidateItem>>;
     using WeighStage = WeighSplats<Weighted>;
     using Candidates = std::conditional_t<K.weigh, WeighStage, Queue<CandidateItem>>;
-    using Connect = ConnectCamera<F, Candidates>;
+    using Connect = ConnectCamera<F, Mis, Candidates>;
     using ConnectHere = std::conditional_t<K.occlude, Clocked<Connect>, Connect>;
-    using AtVertex = std::conditional_t<K.connect, ConnectHere, QueueVertex<F, BidirectionalMis>>;
+    using AtVertex = std::conditional_t<K.connect, ConnectHere, QueueVertex<F, Mis>>;
 
     OccludeStage occlude;
     WeighStage weigh;
-    ConnectCameraQueue<F, Candidates> connect_camera;
+    ConnectCameraQueue<F, Mis, Candidates> connect_camera;
     Splat<F> splat;
 
-    SplatSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave, const SplatQueues& q,
-              const FilmBuffers& film, const BdptPolicy& p, Lane* raw) {
+    SplatSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave, const SplatQueues<Mis>& q,
+              const FilmBuffers& film, const BdptPolicyOf<Mis>& p, Lane* raw) {
         occlude = {scene, tracer, q.weighted, {q.splats}, layout.record(OccludeStage::kName)};
         weigh = {q.candidates,
                  choose<K.occlude>(Gathered<OccludeStage>{occlude, wave.state, q.weighted.capacity()}, q.weighted),
@@ -68,14 +70,13 @@ struct SplatSide {
 
     Candidates candidates() const { return choose<K.weigh>(weigh, weigh.candidates); }
     AtVertex at_vertex() const {
-        return choose<K.connect>(ConnectHere{connect_camera.connect},
-                                 QueueVertex<F, BidirectionalMis>{connect_camera.vertices});
+        return choose<K.connect>(ConnectHere{connect_camera.connect}, QueueVertex<F, Mis>{connect_camera.vertices});
     }
 };
 
 /// Splat candidates of one depth: weighted, tested, kept for the end of the wave.
-template <class Executor, Features F, class Tracer, Fusion K>
-void run_splats(Executor& exec, const SplatSide<F, Tracer, K>& splats) {
+template <class Executor, Features F, class Tracer, Fusion K, class Mis>
+void run_splats(Executor& exec, const SplatSide<F, Tracer, K, Mis>& splats) {
     if constexpr (!K.weigh) exec.run(splats.weigh);
     if constexpr (K.occlude)
         exec.trace_gathered(splats.occlude);
@@ -84,18 +85,18 @@ void run_splats(Executor& exec, const SplatSide<F, Tracer, K>& splats) {
 }
 
 /// Light subpaths of a wave whose vertices are kept for its eye subpaths.
-template <Features F, class Tracer, Fusion K>
+template <Features F, class Tracer, Fusion K, class Mis>
 struct LightStages {
-    using Splats = SplatSide<F, Tracer, K>;
+    using Splats = SplatSide<F, Tracer, K, Mis>;
 
-    GenerateLight<F, typename Splats::Candidates> generate;
-    Extend<F, Tracer, BidirectionalMis> extend[2];
-    LightVertex<F, typename Splats::AtVertex> vertex[2];
-    ConnectCameraQueue<F, typename Splats::Candidates> connect_camera;
+    GenerateLight<F, Mis, typename Splats::Candidates> generate;
+    Extend<F, Tracer, Mis> extend[2];
+    LightVertex<F, Mis, typename Splats::AtVertex> vertex[2];
+    ConnectCameraQueue<F, Mis, typename Splats::Candidates> connect_camera;
 
     LightStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave,
-                const SubpathQueues<SubpathRay>& q, LightVertices vertices, uint32_t* last_vertex, const Splats& splats,
-                const BdptPolicy& p)
+                const SubpathQueues<SubpathRay<Mis>>& q, LightVertices<Mis> vertices, uint32_t* last_vertex,
+                const Splats& splats, const BdptPolicyOf<Mis>& p)
         : connect_camera(splats.connect_camera) {
         const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
         generate = {scene,
@@ -131,9 +132,9 @@ struct LightStages {
     }
 };
 
-template <class Executor, Features F, class Tracer, Fusion K>
-void run_light_subpaths(Executor& exec, const LightStages<F, Tracer, K>& all, const SplatSide<F, Tracer, K>& splats,
-                        const BdptPolicy& p) {
+template <class Executor, Features F, class Tracer, Fusion K, class Mis>
+void run_light_subpaths(Executor& exec, const LightStages<F, Tracer, K, Mis>& all,
+                        const SplatSide<F, Tracer, K, Mis>& splats, const BdptPolicyOf<Mis>& p) {
     for (uint32_t round = 0; round < p.waves.light_rounds(); ++round) {
         const auto s = all.in_round(round);
         exec.run_slots(s.generate, s.generate.wave.tiles * kTilePixels);

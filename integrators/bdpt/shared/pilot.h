@@ -15,5 +15,9 @@ constexpr uint32_t kPilotSubpaths = 8192;
 template <Features F>
 double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, const Rules<BidirectionalMis>& rules,
                            uint64_t seed);
+template <Features F, class Mis>
+double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& rules, uint64_t seed) {
+    return mean_light_vertices<F>(scene, tracer, rules.with(BidirectionalMis(rules.mis)), seed);
+}
 
 }  // namespace ambilux

@@ -6,8 +6,9 @@
 
 namespace ambilux {
 
-struct BdptPolicy {
-    Rules<BidirectionalMis> rules;
+template <class Mis>
+struct BdptPolicyOf {
+    Rules<Mis> rules;
     WavePolicy waves;
     uint32_t cache_draws;            ///< light vertices that an eye vertex draws from a cache; 0: variants without one
     bool coherent_draws;             ///< LightVertexSource
@@ -15,7 +16,13 @@ struct BdptPolicy {
     bool traces_connections;         ///< on a device: connect_vertices traces its shadow rays itself
 
     bool light_subpaths() const { return rules.splat || rules.connect; }
+    /// The same with another model.
+    template <class Other>
+    BdptPolicyOf<Other> with(const Other& mis) const {
+        return {rules.with(mis), waves, cache_draws, coherent_draws, one_connection_per_launch, traces_connections};
+    }
 };
+using BdptPolicy = BdptPolicyOf<BidirectionalMis>;
 
 /// What `settings` ask of a scene (integrators light and bdpt). Throws Error(usage) when subpaths might never end.
 BdptPolicy plan_bdpt(const Scene& scene, const RenderSettings& settings);
@@ -23,7 +30,18 @@ BdptPolicy plan_bdpt(const Scene& scene, const RenderSettings& settings);
 /// Throws Error(usage) that says `why` unless there is one light subpath per pixel and sample.
 void need_one_light_subpath(const RenderSettings& settings, const char* why);
 
+/// The same for a model that adds to BidirectionalMis, and is made of one.
+template <class Mis>
+BdptPolicyOf<Mis> plan_bdpt(const Scene& scene, const RenderSettings& settings) {
+    const BdptPolicy p = plan_bdpt(scene, settings);
+    return p.with(Mis{p.rules.mis});
+}
+
 /// Names of strategies that this render does without.
 std::vector<std::string> skipped_strategies(const Scene& scene, const BdptPolicy& policy);
+template <class Mis>
+std::vector<std::string> skipped_strategies(const Scene& scene, const BdptPolicyOf<Mis>& policy) {
+    return skipped_strategies(scene, policy.with(BidirectionalMis(policy.rules.mis)));
+}
 
 }  // namespace ambilux

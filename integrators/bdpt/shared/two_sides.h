@@ -11,26 +11,29 @@ namespace ambilux {
 
 /// Memory of one wave. Most queues hold the most they can ever be given, since a slot has one item at a time. Of shadow
 /// rays it may have several, as many as there is capacity for.
-template <class Shadow>
-struct TwoSidesMemoryOf {
-    SubpathQueues<SubpathRay> subpaths;
-    EyeQueuesOf<Shadow> eye;
-    SplatQueues splats;
-    Queue<ConnectionVertex> eye_vertices;  ///< of one depth, for pairs
-    LightVertices light_vertices;
+template <class Mis, class Shadow = ShadowItem>
+struct TwoSidesMemory {
+    using Vertex = ConnectionVertex<Mis>;
+
+    SubpathQueues<SubpathRay<Mis>> subpaths;
+    EyeQueues<Mis, Shadow> eye;
+    SplatQueues<Mis> splats;
+    Queue<Vertex> eye_vertices;  ///< of one depth, for pairs
+    LightVertices<Mis> light_vertices;
     Queue<PairItem> pairs, deferred;
     uint32_t* last_vertex;
 
     template <Fusion K, Features F>
-    static TwoSidesMemoryOf lay_out(Layout& layout, const BdptPolicy& p, WaveSize n) {
+    static TwoSidesMemory lay_out(Layout& layout, const BdptPolicyOf<Mis>& p, WaveSize n) {
         const bool by_path = p.waves.queues.fixed_places();
-        const uint32_t lanes = ConnectionVertex::lanes<F>(), pairs = p.rules.connect && !K.occlude ? n.slots : 0;
-        TwoSidesMemoryOf m;
+        const uint32_t lanes = Vertex::template lanes<F>(), pairs = p.rules.connect && !K.occlude ? n.slots : 0;
+        TwoSidesMemory m;
         m.subpaths = {layout, n.slots, p.waves.queues};
-        m.eye = EyeQueuesOf<Shadow>::template lay_out<K, F>(layout, n.slots, n.slots, p.rules, p.waves);
-        m.splats = SplatQueues::lay_out<K, F>(layout, n.slots, n.kept + p.waves.most_light_subpaths(n.slots), p);
-        m.eye_vertices = layout.queue<ConnectionVertex>("eye_vertices", pairs, false, lanes);
-        m.light_vertices = layout.queue<ConnectionVertex>("light_vertices", p.rules.connect ? n.kept : 0, false, lanes);
+        m.eye = EyeQueues<Mis, Shadow>::template lay_out<K, F>(layout, n.slots, n.slots, p.rules, p.waves);
+        m.splats =
+            SplatQueues<Mis>::template lay_out<K, F>(layout, n.slots, n.kept + p.waves.most_light_subpaths(n.slots), p);
+        m.eye_vertices = layout.queue<Vertex>("eye_vertices", pairs, false, lanes);
+        m.light_vertices = layout.queue<Vertex>("light_vertices", p.rules.connect ? n.kept : 0, false, lanes);
         m.pairs = layout.queue<PairItem>("pairs", pairs, by_path);
         m.deferred = layout.queue<PairItem>("deferred", p.traces_connections ? 0 : pairs, by_path);
         m.last_vertex = p.cache_draws == 0 ? layout.allocate<uint32_t>(n.slots) : nullptr;
@@ -38,27 +41,27 @@ struct TwoSidesMemoryOf {
     }
 };
 
-using TwoSidesMemory = TwoSidesMemoryOf<ShadowItem>;
-
 /// `Source`: where light vertices come from (stages/light_vertex_search.h).
-template <Features F, class Tracer, Fusion K, class Source = LightVertexSource>
+template <Features F, class Tracer, Fusion K, class Source>
 struct TwoSidesStages {
-    using Mis = BidirectionalMis;
+    using Mis = typename Source::Mis;
+    using Policy = BdptPolicyOf<Mis>;
+    using Memory = TwoSidesMemory<Mis, typename Source::Learn::Item>;
     using Eye = EyeSide<F, Tracer, K, typename Source::Learn>;
-    using Splats = SplatSide<F, Tracer, K>;
+    using Splats = SplatSide<F, Tracer, K, Mis>;
     using Candidates = typename Eye::Candidates;
     using Connect = std::conditional_t<K.occlude, NextEventAndConnections<F, Candidates, Source>,
                                        NextEventAndPair<F, Candidates, Source>>;
     using AtVertex = std::conditional_t<K.connect, Connect, QueueVertex<F, Mis>>;
     /// A device may trace connections in place, in kernels for diffuse surfaces.
     static constexpr bool kTracesConnections =
-        K.weigh && !K.occlude && F.bsdfs == bit(BsdfType::diffuse) && std::is_same_v<Source, LightVertexSource>;
+        K.weigh && !K.occlude && F.bsdfs == bit(BsdfType::diffuse) && std::is_same_v<Source, LightVertexSource<Mis>>;
 
-    BdptPolicy policy;
+    Policy policy;
     Wave wave;
     Eye eye;
     Splats splats;
-    LightStages<F, Tracer, K> light;
+    LightStages<F, Tracer, K, Mis> light;
     Source source;
     GenerateEye<F, Mis> generate;
     Extend<F, Tracer, Mis> extend[2];
@@ -66,12 +69,12 @@ struct TwoSidesStages {
     ConnectEmitter<F, Mis, Connect> connect_emitter;
     ConnectVertices<F, Candidates, Source> connect_vertices, connect_deferred;
 
-    TwoSidesStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const BdptPolicy& p, const Wave& w,
-                   const TwoSidesMemory& m, const FilmBuffers& film)
+    TwoSidesStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
+                   const Memory& m, const FilmBuffers& film)
         : TwoSidesStages(layout, scene, tracer, p, w, m, film,
                          {m.light_vertices, m.last_vertex, p.cache_draws, p.coherent_draws}) {}
-    TwoSidesStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const BdptPolicy& p, const Wave& w,
-                   const TwoSidesMemoryOf<typename Source::Learn::Item>& m, const FilmBuffers& film, const Source& from)
+    TwoSidesStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
+                   const Memory& m, const FilmBuffers& film, const Source& from)
         : policy(p), wave(w), eye(layout, scene, tracer, w, m.eye, film, p.waves, from.learn()),
           splats(layout, scene, tracer, w, m.splats, film, p, m.eye.raw),
           light(layout, scene, tracer, w, m.subpaths, m.light_vertices, m.last_vertex, splats, p), source(from) {
@@ -83,7 +86,7 @@ struct TwoSidesStages {
             connect = {{next_event}, source, w.state, record(connect_vertices)};
         else
             connect = {next_event, source, m.eye_vertices, m.pairs};
-        const SubpathQueues<SubpathRay>& q = m.subpaths;
+        const SubpathQueues<SubpathRay<Mis>>& q = m.subpaths;
         generate = {scene, wave, p.rules.mis, q.rays[0], film.samples, record(generate)};
         connect_emitter = {scene, wave, p.rules, m.eye.vertices, connect, next_event.record};
         const auto at_vertex = choose<K.connect>(connect, QueueVertex<F, Mis>{m.eye.vertices});
@@ -114,7 +117,7 @@ struct TwoSidesStages {
     auto connect_and_occlude(bool several) const
         requires kTracesConnections
     {
-        return ConnectAndOcclude<F, Tracer, typename Eye::Shadows>{
+        return ConnectAndOcclude<F, Tracer, typename Eye::Shadows, Source>{
             connect_vertices, eye.occlude.with_atomic_add(several), connect_vertices.record};
     }
 };
@@ -139,7 +142,7 @@ void run_connections(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>&
 
 template <class Executor, Features F, class Tracer, Fusion K, class Source>
 void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s) {
-    const Rules<BidirectionalMis>& rules = s.policy.rules;
+    const auto& rules = s.policy.rules;
     start_eye_subpaths<K.generate>(exec, s.generate, s.extend[0], s.wave.tiles * kTilePixels);
     repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several) {
         run_emission(exec, s.eye);
@@ -155,8 +158,8 @@ void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>
 }
 
 /// One wave.
-template <class Executor, Features F, class Tracer, Fusion K>
-void run_two_sides(Executor& exec, const TwoSidesStages<F, Tracer, K>& s) {
+template <class Executor, Features F, class Tracer, Fusion K, class Source>
+void run_two_sides(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s) {
     if (s.policy.rules.max_depth == 0) return;
     if (s.policy.light_subpaths()) run_light_subpaths(exec, s.light, s.splats, s.policy);
     run_eye_subpaths(exec, s);

@@ -11,15 +11,15 @@ namespace ambilux {
 /// Only what weighs and adds up is fused: rounds gather the vertices of all slots.
 constexpr Fusion streaming_fusion(Fusion wanted) { return {wanted.weigh, false, false, false}; }
 
-template <Features F, class Tracer, Fusion kWanted>
-struct StreamingIntegrator {
-    using Mis = BidirectionalMis;
-    using Policy = BdptPolicy;
+template <Features F, class Tracer, Fusion kWanted, class Mis>
+struct StreamingOf {
+    using Policy = BdptPolicyOf<Mis>;
+    using Vertex = ConnectionVertex<Mis>;
     static constexpr Fusion kFusion = streaming_fusion(kWanted);
     static constexpr bool kFilmWide = true;
 
     static Policy plan(const Scene& scene, const RenderSettings& settings) {
-        Policy p = plan_bdpt(scene, settings);
+        Policy p = plan_bdpt<Mis>(scene, settings);
         need_one_light_subpath(settings, "variant streaming has one light subpath per eye vertex; use variant lvc");
         p.waves.keeps_light_vertices = false;
         p.waves.slots_in_flight = 1;  // the renderer says how many
@@ -32,48 +32,48 @@ struct StreamingIntegrator {
     }
 
     struct Memory {
-        Queue<SubpathRay> rays;
+        Queue<SubpathRay<Mis>> rays;
         Queue<SlotHit> eye_hits, light_hits;
         Queue<TurnItem> turns;
-        LaneArray<ConnectionVertex> eye_vertices;
-        LaneArray<SubpathRay> pending;
-        Queue<ConnectionVertex> pairs;
-        EyeQueues eye;
-        SplatQueues splats;
+        LaneArray<Vertex> eye_vertices;
+        LaneArray<SubpathRay<Mis>> pending;
+        Queue<Vertex> pairs;
+        EyeQueues<Mis> eye;
+        SplatQueues<Mis> splats;
         uint32_t* next_path;
     };
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
-        const uint32_t slots = p.waves.slots_in_flight, lanes = ConnectionVertex::lanes<F>();
+        const uint32_t slots = p.waves.slots_in_flight, lanes = Vertex::template lanes<F>();
         Memory m;
-        m.rays = layout.queue<SubpathRay>("rays", slots, true);
+        m.rays = layout.queue<SubpathRay<Mis>>("rays", slots, true);
         m.eye_hits = layout.queue<SlotHit>("eye_hits", slots);
         m.light_hits = layout.queue<SlotHit>("light_hits", p.light_subpaths() ? slots : 0);
         m.turns = layout.queue<TurnItem>("turns", slots);
-        m.eye_vertices = layout.array<ConnectionVertex>(slots, lanes);
-        m.pending = layout.array<SubpathRay>(slots);
-        m.pairs = layout.queue<ConnectionVertex>("pairs", p.rules.connect ? slots : 0, false, lanes);
-        m.eye = EyeQueues::lay_out<kFusion, F>(layout, slots, n.slots, p.rules, p.waves);
-        m.splats = SplatQueues::lay_out<kFusion, F>(layout, slots, with_holes(slots), p);
+        m.eye_vertices = layout.array<Vertex>(slots, lanes);
+        m.pending = layout.array<SubpathRay<Mis>>(slots);
+        m.pairs = layout.queue<Vertex>("pairs", p.rules.connect ? slots : 0, false, lanes);
+        m.eye = EyeQueues<Mis>::template lay_out<kFusion, F>(layout, slots, n.slots, p.rules, p.waves);
+        m.splats = SplatQueues<Mis>::template lay_out<kFusion, F>(layout, slots, with_holes(slots), p);
         m.next_path = layout.allocate<uint32_t>(1);
         return m;
     }
 
     struct Stages {
         using Eye = EyeSide<F, Tracer, kFusion>;
-        using Splats = SplatSide<F, Tracer, kFusion>;
+        using Splats = SplatSide<F, Tracer, kFusion, Mis>;
         using Connect = NextEvent<F, Mis, typename Eye::Candidates>;
 
         Policy policy;
         Wave wave;
         Eye eye;
         Splats splats;
-        StreamBegin<F> begin;
-        StreamExtend<F, Tracer> extend;
-        StreamEyeVertex<F, typename Eye::Emission> eye_vertex;
-        StreamTurn<F, typename Splats::Candidates> turn;
-        StreamLightVertex<F> light_vertex;
+        StreamBegin<F, Mis> begin;
+        StreamExtend<F, Tracer, Mis> extend;
+        StreamEyeVertex<F, Mis, typename Eye::Emission> eye_vertex;
+        StreamTurn<F, Mis, typename Splats::Candidates> turn;
+        StreamLightVertex<F, Mis> light_vertex;
         ConnectEmitter<F, Mis, Connect> connect_emitter;
-        StreamConnect<F, typename Eye::Candidates> connect_vertices;
+        StreamConnect<F, Mis, typename Eye::Candidates> connect_vertices;
 
         Stages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
                const Memory& m, const FilmBuffers& film)
@@ -81,8 +81,8 @@ struct StreamingIntegrator {
               splats(layout, scene, tracer, w, m.splats, film, p, m.eye.raw) {
             const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
             const bool seeds = F.opacity || p.waves.cull > 0.0f;
-            const StreamPool<F> pool = {scene,          wave,      p.rules,      m.rays,
-                                        m.eye_vertices, m.pending, film.samples, m.next_path};
+            const StreamPool<F, Mis> pool = {scene,          wave,      p.rules,      m.rays,
+                                             m.eye_vertices, m.pending, film.samples, m.next_path};
             begin = {pool, record(begin)};
             extend = {scene, tracer, pool, m.eye_hits, m.light_hits, record(extend)};
             eye_vertex = {pool, m.eye_hits, eye.emission(), m.eye.vertices, m.turns, record(eye_vertex)};
@@ -125,5 +125,7 @@ struct StreamingIntegrator {
         });
     }
 };
+template <Features F, class Tracer, Fusion kWanted>
+using StreamingIntegrator = StreamingOf<F, Tracer, kWanted, BidirectionalMis>;
 
 }  // namespace ambilux

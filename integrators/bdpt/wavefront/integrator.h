@@ -5,16 +5,16 @@
 
 namespace ambilux {
 
-template <Features F, class Tracer, Fusion kFusion>
-struct WavefrontIntegrator {
-    using Policy = BdptPolicy;
-    using Memory = TwoSidesMemory;
-    using Stages = TwoSidesStages<F, Tracer, kFusion>;
+template <Features F, class Tracer, Fusion kFusion, class Mis>
+struct WavefrontOf {
+    using Policy = BdptPolicyOf<Mis>;
+    using Memory = TwoSidesMemory<Mis>;
+    using Stages = TwoSidesStages<F, Tracer, kFusion, LightVertexSource<Mis>>;
     static constexpr bool kFilmWide = true;
 
     /// Throws Error(usage) for numbers of light subpaths that leave an eye subpath without its own.
     static Policy plan(const Scene& scene, const RenderSettings& settings) {
-        const Policy p = plan_bdpt(scene, settings);
+        const Policy p = plan_bdpt<Mis>(scene, settings);
         if (p.rules.connect)
             need_one_light_subpath(settings,
                                    "variant wavefront connects every eye subpath with a light subpath of its own; use "
@@ -25,7 +25,7 @@ struct WavefrontIntegrator {
         return p.light_subpaths() ? mean_light_vertices<F>(scene, tracer, p.rules, seed) : 0.0;
     }
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
-        return Memory::lay_out<kFusion, F>(layout, p, n);
+        return Memory::template lay_out<kFusion, F>(layout, p, n);
     }
     static std::vector<std::string> skipped(const Scene& scene, const Policy& p) {
         return skipped_strategies(scene, p);
@@ -35,6 +35,8 @@ struct WavefrontIntegrator {
         run_two_sides(exec, s);
     }
 };
+template <Features F, class Tracer, Fusion kFusion>
+using WavefrontIntegrator = WavefrontOf<F, Tracer, kFusion, BidirectionalMis>;
 
 /// Integrator light has the stages of its one group of strategies (plan_bdpt).
 template <Features F, class Tracer, Fusion kFusion>

@@ -1,0 +1,70 @@
+// The sums of a subpath (Mis::Sums) as items keep them: word by word. Sums are plain words, floats or what their author
+// packs into a word, in the order in which they are declared.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+
+#include "core/hd.h"
+
+namespace ambilux {
+
+/// Words of the sums that a ray keeps.
+template <class Sums>
+constexpr uint32_t ray_words() {
+    static_assert(std::is_trivially_copyable_v<Sums> && sizeof(Sums) % sizeof(float) == 0, "sums are plain words");
+    return sizeof(Sums) / sizeof(float);
+}
+/// The first words, those that a vertex keeps: all, or Sums::kVertexWords.
+template <class Sums>
+constexpr uint32_t vertex_words() {
+    if constexpr (requires { Sums::kVertexWords; })
+        return Sums::kVertexWords;
+    else
+        return ray_words<Sums>();
+}
+
+/// Whole lanes for words that have no place of their own in an item.
+template <uint32_t kWords>
+struct SumLanes {
+    static constexpr uint32_t kLanes = (kWords + 3) / 4;
+    float word[kLanes * 4];
+};
+template <>
+struct SumLanes<0> {
+    static constexpr uint32_t kLanes = 0;
+};
+
+/// `kWords` words, of which an item has places for `kPlaces`. Places without a word are 0.
+template <uint32_t kPlaces, uint32_t kWords>
+struct PackedSums {
+    using More = SumLanes<(kWords > kPlaces ? kWords - kPlaces : 0)>;
+
+    float word[kPlaces];
+    [[no_unique_address]] More more;
+
+    template <class Sums>
+    AMBILUX_HD static PackedSums pack(const Sums& sums) {
+        float all[ray_words<Sums>()];
+        memcpy(all, &sums, sizeof(Sums));
+        PackedSums packed = {};
+        for (uint32_t k = 0; k < kPlaces && k < kWords; ++k) packed.word[k] = all[k];
+        if constexpr (More::kLanes > 0)
+            for (uint32_t k = kPlaces; k < kWords; ++k) packed.more.word[k - kPlaces] = all[k];
+        return packed;
+    }
+    /// Words that were not kept are 0.
+    template <class Sums>
+    AMBILUX_HD Sums unpack() const {
+        float all[ray_words<Sums>()] = {};
+        for (uint32_t k = 0; k < kPlaces && k < kWords; ++k) all[k] = word[k];
+        if constexpr (More::kLanes > 0)
+            for (uint32_t k = kPlaces; k < kWords; ++k) all[k] = more.word[k - kPlaces];
+        Sums sums;
+        memcpy(&sums, all, sizeof(Sums));
+        return sums;
+    }
+};
+
+}  // namespace ambilux
