@@ -15,6 +15,7 @@
 #include "tests/support/bidirectional_images.h"
 #include "tests/support/closed_forms.h"
 #include "tests/support/render_checks.h"
+#include "tests/support/third_sum.h"
 
 using namespace ambilux;
 
@@ -24,14 +25,14 @@ constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
 /// A wave over a whole film whose queues can be changed before a stage runs.
-template <Fusion kFusion>
+template <Fusion kFusion, class Mis = BidirectionalMis>
 struct FusedBench {
-    using Integrator = WavefrontIntegrator<kAllFeatures, CwbvhTracer, kFusion>;
+    using Integrator = WavefrontOf<kAllFeatures, CwbvhTracer, kFusion, Mis>;
     using Stages = typename Integrator::Stages;
 
     Scene scene;
     CwbvhAccel accel;
-    BdptPolicy policy;
+    typename Integrator::Policy policy;
     Wave wave;
     WaveState state{};
     std::vector<Lane> bytes, samples;
@@ -207,6 +208,23 @@ TEST_CASE("G9: nothing is counted in a clean wave, whose film is that of the ren
         CHECK(film.sum == b.sum);
         CHECK(film.sum_squares == b.sum_squares);
     }
+}
+
+TEST_CASE("A third sum comes along to wherever weights ask for it, and the film is that of two sums") {
+    const auto check = [&]<Fusion kFusion>(const Method& method) {
+        FusedBench<kFusion> two(cornell(), method);
+        FusedBench<kFusion, ThirdSumMis> three(cornell(), method);
+        two.run();
+        three.run();
+        CHECK(two.total() > 0);
+        CHECK(three.sum == two.sum);
+        CHECK(three.sum_squares == two.sum_squares);
+    };
+    for (const Method& m : kMethods) {
+        INFO(m.name);
+        check.template operator()<Fusion{}>(m);
+    }
+    check.template operator()<Fusion{.weigh = true, .connect = true}>({"all"});
 }
 
 TEST_CASE("Launches with one pair of a path, and with as many as there is capacity for, connect the same pairs") {
