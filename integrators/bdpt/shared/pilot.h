@@ -16,6 +16,7 @@ template <Features F>
 double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, const Rules<BidirectionalMis>& rules,
                            uint64_t seed);
 template <Features F, class Mis>
+    requires(!std::is_same_v<Mis, BidirectionalMis>)
 double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& rules, uint64_t seed) {
     return mean_light_vertices<F>(scene, tracer, rules.with(BidirectionalMis(rules.mis)), seed);
 }
