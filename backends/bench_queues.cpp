@@ -7,7 +7,7 @@
 #include "accel/embree_tracer.h"
 #include "backends/bench_rays.h"
 #include "backends/cpu/executor.h"
-#include "backends/cpu/wave_bytes.h"
+#include "backends/cpu/host_memory.h"
 #include "backends/cuda/bench_queues.h"
 #include "backends/cuda_device.h"
 #include "backends/ray_batches.h"
@@ -54,7 +54,7 @@ SceneItems make_scene_items(const Scene& scene, uint32_t items) {
 /// The queue of one thread.
 template <class Item>
 struct HostQueue {
-    WaveBytes bytes;
+    HostMemory memory;
     Queue<Item> queue;
     OrderMemory order;
     WaveState state = {};
@@ -64,8 +64,8 @@ struct HostQueue {
     explicit HostQueue(const QueuePolicy& policy) {
         Layout sizes;
         lay_out(sizes, policy);
-        bytes = make_wave_bytes(sizes.bytes());
-        Layout layout(sizes, bytes.get());
+        memory = HostMemory(sizes.bytes());
+        Layout layout(sizes, memory.data());
         lay_out(layout, policy);
         *queue.counter = layout.first_counters()[0];
     }

@@ -36,6 +36,34 @@ AMBILUX_HD int64_t fetch_add_shared(int64_t* sum, int64_t value) {
 #endif
 }
 
+/// Adds `n` unless the sum would be more than `most`; threads of a host may share `sum`, one thread of a device adds.
+/// False if it would; else `before` is what it was.
+AMBILUX_HD bool add_up_to(uint32_t* sum, uint32_t n, uint32_t most, uint32_t& before) {
+#if defined(__CUDA_ARCH__)
+    before = *sum;
+    if (before > most || n > most - before) return false;
+    *sum = before + n;
+    return true;
+#else
+    const std::atomic_ref<uint32_t> shared(*sum);
+    before = shared.load(std::memory_order_relaxed);
+    do {
+        if (before > most || n > most - before) return false;
+    } while (!shared.compare_exchange_weak(before, before + n, std::memory_order_relaxed));
+    return true;
+#endif
+}
+
+/// The largest of `value` and what others, likewise, have raised it to.
+AMBILUX_HD void raise_shared(uint64_t* most, uint64_t value) {
+#if defined(__CUDA_ARCH__)
+    if (*most < value) *most = value;
+#else
+    const std::atomic_ref<uint64_t> shared(*most);
+    for (uint64_t before = shared; before < value && !shared.compare_exchange_weak(before, value);) {}
+#endif
+}
+
 /// Threads of a host may share `sum` too.
 AMBILUX_HD void add_shared(double* sum, double value) {
 #if defined(__CUDA_ARCH__)

@@ -1,21 +1,7 @@
-// What an integrator is to the renderers: a struct
-//   template <Features F, class Tracer, Fusion kFusion> struct Integrator
-// with
-//   Policy, plan(scene, settings)       what it does where, decided once by the host; has a WavePolicy `waves`
-//   Memory, lay_out(layout, policy, n)  the queues of one wave
-//   Stages(layout, scene, tracer, policy, wave, memory, film)
-//   schedule(executor, stages)          one wave, without the update of the film
-//   kFilmWide                           light may land anywhere on the film: a sample is complete when all of it is
-//   skipped(scene, policy, features)    names of what this render does without
-// An executor has, for a stage with items() and a record:
-//   run(stage)            over its items, which are then gone
-//   trace(stage)          the same for rays in no order; trace_gathered(stage): in the order of their queue
-//   extend(stage)         rays become hits where they lie; extend_coherent for neighbouring rays that stay together
-//   run_slots(stage, n)   over n slots for each sample of the wave; with a last argument 1, over n slots once
-//   run_paths(stage, n)   a stage that claims its slots by itself
-//   set_depth(d), next_depth(n), clear(queue), fail_on_overflow(queue, queue)
-//   repeat_while(queue, body)  until the queue is found empty
-//   store(place, value)   of one number that stages share
+// What a method is to the renderer (concept Integrator, integrators/contract.h): a template
+//   template <Features F, class Tracer, Fusion kFusion> struct NAMEIntegrator
+// that says what it decides on the host (Policy, plan), which queues a wave has (Memory, lay_out), what lives longer than
+// a wave (State), what works on them (Stages), and in which order (schedule or iteration).
 #pragma once
 
 #include <algorithm>
@@ -23,8 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "integrators/kept_state.h"
 #include "integrators/settings.h"
 #include "queues/order.h"
+#include "queues/primitives.h"
 #include "scene/scene.h"
 #include "stages/multi_bounce.h"
 #include "stages/update_film.h"
@@ -42,6 +30,7 @@ struct WavePolicy {
                                            ///< finds right; 0: every path has a slot of its own
     uint32_t most_paths = ~0u;             ///< of a wave, as items can number them
     uint32_t light_subpaths_per_tile = 0;  ///< of kTilePixels pixels, in one sample; 0: none
+    uint32_t iteration_samples = 1;        ///< of every pixel in one iteration
     bool keeps_light_vertices = false;     ///< queues of light vertices or splats hold those of a whole wave
 
     /// Most light subpaths of a slot.
@@ -54,12 +43,6 @@ struct WavePolicy {
     uint32_t order_slots(uint32_t slots) const { return slots_in_flight ? slots_in_flight : slots; }
 };
 
-/// How much a wave holds.
-struct WaveSize {
-    uint32_t slots;
-    uint32_t kept;  ///< vertices of its light subpaths
-};
-
 /// Buffers of the film that a wave works on. `samples`: by slot of this wave.
 struct FilmBuffers {
     Lane* samples;
@@ -67,6 +50,23 @@ struct FilmBuffers {
     FilmSums sums;
     double* strategies = nullptr;  ///< StrategyFilm
     uint64_t* strategies_dropped = nullptr;
+};
+
+/// How much a wave holds, and what the primitives of its executor need.
+struct WaveSize {
+    uint32_t slots;
+    uint32_t kept;  ///< vertices of its light subpaths
+    PrimitiveBytes primitives;
+};
+
+/// What the stages of a wave are made of, beside what their method lays out.
+template <class Tracer>
+struct WaveParts {
+    Layout& layout;  ///< of the wave: its records
+    const SceneView& scene;
+    const Tracer& tracer;
+    const Wave& wave;
+    const FilmBuffers& film;
 };
 
 /// Room for the light vertices of so many subpaths, from the mean of the pilot: a quarter more, and six deviations of a

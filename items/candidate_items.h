@@ -47,32 +47,11 @@ AMBILUX_HD void make_shadow(const CandidateItem& c, Rgb value, ShadowItem& item)
     item = {value, c.path, c.origin, c.tmax, c.direction, c.opacity_seed};
 }
 
-/// A ShadowItem from which draws of light vertices are learned (stages/learned_draws.h).
-struct ScoredShadowItem {
-    Rgb value;
-    uint32_t path;
-    Vec3f origin;
-    float tmax;
-    Vec3f direction;
-    uint32_t opacity_seed;
-    uint32_t entry;  ///< of the table; kNone: nothing is learned from this ray
-    float score;
-    uint32_t pad[2];
-
-    AMBILUX_HD ShadowItem ray() const { return {value, path, origin, tmax, direction, opacity_seed}; }
-};
-
-AMBILUX_HD void make_shadow(const CandidateItem& c, Rgb value, ScoredShadowItem& item) {
-    item = {value,
-            c.path,
-            c.origin,
-            c.tmax,
-            c.direction,
-            c.opacity_seed,
-            c.strategy.s() >= 2 ? float_bits(c.film.x) : kNone,
-            c.film.y,
-            {}};
-}
+/// Of a candidate from which nothing is to be learned.
+struct NoNote {};
+AMBILUX_HD const CandidateItem& noted(const CandidateItem& c, NoNote) { return c; }
+/// Without what some methods add to it.
+AMBILUX_HD const CandidateItem& plain(const CandidateItem& c) { return c; }
 
 /// Light to be added to the sample of a path.
 struct alignas(16) Contribution {

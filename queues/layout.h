@@ -45,6 +45,13 @@ public:
         last_by_path_ = by_path;
         return q;
     }
+    /// A queue whose items are kept over a wave, or over an iteration, and whose number is not known before. When they are
+    /// too many, the wave fails and is done again with more room.
+    template <class Item>
+    Queue<Item> growing_queue(const char* name, uint32_t capacity, uint32_t lanes = LaneArray<Item>::kLanes) {
+        growing_.push_back(names_.size());
+        return queue<Item>(name, capacity, false, lanes);
+    }
     template <class Item>
     LaneArray<Item> array(uint32_t capacity, uint32_t lanes = LaneArray<Item>::kLanes) {
         return {allocate<Lane>(uint64_t(capacity) * (lanes <= paired_lanes<Item>() ? (lanes + 1) / 2 * 2 : lanes)),
@@ -81,6 +88,14 @@ public:
     const std::vector<std::string>& record_names() const { return record_names_; }
     QueueCounter* counters() const { return counters_; }
     StageRecord* records() const { return records_; }
+    /// Places of growing queues among all.
+    const std::vector<size_t>& growing() const { return growing_; }
+    /// Most items that a growing queue was given, by `counters`, which lie on the host.
+    uint64_t most_grown(const QueueCounter* counters) const {
+        uint64_t most = 0;
+        for (const size_t q : growing_) most = std::max(most, counters[q].peak);
+        return most;
+    }
     /// What the counters are before the first wave.
     std::vector<QueueCounter> first_counters() const {
         std::vector<QueueCounter> counters(names_.size());
@@ -101,6 +116,7 @@ private:
     StageRecord* records_ = nullptr;
     std::vector<std::string> names_, record_names_;
     std::vector<uint32_t> capacities_;
+    std::vector<size_t> growing_;
 };
 
 }  // namespace ambilux

@@ -11,15 +11,24 @@ namespace ambilux {
 constexpr uint32_t kTileSide = 8;
 constexpr uint32_t kTilePixels = kTileSide * kTileSide;
 
+/// Which memory was too small for a wave.
+enum WaveFailure : uint32_t {
+    kNoFailure,
+    kQueuesFull,    ///< queues that are kept over the wave
+    kAppendedFull,  ///< what all waves of an iteration append to
+};
+
 /// Part of a wave that changes from one to the next; lives where the kernels run.
 struct WaveState {
     uint32_t first_tile;      ///< of this wave
     uint32_t first_sample;    ///< of this wave
     uint32_t samples;         ///< of each pixel in this wave, at most Wave::samples
     uint32_t depth;           ///< segments of the paths in flight
-    uint32_t failed;          ///< a wave ran out of memory: it and all after it do nothing until the host has made room
+    uint32_t failed;          ///< WaveFailure: the wave, and on a device all after it, do nothing until there is room
     uint32_t done;            ///< waves that did not fail
     uint32_t light_subpaths;  ///< of this wave
+    uint32_t iteration;       ///< number of the iteration that this wave belongs to
+    uint32_t appended;        ///< where this wave's part of what all waves append to begins
     alignas(128) uint32_t next =
         0;  ///< slots that threads of a launch have claimed; away from what is read all the time
 };

@@ -6,12 +6,14 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "film/device_image.h"
 #include "film/moments.h"
 #include "integrators/settings.h"
+#include "integrators/state_kind.h"
 #include "scene/scene.h"
 
 namespace ambilux {
@@ -110,6 +112,14 @@ public:
     /// With RenderSettings::technique_depth: images of all strategies up to there. Sums of all samples since the start,
     /// cleared films included.
     virtual std::vector<StrategyImage> strategy_images() { return {}; }
+    /// What a method keeps between iterations: saved with the film, a render goes on from it as if it had not been
+    /// interrupted. Empty, and nothing to load, for most methods.
+    virtual StateKind state_kind() const { return StateKind::none; }
+    virtual std::vector<std::byte> save_state() { return {}; }
+    /// Before the first sample that is rendered. Throws Error(bad_input) if it was saved by another render.
+    virtual void load_state(std::span<const std::byte>) {}
+    /// Samples of every pixel in one iteration: `first` and `count` of render() are multiples of it.
+    virtual uint32_t iteration_samples() const { return 1; }
     /// A count for render() after which a caller should look at clocks and signals again: about 0.2 s of work, at
     /// least 1.
     virtual uint32_t preferred_batch() const = 0;

@@ -21,11 +21,11 @@ AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Rules<Mis>& r
     const SubpathEnd<Mis> y = unpack_end<F>(scene, light);
     Candidate<Mis> c;
     if (!connection<F>(rules, z, y, c)) return;
-    if constexpr (requires { draw.mark(c, z.throughput, state); }) draw.mark(c, z.throughput, state);
+    const auto note = draw.note(c, z.throughput, state);
     c.value *= draw.scale(state);
     if (!is_valid_radiance(c.value, record)) return;
     const uint32_t which = connection_ray(z.depth, draw.from_cache() ? kMaxDepth + place : y.depth);
-    candidates.push(pack_candidate(c, slot, seeds ? draws.shadow_seed(which) : 0));
+    candidates.push(noted(pack_candidate(c, slot, seeds ? draws.shadow_seed(which) : 0), note));
 }
 
 /// At an eye vertex: next event estimation, and the first pair for connect_vertices.
@@ -156,7 +156,10 @@ private:
         const Out& candidates;
         Loop& loop;
 
-        AMBILUX_HD void push(const CandidateItem& c) const { loop.slot = candidates.push(c); }
+        template <class Item>
+        AMBILUX_HD void push(const Item& c) const {
+            loop.slot = candidates.push(c);
+        }
     };
 };
 

@@ -27,6 +27,7 @@ struct LightVertexSource {
     AMBILUX_HD uint32_t first(uint32_t slot) const { return draws > 0 ? draws : last_vertex[slot]; }
 
     AMBILUX_HD bool from_cache() const { return draws > 0; }
+    AMBILUX_HD static NoNote note(const Candidate<Mis>&, Rgb, const WaveState&) { return {}; }
     static LearnNothing learn() { return {}; }
     /// What the queue of eye vertices keeps of the vertex `v` of a slot (ConnectionVertexFront::link).
     AMBILUX_HD static uint32_t link(const Vertex<Mis>&, uint32_t slot) { return slot; }

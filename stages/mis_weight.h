@@ -41,27 +41,30 @@ struct WeighEmission {
 };
 
 /// What eye vertices found by next event estimation and by connections.
-template <class Out>
+/// `Item`: CandidateItem, or one with a note for `Out`.
+template <class Out, class Item = CandidateItem>
 struct WeighCandidates {
     static constexpr const char* kName = "mis_weight";
 
-    Queue<CandidateItem> candidates;
+    Queue<Item> candidates;
     Out shadows;
     StageRecord* record;
     StrategyFilm strategies;
     const Lane* samples;  ///< what the paths have brought so far
     float cull;           ///< cull_factor; 0: none
 
-    const Queue<CandidateItem>& items() const { return candidates; }
+    const Queue<Item>& items() const { return candidates; }
     AMBILUX_HD void operator()(uint32_t i) const { push(candidates.load(i)); }
 
-    AMBILUX_HD uint32_t push(const CandidateItem& c) const {
+    template <class Given>
+    AMBILUX_HD uint32_t push(const Given& candidate) const {
         typename Out::value_type item;
-        return weigh(c, item) ? shadows.push(item) : 0;
+        return weigh(candidate, item) ? shadows.push(item) : 0;
     }
     /// False if nothing is left to be tested.
-    template <class Item>
-    AMBILUX_HD bool weigh(const CandidateItem& c, Item& item) const {
+    template <class Given, class Shadow>
+    AMBILUX_HD bool weigh(const Given& candidate, Shadow& item) const {
+        const CandidateItem& c = plain(candidate);
         Rgb value;
         if (!weighted_light(c.value, c.ratio, record, value)) return false;
         if (cull > 0.0f && c.tmax != kTowardsEnvironment) {
@@ -70,7 +73,7 @@ struct WeighCandidates {
             value *= factor;
         }
         strategies.remember(c.path, c.value, c.strategy);
-        make_shadow(c, value, item);
+        make_shadow(candidate, value, item);
         return true;
     }
 };

@@ -11,6 +11,7 @@ namespace ambilux {
 /// Nothing is learned from shadow rays.
 struct LearnNothing {
     using Item = ShadowItem;
+    using Candidate = CandidateItem;
 
     AMBILUX_HD static const ShadowItem& ray(const ShadowItem& item) { return item; }
     AMBILUX_HD void arrive(const ShadowItem&) const {}

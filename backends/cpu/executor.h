@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "backends/cpu/primitives.h"
 #include "queues/order.h"
 #include "queues/overflow.h"
 #include "stages/fused_clock.h"
@@ -17,7 +18,7 @@ namespace ambilux {
 
 class CpuExecutor {
 public:
-    static constexpr bool kMultiBounce = false;
+    static constexpr bool kHost = true;
 
     explicit CpuExecutor(WaveState* state) : state_(state) {}
     CpuExecutor(WaveState* state, const SceneView& scene, const OrderMemory& order)
@@ -78,6 +79,33 @@ public:
         queue.counter->finish();
     }
     static void store(uint32_t* place, uint32_t value) { *place = value; }
+    /// Has all waves' queue hold what is in that of this wave (stage.items()): stage(i, place) puts item i at `place`. If
+    /// there is no room, the wave fails, and the queues `others` are emptied as well.
+    template <class Stage, class... Item>
+    void append(const Stage& stage, const Queue<Item>&... others) {
+        const Start start;
+        reserve_appended(*state_, *stage.items().counter, *stage.target());
+        if (state_->failed) (others.counter->finish(), ...);
+        const uint32_t n = stage.items().counter->size();
+        for (uint32_t i = 0; i < n; ++i) stage(i, state_->appended + i);
+        record(stage, n, start);
+    }
+    /// Over items that stay.
+    template <class Stage, class Item>
+    void for_each(const Stage& stage, const Queue<Item>& queue) {
+        for_each(stage, queue.counter->size());
+    }
+    template <class Stage>
+    void for_each(const Stage& stage, uint32_t n) {
+        run_slots(stage, n, 1);
+    }
+    /// Of as many pairs as `queue` has items, by the lowest `bits` bits; no key has all of them set.
+    template <class Key, class Item>
+    void sort_pairs(const SortMemory<Key>& m, const Queue<Item>& queue, uint32_t bits, StageRecord* record) {
+        const Start start;
+        sort_pairs_alone(m, queue.counter->size(), bits);
+        record->nanoseconds += elapsed(start);
+    }
     void set_depth(uint32_t depth) { state_->depth = depth; }
     void next_depth(uint32_t depths) { state_->depth += depths; }
 
@@ -140,8 +168,11 @@ private:
     }
     template <class Stage>
     void record(const Stage& stage, uint32_t items, const Start& start) {
+        stage.record->add(items, state_->depth, elapsed(start));
+    }
+    static uint64_t elapsed(const Start& start) {
         const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now() - start.time).count();
-        stage.record->add(items, state_->depth, uint64_t(ns - (FusedTime::inside() - start.inside)));
+        return uint64_t(ns - (FusedTime::inside() - start.inside));
     }
 
     WaveState* state_;

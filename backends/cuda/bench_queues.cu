@@ -102,7 +102,8 @@ void time_pushes(const char* name, uint32_t n, uint32_t one_in, const QueueConte
         q.drain(compaction == Compaction::select ? q.order.list[0] : nullptr, runs.counted(i));
     };
     const auto finish = [&](size_t) {
-        detail::finish_stage<<<1, 1>>>(q.record, q.counters, nullptr, 0, 0, detail::DepthChange{}, q.state, q.clock);
+        detail::finish_stage<<<1, 1>>>(q.record, q.counters, nullptr, nullptr, 0, 0, detail::DepthChange{}, q.state,
+                                       q.clock);
         q.start_over();
     };
     const std::vector<double> seconds =

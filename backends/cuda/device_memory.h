@@ -91,4 +91,33 @@ private:
     size_t size_ = 0;
 };
 
+/// Bytes of the current device that are zero at first (HostMemory has the same functions). All of them wait for the
+/// device: waves run on a stream of their own.
+class DeviceMemory {
+public:
+    DeviceMemory() = default;
+    explicit DeviceMemory(uint64_t bytes, const char* what) : buffer_(bytes, what) { clear(data(), bytes); }
+
+    std::byte* data() { return buffer_.data(); }
+    uint64_t bytes() const { return buffer_.bytes(); }
+
+    static void put(void* to, const void* from, uint64_t bytes) {
+        if (bytes) cuda_check(cudaMemcpy(to, from, bytes, cudaMemcpyHostToDevice), "copy to the device");
+    }
+    static void get(void* to, const void* from, uint64_t bytes) {
+        if (bytes) cuda_check(cudaMemcpy(to, from, bytes, cudaMemcpyDeviceToHost), "copy from the device");
+    }
+    static void copy(void* to, const void* from, uint64_t bytes) {
+        if (bytes) cuda_check(cudaMemcpy(to, from, bytes, cudaMemcpyDeviceToDevice), "copy on the device");
+    }
+    static void clear(void* to, uint64_t bytes) {
+        if (bytes == 0) return;
+        cuda_check(cudaMemset(to, 0, bytes), "clear device memory");
+        cuda_check(cudaDeviceSynchronize(), "clear device memory");
+    }
+
+private:
+    DeviceBuffer<std::byte> buffer_;
+};
+
 }  // namespace ambilux

@@ -12,6 +12,7 @@
 #include "backends/cuda/device_memory.h"
 #include "backends/cuda/graph_capture.h"
 #include "backends/cuda/order.h"
+#include "backends/cuda/primitives.h"
 #include "backends/cuda/ray_kernels.cuh"
 #include "backends/cuda/record_kernels.cuh"
 #include "backends/cuda/stage_kernels.cuh"
@@ -22,7 +23,7 @@ namespace ambilux {
 template <bool kPairs>
 class CudaExecutor {
 public:
-    static constexpr bool kMultiBounce = true;  ///< takes the last subpaths of a wave through several bounces at once
+    static constexpr bool kHost = false;
 
     /// `traced`: features that rays have to know of, the scene's or more. `clock`: one value on the device.
     CudaExecutor(cudaStream_t stream, const Features& traced, WaveState* state, uint64_t* clock, const SceneView& scene,
@@ -123,8 +124,71 @@ public:
     void set_depth(uint32_t depth) { depth_ = {true, depth}; }
     void next_depth(uint32_t depths) { depth_.value += depths; }
 
+    /// Over items that stay.
+    template <class Stage, class Item>
+    void for_each(const Stage& stage, const Queue<Item>& queue) {
+        const auto kernel = detail::launch_over<Stage>;
+        kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(stage, queue.counter, state_);
+        finish_over(stage, queue.counter);
+    }
+    template <class Stage>
+    void for_each(const Stage& stage, uint32_t n) {
+        run_slots(stage, n, 1);
+    }
+    /// Has all waves' queue hold what is in that of this wave (stage.items()): stage(i, place) puts item i at `place`. If
+    /// there is no room, the wave fails, and the queues `others` are emptied as well.
+    template <class Stage, class... Item>
+    void append(const Stage& stage, const Queue<Item>&... others) {
+        may_fail_ = true;
+        QueueCounter* const mine = stage.items().counter;
+        detail::reserve<<<1, 1, 0, stream()>>>(state_, mine, stage.target());
+        (detail::clear_if_failed<<<1, 1, 0, stream()>>>(state_, others.counter), ...);
+        const auto kernel = detail::launch_append<Stage>;
+        kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(stage, mine, state_);
+        finish_over(stage, mine);
+    }
+    /// Of as many pairs as `queue` has items, by the lowest `bits` bits; no key has all of them set. Their time is that
+    /// of the stage that follows.
+    template <class Key, class Item>
+    void sort_pairs(const SortMemory<Key>& m, const Queue<Item>& queue, uint32_t bits, StageRecord*) {
+        const bool switched = graph_.active();
+        const detail::SortSwitch sorts = {switched ? graph_.make_condition() : cudaGraphConditionalHandle{}, switched};
+        const auto kernel = detail::pad_keys<Key>;
+        const Key last = Key(bits < 8 * sizeof(Key) ? (Key(1) << bits) - 1 : ~Key(0));
+        kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(m.keys[0], queue.counter, m.capacity, last,
+                                                                          sorts);
+        if (!switched) return sort_pairs_on_device(m, size_of(queue.counter), bits, stream());
+        graph_.conditional(cudaGraphCondTypeSwitch, sorts.handle, detail::kSortSizes,
+                           [&](uint32_t k) { sort_pairs_on_device(m, m.capacity >> k, bits, stream()); });
+    }
+
+    // ---- between phases ----
+
+    /// What is read of the counters of queues that all waves append to, once in an iteration.
+    void know(const QueueCounter* on_device, std::vector<QueueCounter> on_host) {
+        known_ = on_device;
+        known_counts_ = std::move(on_host);
+    }
+    template <class Item>
+    uint32_t count(const Queue<Item>& queue) const {
+        return known_counts_.at(size_t(queue.counter - known_)).size();
+    }
+    template <class Key>
+    void sort_pairs(const SortMemory<Key>& m, uint32_t n, uint32_t bits, StageRecord*) {
+        sort_pairs_on_device(m, n, bits, stream());
+    }
+    /// Exclusive sums; `out` may be `in`.
+    void scan(const ScanMemory& m, const uint32_t* in, uint32_t* out, uint32_t n, StageRecord*) {
+        scan_on_device(m, in, out, n, stream());
+    }
+
+    /// True if what was launched since may have failed for want of room.
+    bool may_fail() const { return may_fail_; }
+    void expect_no_failure() { may_fail_ = false; }
+
     template <class A, class B>
     void fail_on_overflow(const Queue<A>& a, const Queue<B>& b) {
+        may_fail_ = true;
         detail::fail_on_overflow<<<1, 1, 0, stream()>>>(state_, a.counter, b.counter);
     }
     template <class Item>
@@ -142,7 +206,7 @@ public:
             body();
         };
         if (graph_.active()) return capture_loop(queue, least, counted_body);
-        for (count(queue); size_of(queue.counter) >= least; count(queue)) counted_body();
+        for (count_places(queue); size_of(queue.counter) >= least; count_places(queue)) counted_body();
     }
 
 private:
@@ -171,7 +235,7 @@ private:
     template <class Order, class Stage>
     detail::Items prepare(const Stage& stage) {
         const auto& queue = stage.items();
-        if (std::exchange(counted_, nullptr) != queue.counter) count(queue);
+        if (std::exchange(counted_, nullptr) != queue.counter) count_places(queue);
         const bool selected = queue.flags && order_.policy.compaction == Compaction::select;
         detail::Items items = {
             queue.counter, selected ? order_.list[0] : nullptr, queue.flags, queue.capacity(), nullptr, nullptr, 0};
@@ -217,7 +281,7 @@ private:
     }
     /// Has the counter of a queue by path tell its size; compaction select makes the list too.
     template <class Item>
-    void count(const Queue<Item>& queue) {
+    void count_places(const Queue<Item>& queue) {
         if (!queue.flags || queue.capacity() == 0) return;
         uint32_t* const n = &queue.counter->count;
         if (order_.policy.compaction == Compaction::select)
@@ -230,7 +294,7 @@ private:
     void capture_loop(const Queue<Item>& queue, uint32_t least, Body body) {
         const cudaGraphConditionalHandle again = graph_.make_condition();
         const auto ask = [&] {
-            count(queue);
+            count_places(queue);
             detail::repeat_while_any<<<1, 1, 0, stream()>>>(queue.counter, least, again);
         };
         ask();  // before every entry, since a loop inside of a loop is entered more than once
@@ -247,10 +311,15 @@ private:
         return c.size();
     }
     template <class Stage>
+    void finish_over(const Stage& stage, const QueueCounter* stays) {
+        finish(stage, nullptr, nullptr, 0, 0, stays);
+    }
+    template <class Stage>
     void finish(const Stage& stage, QueueCounter* counter, QueueCounter* out = nullptr, uint32_t slots = 0,
-                uint32_t samples = 0) {
+                uint32_t samples = 0, const QueueCounter* stays = nullptr) {
         cuda_check(cudaGetLastError(), Stage::kName);
-        detail::finish_stage<<<1, 1, 0, stream()>>>(stage.record, counter, out, slots, samples, depth_, state_, clock_);
+        detail::finish_stage<<<1, 1, 0, stream()>>>(stage.record, counter, out, stays, slots, samples, depth_, state_,
+                                                    clock_);
         depth_ = {};
     }
     template <class Stage>
@@ -276,6 +345,9 @@ private:
     const QueueCounter* counted_ = nullptr;  ///< of the queue whose size and list are known before the next launch
     int multiprocessors_ = 0;
     detail::DepthChange depth_{};
+    bool may_fail_ = false;
+    const QueueCounter* known_ = nullptr;
+    std::vector<QueueCounter> known_counts_;
 };
 
 }  // namespace ambilux

@@ -29,12 +29,15 @@ __global__ inline void count_items(const uint8_t* flags, uint32_t capacity, uint
 /// Sorts run over all places of a queue, or a half, a quarter ... of them.
 constexpr uint32_t kSortSizes = 11;
 
-/// Which of these sizes is the smallest that holds `items`; kSortSizes: too few to sort.
-__host__ __device__ inline uint32_t sort_choice(uint32_t capacity, uint32_t items) {
-    if (items < kSortFrom) return kSortSizes;
+/// Which of these sizes is the smallest that holds `items`.
+__host__ __device__ inline uint32_t smallest_size(uint32_t capacity, uint32_t items) {
     uint32_t k = 0;
     while (k + 1 < kSortSizes && capacity >> (k + 1) >= items) ++k;
     return k;
+}
+/// The same; kSortSizes: too few to sort.
+__host__ __device__ inline uint32_t sort_choice(uint32_t capacity, uint32_t items) {
+    return items < kSortFrom ? kSortSizes : smallest_size(capacity, items);
 }
 
 /// Where a graph has a sort for each size: the conditional node that runs one of them.
@@ -73,20 +76,34 @@ __global__ inline void __launch_bounds__(kStageBlock)
     for (uint32_t i = n + blockIdx.x * kStageBlock + threadIdx.x; i < end; i += gridDim.x * kStageBlock) keys[i] = last;
 }
 
+/// `last` for the pairs that are sorted beyond those that there are.
+template <class Key>
+__global__ void __launch_bounds__(kStageBlock)
+    pad_keys(Key* keys, const QueueCounter* counter, uint32_t capacity, Key last, SortSwitch sorts) {
+    const uint32_t n = counter->size(), size = smallest_size(capacity, n);
+    if (sorts.on && blockIdx.x == 0 && threadIdx.x == 0) cudaGraphSetConditional(sorts.handle, size);
+    for (uint32_t i = n + blockIdx.x * kStageBlock + threadIdx.x; i < capacity >> size; i += gridDim.x * kStageBlock)
+        keys[i] = last;
+}
+
 /// A change of WaveState::depth.
 struct DepthChange {
     bool set;  ///< to `value`; otherwise `value` is added
     uint32_t value;
 };
 
-/// After a stage: its record, and its queue emptied; `out`, if it is not null, holds as many items as that did. The
-/// time since the last such kernel is the stage's.
-__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, QueueCounter* out, uint32_t slots,
-                                    uint32_t samples, DepthChange depth, WaveState* state, uint64_t* clock) {
+/// After a stage: its record, and its queue emptied, or not if it `stays`; `out`, if it is not null, holds as many items
+/// as that did. The time since the last such kernel is the stage's.
+__global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, QueueCounter* out,
+                                    const QueueCounter* stays, uint32_t slots, uint32_t samples, DepthChange depth,
+                                    WaveState* state, uint64_t* clock) {
     const uint64_t now = device_nanoseconds();
     state->depth = depth.set ? depth.value : state->depth + depth.value;
     if (out) out->count = counter->size();
-    record->add(counter ? counter->items() : slots * (samples ? samples : state->samples), state->depth, now - *clock);
+    const uint32_t items = counter ? counter->items()
+                           : stays ? stays->size()
+                                   : slots * (samples ? samples : state->samples);
+    record->add(items, state->depth, now - *clock);
     if (counter) counter->finish();
     (counter ? counter->next : state->next) = 0;
     *clock = now;
@@ -110,6 +127,14 @@ __global__ inline void set_wave(WaveState* state, WaveState value) {
 /// fails. It has no samples any more, so that the stages that follow find nothing to do, and the film stays as it was.
 __global__ inline void fail_on_overflow(WaveState* state, QueueCounter* a, QueueCounter* b) {
     fail_wave_on_overflow(*state, *a, *b);
+}
+
+/// For what all waves append to.
+__global__ inline void reserve(WaveState* state, QueueCounter* mine, QueueCounter* all) {
+    reserve_appended(*state, *mine, *all);
+}
+__global__ inline void clear_if_failed(const WaveState* state, QueueCounter* counter) {
+    if (state->failed) counter->finish();
 }
 
 __global__ inline void clear_queue(QueueCounter* counter) { counter->finish(); }

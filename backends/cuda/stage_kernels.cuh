@@ -17,6 +17,25 @@ __global__ void __launch_bounds__(kStageBlock)
     });
 }
 
+/// Over the items of a queue, which stay.
+template <class Stage>
+__global__ void __launch_bounds__(kStageBlock)
+    launch_over(const __grid_constant__ Stage stage, const QueueCounter* counter, WaveState* state) {
+    const uint32_t n = counter->size();
+    in_turns(n, &state->next, [&](uint32_t i) {
+        if (i < n) stage(i);
+    });
+}
+/// The items of a wave are appended to those of all waves.
+template <class Stage>
+__global__ void __launch_bounds__(kStageBlock)
+    launch_append(const __grid_constant__ Stage stage, const QueueCounter* counter, WaveState* state) {
+    const uint32_t n = counter->size(), first = state->appended;
+    in_turns(n, &state->next, [&](uint32_t i) {
+        if (i < n) stage(i, first + i);
+    });
+}
+
 /// All threads stay until the last slot is done.
 template <class Stage>
 __global__ void __launch_bounds__(kPathBlock, 1)

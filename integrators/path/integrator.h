@@ -37,6 +37,7 @@ struct PathIntegrator {
         return skipped_path_parts(scene, policy.rules);
     }
 
+    using State = NoState;
     struct Memory {
         SubpathQueues<PathRay> subpaths;
         EyeQueues<Mis> eye;
@@ -63,18 +64,18 @@ struct PathIntegrator {
         EyeVertex<F, Mis, typename Eye::Emission, AtVertex> eye_vertex[2];
         ConnectEmitter<F, Mis, Connect> connect_emitter;
 
-        Stages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
-               const Memory& m, const FilmBuffers& film)
-            : policy(p), wave(w), eye(layout, scene, tracer, w, m.eye, film, p.waves) {
-            const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
+        Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
+            : policy(p), wave(parts.wave), eye(parts, m.eye, p.waves) {
+            const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
+            const SceneView& scene = parts.scene;
             const SubpathQueues<PathRay>& q = m.subpaths;
             const bool seeds = F.opacity || p.waves.cull > 0.0f;
             const Connect connect = sampling(record(connect_emitter), seeds);
-            generate = {scene, wave, p.rules.mis, q.rays[0], film.samples, record(generate)};
+            generate = {scene, wave, p.rules.mis, q.rays[0], parts.film.samples, record(generate)};
             connect_emitter = {scene, wave, p.rules, m.eye.vertices, connect, connect.record};
             const auto at_vertex = choose<kFusion.connect>(ConnectHere{connect}, QueueVertex<F, Mis>{m.eye.vertices});
             for (int k = 0; k < 2; ++k) {
-                extend[k] = {scene, tracer, wave, Stream::eye, q.rays[k], q.hits[k], record(extend[k])};
+                extend[k] = {scene, parts.tracer, wave, Stream::eye, q.rays[k], q.hits[k], record(extend[k])};
                 eye_vertex[k] = {scene,
                                  wave,
                                  p.rules,

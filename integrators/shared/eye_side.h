@@ -10,14 +10,14 @@
 
 namespace ambilux {
 
-/// Queues that lie between the stages of one depth. `Shadow`: Occlude::Item.
-template <class Mis, class Shadow = ShadowItem>
+/// Queues that lie between the stages of one depth. `Learn`: see Occlude.
+template <class Mis, class Learn = LearnNothing>
 struct EyeQueues {
     Queue<VertexItem<Mis>> vertices;
     Queue<EmissionItem> emission;
     Queue<Contribution> emission_contributions;
-    Queue<CandidateItem> candidates;
-    Queue<Shadow> shadows;
+    Queue<typename Learn::Candidate> candidates;
+    Queue<typename Learn::Item> shadows;
     Queue<Contribution> shadow_contributions;
     Lane* raw;  ///< StrategyFilm
 
@@ -34,8 +34,8 @@ struct EyeQueues {
                                                    VertexItem<Mis>::template lanes<F>());
         q.emission = layout.queue<EmissionItem>("emission", emits, by_path);
         q.emission_contributions = layout.queue<Contribution>("emission_contributions", emits, by_path);
-        q.candidates = layout.queue<CandidateItem>("candidates", K.weigh ? 0 : connects, by_path);
-        q.shadows = layout.queue<Shadow>("shadows", connects, by_path && !K.occlude);
+        q.candidates = layout.queue<typename Learn::Candidate>("candidates", K.weigh ? 0 : connects, by_path);
+        q.shadows = layout.queue<typename Learn::Item>("shadows", connects, by_path && !K.occlude);
         q.shadow_contributions = layout.queue<Contribution>("shadow_contributions", K.weigh ? 0 : connects, by_path);
         q.raw = layout.allocate<Lane>(waves.strategy_depth ? paths : 0);
         return q;
@@ -49,9 +49,9 @@ struct EyeSide {
     using EmissionStage = WeighEmission<Contributions>;
     using OccludeStage = Occlude<F, Tracer, Contributions, Learn>;
     using Shadows = std::conditional_t<K.occlude, Gathered<OccludeStage>, Queue<typename Learn::Item>>;
-    using WeighStage = WeighCandidates<Shadows>;
+    using WeighStage = WeighCandidates<Shadows, typename Learn::Candidate>;
     using Emission = std::conditional_t<K.weigh, EmissionStage, Queue<EmissionItem>>;
-    using Candidates = std::conditional_t<K.weigh, WeighStage, Queue<CandidateItem>>;
+    using Candidates = std::conditional_t<K.weigh, WeighStage, Queue<typename Learn::Candidate>>;
 
     Accumulate accumulate_emission, accumulate;
     EmissionStage weigh_emission;
@@ -59,9 +59,9 @@ struct EyeSide {
     WeighStage weigh;
 
     template <class Mis>
-    EyeSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave,
-            const EyeQueues<Mis, typename Learn::Item>& q, const FilmBuffers& film, const WavePolicy& waves,
+    EyeSide(const WaveParts<Tracer>& parts, const EyeQueues<Mis, Learn>& q, const WavePolicy& waves,
             const Learn& learn = {}) {
+        const auto& [layout, scene, tracer, wave, film] = parts;
         const StrategyFilm strategies = {film.strategies, film.strategies_dropped, q.raw, waves.strategy_depth};
         StageRecord* const accumulates = layout.record(Accumulate::kName);
         StageRecord* const weighs = layout.record(WeighStage::kName);

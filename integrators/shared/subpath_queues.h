@@ -55,7 +55,7 @@ void repeat_depths(Executor& exec, const VertexStage (&vertex)[2], const Extend 
             exec.extend(extend[1 - k]);
         }
     };
-    if constexpr (Executor::kMultiBounce) {
+    if constexpr (!Executor::kHost) {
         if (multi_bounce_below > 0) {
             exec.repeat_while(extend[0].hits, [&] { two_rounds(std::false_type()); }, multi_bounce_below);
             exec.repeat_while(extend[0].hits, [&] { two_rounds(std::true_type()); });

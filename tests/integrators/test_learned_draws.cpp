@@ -7,8 +7,8 @@
 
 #include "core/rng.h"
 #include "integrators/bdpt/learned/cells.h"
-#include "render/device_wave.h"
-#include "stages/learned_draws.h"
+#include "integrators/bdpt/learned/draws.h"
+#include "render/wave_plan.h"
 #include "tests/support/bidirectional_images.h"
 
 using namespace ambilux;
@@ -103,19 +103,23 @@ TEST_CASE("scenes without light vertices, and paths too short for connections") 
 TEST_CASE("a draw finds a vertex with the probability that its contribution is divided by") {
     constexpr uint32_t kLevels = 3, kClusters = 1u << kLevels, kVertices = 57, kDraws = 3, kKeys = 200'000;
     std::vector<DrawSplit> splits(kClusters);
-    std::vector<uint16_t> tickets = {100, 100, 20000, 20001, 40000, 50000, 50000, 60000}, cluster(kVertices);
+    std::vector<uint16_t> tickets = {100, 100, 20000, 20001, 40000, 50000, 50000, 60000}, cluster(kVertices),
+        keys(kVertices);
     std::vector<uint32_t> sorted(kVertices), first(kClusters + 1);
     for (uint32_t i = 0; i < kVertices; ++i) cluster[i] = uint16_t(i * 5 % 7 == 6 ? 4 : i * 5 % 7);  // 6, 7 are empty
     for (const uint16_t c : cluster) ++first[c + 1];
     std::partial_sum(first.begin(), first.end(), first.begin());
     std::vector<uint32_t> next = first;
     for (uint32_t i = 0; i < kVertices; ++i) sorted[next[cluster[i]]++] = i;
+    for (uint32_t i = 0; i < kVertices; ++i) keys[i] = ClusteredVertices::key(cluster[i], i);
     QueueCounter counter = {};
     counter.count = counter.capacity = kVertices;
     LearnedSource source = {};
     source.vertices.counter = &counter;
     source.draws = kDraws;
-    source.by_cluster = {first.data(), nullptr, nullptr, nullptr, cluster.data(), sorted.data()};
+    source.by_cluster.first = first.data();
+    source.by_cluster.sort.keys[0] = keys.data();
+    source.by_cluster.sort.values[1] = sorted.data();
     source.table = {{splits.data(), 0}, {splits.data(), kLevels}, tickets.data(), nullptr, 1.0f};
     std::vector<uint64_t> counts(kVertices);
     uint64_t none = 0;
@@ -144,14 +148,14 @@ TEST_CASE("of a wave of many light subpaths every n-th vertex teaches, for n") {
     // One cluster of eight vertices and no tickets: every vertex has the probability 1/8 in a draw.
     constexpr uint32_t kVertices = 8, kDraws = 2;
     std::vector<DrawSplit> splits(1);
-    std::vector<uint16_t> tickets(1), cluster(kVertices);
+    std::vector<uint16_t> tickets(1);
     std::vector<uint32_t> first = {0, kVertices};
     QueueCounter counter = {};
     counter.count = counter.capacity = kVertices;
     LearnedSource source = {};
     source.vertices.counter = &counter;
     source.draws = kDraws;
-    source.by_cluster = {first.data(), nullptr, nullptr, nullptr, cluster.data(), nullptr};
+    source.by_cluster.first = first.data();
     source.table = {{splits.data(), 0}, {splits.data(), 0}, tickets.data(), nullptr, 1e15f};
     for (const uint32_t teaching_for : {1u, 3u}) {
         WaveState state = {};
@@ -160,13 +164,13 @@ TEST_CASE("of a wave of many light subpaths every n-th vertex teaches, for n") {
         for (uint32_t place = 0; place < kVertices; ++place) {
             Candidate<BidirectionalMis> c = {};
             c.value = {1, 1, 1};
-            LearnedDraw{source, 0, 0, place}.mark(c, {1, 1, 1}, state);
+            const Score score = LearnedDraw{source, 0, 0, place}.note(c, {1, 1, 1}, state);
             INFO("vertex " << place << ", one of " << teaching_for);
             const bool teaches = place % teaching_for == 0;
-            CHECK((float_bits(c.film.x) == 0) == teaches);
-            CHECK((float_bits(c.film.x) == kNone) == !teaches);
+            CHECK((score.entry == 0) == teaches);
+            CHECK((score.entry == kNone) == !teaches);
             // n_l y² / (N² k P_c(v)) of docs/theory.md, section 3, with y = 1 and P_c(v) = 1/n.
-            if (teaches) CHECK(double(c.film.y) == Approx(teaching_for * 1e15 * n * n / (paths * paths * kDraws)));
+            if (teaches) CHECK(double(score.value) == Approx(teaching_for * 1e15 * n * n / (paths * paths * kDraws)));
         }
     }
 }

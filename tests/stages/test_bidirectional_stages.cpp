@@ -115,8 +115,11 @@ struct FusedBench {
     SplatSums splat_sums() { return {splats.data(), nullptr}; }
     FilmSums sums() { return {sum.data(), sum_squares.data()}; }
     Stages stages() {
-        return {
-            layout, scene.view(), accel.tracer(), policy, this_wave(), memory, {samples.data(), splat_sums(), sums()}};
+        const SceneView view = scene.view();
+        const CwbvhTracer tracer = accel.tracer();
+        const Wave in_flight = this_wave();
+        const FilmBuffers film = {samples.data(), splat_sums(), sums()};
+        return Stages(WaveParts<CwbvhTracer>{layout, view, tracer, in_flight, film}, policy, memory, NoState());
     }
     UpdateFilm update() {
         return {this_wave(), samples.data(), splat_sums(), sums(), layout.record(UpdateFilm::kName)};

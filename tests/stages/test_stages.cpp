@@ -74,7 +74,11 @@ struct Bench {
     }
     FilmSums sums() { return {sum.data(), sum_squares.data()}; }
     Stages stages() {
-        return {layout, scene.view(), accel.tracer(), policy, this_wave(), memory, {samples.data(), {}, sums()}};
+        const SceneView view = scene.view();
+        const CwbvhTracer tracer = accel.tracer();
+        const Wave in_flight = this_wave();
+        const FilmBuffers film = {samples.data(), {}, sums()};
+        return Stages(WaveParts<CwbvhTracer>{layout, view, tracer, in_flight, film}, policy, memory, NoState());
     }
     UpdateFilm update() { return {this_wave(), samples.data(), {}, sums(), layout.record(UpdateFilm::kName)}; }
     const StageRecord& record(const std::string& name) const {

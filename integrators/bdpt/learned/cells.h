@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "accel/host_tracer.h"
-#include "stages/draw_tree.h"
+#include "integrators/bdpt/learned/draw_tree.h"
 #include "transport/mis/bidirectional.h"
 #include "transport/subpath/rules.h"
 

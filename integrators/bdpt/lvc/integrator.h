@@ -9,6 +9,7 @@ namespace ambilux {
 template <Features F, class Tracer, Fusion kFusion, class Mis>
 struct LvcOf {
     using Policy = BdptPolicyOf<Mis>;
+    using State = NoState;
     using Memory = TwoSidesMemory<Mis>;
     using Stages = TwoSidesStages<F, Tracer, kFusion, LightVertexSource<Mis>>;
     static constexpr bool kFilmWide = true;

@@ -23,15 +23,16 @@ struct MegakernelOf {
         return skipped_strategies(scene, p);
     }
 
+    using State = NoState;
     struct Memory {
         LightVertices<Mis> light_vertices;
         Queue<SplatItem> splats;
     };
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
         Memory m;
-        m.light_vertices = layout.queue<ConnectionVertex<Mis>>("light_vertices", p.rules.connect ? n.kept : 0, false,
-                                                               ConnectionVertex<Mis>::template lanes<F>());
-        m.splats = layout.queue<SplatItem>("splats", p.rules.splat ? n.kept + n.slots : 0);
+        m.light_vertices = layout.growing_queue<ConnectionVertex<Mis>>(
+            "light_vertices", p.rules.connect ? n.kept : 0, ConnectionVertex<Mis>::template lanes<F>());
+        m.splats = layout.growing_queue<SplatItem>("splats", p.rules.splat ? n.kept + n.slots : 0);
         return m;
     }
 
@@ -41,18 +42,17 @@ struct MegakernelOf {
         Megakernel<F, Tracer, Mis> megakernel;
         Splat<F> splat;
 
-        Stages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
-               const Memory& m, const FilmBuffers& film)
-            : policy(p), wave(w) {
-            const auto record = [&](const char* name) { return layout.record(name); };
+        Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
+            : policy(p), wave(parts.wave) {
+            const auto record = [&](const char* name) { return parts.layout.record(name); };
             const MegakernelRecords records = {
                 record("light_generate"), record("light_extend"), record("light_shade"), record("connect_camera"),
                 record("extend"),         record("shade"),        record("connect"),     record("connect_vertices"),
                 record("mis_weight"),     record("occlude")};
-            megakernel = {scene,        tracer,           wave,
-                          p.rules,      m.light_vertices, m.splats,
-                          film.samples, records,          record(megakernel.kName)};
-            splat = {scene, wave, m.splats, film.splats, {}, record(Splat<F>::kName)};
+            megakernel = {parts.scene,        parts.tracer,     wave,
+                          p.rules,            m.light_vertices, m.splats,
+                          parts.film.samples, records,          record(megakernel.kName)};
+            splat = {parts.scene, wave, m.splats, parts.film.splats, {}, record(Splat<F>::kName)};
         }
     };
 

@@ -35,7 +35,7 @@ struct SplatQueues {
         q.candidates = layout.queue<CandidateItem>("splat_candidates", K.weigh ? 0 : n, by_path);
         q.weighted = layout.queue<CandidateItem>("weighted_splats", n, by_path && !K.occlude);
         q.splats =
-            layout.queue<SplatItem>("splats", p.rules.splat ? uint32_t(std::min<uint64_t>(kept, 0xfffffff0u)) : 0);
+            layout.growing_queue<SplatItem>("splats", p.rules.splat ? uint32_t(std::min<uint64_t>(kept, 0xfffffff0u)) : 0);
         return q;
     }
 };
@@ -56,8 +56,8 @@ struct SplatSide {
     ConnectCameraQueue<F, Mis, Candidates> connect_camera;
     Splat<F> splat;
 
-    SplatSide(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave, const SplatQueues<Mis>& q,
-              const FilmBuffers& film, const BdptPolicyOf<Mis>& p, Lane* raw) {
+    SplatSide(const WaveParts<Tracer>& parts, const SplatQueues<Mis>& q, const BdptPolicyOf<Mis>& p, Lane* raw) {
+        const auto& [layout, scene, tracer, wave, film] = parts;
         occlude = {scene, tracer, q.weighted, {q.splats}, layout.record(OccludeStage::kName)};
         weigh = {q.candidates,
                  choose<K.occlude>(Gathered<OccludeStage>{occlude, wave.state, q.weighted.capacity()}, q.weighted),
@@ -94,11 +94,11 @@ struct LightStages {
     LightVertex<F, Mis, typename Splats::AtVertex> vertex[2];
     ConnectCameraQueue<F, Mis, typename Splats::Candidates> connect_camera;
 
-    LightStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Wave& wave,
-                const SubpathQueues<SubpathRay<Mis>>& q, LightVertices<Mis> vertices, uint32_t* last_vertex,
-                const Splats& splats, const BdptPolicyOf<Mis>& p)
+    LightStages(const WaveParts<Tracer>& parts, const SubpathQueues<SubpathRay<Mis>>& q, LightVertices<Mis> vertices,
+                uint32_t* last_vertex, const Splats& splats, const BdptPolicyOf<Mis>& p)
         : connect_camera(splats.connect_camera) {
-        const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
+        const auto& [layout, scene, tracer, wave, film] = parts;
+        const auto record = [&records = layout](const auto& stage) { return records.record(stage.kName); };
         generate = {scene,
                     wave,
                     p.rules,

@@ -11,12 +11,13 @@ namespace ambilux {
 
 /// Memory of one wave. Most queues hold the most they can ever be given, since a slot has one item at a time. Of shadow
 /// rays it may have several, as many as there is capacity for.
-template <class Mis, class Shadow = ShadowItem>
+/// `Learn`: see Occlude.
+template <class Mis, class Learn = LearnNothing>
 struct TwoSidesMemory {
     using Vertex = ConnectionVertex<Mis>;
 
     SubpathQueues<SubpathRay<Mis>> subpaths;
-    EyeQueues<Mis, Shadow> eye;
+    EyeQueues<Mis, Learn> eye;
     SplatQueues<Mis> splats;
     Queue<Vertex> eye_vertices;  ///< of one depth, for pairs
     LightVertices<Mis> light_vertices;
@@ -29,11 +30,11 @@ struct TwoSidesMemory {
         const uint32_t lanes = Vertex::template lanes<F>(), pairs = p.rules.connect && !K.occlude ? n.slots : 0;
         TwoSidesMemory m;
         m.subpaths = {layout, n.slots, p.waves.queues};
-        m.eye = EyeQueues<Mis, Shadow>::template lay_out<K, F>(layout, n.slots, n.slots, p.rules, p.waves);
+        m.eye = EyeQueues<Mis, Learn>::template lay_out<K, F>(layout, n.slots, n.slots, p.rules, p.waves);
         m.splats =
             SplatQueues<Mis>::template lay_out<K, F>(layout, n.slots, n.kept + p.waves.most_light_subpaths(n.slots), p);
         m.eye_vertices = layout.queue<Vertex>("eye_vertices", pairs, false, lanes);
-        m.light_vertices = layout.queue<Vertex>("light_vertices", p.rules.connect ? n.kept : 0, false, lanes);
+        m.light_vertices = layout.growing_queue<Vertex>("light_vertices", p.rules.connect ? n.kept : 0, lanes);
         m.pairs = layout.queue<PairItem>("pairs", pairs, by_path);
         m.deferred = layout.queue<PairItem>("deferred", p.traces_connections ? 0 : pairs, by_path);
         m.last_vertex = p.cache_draws == 0 ? layout.allocate<uint32_t>(n.slots) : nullptr;
@@ -46,7 +47,7 @@ template <Features F, class Tracer, Fusion K, class Source>
 struct TwoSidesStages {
     using Mis = typename Source::Mis;
     using Policy = BdptPolicyOf<Mis>;
-    using Memory = TwoSidesMemory<Mis, typename Source::Learn::Item>;
+    using Memory = TwoSidesMemory<Mis, typename Source::Learn>;
     using Eye = EyeSide<F, Tracer, K, typename Source::Learn>;
     using Splats = SplatSide<F, Tracer, K, Mis>;
     using Candidates = typename Eye::Candidates;
@@ -69,29 +70,26 @@ struct TwoSidesStages {
     ConnectEmitter<F, Mis, Connect> connect_emitter;
     ConnectVertices<F, Candidates, Source> connect_vertices, connect_deferred;
 
-    TwoSidesStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
-                   const Memory& m, const FilmBuffers& film)
-        : TwoSidesStages(layout, scene, tracer, p, w, m, film,
-                         {m.light_vertices, m.last_vertex, p.cache_draws, p.coherent_draws}) {}
-    TwoSidesStages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
-                   const Memory& m, const FilmBuffers& film, const Source& from)
-        : policy(p), wave(w), eye(layout, scene, tracer, w, m.eye, film, p.waves, from.learn()),
-          splats(layout, scene, tracer, w, m.splats, film, p, m.eye.raw),
-          light(layout, scene, tracer, w, m.subpaths, m.light_vertices, m.last_vertex, splats, p), source(from) {
-        const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
+    TwoSidesStages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const NoState&)
+        : TwoSidesStages(parts, p, m, Source{m.light_vertices, m.last_vertex, p.cache_draws, p.coherent_draws}) {}
+    TwoSidesStages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const Source& from)
+        : policy(p), wave(parts.wave), eye(parts, m.eye, p.waves, from.learn()), splats(parts, m.splats, p, m.eye.raw),
+          light(parts, m.subpaths, m.light_vertices, m.last_vertex, splats, p), source(from) {
+        const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
+        const SceneView& scene = parts.scene;
         const bool seeds = F.opacity || p.waves.cull > 0.0f;
         const NextEvent<F, Mis, Candidates> next_event = {eye.candidates(), record(connect_emitter), seeds};
         Connect connect;
         if constexpr (K.occlude)
-            connect = {{next_event}, source, w.state, record(connect_vertices)};
+            connect = {{next_event}, source, wave.state, record(connect_vertices)};
         else
             connect = {next_event, source, m.eye_vertices, m.pairs};
         const SubpathQueues<SubpathRay<Mis>>& q = m.subpaths;
-        generate = {scene, wave, p.rules.mis, q.rays[0], film.samples, record(generate)};
+        generate = {scene, wave, p.rules.mis, q.rays[0], parts.film.samples, record(generate)};
         connect_emitter = {scene, wave, p.rules, m.eye.vertices, connect, next_event.record};
         const auto at_vertex = choose<K.connect>(connect, QueueVertex<F, Mis>{m.eye.vertices});
         for (int k = 0; k < 2; ++k) {
-            extend[k] = {scene, tracer, wave, Stream::eye, q.rays[k], q.hits[k], record(extend[k])};
+            extend[k] = {scene, parts.tracer, wave, Stream::eye, q.rays[k], q.hits[k], record(extend[k])};
             eye_vertex[k] = {scene,         wave,           p.rules,   q.hits[k],
                              q.rays[1 - k], eye.emission(), at_vertex, record(eye_vertex[k]),
                              false};
@@ -125,7 +123,7 @@ struct TwoSidesStages {
 /// The pairs of one depth: connected, weighted, tested, added to their paths.
 template <class Executor, Features F, class Tracer, Fusion K, class Source>
 void run_connections(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s, bool several_bounces) {
-    if constexpr (s.kTracesConnections && Executor::kMultiBounce)
+    if constexpr (s.kTracesConnections && !Executor::kHost)
         if (s.policy.traces_connections) return exec.run(s.connect_and_occlude(several_bounces));
     const bool several = several_bounces || !s.policy.one_connection_per_launch;
     exec.run(s.connect_vertices);

@@ -31,6 +31,7 @@ struct StreamingOf {
         return skipped_strategies(scene, p);
     }
 
+    using State = NoState;
     struct Memory {
         Queue<SubpathRay<Mis>> rays;
         Queue<SlotHit> eye_hits, light_hits;
@@ -75,16 +76,15 @@ struct StreamingOf {
         ConnectEmitter<F, Mis, Connect> connect_emitter;
         StreamConnect<F, Mis, typename Eye::Candidates> connect_vertices;
 
-        Stages(Layout& layout, const SceneView& scene, const Tracer& tracer, const Policy& p, const Wave& w,
-               const Memory& m, const FilmBuffers& film)
-            : policy(p), wave(w), eye(layout, scene, tracer, w, m.eye, film, p.waves),
-              splats(layout, scene, tracer, w, m.splats, film, p, m.eye.raw) {
-            const auto record = [&](const auto& stage) { return layout.record(stage.kName); };
+        Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
+            : policy(p), wave(parts.wave), eye(parts, m.eye, p.waves), splats(parts, m.splats, p, m.eye.raw) {
+            const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
+            const SceneView& scene = parts.scene;
             const bool seeds = F.opacity || p.waves.cull > 0.0f;
-            const StreamPool<F, Mis> pool = {scene,          wave,      p.rules,      m.rays,
-                                             m.eye_vertices, m.pending, film.samples, m.next_path};
+            const StreamPool<F, Mis> pool = {scene,          wave,      p.rules,            m.rays,
+                                             m.eye_vertices, m.pending, parts.film.samples, m.next_path};
             begin = {pool, record(begin)};
-            extend = {scene, tracer, pool, m.eye_hits, m.light_hits, record(extend)};
+            extend = {scene, parts.tracer, pool, m.eye_hits, m.light_hits, record(extend)};
             eye_vertex = {pool, m.eye_hits, eye.emission(), m.eye.vertices, m.turns, record(eye_vertex)};
             turn = {pool, m.turns, splats.candidates(), record(turn)};
             light_vertex = {pool, m.light_hits, m.splats.vertices, m.pairs, record(light_vertex)};

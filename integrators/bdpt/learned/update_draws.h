@@ -1,7 +1,7 @@
 // learn_draws: what draws have brought becomes how the next ones draw.
 #pragma once
 
-#include "stages/learned_draws.h"
+#include "integrators/bdpt/learned/draws.h"
 
 namespace ambilux {
 

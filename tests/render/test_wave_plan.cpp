@@ -1,6 +1,6 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // Waves of a device for the memory that there is, planned on the host: the layouts are those of the device's kernels.
-#include "render/device_plan.h"
+#include "render/wave_maker.h"
 
 #include "accel/cwbvh.h"
 #include "backends/fusion.h"
@@ -10,7 +10,6 @@
 #include "integrators/bdpt/wavefront/integrator.h"
 #include "integrators/feature_levels.h"
 #include "integrators/path/integrator.h"
-#include "render/device_film.h"
 #include "tests/support/render_scene.h"
 
 using namespace ambilux;
@@ -39,21 +38,16 @@ Planned plan_of(const char* integrator, const char* variant, double light_vertic
     s.max_depth = 8;
     s.expected_samples = samples;
     s.queues.ordering = Ordering::none;
-    auto policy = Integrator::plan(scene, s);
-    DevicePlan plan(scene, s, policy.waves, Integrator::kFilmWide);
+    WaveMaker<Integrator, kFeatures, CwbvhTracer> maker = {
+        scene, s, 0, {{}, [](QueuePolicy, uint32_t) { return uint64_t(0); }}};
+    WavePlan& plan = maker.plan;
     plan.mean = light_vertices;
-    const auto needed = [&] {
-        Layout film, queues;
-        lay_out_film(film, plan.film_wave, policy.waves, Integrator::kFilmWide);
-        Integrator::lay_out(queues, policy, {plan.wave.slot_count(), plan.kept()});
-        if (plan.in_parts()) queues.allocate<Lane>(plan.wave.slot_count());
-        return film.bytes() + queues.bytes();
-    };
+    const auto needed = [&] { return maker.film_bytes() + maker.wave_bytes(plan.kept()); };
     plan.shape_preferred(500, room);
     Planned p;
     p.fits = plan.fit(room, needed);
     p.bytes = needed();
-    p.paths = plan.streams() ? policy.waves.slots_in_flight : plan.wave.slot_count();
+    p.paths = plan.streams() ? maker.policy.waves.slots_in_flight : plan.wave.slot_count();
     p.in_parts = plan.in_parts();
     return p;
 }
@@ -69,7 +63,7 @@ TEST_CASE("waves of a device that hold a part of the film go through all of it o
     WavePolicy waves;
     waves.light_subpaths_per_tile = kTilePixels;
     waves.keeps_light_vertices = true;
-    DevicePlan plan(scene, s, waves, true);
+    WavePlan plan(scene, s, waves, true, 0, false);
     plan.mean = 3.0;
     constexpr uint64_t kFilm = 200 << 20, kPath = 500, kVertex = 96;
     const auto needed = [&] { return kFilm + kPath * plan.wave.slot_count() + kVertex * plan.kept(); };

@@ -5,7 +5,9 @@
 #pragma once
 
 #include "core/atomic.h"
-#include "stages/draw_tree.h"
+#include "integrators/bdpt/learned/draw_tree.h"
+#include "integrators/bdpt/learned/scored_items.h"
+#include "queues/primitives.h"
 #include "stages/light_vertex_search.h"
 #include "stages/occlude.h"
 #include "transport/mis/heuristic.h"
@@ -28,29 +30,31 @@ struct DrawTable {
 /// Scores of shadow rays that are free are added to the table.
 struct LearnDraws {
     using Item = ScoredShadowItem;
+    using Candidate = ScoredCandidate;
 
     int64_t* sums;
 
     AMBILUX_HD static ShadowItem ray(const ScoredShadowItem& item) { return item.ray(); }
     AMBILUX_HD void arrive(const ScoredShadowItem& item) const {
-        if (item.entry != kNone) fetch_add_shared(sums + item.entry, int64_t(item.score));
+        if (item.score.entry != kNone) fetch_add_shared(sums + item.score.entry, int64_t(item.score.value));
     }
 };
 
-/// The light vertices of a wave by clusters. Each cluster is counted in parts, since threads that add to one counter
-/// wait for each other.
+/// The light vertices of a wave by clusters.
 struct ClusteredVertices {
     static constexpr uint32_t kParts = 16;
+    static constexpr uint32_t kPartBits = 4;
 
-    uint32_t* first;    ///< by cluster: in `sorted`; one more at the end
-    uint32_t* counts;   ///< by cluster and part, while they are counted
-    uint32_t* starts;   ///< by cluster and part: in `sorted`
-    uint32_t* place;    ///< by light vertex: which of its part
-    uint16_t* cluster;  ///< by light vertex
-    uint32_t* sorted;   ///< light vertices
+    uint32_t* first;            ///< by cluster: in `sorted`; one more at the end
+    SortMemory<uint16_t> sort;  ///< light vertices by their keys
 
-    /// Of light vertex i: those of a warp have one part, warps at work have all.
-    AMBILUX_HD uint32_t part(uint32_t i) const { return cluster[i] * kParts + i / 32 % kParts; }
+    /// Of a light vertex. Within a cluster vertices lie in parts, which decides nothing but which of them a random number
+    /// finds: images stay as they were.
+    AMBILUX_HD static uint16_t key(uint32_t cluster, uint32_t vertex) {
+        return uint16_t(cluster << kPartBits | (vertex / 32 & (kParts - 1)));
+    }
+    AMBILUX_HD uint32_t cluster(uint32_t vertex) const { return sort.keys[0][vertex] >> kPartBits; }
+    AMBILUX_HD uint32_t sorted(uint32_t place) const { return sort.values[1][place]; }
 };
 
 struct LearnedSearch;
@@ -94,13 +98,13 @@ struct LearnedDraw {
     AMBILUX_HD float scale(const WaveState& state) const {
         return inverse_probability() / (float(state.light_subpaths) * float(source.draws));
     }
-    /// Notes in `c`, whose value is not scaled yet, what is to be learned from it: the second moment of what this draw
-    /// would bring if its cluster were certain, without the throughput of the eye subpath. The least variance has
-    /// draws in proportion to its root. Of a wave of many subpaths, some light vertices teach for the others.
-    AMBILUX_HD void mark(Candidate<BidirectionalMis>& c, Rgb throughput, const WaveState& state) const;
+    /// What is to be learned from `c`, whose value is not scaled yet: the second moment of what this draw would bring if
+    /// its cluster were certain, without the throughput of the eye subpath. The least variance has draws in proportion
+    /// to its root. Of a wave of many subpaths, some light vertices teach for the others.
+    AMBILUX_HD Score note(const Candidate<BidirectionalMis>& c, Rgb throughput, const WaveState& state) const;
 
 private:
-    static constexpr uint32_t kTeachers = 1u << 20;  ///< light subpaths of a wave whose vertices teach
+    static constexpr uint32_t kTrainingSubpaths = 1u << 20;  ///< of a wave, whose vertices are learned from
 };
 
 /// LightVertexSearch.
@@ -112,7 +116,7 @@ struct LearnedSearch {
     uint32_t max_depth, cell;
 
     AMBILUX_HD LearnedDraw draw(uint32_t place) const {
-        return {source, cell, source.by_cluster.cluster[place], place};
+        return {source, cell, source.by_cluster.cluster(place), place};
     }
 
     AMBILUX_HD uint32_t find(uint32_t& next) const {
@@ -140,7 +144,7 @@ struct LearnedSearch {
             if (row[cluster + step - 1] <= ticket) cluster += step;
         const uint32_t* first = source.by_cluster.first + cluster;
         const uint32_t count = first[1] - first[0];
-        return count > 0 ? source.by_cluster.sorted[first[0] + mul_hi(u.x, count)] : kNone;
+        return count > 0 ? source.by_cluster.sorted(first[0] + mul_hi(u.x, count)) : kNone;
     }
 };
 
@@ -149,17 +153,17 @@ AMBILUX_HD LearnedSearch LearnedSource::search(const RngKey& key, uint32_t depth
     return {*this, key, depth, z, max_depth, cell};
 }
 
-AMBILUX_HD void LearnedDraw::mark(Candidate<BidirectionalMis>& c, Rgb throughput, const WaveState& state) const {
+AMBILUX_HD Score LearnedDraw::note(const Candidate<BidirectionalMis>& c, Rgb throughput, const WaveState& state) const {
     const DrawTable& table = source.table;
-    c.film = {bits_float(kNone), 0.0f};
-    const uint32_t taught = 1 + state.light_subpaths / kTeachers;
-    if (place % taught != 0) return;
+    const uint32_t each = 1 + state.light_subpaths / kTrainingSubpaths;  // of so many vertices one is looked at
+    if (place % each != 0) return {};
     const uint32_t* first = source.by_cluster.first + cluster;
     const float y = luminance(c.value) * mis_weight(c.ratio) / luminance(throughput);
     const float n = float(first[1] - first[0]), N = float(state.light_subpaths);
     float score = y * inverse_probability() / (N * float(source.draws));  // of a light subpath
-    score *= y * n / N * table.inverse_unit * float(taught);
-    if (score >= 1.0f) c.film = {bits_float(table.row(cell) + cluster), score < 0x1p44f ? score : 0x1p44f};
+    score *= y * n / N * table.inverse_unit * float(each);
+    if (!(score >= 1.0f)) return {};
+    return {table.row(cell) + cluster, score < 0x1p44f ? score : 0x1p44f};
 }
 
 }  // namespace ambilux
