@@ -1,5 +1,6 @@
 // What methods and executors promise each other, checked where a method is registered (cmake/registry.cmake): a failed
-// check names what is missing. Concepts lie in a namespace of their own: templates call their parameters by the same names.
+// check names what is missing. Concepts lie in a namespace of their own: templates call their parameters by the same
+// names.
 #pragma once
 
 #include "accel/host_tracer.h"
@@ -54,29 +55,30 @@ concept RunsOverItems = requires(E& exec, const detail::AnyStage& stage, const Q
 /// What an executor is to the phases of a method. It says whether it runs on the host; runs a stage over its items,
 /// which are then gone (run), over those of a queue, which stay (for_each), over slots (run_slots), or as one that
 /// claims its slots by itself (run_paths); traces rays (trace, extend); loops until a queue is empty (repeat_while);
-/// fails a wave whose queues overflowed; appends to what all waves share; stores one number that stages share; sorts as many pairs as a queue has items.
+/// fails a wave whose queues overflowed; appends to what all waves share; stores one number that stages share; sorts as
+/// many pairs as a queue has items.
 template <class E>
-concept Executor = RunsOverItems<E> && requires(E& exec, const detail::AnyStage& stage,
-                                                const Queue<Contribution>& queue, const SortMemory<uint32_t>& sort,
-                                                StageRecord* record, uint32_t* place, uint32_t n) {
-    exec.run(stage);
-    exec.fail_on_overflow(queue, queue);
-    exec.append(stage);
-    exec.repeat_while(queue, detail::AnyCall());
-    exec.store(place, n);
-    exec.sort_pairs(sort, queue, n, record);
-    exec.set_depth(n);
-    exec.next_depth(n);
-};
+concept Executor =
+    RunsOverItems<E> && requires(E& exec, const detail::AnyStage& stage, const Queue<Contribution>& queue,
+                                 const SortMemory<uint32_t>& sort, StageRecord* record, uint32_t* place, uint32_t n) {
+        exec.run(stage);
+        exec.fail_on_overflow(queue, queue);
+        exec.append(stage);
+        exec.repeat_while(queue, detail::AnyCall());
+        exec.store(place, n);
+        exec.sort_pairs(sort, queue, n, record);
+        exec.set_depth(n);
+        exec.next_depth(n);
+    };
 /// The same between phases, over what all waves have left: their number is known to the host.
 template <class E>
-concept WholeExecutor = RunsOverItems<E> && requires(E& exec, const Queue<Contribution>& queue,
-                                                     const SortMemory<uint64_t>& sort, const ScanMemory& scan,
-                                                     StageRecord* record, uint32_t* numbers, uint32_t n) {
-    { exec.count(queue) } -> std::convertible_to<uint32_t>;
-    exec.sort_pairs(sort, n, n, record);
-    exec.scan(scan, numbers, numbers, n, record);
-};
+concept WholeExecutor =
+    RunsOverItems<E> && requires(E& exec, const Queue<Contribution>& queue, const SortMemory<uint64_t>& sort,
+                                 const ScanMemory& scan, StageRecord* record, uint32_t* numbers, uint32_t n) {
+        { exec.count(queue) } -> std::convertible_to<uint32_t>;
+        exec.sort_pairs(sort, n, n, record);
+        exec.scan(scan, numbers, numbers, n, record);
+    };
 
 // ---- methods ----
 
@@ -105,9 +107,8 @@ concept HasStages = std::constructible_from<typename I::Stages, const WaveParts<
                                             const typename I::Memory&, const typename I::State&>;
 /// One phase: schedule(executor, stages) is a wave.
 template <class I>
-concept HasSchedule = requires(detail::AnyExecutor& exec, const typename I::Stages& stages) {
-    I::schedule(exec, stages);
-};
+concept HasSchedule =
+    requires(detail::AnyExecutor& exec, const typename I::Stages& stages) { I::schedule(exec, stages); };
 /// Phases: iteration(run) calls run.for_waves(phase) kPhases times, and run.once(work) between them and after them.
 template <class I>
 concept HasIteration = requires(detail::AnyIteration& run) {
@@ -122,11 +123,14 @@ concept Integrator = HasPolicy<I> && HasPilot<I> && HasMemory<I> && KeptState<ty
 /// The same part by part, so that the first message says what is missing.
 template <class I, class Tracer>
 consteval bool check_method() {
-    static_assert(HasPolicy<I>, "a method needs Policy with WavePolicy waves, plan(scene, settings) -> Policy, "
-                                "skipped(scene, policy) and kFilmWide");
-    static_assert(HasPilot<I>, "a method with kFilmWide needs pilot(policy, scene, tracer, seed) -> double: the mean "
-                               "number of vertices that a light subpath leaves");
-    static_assert(HasMemory<I>, "a method needs Memory and lay_out(layout, policy, size) -> Memory: the queues of a wave");
+    static_assert(HasPolicy<I>,
+                  "a method needs Policy with WavePolicy waves, plan(scene, settings) -> Policy, "
+                  "skipped(scene, policy) and kFilmWide");
+    static_assert(HasPilot<I>,
+                  "a method with kFilmWide needs pilot(policy, scene, tracer, seed) -> double: the mean "
+                  "number of vertices that a light subpath leaves");
+    static_assert(HasMemory<I>,
+                  "a method needs Memory and lay_out(layout, policy, size) -> Memory: the queues of a wave");
     static_assert(KeptState<typename I::State, typename I::Policy>,
                   "a method needs State: NoState, or a plain struct with kKind, lay_out(layout, policy, size), "
                   "init(policy, put) and for_each_saved(visit)");

@@ -1,7 +1,7 @@
 // What a method is to the renderer (concept Integrator, integrators/contract.h): a template
 //   template <Features F, class Tracer, Fusion kFusion> struct NAMEIntegrator
-// that says what it decides on the host (Policy, plan), which queues a wave has (Memory, lay_out), what lives longer than
-// a wave (State), what works on them (Stages), and in which order (schedule or iteration).
+// that says what it decides on the host (Policy, plan), which queues a wave has (Memory, lay_out), what lives longer
+// than a wave (State), what works on them (Stages), and in which order (schedule or iteration).
 #pragma once
 
 #include <algorithm>
@@ -56,7 +56,7 @@ struct FilmBuffers {
 struct WaveSize {
     uint32_t slots;
     uint32_t kept;  ///< vertices of its light subpaths
-    PrimitiveBytes primitives;
+    PrimitiveBytes primitives = {};
 };
 
 /// What the stages of a wave are made of, beside what their method lays out.

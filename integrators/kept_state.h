@@ -49,20 +49,19 @@ struct AnyVisit {
 /// A plain struct of places that lay_out gives it, once without memory to tell the bytes. Its memory is zero at first;
 /// init puts there what is known before the first iteration. for_each_saved shows what a resumed render needs.
 template <class S, class Policy>
-concept KeptState = std::is_trivially_copyable_v<S> && requires(const S state, Layout& layout, const Policy& policy,
-                                                                const StateSize& size, detail::AnyPut put,
-                                                                detail::AnyVisit visit) {
-    { S::kKind } -> std::convertible_to<StateKind>;
-    { S::lay_out(layout, policy, size) } -> std::same_as<S>;
-    state.init(policy, put);
-    state.for_each_saved(visit);
-};
+concept KeptState =
+    std::is_trivially_copyable_v<S> && requires(const S state, Layout& layout, const Policy& policy,
+                                                const StateSize& size, detail::AnyPut put, detail::AnyVisit visit) {
+        { S::kKind } -> std::convertible_to<StateKind>;
+        { S::lay_out(layout, policy, size) } -> std::same_as<S>;
+        state.init(policy, put);
+        state.for_each_saved(visit);
+    };
 
 /// A state that waves append to: its queue is one that grows (Layout::growing_queue). take_items copies what an old
 /// state held before it grew: copy(to, from, count).
 template <class S>
-concept AppendedState = requires(const S state, const S& old, uint32_t items, detail::AnyCopy copy) {
-    state.take_items(old, items, copy);
-};
+concept AppendedState =
+    requires(const S state, const S& old, uint32_t items, detail::AnyCopy copy) { state.take_items(old, items, copy); };
 
 }  // namespace ambilux

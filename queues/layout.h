@@ -45,8 +45,8 @@ public:
         last_by_path_ = by_path;
         return q;
     }
-    /// A queue whose items are kept over a wave, or over an iteration, and whose number is not known before. When they are
-    /// too many, the wave fails and is done again with more room.
+    /// A queue whose items are kept over a wave, or over an iteration, and whose number is not known before. When they
+    /// are too many, the wave fails and is done again with more room.
     template <class Item>
     Queue<Item> growing_queue(const char* name, uint32_t capacity, uint32_t lanes = LaneArray<Item>::kLanes) {
         growing_.push_back(names_.size());

@@ -176,7 +176,8 @@ private:
             for (uint32_t tile = 0;;) {
                 for (uint32_t s = 0; s < count; s += plan.wave.samples)
                     for (uint32_t t = s ? 0 : tile; t < tile_count(plan.wave); t += plan.wave.tiles)
-                        backend.launch_wave(phase, body, t, first + s, std::min<uint32_t>(plan.wave.samples, count - s));
+                        backend.launch_wave(phase, body, t, first + s,
+                                            std::min<uint32_t>(plan.wave.samples, count - s));
                 if (!backend.may_fail(phase)) break;
                 backend.wait();
                 const WaveState read = backend.read_state();
@@ -197,8 +198,7 @@ private:
         template <class Work>
         void once(const Work& work) {
             Exec& exec = *backend.executor_;
-            if constexpr (AppendedState<typename Maker::State>)
-                exec.know(state.layout().counters(), state.counters());
+            if constexpr (AppendedState<typename Maker::State>) exec.know(state.layout().counters(), state.counters());
             backend.set_film_state(first, count);
             exec.launch([&](Exec& e) { work(e, *backend.stages_); });
         }
@@ -288,7 +288,8 @@ private:
         }
         cuda_check(cudaDeviceSynchronize(), "preparation");
     }
-    /// A wave had more than there was capacity for. Where there is no memory for more light vertices, waves get smaller.
+    /// A wave had more than there was capacity for. Where there is no memory for more light vertices, waves get
+    /// smaller.
     template <class State>
     void grow(WaveFailure failure, State& state) {
         read_counts();
@@ -325,7 +326,7 @@ private:
     }
 
     Maker& maker_;
-    Features traced_;  ///< what rays are traced for
+    Features traced_;                               ///< what rays are traced for
     std::string device_name_ = cuda_device_name();  ///< asked for once: statistics are read often
     std::optional<PairAccel> host_pairs_;           ///< until they are on the device
     std::shared_ptr<const DeviceScene> device_scene_;

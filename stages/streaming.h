@@ -198,7 +198,8 @@ struct StreamTurn {
         const TurnItem turn = turns.load(i);
         Subpath<Mis> path;
         if (turn.light_subpath && start(turn, path))
-            pool.rays.put(turn.slot, StreamPool<F, Mis>::Items::pack(path, Side::light, turn.path | kLightRay, kInfinity));
+            pool.rays.put(turn.slot,
+                          StreamPool<F, Mis>::Items::pack(path, Side::light, turn.path | kLightRay, kInfinity));
         else
             pool.advance(turn.slot);
     }

@@ -79,8 +79,8 @@ public:
         queue.counter->finish();
     }
     static void store(uint32_t* place, uint32_t value) { *place = value; }
-    /// Has all waves' queue hold what is in that of this wave (stage.items()): stage(i, place) puts item i at `place`. If
-    /// there is no room, the wave fails, and the queues `others` are emptied as well.
+    /// Has all waves' queue hold what is in that of this wave (stage.items()): stage(i, place) puts item i at `place`.
+    /// If there is no room, the wave fails, and the queues `others` are emptied as well.
     template <class Stage, class... Item>
     void append(const Stage& stage, const Queue<Item>&... others) {
         const Start start;

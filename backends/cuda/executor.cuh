@@ -135,8 +135,8 @@ public:
     void for_each(const Stage& stage, uint32_t n) {
         run_slots(stage, n, 1);
     }
-    /// Has all waves' queue hold what is in that of this wave (stage.items()): stage(i, place) puts item i at `place`. If
-    /// there is no room, the wave fails, and the queues `others` are emptied as well.
+    /// Has all waves' queue hold what is in that of this wave (stage.items()): stage(i, place) puts item i at `place`.
+    /// If there is no room, the wave fails, and the queues `others` are emptied as well.
     template <class Stage, class... Item>
     void append(const Stage& stage, const Queue<Item>&... others) {
         may_fail_ = true;

@@ -11,10 +11,10 @@ namespace {
 template <class Key>
 size_t sort_bytes(uint32_t items) {
     size_t bytes = 0;
-    cuda_check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, static_cast<const Key*>(nullptr),
-                                               static_cast<Key*>(nullptr), static_cast<const uint32_t*>(nullptr),
-                                               static_cast<uint32_t*>(nullptr), items),
-               "memory of sorting");
+    cuda_check(
+        cub::DeviceRadixSort::SortPairs(nullptr, bytes, static_cast<const Key*>(nullptr), static_cast<Key*>(nullptr),
+                                        static_cast<const uint32_t*>(nullptr), static_cast<uint32_t*>(nullptr), items),
+        "memory of sorting");
     return bytes;
 }
 

@@ -92,8 +92,8 @@ struct DepthChange {
     uint32_t value;
 };
 
-/// After a stage: its record, and its queue emptied, or not if it `stays`; `out`, if it is not null, holds as many items
-/// as that did. The time since the last such kernel is the stage's.
+/// After a stage: its record, and its queue emptied, or not if it `stays`; `out`, if it is not null, holds as many
+/// items as that did. The time since the last such kernel is the stage's.
 __global__ inline void finish_stage(StageRecord* record, QueueCounter* counter, QueueCounter* out,
                                     const QueueCounter* stays, uint32_t slots, uint32_t samples, DepthChange depth,
                                     WaveState* state, uint64_t* clock) {

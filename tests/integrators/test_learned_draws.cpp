@@ -104,7 +104,7 @@ TEST_CASE("a draw finds a vertex with the probability that its contribution is d
     constexpr uint32_t kLevels = 3, kClusters = 1u << kLevels, kVertices = 57, kDraws = 3, kKeys = 200'000;
     std::vector<DrawSplit> splits(kClusters);
     std::vector<uint16_t> tickets = {100, 100, 20000, 20001, 40000, 50000, 50000, 60000}, cluster(kVertices),
-        keys(kVertices);
+                          keys(kVertices);
     std::vector<uint32_t> sorted(kVertices), first(kClusters + 1);
     for (uint32_t i = 0; i < kVertices; ++i) cluster[i] = uint16_t(i * 5 % 7 == 6 ? 4 : i * 5 % 7);  // 6, 7 are empty
     for (const uint16_t c : cluster) ++first[c + 1];

@@ -48,8 +48,8 @@ struct ClusteredVertices {
     uint32_t* first;            ///< by cluster: in `sorted`; one more at the end
     SortMemory<uint16_t> sort;  ///< light vertices by their keys
 
-    /// Of a light vertex. Within a cluster vertices lie in parts, which decides nothing but which of them a random number
-    /// finds: images stay as they were.
+    /// Of a light vertex. Within a cluster vertices lie in parts, which decides nothing but which of them a random
+    /// number finds: images stay as they were.
     AMBILUX_HD static uint16_t key(uint32_t cluster, uint32_t vertex) {
         return uint16_t(cluster << kPartBits | (vertex / 32 & (kParts - 1)));
     }
@@ -98,9 +98,9 @@ struct LearnedDraw {
     AMBILUX_HD float scale(const WaveState& state) const {
         return inverse_probability() / (float(state.light_subpaths) * float(source.draws));
     }
-    /// What is to be learned from `c`, whose value is not scaled yet: the second moment of what this draw would bring if
-    /// its cluster were certain, without the throughput of the eye subpath. The least variance has draws in proportion
-    /// to its root. Of a wave of many subpaths, some light vertices teach for the others.
+    /// What is to be learned from `c`, whose value is not scaled yet: the second moment of what this draw would bring
+    /// if its cluster were certain, without the throughput of the eye subpath. The least variance has draws in
+    /// proportion to its root. Of a wave of many subpaths, some light vertices teach for the others.
     AMBILUX_HD Score note(const Candidate<BidirectionalMis>& c, Rgb throughput, const WaveState& state) const;
 
 private:

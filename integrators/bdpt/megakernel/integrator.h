@@ -30,8 +30,8 @@ struct MegakernelOf {
     };
     static Memory lay_out(Layout& layout, const Policy& p, WaveSize n) {
         Memory m;
-        m.light_vertices = layout.growing_queue<ConnectionVertex<Mis>>(
-            "light_vertices", p.rules.connect ? n.kept : 0, ConnectionVertex<Mis>::template lanes<F>());
+        m.light_vertices = layout.growing_queue<ConnectionVertex<Mis>>("light_vertices", p.rules.connect ? n.kept : 0,
+                                                                       ConnectionVertex<Mis>::template lanes<F>());
         m.splats = layout.growing_queue<SplatItem>("splats", p.rules.splat ? n.kept + n.slots : 0);
         return m;
     }
@@ -49,9 +49,15 @@ struct MegakernelOf {
                 record("light_generate"), record("light_extend"), record("light_shade"), record("connect_camera"),
                 record("extend"),         record("shade"),        record("connect"),     record("connect_vertices"),
                 record("mis_weight"),     record("occlude")};
-            megakernel = {parts.scene,        parts.tracer,     wave,
-                          p.rules,            m.light_vertices, m.splats,
-                          parts.film.samples, records,          record(megakernel.kName)};
+            megakernel = {parts.scene,
+                          parts.tracer,
+                          wave,
+                          p.rules,
+                          m.light_vertices,
+                          m.splats,
+                          parts.film.samples,
+                          records,
+                          record(megakernel.kName)};
             splat = {parts.scene, wave, m.splats, parts.film.splats, {}, record(Splat<F>::kName)};
         }
     };

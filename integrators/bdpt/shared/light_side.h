@@ -34,8 +34,8 @@ struct SplatQueues {
                                                    VertexItem<Mis>::template lanes<F>());
         q.candidates = layout.queue<CandidateItem>("splat_candidates", K.weigh ? 0 : n, by_path);
         q.weighted = layout.queue<CandidateItem>("weighted_splats", n, by_path && !K.occlude);
-        q.splats =
-            layout.growing_queue<SplatItem>("splats", p.rules.splat ? uint32_t(std::min<uint64_t>(kept, 0xfffffff0u)) : 0);
+        q.splats = layout.growing_queue<SplatItem>("splats",
+                                                   p.rules.splat ? uint32_t(std::min<uint64_t>(kept, 0xfffffff0u)) : 0);
         return q;
     }
 };

@@ -81,8 +81,8 @@ struct StreamingOf {
             const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
             const SceneView& scene = parts.scene;
             const bool seeds = F.opacity || p.waves.cull > 0.0f;
-            const StreamPool<F, Mis> pool = {scene,          wave,      p.rules,            m.rays,
-                                             m.eye_vertices, m.pending, parts.film.samples, m.next_path};
+            const StreamPool<F, Mis> pool = {
+                scene, wave, p.rules, m.rays, m.eye_vertices, m.pending, parts.film.samples, m.next_path};
             begin = {pool, record(begin)};
             extend = {scene, parts.tracer, pool, m.eye_hits, m.light_hits, record(extend)};
             eye_vertex = {pool, m.eye_hits, eye.emission(), m.eye.vertices, m.turns, record(eye_vertex)};
