@@ -95,10 +95,13 @@ public:
     /// Adds samples [first, first + count) of every pixel to the film. Returns how many are finished: all.
     template <class State>
     uint32_t run(uint32_t first, uint32_t count, State& state) {
+        const uint32_t step = contract::HasIteration<Integrator> ? maker_.policy.waves.iteration_samples : count;
         arena_.execute([&] {
-            Iteration<State> iteration = {*this, state, first, count};
-            run_iteration<Integrator>(iteration);
-            if constexpr (Maker::kFilmWide) update_film(first, count);
+            for (uint32_t s = first; s < first + count; s += step) {
+                Iteration<State> iteration = {*this, state, s, step};
+                run_iteration<Integrator>(iteration);
+                if constexpr (Maker::kFilmWide) update_film(s, step);
+            }
         });
         return count;
     }

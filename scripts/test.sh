@@ -5,6 +5,8 @@
 # Arguments go to ctest, for example: scripts/test.sh -R bsdf
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
 scripts/setup.sh
+# The methods of the tutorials are tested as methods outside of the tree.
+export AMBILUX_CMAKE_ARGS="-DAMBILUX_EXTENSIONS=examples/methods ${AMBILUX_CMAKE_ARGS:-}"
 # shellcheck disable=SC2119  # the arguments are for ctest
 configure_and_build
 
