@@ -1,10 +1,43 @@
-// shade: a vertex of an eye subpath. What it meets goes to `EmissionOut`, what may be connected to `AtVertex`.
+// shade and connect: a vertex of an eye subpath, and next event estimation there (s = 1).
 #pragma once
 
+#include "stages/fused_clock.h"
 #include "stages/stage.h"
+#include "transport/subpath/next_event.h"
 #include "transport/subpath/visit.h"
 
 namespace ambilux {
+
+/// At an eye vertex. `Out` takes candidates.
+template <Features F, class Mis, class Out>
+struct NextEvent {
+    Out candidates;
+    StageRecord* record;
+    bool seeds;  ///< shadow rays need a seed: surfaces of partial opacity, culling
+
+    AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
+                       uint32_t slot, const Draws& draws) const {
+        Candidate<Mis> c;
+        if (next_event<F>(scene, rules, v, path.throughput, path.depth, draws.next_event(path.depth), c) &&
+            is_valid_radiance(c.value, record))
+            candidates.push(pack_candidate(c, slot, seeds ? draws.shadow_seed(path.depth) : 0));
+    }
+};
+
+/// What is done at a vertex (NextEvent, ConnectCamera), with its items and its time in the record of the stage that it
+/// is elsewhere. On a host alone.
+template <class AtVertex>
+struct Clocked {
+    AtVertex inner;
+
+    template <class Mis>
+    void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
+            uint32_t slot, const Draws& draws) const {
+        inner.record->count_item(path.depth);
+        const FusedClock clock(inner.record, true);
+        inner.at(scene, rules, v, path, slot, draws);
+    }
+};
 
 /// Vertices wait in a queue for the stage that connects them.
 template <Features F, class Mis>
@@ -17,6 +50,7 @@ struct QueueVertex {
     }
 };
 
+/// What the vertex meets goes to `EmissionOut`, what may be connected to `AtVertex`.
 template <Features F, class Mis, class EmissionOut, class AtVertex>
 struct EyeVertex {
     static constexpr const char* kName = "shade";
@@ -77,6 +111,30 @@ struct EyeVertex {
             return false;
         next = Items::pack(path, Side::eye, h.ray.path, kInfinity);
         return true;
+    }
+};
+
+/// What an eye vertex does, over vertices that wait in a queue.
+template <Features F, class Mis, class AtVertex>
+struct ConnectEmitter {
+    static constexpr const char* kName = "connect";
+
+    SceneView scene;
+    Wave wave;
+    Rules<Mis> rules;
+    Queue<VertexItem<Mis>> vertices;
+    AtVertex connect;
+    StageRecord* record;
+
+    const Queue<VertexItem<Mis>>& items() const { return vertices; }
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const VertexItem<Mis> item = load_vertex<F>(vertices, i);
+        const SubpathEnd<Mis> end = unpack_end<F>(scene, item);
+        Subpath<Mis> path{};
+        path.direction = item.d;
+        path.throughput = end.throughput;
+        path.depth = end.depth;
+        connect.at(scene, rules, end.vertex, path, item.path, {wave.key(item.path)});
     }
 };
 

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "stages/stage.h"
+#include "queues/stage_record.h"
 
 namespace ambilux {
 
@@ -90,21 +90,6 @@ private:
 
     StageRecord* record_;
     int64_t weight_, start_ = 0;
-};
-
-/// What is done at a vertex (NextEvent, ConnectCamera), with its items and its time in the record of the stage that it
-/// is elsewhere. On a host alone.
-template <class AtVertex>
-struct Clocked {
-    AtVertex inner;
-
-    template <class Mis>
-    void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
-            uint32_t slot, const Draws& draws) const {
-        inner.record->count_item(path.depth);
-        const FusedClock clock(inner.record, true);
-        inner.at(scene, rules, v, path, slot, draws);
-    }
 };
 
 }  // namespace ambilux

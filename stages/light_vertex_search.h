@@ -4,7 +4,7 @@
 
 #include "core/warp.h"
 #include "stages/cache_draw.h"
-#include "stages/occlude.h"
+#include "stages/mis_weight.h"
 #include "stages/stage.h"
 
 namespace ambilux {

@@ -71,35 +71,4 @@ private:
     typename detail::KeptBy<Stage>::Type kept_[kMostPacketRays];
 };
 
-/// A queue of shadow rays that are traced whenever there are `most` of them, on a host; what is left when the stage
-/// that makes them ends is traced by a launch.
-template <class Stage>
-struct Gathered {
-    using value_type = typename std::remove_cvref_t<decltype(std::declval<Stage>().items())>::value_type;
-
-    Stage stage;
-    const WaveState* state;
-    uint32_t most;
-
-    template <class Item>
-    uint32_t push(const Item& item) const {
-        const auto& queue = stage.items();
-        queue.push(item);
-        if (queue.counter->count >= most) trace();
-        return 0;
-    }
-
-private:
-    __attribute__((noinline)) void trace() const {
-        const auto& queue = stage.items();
-        const uint32_t count = queue.counter->size();
-        const FusedClock clock(stage.record, most < kMostPacketRays);
-        RayPackets<Stage> packets(stage);
-        for (uint32_t i = 0; i < count; ++i) packets.add(i);
-        packets.trace();
-        queue.counter->finish();
-        stage.record->count_items(count, state->depth);
-    }
-};
-
 }  // namespace ambilux

@@ -1,13 +1,72 @@
-// splat: light is added to the pixels whose filters reach it.
+// mis_weight, occlude and splat of light that light subpaths bring to the film: added to the pixels whose filters reach
+// it.
 #pragma once
 
 #include "film/splat_sums.h"
 #include "film/strategy_film.h"
-#include "stages/stage.h"
+#include "stages/mis_weight.h"
 #include "transport/sensor/filter.h"
 #include "transport/sensor/latlong.h"
 
 namespace ambilux {
+
+/// What light vertices splat.
+template <class Out>
+struct WeighSplats {
+    static constexpr const char* kName = "mis_weight";
+
+    Queue<CandidateItem> candidates;
+    Out weighted;
+    StageRecord* record;
+
+    const Queue<CandidateItem>& items() const { return candidates; }
+    AMBILUX_HD void operator()(uint32_t i) const { push(candidates.load(i)); }
+
+    AMBILUX_HD uint32_t push(CandidateItem c) const {
+        return weighted_light(c.value, c.ratio, record, c.value) ? weighted.push(c) : 0;
+    }
+};
+
+/// Shadow rays of splats.
+template <Features F, class Tracer>
+struct OccludeSplats {
+    static constexpr const char* kName = "occlude";
+    static constexpr Features kFeatures = F;
+    static constexpr bool kAnyHit = true;
+    static constexpr bool kReservesSlots = true;
+    using Kept = Contribution;
+
+    SceneView scene;
+    Tracer tracer;
+    Queue<CandidateItem> candidates;
+    ReservedQueue<SplatItem> splats;
+    StageRecord* record;
+
+    const Queue<CandidateItem>& items() const { return candidates; }
+
+    AMBILUX_HD bool fetch(uint32_t i, Ray& ray, Kept& kept) const {
+        const CandidateItem c = candidates.load(i);
+        kept = {c.value, c.path};
+        return fetch(c, ray);
+    }
+    AMBILUX_HD void finish(uint32_t i, const Kept& kept, bool blocked) const {
+        if (blocked) return;
+        const CandidateItem c = candidates.load(i);
+        splats.push({kept.value, kept.path, c.film, c.strategy, c.ratio});
+    }
+    AMBILUX_HD void operator()(uint32_t i) const { process(candidates.load(i)); }
+    AMBILUX_HD void process(const CandidateItem& c) const {
+        Ray ray;
+        if (fetch(c, ray) && !tracer.template occluded<F>(scene, ray))
+            splats.queue.push({c.value, c.path, c.film, c.strategy, c.ratio});
+    }
+
+private:
+    AMBILUX_HD bool fetch(const CandidateItem& c, Ray& ray) const {
+        ray = {c.origin, c.tmax, c.direction, c.opacity_seed};
+        return is_valid_ray(c.origin, c.direction, record);
+    }
+};
 
 template <Features F>
 struct Splat {

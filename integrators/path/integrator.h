@@ -4,10 +4,8 @@
 #include "integrators/path/policy.h"
 #include "integrators/shared/eye_side.h"
 #include "integrators/shared/subpath_queues.h"
-#include "stages/connect_emitter.h"
 #include "stages/extend.h"
 #include "stages/eye_vertex.h"
-#include "stages/fused_clock.h"
 #include "stages/generate.h"
 
 namespace ambilux {

@@ -3,10 +3,7 @@
 #pragma once
 
 #include "integrators/integrator.h"
-#include "stages/accumulate.h"
 #include "stages/mis_weight.h"
-#include "stages/occlude.h"
-#include "stages/ray_packets.h"
 
 namespace ambilux {
 

@@ -4,9 +4,8 @@
 #include "items/candidate_items.h"
 #include "render/replay/context.h"
 #include "render/replay/record.h"
-#include "stages/accumulate.h"
 #include "stages/mis_weight.h"
-#include "stages/occlude.h"
+#include "stages/splat.h"
 
 namespace ambilux {
 

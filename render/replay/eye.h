@@ -5,7 +5,7 @@
 
 #include "render/replay/arrival.h"
 #include "render/replay/describe.h"
-#include "stages/connect_emitter.h"
+#include "stages/eye_vertex.h"
 #include "transport/subpath/start.h"
 
 namespace ambilux {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "queues/layout.h"
-#include "stages/ray_packets.h"
+#include "stages/mis_weight.h"
 #include "tests/support/catch.h"
 
 using namespace ambilux;

@@ -9,7 +9,7 @@
 #include "integrators/bdpt/learned/scored_items.h"
 #include "queues/primitives.h"
 #include "stages/light_vertex_search.h"
-#include "stages/occlude.h"
+#include "stages/mis_weight.h"
 #include "transport/mis/heuristic.h"
 
 namespace ambilux {

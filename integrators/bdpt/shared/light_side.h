@@ -5,12 +5,9 @@
 #include "integrators/shared/subpath_queues.h"
 #include "stages/extend.h"
 #include "stages/eye_vertex.h"
-#include "stages/fused_clock.h"
 #include "stages/generate.h"
 #include "stages/light_vertex.h"
 #include "stages/mis_weight.h"
-#include "stages/occlude.h"
-#include "stages/ray_packets.h"
 #include "stages/splat.h"
 
 namespace ambilux {

@@ -6,7 +6,7 @@
 #pragma once
 
 #include "integrators/path/ris/settings.h"
-#include "stages/connect_emitter.h"
+#include "stages/eye_vertex.h"
 
 namespace ambilux {
 
