@@ -54,7 +54,30 @@ double flux(const EmissionSample& s) {
     return double(s.radiance.x) * s.cos_theta / (double(s.pick) * s.pdf_pos * s.pdf_dir);
 }
 
+struct Unclassified {
+    static constexpr const char* plugin = "new";
+    static constexpr bool surface = true, delta_position = false, delta_direction = false, infinite = false;
+};
+struct Classified : Unclassified {
+    static constexpr LightStart start = LightStart::surface;
+};
+struct Misclassified : Unclassified {
+    static constexpr LightStart start = LightStart::environment;
+};
+
 }  // namespace
+
+TEST_CASE("An emitter that does not say where its light starts, or says otherwise than its traits, is none") {
+    STATIC_REQUIRE((EmitterModel<Classified> && EmitterModel<AreaEmitter>));
+    STATIC_REQUIRE_FALSE(EmitterModel<Unclassified>);
+    STATIC_REQUIRE_FALSE(EmitterModel<Misclassified>);
+    for (uint32_t type = 0; type < EmitterModels::count; ++type)
+        EmitterModels::for_each([&](auto m) {
+            using Model = typename decltype(m)::type;
+            if (type == EmitterModels::index<Model>())
+                CHECK(light_start<kAllFeatures>(EmitterType(type)) == Model::start);
+        });
+}
 
 TEST_CASE("Emission carries the emitter's power", "[emitter]") {
     const double disk = M_PI * 9;

@@ -14,7 +14,17 @@ struct CubeHeuristic {
 };
 using WithCube = HeuristicList<BalanceHeuristic, PowerHeuristic, CubeHeuristic>;
 
+struct WithoutNorm {
+    static constexpr const char* kName = "no norm";
+    static float term(float ratio) { return ratio; }
+};
+
 }  // namespace
+
+TEST_CASE("What lacks a function is no heuristic") {
+    STATIC_REQUIRE((Heuristic<CubeHeuristic> && Heuristic<PowerHeuristic>));
+    STATIC_REQUIRE_FALSE(Heuristic<WithoutNorm>);
+}
 
 TEST_CASE("a heuristic of one's own: weights of all strategies sum to one, and norms are sums of terms") {
     const float densities[] = {0.3f, 2.0f, 0.0f, 1.1f, 7.0f};
