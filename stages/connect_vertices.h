@@ -1,11 +1,11 @@
 // connect_vertices: eye vertices and light vertices (s, t >= 2).
 #pragma once
 
+#include "stages/arrival.h"
 #include "stages/connection_loop.h"
 #include "stages/eye_vertex.h"
 #include "stages/fused_clock.h"
 #include "stages/light_vertex_search.h"
-#include "stages/mis_weight.h"
 #include "transport/subpath/connection.h"
 
 namespace ambilux {

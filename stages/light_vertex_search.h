@@ -3,8 +3,8 @@
 #pragma once
 
 #include "core/warp.h"
+#include "stages/arrival.h"
 #include "stages/cache_draw.h"
-#include "stages/mis_weight.h"
 #include "stages/stage.h"
 
 namespace ambilux {

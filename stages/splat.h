@@ -4,7 +4,7 @@
 
 #include "film/splat_sums.h"
 #include "film/strategy_film.h"
-#include "stages/mis_weight.h"
+#include "stages/arrival.h"
 #include "transport/sensor/filter.h"
 #include "transport/sensor/latlong.h"
 

@@ -49,7 +49,7 @@ public:
         else
             run_in_order<MortonOrder>(stage, stage, [] {});
     }
-    /// What is left of a queue of Gathered (stages/mis_weight.h), in its order: a path may have several rays there, and
+    /// What is left of a queue of Gathered (stages/arrival.h), in its order: a path may have several rays there, and
     /// what they bring is added one after the other.
     template <class Stage>
     void trace_gathered(const Stage& stage) {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "integrators/integrator.h"
-#include "stages/mis_weight.h"
+#include "stages/arrival.h"
 
 namespace ambilux {
 

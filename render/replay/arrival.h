@@ -4,7 +4,7 @@
 #include "items/candidate_items.h"
 #include "render/replay/context.h"
 #include "render/replay/record.h"
-#include "stages/mis_weight.h"
+#include "stages/arrival.h"
 #include "stages/splat.h"
 
 namespace ambilux {

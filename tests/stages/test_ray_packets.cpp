@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "queues/layout.h"
-#include "stages/mis_weight.h"
+#include "stages/arrival.h"
 #include "tests/support/catch.h"
 
 using namespace ambilux;

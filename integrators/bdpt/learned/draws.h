@@ -8,8 +8,8 @@
 #include "integrators/bdpt/learned/draw_tree.h"
 #include "integrators/bdpt/learned/scored_items.h"
 #include "queues/primitives.h"
+#include "stages/arrival.h"
 #include "stages/light_vertex_search.h"
-#include "stages/mis_weight.h"
 #include "transport/mis/heuristic.h"
 
 namespace ambilux {

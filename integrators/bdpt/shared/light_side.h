@@ -3,11 +3,11 @@
 
 #include "integrators/bdpt/shared/policy.h"
 #include "integrators/shared/subpath_queues.h"
+#include "stages/arrival.h"
 #include "stages/extend.h"
 #include "stages/eye_vertex.h"
 #include "stages/generate.h"
 #include "stages/light_vertex.h"
-#include "stages/mis_weight.h"
 #include "stages/splat.h"
 
 namespace ambilux {
