@@ -2,7 +2,7 @@
 #pragma once
 
 #include "photons.h"
-#include "stages/accumulate.h"
+#include "stages/arrival.h"
 #include "transport/subpath/visit.h"
 
 namespace ambilux::photon_density {
