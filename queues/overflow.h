@@ -23,13 +23,15 @@ AMBILUX_HD void fail_wave_on_overflow(WaveState& state, QueueCounter& a, QueueCo
 }
 
 /// Reserves room in what all waves append to (`all`) for what is in `mine`, or fails the wave and empties `mine`: what
-/// has been appended stays whole, and a wave that failed has left nothing there.
+/// has been appended stays whole, and a wave that failed, here or before, has left nothing there.
 AMBILUX_HD void reserve_appended(WaveState& state, QueueCounter& mine, QueueCounter& all) {
     const uint32_t items = mine.size();
-    if (state.failed || add_up_to(&all.count, items, all.capacity, state.appended)) return;
-    raise_shared(&all.peak, uint64_t(all.capacity) + items);
+    if (!state.failed) {
+        if (add_up_to(&all.count, items, all.capacity, state.appended)) return;
+        raise_shared(&all.peak, uint64_t(all.capacity) + items);
+        fail_wave(state, kAppendedFull);
+    }
     mine.finish();
-    fail_wave(state, kAppendedFull);
 }
 
 }  // namespace ambilux

@@ -1,0 +1,109 @@
+// libs: ambilux_backends ambilux_queues ambilux_core
+// seconds: 5
+// Sorts and scans of a host: those of the standard library, to the byte, on any number of threads.
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include "backends/cpu/executor.h"
+#include "backends/cpu/whole_executor.h"
+#include "tests/support/catch.h"
+#include "tests/support/primitive_cases.h"
+
+using namespace ambilux;
+
+namespace {
+
+constexpr uint32_t kSmall[] = {0, 1, 2, 31, 32, 33, 255, 256, 257, 1000, 4095, 4096, 4097}, kLarge = (1u << 20) + 1;
+
+/// Calls f() on 1, 2 and 7 threads.
+template <class Function>
+void on_threads(const Function& f) {
+    const tbb::global_control most(tbb::global_control::max_allowed_parallelism, 7);
+    for (const int threads : {1, 2, 7}) {
+        INFO(threads << " threads");
+        tbb::task_arena arena(threads);
+        arena.execute(f);
+    }
+}
+
+template <class Key>
+void check_sorts(uint32_t n) {
+    test::for_sort_cases<Key>(n, host_primitive_bytes(), [](const std::string& what, const test::SortCase<Key>& c) {
+        INFO(what);
+        std::vector<std::byte> alone = c.before();
+        sort_pairs_alone(c.place(alone.data()), c.size(), c.bits);
+        CHECK(c.sorted(alone));
+        on_threads([&] {
+            std::vector<std::byte> together = c.before();
+            sort_pairs_together(c.place(together.data()), c.size(), c.bits);
+            CHECK(c.sorted(together));
+        });
+    });
+}
+
+}  // namespace
+
+TEST_CASE("sorts of pairs: stable, by the bits that are asked for, on any number of threads, and no byte beyond") {
+    for (const uint32_t n : kSmall) {
+        check_sorts<uint16_t>(n);
+        check_sorts<uint32_t>(n);
+        check_sorts<uint64_t>(n);
+    }
+    // Of many pairs, one sort of each kind: ties everywhere, and none.
+    const auto sort_many = [](const auto& keys, uint32_t bits) {
+        using Key = std::decay_t<decltype(keys[0])>;
+        const test::SortCase<Key> c{keys, bits, host_primitive_bytes()};
+        std::vector<std::byte> alone = c.before();
+        sort_pairs_alone(c.place(alone.data()), c.size(), c.bits);
+        CHECK(c.sorted(alone));
+        on_threads([&] {
+            std::vector<std::byte> together = c.before();
+            sort_pairs_together(c.place(together.data()), c.size(), c.bits);
+            CHECK(c.sorted(together));
+        });
+    };
+    sort_many(test::scrambled_keys<uint16_t>(kLarge), 16);
+    sort_many(test::scrambled_keys<uint32_t>(kLarge), 3);
+    sort_many(test::scrambled_keys<uint64_t>(kLarge), 64);
+}
+
+TEST_CASE("scans: sums of what comes before, in place too, on any number of threads, and no number beyond") {
+    std::vector<uint32_t> sizes(std::begin(kSmall), std::end(kSmall));
+    for (const uint32_t n : {8191u, 8193u, 100'000u, kLarge}) sizes.push_back(n);
+    for (const uint32_t n : sizes) {
+        INFO(n << " numbers");
+        std::vector<uint32_t> numbers = test::numbers_to_sum(n), sums = test::sums_before(numbers);
+        for (std::vector<uint32_t>* guarded : {&numbers, &sums}) guarded->insert(guarded->end(), 3, 0xa5a5a5a5u);
+        on_threads([&] {
+            std::vector<uint32_t> in = numbers, out(n + 3, 0xa5a5a5a5u);
+            scan_together(in.data(), out.data(), n);
+            CHECK(in == numbers);
+            CHECK(out == sums);
+            scan_together(in.data(), in.data(), n);
+            CHECK(in == sums);
+        });
+    }
+}
+
+TEST_CASE("executors of a host sort as many pairs as a queue has, and no more than it holds") {
+    for (const uint32_t pushed : {0u, 1u, 100u, 105u, 200u}) {
+        INFO(pushed << " pushes");
+        const uint32_t n = std::min(pushed, 105u);
+        const test::SortCase<uint32_t> c{test::scrambled_keys<uint32_t>(n), 7, host_primitive_bytes(), 105};
+        QueueCounter counter{};
+        counter.count = pushed;
+        counter.capacity = 105;
+        const Queue<Contribution> queue = {{nullptr, 105}, &counter};
+        StageRecord record{};
+        std::vector<std::byte> memory = c.before();
+        WaveState state{};
+        CpuExecutor(&state).sort_pairs(c.place(memory.data()), queue, c.bits, &record);
+        CHECK(c.sorted(memory));
+        memory = c.before();
+        CpuWholeExecutor whole;
+        CHECK(whole.count(queue) == n);
+        whole.sort_pairs(c.place(memory.data()), whole.count(queue), c.bits, &record);
+        CHECK(c.sorted(memory));
+        CHECK(counter.count == pushed);
+    }
+}
