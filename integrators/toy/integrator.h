@@ -31,8 +31,9 @@ struct ToyIntegrator {
     }
     static std::vector<std::string> skipped(const Scene&, const Policy&) { return {}; }
 
+    using State = NoState;  // nothing outlives a wave
+
     /// The queues of a wave.
-    using State = NoState;
     struct Memory {
         SubpathQueues<PathRay> subpaths;
         EyeQueues<Mis> eye;
