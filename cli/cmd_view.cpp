@@ -31,8 +31,8 @@ int view(const Options& o) {
                     fmt::format("{}: it has {}x{} pixels, the scene {}x{}; --size changes the scene's", o.reference,
                                 options.reference->mean.width, options.reference->mean.height,
                                 loaded.scene.sensor.crop_width, loaded.scene.sensor.crop_height));
-    Session session(std::move(loaded.scene), settings, std::move(options));
-    serve(session, {o.host, o.port}, save_when_interrupted(),
+    ViewedRender render(std::move(loaded.scene), settings, std::move(options));
+    serve(render, {o.host, o.port}, save_when_interrupted(),
           [](const std::string& url) { log_info(fmt::format("{} (Ctrl-C ends it)", url)); });
     return int(ExitCode::done);
 #else

@@ -78,7 +78,7 @@ AMBILUX_HD bool sample_base(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode
 
 struct SampleOrNone {
     BsdfSample sample;
-    bool some;
+    bool valid;
 };
 
 template <Features F>
@@ -86,13 +86,13 @@ AMBILUX_HD_APART SampleOrNone bsdf_sample_apart(Bsdf b, Vec3f wi, Vec3f u, Trans
     SampleOrNone s;
     if constexpr (F.coats)
         if (b.coat) {
-            s.some = coated_sample(
+            s.valid = coated_sample(
                 Coat{b.coat}, wi, u, [&](Vec3f in, Vec3f wo) { return evaluate_base<F>(b, in, wo, mode); },
                 [&](Vec3f in, Vec3f rest, BsdfSample& below) { return sample_base<F>(b, in, rest, mode, below); },
                 s.sample);
             return s;
         }
-    s.some = sample_base<F>(b, wi, u, mode, s.sample);
+    s.valid = sample_base<F>(b, wi, u, mode, s.sample);
     return s;
 }
 
@@ -127,8 +127,8 @@ AMBILUX_HD bool bsdf_sample(const Bsdf& b, Vec3f wi, Vec3f u, TransportMode mode
         return BsdfAt<Diffuse>{b.as<Diffuse>()}.sample(wi, u, mode, out);
     } else {
         const detail::SampleOrNone s = detail::bsdf_sample_apart<F>(b, wi, u, mode);
-        if (s.some) out = s.sample;
-        return s.some;
+        if (s.valid) out = s.sample;
+        return s.valid;
     }
 }
 

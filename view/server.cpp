@@ -48,14 +48,14 @@ bool is_own(const httplib::Request& request, const std::string& host, int port) 
     return named && (origin.empty() || origin == "http://" + given);
 }
 
-void answer(Session& session, httplib::Server& server) {
+void answer(ViewedRender& render, httplib::Server& server) {
     server.Get("/", [](const httplib::Request&, httplib::Response& r) { r.set_content(kPage, "text/html"); });
     server.Get("/scene", [&](const httplib::Request&, httplib::Response& r) {
-        r.set_content(text_of(session.description()), "application/json");
+        r.set_content(text_of(render.description()), "application/json");
     });
     server.Get("/frame", [&](const httplib::Request& q, httplib::Response& r) {
         const SharedPicture picture =
-            session.wait(std::strtoull(q.get_param_value("after").c_str(), nullptr, 10), kPatience);
+            render.wait(std::strtoull(q.get_param_value("after").c_str(), nullptr, 10), kPatience);
         if (!picture) {
             r.status = 204;
             return;
@@ -65,18 +65,18 @@ void answer(Session& session, httplib::Server& server) {
     });
     server.Post("/camera", [&](const httplib::Request& q, httplib::Response&) {
         const auto json = nlohmann::json::parse(q.body);
-        if (json.value("reset", false)) return session.reset_camera();
-        session.look({vector_of(json.at("origin")), vector_of(json.at("target")), vector_of(json.at("up"))},
-                     json.value("moving", false));
+        if (json.value("reset", false)) return render.reset_camera();
+        render.look({vector_of(json.at("origin")), vector_of(json.at("target")), vector_of(json.at("up"))},
+                    json.value("moving", false));
     });
     server.Post("/method", [&](const httplib::Request& q, httplib::Response&) {
         std::vector<std::pair<std::string, std::string>> assignments;
         for (const auto& pair : nlohmann::json::parse(q.body))
             assignments.emplace_back(pair.at(0).get<std::string>(), pair.at(1).get<std::string>());
-        session.choose(assignments);
+        render.choose(assignments);
     });
     server.Post("/exposure", [&](const httplib::Request& q, httplib::Response&) {
-        session.expose(std::clamp(nlohmann::json::parse(q.body).at("stops").get<float>(), -100.0f, 100.0f));
+        render.expose(std::clamp(nlohmann::json::parse(q.body).at("stops").get<float>(), -100.0f, 100.0f));
     });
     server.set_exception_handler([](const httplib::Request&, httplib::Response& r, std::exception_ptr thrown) {
         try {
@@ -90,7 +90,7 @@ void answer(Session& session, httplib::Server& server) {
 
 }  // namespace
 
-void serve(Session& session, const Address& address, const volatile bool* interrupt,
+void serve(ViewedRender& render, const Address& address, const volatile bool* interrupt,
            const std::function<void(const std::string& url)>& started) {
     httplib::Server server;
     server.set_payload_max_length(kLargestRequest);
@@ -111,7 +111,7 @@ void serve(Session& session, const Address& address, const volatile bool* interr
         r.status = 403;
         return httplib::Server::HandlerResponse::Handled;
     });
-    answer(session, server);
+    answer(render, server);
     std::atomic<bool> over = false;
     std::thread watch([&] {
         while (!over && !is_set(interrupt)) std::this_thread::sleep_for(kLookPeriod);

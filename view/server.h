@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "view/session.h"
+#include "view/viewed_render.h"
 
 namespace ambilux {
 
@@ -13,9 +13,9 @@ struct Address {
     int port = 8765;  ///< 0: a free one
 };
 
-/// Serves `session` until *interrupt becomes true. `started` gets the address of the page once it can be opened.
+/// Serves `render` until *interrupt becomes true. `started` gets the address of the page once it can be opened.
 /// Throws Error(device) if the port is taken or the host is none of this machine's.
-void serve(Session& session, const Address& address, const volatile bool* interrupt,
+void serve(ViewedRender& render, const Address& address, const volatile bool* interrupt,
            const std::function<void(const std::string& url)>& started);
 
 }  // namespace ambilux

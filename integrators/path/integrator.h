@@ -98,11 +98,11 @@ struct PathIntegrator {
     static void schedule(Executor& exec, const Stages& s) {
         if (s.policy.rules.max_depth == 0) return;
         start_eye_subpaths<kFusion.generate>(exec, s.generate, s.extend[0], s.wave.tiles * kTilePixels);
-        repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several) {
+        repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several_bounces) {
             run_emission(exec, s.eye);
             if (!s.policy.rules.next_event) return;
             if constexpr (!kFusion.connect) exec.run(s.connect_emitter);
-            run_candidates(exec, s.eye, several);
+            run_candidates(exec, s.eye, several_bounces);
         });
         exec.set_depth(0);
     }

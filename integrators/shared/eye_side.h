@@ -98,17 +98,17 @@ void run_emission([[maybe_unused]] Executor& exec, [[maybe_unused]] const EyeSid
     }
 }
 
-/// Candidates of one launch: weighted, tested, added to their paths. `several`: there may be several of a path.
+/// Candidates of one launch: weighted, tested, added to their paths. `needs_atomic_add`: a path may have several.
 template <class Executor, Features F, class Tracer, Fusion K, class Learn>
-void run_candidates(Executor& exec, const EyeSide<F, Tracer, K, Learn>& eye, bool several) {
+void run_candidates(Executor& exec, const EyeSide<F, Tracer, K, Learn>& eye, bool needs_atomic_add) {
     if constexpr (!K.weigh) exec.run(eye.weigh);
     if constexpr (K.occlude)
         exec.trace_gathered(eye.occlude);
     else
-        exec.trace(eye.occlude.with_atomic_add(several));
+        exec.trace(eye.occlude.with_atomic_add(needs_atomic_add));
     if constexpr (!K.weigh) {
         Accumulate accumulate = eye.accumulate;
-        accumulate.needs_atomic_add = several;
+        accumulate.needs_atomic_add = needs_atomic_add;
         exec.run(accumulate);
     }
 }

@@ -39,19 +39,20 @@ void start_eye_subpaths(Executor& exec, const Generate& generate, const Extend& 
 }
 
 /// From the hits of depth 1 in place 0 on: vertex[k] goes through the hits of a depth in place k and pushes rays to
-/// place 1 - k, which after rest(several) become the next hits. A device takes fewer than `multi_bounce_below` subpaths
-/// through several bounces at once; `several` is true then: what is pushed may belong to one path more than once.
+/// place 1 - k, which after rest(several_bounces) become the next hits. `several_bounces` is true where a device takes
+/// fewer than `multi_bounce_below` subpaths through several at once: what is pushed may belong to one path more than
+/// once.
 template <class Executor, class VertexStage, class Extend, class Rest>
 void repeat_depths(Executor& exec, const VertexStage (&vertex)[2], const Extend (&extend)[2],
                    uint32_t multi_bounce_below, Rest rest) {
-    const auto two_rounds = [&](auto several) {
+    const auto two_rounds = [&](auto several_bounces) {
         for (const int k : {0, 1}) {
-            if constexpr (several)
+            if constexpr (several_bounces)
                 exec.run(MultiBounce<VertexStage, Extend>{vertex[k], extend[1 - k], vertex[k].record});
             else
                 exec.run(vertex[k]);
-            rest(several.value);
-            exec.next_depth(several ? kBouncesPerLaunch : 1);
+            rest(several_bounces.value);
+            exec.next_depth(several_bounces ? kBouncesPerLaunch : 1);
             exec.extend(extend[1 - k]);
         }
     };

@@ -100,7 +100,7 @@ struct LearnedDraw {
     }
     /// What is to be learned from `c`, whose value is not scaled yet: the second moment of what this draw would bring
     /// if its cluster were certain, without the throughput of the eye subpath. The least variance has draws in
-    /// proportion to its root. Of a wave of many subpaths, some light vertices teach for the others.
+    /// proportion to its root. Of a wave of many subpaths, the vertices of some train for all.
     AMBILUX_HD Score note(const Candidate<BidirectionalMis>& c, Rgb throughput, const WaveState& state) const;
 
 private:

@@ -112,11 +112,11 @@ struct TwoSidesStages {
     }
 
     /// connect_vertices with its shadow rays.
-    auto connect_and_occlude(bool several) const
+    auto connect_and_occlude(bool needs_atomic_add) const
         requires kTracesConnections
     {
         return ConnectAndOcclude<F, Tracer, typename Eye::Shadows, Source>{
-            connect_vertices, eye.occlude.with_atomic_add(several), connect_vertices.record};
+            connect_vertices, eye.occlude.with_atomic_add(needs_atomic_add), connect_vertices.record};
     }
 };
 
@@ -125,16 +125,16 @@ template <class Executor, Features F, class Tracer, Fusion K, class Source>
 void run_connections(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s, bool several_bounces) {
     if constexpr (s.kTracesConnections && !Executor::kHost)
         if (s.policy.traces_connections) return exec.run(s.connect_and_occlude(several_bounces));
-    const bool several = several_bounces || !s.policy.one_connection_per_launch;
+    const bool needs_atomic_add = several_bounces || !s.policy.one_connection_per_launch;
     exec.run(s.connect_vertices);
-    run_candidates(exec, s.eye, several);
+    run_candidates(exec, s.eye, needs_atomic_add);
     const uint32_t longest = s.policy.cache_draws > 0 ? s.policy.cache_draws : s.policy.rules.max_depth - 2;
     if (longest <= 1) return;
     exec.repeat_while(s.connect_vertices.deferred, [&] {
         exec.run(s.connect_deferred);
-        run_candidates(exec, s.eye, several);
+        run_candidates(exec, s.eye, needs_atomic_add);
         exec.run(s.connect_vertices);
-        run_candidates(exec, s.eye, several);
+        run_candidates(exec, s.eye, needs_atomic_add);
     });
 }
 
@@ -142,13 +142,13 @@ template <class Executor, Features F, class Tracer, Fusion K, class Source>
 void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s) {
     const auto& rules = s.policy.rules;
     start_eye_subpaths<K.generate>(exec, s.generate, s.extend[0], s.wave.tiles * kTilePixels);
-    repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several) {
+    repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several_bounces) {
         run_emission(exec, s.eye);
         if constexpr (!K.connect) exec.run(s.connect_emitter);
-        if (rules.next_event || K.occlude) run_candidates(exec, s.eye, several);
+        if (rules.next_event || K.occlude) run_candidates(exec, s.eye, several_bounces);
         if constexpr (!K.occlude) {
             if (!rules.connect) return;
-            run_connections(exec, s, several);
+            run_connections(exec, s, several_bounces);
             exec.clear(s.connect_vertices.vertices);
         }
     });

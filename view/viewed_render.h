@@ -30,13 +30,13 @@ struct ViewOptions {
     uint64_t most_samples = 1 << 16;     ///< per pixel, after which it waits for changes
 };
 
-class Session {
+class ViewedRender {
 public:
     /// Throws what making the first renderer throws.
-    Session(Scene scene, const RenderSettings& settings, ViewOptions options);
-    ~Session();
-    Session(const Session&) = delete;
-    Session& operator=(const Session&) = delete;
+    ViewedRender(Scene scene, const RenderSettings& settings, ViewOptions options);
+    ~ViewedRender();
+    ViewedRender(const ViewedRender&) = delete;
+    ViewedRender& operator=(const ViewedRender&) = delete;
 
     /// The scene's camera and size, and the methods that there are.
     nlohmann::json description() const;

@@ -1,4 +1,4 @@
-#include "view/session.h"
+#include "view/viewed_render.h"
 
 #include <tbb/parallel_for.h>
 
@@ -63,7 +63,7 @@ nlohmann::json look_json(const LookAt& look) {
 
 }  // namespace
 
-Session::Session(Scene scene, const RenderSettings& settings, ViewOptions options)
+ViewedRender::ViewedRender(Scene scene, const RenderSettings& settings, ViewOptions options)
     : scene_(std::move(scene)), sensor_(scene_.sensor), first_(settings), options_(std::move(options)),
       accels_(scene_) {
     wish_.settings = settings;
@@ -72,7 +72,7 @@ Session::Session(Scene scene, const RenderSettings& settings, ViewOptions option
     worker_ = std::thread([this] { work(); });
 }
 
-Session::~Session() {
+ViewedRender::~ViewedRender() {
     {
         const std::lock_guard lock(mutex_);
         ends_ = true;
@@ -82,7 +82,7 @@ Session::~Session() {
     worker_.join();
 }
 
-nlohmann::json Session::description() const {
+nlohmann::json ViewedRender::description() const {
     nlohmann::json methods = nlohmann::json::array();
     for (const Variant& v : variants())
         methods.push_back({{"integrator", v.integrator}, {"variant", v.variant}, {"help", v.help}});
@@ -96,7 +96,7 @@ nlohmann::json Session::description() const {
             {"reference", options_.reference.has_value()}};
 }
 
-void Session::ask(const std::function<void(Wish&)>& change, bool restart) {
+void ViewedRender::ask(const std::function<void(Wish&)>& change, bool restart) {
     {
         const std::lock_guard lock(mutex_);
         change(wish_);
@@ -107,33 +107,33 @@ void Session::ask(const std::function<void(Wish&)>& change, bool restart) {
     wished_.notify_all();
 }
 
-void Session::look(const LookAt& look, bool moving) {
+void ViewedRender::look(const LookAt& look, bool moving) {
     placed(sensor_, look);
     ask([&](Wish& w) { w.look = look, w.moving = moving; }, true);
 }
 
-void Session::reset_camera() {
+void ViewedRender::reset_camera() {
     ask([](Wish& w) { w.look.reset(), w.moving = false; }, true);
 }
 
-void Session::choose(const std::vector<std::pair<std::string, std::string>>& assignments) {
+void ViewedRender::choose(const std::vector<std::pair<std::string, std::string>>& assignments) {
     RenderSettings settings = first_;
     for (const auto& [key, value] : assignments) apply_setting(settings, key, value);
     ask([&](Wish& w) { w.settings = settings, w.moving = false; }, true);
 }
 
-void Session::expose(float stops) {
+void ViewedRender::expose(float stops) {
     ask([&](Wish& w) { w.stops = stops; }, false);
 }
 
-SharedPicture Session::wait(uint64_t after, std::chrono::milliseconds patience) {
+SharedPicture ViewedRender::wait(uint64_t after, std::chrono::milliseconds patience) {
     std::unique_lock lock(mutex_);
     const auto newer = [&] { return ends_ || (frame_ && frame_->number > after); };
     if (!shown_now_.wait_for(lock, patience, newer) || ends_) return nullptr;
     return frame_;
 }
 
-void Session::work() {
+void ViewedRender::work() {
     Wish wish = wish_;
     for (;;) {
         bool anew = false, repaint = false;
@@ -161,13 +161,13 @@ void Session::work() {
     shown_now_.notify_all();
 }
 
-uint32_t Session::divisor(const Wish& wish) const {
+uint32_t ViewedRender::divisor(const Wish& wish) const {
     uint32_t d = 1;
     while (wish.moving && d < kLargestDivisor && whole_seconds_ > kMovingSeconds * d * d) d *= 2;
     return d;
 }
 
-void Session::restart(const Wish& wish) {
+void ViewedRender::restart(const Wish& wish) {
     renderer_.reset();
     samples_ = 0;
     error_ = nullptr;
@@ -181,7 +181,7 @@ void Session::restart(const Wish& wish) {
     }
 }
 
-void Session::render_some() {
+void ViewedRender::render_some() {
     // Samples that lie ready cost nothing; else about as many as a frame has time for.
     const double pixels = double(scene_.sensor.crop_width) * scene_.sensor.crop_height /
                           (double(sensor_.crop_width) * sensor_.crop_height);
@@ -194,7 +194,7 @@ void Session::render_some() {
     samples_ += done;
 }
 
-nlohmann::json Session::facts(const FilmMoments& film, const Wish& wish) {
+nlohmann::json ViewedRender::facts(const FilmMoments& film, const Wish& wish) {
     nlohmann::json out = {{"samples", film.samples}, {"problem", problem_}, {"fps", frames_per_second_}};
     if (!renderer_) return out;
     const RenderStats stats = renderer_->stats();
@@ -220,7 +220,7 @@ nlohmann::json Session::facts(const FilmMoments& film, const Wish& wish) {
     return out;
 }
 
-void Session::publish(const Wish& wish) {
+void ViewedRender::publish(const Wish& wish) {
     auto frame = std::make_shared<Picture>();
     if (renderer_) {
         const FilmMoments film = renderer_->film();
