@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Do the tests notice faults? Draws faults at random over sources, compiles them all into one copy of the project and runs the tests with one of them at a time.
 
-Usage: scripts/checks/mutate.py [--seed S] [--count N] [--folder DIR] [--tests NAME...] [--jobs N] [--retry] [--only ID...] [--built] [--report]
+Usage: scripts/checks/mutate.py [--seed S] [--count N] [--folder DIR] [--sources FOLDER...] [--tests NAME...] [--jobs N] [--retry] [--only ID...] [--built] [--report]
 
 A fault is an expression that is another than in the source: an operator replaced, a factor dropped, arguments swapped, a value 1 % too
 large (scripts/checks/mutation_sites.py). The copy, below the folder, holds both and takes the wrong one where AMBILUX_FAULT is the fault's
@@ -32,8 +32,8 @@ import mutation_sites
 from mutation_sites import Site
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ("transport", "stages", "film")
-TEST_FOLDERS = ("transport", "stages", "film", "items", "queues", "scene", "integrators")
+FOLDERS = ("transport", "stages", "film", "backends", "render", "integrators", "session")
+TEST_FOLDERS = ("transport", "stages", "film", "items", "queues", "scene", "integrators", "backends", "render", "session")
 GOAL = 0.95
 HEADER = """// Which fault of a mutation run is on.
 #pragma once
@@ -86,20 +86,20 @@ def write(path, text):
 class Workspace:
     """The mutated copy and what is known about it."""
 
-    def __init__(self, folder, tests, jobs):
+    def __init__(self, folder, folders, tests, jobs):
         self.folder, self.source, self.build = folder, folder / "source", folder / "build"
-        self.tests, self.jobs = tests, jobs
+        self.folders, self.tests, self.jobs = folders, tests, jobs
         self.cores = queue.SimpleQueue()
         for core in sorted(os.sched_getaffinity(0))[:jobs]:
             self.cores.put(core)
         self.faults = {}
-        self.sources = {n: (ROOT / n).read_text() for n in project_files(*FOLDERS) if n.endswith((".h", ".cpp"))}
+        self.sources = {n: (ROOT / n).read_text() for n in project_files(*folders) if n.endswith((".h", ".cpp"))}
 
     # ---- faults and their build ----
 
     def copy(self):
         for name in project_files():
-            if not (ROOT / name).is_file() or name.startswith(FOLDERS) and name.endswith((".h", ".cpp")):
+            if not (ROOT / name).is_file() or name.startswith(self.folders) and name.endswith((".h", ".cpp")):
                 continue
             target = self.source / name
             if not target.exists() or target.read_bytes() != (ROOT / name).read_bytes():
@@ -135,7 +135,7 @@ class Workspace:
             return {(os.path.relpath(os.path.normpath(Path(entry["directory"]) / m[1]), self.source), int(m[2]))
                     for m in re.finditer(r"^(\S+?):(\d+):(?:\d+:)?\s+(?:error|required from)", run(command, shell=True, cwd=entry["directory"]).stderr, re.MULTILINE)}
 
-        including = r"/((?:bdpt|path|learned)_All|bsdf_plugins|film/\w+|test_stages|test_bidirectional_stages)\.cpp$"
+        including = r"/((?:bdpt|path|learned)_All|bsdf_plugins|(?:film|backends|backends/cpu|render|session|integrators)/\w+|test_stages|test_bidirectional_stages)\.cpp$"
         commands = [c for c in json.loads((self.build / "compile_commands.json").read_text()) if re.search(including, c["file"])]
         with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
             for of_file in pool.map(errors, commands):
@@ -329,6 +329,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=80)
     parser.add_argument("--folder", type=Path, default=ROOT / "build-mutate", help="where the copy, its build and the results lie")
+    parser.add_argument("--sources", nargs="+", choices=FOLDERS, default=FOLDERS, help="folders that faults are drawn from")
     parser.add_argument("--tests", nargs="+", help="test programs instead of all that are quick")
     parser.add_argument("--jobs", type=int, default=1, help="how many faults are tried side by side")
     parser.add_argument("--built", action="store_true", help="the folder holds a copy that is built")
@@ -337,7 +338,7 @@ def main():
     parser.add_argument("--report", action="store_true", help="print what is known and end")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    workspace = Workspace(options.folder.resolve(), options.tests or default_tests(), options.jobs)
+    workspace = Workspace(options.folder.resolve(), tuple(options.sources), options.tests or default_tests(), options.jobs)
     if options.built:
         workspace.read()
     else:
