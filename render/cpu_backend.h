@@ -32,7 +32,8 @@ public:
 
     explicit CpuBackend(Maker& maker) : maker_(maker) {}
 
-    static uint32_t threads() { return uint32_t(tbb::task_arena().max_concurrency()); }
+    /// As many as the caller's arena has.
+    static uint32_t threads() { return uint32_t(tbb::this_task_arena::max_concurrency()); }
     static BackendBytes bytes() {
         return {host_primitive_bytes(), [](QueuePolicy, uint32_t) { return uint64_t(0); }};
     }
@@ -95,7 +96,8 @@ public:
     /// Adds samples [first, first + count) of every pixel to the film. Returns how many are finished: all.
     template <class State>
     uint32_t run(uint32_t first, uint32_t count, State& state) {
-        const uint32_t step = contract::HasIteration<Integrator> ? maker_.policy.waves.iteration_samples : count;
+        constexpr bool kApart = contract::HasIteration<Integrator> || kWholeIterations<Integrator>;
+        const uint32_t step = kApart ? maker_.policy.waves.iteration_samples : count;
         arena_.execute([&] {
             for (uint32_t s = first; s < first + count; s += step) {
                 Iteration<State> iteration = {*this, state, s, step};
@@ -287,7 +289,7 @@ private:
     }
 
     Maker& maker_;
-    tbb::task_arena arena_;
+    tbb::task_arena arena_{int(threads())};
     std::shared_ptr<const void> accel_;
     std::shared_ptr<const Faces> faces_;
     std::vector<OwnWave> waves_;

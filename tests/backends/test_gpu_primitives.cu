@@ -172,7 +172,8 @@ TEST_CASE("appends of a device: whole waves one after the other; one that has no
         INFO("in a graph " << in_graph);
         OwnExecutor own;
         // What all waves append to, a wave's own, another queue that is the wave's.
-        DeviceBuffer<QueueCounter> counters{std::span<const QueueCounter>(counters_of({{0, kRoom}, {0, kMine}, {0, 8}}))};
+        DeviceBuffer<QueueCounter> counters{
+            std::span<const QueueCounter>(counters_of({{0, kRoom}, {0, kMine}, {0, 8}}))};
         DeviceBuffer<uint32_t> owner{std::span<const uint32_t>(std::vector<uint32_t>(kRoom + 50, kNone))}, wave(1);
         const Queue<Contribution> mine = {{nullptr, kMine}, counters.data() + 1},
                                   other = {{nullptr, 8}, counters.data() + 2};
