@@ -14,6 +14,15 @@ if(AMBILUX_SANITIZE)
     $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${AMBILUX_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all>)
   target_link_options(ambilux_options INTERFACE -fsanitize=${AMBILUX_SANITIZE})
 endif()
+# Each test is a program, and GNU ld takes three to six times as long for one.
+include(CheckLinkerFlag)
+foreach(linker lld gold)
+  check_linker_flag(CXX -fuse-ld=${linker} AMBILUX_HAS_${linker})
+  if(AMBILUX_HAS_${linker})
+    target_link_options(ambilux_options INTERFACE $<BUILD_INTERFACE:-fuse-ld=${linker}>)
+    break()
+  endif()
+endforeach()
 if(AMBILUX_HAS_CUDA)
   # Device code calls constexpr host functions; line info costs nothing at run time and serves the profiler. Quotients and roots without the branch for rare
   # operands make shading a tenth faster (docs/performance.md); what must be correctly rounded says so (core/math.h, rounded_divide).

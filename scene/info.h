@@ -1,7 +1,7 @@
 // What is in a scene, for people and for files.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 

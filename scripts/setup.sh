@@ -98,7 +98,8 @@ if [[ ! -x $python || ($made != "$(made_from requirements.txt requirements-tests
   say "setup: making the Python environment in .venv"
   rm -rf "$root/.venv"
   python3 -m venv "$root/.venv"
-  if ! "$python" -m pip install --quiet --disable-pip-version-check "${requirements[@]/#/-r}"; then
+  # Modules are compiled when they are imported: few of those that come along are, and compiling all takes as long as installing them.
+  if ! "$python" -m pip install --no-compile --quiet --disable-pip-version-check "${requirements[@]/#/-r}"; then
     say "setup: pip could not install the packages of ${requirements[*]} into .venv"
     exit 4
   fi

@@ -4,6 +4,7 @@
 // Instances against copies: what loads, what rays meet, where they leave, and images.
 #include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"

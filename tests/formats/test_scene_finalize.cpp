@@ -3,6 +3,7 @@
 // What finalize_scene derives from a scene, against closed forms.
 #include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "core/error.h"
 #include "core/rng.h"

@@ -108,14 +108,19 @@ private:
     double gauss(double t0, double t1, double p0, double p1, Density& density) const {
         static const double node[3] = {0.5 - 0.3872983346207417, 0.5, 0.5 + 0.3872983346207417};
         static const double weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
-        double sum = 0;
+        double cosine_phi[3], sine_phi[3], sum = 0;
+        for (int j = 0; j < 3; ++j) {
+            const double phi = 2 * kPiD * (p0 + (p1 - p0) * node[j]);
+            cosine_phi[j] = std::cos(phi);
+            sine_phi[j] = std::sin(phi);
+        }
         for (int i = 0; i < 3; ++i) {
             const double growth = std::exp(log_ * (t0 + (t1 - t0) * node[i]));
             const double theta = width_ * std::sqrt(growth - 1), sine = std::sin(theta);
             const double jacobian = sine / theta * 0.5 * width_ * width_ * log_ * growth;
+            const float z = float(std::cos(theta));
             for (int j = 0; j < 3; ++j) {
-                const double phi = 2 * kPiD * (p0 + (p1 - p0) * node[j]);
-                const Vec3f v = {float(sine * std::cos(phi)), float(sine * std::sin(phi)), float(std::cos(theta))};
+                const Vec3f v = {float(sine * cosine_phi[j]), float(sine * sine_phi[j]), z};
                 sum += weight[i] * weight[j] * jacobian * double(density(normalize(frame_.to_world(v))));
             }
         }
