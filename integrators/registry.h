@@ -25,7 +25,7 @@ struct Variant {
 /// What `Description` (a folder's variant.h) says of itself.
 template <class Description>
 Variant describe(std::string integrator, std::string variant) {
-    Variant v = {std::move(integrator), std::move(variant), Description::kTraits, Description::kHelp};
+    Variant v = {std::move(integrator), std::move(variant), Description::kTraits, Description::kHelp, {}, false};
     if constexpr (requires { Description::settings(); })
         for (const auto& declaration : Description::settings()) v.own.push_back(own_setting(declaration));
     return v;
