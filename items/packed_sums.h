@@ -36,7 +36,7 @@ struct SumLanes<0> {
     static constexpr uint32_t kLanes = 0;
 };
 
-/// `kWords` words, of which an item has places for `kPlaces`. Places without a word are 0.
+/// The first `kWords` words of sums, of which an item has places for `kPlaces`. Places without a word are 0.
 template <uint32_t kPlaces, uint32_t kWords>
 struct PackedSums {
     using More = SumLanes<(kWords > kPlaces ? kWords - kPlaces : 0)>;
@@ -46,23 +46,15 @@ struct PackedSums {
 
     template <class Sums>
     AMBILUX_HD static PackedSums pack(const Sums& sums) {
-        float all[ray_words<Sums>()];
-        memcpy(all, &sums, sizeof(Sums));
         PackedSums packed = {};
-        for (uint32_t k = 0; k < kPlaces && k < kWords; ++k) packed.word[k] = all[k];
-        if constexpr (More::kLanes > 0)
-            for (uint32_t k = kPlaces; k < kWords; ++k) packed.more.word[k - kPlaces] = all[k];
+        memcpy(&packed, &sums, kWords * sizeof(float));
         return packed;
     }
     /// Words that were not kept are 0.
     template <class Sums>
     AMBILUX_HD Sums unpack() const {
-        float all[ray_words<Sums>()] = {};
-        for (uint32_t k = 0; k < kPlaces && k < kWords; ++k) all[k] = word[k];
-        if constexpr (More::kLanes > 0)
-            for (uint32_t k = kPlaces; k < kWords; ++k) all[k] = more.word[k - kPlaces];
-        Sums sums;
-        memcpy(&sums, all, sizeof(Sums));
+        Sums sums = {};
+        memcpy(&sums, this, kWords * sizeof(float));
         return sums;
     }
 };

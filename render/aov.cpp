@@ -28,12 +28,12 @@ public:
         : view_(view), tracer_(tracer), seed_(seed) {}
 
     void add(uint32_t x, uint32_t y, uint32_t sample, PixelSums& sums) const {
-        const Draws draws = {{seed_, y * view_.sensor.crop_width + x, sample, Stream::eye}};
-        const CameraSample camera = camera_sample<kAllFeatures>(view_, x, y, draws);
+        const RandomNumbers numbers = {{seed_, y * view_.sensor.crop_width + x, sample, Stream::eye}};
+        const CameraSample camera = camera_sample<kAllFeatures>(view_, x, y, numbers);
         Ray ray = {camera.o, camera.tmax, camera.d, 0};
         Rgb seen = {1.0f, 1.0f, 1.0f};
         for (uint32_t depth = 1; depth <= kMostDeltas; ++depth) {
-            ray.alpha_seed = draws.opacity_seed(depth);
+            ray.alpha_seed = numbers.opacity_seed(depth);
             Hit hit = {ray.tmax, 0.0f, 0.0f, kNone};
             if (!tracer_.closest<kFeatures>(view_, ray, hit)) return;
             const SurfacePoint point = surface_at<kFeatures>(view_, hit.prim, hit.u, hit.v);
@@ -43,7 +43,7 @@ public:
                 ++sums.hits;
             }
             const Scattering s = make_scattering<kFeatures>(view_, point, -ray.d);
-            const Vec4f v = draws.scatter(Side::eye, depth);
+            const Vec4f v = numbers.scatter(Side::eye, depth);
             ScatterSample next;
             const bool scatters = scatter_sample<kFeatures>(s, {v.x, v.y, v.z}, TransportMode::radiance, next);
             if (!scatters || !(next.flags & kScatterDelta)) {

@@ -14,7 +14,7 @@ namespace ambilux {
 /// `Draw` is asked for last: until then no register keeps it.
 template <Features F, class Mis, class Draw, class Out>
 AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Rules<Mis>& rules, const Draw& draw,
-                                     const WaveState& state, const Draws& draws, const SubpathEnd<Mis>& z,
+                                     const WaveState& state, const NumbersOf<Mis>& numbers, const SubpathEnd<Mis>& z,
                                      uint32_t slot, const ConnectionVertex<Mis>& light, uint32_t place, bool seeds,
                                      const Out& candidates, StageRecord* record) {
     const SubpathEnd<Mis> y = unpack_end<F>(scene, light);
@@ -24,7 +24,7 @@ AMBILUX_HD_ONCE void push_connection(const SceneView& scene, const Rules<Mis>& r
     c.value *= draw.scale(state);
     if (!is_valid_radiance(c.value, record)) return;
     const uint32_t which = connection_ray(z.depth, draw.from_cache() ? kMaxDepth + place : y.depth);
-    candidates.push(noted(pack_candidate(c, slot, seeds ? draws.shadow_seed(which) : 0), note));
+    candidates.push(noted(pack_candidate(c, slot, seeds ? numbers.shadow_seed(which) : 0), note));
 }
 
 /// At an eye vertex: next event estimation, and the first pair for connect_vertices.
@@ -38,13 +38,13 @@ struct NextEventAndPair {
     Queue<PairItem> pairs;
 
     AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
-                       uint32_t slot, const Draws& draws) const {
-        next_event.at(scene, rules, v, path, slot, draws);
+                       uint32_t slot, const NumbersOf<Mis>& numbers) const {
+        next_event.at(scene, rules, v, path, slot, numbers);
         if (!rules.connect) return;
         const Warp warp;
         uint32_t next = source.first(slot);
         const uint32_t link = source.link(v, slot),
-                       light = source.search(draws.key, path.depth, v, rules.max_depth, link).find(next);
+                       light = source.search(numbers.key, path.depth, v, rules.max_depth, link).find(next);
         if (light != kNone)
             pairs.push({push_vertex<F>(eye_vertices, pack_connection_vertex(v, path, link)), light, slot, next});
         warp.meet();  // else lanes that search longer than others stay apart
@@ -62,17 +62,17 @@ struct NextEventAndConnections {
     StageRecord* record;  ///< of connect_vertices
 
     AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
-                       uint32_t slot, const Draws& draws) const {
-        if (rules.next_event) next_event.at(scene, rules, v, path, slot, draws);
+                       uint32_t slot, const NumbersOf<Mis>& numbers) const {
+        if (rules.next_event) next_event.at(scene, rules, v, path, slot, numbers);
         if (!rules.connect) return;
         const FusedClock clock(record, true);
-        const auto lights = source.search(draws.key, path.depth, v, rules.max_depth, source.link(v, slot));
+        const auto lights = source.search(numbers.key, path.depth, v, rules.max_depth, source.link(v, slot));
         uint32_t next = source.first(slot), found = lights.find(next);
         if (found == kNone) return;
         const SubpathEnd<Mis> end = rounded_end<F>(scene, v, path);
         for (; found != kNone; found = lights.find(next)) {
             record->count_item(path.depth);
-            push_connection<F>(scene, rules, lights.draw(found), *state, draws, end, slot,
+            push_connection<F>(scene, rules, lights.draw(found), *state, numbers, end, slot,
                                load_vertex<F>(source.vertices, found), found, next_event.inner.seeds,
                                next_event.inner.candidates, record);
         }
@@ -138,13 +138,13 @@ struct ConnectVertices {
         const ConnectionVertex<Mis> light = load_vertex<F>(source.vertices, place);
         const ConnectionVertex<Mis> eye = load_vertex<F>(vertices, pair.vertex);
         const SubpathEnd<Mis> z = unpack_end<F>(scene, eye);
-        const Draws draws = {wave.key(pair.path)};
+        const NumbersOf<Mis> numbers = {wave.key(pair.path)};
         const Warp warp;
-        const auto search = source.search(draws.key, z.depth, z.vertex, rules.max_depth, eye.front.link);
+        const auto search = source.search(numbers.key, z.depth, z.vertex, rules.max_depth, eye.front.link);
         pair.light = search.find(pair.next);
         warp.meet();  // else lanes that search longer than others stay apart
-        push_connection<F>(scene, rules, search.draw(place), *wave.state, draws, z, pair.path, light, place, seeds, out,
-                           record);
+        push_connection<F>(scene, rules, search.draw(place), *wave.state, numbers, z, pair.path, light, place, seeds,
+                           out, record);
         if (pair.light == kNone) return false;
         ++count.steps;
         return true;

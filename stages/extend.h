@@ -34,7 +34,8 @@ struct Extend {
     /// False for an invalid ray.
     AMBILUX_HD bool fetch(const RayItem& item, Ray& ray) const {
         ray = {item.origin, Items::tmax(item), item.direction, 0};
-        if constexpr (F.opacity) ray.alpha_seed = Draws{wave.key(item.path, stream)}.opacity_seed(item.bits.depth());
+        if constexpr (F.opacity)
+            ray.alpha_seed = NumbersOf<Mis>{wave.key(item.path, stream)}.opacity_seed(item.bits.depth());
         return is_valid_ray(item.origin, item.direction, record);
     }
     /// Where the ray of an item ends.

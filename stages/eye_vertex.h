@@ -16,11 +16,11 @@ struct NextEvent {
     bool seeds;  ///< shadow rays need a seed: surfaces of partial opacity, culling
 
     AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
-                       uint32_t slot, const Draws& draws) const {
+                       uint32_t slot, const NumbersOf<Mis>& numbers) const {
         Candidate<Mis> c;
-        if (next_event<F>(scene, rules, v, path.throughput, path.depth, draws.next_event(path.depth), c) &&
+        if (next_event<F>(scene, rules, v, path.throughput, path.depth, numbers.next_event(path.depth), c) &&
             is_valid_radiance(c.value, record))
-            candidates.push(pack_candidate(c, slot, seeds ? draws.shadow_seed(path.depth) : 0));
+            candidates.push(pack_candidate(c, slot, seeds ? numbers.shadow_seed(path.depth) : 0));
     }
 };
 
@@ -32,10 +32,10 @@ struct Clocked {
 
     template <class Mis>
     void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
-            uint32_t slot, const Draws& draws) const {
+            uint32_t slot, const NumbersOf<Mis>& numbers) const {
         inner.record->count_item(path.depth);
         const FusedClock clock(inner.record, true);
-        inner.at(scene, rules, v, path, slot, draws);
+        inner.at(scene, rules, v, path, slot, numbers);
     }
 };
 
@@ -45,7 +45,7 @@ struct QueueVertex {
     Queue<VertexItem<Mis>> vertices;
 
     AMBILUX_HD void at(const SceneView&, const Rules<Mis>&, const Vertex<Mis>& v, const Subpath<Mis>& path,
-                       uint32_t slot, const Draws&) const {
+                       uint32_t slot, const NumbersOf<Mis>&) const {
         push_vertex<F>(vertices, pack_vertex(v, path, slot));
     }
 };
@@ -92,14 +92,14 @@ struct EyeVertex {
         const EyeVertex& stage;
         uint32_t slot;
 
-        AMBILUX_HD Draws draws() const { return {stage.wave.key(slot)}; }
+        AMBILUX_HD NumbersOf<Mis> numbers() const { return {stage.wave.key(slot)}; }
         AMBILUX_HD void add(const Candidate<Mis>& c) const {
             if (is_valid_radiance(c.value, stage.record))
                 stage.emission.push(EmissionItem{c.value, slot, c.ratio, c.strategy, {}});
         }
-        AMBILUX_HD void at(const Vertex<Mis>& v, const Subpath<Mis>& path, const Draws& draws) const {
+        AMBILUX_HD void at(const Vertex<Mis>& v, const Subpath<Mis>& path, const NumbersOf<Mis>& numbers) const {
             if (stage.rules.next_event || stage.rules.connect)
-                stage.vertices.at(stage.scene, stage.rules, v, path, slot, draws);
+                stage.vertices.at(stage.scene, stage.rules, v, path, slot, numbers);
         }
         AMBILUX_HD bool valid(Rgb throughput) const { return is_valid_radiance(throughput, stage.record); }
     };

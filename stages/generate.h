@@ -35,18 +35,17 @@ struct GenerateEye {
 };
 
 /// Where the start of a light subpath goes: what the camera sees of the emitter itself to `splats`.
-template <Features F, class Out>
+template <Features F, class Mis, class Out>
 struct LightStartSink {
     const Out& splats;
     uint32_t slot;
-    const Draws& draws;
+    const NumbersOf<Mis>& numbers;
     StageRecord* record;
 
     AMBILUX_HD bool valid(Rgb flux) const { return is_valid_radiance(flux, record); }
-    template <class Mis>
     AMBILUX_HD void add(const Candidate<Mis>& c) const {
         if (is_valid_radiance(c.value, record))
-            splats.push(pack_candidate(c, slot, F.opacity ? draws.shadow_seed(0) : 0));
+            splats.push(pack_candidate(c, slot, F.opacity ? numbers.shadow_seed(0) : 0));
     }
 };
 
@@ -69,10 +68,11 @@ struct GenerateLight {
     AMBILUX_HD void operator()(uint32_t slot) const {
         if (last_vertex) last_vertex[slot] = kNone;
         if (round >= light_subpaths_of(slot, per_tile) || !wave.locate(slot).active) return;
-        const Draws draws = {wave.key(slot, Stream::light)};
+        const NumbersOf<Mis> numbers = {wave.key(slot, Stream::light)};
         EmissionSample e;
         Subpath<Mis> path;
-        if (start_light_subpath<F>(scene, rules, draws, LightStartSink<F, Out>{splats, slot, draws, record}, e, path))
+        if (start_light_subpath<F>(scene, rules, numbers, LightStartSink<F, Mis, Out>{splats, slot, numbers, record}, e,
+                                   path))
             rays.push(Items::pack(path, Side::light, slot, kInfinity));
     }
 };

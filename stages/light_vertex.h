@@ -14,12 +14,12 @@ struct ConnectCamera {
     StageRecord* record;
 
     AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& y, const Subpath<Mis>& path,
-                       uint32_t slot, const Draws& draws) const {
-        const Vec4f u = draws.lens(path.depth);
+                       uint32_t slot, const NumbersOf<Mis>& numbers) const {
+        const Vec4f u = numbers.lens(path.depth);
         Candidate<Mis> c;
         if (camera_connection<F>(scene, rules, y, path.throughput, path.depth, {u.x, u.y}, c) &&
             is_valid_radiance(c.value, record))
-            splats.push(pack_candidate(c, slot, F.opacity ? draws.shadow_seed(path.depth) : 0));
+            splats.push(pack_candidate(c, slot, F.opacity ? numbers.shadow_seed(path.depth) : 0));
     }
 };
 
@@ -76,12 +76,12 @@ struct LightVertex {
         const LightVertex& stage;
         uint32_t slot;
 
-        AMBILUX_HD Draws draws() const { return {stage.wave.key(slot, Stream::light)}; }
+        AMBILUX_HD NumbersOf<Mis> numbers() const { return {stage.wave.key(slot, Stream::light)}; }
         AMBILUX_HD void add(const Candidate<Mis>&) const {}
-        AMBILUX_HD void at(const Vertex<Mis>& y, const Subpath<Mis>& path, const Draws& draws) const {
+        AMBILUX_HD void at(const Vertex<Mis>& y, const Subpath<Mis>& path, const NumbersOf<Mis>& numbers) const {
             const Rules<Mis>& rules = stage.rules;
             if (rules.splat && rules.wants(path.depth + 1, 1))
-                stage.camera.at(stage.scene, rules, y, path, slot, draws);
+                stage.camera.at(stage.scene, rules, y, path, slot, numbers);
             if (!rules.connect || path.depth + 2 > rules.max_depth) return;
             const uint32_t link = stage.last_vertex ? stage.last_vertex[slot] : kNone;
             const uint32_t place = push_vertex<F>(stage.vertices, pack_connection_vertex(y, path, link));

@@ -126,7 +126,7 @@ private:
         uint32_t light_rays, eye_rays, shadow_rays;
     };
 
-    AMBILUX_HD Draws draws(const State& s) const {
+    AMBILUX_HD NumbersOf<Mis> numbers(const State& s) const {
         return {wave.key(s.slot, s.side == Side::light ? Stream::light : Stream::eye)};
     }
     /// A vertex past the capacity was not kept: the wave will be done again.
@@ -145,16 +145,16 @@ private:
     struct LightStart {
         const Megakernel& kernel;
         State& s;
-        const Draws& draws;
+        const NumbersOf<Mis>& numbers;
 
         AMBILUX_HD bool valid(Rgb flux) const { return is_valid_radiance(flux, kernel.records.light_generate); }
         AMBILUX_HD void add(const Candidate<Mis>& c) const {
-            kernel.test(s, c, draws, 0, kernel.records.light_generate);
+            kernel.test(s, c, numbers, 0, kernel.records.light_generate);
         }
     };
 
     AMBILUX_HD void begin_light(State& s) const {
-        const Draws d = draws(s);
+        const NumbersOf<Mis> d = numbers(s);
         EmissionSample e;
         s.tmax = kInfinity;
         s.going = start_light_subpath<F>(scene, rules, d, LightStart{*this, s, d}, e, s.path);
@@ -163,7 +163,7 @@ private:
     AMBILUX_HD void begin_eye(State& s) const {
         s.side = Side::eye;
         const PathSlot p = wave.locate(s.slot);
-        s.path = start_eye_subpath<F>(scene, rules.mis, p.x, p.y, draws(s), s.tmax);
+        s.path = start_eye_subpath<F>(scene, rules.mis, p.x, p.y, numbers(s), s.tmax);
         s.going = true;
         s.sum = {0.0f, 0.0f, 0.0f};
     }
@@ -178,7 +178,7 @@ private:
         Ray ray = s.shadow;
         if (!s.testing) {
             ray = {s.path.origin, s.tmax, s.path.direction, 0};
-            if constexpr (F.opacity) ray.alpha_seed = draws(s).opacity_seed(s.path.depth);
+            if constexpr (F.opacity) ray.alpha_seed = numbers(s).opacity_seed(s.path.depth);
         }
         StageRecord* const tracing = s.testing               ? records.occlude
                                      : s.side == Side::light ? records.light_extend
@@ -197,7 +197,8 @@ private:
     }
 
     /// The candidate, weighted, asks for a shadow ray.
-    AMBILUX_HD void test(State& s, const Candidate<Mis>& c, const Draws& d, uint32_t which, StageRecord* maker) const {
+    AMBILUX_HD void test(State& s, const Candidate<Mis>& c, const NumbersOf<Mis>& d, uint32_t which,
+                         StageRecord* maker) const {
         if (!is_valid_radiance(c.value, maker)) return;
         s.value = c.value * mis_weight(c.ratio);
         if (!is_valid_radiance(s.value, records.mis_weight) || is_zero(s.value)) return;
@@ -211,14 +212,14 @@ private:
         State& s;
         const Hit& hit;
 
-        AMBILUX_HD Draws draws() const { return kernel.draws(s); }
+        AMBILUX_HD NumbersOf<Mis> numbers() const { return kernel.numbers(s); }
         AMBILUX_HD void add(const Candidate<Mis>& c) const {
             if (!is_valid_radiance(c.value, kernel.records.shade)) return;
             const Rgb weighted = c.value * mis_weight(c.ratio);
             if (is_valid_radiance(weighted, kernel.records.mis_weight)) s.sum += weighted;
         }
-        AMBILUX_HD void at(const Vertex<Mis>& x, const Subpath<Mis>& path, const Draws& draws) const {
-            kernel.connect_end(s, x, path, hit, draws);
+        AMBILUX_HD void at(const Vertex<Mis>& x, const Subpath<Mis>& path, const NumbersOf<Mis>& numbers) const {
+            kernel.connect_end(s, x, path, hit, numbers);
         }
         AMBILUX_HD bool valid(Rgb throughput) const {
             return is_valid_radiance(throughput,
@@ -234,7 +235,7 @@ private:
 
     /// A vertex and the camera or an emitter; and it is kept, or waits, for connections.
     AMBILUX_HD void connect_end(State& s, const Vertex<Mis>& x, const Subpath<Mis>& path, const Hit& hit,
-                                const Draws& d) const {
+                                const NumbersOf<Mis>& d) const {
         const bool light = s.side == Side::light;
         Candidate<Mis> c;
         c.environment = false;
@@ -267,7 +268,7 @@ private:
         const SubpathEnd<Mis> eye = {vertex_with<F, Mis>(scene, z.d, z.depth, point, z.sums), z.throughput, z.depth};
         Candidate<Mis> c;
         if (connection<F>(rules, eye, unpack_end<F>(scene, load_vertex<F>(light_vertices, place)), c))
-            test(s, c, draws(s), connection_ray(z.depth, light_depth), records.connect_vertices);
+            test(s, c, numbers(s), connection_ray(z.depth, light_depth), records.connect_vertices);
     }
 };
 

@@ -34,7 +34,7 @@ struct StreamPool {
     uint32_t* next_path;                   ///< of the wave, that no slot has claimed
 
     /// Random numbers of the light subpath for an eye vertex: another one for each depth.
-    AMBILUX_HD Draws light_draws(uint32_t path, const ConnectionVertexFront& vertex) const {
+    AMBILUX_HD NumbersOf<Mis> light_numbers(uint32_t path, const ConnectionVertexFront& vertex) const {
         return {wave.key(path, Stream::light), vertex.bits.depth() - 1};
     }
     /// The hit of a slot's ray, and whose it is.
@@ -96,9 +96,9 @@ struct StreamExtend {
         ray = {item.origin, StreamPool<F, Mis>::Items::tmax(item), item.direction, 0};
         if constexpr (F.opacity) {
             const uint32_t path = item.path & ~kLightRay;
-            const Draws draws =
-                item.path & kLightRay ? pool.light_draws(path, pool.eye.load_front(slot)) : Draws{pool.wave.key(path)};
-            ray.alpha_seed = draws.opacity_seed(item.bits.depth());
+            const NumbersOf<Mis> numbers = item.path & kLightRay ? pool.light_numbers(path, pool.eye.load_front(slot))
+                                                                 : NumbersOf<Mis>{pool.wave.key(path)};
+            ray.alpha_seed = numbers.opacity_seed(item.bits.depth());
         }
         if (is_valid_ray(item.origin, item.direction, record)) return true;
         finish(slot, {ray.tmax, 0.0f, 0.0f, kNone});
@@ -148,12 +148,12 @@ struct StreamEyeVertex {
         ConnectionVertex<Mis>& waiting;
         bool& connects;
 
-        AMBILUX_HD Draws draws() const { return {stage.pool.wave.key(path)}; }
+        AMBILUX_HD NumbersOf<Mis> numbers() const { return {stage.pool.wave.key(path)}; }
         AMBILUX_HD void add(const Candidate<Mis>& c) const {
             if (is_valid_radiance(c.value, stage.record))
                 stage.emission.push(EmissionItem{c.value, path, c.ratio, c.strategy, {}});
         }
-        AMBILUX_HD void at(const Vertex<Mis>& z, const Subpath<Mis>& s, const Draws&) const {
+        AMBILUX_HD void at(const Vertex<Mis>& z, const Subpath<Mis>& s, const NumbersOf<Mis>&) const {
             const Rules<Mis>& rules = stage.pool.rules;
             if (rules.next_event) push_vertex<F>(stage.vertices, pack_vertex(z, s, path));
             connects = rules.connect && s.depth + 2 <= rules.max_depth;
@@ -206,10 +206,10 @@ struct StreamTurn {
 
 private:
     AMBILUX_HD bool start(const TurnItem& turn, Subpath<Mis>& path) const {
-        const Draws draws = pool.light_draws(turn.path, pool.eye.load_front(turn.slot));
+        const NumbersOf<Mis> numbers = pool.light_numbers(turn.path, pool.eye.load_front(turn.slot));
         EmissionSample e;
-        return start_light_subpath<F>(pool.scene, pool.rules, draws,
-                                      LightStartSink<F, Splats>{splats, turn.path, draws, record}, e, path);
+        return start_light_subpath<F>(pool.scene, pool.rules, numbers,
+                                      LightStartSink<F, Mis, Splats>{splats, turn.path, numbers, record}, e, path);
     }
 };
 
@@ -229,13 +229,13 @@ struct StreamLightVertex {
     struct Sink {
         const StreamLightVertex& stage;
         const ConnectionVertexFront& eye;
-        const Draws& subpath_draws;
+        const NumbersOf<Mis>& subpath_numbers;
         bool splat;
         uint32_t slot, path;
 
-        AMBILUX_HD Draws draws() const { return subpath_draws; }
+        AMBILUX_HD NumbersOf<Mis> numbers() const { return subpath_numbers; }
         AMBILUX_HD void add(const Candidate<Mis>&) const {}
-        AMBILUX_HD void at(const Vertex<Mis>& y, const Subpath<Mis>& s, const Draws&) const {
+        AMBILUX_HD void at(const Vertex<Mis>& y, const Subpath<Mis>& s, const NumbersOf<Mis>&) const {
             if (splat && stage.pool.rules.wants(s.depth + 1, 1))
                 push_vertex<F>(stage.camera_vertices, pack_vertex(y, s, path));
             if (eye.link != kNoPath && s.depth + eye.bits.depth() + 1 <= stage.pool.rules.max_depth &&
@@ -251,13 +251,13 @@ struct StreamLightVertex {
         const HitItem<SubpathRay<Mis>> h = pool.hit_of(end);
         const Rules<Mis>& rules = pool.rules;
         const ConnectionVertexFront eye = pool.eye.load_front(end.slot);
-        const Draws draws = pool.light_draws(h.ray.path, eye);
-        const bool splat = rules.splat && draws.number == 0;
+        const NumbersOf<Mis> numbers = pool.light_numbers(h.ray.path, eye);
+        const bool splat = rules.splat && numbers.number == 0;
         // A path has one segment more than its light subpath, and those of the eye subpath if there is one.
         const uint32_t longest = splat ? rules.max_depth - 1 : rules.max_depth - 1 - eye.bits.depth();
         Subpath<Mis> path = StreamPool<F, Mis>::Items::unpack(h.ray);
         if (!visit<F>(pool.scene, rules, Side::light, longest, h.hit(), path,
-                      Sink{*this, eye, draws, splat, end.slot, h.ray.path}))
+                      Sink{*this, eye, numbers, splat, end.slot, h.ray.path}))
             return pool.advance(end.slot);
         pool.rays.put(end.slot, StreamPool<F, Mis>::Items::pack(path, Side::light, h.ray.path | kLightRay, kInfinity));
     }
@@ -285,7 +285,7 @@ struct StreamConnect {
         if constexpr (Item::template lanes<F>() > Item::kDiffuseLanes)
             if (!eye.bits().template diffuse<F>())
                 pool.eye.load_more(slot, eye, Item::kDiffuseLanes, Item::template lanes<F>());
-        push_connection<F>(pool.scene, pool.rules, source, *pool.wave.state, Draws{pool.wave.key(eye.path())},
+        push_connection<F>(pool.scene, pool.rules, source, *pool.wave.state, NumbersOf<Mis>{pool.wave.key(eye.path())},
                            unpack_end<F>(pool.scene, eye), eye.path(), light, kNone, seeds, candidates, record);
     }
 };

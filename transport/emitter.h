@@ -9,6 +9,7 @@
 #include "transport/emitter/directional_area.h"
 #include "transport/emitter/envmap.h"
 #include "transport/emitter/hidden_area.h"
+#include "transport/emitter/lights.h"
 #include "transport/emitter/point.h"
 #include "transport/emitter/projector.h"
 #include "transport/emitter/spot.h"
@@ -51,12 +52,15 @@ static_assert(kEmittersFrom<LightStart::environment> == (bit(EmitterType::consta
 
 /// sample_emitter_direct without the lookup of an environment map, which costs more than the rest: s.radiance is to be
 /// replaced by emitter_sample_radiance once it is clear that the sample matters. True does not promise light then.
-template <Features F>
-AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, Vec3f reference_p, Vec4f u, EmitterSample& s) {
+/// `pick`: of the emitter.
+template <Features F, class Lights>
+AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, const Lights& lights, const Receiver& receiver, Vec4f u,
+                                        EmitterSample& s, typename Lights::Pick& pick) {
     if (view.emitter_count == 0) return false;
-    const uint32_t index = sample_cdf(view.emitter_cdf, view.emitter_count, u.x);
-    const Emitter& emitter = view.emitters[index];
-    s.emitter = index;
+    pick = lights.pick(view, receiver, u.x);
+    const Vec3f reference_p = receiver.p;
+    const Emitter& emitter = view.emitters[pick.emitter];
+    s.emitter = pick.emitter;
     bool lit = false;
     // Not by visit_emitter: with a lambda in between, nvcc spills more in shading kernels.
     switch (emitter.type) {
@@ -69,8 +73,16 @@ AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, Vec3f reference_p
 #undef AMBILUX_CASE
         default: break;
     }
+    s.pdf_sa *= pick.over_power;
     // Written so that NaN fails too.
     return lit && s.pdf_sa > 0.0f && s.pdf_sa < kInfinity && max_component(s.radiance) > 0.0f;
+}
+
+/// The same of emitters picked by power.
+template <Features F>
+AMBILUX_HD bool sample_emitter_deferred(const SceneView& view, Vec3f reference_p, Vec4f u, EmitterSample& s) {
+    LightsByPower::Pick pick;
+    return sample_emitter_deferred<F>(view, LightsByPower{}, {reference_p, {}}, u, s, pick);
 }
 
 /// Radiance of a sample of sample_emitter_deferred, in the units of EmitterSample::radiance.
@@ -89,18 +101,24 @@ AMBILUX_HD bool is_environment(const SceneView& view, uint32_t emitter) {
     return F.has_environment() && emitter == view.environment;
 }
 
-/// Picks an emitter by the scene's pick probabilities and samples its light towards `reference_p` (world space). `u` in
-/// [0,1)^4: x picks the emitter, y and z place the sample on it, w picks the primitive of a mesh or the row of an
-/// environment map. False when the sample carries no light (nothing to add, still one sample); then `s` is not to be
-/// read.
-template <Features F>
-AMBILUX_HD bool sample_emitter_direct(const SceneView& view, Vec3f reference_p, Vec4f u, EmitterSample& s) {
-    if (!sample_emitter_deferred<F>(view, reference_p, u, s)) return false;
+/// Picks an emitter for `receiver` (world space) and samples its light towards there. `u` in [0,1)^4: x picks the
+/// emitter, y and z place the sample on it, w picks the primitive of a mesh or the row of an environment map. False
+/// when the sample carries no light (nothing to add, still one sample); then `s` is not to be read.
+template <Features F, class Lights>
+AMBILUX_HD bool sample_emitter_direct(const SceneView& view, const Lights& lights, const Receiver& receiver, Vec4f u,
+                                      EmitterSample& s) {
+    typename Lights::Pick pick;
+    if (!sample_emitter_deferred<F>(view, lights, receiver, u, s, pick)) return false;
     s.radiance = emitter_sample_radiance<F>(view, s);
     return max_component(s.radiance) > 0.0f;
 }
+/// The same of emitters picked by power.
+template <Features F>
+AMBILUX_HD bool sample_emitter_direct(const SceneView& view, Vec3f reference_p, Vec4f u, EmitterSample& s) {
+    return sample_emitter_direct<F>(view, LightsByPower{}, {reference_p, {}}, u, s);
+}
 
-/// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` at
+/// Density per solid angle, pick probability by power included, with which sample_emitter_direct returns unit `wi` at
 /// `reference_p` by way of area emitter `emitter`, which a ray along `wi` meets at `hit`. Zero for every other type: no
 /// ray meets those. Relative error: 8 roundings and 4 over the cosine at `hit`; spheres 12 and 8 over that of their
 /// cone.
@@ -114,8 +132,8 @@ AMBILUX_HD float pdf_emitter_direct(const SceneView& view, uint32_t emitter, Vec
     return 0.0f;
 }
 
-/// Density per solid angle, pick probability included, with which sample_emitter_direct returns unit `wi` by way of the
-/// environment; zero without one.
+/// Density per solid angle, pick probability by power included, with which sample_emitter_direct returns unit `wi` by
+/// way of the environment; zero without one.
 template <Features F>
 AMBILUX_HD float pdf_environment_direct(const SceneView& view, Vec3f wi) {
     if constexpr (F.has_environment()) {

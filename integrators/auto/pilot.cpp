@@ -64,7 +64,7 @@ struct EyeSums {
 /// An eye subpath and where its results go.
 struct Eye {
     uint32_t number;
-    Draws draws;
+    RandomNumbers numbers;
     PilotSums& pixel;
     PilotWork& work;
     EyeSums sums[kMostCandidates];
@@ -137,26 +137,27 @@ private:
 
     /// `rays` are counted.
     template <class Sink>
-    void trace(Side side, const PilotSubpath& first, float tmax, const Draws& draws, const Sink& sink,
+    void trace(Side side, const PilotSubpath& first, float tmax, const RandomNumbers& numbers, const Sink& sink,
                double& rays) const {
         const auto extend = [&](const PilotSubpath& path, float at_most) {
             rays += 1;
-            return end_of_ray<F>(view_, tracer_, path, at_most, draws);
+            return end_of_ray<F>(view_, tracer_, path, at_most, numbers);
         };
         trace_subpath<F>(view_, rules_, side, rules_.longest(side), first, tmax, extend, sink);
     }
-    bool is_free(const PilotCandidatePath& c, const Draws& draws, uint32_t which) const {
+    bool is_free(const PilotCandidatePath& c, const RandomNumbers& numbers, uint32_t which) const {
         if (!is_finite(c.origin) || !is_finite(c.direction)) return false;
-        const uint32_t seed = F.opacity ? draws.shadow_seed(which) : 0;
+        const uint32_t seed = F.opacity ? numbers.shadow_seed(which) : 0;
         return !tracer_.occluded<F>(view_, Ray{c.origin, c.tmax, c.direction, seed});
     }
 
     // ---- light subpaths ----
 
-    void splat(LightTask& task, const PilotCandidatePath& c, const Draws& draws, uint32_t which, Rgb emitted) const {
+    void splat(LightTask& task, const PilotCandidatePath& c, const RandomNumbers& numbers, uint32_t which,
+               Rgb emitted) const {
         if (!counts(c.value)) return;
         task.splat_rays += 1;
-        if (is_free(c, draws, which))
+        if (is_free(c, numbers, which))
             task.splats.push_back({{c.value, shares_of(c.ratio, 1), filter_coverage(view_, c.film)},
                                    blocks_.at(view_.sensor, c.film),
                                    which == 0,
@@ -166,16 +167,16 @@ private:
     struct LightSink {
         const PilotRun& pilot;
         LightTask& task;
-        const Draws& subpath_draws;
+        const RandomNumbers& subpath_numbers;
         const EmissionSample& start;
 
-        Draws draws() const { return subpath_draws; }
-        void add(const PilotCandidatePath& c) const { pilot.splat(task, c, subpath_draws, 0, start.radiance); }
-        void at(const Vertex<PilotMis>& y, const PilotSubpath& path, const Draws& draws) const {
-            const Vec4f u = draws.lens(path.depth);
+        RandomNumbers numbers() const { return subpath_numbers; }
+        void add(const PilotCandidatePath& c) const { pilot.splat(task, c, subpath_numbers, 0, start.radiance); }
+        void at(const Vertex<PilotMis>& y, const PilotSubpath& path, const RandomNumbers& numbers) const {
+            const Vec4f u = numbers.lens(path.depth);
             PilotCandidatePath c;
             if (camera_connection<F>(pilot.view_, pilot.rules_, y, path.throughput, path.depth, {u.x, u.y}, c))
-                pilot.splat(task, c, draws, path.depth, start.radiance);
+                pilot.splat(task, c, numbers, path.depth, start.radiance);
             if (pilot.rules_.connect && path.depth + 2 <= pilot.rules_.max_depth)
                 task.vertices.push_back({y, path.throughput, path.depth});
         }
@@ -183,12 +184,12 @@ private:
     };
 
     void light_subpath(uint32_t i, LightTask& task) const {
-        const Draws draws = {{settings_.seed, i, 2, Stream::pilot}};
+        const RandomNumbers numbers = {{settings_.seed, i, 2, Stream::pilot}};
         EmissionSample e;
         PilotSubpath first;
-        const LightSink sink = {*this, task, draws, e};
-        if (start_light_subpath<F>(view_, rules_, draws, sink, e, first))
-            trace(Side::light, first, kInfinity, draws, sink, task.rays);
+        const LightSink sink = {*this, task, numbers, e};
+        if (start_light_subpath<F>(view_, rules_, numbers, sink, e, first))
+            trace(Side::light, first, kInfinity, numbers, sink, task.rays);
     }
 
     /// Vertices and splats stay where they are: they are large.
@@ -256,14 +257,14 @@ private:
         const PilotRun& pilot;
         Eye& eye;
 
-        const Draws& draws() const { return eye.draws; }
+        const RandomNumbers& numbers() const { return eye.numbers; }
         void add(const PilotCandidatePath& c) const {
             if (!counts(c.value)) return;
             if (c.strategy.segments() == 1)
                 for (int k = 0; k < 3; ++k) eye.pixel.seen[k] = std::max(eye.pixel.seen[k], double(c.value[k]));
             pilot.found(eye, {c.value, shares_of(c.ratio, 0)}, c.strategy.segments());
         }
-        void at(const Vertex<PilotMis>& z, const PilotSubpath& path, const Draws&) const {
+        void at(const Vertex<PilotMis>& z, const PilotSubpath& path, const RandomNumbers&) const {
             const PilotVertex end = {z, path.throughput, path.depth};
             if (eye.first_smooth == 0) pilot.first_smooth(eye, end);
             pilot.next_event(eye, end);
@@ -275,8 +276,8 @@ private:
     void eye_subpath(Eye& eye, uint32_t x, uint32_t y) const {
         if (rules_.max_depth == 0) return;
         float tmax;
-        const PilotSubpath first = start_eye_subpath<F>(view_, rules_.mis, x, y, eye.draws, tmax);
-        trace(Side::eye, first, tmax, eye.draws, EyeSink{*this, eye}, eye.work.eye_rays);
+        const PilotSubpath first = start_eye_subpath<F>(view_, rules_.mis, x, y, eye.numbers, tmax);
+        trace(Side::eye, first, tmax, eye.numbers, EyeSink{*this, eye}, eye.work.eye_rays);
     }
 
     void first_smooth(Eye& eye, const PilotVertex& z) const {
@@ -289,12 +290,12 @@ private:
 
     void next_event(Eye& eye, const PilotVertex& z) const {
         PilotCandidatePath c;
-        if (!ambilux::next_event<F>(view_, rules_, z.vertex, z.throughput, z.depth, eye.draws.next_event(z.depth), c))
+        if (!ambilux::next_event<F>(view_, rules_, z.vertex, z.throughput, z.depth, eye.numbers.next_event(z.depth), c))
             return;
         if (c.environment) c.value *= environment_radiance<F>(view_, c.direction);
         if (!counts(c.value)) return;
         eye.work.next_events += 1;
-        if (is_free(c, eye.draws, z.depth)) found(eye, {c.value, shares_of(c.ratio, 0)}, z.depth + 1);
+        if (is_free(c, eye.numbers, z.depth)) found(eye, {c.value, shares_of(c.ratio, 0)}, z.depth + 1);
     }
 
     /// The connection of two vertices; false if it brings nothing.
@@ -305,7 +306,7 @@ private:
         tried += 1;
         if (!ambilux::connection<F>(rules_, z, y, c) || !counts(c.value)) return false;
         rays += 1;
-        if (!is_free(c, eye.draws, connection_ray(z.depth, which))) return false;
+        if (!is_free(c, eye.numbers, connection_ray(z.depth, which))) return false;
         e = {c.value, shares_of(c.ratio, 2)};
         return true;
     }
@@ -313,7 +314,7 @@ private:
     void connect(Eye& eye, const PilotVertex& z) const {
         PilotWork& work = eye.work;
         work.vertices += 1;
-        const Uint4 bits = cache_draw(eye.draws.key, z.depth, 0);
+        const Uint4 bits = cache_draw(eye.numbers.key, z.depth, 0);
         const PilotVertex* drawn_vertices[2] = {vertices_[mul_hi(bits.x, uint32_t(vertices_.size()))],
                                                 vertices_[mul_hi(bits.y, uint32_t(vertices_.size()))]};
         for (const PilotVertex* v : drawn_vertices)

@@ -14,6 +14,9 @@ struct PilotMis {
         MisSums of[kSets];
     };
     using Start = SubpathStart;
+    using Directions = BsdfDirections;
+    using Lights = LightsByPower;
+    using Numbers = RandomNumbers;
     struct Ratio {
         float of[kSets];
     };
@@ -42,9 +45,9 @@ struct PilotMis {
     static void start_light(const EmissionSample& e, SubpathStart& start) { BidirectionalMis::start_light(e, start); }
 
     template <Features F, class Path>
-    Sums sums_at(const SceneView& scene, Side side, const Path& path, const Sums& sums,
+    Sums sums_at(const SceneView& scene, const Lights& lights, Side side, const Path& path, const Sums& sums,
                  const SurfacePoint& point) const {
-        return each<Sums>([&](uint32_t m) { return sets[m].sums_at<F>(scene, side, path, sums.of[m], point); });
+        return each<Sums>([&](uint32_t m) { return sets[m].sums_at<F>(scene, lights, side, path, sums.of[m], point); });
     }
     Sums sums_after_scatter(const Sums& s, bool first, bool delta, float pdf_forward_sa, float pdf_reverse_sa,
                             float cos_out) const {
@@ -53,21 +56,24 @@ struct PilotMis {
         });
     }
     template <Features F, class Path>
-    bool hit_ratio(const SceneView& scene, const Path& path, const Sums& ray, uint32_t emitter,
+    bool hit_ratio(const SceneView& scene, const Lights& lights, const Path& path, const Sums& ray, uint32_t emitter,
                    const SurfacePoint& light, Ratio& ratio) const {
-        for (uint32_t m = 0; m < kSets; ++m) sets[m].hit_ratio<F>(scene, path, ray.of[m], emitter, light, ratio.of[m]);
+        for (uint32_t m = 0; m < kSets; ++m)
+            sets[m].hit_ratio<F>(scene, lights, path, ray.of[m], emitter, light, ratio.of[m]);
         return true;
     }
     template <Features F, class Path>
-    bool escape_ratio(const SceneView& scene, const Path& path, const Sums& ray, Ratio& ratio) const {
-        for (uint32_t m = 0; m < kSets; ++m) sets[m].escape_ratio<F>(scene, path, ray.of[m], ratio.of[m]);
+    bool escape_ratio(const SceneView& scene, const Lights& lights, const Path& path, const Sums& ray,
+                      Ratio& ratio) const {
+        for (uint32_t m = 0; m < kSets; ++m) sets[m].escape_ratio<F>(scene, lights, path, ray.of[m], ratio.of[m]);
         return true;
     }
     template <Features F>
-    Ratio next_event_ratio(const SceneView& scene, const Sums& z, bool first, const EmitterSample& light,
-                           const BsdfValue& f, float cos_z) const {
-        return each<Ratio>(
-            [&](uint32_t m) { return sets[m].next_event_ratio<F>(scene, z.of[m], first, light, f, cos_z); });
+    Ratio next_event_ratio(const SceneView& scene, float over_power, const Sums& z, bool first,
+                           const EmitterSample& light, const BsdfValue& f, float cos_z) const {
+        return each<Ratio>([&](uint32_t m) {
+            return sets[m].next_event_ratio<F>(scene, over_power, z.of[m], first, light, f, cos_z);
+        });
     }
     /// In multiples of the density of one pair of subpaths: sets without connections have none of theirs.
     Ratio connection_ratio(const Sums& y, bool y_first, const Sums& z, bool z_first,

@@ -17,9 +17,10 @@ struct NoSettings {
 
 /// `Sampling`: how eye vertices sample emitters, with `SamplingSettings` as its last member unless that is empty.
 template <Features F, class Tracer, Fusion kFusion, template <Features, class, class> class Sampling = NextEvent,
-          class SamplingSettings = NoSettings>
+          class SamplingSettings = NoSettings, class Model = UnidirectionalMis>
 struct PathIntegrator {
-    using Mis = UnidirectionalMis;
+    using Mis = Model;
+    using RayItem = typename SubpathItems<Mis>::Ray;
     static constexpr bool kFilmWide = false;
 
     struct Policy {
@@ -29,15 +30,15 @@ struct PathIntegrator {
     };
     static Policy plan(const Scene& scene, const RenderSettings& settings) {
         const PathPolicy p = plan_path(scene, settings);
-        return {p.rules, p.waves, SamplingSettings::plan(settings)};
+        return {p.rules.with(Mis{p.rules.mis}), p.waves, SamplingSettings::plan(settings)};
     }
     static std::vector<std::string> skipped(const Scene& scene, const Policy& policy) {
-        return skipped_path_parts(scene, policy.rules);
+        return skipped_path_parts(scene, policy.rules.with(UnidirectionalMis(policy.rules.mis)));
     }
 
     using State = NoState;
     struct Memory {
-        SubpathQueues<PathRay> subpaths;
+        SubpathQueues<RayItem> subpaths;
         EyeQueues<Mis> eye;
     };
     /// Every queue holds the most it can ever be given: a slot has at most one item of each kind at a time.
@@ -66,7 +67,7 @@ struct PathIntegrator {
             : policy(p), wave(parts.wave), eye(parts, m.eye, p.waves) {
             const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
             const SceneView& scene = parts.scene;
-            const SubpathQueues<PathRay>& q = m.subpaths;
+            const SubpathQueues<RayItem>& q = m.subpaths;
             const bool seeds = F.opacity || p.waves.cull > 0.0f;
             const Connect connect = sampling(record(connect_emitter), seeds);
             generate = {scene, wave, p.rules.mis, q.rays[0], parts.film.samples, record(generate)};

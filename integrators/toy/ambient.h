@@ -27,8 +27,8 @@ struct Ambient {
         const Hit hit = h.hit();
         if (hit.prim == kNone) return;
         const SurfacePoint point = surface_at<F>(scene, hit.prim, hit.u, hit.v);
-        const Draws draws = {wave.key(h.ray.path)};
-        const Vec4f u = draws.scatter(Side::eye, 1);
+        const RandomNumbers numbers = {wave.key(h.ray.path)};
+        const Vec4f u = numbers.scatter(Side::eye, 1);
         const Vec3f ng = dot(point.ng, h.ray.direction) > 0.0f ? -point.ng : point.ng;
         Candidate<UnidirectionalMis> c{};
         c.direction = frame_from_normal(ng).to_world(square_to_cosine_hemisphere({u.x, u.y}));
@@ -36,7 +36,7 @@ struct Ambient {
         c.tmax = settings.radius > 0.0f ? settings.radius : kInfinity;
         c.value = {1.0f, 1.0f, 1.0f};  // cosine / pi over the density
         c.strategy = Strategy::make(1, 2);
-        candidates.push(pack_candidate(c, h.ray.path, F.opacity ? draws.shadow_seed(1) : 0));
+        candidates.push(pack_candidate(c, h.ray.path, F.opacity ? numbers.shadow_seed(1) : 0));
     }
 };
 

@@ -31,7 +31,7 @@ struct ReplayConnections {
 
     /// The vertices that a search of the render's stages finds.
     void searched() const {
-        const LightVertexSearch<BidirectionalMis> search = {source, eye.draws.key, path.depth, vertex,
+        const LightVertexSearch<BidirectionalMis> search = {source, eye.numbers.key, path.depth, vertex,
                                                             eye.ctx.rules.max_depth};
         uint32_t next = source.first(0), found = search.find(next);
         if (found == kNone) return;
@@ -55,7 +55,7 @@ private:
         bool pushed = false;
         DropWatch watch;
         ReplayDrop drop;
-        push_connection<kReplayFeatures>(ctx.view, ctx.rules, source, state, eye.draws, end, 0, light, place, true,
+        push_connection<kReplayFeatures>(ctx.view, ctx.rules, source, state, eye.numbers, end, 0, light, place, true,
                                          LastItem<CandidateItem>{&item, &pushed}, watch.record());
         const bool dropped = watch.dropped("connect_vertices", drop);
         if (!pushed && !dropped) return;

@@ -60,10 +60,10 @@ inline void finish(ReplaySample& s) {
 
 /// Nearest hit of a subpath's ray, as extend has it: a ray that is invalid is a miss, and counted.
 template <class Mis>
-Hit replay_extend(const ReplayContext<Mis>& ctx, const Subpath<Mis>& path, float tmax, const Draws& draws,
+Hit replay_extend(const ReplayContext<Mis>& ctx, const Subpath<Mis>& path, float tmax, const RandomNumbers& numbers,
                   StageRecord* record) {
     if (!is_valid_ray(path.origin, path.direction, record)) return {tmax, 0.0f, 0.0f, kNone};
-    return end_of_ray<kReplayFeatures>(ctx.view, ctx.tracer, path, tmax, draws);
+    return end_of_ray<kReplayFeatures>(ctx.view, ctx.tracer, path, tmax, numbers);
 }
 
 }  // namespace ambilux

@@ -24,7 +24,7 @@ ReplayVertex describe_arrival(const ReplayContext<Mis>& ctx, Side side, const Su
     v.miss = hit.prim == kNone;
     if (v.miss) return v;
     const SurfacePoint point = surface_at<F>(ctx.view, hit.prim, hit.u, hit.v);
-    const Vertex<Mis> vertex = vertex_at<F>(ctx.view, ctx.rules.mis, side, path, point);
+    const Vertex<Mis> vertex = vertex_at<F>(ctx.view, ctx.rules, side, path, point);
     v.sums = named_sums(vertex.sums);
     v.distance = length(point.p - path.origin);
     v.p = point.p;
@@ -69,8 +69,8 @@ std::string why_scattering_ends(const ReplayContext<Mis>& ctx, const Subpath<Mis
 
 /// What was sampled at the vertex, and why the subpath ends if it does. `before`: the subpath that arrived.
 template <class Mis>
-void describe_departure(const ReplayContext<Mis>& ctx, Side side, uint32_t longest, const Hit& hit, const Draws& draws,
-                        const Subpath<Mis>& before, bool goes_on, ReplayVertex& v) {
+void describe_departure(const ReplayContext<Mis>& ctx, Side side, uint32_t longest, const Hit& hit,
+                        const RandomNumbers& numbers, const Subpath<Mis>& before, bool goes_on, ReplayVertex& v) {
     constexpr Features F = kReplayFeatures;
     if (v.miss) return void(v.end = "the ray leaves the scene");
     if (side == Side::eye && ctx.rules.background_only)
@@ -78,10 +78,10 @@ void describe_departure(const ReplayContext<Mis>& ctx, Side side, uint32_t longe
     if (before.depth >= ctx.rules.max_depth) return void(v.end = "max_depth");
     if (before.depth >= longest) return void(v.end = "no strategy needs a longer subpath");
     const SurfacePoint point = surface_at<F>(ctx.view, hit.prim, hit.u, hit.v);
-    const Vertex<Mis> vertex = vertex_at<F>(ctx.view, ctx.rules.mis, side, before, point);
-    const Vec4f u = draws.scatter(side, before.depth);
+    const Vertex<Mis> vertex = vertex_at<F>(ctx.view, ctx.rules, side, before, point);
+    const Vec4f u = numbers.scatter(side, before.depth);
     ScatterSample s;
-    if (!scatter_sample<F>(vertex.scattering, {u.x, u.y, u.z}, transport_mode(side), s))
+    if (!ctx.rules.directions.template sample<F>(vertex, {u.x, u.y, u.z}, transport_mode(side), s))
         return void(v.end = "the BSDF scatters nothing");
     v.scatter = {true, s.wo, s.pdf_sa, s.pdf_reverse_sa, bool(s.flags & kScatterDelta), s.weight, s.eta, {}};
     v.scatter.roulette = describe_roulette(ctx, side, vertex, u, before);
@@ -95,7 +95,7 @@ void replay_subpath(const ReplayContext<Mis>& ctx, uint32_t longest, const Subpa
     std::vector<std::pair<Subpath<Mis>, Hit>> steps;
     DropWatch watch;
     const auto extend = [&](const Subpath<Mis>& path, float at_most) {
-        const Hit hit = replay_extend(ctx, path, at_most, sink.draws(), watch.record());
+        const Hit hit = replay_extend(ctx, path, at_most, sink.numbers(), watch.record());
         watch.dropped(out.side == Side::eye ? "extend" : "light_extend", out.drop);
         if (details) steps.emplace_back(path, hit);
         sink.arrived(path, hit);
@@ -105,7 +105,7 @@ void replay_subpath(const ReplayContext<Mis>& ctx, uint32_t longest, const Subpa
     for (const auto& [path, hit] : steps) {
         out.vertices.push_back(describe_arrival(ctx, out.side, path, hit));
         const bool goes_on = out.vertices.size() < steps.size();
-        describe_departure(ctx, out.side, longest, hit, sink.draws(), path, goes_on, out.vertices.back());
+        describe_departure(ctx, out.side, longest, hit, sink.numbers(), path, goes_on, out.vertices.back());
     }
 }
 
@@ -115,13 +115,19 @@ void replay_subpath(const ReplayContext<Mis>& ctx, uint32_t longest, const Subpa
 template <class Mis>
 std::vector<ReplayNumber> hit_densities(const ReplayContext<Mis>& ctx, const Subpath<Mis>& path, const Hit& hit) {
     constexpr Features F = kReplayFeatures;
-    if (hit.prim == kNone) return {{"pdf_next_event_sa", pdf_environment_direct<F>(ctx.view, path.direction)}};
+    const auto over_power = [&](uint32_t emitter) {
+        return ctx.rules.lights.over_power(ctx.view, receiver_of_ray(path.origin, path.sums), emitter);
+    };
+    if (hit.prim == kNone)
+        return {{"pdf_next_event_sa",
+                 pdf_environment_direct<F>(ctx.view, path.direction) * over_power(ctx.view.environment)}};
     const SurfacePoint light = surface_at<F>(ctx.view, hit.prim, hit.u, hit.v);
     const uint32_t emitter = ctx.view.shapes[light.shape].emitter;
     const Emitter& e = ctx.view.emitters[emitter];
     const float pick = e.pick_probability;
     return {{"opacity", area_opacity<F>(ctx.view, e, light.uv)},
-            {"pdf_next_event_sa", pdf_emitter_direct<F>(ctx.view, emitter, path.origin, path.direction, light)},
+            {"pdf_next_event_sa",
+             pdf_emitter_direct<F>(ctx.view, emitter, path.origin, path.direction, light) * over_power(emitter)},
             {"pdf_emission_area", pick * pdf_emission_position<F>(ctx.view, emitter, light.prim)},
             {"pdf_emission_sa", pdf_emission_direction<F>(ctx.view, emitter, light.ng, -path.direction)}};
 }
@@ -131,8 +137,9 @@ template <class Mis>
 std::vector<ReplayNumber> next_event_densities(const ReplayContext<Mis>& ctx, const Vertex<Mis>& z, Vec4f u) {
     constexpr Features F = kReplayFeatures;
     EmitterSample light;
-    if (!sample_emitter_deferred<F>(ctx.view, z.point.p, u, light)) return {};
-    const BsdfValue f = scatter_evaluate<F>(z.scattering, light.wi, TransportMode::radiance);
+    typename Mis::Lights::Pick pick;
+    if (!sample_emitter_deferred<F>(ctx.view, ctx.rules.lights, {z.point.p, z.point.ng}, u, light, pick)) return {};
+    const BsdfValue f = ctx.rules.directions.template evaluate<F>(z, light.wi, TransportMode::radiance);
     return {{"emitter", double(light.emitter)},
             {light.delta ? "pick_probability" : "pdf_next_event_sa", light.pdf_sa},
             {"distance", light.distance},

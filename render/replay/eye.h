@@ -16,13 +16,13 @@ struct ReplayEye {
     using At = std::function<void(ReplayEye&, const Vertex<Mis>&, const Subpath<Mis>&)>;
     /// The stage that samples emitters; false if it pushed no candidate.
     using SampleEmitter = std::function<bool(const ReplayContext<Mis>&, const Vertex<Mis>&, const Subpath<Mis>&,
-                                             const Draws&, StageRecord*, CandidateItem&)>;
+                                             const RandomNumbers&, StageRecord*, CandidateItem&)>;
 
     const ReplayContext<Mis>& ctx;
     const SampleEmitter& sample_emitter;
     const At& connect;  ///< may be empty
     bool details;
-    Draws draws;
+    RandomNumbers numbers;
     ReplaySample& out;
     EyeArrival<Mis> arrival;
     Subpath<Mis> ray{};  ///< that ended at `hit`
@@ -38,11 +38,11 @@ struct ReplayEye {
         CandidateItem item;
         DropWatch watch;
         ReplayDrop drop;
-        const bool pushed = sample_emitter(ctx, z, path, draws, watch.record(), item);
+        const bool pushed = sample_emitter(ctx, z, path, numbers, watch.record(), item);
         const bool dropped = watch.dropped("connect", drop);
         if (!pushed && !dropped) return;
         ReplayCandidate& r = add("next event");
-        if (details) r.densities = next_event_densities(ctx, z, draws.next_event(path.depth));
+        if (details) r.densities = next_event_densities(ctx, z, numbers.next_event(path.depth));
         if (pushed) return arrival.light(item, r);
         r.strategy = Strategy::make(1, path.depth + 1);
         r.fate = ReplayFate::invalid;
@@ -60,13 +60,13 @@ template <class Mis>
 struct ReplayEyeSink {
     ReplayEye<Mis>& eye;
 
-    Draws draws() const { return eye.draws; }
+    RandomNumbers numbers() const { return eye.numbers; }
     void arrived(const Subpath<Mis>& path, const Hit& hit) const {
         eye.ray = path;
         eye.hit = hit;
     }
     void add(const Candidate<Mis>& c) const { eye.found(c); }
-    void at(const Vertex<Mis>& z, const Subpath<Mis>& path, const Draws&) const {
+    void at(const Vertex<Mis>& z, const Subpath<Mis>& path, const RandomNumbers&) const {
         eye.next_event(z, path);
         if (eye.connect) eye.connect(eye, z, path);
     }
@@ -81,16 +81,16 @@ struct ReplayEyeSink {
 /// Next event estimation of a render: NextEvent, or what a variant has in its place.
 template <class Mis, class Stage>
 bool push_next_event(const ReplayContext<Mis>& ctx, const Stage& stage, const Vertex<Mis>& z, const Subpath<Mis>& path,
-                     const Draws& draws) {
-    stage.at(ctx.view, ctx.rules, z, path, 0, draws);
+                     const RandomNumbers& numbers) {
+    stage.at(ctx.view, ctx.rules, z, path, 0, numbers);
     return *stage.candidates.pushed;
 }
 template <class Mis>
 bool sample_next_event(const ReplayContext<Mis>& ctx, const Vertex<Mis>& z, const Subpath<Mis>& path,
-                       const Draws& draws, StageRecord* record, CandidateItem& item) {
+                       const RandomNumbers& numbers, StageRecord* record, CandidateItem& item) {
     bool pushed = false;
     const NextEvent<kReplayFeatures, Mis, LastItem<CandidateItem>> stage = {{&item, &pushed}, record, true};
-    return push_next_event(ctx, stage, z, path, draws);
+    return push_next_event(ctx, stage, z, path, numbers);
 }
 
 /// The eye subpath of `out`'s pixel and sample; what it brings is in out.eye_sum.
@@ -101,10 +101,10 @@ void replay_eye(const ReplayContext<Mis>& ctx, const typename ReplayEye<Mis>::Sa
     const uint32_t pixel = out.y * ctx.view.sensor.crop_width + out.x;
     out.eye.side = Side::eye;
     out.eye.number = pixel;
-    const Draws draws = {{out.seed, pixel, out.sample, Stream::eye}};
-    ReplayEye<Mis> eye{ctx, sample_emitter, connect, details, draws, out, EyeArrival<Mis>(ctx)};
+    const RandomNumbers numbers = {{out.seed, pixel, out.sample, Stream::eye}};
+    ReplayEye<Mis> eye{ctx, sample_emitter, connect, details, numbers, out, EyeArrival<Mis>(ctx)};
     float tmax;
-    const auto first = start_eye_subpath<kReplayFeatures>(ctx.view, ctx.rules.mis, out.x, out.y, draws, tmax);
+    const auto first = start_eye_subpath<kReplayFeatures>(ctx.view, ctx.rules.mis, out.x, out.y, numbers, tmax);
     replay_subpath(ctx, ctx.rules.longest(Side::eye), first, tmax, ReplayEyeSink<Mis>{eye}, details, out.eye);
     out.eye_sum = eye.arrival.sum();
 }

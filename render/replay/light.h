@@ -28,7 +28,7 @@ struct ReplayLightRequest {
     /// True for vertices that connections may use.
     std::function<bool(const BidirectionalVertex&, uint32_t depth)> keeps;
 
-    Draws draws() const { return {{seed, number, sample, Stream::light}, part}; }
+    RandomNumbers numbers() const { return {{seed, number, sample, Stream::light}, part}; }
 };
 
 /// A splat candidate goes through the stages of a render.
@@ -63,10 +63,10 @@ struct ReplaySplats {
 struct ReplayLightSink {
     const ReplaySplats& splats;
 
-    Draws draws() const { return splats.request.draws(); }
+    RandomNumbers numbers() const { return splats.request.numbers(); }
     void arrived(const Subpath<BidirectionalMis>&, const Hit&) const {}
     void add(const Candidate<BidirectionalMis>&) const {}
-    void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& path, const Draws& d) const {
+    void at(const BidirectionalVertex& y, const Subpath<BidirectionalMis>& path, const RandomNumbers& d) const {
         const auto& [ctx, request, light] = splats;
         if (ctx.rules.splat && request.splats && ctx.rules.wants(path.depth + 1, 1)) {
             DropWatch watch;
@@ -108,13 +108,13 @@ inline ReplayLight replay_light(const ReplayContext<BidirectionalMis>& ctx, cons
     subpath.side = Side::light;
     subpath.number = request.number;
     subpath.part = request.part;
-    const Draws draws = request.draws();
+    const RandomNumbers numbers = request.numbers();
     const ReplaySplats splats = {ctx, request, light};
     DropWatch watch;
-    const LightStartSink<kReplayFeatures, ReplaySplats> start = {splats, 0, draws, watch.record()};
+    const LightStartSink<kReplayFeatures, BidirectionalMis, ReplaySplats> start = {splats, 0, numbers, watch.record()};
     EmissionSample e;
     Subpath<BidirectionalMis> first{};  // depth 0
-    const bool starts = start_light_subpath<kReplayFeatures>(ctx.view, ctx.rules, draws, start, e, first);
+    const bool starts = start_light_subpath<kReplayFeatures>(ctx.view, ctx.rules, numbers, start, e, first);
     if (request.details && first.depth > 0) describe_start(ctx, e, subpath);
     const bool valid = is_valid_radiance(first.throughput);
     ReplayDrop drop;

@@ -12,12 +12,12 @@ using Eye = ReplayEye<UnidirectionalMis>;
 /// Variant ris has another stage in the place of next event estimation.
 Eye::SampleEmitter resampled(const RisSettings& settings) {
     return [settings](const ReplayContext<UnidirectionalMis>& ctx, const Vertex<UnidirectionalMis>& z,
-                      const Subpath<UnidirectionalMis>& path, const Draws& draws, StageRecord* record,
+                      const Subpath<UnidirectionalMis>& path, const RandomNumbers& numbers, StageRecord* record,
                       CandidateItem& item) {
         bool pushed = false;
         const ResampledNextEvent<kReplayFeatures, UnidirectionalMis, LastItem<CandidateItem>> stage = {
             {&item, &pushed}, record, true, settings};
-        return push_next_event(ctx, stage, z, path, draws);
+        return push_next_event(ctx, stage, z, path, numbers);
     };
 }
 

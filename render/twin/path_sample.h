@@ -51,10 +51,10 @@ public:
             light_vertices_.clear();
             if (rules_.splat || rules_.connect) light_subpath({{seed, pixel, sample, Stream::light}});
         }
-        const Draws draws = {{seed, pixel, sample, Stream::eye}};
+        const RandomNumbers numbers = {{seed, pixel, sample, Stream::eye}};
         double tmax;
-        const Path first = start_eye_subpath<kFeatures>(scene_, rules_.mis, x, y, draws, tmax);
-        follow(first, tmax, Sink{*this, Side::eye, draws});
+        const Path first = start_eye_subpath<kFeatures>(scene_, rules_.mis, x, y, numbers, tmax);
+        follow(first, tmax, Sink{*this, Side::eye, numbers});
         return sum_;
     }
 
@@ -62,30 +62,30 @@ private:
     static constexpr Features kFeatures = kAllFeatures;
     using Path = Subpath<Mis>;
 
-    void light_subpath(const Draws& draws) {
+    void light_subpath(const RandomNumbers& numbers) {
         EmissionSample e;
         Path first;
-        const Sink sink = {*this, Side::light, draws};
-        if (start_light_subpath<kFeatures>(scene_, rules_, draws, sink, e, first)) follow(first, kInfinity, sink);
+        const Sink sink = {*this, Side::light, numbers};
+        if (start_light_subpath<kFeatures>(scene_, rules_, numbers, sink, e, first)) follow(first, kInfinity, sink);
     }
 
     /// Of visit().
     struct Sink {
         PathSample& sample;
         Side side;
-        const Draws& subpath_draws;
+        const RandomNumbers& subpath_numbers;
 
-        Draws draws() const { return subpath_draws; }
+        RandomNumbers numbers() const { return subpath_numbers; }
         void add(const Candidate<Mis>& c) const {
-            if (side == Side::light) return sample.splat(c, subpath_draws.shadow_seed(0));
+            if (side == Side::light) return sample.splat(c, subpath_numbers.shadow_seed(0));
             Rgb value;
             if (sample.weigh(c, value)) sample.sum_ += value;
         }
-        void at(const Vertex<Mis>& v, const Path& path, const Draws& draws) const {
+        void at(const Vertex<Mis>& v, const Path& path, const RandomNumbers& numbers) const {
             if (side == Side::eye)
-                sample.eye_vertex(v, path, draws);
+                sample.eye_vertex(v, path, numbers);
             else if constexpr (Mis::kBidirectional)
-                sample.light_vertex(v, path, draws);
+                sample.light_vertex(v, path, numbers);
         }
         bool valid(Rgb throughput) const { return sample.valid(throughput); }
     };
@@ -95,7 +95,7 @@ private:
         const auto extend = [&](const Path& path, double at_most) -> Hit {
             if (is_finite(path.origin) && is_finite(path.direction)) {
                 ++counts_.rays_extend;
-                const uint32_t seed = sink.subpath_draws.opacity_seed(path.depth);
+                const uint32_t seed = sink.subpath_numbers.opacity_seed(path.depth);
                 return tracer_.closest({path.origin, at_most, path.direction, seed});
             }
             ++counts_.invalid.nan;
@@ -104,23 +104,23 @@ private:
         trace_subpath<kFeatures>(scene_, rules_, sink.side, rules_.longest(sink.side), first, tmax, extend, sink);
     }
 
-    void eye_vertex(const Vertex<Mis>& v, const Path& path, const Draws& draws) {
+    void eye_vertex(const Vertex<Mis>& v, const Path& path, const RandomNumbers& numbers) {
         Candidate<Mis> c;
-        if (next_event<kFeatures>(scene_, rules_, v, path.throughput, path.depth, draws.next_event(path.depth), c))
-            collect(c, draws.shadow_seed(path.depth));
+        if (next_event<kFeatures>(scene_, rules_, v, path.throughput, path.depth, numbers.next_event(path.depth), c))
+            collect(c, numbers.shadow_seed(path.depth));
         if constexpr (Mis::kBidirectional) {
             const SubpathEnd<Mis> z = {v, path.throughput, path.depth};
             for (const SubpathEnd<Mis>& y : light_vertices_)
                 if (z.depth + y.depth + 1 <= rules_.max_depth && connection<kFeatures>(rules_, z, y, c))
-                    collect(c, draws.shadow_seed(connection_ray(z.depth, y.depth)));
+                    collect(c, numbers.shadow_seed(connection_ray(z.depth, y.depth)));
         }
     }
 
-    void light_vertex(const Vertex<Mis>& v, const Path& path, const Draws& draws) {
-        const Vec4f u = draws.lens(path.depth);
+    void light_vertex(const Vertex<Mis>& v, const Path& path, const RandomNumbers& numbers) {
+        const Vec4f u = numbers.lens(path.depth);
         Candidate<Mis> c;
         if (camera_connection<kFeatures>(scene_, rules_, v, path.throughput, path.depth, {u.x, u.y}, c))
-            splat(c, draws.shadow_seed(path.depth));
+            splat(c, numbers.shadow_seed(path.depth));
         if (rules_.connect && path.depth + 2 <= rules_.max_depth)
             light_vertices_.push_back({v, path.throughput, path.depth});
     }

@@ -215,7 +215,8 @@ TEST_CASE("Seeds of rays: neighbouring pixels, samples, depths, subpaths and ran
     const RngKey base = {7, 0, 0, Stream::eye};
     // `number`: of the light subpath among those of its key, or of the light vertex that a shadow ray is for.
     const auto seed = [](const RngKey& key, uint32_t depth, uint32_t number, bool shadow) {
-        return shadow ? Draws{key}.shadow_seed(connection_ray(depth, number)) : Draws{key, number}.opacity_seed(depth);
+        return shadow ? RandomNumbers{key}.shadow_seed(connection_ray(depth, number))
+                      : RandomNumbers{key, number}.opacity_seed(depth);
     };
     const auto neighbour = [](RngKey key, uint32_t& depth, uint32_t& number, bool& shadow, int which) {
         switch (which) {

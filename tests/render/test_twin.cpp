@@ -237,10 +237,10 @@ TEST_CASE("Directions of long subpaths are unit, and their vertices on their sur
     uint32_t longest = 0;
     double worst_length = 0, worst_distance = 0;
     for (uint32_t index = 0; index < 100; ++index) {
-        const twin::Draws draws = {{7, index, 0, twin::Stream::test}};
+        const twin::RandomNumbers numbers = {{7, index, 0, twin::Stream::test}};
         twin::Subpath<twin::UnidirectionalMis> path{};
         path.origin = {0.5, 0.1, 0.2};
-        path.direction = twin::square_to_sphere({draws.camera().x, draws.camera().y});
+        path.direction = twin::square_to_sphere({numbers.camera().x, numbers.camera().y});
         path.throughput = {1, 1, 1};
         path.roulette_scale = 1;
         for (path.depth = 1; path.depth < 1000;) {
@@ -249,9 +249,9 @@ TEST_CASE("Directions of long subpaths are unit, and their vertices on their sur
             const twin::SurfacePoint point = twin::surface_at<twin::kAllFeatures>(view, hit.prim, hit.u, hit.v);
             const double radius = hit.prim == 0 ? 1.0 : double(0.3f);
             worst_distance = std::max(worst_distance, std::abs(twin::length(point.p) - radius));
-            const auto vertex = twin::vertex_at<twin::kAllFeatures>(view, rules.mis, twin::Side::eye, path, point);
+            const auto vertex = twin::vertex_at<twin::kAllFeatures>(view, rules, twin::Side::eye, path, point);
             if (!twin::scatter<twin::kAllFeatures>(rules, twin::Side::eye, vertex,
-                                                   draws.scatter(twin::Side::eye, path.depth), path))
+                                                   numbers.scatter(twin::Side::eye, path.depth), path))
                 break;
             worst_length = std::max(worst_length, std::abs(twin::length(path.direction) - 1) / path.depth);
         }

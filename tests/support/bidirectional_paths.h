@@ -308,7 +308,7 @@ private:
         while (light_.size() < kMaxVertices) {
             Hit hit;
             if (!tracer_.closest<F>(scene_, {path.origin, kInfinity, path.direction, 0}, hit)) return;
-            light_.push_back({vertex_at<F>(scene_, mis_, Side::light, path, point(hit)), path.direction, hit});
+            light_.push_back({vertex_at<F>(scene_, rules_, Side::light, path, point(hit)), path.direction, hit});
             if (!scatter<F>(rules_, Side::light, light_.back().vertex, random(10 + path.depth), path)) return;
             light_.back().delta = path.delta;
         }
@@ -331,7 +331,7 @@ private:
                 return;
             }
             tmax = kInfinity;
-            const BidirectionalVertex z = vertex_at<F>(scene_, mis_, Side::eye, path, point(hit));
+            const BidirectionalVertex z = vertex_at<F>(scene_, rules_, Side::eye, path, point(hit));
             hit_emitter(path, z);
             eye_.push_back({z, path.direction, hit});
             if (!scatter<F>(rules_, Side::eye, z, random(30 + path.depth), path)) return;
@@ -391,7 +391,7 @@ private:
         const bool counts = escape<F>(scene_, rules_, path, c);
         // The rules and the ratio agree on that.
         float ratio;
-        CHECK(mis_.escape_ratio<F>(scene_, path, path.sums, ratio) == counts);
+        CHECK(mis_.escape_ratio<F>(scene_, rules_.lights, path, path.sums, ratio) == counts);
         compare(kEscape, 0, c, p, counts);
     }
 
@@ -584,7 +584,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
     };
 
     const auto meet = [&](Side side, const BidirectionalSubpath& w, const OraclePath::Vertex& x) {
-        return vertex_at<F>(scene_, mis_, side, w, surface_at<F>(scene_, x.prim, x.u, x.v));
+        return vertex_at<F>(scene_, rules_, side, w, surface_at<F>(scene_, x.prim, x.u, x.v));
     };
 
     // Light subpath over x_1 ... x_(k-1).
@@ -635,8 +635,8 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
         float ratio = 0;
         BidirectionalCandidate candidate;
         if (s == 0) {
-            CHECK((infinite ? mis_.escape_ratio<F>(scene_, w, w.sums, ratio)
-                            : mis_.hit_ratio<F>(scene_, w, w.sums, path.emitter, path.light, ratio)));
+            CHECK((infinite ? mis_.escape_ratio<F>(scene_, rules_.lights, w, w.sums, ratio)
+                            : mis_.hit_ratio<F>(scene_, rules_.lights, w, w.sums, path.emitter, path.light, ratio)));
         } else if (s == k) {
             if (k == 1 ? !visible_emitter<F>(scene_, rules_, start, path.lens_u, candidate)
                        : !camera_connection<F>(scene_, rules_, y[k - 1], {1, 1, 1}, k - 1, path.lens_u, candidate))
@@ -656,8 +656,8 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
             BsdfValue f{};
             f.pdf_sa = scatter_pdf<F>(z[1].scattering, light.wi);
             f.pdf_reverse_sa = reverse_pdf(z[1].scattering, light.wi);
-            ratio =
-                mis_.next_event_ratio<F>(scene_, z[1].sums, z[1].first, light, f, fabsf(dot(z[1].point.ng, light.wi)));
+            ratio = mis_.next_event_ratio<F>(scene_, 1.0f, z[1].sums, z[1].first, light, f,
+                                             fabsf(dot(z[1].point.ng, light.wi)));
         } else {
             if (!connection<F>(rules_, {z[s], {1, 1, 1}, k - s}, {y[s - 1], {1, 1, 1}, s - 1}, candidate)) return;
             ratio = candidate.ratio;

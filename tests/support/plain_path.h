@@ -16,20 +16,20 @@ struct PlainSink {
     const SceneView& scene;
     const EmbreeTracer& tracer;
     const Rules<Mis>& rules;
-    Draws numbers;
+    RandomNumbers subpath_numbers;
     Rgb& sample;
 
-    Draws draws() const { return numbers; }
+    RandomNumbers numbers() const { return subpath_numbers; }
     bool valid(Rgb throughput) const { return is_valid_radiance(throughput); }
     void add(const Candidate<Mis>& c) const { sample += c.value * mis_weight(c.ratio); }
-    void at(const Vertex<Mis>& v, const Subpath<Mis>& path, const Draws& draws) const {
+    void at(const Vertex<Mis>& v, const Subpath<Mis>& path, const RandomNumbers& numbers) const {
         Candidate<Mis> c;
         if (!rules.next_event ||
-            !next_event<F>(scene, rules, v, path.throughput, path.depth, draws.next_event(path.depth), c))
+            !next_event<F>(scene, rules, v, path.throughput, path.depth, numbers.next_event(path.depth), c))
             return;
         const Rgb value = c.value * mis_weight(c.ratio);
         if (is_zero(value)) return;
-        const Ray ray = {c.origin, c.tmax, c.direction, F.opacity ? draws.shadow_seed(path.depth) : 0};
+        const Ray ray = {c.origin, c.tmax, c.direction, F.opacity ? numbers.shadow_seed(path.depth) : 0};
         if (tracer.occluded<F>(scene, ray)) return;
         sample += c.environment ? value * environment_radiance<F>(scene, c.direction) : value;
     }
@@ -39,14 +39,14 @@ template <Features F>
 Rgb plain_sample(const SceneView& scene, const EmbreeTracer& tracer, const Rules<UnidirectionalMis>& rules,
                  const PathSlot& p, const RngKey& key) {
     Rgb sample = {0, 0, 0};
-    const Draws draws = {key};
-    const CameraSample camera = camera_sample<F>(scene, p.x, p.y, draws);
+    const RandomNumbers numbers = {key};
+    const CameraSample camera = camera_sample<F>(scene, p.x, p.y, numbers);
     Subpath<UnidirectionalMis> path = start_eye<F>(scene, rules.mis, camera);
-    const PlainSink<F> sink = {scene, tracer, rules, draws, sample};
+    const PlainSink<F> sink = {scene, tracer, rules, numbers, sample};
     float tmax = camera.tmax;
     for (bool goes_on = true; goes_on; tmax = kInfinity) {
         Hit hit;
-        const Ray ray = {path.origin, tmax, path.direction, F.opacity ? draws.opacity_seed(path.depth) : 0};
+        const Ray ray = {path.origin, tmax, path.direction, F.opacity ? numbers.opacity_seed(path.depth) : 0};
         if (!tracer.closest<F>(scene, ray, hit)) hit.prim = kNone;
         goes_on = visit<F>(scene, rules, Side::eye, rules.longest(Side::eye), hit, path, sink);
     }

@@ -23,9 +23,9 @@ struct ThirdSumMis : BidirectionalMis {
         sums = with_third(two);
     }
     template <Features F, class Path>
-    Sums sums_at(const SceneView& scene, Side side, const Path& path, const Sums& sums,
+    Sums sums_at(const SceneView& scene, const Lights& lights, Side side, const Path& path, const Sums& sums,
                  const SurfacePoint& point) const {
-        return with_third(BidirectionalMis::sums_at<F>(scene, side, path, sums, point));
+        return with_third(BidirectionalMis::sums_at<F>(scene, lights, side, path, sums, point));
     }
     Sums sums_after_scatter(const Sums& s, bool first, bool delta, float pdf_forward_sa, float pdf_reverse_sa,
                             float cos_out) const {
@@ -33,22 +33,23 @@ struct ThirdSumMis : BidirectionalMis {
             BidirectionalMis::sums_after_scatter(s, first, delta, pdf_forward_sa, pdf_reverse_sa, cos_out));
     }
     template <Features F, class Path>
-    bool hit_ratio(const SceneView& scene, const Path& path, const Sums& ray, uint32_t emitter,
+    bool hit_ratio(const SceneView& scene, const Lights& lights, const Path& path, const Sums& ray, uint32_t emitter,
                    const SurfacePoint& light, float& ratio) const {
-        const bool counts = BidirectionalMis::hit_ratio<F>(scene, path, ray, emitter, light, ratio);
+        const bool counts = BidirectionalMis::hit_ratio<F>(scene, lights, path, ray, emitter, light, ratio);
         ratio = checked(ray, ratio);
         return counts;
     }
     template <Features F, class Path>
-    bool escape_ratio(const SceneView& scene, const Path& path, const Sums& ray, float& ratio) const {
-        const bool counts = BidirectionalMis::escape_ratio<F>(scene, path, ray, ratio);
+    bool escape_ratio(const SceneView& scene, const Lights& lights, const Path& path, const Sums& ray,
+                      float& ratio) const {
+        const bool counts = BidirectionalMis::escape_ratio<F>(scene, lights, path, ray, ratio);
         ratio = checked(ray, ratio);
         return counts;
     }
     template <Features F>
-    float next_event_ratio(const SceneView& scene, const Sums& z, bool first, const EmitterSample& light,
-                           const BsdfValue& f, float cos_z) const {
-        return checked(z, BidirectionalMis::next_event_ratio<F>(scene, z, first, light, f, cos_z));
+    float next_event_ratio(const SceneView& scene, float over_power, const Sums& z, bool first,
+                           const EmitterSample& light, const BsdfValue& f, float cos_z) const {
+        return checked(z, BidirectionalMis::next_event_ratio<F>(scene, over_power, z, first, light, f, cos_z));
     }
     float connection_ratio(const Sums& y, bool y_first, const Sums& z, bool z_first,
                            const ConnectionDensities& p) const {

@@ -47,7 +47,7 @@ TEST_CASE("B28: weights of two strategies lie in [0,1], sum to one and are right
                 light.pdf_sa = p;
                 BsdfValue f{};
                 f.pdf_sa = q;
-                const float next_event = mis_weight(mis.next_event_ratio<kOpaque>({}, {}, false, light, f, 1.0f));
+                const float next_event = mis_weight(mis.next_event_ratio<kOpaque>({}, 1.0f, {}, false, light, f, 1.0f));
                 float ratio = -1;
                 REQUIRE(mis.ratio_to({q}, p, ratio));
                 const float hit = mis_weight(ratio);
@@ -172,7 +172,7 @@ TEST_CASE("B27: without a light subpath strategies that need one have no weight,
         sample.pdf_sa = 1, sample.distance = 2, sample.delta = true, sample.wi = {0, 0, 1};
         BsdfValue f{};
         f.pdf_sa = 0.3f, f.pdf_reverse_sa = 0.2f;
-        const float w = mis_weight(none.next_event_ratio<kAllFeatures>(view, eye, false, sample, f, 0.5f));
+        const float w = mis_weight(none.next_event_ratio<kAllFeatures>(view, 1.0f, eye, false, sample, f, 0.5f));
         CHECK(w > 0);
         CHECK(w <= 1);
     }

@@ -138,13 +138,13 @@ TEST_CASE("seeds of opacity differ between the rays of a subpath, its shadow ray
     std::set<uint32_t> seeds;
     size_t made = 0;
     for (const uint32_t number : {0u, 1u, 2u, 9u}) {
-        const Draws draws{{7, 11, 3, Stream::light}, number};
-        for (uint32_t depth = 1; depth <= 60; ++depth, ++made) seeds.insert(draws.opacity_seed(depth));
+        const RandomNumbers numbers{{7, 11, 3, Stream::light}, number};
+        for (uint32_t depth = 1; depth <= 60; ++depth, ++made) seeds.insert(numbers.opacity_seed(depth));
     }
-    const Draws draws{{7, 11, 3, Stream::light}};
+    const RandomNumbers numbers{{7, 11, 3, Stream::light}};
     for (uint32_t depth = 1; depth <= 30; ++depth)
         for (uint32_t light = 0; light <= 30; ++light, ++made)
-            seeds.insert(draws.shadow_seed(connection_ray(depth, light)));
+            seeds.insert(numbers.shadow_seed(connection_ray(depth, light)));
     // 32 bits: one pair among 1170 numbers meets by chance once in 6000 trials.
     CHECK(seeds.size() == made);
 }

@@ -15,6 +15,7 @@
 #include "transport/emitter/emission.h"
 #include "transport/mis/heuristic.h"
 #include "transport/sensor/importance.h"
+#include "transport/subpath/directions.h"
 #include "transport/subpath/subpath.h"
 
 namespace ambilux {
@@ -47,6 +48,9 @@ struct BidirectionalMis {
     using Sums = MisSums;
     using Start = SubpathStart;
     using Ratio = float;
+    using Directions = BsdfDirections;
+    using Lights = LightsByPower;
+    using Numbers = RandomNumbers;
     static constexpr bool kBidirectional = true;
 
     MisHeuristic heuristic;
@@ -99,12 +103,15 @@ struct BidirectionalMis {
     }
 
     /// Sums where the ray of `path`, with sums `sums`, meets `point`.
-    template <Features F, class Path>
-    AMBILUX_HD MisSums sums_at(const SceneView& scene, Side side, const Path& path, MisSums sums,
+    template <Features F, class Path, class Lights>
+    AMBILUX_HD MisSums sums_at(const SceneView& scene, const Lights& lights, Side side, const Path& path, MisSums sums,
                                const SurfacePoint& point) const {
         const float cos_in = fabsf(dot(point.ng, path.direction));
         const bool first = path.depth == 1;
-        if (side == Side::light && first) return first_light_sums<F>(scene, path, point.p, cos_in);
+        if (side == Side::light && first) {
+            const float over_power = lights.over_power(scene, Receiver{point.p, point.ng}, path.start.emitter);
+            return first_light_sums<F>(scene, path, point.p, cos_in, over_power);
+        }
         float d2 = length_squared(point.p - path.origin);
         if (first) d2 = sqr(sqrtf(d2) + path.start.camera_distance);
         return sums_at_hit(sums, d2, cos_in, first && camera_delta_direction(scene.sensor));
@@ -133,9 +140,11 @@ struct BidirectionalMis {
         return first ? s.dvcm : connection_density() * s.dvcm;
     }
 
-    /// Sums at the first vertex of a light subpath, at `p`, met at cosine `cos_in` (equation 13).
+    /// Sums at the first vertex of a light subpath, at `p`, met at cosine `cos_in` (equation 13). `over_power`: of the
+    /// emitter, picked for this vertex (Mis::Lights).
     template <Features F, class Path>
-    AMBILUX_HD MisSums first_light_sums(const SceneView& scene, const Path& path, Vec3f p, float cos_in) const {
+    AMBILUX_HD MisSums first_light_sums(const SceneView& scene, const Path& path, Vec3f p, float cos_in,
+                                        float over_power) const {
         const SubpathStart& start = path.start;
         const Emitter& e = scene.emitters[start.emitter];
         const float scale = start.inv_pdf / cos_in;
@@ -163,16 +172,16 @@ struct BidirectionalMis {
                 next_event = start.direction * scale;  // samples its direction likewise
                 hit = scale;
         }
-        return {masked(kNextEventStrategies, next_event), masked(kHitStrategies, hit)};
+        return {masked(kNextEventStrategies, next_event * over_power), masked(kHitStrategies, hit)};
     }
 
     // ---- ratios of the other strategies ----
 
     /// s = 0: the ray of `path`, with sums `ray` (not those at the hit), meets area emitter `emitter` at `light`
     /// (equation 14). False if this strategy does not count.
-    template <Features F, class Path>
-    AMBILUX_HD bool hit_ratio(const SceneView& scene, const Path& path, MisSums ray, uint32_t emitter,
-                              const SurfacePoint& light, float& ratio) const {
+    template <Features F, class Path, class Lights>
+    AMBILUX_HD bool hit_ratio(const SceneView& scene, const Lights& lights, const Path& path, MisSums ray,
+                              uint32_t emitter, const SurfacePoint& light, float& ratio) const {
         const Vec3f d = path.direction;
         const float cos_light = -dot(light.ng, d);
         // Densities of the other strategies over the chance that a ray meets a masked emitter.
@@ -187,7 +196,8 @@ struct BidirectionalMis {
             return true;
         }
         const float next_event =
-            masked(kNextEventStrategies, pdf_emitter_direct<F>(scene, emitter, path.origin, d, light)) * inv_opacity;
+            masked(kNextEventStrategies, pdf_emitter_direct<F>(scene, emitter, path.origin, d, light)) * inv_opacity *
+            lights.over_power(scene, receiver_of_ray(path.origin, path.sums), emitter);
         const float emission = pdf_pos * pdf_emission_direction<F>(scene, emitter, light.ng, -d) / cos_light;
         ratio = term(next_event * ray.dvcm) + term(emission * ray.dvc);
         return true;
@@ -195,33 +205,36 @@ struct BidirectionalMis {
 
     /// s = 0 where the ray leaves the scene towards the environment. A path of one segment has no other strategy: the
     /// light tracer sees the environment for itself.
-    template <Features F, class Path>
-    AMBILUX_HD bool escape_ratio(const SceneView& scene, const Path& path, MisSums ray, float& ratio) const {
+    template <Features F, class Path, class Lights>
+    AMBILUX_HD bool escape_ratio(const SceneView& scene, const Lights& lights, const Path& path, MisSums ray,
+                                 float& ratio) const {
         ratio = 0.0f;
         if (path.depth == 1) return true;
         if (!has(kHitStrategies)) return false;
         // Light subpaths draw their directions as next event estimation does.
         const float pdf_sa = pdf_environment_direct<F>(scene, path.direction);
+        const float next_event =
+            pdf_sa * lights.over_power(scene, receiver_of_ray(path.origin, path.sums), scene.environment);
         const float emission = pdf_sa * pdf_emission_position<F>(scene, scene.environment, kNone);
-        ratio = term(masked(kNextEventStrategies, pdf_sa) * ray.dvcm) + term(emission * ray.dvc);
+        ratio = term(masked(kNextEventStrategies, next_event) * ray.dvcm) + term(emission * ray.dvc);
         return true;
     }
 
     /// s = 1: light sample `light` at an eye vertex with sums `z`. `f`: densities of BSDF sampling towards the light,
     /// and of the way back for light that arrives from there; `cos_z`: between the geometric normal and the direction
-    /// to the light. Equation 15.
+    /// to the light; `over_power`: of the emitter's pick. Equation 15.
     template <Features F>
-    AMBILUX_HD float next_event_ratio(const SceneView& scene, MisSums z, bool first, const EmitterSample& light,
-                                      const BsdfValue& f, float cos_z) const {
+    AMBILUX_HD float next_event_ratio(const SceneView& scene, float over_power, MisSums z, bool first,
+                                      const EmitterSample& light, const BsdfValue& f, float cos_z) const {
         const Emitter& e = scene.emitters[light.emitter];
         float pdf_hit_sa = f.pdf_sa;
         if constexpr (F.opacity) pdf_hit_sa *= sample_opacity(scene, light);
         const float fewer = light.delta ? 0.0f : masked(kHitStrategies, term(pdf_hit_sa / light.pdf_sa));
-        float more = cos_z;  // density of a light subpath to here over that of this sample
+        float more = cos_z / over_power;  // density of a light subpath to here over that of this sample
         switch (light_start<F>(e.type)) {
             case LightStart::surface:  // the cosine at the light is in both
-                more *= e.pick_probability * pdf_emission_position<F>(scene, light.emitter, light.prim) * kInvPi /
-                        light.pdf_sa;
+                more *= over_power * e.pick_probability * pdf_emission_position<F>(scene, light.emitter, light.prim) *
+                        kInvPi / light.pdf_sa;
                 break;
             case LightStart::point:
             case LightStart::hidden_surface:

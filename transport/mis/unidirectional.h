@@ -4,6 +4,7 @@
 #include "transport/emitter.h"
 #include "transport/mis/estimator.h"
 #include "transport/mis/heuristic.h"
+#include "transport/subpath/directions.h"
 #include "transport/subpath/subpath.h"
 
 namespace ambilux {
@@ -15,6 +16,9 @@ struct UnidirectionalMis {
         float pdf_sa;
     };
     struct Start {};
+    using Directions = BsdfDirections;
+    using Lights = LightsByPower;
+    using Numbers = RandomNumbers;
     using Ratio = float;
     static constexpr bool kBidirectional = false;
 
@@ -27,8 +31,8 @@ struct UnidirectionalMis {
         sums = {0.0f};
     }
 
-    template <Features F, class Path>
-    AMBILUX_HD Sums sums_at(const SceneView&, Side, const Path&, Sums sums, const SurfacePoint&) const {
+    template <Features F, class Path, class Lights>
+    AMBILUX_HD Sums sums_at(const SceneView&, const Lights&, Side, const Path&, Sums sums, const SurfacePoint&) const {
         return sums;
     }
     AMBILUX_HD Sums sums_after_scatter(Sums, bool, bool, float pdf_forward_sa, float, float) const {
@@ -43,24 +47,29 @@ struct UnidirectionalMis {
         if (pdf_other_sa == 0.0f) ratio = 0.0f;
         return true;
     }
-    template <Features F, class Path>
-    AMBILUX_HD bool hit_ratio(const SceneView& scene, const Path& path, Sums ray, uint32_t emitter,
-                              const SurfacePoint& light, float& ratio) const {
+    template <Features F, class Path, class Lights>
+    AMBILUX_HD bool hit_ratio(const SceneView& scene, const Lights& lights, const Path& path, Sums ray,
+                              uint32_t emitter, const SurfacePoint& light, float& ratio) const {
         float pdf_other_sa = 0.0f;
         if (next_event && !path.delta) {
-            pdf_other_sa = pdf_emitter_direct<F>(scene, emitter, path.origin, path.direction, light);
+            pdf_other_sa = pdf_emitter_direct<F>(scene, emitter, path.origin, path.direction, light) *
+                           lights.over_power(scene, receiver_of_ray(path.origin, path.sums), emitter);
             if constexpr (F.opacity) pdf_other_sa /= hit_opacity<F>(scene, emitter, light);
         }
         return ratio_to(ray, pdf_other_sa, ratio);
     }
-    template <Features F, class Path>
-    AMBILUX_HD bool escape_ratio(const SceneView& scene, const Path& path, Sums ray, float& ratio) const {
-        const bool sampled = next_event && !path.delta;
-        return ratio_to(ray, sampled ? pdf_environment_direct<F>(scene, path.direction) : 0.0f, ratio);
+    template <Features F, class Path, class Lights>
+    AMBILUX_HD bool escape_ratio(const SceneView& scene, const Lights& lights, const Path& path, Sums ray,
+                                 float& ratio) const {
+        float pdf_other_sa = 0.0f;
+        if (next_event && !path.delta)
+            pdf_other_sa = pdf_environment_direct<F>(scene, path.direction) *
+                           lights.over_power(scene, receiver_of_ray(path.origin, path.sums), scene.environment);
+        return ratio_to(ray, pdf_other_sa, ratio);
     }
     template <Features F>
-    AMBILUX_HD float next_event_ratio([[maybe_unused]] const SceneView& scene, Sums, bool, const EmitterSample& light,
-                                      const BsdfValue& f, float) const {
+    AMBILUX_HD float next_event_ratio([[maybe_unused]] const SceneView& scene, float, Sums, bool,
+                                      const EmitterSample& light, const BsdfValue& f, float) const {
         // Only BSDF sampling and a hit could find this light too.
         const bool other = estimator == Estimator::mis && !light.delta;
         float pdf_hit_sa = f.pdf_sa;

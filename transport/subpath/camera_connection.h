@@ -2,9 +2,9 @@
 #pragma once
 
 #include "transport/sensor/importance.h"
+#include "transport/subpath/bsdf_directions.h"
 #include "transport/subpath/rules.h"
 #include "transport/subpath/vertex.h"
-#include "transport/surface_scattering.h"
 
 namespace ambilux {
 
@@ -52,7 +52,7 @@ AMBILUX_HD bool camera_connection(const SceneView& scene, const Rules<Mis>& rule
     if (!connect_to_camera<F>(scene.sensor, y.point.p, lens_u, camera) ||
         !reaches_pixels<F>(scene.sensor, camera.film_position))
         return false;
-    const BsdfValue f = scatter_evaluate<F>(y.scattering, camera.wi, TransportMode::importance);
+    const BsdfValue f = rules.directions.template evaluate<F>(y, camera.wi, TransportMode::importance);
     if (is_zero(f.value)) return false;
     c.value = throughput * f.value * (camera.weight / rules.mis.light_subpaths);
     const float cos_y = fabsf(dot(y.point.ng, camera.wi));

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "transport/mis/bidirectional.h"
+#include "transport/subpath/bsdf_directions.h"
 #include "transport/subpath/rules.h"
 #include "transport/subpath/vertex.h"
-#include "transport/surface_scattering.h"
 
 namespace ambilux {
 
@@ -31,9 +31,9 @@ AMBILUX_HD bool connection(const Rules<Mis>& rules, const SubpathEnd<Mis>& z, co
     const float d2 = length_squared(to_y);
     if (!(d2 > 0.0f) || !may_connect(y.vertex, z.vertex)) return false;
     const Vec3f w = to_y * inverse_sqrt(d2);
-    const BsdfValue f_z = scatter_evaluate<F>(z.vertex.scattering, w, TransportMode::radiance);
+    const BsdfValue f_z = rules.directions.template evaluate<F>(z.vertex, w, TransportMode::radiance);
     if (is_zero(f_z.value)) return false;
-    const BsdfValue f_y = scatter_evaluate<F>(y.vertex.scattering, -w, TransportMode::importance);
+    const BsdfValue f_y = rules.directions.template evaluate<F>(y.vertex, -w, TransportMode::importance);
     if (is_zero(f_y.value)) return false;
     c.value = y.throughput * f_y.value * f_z.value * z.throughput * (1.0f / d2);
     const float cos_y = fabsf(dot(y.vertex.point.ng, w)), cos_z = fabsf(dot(z.vertex.point.ng, w));

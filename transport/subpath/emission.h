@@ -28,7 +28,8 @@ AMBILUX_HD bool emission(const SceneView& scene, const Rules<Mis>& rules, const 
         return false;
     const Rgb radiance = emitted_radiance<F>(scene, emitter, point, -path.direction);
     typename Mis::Ratio ratio;
-    return !is_zero(radiance) && rules.mis.template hit_ratio<F>(scene, path, path.sums, emitter, point, ratio) &&
+    return !is_zero(radiance) &&
+           rules.mis.template hit_ratio<F>(scene, rules.lights, path, path.sums, emitter, point, ratio) &&
            detail::emitted(rules, path, radiance, ratio, c);
 }
 
@@ -40,7 +41,7 @@ AMBILUX_HD bool escape(const SceneView& scene, const Rules<Mis>& rules, const Su
             !rules.wants(0, path.depth + 1))
             return false;
         typename Mis::Ratio ratio;
-        return rules.mis.template escape_ratio<F>(scene, path, path.sums, ratio) &&
+        return rules.mis.template escape_ratio<F>(scene, rules.lights, path, path.sums, ratio) &&
                detail::emitted(rules, path, environment_radiance<F>(scene, path.direction), ratio, c);
     }
     return false;

@@ -2,19 +2,21 @@
 #pragma once
 
 #include "transport/emitter.h"
+#include "transport/subpath/bsdf_directions.h"
 #include "transport/subpath/rules.h"
 #include "transport/subpath/vertex.h"
-#include "transport/surface_scattering.h"
 
 namespace ambilux {
 
-/// Completes the candidate of the emitter sample `light`, whose value is known: ratio, strategy and segment. `f`: how
-/// `z` scatters its light. False if nothing lies between.
+/// Completes the candidate of the emitter sample `light`, whose value is known: ratio, strategy and segment.
+/// `over_power`: of the emitter's pick (Mis::Lights); `f`: how `z` scatters its light. False if nothing lies between.
 template <Features F, class Mis>
 AMBILUX_HD bool complete_next_event(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& z,
-                                    uint32_t depth, const EmitterSample& light, const BsdfValue& f, Candidate<Mis>& c) {
+                                    uint32_t depth, float over_power, const EmitterSample& light, const BsdfValue& f,
+                                    Candidate<Mis>& c) {
     const float cos_z = fabsf(dot(z.point.ng, light.wi));
-    c.ratio = rules.counted(rules.mis.template next_event_ratio<F>(scene, z.sums, z.first, light, f, cos_z));
+    c.ratio =
+        rules.counted(rules.mis.template next_event_ratio<F>(scene, over_power, z.sums, z.first, light, f, cos_z));
     c.strategy = Strategy::make(1, depth + 1);
     if (light.distance < kInfinity)
         return set_segment(c, z, light.wi, light.p, ray_offset(light.p, light.p_error, light.ng), light.ng);
@@ -30,13 +32,16 @@ template <Features F, class Mis>
 AMBILUX_HD bool next_event(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& z, Rgb throughput,
                            uint32_t depth, Vec4f u, Candidate<Mis>& c) {
     EmitterSample light;
+    typename Mis::Lights::Pick pick;
     if (!rules.next_event || !rules.wants(1, depth + 1)) return false;
-    if (!sample_emitter_deferred<F>(scene, z.point.p, u, light) || !may_scatter(z.scattering, light.wi)) return false;
-    const BsdfValue f = scatter_evaluate<F>(z.scattering, light.wi, TransportMode::radiance);
+    if (!sample_emitter_deferred<F>(scene, rules.lights, {z.point.p, z.point.ng}, u, light, pick) ||
+        !may_scatter(z.scattering, light.wi))
+        return false;
+    const BsdfValue f = rules.directions.template evaluate<F>(z, light.wi, TransportMode::radiance);
     if (is_zero(f.value)) return false;
     c.environment = is_environment<F>(scene, light.emitter);
     c.value = throughput * f.value * ((c.environment ? splat(1.0f) : light.radiance) / light.pdf_sa);
-    return !is_zero(c.value) && complete_next_event<F>(scene, rules, z, depth, light, f, c);
+    return !is_zero(c.value) && complete_next_event<F>(scene, rules, z, depth, pick.over_power, light, f, c);
 }
 
 }  // namespace ambilux

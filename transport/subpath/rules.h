@@ -2,6 +2,7 @@
 #pragma once
 
 #include "transport/mis/strategy.h"
+#include "transport/subpath/directions.h"
 #include "transport/subpath/subpath.h"
 
 namespace ambilux {
@@ -21,12 +22,14 @@ struct Rules {
     bool background_only;  ///< eye subpaths end at their first vertex: they serve the directly seen environment, which
                            ///< no light subpath finds
     SingleStrategies singles;
+    [[no_unique_address]] typename Mis::Directions directions;  ///< how directions are sampled at vertices
+    [[no_unique_address]] typename Mis::Lights lights;          ///< how emitters are picked by next event estimation
 
-    /// The same with another model.
+    /// The same with another model, whose samplers are as they come.
     template <class Other>
     Rules<Other> with(const Other& other) const {
         return {other,      max_depth, rr_depth, rr_cap,          hide_emitters, count_hits, count_environment,
-                next_event, splat,     connect,  background_only, singles};
+                next_event, splat,     connect,  background_only, singles,       {},         {}};
     }
     /// Eye subpaths of `depth` segments count the environment that they reach: beyond the first segment as hits only.
     AMBILUX_HD bool counts_environment(uint32_t depth) const {

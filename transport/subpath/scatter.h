@@ -1,10 +1,10 @@
 // The next ray of a subpath.
 #pragma once
 
+#include "transport/subpath/bsdf_directions.h"
 #include "transport/subpath/roulette.h"
 #include "transport/subpath/rules.h"
 #include "transport/subpath/vertex.h"
-#include "transport/surface_scattering.h"
 
 namespace ambilux {
 
@@ -28,11 +28,11 @@ AMBILUX_HD float delta_reverse_pdf(const Scattering& s, const ScatterSample& dra
     return delta_reverse_pdf(s, drawn.wo, drawn.eta);
 }
 
-/// Scatters `path` at `vertex` with `u`: xyz for the BSDF, w for Russian roulette. False if the subpath ends.
+/// Scatters `path` at `vertex` with `u`: xyz for the direction, w for Russian roulette. False if the subpath ends.
 template <Features F, class Mis>
 AMBILUX_HD bool scatter(const Rules<Mis>& rules, Side side, const Vertex<Mis>& vertex, Vec4f u, Subpath<Mis>& path) {
     ScatterSample s;
-    if (!scatter_sample<F>(vertex.scattering, {u.x, u.y, u.z}, transport_mode(side), s)) return false;
+    if (!rules.directions.template sample<F>(vertex, {u.x, u.y, u.z}, transport_mode(side), s)) return false;
     const bool delta = s.flags & kScatterDelta;
     const uint32_t met = path.depth;
     if (met + 1 == rules.max_depth && !rules.mis.counts_last_segment(delta)) return false;

@@ -26,9 +26,9 @@ AMBILUX_HD Subpath<Mis> first_ray(Vec3f origin, Vec3f direction, Rgb throughput)
 }  // namespace detail
 
 /// Camera ray through pixel (x,y) of the crop.
-template <Features F>
-AMBILUX_HD CameraSample camera_sample(const SceneView& scene, uint32_t x, uint32_t y, const Draws& draws) {
-    const Vec4f u = draws.camera();
+template <Features F, class Numbers>
+AMBILUX_HD CameraSample camera_sample(const SceneView& scene, uint32_t x, uint32_t y, const Numbers& numbers) {
+    const Vec4f u = numbers.camera();
     return sample_camera_ray<F>(scene.sensor, sample_film_position(scene, x, y, {u.x, u.y}), {u.z, u.w});
 }
 
@@ -54,8 +54,8 @@ AMBILUX_HD Subpath<Mis> start_light(const Mis& mis, const EmissionSample& e) {
 /// Eye subpath through pixel (x,y) of the crop. `tmax`: of its first ray.
 template <Features F, class Mis>
 AMBILUX_HD Subpath<Mis> start_eye_subpath(const SceneView& scene, const Mis& mis, uint32_t x, uint32_t y,
-                                          const Draws& draws, float& tmax) {
-    const CameraSample c = camera_sample<F>(scene, x, y, draws);
+                                          const NumbersOf<Mis>& numbers, float& tmax) {
+    const CameraSample c = camera_sample<F>(scene, x, y, numbers);
     tmax = c.tmax;
     return start_eye<F>(scene, mis, c);
 }
@@ -64,14 +64,14 @@ AMBILUX_HD Subpath<Mis> start_eye_subpath(const SceneView& scene, const Mis& mis
 /// called where the camera sees the emitter itself: of a key's first light subpath. False if there is no first ray;
 /// `path` is left alone if the emission carries no light.
 template <Features F, class Mis, class Sink>
-AMBILUX_HD bool start_light_subpath(const SceneView& scene, const Rules<Mis>& rules, const Draws& draws,
+AMBILUX_HD bool start_light_subpath(const SceneView& scene, const Rules<Mis>& rules, const NumbersOf<Mis>& numbers,
                                     const Sink& sink, EmissionSample& e, Subpath<Mis>& path) {
-    const Vec4f u = draws.emission_direction();
-    if (!sample_emission<F>(scene, draws.emission_position(), {u.x, u.y}, e)) return false;
+    const Vec4f u = numbers.emission_direction();
+    if (!sample_emission<F>(scene, numbers.emission_position(), {u.x, u.y}, e)) return false;
     path = start_light(rules.mis, e);
     if (!sink.valid(path.throughput)) return false;
     Candidate<Mis> c;
-    if (draws.number == 0 && visible_emitter<F>(scene, rules, e, {u.z, u.w}, c)) sink.add(c);
+    if (numbers.number == 0 && visible_emitter<F>(scene, rules, e, {u.z, u.w}, c)) sink.add(c);
     return rules.max_depth >= 2;
 }
 

@@ -44,8 +44,10 @@ struct Candidate {
     bool environment;  ///< `value` lacks the environment's radiance along `direction`, looked up once the way is free
 };
 
-/// Random numbers of a subpath: a block of four for each decision (core/rng.h).
-struct Draws {
+/// Random numbers of a subpath: a block of four for each decision (core/rng.h). A model of weights names the type that
+/// its integrator uses (Mis::Numbers). It holds these two fields and nothing else, so that whoever needs numbers makes
+/// it anew.
+struct RandomNumbers {
     RngKey key;
     uint32_t number = 0;  ///< of the light subpath among those of its key: streaming starts one for every eye vertex
 
@@ -71,7 +73,10 @@ private:
     }
 };
 
-/// Which shadow ray of an eye vertex at `depth` a connection with a light vertex is (Draws::shadow_seed).
+template <class Mis>
+using NumbersOf = typename Mis::Numbers;
+
+/// Which shadow ray of an eye vertex at `depth` a connection with a light vertex is (RandomNumbers::shadow_seed).
 AMBILUX_HD uint32_t connection_ray(uint32_t depth, uint32_t light) { return depth + (light << kDepthBits); }
 
 /// True if `v` can be radiance: finite, neither negative nor -0. One comparison: the bits of such floats are below

@@ -8,8 +8,9 @@ namespace ambilux {
 
 /// Where the ray of `path` ends, at most `tmax` away.
 template <Features F, class Mis, class Tracer>
-Hit end_of_ray(const SceneView& scene, const Tracer& tracer, const Subpath<Mis>& path, float tmax, const Draws& draws) {
-    const uint32_t seed = F.opacity ? draws.opacity_seed(path.depth) : 0;
+Hit end_of_ray(const SceneView& scene, const Tracer& tracer, const Subpath<Mis>& path, float tmax,
+               const NumbersOf<Mis>& numbers) {
+    const uint32_t seed = F.opacity ? numbers.opacity_seed(path.depth) : 0;
     Hit hit = {tmax, 0.0f, 0.0f, kNone};
     tracer.template closest<F>(scene, Ray{path.origin, tmax, path.direction, seed}, hit);
     return hit;

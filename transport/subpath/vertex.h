@@ -2,7 +2,7 @@
 #pragma once
 
 #include "transport/scattering.h"
-#include "transport/subpath/subpath.h"
+#include "transport/subpath/rules.h"
 
 namespace ambilux {
 
@@ -37,10 +37,10 @@ AMBILUX_HD Vertex<Mis> vertex_with(const SceneView& scene, Vec3f direction, uint
     return v;
 }
 template <Features F, class Mis>
-AMBILUX_HD Vertex<Mis> vertex_at(const SceneView& scene, const Mis& mis, Side side, const Subpath<Mis>& path,
+AMBILUX_HD Vertex<Mis> vertex_at(const SceneView& scene, const Rules<Mis>& rules, Side side, const Subpath<Mis>& path,
                                  const SurfacePoint& point) {
     return vertex_with<F, Mis>(scene, path.direction, path.depth, point,
-                               mis.template sums_at<F>(scene, side, path, path.sums, point));
+                               rules.mis.template sums_at<F>(scene, rules.lights, side, path, path.sums, point));
 }
 
 /// True if the point that lies `to` from `x` lies in the plane of its surface, as far as positions are known: no higher

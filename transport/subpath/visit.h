@@ -7,8 +7,8 @@
 
 namespace ambilux {
 
-/// The ray of `path` ended at `hit`; a miss if hit.prim is kNone. Emission goes to sink.add(candidate); sink.draws()
-/// gives the random numbers of the subpath, late, so that no register keeps them before; sink.at(vertex, path, draws)
+/// The ray of `path` ended at `hit`; a miss if hit.prim is kNone. Emission goes to sink.add(candidate); sink.numbers()
+/// gives the random numbers of the subpath, late, so that no register keeps them before; sink.at(vertex, path, numbers)
 /// is called where connections may start; sink.valid(throughput) may end the subpath. True if it goes on, with `path`
 /// as the next ray. `longest`: segments that the subpath may have (Rules::longest, or fewer). No visibility and no loop
 /// over connections: schedules hold one ray per slot.
@@ -27,11 +27,11 @@ AMBILUX_HD bool visit(const SceneView& scene, const Rules<Mis>& rules, Side side
         if (emission<F>(scene, rules, path, point, c)) sink.add(c);
     }
     if (path.depth >= rules.max_depth) return false;
-    const Vertex<Mis> vertex = vertex_at<F>(scene, rules.mis, side, path, point);
-    const Draws draws = sink.draws();
-    if (bsdf_is_smooth(vertex.scattering.bsdf)) sink.at(vertex, path, draws);
+    const Vertex<Mis> vertex = vertex_at<F>(scene, rules, side, path, point);
+    const NumbersOf<Mis> numbers = sink.numbers();
+    if (bsdf_is_smooth(vertex.scattering.bsdf)) sink.at(vertex, path, numbers);
     if (path.depth >= longest) return false;
-    return scatter<F>(rules, side, vertex, draws.scatter(side, path.depth), path) && sink.valid(path.throughput);
+    return scatter<F>(rules, side, vertex, numbers.scatter(side, path.depth), path) && sink.valid(path.throughput);
 }
 
 }  // namespace ambilux

@@ -15,7 +15,7 @@ struct LeavePhoton {
     uint32_t iteration_samples;
 
     AMBILUX_HD void at(const SceneView&, const Rules<Mis>&, const Vertex<Mis>& y, const Subpath<Mis>& path,
-                       uint32_t slot, const Draws&) const {
+                       uint32_t slot, const NumbersOf<Mis>&) const {
         const PathSlot p = wave.locate(slot);
         const uint32_t first = wave.state->iteration * iteration_samples;
         photons.push({y.point.p, (p.sample - first) * wave.width * wave.height + p.pixel, path.direction, path.depth,
@@ -83,9 +83,9 @@ struct Gather {
         uint32_t slot;
         bool& gathered;
 
-        AMBILUX_HD Draws draws() const { return {stage.wave.key(slot)}; }
+        AMBILUX_HD NumbersOf<Mis> numbers() const { return {stage.wave.key(slot)}; }
         AMBILUX_HD void add(const Candidate<Mis>& c) const { stage.samples.push({c.value, slot}); }
-        AMBILUX_HD void at(const Vertex<Mis>& z, const Subpath<Mis>& path, const Draws&) const {
+        AMBILUX_HD void at(const Vertex<Mis>& z, const Subpath<Mis>& path, const NumbersOf<Mis>&) const {
             const Grid grid = Grid::of(stage.scene, stage.settings, stage.wave.state->iteration);
             const Rgb light =
                 density<F>(stage.state, grid, z, stage.rules.max_depth - path.depth) * (1.0f / stage.light_subpaths);

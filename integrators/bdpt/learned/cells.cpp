@@ -38,11 +38,11 @@ struct KeepEnds {
     Ends& ends;
     bool whole;
     uint32_t max_depth;
-    const Draws& subpath_draws;
+    const RandomNumbers& subpath_numbers;
 
-    Draws draws() const { return subpath_draws; }
+    RandomNumbers numbers() const { return subpath_numbers; }
     void add(const Candidate<Mis>&) const {}
-    void at(const Vertex<Mis>& v, const Subpath<Mis>& path, const Draws&) const {
+    void at(const Vertex<Mis>& v, const Subpath<Mis>& path, const RandomNumbers&) const {
         if (path.depth + 2 > max_depth) return;
         const SubpathEnd<Mis> end = {v, path.throughput, path.depth};
         ends.points.push_back(point_of(end));
@@ -54,10 +54,10 @@ struct KeepEnds {
 /// Keys of light subpaths come after those of eye subpaths.
 template <Features F>
 bool start(const SceneView& scene, const Rules<Mis>& rules, Side side, const KeepEnds& sink, Subpath<Mis>& path) {
-    const Draws draws = sink.draws();
+    const RandomNumbers numbers = sink.numbers();
     EmissionSample e;
-    if (side == Side::light) return start_light_subpath<F>(scene, rules, draws, sink, e, path);
-    const Vec4f u = draws.camera(), pixel = draws.block(0x8000);
+    if (side == Side::light) return start_light_subpath<F>(scene, rules, numbers, sink, e, path);
+    const Vec4f u = numbers.camera(), pixel = numbers.block(0x8000);
     const Sensor& s = scene.sensor;
     const Vec2f at = {float(s.crop_x) + pixel.x * float(s.crop_width),
                       float(s.crop_y) + pixel.y * float(s.crop_height)};
@@ -71,13 +71,13 @@ Ends trace(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& r
     parallel_for(
         kSubpaths,
         [&](uint32_t i) {
-            const Draws draws = {{seed, side == Side::light ? i : kSubpaths + i, 0, Stream::pilot}};
-            const KeepEnds sink = {ends[i], i < kWhole, rules.max_depth, draws};
+            const RandomNumbers numbers = {{seed, side == Side::light ? i : kSubpaths + i, 0, Stream::pilot}};
+            const KeepEnds sink = {ends[i], i < kWhole, rules.max_depth, numbers};
             Subpath<Mis> first;
             if (!start<F>(scene, rules, side, sink, first)) return;
             trace_subpath<F>(
                 scene, rules, side, rules.longest(side), first, kInfinity,
-                [&](const auto& path, float tmax) { return end_of_ray<F>(scene, tracer, path, tmax, draws); }, sink);
+                [&](const auto& path, float tmax) { return end_of_ray<F>(scene, tracer, path, tmax, numbers); }, sink);
         },
         64u);
     Ends all;

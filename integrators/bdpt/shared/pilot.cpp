@@ -14,11 +14,11 @@ namespace {
 struct CountVertices {
     uint32_t& count;
     uint32_t max_depth;
-    const Draws& subpath_draws;
+    const RandomNumbers& subpath_numbers;
 
-    Draws draws() const { return subpath_draws; }
+    RandomNumbers numbers() const { return subpath_numbers; }
     void add(const Candidate<BidirectionalMis>&) const {}
-    void at(const Vertex<BidirectionalMis>&, const Subpath<BidirectionalMis>& path, const Draws&) const {
+    void at(const Vertex<BidirectionalMis>&, const Subpath<BidirectionalMis>& path, const RandomNumbers&) const {
         count += path.depth + 2 <= max_depth;
     }
     bool valid(Rgb) const { return true; }
@@ -33,15 +33,15 @@ double mean_light_vertices(const SceneView& scene, const HostTracer& tracer, con
     parallel_for(
         kPilotSubpaths,
         [&](uint32_t i) {
-            const Draws draws = {{seed, i, 0, Stream::pilot}};
+            const RandomNumbers numbers = {{seed, i, 0, Stream::pilot}};
             uint32_t count = 0;
-            const CountVertices sink = {count, rules.max_depth, draws};
+            const CountVertices sink = {count, rules.max_depth, numbers};
             EmissionSample e;
             Subpath<BidirectionalMis> first;
-            if (!start_light_subpath<F>(scene, rules, draws, sink, e, first)) return;
+            if (!start_light_subpath<F>(scene, rules, numbers, sink, e, first)) return;
             trace_subpath<F>(
                 scene, rules, Side::light, rules.longest(Side::light), first, kInfinity,
-                [&](const auto& path, float tmax) { return end_of_ray<F>(scene, tracer, path, tmax, draws); }, sink);
+                [&](const auto& path, float tmax) { return end_of_ray<F>(scene, tracer, path, tmax, numbers); }, sink);
             vertices.fetch_add(count, std::memory_order_relaxed);
         },
         64u);

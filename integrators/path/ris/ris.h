@@ -45,31 +45,32 @@ struct ResampledNextEvent {
     RisSettings settings;
 
     AMBILUX_HD void at(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v, const Subpath<Mis>& path,
-                       uint32_t slot, const Draws& draws) const {
+                       uint32_t slot, const NumbersOf<Mis>& numbers) const {
         Candidate<Mis> c;
-        if (resample(scene, rules, v, path, draws, c) && is_valid_radiance(c.value, record))
-            candidates.push(pack_candidate(c, slot, seeds ? draws.shadow_seed(path.depth) : 0));
+        if (resample(scene, rules, v, path, numbers, c) && is_valid_radiance(c.value, record))
+            candidates.push(pack_candidate(c, slot, seeds ? numbers.shadow_seed(path.depth) : 0));
     }
 
 private:
-    /// Blocks of random numbers beyond those of Draws.
+    /// Blocks of random numbers beyond those of RandomNumbers.
     static constexpr uint32_t kFirstBlock = 0x20000u;
 
-    AMBILUX_HD static Vec4f numbers(const Draws& draws, uint32_t depth, uint32_t i) {
-        return draws.block(kFirstBlock + depth * RisSettings::kMostCandidates + i);
+    AMBILUX_HD static Vec4f block(const NumbersOf<Mis>& numbers, uint32_t depth, uint32_t i) {
+        return numbers.block(kFirstBlock + depth * RisSettings::kMostCandidates + i);
     }
     AMBILUX_HD bool resample(const SceneView& scene, const Rules<Mis>& rules, const Vertex<Mis>& v,
-                             const Subpath<Mis>& path, const Draws& draws, Candidate<Mis>& c) const {
+                             const Subpath<Mis>& path, const NumbersOf<Mis>& numbers, Candidate<Mis>& c) const {
         if (!rules.next_event) return false;
+        const Receiver receiver = {v.point.p, v.point.ng};
         Reservoir reservoir{};
-        reservoir.u = draws.next_event(path.depth).x;
+        reservoir.u = numbers.next_event(path.depth).x;
         for (uint32_t i = 0; i < settings.candidates; ++i) {
             LightCandidate x;
             // The target needs the radiance of environments now, not once the way is known to be free.
-            if (!sample_emitter_direct<F>(scene, v.point.p, numbers(draws, path.depth, i), x.light) ||
+            if (!sample_emitter_direct<F>(scene, rules.lights, receiver, block(numbers, path.depth, i), x.light) ||
                 !may_scatter(v.scattering, x.light.wi))
                 continue;
-            x.f = scatter_evaluate<F>(v.scattering, x.light.wi, TransportMode::radiance);
+            x.f = rules.directions.template evaluate<F>(v, x.light.wi, TransportMode::radiance);
             if (is_zero(x.f.value) || !is_valid_radiance(x.f.value * (x.light.radiance / x.light.pdf_sa), record))
                 continue;
             const float target = luminance(x.f.value * x.light.radiance), weight = target / x.light.pdf_sa;
@@ -79,8 +80,9 @@ private:
         const LightCandidate& y = reservoir.kept;
         const float scale = reservoir.sum / (float(settings.candidates) * reservoir.target);
         c.value = path.throughput * y.f.value * (y.light.radiance * scale);
+        const float over_power = rules.lights.over_power(scene, receiver, y.light.emitter);
         c.environment = false;  // its radiance is in the value
-        return !is_zero(c.value) && complete_next_event<F>(scene, rules, v, path.depth, y.light, y.f, c);
+        return !is_zero(c.value) && complete_next_event<F>(scene, rules, v, path.depth, over_power, y.light, y.f, c);
     }
 };
 
