@@ -13,12 +13,13 @@ Budget batch_end(const ExperimentConfig& config, const RenderPosition& at, const
     const auto end = [](double now, double step) { return (std::floor(now / step + 0.5) + 1) * step; };
     if (!config.seconds.empty()) {
         const double step = config.seconds.back() / kBatches, next = end(at.seconds, step);
-        // A batch for which half a sample is too long would never begin.
-        const bool has_room = next - at.seconds >= 0.5 * at.per_sample;
+        // A batch for which half an iteration is too long would never begin.
+        const bool has_room = next - at.seconds >= 0.5 * at.per_iteration();
         if (has_room && (budget.seconds == 0 || next <= budget.seconds - 0.5 * step)) budget.seconds = next;
     } else {
         const double step = std::max(1.0, double(config.spp.back()) / kBatches);
-        const auto next = uint64_t(std::llround(end(double(at.samples), step)));
+        const uint32_t k = at.iteration_samples;
+        const uint64_t next = (uint64_t(std::llround(end(double(at.samples), step))) + k - 1) / k * k;
         if (double(next) <= double(budget.samples) - 0.5 * step) budget.samples = next;
     }
     return budget;

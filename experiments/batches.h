@@ -16,7 +16,7 @@ namespace ambilux {
 /// Of a render: enough to resample, few enough to cost little.
 constexpr int kBatches = 16;
 
-/// `checkpoint`, or the end of the batch after `at` if that comes sooner by half a batch or more.
+/// `checkpoint`, or the end of the batch after `at`, in whole iterations, if that comes sooner by half a batch or more.
 Budget batch_end(const ExperimentConfig& config, const RenderPosition& at, const Budget& checkpoint);
 
 /// The budget until the first of the pending checkpoints, or the end of a batch (batch_end).

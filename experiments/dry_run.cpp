@@ -26,11 +26,11 @@ struct Pilot {
     uint64_t memory = 0;
 };
 
-/// Renders for a moment. The first sample warms up caches and is not measured, unless it takes long enough alone.
+/// Renders for a moment. The first iteration warms up caches and is not measured, unless it takes long enough alone.
 Pilot measure(const Scene& scene, const RenderSettings& settings, const volatile bool* interrupt, const Hooks& hooks) {
     const auto renderer = hooks.make_renderer(scene, settings);
     Pilot pilot;
-    RenderPosition p = drive(*renderer, {}, {1, 0}, interrupt);
+    RenderPosition p = drive(*renderer, {}, {renderer->iteration_samples(), 0}, interrupt);
     if (!p.interrupted && p.seconds < kPilotSeconds) {
         const RenderPosition first{p.samples, 0, false};
         p = drive(*renderer, first, {0, kPilotSeconds}, interrupt);

@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/sha256.h"
 #include "experiments/reference_store.h"
+#include "session/drive.h"
 
 namespace ambilux {
 namespace {
@@ -55,11 +56,16 @@ int line_of(const RunEntry& run, const std::string& message, int line) {
     return line;
 }
 
-/// Makes a renderer and lets it go; what it refuses is refused with the line of `run`.
+/// Makes a renderer and lets it go; what it refuses, and numbers of `samples` that are no whole iterations, is refused
+/// with the line of `run`.
 RenderStats try_settings(const ExperimentConfig& config, const LoadedEntry& scene, const RunEntry& run,
-                         const RenderSettings& settings, const std::string& who, int line, const Hooks& hooks) {
+                         const RenderSettings& settings, const std::vector<uint64_t>& samples, const std::string& who,
+                         int line, const Hooks& hooks) {
     try {
-        return hooks.make_renderer(scene.scene, settings)->stats();
+        const std::unique_ptr<Renderer> renderer = hooks.make_renderer(scene.scene, settings);
+        const RenderStats stats = renderer->stats();
+        for (const uint64_t spp : samples) check_iterations("spp", spp, renderer->iteration_samples(), stats.settings);
+        return stats;
     } catch (const Error& e) {
         if (e.code != ExitCode::usage) throw;
         throw input_error(config.file, line_of(run, e.what(), line), fmt::format("{}: {}", who, e.what()));
@@ -104,7 +110,7 @@ Prepared prepare_experiment(const std::string& path, bool reduced, const Hooks& 
                 !tried.insert({settings.integrator, settings.variant, settings.backend}).second)
                 continue;
             const RenderStats stats =
-                try_settings(p.config, scene, run, settings,
+                try_settings(p.config, scene, run, settings, p.config.spp,
                              fmt::format("run '{}' on scene '{}'", run.name, scene.entry->name), run.line, hooks);
             p.devices.insert(stats.device);
             p.backends.insert(stats.backend);
@@ -112,8 +118,8 @@ Prepared prepare_experiment(const std::string& path, bool reduced, const Hooks& 
         const RunEntry& how = scene.entry->reference.how;
         if (how.settings.empty()) continue;
         const RenderSettings settings = reference_settings(p.config, *scene.entry, scene.scene, scene.max_depth, hooks);
-        try_settings(p.config, scene, how, settings, fmt::format("reference of '{}'", scene.entry->name), how.line,
-                     hooks);
+        try_settings(p.config, scene, how, settings, {scene.entry->reference.spp},
+                     fmt::format("reference of '{}'", scene.entry->name), how.line, hooks);
     }
     return p;
 }

@@ -83,6 +83,7 @@ bool TaskRunner::try_render(size_t index, const RunEntry& run, uint64_t seed) {
     restore(task);
     task.settings = settings_for(config_, task.scene, run, seed, p_.hooks);
     const std::unique_ptr<Renderer> renderer = maker(run).make(task.what(), task.total);
+    if (task.state.moments.samples) load_devices(*renderer, task.state.devices, task.state_path);
     const bool cuda = p_.prepared.backends.contains("cuda");
     gpu_ = {};
     const LoadReading load = p_.hooks.load();
@@ -138,6 +139,7 @@ void TaskRunner::restore(RenderTask& task) {
 bool TaskRunner::pass_checkpoints(RenderTask& task, Renderer& renderer) {
     RenderState& state = task.state;
     RenderPosition position{state.moments.samples, state.notes["seconds"].get<double>(), false};
+    position.iteration_samples = renderer.iteration_samples();
     // Choosing is part of the method: its time counts.
     position.seconds += renderer.stats().selection.seconds;
     p_.work.begin(task.work, work_after(config_, task.scene, position));
@@ -157,6 +159,7 @@ bool TaskRunner::pass_checkpoints(RenderTask& task, Renderer& renderer) {
             if (!position.interrupted)
                 record_batch(task, film, position.seconds - before.seconds, other_cores(load, after));
             state.moments.add(film);
+            state.devices = save_devices(renderer);
             renderer.clear_film();
         }
         counted = renderer.stats();  // a renderer may or may not restart its counters with its film

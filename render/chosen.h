@@ -37,6 +37,10 @@ public:
         return s;
     }
     std::vector<StrategyImage> strategy_images() override { return renderer_->strategy_images(); }
+    StateKind state_kind() const override { return renderer_->state_kind(); }
+    std::vector<std::byte> save_state() override { return renderer_->save_state(); }
+    void load_state(std::span<const std::byte> saved) override { drop(), renderer_->load_state(saved); }
+    uint32_t iteration_samples() const override { return renderer_->iteration_samples(); }
     uint32_t preferred_batch() const override { return renderer_->preferred_batch(); }
 
 private:

@@ -25,11 +25,12 @@ std::map<std::string, InvalidCounts> InvalidWatch::news() {
 
 std::vector<InvalidBatch> InvalidWatch::samples(const InvalidBatch& batch, size_t most,
                                                 const volatile bool* interrupt) {
-    if (batch.count == 1) return {batch};
+    const uint32_t k = iteration_samples();
+    if (batch.count == k) return {batch};
     std::vector<InvalidBatch> found;
-    for (uint32_t s = 0; s < batch.count && found.size() < most; ++s) {
-        if (is_set(interrupt) || renderer_->render(batch.first + s, 1, interrupt) == 0) break;
-        InvalidBatch one = {batch.first + s, 1, news()};
+    for (uint32_t s = 0; s < batch.count && found.size() < most; s += k) {
+        if (is_set(interrupt) || renderer_->render(batch.first + s, k, interrupt) == 0) break;
+        InvalidBatch one = {batch.first + s, k, news()};
         if (!one.by_stage.empty()) found.push_back(std::move(one));
     }
     return found;

@@ -26,13 +26,17 @@ public:
     uint32_t ready() const override { return renderer_->ready(); }
     RenderStats stats() override { return renderer_->stats(); }
     std::vector<StrategyImage> strategy_images() override { return renderer_->strategy_images(); }
+    StateKind state_kind() const override { return renderer_->state_kind(); }
+    std::vector<std::byte> save_state() override { return renderer_->save_state(); }
+    void load_state(std::span<const std::byte> saved) override { renderer_->load_state(saved); }
+    uint32_t iteration_samples() const override { return renderer_->iteration_samples(); }
     uint32_t preferred_batch() const override { return renderer_->preferred_batch(); }
 
     const std::vector<InvalidBatch>& batches() const { return batches_; }
     /// What all samples dropped that were rendered.
     const std::map<std::string, InvalidCounts>& by_stage() const { return counted_; }
-    /// The samples of a batch that drop values, each as a batch of its own, by rendering them again: at most `most`,
-    /// the first ones. The film is of no use any more.
+    /// The iterations of a batch (most methods: samples) that drop values, each as a batch of its own, by rendering
+    /// them again: at most `most`, the first ones. The film is of no use any more.
     std::vector<InvalidBatch> samples(const InvalidBatch& batch, size_t most, const volatile bool* interrupt);
 
 private:

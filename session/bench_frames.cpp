@@ -31,11 +31,12 @@ double FrameTimes::quantile(double share) const {
 
 FrameTimes time_frames(Renderer& renderer, uint32_t frames, const volatile bool* interrupt) {
     using Clock = std::chrono::steady_clock;
+    const uint32_t k = renderer.iteration_samples();
     FrameTimes times;
     for (uint32_t frame = 0; frame < kUntimed + frames && !is_set(interrupt); ++frame) {
         const auto start = Clock::now();
         renderer.clear_film();
-        if (renderer.render(frame, 1, interrupt) < 1) break;
+        if (renderer.render(frame * k, k, interrupt) < k) break;
         read_image(renderer, times.rgb);
         if (frame >= kUntimed) times.seconds.push_back(std::chrono::duration<double>(Clock::now() - start).count());
     }

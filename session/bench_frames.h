@@ -7,7 +7,8 @@
 
 namespace ambilux {
 
-/// Seconds of frames, each: a film that is cleared, one sample of every pixel, and its image in the memory of the host.
+/// Seconds of frames, each: a film that is cleared, one iteration (for most methods: one sample of every pixel), and
+/// its image in the memory of the host.
 struct FrameTimes {
     std::vector<double> seconds;  ///< in their order
     std::vector<float> rgb;       ///< the last image, as Image::rgb

@@ -100,6 +100,7 @@ public:
         if (sums && sums->notes["identity"] == identity_ && sums->moments.samples >= total_.samples &&
             sums->moments.width == scene_.sensor.crop_width && sums->moments.height == scene_.sensor.crop_height) {
             total_ = std::move(sums->moments);
+            devices_ = std::move(sums->devices);
             earlier_seconds_ = sums->notes["seconds"].get<double>();
             result_.reference = to_reference(total_);
         }
@@ -107,15 +108,18 @@ public:
     }
 
     void render(Renderer& renderer) {
+        if (devices_) load_devices(renderer, *devices_, sums_path_);  // an image that is extended learns anew
         RenderPosition position{total_.samples, 0, false};
         while (position.samples < request_.spp && !position.interrupted) {
             const uint64_t before = position.samples;
-            // A checkpoint's time ends drive(); it makes at least one sample.
-            const double due = position.seconds + std::max({request_.checkpoint_seconds, 1e-3, position.per_sample});
+            // A checkpoint's time ends drive(); it makes at least one iteration.
+            const double due =
+                position.seconds + std::max({request_.checkpoint_seconds, 1e-3, position.per_iteration()});
             position = drive(renderer, position, {request_.spp, due}, request_.interrupt, request_.on_batch);
             if (position.samples == before) continue;
             total_.add(renderer.film());
             result_.stats = renderer.stats();
+            devices_ = save_devices(renderer);
             renderer.clear_film();
             write(earlier_seconds_ + position.seconds);
         }
@@ -142,7 +146,7 @@ private:
         result_.attributes = attributes_of(stated, seconds);
         if (total_.samples < 2) return;
         if (total_.samples < request_.spp)
-            write_state(sums_path_, {total_, {{"identity", identity_}, {"seconds", seconds}}});
+            write_state(sums_path_, {total_, {{"identity", identity_}, {"seconds", seconds}}, *devices_});
         write_reference_exr(request_.path, result_.reference, result_.attributes);
     }
 
@@ -152,6 +156,7 @@ private:
     const std::string sums_path_;
     nlohmann::json identity_;
     FilmMoments total_;
+    std::optional<DeviceStates> devices_;  ///< of the sums beside the image
     double earlier_seconds_ = 0;
     ReferenceResult result_;
 };

@@ -40,8 +40,8 @@ struct ReferenceResult {
 /// Brings the file up to `spp` samples and saves it every `checkpoint_seconds` and at the end, also when interrupted. A
 /// file that holds as many samples already is returned as it is. Until the file is complete its sums lie beside it in
 /// full precision (PATH.sums), so that a reference that was killed and continued has the values of one that was not;
-/// one that is extended later starts from the stored floats (6e-8 relative). Throws Error(bad_input) that names what
-/// differs if the file is of another scene, size, depth, seed or integrator.
+/// one that is extended later starts from the stored floats (6e-8 relative), and its method learns anew. Throws
+/// Error(bad_input) that names what differs if the file is of another scene, size, depth, seed or integrator.
 ReferenceResult make_reference(const Scene& scene, const ReferenceRequest& request, const Hooks& hooks);
 
 }  // namespace ambilux

@@ -1,15 +1,19 @@
 #include "session/state.h"
 
+#include <fmt/format.h>
+
 #include <cstring>
 #include <filesystem>
 
 #include "core/atomic_file.h"
+#include "core/error.h"
 #include "core/log.h"
+#include "render/renderer.h"
 
 namespace ambilux {
 namespace {
 
-constexpr char kMagic[] = "ambilux state 3\n";
+constexpr char kMagic[] = "ambilux state 4\n";
 
 /// FNV-1a, 64 bits: against truncation and bit rot, not against people.
 uint64_t checksum(std::string_view bytes) {
@@ -34,15 +38,40 @@ bool take(std::string_view& in, T* values, size_t count) {
 
 }  // namespace
 
+DeviceStates save_devices(Renderer& renderer) {
+    if (renderer.state_kind() != StateKind::per_device) return {};
+    return {renderer.save_state()};
+}
+
+void load_devices(Renderer& renderer, const DeviceStates& saved, const std::string& path) {
+    if (renderer.state_kind() != StateKind::per_device) return;
+    check_devices(saved, 1, path);
+    if (!saved[0].empty()) renderer.load_state(saved[0]);
+}
+
+void check_devices(const DeviceStates& saved, size_t count, const std::string& path) {
+    if (saved.size() == count) return;
+    const auto devices = [](size_t n) { return fmt::format("{} device{}", n, n == 1 ? "" : "s"); };
+    throw input_error(path, 0,
+                      fmt::format("{} saved what this method has learned, and {} would go on: take as many devices, or "
+                                  "remove the file",
+                                  devices(saved.size()), devices(count)));
+}
+
 void write_state(const std::string& path, const RenderState& state) {
     const FilmMoments& m = state.moments;
     const std::string notes = state.notes.dump();
     std::string out = kMagic;
-    const uint64_t numbers[] = {notes.size(), m.width, m.height, m.samples, m.sum.size()};
-    put(out, numbers, 5);
+    const uint64_t numbers[] = {notes.size(), m.width, m.height, m.samples, m.sum.size(), state.devices.size()};
+    put(out, numbers, 6);
     out += notes;
     put(out, m.sum.data(), m.sum.size());
     put(out, m.sum_squares.data(), m.sum_squares.size());
+    for (const std::vector<std::byte>& device : state.devices) {
+        const uint64_t bytes = device.size();
+        put(out, &bytes, 1);
+        put(out, device.data(), device.size());
+    }
     const uint64_t hash = checksum(out);
     put(out, &hash, 1);
     write_file_atomic(path, out);
@@ -56,13 +85,13 @@ std::optional<RenderState> read_state(const std::string& path) {
         log_warning(path + " is damaged, or of another version: this render begins anew");
         return std::nullopt;
     };
-    uint64_t hash = 0, numbers[5];
+    uint64_t hash = 0, numbers[6];
     if (content.size() < sizeof hash) return damaged();
     std::memcpy(&hash, content.data() + content.size() - sizeof hash, sizeof hash);
     in.remove_suffix(sizeof hash);
     if (!in.starts_with(kMagic) || checksum(in) != hash) return damaged();
     in.remove_prefix(sizeof kMagic - 1);
-    if (!take(in, numbers, 5) || numbers[0] > in.size()) return damaged();
+    if (!take(in, numbers, 6) || numbers[0] > in.size()) return damaged();
     RenderState state;
     state.notes = nlohmann::json::parse(in.substr(0, numbers[0]), nullptr, false);
     in.remove_prefix(numbers[0]);
@@ -70,9 +99,15 @@ std::optional<RenderState> read_state(const std::string& path) {
         return damaged();
     state.moments = {uint32_t(numbers[1]), uint32_t(numbers[2]), numbers[3], std::vector<double>(numbers[4]),
                      std::vector<double>(numbers[4])};
-    if (!take(in, state.moments.sum.data(), numbers[4]) || !take(in, state.moments.sum_squares.data(), numbers[4]) ||
-        !in.empty())
+    if (!take(in, state.moments.sum.data(), numbers[4]) || !take(in, state.moments.sum_squares.data(), numbers[4]))
         return damaged();
+    for (uint64_t device = 0; device < numbers[5]; ++device) {
+        uint64_t bytes = 0;
+        if (!take(in, &bytes, 1) || bytes > in.size()) return damaged();
+        state.devices.emplace_back(bytes);
+        take(in, state.devices.back().data(), bytes);
+    }
+    if (!in.empty()) return damaged();
     return state;
 }
 

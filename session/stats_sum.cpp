@@ -1,5 +1,7 @@
 #include "session/stats_sum.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 
@@ -102,6 +104,30 @@ void add_part(RenderStats& total, const RenderStats& before, const RenderStats& 
             counts);
     }
     total = std::move(sum);
+}
+
+RenderStats sum_of_devices(RenderStats sum, const std::vector<std::pair<std::string, RenderStats>>& devices,
+                           bool hosts) {
+    RenderStats together;
+    std::map<std::string, int> names;
+    for (const auto& [host, stats] : devices) {
+        add_part(sum, {}, stats);
+        together.memory_bytes += stats.memory_bytes;
+        together.memory_bytes_predicted += stats.memory_bytes_predicted;
+        together.memory_bytes_peak += stats.memory_bytes_peak;
+        together.build_seconds = std::max(together.build_seconds, stats.build_seconds);
+        ++names[host + ": " + stats.device];
+    }
+    sum.device.clear();
+    for (const auto& [name, count] : names)
+        sum.device +=
+            fmt::format("{}{}{}", sum.device.empty() ? "" : "; ", count > 1 ? fmt::format("{} x ", count) : "",
+                        names.size() > 1 || hosts ? name : devices[0].second.device);
+    sum.memory_bytes = together.memory_bytes;
+    sum.memory_bytes_predicted = together.memory_bytes_predicted;
+    sum.memory_bytes_peak = together.memory_bytes_peak;
+    sum.build_seconds = together.build_seconds;
+    return sum;
 }
 
 nlohmann::json save_stats(const RenderStats& s) {

@@ -11,6 +11,11 @@ namespace ambilux {
 /// rest is taken from `now`.
 void add_part(RenderStats& total, const RenderStats& before, const RenderStats& now);
 
+/// Of devices that rendered at the same time, each with the name of its host, and of an earlier part. `hosts`: names of
+/// hosts are stated even where all devices are alike.
+RenderStats sum_of_devices(RenderStats earlier, const std::vector<std::pair<std::string, RenderStats>>& devices,
+                           bool hosts);
+
 /// All fields, and back.
 nlohmann::json save_stats(const RenderStats& stats);
 RenderStats restore_stats(const nlohmann::json& json);

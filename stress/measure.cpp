@@ -87,14 +87,16 @@ Measurement measure(const Hooks& hooks, const Scene& scene, const RenderSettings
     if (effort.samples > kMaxSamples) throw Error(ExitCode::usage, "at most 4294967295 samples per pixel are possible");
     const double pixels = double(scene.sensor.crop_width) * scene.sensor.crop_height;
     BoxSums sums(scene.sensor.crop_width, scene.sensor.crop_height);
-    uint64_t count = uint64_t(std::max(1.0, std::round(effort.first_paths / (pixels * sums.batch_count))));
     RenderSettings s = settings;
     s.expected_samples = std::max(effort.samples, uint64_t(effort.paths / pixels)) / sums.batch_count + 1;
     const auto start = Clock::now();
     const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
     const std::unique_ptr<Renderer> renderer = hooks.make_renderer(scene, s);
+    const uint64_t k = renderer->iteration_samples();
+    const auto whole = [k](uint64_t wanted) { return (wanted + k - 1) / k * k; };
     Measurement m;
     uint64_t samples = 0;  // of every batch
+    uint64_t count = whole(uint64_t(std::max(1.0, std::round(effort.first_paths / (pixels * sums.batch_count)))));
     while (count > 0) {
         const double before = elapsed();
         const auto out_of_time = [&](uint32_t done) {
@@ -121,7 +123,7 @@ Measurement measure(const Hooks& hooks, const Scene& scene, const RenderSettings
         m.seconds = elapsed();
         if (done < sums.batch_count) break;
         if (samples == count) m.first = mean_of(m.batches).value;
-        count = next_round(m, effort, pixels, sums.batch_count, samples, m.seconds - before, count);
+        count = whole(next_round(m, effort, pixels, sums.batch_count, samples, m.seconds - before, count));
     }
     const RenderStats stats = renderer->stats();
     m.invalid = stats.invalid.total();

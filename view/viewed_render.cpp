@@ -188,6 +188,8 @@ void ViewedRender::render_some() {
     const double one = whole_seconds_ * pixels;
     uint32_t count = samples_ && one > 0 ? uint32_t(std::clamp(kFrameSeconds / one, 1.0, 64.0)) : 1;
     if (samples_ == 0) count = std::max(count, renderer_->ready());
+    const uint32_t k = renderer_->iteration_samples();
+    count = std::max(k, count / k * k);
     const auto start = Clock::now();
     const uint32_t done = renderer_->render(samples_, count, &interrupt_);
     if (done && done > renderer_->ready()) whole_seconds_ = seconds_since(start) / done / pixels;

@@ -17,10 +17,10 @@ FilmMoments as_one_sample(const FilmMoments& part) {
     return one;
 }
 
-/// kAgreementParts parts of `samples` per pixel; empty if interrupted.
+/// kAgreementParts parts of together `samples` per pixel, in whole iterations; empty if interrupted.
 std::vector<FilmMoments> render_parts(Renderer& renderer, uint64_t samples, const volatile bool* interrupt,
                                       RenderPosition& position) {
-    const uint64_t each = std::max<uint64_t>(1, samples / kAgreementParts);
+    const uint64_t k = renderer.iteration_samples(), each = std::max(k, samples / kAgreementParts / k * k);
     std::vector<FilmMoments> parts;
     for (int i = 1; i <= kAgreementParts; ++i) {
         position = drive(renderer, position, {each * uint64_t(i), 0}, interrupt);

@@ -85,7 +85,7 @@ public:
             Budget part = budget_;
             const bool shorter = seconds > 0 && (budget_.seconds == 0 || position_.seconds + seconds < budget_.seconds);
             // A batch of its own is the least that a step makes.
-            if (shorter) part.seconds = position_.seconds + std::max(seconds, position_.per_sample);
+            if (shorter) part.seconds = position_.seconds + std::max(seconds, position_.per_iteration());
             const uint64_t before = position_.samples;
             position_ = drive(*renderer_, position_, part, interrupt);
             position_.interrupted = false;

@@ -1,13 +1,18 @@
 #include "session/parallel/checkpoint.h"
 
+#include <fmt/format.h>
+
 #include <filesystem>
+
+#include "core/error.h"
 
 namespace ambilux {
 namespace {
 
 /// The films of a tree one below the other, as one film.
-RenderState stacked(const MergeTree& tree, nlohmann::json notes) {
+RenderState stacked(const MergeTree& tree, nlohmann::json notes, DeviceStates devices) {
     RenderState state;
+    state.devices = std::move(devices);
     notes["nodes"] = nlohmann::json::array();
     for (const auto& [first, entry] : tree.entries()) {
         const FilmMoments& film = entry.film;
@@ -45,17 +50,32 @@ MergeTree unstacked(const RenderState& state) {
 
 bool CheckpointFile::exists() const { return std::filesystem::exists(path_); }
 
-nlohmann::json CheckpointFile::read(MergeTree& tree) const {
+nlohmann::json CheckpointFile::read(MergeTree& tree, DeviceStates& devices) const {
     std::optional<RenderState> state = read_state(path_);
     if (!state) return nullptr;
     tree = unstacked(*state);
+    devices = std::move(state->devices);
     return std::move(state->notes);
 }
 
-void CheckpointFile::write(const MergeTree& tree, nlohmann::json notes) {
+void CheckpointFile::check_same(const nlohmann::json& notes, const nlohmann::json& identity,
+                                uint32_t range_size) const {
+    const auto refuse = [&](const std::string& what) {
+        throw input_error(
+            path_, 0, fmt::format("holds another render: its {} differs. Give another -o, or remove the file", what));
+    };
+    for (const char* key : {"scene_hash", "spp"})
+        if (notes.at("identity").at(key) != identity.at(key)) refuse(key);
+    for (const auto& [key, value] : identity.at("settings").items())
+        if (notes.at("identity").at("settings").value(key, nlohmann::json()) != value) refuse(key);
+    if (range_size && notes.at("range_size") != range_size) refuse("range size");
+}
+
+void CheckpointFile::write(const MergeTree& tree, nlohmann::json notes, DeviceStates devices) {
     wait();
-    writing_ = std::async(std::launch::async,
-                          [path = path_, state = stacked(tree, std::move(notes))] { write_state(path, state); });
+    writing_ = std::async(
+        std::launch::async,
+        [path = path_, state = stacked(tree, std::move(notes), std::move(devices))] { write_state(path, state); });
 }
 
 void CheckpointFile::wait() {

@@ -14,10 +14,13 @@ public:
     explicit CheckpointFile(std::string path) : path_(std::move(path)) {}
 
     bool exists() const;
-    /// Notes of the state, and `tree` filled; null if there is none or it is damaged (read_state).
-    nlohmann::json read(MergeTree& tree) const;
+    /// Notes of the state, and `tree` and `devices` filled; null if there is none or it is damaged (read_state).
+    nlohmann::json read(MergeTree& tree, DeviceStates& devices) const;
+    /// Throws Error(bad_input) that names what differs if notes of the state are those of another render. `range_size`:
+    /// 0 agrees with any.
+    void check_same(const nlohmann::json& notes, const nlohmann::json& identity, uint32_t range_size) const;
     /// Begins to write; waits for an earlier one to end.
-    void write(const MergeTree& tree, nlohmann::json notes);
+    void write(const MergeTree& tree, nlohmann::json notes, DeviceStates devices);
     /// Throws what writing threw.
     void wait();
     void remove();

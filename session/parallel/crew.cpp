@@ -17,16 +17,17 @@ double seconds_between(Clock::time_point a, Clock::time_point b) {
 }
 double seconds_since(Clock::time_point start) { return seconds_between(start, Clock::now()); }
 
-/// Samples from 0 on, in batches that grow, until about `seconds` are over.
+/// Samples from 0 on, in batches of whole iterations that grow, until about `seconds` are over.
 uint32_t render_for(Renderer& renderer, double seconds, const volatile bool* stop) {
     const auto start = Clock::now();
+    const uint32_t k = renderer.iteration_samples();
     uint32_t done = 0;
     for (;;) {
         const double passed = seconds_since(start);
         if (is_set(stop) || passed >= seconds) return done;
         const double left = done ? (seconds - passed) / passed * done : 1;
         const auto count = uint32_t(std::clamp<double>(left, 1, std::max<uint32_t>(1, 4 * done)));
-        done += renderer.render(done, count, stop);
+        done += renderer.render(done, std::max(k, count / k * k), stop);
     }
 }
 
@@ -80,13 +81,17 @@ void Crew::run(size_t index, const Scene& scene, RenderSettings settings, Shared
     std::future<void> handing;  // over the film before; before the lock, which it needs to end
     std::unique_lock lock(mutex_);
     worker.work.stats = renderer->stats();
+    state_kind_ = renderer->state_kind();
+    iteration_samples_ = renderer->iteration_samples();
     worker.ready = true;
     changed_.notify_all();
     for (Task task;;) {
         changed_.wait(lock, [&] { return is_set(&stop_) || next_task(index, task); });
         if (is_set(&stop_)) return;
         worker.busy = true;
+        const std::vector<std::byte> earlier = std::exchange(worker.state, {});
         lock.unlock();
+        if (!earlier.empty()) renderer->load_state(earlier);
         std::optional<Piece> piece = render(index, *renderer, task);
         if (!piece) return;
         if (handing.valid()) handing.get();
@@ -147,7 +152,9 @@ std::optional<Crew::Piece> Crew::render(size_t index, Renderer& renderer, const 
         if (renderer.render(order.ranges.first_sample(task.range), samples, &stop_) < samples) return {};
     }
     if (is_set(&stop_)) return {};
-    return Piece{task, index, {}, seconds_since(start)};
+    const double seconds = seconds_since(start);
+    const bool keeps = renderer.state_kind() == StateKind::per_device;
+    return Piece{task, index, {}, seconds, keeps ? renderer.save_state() : std::vector<std::byte>()};
 }
 
 /// Waits while two films of the worker are not added up: there would be ever more of them.
@@ -162,6 +169,11 @@ void Crew::post(Piece piece, RenderStats stats) {
     ++worker.waiting;
     pieces_.push_back(std::move(piece));
     changed_.notify_all();
+}
+
+void Crew::load(std::vector<RangeState> states) {
+    const std::lock_guard lock(mutex_);
+    for (RangeState& s : states) workers_.at(s.device)->state = std::move(s.state);
 }
 
 void Crew::give(const Order& order) {
@@ -201,6 +213,8 @@ std::vector<Finished> Crew::take(double seconds) {
         lock.unlock();
         Open& node = *piece.task.node;
         node.seconds += piece.seconds;
+        if (state_kind_ == StateKind::per_device)
+            states_.push_back({piece.worker, piece.task.range, std::move(piece.state)});
         node.films.add({0, piece.task.range}, std::move(piece.film));
         if (--node.missing == 0) finished.push_back({node.order, node.films.take_sum(), node.seconds});
         lock.lock();

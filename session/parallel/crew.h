@@ -33,6 +33,13 @@ struct Finished {
     double seconds = 0;  ///< of all devices together
 };
 
+/// What a device keeps (Renderer::save_state) after a range.
+struct RangeState {
+    size_t device = 0;  ///< of its crew
+    uint64_t range = 0;
+    std::vector<std::byte> state;
+};
+
 /// A device as --devices names it: the number of a CUDA device, or "cpu".
 struct Device {
     int cuda = -1;  ///< -1: the CPU
@@ -55,12 +62,20 @@ public:
     ~Crew();
 
     size_t size() const { return workers_.size(); }
+    /// Of the renderers' method.
+    StateKind state_kind() const { return state_kind_; }
+    uint32_t iteration_samples() const { return iteration_samples_; }
+    /// Before the first order: what devices keep from an earlier part of the render.
+    void load(std::vector<RangeState> states);
     void give(const Order& order);
     /// Ranges that its devices could begin now, beside those that it was given.
     size_t wanted() const;
     /// Nodes that were finished meanwhile; waits up to `seconds` for a film of any device. Throws what a device threw,
     /// after what was finished before.
     std::vector<Finished> take(double seconds);
+    /// Of methods that keep a state per device: after each range whose film was taken since, in the order of each
+    /// device.
+    std::vector<RangeState> take_states() { return std::exchange(states_, {}); }
     /// Of each device.
     std::vector<DeviceWork> work() const;
 
@@ -80,7 +95,8 @@ private:
         Device device;
         DeviceWork work;
         bool ready = false, busy = false;
-        int waiting = 0;  ///< its films that are not taken yet
+        int waiting = 0;               ///< its films that are not taken yet
+        std::vector<std::byte> state;  ///< of an earlier part, before its first range
         std::thread thread;
     };
     struct Task {
@@ -93,6 +109,7 @@ private:
         size_t worker = 0;
         FilmMoments film;
         double seconds = 0;
+        std::vector<std::byte> state;  ///< of methods that keep one per device
     };
 
     void run(size_t index, const Scene& scene, RenderSettings settings, SharedAccels& host);
@@ -107,6 +124,9 @@ private:
     std::condition_variable changed_;
     std::deque<std::shared_ptr<Open>> open_;  ///< with ranges that no device has begun
     std::deque<Piece> pieces_;
+    std::vector<RangeState> states_;  ///< of the thread that takes
+    StateKind state_kind_ = StateKind::none;
+    uint32_t iteration_samples_ = 1;
     std::exception_ptr error_;
     bool failed_ = false;  ///< take() has seen it
     volatile bool stop_ = false;

@@ -11,6 +11,7 @@
 #include "render/shared_renderer.h"
 #include "session/parallel/checkpoint.h"
 #include "session/parallel/collector.h"
+#include "session/parallel/state_log.h"
 #include "session/parallel/wire.h"
 #include "session/statistics.h"
 #include "session/stats_sum.h"
@@ -38,6 +39,7 @@ public:
         restore();
         choose();
         gather();
+        if (!interrupted_) begin_iterations();
         start_ = Clock::now();
         saved_ = start_;
         try {
@@ -54,6 +56,7 @@ private:
     /// A rank with its devices.
     struct Party {
         int rank = 0;
+        size_t first_device = 0;  ///< its number among those of all ranks
         std::string host;
         std::vector<DeviceWork> devices;
         uint64_t open = 0;     ///< nodes that it has not rendered
@@ -80,18 +83,9 @@ private:
             throw Error(ExitCode::usage, fmt::format("{} holds a render that was stopped: go on with it with --resume, "
                                                      "or remove the file",
                                                      state_.path()));
-        const nlohmann::json notes = state_.read(tree_);
+        const nlohmann::json notes = state_.read(tree_, kept_);
         if (notes.is_null()) return;
-        const auto refuse = [&](const std::string& what) {
-            throw input_error(
-                state_.path(), 0,
-                fmt::format("holds another render: its {} differs. Give another -o, or remove the file", what));
-        };
-        for (const char* key : {"scene_hash", "spp"})
-            if (notes.at("identity").at(key) != identity_.at(key)) refuse(key);
-        for (const auto& [key, value] : identity_.at("settings").items())
-            if (notes.at("identity").at("settings").value(key, nlohmann::json()) != value) refuse(key);
-        if (request_.range_size && notes.at("range_size") != request_.range_size) refuse("range size");
+        state_.check_same(notes, identity_, request_.range_size);
         ranges_.size = notes.at("range_size");
         earlier_ = restore_stats(notes.at("stats"));
         earlier_seconds_ = notes.at("seconds");
@@ -145,6 +139,29 @@ private:
         }
     }
 
+    /// What follows from the method: whole iterations, and what each device keeps.
+    void begin_iterations() {
+        const uint32_t k = crew_->iteration_samples();
+        const RenderSettings method = parties_[0].devices[0].stats.settings;
+        check_iterations("spp", request_.budget.samples, k, method);
+        check_iterations("range-size", request_.range_size, k, method);
+        if (tree_.samples() == 0) ranges_.size = (ranges_.size + k - 1) / k * k;
+        size_t devices = 0;
+        for (Party& p : parties_) p.first_device = std::exchange(devices, devices + p.devices.size());
+        if (crew_->state_kind() != StateKind::per_device) return;
+        if (tree_.samples()) check_devices(kept_, devices, state_.path());
+        kept_.resize(devices);
+        for (const Party& p : parties_) {
+            std::vector<RangeState> own;
+            for (size_t d = 0; d < p.devices.size(); ++d) own.push_back({d, 0, kept_[p.first_device + d]});
+            if (p.rank == 0)
+                crew_->load(std::move(own));
+            else
+                tell(ranks_, p.rank, Say::states, {}, nullptr, own);
+        }
+        log_ = StateLog(std::move(kept_));
+    }
+
     double elapsed() const { return earlier_seconds_ + seconds_since(start_); }
 
     void find_range_size() {
@@ -155,6 +172,7 @@ private:
             for (Finished& f : crew_->take(kPatience)) {
                 ranges_.size = f.order.ranges.size;
                 rendered(parties_[0], f.order.node, f.seconds, crew_->work());
+                log_.add(0, crew_->take_states());
                 arrived(f.order.node, std::move(f.film));
             }
             interrupted_ = is_set(request_.interrupt);
@@ -197,7 +215,10 @@ private:
     }
 
     void render() {
-        const unsigned nodes = request_.block_nodes ? request_.block_nodes : default_block_nodes(ranks_.size());
+        // Without blocks films come soon, and few states wait for them.
+        const bool keeps = crew_->state_kind() == StateKind::per_device;
+        const unsigned some = request_.block_nodes ? request_.block_nodes : default_block_nodes(ranks_.size());
+        const unsigned nodes = keeps ? 1 : some;
         Dealer dealer(ranges_, request_.budget.seconds, tree_, nodes);
         bool last = false;
         for (;;) {
@@ -227,7 +248,7 @@ private:
         if (since >= 0.5 * request_.checkpoint_seconds && !wanted_collected_ && collected_later_ > 0)
             want_collected(false);
         if (since < request_.checkpoint_seconds) return;
-        state_.write(tree_, notes());
+        save();
         saved_ = Clock::now();
         wanted_collected_ = false;
     }
@@ -248,7 +269,9 @@ private:
     }
 
     void take() {
-        for (Finished& f : crew_->take(ranks_.size() > 1 ? kPollSeconds : kPatience)) {
+        std::vector<Finished> all = crew_->take(ranks_.size() > 1 ? kPollSeconds : kPatience);
+        log_.add(0, crew_->take_states());
+        for (Finished& f : all) {
             rendered(parties_[0], f.order.node, f.seconds, crew_->work());
             if (f.order.collector)
                 tell_part(ranks_, f);
@@ -262,6 +285,7 @@ private:
                 party.wanted = t.at("ranges");
                 continue;
             }
+            log_.add(party.first_device, std::move(told->states));
             const RangeNode node = read_node(t.at("node"));
             if (told->kind == Say::collected)
                 collected_later_ -= node.end() - node.first();
@@ -269,6 +293,7 @@ private:
                 rendered(party, node, t.at("seconds"), restore_work(t.at("devices")));
             if (told->film.samples) arrived(node, std::move(told->film));
         }
+        log_.saved(tree_);  // forgets older ones
     }
 
     void rendered(Party& party, RangeNode node, double seconds, std::vector<DeviceWork> devices) const {
@@ -290,28 +315,10 @@ private:
 
     /// Of all devices, and of what an earlier part did.
     RenderStats total() const {
-        RenderStats sum = earlier_;
-        uint64_t bytes = 0, predicted = 0, peak = 0;
-        double build = 0;
-        std::map<std::string, int> devices;
+        std::vector<std::pair<std::string, RenderStats>> devices;
         for (const Party& p : parties_)
-            for (const DeviceWork& d : p.devices) {
-                add_part(sum, {}, d.stats);
-                bytes += d.stats.memory_bytes;
-                predicted += d.stats.memory_bytes_predicted;
-                peak += d.stats.memory_bytes_peak;
-                build = std::max(build, d.stats.build_seconds);
-                ++devices[p.host + ": " + d.stats.device];
-            }
-        sum.device.clear();
-        for (const auto& [name, count] : devices)
-            sum.device +=
-                fmt::format("{}{}{}", sum.device.empty() ? "" : "; ", count > 1 ? fmt::format("{} x ", count) : "",
-                            devices.size() > 1 || ranks_.size() > 1 ? name : parties_[0].devices[0].stats.device);
-        sum.memory_bytes = bytes;
-        sum.memory_bytes_predicted = predicted;
-        sum.memory_bytes_peak = peak;
-        sum.build_seconds = build;
+            for (const DeviceWork& d : p.devices) devices.emplace_back(p.host, d.stats);
+        RenderStats sum = sum_of_devices(earlier_, devices, ranks_.size() > 1);
         sum.selection = selection_;
         sum.samples = tree_.samples();
         sum.render_seconds = elapsed();
@@ -325,10 +332,12 @@ private:
                 {"stats", save_stats(total())}};
     }
 
+    void save() { state_.write(tree_, notes(), log_.saved(tree_)); }
+
     /// A device failed, which ends the render: whole nodes are saved, and the message says so.
     void save_after_fault(const Error& fault) {
         if (tree_.samples() == 0) return;
-        state_.write(tree_, notes());
+        save();
         state_.wait();
         throw Error(fault.code,
                     fmt::format("{}. {} samples per pixel are in {}; the same command with --resume goes on",
@@ -340,7 +349,7 @@ private:
         result.position = position();
         result.stats = total();
         if (interrupted_ && tree_.samples()) {
-            state_.write(tree_, notes());
+            save();
             state_.wait();
             result.state_path = state_.path();
         }
@@ -365,6 +374,8 @@ private:
     nlohmann::json identity_;
     Ranges ranges_;
     MergeTree tree_;
+    DeviceStates kept_;  ///< by an earlier part
+    StateLog log_;
     RenderStats earlier_;
     double earlier_seconds_ = 0, merge_seconds_ = 0, receive_seconds_ = 0;
     uint64_t films_ = 0;            ///< that came here

@@ -73,6 +73,10 @@ void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& r
         while (std::optional<Told> told = hear(ranks, collecting.memory())) {
             if (told->kind == Say::stop) return;
             if (collecting.heard(*told)) continue;
+            if (told->kind == Say::states) {
+                if (crew) crew->load(std::move(told->states));
+                continue;
+            }
             if (told->text.at("last").get<bool>()) asked = false;
             if (crew) crew->give(read_order(told->text));
         }
@@ -90,7 +94,7 @@ void serve_parallel(const Scene& scene, const ParallelRequest& request, Ranks& r
             if (f.order.collector) tell_part(ranks, f);
             const nlohmann::json text = {
                 {"node", node_text(f.order.node)}, {"seconds", f.seconds}, {"devices", work_text(crew->work())}};
-            tell(ranks, 0, Say::finished, text, f.order.collector ? nullptr : &f.film);
+            tell(ranks, 0, Say::finished, text, f.order.collector ? nullptr : &f.film, crew->take_states());
         }
     }
 }

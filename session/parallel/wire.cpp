@@ -11,20 +11,50 @@ namespace {
 
 struct Head {
     uint64_t width, height, samples;
+    uint64_t text;  ///< bytes; states follow
 };
+
+constexpr const char* kCutOff = "a message of another rank is cut off";
+
+template <class T>
+void put(std::string& message, const T& value) {
+    message.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+std::vector<RangeState> read_states(std::string_view bytes) {
+    std::vector<RangeState> states;
+    while (!bytes.empty()) {
+        uint64_t numbers[3];
+        if (bytes.size() < sizeof numbers) throw Error(ExitCode::device, kCutOff);
+        std::memcpy(numbers, bytes.data(), sizeof numbers);
+        bytes.remove_prefix(sizeof numbers);
+        if (bytes.size() < numbers[2]) throw Error(ExitCode::device, kCutOff);
+        const auto* const state = reinterpret_cast<const std::byte*>(bytes.data());
+        states.push_back({size_t(numbers[0]), numbers[1], {state, state + numbers[2]}});
+        bytes.remove_prefix(numbers[2]);
+    }
+    return states;
+}
 
 }  // namespace
 
-void tell(Ranks& ranks, int to, Say kind, const nlohmann::json& text, const FilmMoments* film) {
-    Head head = {0, 0, 0};
+void tell(Ranks& ranks, int to, Say kind, const nlohmann::json& text, const FilmMoments* film,
+          const std::vector<RangeState>& states) {
+    const std::string words = text.dump();
+    Head head = {0, 0, 0, words.size()};
     std::vector<std::span<const double>> arrays;
     if (film) {
-        head = {film->width, film->height, film->samples};
+        head = {film->width, film->height, film->samples, words.size()};
         arrays = {film->sum, film->sum_squares};
     }
-    std::string message(sizeof head, '\0');
-    std::memcpy(message.data(), &head, sizeof head);
-    ranks.send(to, int(kind), message + text.dump(), arrays);
+    std::string message;
+    put(message, head);
+    message += words;
+    for (const RangeState& s : states) {
+        for (const uint64_t number : {uint64_t(s.device), s.range, uint64_t(s.state.size())}) put(message, number);
+        message.append(reinterpret_cast<const char*>(s.state.data()), s.state.size());
+    }
+    ranks.send(to, int(kind), message, arrays);
 }
 
 void tell_part(Ranks& ranks, const Finished& f) {
@@ -36,18 +66,23 @@ std::optional<Told> hear(Ranks& ranks, Arrays* memory) {
     std::optional<RankMessage> message = ranks.poll(memory);
     if (!message) return std::nullopt;
     Head head;
-    const std::string& bytes = message->bytes;
-    if (bytes.size() < sizeof head) throw Error(ExitCode::device, "a message of another rank is cut off");
+    std::string_view bytes = message->bytes;
+    if (bytes.size() < sizeof head) throw Error(ExitCode::device, kCutOff);
     std::memcpy(&head, bytes.data(), sizeof head);
-    Told told = {
-        message->from, Say(message->kind), nlohmann::json::parse(bytes.begin() + sizeof head, bytes.end()), {}};
+    bytes.remove_prefix(sizeof head);
+    if (bytes.size() < head.text) throw Error(ExitCode::device, kCutOff);
+    Told told = {message->from,
+                 Say(message->kind),
+                 nlohmann::json::parse(bytes.substr(0, head.text)),
+                 {},
+                 read_states(bytes.substr(head.text))};
     told.film = {uint32_t(head.width), uint32_t(head.height), head.samples, {}, {}};
     if (message->arrays.size() == 2) {
         told.film.sum = std::move(message->arrays[0]);
         told.film.sum_squares = std::move(message->arrays[1]);
     }
     if (told.film.sum.size() != 3 * head.width * head.height || told.film.sum_squares.size() != told.film.sum.size())
-        throw Error(ExitCode::device, "a message of another rank is cut off");
+        throw Error(ExitCode::device, kCutOff);
     return told;
 }
 

@@ -13,6 +13,7 @@ enum class Say : int {
     setup = 1,  ///< first rank to all: what is rendered
     ready,      ///< back: host and devices
     wanted,     ///< back: how many ranges it could begin
+    states,     ///< to one: what its devices kept from an earlier part, before its first order
     order,      ///< to one: which ranges
     finished,   ///< back: they are rendered; with their film, if no other rank collects it
     part,       ///< to the rank that collects: that film
@@ -21,7 +22,8 @@ enum class Say : int {
     stop,       ///< to all: nothing is left to do
 };
 
-void tell(Ranks& ranks, int to, Say kind, const nlohmann::json& text, const FilmMoments* film = nullptr);
+void tell(Ranks& ranks, int to, Say kind, const nlohmann::json& text, const FilmMoments* film = nullptr,
+          const std::vector<RangeState>& states = {});
 
 /// The film of a node, to the rank that collects it.
 void tell_part(Ranks& ranks, const Finished& finished);
@@ -31,6 +33,7 @@ struct Told {
     Say kind = Say::stop;
     nlohmann::json text;
     FilmMoments film;
+    std::vector<RangeState> states;
 };
 /// A film lies in `memory`, if that is large enough.
 std::optional<Told> hear(Ranks& ranks, Arrays* memory = nullptr);

@@ -262,13 +262,14 @@ TEST_CASE("runs and scenes come in an order that the seed decides, all of them o
 
 TEST_CASE("a damaged state costs the render, not the experiment") {
     const TempFolder folder;
-    RenderState state{{1, 1, 2, {1, 2, 3}, {4, 5, 6}}, {{"rows", {"x"}}}};
+    RenderState state{{1, 1, 2, {1, 2, 3}, {4, 5, 6}}, {{"rows", {"x"}}}, {{std::byte{9}, std::byte{8}}, {}}};
     write_state(folder / "s", state);
     const auto back = read_state(folder / "s");
     REQUIRE(back);
     CHECK(back->moments.sum == state.moments.sum);
     CHECK(back->moments.sum_squares == state.moments.sum_squares);
     CHECK(back->notes == state.notes);
+    CHECK(back->devices == state.devices);
     const std::string bytes = read_file(folder / "s");
     set_quiet(true);
     for (size_t keep = 0; keep < bytes.size(); ++keep) {

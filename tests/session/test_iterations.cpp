@@ -1,0 +1,318 @@
+// libs: ambilux_experiments
+// timeout: 120
+// Renders of whole iterations, and methods whose devices keep a state: what is stopped goes on as if it had not been.
+#include "core/flag.h"
+#include "film/exr_io.h"
+#include "integrators/setting.h"
+#include "render/chosen.h"
+#include "render/invalid_watch.h"
+#include "render/sample_watch.h"
+#include "session/parallel/parallel_render.h"
+#include "session/parallel/state_log.h"
+#include "session/reference.h"
+#include "session/state.h"
+#include "tests/support/experiment_fakes.h"
+#include "tests/support/render_scene.h"
+#include "tests/support/thread_ranks.h"
+
+using namespace ambilux;
+using namespace ambilux::test;
+
+namespace {
+
+/// Iterations of four samples, and a state.
+struct ByFour : FakeRenderer {
+    using FakeRenderer::FakeRenderer;
+    std::vector<std::byte> state = {std::byte{7}};
+    std::vector<uint32_t> counts;
+    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+        CHECK(first % 4 == 0);
+        CHECK(count % 4 == 0);
+        counts.push_back(count);
+        uint32_t done = 0;
+        while (done < count && !is_set(interrupt)) done += FakeRenderer::render(first + done, 4, nullptr);
+        return done;
+    }
+    uint32_t iteration_samples() const override { return 4; }
+    StateKind state_kind() const override { return StateKind::per_device; }
+    std::vector<std::byte> save_state() override { return state; }
+    void load_state(std::span<const std::byte> saved) override { state.assign(saved.begin(), saved.end()); }
+};
+
+/// Says what it costs.
+struct TimedByFour : ByFour, SelfTimed {
+    double last = 0;
+    using ByFour::ByFour;
+    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+        const uint32_t done = ByFour::render(first, count, interrupt);
+        last = 0.1 * done;
+        return done;
+    }
+    double last_seconds() const override { return last; }
+};
+
+Scene small_scene() {
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 2;
+    return scene;
+}
+
+RenderSettings learned(const Scene& scene) {
+    RenderSettings settings = cpu_settings(scene, Estimator::mis);
+    apply_setting(settings, "integrator", "bdpt");
+    apply_setting(settings, "variant", "learned");
+    return settings;
+}
+
+ParallelRequest learned_request(const Scene& scene, const TempFolder& folder, size_t workers, bool resume) {
+    ParallelRequest request;
+    request.settings = learned(scene);
+    request.budget = {50, 0};
+    request.devices = std::vector<std::string>(workers, "cpu");
+    request.range_size = 3;
+    request.state_path = folder / "state";
+    request.resume = resume;
+    return request;
+}
+
+/// Stopped after some ranges.
+ParallelResult stopped(ParallelRequest request, const std::function<ParallelResult(const ParallelRequest&)>& render) {
+    volatile bool interrupt = false;
+    request.interrupt = &interrupt;
+    request.on_progress = [&](const RenderPosition& p, const RenderStats&) {
+        if (p.samples > 10) set_flag(&interrupt);
+    };
+    return render(request);
+}
+
+bool same(const FilmMoments& a, const FilmMoments& b) {
+    return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares;
+}
+
+FilmMoments pixel() { return {1, 1, 1, std::vector<double>(3), std::vector<double>(3)}; }
+
+}  // namespace
+
+TEST_CASE("a number of samples that is no whole iterations is refused before any is rendered") {
+    World world;
+    ByFour renderer(small_scene(), {}, world);
+    const std::string message = error_of([&] { drive(renderer, {}, {10, 0}); }, ExitCode::usage);
+    CHECK(contains(message, "spp=10: "));
+    CHECK(contains(message, "iterations of 4 samples: 8 or 12"));
+    CHECK(contains(error_of([&] { drive(renderer, {}, {3, 5}); }, ExitCode::usage), "4 samples: 4 would be"));
+    CHECK(world.samples == 0);
+    CHECK(contains(error_of([] { check_iterations("range-size", 6, 4, {}); }, ExitCode::usage), "range-size=6: "));
+}
+
+TEST_CASE("batches are whole iterations, by samples and by time, and so is what an interrupt leaves") {
+    World world;
+    const Scene scene = small_scene();
+    ByFour renderer(scene, {}, world);
+    world.batch = 3;
+    CHECK(drive(renderer, {}, {8, 0}).samples == 8);
+    CHECK(renderer.counts == std::vector<uint32_t>{4, 4});
+    world.batch = 11;
+    CHECK(drive(renderer, {8, 0, false}, {20, 0}).samples == 20);
+    CHECK(renderer.counts == std::vector<uint32_t>{4, 4, 8, 4});
+    world.stop_at = world.calls + 2;
+    const RenderPosition p = drive(renderer, {20, 0, false}, {100, 0}, &world.flag);
+    CHECK(p.interrupted);
+    CHECK(p.samples == 28);
+
+    // An iteration takes 0.4 s.
+    world.batch = 1000;
+    for (const auto& [seconds, samples] : std::vector<std::pair<double, uint64_t>>{{0.01, 4}, {0.9, 8}, {1.1, 12}}) {
+        CAPTURE(seconds);
+        TimedByFour timed(scene, {}, world);
+        const RenderPosition end = drive(timed, {}, {0, seconds});
+        CHECK(end.samples == samples);
+        CHECK(end.per_iteration() == Approx(0.4));
+        CHECK(drive(timed, end, {0, end.seconds + 0.19}).samples == samples);  // no time for half of one
+        CHECK(drive(timed, end, {0, end.seconds + 0.21}).samples == samples + 4);
+    }
+}
+
+TEST_CASE("experiments and references render whole iterations, and refuse checkpoints that are none") {
+    const TempFolder folder;
+    World world;
+    Hooks hooks = fake_hooks(world);
+    hooks.make_renderer = [&](const Scene& scene, const RenderSettings& settings) {
+        return std::make_unique<ByFour>(scene, settings, world);
+    };
+    write_inputs(folder);
+    CHECK(contains(error_of([&] { run_experiment(request(folder, "out"), hooks); }), "spp=1: "));
+    CHECK(world.samples == 0);
+    std::string config = kConfig;
+    config.replace(config.find("[1, 2, 8, 32]"), 13, "[4, 16, 36]");
+    write_inputs(folder, config);
+    CHECK(run_experiment(request(folder, "out"), hooks) == ExitCode::done);
+    CHECK(world.samples == 2 * 400 + 8 * 36);
+}
+
+TEST_CASE("wrapped renderers have the iterations and the state of what they wrap") {
+    World world;
+    const auto check = [&](const auto& wrap) {
+        auto inner = std::make_unique<ByFour>(small_scene(), RenderSettings{}, world);
+        ByFour& own = *inner;
+        const std::unique_ptr<Renderer> renderer = wrap(std::move(inner));
+        CHECK(renderer->iteration_samples() == 4);
+        CHECK(renderer->state_kind() == StateKind::per_device);
+        CHECK(renderer->save_state() == own.state);
+        const std::vector<std::byte> other(3);
+        renderer->load_state(other);
+        CHECK(own.state == other);
+    };
+    check([](std::unique_ptr<Renderer> r) { return std::make_unique<Chosen>(std::move(r), 0, SelectionStats{}); });
+    check([](std::unique_ptr<Renderer> r) { return std::make_unique<InvalidWatch>(std::move(r)); });
+    check([](std::unique_ptr<Renderer> r) { return std::make_unique<SampleWatch>(std::move(r)); });
+}
+
+TEST_CASE("states that are saved have learned from films that are there alone") {
+    const auto state = [](size_t device, uint64_t range) {
+        return RangeState{device, range, std::vector<std::byte>(size_t(range + 1))};
+    };
+    const auto sizes = [](const DeviceStates& states) {
+        std::vector<size_t> all;
+        for (const auto& s : states) all.push_back(s.size());
+        return all;
+    };
+    StateLog log(DeviceStates(3));
+    log.add(0, {state(0, 0), state(0, 2)});
+    log.add(1, {state(0, 1), state(1, 3), state(0, 4)});
+    MergeTree films;
+    CHECK(sizes(log.saved(films)) == std::vector<size_t>{0, 0, 0});
+    films.add({0, 2}, pixel());  // range 0 of its device is missing
+    CHECK(sizes(log.saved(films)) == std::vector<size_t>{0, 0, 0});
+    films.add({0, 0}, pixel());
+    films.add({0, 1}, pixel());
+    CHECK(sizes(log.saved(films)) == std::vector<size_t>{3, 2, 0});
+    films.add({0, 3}, pixel());
+    films.add({0, 4}, pixel());
+    CHECK(sizes(log.saved(films)) == std::vector<size_t>{3, 5, 4});
+}
+
+TEST_CASE("learned, stopped and resumed on the device that it had, has the bits of an uninterrupted render") {
+    const Scene scene = project_scene("cornell", 24, 18);
+    const TempFolder folder;
+    const auto render = [&](const ParallelRequest& r) { return render_parallel(scene, r, ranks()); };
+    const FilmMoments expected = render(learned_request(scene, folder, 1, false)).film;
+    const ParallelResult part = stopped(learned_request(scene, folder, 1, false), render);
+    REQUIRE(part.position.interrupted);
+    REQUIRE(part.film.samples < 50);
+    const std::string saved = read_file(folder / "state");
+
+    const std::string refused = error_of([&] { render(learned_request(scene, folder, 2, true)); });
+    CHECK(contains(refused, "1 device saved"));
+    CHECK(contains(refused, "2 devices would go on"));
+    CHECK(read_file(folder / "state") == saved);
+    CHECK(same(render(learned_request(scene, folder, 1, true)).film, expected));
+    CHECK_FALSE(fs::exists(folder / "state"));
+
+    // Without what was learned it would be another image: nothing above is true by chance.
+    folder.write("state", saved);
+    RenderState state = read_state(folder / "state").value();
+    REQUIRE(state.devices.size() == 1);
+    state.devices[0].resize(state.devices[0].size() / 2);
+    write_state(folder / "state", state);
+    CHECK(contains(error_of([&] { render(learned_request(scene, folder, 1, true)); }), "saved state: "));
+    state.devices[0].clear();
+    write_state(folder / "state", state);
+    CHECK_FALSE(same(render(learned_request(scene, folder, 1, true)).film, expected));
+    folder.write("state", saved);
+    state.devices.clear();
+    write_state(folder / "state", state);
+    CHECK(contains(error_of([&] { render(learned_request(scene, folder, 1, true)); }), "0 devices saved"));
+}
+
+TEST_CASE("several devices and ranks save what each has learned, and as many go on") {
+    const Scene scene = project_scene("cornell", 24, 18);
+    for (const int count : {1, 2, 3}) {
+        CAPTURE(count);
+        const TempFolder folder;
+        const auto render = [&](const ParallelRequest& request) {
+            ThreadRanks all(count);
+            ParallelResult result;
+            all.run([&](Ranks& r) {
+                if (r.rank() == 0)
+                    result = render_parallel(scene, request, r);
+                else
+                    serve_parallel(scene, request, r);
+            });
+            return result;
+        };
+        // The ranks of a host share its devices: two for one rank, one each for two or three.
+        const ParallelResult part = stopped(learned_request(scene, folder, 2, false), render);
+        REQUIRE(part.position.interrupted);
+        REQUIRE(read_state(folder / "state").value().devices.size() == part.workers.size());
+        const ParallelResult whole = render(learned_request(scene, folder, 2, true));
+        CHECK(whole.film.samples == 50);
+        CHECK(whole.stats.invalid.total() == 0);
+        CHECK(whole.workers.size() == part.workers.size());
+    }
+}
+
+TEST_CASE("a learned reference that was stopped goes on with what it had learned") {
+    const Scene scene = project_scene("cornell", 24, 18);
+    const TempFolder folder;
+    const auto request_for = [&](const std::string& name) {
+        ReferenceRequest r = reference_request(folder / name, 64, learned(scene));
+        r.checkpoint_seconds = 1e-3;
+        return r;
+    };
+    const Image expected = make_reference(scene, request_for("whole.exr"), default_hooks()).reference.mean;
+    volatile bool interrupt = false;
+    ReferenceRequest r = request_for("part.exr");
+    r.interrupt = &interrupt;
+    r.on_batch = [&](const RenderPosition& p) {
+        if (p.samples >= 12) set_flag(&interrupt);
+    };
+    const ReferenceResult part = make_reference(scene, r, default_hooks());
+    REQUIRE(part.interrupted);
+    REQUIRE(part.reference.samples < 64);
+    const ReferenceResult whole = make_reference(scene, request_for("part.exr"), default_hooks());
+    CHECK(whole.continued_from == part.reference.samples);
+    // Films of checkpoints, whose bounds the clock sets, are added up.
+    double most = 0;
+    for (size_t i = 0; i < expected.rgb.size(); ++i)
+        most = std::max(most, std::abs(double(whole.reference.mean.rgb[i]) / expected.rgb[i] - 1));
+    CHECK(most < 1e-6);
+}
+
+TEST_CASE("an experiment with learned, stopped and resumed, has the image of an uninterrupted one") {
+    const TempFolder folder;
+    folder.write("e.toml", std::string(R"(name = "kept"
+repeats = 0
+backend = "cpu"
+seeds = [1]
+[reference]
+spp = 16
+[budget]
+spp = [4, 32]
+[[scene]]
+name = "cornell"
+path = ")") + AMBILUX_SOURCE_DIR +
+                               R"(/scenes/cornell.xml"
+size = [24, 18]
+[[run]]
+name = "learned"
+integrator = "bdpt"
+variant = "learned"
+)");
+    const auto image = [&](const std::string& out) {
+        return read_exr(folder / (out + "/images/cornell/learned_1.exr")).rgb;
+    };
+    REQUIRE(run_experiment(request(folder, "whole"), default_hooks()) == ExitCode::done);
+    volatile bool interrupt = false;
+    Hooks hooks = default_hooks();
+    int readings = 0;
+    hooks.load = [&] {
+        if (++readings == 9) set_flag(&interrupt);  // two for each batch
+        return LoadReading{};
+    };
+    ExperimentRequest r = request(folder, "part");
+    r.interrupt = &interrupt;
+    REQUIRE(run_experiment(r, hooks) == ExitCode::interrupted);
+    REQUIRE(fs::exists(folder / "part/state/cornell"));
+    REQUIRE(run_experiment(request(folder, "part", true), default_hooks()) == ExitCode::done);
+    CHECK(bool(image("part") == image("whole")));
+}
