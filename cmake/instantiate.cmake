@@ -1,5 +1,6 @@
-# instantiate(TARGET TABLE): a translation unit for each unit of the registries, level of features and backend, so that
-# they compile side by side and a change of one rebuilds its own; and the file TABLE with the list of all renderers.
+# instantiate(TARGET TABLE REPLAYS): a translation unit for each unit of the registries, level of features and backend, so
+# that they compile side by side and a change of one rebuilds its own; the file TABLE with the list of all renderers, and
+# the file REPLAYS with that of all replays.
 include(${PROJECT_SOURCE_DIR}/cmake/registry.cmake)
 
 # read_levels(VARIABLE RESULT): the levels that a cache variable names; all if it names none.
@@ -19,7 +20,7 @@ function(read_levels variable result)
   set(${result} ${levels} PARENT_SCOPE)
 endfunction()
 
-function(instantiate target table)
+function(instantiate target table replays)
   read_levels(AMBILUX_CPU_LEVELS cpu_levels)
   set(cuda_levels "")
   if(AMBILUX_HAS_CUDA)
@@ -30,9 +31,22 @@ function(instantiate target table)
   set(cuda_units "")
   set(TABLE_INCLUDES "")
   set(ROWS "")
+  set(REPLAY_INCLUDES "")
+  set(REPLAY_INTEGRATORS "")
+  set(REPLAY_ROWS "")
   foreach(entry ${entries})
     split_entry("${entry}")
-    string(APPEND TABLE_INCLUDES "#include \"${FOLDER}/variant.h\"\n")
+    set(variant_header "#include \"${FOLDER}/variant.h\"\n")
+    set(integrator_header "#include \"${FOLDER}/integrator.h\"\n")
+    string(CONCAT integrator_of
+      "struct ${NAME}Variant;\ntemplate <>\nstruct IntegratorOf<${NAME}Variant> {\n"
+      "    template <Features F, class Tracer, Fusion K>\n"
+      "    using Type = ${NAME}Integrator<F, Tracer, K>;\n};\n")
+    string(APPEND TABLE_INCLUDES "${variant_header}")
+    string(APPEND REPLAY_INCLUDES "${variant_header}${integrator_header}")
+    string(APPEND REPLAY_INTEGRATORS "${integrator_of}")
+    string(APPEND REPLAY_ROWS
+      "    if (variant.is(\"${INTEGRATOR}\", \"${VARIANT}\")) return maker<${NAME}Variant>();\n")
     foreach(level ${LEVELS})
       set(unit ${UNIT}_${level})
       foreach(backend cpu cuda)
@@ -47,15 +61,13 @@ function(instantiate target table)
       endforeach()
       string(APPEND ROWS
         "        compiled<${NAME}Variant, k${level}Features, ${on_cpu}, ${on_cuda}>(\"${INTEGRATOR}\", \"${VARIANT}\"),\n")
-      string(APPEND headers_${unit} "#include \"${FOLDER}/integrator.h\"\n")
-      string(APPEND variants_${unit} "#include \"${FOLDER}/variant.h\"\n")
-      string(APPEND traits_${unit}
-        "struct ${NAME}Variant;\ntemplate <>\nstruct IntegratorOf<${NAME}Variant> {\n"
-        "    template <Features F, class Tracer, Fusion K>\n"
-        "    using Type = ${NAME}Integrator<F, Tracer, K>;\n};\n")
+      string(APPEND headers_${unit} "${integrator_header}")
+      string(APPEND variants_${unit} "${variant_header}")
+      string(APPEND traits_${unit} "${integrator_of}")
     endforeach()
   endforeach()
   configure_file(${PROJECT_SOURCE_DIR}/cmake/renderers.cpp.in ${table} @ONLY)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/replays.cpp.in ${replays} @ONLY)
   list(REMOVE_DUPLICATES cpu_units)
   list(REMOVE_DUPLICATES cuda_units)
   foreach(unit ${cpu_units})

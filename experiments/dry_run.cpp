@@ -127,7 +127,7 @@ private:
             state = place.cached ? fmt::format("to extend from {} spp, {}", place.cached, about(seconds))
                                  : "to make, " + about(seconds);
         }
-        const std::string making = place.settings_text.empty() ? "path" : place.settings_text;
+        const std::string making = place.settings_text.empty() ? place.settings.integrator : place.settings_text;
         scene_rows_ +=
             fmt::format("  {:<28} {:>11} {:>6}  {} spp by {}: {}\n", scene.entry->name,
                         fmt::format("{}x{}", scene.scene.sensor.crop_width, scene.scene.sensor.crop_height),

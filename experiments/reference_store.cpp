@@ -22,7 +22,6 @@ namespace fs = std::filesystem;
 RenderSettings reference_settings(const ExperimentConfig& config, const SceneEntry& entry, const Scene& scene,
                                   int max_depth, const Hooks& hooks) {
     RenderSettings s;
-    s.integrator = "path";
     s.backend = config.backend;
     s.max_depth = max_depth;
     s.rr_depth = scene.integrator.rr_depth;
@@ -44,7 +43,7 @@ ReferencePlace find_reference(const std::string& folder, const ExperimentConfig&
     std::string making;
     for (const auto& [key, value] : set)
         place.settings_text += (place.settings_text.empty() ? "" : " ") + key + "=" + value;
-    if (place.settings_text == "integrator=path") place.settings_text.clear();
+    if (place.settings_text == "integrator=" + RenderSettings().integrator) place.settings_text.clear();
     if (!place.settings_text.empty()) {
         making = "-" + place.settings.integrator + "-" + to_hex(sha256(place.settings_text)).substr(0, 8);
     }

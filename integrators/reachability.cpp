@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "integrators/registry.h"
 #include "transport/mis/strategy.h"
 
 namespace ambilux {
@@ -90,10 +91,8 @@ std::string unreachable_path(const Features& features, uint32_t strategies, int 
 }
 
 uint32_t sampled_strategies(const RenderSettings& settings) {
-    if (settings.integrator == "light") return kLightStrategies;
-    if (settings.integrator == "bdpt") return settings.strategies;
-    if (settings.integrator != "path") return 0;
-    return settings.estimator == Estimator::naive ? uint32_t(kHitStrategies) : kHitStrategies | kNextEventStrategies;
+    const Variant* const variant = find_variant(settings.integrator, settings.variant);
+    return variant && variant->strategies ? variant->strategies(settings) : 0;
 }
 
 namespace {
@@ -109,7 +108,8 @@ std::string lacking(const std::string& path, const std::string& why) {
 
 std::string missing_light(const Features& features, const RenderSettings& settings) {
     if (settings.automatic) return "";
-    if (settings.singles.on && settings.integrator == "bdpt") {
+    const Variant* const variant = find_variant(settings.integrator, settings.variant);
+    if (settings.singles.on && variant && variant->traits.strategies) {
         const std::string lost = shortest(features, settings.max_depth, [&](const Word& w) {
             return finds(uint32_t(kAllStrategies), w) && !finds(settings.singles, w);
         });

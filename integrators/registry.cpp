@@ -16,6 +16,8 @@ std::vector<std::string> names_of(std::string Variant::* name, bool in_tree = fa
     return names;
 }
 
+bool find_all_light(const VariantTraits& traits) { return traits.references != References::none; }
+
 /// "path, bdpt (lvc, streaming)": all variants of an integrator, or some.
 std::string list_variants(Applies applies, bool cuda, bool in_tree) {
     std::vector<std::string> parts;
@@ -73,21 +75,25 @@ const Setting* Variant::find_own(const std::string& key) const {
 std::vector<std::string> integrator_names() { return names_of(&Variant::integrator); }
 std::vector<std::string> variant_names() { return names_of(&Variant::variant); }
 
-std::vector<std::string> reference_integrators() {
+std::vector<std::string> integrators_that(Has has) {
     std::vector<std::string> names;
     for (const std::string& name : integrator_names())
-        if (makes_references(name)) names.push_back(name);
+        if (!variants_that(has, name).empty()) names.push_back(name);
     return names;
 }
-bool makes_references(const std::string& integrator) {
-    const auto& all = variants();
-    return std::any_of(all.begin(), all.end(),
-                       [&](const Variant& v) { return v.integrator == integrator && v.traits.finds_all_light; });
+std::vector<std::string> variants_that(Has has, const std::string& integrator) {
+    std::vector<std::string> names;
+    for (const Variant& v : variants())
+        if (v.integrator == integrator && has(v.traits)) names.push_back(v.variant);
+    return names;
 }
+
+std::vector<std::string> reference_integrators() { return integrators_that(find_all_light); }
+bool makes_references(const std::string& integrator) { return !variants_that(find_all_light, integrator).empty(); }
 
 const Variant* find_variant(const std::string& integrator, const std::string& variant) {
     for (const Variant& v : variants())
-        if (integrator == v.integrator && variant == v.variant) return &v;
+        if (v.is(integrator, variant)) return &v;
     return nullptr;
 }
 
@@ -137,8 +143,11 @@ void check_settings(const RenderSettings& settings, const Variant& variant, bool
 
 SettingValue shown_strategies(const RenderSettings& settings) {
     const Variant* v = find_variant(settings.integrator, settings.variant);
-    if (!v || !v->traits.light_subpaths) return std::string();
-    return v->traits.strategies ? strategies_text(settings) : std::string("light");
+    if (!v || !v->traits.light_subpaths || !v->strategies) return std::string();
+    RenderSettings shown = settings;
+    shown.strategies = v->strategies(settings);
+    if (!v->traits.strategies) shown.singles = {};
+    return strategies_text(shown);
 }
 
 }  // namespace ambilux

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "integrators/offers.h"
 #include "integrators/setting.h"
 
 namespace ambilux {
@@ -13,21 +14,38 @@ namespace ambilux {
 struct Variant {
     std::string integrator, variant;
     VariantTraits traits;
-    std::string help;          ///< one sentence
-    std::vector<Setting> own;  ///< settings that only this variant has
-    bool outside = false;      ///< of the tree (AMBILUX_EXTENSIONS)
+    std::string help;               ///< one sentence
+    std::vector<Setting> own = {};  ///< settings that only this variant has
+    /// The groups (StrategyBits) that it samples; null: none that this notation describes.
+    uint32_t (*strategies)(const RenderSettings&) = nullptr;
+    std::vector<SelectionOffer> (*selection)(const SelectionRequest&) = nullptr;  ///< null: it is never selected
+    std::vector<Stressed> stress = {};
+    bool outside = false;  ///< of the tree (AMBILUX_EXTENSIONS)
 
+    bool is(const std::string& of_integrator, const std::string& of_variant) const {
+        return integrator == of_integrator && variant == of_variant;
+    }
     std::string name() const { return integrator + " " + variant; }
     /// Null if it declares no setting of this key.
     const Setting* find_own(const std::string& key) const;
 };
 
-/// What `Description` (a folder's variant.h) says of itself.
+/// What `Description` (a folder's variant.h) says of itself: kTraits and kHelp, and what it has of settings(),
+/// strategies(settings), selection(request) and stress(). Without these, it is never selected and stressed as it is.
 template <class Description>
-Variant describe(std::string integrator, std::string variant) {
-    Variant v = {std::move(integrator), std::move(variant), Description::kTraits, Description::kHelp, {}, false};
+Variant describe(const std::string& integrator, const std::string& variant) {
+    Variant v = {integrator, variant, Description::kTraits, Description::kHelp};
     if constexpr (requires { Description::settings(); })
         for (const auto& declaration : Description::settings()) v.own.push_back(own_setting(declaration));
+    if constexpr (requires { Description::strategies; })
+        v.strategies = Description::strategies;
+    else if (v.traits.strategies)
+        v.strategies = [](const RenderSettings& settings) { return settings.strategies; };
+    if constexpr (requires { Description::selection; }) v.selection = Description::selection;
+    if constexpr (requires { Description::stress; })
+        v.stress = Description::stress();
+    else
+        v.stress = {{variant == RenderSettings().variant ? integrator : integrator + "-" + variant}};
     return v;
 }
 
@@ -43,6 +61,11 @@ const std::vector<Variant>& variants();
 /// Names, each once.
 std::vector<std::string> integrator_names();
 std::vector<std::string> variant_names();
+
+/// Names of integrators that have a variant of such traits, and of those variants.
+using Has = bool (*)(const VariantTraits&);
+std::vector<std::string> integrators_that(Has has);
+std::vector<std::string> variants_that(Has has, const std::string& integrator);
 
 /// Those that find all light, as ground truth must.
 std::vector<std::string> reference_integrators();

@@ -1,7 +1,26 @@
 // What settings have an effect on: each variant of an integrator states it in its folder (variant.h).
 #pragma once
 
+#include <cstdint>
+
 namespace ambilux {
+
+/// How a replay (render/replay) finds the light vertices that an eye vertex is connected with.
+enum class ReplayPairing : uint32_t {
+    no_replay,    ///< there is no replay
+    none,         ///< there are no connections
+    own_subpath,  ///< those of the slot's light subpath, from its end
+    registers,    ///< the same, with the eye vertex as it is instead of as items keep it
+    own_vertex,   ///< those of a light subpath that is made for this eye vertex, from its start
+    cache,        ///< drawn from those of a wave
+};
+
+/// How a variant makes references (experiments/reference.h), for which its default settings must find all light.
+enum class References : uint32_t {
+    none,
+    plain,     ///< by its first variant and estimator mis; but for precision, no setting makes it another reference
+    as_it_is,  ///< settings are a part of the identity
+};
 
 /// What a variant of an integrator has. Settings that need something else are refused by name (setting.h).
 struct VariantTraits {
@@ -19,7 +38,9 @@ struct VariantTraits {
     bool binary_bvh = false;       ///< has kernels for accel=bvh2
     bool streams = false;          ///< a wave holds more paths than it has slots
     bool in_double = false;        ///< has a twin in double precision (render/twin/twin.h)
-    bool finds_all_light = false;  ///< with its default settings: may make references
+    bool selects_any = false;      ///< bdpt.auto=true selects any variant; else this one or the path tracer
+    ReplayPairing replay = ReplayPairing::no_replay;
+    References references = References::none;
 };
 
 }  // namespace ambilux

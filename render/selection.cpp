@@ -29,18 +29,12 @@ constexpr double kTrimmedBlocks = 0.01;
 /// Where the ratio of times does not follow from the work: candidates whose product of variance and work is within this
 /// factor of the best are timed.
 constexpr double kDoubt = 1.3;
-/// Four learned draws are taken to be worth as many uniform ones, for that much more work of all kinds: what ten scenes
-/// show (docs/lab/2026-11-25-learned-draws.md).
-constexpr uint32_t kLearnedDraws = 4, kLearnedWorth = 12;
-constexpr double kLearnedWork = 1.25;
-/// Eye subpaths of a render from which on enough is learned.
-constexpr double kLearnedSubpaths = 1 << 18;
 constexpr uint32_t kFirstTimedSample = 0xffff0000u;  ///< far from those of the image
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-std::string joined(const std::vector<std::pair<std::string, std::string>>& settings) {
+std::string joined(const SettingTexts& settings) {
     std::string text;
     for (const auto& [key, value] : settings) text += (text.empty() ? "" : " ") + key + "=" + value;
     return text;
@@ -50,13 +44,23 @@ RenderSettings settings_of(const RenderSettings& settings, const SelectionCandid
     RenderSettings s = settings;
     s.automatic = false;
     for (const auto& [key, value] : candidate.settings) apply_setting(s, key, value);
-    if (s.variant != "lvc") s.draws = CacheDraws::automatic;  // others have no draws to be set
+    if (!variant_of(s).traits.draws_together) s.draws = CacheDraws::automatic;  // others have no draws to be set
     return s;
 }
 
-/// The variant of bdpt that leaves all variants to choose from.
-const char* const kPaired = "wavefront";
-bool is_paired(const RenderSettings& settings) { return &variant_of(settings) == find_variant("bdpt", kPaired); }
+SelectionCandidate candidate_of(const Variant& variant, SelectionOffer offer, float light_paths) {
+    SelectionCandidate c;
+    c.name = variant.integrator + offer.suffix;
+    c.pilot = {light_paths, offer.connect, offer.worth};
+    c.settings = {{"integrator", variant.integrator}, {"variant", variant.variant}};
+    c.settings.insert(c.settings.end(), offer.settings.begin(), offer.settings.end());
+    if (light_paths > 0.0f && light_paths != 1.0f) {
+        c.name += fmt::format(", {} light subpaths per pixel", light_paths);
+        c.settings.emplace_back("light_paths", fmt::format("{}", light_paths));
+    }
+    c.offer = std::move(offer);
+    return c;
+}
 
 /// Candidates of one family do the same but for the numbers of light subpaths and draws, so that the time of one tells
 /// that of the others.
@@ -143,37 +147,14 @@ private:
 }  // namespace
 
 std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda) {
-    const VariantTraits& asked = variant_of(settings).traits;
-    const std::string& variant = settings.variant;
-    const bool paired = is_paired(settings);  // else the selection is restricted to the variant that was asked for
-    std::vector<SelectionCandidate> all = {
-        {"path", {0.0f, false, 0}, {{"integrator", "path"}, {"variant", "wavefront"}, {"estimator", "mis"}}}};
-    const auto add = [&](std::string name, const PilotCandidate& pilot, const std::string& of,
-                         const std::string& strategies) {
-        all.push_back({std::move(name), pilot, {{"integrator", "bdpt"}, {"variant", of}, {"strategies", strategies}}});
-        if (of == "learned") all.back().learned_draws = kLearnedDraws;
-        if (const uint32_t draws = all.back().draws())
-            all.back().settings.emplace_back("connections", std::to_string(draws));
-        if (pilot.light_subpaths != 1.0f) {
-            all.back().name += fmt::format(", {} light subpaths per pixel", pilot.light_subpaths);
-            all.back().settings.emplace_back("light_paths", fmt::format("{}", pilot.light_subpaths));
+    const Variant& asked = variant_of(settings);
+    std::vector<SelectionCandidate> all;
+    for (const float light_paths : {0.0f, 0.25f, 1.0f, 4.0f})
+        for (const Variant& v : variants()) {
+            if (!v.selection) continue;
+            for (SelectionOffer& offer : v.selection({settings, asked.traits, &v == &asked, cuda, light_paths}))
+                all.push_back(candidate_of(v, std::move(offer), light_paths));
         }
-    };
-    const std::string plain = asked.draws ? kPaired : variant;
-    // On a device the cache has another order in every run.
-    const bool cache = asked.draws || (paired && !(cuda && settings.deterministic));
-    for (const float light_paths : {0.25f, 1.0f, 4.0f}) {
-        if (light_paths != 1.0f && !paired && !asked.draws) continue;
-        add("bdpt without connections", {light_paths, false, 0}, plain, "hits+next_event+light");
-        if (light_paths == 1.0f && !asked.draws) add("bdpt, " + variant, {1.0f, true, 0}, variant, "all");
-        for (uint32_t k = 1; cache && k <= 16; k *= 2)
-            add(fmt::format("bdpt, lvc, {} connection{}", k, k > 1 ? "s" : ""), {light_paths, true, k}, "lvc", "all");
-        // On a device it was not tried. It gathers no images of strategies.
-        const bool learns = cache && !cuda && variant != "lvc" && settings.technique_depth == 0;
-        if (!learns) continue;
-        add(fmt::format("bdpt, learned, {} connections", kLearnedDraws), {light_paths, true, kLearnedWorth}, "learned",
-            "all");
-    }
     return all;
 }
 
@@ -188,8 +169,8 @@ double selection_work(const PilotWork& w, const SelectionCandidate& candidate, b
     if (c.light_subpaths == 0.0f && !c.connect) return eye;
     double work = eye + light;
     if (c.connect && c.draws == 0) work += pair * w.pairs + ray * w.pair_rays;
-    if (c.connect && candidate.draws() > 0) work += candidate.draws() * (draw * w.draws + ray * w.draw_rays);
-    if (candidate.learned_draws) work *= kLearnedWork;
+    if (c.connect) work += candidate.offer.draws * (draw * w.draws + ray * w.draw_rays);
+    work *= candidate.offer.work;
     const bool streaming = variant_of(settings_of({}, candidate)).traits.streams;
     // A light subpath for every vertex of an eye subpath.
     if (c.connect && streaming) work += std::max(0.0, w.vertices - 1.0) * w.light_rays;
@@ -241,7 +222,7 @@ public:
         if (head_start_) head_start_->stop();
         variance_ = selection_variances(pilot);
         for (size_t c = 0; c < candidates_.size(); ++c) {
-            if (candidates_[c].learned_draws && !learns_enough(pilot))
+            if (eye_subpaths(pilot) < candidates_[c].offer.least_subpaths)
                 excluded_[c] = "has too few samples to learn from";
             if (!excluded_[c].empty()) variance_[c] = double(kInfinity);
         }
@@ -263,8 +244,9 @@ public:
     }
 
 private:
-    bool learns_enough(const Pilot& pilot) const {
-        return pilot.expected_samples * scene_.sensor.crop_width * scene_.sensor.crop_height >= kLearnedSubpaths;
+    /// Of the whole render.
+    double eye_subpaths(const Pilot& pilot) const {
+        return pilot.expected_samples * scene_.sensor.crop_width * scene_.sensor.crop_height;
     }
     double score(size_t c) const { return variance_[c] * cost_[c]; }
 
@@ -278,7 +260,8 @@ private:
     /// (docs/performance.md), closer than waves tell that are short enough to be timed; but not for variants of other
     /// schedules.
     std::optional<size_t> doubtful_rival() const {
-        const bool doubtful = !is_paired(settings_) && !variant_of(settings_).traits.draws;
+        const VariantTraits& asked = variant_of(settings_).traits;
+        const bool doubtful = !asked.selects_any && !asked.draws;
         if (!doubtful || settings_.deterministic) return {};
         const size_t best = ranked_[0];
         const auto rival = std::find_if(ranked_.begin(), ranked_.end(),

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "integrators/auto/pilot.h"
+#include "integrators/offers.h"
 #include "render/renderer.h"
 
 namespace ambilux {
@@ -11,12 +12,9 @@ namespace ambilux {
 /// What `settings` leave to choose from, the path tracer first.
 struct SelectionCandidate {
     std::string name;
-    PilotCandidate pilot;  ///< of variant learned: the uniform draws that its own are taken to be worth
-    std::vector<std::pair<std::string, std::string>> settings;
-    uint32_t learned_draws = 0;  ///< that variant learned makes
-
-    /// Of each eye vertex from the cache, as they are made.
-    uint32_t draws() const { return learned_draws ? learned_draws : pilot.draws; }
+    PilotCandidate pilot;  ///< with the uniform draws that those of the offer are taken to be worth
+    SettingTexts settings;
+    SelectionOffer offer;
 };
 std::vector<SelectionCandidate> selection_candidates(const RenderSettings& settings, bool cuda);
 

@@ -55,15 +55,15 @@ void check_settings(const RenderSettings& settings) {
 
 /// The settings that make a reference another one than the path tracer's; empty for it. Part of its identity.
 std::string making(const RenderSettings& settings) {
-    const bool path = settings.integrator == "path";
+    const bool plain = variant_of(settings).traits.references == References::plain;
     std::string text;
     const auto add = [&](const std::string& key, const std::string& value) {
         text += (text.empty() ? "" : " ") + key + "=" + value;
     };
     for (const Setting& s : general_settings())
-        if (s.place != InExperiment::experiment && !s.is_default(settings) && (!path || s.what.key == "precision"))
+        if (s.place != InExperiment::experiment && !s.is_default(settings) && (!plain || s.what.key == "precision"))
             add(s.what.key, s.text(settings));
-    if (!path)
+    if (!plain)
         for (const auto& [key, value] : settings.own) add(key, value);
     return text;
 }
@@ -172,10 +172,12 @@ uint64_t reference_seed(uint64_t seed) {
 
 ReferenceRequest reference_request(const std::string& path, uint64_t spp, const RenderSettings& settings) {
     for (const char* key : {"variant", "estimator"})
-        if (settings.integrator == "path" && !find_general_setting(key)->is_default(settings))
+        if (variant_of(settings).traits.references == References::plain &&
+            !find_general_setting(key)->is_default(settings))
             throw Error(ExitCode::usage,
-                        "a reference by integrator path is made by its first variant with estimator mis: leave these "
-                        "settings out");
+                        fmt::format("a reference by integrator {} is made by its first variant with estimator mis: "
+                                    "leave these settings out",
+                                    settings.integrator));
     ReferenceRequest request;
     request.path = path;
     request.spp = spp;

@@ -2,26 +2,20 @@
 
 #include <sstream>
 
+#include "integrators/registry.h"
+
 namespace ambilux::stress {
 
 const std::vector<Method>& methods() {
-    static const std::vector<Method> list = {
-        {"path-naive", {{"integrator", "path"}, {"estimator", "naive"}}},
-        {"path-nee", {{"integrator", "path"}, {"estimator", "nee"}}},
-        {"path-mis", {{"integrator", "path"}}},
-        {"path-mis-power", {{"integrator", "path"}, {"heuristic", "power"}}},
-        {"path-ris", {{"integrator", "path"}, {"variant", "ris"}}, false},
-        {"light", {{"integrator", "light"}}},
-        {"light-power", {{"integrator", "light"}, {"heuristic", "power"}}, false},
-        {"bdpt", {{"integrator", "bdpt"}}},
-        {"bdpt-power", {{"integrator", "bdpt"}, {"heuristic", "power"}}},
-        {"lvc", {{"integrator", "bdpt"}, {"variant", "lvc"}}},
-        {"lvc-power", {{"integrator", "bdpt"}, {"variant", "lvc"}, {"heuristic", "power"}}, false},
-        {"streaming", {{"integrator", "bdpt"}, {"variant", "streaming"}}},
-        {"streaming-power", {{"integrator", "bdpt"}, {"variant", "streaming"}, {"heuristic", "power"}}, false},
-        {"megakernel", {{"integrator", "bdpt"}, {"variant", "megakernel"}}},
-        {"megakernel-power", {{"integrator", "bdpt"}, {"variant", "megakernel"}, {"heuristic", "power"}}, false},
-    };
+    static const std::vector<Method> list = [] {
+        std::vector<Method> all;
+        for (const Variant& v : variants())
+            for (const Stressed& s : v.stress) {
+                all.push_back({s.name, {{"integrator", v.integrator}, {"variant", v.variant}}, s.quick});
+                all.back().settings.insert(all.back().settings.end(), s.settings.begin(), s.settings.end());
+            }
+        return all;
+    }();
     return list;
 }
 

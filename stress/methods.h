@@ -16,7 +16,7 @@ struct Method {
     bool quick = true;  ///< part of --quick
 };
 
-/// Every integrator and variant that estimates all light or light by paths from the emitters, with both heuristics.
+/// What variants say in their folders, in the order of the registry.
 const std::vector<Method>& methods();
 
 /// Settings of a render of `scene`, whose depths are those of its file.

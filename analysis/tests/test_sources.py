@@ -87,6 +87,29 @@ def long_functions(path, text):
     return [f"{path}: {name}" for _, name, lines in functions(text) if lines > MAX_FUNCTION_LINES]
 
 
+def method_names():
+    """Of integrators and variants, from the registry."""
+    lines = (ROOT / "integrators" / "registry.list").read_text(encoding="utf-8").splitlines()
+    return sorted({name for line in lines if line and line[0] != "#" for name in line.split()[:2]})
+
+
+# Who may ask for a method by its name: the registry, what finds a method's renderer, and what a method says of itself.
+# Formats and peers have names of other renderers' plugins.
+NAMING = re.compile(r"integrators/registry[^/]*|render/make_renderer\.cpp|integrators/.*/variant\.h|formats/.*|(experiments/)?peers/.*")
+
+
+def compared_names(path, text):
+    """Lines that compare the name of a method, or look a method up by its name."""
+    if NAMING.fullmatch(path):
+        return []
+    name = f'"(?:{"|".join(method_names())})"'
+    field = r"\b(?:integrator|variant)"
+    asks = re.compile(rf"[=!]=\s*{name}|{name}\s*[=!]=|(?:\.|->){field}\s*[=!]=|[=!]=\s*(?:\w+(?:\.|->))+{field}\b|"
+                      rf"(?:find_variant|\bis|makes_references)\([^)]*{name}|(?:compare|starts_with|find)\({name}")
+    return [f"{path}:{i} asks for a method by its name: {line.strip()}"
+            for i, line in enumerate(text.splitlines(), 1) if asks.search(line.split("//")[0])]
+
+
 def all_wrong(check):
     found = list(sources())
     assert len(found) > 200
@@ -141,6 +164,29 @@ def test_no_function_is_too_long():
 ])
 def test_functions_are_found_by_their_braces(text, found):
     assert list(functions(text)) == found
+
+
+def test_only_the_registry_asks_for_a_method_by_its_name():
+    wrong = all_wrong(compared_names)
+    assert not wrong, "\n".join(["What others ask of a method stands in its variant.h (integrators/registry.h):", *wrong])
+
+
+@pytest.mark.parametrize(("path", "line", "wrong"), [
+    ("render/a.cpp", 'if (settings.integrator == "path") return;', 1),
+    ("render/a.cpp", 'if ("lvc" != settings.variant) return;', 1),
+    ("render/a.cpp", "for (const char* name : names) if (settings.integrator == name) return;", 1),
+    ("render/a.cpp", "if (name == r.variant) return;", 1),
+    ("render/a.cpp", "if (of == \"learned\") return;", 1),
+    ("render/a.cpp", 'find_variant("bdpt", kPaired)', 1),
+    ("render/a.cpp", "if (settings.variant_count == 2) return;", 0),
+    ("render/a.cpp", 'const char* const name = "path";  // == "path"', 0),
+    ("integrators/bdpt/lvc/variant.h", 'if (settings.variant == "lvc") return;', 0),
+    ("integrators/registry.cpp", "if (v.integrator == name) return;", 0),
+    ("integrators/reachability.cpp", 'if (settings.integrator == "light") return;', 1),
+    ("formats/mitsuba/a.cpp", 'if (type == "path") return;', 0),
+])
+def test_comparisons_of_names_are_found(path, line, wrong):
+    assert len(compared_names(path, line)) == wrong
 
 
 def test_every_folder_of_sources_has_its_place_in_the_order():

@@ -119,8 +119,8 @@ nlohmann::json PeerRuns::find_state(const RenderOf& render, const Reference& ref
     }
     if (!agreement.interrupted && !agreement.test.pass && is_path_tracer(render.run)) {
         RenderSettings settings = render.settings;
-        settings.integrator = "path";
-        settings.variant = "wavefront";
+        settings.integrator = RenderSettings().integrator;
+        settings.variant = RenderSettings().variant;
         settings.seed = kAgreementSeed;
         compare_with_own(agreement, *make_renderer(render.scene.scene, settings), request_.interrupt);
     }

@@ -21,6 +21,8 @@ template <Features F, class Tracer, Fusion kFusion, template <Features, class, c
 struct PathIntegrator {
     using Mis = Model;
     using RayItem = typename SubpathItems<Mis>::Ray;
+    template <class Out>
+    using SampleEmitters = Sampling<F, Mis, Out>;
     static constexpr bool kFilmWide = false;
 
     struct Policy {

@@ -1,6 +1,7 @@
 // What integrator toy has.
 #pragma once
 
+#include "integrators/offers.h"
 #include "integrators/setting.h"
 #include "integrators/toy/settings.h"
 
@@ -11,6 +12,7 @@ struct ToyVariant {
     static constexpr VariantTraits kTraits = {.weights = false, .culls = false};
 
     static std::vector<Declaration<ToySettings>> settings();
+    static std::vector<Stressed> stress() { return {}; }  // it estimates no light
 };
 
 }  // namespace ambilux

@@ -5,10 +5,6 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
-#include "integrators/bdpt/lvc/integrator.h"
-#include "integrators/bdpt/megakernel/integrator.h"
-#include "integrators/bdpt/streaming/integrator.h"
-#include "integrators/bdpt/wavefront/integrator.h"
 #include "render/replay/connect.h"
 #include "render/replay/film_share.h"
 #include "render/replay/make.h"
@@ -40,10 +36,11 @@ private:
 
 class BdptReplay final : public Replay {
 public:
-    BdptReplay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer) : seed_(settings.seed) {
+    BdptReplay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer, const BdptPolicy& policy,
+               ReplayPairing pairing)
+        : seed_(settings.seed), policy_(policy), pairing_(pairing) {
         ctx_.view = scene.view();
         ctx_.tracer = tracer;
-        plan(scene, settings);
         ctx_.rules = policy_.rules;
         ctx_.cull = policy_.waves.cull;
         ctx_.radiance_first = pairing_ == ReplayPairing::registers;
@@ -61,6 +58,7 @@ public:
         Eye::At connect;
         std::shared_ptr<const ReplayVertices> lights;
         switch (pairing_) {
+            case ReplayPairing::no_replay:
             case ReplayPairing::none: break;
             case ReplayPairing::own_subpath:
             case ReplayPairing::registers: lights = own_subpath(request, pixel, out); break;
@@ -101,28 +99,6 @@ public:
     }
 
 private:
-    void plan(const Scene& scene, const RenderSettings& settings) {
-        if (settings.variant == "lvc") {
-            using Lvc = LvcIntegrator<kReplayFeatures, HostTracer, Fusion{}>;
-            policy_ = Lvc::plan(scene, settings);
-            Lvc::pilot(policy_, ctx_.view, ctx_.tracer, settings.seed);
-            pairing_ = ReplayPairing::cache;
-        } else if (settings.variant == "streaming") {
-            policy_ = StreamingIntegrator<kReplayFeatures, HostTracer, Fusion{}>::plan(scene, settings);
-            pairing_ = ReplayPairing::own_vertex;
-        } else if (settings.variant == "megakernel") {
-            policy_ = MegakernelIntegrator<kReplayFeatures, HostTracer, Fusion{}>::plan(scene, settings);
-            pairing_ = ReplayPairing::registers;
-        } else if (settings.variant == "wavefront") {
-            policy_ = WavefrontIntegrator<kReplayFeatures, HostTracer, Fusion{}>::plan(scene, settings);
-            pairing_ = ReplayPairing::own_subpath;
-        } else {
-            throw Error(ExitCode::usage, fmt::format("variant {}: there is no replay of it; wavefront, lvc, streaming "
-                                                     "and megakernel have one",
-                                                     settings.variant));
-        }
-    }
-
     /// True if a light subpath of this number starts in every sample.
     bool exists(uint32_t number) const {
         const uint32_t pixels = wave_.width * wave_.height, pixel = number % pixels;
@@ -259,8 +235,8 @@ private:
 
     uint64_t seed_;
     ReplayContext<BidirectionalMis> ctx_{};
-    BdptPolicy policy_{};
-    ReplayPairing pairing_ = ReplayPairing::none;
+    BdptPolicy policy_;
+    ReplayPairing pairing_;
     Wave wave_{};
     bool cache_known_ = true;
     Eye::SampleEmitter sample_emitter_ = sample_next_event<BidirectionalMis>;
@@ -269,8 +245,9 @@ private:
 
 }  // namespace
 
-std::unique_ptr<Replay> make_bdpt_replay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer) {
-    return std::make_unique<BdptReplay>(scene, settings, tracer);
+std::unique_ptr<Replay> make_bdpt_replay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer,
+                                         const BdptPolicy& policy, ReplayPairing pairing) {
+    return std::make_unique<BdptReplay>(scene, settings, tracer, policy, pairing);
 }
 
 }  // namespace ambilux

@@ -1,4 +1,4 @@
-// Connections of eye vertices with light vertices in a replay, as the variants of bdpt make them.
+// Connections of eye vertices with light vertices in a replay, as bidirectional methods make them.
 #pragma once
 
 #include "render/replay/eye.h"
@@ -6,15 +6,6 @@
 #include "stages/connect_vertices.h"
 
 namespace ambilux {
-
-/// How an eye vertex of a variant meets light vertices.
-enum class ReplayPairing : uint32_t {
-    none,
-    own_subpath,  ///< wavefront: those of the slot's light subpath, from its end
-    registers,    ///< megakernel: the same, with the eye vertex as it is instead of as items keep it
-    own_vertex,   ///< streaming: those of a light subpath that is made for this eye vertex, from its start
-    cache,        ///< lvc: drawn from those of a wave
-};
 
 /// The eye vertex `z` of a sample, joined with light vertices. `scale`: beyond that of the render's own stage.
 struct ReplayConnections {

@@ -19,7 +19,8 @@ struct ReplayContext {
     HostTracer tracer;
     Rules<Mis> rules;
     float cull = 0;
-    bool radiance_first = false;  ///< variant megakernel: the environment's radiance is looked up before the weight
+    bool radiance_first =
+        false;  ///< ReplayPairing::registers: the environment's radiance is looked up before the weight
 };
 
 /// Sees what a stage drops.

@@ -1,14 +1,21 @@
-// Replays by integrator.
+// Replays by variant.
 #pragma once
 
 #include "accel/host_tracer.h"
+#include "integrators/registry.h"
 #include "render/replay/replay.h"
 
 namespace ambilux {
 
-/// Integrator path, with its variants.
-std::unique_ptr<Replay> make_path_replay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer);
-/// Integrators light and bdpt, with their variants.
-std::unique_ptr<Replay> make_bdpt_replay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer);
+struct BidirectionalMis;
+template <class Mis>
+struct BdptPolicyOf;
+
+std::unique_ptr<Replay> make_bdpt_replay(const Scene& scene, const RenderSettings& settings, const HostTracer& tracer,
+                                         const BdptPolicyOf<BidirectionalMis>& policy, ReplayPairing pairing);
+
+using MakeReplay = std::unique_ptr<Replay> (*)(const Scene&, const RenderSettings&, const HostTracer&);
+/// Null: there is no replay of it.
+MakeReplay replay_of(const Variant& variant);
 
 }  // namespace ambilux

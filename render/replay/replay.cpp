@@ -1,47 +1,38 @@
 #include "render/replay/replay.h"
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"
 #include "core/error.h"
-#include "integrators/registry.h"
 #include "render/replay/make.h"
 
 namespace ambilux {
 namespace {
 
-/// Keeps the structure that rays are traced through.
-class WithAccel final : public Replay {
-public:
-    WithAccel(std::shared_ptr<const void> accel, std::unique_ptr<Replay> replay)
-        : accel_(std::move(accel)), replay_(std::move(replay)) {}
-
-    ReplaySample sample(const ReplayRequest& request) const override { return replay_->sample(request); }
-    uint32_t light_subpaths() const override { return replay_->light_subpaths(); }
-    bool has_light_subpath(uint32_t number) const override { return replay_->has_light_subpath(number); }
-    ReplaySubpath light_subpath(uint32_t number, uint32_t sample, bool details,
-                                std::vector<ReplayCandidate>& splats) const override {
-        return replay_->light_subpath(number, sample, details, splats);
-    }
-
-private:
-    std::shared_ptr<const void> accel_;
-    std::unique_ptr<Replay> replay_;
-};
+/// "path, light and bdpt"
+std::string listed(std::vector<std::string> names) {
+    const std::string last = std::move(names.back());
+    names.pop_back();
+    return names.empty() ? last : fmt::format("{} and {}", fmt::join(names, ", "), last);
+}
 
 }  // namespace
 
 void check_replay(const RenderSettings& settings) {
-    check_settings(settings, variant_of(settings), settings.backend == Backend::cuda);
+    const Variant& variant = variant_of(settings);
+    check_settings(settings, variant, settings.backend == Backend::cuda);
     if (settings.automatic)
         throw Error(ExitCode::usage,
                     "bdpt.auto=true: which integrator made the sample is up to a pilot; give the settings that "
                     "`ambilux render` printed as its selection");
-    for (const char* name : {"path", "light", "bdpt"})
-        if (settings.integrator == name) return;
-    throw Error(ExitCode::usage, fmt::format("integrator {}: there is no replay of it; path, light and bdpt have one",
-                                             settings.integrator));
+    if (variant.traits.replay != ReplayPairing::no_replay) return;
+    const auto have = [](const VariantTraits& v) { return v.replay != ReplayPairing::no_replay; };
+    const std::vector<std::string> others = variants_that(have, variant.integrator);
+    throw Error(ExitCode::usage, others.empty() ? fmt::format("integrator {}: there is no replay of it; {} have one",
+                                                              variant.integrator, listed(integrators_that(have)))
+                                                : fmt::format("variant {}: there is no replay of it; {} have one",
+                                                              variant.variant, listed(others)));
 }
 
 std::unique_ptr<Replay> make_replay(const Scene& scene, const RenderSettings& settings, SharedAccels& accels) {
@@ -49,10 +40,9 @@ std::unique_ptr<Replay> make_replay(const Scene& scene, const RenderSettings& se
     const bool cuda = settings.backend == Backend::cuda;
     const bool device_structure = cuda || settings.accel == AccelKind::cwbvh;
     const auto make = [&](const auto& accel) -> std::unique_ptr<Replay> {
-        const HostTracer tracer(accel->tracer());
-        return std::make_unique<WithAccel>(accel, settings.integrator == "path"
-                                                      ? make_path_replay(scene, settings, tracer)
-                                                      : make_bdpt_replay(scene, settings, tracer));
+        std::unique_ptr<Replay> replay = replay_of(variant_of(settings))(scene, settings, HostTracer(accel->tracer()));
+        replay->accel = accel;
+        return replay;
     };
     return device_structure ? make(accels.get<CwbvhAccel>()) : make(accels.get<EmbreeAccel>());
 }

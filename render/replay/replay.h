@@ -13,7 +13,7 @@ namespace ambilux {
 struct ReplayRequest {
     uint32_t x = 0, y = 0;  ///< pixel of the image, from the top left
     uint32_t sample = 0;
-    std::optional<uint32_t> light_subpath;  ///< is described too; eye vertices of variant lvc are connected with it
+    std::optional<uint32_t> light_subpath;  ///< is described too; eye vertices that draw are connected with it
                                             ///< instead of a cache
     bool splats = true;   ///< looks for those of all light subpaths of the sample: as many as the image has pixels
     bool details = true;  ///< vertices and densities are described
@@ -22,6 +22,8 @@ struct ReplayRequest {
 /// Replays samples of one render. Safe to use from many threads.
 class Replay {
 public:
+    std::shared_ptr<const void> accel;  ///< that rays are traced through
+
     virtual ~Replay() = default;
     virtual ReplaySample sample(const ReplayRequest& request) const = 0;
     /// Light subpaths of one sample of all pixels; 0 where there are none.

@@ -9,7 +9,7 @@
 #include "core/parallel.h"
 #include "integrators/bdpt/shared/policy.h"
 #include "integrators/path/policy.h"
-#include "integrators/setting.h"
+#include "integrators/registry.h"
 #include "render/statistics.h"
 #include "render/twin/convert.h"
 #include "render/twin/path_sample.h"
@@ -163,9 +163,9 @@ void check(const RenderSettings& settings) {
 
 std::unique_ptr<Renderer> make_twin(const Scene& scene, const RenderSettings& settings) {
     twin::check(settings);
-    if (settings.integrator == "path")
-        return std::make_unique<twin::Twin<twin::UnidirectionalMis>>(scene, settings, plan_path(scene, settings).rules);
-    return std::make_unique<twin::Twin<twin::BidirectionalMis>>(scene, settings, plan_bdpt(scene, settings).rules);
+    if (variant_of(settings).traits.light_subpaths)
+        return std::make_unique<twin::Twin<twin::BidirectionalMis>>(scene, settings, plan_bdpt(scene, settings).rules);
+    return std::make_unique<twin::Twin<twin::UnidirectionalMis>>(scene, settings, plan_path(scene, settings).rules);
 }
 
 }  // namespace ambilux

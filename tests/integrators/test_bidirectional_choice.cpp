@@ -107,7 +107,8 @@ TEST_CASE("second moments that the pilot predicts are those of renders, for ever
         s.seed = 77;
         const FilmMoments truth = render_scene(scene, fixed(s, {{"variant", "lvc"}}), 1024).film;
         for (size_t c = 0; c < candidates.size(); ++c) {
-            if (candidates[c].learned_draws > 0) continue;  // predicted by what other draws are worth
+            if (candidates[c].offer.worth != candidates[c].offer.draws)
+                continue;  // predicted by what other draws are worth
             std::vector<double> measured;
             const auto renderer = make_renderer(scene, fixed(s, candidates[c].settings));
             for (uint32_t k = 0; k < 12; ++k) {
@@ -238,7 +239,8 @@ TEST_CASE("behind a door ajar draws learn, if the render is long enough for it a
     RenderSettings s = automatic_settings(*scene);
     const auto learning = [&](bool cuda) {
         const auto all = selection_candidates(s, cuda);
-        return std::count_if(all.begin(), all.end(), [](const SelectionCandidate& c) { return c.learned_draws > 0; });
+        return std::count_if(all.begin(), all.end(),
+                             [](const SelectionCandidate& c) { return c.offer.least_subpaths > 0; });
     };
     CHECK(learning(false) == 3);
     CHECK(learning(true) == 0);

@@ -90,6 +90,45 @@ TEST_CASE("what a variant declares for itself is refused elsewhere by name") {
         }
 }
 
+namespace {
+
+/// A variant.h that says as little as can be.
+struct Bare {
+    static constexpr const char* kHelp = "nothing";
+    static constexpr VariantTraits kTraits = {};
+};
+struct BareStrategies {
+    static constexpr const char* kHelp = "nothing";
+    static constexpr VariantTraits kTraits = {.strategies = true};
+};
+
+}  // namespace
+
+TEST_CASE("a variant that says nothing else has no replay, makes no reference, is not selected and stressed as it is") {
+    const Variant bare = describe<Bare>("new", "wavefront");
+    CHECK(bare.traits.replay == ReplayPairing::no_replay);
+    CHECK(bare.traits.references == References::none);
+    CHECK_FALSE(bare.strategies);
+    CHECK_FALSE(bare.selection);
+    REQUIRE(bare.stress.size() == 1);
+    CHECK(bare.stress[0].name == "new");
+    CHECK(bare.stress[0].settings.empty());
+    CHECK(describe<Bare>("new", "other").stress[0].name == "new-other");
+    RenderSettings settings;
+    settings.strategies = kHitStrategies;
+    CHECK(describe<BareStrategies>("new", "wavefront").strategies(settings) == kHitStrategies);
+}
+
+TEST_CASE("stress has the methods that variants name, each once") {
+    std::vector<std::string> names;
+    for (const Variant& v : variants())
+        for (const Stressed& s : v.stress)
+            if (!v.outside) names.push_back(s.name);
+    CHECK(names == std::vector<std::string>{"path-naive", "path-nee", "path-mis", "path-mis-power", "path-ris", "light",
+                                            "light-power", "bdpt", "bdpt-power", "lvc", "lvc-power", "streaming",
+                                            "streaming-power", "megakernel", "megakernel-power"});
+}
+
 TEST_CASE("a setting without an effect is refused with key, value, place and where it has one") {
     const auto refused = [](const char* integrator, const char* variant, const char* key, const char* value,
                             bool cuda) {

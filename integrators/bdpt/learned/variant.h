@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "integrators/bdpt/learned/settings.h"
+#include "integrators/offers.h"
 #include "integrators/setting.h"
 
 namespace ambilux {
@@ -11,10 +12,24 @@ namespace ambilux {
 struct LearnedVariant {
     static constexpr const char* kHelp =
         "lvc whose draws follow what light vertices have brought to eye vertices in earlier passes";
-    static constexpr VariantTraits kTraits = {
-        .strategies = true, .light_subpaths = true, .draws = true, .repeats = false, .finds_all_light = true};
+    static constexpr VariantTraits kTraits = {.strategies = true,
+                                              .light_subpaths = true,
+                                              .draws = true,
+                                              .repeats = false,
+                                              .references = References::as_it_is};
 
     static std::vector<Declaration<LearnedSettings>> settings();
+    /// Four learned draws are taken to be worth twelve uniform ones, from as many eye subpaths on as teach enough: what
+    /// ten scenes show (docs/lab/2026-11-25-learned-draws.md). On a device it was not tried.
+    static std::vector<SelectionOffer> selection(const SelectionRequest& r) {
+        const bool images = r.settings.technique_depth > 0;  // of strategies, which it does not gather
+        const bool offered = r.asked.selects_any || r.itself;
+        if (r.light_paths == 0.0f || !offered || !r.may_draw() || r.cuda || images) return {};
+        return {
+            {", learned, 4 connections", {{"strategies", "all"}, {"connections", "4"}}, true, 4, 12, 1.25, 1 << 18}};
+    }
+    /// Random scenes compare it with the others instead (docs/validation.md).
+    static std::vector<Stressed> stress() { return {}; }
 };
 
 }  // namespace ambilux

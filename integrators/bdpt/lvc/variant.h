@@ -1,7 +1,7 @@
 // What variant lvc of integrator bdpt has.
 #pragma once
 
-#include "integrators/variant_traits.h"
+#include "integrators/offers.h"
 
 namespace ambilux {
 
@@ -14,7 +14,20 @@ struct LvcVariant {
                                               .draws_together = true,
                                               .strategy_images = true,
                                               .repeats = false,
-                                              .finds_all_light = true};
+                                              .replay = ReplayPairing::cache,
+                                              .references = References::as_it_is};
+
+    static std::vector<SelectionOffer> selection(const SelectionRequest& r) {
+        std::vector<SelectionOffer> offers;
+        for (uint32_t k = 1; r.light_paths > 0.0f && r.may_draw() && k <= 16; k *= 2)
+            offers.push_back({", lvc, " + std::to_string(k) + (k > 1 ? " connections" : " connection"),
+                              {{"strategies", "all"}, {"connections", std::to_string(k)}},
+                              true,
+                              k,
+                              k});
+        return offers;
+    }
+    static std::vector<Stressed> stress() { return both_heuristics("lvc"); }
 };
 
 }  // namespace ambilux

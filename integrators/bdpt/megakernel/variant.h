@@ -1,14 +1,21 @@
 // What variant megakernel of integrator bdpt has.
 #pragma once
 
-#include "integrators/variant_traits.h"
+#include "integrators/offers.h"
 
 namespace ambilux {
 
 struct MegakernelVariant {
     static constexpr const char* kHelp = "one kernel in which subpaths live in registers, to compare with";
-    static constexpr VariantTraits kTraits = {
-        .strategies = true, .light_subpaths = true, .sorts = false, .compacts = false, .finds_all_light = true};
+    static constexpr VariantTraits kTraits = {.strategies = true,
+                                              .light_subpaths = true,
+                                              .sorts = false,
+                                              .compacts = false,
+                                              .replay = ReplayPairing::registers,
+                                              .references = References::as_it_is};
+
+    static std::vector<SelectionOffer> selection(const SelectionRequest& r) { return paired_offers(r, ", megakernel"); }
+    static std::vector<Stressed> stress() { return both_heuristics("megakernel"); }
 };
 
 }  // namespace ambilux

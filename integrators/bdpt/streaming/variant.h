@@ -1,7 +1,7 @@
 // What variant streaming of integrator bdpt has.
 #pragma once
 
-#include "integrators/variant_traits.h"
+#include "integrators/offers.h"
 
 namespace ambilux {
 
@@ -13,7 +13,11 @@ struct StreamingVariant {
                                               .strategy_images = true,
                                               .compacts = false,
                                               .streams = true,
-                                              .finds_all_light = true};
+                                              .replay = ReplayPairing::own_vertex,
+                                              .references = References::as_it_is};
+
+    static std::vector<SelectionOffer> selection(const SelectionRequest& r) { return paired_offers(r, ", streaming"); }
+    static std::vector<Stressed> stress() { return both_heuristics("streaming"); }
 };
 
 }  // namespace ambilux

@@ -18,6 +18,8 @@ struct PathRisVariant {
     }();
 
     static std::vector<Declaration<RisSettings>> settings();
+    static uint32_t strategies(const RenderSettings& s) { return PathVariant::strategies(s); }
+    static std::vector<Stressed> stress() { return {{"path-ris", {}, false}}; }
 };
 
 }  // namespace ambilux
