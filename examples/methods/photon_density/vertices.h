@@ -84,12 +84,12 @@ struct Gather {
         bool& gathered;
 
         AMBILUX_HD NumbersOf<Mis> numbers() const { return {stage.wave.key(slot)}; }
-        AMBILUX_HD void add(const Candidate<Mis>& c) const { stage.samples.push({c.value, slot}); }
+        AMBILUX_HD void add(const Candidate<Mis>& c) const { stage.samples.push(Contribution{c.value, slot}); }
         AMBILUX_HD void at(const Vertex<Mis>& z, const Subpath<Mis>& path, const NumbersOf<Mis>&) const {
             const Grid grid = Grid::of(stage.scene, stage.settings, stage.wave.state->iteration);
             const Rgb light =
                 density<F>(stage.state, grid, z, stage.rules.max_depth - path.depth) * (1.0f / stage.light_subpaths);
-            stage.samples.push({path.throughput * light, slot});
+            stage.samples.push(Contribution{path.throughput * light, slot});
             gathered = true;
         }
         AMBILUX_HD bool valid(Rgb throughput) const { return !gathered && is_valid_radiance(throughput, stage.record); }
