@@ -72,8 +72,8 @@ const Setting* Variant::find_own(const std::string& key) const {
     return at == own.end() ? nullptr : &*at;
 }
 
-std::vector<std::string> integrator_names() { return names_of(&Variant::integrator); }
-std::vector<std::string> variant_names() { return names_of(&Variant::variant); }
+std::vector<std::string> integrator_names(bool in_tree) { return names_of(&Variant::integrator, in_tree); }
+std::vector<std::string> variant_names(bool in_tree) { return names_of(&Variant::variant, in_tree); }
 
 std::vector<std::string> integrators_that(Has has) {
     std::vector<std::string> names;

@@ -59,8 +59,8 @@ inline Variant outside(Variant v) {
 const std::vector<Variant>& variants();
 
 /// Names, each once.
-std::vector<std::string> integrator_names();
-std::vector<std::string> variant_names();
+std::vector<std::string> integrator_names(bool in_tree = false);
+std::vector<std::string> variant_names(bool in_tree = false);
 
 /// Names of integrators that have a variant of such traits, and of those variants.
 using Has = bool (*)(const VariantTraits&);

@@ -23,7 +23,12 @@ std::vector<Row> rows(bool in_tree) {
     const auto add = [&](const Setting& s, const std::string& where) {
         all.push_back({s.what.key, s.what.allowed, s.default_text(), where, s.what.help});
     };
-    for (const Setting& s : general_settings()) add(s, where_text(s, in_tree));
+    for (const Setting& s : general_settings()) {
+        add(s, where_text(s, in_tree));
+        if (s.what.key == "integrator")
+            all.back().values = fmt::format("{}", fmt::join(integrator_names(in_tree), ", "));
+        if (s.what.key == "variant") all.back().values = fmt::format("{}", fmt::join(variant_names(in_tree), ", "));
+    }
     for (const Variant& v : variants())
         for (const Setting& s : v.own)
             if (!(in_tree && v.outside)) add(s, v.name());

@@ -34,6 +34,7 @@ struct SumLanes {
 template <>
 struct SumLanes<0> {
     static constexpr uint32_t kLanes = 0;
+    float word[0];  // no size: nvcc loses what follows a member without an address of its own when it copies
 };
 
 /// The first `kWords` words of sums, of which an item has places for `kPlaces`. Places without a word are 0.
@@ -42,7 +43,7 @@ struct PackedSums {
     using More = SumLanes<(kWords > kPlaces ? kWords - kPlaces : 0)>;
 
     float word[kPlaces];
-    [[no_unique_address]] More more;
+    More more;
 
     template <class Sums>
     AMBILUX_HD static PackedSums pack(const Sums& sums) {

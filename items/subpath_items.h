@@ -36,7 +36,7 @@ struct PathRayOf {
     SubpathBits bits;  ///< depth counts this segment
     Rgb throughput;
     float sum_or_tmax;  ///< word 0 of the sums; of camera rays the distance of the far plane
-    [[no_unique_address]] typename Sums::More more;
+    typename Sums::More more;
 };
 using PathRay = PathRayOf<UnidirectionalMis>;
 
@@ -57,7 +57,7 @@ struct SubpathRay {
                              ///< SubpathStart::inv_pdf and direction
     uint32_t start;          ///< first rays: camera_distance (eye), prim (light) of SubpathStart
     uint32_t sum_or_start;   ///< word 2 of the sums; first ray of a light subpath: emitter and opacity_step
-    [[no_unique_address]] typename Sums::More more;
+    typename Sums::More more;
 };
 
 /// Where a ray ended: the last lane of a HitItem.

@@ -68,7 +68,7 @@ struct ConnectionVertex {
     Rgb throughput;  ///< of a diffuse vertex: times its reflectance
     float sum0;
     Vec2f d, n;  ///< of the ray that met it; frame.n
-    [[no_unique_address]] typename Sums::More more;
+    typename Sums::More more;
     Vec3f tangent;  ///< ScatteringParts
     uint32_t record;
     Rgb color0;  ///< BsdfInputs, where there are textures
@@ -105,7 +105,7 @@ struct VertexItem {
     float offset;
     Rgb color0;  ///< BsdfInputs
     uint32_t record;
-    [[no_unique_address]] typename Sums::More more;
+    typename Sums::More more;
     Vec3f tangent;
     float number0;
     Rgb color1;

@@ -128,13 +128,15 @@ TEST_CASE("bytes are read with their unit and printed with the largest that divi
 TEST_CASE("1920x1080 within 256 MiB, 1 GiB and 4 GiB, of all integrators and variants on the CPU") {
     const Scene scene = project_scene("cornell", 1920, 1080);
     SharedAccels accels(scene);
-    for (const Variant& variant : variants())
+    for (const Variant& variant : variants()) {
+        if (variant.outside) continue;  // a state may hold what an iteration of the whole film leaves
         for (const char* memory : {"256M", "1G", "4G"}) {
             CAPTURE(variant.name(), memory);
             RenderSettings s = settings_of(scene, variant);
             apply_setting(s, "memory", memory);
             render_counted(scene, s, 0, accels);  // all is there before the first sample
         }
+    }
 }
 
 TEST_CASE("the least budget renders, one byte less is refused with the bytes of each part") {

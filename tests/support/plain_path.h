@@ -3,6 +3,8 @@
 
 #include "accel/embree_tracer.h"
 #include "queues/wave.h"
+#include "transport/mis/heuristic.h"
+#include "transport/mis/unidirectional.h"
 #include "transport/subpath/next_event.h"
 #include "transport/subpath/start.h"
 #include "transport/subpath/visit.h"

@@ -22,8 +22,8 @@ struct Rules {
     bool background_only;  ///< eye subpaths end at their first vertex: they serve the directly seen environment, which
                            ///< no light subpath finds
     SingleStrategies singles;
-    [[no_unique_address]] typename Mis::Directions directions;  ///< how directions are sampled at vertices
-    [[no_unique_address]] typename Mis::Lights lights;          ///< how emitters are picked by next event estimation
+    typename Mis::Directions directions;  ///< how directions are sampled at vertices
+    typename Mis::Lights lights;          ///< how emitters are picked by next event estimation
 
     /// The same with another model, whose samplers are as they come.
     template <class Other>

@@ -1,6 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // labels: gpu
-// Integrator photon_density on a device: the image of the CPU, whatever waves hold, and where photons had too little room.
+// Integrator photon_density on a device: the image of the CPU, whatever waves hold, and where photons had too little
+// room.
 #include "tests/support/gpu_device.h"
 #include "tests/support/render_scene.h"
 
