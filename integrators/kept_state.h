@@ -58,8 +58,8 @@ concept KeptState =
         state.for_each_saved(visit);
     };
 
-/// A state that waves append to: its queue is one that grows (Layout::growing_queue). take_items copies what an old
-/// state held before it grew: copy(to, from, count).
+/// A state that waves append to: its queue is one that grows (Layout::growing_queue). take_items copies all that an old
+/// state held before it grew, its tables too: copy(to, from, count).
 template <class S>
 concept AppendedState =
     requires(const S state, const S& old, uint32_t items, detail::AnyCopy copy) { state.take_items(old, items, copy); };

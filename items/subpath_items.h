@@ -107,14 +107,10 @@ struct SubpathItems<Mis, false> {
     }
     AMBILUX_HD static Path unpack(const Ray& r) {
         const typename Ray::Sums sums = {{r.sum_or_tmax}, r.more};
-        return {r.origin,
-                r.direction,
-                r.throughput,
-                sums.template unpack<typename Mis::Sums>(),
-                {},
-                r.bits.depth(),
-                r.bits.roulette_scale(),
-                r.bits.delta()};
+        return {r.origin,       r.direction,
+                r.throughput,   sums.template unpack<typename Mis::Sums>(),
+                r.bits.depth(), r.bits.roulette_scale(),
+                r.bits.delta(), {}};
     }
     AMBILUX_HD static float tmax(const Ray& r) { return r.bits.depth() == 1 ? r.sum_or_tmax : kInfinity; }
 };

@@ -1,6 +1,7 @@
 // Memory of sorts and scans, which executors run: CUB's on a device, TBB's and the standard library's on a host.
 #pragma once
 
+#include "core/hd.h"
 #include "queues/layout.h"
 
 namespace ambilux {
@@ -42,5 +43,19 @@ struct ScanMemory {
         return {layout.allocate<std::byte>(bytes), bytes};
     }
 };
+
+/// The first of `count` sorted keys that is no less than `key`.
+template <class Key>
+AMBILUX_HD uint32_t lower_bound(const Key* keys, uint32_t count, Key key) {
+    uint32_t begin = 0, end = count;
+    while (begin < end) {
+        const uint32_t middle = begin + (end - begin) / 2;
+        if (keys[middle] < key)
+            begin = middle + 1;
+        else
+            end = middle;
+    }
+    return begin;
+}
 
 }  // namespace ambilux

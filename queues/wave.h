@@ -25,7 +25,7 @@ struct WaveState {
     uint32_t samples;         ///< of each pixel in this wave, at most Wave::samples
     uint32_t depth;           ///< segments of the paths in flight
     uint32_t failed;          ///< WaveFailure: the wave, and on a device all after it, do nothing until there is room
-    uint32_t done;            ///< waves that did not fail
+    uint32_t done;            ///< waves of phases that may fail, and did not
     uint32_t light_subpaths;  ///< of this wave
     uint32_t iteration;       ///< number of the iteration that this wave belongs to
     uint32_t appended;        ///< where this wave's part of what all waves append to begins

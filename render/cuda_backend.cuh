@@ -152,7 +152,6 @@ private:
             Exec& exec = *backend.executor_;
             const size_t phase = backend.phases_.size();
             backend.phases_.emplace_back();
-            exec.expect_no_failure();
             Owned<cudaGraphExec_t> graph = exec.capture([&](Exec& e) { backend.run_wave(e, phase, body); });
             backend.phases_.back() = {std::move(graph), exec.may_fail()};
         }
@@ -198,7 +197,6 @@ private:
         template <class Work>
         void once(const Work& work) {
             Exec& exec = *backend.executor_;
-            if constexpr (AppendedState<typename Maker::State>) exec.know(state.layout().counters(), state.counters());
             backend.set_film_state(first, count);
             exec.launch([&](Exec& e) { work(e, *backend.stages_); });
         }
@@ -210,9 +208,10 @@ private:
     /// A wave of a phase; the last also adds its samples to the film, unless they are a part of it.
     template <class Body>
     void run_wave(Exec& exec, size_t phase, const Body& body) {
+        exec.expect_no_failure();
         body(exec, *stages_);
         if (phase + 1 == phases_of<Integrator>() && !maker_.plan.in_parts()) update_film(exec, maker_.plan.wave);
-        exec.finish_wave();
+        if (exec.may_fail()) exec.finish_wave();
     }
     void update_film(Exec& exec, Wave wave) {
         wave.state = state_;

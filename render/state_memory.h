@@ -39,7 +39,8 @@ public:
         maker_.appended = before;
         return bytes;
     }
-    /// More room for what waves append. What is there stays, and the state's places change.
+    /// More room for what waves append. The state's places change; what is there stays as far as take_items copies it:
+    /// init is not called again.
     void grow() {
         if constexpr (AppendedState<State>) {
             const std::vector<QueueCounter> old_counters = counters();
@@ -64,17 +65,16 @@ public:
     /// What a resumed render needs of it: of each array its name, its size, its bytes.
     std::vector<std::byte> save() const {
         std::vector<std::byte> saved;
-        const auto append = [&](const void* from, size_t bytes) {
-            const auto* const begin = static_cast<const std::byte*>(from);
-            saved.insert(saved.end(), begin, begin + bytes);
+        const auto grown = [&](size_t bytes) {
+            saved.resize(saved.size() + bytes);
+            return saved.data() + saved.size() - bytes;
         };
         maker_.state.for_each_saved([&](const char* name, auto* place, uint64_t count) {
             const uint64_t bytes = count * sizeof(*place), letters = std::strlen(name);
-            append(&letters, sizeof(letters));
-            append(name, letters);
-            append(&bytes, sizeof(bytes));
-            saved.resize(saved.size() + bytes);
-            Memory::get(saved.data() + saved.size() - bytes, place, bytes);
+            std::memcpy(grown(sizeof(letters)), &letters, sizeof(letters));
+            std::memcpy(grown(letters), name, letters);
+            std::memcpy(grown(sizeof(bytes)), &bytes, sizeof(bytes));
+            Memory::get(grown(bytes), place, bytes);
         });
         return saved;
     }

@@ -110,6 +110,15 @@ def compared_names(path, text):
             for i, line in enumerate(text.splitlines(), 1) if asks.search(line.split("//")[0])]
 
 
+# nvcc copies a struct up to its first member without an address, and leaves out what follows.
+NO_ADDRESS_INSIDE = re.compile(r"no_unique_address\]\][^;]*;[^\n]*\n[ \t]*[^\s}]")
+
+
+def members_without_address(path, text):
+    return [f"{path}: a member without an address must be the last of its struct: {found.group().splitlines()[0]}"
+            for found in NO_ADDRESS_INSIDE.finditer(text)]
+
+
 def all_wrong(check):
     found = list(sources())
     assert len(found) > 200
@@ -169,6 +178,20 @@ def test_functions_are_found_by_their_braces(text, found):
 def test_only_the_registry_asks_for_a_method_by_its_name():
     wrong = all_wrong(compared_names)
     assert not wrong, "\n".join(["What others ask of a method stands in its variant.h (integrators/registry.h):", *wrong])
+
+
+@pytest.mark.parametrize(("members", "wrong"), [
+    ("    [[no_unique_address]] A a;  ///< why\n};", 0),
+    ("    [[no_unique_address]] A a = {};\n\n    int f() const;\n};", 0),
+    ("    [[no_unique_address]] A a;\n    int b;\n};", 1),
+])
+def test_members_without_address_are_found(members, wrong):
+    assert len(members_without_address("a.h", f"struct S {{\n{members}\n")) == wrong
+
+
+def test_members_without_address_come_last():
+    wrong = all_wrong(members_without_address)
+    assert not wrong, "\n".join(["", *wrong])
 
 
 @pytest.mark.parametrize(("path", "line", "wrong"), [

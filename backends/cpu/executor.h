@@ -99,7 +99,7 @@ public:
     void for_each(const Stage& stage, uint32_t n) {
         run_slots(stage, n, 1);
     }
-    /// Of as many pairs as `queue` has items, by the lowest `bits` bits; no key has all of them set.
+    /// Of as many pairs as `queue` has items, by the lowest `bits` bits.
     template <class Key, class Item>
     void sort_pairs(const SortMemory<Key>& m, const Queue<Item>& queue, uint32_t bits, StageRecord* record) {
         const Start start;

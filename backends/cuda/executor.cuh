@@ -147,8 +147,7 @@ public:
         kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(stage, mine, state_);
         finish_over(stage, mine);
     }
-    /// Of as many pairs as `queue` has items, by the lowest `bits` bits; no key has all of them set. Their time is that
-    /// of the stage that follows.
+    /// Of as many pairs as `queue` has items, by the lowest `bits` bits. Their time is that of the stage that follows.
     template <class Key, class Item>
     void sort_pairs(const SortMemory<Key>& m, const Queue<Item>& queue, uint32_t bits, StageRecord*) {
         const bool switched = graph_.active();
@@ -164,14 +163,10 @@ public:
 
     // ---- between phases ----
 
-    /// What is read of the counters of queues that all waves append to, once in an iteration.
-    void know(const QueueCounter* on_device, std::vector<QueueCounter> on_host) {
-        known_ = on_device;
-        known_counts_ = std::move(on_host);
-    }
+    /// The host waits for it.
     template <class Item>
     uint32_t count(const Queue<Item>& queue) const {
-        return known_counts_.at(size_t(queue.counter - known_)).size();
+        return size_of(queue.counter);
     }
     template <class Key>
     void sort_pairs(const SortMemory<Key>& m, uint32_t n, uint32_t bits, StageRecord*) {
@@ -346,8 +341,6 @@ private:
     int multiprocessors_ = 0;
     detail::DepthChange depth_{};
     bool may_fail_ = false;
-    const QueueCounter* known_ = nullptr;
-    std::vector<QueueCounter> known_counts_;
 };
 
 }  // namespace ambilux

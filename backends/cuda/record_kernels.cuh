@@ -76,7 +76,8 @@ __global__ inline void __launch_bounds__(kStageBlock)
     for (uint32_t i = n + blockIdx.x * kStageBlock + threadIdx.x; i < end; i += gridDim.x * kStageBlock) keys[i] = last;
 }
 
-/// `last` for the pairs that are sorted beyond those that there are.
+/// `last` for the pairs that are sorted beyond those that there are. They stay behind those whose key it is: the sort
+/// is stable.
 template <class Key>
 __global__ void __launch_bounds__(kStageBlock)
     pad_keys(Key* keys, const QueueCounter* counter, uint32_t capacity, Key last, SortSwitch sorts) {

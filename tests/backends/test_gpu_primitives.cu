@@ -215,7 +215,6 @@ TEST_CASE("appends of a device: whole waves one after the other; one that has no
         CHECK(end == kRoom);
         CHECK(owner.download() == expected);
         CHECK(own.record.download()[0].items == items_done);
-        own.exec.know(counters.data(), counters.download());
         CHECK(own.exec.count(Queue<Contribution>{{nullptr, kRoom}, counters.data()}) == kRoom);
         CHECK(own.exec.count(other) == 5);
     }

@@ -70,9 +70,14 @@ TEST_CASE("Rays of subpaths come back with the bits that went in, whatever they 
     for (int i = 0; i < 100000; ++i) {
         const uint32_t depth = i % 3 ? 1 + numbers.index(kMaxDepth) : 1;
         const float scale = rounded_scale(numbers.magnitude(-30, 30));
-        Subpath<UnidirectionalMis> alone = {
-            any_vector(numbers), any_vector(numbers), any_vector(numbers), {any_float(numbers)}, {}, depth, scale,
-            i % 2 == 0};
+        Subpath<UnidirectionalMis> alone = {any_vector(numbers),
+                                            any_vector(numbers),
+                                            any_vector(numbers),
+                                            {any_float(numbers)},
+                                            depth,
+                                            scale,
+                                            i % 2 == 0,
+                                            {}};
         using Alone = SubpathItems<UnidirectionalMis>;
         const float tmax = any_float(numbers);
         const PathRay ray = Alone::pack(alone, Side::eye, 7, tmax);
@@ -88,10 +93,10 @@ TEST_CASE("Rays of subpaths come back with the bits that went in, whatever they 
                                           any_vector(numbers),
                                           any_vector(numbers),
                                           {any_float(numbers), any_float(numbers)},
-                                          {},
                                           depth,
                                           scale,
-                                          i % 2 == 0};
+                                          i % 2 == 0,
+                                          {}};
         path.start = {any_float(numbers),
                       any_float(numbers),
                       uint32_t(numbers.rng()),

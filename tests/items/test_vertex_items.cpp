@@ -167,7 +167,7 @@ TEST_CASE("A vertex that comes from a queue is the one that went in, surface, fr
                 REQUIRE((close(a.frame.s, b.frame.s) && close(a.frame.t, b.frame.t) && close(a.wi, b.wi)));
                 REQUIRE((a.record == b.record && a.flipped == b.flipped && same_parameters(f, g)));
             };
-            const Subpath<UnidirectionalMis> unidirectional = {{}, d, {1, 2, 3}, {0.5f}, {}, depth, 1.0f, false};
+            const Subpath<UnidirectionalMis> unidirectional = {{}, d, {1, 2, 3}, {0.5f}, depth, 1.0f, false, {}};
             const VertexItem<UnidirectionalMis> without_sums =
                 pack_vertex(vertex_with<kAllFeatures, UnidirectionalMis>(
                                 view, d, depth, surface_at<kAllFeatures>(view, hit.prim, hit.u, hit.v), {0.5f}),
@@ -327,11 +327,11 @@ TEST_CASE("A ray that comes from a queue is the one that went in, with all that 
     for (const uint32_t depth : {1u, 2u, kMaxDepth})
         for (const bool delta : {false, true}) {
             INFO("depth " << depth << " delta " << delta);
-            const Subpath<UnidirectionalMis> alone = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10}, {}, depth, 1.5f, delta};
+            const Subpath<UnidirectionalMis> alone = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10}, depth, 1.5f, delta, {}};
             const auto back = check(UnidirectionalMis{}, Side::eye, alone, 100.0f);
             if (depth > 1) CHECK(back.sums.pdf_sa == 10);
             for (const Side side : {Side::eye, Side::light}) {
-                BidirectionalSubpath path = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11}, {}, depth, 1.5f, delta};
+                BidirectionalSubpath path = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}, {10, 11}, depth, 1.5f, delta, {}};
                 path.start = {12, 13, 14, 15, 77, 16};
                 const BidirectionalSubpath b = check(BidirectionalMis{}, side, path, 100.0f);
                 // First rays of light subpaths have no sums yet; others have no start.

@@ -157,18 +157,10 @@ struct CountBins {
     uint32_t marks;
     StageRecord* record;
 
-    AMBILUX_HD uint32_t lower_bound(uint32_t bin) const {
-        uint32_t begin = 0, end = marks;
-        while (begin < end) {
-            const uint32_t middle = begin + (end - begin) / 2;
-            if (all.order.keys[1][middle] >> 40 < bin)
-                begin = middle + 1;
-            else
-                end = middle;
-        }
-        return begin;
+    AMBILUX_HD uint32_t first(uint32_t bin) const {
+        return lower_bound<uint64_t>(all.order.keys[1], marks, uint64_t(bin) << 40);
     }
-    AMBILUX_HD void operator()(uint32_t bin) const { all.in_bin[bin] = lower_bound(bin + 1) - lower_bound(bin); }
+    AMBILUX_HD void operator()(uint32_t bin) const { all.in_bin[bin] = first(bin + 1) - first(bin); }
 };
 
 template <class State>

@@ -25,11 +25,11 @@ struct Subpath {
     Vec3f origin, direction;
     Rgb throughput;  ///< eye: importance; light: flux. Everything up to and with the scattering into `direction`
     typename Mis::Sums sums;  ///< of the ray; those of a light subpath begin at its first vertex
-    [[no_unique_address]] typename Mis::Start start;  ///< of first rays
-    uint32_t depth;                                   ///< segments, this one included
+    uint32_t depth;           ///< segments, this one included
     float roulette_scale;  ///< roulette sees throughput · scale². Eye: product of the relative indices passed through;
                            ///< light: 1/sqrt of the flux at the start
     bool delta;            ///< the last scattering was a delta (true for first rays)
+    [[no_unique_address]] typename Mis::Start start;  ///< of first rays
 };
 
 /// What a strategy found, without its weight, and the segment that must be free for it.

@@ -42,22 +42,10 @@ struct Grid {
 
 /// Keys put photons in order of cell, light subpath and depth: an order that knows nothing of waves and threads, so
 /// that sums over a cell have the same bits for any number of them.
-AMBILUX_HD uint64_t cell_key(uint32_t cell) { return uint64_t(cell) << 43; }
+constexpr uint32_t kCellShift = 43;
+AMBILUX_HD uint64_t cell_key(uint32_t cell) { return uint64_t(cell) << kCellShift; }
 AMBILUX_HD uint64_t photon_key(uint32_t cell, const Photon& photon) {
     return cell_key(cell) | uint64_t(photon.subpath) << 11 | (photon.depth & 0x7ffu);
-}
-
-/// The first of `count` sorted keys that is no less than `key`.
-AMBILUX_HD uint32_t lower_bound(const uint64_t* keys, uint32_t count, uint64_t key) {
-    uint32_t begin = 0, end = count;
-    while (begin < end) {
-        const uint32_t middle = begin + (end - begin) / 2;
-        if (keys[middle] < key)
-            begin = middle + 1;
-        else
-            end = middle;
-    }
-    return begin;
 }
 
 /// What lives as long as an iteration: the photons of all its waves. Nothing outlives it, and the radius follows from

@@ -37,10 +37,11 @@ AMBILUX_HD Rgb density(const State& state, const Grid& grid, const Vertex<Mis>& 
     const uint64_t* keys = state.order.keys[1];
     const uint32_t count = state.photons.counter->size();
     Rgb sum = {0.0f, 0.0f, 0.0f};
-    for (uint32_t y = first[1]; y <= last[1]; ++y)
-        for (uint32_t x = first[2]; x <= last[2]; ++x) {
-            const uint64_t begin = cell_key(grid.row(y, x) + first[0]), end = cell_key(grid.row(y, x) + last[0] + 1);
-            for (uint32_t i = lower_bound(keys, count, begin); i < count && keys[i] < end; ++i) {
+    for (uint32_t cy = first[1]; cy <= last[1]; ++cy)
+        for (uint32_t cz = first[2]; cz <= last[2]; ++cz) {
+            const uint32_t row = grid.row(cy, cz);
+            uint32_t i = lower_bound(keys, count, cell_key(row + first[0]));
+            for (; i < count && keys[i] >> kCellShift <= row + last[0]; ++i) {
                 const Photon photon = state.photons.load(state.order.values[1][i]);
                 const float cosine = fabsf(dot(z.scattering.frame.n, photon.d));
                 if (length_squared(photon.p - p) > sqr(grid.radius) || photon.depth > most_depth || !(cosine > 0.0f))

@@ -29,16 +29,8 @@ struct FindClusters {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t cluster) const {
-        const uint16_t* keys = source.by_cluster.sort.keys[1];
-        uint32_t begin = 0, end = source.vertices.counter->size();
-        while (begin < end) {
-            const uint32_t middle = begin + (end - begin) / 2;
-            if (keys[middle] >> ClusteredVertices::kPartBits < cluster)
-                begin = middle + 1;
-            else
-                end = middle;
-        }
-        source.by_cluster.first[cluster] = begin;
+        source.by_cluster.first[cluster] = lower_bound(source.by_cluster.sort.keys[1], source.vertices.counter->size(),
+                                                       ClusteredVertices::key(cluster, 0));
     }
 };
 
