@@ -2,12 +2,27 @@
 // many registers less for a thread, measured on an H200 (docs/performance.md).
 #pragma once
 
-#include "stages/connect_vertices.h"
-#include "stages/eye_vertex.h"
-#include "stages/light_vertex.h"
-#include "stages/streaming.h"
+#include "models/features.h"
 
 namespace ambilux {
+
+// Declared alone: what they include would make every launch depend on all BSDFs.
+template <Features F, class Mis, class EmissionOut, class AtVertex>
+struct EyeVertex;
+template <Features F, class Mis, class AtVertex>
+struct LightVertex;
+template <class Mis>
+struct LightVertexSource;
+template <Features F, class Out, class Source>
+struct ConnectVertices;
+template <Features F, class Tracer, class Shadows, class Source>
+struct ConnectAndOcclude;
+template <Features F, class Mis, class EmissionOut>
+struct StreamEyeVertex;
+template <Features F, class Mis>
+struct StreamLightVertex;
+template <Features F, class Mis, class Out>
+struct StreamConnect;
 
 constexpr uint32_t kStageBlock = 128;
 /// The megakernel has one block on each multiprocessor, whose threads go through its parts together.
