@@ -93,6 +93,7 @@ void Parser::finish() {
         fail(saved_.back().where, std::string(saved_.back().is_object ? "Object" : "Attribute") + "Begin has no end");
     if (!in_world_) fail(scene_.document.scene->where, "the scene has no WorldBegin");
     finish_shapes(scene_);
+    finish_instances(scene_);
 }
 
 void Parser::directive(const Token& word) {
@@ -360,12 +361,7 @@ void Parser::object(const std::string& name, const Where& at) {
     }
     const auto known = scene_.objects.find(id);
     if (known == scene_.objects.end()) fail(at, "unknown object '" + id + "'");
-    if (++scene_.shape_count > scene_.document.limits.shapes)
-        fail(at, "the scene has more shapes than --limits shapes=" + std::to_string(scene_.document.limits.shapes));
-    Object& instance = add_object(scene_.document, "shape", "instance", at);
-    set_transform(instance, "to_world", scene_.state.ctm);
-    add_child(instance, *known->second);
-    add_child(*scene_.document.scene, instance);
+    add_instance(scene_, *known->second, at);
 }
 
 void Parser::include(const Where& at, bool import) {

@@ -49,6 +49,20 @@ struct LateShape {
     Object* open_object;
 };
 
+/// A sphere or cylinder of an object, from which an instance may make a mesh.
+struct RoundShape {
+    LateShape shape;
+    Surface surface;
+    const Object* object;
+};
+
+/// Of an object of the file, whose shapes need not be known yet.
+struct Instance {
+    Object* object;
+    const Object* group;
+    Matrix ctm;
+};
+
 struct SceneMaker {
     SceneMaker(Document& d, Report& r, std::string f)
         : document(d), report(r), folder(std::move(f)), textures({folder, d, r}, d, r) {}
@@ -66,6 +80,8 @@ struct SceneMaker {
     uint64_t shape_count = 0;
     std::vector<CurveMesh> curves;
     std::vector<LateShape> late_shapes;
+    std::vector<RoundShape> round_shapes;
+    std::vector<Instance> instances;
 
     /// BSDFs of materials; keeps the materials, so that no address comes twice.
     std::map<std::pair<Shared, Surface>, const Object*> materials;
@@ -80,10 +96,17 @@ struct Options {
 };
 void add_options(SceneMaker& scene, const Options& options);
 
-void add_shape(SceneMaker& scene, const Parameters& in);
+/// `as_mesh`: what else would be a sphere, disk or cylinder too.
+void add_shape(SceneMaker& scene, const Parameters& in, bool as_mesh = false);
 /// At once, or by finish_shapes if the shape's material is still unknown.
 void add_shape_when_known(SceneMaker& scene, Parameters in);
 void finish_shapes(SceneMaker& scene);
+void add_instance(SceneMaker& scene, Object& group, const Where& where);
+/// Once all shapes are known.
+void finish_instances(SceneMaker& scene);
+/// True of a sphere or cylinder that the transform stretches or shears into what no quadric here is (make_quadric()).
+bool is_stretched(Surface surface, const Matrix& m);
+void note_stretched(SceneMaker& scene, const Where& where);
 /// Directive of what stands for a material that is not defined yet; its type is the name.
 inline constexpr char kNamedMaterial[] = "NamedMaterial";
 Shared named_material(const SceneMaker& scene, const std::string& name, const Where& where);

@@ -70,27 +70,13 @@ Placed add_quadric(SceneMaker& scene, const Parameters& in) {
     return out;
 }
 
-/// A sphere or cylinder that its transform stretches or shears into what no quadric here is (make_quadric()).
-bool is_stretched(const SceneMaker& scene, const Parameters& in) {
-    const Surface surface = surface_of(in.type);
-    if (surface != Surface::sphere && surface != Surface::cylinder) return false;
-    constexpr double kTolerance = 1e-3;
-    const Matrix& m = scene.state.ctm;
-    const auto axis = [&m](int i) { return length(Vec3d{m.m[0][i], m.m[1][i], m.m[2][i]}); };
-    const double lx = axis(0), ly = axis(1), lz = axis(2);
-    const double radius = surface == Surface::sphere ? (lx + ly + lz) / 3 : (lx + ly) / 2;
-    const auto differs = [&](double l) { return !(std::fabs(l - radius) < kTolerance * radius); };
-    return !is_orthogonal(m, kTolerance) || differs(lx) || differs(ly) || (surface == Surface::sphere && differs(lz));
-}
-
 Mesh own_mesh(SceneMaker& scene, const Parameters& in, double& exact_area) {
     if (surface_of(in.type) != Surface::mesh) {
         if (is_cut(in))
             scene.report.note(in.where,
                               "parts of spheres, disks and cylinders are triangles: 256 around, 128 from pole to pole");
-        else if (is_stretched(scene, in))
-            scene.report.note(in.where,
-                              "stretched spheres and cylinders are triangles: 256 around, 128 from pole to pole");
+        else if (is_stretched(surface_of(in.type), scene.state.ctm))
+            note_stretched(scene, in.where);
         return cut_quadric(in, exact_area);
     }
     if (in.type == "trianglemesh") return triangle_mesh(scene, in);
@@ -184,7 +170,7 @@ struct Look {
 };
 
 Look look_of(SceneMaker& scene, const Parameters& in, Surface surface) {
-    Look look{surface, shines_unseen(scene, in)};
+    Look look{surface, shines_unseen(scene, in), false, nullptr, nullptr};
     const auto surface_bsdf = [&]() -> const Object* {
         if (look.hidden) return &add_object(scene.document, "bsdf", "null", in.where);
         return masked(scene, in, surface_material(scene, scene.state.material, look.surface), uv_map(look.surface));
@@ -241,9 +227,24 @@ Placed add_surface(SceneMaker& scene, const Parameters& in, Look& look) {
 
 }  // namespace
 
-void add_shape(SceneMaker& scene, const Parameters& in) {
+bool is_stretched(Surface surface, const Matrix& m) {
+    if (surface != Surface::sphere && surface != Surface::cylinder) return false;
+    constexpr double kTolerance = 1e-3;
+    const auto axis = [&m](int i) { return length(Vec3d{m.m[0][i], m.m[1][i], m.m[2][i]}); };
+    const double lx = axis(0), ly = axis(1), lz = axis(2);
+    const double radius = surface == Surface::sphere ? (lx + ly + lz) / 3 : (lx + ly) / 2;
+    const auto differs = [&](double l) { return !(std::fabs(l - radius) < kTolerance * radius); };
+    return !is_orthogonal(m, kTolerance) || differs(lx) || differs(ly) || (surface == Surface::sphere && differs(lz));
+}
+
+void note_stretched(SceneMaker& scene, const Where& where) {
+    scene.report.note(where, "stretched spheres and cylinders are triangles: 256 around, 128 from pole to pole");
+}
+
+void add_shape(SceneMaker& scene, const Parameters& in, bool as_mesh) {
     const std::string& type = in.type;
-    const bool round = surface_of(type) != Surface::mesh, quadric = round && !is_cut(in) && !is_stretched(scene, in);
+    const bool round = surface_of(type) != Surface::mesh,
+               quadric = round && !as_mesh && !is_cut(in) && !is_stretched(surface_of(type), scene.state.ctm);
     if (!round && type != "trianglemesh" && type != "plymesh" && type != "bilinearmesh" && type != "loopsubdiv" &&
         type != "curve")
         return scene.report.refuse(in.where, "shape '" + type + "' is not supported", "it is left out");
@@ -263,6 +264,8 @@ void add_shape(SceneMaker& scene, const Parameters& in) {
         add_child(shape, area_emitter(scene, *scene.state.area_light, uv_map(look.surface), placed.area, look.hidden,
                                       look.hidden ? Texture{} : scene.textures.number(in, "alpha", 1)));
     in.finish(scene.report);
+    if (scene.open_object && (look.surface == Surface::sphere || look.surface == Surface::cylinder))
+        scene.round_shapes.push_back({{in, scene.state, scene.open_object}, look.surface, &shape});
     add_child(scene.open_object ? *scene.open_object : *scene.document.scene, shape);
     if (scene.state.area_light && !scene.open_object && scene.state.area_light->in.boolean("twosided", false))
         add_back(scene, in, shape, *look.bsdf);

@@ -151,6 +151,36 @@ TEST_CASE("stretched spheres and cylinders are meshes, with their normals") {
         CHECK(load_pbrt_world(world).quadrics.size() == 1);
 }
 
+TEST_CASE("an instance that stretches a sphere has a mesh in its place, others keep it") {
+    const Scene both = load_pbrt_world(
+        "ObjectBegin \"o\" Translate 1 0 0 Shape \"sphere\" Shape \"disk\"\nObjectEnd\n"
+        "ObjectInstance \"o\" Scale 1 2 1 ObjectInstance \"o\" ObjectInstance \"o\"");
+    CHECK(has_note(both, "stretched spheres and cylinders are triangles"));
+    CHECK(both.shapes.size() == 6);
+    CHECK(both.quadrics.size() == 4);  // a sphere and three disks
+    for (const MeshVertex& v : both.vertices)
+        CHECK(length(Vec3f{v.p.x - 1, v.p.y / 2, v.p.z}) == Approx(1).epsilon(1e-5));
+    // What the object stretches, an instance may make round again, but it is a mesh by then; a cylinder may be longer.
+    const auto quadrics_in = [](const std::string& shape, const std::string& transform) {
+        return load_pbrt_world("ObjectBegin \"o\" " + shape + " ObjectEnd " + transform + " ObjectInstance \"o\"")
+            .quadrics.size();
+    };
+    CHECK(quadrics_in("Shape \"cylinder\"", "Scale 1 1 3") == 1);
+    CHECK(quadrics_in("Shape \"cylinder\"", "Scale 1 2 1") == 0);
+    CHECK(quadrics_in("Shape \"sphere\"", "Scale -2 2 2 Rotate 40 1 2 3") == 1);
+    CHECK(quadrics_in("Shape \"disk\"", "Scale 1 2 3") == 1);
+}
+
+TEST_CASE("a sphere of an object on a material that comes later is stretched by instances too") {
+    const Scene s = load_pbrt_world(
+        "ObjectBegin \"o\" NamedMaterial \"late\" Shape \"sphere\" ObjectEnd\n"
+        "Scale 1 1 4 ObjectInstance \"o\"\n"
+        "MakeNamedMaterial \"late\" \"string type\" \"conductor\"");
+    CHECK(s.quadrics.empty());
+    REQUIRE(s.shapes.size() == 1);
+    CHECK(s.bsdfs[s.shapes[0].material].type == BsdfType::conductor);
+}
+
 TEST_CASE("curves are tubes, those of one material in one mesh") {
     const std::string curve = "Shape \"curve\" \"string type\" \"cylinder\" \"float width\" 0.2 ";
     const Scene s = test::load_pbrt_world(
