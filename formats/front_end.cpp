@@ -11,14 +11,16 @@ Scene load_by(const std::string& path, const LoadOptions& options,
     document.smooth_normals = false;
     document.mirrors_turn_in = false;
     document.scene = &document::add_object(document, "scene", "", {path, 0});
-    {
-        const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
-        Report report(options.lenient);
-        read(document, report);
-        report.write(document);
-        document::check_references(document);
-    }
-    return document::load_document(path, document, options);
+    return naming_includes(document, [&] {
+        {
+            const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
+            Report report(options.lenient);
+            read(document, report);
+            report.write(document);
+            document::check_references(document);
+        }
+        return document::load_document(path, document, options);
+    });
 }
 
 }  // namespace ambilux

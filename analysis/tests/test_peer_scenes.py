@@ -70,13 +70,14 @@ def test_the_projects_scenes_need_few_changes(tmp_path):
 
 
 def test_bump_and_normal_maps_of_older_formats_have_no_newer_flags(tmp_path):
-    text = '<scene version="2.1.0"><sensor type="perspective"/><bsdf type="bumpmap"/></scene>'
+    text = '<scene version="0.6.0"><sensor type="perspective"/><bsdf type="bumpmap"/></scene>'
     root, changes = convert(tmp_path, text)
     assert {e.get("name"): e.get("value") for e in root.find("bsdf")} == {"flip_invalid_normals": "false", "use_shadowing_function": "false"}
-    assert len(changes) == 2
-    root, changes = convert(tmp_path, text.replace("2.1.0", "3.0.0"))
-    assert len(root.find("bsdf")) == 0
-    assert not changes
+    assert changes[0] == "format 0.6.0 is 3.0.0" and len(changes) == 3
+    for newer in ("2.1.0", "3.0.0"):
+        root, changes = convert(tmp_path, text.replace("0.6.0", newer))
+        assert len(root.find("bsdf")) == 0
+        assert not changes
 
 
 def test_what_cannot_be_divided_is_an_error(tmp_path):

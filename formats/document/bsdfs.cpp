@@ -72,7 +72,7 @@ const Object* strip(Builder& builder, const Object* object, Adapters& adapters, 
             const ScaledTexture scaled = load_scaled_texture(builder, *texture);
             (bump ? adapters.bump_map : adapters.normal_map) = scaled.texture;
             if (bump) adapters.bump_scale = float(in.number("scale", 1)) * luminance(scaled.scale);
-            const bool by_default = object->version >= 3;  // Mitsuba 3.7 and later
+            const bool by_default = object->version >= 2;  // Mitsuba 3.7 and later, of files of Mitsuba 2 too
             if (in.boolean("flip_invalid_normals", by_default)) adapters.map_rules |= kTurnNormals;
             if (in.boolean("use_shadowing_function", by_default)) adapters.map_rules |= kShadowBumps;
             if (!bump && !(scaled.scale == splat(1))) in.fail("the texture of a normalmap must not be scaled");

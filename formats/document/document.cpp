@@ -31,6 +31,26 @@ std::string Document::resolve(const std::string& name, const Where& where) const
     throw input_error(where.file, where.line, "file '" + name + "' does not exist");
 }
 
+Scene naming_includes(const Document& document, const std::function<Scene()>& load) {
+    try {
+        return load();
+    } catch (const Error& e) {
+        const auto& included = document.included_from;
+        const std::string message = e.what();
+        auto at = std::find_if(included.begin(), included.end(),
+                               [&](const auto& file) { return message.starts_with(file.first + ":"); });
+        if (at == included.end()) throw;
+        constexpr int kMostNamed = 4;
+        std::string outer;
+        for (int i = 0; at != included.end() && i < kMostNamed; at = included.find(at->second.file), ++i)
+            outer.append(i ? ", by " : " (included by ")
+                .append(at->second.file)
+                .append(":")
+                .append(std::to_string(at->second.line));
+        throw Error(e.code, message + outer + ")");
+    }
+}
+
 namespace {
 
 Value& add_value(Object& object, const std::string& name, ValueKind kind) {

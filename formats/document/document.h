@@ -70,6 +70,7 @@ struct Document {
     std::map<std::string, const Object*> ids;
     std::vector<std::string> search_folders;                 ///< of <path>, in order
     std::vector<std::pair<std::string, std::string>> files;  ///< path and text of the scene files read
+    std::map<std::string, Where> included_from;              ///< of those that others include: by which
     Limits limits;
 
     // What front ends of other formats hand over (formats/pbrt, formats/gltf).
@@ -86,6 +87,9 @@ struct Document {
     /// main file's. Throws Error(bad_input) if there is none.
     std::string resolve(const std::string& name, const Where& where) const;
 };
+
+/// What `load` returns. What it throws of a file that others include names those too.
+Scene naming_includes(const Document& document, const std::function<Scene()>& load);
 
 /// Throws Error(bad_input) if objects contain themselves or, each counted as often as it is referred to, are more or
 /// nested deeper than the limits allow.

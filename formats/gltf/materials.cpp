@@ -270,6 +270,7 @@ private:
     const Object& with_normals(const Object& inner) {
         Object& out = object("bsdf", "normalmap");
         set_boolean(out, "flip_invalid_normals", true);  // else steep maps are black at silhouettes
+        set_boolean(out, "use_shadowing_function", false);
         add_child(out, textures_.normals(normal_texture_, m_.normalTexture.scale, use_.mirrored, !use_.tangents));
         add_child(out, inner);
         if (use_.tangents) c_.note("tangents of normal maps follow the texture coordinates, not those of the file");

@@ -9,11 +9,15 @@ namespace {
 
 /// Of a file or, if there is one, of a text.
 Scene scene_of(const std::string& path, const LoadOptions& options, const std::string* text) {
-    const auto read = [&] {
-        const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
-        return mitsuba::parse_document(path, options.parameters, options.limits, text);
-    };
-    return document::load_document(path, read(), options);
+    document::Document document;
+    document.limits = options.limits;
+    return naming_includes(document, [&] {
+        {
+            const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
+            mitsuba::parse_document(document, path, options.parameters, text);
+        }
+        return document::load_document(path, document, options);
+    });
 }
 
 }  // namespace

@@ -129,6 +129,7 @@ struct Parser {
         open_files.push_back(canonical.string());
 
         check_includes(document.files.size(), from);
+        if (depth > 1) document.included_from.try_emplace(path, from);
         parse_text(path, read_input(path, document.limits), depth);
         open_files.pop_back();
     }
@@ -181,10 +182,8 @@ struct Parser {
 
 }  // namespace
 
-Document parse_document(const std::string& path, const std::vector<std::pair<std::string, std::string>>& parameters,
-                        const Limits& limits, const std::string* text) {
-    Document document;
-    document.limits = limits;
+void parse_document(Document& document, const std::string& path,
+                    const std::vector<std::pair<std::string, std::string>>& parameters, const std::string* text) {
     Parser parser{document, ValueParser(document), {}};
     std::set<std::string> given;
     for (const auto& [name, value] : parameters) {
@@ -198,7 +197,6 @@ Document parse_document(const std::string& path, const std::vector<std::pair<std
     for (const std::string& name : given)
         if (!parser.values.is_used(name)) throw input_error(path, 0, "the scene has no parameter '$" + name + "'");
     parser.resolve_references();
-    return document;
 }
 
 }  // namespace ambilux::mitsuba

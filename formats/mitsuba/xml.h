@@ -7,9 +7,9 @@ namespace ambilux::mitsuba {
 
 using namespace document;
 
-/// Parses the file, or `text` as if the file held it. `parameters` replace <default>s; one that the file does not use
-/// is an error. Throws Error(bad_input) with file and line.
-Document parse_document(const std::string& path, const std::vector<std::pair<std::string, std::string>>& parameters,
-                        const Limits& limits = {}, const std::string* text = nullptr);
+/// Parses the file, or `text` as if the file held it, into a document that has its limits. `parameters` replace
+/// <default>s; one that the file does not use is an error. Throws Error(bad_input) with file and line.
+void parse_document(Document& document, const std::string& path,
+                    const std::vector<std::pair<std::string, std::string>>& parameters, const std::string* text);
 
 }  // namespace ambilux::mitsuba

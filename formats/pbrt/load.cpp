@@ -71,6 +71,7 @@ void Parser::parse_file(const std::string& path, const Where& from, uint64_t dep
     if (std::find(open_files_.begin(), open_files_.end(), path) != open_files_.end())
         fail(from, "circular include of '" + path + "'");
     open_files_.push_back(path);
+    if (depth > 1) scene_.document.included_from.try_emplace(path, from);
     const std::string text = gunzip_if_packed(path, read_input(path, limits), limits);
     scene_.document.file_digests.push_back({path, sha256(text)});
     Tokenizer tokens(path, text);

@@ -54,6 +54,14 @@ private:
         return textures().color(in_, name, splat(float(fallback)), ColorUse::reflectance, space_);
     }
 
+    /// Without Mitsuba's rules for normals that face away.
+    Object& map_of(const char* type) {
+        Object& object = bsdf(type);
+        set_boolean(object, "flip_invalid_normals", false);
+        set_boolean(object, "use_shadowing_function", false);
+        return object;
+    }
+
     /// With maps and, unless light passes, for both sides.
     const Object* finish(Object& object, bool transmits) {
         const Object* out = &object;
@@ -69,12 +77,12 @@ private:
             texture.image = std::make_shared<TextureImage>();
             texture.image->path = resolve(scene_.folder, map, texture.where);
             texture.image->gamma = 1;
-            Object& outer = bsdf("normalmap");
+            Object& outer = map_of("normalmap");
             add_child(outer, textures().object(texture, uv_));
             add_child(outer, object);
             out = &outer;
         } else if (bumps) {
-            Object& outer = bsdf("bumpmap");
+            Object& outer = map_of("bumpmap");
             Texture heights = textures().number(in_, "displacement", 0);
             if (heights.kind == Texture::Kind::image) {
                 set_number(outer, "scale", heights.color.x);

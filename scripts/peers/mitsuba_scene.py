@@ -240,7 +240,7 @@ def convert(job):
     bitmaps(root, old, changes)
     conductors(root, changes)
     rough_diffuse(root, changes)
-    if int(version.split(".")[0]) < 3:
+    if old:
         bump_flags(root, changes)
     unused_flags(root, changes)
     film_of(root, job, changes)

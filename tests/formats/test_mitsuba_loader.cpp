@@ -398,6 +398,8 @@ TEST_CASE("mistakes are named with file and line") {
     folder.write("range.obj", "v 0 0 0\nf 1 2 3\n");
     folder.write("self.xml", wrap("<include filename='self.xml'/>", "3.0.0"));
     folder.write("notscene.xml", "<bsdf type='diffuse'/>");
+    folder.write("outer.xml", wrap("<include filename='wrong.xml'/>", "3.0.0"));
+    folder.write("wrong.xml", wrap("<shape type='rectangle'><bsdf type='plaid'/></shape>", "3.0.0"));
     folder.write("bad.png", "no image");
     const std::pair<const char*, const char*> cases[] = {
         {"<bsdf type='diffuse'", "scene.xml:"},
@@ -405,7 +407,10 @@ TEST_CASE("mistakes are named with file and line") {
         {"\n<shape type='rectangle'><ref id='nobody'/></shape>", "scene.xml:3: reference to unknown id 'nobody'"},
         {"<bsdf type='diffuse' id='a'/>\n<bsdf type='diffuse' id='a'/>", "scene.xml:3: id 'a' is already used at "},
         {"<include filename='self.xml'/>", "self.xml:2: circular include of "},
-        {"<include filename='notscene.xml'/>", "notscene.xml:1: the outermost element is not <scene>"},
+        {"<include filename='notscene.xml'/>", "notscene.xml:1: the outermost element is not <scene> (included by "},
+        {"<include filename='outer.xml'/>", "wrong.xml:2: BSDF type 'plaid' is not supported (included by "},
+        {"<include filename='outer.xml'/>", "outer.xml:2, by "},
+        {"<include filename='outer.xml'/>", "scene.xml:2)"},
         {"<include filename='missing.xml'/>", "scene.xml:2: file 'missing.xml' does not exist"},
         {"\n<shape type='$kind'/>", "scene.xml:3: parameter '$kind' has no value and no <default>"},
         {"<shape type='obj'>\n<string name='filename' value='missing.obj'/></shape>",

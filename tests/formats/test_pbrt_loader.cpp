@@ -159,6 +159,11 @@ TEST_CASE("errors say where") {
     }
     CHECK(contains(pbrt_error("Shape \"sphere\""), "Shape must stand behind WorldBegin"));
     CHECK(contains(pbrt_error(""), "has no WorldBegin"));
+    const TempFolder folder;
+    folder.write("wrong.pbrt", "\nShape \"ball\"");
+    const std::string error = pbrt_error("WorldBegin\nInclude \"wrong.pbrt\"", {}, &folder);
+    CHECK(contains(error, "wrong.pbrt:2: shape 'ball' is not supported"));
+    CHECK(contains(error, "scene.pbrt:2)"));
 }
 
 TEST_CASE("files that nest, unpack or repeat stay within the limits") {

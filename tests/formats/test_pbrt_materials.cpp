@@ -165,6 +165,7 @@ TEST_CASE("factors of textures: reflectances end at 1, heights may be negative, 
     check_rgb(reflectance(s, 0, {0.25f, 0.5f}), splat(1));
     CHECK(bsdf(s).bump_map >= 0);
     CHECK(bsdf(s).bump_scale == -2);
+    CHECK(bsdf(s).map_rules == 0);
     CHECK(bsdf(s, 1).as<RoughPlastic>().alpha.value == Approx(0.5f));
     CHECK(has_note(s, "mean of its roughness"));
 }
