@@ -117,6 +117,14 @@ int conclude(const Options& o, const LoadedScene& loaded, const RenderSettings& 
     return int(ExitCode::done);
 }
 
+/// The scene, its warnings said.
+LoadedScene load(const Options& o) {
+    LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
+    if (o.strict && !loaded.scene.warnings.empty())
+        throw Error(ExitCode::bad_input, "--strict: the scene has warnings, nothing was rendered");
+    return loaded;
+}
+
 void show_progress(Progress& progress, const Budget& budget, const RenderPosition& p, const RenderStats& stats) {
     const double fraction = budget.samples ? double(p.samples) / double(budget.samples) : p.seconds / budget.seconds;
     progress.update(std::min(fraction, 1.0), progress_details(p.samples, p.seconds, stats));
@@ -138,7 +146,7 @@ nlohmann::json describe_parts(const ParallelResult& result) {
 }
 
 int render_by_ranges(const Options& o) {
-    const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
+    const LoadedScene loaded = load(o);
     ParallelRequest request;
     request.settings = o.render.settings(loaded.scene);
     request.budget = render_budget(o.spp, o.time, loaded.scene, "--");
@@ -281,7 +289,7 @@ nlohmann::json find(const Options& o, const Scene& scene, const RenderSettings& 
 int render(const Options& o) {
     check(o);
     if (o.by_ranges()) return render_by_ranges(o);
-    const LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
+    const LoadedScene loaded = load(o);
     const Scene& scene = loaded.scene;
     RenderSettings settings = o.render.settings(scene);
     if (!o.techniques.empty() && settings.technique_depth == 0) settings.technique_depth = kDefaultTechniqueDepth;
@@ -349,7 +357,9 @@ void add_render(CLI::App& app, Run& run) {
     command.add_option("--checkpoint", o->checkpoint,
                        "Seconds between two states of the render, OUTPUT.state. Default with several devices: 60");
     command.add_flag("--resume", o->resume, "Go on from OUTPUT.state, with any number of devices and ranks");
-    command.add_flag("--strict", o->strict, "Fail (exit code 4) if invalid values or lost queue items were counted");
+    command.add_flag(
+        "--strict", o->strict,
+        "Fail (exit code 4) if invalid values or lost queue items were counted, and (3) if the scene has warnings");
     command.add_option("--json", o->json, "Write the statistics to a file, or - for standard output");
     command.callback([o, png, &run] {
         if (png->count() > 0 && o->png.empty())

@@ -10,6 +10,7 @@ Scene load_by(const std::string& path, const LoadOptions& options,
     document.limits = options.limits;
     document.smooth_normals = false;
     document.mirrors_turn_in = false;
+    document.clips_reflectances = true;
     document.scene = &document::add_object(document, "scene", "", {path, 0});
     return naming_includes(document, [&] {
         {

@@ -15,7 +15,7 @@ void Report::List::add(const Where& where, const std::string& text) {
 std::vector<std::string> Report::List::lines() const {
     std::vector<std::string> lines;
     for (const Entry& e : entries)
-        lines.push_back(e.where.file + (e.where.line ? ":" + std::to_string(e.where.line) : "") + ": " + e.text +
+        lines.push_back(e.where.text() + ": " + e.text +
                         (e.count > 1 ? " (" + std::to_string(e.count) + " times)" : ""));
     return lines;
 }
@@ -28,7 +28,7 @@ void Report::refuse(const Where& where, const std::string& problem, const std::s
 }
 
 void Report::write(document::Document& document) const {
-    document.notes = notes_.lines();
+    for (const std::string& note : notes_.lines()) document.notes.push_back(note);
     document.warnings = warnings_.lines();
 }
 

@@ -114,6 +114,7 @@ ParamRgb baked_color(Builder& builder, const Reader& in, const std::vector<Param
     const SceneView view = builder.scene.view();
     std::vector<float> texels;
     texels.reserve(4 * count);
+    TextureFacts facts{{}, {}, in.where().file};
     double sum[3] = {0, 0, 0};
     for (uint32_t y = 0; y < out.height; ++y)
         for (uint32_t x = 0; x < out.width; ++x) {
@@ -124,10 +125,11 @@ ParamRgb baked_color(Builder& builder, const Reader& in, const std::vector<Param
             }
             const Rgb c = f(values);
             for (int i = 0; i < 3; ++i) sum[i] += double(c[i]);
+            facts.largest = max(facts.largest, c);
             texels.insert(texels.end(), {c.x, c.y, c.z, 1.0f});
         }
-    const auto mean = [&](int i) { return float(sum[i] / double(count)); };
-    return {splat(1), add_baked_texture(builder, out, texels, {mean(0), mean(1), mean(2)})};
+    for (int i = 0; i < 3; ++i) facts.mean[i] = float(sum[i] / double(count));
+    return {splat(1), add_baked_texture(builder, out, texels, facts)};
 }
 
 ParamFloat baked_number(Builder& builder, const Reader& in, const std::vector<ParamFloat>& inputs,

@@ -252,7 +252,7 @@ struct MaterialBuilder {
             if (!(w >= 0)) in.fail(in.where("weights"), "weights must not be negative");
             sum += w;
         }
-        if (!(sum > 0 && sum <= 1 + 1e-6))
+        if (!(sum > 0 && sum <= double(kRoundedOne)))
             in.fail(in.where("weights"), "the weights must be positive and sum to 1 at most");
         // From the last one on; what is missing to 1 is black.
         uint32_t rest = sum < 1 - 1e-6 ? black() : parts.back();

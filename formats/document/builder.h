@@ -15,6 +15,12 @@
 
 namespace ambilux::document {
 
+/// Of the colours of a texture.
+struct TextureFacts {
+    Rgb mean{}, largest{};
+    std::string file;  ///< that they come from
+};
+
 struct Builder {
     Builder(const Document& d, const LoadOptions& o, Vec3d p, Scene& s)
         : document(d), options(o), to_scene(translation(-p.x, -p.y, -p.z)), scene(s) {}
@@ -29,7 +35,7 @@ struct Builder {
     std::map<std::string, uint64_t> texel_pool;                      ///< file and decoding -> offset
     std::map<std::string, int32_t> texture_pool;                     ///< all settings -> texture
     std::map<std::string, struct LoadedImage> images;                ///< by path and decoding
-    std::vector<Rgb> texture_means;                                  ///< per texture
+    std::vector<TextureFacts> texture_facts;                         ///< per texture
     std::map<const Object*, uint32_t> materials;
     uint32_t default_materials[2] = {kNone, kNone};  ///< of shapes without and with an emitter
     uint32_t null_materials[2] = {kNone, kNone};     ///< the same of BSDF null
@@ -59,6 +65,9 @@ struct Builder {
 
     /// Something we cannot do: an error, or with --lenient a warning that says what is done instead.
     void refuse(const Where& where, const std::string& problem, const std::string& instead);
+
+    /// Said once for each text: the image may be another than the file asks for, or none is right.
+    void warn(const Where& where, const std::string& text);
 };
 
 /// Size and place of an image whose texels are in the scene.
@@ -67,8 +76,7 @@ struct LoadedImage {
     uint64_t offset = 0;
     TexelFormat format = TexelFormat::rgba8;
     uint32_t decode_table = 0;
-    Rgb mean{};
-    float largest = 0;  ///< value of any colour; only known of float texels
+    TextureFacts facts;
 };
 
 /// Reads the parameters of one object and keeps track of which were asked for.
@@ -107,6 +115,7 @@ public:
     void finish();
 
 private:
+    ParamRgb checked_reflectance(const std::string& name, const Object& texture, const ParamRgb& parameter);
     const Value* value(const std::string& name, std::initializer_list<ValueKind> kinds, const char* expected);
     const Child* child_named(const std::string& name) const;
 
@@ -136,9 +145,11 @@ int32_t add_environment_image(Builder& builder, const std::string& name, const T
 /// The same of RGBA texels that are at hand.
 int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels);
 /// Texture of float texels that bilinear lookups find at texel centres.
-int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels, Rgb mean);
+int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels,
+                  const TextureFacts& facts);
 /// Texture of these RGBA texels with the size, coordinates, wrap mode and filter of `settings`.
-int32_t add_baked_texture(Builder& builder, const Texture& settings, const std::vector<float>& texels, Rgb mean);
+int32_t add_baked_texture(Builder& builder, const Texture& settings, const std::vector<float>& texels,
+                          const TextureFacts& facts);
 /// Mean colour of a parameter over its texture.
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter);
 

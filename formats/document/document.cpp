@@ -74,6 +74,20 @@ void for_all_below(const Object& object, const std::function<void(const Object&)
     visit(object);
 }
 
+void note_image(std::vector<std::string>& notes, const std::string& path, const Texels& image) {
+    for (const std::string& text : image.notes)
+        if (const std::string note = path + ": " + text; std::find(notes.begin(), notes.end(), note) == notes.end())
+            notes.push_back(note);
+}
+
+Texels read_image_file(Document& document, const std::string& path) {
+    const std::string bytes = read_input(path, document.limits);
+    document.file_digests.push_back({path, sha256(bytes)});
+    Texels texels = read_image(path, bytes, document.limits);
+    note_image(document.notes, path, texels);
+    return texels;
+}
+
 void take_texels(Document& document, const Where& where, uint64_t texels, uint64_t bytes_each) {
     FileBudget(where.file, document.limits).bytes(texels, bytes_each);
     document.made_texels += texels * bytes_each;

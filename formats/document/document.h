@@ -20,10 +20,16 @@
 
 namespace ambilux::document {
 
+/// What exporters round to just above 1 counts as 1.
+constexpr float kRoundedOne = 1.001f;
+inline float without_rounding(float v) { return v > 1 && v <= kRoundedOne ? 1 : v; }
+
 /// Where something stands in the input.
 struct Where {
     std::string file;
-    int line = 0;
+    int line = 0;  ///< 0: the file as a whole
+
+    std::string text() const { return line ? file + ":" + std::to_string(line) : file; }
 };
 
 enum class ValueKind { boolean, integer, number, text, vector, rgb, spectrum, transform };
@@ -83,6 +89,8 @@ struct Document {
     bool smooth_normals = true;           ///< meshes without normals get smooth ones, as in Mitsuba
     bool mirrors_turn_in = true;          ///< mirrored meshes of files, and spheres, turn in, as in Mitsuba 2 and 3
 
+    bool clips_reflectances = false;  ///< textures that reflect more than 1 reflect 1, as in pbrt and glTF
+
     /// Path of a file named in `where.file`: relative to that file's folder, then to the <path> folders, then to the
     /// main file's. Throws Error(bad_input) if there is none.
     std::string resolve(const std::string& name, const Where& where) const;
@@ -102,6 +110,10 @@ void for_all_below(const Object& object, const std::function<void(const Object&)
 /// Before a front end makes an image of its own: throws Error(bad_input) where one or all are more than the limits
 /// allow.
 void take_texels(Document& document, const Where& where, uint64_t texels, uint64_t bytes_each);
+/// What the file of an image says of itself and is not taken as it says, each once.
+void note_image(std::vector<std::string>& notes, const std::string& path, const Texels& image);
+/// Texels of a file, its digest and what there is to say of it.
+Texels read_image_file(Document& document, const std::string& path);
 /// The same shape turned over, for a light of two sides; to be added behind the shape, once that is complete.
 Object& add_light_back(Document& document, const Object& shape);
 void add_child(Object& parent, const Object& child, const std::string& name = "");

@@ -55,7 +55,7 @@ std::array<Rgb, 4> linear_block(std::array<Rgb, 3> v, uint32_t width) {
     return {v[0], v[1], v[2], v[1] + v[2] - v[0]};
 }
 
-std::vector<float> texels_of(const Atlas& atlas, const Mesh& mesh, const MeshAttribute& a, Rgb& mean) {
+std::vector<float> texels_of(const Atlas& atlas, const Mesh& mesh, const MeshAttribute& a, TextureFacts& facts) {
     std::vector<float> texels(size_t(atlas.width) * atlas.height * 4, 0.0f);
     for (size_t t = 0; t < mesh.faces.size(); ++t) {
         std::array<Rgb, 3> v;
@@ -66,7 +66,7 @@ std::vector<float> texels_of(const Atlas& atlas, const Mesh& mesh, const MeshAtt
             for (int c = 0; c < 3; ++c) texel[c] = block[k][c];
             texel[3] = 1;
         }
-        mean += (v[0] + v[1] + v[2]) * (1.0f / (3 * float(mesh.faces.size())));
+        facts.mean += (v[0] + v[1] + v[2]) * (1.0f / (3 * float(mesh.faces.size())));
     }
     return texels;
 }
@@ -104,9 +104,10 @@ Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh&
         for (const Rgb& value : a.values)
             if (min_component(value) < 0) throw input_error(path, 0, "attribute '" + a.name + "' is negative");
         builder.take_memory(uint64_t(atlas.width) * atlas.height * 16, path);
-        Rgb mean{};
-        const std::vector<float> texels = texels_of(atlas, mesh, a, mean);
-        textures[a.name] = add_atlas(builder, atlas.width, atlas.height, texels, mean);
+        TextureFacts facts{{}, {}, path};
+        for (const Rgb& value : a.values) facts.largest = max(facts.largest, value);
+        const std::vector<float> texels = texels_of(atlas, mesh, a, facts);
+        textures[a.name] = add_atlas(builder, atlas.width, atlas.height, texels, facts);
     }
     builder.take_memory(mesh_bytes(3 * mesh.faces.size(), mesh.faces.size()), path);
     Mesh out;

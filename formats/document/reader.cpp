@@ -7,7 +7,7 @@
 
 #include "accel/range.h"
 #include "core/error.h"
-#include "formats/document/builder.h"
+#include "formats/document/baked_textures.h"
 #include "formats/document/named_media.h"
 #include "formats/document/plugins.h"
 
@@ -19,13 +19,16 @@ static const Plugins kMarks = {"caustic_caster_single", "caustic_caster_multi", 
 
 void Builder::refuse(const Where& where, const std::string& problem, const std::string& instead) {
     if (!options.lenient) throw input_error(where.file, where.line, problem);
-    const std::string message = where.file + ":" + std::to_string(where.line) + ": " + problem + "; " + instead;
+    warn(where, problem + "; " + instead);
+}
+
+void Builder::warn(const Where& where, const std::string& text) {
+    const std::string message = where.text() + ": " + text;
     if (reported.insert(message).second) scene.warnings.push_back(message);
 }
 
 void Builder::note(const Where& where, const std::string& text) {
-    if (reported.insert(text).second)
-        scene.notes.push_back(where.file + ":" + std::to_string(where.line) + ": " + text);
+    if (reported.insert(text).second) scene.notes.push_back(where.text() + ": " + text);
 }
 
 void Builder::take_memory(uint64_t bytes, const std::string& path) {
@@ -145,12 +148,11 @@ Rgb Reader::color(const std::string& name, Rgb fallback, SpectrumUse use) {
         rgb *= kEqualEnergy;  // as Mitsuba 3; its D65 is white
     if (!is_finite(rgb)) fail(v->where, "'" + name + "' is not finite");
     if (min_component(rgb) < 0) fail(v->where, "'" + name + "' is negative");
-    if (use == SpectrumUse::reflectance && max_component(rgb) > 1) {
+    if (use != SpectrumUse::reflectance) return rgb;
+    if (max_component(rgb) > kRoundedOne)
         builder_.refuse(v->where, "'" + name + "' is larger than 1, the surface would create energy",
                         "it is clipped at 1");
-        rgb = min(rgb, splat(1));
-    }
-    return rgb;
+    return min(rgb, splat(1));
 }
 
 ParamRgb Reader::textured_color(const std::string& name, Rgb fallback, SpectrumUse use) {
@@ -158,9 +160,25 @@ ParamRgb Reader::textured_color(const std::string& name, Rgb fallback, SpectrumU
         if (texture->tag != "texture")
             fail(where(name), "'" + name + "' must be a colour or a texture, not a " + texture->tag);
         const ScaledTexture scaled = load_scaled_texture(builder_, *texture);
-        return {scaled.scale, scaled.texture};
+        const ParamRgb out{scaled.scale, scaled.texture};
+        return use == SpectrumUse::reflectance ? checked_reflectance(name, *texture, out) : out;
     }
     return {color(name, fallback, use), -1};
+}
+
+/// A texture that is more than 1 somewhere.
+ParamRgb Reader::checked_reflectance(const std::string& name, const Object& texture, const ParamRgb& parameter) {
+    if (builder_.validate_only) return parameter;
+    const TextureFacts& facts = builder_.texture_facts[size_t(parameter.texture)];
+    const float largest = max_component(parameter.value * facts.largest);
+    if (!(largest > kRoundedOne)) return parameter;
+    const std::string problem = fmt::format("'{}' is up to {:.4g}, by {}", name, largest, facts.file);
+    if (!builder_.document.clips_reflectances) {
+        builder_.warn(texture.where, problem + ": what reflects more than 1 creates energy");
+        return parameter;
+    }
+    builder_.note(texture.where, problem + ", and is clipped at 1");
+    return baked_color(builder_, *this, {parameter}, [](const std::vector<Rgb>& v) { return min(v[0], splat(1)); });
 }
 
 ParamFloat Reader::textured_number(const std::string& name, float fallback) {
@@ -170,14 +188,14 @@ ParamFloat Reader::textured_number(const std::string& name, float fallback) {
         const ScaledTexture scaled = load_scaled_texture(builder_, *texture, TextureUse::number);
         if (scaled.scale.x != scaled.scale.y || scaled.scale.x != scaled.scale.z)
             fail(texture->where, "a number cannot come from a texture that is scaled by a colour");
-        return {scaled.scale.x, scaled.texture};
+        return {without_rounding(scaled.scale.x), scaled.texture};
     }
     const Value* v = object_.find(name);
     // A colour is the mean of its channels, as in Mitsuba 3.
     const bool colored = v && (v->kind == ValueKind::rgb || (v->kind == ValueKind::spectrum && v->samples.empty()));
     if (colored) used_values_.insert(v);
     const Rgb rgb = colored && v->kind == ValueKind::rgb ? v->rgb : splat(colored ? float(v->number) : 0);
-    const float value = colored ? (rgb.x + rgb.y + rgb.z) / 3 : float(number(name, fallback));
+    const float value = without_rounding(colored ? (rgb.x + rgb.y + rgb.z) / 3 : float(number(name, fallback)));
     if (!std::isfinite(value)) fail(where(name), "'" + name + "' is too large for a float");
     return {value, -1};
 }

@@ -233,7 +233,9 @@ void ShapeBuilder::read_tessellated(Reader& in, Job& job, const Matrix& outer) {
     MeshSource source;
     source.type = job.type;
     if (field) {
-        source.mesh = read_height_field(path, bytes, scale, smooth, limits);
+        const Texels texels = read_image(path, bytes, limits);
+        note_image(builder.scene.notes, path, texels);
+        source.mesh = mesh_of_image(path, texels, scale, smooth, limits);
     } else if (grid) {
         source.mesh = mesh_of_grid(path, read_distance_grid(path, bytes, limits),
                                    normals == "smooth" ? GridNormals::smooth : GridNormals::analytic);

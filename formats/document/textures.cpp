@@ -91,6 +91,7 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
         const std::string bytes = read_input(path, builder.options.limits);
         builder.file_digests.push_back({path, sha256(bytes)});
         own = read_image(path, bytes, builder.options.limits);
+        note_image(builder.scene.notes, path, own);
     } else if (channel >= 0) {
         own = *given;
     }
@@ -101,6 +102,8 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
     LoadedImage out;
     out.width = image.width;
     out.height = image.height;
+    out.facts.file = path;
+    Rgb& largest = out.facts.largest;
     double mean[3] = {0, 0, 0};
     const size_t count = size_t(image.width) * image.height;
     builder.take_memory(count * (image.is_8bit && !as_float ? 4 : 16), path);
@@ -113,7 +116,10 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
         out.offset = it->second;
         const float* table = builder.scene.tables.data() + out.decode_table;
         for (size_t i = 0; i < count; ++i)
-            for (int c = 0; c < 3; ++c) mean[c] += table[image.bytes[4 * i + c]];
+            for (int c = 0; c < 3; ++c) {
+                const float v = table[image.bytes[4 * i + c]];
+                mean[c] += v, largest[c] = std::max(largest[c], v);
+            }
     } else {
         std::vector<float> texels(count * 4);
         for (size_t i = 0; i < texels.size(); ++i) {
@@ -123,11 +129,11 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
                 throw input_error(path, 0,
                                   "texel (" + std::to_string(i / 4 % image.width) + ", " +
                                       std::to_string(i / 4 / image.width) + ") is not finite");
-            if (i % 4 < 3) mean[i % 4] += texels[i], out.largest = std::max(out.largest, texels[i]);
+            if (const int c = int(i % 4); c < 3) mean[c] += texels[i], largest[c] = std::max(largest[c], texels[i]);
         }
         out.offset = append_floats(builder.scene, texels, as_float, out.format);
     }
-    out.mean = {float(mean[0] / double(count)), float(mean[1] / double(count)), float(mean[2] / double(count))};
+    out.facts.mean = {float(mean[0] / double(count)), float(mean[1] / double(count)), float(mean[2] / double(count))};
     builder.images[key] = out;
     return out;
 }
@@ -187,12 +193,12 @@ TextureFilter texture_filter(Builder& builder, Reader& in) {
     return TextureFilter::bilinear;
 }
 
-int32_t add_texture(Builder& builder, const Texture& texture, Rgb mean) {
+int32_t add_texture(Builder& builder, const Texture& texture, const TextureFacts& facts) {
     const std::string key(reinterpret_cast<const char*>(&texture), sizeof texture);
     const auto [it, added] = builder.texture_pool.try_emplace(key, int32_t(builder.scene.textures.size()));
     if (added) {
         builder.scene.textures.push_back(texture);
-        builder.texture_means.push_back(mean);
+        builder.texture_facts.push_back(facts);
     }
     return it->second;
 }
@@ -207,7 +213,7 @@ Rgb raw_value(Reader& in) {
 }
 
 /// Grid of lines on a ground: a bitmap of one period, as fine as the lines need.
-void read_grid(Builder& builder, Reader& in, Texture& texture, Rgb& mean) {
+void read_grid(Builder& builder, Reader& in, Texture& texture, TextureFacts& facts) {
     constexpr uint32_t kMost = 1024;
     const Rgb ground = in.color("color0", splat(0.2f), SpectrumUse::reflectance),
               line = in.color("color1", splat(0.4f), SpectrumUse::reflectance);
@@ -227,7 +233,7 @@ void read_grid(Builder& builder, Reader& in, Texture& texture, Rgb& mean) {
     for (uint32_t y = 0; y < n; ++y)
         for (uint32_t x = 0; x < n; ++x) {
             const Rgb c = is_line(x) || is_line(y) ? line : ground;
-            mean += c * (1.0f / (float(n) * float(n)));
+            facts.mean += c * (1.0f / (float(n) * float(n)));
             texels.insert(texels.end(), {c.x, c.y, c.z, 1.0f});
         }
     builder.take_memory(texels.size() * sizeof(float), in.where().file);
@@ -240,7 +246,7 @@ void read_grid(Builder& builder, Reader& in, Texture& texture, Rgb& mean) {
 }
 
 /// An image of a file or of the document.
-void read_bitmap(Builder& builder, Reader& in, Texture& texture, Rgb& mean) {
+void read_bitmap(Builder& builder, Reader& in, Texture& texture, TextureFacts& facts) {
     texture.type = TextureType::bitmap;
     const Texels* given = given_image(builder, in);
     const std::string name = in.text(given ? "image" : "filename", "");
@@ -264,10 +270,10 @@ void read_bitmap(Builder& builder, Reader& in, Texture& texture, Rgb& mean) {
     texture.height = image.height;
     texture.offset = image.offset;
     texture.decode_table = image.decode_table;
-    mean = image.mean;
+    facts = image.facts;
 }
 
-void read_checkerboard(Builder& builder, Reader& in, TextureUse use, Texture& texture, Rgb& mean) {
+void read_checkerboard(Builder& builder, Reader& in, TextureUse use, Texture& texture, TextureFacts& facts) {
     texture.type = TextureType::checkerboard;
     texture.color0 = in.color("color0", splat(0.4f), SpectrumUse::reflectance);
     texture.color1 = in.color("color1", splat(0.2f), SpectrumUse::reflectance);
@@ -277,7 +283,8 @@ void read_checkerboard(Builder& builder, Reader& in, TextureUse use, Texture& te
         std::swap(texture.color0, texture.color1);
         builder.note(in.where(), "a checkerboard of numbers has its colours exchanged, as in Mitsuba 3");
     }
-    mean = (texture.color0 + texture.color1) * 0.5f;
+    facts.mean = (texture.color0 + texture.color1) * 0.5f;
+    facts.largest = max(texture.color0, texture.color1);
 }
 
 }  // namespace
@@ -301,24 +308,24 @@ int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
     if (object.type == "mesh_attribute" || object.type == "vertexcolors") return attribute_texture(builder, in);
     Texture texture;
     memset(&texture, 0, sizeof texture);  // padding too, because the record is its own key
-    Rgb mean{};
+    TextureFacts facts{{}, {}, object.where.file};
     if (object.type == "bitmap") {
-        read_bitmap(builder, in, texture, mean);
+        read_bitmap(builder, in, texture, facts);
     } else if (object.type == "checkerboard") {
-        read_checkerboard(builder, in, use, texture, mean);
+        read_checkerboard(builder, in, use, texture, facts);
     } else if (object.type == "rawconstant") {
         texture.type = TextureType::checkerboard;
-        texture.color0 = texture.color1 = mean = raw_value(in);
+        texture.color0 = texture.color1 = facts.mean = facts.largest = raw_value(in);
         in.finish();
     } else if (object.type == "gridtexture") {
-        read_grid(builder, in, texture, mean);
+        read_grid(builder, in, texture, facts);
         in.finish();
     } else {
         builder.refuse(object.where, "texture type '" + object.type + "' is not supported", "a grey of 0.5 is used");
         texture.type = TextureType::checkerboard;
-        texture.color0 = texture.color1 = mean = splat(0.5f);
+        texture.color0 = texture.color1 = facts.mean = splat(0.5f);
     }
-    return builder.validate_only ? 0 : add_texture(builder, texture, mean);
+    return builder.validate_only ? 0 : add_texture(builder, texture, facts);
 }
 
 namespace {
@@ -334,7 +341,7 @@ int32_t add_plain_texture(Builder& builder, const LoadedImage& image) {
     texture.height = image.height;
     texture.offset = image.offset;
     texture.to_uv[0][0] = texture.to_uv[1][1] = 1;
-    return add_texture(builder, texture, image.mean);
+    return add_texture(builder, texture, image.facts);
 }
 
 }  // namespace
@@ -342,29 +349,31 @@ int32_t add_plain_texture(Builder& builder, const LoadedImage& image) {
 int32_t load_environment_image(Builder& builder, Reader& in, const std::string& path, float& largest) {
     const double gamma = in.object().version < 2 ? read_gamma(in) : 0;
     const LoadedImage image = load_image(builder, path, gamma, true);
-    largest = image.largest;
+    largest = max_component(image.facts.largest);
     return add_plain_texture(builder, image);
 }
 
 int32_t add_environment_image(Builder& builder, const std::string& name, const Texels& texels, float& largest) {
     const LoadedImage image = load_image(builder, name, 1, true, -1, &texels);
-    largest = image.largest;
+    largest = max_component(image.facts.largest);
     return add_plain_texture(builder, image);
 }
 
-int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels, Rgb mean) {
+int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels,
+                  const TextureFacts& facts) {
     LoadedImage image;
     image.width = width;
     image.height = height;
-    image.mean = mean;
+    image.facts = facts;
     image.offset = append_floats(builder.scene, texels, false, image.format);
     return add_plain_texture(builder, image);
 }
 
-int32_t add_baked_texture(Builder& builder, const Texture& settings, const std::vector<float>& texels, Rgb mean) {
+int32_t add_baked_texture(Builder& builder, const Texture& settings, const std::vector<float>& texels,
+                          const TextureFacts& facts) {
     Texture texture = settings;
     texture.offset = append_floats(builder.scene, texels, false, texture.format);
-    return add_texture(builder, texture, mean);
+    return add_texture(builder, texture, facts);
 }
 
 int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels) {
@@ -377,7 +386,7 @@ int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height,
 
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter) {
     return parameter.texture >= 0 && !builder.validate_only
-               ? parameter.value * builder.texture_means[size_t(parameter.texture)]
+               ? parameter.value * builder.texture_facts[size_t(parameter.texture)].mean
                : parameter.value;
 }
 

@@ -21,16 +21,17 @@ class MaterialMaker {
 public:
     MaterialMaker(Context& context, int index, const tinygltf::Material& material, const Use& use,
                   const std::string& what)
-        : c_(context), m_(material), colors_(use.colors), use_(use), textures_(context, index, what) {}
+        : c_(context), m_(material), what_(what), colors_(use.colors), use_(use), textures_(context, index, what) {}
 
     Context::Surface make() {
         check_extensions();
         const auto& pbr = m_.pbrMetallicRoughness;
-        base_ = color_of(pbr.baseColorFactor, splat(1));
+        base_ = at_most_1(color_of(pbr.baseColorFactor, splat(1)), "baseColorFactor");
         alpha_ = pbr.baseColorFactor.size() > 3 ? pbr.baseColorFactor[3] : 1;
         base_texture_ = textures_.with_image(used(pbr.baseColorTexture));
         rough_texture_ = textures_.with_image(used(pbr.metallicRoughnessTexture));
-        rough_ = pbr.roughnessFactor, metallic_ = pbr.metallicFactor;
+        rough_ = c_.at_most_1(pbr.roughnessFactor, what_ + ": roughnessFactor");
+        metallic_ = c_.at_most_1(pbr.metallicFactor, what_ + ": metallicFactor");
         if (const auto* given = extension(m_.extensions, kGlossiness)) convert(*given);
         normal_texture_ = textures_.with_image(used(m_.normalTexture));
         if (!colors_.varies) base_ *= colors_.color;
@@ -55,6 +56,11 @@ public:
 
 private:
     Object& object(const char* tag, const char* type) { return add_object(c_.document, tag, type, c_.where); }
+
+    Rgb at_most_1(Rgb color, const char* name) {
+        for (int k = 0; k < 3; ++k) color[k] = float(c_.at_most_1(double(color[k]), what_ + ": " + name));
+        return color;
+    }
 
     /// The extension takes the place of the metallic-roughness part, which is for programs that do not know it.
     void convert(const tinygltf::Value& given) {
@@ -220,8 +226,10 @@ private:
                &through = object("bsdf", "difftrans");
         set_number_or_texture(blend, "weight", std::min(weight, 1.0),
                               textures_.with_image(used(given, "diffuseTransmissionTexture")), "a");
-        set_color_or_texture(through, "transmittance", color_in(*given, "diffuseTransmissionColorFactor", splat(1)),
-                             textures_.with_image(used(given, "diffuseTransmissionColorTexture")));
+        set_color_or_texture(
+            through, "transmittance",
+            at_most_1(color_in(*given, "diffuseTransmissionColorFactor", splat(1)), "diffuseTransmissionColorFactor"),
+            textures_.with_image(used(given, "diffuseTransmissionColorTexture")));
         add_child(both, opaque);
         add_child(blend, both);
         add_child(blend, through);
@@ -328,6 +336,7 @@ private:
 
     Context& c_;
     const tinygltf::Material& m_;
+    std::string what_;
     VertexColors colors_;
     Use use_;
     TextureMaker textures_;

@@ -97,7 +97,7 @@ bool put_on_skin(Context& context, Mesh& mesh, const tinygltf::Primitive& primit
 
 }  // namespace
 
-VertexColors vertex_colors(const Context& context, const tinygltf::Primitive& primitive, const std::string& what) {
+VertexColors vertex_colors(Context& context, const tinygltf::Primitive& primitive, const std::string& what) {
     VertexColors out;
     const int index = attribute(primitive.attributes, "COLOR_0");
     if (index < 0) return out;
@@ -107,9 +107,14 @@ VertexColors vertex_colors(const Context& context, const tinygltf::Primitive& pr
         const std::vector<double> all = accessor_values(context, index, 4, what + ", COLOR_0");
         for (size_t i = 3; i < all.size(); i += 4) out.alphas.push_back(splat(float(all[i])));
     }
-    for (const std::vector<Rgb>* list : {&out.values, &out.alphas})
-        for (const Rgb& c : *list)
+    float largest = 0;
+    for (std::vector<Rgb>* list : {&out.values, &out.alphas})
+        for (Rgb& c : *list) {
             if (!is_finite(c) || min_component(c) < 0) context.fail(what + ": a colour is negative or not finite");
+            largest = std::max(largest, max_component(c));
+            c = min(c, splat(1));
+        }
+    context.at_most_1(largest, what + ": the largest colour of its vertices");
     const auto merge_equal = [](const std::vector<Rgb>& all, Rgb& one, bool& varies) {
         if (all.empty()) return;
         one = all[0];

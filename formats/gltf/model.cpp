@@ -1,5 +1,7 @@
 #include "formats/gltf/model.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <climits>
 #include <cmath>
@@ -13,6 +15,11 @@
 namespace ambilux::gltf {
 
 void Context::fail(const std::string& message) const { throw input_error(where.file, where.line, message); }
+
+double Context::at_most_1(double value, const std::string& what) {
+    if (value > double(document::kRoundedOne)) note(fmt::format("{} is {:.4g} and counts as 1", what, value));
+    return std::min(value, 1.0);
+}
 
 void Context::leave_out(const std::string& extension, const std::string& what) {
     const auto& required = model.extensionsRequired;

@@ -35,6 +35,8 @@ struct Context {
     [[noreturn]] void fail(const std::string& message) const;
     void note(const std::string& text) { report.note(where, text); }
     void refuse(const std::string& problem, const std::string& instead) { report.refuse(where, problem, instead); }
+    /// A number that glTF has from 0 to 1.
+    double at_most_1(double value, const std::string& what);
     /// A part of an extension that is not supported: refused only where the file says that nobody can do without it.
     void leave_out(const std::string& extension, const std::string& what);
 };
@@ -65,7 +67,7 @@ struct VertexColors {
     double alpha = 1;
     std::vector<Rgb> values, alphas;
 };
-VertexColors vertex_colors(const Context& context, const tinygltf::Primitive& primitive, const std::string& what);
+VertexColors vertex_colors(Context& context, const tinygltf::Primitive& primitive, const std::string& what);
 
 /// Triangles of a primitive, with the set of texture coordinates that its material wants.
 Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int tex_coord, const Pose& pose,

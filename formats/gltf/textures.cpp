@@ -65,7 +65,9 @@ const std::string& TextureMaker::image(int index) {
     if (index < 0 || size_t(index) >= c_.image_bytes.size())
         c_.fail(what_ + ": there is no image " + std::to_string(index));
     const std::string wanted = c_.where.file + ", image " + std::to_string(index);
-    c_.document.images[wanted] = read_image(wanted, c_.image_bytes[size_t(index)], c_.document.limits);
+    const Texels& read = c_.document.images[wanted] =
+        read_image(wanted, c_.image_bytes[size_t(index)], c_.document.limits);
+    for (const std::string& note : read.notes) c_.report.note({wanted}, note);
     return name = wanted;
 }
 

@@ -149,6 +149,20 @@ void check_header(const Imf::Header& header, bool tiled, uint64_t file_size, con
     if (chunks > file_size / 8) budget.fail("cannot read EXR image: it claims more pixels than the file holds");
 }
 
+/// Calls of OpenEXR; what it says of the file becomes our error.
+template <class F>
+void guarded(const FileBudget& budget, F f) {
+    try {
+        f();
+    } catch (const Error&) {
+        throw;
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& e) {
+        budget.fail(std::string("cannot read EXR image: ") + e.what());
+    }
+}
+
 }  // namespace
 
 bool is_exr(std::string_view bytes) { return bytes.starts_with("\x76\x2f\x31\x01"); }
@@ -159,7 +173,7 @@ ExrFile::ExrFile(std::string_view bytes, FileBudget& budget) : budget_(budget) {
     if ((version & 0xff) != 2 || (version & ~0xffu & ~kKnownFlags))
         budget.fail("cannot read EXR image: files of several parts or of deep pixels are not supported");
     check_attributes(bytes, budget);
-    try {
+    guarded(budget, [&] {
         Stream again(budget.path(), bytes);
         again.seekg(kHeaderAt);
         Imf::Header header;
@@ -168,13 +182,7 @@ ExrFile::ExrFile(std::string_view bytes, FileBudget& budget) : budget_(budget) {
         check_header(header, version & kTiled, bytes.size(), budget);
         stream_ = std::make_unique<Stream>(budget.path(), bytes);
         file_ = std::make_unique<Imf::InputFile>(*stream_, 0);
-    } catch (const Error&) {
-        throw;
-    } catch (const std::bad_alloc&) {
-        throw;
-    } catch (const std::exception& e) {
-        budget.fail(std::string("cannot read EXR image: ") + e.what());
-    }
+    });
 }
 
 ExrFile::~ExrFile() = default;
@@ -187,43 +195,33 @@ bool ExrFile::has(std::initializer_list<const char*> channels) const {
     return true;
 }
 
-void ExrFile::read(const Imf::FrameBuffer& buffer) {
-    try {
-        file_->setFrameBuffer(buffer);
-        for (int64_t y = window().min.y; y <= window().max.y; y += int64_t(kMostLines)) {
-            file_->readPixels(int(y), int(std::min<int64_t>(y + int64_t(kMostLines) - 1, window().max.y)));
-            if (budget_.expired())
-                budget_.fail("reading it takes longer than --limits seconds=" +
-                             std::to_string(budget_.limits().seconds));
-        }
-    } catch (const Error&) {
-        throw;
-    } catch (const std::bad_alloc&) {
-        throw;
-    } catch (const std::exception& e) {
-        budget_.fail(std::string("cannot read EXR image: ") + e.what());
+template <class File>
+void ExrFile::read_lines(File& file) {
+    for (int64_t y = window().min.y; y <= window().max.y; y += int64_t(kMostLines)) {
+        file.readPixels(int(y), int(std::min<int64_t>(y + int64_t(kMostLines) - 1, window().max.y)));
+        if (budget_.expired())
+            budget_.fail("reading it takes longer than --limits seconds=" + std::to_string(budget_.limits().seconds));
     }
 }
 
-Texels read_exr_texels(std::string_view bytes, FileBudget& budget) {
-    ExrFile file(bytes, budget);
-    Texels texels = make_texels(file.width(), file.height(), false, budget);
-    texels.is_linear = true;
-    const bool grey = file.has({"Y"}) && !file.has({"R"});
-    if (!grey && !file.has({"R", "G", "B"}))
-        budget.fail("cannot read EXR image: it has neither channels R, G, B nor Y at full resolution");
-    Imf::FrameBuffer buffer;
-    const char* names[4] = {grey ? "Y" : "R", "G", "B", "A"};
-    for (int c = 0; c < 4; ++c) {
-        if (grey && (c == 1 || c == 2)) continue;
-        buffer.insert(names[c], Imf::Slice::Make(Imf::FLOAT, texels.floats.data() + c, file.window(), 16,
-                                                 size_t(texels.width) * 16, 1, 1, c == 3 ? 1.0 : 0.0));
-    }
-    file.read(buffer);
-    if (grey)
-        for (size_t i = 0; i < texels.floats.size(); i += 4)
-            texels.floats[i + 1] = texels.floats[i + 2] = texels.floats[i];
-    return texels;
+void ExrFile::read(const Imf::FrameBuffer& buffer) {
+    guarded(budget_, [&] {
+        file_->setFrameBuffer(buffer);
+        read_lines(*file_);
+    });
+}
+
+std::vector<Imf::Rgba> ExrFile::read_chroma(const std::string& layer) {
+    std::vector<Imf::Rgba> pixels(size_t(width()) * height());
+    guarded(budget_, [&] {
+        stream_->seekg(0);
+        Imf::RgbaInputFile file(*stream_, 0);
+        file.setLayerName(layer);
+        const Imath::V2i first = window().min;
+        file.setFrameBuffer(pixels.data() - (first.x + int64_t(first.y) * width()), 1, width());
+        read_lines(file);
+    });
+    return pixels;
 }
 
 }  // namespace ambilux

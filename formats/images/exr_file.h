@@ -4,9 +4,11 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
+#include <ImfRgbaFile.h>
 
 #include <memory>
 #include <string_view>
+#include <vector>
 
 #include "formats/file_budget.h"
 
@@ -27,9 +29,14 @@ public:
     bool has(std::initializer_list<const char*> channels) const;
     /// Reads all rows into `buffer`, which addresses pixels by their place in the window.
     void read(const Imf::FrameBuffer& buffer);
+    /// Pixels of a layer's channels Y, RY and BY, the last two at half of the resolution, in the file's primaries. The
+    /// file cannot be read otherwise after it.
+    std::vector<Imf::Rgba> read_chroma(const std::string& layer);
 
 private:
     class Stream;
+    template <class File>
+    void read_lines(File& file);
 
     FileBudget& budget_;
     std::unique_ptr<Stream> stream_;

@@ -15,12 +15,13 @@ namespace ambilux {
 struct Texels {
     uint32_t width = 0, height = 0;
     bool is_8bit = false;
-    bool is_linear = false;      ///< EXR and HDR; otherwise values are sRGB-encoded unless the scene says different
-    std::vector<uint8_t> bytes;  ///< 4 per texel if is_8bit
-    std::vector<float> floats;   ///< 4 per texel otherwise
+    bool is_linear = false;          ///< EXR and HDR; otherwise values are sRGB-encoded unless the scene says different
+    std::vector<uint8_t> bytes;      ///< 4 per texel if is_8bit
+    std::vector<float> floats;       ///< 4 per texel otherwise
+    std::vector<std::string> notes;  ///< what the file says of itself that is followed in our own way, or not at all
 };
 
-/// Decodes PNG (libpng), JPEG (libjpeg-turbo), EXR (OpenEXR: channels R G B A or Y, data window), HDR, PNM (P5, P6,
+/// Decodes PNG (libpng), JPEG (libjpeg-turbo), EXR (OpenEXR, data window), HDR, PNM (P5, P6,
 /// PF), BMP or TGA. The format follows from the content. Throws Error(bad_input) with `path`, also for what is beyond
 /// the limits, before it is allocated.
 Texels read_image(const std::string& path, std::string_view bytes, const Limits& limits = {});

@@ -6,7 +6,6 @@
 #include "core/math.h"
 #include "core/srgb.h"
 #include "formats/file_budget.h"
-#include "formats/images/image_io.h"
 
 namespace ambilux {
 
@@ -65,9 +64,7 @@ Mesh mesh_of_heights(const std::string& path, uint32_t width, uint32_t height, c
     return mesh;
 }
 
-Mesh read_height_field(const std::string& path, std::string_view bytes, double scale, bool smooth,
-                       const Limits& limits) {
-    const Texels texels = read_image(path, bytes, limits);
+Mesh mesh_of_image(const std::string& path, const Texels& texels, double scale, bool smooth, const Limits& limits) {
     std::vector<float> heights(size_t(texels.width) * texels.height);
     for (size_t i = 0; i < heights.size(); ++i) {
         Vec3f c;

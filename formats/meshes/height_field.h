@@ -1,6 +1,7 @@
 // Surfaces of heights on a grid, as triangles.
 #pragma once
 
+#include "formats/images/image_io.h"
 #include "formats/meshes/mesh.h"
 
 namespace ambilux {
@@ -12,7 +13,6 @@ Mesh mesh_of_heights(const std::string& path, uint32_t width, uint32_t height, c
                      bool smooth, const Limits& limits = {});
 
 /// The same of an image: its luminance, linear, times `scale`.
-Mesh read_height_field(const std::string& path, std::string_view bytes, double scale, bool smooth,
-                       const Limits& limits = {});
+Mesh mesh_of_image(const std::string& path, const Texels& texels, double scale, bool smooth, const Limits& limits = {});
 
 }  // namespace ambilux

@@ -41,9 +41,7 @@ Rgb SphereImage::at(double x, double y, double z) const {
 
 SphereImage read_sphere_image(document::Document& document, const std::string& path, const Where& where,
                               const char* light) {
-    const std::string bytes = read_input(path, document.limits);
-    document.file_digests.push_back({path, sha256(bytes)});
-    const Texels texels = read_image(path, bytes, document.limits);
+    const Texels texels = document::read_image_file(document, path);
     if (texels.width != texels.height)
         fail(where, "the image of " + std::string(light) + " is " + std::to_string(texels.width) + "x" +
                         std::to_string(texels.height) + "; an equal-area octahedral map is square");

@@ -188,9 +188,7 @@ std::shared_ptr<TextureImage> Textures::image_file(const std::string& path, doub
 
 void Textures::load_texels(TextureImage& image) const {
     if (!image.texels.empty()) return;
-    const std::string bytes = read_input(image.path, document_.limits);
-    document_.file_digests.push_back({image.path, sha256(bytes)});
-    const Texels texels = read_image(image.path, bytes, document_.limits);
+    const Texels texels = document::read_image_file(document_, image.path);
     FileBudget(image.path, document_.limits).bytes(uint64_t(texels.width) * texels.height, sizeof(Rgb));
     image.width = texels.width, image.height = texels.height;
     const double gamma = image.gamma != 0 ? image.gamma : texels.is_linear ? 1 : -1;
