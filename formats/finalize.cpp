@@ -235,6 +235,8 @@ void fill_emitters(Scene& scene, LightPicking picking) {
         powers.push_back(p);
         infinite.push_back(is_infinite(e.type));
     }
+    if (*std::max_element(powers.begin(), powers.end()) == 0)
+        scene.notes.push_back(scene.path + ": none of its lights shines: its image is black");
     const std::vector<double> weights = picking_weights(std::move(powers), infinite, picking);
     scene.emitter_cdf =
         checked_pick_table(scene, weights, "emitters", "make one mesh light of emitters with the same radiance");

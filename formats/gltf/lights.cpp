@@ -47,6 +47,7 @@ void add_light(Context& context, const tinygltf::Light& light, const Matrix& to_
     const Rgb color =
         light.color.size() < 3 ? splat(1) : Rgb{float(light.color[0]), float(light.color[1]), float(light.color[2])};
     const Rgb value = color * float(light.intensity);
+    if (value == splat(0)) return context.note("lights of intensity 0 are left out");
     context.emits = true;
     if (light.range > 0)
         context.note("the range of lights is left out: their light falls off with the squared distance");

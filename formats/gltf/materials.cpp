@@ -322,8 +322,10 @@ private:
             number(extension(m_.extensions, "KHR_materials_emissive_strength"), "emissiveStrength", 1);
         const Rgb radiance = color_of(m_.emissiveFactor, splat(0)) * float(strength * opacity_.number);
         if (!(max_component(radiance) > 0)) return nullptr;
-        Object& out = object("emitter", "area");
         const Used texture = textures_.with_image(used(m_.emissiveTexture));
+        // Exporters write one for every material.
+        if (texture.index >= 0 && !(max_component(textures_.mean(texture, false) * radiance) > 0)) return nullptr;
+        Object& out = object("emitter", "area");
         if (opacity_.texture && texture.index < 0 && !colors_.alpha_varies) {
             add_child(out, textures_.scaled(*opacity_.texture, radiance), "radiance");
         } else {

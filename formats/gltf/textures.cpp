@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/error.h"
 #include "core/srgb.h"
 
 namespace ambilux::gltf {
@@ -58,16 +59,30 @@ Used TextureMaker::with_image(const Used& use) {
     return {};
 }
 
+/// Of an image that the library did not find beside the file.
+std::string TextureMaker::image_path(int index) const {
+    const std::string& uri = c_.model.images[size_t(index)].uri;
+    try {
+        return c_.document.resolve(uri.starts_with("file://") ? uri.substr(7) : uri, c_.where);
+    } catch (const Error&) {
+        c_.fail(fmt::format("{}: the file of image {}, '{}', does not exist", what_, index, uri));
+    }
+}
+
 /// The image with this index, decoded once.
 const std::string& TextureMaker::image(int index) {
     std::string& name = c_.images[index];
     if (!name.empty()) return name;
     if (index < 0 || size_t(index) >= c_.image_bytes.size())
         c_.fail(what_ + ": there is no image " + std::to_string(index));
-    const std::string wanted = c_.where.file + ", image " + std::to_string(index);
-    const Texels& read = c_.document.images[wanted] =
-        read_image(wanted, c_.image_bytes[size_t(index)], c_.document.limits);
-    for (const std::string& note : read.notes) c_.report.note({wanted}, note);
+    const std::string& uri = c_.model.images[size_t(index)].uri;
+    const std::string &bytes = c_.image_bytes[size_t(index)],
+                      wanted = c_.where.file + ", image " + std::to_string(index) + (uri.empty() ? "" : ", " + uri);
+    const bool is_read = !bytes.empty() || uri.empty();
+    const Texels& image = c_.document.images[wanted] =
+        is_read ? read_image(wanted, bytes, c_.document.limits) : read_image_file(c_.document, image_path(index));
+    if (is_read)
+        for (const std::string& note : image.notes) c_.report.note({wanted}, note);
     return name = wanted;
 }
 

@@ -57,6 +57,7 @@ public:
 
 private:
     Object& object(const char* tag, const char* type) { return document::add_object(c_.document, tag, type, c_.where); }
+    std::string image_path(int index) const;
     const std::string& image(int index);
     /// Of a texture that is there.
     const std::string& image_of(const Used& use);

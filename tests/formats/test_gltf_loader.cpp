@@ -227,6 +227,61 @@ TEST_CASE("binary files and files beside") {
         CHECK_THROWS_AS(load_scene_file(folder.write("cut.glb", glb.substr(0, n))), Error);
 }
 
+TEST_CASE("an image that is not there is said not to exist, whatever it is called") {
+    for (const std::string name :
+         {"textures/Wood.PNG", "http://example.org/a%20b.png", "/no/such/folder/a.png", "file:///no/such/a.png",
+          "C:\\textures\\a.png", "..\\textures\\a.png", "a%20b.png"}) {
+        Json j = quad_scene();
+        j["images"] = {{{"uri", name}}};
+        j["textures"] = {{{"source", 0}}};
+        CHECK(load(j).triangles.size() == 2);  // nothing uses it
+        j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
+        INFO(name);
+        CHECK(contains(error_of(j), "material 0: the file of image 0, '" + name + "', does not exist"));
+    }
+    // What is there is found, however it is written.
+    const TempFolder folder;
+    folder.write("a b.png", png_bytes(1, 1, {255, 255, 255}));
+    std::filesystem::create_directories(folder.path / "in");
+    folder.write("in/c.png", png_bytes(1, 1, {255, 255, 255}));
+    for (const std::string name :
+         {std::string("a%20b.png"), std::string("in\\c.png"), std::string("./in/c.png"),
+          (folder.path / "in/c.png").string(), "file://" + (folder.path / "in/c.png").string()}) {
+        Json j = quad_scene();
+        j["images"] = {{{"uri", name}}};
+        j["textures"] = {{{"source", 0}}};
+        j["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
+        INFO(name);
+        CHECK(load(j, {}, &folder).triangles.size() == 2);
+    }
+}
+
+TEST_CASE("lights that shine nothing are none") {
+    for (const std::string type : {"point", "directional", "spot"}) {
+        const Json light = {{"type", type}, {"intensity", 0}, {"spot", Json::object()}};
+        const Scene s = load(with_light(quad_scene(), light));
+        CHECK(s.environment != kNone);
+        CHECK(s.emitters.size() == 1);
+        CHECK(has_note(s, "lights of intensity 0 are left out"));
+        CHECK(has_note(s, "the file has no light"));
+        CHECK(load(with_light(quad_scene(), {{"type", "point"}, {"color", {0, 0, 0}}})).environment != kNone);
+    }
+    const auto textured = [](const std::vector<uint8_t>& texels) {
+        Json j = quad_scene();
+        add_image(j, png_bytes(2, 1, texels));
+        j["materials"][0]["emissiveFactor"] = {1, 0, 0};
+        j["materials"][0]["emissiveTexture"] = {{"index", 0}};
+        return load(j);
+    };
+    CHECK(has_note(textured({0, 0, 0, 0, 0, 0}), "the file has no light"));
+    CHECK(has_note(textured({0, 255, 0, 0, 0, 255}), "the file has no light"));
+    CHECK(textured({0, 0, 0, 1, 0, 0}).environment == kNone);
+    // In scenes of Mitsuba, whose images are black without light, a note says so.
+    const std::string point = "<shape type='rectangle'/><emitter type='point'><rgb name='intensity' value='";
+    CHECK(has_note(test::load(point + "0'/></emitter>"), "none of its lights shines"));
+    CHECK_FALSE(has_note(test::load(point + "0, 1, 0'/></emitter>"), "none of its lights shines"));
+}
+
 TEST_CASE("what is not known is refused by name") {
     std::vector<std::pair<std::string, Json>> cases;
     const auto add = [&](const std::string& problem) -> Json& {
