@@ -42,8 +42,8 @@ struct SceneOptions {
 
 /// Options that say how it is rendered.
 struct RenderOptions {
-    std::string integrator = "path", variant = "wavefront", backend = "auto", precision = "single", memory = "all",
-                textures = "device";
+    std::string integrator;  ///< empty: what the scene asks for
+    std::string variant = "wavefront", backend = "auto", precision = "single", memory = "all", textures = "device";
     uint64_t seed = 0;
     std::optional<int> max_depth;
     bool deterministic = false;

@@ -72,8 +72,11 @@ LoadOptions SceneOptions::load_options() const {
 
 void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
     if (!fixed_integrator) {
-        command.add_option("-i,--integrator", integrator, help_of("integrator"))->capture_default_str();
+        command.add_option("-i,--integrator", integrator,
+                           help_of("integrator") + ". Default: what the scene asks for, or path");
         command.add_option("--variant", variant, help_of("variant"))->capture_default_str();
+    } else {
+        integrator = RenderSettings{}.integrator;
     }
     command.add_option("--backend", backend, help_of("backend"))->capture_default_str();
     command.add_option("--precision", precision, help_of("precision"))->capture_default_str();
@@ -90,7 +93,7 @@ void RenderOptions::add_to(CLI::App& command, bool fixed_integrator) {
 
 RenderSettings RenderOptions::settings(const Scene& scene) const {
     RenderSettings s = default_settings(scene);
-    apply_setting(s, "integrator", integrator);
+    if (!integrator.empty()) apply_setting(s, "integrator", integrator);
     apply_setting(s, "variant", variant);
     apply_setting(s, "backend", backend);
     apply_setting(s, "precision", precision);

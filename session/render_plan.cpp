@@ -11,6 +11,7 @@ namespace ambilux {
 
 RenderSettings default_settings(const Scene& scene) {
     RenderSettings s;
+    s.integrator = scene.integrator.type;
     s.max_depth = scene.integrator.max_depth;
     s.rr_depth = scene.integrator.rr_depth;
     return s;

@@ -8,7 +8,7 @@
 
 namespace ambilux {
 
-/// Settings that nothing was said about: the defaults, with the depths that the scene asks for.
+/// Settings that nothing was said about: the defaults, with the integrator and the depths that the scene asks for.
 RenderSettings default_settings(const Scene& scene);
 
 /// Until when to render: `spp`, `time` in seconds or, with neither, the scene's samples. `prefix` stands before the two

@@ -60,6 +60,9 @@ struct Builder {
     /// Fails unless all of these are in the range of the tracers (accel/range.h). `what` has them: "the shape".
     void check_range(const Where& where, const std::string& what, std::initializer_list<Vec3d> points) const;
 
+    /// Document::resolve(), with a note where an included file has another one of that name beside it.
+    std::string file(const std::string& name, const Where& where);
+
     /// Something we do in our own way, with the image that the file asks for; each text is said once.
     void note(const Where& where, const std::string& text);
 

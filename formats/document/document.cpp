@@ -18,9 +18,9 @@ const Value* Object::find(const std::string& name) const {
 
 std::string Document::resolve(const std::string& name, const Where& where) const {
     std::error_code ignored;
-    std::vector<fs::path> folders = {fs::path(where.file).parent_path()};
-    folders.insert(folders.end(), search_folders.begin(), search_folders.end());
+    std::vector<fs::path> folders(search_folders.rbegin(), search_folders.rend());
     if (!files.empty()) folders.push_back(fs::path(files[0].first).parent_path());
+    folders.push_back(fs::path(where.file).parent_path());
     std::string slashed = name;  // backslashes are what exporters on Windows write
     std::replace(slashed.begin(), slashed.end(), '\\', '/');
     for (const fs::path path : {name, slashed}) {

@@ -23,12 +23,21 @@ void check_sampling_weight(Builder& builder, Reader& in) {
 
 Vec3f to_vec3f(Vec3d v) { return {float(v.x), float(v.y), float(v.z)}; }
 
-Matrix rigid_transform(Builder& builder, Reader& in) {
+/// Where it stands and how it is turned. `scale`, of all axes alike, means nothing to a light that spreads from a point
+/// or comes from afar.
+Matrix rigid_transform(Builder& builder, Reader& in, double* scale = nullptr) {
+    Matrix m = builder.to_scene * in.transform("to_world");
+    const double l = length(column(m, 2)), s = std::fabs(l - 1) < 1e-3 ? 1 : l;
+    if (!(std::fabs(determinant(m)) > 0)) in.fail(in.where("to_world"), "the emitter's transform is singular");
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) m.m[i][j] /= s;
+    if (scale) *scale = s;
     bool problem = false;
-    const Matrix m = rigid_part(builder.to_scene * in.transform("to_world"), problem);
+    m = rigid_part(m, problem);
     if (problem)
         builder.refuse(in.where("to_world"),
-                       "the transform of an emitter of type '" + in.object().type + "' must not scale or shear",
+                       "the transform of an emitter of type '" + in.object().type +
+                           "' must not shear, or scale one axis more than another",
                        "scale and shear are left out");
     return m;
 }
@@ -74,14 +83,15 @@ void read_plugin(ModelTag<SpotEmitter>, Builder& builder, Reader& in, Emitter& e
 }
 
 void read_plugin(ModelTag<ProjectorEmitter>, Builder& builder, Reader& in, Emitter& e) {
-    const Matrix m = rigid_transform(builder, in);
+    double enlarged = 1;
+    const Matrix m = rigid_transform(builder, in, &enlarged);
     builder.check_range(in.where(), "the emitter of type 'projector'", {column(m, 3)});
     e.to_world = to_affine(m);
     e.to_local = to_affine(affine_inverse(m));
     e.position = to_vec3f(column(m, 3));
     e.direction = to_vec3f(column(m, 2));
     e.radiance = in.textured_color("irradiance", {1, 1, 1}, SpectrumUse::emission);
-    e.radiance.value = e.radiance.value * float(M_PI * in.number("scale", 1));  // Mitsuba's convention
+    e.radiance.value = e.radiance.value * float(M_PI * in.number("scale", 1) * enlarged);  // as in Mitsuba
     double aspect = 1;
     if (e.radiance.texture >= 0 && !builder.validate_only) {
         const Texture& t = builder.scene.textures[size_t(e.radiance.texture)];
@@ -104,6 +114,7 @@ void read_plugin(ModelTag<DirectionalEmitter>, Builder&, Reader& in, Emitter& e)
 }
 
 void read_plugin(ModelTag<ConstantEmitter>, Builder&, Reader& in, Emitter& e) {
+    in.ignore({"to_world"});  // the same from everywhere
     e.radiance = {in.color("radiance", {1, 1, 1}, SpectrumUse::emission), -1};
 }
 
@@ -138,7 +149,7 @@ void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter&
     float largest = 0;
     const int32_t texture =
         is_given ? add_environment_image(builder, given->first, given->second, largest)
-                 : load_environment_image(builder, in, builder.document.resolve(name, in.where("filename")), largest);
+                 : load_environment_image(builder, in, builder.file(name, in.where("filename")), largest);
     e.radiance = {splat(float(scale)), texture};
     const double most = std::numeric_limits<float>::max();
     if (!(scale <= most && scale * largest <= most))

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <mutex>
 
@@ -29,6 +30,18 @@ void Builder::warn(const Where& where, const std::string& text) {
 
 void Builder::note(const Where& where, const std::string& text) {
     if (reported.insert(text).second) scene.notes.push_back(where.text() + ": " + text);
+}
+
+std::string Builder::file(const std::string& name, const Where& where) {
+    namespace fs = std::filesystem;
+    const std::string path = document.resolve(name, where);
+    std::error_code ignored;
+    const fs::path beside = fs::path(where.file).parent_path() / name;
+    if (where.file != scene.path && beside != path && fs::exists(beside, ignored) &&
+        !fs::equivalent(beside, path, ignored))
+        note(where,
+             fmt::format("'{}' is '{}', as in Mitsuba, and not the file of that name beside this one", name, path));
+    return path;
 }
 
 void Builder::take_memory(uint64_t bytes, const std::string& path) {

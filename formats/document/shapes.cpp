@@ -190,7 +190,7 @@ void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
     MeshSource source;
     const std::string name = in.text("filename", "");
     if (name.empty()) in.fail(job.type + " shape has no filename");
-    source.path = builder.document.resolve(name, in.where("filename"));
+    source.path = builder.file(name, in.where("filename"));
     source.type = job.type;
     source.flip_v = in.boolean("flip_tex_coords", job.type == "obj");
     if (job.type == "serialized")
@@ -208,7 +208,7 @@ void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
 void ShapeBuilder::read_tessellated(Reader& in, Job& job, const Matrix& outer) {
     const std::string name = in.text("filename", "");
     if (name.empty()) in.fail(job.type + " shape has no filename");
-    const std::string path = builder.document.resolve(name, in.where("filename"));
+    const std::string path = builder.file(name, in.where("filename"));
     const bool grid = job.type == "sdfgrid", field = job.type == "heightfield";
     const double scale = field ? in.number("scale", 1) : 1;
     const bool smooth = field && in.boolean("shading_normals", true);

@@ -251,7 +251,7 @@ void read_bitmap(Builder& builder, Reader& in, Texture& texture, TextureFacts& f
     const Texels* given = given_image(builder, in);
     const std::string name = in.text(given ? "image" : "filename", "");
     if (name.empty()) in.fail("bitmap texture has no filename");
-    const std::string path = given ? name : builder.document.resolve(name, in.where("filename"));
+    const std::string path = given ? name : builder.file(name, in.where("filename"));
     const bool raw = in.boolean("raw", false);
     const double given_gamma = read_gamma(in), gamma = raw ? 1 : given_gamma;
     const std::string channel = in.text("channel", "");

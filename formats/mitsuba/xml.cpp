@@ -65,7 +65,11 @@ struct Parser {
                 ValueParser::allow(source, child, {"value"});
                 const std::string folder = values.attribute(source, child, "value");
                 check_includes(document.search_folders.size() + 1, at);
-                document.search_folders.push_back(document.resolve(folder, at));
+                // As in Mitsuba: beside the file that names it, else where files are looked for.
+                std::error_code ignored;
+                const fs::path beside = fs::path(source.path).parent_path() / folder;
+                document.search_folders.push_back(fs::exists(beside, ignored) ? beside.string()
+                                                                              : document.resolve(folder, at));
             } else if (tag == "alias") {
                 ValueParser::allow(source, child, {"id", "as"});
                 const std::string id = values.attribute(source, child, "id");

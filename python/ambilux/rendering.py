@@ -70,10 +70,10 @@ def image_of(core: _core.Render, device: str | None) -> Image:
     return Image._of(core.pixels(), stats=json.loads(core.stats()), attributes=json.loads(core.attributes()), on_device=on_device)
 
 
-def render(scene: Scene | str | os.PathLike[str], integrator: str = "path", variant: str | None = None, *, spp: int | None = None, time: float | None = None,
+def render(scene: Scene | str | os.PathLike[str], integrator: str | None = None, variant: str | None = None, *, spp: int | None = None, time: float | None = None,
            seed: int | None = None, size: tuple[int, int] | None = None, max_depth: int | None = None, backend: str | None = None,
            device: str | None = None, settings: Mapping[str, Any] | None = None) -> Image:
-    """Renders `spp` samples per pixel, or for `time` seconds; with neither as many as the scene asks for.
+    """Renders `spp` samples per pixel, or for `time` seconds; with neither as many as the scene asks for, and without `integrator` by the scene's.
 
     With device="cuda" the image is on the device as well, as `image.on_device`. `settings` are those of `ambilux help settings`. Other threads run meanwhile. An interrupt (KeyboardInterrupt) ends it
     after the sample per pixel in work.
@@ -105,7 +105,7 @@ class Step:
         return self.image.variance
 
 
-def progressive(scene: Scene | str | os.PathLike[str], integrator: str = "path", variant: str | None = None, *, spp: int | None = None,
+def progressive(scene: Scene | str | os.PathLike[str], integrator: str | None = None, variant: str | None = None, *, spp: int | None = None,
                 time: float | None = None, every: float = 0.5, seed: int | None = None, size: tuple[int, int] | None = None, max_depth: int | None = None,
                 backend: str | None = None, device: str | None = None, settings: Mapping[str, Any] | None = None) -> Iterator[Step]:
     """The same render, with the image so far about `every` seconds and at the end.
@@ -138,5 +138,5 @@ def reference(scene: Scene | str | os.PathLike[str], path: str | os.PathLike[str
     if os.fspath(path).lower().endswith(".png"):
         raise UsageError(f"{os.fspath(path)}: a reference is an EXR file, whose name ends in .exr")
     core, attributes = _core.reference(scene_of(scene, size)._core, os.fspath(path), count("spp", spp),
-                                       assignments(settings, seed=seed, max_depth=max_depth, backend=backend))
+                                       assignments(settings, integrator="path", seed=seed, max_depth=max_depth, backend=backend))
     return Image._of(core, attributes=json.loads(attributes))

@@ -27,6 +27,38 @@ std::string textured(const std::string& texture) {
 
 }  // namespace
 
+TEST_CASE("of files of one name the folders of <path> come first, then that of the scene, then that of the include") {
+    const TempFolder folder;
+    const std::string part = wrap("<shape type='obj'><string name='filename' value='m.obj'/></shape>", "3.0.0");
+    const auto square = [&](const std::string& in, int size) {
+        const std::string s = std::to_string(size);
+        folder.write(in + "m.obj", "v 0 0 0\nv " + s + " 0 0\nv 0 " + s + " 0\nf 1 2 3\n");
+    };
+    folder.write("sub/part.xml", part);
+    square("sub/", 3);
+    const auto size = [&](const std::string& body) {
+        const Scene s = load(body, {}, "3.0.0", &folder);
+        CHECK(has_note(s, "part.xml:2: 'm.obj' is ") ==
+              (contains(body, "include") && s.vertices[1].p.x != 3));  // the other one lies beside the include
+        return s.vertices[1].p.x;
+    };
+    const std::string include = "<include filename='sub/part.xml'/>",
+                      shape = "<shape type='obj'><string name='filename' value='m.obj'/></shape>";
+    CHECK(size(include) == 3);  // the only one
+    square("", 1);
+    CHECK(size(include) == 1);
+    CHECK(size(shape) == 1);
+    square("a/", 4);
+    square("b/", 5);
+    CHECK(size("<path value='a'/>" + shape) == 4);
+    CHECK(size("<path value='a'/><path value='b'/>" + shape) == 5);
+    CHECK(size("<path value='a'/>" + include) == 4);
+    // A <path> of an included file lies beside it, if there is such a folder.
+    square("sub/a/", 6);
+    folder.write("sub/part.xml", wrap("<path value='a'/>" + shape, "3.0.0"));
+    CHECK(load(include, {}, "3.0.0", &folder).vertices[1].p.x == 6);
+}
+
 TEST_CASE("films: all kinds get linear values, with a note") {
     for (const char* type : {"ldrfilm", "tiledhdrfilm", "mfilm"}) {
         const Scene s = load_quietly(film("<film type='" + std::string(type) +

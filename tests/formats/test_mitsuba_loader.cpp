@@ -371,6 +371,38 @@ TEST_CASE("emitters: values, frames, one environment") {
     CHECK(contains(error_of("<emitter type='beam'/>"), "emitter type 'beam' is not supported"));
 }
 
+TEST_CASE("lights that scale alike along all axes are those without scale, but for the irradiance of projectors") {
+    const auto light = [](const std::string& type, const std::string& scale) {
+        return load("<emitter type='" + type + "'><transform name='to_world'>" + scale +
+                    "<lookat origin='1,2,3' target='0,0,0' up='0,1,0'/></transform></emitter>")
+            .emitters[0];
+    };
+    const auto same = [](const Affine& a, const Affine& b) {
+        return std::equal(&a.m[0][0], &a.m[0][0] + 12, &b.m[0][0],
+                          [](float x, float y) { return std::fabs(x - y) < 1e-6f; });
+    };
+    for (const char* type : {"point", "spot", "projector", "directional", "collimated", "constant", "sunsky"}) {
+        INFO(type);
+        const Emitter plain = light(type, "");
+        for (const char* scale : {"<scale value='2'/>", "<scale value='0.01'/>"}) {
+            const Emitter scaled = light(type, scale);
+            check_rgb(scaled.position, plain.position);
+            check_rgb(scaled.direction, plain.direction);
+            CHECK(same(scaled.to_world, plain.to_world));
+            CHECK(same(scaled.to_local, plain.to_local));
+        }
+        // As in Mitsuba 3.9.
+        const float larger = type == std::string("projector") ? 2 : 1;
+        check_rgb(light(type, "<scale value='2'/>").radiance.value, larger * plain.radiance.value);
+        if (plain.to_world.m[0][0] == 1) continue;
+        CHECK(contains(error_of(std::string("<emitter type='") + type +
+                                "'><transform name='to_world'><scale x='2'/></transform></emitter>"),
+                       "must not shear, or scale one axis more than another"));
+    }
+    CHECK(contains(error_of("<emitter type='spot'><transform name='to_world'><scale value='0'/></transform></emitter>"),
+                   "the emitter's transform is singular"));
+}
+
 TEST_CASE("environment maps are stored as halves unless that loses something") {
     const test::TempFolder folder;
     // Radiance's RGBE: mantissas over 256 times 2^(exponent-128); two texels, neither compressed.

@@ -314,7 +314,7 @@ TEST_CASE("collimated and directionalarea: a ray with power, a shape with power 
                    "emitter type 'collimated' on a shape is not supported"));
     CHECK(contains(error_of("<emitter type='collimated'><transform name='to_world'><scale x='2'/></transform>"
                             "</emitter>"),
-                   "must not scale or shear"));
+                   "must not shear, or scale one axis more than another"));
 }
 
 TEST_CASE("thin sheets and beams are written as they were read") {
