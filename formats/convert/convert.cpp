@@ -19,8 +19,11 @@ double degrees(double radians) { return radians * (180 / M_PI); }
 
 void add_integrator(Writer& w, xml_node root) {
     const IntegratorHint& hint = w.scene.integrator;
-    if (hint.type == "bdpt") w.note("Mitsuba 3 has no bidirectional integrator: path stands for it");
-    xml_node node = add_object(root, "integrator", hint.type == "light" ? "ptracer" : "path");
+    // Where a light needs one, path would be black.
+    const bool kept = hint.type == "bdpt" && w.scene.features.has_beams();
+    if (hint.type == "bdpt")
+        w.note(std::string("Mitsuba 3 has no bidirectional integrator") + (kept ? "" : ": path stands for it"));
+    xml_node node = add_object(root, "integrator", hint.type == "light" ? "ptracer" : kept ? "bdpt" : "path");
     add_integer(node, "max_depth", hint.max_depth);
     add_integer(node, "rr_depth", hint.rr_depth);
     if (hint.hide_emitters) add_boolean(node, "hide_emitters", true);
@@ -127,8 +130,8 @@ void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
             add_transform(node, "to_world", e.to_world);
             add_number(node, "cutoff_angle", degrees(e.cutoff));
             add_number(node, "beam_width", degrees(e.beam_width));
-            add_rgb(node, "intensity", e.radiance.texture >= 0 ? splat(1) : e.radiance.value);
-            if (e.radiance.texture >= 0) add_texture(w, node, "texture", e.radiance.texture, e.radiance.value, false);
+            add_rgb(node, "intensity", e.radiance.value);
+            if (e.radiance.texture >= 0) add_texture(w, node, "texture", e.radiance.texture, splat(1), false);
             return;
         }
         case EmitterType::projector: {

@@ -56,6 +56,15 @@ const char* plugin_of(PrimitiveType type) {
     }
 }
 
+/// The side that must be written: a sphere that its own transform mirrors is turned over when it is read, as in
+/// Mitsuba 3 (ShapeBuilder::read_placement).
+bool written_flip(const Quadric& q) {
+    const auto& m = q.to_world.m;
+    const auto minor = [&](int i, int j) { return double(m[1][i]) * m[2][j] - double(m[1][j]) * m[2][i]; };
+    const bool mirrors = m[0][0] * minor(1, 2) + m[0][1] * minor(2, 0) + m[0][2] * minor(0, 1) < 0;
+    return (q.flip != 0) != (q.type == PrimitiveType::sphere && mirrors);
+}
+
 }  // namespace
 
 void add_shapes(Writer& w, xml_node root) {
@@ -74,7 +83,7 @@ void add_shapes(Writer& w, xml_node root) {
             const Quadric& q = scene.quadrics[shape.first_primitive - scene.triangles.size()];
             node = add_object(root, "shape", plugin_of(q.type));
             add_transform(node, "to_world", q.to_world);
-            if (q.flip) add_boolean(node, "flip_normals", true);
+            if (written_flip(q)) add_boolean(node, "flip_normals", true);
         }
         node.append_child("ref").append_attribute("id") = fmt::format("material{}", shape.material).c_str();
         if (shape.emitter != kNone) add_emitter(w, node, scene.emitters[shape.emitter]);

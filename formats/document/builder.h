@@ -130,7 +130,7 @@ private:
 };
 
 /// What a texture is read for.
-enum class TextureUse { color, number };
+enum class TextureUse { color, number, light };
 /// Texture object as index into Scene::textures (0 when only validating).
 int32_t load_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
 /// The texture that stands for an attribute of the mesh (Builder::attribute_textures).

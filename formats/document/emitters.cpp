@@ -79,7 +79,8 @@ void read_plugin(ModelTag<SpotEmitter>, Builder& builder, Reader& in, Emitter& e
         in.fail(in.where("beam_width"), "beam_width must lie between 0 and cutoff_angle");
     set_spot_angles(e, cutoff * (M_PI / 180), beam * (M_PI / 180));
     e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
-    if (const Object* texture = in.take_named("texture")) e.radiance.texture = load_texture(builder, *texture);
+    if (const Object* texture = in.take_named("texture"))
+        e.radiance.texture = load_texture(builder, *texture, TextureUse::light);
 }
 
 void read_plugin(ModelTag<ProjectorEmitter>, Builder& builder, Reader& in, Emitter& e) {

@@ -36,7 +36,7 @@ void validate_unused(Builder& builder) {
     builder.validate_only = true;
     for (const Child& child : builder.document.scene->children) {
         if (child.object->tag == "bsdf") build_material(builder, *child.object);
-        if (child.object->tag == "texture") load_scaled_texture(builder, *child.object);
+        if (child.object->tag == "texture") load_scaled_texture(builder, *child.object, TextureUse::light);
     }
     builder.validate_only = false;
 }

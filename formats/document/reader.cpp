@@ -172,7 +172,8 @@ ParamRgb Reader::textured_color(const std::string& name, Rgb fallback, SpectrumU
     if (const Object* texture = take_named(name)) {
         if (texture->tag != "texture")
             fail(where(name), "'" + name + "' must be a colour or a texture, not a " + texture->tag);
-        const ScaledTexture scaled = load_scaled_texture(builder_, *texture);
+        const ScaledTexture scaled = load_scaled_texture(
+            builder_, *texture, use == SpectrumUse::emission ? TextureUse::light : TextureUse::color);
         const ParamRgb out{scaled.scale, scaled.texture};
         return use == SpectrumUse::reflectance ? checked_reflectance(name, *texture, out) : out;
     }

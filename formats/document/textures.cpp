@@ -212,11 +212,16 @@ Rgb raw_value(Reader& in) {
     return {float(v.x), float(v.y), float(v.z)};
 }
 
+/// What colours of textures may be: those of lights have no largest one.
+SpectrumUse colors_of(TextureUse use) {
+    return use == TextureUse::light ? SpectrumUse::emission : SpectrumUse::reflectance;
+}
+
 /// Grid of lines on a ground: a bitmap of one period, as fine as the lines need.
-void read_grid(Builder& builder, Reader& in, Texture& texture, TextureFacts& facts) {
+void read_grid(Builder& builder, Reader& in, TextureUse use, Texture& texture, TextureFacts& facts) {
     constexpr uint32_t kMost = 1024;
-    const Rgb ground = in.color("color0", splat(0.2f), SpectrumUse::reflectance),
-              line = in.color("color1", splat(0.4f), SpectrumUse::reflectance);
+    const Rgb ground = in.color("color0", splat(0.2f), colors_of(use)),
+              line = in.color("color1", splat(0.4f), colors_of(use));
     const double width = in.number("line_width", 0.01);
     if (!(width > 0 && width < 0.5)) in.fail(in.where("line_width"), "line_width must lie between 0 and 0.5");
     read_to_uv(in, texture.to_uv);
@@ -275,8 +280,8 @@ void read_bitmap(Builder& builder, Reader& in, Texture& texture, TextureFacts& f
 
 void read_checkerboard(Builder& builder, Reader& in, TextureUse use, Texture& texture, TextureFacts& facts) {
     texture.type = TextureType::checkerboard;
-    texture.color0 = in.color("color0", splat(0.4f), SpectrumUse::reflectance);
-    texture.color1 = in.color("color1", splat(0.2f), SpectrumUse::reflectance);
+    texture.color0 = in.color("color0", splat(0.4f), colors_of(use));
+    texture.color1 = in.color("color1", splat(0.2f), colors_of(use));
     read_to_uv(in, texture.to_uv);
     in.finish();
     if (!builder.validate_only && use == TextureUse::number && in.object().version >= 3) {
@@ -318,7 +323,7 @@ int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
         texture.color0 = texture.color1 = facts.mean = facts.largest = raw_value(in);
         in.finish();
     } else if (object.type == "gridtexture") {
-        read_grid(builder, in, texture, facts);
+        read_grid(builder, in, use, texture, facts);
         in.finish();
     } else {
         builder.refuse(object.where, "texture type '" + object.type + "' is not supported", "a grey of 0.5 is used");

@@ -364,6 +364,13 @@ TEST_CASE("emitters: values, frames, one environment") {
     CHECK(area.shapes[0].emitter == 0);
     CHECK(area.emitters[0].shape == 0);
     CHECK(area.emitters[0].pick_probability == 1.0f);
+    const std::string bright =
+        "<texture type='checkerboard' name='radiance' id='t'><rgb name='color0' value='7'/></texture>";
+    CHECK(load("<shape type='cube'><emitter type='area'>" + bright + "</emitter></shape>").textures[0].color0 ==
+          splat(7));
+    CHECK(contains(
+        error_of(bright + "<shape type='cube'><bsdf type='diffuse'><ref id='t' name='reflectance'/></bsdf></shape>"),
+        "'color0' is larger than 1"));
     CHECK(contains(error_of("<emitter type='constant'/>\n<emitter type='constant'/>"),
                    ":3: only one constant, envmap or sky"));
     CHECK(contains(error_of("<emitter type='point'><rgb name='intensity' value='-1'/></emitter>"),
