@@ -6,6 +6,7 @@
 
 #include "core/atomic_file.h"
 #include "core/log.h"
+#include "core/text.h"
 #include "experiments/config_runs.h"
 #include "experiments/sweep.h"
 #include "experiments/toml_depth.h"
@@ -203,7 +204,7 @@ void read_budget(const Reader& r, const toml::table& t, ExperimentConfig& config
 
 toml::table parse_toml(const std::string& path) {
     constexpr uint64_t kMostBytes = 16 << 20;
-    const std::string content = read_file(path, kMostBytes);
+    const std::string content = plain_text(path, read_file(path, kMostBytes));
     check_key_depth(path, content);
     try {
         return toml::parse(content, path);

@@ -7,6 +7,7 @@
 #include "core/srgb.h"
 #include "formats/document/shape_jobs.h"
 #include "formats/file_budget.h"
+#include "formats/gzip.h"
 
 namespace ambilux::document {
 
@@ -14,9 +15,16 @@ namespace {
 
 bool is_attribute(const Object& texture) { return texture.type == "mesh_attribute" || texture.type == "vertexcolors"; }
 
-/// Textures of a BSDF: are there some that take values from the mesh, and some that depend on coordinates?
+/// The attribute that such a texture shows.
+std::string attribute_of(const Object& texture) {
+    const Value* name = texture.type == "vertexcolors" ? nullptr : texture.find("name");
+    return texture.type == "vertexcolors" ? "vertex_color" : name ? name->text : "";
+}
+
+/// Textures of a BSDF: those that take values from the mesh, and are there some that depend on coordinates?
 struct AttributeUse {
-    bool attributes = false, others = false;
+    std::set<std::string> attributes = {};
+    bool others = false;
     std::set<const Object*> seen = {};  ///< objects are shared: what is twice in each of n levels is there 2^n times
 
     void look_into(const Object& object) {
@@ -24,7 +32,7 @@ struct AttributeUse {
         for (const Child& child : object.children) {
             const Object& inner = *child.object;
             if (inner.tag == "texture" && is_attribute(inner))
-                attributes = true;
+                attributes.insert(attribute_of(inner));
             else if (inner.tag == "texture" && inner.type != "scale" && inner.type != "rawconstant")
                 others = true;
             look_into(inner);
@@ -73,25 +81,31 @@ std::vector<float> texels_of(const Atlas& atlas, const Mesh& mesh, const MeshAtt
 
 }  // namespace
 
-bool has_mesh_attributes(const Object& bsdf) {
+std::set<std::string> mesh_attributes_of(const Object& bsdf) {
     AttributeUse use;
     use.look_into(bsdf);
-    if (use.attributes && use.others)
+    if (!use.attributes.empty() && use.others)
         throw input_error(bsdf.where.file, bsdf.where.line,
                           "mesh attributes together with other textures in one BSDF are not supported");
     return use.attributes;
 }
 
-Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source) {
+Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source, const std::set<std::string>& names) {
     const ScopedSeconds clock(&builder.options.times->read);
-    const std::string bytes = read_input(source.path, builder.options.limits);
+    const Limits& limits = builder.options.limits;
+    const std::string bytes = gunzip_if_packed(source.path, read_input(source.path, limits), limits);
     builder.file_digests.push_back({source.path, sha256(bytes)});
-    Mesh mesh = read_ply(source.path, bytes, source.flip_v, builder.options.limits, true);
-    if (in.object().version >= 2 || !in.boolean("srgb", true)) return mesh;
-    for (MeshAttribute& a : mesh.attributes)
-        if (a.name == "vertex_color")
+    Mesh mesh = read_ply(source.path, bytes, source.flip_v, limits, names);
+    const bool older = in.object().version < 2, srgb = older && in.boolean("srgb", true);
+    for (MeshAttribute& a : mesh.attributes) {
+        if (a.most > 1 && (!older || a.property == "r"))
+            builder.note({source.path, 0}, "colours in whole numbers are parts of the largest, " +
+                                               std::to_string(int(a.most)) + (srgb ? ", and sRGB" : ", and linear") +
+                                               "; Mitsuba takes these as they are");
+        if (srgb && a.name == "vertex_color")
             for (Rgb& value : a.values)
                 for (int c = 0; c < 3; ++c) value[c] = float(srgb_to_linear(value[c]));
+    }
     return mesh;
 }
 
@@ -127,7 +141,8 @@ Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh&
 }
 
 int32_t attribute_texture(const Builder& builder, Reader& in) {
-    const std::string name = in.object().type == "vertexcolors" ? "vertex_color" : in.text("name", "");
+    const std::string name = attribute_of(in.object());
+    in.ignore({"name"});
     if (in.number("scale", 1) != 1) in.fail(in.where("scale"), "a scale of mesh_attribute is not supported");
     in.finish();
     if (builder.validate_only) return 0;

@@ -59,13 +59,13 @@ void add_instances(const Builder& builder, const std::vector<GroupJobs>& groups,
 /// Moves a mesh to world space, orients it and leaves out triangles without area.
 void transform_mesh(const Builder& builder, Job& job, const Mesh& mesh);
 
-/// True if a texture of the BSDF takes its values from the mesh. Fails if others do not, since they would need
-/// coordinates of their own.
-bool has_mesh_attributes(const Object& bsdf);
+/// Attributes of the mesh that textures of the BSDF take their values from. Fails if others do not, since they would
+/// need coordinates of their own.
+std::set<std::string> mesh_attributes_of(const Object& bsdf);
 
-/// The PLY file of a shape with its attributes. Colours of vertices in files of the older generation are sRGB unless
+/// The PLY file of a shape with these attributes. Colours of vertices in files of the older generation are sRGB unless
 /// the shape says otherwise (`srgb`).
-Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source);
+Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source, const std::set<std::string>& names);
 
 /// The mesh with vertices and coordinates of its own for every triangle, so that `textures`, one for every attribute,
 /// have its values between them: blocks of 2x2 texels, in which a bilinear lookup is linear.

@@ -41,7 +41,7 @@ struct ShapeBuilder {
     void read_mesh_file(Reader& in, Job& job);
     void read_tessellated(Reader& in, Job& job, const Matrix& outer);
     uint32_t add_emitter(const Object& object);
-    uint32_t material_of_attributes(Job& job, Reader& in, const Object& bsdf);
+    uint32_t material_of_attributes(Job& job, Reader& in, const Object& bsdf, const std::set<std::string>& names);
 };
 
 bool is_quadric(const std::string& type) { return type == "sphere" || type == "disk" || type == "cylinder"; }
@@ -126,8 +126,8 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     job.type = type;
     read_placement(in, outer, job);
     const Object* bsdf = in.take("bsdf");
-    const bool attributes = bsdf && has_mesh_attributes(*bsdf);
-    if (attributes && type != "ply" && type != "mesh") in.fail("mesh attributes are read from ply files only");
+    const std::set<std::string> attributes = bsdf ? mesh_attributes_of(*bsdf) : std::set<std::string>{};
+    if (!attributes.empty() && type != "ply" && type != "mesh") in.fail("mesh attributes are read from ply files only");
     if (is_tessellated(type))
         read_tessellated(in, job, outer);
     else
@@ -137,8 +137,8 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
         builder.refuse(emitter->where, "an emitter inside of a shapegroup is not supported", "the shape does not emit");
     else if (emitter)
         job.emitter = add_emitter(*emitter);
-    if (attributes)
-        job.material = material_of_attributes(job, in, *bsdf);
+    if (!attributes.empty())
+        job.material = material_of_attributes(job, in, *bsdf, attributes);
     else
         job.material = shape_material(builder, bsdf, emitter, job.where);
     in.ignore({"silhouette_sampling_weight", "shutter_open", "shutter_close"});
@@ -150,12 +150,15 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
 }
 
 /// Reads the mesh now, and gives the shape a copy of it that its textures are made for.
-uint32_t ShapeBuilder::material_of_attributes(Job& job, Reader& in, const Object& bsdf) {
+uint32_t ShapeBuilder::material_of_attributes(Job& job, Reader& in, const Object& bsdf,
+                                              const std::set<std::string>& names) {
     MeshSource source = sources[size_t(job.source)];
-    const Mesh mesh = source.given ? *source.given : read_with_attributes(builder, in, source);
+    const Mesh mesh = source.given ? *source.given : read_with_attributes(builder, in, source, names);
     source.given = nullptr;
     std::map<std::string, int32_t> textures;
     source.mesh = with_attribute_atlas(builder, source.path.empty() ? job.where.file : source.path, mesh, textures);
+    source.mesh.origin = mesh.origin;
+    source.mesh.notes = mesh.notes;
     source.path.clear();
     job.source = add_source(std::move(source), "attributes " + std::to_string(jobs.size()));
     builder.attribute_textures = &textures;
@@ -291,33 +294,55 @@ void ShapeBuilder::add_instance(const Object& object, const Matrix& outer) {
 
 uint64_t memory_of(const Mesh& mesh) { return mesh_bytes(mesh.positions.size(), mesh.faces.size()); }
 
-/// Reads the files of meshes, on all threads.
-void load_sources(Builder& builder, std::vector<MeshSource>& sources) {
+/// Calls f with every job of a mesh, those of groups too.
+template <class Function>
+void for_all_meshes(ShapeBuilder& shapes, const Function& f) {
+    const auto visit = [&](std::vector<Job>& jobs) {
+        for (Job& job : jobs)
+            if (job.source >= 0) f(job, shapes.sources[size_t(job.source)]);
+    };
+    visit(shapes.jobs);
+    for (GroupJobs& group : shapes.groups) visit(group.jobs);
+}
+
+/// Reads the file and its digest on two threads.
+void load_source(MeshSource& s, const Limits& limits) {
+    const std::string bytes = gunzip_if_packed(s.path, read_input(s.path, limits), limits);
+    s.lacks_materials = s.lacks_materials && bytes.find("mtllib ") != std::string::npos;
+    const auto read = [&] {
+        if (s.type == "obj") return read_obj(s.path, bytes, s.flip_v, limits);
+        if (s.type == "ply") return read_ply(s.path, bytes, s.flip_v, limits);
+        return read_serialized(s.path, bytes, s.shape_index, s.flip_v, limits);
+    };
+    parallel_for(2, [&](int task) {
+        if (task == 0)
+            s.digest = sha256(bytes);
+        else
+            s.mesh = read();
+    });
+}
+
+/// Reads the files of meshes that jobs have, on all threads.
+void load_sources(Builder& builder, ShapeBuilder& shapes) {
     const ScopedSeconds clock(&builder.options.times->read);
+    std::vector<MeshSource>& sources = shapes.sources;
+    std::set<const MeshSource*> used;
+    for_all_meshes(shapes, [&](Job&, const MeshSource& s) { used.insert(&s); });
     parallel_for(sources.size(), [&](size_t i) {
-        MeshSource& s = sources[i];
-        if (s.path.empty()) return;
-        const Limits& limits = builder.options.limits;
-        const std::string bytes = gunzip_if_packed(s.path, read_input(s.path, limits), limits);
-        s.lacks_materials = s.lacks_materials && bytes.find("mtllib ") != std::string::npos;
-        const auto read = [&] {
-            if (s.type == "obj") return read_obj(s.path, bytes, s.flip_v, limits);
-            if (s.type == "ply") return read_ply(s.path, bytes, s.flip_v, limits);
-            return read_serialized(s.path, bytes, s.shape_index, s.flip_v, limits);
-        };
-        parallel_for(2, [&](int task) {
-            if (task == 0)
-                s.digest = sha256(bytes);
-            else
-                s.mesh = read();
-        });
+        if (used.contains(&sources[i]) && !sources[i].path.empty()) load_source(sources[i], builder.options.limits);
     });
     for (const MeshSource& s : sources) {
-        if (s.path.empty()) continue;
+        const Where at{s.path, 0};
+        for (const std::string& note : s.mesh.notes) builder.note(at, note);
+        if (s.path.empty() || !used.contains(&s)) continue;
         builder.file_digests.push_back({s.path, s.digest});
         if (s.lacks_materials)
-            builder.note({s.path, 1}, "materials of obj files are not read; such shapes without a BSDF are diffuse");
+            builder.note(at, "materials of obj files are not read; such shapes without a BSDF are diffuse");
     }
+    for_all_meshes(shapes, [&](Job& job, const MeshSource& s) {
+        const auto& o = s.content().origin;
+        job.to_world = job.to_world * translation(o[0], o[1], o[2]);
+    });
 }
 
 }  // namespace
@@ -327,7 +352,7 @@ void build_shapes(Builder& builder, const Object& root) {
     for (const Child& child : root.children) {
         if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false, false);
     }
-    load_sources(builder, shapes.sources);
+    load_sources(builder, shapes);
     place_instances(builder, shapes.groups, shapes.sources, shapes.jobs);
     // Shapes get meshes of their own, and so does the scene.
     for (const MeshSource& s : shapes.sources) builder.take_memory(memory_of(s.content()), s.path);

@@ -163,6 +163,7 @@ Mesh primitive_mesh(Context& context, const tinygltf::Primitive& primitive, int 
     if (turn)
         for (auto& face : mesh.faces) std::swap(face[1], face[2]);
     check_mesh(context.where.file + ": " + what, mesh);
+    for (const std::string& note : mesh.notes) context.note(note);
     return mesh;
 }
 

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "formats/file_budget.h"
 #include "formats/gltf/meshopt.h"
 
@@ -102,7 +103,7 @@ Callbacks callbacks(Files& files) {
 void read_model(Context& context, const std::string& path) {
     const std::string whole = read_input(path, context.document.limits);
     context.document.file_digests.push_back({path, sha256(whole)});
-    const std::string bytes = with_fallback_buffers(whole);
+    const std::string bytes = with_fallback_buffers(whole.starts_with("glTF") ? whole : plain_text(path, whole));
     if (bytes.size() > size_t(INT32_MAX)) context.fail("a glTF file may have 2 GiB at most");
     Files files{context, ""};
     tinygltf::TinyGLTF reader;

@@ -2,6 +2,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/text.h"
 #include "formats/images/readers.h"
 
 namespace ambilux {
@@ -11,12 +12,14 @@ namespace {
 /// Widths of run-length encoded rows; others are stored as they are.
 constexpr uint64_t kLeastPacked = 8, kMostPacked = 32767;
 
+/// Without blanks at its end.
 std::string_view take_line(ByteReader& in) {
-    const size_t end = in.bytes.find('\n', in.at);
-    if (end == std::string_view::npos) in.budget.fail("the file ends within its header");
+    const std::string_view line_end = line_end_of(in.bytes);
+    const size_t end = in.bytes.find(line_end, in.at);
+    if (line_end.empty() || end == std::string_view::npos) in.budget.fail("the file ends within its header");
     const std::string_view line = in.take(end - in.at);
-    in.u8();
-    return line;
+    in.take(line_end.size());
+    return line.substr(0, line.find_last_not_of(" \t\r") + 1);
 }
 
 uint64_t take_size(std::string_view& line, std::string_view axis, const FileBudget& budget) {
@@ -51,7 +54,7 @@ void read_packed_row(ByteReader& in, uint64_t width, std::vector<uint8_t>& row) 
 
 }  // namespace
 
-bool is_hdr(std::string_view bytes) { return bytes.starts_with("#?RADIANCE\n") || bytes.starts_with("#?RGBE\n"); }
+bool is_hdr(std::string_view bytes) { return bytes.starts_with("#?RADIANCE") || bytes.starts_with("#?RGBE"); }
 
 Texels read_hdr(std::string_view bytes, FileBudget& budget) {
     ByteReader in{bytes, budget};

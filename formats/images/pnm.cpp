@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/text.h"
 #include "formats/images/readers.h"
 
 namespace ambilux {
@@ -15,7 +16,7 @@ uint64_t take_number(ByteReader& in) {
     uint8_t c = in.u8();
     while (is_space(c) || c == '#') {
         if (c == '#')
-            while (c != '\n') c = in.u8();
+            while (c != '\n' && c != '\r') c = in.u8();
         c = in.u8();
     }
     uint64_t value = 0;
@@ -25,6 +26,12 @@ uint64_t take_number(ByteReader& in) {
     return value;
 }
 
+/// Behind the one blank that ends the header: in files whose lines end in CR LF, behind both.
+void end_header(ByteReader& in) {
+    const bool is_half = in.bytes[in.at - 1] == '\r' && line_end_of(in.bytes) == "\r\n";
+    if (is_half && in.left() > 0 && in.bytes[in.at] == '\n') in.u8();
+}
+
 /// Next word of the header, up to the one blank behind it.
 std::string take_word(ByteReader& in) {
     std::string word;
@@ -32,6 +39,7 @@ std::string take_word(ByteReader& in) {
     while (is_space(c)) c = in.u8();
     for (; !is_space(c) && word.size() < 32; c = in.u8()) word += char(c);
     if (!is_space(c)) in.budget.fail("cannot read PFM image: damaged header");
+    end_header(in);
     return word;
 }
 
@@ -76,6 +84,7 @@ Texels read_pnm(std::string_view bytes, FileBudget& budget) {
     if (highest == 0 || highest > 65535)
         budget.fail("cannot read PNM image: its highest value is not within 1 to 65535");
     budget.pixels(width, height);
+    end_header(in);
     const uint64_t size = highest > 255 ? 2 : 1;
     in.need(width * height * channels * size);
     // Bytes keep their values where 255 is the highest.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/text_cursor.h"
 
@@ -67,8 +68,10 @@ void add_sphere(Tube& tube, V center, double radius) {
 
 }  // namespace
 
-std::vector<Curve> read_curves(const std::string& path, std::string_view text, const Limits& limits) {
+std::vector<Curve> read_curves(const std::string& path, std::string_view bytes, const Limits& limits) {
     FileBudget budget(path, limits);
+    std::string store;
+    const std::string_view text = plain_text(path, bytes, store);
     std::vector<Curve> curves;
     bool fresh = true;
     uint64_t points = 0;

@@ -1,6 +1,7 @@
 #include "formats/meshes/mesh.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
 #include "core/math.h"
@@ -74,7 +75,25 @@ uint64_t mesh_bytes(uint64_t vertices, uint64_t triangles) {
     return vertices * (2 * sizeof(Vec3f) + sizeof(Vec2f)) + triangles * sizeof(std::array<uint32_t, 3>);
 }
 
-void check_mesh(const std::string& path, const Mesh& mesh) {
+void set_positions(Mesh& mesh, const std::vector<std::array<double, 3>>& points) {
+    constexpr double kFar = 16;  // half extents: four bits
+    std::array<double, 3> lower, upper, middle;
+    lower.fill(INFINITY), upper.fill(-INFINITY);
+    for (const auto& p : points)
+        for (size_t k = 0; k < 3; ++k) lower[k] = std::min(lower[k], p[k]), upper[k] = std::max(upper[k], p[k]);
+    double extent = 0, away = 0;
+    for (size_t k = 0; k < 3; ++k) {
+        middle[k] = 0.5 * (lower[k] + upper[k]);
+        extent = std::max(extent, 0.5 * (upper[k] - lower[k]));
+        away = std::max(away, std::fabs(middle[k]));
+    }
+    if (away > kFar * extent && std::isfinite(away)) mesh.origin = middle;
+    mesh.positions.resize(points.size());
+    for (size_t i = 0; i < points.size(); ++i)
+        for (size_t k = 0; k < 3; ++k) mesh.positions[i][int(k)] = float(points[i][k] - mesh.origin[k]);
+}
+
+void check_mesh(const std::string& path, Mesh& mesh) {
     if (mesh.faces.empty()) throw input_error(path, 0, "the mesh has no faces");
     for (const size_t count : {mesh.normals.size(), mesh.uvs.size()})
         if (count != 0 && count != mesh.positions.size())
@@ -84,9 +103,11 @@ void check_mesh(const std::string& path, const Mesh& mesh) {
     for (size_t i = 0; i < mesh.positions.size(); ++i)
         if (!is_finite(mesh.positions[i]))
             throw input_error(path, 0, "position of vertex " + std::to_string(i) + " is not finite");
-    for (size_t i = 0; i < mesh.normals.size(); ++i)
-        if (!is_finite(mesh.normals[i]))
-            throw input_error(path, 0, "normal of vertex " + std::to_string(i) + " is not finite");
+    size_t bad_normals = 0;
+    for (Vec3f& n : mesh.normals)
+        if (!is_finite(n)) n = {0, 0, 0}, ++bad_normals;
+    if (bad_normals > 0)
+        mesh.notes.push_back("normals that are not finite count as none: " + std::to_string(bad_normals));
     for (size_t i = 0; i < mesh.uvs.size(); ++i)
         if (!is_finite(Vec3f{mesh.uvs[i].x, mesh.uvs[i].y, 0}))
             throw input_error(path, 0, "texture coordinate of vertex " + std::to_string(i) + " is not finite");

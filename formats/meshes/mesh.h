@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,6 +19,8 @@ struct MeshAttribute {
     bool per_face = false;
     uint32_t channels = 0;  ///< in the file
     std::vector<Rgb> values;
+    std::string property = {}; ///< that the first channel comes from
+    float most = 1;            ///< of the type of a colour in whole numbers, which `values` are parts of
 };
 
 /// Indexed triangles. `normals` and `uvs` hold one entry per vertex, or none at all. Normals need not be unit.
@@ -26,18 +29,23 @@ struct Mesh {
     std::vector<Vec2f> uvs;
     std::vector<std::array<uint32_t, 3>> faces;
     std::vector<MeshAttribute> attributes;
+    /// Where the positions' origin lies in the file's coordinates: floats far from 0 would lose what doubles have.
+    std::array<double, 3> origin{};
+    std::vector<std::string> notes;  ///< what the file has and the mesh has not
 };
 
 /// Wavefront OBJ: v, vt, vn and f with positive or negative indices and any number of corners (cut into a fan).
-/// Vertices with the same triple of indices are shared. Other statements are skipped. `flip_v`: v becomes 1-v
+/// Vertices with the same triple of indices are shared. Faces of two corners and other statements are left out. `flip_v`: v becomes 1-v
 /// (Mitsuba's flip_tex_coords). `path` is for messages. A file without faces is refused, as by all readers.
 Mesh read_obj(const std::string& path, std::string_view text, bool flip_v, const Limits& limits = {});
 
-/// Stanford PLY, ascii or binary of either byte order. Vertex properties x y z, nx ny nz, and u v (also s t, texture_u
-/// texture_v); faces with three or more corners. Properties NAME_0 to NAME_2, or r, g, b of NAME color, are attributes,
-/// which are kept if `attributes` says so. Other properties and elements are skipped.
+/// Stanford PLY, ascii or binary of either byte order: coordinates, normals, texture coordinates, colours, faces and
+/// triangle strips by the names that programs give them (ply_header.cpp). Properties NAME_0 to NAME_2, and colours as
+/// NAME color, are attributes, of which those in `attributes` are kept. What the file has beside is in Mesh::notes.
 Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits = {},
-              bool attributes = false);
+              const std::set<std::string>& attributes = {});
+/// Whether a PLY file that begins with these bytes has texture coordinates.
+bool ply_has_uvs(const std::string& path, std::string_view bytes);
 
 /// Mitsuba's .serialized format, version 3 or 4; `shape_index` picks one of the meshes in the file.
 Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_index, bool flip_v,
@@ -61,8 +69,11 @@ Mesh split_at_edges(const std::string& path, const Mesh& mesh, double degrees);
 /// Memory of a mesh of that many vertices and triangles, at most.
 uint64_t mesh_bytes(uint64_t vertices, uint64_t triangles);
 
+/// Positions about their middle, if they are far from 0 for their extent.
+void set_positions(Mesh& mesh, const std::vector<std::array<double, 3>>& points);
+
 /// Throws Error(bad_input) if there is no face, a coordinate is not finite, an index is out of range, or an attribute
-/// is not there for every vertex.
-void check_mesh(const std::string& path, const Mesh& mesh);
+/// is not there for every vertex. Normals that are not finite become none, with a note.
+void check_mesh(const std::string& path, Mesh& mesh);
 
 }  // namespace ambilux

@@ -1,7 +1,9 @@
 #include <cstring>
+#include <set>
 #include <unordered_map>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/text_cursor.h"
@@ -28,15 +30,37 @@ struct CornerHash {
 struct ObjReader {
     const std::string& path;
     TextCursor text;
-    std::vector<Vec3f> positions, normals;
+    std::vector<std::array<double, 3>> positions;
+    std::vector<Vec3f> normals;
     std::vector<Vec2f> uvs;
+    std::set<std::string> unused;  ///< what the file has beside the mesh
+    uint64_t thin_faces = 0;
 
     [[noreturn]] void fail(const std::string& message) const { throw input_error(path, text.line, message); }
 
-    float coordinate(const char* statement) {
+    /// A backslash at the end of a line stands for a blank, and '#' begins a comment.
+    bool at_end() {
         text.skip_blanks();
-        float value = 0;
-        if (!text.number(value)) fail(std::string("expected a number in '") + statement + "'");
+        while (text.at < text.end && *text.at == '\\') {
+            TextCursor rest = text;
+            ++rest.at;
+            if (!rest.at_line_end()) break;
+            rest.next_line();
+            text = rest;
+            text.skip_blanks();
+        }
+        return text.done() || *text.at == '\n' || *text.at == '#';
+    }
+    /// Behind the rest of the statement.
+    void next_statement() {
+        while (!at_end()) text.word();
+        text.next_line();
+    }
+
+    template <class T = float>
+    T coordinate(const char* statement) {
+        T value = 0;
+        if (at_end() || !text.number(value)) fail(std::string("expected a number in '") + statement + "'");
         return value;
     }
 
@@ -49,24 +73,25 @@ struct ObjReader {
         return uint32_t(zero_based);
     }
 
+    /// Index behind a '/', or none: exporters write slashes without an index behind them.
+    uint32_t next_index(size_t count, const char* what) {
+        if (text.at >= text.end || *text.at != '/') return kAbsent;
+        ++text.at;
+        int64_t index = 0;
+        if (at_corner_end() || *text.at == '/') return kAbsent;
+        if (!text.number(index)) fail(std::string("expected a ") + what + " index in 'f'");
+        return resolve(index, count, what);
+    }
+    bool at_corner_end() const { return text.done() || std::string_view(" \t\n#\\").find(*text.at) != std::string_view::npos; }
+
     Corner corner() {
-        Corner c = {kAbsent, kAbsent, kAbsent};
         int64_t index = 0;
         if (!text.number(index)) fail("expected a vertex index in 'f'");
-        c.v = resolve(index, positions.size(), "vertex");
-        if (text.at < text.end && *text.at == '/') {
-            ++text.at;
-            if (text.at < text.end && *text.at != '/') {
-                if (!text.number(index)) fail("expected a texture coordinate index in 'f'");
-                c.vt = resolve(index, uvs.size(), "texture coordinate");
-            }
-            if (text.at < text.end && *text.at == '/') {
-                ++text.at;
-                if (!text.number(index)) fail("expected a normal index in 'f'");
-                c.vn = resolve(index, normals.size(), "normal");
-            }
-        }
-        return c;
+        const uint32_t v = resolve(index, positions.size(), "vertex");
+        const uint32_t vt = next_index(uvs.size(), "texture coordinate");
+        const uint32_t vn = next_index(normals.size(), "normal");
+        if (!at_corner_end()) fail("expected a blank behind a corner in 'f'");
+        return {v, vt, vn};
     }
 };
 
@@ -87,53 +112,92 @@ void flatten_faces(Mesh& mesh, std::vector<Corner>& corners) {
     }
 }
 
+/// A statement of another kind.
+void leave_out(ObjReader& in, std::string_view keyword) {
+    static const std::set<std::string_view> without_effect = {"",         "o",        "g",          "s",         "usemtl",
+                                                              "mtllib",   "usemap",   "maplib",     "lod",       "mg",
+                                                              "bevel",    "c_interp", "d_interp",   "trace_obj", "ctech",
+                                                              "stech",    "cstype",   "shadow_obj", "deg",       "end"};
+    constexpr size_t kMost = 8, kLongest = 16;
+    if (!without_effect.contains(keyword) && in.unused.size() < kMost)
+        in.unused.insert("'" + std::string(keyword.substr(0, kLongest)) + "'");
+}
+
+void read_vertex(ObjReader& in) {
+    const double x = in.coordinate<double>("v"), y = in.coordinate<double>("v"), z = in.coordinate<double>("v");
+    in.positions.push_back({x, y, z});
+    int more = 0;
+    for (; !in.at_end(); in.text.word()) ++more;
+    if (more >= 3) in.unused.insert("colours of vertices");  // one is a weight
+}
+
+void add_notes(const ObjReader& in, Mesh& mesh) {
+    if (in.thin_faces > 0)
+        mesh.notes.push_back("faces of fewer than three corners are left out: " + std::to_string(in.thin_faces));
+    if (in.unused.empty()) return;
+    std::string list;
+    for (const std::string& what : in.unused) list += (list.empty() ? "" : ", ") + what;
+    mesh.notes.push_back("the obj file has what is not used: " + list);
+}
+
 }  // namespace
 
 Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits) {
     FileBudget budget(path, limits);
-    ObjReader in{path, TextCursor(bytes), {}, {}, {}};
+    std::string store;
+    ObjReader in{path, TextCursor(plain_text(path, bytes, store)), {}, {}, {}, {}};
     std::unordered_map<Corner, uint32_t, CornerHash> vertex_of;
     std::vector<Corner> corners;  ///< of each vertex
     Mesh mesh;
     std::vector<uint32_t> polygon;
     bool some_normals = false, some_uvs = false, lacks_normals = false;
 
-    for (; !in.text.done(); in.text.next_line()) {
+    for (; !in.text.done(); in.next_statement()) {
         budget.tick();
+        if (in.at_end()) continue;
         const std::string_view keyword = in.text.word();
         if (keyword == "v") {
-            const float x = in.coordinate("v"), y = in.coordinate("v"), z = in.coordinate("v");
-            in.positions.push_back({x, y, z});
+            read_vertex(in);
         } else if (keyword == "vn") {
             const float x = in.coordinate("vn"), y = in.coordinate("vn"), z = in.coordinate("vn");
             in.normals.push_back({x, y, z});
         } else if (keyword == "vt") {
             const float u = in.coordinate("vt");
-            const float v = in.text.at_line_end() ? 0.0f : in.coordinate("vt");
+            const float v = in.at_end() ? 0.0f : in.coordinate("vt");
             in.uvs.push_back({u, flip_v ? 1 - v : v});
-        } else if (keyword == "f") {
+        } else if (keyword == "f" || keyword == "fo") {
             polygon.clear();
-            while (!in.text.at_line_end()) {
+            while (!in.at_end()) {
                 const Corner c = in.corner();
-                some_normals |= c.vn != kAbsent;
-                lacks_normals |= c.vn == kAbsent;
-                some_uvs |= c.vt != kAbsent;
                 const auto [vertex, is_new] = vertex_of.try_emplace(c, uint32_t(corners.size()));
                 if (is_new) corners.push_back(c);
                 polygon.push_back(vertex->second);
             }
-            if (polygon.size() < 3) in.fail("a face needs at least three corners");
+            if (polygon.size() < 3) {
+                ++in.thin_faces;
+                continue;
+            }
+            for (uint32_t v : polygon) {
+                some_normals |= corners[v].vn != kAbsent;
+                lacks_normals |= corners[v].vn == kAbsent;
+                some_uvs |= corners[v].vt != kAbsent;
+            }
             for (size_t i = 2; i < polygon.size(); ++i) mesh.faces.push_back({polygon[0], polygon[i - 1], polygon[i]});
             budget.bytes(mesh_bytes(corners.size(), mesh.faces.size()));
+        } else {
+            leave_out(in, keyword);
         }
     }
 
+    std::vector<std::array<double, 3>> points;
     for (const Corner& c : corners) {
-        mesh.positions.push_back(in.positions[c.v]);
+        points.push_back(in.positions[c.v]);
         if (some_uvs) mesh.uvs.push_back(c.vt == kAbsent ? Vec2f{0, 0} : in.uvs[c.vt]);
         if (some_normals) mesh.normals.push_back(c.vn == kAbsent ? Vec3f{0, 0, 0} : in.normals[c.vn]);
     }
+    set_positions(mesh, points);
     if (some_normals && lacks_normals) flatten_faces(mesh, corners);
+    add_notes(in, mesh);
     check_mesh(path, mesh);
     return mesh;
 }

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/ply_blocks.h"
@@ -12,57 +13,6 @@ namespace ambilux {
 namespace {
 
 using namespace ply;
-
-bool scalar_named(std::string_view name, Scalar& type) {
-    struct Name {
-        const char* text;
-        Scalar type;
-    };
-    static constexpr Name names[] = {
-        {"char", Scalar::int8},      {"int8", Scalar::int8},       {"uchar", Scalar::uint8},
-        {"uint8", Scalar::uint8},    {"short", Scalar::int16},     {"int16", Scalar::int16},
-        {"ushort", Scalar::uint16},  {"uint16", Scalar::uint16},   {"int", Scalar::int32},
-        {"int32", Scalar::int32},    {"uint", Scalar::uint32},     {"uint32", Scalar::uint32},
-        {"float", Scalar::float32},  {"float32", Scalar::float32}, {"double", Scalar::float64},
-        {"float64", Scalar::float64}};
-    for (const Name& n : names)
-        if (name == n.text) {
-            type = n.type;
-            return true;
-        }
-    return false;
-}
-
-Role role_named(std::string_view name) {
-    if (name == "x") return Role::x;
-    if (name == "y") return Role::y;
-    if (name == "z") return Role::z;
-    if (name == "nx") return Role::nx;
-    if (name == "ny") return Role::ny;
-    if (name == "nz") return Role::nz;
-    if (name == "u" || name == "s" || name == "texture_u") return Role::u;
-    if (name == "v" || name == "t" || name == "texture_v") return Role::v;
-    return Role::skip;
-}
-
-/// Name and channel of an attribute; false for what is none.
-bool attribute_named(const std::string& property, const char* prefix, std::string& name, uint32_t& channel) {
-    for (uint32_t c = 0; c < 3; ++c)
-        if (property == std::string(1, "rgb"[c])) {
-            name = std::string(prefix) + "color";
-            channel = c;
-            return true;
-        }
-    const size_t n = property.size();
-    if (n < 3 || property[n - 2] != '_' || property[n - 1] < '0' || property[n - 1] > '2') return false;
-    channel = uint32_t(property[n - 1] - '0');
-    name = property.substr(0, n - 2);
-    if (!name.starts_with(prefix)) name.insert(0, prefix);
-    return true;
-}
-
-/// Elements of a file and properties of an element.
-constexpr size_t kMostParts = 1000;
 
 struct PlyReader {
     const std::string& path;
@@ -103,69 +53,8 @@ struct PlyReader {
     }
 };
 
-std::vector<Element> read_header(PlyReader& in) {
-    TextCursor& text = in.text;
-    if (text.word() != "ply") in.fail("not a PLY file (no 'ply' in the first line)");
-    text.next_line();
-    std::vector<Element> elements;
-    bool has_format = false;
-    Encoding encoding = Encoding::ascii;
-    for (;; text.next_line()) {
-        if (text.done()) in.fail("header has no end_header");
-        const std::string_view keyword = text.word();
-        if (keyword == "end_header") break;
-        if (keyword == "format") {
-            const std::string_view name = text.word();
-            if (name == "ascii")
-                encoding = Encoding::ascii;
-            else if (name == "binary_little_endian")
-                encoding = Encoding::little_endian;
-            else if (name == "binary_big_endian")
-                encoding = Encoding::big_endian;
-            else
-                in.fail("unknown format '" + std::string(name) + "'");
-            has_format = true;
-        } else if (keyword == "element") {
-            Element element;
-            element.name = text.word();
-            for (const Element& earlier : elements)
-                if (earlier.name == element.name) in.fail("element '" + element.name + "' is declared twice");
-            if (elements.size() == kMostParts) in.fail("more than " + std::to_string(kMostParts) + " elements");
-            text.skip_blanks();
-            if (!text.number(element.count)) in.fail("expected a count for element '" + element.name + "'");
-            elements.push_back(element);
-        } else if (keyword == "property") {
-            if (elements.empty()) in.fail("property before any element");
-            Property property;
-            std::string_view type = text.word();
-            if (type == "list") {
-                property.list = true;
-                const std::string_view count_type = text.word();
-                if (!scalar_named(count_type, property.count_type))
-                    in.fail("unknown type '" + std::string(count_type) + "'");
-                type = text.word();
-            }
-            if (!scalar_named(type, property.type)) in.fail("unknown type '" + std::string(type) + "'");
-            property.name = text.word();
-            if (elements.back().properties.size() == kMostParts)
-                in.fail("more than " + std::to_string(kMostParts) + " properties of an element");
-            if (elements.back().name == "vertex" && !property.list) property.role = role_named(property.name);
-            elements.back().properties.push_back(property);
-        } else if (keyword != "comment" && keyword != "obj_info" && !keyword.empty()) {
-            in.fail("unknown header statement '" + std::string(keyword) + "'");
-        }
-    }
-    if (!has_format) in.fail("header has no format");
-    text.next_line();
-    in.encoding = encoding;
-    return elements;
-}
-
-bool has_role(const Element& element, Role role) {
-    for (const Property& p : element.properties)
-        if (p.role == role) return true;
-    return false;
-}
+/// The largest value of a colour of this type.
+float most_of(Scalar type) { return type == Scalar::uint8 ? 255.0f : type == Scalar::uint16 ? 65535.0f : 1.0f; }
 
 /// Bytes that an entry takes at least: of text a digit and a blank for each number.
 uint64_t least_size(const Element& element, Encoding encoding) {
@@ -178,9 +67,13 @@ uint64_t least_size(const Element& element, Encoding encoding) {
 struct MeshBuilder {
     PlyReader& in;
     FileBudget& budget;
-    bool flip_v, keep_attributes;
+    bool flip_v;
+    const std::set<std::string>& wanted;  ///< attributes
     Mesh mesh;
     bool has_faces = false;
+    uint64_t vertices = 0, thin_faces = 0;
+    std::string unused = {};
+    std::vector<std::array<double, 3>> points = {};  ///< positions that may be more than floats
 
     void read(Element element) {
         const uint64_t size = least_size(element, in.encoding);
@@ -190,41 +83,61 @@ struct MeshBuilder {
             in.fail("element '" + element.name + "' claims " + std::to_string(element.count) +
                     " entries, more than the file holds");
         if (size == 0) return;
-        if (keep_attributes && (element.name == "vertex" || element.name == "face")) declare_attributes(element);
+        declare_attributes(element);
+        note_unused(element);
         if (element.name == "vertex")
             read_vertices(element);
         else if (element.name == "face")
             read_faces(element);
+        else if (element.name == "tristrips")
+            read_strips(element);
         else
             skip(element);
     }
 
+    Mesh finish(const std::string& path) {
+        if (!points.empty()) set_positions(mesh, points);
+        for (MeshAttribute& a : mesh.attributes) finish_attribute(a);
+        if (thin_faces > 0)
+            mesh.notes.push_back("faces of fewer than three corners are left out: " + std::to_string(thin_faces));
+        if (!unused.empty()) mesh.notes.push_back("the ply file has what is not used: " + unused);
+        check_mesh(path, mesh);
+        return std::move(mesh);
+    }
+
 private:
     void declare_attributes(Element& element) {
-        const bool per_face = element.name == "face";
         for (Property& p : element.properties) {
-            std::string name;
-            if (p.list || p.role != Role::skip ||
-                !attribute_named(p.name, per_face ? "face_" : "vertex_", name, p.channel))
-                continue;
+            if (!wanted.contains(p.attribute_name)) continue;
             size_t i = 0;
-            while (i < mesh.attributes.size() && mesh.attributes[i].name != name) ++i;
-            if (i == mesh.attributes.size()) mesh.attributes.push_back({name, per_face, 0, {}});
+            while (i < mesh.attributes.size() && mesh.attributes[i].name != p.attribute_name) ++i;
+            if (i == mesh.attributes.size()) {
+                const float most = p.attribute_name.ends_with("color") ? most_of(p.type) : 1;
+                mesh.attributes.push_back({p.attribute_name, element.name == "face", 0, {}, p.name, most});
+            }
             p.attribute = int(i);
             mesh.attributes[i].channels = std::max(mesh.attributes[i].channels, p.channel + 1);
         }
         budget.bytes(element.count * mesh.attributes.size() * sizeof(Rgb));
     }
 
+    /// Of an element and its properties, all but what the mesh gets.
+    void note_unused(const Element& element) {
+        constexpr size_t kMost = 200;
+        std::string names;
+        for (const Property& p : element.properties)
+            if (p.role == Role::skip && p.attribute < 0) names += (names.empty() ? "" : " ") + p.name;
+        if (names.empty() || element.count == 0 || unused.size() > kMost) return;
+        unused += (unused.empty() ? "" : ", ") + names.substr(0, kMost) + " of element " + element.name;
+    }
+
     /// Value of a property of entry `i`, kept if it is one of an attribute.
-    float property_value(const Property& p, size_t i) {
-        const float value = float(in.value(p.type));
+    double property_value(const Property& p, size_t i) {
+        const double value = in.value(p.type);
         if (p.attribute < 0) return value;
         MeshAttribute& a = mesh.attributes[size_t(p.attribute)];
         a.values.resize(std::max(a.values.size(), i + 1));
-        if (!std::isfinite(value)) in.fail("attribute '" + a.name + "' is not finite");
-        a.values[i][int(p.channel)] = value;
-        if (a.channels == 1) a.values[i] = {value, value, value};
+        a.values[i][int(p.channel)] = float(value);
         return value;
     }
 
@@ -259,25 +172,36 @@ private:
             in.fail("vertices have no x, y, z");
         const bool normals = has_role(element, Role::nx) && has_role(element, Role::ny) && has_role(element, Role::nz),
                    uvs = has_role(element, Role::u) && has_role(element, Role::v);
-        budget.bytes(mesh_bytes(element.count, 0));
-        mesh.positions.resize(element.count);
+        vertices = element.count;
+        budget.bytes(mesh_bytes(vertices, 0));
         if (normals) mesh.normals.resize(element.count);
         if (uvs) mesh.uvs.resize(element.count);
-        if (has_fixed_size(element)) return read_vertex_columns(element);
+        const bool columns = has_fixed_size(element);
+        if (columns && !has_double_positions(element))
+            mesh.positions.resize(element.count);
+        else
+            points.resize(element.count);
+        if (columns) return read_vertex_columns(element);
         for (uint64_t i = 0; i < element.count; ++i) {
-            float vertex[9] = {};
+            double vertex[9] = {};
             for (const Property& p : element.properties) {
                 if (p.list)
                     skip_list(p);
                 else
                     vertex[int(p.role)] = property_value(p, i);
             }
-            mesh.positions[i] = {vertex[int(Role::x)], vertex[int(Role::y)], vertex[int(Role::z)]};
-            if (normals) mesh.normals[i] = {vertex[int(Role::nx)], vertex[int(Role::ny)], vertex[int(Role::nz)]};
-            const float v = vertex[int(Role::v)];
-            if (uvs) mesh.uvs[i] = {vertex[int(Role::u)], flip_v ? 1 - v : v};
+            const auto at = [&](Role role) { return float(vertex[int(role)]); };
+            points[i] = {vertex[int(Role::x)], vertex[int(Role::y)], vertex[int(Role::z)]};
+            if (normals) mesh.normals[i] = {at(Role::nx), at(Role::ny), at(Role::nz)};
+            if (uvs) mesh.uvs[i] = {at(Role::u), flip_v ? 1 - at(Role::v) : at(Role::v)};
             budget.tick();
         }
+    }
+
+    static bool has_double_positions(const Element& element) {
+        for (const Property& p : element.properties)
+            if (p.role >= Role::x && p.role <= Role::z && p.type == Scalar::float64) return true;
+        return false;
     }
 
     /// Where the values of a property go, and how many floats apart; null if they are not kept.
@@ -297,7 +221,10 @@ private:
             const uint64_t count = std::min(kBlock, element.count - first);
             const char* from = in.text.at;
             for (const Property& p : element.properties) {
-                if (const auto [to, step] = target_of(p); to)
+                if (!points.empty() && p.role >= Role::x && p.role <= Role::z)
+                    copy_column(p.type, is_swapped(in.encoding), from, stride, count,
+                                &points[first][size_t(p.role) - size_t(Role::x)], 3);
+                else if (const auto [to, step] = target_of(p); to)
                     copy_column(p.type, is_swapped(in.encoding), from, stride, count, to + first * step, step);
                 from += size_of(p.type);
             }
@@ -306,19 +233,19 @@ private:
             in.text.at += count * stride;
             budget.tick(count);
         }
-        for (MeshAttribute& a : mesh.attributes)
-            if (!a.per_face) finish_attribute(a);
     }
 
     void finish_attribute(MeshAttribute& a) const {
+        if (a.per_face) a.values.resize(mesh.faces.size());
         for (Rgb& value : a.values) {
             if (a.channels == 1) value = {value.x, value.x, value.x};
+            if (a.most > 1) value = value / a.most;
             if (!is_finite(value)) in.fail("attribute '" + a.name + "' is not finite");
         }
     }
 
     void read_faces(const Element& element) {
-        budget.bytes(mesh_bytes(mesh.positions.size(), element.count));
+        budget.bytes(mesh_bytes(vertices, element.count));
         mesh.faces.reserve(element.count);
         std::vector<uint32_t> polygon;
         const FaceLayout layout = in.encoding == Encoding::ascii ? FaceLayout{} : face_layout(element);
@@ -326,7 +253,7 @@ private:
             if (layout.valid) {
                 const uint64_t read = read_small_faces(layout, is_swapped(in.encoding), in.text.at, in.text.end,
                                                        std::min(kBlock, element.count - i), mesh.faces);
-                budget.bytes(mesh_bytes(mesh.positions.size(), mesh.faces.size()));
+                budget.bytes(mesh_bytes(vertices, mesh.faces.size()));
                 budget.tick(read);
                 has_faces |= read > 0;
                 if ((i += read) == element.count) break;
@@ -334,10 +261,10 @@ private:
             const size_t first = mesh.faces.size();
             polygon.clear();
             for (const Property& p : element.properties) {
-                if (p.list && (p.name == "vertex_indices" || p.name == "vertex_index")) {
+                if (p.role == Role::corners) {
                     has_faces = true;
                     uint32_t left = in.index(p.count_type);
-                    budget.bytes(mesh_bytes(mesh.positions.size(), mesh.faces.size() + left));
+                    budget.bytes(mesh_bytes(vertices, mesh.faces.size() + left));
                     for (; left > 0; --left) polygon.push_back(in.index(p.type));
                 } else if (p.list) {
                     skip_list(p);
@@ -345,32 +272,72 @@ private:
                     property_value(p, first);
                 }
             }
-            if (polygon.size() < 3) in.fail("face " + std::to_string(i) + " has fewer than three corners");
+            thin_faces += polygon.size() < 3;
             for (size_t k = 2; k < polygon.size(); ++k) mesh.faces.push_back({polygon[0], polygon[k - 1], polygon[k]});
             for (MeshAttribute& a : mesh.attributes)
                 if (a.per_face && first < a.values.size()) a.values.resize(mesh.faces.size(), Rgb(a.values[first]));
-            budget.bytes(mesh_bytes(mesh.positions.size(), mesh.faces.size()));
+            budget.bytes(mesh_bytes(vertices, mesh.faces.size()));
             budget.tick();
         }
+    }
+
+    /// Every corner but the first two of a strip makes a triangle with those before it, turned over at every second
+    /// one; -1 ends a strip.
+    void read_strips(const Element& element) {
+        std::vector<uint32_t> strip;
+        for (uint64_t i = 0; i < element.count; ++i)
+            for (const Property& p : element.properties) {
+                if (p.role != Role::corners) {
+                    p.list ? skip_list(p) : void(in.value(p.type));
+                    continue;
+                }
+                has_faces = true;
+                strip.clear();
+                for (uint32_t left = in.index(p.count_type); left > 0; --left) {
+                    TextCursor here = in.text;
+                    if (in.value(p.type) == -1) {
+                        strip.clear();
+                        continue;
+                    }
+                    in.text = here;
+                    strip.push_back(in.index(p.type));
+                    const size_t n = strip.size();
+                    if (n < 3) continue;
+                    const uint32_t a = strip[n - 3], b = strip[n - 2], c = strip[n - 1];
+                    if (a != b && b != c && c != a) mesh.faces.push_back({n % 2 ? a : b, n % 2 ? b : a, c});
+                    if (n % 4096 == 0) budget.bytes(mesh_bytes(vertices, mesh.faces.size()));
+                    budget.tick();
+                }
+            }
     }
 };
 
 }  // namespace
 
-Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits, bool attributes) {
+Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits,
+              const std::set<std::string>& attributes) {
     FileBudget budget(path, limits);
-    PlyReader in{path, TextCursor(bytes)};
-    const std::vector<Element> elements = read_header(in);
+    const Header header = read_header(path, bytes);
+    std::string_view body = bytes.substr(header.size);
+    std::string store;
+    if (header.encoding == Encoding::ascii) body = plain_text(path, body, store);
+    PlyReader in{path, TextCursor(body), header.encoding};
+    in.text.line = header.lines + 1;
     MeshBuilder builder{in, budget, flip_v, attributes, {}};
     bool has_vertices = false;
-    for (const Element& element : elements) {
+    for (const Element& element : header.elements) {
         has_vertices |= element.name == "vertex";
         builder.read(element);
     }
     if (!has_vertices) in.fail("no element 'vertex'");
     if (!builder.has_faces) in.fail("no faces with vertex_indices");
-    check_mesh(path, builder.mesh);
-    return std::move(builder.mesh);
+    return builder.finish(path);
+}
+
+bool ply_has_uvs(const std::string& path, std::string_view bytes) {
+    for (const Element& element : read_header(path, bytes).elements)
+        if (element.name == "vertex") return has_role(element, Role::u);
+    return false;
 }
 
 }  // namespace ambilux

@@ -42,15 +42,15 @@ auto with_type(Scalar type, Function&& f) {
     }
 }
 
-/// A property of `count` entries, `stride` bytes apart, into floats `step` floats apart.
-inline void copy_column(Scalar type, bool swap, const char* from, size_t stride, uint64_t count, float* to,
-                        size_t step) {
+/// A property of `count` entries, `stride` bytes apart, into numbers `step` of them apart.
+template <class Number>
+void copy_column(Scalar type, bool swap, const char* from, size_t stride, uint64_t count, Number* to, size_t step) {
     with_type(type, [&](auto tag) {
         using T = decltype(tag);
         if (swap)
-            for (uint64_t i = 0; i < count; ++i) to[i * step] = float(load<T>(from + i * stride, true));
+            for (uint64_t i = 0; i < count; ++i) to[i * step] = Number(load<T>(from + i * stride, true));
         else
-            for (uint64_t i = 0; i < count; ++i) to[i * step] = float(load<T>(from + i * stride, false));
+            for (uint64_t i = 0; i < count; ++i) to[i * step] = Number(load<T>(from + i * stride, false));
     });
 }
 
@@ -78,7 +78,7 @@ inline FaceLayout face_layout(const Element& element) {
     FaceLayout layout;
     int lists = 0;
     for (const Property& p : element.properties) {
-        if (p.attribute >= 0 || (p.list && p.name != "vertex_indices" && p.name != "vertex_index")) return {};
+        if (p.attribute >= 0 || (p.list && p.role != Role::corners)) return {};
         if (p.list)
             layout.count_type = p.count_type, layout.index_type = p.type, ++lists;
         else

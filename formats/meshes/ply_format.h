@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace ambilux::ply {
@@ -10,8 +11,8 @@ namespace ambilux::ply {
 enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 enum class Encoding { ascii, little_endian, big_endian };
 
-/// What a property of the vertex element means to us.
-enum class Role { skip, x, y, z, nx, ny, nz, u, v };
+/// What a property means to us: of vertices, and `corners` of faces and strips.
+enum class Role { skip, x, y, z, nx, ny, nz, u, v, corners };
 
 struct Property {
     std::string name;
@@ -19,8 +20,9 @@ struct Property {
     bool list = false;
     Scalar count_type = Scalar::uint8;
     Role role = Role::skip;
-    int attribute = -1;    ///< place in Mesh::attributes
-    uint32_t channel = 0;  ///< of it
+    std::string attribute_name;  ///< as MeshAttribute has it; may be empty
+    uint32_t channel = 0;        ///< of it
+    int attribute = -1;          ///< place in Mesh::attributes
 };
 
 struct Element {
@@ -28,6 +30,22 @@ struct Element {
     uint64_t count = 0;
     std::vector<Property> properties;
 };
+
+struct Header {
+    Encoding encoding = Encoding::ascii;
+    std::vector<Element> elements;
+    size_t size = 0;  ///< in bytes
+    int lines = 0;
+};
+
+/// The header at the beginning of a file, with the roles of its properties by the names that programs give them.
+Header read_header(const std::string& path, std::string_view bytes);
+
+inline bool has_role(const Element& element, Role role) {
+    for (const Property& p : element.properties)
+        if (p.role == role) return true;
+    return false;
+}
 
 inline size_t size_of(Scalar type) {
     switch (type) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <charconv>
+#include <limits>
 #include <string>
 #include <string_view>
 
@@ -39,8 +40,8 @@ struct TextCursor {
         while (at < end && *at != ' ' && *at != '\t' && *at != '\r' && *at != '\n') ++at;
         return {first, size_t(at - first)};
     }
-    /// Reads a number right here; false if there is none. "nan" and "inf" are numbers; what is too large for T becomes
-    /// inf or fails.
+    /// Reads a number right here; false if there is none. "nan", "inf" and "1.#QNAN", as old programs on Windows write
+    /// what is no number, are numbers; what is too large for T becomes inf or fails.
     template <class T>
     bool number(T& value) {
         if (at < end && *at == '+') ++at;
@@ -59,6 +60,9 @@ struct TextCursor {
             }
         }
         at = result.ptr;
+        if constexpr (std::is_floating_point_v<T>)
+            if (at + 1 < end && *at == '#' && at[-1] == '.' && at[1] >= 'I' && at[1] <= 'S')
+                word(), value = std::numeric_limits<T>::quiet_NaN();
         return true;
     }
 };

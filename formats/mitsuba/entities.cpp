@@ -4,6 +4,7 @@
 #include <map>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "formats/file_budget.h"
 
 namespace ambilux::mitsuba {
@@ -125,7 +126,7 @@ struct Expander {
                               "more files than --limits includes=" + std::to_string(document.limits.includes));
         std::string content = read_input(file, document.limits);
         document.files.push_back({file, content});
-        if (content.compare(0, 3, "\xEF\xBB\xBF") == 0) content.erase(0, 3);
+        content = plain_text_of_utf16(file, content);
         content.erase(0, behind(content, 0, "<?xml", "?>"));
         // A file that is no XML stays out of values, and so out of messages.
         const auto first = std::find_if_not(content.begin(), content.end(), is_blank);

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "formats/document/plugins.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/text_cursor.h"
@@ -140,7 +141,7 @@ struct Parser {
 
     void parse_text(const std::string& path, const std::string& text, uint64_t depth) {
         document.files.push_back({path, text});
-        const std::string bytes = expand_entities(document, path, text);
+        const std::string bytes = expand_entities(document, path, plain_text_of_utf16(path, text));
         XmlSource source;
         source.path = path;
         for (size_t i = 0; i < bytes.size(); ++i)

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/srgb.h"
+#include "core/text.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/text_cursor.h"
 
@@ -196,7 +197,8 @@ Value ValueParser::parse_spectrum(const XmlSource& source, const pugi::xml_node&
         const std::string path = document_.resolve(attribute(source, node, "filename"), at);
         const std::string bytes = read_input(path, document_.limits);
         document_.files.push_back({path, bytes});
-        TextCursor cursor(bytes);
+        const std::string plain = plain_text(path, bytes);
+        TextCursor cursor(plain);
         for (; !cursor.done(); cursor.next_line()) {
             const std::string wavelength(cursor.word()), amount(cursor.word());
             if (wavelength.empty() || wavelength[0] == '#') continue;

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/text.h"
 #include "formats/front_end.h"
 #include "formats/gzip.h"
 #include "formats/pbrt/scene.h"
@@ -72,8 +73,9 @@ void Parser::parse_file(const std::string& path, const Where& from, uint64_t dep
         fail(from, "circular include of '" + path + "'");
     open_files_.push_back(path);
     if (depth > 1) scene_.document.included_from.try_emplace(path, from);
-    const std::string text = gunzip_if_packed(path, read_input(path, limits), limits);
-    scene_.document.file_digests.push_back({path, sha256(text)});
+    const std::string bytes = gunzip_if_packed(path, read_input(path, limits), limits);
+    scene_.document.file_digests.push_back({path, sha256(bytes)});
+    const std::string text = plain_text(path, bytes);
     Tokenizer tokens(path, text);
     FileBudget budget(path, limits);
     Tokenizer* const outer_tokens = std::exchange(tokens_, &tokens);

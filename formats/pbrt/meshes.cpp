@@ -139,13 +139,8 @@ bool has_uvs(const std::string& path) {
     std::string head(1 << 16, '\0');
     file.read(head.data(), std::streamsize(head.size()));
     head.resize(size_t(std::max<std::streamsize>(file.gcount(), 0)));
-    if (!head.starts_with("ply")) return false;  // packed
-    const size_t end = head.find("end_header");
-    if (end == std::string::npos) return true;
-    for (const char* name : {" u", " s", " texture_u"})
-        for (const char* line : {"\n", "\r"})
-            if (head.find(name + std::string(line)) < end) return true;
-    return false;
+    if (head.starts_with("\x1f\x8b")) return false;  // packed
+    return head.find("end_header") == std::string::npos || ply_has_uvs(path, head);
 }
 
 }  // namespace ambilux::pbrt

@@ -108,16 +108,19 @@ Placed add_mesh(SceneMaker& scene, const Parameters& in, bool textured, const Pr
         const std::string bytes = gunzip_if_packed(path, read_input(path, limits), limits);
         scene.document.file_digests.push_back({path, sha256(bytes)});
         mesh = read_ply(path, bytes, false, limits);
+        for (const std::string& note : mesh.notes) scene.report.note({path, 0}, note);
+        out.local = translation(mesh.origin[0], mesh.origin[1], mesh.origin[2]);
     } else {
         mesh = own_mesh(scene, in, exact_area);
     }
     check_mesh(in.where.file + ":" + std::to_string(in.where.line), mesh);
+    const Matrix placed = scene.state.ctm * out.local;
     if (projection)
-        mesh = projected(mesh, scene.state.ctm, *projection);
+        mesh = projected(mesh, placed, *projection);
     else if (mesh.uvs.empty() && textured)
         mesh = with_default_uvs(mesh);
     if (solid) {
-        BakedMesh baked = bake_solids(scene, in.where, mesh, scene.state.ctm, **solid);
+        BakedMesh baked = bake_solids(scene, in.where, mesh, placed, **solid);
         mesh = std::move(baked.mesh);
         *solid = baked.bsdf;
     }
@@ -125,6 +128,7 @@ Placed add_mesh(SceneMaker& scene, const Parameters& in, bool textured, const Pr
     out.object = &add_object(scene.document, "shape", "mesh", in.where);
     const std::string name =
         in.where.file + ":" + std::to_string(in.where.line) + "#" + std::to_string(scene.document.meshes.size());
+    mesh.notes.clear(), mesh.origin = {};  // said, and in `local`
     scene.document.meshes[name] = std::move(mesh);
     set_text(*out.object, "name", name);
     return out;

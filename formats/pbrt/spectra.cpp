@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "core/text.h"
 #include "formats/document/named_media.h"
 #include "formats/document/spectrum.h"
 
@@ -127,8 +128,9 @@ std::string resolve(const std::string& folder, const std::string& name, const Wh
 std::vector<std::pair<double, double>> SpectrumReader::samples(const Parameter& p) const {
     std::vector<double> values = p.numbers;
     if (!p.strings.empty()) {
-        const std::string path = resolve(folder, p.strings[0], p.where), text = read_input(path, document.limits);
-        document.file_digests.push_back({path, sha256(text)});
+        const std::string path = resolve(folder, p.strings[0], p.where), bytes = read_input(path, document.limits);
+        document.file_digests.push_back({path, sha256(bytes)});
+        const std::string text = plain_text(path, bytes);
         Tokenizer tokens(path, text);
         FileBudget budget(path, document.limits);
         while (tokens.peek().kind != TokenKind::end) {
