@@ -12,7 +12,7 @@ namespace {
 struct Header {
     uint32_t pixels_at, size;
     uint64_t width, height;
-    bool top_down;
+    bool top_down, has_profile;
     uint32_t bits, colors;
     std::array<uint32_t, 4> masks;  ///< of red, green, blue, alpha
 };
@@ -43,6 +43,11 @@ Header take_header(ByteReader& in) {
     if (compression == 3) {
         for (int c = 0; c < 3; ++c) h.masks[size_t(c)] = in.u32();
         h.masks[3] = h.size >= 56 ? in.u32() : 0;
+    }
+    if (h.size == 124) {
+        in.seek(14 + 56);
+        const std::string_view space = in.take(4);  // stored with its last letter first
+        h.has_profile = space == "DEBM" || space == "KNIL";
     }
     return h;
 }
@@ -81,6 +86,7 @@ Texels read_bmp(std::string_view bytes, FileBudget& budget) {
     in.seek(h.pixels_at);
     in.need(row_bytes * h.height);
     Texels texels = make_texels(h.width, h.height, true, budget);
+    if (h.has_profile) note_profile(bytes, texels);
     bool any_alpha = false;
     for (uint64_t y = 0; y < h.height; ++y) {
         ByteReader row{in.take(row_bytes), budget};

@@ -1,4 +1,5 @@
 // Radiance's RGBE pictures (Ward, "Real Pixels", Graphics Gems II; the Radiance file formats, section "Picture files").
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -22,15 +23,64 @@ std::string_view take_line(ByteReader& in) {
     return line.substr(0, line.find_last_not_of(" \t\r") + 1);
 }
 
-uint64_t take_size(std::string_view& line, std::string_view axis, const FileBudget& budget) {
-    uint64_t size = 0;
-    if (line.starts_with(axis)) {
-        line.remove_prefix(axis.size());
-        const auto result = std::from_chars(line.data(), line.data() + line.size(), size);
-        line.remove_prefix(size_t(result.ptr - line.data()));
-        if (result.ec == std::errc()) return size;
+/// What a line of the header is set to, as numbers.
+std::vector<double> numbers_behind(std::string_view line, std::string_view name, const FileBudget& budget) {
+    const std::string text(line.substr(name.size()));
+    std::vector<double> out;
+    for (const char* at = text.c_str(); *at;) {
+        char* end = nullptr;
+        out.push_back(std::strtod(at, &end));
+        if (end == at || !std::isfinite(out.back()))
+            budget.fail("cannot read HDR image: '" + std::string(line) + "' is no number");
+        for (at = end; *at == ' ';) ++at;
     }
-    budget.fail("cannot read HDR image: its size must be written as '-Y HEIGHT +X WIDTH'");
+    return out;
+}
+
+/// Factors that the values have got, which are taken away, and what the header says beside.
+struct Header {
+    bool is_rgbe = false;
+    double applied[3] = {1, 1, 1};
+    std::vector<std::string> notes;
+
+    void take(std::string_view line, const FileBudget& budget) {
+        is_rgbe |= line == "FORMAT=32-bit_rle_rgbe";
+        for (const std::string_view name : {"EXPOSURE=", "COLORCORR="}) {
+            if (!line.starts_with(name)) continue;
+            const std::vector<double> by = numbers_behind(line, name, budget);
+            for (size_t c = 0; c < 3; ++c) {
+                applied[c] *= by.empty() ? 0 : by[std::min(c, by.size() - 1)];
+                if (!(applied[c] > 0))
+                    budget.fail("cannot read HDR image: '" + std::string(line) + "' is not positive");
+            }
+            if (std::any_of(by.begin(), by.end(), [](double v) { return v != 1; }))
+                notes.push_back("values are divided by what its header has: " + std::string(line));
+        }
+        if (line.starts_with("PRIMARIES=") ||
+            (line.starts_with("GAMMA=") && numbers_behind(line, "GAMMA=", budget) != std::vector<double>{1}))
+            notes.push_back("colours are taken as linear Rec.709, whatever its header has: " + std::string(line));
+    }
+};
+
+/// One of the two axes that pixels follow: rows are stored along the first one, pixels of a row along the second.
+struct Axis {
+    bool is_x, reversed;  ///< from the right to the left, or from the bottom to the top
+    uint64_t size;
+
+    uint64_t place(uint64_t i) const { return reversed ? size - 1 - i : i; }
+};
+
+Axis take_axis(std::string_view& line, const FileBudget& budget) {
+    const std::string_view known = "+X -X -Y +Y ";
+    const size_t kind = line.size() < 3 ? std::string_view::npos : known.find(line.substr(0, 3));
+    uint64_t size = 0;
+    if (kind != std::string_view::npos && kind % 3 == 0) {
+        line.remove_prefix(3);
+        const auto result = std::from_chars(line.data(), line.data() + line.size(), size);
+        line.remove_prefix(std::min(size_t(result.ptr - line.data()) + 1, line.size()));
+        if (result.ec == std::errc()) return {kind < 6, kind % 6 == 3, size};
+    }
+    budget.fail("cannot read HDR image: its size must be written as '-Y HEIGHT +X WIDTH', with other signs or order");
 }
 
 void decode(const uint8_t* rgbe, float* out) {
@@ -58,11 +108,13 @@ bool is_hdr(std::string_view bytes) { return bytes.starts_with("#?RADIANCE") || 
 
 Texels read_hdr(std::string_view bytes, FileBudget& budget) {
     ByteReader in{bytes, budget};
-    bool is_rgbe = false;
-    for (std::string_view line; !(line = take_line(in)).empty();) is_rgbe |= line == "FORMAT=32-bit_rle_rgbe";
-    if (!is_rgbe) budget.fail("cannot read HDR image: its FORMAT is not 32-bit_rle_rgbe");
+    Header header;
+    for (std::string_view line; !(line = take_line(in)).empty();) header.take(line, budget);
+    if (!header.is_rgbe) budget.fail("cannot read HDR image: its FORMAT is not 32-bit_rle_rgbe");
     std::string_view size = take_line(in);
-    const uint64_t height = take_size(size, "-Y ", budget), width = take_size(size, " +X ", budget);
+    const Axis rows = take_axis(size, budget), pixels = take_axis(size, budget);
+    if (rows.is_x == pixels.is_x) budget.fail("cannot read HDR image: its size has one axis twice");
+    const uint64_t width = pixels.size, height = rows.size;
     budget.pixels(width, height);
 
     const auto marker = [&](size_t i) { return in.left() > i ? uint8_t(in.bytes[in.at + i]) : 0; };
@@ -72,8 +124,9 @@ Texels read_hdr(std::string_view bytes, FileBudget& budget) {
     const bool packed = width >= kLeastPacked && width <= kMostPacked && is_packed();
     // A run is at most 127 pixels long and takes two bytes.
     in.need(packed ? height * (4 + 4 * 2 * ((width + 126) / 127)) : height * width * 4);
-    Texels texels = make_texels(width, height, false, budget);
+    Texels texels = rows.is_x ? make_texels(height, width, false, budget) : make_texels(width, height, false, budget);
     texels.is_linear = true;
+    texels.notes = std::move(header.notes);
     std::vector<uint8_t> row(width * 4);
     for (uint64_t y = 0; y < height; ++y) {
         if (packed) {
@@ -83,7 +136,12 @@ Texels read_hdr(std::string_view bytes, FileBudget& budget) {
             const std::string_view stored = in.take(width * 4);
             row.assign(stored.begin(), stored.end());
         }
-        for (uint64_t x = 0; x < width; ++x) decode(&row[4 * x], &texels.floats[4 * (y * width + x)]);
+        for (uint64_t x = 0; x < width; ++x) {
+            const uint64_t along = pixels.place(x), across = rows.place(y);
+            float* texel = &texels.floats[4 * (rows.is_x ? along * height + across : across * width + along)];
+            decode(&row[4 * x], texel);
+            for (size_t c = 0; c < 3; ++c) texel[c] = float(texel[c] / header.applied[c]);
+        }
         budget.tick();
     }
     return texels;

@@ -19,6 +19,27 @@ Texels make_texels(uint64_t width, uint64_t height, bool is_8bit, const FileBudg
     return texels;
 }
 
+void note_profile(std::string_view profile, Texels& texels) {
+    if (profile.find("sRGB") != std::string_view::npos || profile.find({"s\0R\0G\0B", 7}) != std::string_view::npos)
+        return;
+    texels.notes.emplace_back("its colour profile (ICC), which is not sRGB, is left out");
+}
+
+void note_orientation(std::string_view exif, Texels& texels) {
+    const bool little = exif.starts_with("II");
+    const auto number = [&](size_t at, size_t bytes) {
+        uint32_t v = 0;
+        for (size_t i = 0; i < bytes; ++i)
+            v = v << 8 | (at + bytes <= exif.size() ? uint8_t(exif[at + (little ? bytes - 1 - i : i)]) : 0u);
+        return v;
+    };
+    const size_t list = number(4, 4), count = number(list, 2);
+    for (size_t at = list + 2; at < list + 2 + 12 * count; at += 12)
+        if (const uint32_t value = number(at + 8, 2); number(at, 2) == 0x112 && value > 1 && value <= 8)
+            texels.notes.push_back("rows are taken as they lie; its EXIF orientation is left out: " +
+                                   std::to_string(value));
+}
+
 Texels read_image(const std::string& path, std::string_view bytes, const Limits& limits) {
     FileBudget budget(path, limits);
     struct Format {

@@ -27,6 +27,7 @@ public:
             jpeg_create_decompress(info);
             info->progress = &progress_;
             jpeg_mem_src(info, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+            for (const int marker : {1, 2}) jpeg_save_markers(info, JPEG_APP0 + marker, 0xffff);
             jpeg_read_header(info, TRUE);
         });
     }
@@ -82,6 +83,16 @@ private:
     char message_[JMSG_LENGTH_MAX] = {};
 };
 
+void note_markers(jpeg_saved_marker_ptr list, Texels& texels) {
+    std::string profile;
+    for (const jpeg_marker_struct* m = list; m; m = m->next) {
+        const std::string_view data(reinterpret_cast<const char*>(m->data), m->data_length);
+        if (m->marker == JPEG_APP0 + 1 && data.starts_with({"Exif\0\0", 6})) note_orientation(data.substr(6), texels);
+        if (m->marker == JPEG_APP0 + 2 && data.starts_with("ICC_PROFILE")) profile += data;
+    }
+    if (!profile.empty()) note_profile(profile, texels);
+}
+
 /// Inverted CMYK, as Adobe writes it, in place.
 void cmyk_to_rgb(uint8_t* row, uint32_t width) {
     for (uint8_t* p = row; p < row + size_t(width) * 4; p += 4) {
@@ -99,7 +110,9 @@ Texels read_jpeg(std::string_view bytes, FileBudget& budget) {
     uint32_t width = 0, height = 0;
     int components = 0;
     bool arithmetic = false;
+    jpeg_saved_marker_ptr markers = nullptr;
     reader.call([&](j_decompress_ptr info) {
+        markers = info->marker_list;
         width = info->image_width;
         height = info->image_height;
         components = info->num_components;
@@ -112,6 +125,7 @@ Texels read_jpeg(std::string_view bytes, FileBudget& budget) {
     if (components != 1 && components != 3 && components != 4)
         budget.fail("cannot read JPEG image: it has " + std::to_string(components) + " components");
     Texels texels = make_texels(width, height, true, budget);
+    note_markers(markers, texels);
     reader.call([&](j_decompress_ptr info) {
         info->out_color_space = components == 4 ? JCS_CMYK : JCS_EXT_RGBA;
         jpeg_start_decompress(info);

@@ -30,6 +30,11 @@ Texels read_tga(std::string_view bytes, FileBudget& budget);
 /// Texels of the size, opaque black, once the budget allows it.
 Texels make_texels(uint64_t width, uint64_t height, bool is_8bit, const FileBudget& budget);
 
+/// For an ICC profile of other colours than sRGB's, which nothing follows.
+void note_profile(std::string_view profile, Texels& texels);
+/// For EXIF data, as in TIFF, that ask for the image to be turned.
+void note_orientation(std::string_view exif, Texels& texels);
+
 /// Little-endian numbers one after the other; fails at the end of the file.
 struct ByteReader {
     std::string_view bytes;

@@ -1,4 +1,4 @@
-// libs: ambilux_formats OpenEXR::OpenEXR
+// libs: ambilux_formats OpenEXR::OpenEXR ZLIB::ZLIB JPEG::JPEG
 // timeout: 60
 // What image files say of themselves.
 #include <ImfArray.h>
@@ -6,11 +6,13 @@
 #include <ImfOutputFile.h>
 #include <ImfRgbaFile.h>
 #include <ImfStandardAttributes.h>
+#include <zlib.h>
 
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "formats/images/image_io.h"
 #include "tests/support/catch.h"
+#include "tests/support/image_files.h"
 #include "tests/support/temp_folder.h"
 
 using namespace ambilux;
@@ -164,4 +166,96 @@ TEST_CASE("EXR: windows that differ, and faces of a cube, are told") {
     Imf::Header cube(2, 12);
     Imf::addEnvmap(cube, Imf::ENVMAP_CUBE);
     CHECK(contains(joined(read_image("x", exr_file(cube, {{"Y", 1}}))), "faces of a cube"));
+}
+
+namespace {
+
+/// Two rows of three pixels, red 1 to 6 as they are stored.
+std::string hdr_file(const std::string& header, const std::string& size) {
+    std::string out = "#?RADIANCE\n" + header + "FORMAT=32-bit_rle_rgbe\n\n" + size + "\n";
+    for (int i = 1; i <= 6; ++i) out += test::rgbe(float(i), 16, 8);
+    return out;
+}
+
+std::string big_endian(uint32_t v) { return {char(v >> 24), char(v >> 16), char(v >> 8), char(v)}; }
+
+/// A PNG with one more chunk behind its first one.
+std::string png_with(const std::string& type, const std::string& data) {
+    std::string png = png_bytes(1, 1, {10, 20, 30});
+    const size_t srgb = png.find("sRGB");  // which counts before others
+    if (srgb != std::string::npos) png.erase(srgb - 4, 13);
+    const std::string body = type + data;
+    const uint32_t crc = uint32_t(crc32(0, reinterpret_cast<const Bytef*>(body.data()), uInt(body.size())));
+    return png.insert(8 + 12 + 13, big_endian(uint32_t(data.size())) + body + big_endian(crc));
+}
+
+std::string exif(char value) {
+    return std::string("MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0", 19) + std::string({value, 0, 0});
+}
+
+/// A JPEG with one more segment at its begin.
+std::string jpeg_with(char marker, const std::string& data) {
+    std::string jpeg = test::jpeg_file(8, 8, std::vector<uint8_t>(192, 100));
+    const size_t size = data.size() + 2;
+    return jpeg.insert(2, std::string({'\xff', marker, char(size >> 8), char(size)}) + data);
+}
+
+}  // namespace
+
+TEST_CASE("HDR: rows and pixels go where the header says") {
+    const auto reds = [](const std::string& size) {
+        const Texels image = read_image("x", hdr_file("", size));
+        std::vector<float> out = {float(image.width), float(image.height)};
+        for (size_t i = 0; i < image.floats.size(); i += 4) out.push_back(image.floats[i]);
+        return out;
+    };
+    using List = std::vector<float>;
+    CHECK(reds("-Y 2 +X 3") == List{3, 2, 1, 2, 3, 4, 5, 6});
+    CHECK(reds("+Y 2 +X 3") == List{3, 2, 4, 5, 6, 1, 2, 3});
+    CHECK(reds("-Y 2 -X 3") == List{3, 2, 3, 2, 1, 6, 5, 4});
+    CHECK(reds("+Y 2 -X 3") == List{3, 2, 6, 5, 4, 3, 2, 1});
+    // Stored by columns.
+    CHECK(reds("+X 2 -Y 3") == List{2, 3, 1, 4, 2, 5, 3, 6});
+    CHECK(reds("+X 2 +Y 3") == List{2, 3, 3, 6, 2, 5, 1, 4});
+    CHECK(reds("-X 2 -Y 3") == List{2, 3, 4, 1, 5, 2, 6, 3});
+    CHECK(reds("-X 2 +Y 3") == List{2, 3, 6, 3, 5, 2, 4, 1});
+    for (const char* size : {"-Y 2 +Y 3", "2 3", "-Y", "-Y 2", "-Z 2 +X 3", "-Y 99999999999999999999 +X 3", ""})
+        CHECK(contains(error_of([&] { reds(size); }), "its size"));
+}
+
+TEST_CASE("HDR: values are those before exposure and colour correction; other colours are told") {
+    const auto read = [](const std::string& header) { return read_image("x", hdr_file(header, "-Y 2 +X 3")); };
+    const Texels image = read("EXPOSURE=2\nSOFTWARE=none\nEXPOSURE= 4.0\nCOLORCORR= 1 2 0.5\r\n");
+    CHECK(image.floats[0] == 1.0f / 8);
+    CHECK(image.floats[1] == 1);
+    CHECK(image.floats[2] == 2);
+    CHECK(contains(joined(image), "divided by what its header has: EXPOSURE=2\n"));
+    CHECK(contains(joined(image), "COLORCORR= 1 2 0.5"));
+    CHECK(joined(read("EXPOSURE=1.0000\nGAMMA=1\n")).empty());
+    CHECK(contains(joined(read("GAMMA=2.2\n")), "whatever its header has: GAMMA=2.2"));
+    CHECK(contains(joined(read("PRIMARIES= 0.7 0.3 0.2 0.7 0.1 0.1 0.33 0.33\n")), "PRIMARIES= 0.7"));
+    for (const char* bad : {"EXPOSURE=0\n", "EXPOSURE=x\n", "EXPOSURE=nan\n", "EXPOSURE=\n", "COLORCORR=1 -1 1\n"})
+        CHECK(contains(error_of([&] { read(bad); }), "cannot read HDR image: '"));
+}
+
+TEST_CASE("PNG, JPEG and BMP: colours and orientation that nobody follows are told") {
+    const auto notes = [](const std::string& file) { return joined(read_image("x", file)); };
+    CHECK(notes(png_bytes(1, 1, {1, 2, 3})).empty());
+    CHECK(notes(png_with("gAMA", big_endian(45455))).empty());
+    CHECK(contains(notes(png_with("gAMA", big_endian(100000))), "gAMA is left out: 1.0"));
+    std::string primaries;
+    for (const uint32_t v : {31270, 32900, 68000, 32000, 26500, 69000, 15000, 6000}) primaries += big_endian(v);
+    CHECK(contains(notes(png_with("cHRM", primaries)), "cHRM"));
+    CHECK(contains(notes(png_with("eXIf", exif(6))), "EXIF orientation is left out: 6"));
+    CHECK(notes(png_with("eXIf", exif(1))).empty());
+    CHECK(read_image("x", png_with("gAMA", big_endian(100000))).bytes[1] == 20);
+
+    const std::string head("Exif\0\0", 6);
+    CHECK(contains(notes(jpeg_with('\xe1', head + exif(8))), "EXIF orientation is left out: 8"));
+    CHECK(notes(jpeg_with('\xe1', head + exif(1))).empty());
+    CHECK(notes(jpeg_with('\xe1', "Exif")).empty());
+    CHECK(notes(jpeg_with('\xe1', head + exif(8).substr(0, 12))).empty());
+    const std::string icc("ICC_PROFILE\0\x01\x01", 14);
+    CHECK(contains(notes(jpeg_with('\xe2', icc + "Adobe RGB (1998)")), "colour profile"));
+    CHECK(notes(jpeg_with('\xe2', icc + "sRGB IEC61966-2.1")).empty());
 }
