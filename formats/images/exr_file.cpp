@@ -46,32 +46,22 @@ std::string_view take_name(ByteReader& in) {
 
 /// Bytes of a value of a type that always has the same number; 0: of another type.
 uint32_t fixed_size(std::string_view type) {
-    static constexpr std::pair<std::string_view, uint32_t> kSizes[] = {{"box2f", 16},
-                                                                       {"box2i", 16},
-                                                                       {"chromaticities", 32},
-                                                                       {"compression", 1},
-                                                                       {"deepImageState", 1},
-                                                                       {"double", 8},
-                                                                       {"envmap", 1},
-                                                                       {"float", 4},
-                                                                       {"int", 4},
-                                                                       {"keycode", 28},
-                                                                       {"lineOrder", 1},
-                                                                       {"m33d", 72},
-                                                                       {"m33f", 36},
-                                                                       {"m44d", 128},
-                                                                       {"m44f", 64},
-                                                                       {"rational", 8},
-                                                                       {"tiledesc", 9},
-                                                                       {"timecode", 8},
-                                                                       {"v2d", 16},
-                                                                       {"v2f", 8},
-                                                                       {"v2i", 8},
-                                                                       {"v3d", 24},
-                                                                       {"v3f", 12},
-                                                                       {"v3i", 12}};
-    for (const auto& [name, size] : kSizes)
-        if (type == name) return size;
+    static constexpr std::pair<uint32_t, std::string_view> kTypes[] = {
+        {1, " compression deepImageState envmap lineOrder "},
+        {4, " float int "},
+        {8, " double rational timecode v2f v2i "},
+        {9, " tiledesc "},
+        {12, " v3f v3i "},
+        {16, " box2f box2i v2d "},
+        {24, " v3d "},
+        {28, " keycode "},
+        {32, " chromaticities "},
+        {36, " m33f "},
+        {64, " m44f "},
+        {72, " m33d "},
+        {128, " m44d "}};
+    for (const auto& [size, types] : kTypes)
+        if (types.find(" " + std::string(type) + " ") != std::string_view::npos) return size;
     return 0;
 }
 

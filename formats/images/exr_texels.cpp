@@ -4,7 +4,6 @@
 #include <ImfStandardAttributes.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "formats/images/exr_file.h"
@@ -110,13 +109,6 @@ void note_header(const Imf::Header& header, std::vector<std::string>& notes) {
         notes.emplace_back("it says that it is an environment on the faces of a cube, and is taken as it lies");
 }
 
-bool is_rec709(const Imf::Chromaticities& c) {
-    const Imf::Chromaticities ours;
-    return (c.red - ours.red).length2() + (c.green - ours.green).length2() + (c.blue - ours.blue).length2() +
-               (c.white - ours.white).length2() <
-           1e-6f;
-}
-
 /// Of colours with these primaries to linear Rec.709, without adaptation of the white.
 Imath::M44f to_rec709(const Imf::Chromaticities& from, const FileBudget& budget) {
     const std::string problem = "cannot read EXR image: its chromaticities are no primaries of colours";
@@ -126,9 +118,7 @@ Imath::M44f to_rec709(const Imf::Chromaticities& from, const FileBudget& budget)
     } catch (const std::exception&) {
         budget.fail(problem);
     }
-    for (const auto& row : m.x)
-        for (const float v : row)
-            if (!std::isfinite(v)) budget.fail(problem);
+    if (!m.equalWithAbsError(m, 0)) budget.fail(problem);  // not finite
     return m;
 }
 
@@ -160,12 +150,6 @@ void read_channels(ExrFile& file, const Layer& layer, Texels& texels) {
     }
 }
 
-void read_chroma(ExrFile& file, const Layer& layer, Texels& texels) {
-    float* out = texels.floats.data();
-    for (const Imf::Rgba& p : file.read_chroma(layer.name))
-        for (const float v : {float(p.r), float(p.g), float(p.b), float(p.a)}) *out++ = v;
-}
-
 }  // namespace
 
 Texels read_exr_texels(std::string_view bytes, FileBudget& budget) {
@@ -176,17 +160,19 @@ Texels read_exr_texels(std::string_view bytes, FileBudget& budget) {
     const Layer layer = choose_layer(header.channels(), texels.notes, budget);
     note_unused(header.channels(), layer, texels.notes);
     note_header(header, texels.notes);
-    if (layer.colors == Colors::chroma)
-        read_chroma(file, layer, texels);
-    else
+    if (layer.colors == Colors::chroma) {
+        float* out = texels.floats.data();
+        for (const Imf::Rgba& p : file.read_chroma(layer.name))
+            for (const float v : {float(p.r), float(p.g), float(p.b), float(p.a)}) *out++ = v;
+    } else {
         read_channels(file, layer, texels);
-    const Imf::Chromaticities own =
-        Imf::hasChromaticities(header) ? Imf::chromaticities(header) : Imf::Chromaticities();
-    const bool is_rgb = layer.colors == Colors::rgb || layer.colors == Colors::chroma;
+    }
+    Imath::M44f m;
     if (layer.colors == Colors::xyz)
-        convert(texels, Imf::XYZtoRGB(Imf::Chromaticities(), 1));
-    else if (is_rgb && !is_rec709(own))
-        convert(texels, to_rec709(own, budget));
+        m = Imf::XYZtoRGB(Imf::Chromaticities(), 1);
+    else if (layer.colors != Colors::grey && Imf::hasChromaticities(header))
+        m = to_rec709(Imf::chromaticities(header), budget);
+    if (!m.equalWithAbsError(Imath::M44f(), 1e-3f)) convert(texels, m);
     return texels;
 }
 

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
 #include "core/text.h"
 #include "formats/images/readers.h"
@@ -23,42 +25,30 @@ std::string_view take_line(ByteReader& in) {
     return line.substr(0, line.find_last_not_of(" \t\r") + 1);
 }
 
-/// What a line of the header is set to, as numbers.
-std::vector<double> numbers_behind(std::string_view line, std::string_view name, const FileBudget& budget) {
-    const std::string text(line.substr(name.size()));
-    std::vector<double> out;
-    for (const char* at = text.c_str(); *at;) {
-        char* end = nullptr;
-        out.push_back(std::strtod(at, &end));
-        if (end == at || !std::isfinite(out.back()))
-            budget.fail("cannot read HDR image: '" + std::string(line) + "' is no number");
-        for (at = end; *at == ' ';) ++at;
-    }
-    return out;
-}
-
 /// Factors that the values have got, which are taken away, and what the header says beside.
 struct Header {
     bool is_rgbe = false;
     double applied[3] = {1, 1, 1};
     std::vector<std::string> notes;
 
-    void take(std::string_view line, const FileBudget& budget) {
+    void take(const std::string& line, const FileBudget& budget) {
         is_rgbe |= line == "FORMAT=32-bit_rle_rgbe";
-        for (const std::string_view name : {"EXPOSURE=", "COLORCORR="}) {
-            if (!line.starts_with(name)) continue;
-            const std::vector<double> by = numbers_behind(line, name, budget);
-            for (size_t c = 0; c < 3; ++c) {
-                applied[c] *= by.empty() ? 0 : by[std::min(c, by.size() - 1)];
-                if (!(applied[c] > 0))
-                    budget.fail("cannot read HDR image: '" + std::string(line) + "' is not positive");
-            }
-            if (std::any_of(by.begin(), by.end(), [](double v) { return v != 1; }))
-                notes.push_back("values are divided by what its header has: " + std::string(line));
+        double by[3] = {1, 1, 1};
+        if (line.starts_with("EXPOSURE=")) {
+            if (sscanf(line.c_str(), "EXPOSURE=%lf", by) != 1) by[0] = 0;
+            by[1] = by[2] = by[0];
+        } else if (line.starts_with("COLORCORR=")) {
+            if (sscanf(line.c_str(), "COLORCORR=%lf %lf %lf", by, by + 1, by + 2) != 3) by[0] = 0;
+        } else if (line.starts_with("PRIMARIES=") ||
+                   (line.starts_with("GAMMA=") && std::strtod(&line[6], nullptr) != 1)) {
+            notes.push_back("colours are taken as linear Rec.709, whatever its header has: " + line);
         }
-        if (line.starts_with("PRIMARIES=") ||
-            (line.starts_with("GAMMA=") && numbers_behind(line, "GAMMA=", budget) != std::vector<double>{1}))
-            notes.push_back("colours are taken as linear Rec.709, whatever its header has: " + std::string(line));
+        for (size_t c = 0; c < 3; ++c) {
+            if (!(by[c] > 0 && by[c] < 1e30)) budget.fail("cannot read HDR image: '" + line + "' is not positive");
+            applied[c] *= by[c];
+        }
+        if (by[0] != 1 || by[1] != 1 || by[2] != 1)
+            notes.push_back("values are divided by what its header has: " + line);
     }
 };
 
@@ -109,7 +99,7 @@ bool is_hdr(std::string_view bytes) { return bytes.starts_with("#?RADIANCE") || 
 Texels read_hdr(std::string_view bytes, FileBudget& budget) {
     ByteReader in{bytes, budget};
     Header header;
-    for (std::string_view line; !(line = take_line(in)).empty();) header.take(line, budget);
+    for (std::string_view line; !(line = take_line(in)).empty();) header.take(std::string(line), budget);
     if (!header.is_rgbe) budget.fail("cannot read HDR image: its FORMAT is not 32-bit_rle_rgbe");
     std::string_view size = take_line(in);
     const Axis rows = take_axis(size, budget), pixels = take_axis(size, budget);

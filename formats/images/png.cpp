@@ -1,5 +1,6 @@
 #include <png.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <csetjmp>
@@ -73,47 +74,29 @@ void read_rows(PngReader& reader, int passes, uint32_t height, uint8_t* pixels, 
     reader.call([](png_structp png, png_infop) { png_read_end(png, nullptr); });
 }
 
-/// What the chunks of a PNG say of its colours and rows. The pointers are libpng's.
-struct Said {
-    int intent = 0;
+/// What the chunks say of colours and rows, which nobody follows: Mitsuba and pbrt take all as sRGB, as glTF wants it.
+void note_chunks(PngReader& reader, Texels& texels) {
+    constexpr double kSrgb[8] = {0.3127, 0.3290, 0.64, 0.33, 0.30, 0.60, 0.15, 0.06};
     double gamma = 0, xy[8] = {};
     png_bytep profile = nullptr, exif = nullptr;
     png_uint_32 profile_size = 0, exif_size = 0;
-    bool is_srgb = false;
-};
-
-Said ask(PngReader& reader) {
-    Said out;
+    bool is_srgb = false, has_primaries = false;
     reader.call([&](png_structp png, png_infop info) {
-        int method = 0;
-        png_charp name = nullptr;
-        double* v = out.xy;
-        out.is_srgb = png_get_sRGB(png, info, &out.intent);
-        png_get_gAMA(png, info, &out.gamma);
-        png_get_cHRM(png, info, v, v + 1, v + 2, v + 3, v + 4, v + 5, v + 6, v + 7);
-        png_get_iCCP(png, info, &name, &method, &out.profile, &out.profile_size);
-        png_get_eXIf_1(png, info, &out.exif_size, &out.exif);
+        int n = 0;
+        char* name = nullptr;
+        is_srgb = png_get_sRGB(png, info, &n);
+        png_get_gAMA(png, info, &gamma);
+        has_primaries = png_get_cHRM(png, info, xy, xy + 1, xy + 2, xy + 3, xy + 4, xy + 5, xy + 6, xy + 7);
+        png_get_iCCP(png, info, &name, &n, &profile, &profile_size);
+        png_get_eXIf_1(png, info, &exif_size, &exif);
     });
-    return out;
-}
-
-/// Nobody follows them: Mitsuba and pbrt take all as sRGB, and glTF asks for it.
-void note_chunks(const Said& said, Texels& texels) {
-    const auto bytes = [](png_bytep at, size_t size) {
-        return std::string_view(reinterpret_cast<const char*>(at), at ? size : 0);
-    };
-    if (said.exif) note_orientation(bytes(said.exif, said.exif_size), texels);
-    if (said.is_srgb) return;
-    if (said.profile) return note_profile(bytes(said.profile, said.profile_size), texels);
-    if (said.gamma > 0 && std::fabs(said.gamma - 1 / 2.2) > 0.02)
-        texels.notes.push_back(
-            "values are as the scene has them, sRGB unless it says else; the gamma of its gAMA is "
-            "left out: " +
-            std::to_string(said.gamma));
-    constexpr double kSrgb[8] = {0.3127, 0.3290, 0.64, 0.33, 0.30, 0.60, 0.15, 0.06};
-    for (int i = 0; i < 8; ++i)
-        if (said.xy[3] > 0 && std::fabs(said.xy[i] - kSrgb[i]) > 0.01)
-            return texels.notes.emplace_back("its cHRM, other primaries than sRGB's, are left out"), void();
+    if (exif) note_orientation({reinterpret_cast<const char*>(exif), exif_size}, texels);
+    if (is_srgb) return;
+    if (profile) return note_profile({reinterpret_cast<const char*>(profile), profile_size}, texels);
+    if (gamma > 0 && std::fabs(gamma - 1 / 2.2) > 0.02)
+        texels.notes.push_back("the gamma of its gAMA is left out: " + std::to_string(gamma));
+    if (has_primaries && !std::equal(xy, xy + 8, kSrgb, [](double a, double b) { return std::fabs(a - b) <= 0.01; }))
+        texels.notes.emplace_back("its cHRM, other primaries than sRGB's, are left out");
 }
 
 }  // namespace
@@ -132,7 +115,6 @@ Texels read_png(std::string_view bytes, FileBudget& budget) {
         depth = png_get_bit_depth(png, info);
         stored_row = png_get_rowbytes(png, info);
     });
-    const Said said = ask(reader);
     budget.pixels(width, height);
     if (stored_row > bytes.size() * kMostPacked / height)
         budget.fail("the image claims more pixels than the file holds");
@@ -149,7 +131,7 @@ Texels read_png(std::string_view bytes, FileBudget& budget) {
     if (row != size_t(width) * 4 * (is_8bit ? 1 : 2))
         budget.fail("cannot read PNG image: unexpected layout of its rows");
     Texels texels = make_texels(width, height, is_8bit, budget);
-    note_chunks(said, texels);
+    note_chunks(reader, texels);
     if (is_8bit) {
         read_rows(reader, passes, height, texels.bytes.data(), row, budget);
         return texels;
