@@ -625,6 +625,25 @@ TEST_CASE("A render that drops invalid values names the command that replays the
     CHECK(contains(strict.err, "ambilux trace"));
 }
 
+TEST_CASE("render --strict fails on a scene with warnings, such as of a surface that creates energy") {
+    const test::TempFolder folder;
+    const float texel[] = {1.5f, 0.5f, 0.5f};
+    folder.write("bright.pfm", "PF\n1 1\n-1\n" + std::string(reinterpret_cast<const char*>(texel), sizeof texel));
+    const std::string scene = folder.write(
+        "scene.xml",
+        "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'><integer name='width' value='4'/>"
+        "<integer name='height' value='4'/></film></sensor><emitter type='constant'/><shape type='rectangle'>"
+        "<bsdf type='diffuse'><texture type='bitmap' name='reflectance'><string name='filename' value='bright.pfm'/>"
+        "</texture></bsdf></shape></scene>");
+    const Outcome plain = run(folder, {"render", scene, "--spp", "1", "-o", folder / "a.exr"});
+    CHECK(plain.code == 0);
+    CHECK(contains(plain.err, "bright.pfm: what reflects more than 1 creates energy"));
+    const Outcome strict = run(folder, {"render", scene, "--spp", "1", "--strict", "-o", folder / "b.exr"});
+    CHECK(strict.code == 3);
+    CHECK(contains(strict.err, "'reflectance' is up to 1.5"));
+    CHECK_FALSE(std::filesystem::exists(folder / "b.exr"));
+}
+
 TEST_CASE("stress: families are listed, scenes exported, cells rendered and gone on with") {
     const test::TempFolder folder;
     const Outcome list = run(folder, {"stress", "--list"});

@@ -13,13 +13,14 @@
 #include "formats/images/image_io.h"
 #include "tests/support/catch.h"
 #include "tests/support/image_files.h"
+#include "tests/support/mitsuba_text.h"
+#include "tests/support/pbrt_text.h"
 #include "tests/support/temp_folder.h"
 
 using namespace ambilux;
+using test::contains;
 
 namespace {
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 std::string joined(const Texels& image) {
     std::string out;
@@ -258,4 +259,33 @@ TEST_CASE("PNG, JPEG and BMP: colours and orientation that nobody follows are to
     const std::string icc("ICC_PROFILE\0\x01\x01", 14);
     CHECK(contains(notes(jpeg_with('\xe2', icc + "Adobe RGB (1998)")), "colour profile"));
     CHECK(notes(jpeg_with('\xe2', icc + "sRGB IEC61966-2.1")).empty());
+}
+
+TEST_CASE("notes of an image reach the scene once, whatever asks for it") {
+    const test::TempFolder folder;
+    const std::string path = folder.write("a.png", png_with("gAMA", big_endian(100000)));
+    folder.write("b.hdr", hdr_file("EXPOSURE=2\n", "-Y 2 +X 3"));
+    const auto count = [&](const Scene& s, const std::string& name) {
+        return std::count_if(s.notes.begin(), s.notes.end(), [&](const std::string& note) {
+            return note.starts_with((folder.path / name).string() + ": ");
+        });
+    };
+    const std::string bitmap = "<string name='filename' value='a.png'/></texture></bsdf></shape>",
+                      diffuse =
+                          "<shape type='rectangle'><bsdf type='diffuse'><texture type='bitmap' name='reflectance'>";
+    const Scene s = test::load(diffuse + bitmap + diffuse + "<boolean name='raw' value='true'/>" + bitmap +
+                                   "<emitter type='envmap'><string name='filename' value='b.hdr'/></emitter>",
+                               {}, "3.0.0", &folder);
+    CHECK(count(s, "a.png") == 1);
+    CHECK(count(s, "b.hdr") == 1);
+    const Scene p = test::load_pbrt_world(
+        "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.png\"\n"
+        "Texture \"f\" \"float\" \"imagemap\" \"string filename\" \"a.png\"\n"
+        "Material \"coateddiffuse\" \"texture reflectance\" \"t\" \"texture roughness\" \"f\"\n" +
+            test::kUnitTriangle,
+        {}, &folder);
+    CHECK(count(p, "a.png") == 1);
+    const Scene field =
+        test::load("<shape type='heightfield'><string name='filename' value='b.hdr'/></shape>", {}, "0.6.0", &folder);
+    CHECK(count(field, "b.hdr") == 1);
 }
