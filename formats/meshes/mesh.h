@@ -19,8 +19,8 @@ struct MeshAttribute {
     bool per_face = false;
     uint32_t channels = 0;  ///< in the file
     std::vector<Rgb> values;
-    std::string property = {}; ///< that the first channel comes from
-    float most = 1;            ///< of the type of a colour in whole numbers, which `values` are parts of
+    std::string property = {};  ///< that the first channel comes from
+    float most = 1;             ///< of the type of a colour in whole numbers, which `values` are parts of
 };
 
 /// Indexed triangles. `normals` and `uvs` hold one entry per vertex, or none at all. Normals need not be unit.
@@ -35,8 +35,9 @@ struct Mesh {
 };
 
 /// Wavefront OBJ: v, vt, vn and f with positive or negative indices and any number of corners (cut into a fan).
-/// Vertices with the same triple of indices are shared. Faces of two corners and other statements are left out. `flip_v`: v becomes 1-v
-/// (Mitsuba's flip_tex_coords). `path` is for messages. A file without faces is refused, as by all readers.
+/// Vertices with the same triple of indices are shared. Faces of two corners and other statements are left out.
+/// `flip_v`: v becomes 1-v (Mitsuba's flip_tex_coords). `path` is for messages. A file without faces is refused, as by
+/// all readers.
 Mesh read_obj(const std::string& path, std::string_view text, bool flip_v, const Limits& limits = {});
 
 /// Stanford PLY, ascii or binary of either byte order: coordinates, normals, texture coordinates, colours, faces and

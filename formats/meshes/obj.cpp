@@ -51,9 +51,15 @@ struct ObjReader {
         }
         return text.done() || *text.at == '\n' || *text.at == '#';
     }
+    /// Without a backslash at the end of the line.
+    std::string_view word() {
+        std::string_view result = text.word();
+        if (result.size() > 1 && result.back() == '\\') result.remove_suffix(1), --text.at;
+        return result;
+    }
     /// Behind the rest of the statement.
     void next_statement() {
-        while (!at_end()) text.word();
+        while (!at_end()) word();
         text.next_line();
     }
 
@@ -82,7 +88,9 @@ struct ObjReader {
         if (!text.number(index)) fail(std::string("expected a ") + what + " index in 'f'");
         return resolve(index, count, what);
     }
-    bool at_corner_end() const { return text.done() || std::string_view(" \t\n#\\").find(*text.at) != std::string_view::npos; }
+    bool at_corner_end() const {
+        return text.done() || std::string_view(" \t\n#\\").find(*text.at) != std::string_view::npos;
+    }
 
     Corner corner() {
         int64_t index = 0;
@@ -114,10 +122,9 @@ void flatten_faces(Mesh& mesh, std::vector<Corner>& corners) {
 
 /// A statement of another kind.
 void leave_out(ObjReader& in, std::string_view keyword) {
-    static const std::set<std::string_view> without_effect = {"",         "o",        "g",          "s",         "usemtl",
-                                                              "mtllib",   "usemap",   "maplib",     "lod",       "mg",
-                                                              "bevel",    "c_interp", "d_interp",   "trace_obj", "ctech",
-                                                              "stech",    "cstype",   "shadow_obj", "deg",       "end"};
+    static const std::set<std::string_view> without_effect = {
+        "",      "o",        "g",        "s",         "usemtl", "mtllib", "usemap", "maplib",     "lod", "mg",
+        "bevel", "c_interp", "d_interp", "trace_obj", "ctech",  "stech",  "cstype", "shadow_obj", "deg", "end"};
     constexpr size_t kMost = 8, kLongest = 16;
     if (!without_effect.contains(keyword) && in.unused.size() < kMost)
         in.unused.insert("'" + std::string(keyword.substr(0, kLongest)) + "'");
@@ -127,7 +134,7 @@ void read_vertex(ObjReader& in) {
     const double x = in.coordinate<double>("v"), y = in.coordinate<double>("v"), z = in.coordinate<double>("v");
     in.positions.push_back({x, y, z});
     int more = 0;
-    for (; !in.at_end(); in.text.word()) ++more;
+    for (; !in.at_end(); in.word()) ++more;
     if (more >= 3) in.unused.insert("colours of vertices");  // one is a weight
 }
 
@@ -155,7 +162,7 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
     for (; !in.text.done(); in.next_statement()) {
         budget.tick();
         if (in.at_end()) continue;
-        const std::string_view keyword = in.text.word();
+        const std::string_view keyword = in.word();
         if (keyword == "v") {
             read_vertex(in);
         } else if (keyword == "vn") {

@@ -68,8 +68,8 @@ void name_attributes(Element& element, const std::string& prefix) {
         p.channel = uint32_t(p.name[n - 1] - '0');
         p.attribute_name = (p.name.starts_with(prefix) ? "" : prefix) + p.name.substr(0, n - 2);
     }
-    for (const Names& names : {Names{"r", "g", "b"}, Names{"red", "green", "blue"},
-                               Names{"diffuse_red", "diffuse_green", "diffuse_blue"}}) {
+    for (const Names& names :
+         {Names{"r", "g", "b"}, Names{"red", "green", "blue"}, Names{"diffuse_red", "diffuse_green", "diffuse_blue"}}) {
         const std::vector<Property*> found = all_named(element, names);
         for (size_t i = 0; i < found.size(); ++i)
             found[i]->attribute_name = prefix + "color", found[i]->channel = uint32_t(i);

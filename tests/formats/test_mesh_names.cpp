@@ -82,8 +82,8 @@ TEST_CASE("PLY: coordinates and normals by all their names give the same mesh, w
     };
     const Mesh plain = read(properties("float", {"u", "v"}), uvs);
     REQUIRE(plain.uvs.size() == 4);
-    for (const auto& names : {std::initializer_list<const char*>{"s", "t"}, {"texture_u", "texture_v"},
-                              {"texture_s", "texture_t"}}) {
+    for (const auto& names :
+         {std::initializer_list<const char*>{"s", "t"}, {"texture_u", "texture_v"}, {"texture_s", "texture_t"}}) {
         const std::string text = square(properties("double", names), uvs);
         CHECK(same(read_ply("a.ply", text, false), plain));
         CHECK(read_ply("a.ply", text, false).notes.empty());
@@ -108,14 +108,15 @@ TEST_CASE("PLY: colours by all their names are attributes; bytes are 255ths, wor
         CHECK(mesh.attributes[0].name == "vertex_color");
         return mesh.attributes[0].values.at(3);
     };
-    for (const auto& names : {std::initializer_list<const char*>{"red", "green", "blue"}, {"r", "g", "b"},
+    for (const auto& names : {std::initializer_list<const char*>{"red", "green", "blue"},
+                              {"r", "g", "b"},
                               {"diffuse_red", "diffuse_green", "diffuse_blue"}}) {
         check_rgb(color("float", names, "0.8 0.4 0.2"), {0.8f, 0.4f, 0.2f}, 1e-6);
         check_rgb(color("uchar", names, "200 100 50"), Rgb{200, 100, 50} / 255.0f, 1e-6);
         check_rgb(color("ushort", names, "65535 0 13107"), {1, 0, 0.2f}, 1e-6);
     }
-    const std::string text = square(properties("uchar", {"red", "green", "blue", "alpha"}),
-                                    {"1 2 3 4", "1 2 3 4", "1 2 3 4", "1 2 3 4"});
+    const std::string text =
+        square(properties("uchar", {"red", "green", "blue", "alpha"}), {"1 2 3 4", "1 2 3 4", "1 2 3 4", "1 2 3 4"});
     const Mesh kept = read_ply("a.ply", text, false, {}, wanted), left = read_ply("a.ply", text, false);
     REQUIRE(kept.notes.size() == 1);
     CHECK(contains(kept.notes[0], "not used: alpha of element vertex"));
@@ -160,19 +161,19 @@ TEST_CASE("normals that are not finite count as none, with their number in a not
         CHECK(ply.normals[1] == Vec3f{0, 0, 0});
         REQUIRE(ply.notes.size() == 1);
         CHECK(contains(ply.notes[0], "not finite count as none: 2"));
-        const Mesh obj =
-            read_obj("a.obj", kVertices + "vn " + bad + "\nf 1//1 2//2 3//1\n", true);
+        const Mesh obj = read_obj("a.obj", kVertices + "vn " + bad + "\nf 1//1 2//2 3//1\n", true);
         CHECK(obj.normals[1] == Vec3f{0, 0, 0});
         CHECK(obj.notes.size() == 1);
     }
     // The scene has the normal of the triangle there.
     const TempFolder folder;
     folder.write("m.ply", square(names, {"0 0 1", "nan 0 1", "0 0 1", "0 0 1"}));
-    const Scene s = load("<shape type='ply'><string name='filename' value='m.ply'/></shape><emitter type='point'/>",
-                         {}, "3.0.0", &folder);
+    const Scene s = load("<shape type='ply'><string name='filename' value='m.ply'/></shape><emitter type='point'/>", {},
+                         "3.0.0", &folder);
     for (const MeshVertex& v : s.vertices) CHECK(v.n == Vec3f{0, 0, 1});
     CHECK(has_note(s, "m.ply: normals that are not finite count as none: 1"));
-    const Scene p = load_pbrt_world("LightSource \"point\"\nShape \"plymesh\" \"string filename\" \"m.ply\"", {}, &folder);
+    const Scene p =
+        load_pbrt_world("LightSource \"point\"\nShape \"plymesh\" \"string filename\" \"m.ply\"", {}, &folder);
     for (const MeshVertex& v : p.vertices) CHECK(v.n == Vec3f{0, 0, 1});
     CHECK(has_note(p, "m.ply: normals that are not finite count as none: 1"));
 }
@@ -209,7 +210,8 @@ TEST_CASE("coordinates in doubles far from 0 lose nothing where a transform take
     const auto files = [&](bool moved) {
         const std::string head = "element vertex 4\n" + properties("double", {"x", "y", "z"}) +
                                  "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
-        std::string obj, ascii = "ply\nformat ascii 1.0\n" + head, binary = "ply\nformat binary_little_endian 1.0\n" + head;
+        std::string obj, ascii = "ply\nformat ascii 1.0\n" + head,
+                         binary = "ply\nformat binary_little_endian 1.0\n" + head;
         for (int i = 0; i < 4; ++i) {
             std::string line;
             for (int k = 0; k < 3; ++k) line += fmt::format(" {:.12f}", at(i, k, moved)), put(binary, at(i, k, moved));
@@ -232,7 +234,6 @@ TEST_CASE("coordinates in doubles far from 0 lose nothing where a transform take
         const std::string type = i ? "ply" : "obj";
         const Scene near = scene(type, files(false)[size_t(i)], false), far = scene(type, files(true)[size_t(i)], true);
         REQUIRE(near.vertices.size() == far.vertices.size());
-        for (size_t v = 0; v < near.vertices.size(); ++v)
-            CHECK(length(near.vertices[v].p - far.vertices[v].p) < 1e-6f);
+        for (size_t v = 0; v < near.vertices.size(); ++v) CHECK(length(near.vertices[v].p - far.vertices[v].p) < 1e-6f);
     }
 }

@@ -96,7 +96,9 @@ void check_spellings(const std::function<Scene(Writer&)>& load_written) {
 }
 
 std::string obj_text(Writer& w) {
-    const auto end = [&] { return w.one_of({"\n", " \n", "\t\n", " # it's a comment\n", "#\n", "\n\n", "\n# f 1 2 3 \\\n"}); };
+    const auto end = [&] {
+        return w.one_of({"\n", " \n", "\t\n", " # it's a comment\n", "#\n", "\n\n", "\n# f 1 2 3 \\\n"});
+    };
     const auto gap = [&] { return w.one_of({" ", "  ", "\t", " \\\n", "\\\n ", " \\ \n\t"}); };
     std::string text = w.one_of({"", "# head\n", "\n", "mtllib none.mtl\n"});
     for (const auto& p : {std::array{0.0, 0.0, 0.5}, {1.0, 0.0, 0.25}, {1.0, 1.0, 0.125}, {-0.5, 1.0, 1e-3}})
@@ -134,7 +136,9 @@ std::string xml_element(Writer& w, const std::string& tag, std::vector<std::arra
 }
 
 std::string xml_text(Writer& w) {
-    const auto list = [&](std::initializer_list<double> v) { return w.numbers(v, w.one_of({", ", " ", ",", "  ", "\n"})) + w.one_of({"", " ", ", "}); };
+    const auto list = [&](std::initializer_list<double> v) {
+        return w.numbers(v, w.one_of({", ", " ", ",", "  ", "\n"})) + w.one_of({"", " ", ", "});
+    };
     const auto value = [&](const char* tag, const char* name, const std::string& v) {
         return xml_element(w, tag, {{"name", name}, {"value", v}});
     };
@@ -142,10 +146,12 @@ std::string xml_text(Writer& w) {
         w, "transform", {{"name", "to_world"}},
         xml_element(w, "translate", {{"x", w.number(0.5)}, {"y", w.number(-2)}, {"z", w.number(1e-3)}}) +
             xml_element(w, "matrix", {{"value", list({1, 0, 0, 0.25, 0, 1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1})}}));
-    const std::string bsdf = xml_element(w, "bsdf", {{"type", "diffuse"}}, value("rgb", "reflectance", list({0.1, 0.25, 0.75})));
+    const std::string bsdf =
+        xml_element(w, "bsdf", {{"type", "diffuse"}}, value("rgb", "reflectance", list({0.1, 0.25, 0.75})));
     const std::string light =
         xml_element(w, "emitter", {{"type", "point"}},
-                    value("spectrum", "intensity", w.one_of({"400:1, 500:2, 700:0.5", "400:1 500:2 700:.5", "400:1,500:2,700:0.5,"})) +
+                    value("spectrum", "intensity",
+                          w.one_of({"400:1, 500:2, 700:0.5", "400:1 500:2 700:.5", "400:1,500:2,700:0.5,"})) +
                         xml_element(w, "point", {{"name", "position"}, {"value", list({0, 1, 5})}}));
     const std::string head = w.one_of({"", "<?xml version='1.0'?>\n", "<!-- head -->\n", "\n"});
     return head + xml_element(w, "scene", {{"version", "3.0.0"}},
@@ -157,14 +163,17 @@ std::string pbrt_text(Writer& w) {
     const auto list = [&](std::initializer_list<double> v) {
         return w.one_of({"[", "[ ", "[\n"}) + w.numbers(v, gap()) + w.one_of({"]", " ]", " # end\n]"});
     };
-    const auto parameter = [&](const std::string& name, const std::string& v) { return gap() + "\"" + name + "\"" + gap() + v; };
-    std::string uv = parameter("point2 uv", list({0, 0, 1, 0, 0, 1})), p = parameter("point3 P", list({0, 0, 0.5, 1, 0, 0.25, 0, 1, 1e-3}));
+    const auto parameter = [&](const std::string& name, const std::string& v) {
+        return gap() + "\"" + name + "\"" + gap() + v;
+    };
+    std::string uv = parameter("point2 uv", list({0, 0, 1, 0, 0, 1})),
+                p = parameter("point3 P", list({0, 0, 0.5, 1, 0, 0.25, 0, 1, 1e-3}));
     if (w.pick(2)) std::swap(uv, p);
     return w.one_of({"", "# head\n", "\n"}) + "WorldBegin" + gap() + "LightSource" + gap() + "\"point\"" +
            parameter("rgb I", list({1, 2, 0.5})) + gap() + "Material" + gap() + "\"diffuse\"" +
-           parameter("spectrum reflectance", w.one_of({"\"s.spd\"", "[\"s.spd\"]", "[ \"s.spd\" ]"})) + gap() + "Translate" + gap() +
-           w.numbers({0.5, -2, 1e-3}, gap()) + gap() + "Shape" + gap() + "\"trianglemesh\"" + uv + p +
-           parameter("integer indices", "[0 1 2]") + w.one_of({"\n", "", " # end"});
+           parameter("spectrum reflectance", w.one_of({"\"s.spd\"", "[\"s.spd\"]", "[ \"s.spd\" ]"})) + gap() +
+           "Translate" + gap() + w.numbers({0.5, -2, 1e-3}, gap()) + gap() + "Shape" + gap() + "\"trianglemesh\"" + uv +
+           p + parameter("integer indices", "[0 1 2]") + w.one_of({"\n", "", " # end"});
 }
 
 std::string spd_text(Writer& w) {
@@ -183,15 +192,24 @@ std::string gltf_text(Writer& w) {
         for (const std::string& m : members) text += (text.empty() ? "" : ",") + gap() + m + gap();
         return "{" + text + "}";
     };
-    const std::string buffer = "\"uri\":\"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"";
-    return object({"\"asset\":" + object({"\"version\":\"2.0\""}), "\"scene\":0", "\"scenes\":[" + object({"\"nodes\":[0]"}) + "]",
-                   "\"nodes\":[" + object({"\"mesh\":0", "\"translation\":[0.5,-2,1" + w.one_of({"e-3", "E-3", "e-03"}) + "]"}) + "]",
-                   "\"meshes\":[{\"primitives\":[" + object({"\"attributes\":{\"POSITION\":0}", "\"material\":0"}) + "]}]",
-                   "\"materials\":[" + object({"\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.5,2.5e-1,1" + w.one_of({"", ".0", "e0"}) + ",1]}"}) + "]",
-                   "\"buffers\":[" + object({"\"byteLength\":36", buffer}) + "]",
-                   "\"bufferViews\":[" + object({"\"buffer\":0", "\"byteLength\":36"}) + "]",
-                   "\"accessors\":[" + object({"\"bufferView\":0", "\"componentType\":5126", "\"count\":3", "\"type\":\"VEC3\"",
-                                               "\"min\":[0,0,0]", "\"max\":[1,1,0]"}) + "]"});
+    const std::string buffer =
+        "\"uri\":\"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"";
+    return object(
+        {"\"asset\":" + object({"\"version\":\"2.0\""}), "\"scene\":0",
+         "\"scenes\":[" + object({"\"nodes\":[0]"}) + "]",
+         "\"nodes\":[" + object({"\"mesh\":0", "\"translation\":[0.5,-2,1" + w.one_of({"e-3", "E-3", "e-03"}) + "]"}) +
+             "]",
+         "\"meshes\":[{\"primitives\":[" + object({"\"attributes\":{\"POSITION\":0}", "\"material\":0"}) + "]}]",
+         "\"materials\":[" +
+             object({"\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.5,2.5e-1,1" + w.one_of({"", ".0", "e0"}) +
+                     ",1]}"}) +
+             "]",
+         "\"buffers\":[" + object({"\"byteLength\":36", buffer}) + "]",
+         "\"bufferViews\":[" + object({"\"buffer\":0", "\"byteLength\":36"}) + "]",
+         "\"accessors\":[" +
+             object({"\"bufferView\":0", "\"componentType\":5126", "\"count\":3", "\"type\":\"VEC3\"",
+                     "\"min\":[0,0,0]", "\"max\":[1,1,0]"}) +
+             "]"});
 }
 
 }  // namespace
@@ -204,7 +222,8 @@ TEST_CASE("Mitsuba XML, OBJ, ASCII PLY and spectra: every spelling of a scene is
         folder.write("m.ply", w.file(ply_text(w)));
         std::string text = xml_text(w);
         const std::string more =
-            "<shape type='obj'><string name='filename' value='m.obj'/><bsdf type='diffuse'><spectrum name='reflectance' "
+            "<shape type='obj'><string name='filename' value='m.obj'/><bsdf type='diffuse'><spectrum "
+            "name='reflectance' "
             "filename='s.spd'/></bsdf></shape><shape type='ply'><string name='filename' value='m.ply'/></shape>";
         text.insert(text.find(kSensor), more);
         return load_mitsuba(folder.write("scene.xml", w.file(text, true)), {});
@@ -221,14 +240,19 @@ TEST_CASE("pbrt and its spectra: every spelling of a scene is the same scene, to
 
 TEST_CASE("glTF: every spelling of a scene is the same scene, to the bit") {
     const TempFolder folder;
-    check_spellings([&](Writer& w) { return load_gltf(folder.write("scene.gltf", w.file(gltf_text(w))), {}); });
+    check_spellings([&](Writer& w) { return load_scene_file(folder.write("scene.gltf", w.file(gltf_text(w))), {}); });
 }
 
 TEST_CASE("text in UTF-16 or UTF-32 is refused by that name, but XML may be UTF-16") {
     using namespace std::string_literals;
-    for (const auto& [bytes, name] : {std::pair{"\xFF\xFEv\0 \0"s, "UTF-16LE"}, {"\xFE\xFF\0v\0 "s, "UTF-16BE"},
-                                      {"v\0 \0"s, "UTF-16LE"}, {"\0v\0 "s, "UTF-16BE"}, {"\xFF\xFE\0\0v\0\0\0"s, "UTF-32LE"},
-                                      {"\0\0\xFE\xFF\0\0\0v"s, "UTF-32BE"}, {"v\0\0\0"s, "UTF-32LE"}, {"\0\0\0v"s, "UTF-32BE"}}) {
+    for (const auto& [bytes, name] : {std::pair{"\xFF\xFEv\0 \0"s, "UTF-16LE"},
+                                      {"\xFE\xFF\0v\0 "s, "UTF-16BE"},
+                                      {"v\0 \0"s, "UTF-16LE"},
+                                      {"\0v\0 "s, "UTF-16BE"},
+                                      {"\xFF\xFE\0\0v\0\0\0"s, "UTF-32LE"},
+                                      {"\0\0\xFE\xFF\0\0\0v"s, "UTF-32BE"},
+                                      {"v\0\0\0"s, "UTF-32LE"},
+                                      {"\0\0\0v"s, "UTF-32BE"}}) {
         CHECK(encoding_of(bytes) == name);
         const auto message = [&, b = bytes](const auto& read) -> std::string {
             try {
@@ -260,11 +284,12 @@ TEST_CASE("text headers of binary files: PLY, HDR, PNM and PFM with every line e
             std::string data = first + std::string(36 + 13 - first.size(), '\0');
             data.replace(36, 13, std::string("\3\0\0\0\0\1\0\0\0\2\0\0\0", 13));
             const std::string header = lines(
-                "ply\nformat binary_little_endian 1.0\ncomment by hand\nelement vertex 3\nproperty float x\nproperty float y\n"
+                "ply\nformat binary_little_endian 1.0\ncomment by hand\nelement vertex 3\nproperty float x\nproperty "
+                "float y\n"
                 "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n");
+            float x = 0;
             for (const std::string& mark : {std::string(), kMark}) {
                 const Mesh mesh = read_ply("a.ply", mark + header + data, false);
-                float x = 0;
                 memcpy(&x, data.data(), sizeof x);
                 CHECK(mesh.positions.at(0).x == x);
                 CHECK(mesh.faces.size() == 1);
