@@ -96,6 +96,7 @@ Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source
     const std::string bytes = gunzip_if_packed(source.path, read_input(source.path, limits), limits);
     builder.file_digests.push_back({source.path, sha256(bytes)});
     Mesh mesh = read_ply(source.path, bytes, source.flip_v, limits, names);
+    for (const std::string& note : mesh.notes) builder.note({source.path, 0}, note);
     const bool older = in.object().version < 2, srgb = older && in.boolean("srgb", true);
     for (MeshAttribute& a : mesh.attributes) {
         if (a.most > 1 && (!older || a.property == "r"))
@@ -125,6 +126,7 @@ Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh&
     }
     builder.take_memory(mesh_bytes(3 * mesh.faces.size(), mesh.faces.size()), path);
     Mesh out;
+    out.origin = mesh.origin;
     // Vertices that were shared keep the normal that they would have got.
     const bool flat = mesh.normals.empty() && !builder.document.smooth_normals;
     const std::vector<Vec3f> normals = mesh.normals.empty() && !flat ? smooth_normals(mesh) : mesh.normals;

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "formats/meshes/text_cursor.h"
+#include "core/text_cursor.h"
 
 namespace ambilux::document {
 

@@ -5,9 +5,9 @@
 
 #include "accel/range.h"
 #include "core/error.h"
+#include "core/text_cursor.h"
 #include "formats/document/builder.h"
 #include "formats/document/plugins.h"
-#include "formats/meshes/text_cursor.h"
 #include "transport/subpath/subpath.h"
 
 namespace ambilux::document {

@@ -157,8 +157,6 @@ uint32_t ShapeBuilder::material_of_attributes(Job& job, Reader& in, const Object
     source.given = nullptr;
     std::map<std::string, int32_t> textures;
     source.mesh = with_attribute_atlas(builder, source.path.empty() ? job.where.file : source.path, mesh, textures);
-    source.mesh.origin = mesh.origin;
-    source.mesh.notes = mesh.notes;
     source.path.clear();
     job.source = add_source(std::move(source), "attributes " + std::to_string(jobs.size()));
     builder.attribute_textures = &textures;
@@ -294,17 +292,6 @@ void ShapeBuilder::add_instance(const Object& object, const Matrix& outer) {
 
 uint64_t memory_of(const Mesh& mesh) { return mesh_bytes(mesh.positions.size(), mesh.faces.size()); }
 
-/// Calls f with every job of a mesh, those of groups too.
-template <class Function>
-void for_all_meshes(ShapeBuilder& shapes, const Function& f) {
-    const auto visit = [&](std::vector<Job>& jobs) {
-        for (Job& job : jobs)
-            if (job.source >= 0) f(job, shapes.sources[size_t(job.source)]);
-    };
-    visit(shapes.jobs);
-    for (GroupJobs& group : shapes.groups) visit(group.jobs);
-}
-
 /// Reads the file and its digest on two threads.
 void load_source(MeshSource& s, const Limits& limits) {
     const std::string bytes = gunzip_if_packed(s.path, read_input(s.path, limits), limits);
@@ -325,24 +312,31 @@ void load_source(MeshSource& s, const Limits& limits) {
 /// Reads the files of meshes that jobs have, on all threads.
 void load_sources(Builder& builder, ShapeBuilder& shapes) {
     const ScopedSeconds clock(&builder.options.times->read);
-    std::vector<MeshSource>& sources = shapes.sources;
-    std::set<const MeshSource*> used;
-    for_all_meshes(shapes, [&](Job&, const MeshSource& s) { used.insert(&s); });
-    parallel_for(sources.size(), [&](size_t i) {
-        if (used.contains(&sources[i]) && !sources[i].path.empty()) load_source(sources[i], builder.options.limits);
+    std::vector<Job*> jobs;
+    const auto collect = [&](std::vector<Job>& all) {
+        for (Job& job : all)
+            if (job.source >= 0) jobs.push_back(&job);
+    };
+    collect(shapes.jobs);
+    for (GroupJobs& group : shapes.groups) collect(group.jobs);
+    std::vector<bool> used(shapes.sources.size());
+    for (const Job* job : jobs) used[size_t(job->source)] = true;
+    parallel_for(shapes.sources.size(), [&](size_t i) {
+        MeshSource& s = shapes.sources[i];
+        if (used[i] && !s.path.empty()) load_source(s, builder.options.limits);
     });
-    for (const MeshSource& s : sources) {
-        const Where at{s.path, 0};
-        for (const std::string& note : s.mesh.notes) builder.note(at, note);
-        if (s.path.empty() || !used.contains(&s)) continue;
+    for (size_t i = 0; i < used.size(); ++i) {
+        const MeshSource& s = shapes.sources[i];
+        for (const std::string& note : s.mesh.notes) builder.note({s.path, 0}, note);
+        if (s.path.empty() || !used[i]) continue;
         builder.file_digests.push_back({s.path, s.digest});
         if (s.lacks_materials)
-            builder.note(at, "materials of obj files are not read; such shapes without a BSDF are diffuse");
+            builder.note({s.path, 0}, "materials of obj files are not read; such shapes without a BSDF are diffuse");
     }
-    for_all_meshes(shapes, [&](Job& job, const MeshSource& s) {
-        const auto& o = s.content().origin;
-        job.to_world = job.to_world * translation(o[0], o[1], o[2]);
-    });
+    for (Job* job : jobs) {
+        const auto& o = shapes.sources[size_t(job->source)].content().origin;
+        job->to_world = job->to_world * translation(o[0], o[1], o[2]);
+    }
 }
 
 }  // namespace

@@ -4,9 +4,9 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "core/text_cursor.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
-#include "formats/meshes/text_cursor.h"
 
 namespace ambilux {
 
@@ -122,12 +122,12 @@ void flatten_faces(Mesh& mesh, std::vector<Corner>& corners) {
 
 /// A statement of another kind.
 void leave_out(ObjReader& in, std::string_view keyword) {
-    static const std::set<std::string_view> without_effect = {
-        "",      "o",        "g",        "s",         "usemtl", "mtllib", "usemap", "maplib",     "lod", "mg",
-        "bevel", "c_interp", "d_interp", "trace_obj", "ctech",  "stech",  "cstype", "shadow_obj", "deg", "end"};
+    static const std::string without_effect =
+        " o g s usemtl mtllib usemap maplib lod mg bevel c_interp d_interp shadow_obj trace_obj ctech stech ";
     constexpr size_t kMost = 8, kLongest = 16;
-    if (!without_effect.contains(keyword) && in.unused.size() < kMost)
-        in.unused.insert("'" + std::string(keyword.substr(0, kLongest)) + "'");
+    const std::string word(keyword.substr(0, kLongest));
+    if (in.unused.size() < kMost && without_effect.find(" " + word + " ") == std::string::npos)
+        in.unused.insert("'" + word + "'");
 }
 
 void read_vertex(ObjReader& in) {

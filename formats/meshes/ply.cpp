@@ -3,10 +3,10 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "core/text_cursor.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/ply_blocks.h"
-#include "formats/meshes/text_cursor.h"
 
 namespace ambilux {
 

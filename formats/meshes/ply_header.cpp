@@ -4,8 +4,8 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "core/text_cursor.h"
 #include "formats/meshes/ply_format.h"
-#include "formats/meshes/text_cursor.h"
 
 namespace ambilux::ply {
 

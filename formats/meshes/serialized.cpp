@@ -139,7 +139,10 @@ Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_
         return result;
     };
     Mesh mesh;
-    mesh.positions = vectors();
+    if (doubles)
+        set_positions(mesh, in.values<std::array<double, 3>>(vertices));
+    else
+        mesh.positions = vectors();
     if (flags & kNormals) mesh.normals = vectors();
     if (flags & kTexcoords) {
         const std::vector<float> values = in.floats(vertices * 2, doubles);
@@ -147,7 +150,10 @@ Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_
         for (size_t i = 0; i < vertices; ++i)
             mesh.uvs[i] = {values[2 * i], flip_v ? 1 - values[2 * i + 1] : values[2 * i + 1]};
     }
-    if (flags & kColors) vectors();
+    if (flags & kColors) {
+        vectors();
+        mesh.notes.push_back("the serialized file has what is not used: colours of vertices");
+    }
     mesh.faces = in.values<std::array<uint32_t, 3>>(triangles);
     check_mesh(path, mesh);
     return mesh;

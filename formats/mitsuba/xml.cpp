@@ -6,9 +6,9 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "core/text_cursor.h"
 #include "formats/document/plugins.h"
 #include "formats/file_budget.h"
-#include "formats/meshes/text_cursor.h"
 #include "formats/mitsuba/entities.h"
 #include "formats/mitsuba/xml_values.h"
 

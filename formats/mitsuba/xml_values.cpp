@@ -7,8 +7,8 @@
 #include "core/error.h"
 #include "core/srgb.h"
 #include "core/text.h"
+#include "core/text_cursor.h"
 #include "formats/file_budget.h"
-#include "formats/meshes/text_cursor.h"
 
 namespace ambilux::mitsuba {
 namespace {

@@ -306,6 +306,7 @@ TEST_CASE("serialized: versions, precision, several meshes, damage") {
                 const Mesh mesh = read_serialized("a.serialized", file, i, false);
                 REQUIRE(mesh.positions.size() == 3);
                 CHECK(mesh.positions[0].x == float(-i));
+                CHECK(mesh.notes.size() == 1);  // it has colours
                 CHECK(mesh.normals[2] == Vec3f{0, 0, 1});
                 CHECK(mesh.uvs[1].y == 0.25f);
                 CHECK(mesh.faces[0] == std::array<uint32_t, 3>{0, 1, 2});
