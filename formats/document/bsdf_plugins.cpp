@@ -119,7 +119,7 @@ void read_plugin(Builder&, Reader& in, Textured<Diffuse>& p) { p.reflectance = r
 void read_plugin(Builder&, Reader& in, Textured<RoughDiffuse>& p) {
     p.reflectance = read_reflectance(in);
     p.alpha = in.textured_number("alpha", 0.2f);
-    in.ignore({"use_fast_approx"});  // we always evaluate the full model
+    in.leave({{"use_fast_approx", "false"}}, "the full model is evaluated");
 }
 
 void read_plugin(Builder& builder, Reader& in, Textured<Conductor>& p) { read_metal(builder, in, p); }

@@ -82,6 +82,12 @@ struct LoadedImage {
     TextureFacts facts;
 };
 
+/// A parameter that is not followed, and the values, "a|b", with which it needs not be.
+struct LeftOut {
+    const char* name;
+    const char* done = "";
+};
+
 /// Reads the parameters of one object and keeps track of which were asked for.
 class Reader {
 public:
@@ -114,6 +120,8 @@ public:
     const Object* take_named(const std::string& name);
     /// Parameters that are known and change nothing here.
     void ignore(std::initializer_list<const char*> names);
+    /// Parameters that ask for what is not done: a note says why.
+    void leave(std::initializer_list<LeftOut> parameters, const std::string& why);
     /// Refuses what is left over.
     void finish();
 

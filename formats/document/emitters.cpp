@@ -146,7 +146,7 @@ void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter&
     if (name.empty() && !is_given) in.fail("envmap has no filename");
     const double scale = in.number("scale", 1);
     if (!(scale >= 0)) in.fail(in.where("scale"), "scale must not be negative");
-    in.ignore({"cache", "mis_compensation"});
+    in.leave({{"cache"}, {"mis_compensation", "false"}}, "it is sampled in our own way");
     float largest = 0;
     const int32_t texture =
         is_given ? add_environment_image(builder, given->first, given->second, largest)

@@ -74,7 +74,9 @@ void build_integrator(Builder& builder, const Object& object) {
     if (type == "direct") {
         hint.type = "path";
         hint.max_depth = 2;
-        in.ignore({"shading_samples", "emitter_samples", "bsdf_samples", "luminaire_samples"});
+        in.leave(
+            {{"shading_samples", "1"}, {"emitter_samples", "1"}, {"bsdf_samples", "1"}, {"luminaire_samples", "1"}},
+            "paths take one sample of each");
     } else if (!other) {
         hint.type = type == "ptracer" ? "light" : (type == "bdpt" ? "bdpt" : "path");
         read_lengths(in, hint);
@@ -86,8 +88,9 @@ void build_integrator(Builder& builder, const Object& object) {
         return;
     }
     hint.hide_emitters = in.boolean("hide_emitters", false);
-    in.boolean("strict_normals", false);  // ours always are (transport/surface_scattering.h, sides_agree)
-    for (const char* name : kSteering) in.ignore({name});
+    in.leave({{"strict_normals", "true"}}, "both normals always count");  // surface_scattering.h, sides_agree
+    if (!full)
+        for (const char* name : kSteering) in.leave({{name}}, "the command line says how much is rendered");
     // Of the others all values are about how they do it.
     if (!full) in.finish();
 }

@@ -11,6 +11,8 @@
 namespace ambilux::document {
 namespace {
 
+constexpr const char* kSampling = "samples are chosen in our own way";
+
 ParamFloat textured_share(Reader& in, const char* name, float fallback) {
     const ParamFloat given = in.textured_number(name, fallback);
     if (!(given.value >= 0 && given.value <= 1))
@@ -67,9 +69,12 @@ PrincipledParts read_principled(Builder& builder, Reader& in) {
     p.clearcoat = share(builder, in, "clearcoat", 0);
     p.clearcoat_alpha = 0.1f + (0.001f - 0.1f) * share(builder, in, "clearcoat_gloss", 0);
     const ParamFloat spec_trans = textured_share(in, "spec_trans", 0);
-    // How another renderer chooses its samples.
-    in.ignore({"diffuse_reflectance_sampling_rate", "main_specular_sampling_rate", "clearcoat_sampling_rate",
-               "spec_reflectance_sampling_rate", "spec_trans_sampling_rate"});
+    in.leave({{"diffuse_reflectance_sampling_rate"},
+              {"main_specular_sampling_rate"},
+              {"clearcoat_sampling_rate"},
+              {"spec_reflectance_sampling_rate"},
+              {"spec_trans_sampling_rate"}},
+             kSampling);
     if (spec_trans.texture < 0 && spec_trans.value == 0) return parts;
 
     if (p.ior == 1) in.fail(in.where("eta"), "spec_trans needs an index of refraction other than 1");
@@ -123,8 +128,11 @@ Textured<PrincipledThin> read_principled_thin(Builder& builder, Reader& in) {
     p.specular = textured_share(in, "spec_trans", 0);
     p.ior = in.has("eta") ? read_eta(builder, in) : 1.5f;
     p.through = share(builder, in, "diff_trans", 0, 2) / 2;
-    in.ignore({"diffuse_reflectance_sampling_rate", "specular_reflectance_sampling_rate",
-               "specular_transmittance_sampling_rate", "diffuse_transmittance_sampling_rate"});
+    in.leave({{"diffuse_reflectance_sampling_rate"},
+              {"specular_reflectance_sampling_rate"},
+              {"specular_transmittance_sampling_rate"},
+              {"diffuse_transmittance_sampling_rate"}},
+             kSampling);
     return p;
 }
 

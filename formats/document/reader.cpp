@@ -237,6 +237,20 @@ void Reader::ignore(std::initializer_list<const char*> names) {
     }
 }
 
+void Reader::leave(std::initializer_list<LeftOut> parameters, const std::string& why) {
+    for (const auto& [name, done] : parameters) {
+        const Value* v = object_.find(name);
+        if (!v || !used_values_.insert(v).second) continue;
+        const bool is_text = v->kind == ValueKind::text, is_flag = v->kind == ValueKind::boolean;
+        const std::string given = is_text   ? v->text
+                                  : is_flag ? (v->number ? "true" : "false")
+                                            : fmt::format("{}", v->number);
+        if (fmt::format("|{}|", done).find("|" + given + "|") != std::string::npos) continue;
+        builder_.note(v->where,
+                      fmt::format("'{}' of {} '{}' is not followed: {}", name, object_.tag, object_.type, why));
+    }
+}
+
 void Reader::finish() {
     for (const Value& v : object_.values)
         if (used_values_.count(&v))

@@ -154,29 +154,33 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
         builder.note(in.where(), "a film of type '" + type + "' gets linear values, as hdrfilm does");
     read_film_size(builder, in, sensor);
     read_filter(builder, in, sensor);
-    // How files are written and shown; our images are linear and complete.
-    in.ignore({"gamma",
-               "banner",
-               "file_format",
-               "pixel_format",
-               "component_format",
-               "attach_log",
-               "compensate",
-               "high_quality_edges",
-               "sample_border",
-               "exposure",
-               "key",
-               "burn",
-               "tonemap_method",
-               "label",
-               "digits",
-               "variable",
-               "tonemap",
-               "fps",
-               "cache",
-               "reinhard_key",
-               "mode",
-               "filename"});
+    const bool wide = sensor.filter != FilterType::box || sensor.filter_radius > 0.5f;
+    const char* const edges = wide ? "true" : "true|false";
+    in.leave({{"sample_border", edges}, {"high_quality_edges", edges}}, "filters reach beyond the edges of the film");
+    in.leave({{"pixel_format", "rgb"}}, "images have the channels R, G and B");
+    in.leave({{"file_format", "openexr"}, {"component_format", "float16|float32"}, {"compensate", "true|false"}},
+             "images are OpenEXR files of floats");
+    const std::string shown = "images hold linear values";
+    // The note on such a type says so.
+    if (known && type != "hdrfilm")
+        in.ignore({"exposure", "key", "burn", "tonemap_method", "label", "digits", "variable", "gamma", "tonemap"});
+    in.leave({{"banner", "false"},
+              {"attach_log", "false"},
+              {"gamma"},
+              {"exposure"},
+              {"key"},
+              {"burn"},
+              {"tonemap_method"},
+              {"label"},
+              {"digits"},
+              {"variable"},
+              {"tonemap"},
+              {"fps"},
+              {"cache"},
+              {"reinhard_key"},
+              {"mode"},
+              {"filename"}},
+             shown);
     if (known) in.finish();
     if (builder.options.width) resize_film(builder.options.width, builder.options.height, sensor);
 }
@@ -186,12 +190,14 @@ void read_sampler(Builder& builder, const Object* object) {
     Reader in(builder, *object);
     const bool known = is_one_of(sampler_plugins(), object->type);
     // Every sampler has the same expected image; ours is independent.
-    if (!known)
-        builder.note(object->where, "sampler type '" + object->type + "' is not known; samples are independent");
+    if (object->type != "independent")
+        builder.note(object->where, "sampler type '" + object->type + "' is " + (known ? "not followed" : "not known") +
+                                        "; samples are independent");
     const int64_t spp = in.integer("sample_count", 4);
     if (spp < 1 || spp > 1000000000) in.fail(in.where("sample_count"), "sample_count must be positive");
     builder.scene.integrator.spp = int(spp);
-    in.ignore({"seed", "scramble", "jitter", "dimension", "strength"});
+    in.leave({{"seed", "0"}}, "--seed has the last word");
+    in.ignore({"scramble", "jitter", "dimension", "strength"});
     if (known) in.finish();
 }
 
@@ -290,8 +296,7 @@ void build_sensor(Builder& builder, const Object& object) {
     } else {
         read_lens(in, sensor, aspect);
     }
-    // Nothing moves, so that the shutter has no effect.
-    in.ignore({"shutter_open", "shutter_close"});
+    in.leave({{"shutter_open", "0"}, {"shutter_close", "0"}}, "nothing moves");
     if (known) in.finish();
 }
 

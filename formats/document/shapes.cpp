@@ -141,7 +141,8 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
         job.material = material_of_attributes(job, in, *bsdf, attributes);
     else
         job.material = shape_material(builder, bsdf, emitter, job.where);
-    in.ignore({"silhouette_sampling_weight", "shutter_open", "shutter_close"});
+    in.leave({{"silhouette_sampling_weight"}}, "images are not differentiated");
+    in.leave({{"shutter_open", "0"}, {"shutter_close", "0"}}, "nothing moves");
     if (type == "ply" && object.version < 2) in.ignore({"srgb"});  // of colours that nothing uses
     in.finish();
     if (jobs.size() >= builder.options.limits.shapes)

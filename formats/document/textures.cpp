@@ -265,7 +265,8 @@ void read_bitmap(Builder& builder, Reader& in, Texture& texture, TextureFacts& f
     texture.wrap = wrap_mode(builder, in);
     texture.filter = texture_filter(builder, in);
     read_to_uv(in, texture.to_uv);
-    in.ignore({"format", "accel", "max_anisotropy", "cache"});  // storage and prefiltering of other renderers
+    in.leave({{"format", "auto|variant"}, {"accel"}, {"max_anisotropy"}, {"cache"}},
+             "textures are stored in our own way");
     in.finish();
     if (builder.validate_only) return;
     const LoadedImage image =
