@@ -1,10 +1,11 @@
 """python -m analysis RESULTS -o OUT, python -m analysis pack RESULTS -o FILE.zip: see docs/experiments.md.
 
-Writes figures (.pdf, .png, .caption.txt), tables (.csv, .tex) and report.html into OUT. Exit codes: 0 done, 2 usage, 3 bad input (what does not depend on it
-is made all the same), 4 a file that cannot be written.
+Writes figures (.pdf, .png, .caption.txt), tables (.csv, .tex) and report.html into OUT. Exit codes: 0 done, 2 usage, 3 bad input or a part that failed (all
+others are made, and report.html names it; that a reference is black is no failure), 4 a file that cannot be written.
 """
 
 import argparse
+import functools
 import os
 import sys
 from pathlib import Path
@@ -32,19 +33,19 @@ def analyse(results, out, insets=None, full_size=False):
         if scene not in data.scenes:
             raise experiments.InputError(f"--inset {scene}: there is no such scene; there are {', '.join(data.scenes)}")
     out.mkdir(parents=True, exist_ok=True)
-    lines = summary.lines(data, flip_maps.of_runs(data))
-    said = remarks.remarks(data, lines)
-    write(out / "table.csv", tables.to_csv(lines))
-    for name, text in latex.files(data, lines).items():
+    early = figures.Made()
+    flips = figures.apart(early, "FLIP", lambda: flip_maps.of_runs(data), {})
+    lines = summary.lines(data, flips, lambda *name: functools.partial(figures.apart, early, ", ".join(name)))
+    said = figures.apart(early, "remarks", lambda: remarks.remarks(data, lines), [])
+    figures.apart(early, "table.csv", lambda: write(out / "table.csv", tables.to_csv(lines)))
+    for name, text in figures.apart(early, "tables for LaTeX", lambda: latex.files(data, lines), {}).items():
         write(out / name, text)
     made = figures.make_all(data, out, write, insets or {})
-    try:
-        rows = strategy_rows(data)
-        if rows:
-            write(out / "strategy_variance.csv", tables.variances_to_csv(rows))
-        write(out / "report.html", report.render(data, lines, said, made, out, full_size))
-    except experiments.InputError as e:
-        made.broken.append(f"report.html: {e}")
+    made.broken = early.broken + made.broken
+    rows = figures.apart(made, "strategy_variance.csv", lambda: strategy_rows(data))
+    if rows:
+        write(out / "strategy_variance.csv", tables.variances_to_csv(rows))
+    figures.apart(made, "report.html", lambda: write(out / "report.html", report.render(data, lines, said, made, out, full_size)))
     return said, made
 
 

@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 
 from analysis import ablation, captions, comparison, convergence, error_maps, flip_maps, occupancy, overview, pyramid, stage_times, style
@@ -51,19 +52,47 @@ def make_one(name, make, experiment, out, write):
         made.missing.append((name, str(e)))
     except InputError as e:
         made.broken.append((name, str(e)))
+    except OSError:
+        raise
+    except Exception as e:  # one scene's failure takes no other down
+        made.broken.append((name, told(e)))
     return made
 
 
-def in_processes(work, count):
+def told(error):
+    return str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+
+
+def apart(made, name, make, otherwise=None):
+    """make(), or `otherwise` and a message in made.broken."""
+    try:
+        return make()
+    except OSError:
+        raise
+    except Exception as e:
+        made.broken.append(f"{name}: {told(e)}")
+        return otherwise
+
+
+def in_processes(work, count, lost=None):
     """[work(0), work(1), ...], on all processors. Processes are forks of this one: they know what it has read and computed, and `work` may be anything
-    that does not start threads of OpenMP, which do not outlive a fork."""
+    that does not start threads of OpenMP, which do not outlive a fork. lost(i) stands for work that ends its process."""
     global forked
     processes = min(count, len(os.sched_getaffinity(0)))
     if processes < 2:
         return [work(i) for i in range(count)]
     forked = work
-    with ProcessPoolExecutor(processes, multiprocessing.get_context("fork")) as pool:
-        return list(pool.map(do_forked, range(count)))
+    context = multiprocessing.get_context("fork")
+    with ProcessPoolExecutor(processes, context) as pool:
+        futures = [pool.submit(do_forked, i) for i in range(count)]
+    # A process that dies takes the others' work along: it is done again, each in a process of its own.
+    return [alone(i, context, lost) if isinstance(f.exception(), BrokenProcessPool) else f.result() for i, f in enumerate(futures)]
+
+
+def alone(i, context, lost):
+    with ProcessPoolExecutor(1, context) as pool:
+        future = pool.submit(do_forked, i)
+    return lost(i) if lost and isinstance(future.exception(), BrokenProcessPool) else future.result()
 
 
 def do_forked(i):
@@ -75,7 +104,7 @@ def make_all(experiment, out, write, insets):
     does not keep the others from being made."""
     figures = list(plan(experiment, insets))
     made = Made()
-    for one in in_processes(lambda i: make_one(*figures[i], experiment, out, write), len(figures)):
+    for one in in_processes(lambda i: make_one(*figures[i], experiment, out, write), len(figures), lambda i: Made(broken=[(figures[i][0], "its process ended")])):
         made.pictures += one.pictures
         made.missing += one.missing
         for name, message in one.broken:

@@ -25,6 +25,8 @@ ACROSS = 7
 
 def flip(image, reference):
     """(map in [0, 1] of shape (height, width), mean). NaN, Inf and negative values, which FLIP does not know, count as zero."""
+    if images.is_black(reference):  # HDR-FLIP finds no exposure for it, and would end the program
+        raise style.NotMade("the reference is black")
     clean = [np.ascontiguousarray(np.clip(np.nan_to_num(x, posinf=0.0, neginf=0.0), 0, None), dtype=np.float32) for x in (reference, image)]
     values, mean, _ = flip_evaluator.evaluate(*clean, "HDR", applyMagma=False)
     return np.asarray(values, dtype=np.float32).reshape(reference.shape[:2]), float(mean)
@@ -50,7 +52,7 @@ def of_runs(experiment):
         for run in experiment.runs if reference else ():
             try:
                 found = [of_files(path, reference) for _, path in experiment.files("images", scene, run, ".exr")]
-            except (InputError, ValueError):
+            except (InputError, ValueError, style.NotMade):
                 continue
             if found:
                 out[scene, run] = (float(np.mean([mean for _, mean in found])), float(np.mean([np.median(values) / 255 for values, _ in found])))

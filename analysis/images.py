@@ -32,6 +32,14 @@ def read_like(path, reference):
     return image
 
 
+BLACK = 1.3e-7
+
+
+def is_black(image):
+    """Whether no luminance is above BLACK."""
+    return not (np.nan_to_num(image, posinf=0.0) @ np.array([0.2126, 0.7152, 0.0722])).max() > BLACK
+
+
 def exposure(reference):
     """Factor that puts the 95th percentile of the reference's luminance (Rec.709 weights) at 0.8; 1 for a black image."""
     level = float(np.percentile(reference @ np.array([0.2126, 0.7152, 0.0722]), 95))

@@ -4,7 +4,7 @@ import math
 import re
 
 from analysis import experiment as experiments
-from analysis import fairness, peers, summary, verdicts
+from analysis import fairness, images, peers, summary, verdicts
 
 FEW_PIXELS = 2.0  # relMSE over relMSE without the worst pixels, from which on these hold more than half of it
 ROUNDING = 1e-3
@@ -121,6 +121,13 @@ def clock_remarks(experiment):
             yield (f"{name}: {a[name]:.0f} MHz at {first}, {b[name]:.0f} at {last}{idle}; times of early and late renders may not compare")
 
 
+def has_black_reference(experiment, scene):
+    try:
+        return (path := experiment.reference(scene)) is not None and images.is_black(images.read_exr(path))
+    except experiments.InputError:
+        return False  # the figures tell
+
+
 def remarks(experiment, lines):
     """Sentences that a reader must know before believing the figures: gaps, dropped values, bias, references that are too noisy, pixels that decide
     relMSE, clocks that changed."""
@@ -130,6 +137,8 @@ def remarks(experiment, lines):
         if not every:
             found.append(f"{scene}: no results yet")
             continue
+        if has_black_reference(experiment, scene):
+            found.append(f"{scene}: its reference is black, so that relative errors mean nothing and FLIP has none: look for light that no path finds")
         for run in experiment.runs:
             have = {(r.seed, r.checkpoint) for r in experiment.select(scene, run)}
             if len(have) < len(every) and (have or not peers.is_left_out(experiment, scene, run)):

@@ -10,7 +10,7 @@ from pathlib import Path
 from matplotlib import colormaps
 from PIL import Image
 
-from analysis import captions, convergence, flip_maps, hdr_data, images, peers, style, summary, tables, verdicts
+from analysis import captions, convergence, figures, flip_maps, hdr_data, images, peers, style, summary, tables, verdicts
 from analysis import remarks as remarks_of
 
 PAGE = Path(__file__).parent / "page"
@@ -74,7 +74,10 @@ def scene_data(experiment, scene, full_size=False):
             scale = images.highest_of([images.relative_error(p, small[0][1]) for _, p in small[1:]])
         if flip_maps.flip_evaluator is not None:
             for entry, (_, file) in zip(entries[1:], files):
-                entry["flip"] = hdr_data.deflate(flip_maps.of_files(file, path, factor)[0].tobytes())
+                try:
+                    entry["flip"] = hdr_data.deflate(flip_maps.of_files(file, path, factor)[0].tobytes())
+                except style.NotMade:
+                    break
     return {"name": scene, "width": width, "height": height, "exposure": images.exposure(small[0][1]), "scale": scale, "shrunk": factor, "images": entries}
 
 
@@ -126,7 +129,7 @@ def verdict_table(lines):
 def render(experiment, lines, remarks, made, out, full_size=False):
     """The page as text. `made`: figures.Made, whose PNG files lie in the folder `out`. full_size: large images are not averaged over blocks."""
     name = html.escape(experiment.name)
-    scenes = {scene: scene_data(experiment, scene, full_size) for scene in experiment.scenes}
+    scenes = {scene: figures.apart(made, f"images of {scene}", lambda scene=scene: scene_data(experiment, scene, full_size)) for scene in experiment.scenes}
     data = {"plot": plot_data(experiment), "scenes": {k: v for k, v in scenes.items() if v},
             "colours": {"error": table_of_colours(style.ERROR_COLOURS), "signed": table_of_colours(style.SIGNED_COLOURS)}}
     body = [f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'

@@ -194,12 +194,14 @@ def line(experiment, scene, run, checkpoint):
         reference_error=reference_error, bias_z=max(abs(r.bias_z) for r in rows), invalid=sum(r.invalid for r in rows), methods=experiment.methods(scene, run))
 
 
-def lines(experiment, flips=None):
-    """One Line per (scene, run), in the order of the configuration. flips: {(scene, run): (mean, median)} of HDR-FLIP."""
+def lines(experiment, flips=None, apart=None):
+    """One Line per (scene, run), in the order of the configuration. flips: {(scene, run): (mean, median)} of HDR-FLIP. apart(scene, run)(make) is make(), or
+    None where that fails; without it failures are thrown."""
     if "lines" not in experiment.kept:
         last = {scene: experiment.last_common_checkpoint(scene) for scene in experiment.scenes}
-        experiment.kept["lines"] = [line(experiment, scene, run, last[scene]) for scene in experiment.scenes if last[scene] is not None for run in experiment.runs
-                                    if experiment.select(scene, run, last[scene])]
+        made = ((apart(scene, run) if apart else lambda make: make())(lambda scene=scene, run=run: line(experiment, scene, run, last[scene]))
+                for scene in experiment.scenes if last[scene] is not None for run in experiment.runs if experiment.select(scene, run, last[scene]))
+        experiment.kept["lines"] = [x for x in made if x is not None]
     found = experiment.kept["lines"]
     return [replace(x, flip=flips[x.scene, x.run][0], flip_median=flips[x.scene, x.run][1]) if (x.scene, x.run) in flips else x for x in found] if flips else found
 

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from analysis import __main__ as program
-from analysis import ablation, captions, comparison, convergence, error_maps, experiment, flip_maps, images, pyramid, stage_times, style
+from analysis import ablation, captions, comparison, convergence, error_maps, experiment, figures, flip_maps, images, pyramid, remarks, stage_times, style, summary
 from analysis.tests import synthetic
 
 RUNS = (("nee", 0.7, 1.5), ("lvc[connections=1]", 0.5, 2.0), ("lvc[connections=4]", 0.4, 3.0))
@@ -278,3 +279,37 @@ def test_tables_are_latex(output, tmp_path):
     document.write_text(r"\documentclass{article}\usepackage{booktabs}\begin{document}" + "\n" + inputs + "\n" + r"\end{document}")
     made = subprocess.run(["pdflatex", "-interaction=nonstopmode", "-halt-on-error", document.name], cwd=tmp_path, capture_output=True, text=True)
     assert made.returncode == 0, made.stdout[-2000:]
+
+
+def test_a_black_reference_takes_nothing_of_other_scenes_along(tmp_path):
+    results = synthetic.make(tmp_path / "run", scenes=("box", "black"), runs=RUNS[:2])
+    for path in (results / "references").glob("black*.exr"):
+        synthetic.write_exr(path, np.zeros_like(synthetic.picture()))
+    said, made = program.analyse(results, tmp_path / "out")
+    assert not made.broken and any("black: its reference is black" in s for s in said)
+    assert {"comparison_box", "errors_box", "comparison_black", "errors_black"} <= {name for name, *_ in made.pictures}
+    assert "its reference is black" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    if flip_maps.flip_evaluator is not None:
+        assert ("flip_black", "the reference is black") in made.missing and "flip_box" in {name for name, *_ in made.pictures}
+
+
+def test_what_fails_is_named_and_all_others_are_made(folder, tmp_path, monkeypatch):
+    def fails():
+        raise ZeroDivisionError("no pixels")
+
+    def planned(experiment, insets):
+        yield "ends", lambda: os._exit(1)
+        yield "fails", fails
+        yield "errors_box", lambda: error_maps.make(experiment, "box")
+
+    monkeypatch.setattr(figures, "plan", planned)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
+    monkeypatch.setattr(remarks, "remarks", lambda *_: fails())
+    line = summary.line
+    monkeypatch.setattr(summary, "line", lambda e, scene, run, checkpoint: fails() if run == "nee" else line(e, scene, run, checkpoint))
+    _, made = program.analyse(folder, tmp_path)
+    assert [name for name, *_ in made.pictures] == ["errors_box"]
+    assert made.broken == ["box, nee: ZeroDivisionError: no pixels", "remarks: ZeroDivisionError: no pixels", "ends: its process ended",
+                           "fails: ZeroDivisionError: no pixels"]
+    report = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert all(message in report for message in made.broken)
