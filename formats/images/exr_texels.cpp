@@ -2,6 +2,7 @@
 #include <ImfChannelList.h>
 #include <ImfRgba.h>
 #include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
 
 #include <algorithm>
 #include <map>
@@ -107,6 +108,12 @@ void note_header(const Imf::Header& header, std::vector<std::string>& notes) {
                         ", whatever its display window is: " + text(header.displayWindow()));
     if (Imf::hasEnvmap(header) && Imf::envmap(header) == Imf::ENVMAP_CUBE)
         notes.emplace_back("it says that it is an environment on the faces of a cube, and is taken as it lies");
+    for (const char* name : {"colorInteropID", "oiio:ColorSpace"}) {
+        const auto* space = header.findTypedAttribute<Imf::StringAttribute>(name);
+        const std::string value = space && !Imf::hasChromaticities(header) ? space->value() : "";
+        if (!value.empty() && !value.starts_with("lin_rec709") && value != "Linear" && value != "scene_linear")
+            notes.push_back("colours are taken as linear Rec.709, whatever its " + std::string(name) + " is: " + value);
+    }
 }
 
 /// Of colours with these primaries to linear Rec.709, without adaptation of the white.

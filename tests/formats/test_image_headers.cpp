@@ -6,6 +6,7 @@
 #include <ImfOutputFile.h>
 #include <ImfRgbaFile.h>
 #include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
 #include <zlib.h>
 
 #include "core/atomic_file.h"
@@ -157,13 +158,20 @@ TEST_CASE("EXR: luminance and chroma are colours in the primaries of the file") 
     CHECK(grey.floats[0] == grey.floats[1]);
 }
 
-TEST_CASE("EXR: windows that differ, and faces of a cube, are told") {
+TEST_CASE("EXR: windows that differ, faces of a cube and names of colour spaces are told") {
     const Imf::Header cropped(Imath::Box2i({0, 0}, {99, 49}), Imath::Box2i({10, 20}, {11, 22}));
     const Texels image = read_image("x", exr_file(cropped, {{"R", 1}, {"G", 1}, {"B", 1}}));
     CHECK(image.width == 2);
     CHECK(image.height == 3);
     CHECK(
         contains(joined(image), "its data window, 2x3 at (10, 20), whatever its display window is: 100x50 at (0, 0)"));
+    const auto of_space = [](const char* name) {
+        Imf::Header header(2, 2);
+        header.insert("oiio:ColorSpace", Imf::StringAttribute(name));
+        return joined(read_image("x", exr_file(header, {{"R", 1}, {"G", 1}, {"B", 1}})));
+    };
+    CHECK(contains(of_space("ACEScg"), "whatever its oiio:ColorSpace is: ACEScg"));
+    CHECK(of_space("lin_rec709_scene").empty());
     Imf::Header cube(2, 12);
     Imf::addEnvmap(cube, Imf::ENVMAP_CUBE);
     CHECK(contains(joined(read_image("x", exr_file(cube, {{"Y", 1}}))), "faces of a cube"));
