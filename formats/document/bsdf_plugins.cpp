@@ -2,6 +2,7 @@
 
 #include "formats/document/bsdf_plugins.h"
 #include "formats/document/named_media.h"
+#include "formats/document/plugins.h"
 #include "formats/document/principled.h"
 #include "transport/bsdf/microfacet.h"
 #include "transport/bsdf/precompute.h"
@@ -232,7 +233,8 @@ BsdfRecord read_bsdf(Builder& builder, const Object& object) {
         known = true;
     });
     if (known) return record;
-    builder.refuse(object.where, "BSDF type '" + object.type + "' is not supported",
+    builder.refuse(object.where,
+                   "BSDF type '" + object.type + "' is not supported" + what_is_meant("bsdf", object.type),
                    "a diffuse surface of reflectance 0.5 is used");
     return diffuse_record(0.5f);
 }

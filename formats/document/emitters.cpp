@@ -189,7 +189,11 @@ Emitter read_emitter(Builder& builder, const Object& object, bool on_shape) {
 void build_emitter(Builder& builder, const Object& object) {
     const Emitter e = read_emitter(builder, object, false);
     if (e.type == EmitterType::count) {
-        builder.refuse(object.where, "emitter type '" + object.type + "' is not supported", "it is left out");
+        const bool misplaced = is_one_of(emitter_plugins(), object.type);
+        builder.refuse(object.where,
+                       "emitter type '" + object.type + "' is not supported" +
+                           (misplaced ? " here: it belongs in a shape" : what_is_meant("emitter", object.type)),
+                       "it is left out");
         return;
     }
     if (is_environment(e.type)) {

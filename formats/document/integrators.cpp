@@ -39,7 +39,8 @@ void read_lengths(Reader& in, IntegratorHint& hint) {
 /// One of another program: how it samples does not matter here, its path lengths do.
 void build_foreign_integrator(Builder& builder, Reader& in) {
     const Object* nested = in.take("integrator");
-    builder.note(in.where(), fmt::format("integrator '{}' is not known; {} is used", in.object().type,
+    builder.note(in.where(), fmt::format("integrator '{}' is not known{}; {} is used", in.object().type,
+                                         what_is_meant("integrator", in.object().type),
                                          nested ? "the one inside of it" : "path, with its max_depth,"));
     if (nested) return build_integrator(builder, *nested);
     builder.scene.integrator.type = "path";

@@ -21,6 +21,13 @@ const Plugins& texture_plugins();
 
 bool is_one_of(const Plugins& plugins, const std::string& type);
 
+/// The one of these that differs from `name` by a letter or two; empty if there is none.
+std::string nearest_name(const Plugins& known, const std::string& name);
+
+/// Why `type` may have been written for an object with this tag, as the end of a message: it is another kind of object,
+/// or nearly one of these; empty if neither.
+std::string what_is_meant(const std::string& tag, const std::string& type);
+
 /// The tag of each type: no two tags share one.
 std::map<std::string, std::string> plugins();
 

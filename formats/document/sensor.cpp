@@ -18,9 +18,10 @@ static constexpr double kLeastTangent = 1e-9, kMostTangent = 1e9;
 Vec2f field_of_view(Reader& in, double aspect) {
     if (in.has("fov") && in.has("focal_length"))
         in.fail(in.where("focal_length"), "both 'fov' and 'focal_length' are given");
-    std::string axis = in.text("fov_axis", "x");
+    std::string axis = "diagonal";
     double t = 0;
     if (in.has("fov")) {
+        axis = in.text("fov_axis", "x");
         const double fov = in.number("fov", 0);
         if (!(fov > 0 && fov < 180)) in.fail(in.where("fov"), "fov must lie between 0 and 180 degrees");
         t = std::tan(fov * (M_PI / 360));
@@ -32,7 +33,7 @@ Vec2f field_of_view(Reader& in, double aspect) {
         if (!ok || !(focal > 0) || (!cursor.done() && cursor.word() != "mm"))
             in.fail(in.where("focal_length"), "'" + text + "' is not a focal length in mm");
         t = std::sqrt(36.0 * 36 + 24 * 24) / (2 * focal);
-        axis = "diagonal";
+        in.leave({{"fov_axis", "diagonal"}}, "a focal length is that of the diagonal");
     }
     if (axis == "smaller") axis = aspect > 1 ? "y" : "x";
     if (axis == "larger") axis = aspect > 1 ? "x" : "y";
@@ -86,8 +87,10 @@ void read_filter(Builder& builder, Reader& film, Sensor& sensor) {
         in.ignore({"b", "c", "a", "lobes"});
         return in.finish();
     } else {
-        builder.refuse(object->where, "reconstruction filter '" + object->type + "' is not supported",
-                       "gaussian is used");
+        builder.refuse(
+            object->where,
+            "reconstruction filter '" + object->type + "' is not supported" + what_is_meant("rfilter", object->type),
+            "gaussian is used");
         return;
     }
     if (!(sensor.filter_radius > 0)) in.fail("the radius of the reconstruction filter must be positive");
@@ -263,7 +266,9 @@ void build_sensor(Builder& builder, const Object& object) {
     read_sampler(builder, in.take("sampler"));
 
     const bool known = find_sensor(type, sensor.type);
-    if (!known) builder.refuse(object.where, "sensor type '" + type + "' is not supported", "perspective is used");
+    if (!known)
+        builder.refuse(object.where, "sensor type '" + type + "' is not supported" + what_is_meant("sensor", type),
+                       "perspective is used");
 
     const double aspect = double(sensor.film_width) / sensor.film_height;
     Matrix to_world = builder.to_scene * in.transform("to_world");

@@ -118,7 +118,8 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     const std::string& type = object.type;
     const bool given = type == "mesh" && !builder.document.meshes.empty();
     if (!is_one_of(shape_plugins(), type) && !given) {
-        builder.refuse(object.where, "shape type '" + type + "' is not supported", "the shape is left out");
+        builder.refuse(object.where, "shape type '" + type + "' is not supported" + what_is_meant("shape", type),
+                       "the shape is left out");
         return;
     }
     Job job;
@@ -258,7 +259,10 @@ void ShapeBuilder::read_tessellated(Reader& in, Job& job, const Matrix& outer) {
 uint32_t ShapeBuilder::add_emitter(const Object& object) {
     Emitter e = read_emitter(builder, object, true);
     if (e.type == EmitterType::count) {
-        builder.refuse(object.where, "emitter type '" + object.type + "' on a shape is not supported",
+        builder.refuse(object.where,
+                       "emitter type '" + object.type + "' on a shape is not supported" +
+                           (is_one_of(emitter_plugins(), object.type) ? ": it belongs in the scene"
+                                                                      : what_is_meant("emitter", object.type)),
                        "the shape does not emit");
         e.type = EmitterType::area;
     }

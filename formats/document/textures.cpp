@@ -327,7 +327,9 @@ int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
         read_grid(builder, in, use, texture, facts);
         in.finish();
     } else {
-        builder.refuse(object.where, "texture type '" + object.type + "' is not supported", "a grey of 0.5 is used");
+        builder.refuse(object.where,
+                       "texture type '" + object.type + "' is not supported" + what_is_meant("texture", object.type),
+                       "a grey of 0.5 is used");
         texture.type = TextureType::checkerboard;
         texture.color0 = texture.color1 = facts.mean = splat(0.5f);
     }

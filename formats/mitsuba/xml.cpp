@@ -18,12 +18,12 @@ namespace fs = std::filesystem;
 
 namespace {
 
-bool is_object_tag(const std::string& tag) {
-    static const std::set<std::string> tags = {"scene",   "integrator", "sensor", "sampler",   "film",
-                                               "rfilter", "shape",      "bsdf",   "texture",   "emitter",
-                                               "medium",  "phase",      "volume", "subsurface"};
-    return tags.count(tag) > 0;
+const Plugins& object_tags() {
+    static const Plugins tags = {"scene", "integrator", "sensor",  "sampler", "film",  "rfilter", "shape",
+                                 "bsdf",  "texture",    "emitter", "medium",  "phase", "volume",  "subsurface"};
+    return tags;
 }
+bool is_object_tag(const std::string& tag) { return is_one_of(object_tags(), tag); }
 
 constexpr int kNewestVersion = 3;
 
@@ -84,7 +84,13 @@ struct Parser {
                 const Object* nested = parse_object(source, child, tag, depth + 1);
                 object.children.push_back({values.parameter_name(source, child), at, "", nested});
             } else {
-                fail(at, "unknown element <" + tag + ">");
+                const std::string near = nearest_name(object_tags(), tag);
+                const auto known = plugins();
+                const auto plugin = known.find(tag);
+                fail(at, "unknown element <" + tag + ">" +
+                             (plugin != known.end() ? ": '" + tag + "' is a type of <" + plugin->second + ">"
+                              : near.empty()        ? ""
+                                                    : ": <" + near + "> is known"));
             }
         }
     }
