@@ -25,6 +25,16 @@ const Plugins& object_tags() {
 }
 bool is_object_tag(const std::string& tag) { return is_one_of(object_tags(), tag); }
 
+[[noreturn]] void fail_unknown(const Where& at, const std::string& tag) {
+    const auto known = plugins();
+    const auto plugin = known.find(tag);
+    const std::string near = nearest_name(object_tags(), tag);
+    fail(at, "unknown element <" + tag + ">" +
+                 (plugin != known.end() ? ": '" + tag + "' is a type of <" + plugin->second + ">"
+                  : near.empty()        ? ""
+                                        : ": <" + near + "> is known"));
+}
+
 constexpr int kNewestVersion = 3;
 
 struct Parser {
@@ -84,13 +94,7 @@ struct Parser {
                 const Object* nested = parse_object(source, child, tag, depth + 1);
                 object.children.push_back({values.parameter_name(source, child), at, "", nested});
             } else {
-                const std::string near = nearest_name(object_tags(), tag);
-                const auto known = plugins();
-                const auto plugin = known.find(tag);
-                fail(at, "unknown element <" + tag + ">" +
-                             (plugin != known.end() ? ": '" + tag + "' is a type of <" + plugin->second + ">"
-                              : near.empty()        ? ""
-                                                    : ": <" + near + "> is known"));
+                fail_unknown(at, tag);
             }
         }
     }
