@@ -82,6 +82,18 @@ struct LoadedImage {
     TextureFacts facts;
 };
 
+/// Appends bytes at the next multiple of 16.
+uint64_t append_texels(Scene& scene, const void* data, size_t size);
+/// Appends RGBA texels, as halves where that is allowed and loses nothing.
+uint64_t append_floats(Scene& scene, const std::vector<float>& texels, bool allow_half, TexelFormat& format);
+/// Puts the image's texels into the scene, once per file and decoding. `gamma` 0 takes what the file format implies;
+/// `as_float` stores floats (environment maps), as halves where nothing is lost by that; alpha, which no one reads
+/// there, is 1 then.
+/// `channel` 0 to 3 puts that one of red, green, blue and alpha into all colours; alpha is linear.
+/// `given`: of the document, not of a file.
+LoadedImage load_image(Builder& builder, const std::string& path, double gamma, bool as_float, int channel = -1,
+                       const Texels* given = nullptr);
+
 /// A parameter that is not followed, and the values, "a|b", with which it needs not be.
 struct LeftOut {
     const char* name;

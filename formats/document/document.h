@@ -89,7 +89,7 @@ struct Document {
     bool smooth_normals = true;           ///< meshes without normals get smooth ones, as in Mitsuba
     bool mirrors_turn_in = true;          ///< mirrored meshes of files, and spheres, turn in, as in Mitsuba 2 and 3
 
-    bool clips_reflectances = false;      ///< textures that reflect more than 1 reflect 1, as in pbrt and glTF
+    bool clips_reflectances = false;  ///< textures that reflect more than 1 reflect 1, as in pbrt and glTF
 
     /// Path of a file named in `where.file`: in the <path> folders, the last one first, then in the folder of the main
     /// file, as in Mitsuba, and then in that of the file that names it. Throws Error(bad_input) if there is none.

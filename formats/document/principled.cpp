@@ -57,6 +57,28 @@ void read_common(Builder& builder, Reader& in, Parameters& p) {
     p.flatness = of_65535(share(builder, in, "flatness", 0));
 }
 
+/// What it transmits by.
+Textured<RoughDielectric> glass_of(Builder& builder, Reader& in, const Textured<Principled>& p) {
+    Textured<RoughDielectric> glass{};
+    glass.specular_reflectance = {splat(1), -1};
+    glass.specular_transmittance = baked_color(builder, in, {p.base_color}, [](const std::vector<Rgb>& v) {
+        return Rgb{std::sqrt(v[0].x), std::sqrt(v[0].y), std::sqrt(v[0].z)};
+    });
+    const auto alpha = [&](bool along_s) {
+        return baked_number(builder, in, {p.roughness, p.anisotropic}, [along_s](const std::vector<float>& v) {
+            const MicrofacetDistribution d = burley_microfacets(v[0], v[1]);
+            return along_s ? d.alpha_u : d.alpha_v;
+        });
+    };
+    const bool isotropic = p.anisotropic.texture < 0 && p.anisotropic.value == 0;
+    glass.alpha_u = alpha(true);
+    glass.alpha_v = isotropic ? glass.alpha_u : alpha(false);
+    glass.ior = p.ior;
+    glass.distribution = Microfacets::ggx;
+    glass.sample_visible = true;
+    return glass;
+}
+
 }  // namespace
 
 PrincipledParts read_principled(Builder& builder, Reader& in) {
@@ -92,23 +114,7 @@ PrincipledParts read_principled(Builder& builder, Reader& in) {
     parts.glass_weight = baked_number(builder, in, {p.metallic, spec_trans}, glass_share);
     const bool all_glass = parts.glass_weight.texture < 0 && parts.glass_weight.value == 1;
     if (all_glass && p.clearcoat > 0) in.fail(in.where("clearcoat"), "clearcoat on glass alone is not supported");
-    parts.glass = {};
-    parts.glass.specular_reflectance = {splat(1), -1};
-    parts.glass.specular_transmittance = baked_color(builder, in, {p.base_color}, [](const std::vector<Rgb>& v) {
-        return Rgb{std::sqrt(v[0].x), std::sqrt(v[0].y), std::sqrt(v[0].z)};
-    });
-    const auto alpha = [&](bool along_s) {
-        return baked_number(builder, in, {p.roughness, p.anisotropic}, [along_s](const std::vector<float>& v) {
-            const MicrofacetDistribution d = burley_microfacets(v[0], v[1]);
-            return along_s ? d.alpha_u : d.alpha_v;
-        });
-    };
-    const bool isotropic = p.anisotropic.texture < 0 && p.anisotropic.value == 0;
-    parts.glass.alpha_u = alpha(true);
-    parts.glass.alpha_v = isotropic ? parts.glass.alpha_u : alpha(false);
-    parts.glass.ior = p.ior;
-    parts.glass.distribution = Microfacets::ggx;
-    parts.glass.sample_visible = true;
+    parts.glass = glass_of(builder, in, p);
     if (all_glass) return parts;
     if (!textured) {
         const float rest = 1 - parts.glass_weight.value;

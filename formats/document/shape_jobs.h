@@ -47,6 +47,10 @@ struct GroupJobs {
 /// What a shape of type obj says of parts of its file, each of which can have its BSDF in the older generation.
 void read_obj_parts(Builder& builder, Reader& in, MeshSource& source);
 
+/// Reads the files of meshes that jobs have, also those of groups, on all threads; jobs get the origins of meshes.
+void load_sources(Builder& builder, std::vector<MeshSource>& sources, std::vector<Job>& placed,
+                  std::vector<GroupJobs>& groups);
+
 /// Puts copies of what groups hold in the places of jobs of type "instance", or leaves it to be shared: meshes of
 /// groups whose copies would have more than Limits::copies triangles. Their jobs then come last, group by group, around
 /// the middle of the group. Fails where the scene would have too many shapes.

@@ -9,7 +9,6 @@
 #include "formats/document/plugins.h"
 #include "formats/document/shape_jobs.h"
 #include "formats/file_budget.h"
-#include "formats/gzip.h"
 #include "formats/meshes/curves.h"
 #include "formats/meshes/height_field.h"
 #include "formats/meshes/mesh.h"
@@ -297,53 +296,6 @@ void ShapeBuilder::add_instance(const Object& object, const Matrix& outer) {
 
 uint64_t memory_of(const Mesh& mesh) { return mesh_bytes(mesh.positions.size(), mesh.faces.size()); }
 
-/// Reads the file and its digest on two threads.
-void load_source(MeshSource& s, const Limits& limits) {
-    const std::string bytes = gunzip_if_packed(s.path, read_input(s.path, limits), limits);
-    s.lacks_materials = s.lacks_materials && bytes.find("mtllib ") != std::string::npos;
-    const auto read = [&] {
-        if (s.type == "obj") return read_obj(s.path, bytes, s.flip_v, limits);
-        if (s.type == "ply") return read_ply(s.path, bytes, s.flip_v, limits);
-        return read_serialized(s.path, bytes, s.shape_index, s.flip_v, limits);
-    };
-    parallel_for(2, [&](int task) {
-        if (task == 0)
-            s.digest = sha256(bytes);
-        else
-            s.mesh = read();
-    });
-}
-
-/// Reads the files of meshes that jobs have, on all threads.
-void load_sources(Builder& builder, ShapeBuilder& shapes) {
-    const ScopedSeconds clock(&builder.options.times->read);
-    std::vector<Job*> jobs;
-    const auto collect = [&](std::vector<Job>& all) {
-        for (Job& job : all)
-            if (job.source >= 0) jobs.push_back(&job);
-    };
-    collect(shapes.jobs);
-    for (GroupJobs& group : shapes.groups) collect(group.jobs);
-    std::vector<bool> used(shapes.sources.size());
-    for (const Job* job : jobs) used[size_t(job->source)] = true;
-    parallel_for(shapes.sources.size(), [&](size_t i) {
-        MeshSource& s = shapes.sources[i];
-        if (used[i] && !s.path.empty()) load_source(s, builder.options.limits);
-    });
-    for (size_t i = 0; i < used.size(); ++i) {
-        const MeshSource& s = shapes.sources[i];
-        for (const std::string& note : s.mesh.notes) builder.note({s.path, 0}, note);
-        if (s.path.empty() || !used[i]) continue;
-        builder.file_digests.push_back({s.path, s.digest});
-        if (s.lacks_materials)
-            builder.note({s.path, 0}, "materials of obj files are not read; such shapes without a BSDF are diffuse");
-    }
-    for (Job* job : jobs) {
-        const auto& o = shapes.sources[size_t(job->source)].content().origin;
-        job->to_world = job->to_world * translation(o[0], o[1], o[2]);
-    }
-}
-
 }  // namespace
 
 void build_shapes(Builder& builder, const Object& root) {
@@ -351,7 +303,7 @@ void build_shapes(Builder& builder, const Object& root) {
     for (const Child& child : root.children) {
         if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false, false);
     }
-    load_sources(builder, shapes);
+    load_sources(builder, shapes.sources, shapes.jobs, shapes.groups);
     place_instances(builder, shapes.groups, shapes.sources, shapes.jobs);
     // Shapes get meshes of their own, and so does the scene.
     for (const MeshSource& s : shapes.sources) builder.take_memory(memory_of(s.content()), s.path);
