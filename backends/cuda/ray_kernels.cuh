@@ -4,6 +4,7 @@
 
 #include "backends/cuda/launch_items.cuh"
 #include "backends/cuda/trace_kernels.cuh"
+#include "queues/reserved_queue.h"
 #include "queues/wave.h"
 
 namespace ambilux::detail {

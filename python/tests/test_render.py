@@ -30,6 +30,14 @@ def test_a_render_is_that_of_the_program(scene, tmp_path):
     assert image.stats["integrator"] == "bdpt" and image.stats["variant"] == "lvc" and image.stats["spp"] == 4
 
 
+def test_without_an_integrator_that_of_the_scene_renders(tmp_path):
+    file = tmp_path / "s.xml"
+    file.write_text('<scene version="3.0.0"><integrator type="bdpt"/><shape type="sphere"/><emitter type="constant"/></scene>')
+    scene = ambilux.load(file, size=(4, 4))
+    assert ambilux.render(scene, spp=1, backend="cpu").stats["integrator"] == "bdpt"
+    assert ambilux.render(scene, "path", spp=1, backend="cpu").stats["integrator"] == "path"
+
+
 def test_a_budget_of_memory_is_kept_or_refused(scene):
     any_memory = ambilux.render(scene, spp=2, backend="cpu")
     image = ambilux.render(scene, spp=2, backend="cpu", settings={"memory": "64M"})

@@ -644,6 +644,26 @@ TEST_CASE("render --strict fails on a scene with warnings, such as of a surface 
     CHECK_FALSE(std::filesystem::exists(folder / "b.exr"));
 }
 
+TEST_CASE("the integrator that a scene names renders it, unless -i says otherwise") {
+    const test::TempFolder folder;
+    const auto integrator_of = [&](const std::string& named, std::vector<std::string> more) {
+        const std::string scene = folder.write(
+            "s.xml", "<scene version=\"3.0.0\">" + (named.empty() ? "" : "<integrator type=\"" + named + "\"/>") +
+                         "<shape type=\"sphere\"/><emitter type=\"constant\"/></scene>");
+        more.insert(more.begin(),
+                    {"render", scene, "-o", folder / "a.exr", "--size", "4x4", "--spp", "1", "--json", "-"});
+        const Outcome o = run(folder, more);
+        INFO(o.err);
+        REQUIRE(o.code == 0);
+        return json::parse(o.out).at("integrator").get<std::string>();
+    };
+    CHECK(integrator_of("", {}) == "path");
+    CHECK(integrator_of("direct", {}) == "path");
+    CHECK(integrator_of("bdpt", {}) == "bdpt");
+    CHECK(integrator_of("ptracer", {}) == "light");
+    CHECK(integrator_of("bdpt", {"-i", "path"}) == "path");
+}
+
 TEST_CASE("stress: families are listed, scenes exported, cells rendered and gone on with") {
     const test::TempFolder folder;
     const Outcome list = run(folder, {"stress", "--list"});
