@@ -20,7 +20,7 @@
 
 namespace ambilux::document {
 
-/// What exporters round to just above 1 counts as 1.
+/// What exporters round to just above 1, by up to a step of a half, counts as 1.
 constexpr float kRoundedOne = 1.001f;
 inline float without_rounding(float v) { return v > 1 && v <= kRoundedOne ? 1 : v; }
 
