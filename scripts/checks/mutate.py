@@ -33,7 +33,8 @@ from mutation_sites import Site
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("transport", "stages", "film", "backends", "render", "integrators", "session")
-TEST_FOLDERS = ("transport", "stages", "film", "items", "queues", "scene", "integrators", "backends", "render", "session")
+ELSEWHERE = ("backends/cuda/", "backends/mpi/")  # not compiled by the copy's build: faults there would count as survivors
+TEST_FOLDERS = ("transport", "stages", "film", "items", "queues", "scene", "integrators", "backends", "render", "session", "experiments", "cli")
 GOAL = 0.95
 HEADER = """// Which fault of a mutation run is on.
 #pragma once
@@ -49,7 +50,7 @@ struct Mutation {
         log = std::getenv("AMBILUX_FAULT_LOG");
     }
     ~Mutation() {
-        std::FILE* file = log ? std::fopen(log, "w") : nullptr;
+        std::FILE* file = log ? std::fopen(log, "a") : nullptr;  // a test may run the program
         for (int k = 0; file && k < int(sizeof(reached)); ++k)
             if (reached[k]) std::fprintf(file, "%%d\\n", k);
         if (file) std::fclose(file);
@@ -93,13 +94,13 @@ class Workspace:
         for core in sorted(os.sched_getaffinity(0))[:jobs]:
             self.cores.put(core)
         self.faults = {}
-        self.sources = {n: (ROOT / n).read_text() for n in project_files(*folders) if n.endswith((".h", ".cpp"))}
+        self.sources = {n: (ROOT / n).read_text() for n in project_files(*folders) if n.endswith((".h", ".cpp")) and not n.startswith(ELSEWHERE)}
 
     # ---- faults and their build ----
 
     def copy(self):
         for name in project_files():
-            if not (ROOT / name).is_file() or name.startswith(self.folders) and name.endswith((".h", ".cpp")):
+            if not (ROOT / name).is_file() or name in self.sources or name.endswith("registry.list"):
                 continue
             target = self.source / name
             if not target.exists() or target.read_bytes() != (ROOT / name).read_bytes():
@@ -107,7 +108,8 @@ class Workspace:
                 shutil.copy2(ROOT / name, target)
         # One set of kernels instead of one a level of features: a fifth of the build.
         write(self.source / "cmake/registry.cmake", re.sub(r"set\(AMBILUX_LEVELS [^)]*\)", "set(AMBILUX_LEVELS All)", (ROOT / "cmake/registry.cmake").read_text()))
-        write(self.source / "integrators/registry.list", (ROOT / "integrators/registry.list").read_text().replace("Diffuse All", ""))
+        for name in filter(lambda n: n.endswith("registry.list"), project_files()):
+            write(self.source / name, re.sub(r"(?m)^((?:\w\S* +){4}\w\S*).*", r"\1", (ROOT / name).read_text()))
 
         # The twin in double precision is made from the sources without faults: it checks, it is not checked.
         twin = (ROOT / "cmake/double_precision.cmake").read_text()
@@ -315,7 +317,7 @@ def report(workspace):
 
 
 def default_tests():
-    """Tests of the CPU that are neither long nor in need of the whole program."""
+    """Tests of the CPU without a label; those of formats, statistics and stress say little about these folders for their time."""
     names = []
     for name in project_files("tests"):
         path = ROOT / name
