@@ -135,7 +135,7 @@ class Workspace:
         def errors(entry):
             command = re.sub(r"^(env \S+ )?\S*ccache ", "", re.sub(r" -o \S+", "", entry["command"])) + " -fsyntax-only -w -fmax-errors=0"
             return {(os.path.relpath(os.path.normpath(Path(entry["directory"]) / m[1]), self.source), int(m[2]))
-                    for m in re.finditer(r"^(\S+?):(\d+):(?:\d+:)?\s+(?:error|required from)", run(command, shell=True, cwd=entry["directory"]).stderr, re.MULTILINE)}
+                    for m in re.finditer(r"^(\S+?):(\d+):(?:\d+:)?\s+(?:error|required from|in .constexpr. expansion)", run(command, shell=True, cwd=entry["directory"]).stderr, re.MULTILINE)}
 
         including = r"/((?:bdpt|path|learned)_All|bsdf_plugins|(?:film|backends|backends/cpu|render|session|integrators)/\w+|test_stages|test_bidirectional_stages)\.cpp$"
         commands = [c for c in json.loads((self.build / "compile_commands.json").read_text()) if re.search(including, c["file"])]
