@@ -285,7 +285,8 @@ private:
             Capture capture = {*this};
             run_iteration<Integrator>(capture);
         }
-        cuda_check(cudaDeviceSynchronize(), "preparation");
+        wait_for_default_stream("preparation");
+        cuda_check(cudaStreamSynchronize(stream_.get()), "preparation");
     }
     /// A wave had more than there was capacity for. Where there is no memory for more light vertices, waves get
     /// smaller.

@@ -36,6 +36,10 @@ inline uint64_t free_device_bytes() {
     return free;
 }
 
+/// Waits for what the default stream was given. Not for the device: another thread may capture a graph on it, which a
+/// wait for the whole device breaks.
+inline void wait_for_default_stream(const char* what) { cuda_check(cudaStreamSynchronize(nullptr), what); }
+
 /// An array on the device, not initialised. Without elements it holds no memory and data() is null. Copies run on the
 /// default stream.
 template <class T>
@@ -113,7 +117,7 @@ public:
     static void clear(void* to, uint64_t bytes) {
         if (bytes == 0) return;
         cuda_check(cudaMemset(to, 0, bytes), "clear device memory");
-        cuda_check(cudaDeviceSynchronize(), "clear device memory");
+        wait_for_default_stream("clear device memory");
     }
 
 private:

@@ -21,7 +21,7 @@ DeviceImage mean_on_device(const double* sum, uint32_t width, uint32_t height, u
     else
         divide<<<1024, 256>>>(sum, buffer->data(), values, double(samples));
     cuda_check(cudaGetLastError(), "image on the device");
-    cuda_check(cudaDeviceSynchronize(), "image on the device");
+    wait_for_default_stream("image on the device");
     DeviceImage image = {0, width, height, samples, {buffer, buffer->data()}};
     cuda_check(cudaGetDevice(&image.device), "device");
     return image;

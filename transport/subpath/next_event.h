@@ -41,7 +41,8 @@ AMBILUX_HD bool next_event(const SceneView& scene, const Rules<Mis>& rules, cons
     if (is_zero(f.value)) return false;
     c.environment = is_environment<F>(scene, light.emitter);
     c.value = throughput * f.value * ((c.environment ? splat(1.0f) : light.radiance) / light.pdf_sa);
-    return !is_zero(c.value) && complete_next_event<F>(scene, rules, z, depth, pick.over_power, light, f, c);
+    if (is_zero(c.value)) return false;  // as a condition of what is returned it costs nvcc ten registers
+    return complete_next_event<F>(scene, rules, z, depth, pick.over_power, light, f, c);
 }
 
 }  // namespace ambilux

@@ -82,7 +82,8 @@ private:
         c.value = path.throughput * y.f.value * (y.light.radiance * scale);
         const float over_power = rules.lights.over_power(scene, receiver, y.light.emitter);
         c.environment = false;  // its radiance is in the value
-        return !is_zero(c.value) && complete_next_event<F>(scene, rules, v, path.depth, over_power, y.light, y.f, c);
+        if (is_zero(c.value)) return false;
+        return complete_next_event<F>(scene, rules, v, path.depth, over_power, y.light, y.f, c);
     }
 };
 
