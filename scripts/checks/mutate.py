@@ -128,26 +128,35 @@ class Workspace:
         if result.returncode:
             sys.exit(result.stdout + result.stderr)
 
+    def lines_of_errors(self, text, folder):
+        """Files of the copy and lines that a compiler's messages name."""
+        found = re.finditer(r"^(\S+?):(\d+):(?:\d+:)?\s+(?:error|required from|in .constexpr. expansion)", text, re.MULTILINE)
+        return {(os.path.relpath(os.path.normpath(Path(folder) / m[1]), self.source), int(m[2])) for m in found}
+
+    def faults_at(self, lines):
+        # The rewritten file has one line more, the include.
+        found = {number for number, site in self.faults.items() for file, line in lines if file == site.file and site.line <= line - 1 <= site.last_line}
+        if lines and not found:
+            sys.exit(f"the copy does not compile, and no fault explains it: {sorted(lines)[:5]}")
+        return found
+
+    def save(self, key):
+        (self.folder / "faults.json").write_text(json.dumps({"key": key, "faults": {k: vars(s) for k, s in self.faults.items()}}, indent=1))
+
     def broken(self):
         """Faults that do not compile, by the compiler's messages about a few files that include all of the others."""
-        found, lines = set(), set()
+        lines = set()
 
         def errors(entry):
             command = re.sub(r"^(env \S+ )?\S*ccache ", "", re.sub(r" -o \S+", "", entry["command"])) + " -fsyntax-only -w -fmax-errors=0"
-            return {(os.path.relpath(os.path.normpath(Path(entry["directory"]) / m[1]), self.source), int(m[2]))
-                    for m in re.finditer(r"^(\S+?):(\d+):(?:\d+:)?\s+(?:error|required from|in .constexpr. expansion)", run(command, shell=True, cwd=entry["directory"]).stderr, re.MULTILINE)}
+            return self.lines_of_errors(run(command, shell=True, cwd=entry["directory"]).stderr, entry["directory"])
 
-        including = r"/((?:bdpt|path|learned)_All|bsdf_plugins|(?:film|backends|backends/cpu|render|session|integrators)/\w+|test_stages|test_bidirectional_stages)\.cpp$"
+        including = r"/(\w+_All|bsdf_plugins|(?:film|backends|render|session|integrators)/[\w/]+|test_stages|test_bidirectional_stages)\.cpp$"
         commands = [c for c in json.loads((self.build / "compile_commands.json").read_text()) if re.search(including, c["file"])]
         with concurrent.futures.ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
             for of_file in pool.map(errors, commands):
                 lines |= of_file
-        for number, site in self.faults.items():
-            # The rewritten file has one line more, the include.
-            found |= {number for file, line in lines if file == site.file and site.line <= line - 1 <= site.last_line}
-        if lines and not found:
-            sys.exit(f"the copy does not compile, and no fault explains it: {sorted(lines)[:5]}")
-        return found
+        return self.faults_at(lines)
 
     def read(self):
         """Faults of a copy that is built already."""
@@ -177,16 +186,21 @@ class Workspace:
                 broken = self.broken()
                 say(f"{len(drawn)} faults drawn, {len(broken)} of them do not compile")
                 dropped |= {self.faults[k] for k in broken}
-        known.write_text(json.dumps({"key": key, "faults": {k: vars(s) for k, s in self.faults.items()}}, indent=1))
+        self.save(key)
 
     def compile(self):
         say("building " + " ".join(self.tests))
         began = time.time()
         # Compilers say more about what is unreachable or unused in faults than in sources.
-        result = run(["nice", "cmake", "--build", self.build, "-j", str(len(os.sched_getaffinity(0))), "--target", *self.tests])
-        if result.returncode:
-            errors = [line for line in result.stdout.splitlines() if re.search(r"\berror:|FAILED", line)]
-            sys.exit("\n".join(["the build failed", *errors[:20]]))
+        command = ["nice", "cmake", "--build", self.build, "-j", str(len(os.sched_getaffinity(0))), "--target", *self.tests, "--", "-k", "0"]
+        while (result := run(command)).returncode:
+            broken = self.faults_at(self.lines_of_errors(result.stdout, self.build))
+            if not broken:
+                sys.exit("the build failed\n" + result.stdout[-4000:])
+            say(f"{len(broken)} faults more do not compile, and are left out")
+            for number in broken:
+                del self.faults[number]
+            self.rewrite(), self.save(json.loads((self.folder / "faults.json").read_text())["key"])
         say(f"built in {time.time() - began:.0f} s")
 
     # ---- running tests ----
