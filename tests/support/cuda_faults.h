@@ -43,7 +43,8 @@ struct CudaFaults {
         }
         return cudaSuccess;
     }
-    bool is_lost() const { return fault == Fault::lost && left == 0; }
+    /// Only once a call has failed: an error of what is destroyed before would be nobody's.
+    bool is_lost() const { return fault == Fault::lost && begun && left == 0; }
 };
 inline CudaFaults cuda_faults;
 
