@@ -3,6 +3,7 @@
 //                                   Emitter::pick_probability, by which light subpaths begin
 //   pick(view, receiver, u)         picks one with u in [0,1)
 //   over_power(view, receiver, i)   of emitter i, whoever found it
+// Receivers and sums by value: a reference to a part of a subpath cost nvcc 380 bytes of spills (core/hd.h).
 // A model of weights names it (Mis::Lights), and Rules hold it.
 #pragma once
 
@@ -19,7 +20,7 @@ struct Receiver {
 
 /// Where the ray with `sums` began at `p`. Sums that hold the normal there say so by receiver_normal().
 template <class Sums>
-AMBILUX_HD Receiver receiver_of_ray(Vec3f p, [[maybe_unused]] const Sums& sums) {
+AMBILUX_HD Receiver receiver_of_ray(Vec3f p, [[maybe_unused]] Sums sums) {
     if constexpr (requires { sums.receiver_normal(); })
         return {p, sums.receiver_normal()};
     else
@@ -32,10 +33,10 @@ struct LightsByPower {
         static constexpr float over_power = 1.0f;
         uint32_t emitter;
     };
-    AMBILUX_HD static Pick pick(const SceneView& view, const Receiver&, float u) {
+    AMBILUX_HD static Pick pick(const SceneView& view, Receiver, float u) {
         return {sample_cdf(view.emitter_cdf, view.emitter_count, u)};
     }
-    AMBILUX_HD static constexpr float over_power(const SceneView&, const Receiver&, uint32_t) { return 1.0f; }
+    AMBILUX_HD static constexpr float over_power(const SceneView&, Receiver, uint32_t) { return 1.0f; }
 };
 
 }  // namespace ambilux
