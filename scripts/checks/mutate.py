@@ -134,6 +134,7 @@ class Workspace:
         return {(os.path.relpath(os.path.normpath(Path(folder) / m[1]), self.source), int(m[2])) for m in found}
 
     def faults_at(self, lines):
+        """Faults that stand in those lines."""
         # The rewritten file has one line more, the include.
         found = {number for number, site in self.faults.items() for file, line in lines if file == site.file and site.line <= line - 1 <= site.last_line}
         if lines and not found:
@@ -144,8 +145,8 @@ class Workspace:
             found = {min(near)[1]}
         return found
 
-    def save(self, key):
-        (self.folder / "faults.json").write_text(json.dumps({"key": key, "faults": {k: vars(s) for k, s in self.faults.items()}}, indent=1))
+    def save(self):
+        (self.folder / "faults.json").write_text(json.dumps({"key": self.key, "faults": {k: vars(s) for k, s in self.faults.items()}}, indent=1))
 
     def broken(self):
         """Faults that do not compile, by the compiler's messages about a few files that include all of the others."""
@@ -168,9 +169,9 @@ class Workspace:
 
     def draw(self, seed, count):
         """Draws faults, without those that do not compile, or reads those of an earlier run."""
-        key = hashlib.sha256(json.dumps([seed, count, self.sources], sort_keys=True).encode()).hexdigest()
+        self.key = hashlib.sha256(json.dumps([seed, count, self.sources], sort_keys=True).encode()).hexdigest()
         known = self.folder / "faults.json"
-        if known.exists() and (saved := json.loads(known.read_text()))["key"] == key:
+        if known.exists() and json.loads(known.read_text())["key"] == self.key:
             self.read()
             self.copy(), self.rewrite(), self.configure()
             return
@@ -190,7 +191,7 @@ class Workspace:
                 broken = self.broken()
                 say(f"{len(drawn)} faults drawn, {len(broken)} of them do not compile")
                 dropped |= {self.faults[k] for k in broken}
-        self.save(key)
+        self.save()
 
     def compile(self):
         say("building " + " ".join(self.tests))
@@ -204,7 +205,7 @@ class Workspace:
             say(f"{len(broken)} faults more do not compile, and are left out")
             for number in broken:
                 del self.faults[number]
-            self.rewrite(), self.save(json.loads((self.folder / "faults.json").read_text())["key"])
+            self.rewrite(), self.save()
         say(f"built in {time.time() - began:.0f} s")
 
     # ---- running tests ----
