@@ -127,7 +127,7 @@ TEST_CASE("B1: a point light in a bump-mapped sphere, every family of strategies
         folder.write("scene.xml", scene_xml(2, camera("0.5,0.1,0.2", "-1,0.2,0", 80) +
                                                    "<shape type='sphere'><boolean name='flip_normals' value='true'/>" +
                                                    bump + "</shape>" + point_light("x='-0.2' y='0.3' z='0.1'"))));
-    agree_length_by_length(scene, 4, 256, 0.06);
+    agree_length_by_length(scene, 4, 96, 0.06);
 }
 
 TEST_CASE("B2: a coarse ball with radial normals, shared and unshared vertices, diffuse and rough metal",
@@ -157,7 +157,7 @@ TEST_CASE("B3: normals 60 degrees off, every family of strategies, length by len
                          "</bsdf></shape><shape type='rectangle'><transform name='to_world'><rotate x='1' "
                          "angle='90'/><translate y='1' z='1'/></transform>" +
                          kWhite + "</shape>" + lamp(0.5, 0.5, 0.2, -0.3, 2));
-    agree_length_by_length(scene_with(xml, {{"quad.obj", quad}}), 4, 512, 0.12);
+    agree_length_by_length(scene_with(xml, {{"quad.obj", quad}}), 4, 128, 0.12);
 }
 
 TEST_CASE("B4: rays along surfaces and lights in their plane give no NaN", "[bidirectional]") {

@@ -203,6 +203,35 @@ TEST_CASE("leaves of a tree of cells hold as many points each, and some where ma
     for (const uint32_t few : {0u, 1u, 3u}) CHECK(split_points({points.begin(), points.begin() + few}, 4).size() == 16);
 }
 
+TEST_CASE("splits of a tree of cells look at one coordinate of the place or of the normal") {
+    const Vec3f p = {1, 2, 3}, n = {4, 5, 6};
+    for (uint32_t axis = 0; axis < 6; ++axis) {
+        const float value = float(axis + 1);
+        for (const float at : {value - 0.5f, value, value + 0.5f}) {
+            DrawSplit splits[2] = {{}, {at, axis}};
+            CHECK(DrawTree{splits, 1}.leaf(p, n) == (value >= at ? 1 : 0));
+        }
+    }
+}
+
+TEST_CASE("clusters begin where the vertices of those before end") {
+    // Keys of parts 3 and 15 of cluster 0, 0 and 1 of cluster 2.
+    std::vector<uint16_t> keys;
+    for (const auto& [cluster, vertex] : {std::pair{0u, 3 * 32u}, {0u, 15 * 32u}, {2u, 0u}, {2u, 32u}})
+        keys.push_back(ClusteredVertices::key(cluster, vertex));
+    CHECK(std::is_sorted(keys.begin(), keys.end()));
+    QueueCounter counter{};
+    counter.capacity = counter.count = 4;
+    std::vector<uint32_t> first(4);
+    LearnedSource source{};
+    source.vertices.counter = &counter;
+    source.by_cluster.first = first.data();
+    source.by_cluster.sort.keys[1] = keys.data();
+    const FindClusters find = {source, nullptr};
+    for (uint32_t cluster = 0; cluster < 4; ++cluster) find(cluster);
+    CHECK(first == std::vector<uint32_t>{0, 2, 2, 4});
+}
+
 TEST_CASE("behind a door ajar learned draws have much less variance than uniform ones", "[data]") {
     const auto scene = published_scene("veach-ajar", 64, 36);
     if (!scene) return;

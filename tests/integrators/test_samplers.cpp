@@ -264,6 +264,16 @@ TEST_CASE("Lights picked by what the receiver is give the same image, by paths a
 TEST_CASE("Samplers of directions and lights go with each other and with a third sum") {
     using Both = With<ThirdSumMis, MixedDirections<true>, LightsByPower>;
     check<BdptBy<Both>, BdptBy<BidirectionalMis>>({"materials"}, "bdpt");
+    // What a render does without is said of them as of the model that they add to.
+    const Scene scene = project_scene("cornell", 8, 8);
+    RenderSettings s;
+    s.integrator = "bdpt";
+    const auto skipped = [&]<class Integrator>() { return Integrator::skipped(scene, Integrator::plan(scene, s)); };
+    for (const int max_depth : {8, 1}) {
+        s.max_depth = max_depth;
+        CHECK(skipped.template operator()<BdptBy<Both>>() == skipped.template operator()<BdptBy<BidirectionalMis>>());
+        CHECK(skipped.template operator()<BdptBy<Both>>().empty() == (max_depth == 8));
+    }
 }
 
 TEST_CASE("A model's random numbers are those of its subpaths") {

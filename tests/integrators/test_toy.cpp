@@ -65,6 +65,21 @@ TEST_CASE("a disk above a plane hides its form factor from the point below") {
     CHECK(sees_bias(image, truth, 0.05));
 }
 
+TEST_CASE("every tile of a wave is seen, and stages count at their depths, wave after wave") {
+    const Scene scene = project_scene("cornell", 64, 64);
+    RenderSettings s = toy_settings(scene);
+    s.threads = 1;
+    s.fuse = Fuse::none;
+    const RenderStats stats = render_scene(scene, s, 4).stats;
+    CHECK(stats.wave_paths > 64);
+    for (const StageStats& stage : stats.stages) {
+        INFO(stage.name);
+        const uint64_t depth = stage.name == "generate" || stage.name == "update_film" ? 0 : 1;
+        CHECK(stage.items_by_depth.at(depth) == stage.items);
+        if (stage.name == "generate" || stage.name == "extend") CHECK(stage.items == 64 * 64 * 4);
+    }
+}
+
 TEST_CASE("toy refuses what it has not") {
     const Scene scene = project_scene("cornell", 16, 16);
     for (const auto& [key, value] :

@@ -2,9 +2,14 @@
 // A setting is declared once: what follows from its declaration is complete and agrees.
 #include "integrators/settings_help.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "integrators/path/policy.h"
 #include "integrators/registry.h"
+#include "integrators/warnings.h"
 #include "session/statistics.h"
 #include "session/stats_sum.h"
 #include "tests/support/render_scene.h"
@@ -127,6 +132,76 @@ TEST_CASE("stress has the methods that variants name, each once") {
     CHECK(names == std::vector<std::string>{"path-naive", "path-nee", "path-mis", "path-mis-power", "path-ris", "light",
                                             "light-power", "bdpt", "bdpt-power", "lvc", "lvc-power", "streaming",
                                             "streaming-power", "megakernel", "megakernel-power"});
+}
+
+TEST_CASE("learned draws are offered to the selection as four that are worth twelve, where they may be") {
+    RenderSettings s;
+    s.integrator = "bdpt";
+    s.variant = "lvc";
+    const VariantTraits any = {.draws = true, .selects_any = true};
+    SelectionRequest asked = {s, any, false, false, 1.0f};
+    const Variant* learned = find_variant("bdpt", "learned");
+    REQUIRE(learned);
+    const std::vector<SelectionOffer> offers = learned->selection(asked);
+    REQUIRE(offers.size() == 1);
+    CHECK(offers[0].settings == SettingTexts{{"strategies", "all"}, {"connections", "4"}});
+    CHECK(offers[0].connect);
+    CHECK(offers[0].draws == 4);
+    CHECK(offers[0].worth == 12);
+    asked.cuda = true;
+    CHECK(learned->selection(asked).empty());
+    asked = {s, any, false, false, 0.0f};
+    CHECK(learned->selection(asked).empty());
+}
+
+TEST_CASE("numbers of light subpaths between those that tiles can have are refused with the next ones") {
+    RenderSettings s;
+    CHECK_THAT(refusal([&] { apply_setting(s, "light_paths", "0.26"); }),
+               ContainsSubstring("the next are 0.25 and 0.265625"));
+    CHECK_THAT(refusal([&] { apply_setting(s, "light_paths", "2.99"); }),
+               ContainsSubstring("the next are 2.984375 and 3"));
+}
+
+TEST_CASE("roulette that lets variance double within the depth of paths is warned of") {
+    const Scene scene = scene_from_text(
+        "<scene version='3.0.0'><sensor type='perspective'/><emitter type='constant'/><shape type='sphere'>"
+        "<bsdf type='diffuse'><rgb name='reflectance' value='0.9, 0.99, 0.5'/></bsdf></shape></scene>");
+    RenderSettings s;
+    s.rr_depth = 5;
+    s.rr_cap = 0.95f;
+    const double doubles_after = std::log(2.0) / std::log(double(0.99f) * 0.99f / 0.95f);  // 22.2 vertices
+    for (const auto& [depth, warned] : {std::pair{-1, true},
+                                        {5 + int(std::ceil(doubles_after)), true},
+                                        {5 + int(std::floor(doubles_after)), false},
+                                        {1, false}}) {
+        s.max_depth = depth;
+        const std::vector<std::string> warnings = render_warnings(scene, s);
+        INFO(depth << " of " << doubles_after);
+        CHECK(std::any_of(warnings.begin(), warnings.end(), [](const std::string& w) {
+                  return w.starts_with("a surface reflects 0.99 of the light, and Russian roulette ends one path in 20");
+              }) == warned);
+    }
+    s.max_depth = -1;
+    s.rr_cap = 0.99f;
+    CHECK(render_warnings(scene, s).empty());
+}
+
+TEST_CASE("a path tracer says which of its stages a render does without, and why") {
+    const auto skipped = [](const Scene& scene, Estimator estimator, int max_depth) {
+        RenderSettings s;
+        s.estimator = estimator;
+        s.max_depth = max_depth;
+        return skipped_path_parts(scene, plan_path(scene, s).rules);
+    };
+    const Scene scene = project_scene("cornell", 8, 8);
+    Scene dark = scene;
+    dark.emitters.clear();
+    using Parts = std::vector<std::string>;
+    CHECK(skipped(scene, Estimator::mis, 8).empty());
+    CHECK(skipped(scene, Estimator::naive, 8) == Parts{"connect, occlude: estimator naive samples no emitters"});
+    CHECK(skipped(scene, Estimator::mis, 1) == Parts{"connect, occlude: max_depth leaves no segment for them"});
+    CHECK(skipped(dark, Estimator::mis, 8) ==
+          Parts{"connect, occlude: no emitters", "mis_weight and accumulate of hits: no emitters"});
 }
 
 TEST_CASE("a setting without an effect is refused with key, value, place and where it has one") {
