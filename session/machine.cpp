@@ -72,11 +72,15 @@ nlohmann::json parse_gpu_clocks(const std::string& lines) {
 }
 
 CpuMhz cpu_mhz() {
+    std::ifstream cpuinfo("/proc/cpuinfo");
+    return parse_cpu_mhz(cpuinfo);
+}
+
+CpuMhz parse_cpu_mhz(std::istream& cpuinfo) {
     CpuMhz found;
     double sum = 0;
     int cores = 0;
-    std::ifstream cpu("/proc/cpuinfo");
-    for (std::string line; std::getline(cpu, line);) {
+    for (std::string line; std::getline(cpuinfo, line);) {
         if (!line.starts_with("cpu MHz")) continue;
         const size_t at = line.find(": ");
         double mhz = 0;

@@ -1,6 +1,7 @@
 // What the figures were measured on.
 #pragma once
 
+#include <iosfwd>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -14,6 +15,8 @@ struct CpuMhz {
 };
 /// From /proc/cpuinfo.
 CpuMhz cpu_mhz();
+/// From lines such as "cpu MHz\t\t: 2100.000" of that file; lines without a number do not count.
+CpuMhz parse_cpu_mhz(std::istream& cpuinfo);
 
 /// What the clocks run at now, as {when, cpu_mhz {lowest, mean, highest}, gpu [{sm_mhz, memory_mhz, celsius}]}: figures
 /// of a machine that was throttled or shared can be told. From /proc/cpuinfo and nvidia-smi; null where those do not

@@ -136,6 +136,41 @@ TEST_CASE("what a worker throws ends the render") {
     CHECK_THROWS_AS(render_parallel(scene, request, ranks()), Error);
 }
 
+TEST_CASE("what was rendered before a device failed is saved and gone on with; other errors leave no state") {
+    const Scene scene = project_scene("cornell", 16, 12);
+    const test::TempFolder folder;
+    const auto request = [&] { return request_for(scene, folder, "path", "wavefront", 1); };
+    const FilmMoments expected = render_parallel(scene, request(), ranks()).film;
+    uint64_t rendered = 0;
+    const auto failing = [&](ExitCode code) {
+        ParallelRequest r = request();
+        r.on_progress = [&, code](const RenderPosition& p, const RenderStats&) {
+            rendered = p.samples;
+            if (rendered > 20) throw Error(code, "the device is lost");
+        };
+        try {
+            render_parallel(scene, r, ranks());
+        } catch (const Error& error) {
+            CHECK(error.code == code);
+            return std::string(error.what());
+        }
+        return std::string("no error");
+    };
+    CHECK(failing(ExitCode::bad_input) == "the device is lost");
+    CHECK(!std::filesystem::exists(folder / "state"));
+    CHECK(failing(ExitCode::device) == "the device is lost. " + std::to_string(rendered) +
+                                           " samples per pixel are in " + (folder / "state") +
+                                           "; the same command with --resume goes on");
+    REQUIRE(rendered > 20);
+    REQUIRE(rendered < 50);
+    ParallelRequest rest = request();
+    rest.resume = true;
+    const ParallelResult whole = render_parallel(scene, rest, ranks());
+    CHECK(same(whole.film, expected));
+    CHECK(whole.workers.at(0).samples == 50 - rendered);
+    CHECK(!std::filesystem::exists(folder / "state"));
+}
+
 TEST_CASE("a crew renders a node on all of its devices, hands over one film for it, and has one structure for rays") {
     const Scene scene = project_scene("glass", 24, 16);
     const RenderSettings settings = cpu_settings(scene, Estimator::mis);
