@@ -84,9 +84,7 @@ CpuMhz parse_cpu_mhz(std::istream& cpuinfo) {
         if (!line.starts_with("cpu MHz")) continue;
         const size_t at = line.find(": ");
         double mhz = 0;
-        if (at == std::string::npos ||
-            std::from_chars(line.data() + at + 2, line.data() + line.size(), mhz).ec != std::errc())
-            continue;
+        if (at == std::string::npos || !(std::istringstream(line.substr(at + 2)) >> mhz)) continue;
         found.lowest = cores ? std::min(found.lowest, mhz) : mhz;
         found.highest = std::max(found.highest, mhz);
         sum += mhz;
