@@ -17,18 +17,14 @@
 #include "core/version.h"
 
 namespace ambilux {
-namespace {
 
-/// The first word of digits and dots, such as 580.65.06; all of it without one.
-std::string version_in(const std::string& line) {
+std::string parse_driver_version(const std::string& line) {
     std::istringstream words(line);
     for (std::string word; words >> word;)
         if (word.find('.') != std::string::npos && word.find_first_not_of("0123456789.") == std::string::npos)
             return word;
     return line;
 }
-
-}  // namespace
 
 nlohmann::json describe_machine() {
     nlohmann::json machine = {{"cpu", nullptr},
@@ -44,9 +40,8 @@ nlohmann::json describe_machine() {
             if (const size_t at = line.find(": "); at != std::string::npos) machine["cpu"] = line.substr(at + 2);
             break;
         }
-    // "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build ..."
     std::ifstream driver("/proc/driver/nvidia/version");
-    if (std::string line; std::getline(driver, line)) machine["driver"] = version_in(line);
+    if (std::string line; std::getline(driver, line)) machine["driver"] = parse_driver_version(line);
     if (utsname name; ::uname(&name) == 0)
         machine["system"] = std::string(name.sysname) + " " + name.release + " " + name.machine;
     return machine;

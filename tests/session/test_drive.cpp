@@ -125,6 +125,24 @@ TEST_CASE("samples that a renderer brings along are the first of a render with a
     CHECK(drive(counted, {}, {5, 0}).samples == 5);  // fewer than there are: the renderer sees that
 }
 
+TEST_CASE("after samples that a renderer brought along a batch is no more than as many") {
+    World world;
+    world.batch = 1000;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 1;
+    struct Prepared : SaysItsTime {
+        using SaysItsTime::SaysItsTime;
+        uint32_t ready() const override { return 40; }
+    };
+    Prepared renderer(scene, {}, world, 1.0 / 1024);
+    std::vector<uint64_t> ends;
+    drive(renderer, {}, {0, 1.0}, nullptr, [&](const RenderPosition& p) {
+        ends.push_back(p.samples);
+        CHECK((p.per_sample > 0) == (p.samples > 40));  // those that were ready are no measure
+    });
+    CHECK(ends == std::vector<uint64_t>{40, 80, 240, 880, 1024});
+}
+
 TEST_CASE("the time that is left: by kind, and for budgets of samples and seconds at once") {
     WorkEstimate work;
     work.plan("a", 4, {100, 0});

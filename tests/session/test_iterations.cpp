@@ -8,6 +8,7 @@
 #include "render/chosen.h"
 #include "render/invalid_watch.h"
 #include "render/sample_watch.h"
+#include "session/parallel/checkpoint.h"
 #include "session/parallel/parallel_render.h"
 #include "session/parallel/state_log.h"
 #include "session/reference.h"
@@ -87,7 +88,8 @@ ParallelResult stopped(ParallelRequest request, const std::function<ParallelResu
 }
 
 bool same(const FilmMoments& a, const FilmMoments& b) {
-    return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares;
+    return a.width == b.width && a.height == b.height && a.samples == b.samples && a.sum == b.sum &&
+           a.sum_squares == b.sum_squares;
 }
 
 FilmMoments pixel() { return {1, 1, 1, std::vector<double>(3), std::vector<double>(3)}; }
@@ -295,6 +297,59 @@ TEST_CASE("a saved state comes back whole, and one that is damaged anywhere is n
     no_json[kMagic + 48] = 'x';
     CHECK(is_damaged(with_checksum(no_json)));
     CHECK_FALSE(is_damaged(good));
+}
+
+TEST_CASE("the sums of a tree are saved one by one, with notes and states, and a render of something else is refused") {
+    const TempFolder folder;
+    CheckpointFile file(folder / "state");
+    MergeTree tree, read;
+    DeviceStates devices;
+    CHECK_FALSE(file.exists());
+    CHECK(file.read(read, devices).is_null());
+    const auto film = [](uint64_t samples, double first) {
+        return FilmMoments{1, 2, samples, {first, 2, 3, 4, 5, 6}, {7, 8, 9, 10, 11, 12 * first}};
+    };
+    tree.add({1, 0}, film(6, 1));
+    tree.add({0, 3}, film(3, 20));
+    tree.add({2, 2}, film(12, 300));
+    const nlohmann::json identity = {{"scene_hash", "ab"}, {"spp", 100}, {"settings", {{"seed", 1}, {"depth", 4}}}};
+    const DeviceStates kept = {{std::byte{1}}, {}};
+    file.write(tree, {{"identity", identity}, {"range_size", 3}, {"seconds", 0.5}}, kept);
+    file.wait();
+    CHECK(file.exists());
+    const nlohmann::json notes = file.read(read, devices);
+    CHECK(notes.at("seconds") == 0.5);
+    CHECK(devices == kept);
+    CHECK(read.samples() == 21);
+    REQUIRE(read.entries().size() == 3);
+    for (const auto& [first, entry] : tree.entries()) {
+        const MergeTree::Entry& back = read.entries().at(first);
+        CHECK(back.node == entry.node);
+        CHECK(same(back.film, entry.film));
+    }
+    CHECK_NOTHROW(file.check_same(notes, identity, 3));
+    CHECK_NOTHROW(file.check_same(notes, identity, 0));
+    const auto refused = [&](const nlohmann::json& other, uint32_t size) {
+        const std::string text = error_of([&] { file.check_same(notes, other, size); }), from = "its ";
+        return text.substr(text.find(from) + from.size(), text.find(" differs") - text.find(from) - from.size());
+    };
+    CHECK(refused(identity, 4) == "range size");
+    for (const char* key : {"scene_hash", "spp"}) {
+        nlohmann::json other = identity;
+        other[key] = "other";
+        CHECK(refused(other, 3) == key);
+    }
+    for (const char* key : {"seed", "new"}) {
+        nlohmann::json other = identity;
+        other["settings"][key] = 2;
+        CHECK(refused(other, 3) == key);
+    }
+    file.write({}, {{"identity", identity}}, {});
+    file.wait();
+    CHECK(file.read(read, devices).at("nodes").empty());
+    CHECK(read.entries().empty());
+    file.remove();
+    CHECK_FALSE(file.exists());
 }
 
 TEST_CASE("states that are saved have learned from films that are there alone") {

@@ -3,6 +3,9 @@
 // What an experiment records of its machine: load, versions, clocks.
 #include <sys/wait.h>
 
+#include <algorithm>
+#include <cctype>
+#include <cstring>
 #include <ctime>
 #include <sstream>
 
@@ -44,6 +47,17 @@ TEST_CASE("what others take of the machine is told from what this process takes"
     const nlohmann::json versions = describe_versions();
     for (const char* key : {"ambilux", "git_revision", "compiler", "flags", "embree", "tbb"})
         CHECK_FALSE(versions[key].get<std::string>().empty());
+}
+
+TEST_CASE("the command line is told as a shell takes it: only what it would read otherwise is in quotes") {
+    std::ifstream in("/proc/self/cmdline", std::ios::binary);
+    std::string expected;
+    for (std::string argument; std::getline(in, argument, '\0');) {
+        const auto plain = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || strchr("/._-+=,:~[]", c); };
+        const bool quoted = argument.empty() || !std::all_of(argument.begin(), argument.end(), plain);
+        expected += (expected.empty() ? "" : " ") + (quoted ? "'" + argument + "'" : argument);
+    }
+    CHECK(command_line() == expected);
 }
 
 TEST_CASE("CPU seconds of a process are its own and those of its ended children, whatever its name is") {
@@ -95,6 +109,17 @@ TEST_CASE("clocks of cores are read from what the kernel prints, and a core that
     std::istringstream nothing("processor\t: 0\n");
     const CpuMhz none = parse_cpu_mhz(nothing);
     CHECK((none.lowest == 0 && none.mean == 0 && none.highest == 0));
+}
+
+TEST_CASE("the version of a driver is the first word of digits and dots") {
+    CHECK(parse_driver_version("NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build 1.2") ==
+          "580.65.06");
+    CHECK(parse_driver_version("NVRM version: 580 v1.2") == "NVRM version: 580 v1.2");
+    CHECK(parse_driver_version("").empty());
+    const nlohmann::json machine = describe_machine();
+    CHECK(machine["cores"] == std::thread::hardware_concurrency());
+    CHECK(machine["memory_bytes"] > uint64_t(1) << 24);
+    CHECK(machine["system"].get<std::string>().starts_with("Linux "));
 }
 
 TEST_CASE("clocks of graphics cards are read from what nvidia-smi prints") {

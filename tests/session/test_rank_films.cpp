@@ -14,7 +14,8 @@ using namespace ambilux;
 namespace {
 
 bool same(const FilmMoments& a, const FilmMoments& b) {
-    return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares;
+    return a.width == b.width && a.height == b.height && a.samples == b.samples && a.sum == b.sum &&
+           a.sum_squares == b.sum_squares;
 }
 
 ParallelRequest request_for(const Scene& scene, const test::TempFolder& folder, unsigned block_nodes) {

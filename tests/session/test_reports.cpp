@@ -4,6 +4,7 @@
 #include "integrators/registry.h"
 #include "integrators/setting.h"
 #include "session/bench_frames.h"
+#include "session/render_plan.h"
 #include "session/statistics.h"
 #include "session/stats_sum.h"
 #include "session/technique_files.h"
@@ -387,4 +388,58 @@ TEST_CASE("images of strategies are listed with their means, and the longest pat
     CHECK(said["technique"] == "raw");
     CHECK(bool(read_exr(folder / "t/weighted_s03_t02.exr", &said).rgb == raw));
     CHECK(said["technique"] == "weighted");
+}
+
+TEST_CASE("values that were dropped and items that were lost are told stage by stage and queue by queue") {
+    CHECK(lost_values(some_stats()) ==
+          "stage connect dropped 1 NaN, 2 Inf, 3 negative values; stage shade dropped 10 NaN, 9 Inf, 8 negative values; "
+          "queue hits of capacity 100 lost 2 items; queue splats of capacity 50 lost 1 items");
+    RenderStats stats;
+    CHECK(lost_values(stats).empty());
+    stats.invalid.underflow = 5;
+    stats.invalid_by_stage["shade"].underflow = 5;
+    CHECK(lost_values(stats).empty());  // no error by itself
+    stats.invalid.inf = 2;
+    CHECK(lost_values(stats) == "0 NaN, 2 Inf, 0 negative values were dropped");
+}
+
+TEST_CASE("a render ends by samples or by time, and by the samples of its scene where nothing is said") {
+    Scene scene = small_scene(2, 1);
+    scene.integrator.spp = 12;
+    scene.integrator.type = "bdpt";
+    scene.integrator.max_depth = 7;
+    scene.integrator.rr_depth = 3;
+    const auto budget = [&](std::optional<uint64_t> spp, std::optional<double> time) {
+        const Budget b = render_budget(spp, time, scene, "--");
+        return std::pair(b.samples, b.seconds);
+    };
+    CHECK(budget({}, {}) == std::pair(uint64_t(12), 0.0));
+    CHECK(budget(3, {}) == std::pair(uint64_t(3), 0.0));
+    CHECK(budget({}, 0.5) == std::pair(uint64_t(0), 0.5));
+    scene.integrator.spp = 0;
+    CHECK(budget({}, {}) == std::pair(uint64_t(1), 0.0));
+    const auto refused = [&](std::optional<uint64_t> spp, std::optional<double> time) {
+        return error_of([&] { budget(spp, time); }, ExitCode::usage);
+    };
+    CHECK(refused(3, 0.5) == "--spp and --time exclude each other: a render ends by one of them");
+    CHECK(refused(0, {}) == "--spp 0: at least one sample per pixel is needed");
+    for (const double time : {0.0, -1.0, double(kInfinity), std::nan("")})
+        CHECK(refused({}, time) == "--time: more than zero seconds are needed");
+    RenderSettings settings = default_settings(scene);
+    CHECK(settings.integrator == "bdpt");
+    CHECK(settings.max_depth == 7);
+    CHECK(settings.rr_depth == 3);
+    expect(settings, {9, 0.25});
+    CHECK(settings.expected_samples == 9);
+    CHECK(settings.expected_seconds == 0.25);
+    World world;
+    FakeRenderer plain(scene, {}, world);
+    CHECK(first_position(plain).seconds == 0);
+    struct Chose : FakeRenderer {
+        using FakeRenderer::FakeRenderer;
+        RenderStats stats() override { return some_stats(); }
+    };
+    Chose chose(scene, {}, world);
+    CHECK(first_position(chose).seconds == 0.25);
+    CHECK(first_position(chose).samples == 0);
 }
