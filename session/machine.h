@@ -10,8 +10,8 @@ namespace ambilux {
 /// cpu (model), cores, memory_bytes, system, driver (of NVIDIA devices; null without), read from /proc.
 nlohmann::json describe_machine();
 
-/// Of a line such as "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build": the first word
-/// of digits and dots; all of it without one.
+/// Of a line such as "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build": the first
+/// word of digits and dots; all of it without one.
 std::string parse_driver_version(const std::string& line);
 
 struct CpuMhz {

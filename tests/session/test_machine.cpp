@@ -53,7 +53,9 @@ TEST_CASE("the command line is told as a shell takes it: only what it would read
     std::ifstream in("/proc/self/cmdline", std::ios::binary);
     std::string expected;
     for (std::string argument; std::getline(in, argument, '\0');) {
-        const auto plain = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || strchr("/._-+=,:~[]", c); };
+        const auto plain = [](char c) {
+            return std::isalnum(static_cast<unsigned char>(c)) || strchr("/._-+=,:~[]", c);
+        };
         const bool quoted = argument.empty() || !std::all_of(argument.begin(), argument.end(), plain);
         expected += (expected.empty() ? "" : " ") + (quoted ? "'" + argument + "'" : argument);
     }
@@ -112,8 +114,8 @@ TEST_CASE("clocks of cores are read from what the kernel prints, and a core that
 }
 
 TEST_CASE("the version of a driver is the first word of digits and dots") {
-    CHECK(parse_driver_version("NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build 1.2") ==
-          "580.65.06");
+    CHECK(parse_driver_version(
+              "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build 1.2") == "580.65.06");
     CHECK(parse_driver_version("NVRM version: 580 v1.2") == "NVRM version: 580 v1.2");
     CHECK(parse_driver_version("").empty());
     const nlohmann::json machine = describe_machine();

@@ -59,6 +59,7 @@ TEST_CASE("1, 2, 4 and 7 ranks make the same bits, whether the first one adds up
             CHECK(same(result.film, *expected));
             CHECK(result.stats.samples == 200);
             CHECK(result.workers.size() == size_t(ranks));
+            CHECK((result.stats.device.find(host_name() + ": ") != std::string::npos) == (ranks > 1));
             uint64_t samples = 0;
             for (const WorkerShare& w : result.workers) samples += w.samples;
             CHECK(samples == 200);

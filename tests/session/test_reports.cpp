@@ -391,9 +391,10 @@ TEST_CASE("images of strategies are listed with their means, and the longest pat
 }
 
 TEST_CASE("values that were dropped and items that were lost are told stage by stage and queue by queue") {
-    CHECK(lost_values(some_stats()) ==
-          "stage connect dropped 1 NaN, 2 Inf, 3 negative values; stage shade dropped 10 NaN, 9 Inf, 8 negative values; "
-          "queue hits of capacity 100 lost 2 items; queue splats of capacity 50 lost 1 items");
+    CHECK(
+        lost_values(some_stats()) ==
+        "stage connect dropped 1 NaN, 2 Inf, 3 negative values; stage shade dropped 10 NaN, 9 Inf, 8 negative values; "
+        "queue hits of capacity 100 lost 2 items; queue splats of capacity 50 lost 1 items");
     RenderStats stats;
     CHECK(lost_values(stats).empty());
     stats.invalid.underflow = 5;
