@@ -49,7 +49,7 @@ public:
 
     bool streams() const { return waves_.slots_in_flight > 0; }
     /// A wave holds a part of the film.
-    bool in_parts() const { return film_wide_ && (threads_ > 0 || wave.tiles < tile_count(wave)); }
+    bool in_parts() const { return film_wide_ && wave.tiles < tile_count(wave); }
     /// Light subpaths of a wave from `tile` on, in one sample.
     uint32_t light_subpaths(uint32_t tile) const;
     /// Light vertices that the queues of a wave have room for.

@@ -22,7 +22,6 @@ std::vector<std::string> slowdowns(uint64_t held_down);
 class GpuReadings {
 public:
     void add(const GpuReading& reading);
-    bool empty() const { return count_ == 0; }
     /// {readings, sm_mhz {lowest, mean, highest}, memory_mhz, celsius, watts, slowdowns}: lowest, highest, highest and
     /// mean; null where there were none.
     nlohmann::json json() const;

@@ -17,18 +17,14 @@
 #include "core/version.h"
 
 namespace ambilux {
-namespace {
 
-/// The first word of digits and dots, such as 580.65.06; all of it without one.
-std::string version_in(const std::string& line) {
+std::string parse_driver_version(const std::string& line) {
     std::istringstream words(line);
     for (std::string word; words >> word;)
         if (word.find('.') != std::string::npos && word.find_first_not_of("0123456789.") == std::string::npos)
             return word;
     return line;
 }
-
-}  // namespace
 
 nlohmann::json describe_machine() {
     nlohmann::json machine = {{"cpu", nullptr},
@@ -44,9 +40,8 @@ nlohmann::json describe_machine() {
             if (const size_t at = line.find(": "); at != std::string::npos) machine["cpu"] = line.substr(at + 2);
             break;
         }
-    // "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build ..."
     std::ifstream driver("/proc/driver/nvidia/version");
-    if (std::string line; std::getline(driver, line)) machine["driver"] = version_in(line);
+    if (std::string line; std::getline(driver, line)) machine["driver"] = parse_driver_version(line);
     if (utsname name; ::uname(&name) == 0)
         machine["system"] = std::string(name.sysname) + " " + name.release + " " + name.machine;
     return machine;
@@ -72,17 +67,19 @@ nlohmann::json parse_gpu_clocks(const std::string& lines) {
 }
 
 CpuMhz cpu_mhz() {
+    std::ifstream cpuinfo("/proc/cpuinfo");
+    return parse_cpu_mhz(cpuinfo);
+}
+
+CpuMhz parse_cpu_mhz(std::istream& cpuinfo) {
     CpuMhz found;
     double sum = 0;
     int cores = 0;
-    std::ifstream cpu("/proc/cpuinfo");
-    for (std::string line; std::getline(cpu, line);) {
+    for (std::string line; std::getline(cpuinfo, line);) {
         if (!line.starts_with("cpu MHz")) continue;
         const size_t at = line.find(": ");
         double mhz = 0;
-        if (at == std::string::npos ||
-            std::from_chars(line.data() + at + 2, line.data() + line.size(), mhz).ec != std::errc())
-            continue;
+        if (at == std::string::npos || !(std::istringstream(line.substr(at + 2)) >> mhz)) continue;
         found.lowest = cores ? std::min(found.lowest, mhz) : mhz;
         found.highest = std::max(found.highest, mhz);
         sum += mhz;

@@ -1,6 +1,7 @@
 // What the figures were measured on.
 #pragma once
 
+#include <iosfwd>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -9,11 +10,17 @@ namespace ambilux {
 /// cpu (model), cores, memory_bytes, system, driver (of NVIDIA devices; null without), read from /proc.
 nlohmann::json describe_machine();
 
+/// Of a line such as "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build": the first
+/// word of digits and dots; all of it without one.
+std::string parse_driver_version(const std::string& line);
+
 struct CpuMhz {
     double lowest = 0, mean = 0, highest = 0;  ///< over cores; 0: unknown
 };
 /// From /proc/cpuinfo.
 CpuMhz cpu_mhz();
+/// From lines such as "cpu MHz\t\t: 2100.000" of that file; lines without a number do not count.
+CpuMhz parse_cpu_mhz(std::istream& cpuinfo);
 
 /// What the clocks run at now, as {when, cpu_mhz {lowest, mean, highest}, gpu [{sm_mhz, memory_mhz, celsius}]}: figures
 /// of a machine that was throttled or shared can be told. From /proc/cpuinfo and nvidia-smi; null where those do not

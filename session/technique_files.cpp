@@ -12,7 +12,7 @@ namespace ambilux {
 namespace {
 
 double mean_of(const std::vector<float>& values) {
-    return values.empty() ? 0.0 : std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
+    return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
 }
 
 }  // namespace

@@ -12,8 +12,10 @@ namespace ambilux {
 
 namespace detail {
 
+constexpr std::align_val_t kHostAlignment{256};
+
 struct HostMemoryDelete {
-    void operator()(std::byte* p) const { ::operator delete[](p, std::align_val_t(256)); }
+    void operator()(std::byte* p) const { ::operator delete[](p, kHostAlignment); }
 };
 
 }  // namespace detail
@@ -25,7 +27,7 @@ public:
     HostMemory() = default;
     /// Throws std::bad_alloc. `what` is for messages of other kinds of memory.
     explicit HostMemory(uint64_t bytes, const char* = "")
-        : bytes_(bytes), data_(static_cast<std::byte*>(::operator new[](bytes, std::align_val_t(256)))) {
+        : bytes_(bytes), data_(static_cast<std::byte*>(::operator new[](bytes, detail::kHostAlignment))) {
         std::fill_n(data_.get(), bytes, std::byte{0});
     }
 

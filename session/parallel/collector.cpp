@@ -25,7 +25,7 @@ std::vector<MergeTree::Entry> Collector::add(const RangeNode& block, const Range
     spare_ = b.films.take_spare();
     if (b.missing > 0 && !last_) return {};
     std::vector<MergeTree::Entry> whole = b.films.take_entries();
-    if (b.missing == 0) blocks_.erase(found);
+    blocks_.erase(found);
     return whole;
 }
 

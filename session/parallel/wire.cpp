@@ -14,6 +14,11 @@ struct Head {
     uint64_t text;  ///< bytes; states follow
 };
 
+/// Before the bytes of each state.
+struct StateHead {
+    uint64_t device, range, bytes;
+};
+
 constexpr const char* kCutOff = "a message of another rank is cut off";
 
 template <class T>
@@ -24,14 +29,14 @@ void put(std::string& message, const T& value) {
 std::vector<RangeState> read_states(std::string_view bytes) {
     std::vector<RangeState> states;
     while (!bytes.empty()) {
-        uint64_t numbers[3];
-        if (bytes.size() < sizeof numbers) throw Error(ExitCode::device, kCutOff);
-        std::memcpy(numbers, bytes.data(), sizeof numbers);
-        bytes.remove_prefix(sizeof numbers);
-        if (bytes.size() < numbers[2]) throw Error(ExitCode::device, kCutOff);
+        StateHead head;
+        if (bytes.size() < sizeof head) throw Error(ExitCode::device, kCutOff);
+        std::memcpy(&head, bytes.data(), sizeof head);
+        bytes.remove_prefix(sizeof head);
+        if (bytes.size() < head.bytes) throw Error(ExitCode::device, kCutOff);
         const auto* const state = reinterpret_cast<const std::byte*>(bytes.data());
-        states.push_back({size_t(numbers[0]), numbers[1], {state, state + numbers[2]}});
-        bytes.remove_prefix(numbers[2]);
+        states.push_back({size_t(head.device), head.range, {state, state + head.bytes}});
+        bytes.remove_prefix(head.bytes);
     }
     return states;
 }
@@ -51,7 +56,7 @@ void tell(Ranks& ranks, int to, Say kind, const nlohmann::json& text, const Film
     put(message, head);
     message += words;
     for (const RangeState& s : states) {
-        for (const uint64_t number : {uint64_t(s.device), s.range, uint64_t(s.state.size())}) put(message, number);
+        put(message, StateHead{s.device, s.range, s.state.size()});
         message.append(reinterpret_cast<const char*>(s.state.data()), s.state.size());
     }
     ranks.send(to, int(kind), message, arrays);

@@ -174,6 +174,52 @@ TEST_CASE("Batches are a function of the seed") {
     }
 }
 
+TEST_CASE("the median is the middle of times, or the mean of the two in the middle") {
+    CHECK(median({3}) == 3);
+    CHECK(median({5, 1}) == 3);
+    CHECK(median({9, 1, 2}) == 2);
+    CHECK(median({8, 1, 3, 2}) == 2.5);
+}
+
+TEST_CASE("rays are traced by the least set of features that a scene needs, of those that there are") {
+    constexpr uint32_t kTriangle = bit(PrimitiveType::triangle), kSphere = bit(PrimitiveType::sphere);
+    const auto traced = [](uint32_t primitives, bool opacity, bool instances) {
+        Features features;
+        features.primitives = primitives;
+        features.opacity = opacity;
+        features.instances = instances;
+        return with_traversal_features(features, [](auto set) -> Features { return set.value; });
+    };
+    CHECK(traced(kTriangle, false, false) == kOpaqueTriangles);
+    CHECK(traced(kTriangle, true, false) == kMaskedTriangles);
+    for (const uint32_t shapes : {kSphere, kTriangle | kSphere}) {
+        CHECK(traced(shapes, false, false) == kOpaqueShapes);
+        CHECK(traced(shapes, true, false) == kAllFeatures);
+        CHECK(traced(shapes, false, true) == kOpaqueInstances);
+        CHECK(traced(shapes, true, true) == kAllFeatures);
+    }
+    CHECK(traced(kTriangle, false, true) == kOpaqueInstances);
+    CHECK(traced(kTriangle, true, true) == kAllFeatures);
+    // Kernels of few features.
+    const auto some = [](const Features& features) {
+        return with_traversal_features<kMaskedTriangles>(features, [](auto set) -> Features { return set.value; });
+    };
+    CHECK(some(kOpaqueTriangles) == kOpaqueTriangles);
+    CHECK(some(kMaskedTriangles) == kMaskedTriangles);
+    CHECK_THROWS_AS(some(kOpaqueShapes), std::logic_error);
+    CHECK_THROWS_AS(some(kOpaqueInstances), std::logic_error);
+    constexpr Features kNoInstances = {0, 0, kAllFeatures.primitives, true, false, true};
+    const auto shapes = [](const Features& features) {
+        return with_traversal_features<kNoInstances>(features, [](auto set) -> Features { return set.value; });
+    };
+    Features masked = kOpaqueShapes;
+    masked.opacity = true;
+    CHECK(shapes(kOpaqueShapes) == kOpaqueShapes);
+    CHECK(shapes(masked) == kNoInstances);
+    masked.instances = true;
+    CHECK_THROWS_AS(shapes(masked), std::logic_error);
+}
+
 TEST_CASE("bench rays reports complete rows on the CPU, and all structures find the same") {
     const Scene scene = cornell();
     std::map<std::string, double> hit;

@@ -5,6 +5,7 @@
 #include <tbb/task_arena.h>
 
 #include "backends/cpu/executor.h"
+#include "backends/cpu/host_memory.h"
 #include "backends/cpu/whole_executor.h"
 #include "tests/support/catch.h"
 #include "tests/support/primitive_cases.h"
@@ -106,4 +107,26 @@ TEST_CASE("executors of a host sort as many pairs as a queue has, and no more th
         CHECK(c.sorted(memory));
         CHECK(counter.count == pushed);
     }
+}
+
+TEST_CASE("Memory of a host lies where queues want it, is zero at first, and is copied byte by byte") {
+    for (const uint64_t bytes : {1, 255, 256, 1000}) {
+        HostMemory memory(bytes);
+        CHECK(memory.bytes() == bytes);
+        CHECK(reinterpret_cast<uintptr_t>(memory.data()) % 256 == 0);
+        CHECK(std::all_of(memory.data(), memory.data() + bytes, [](std::byte b) { return b == std::byte{0}; }));
+    }
+    HostMemory memory(4);
+    const char text[] = {'a', 'b', 'c', 'd'};
+    char back[4] = {};
+    HostMemory::put(memory.data(), text, 3);
+    HostMemory::copy(memory.data() + 3, memory.data(), 1);
+    HostMemory::get(back, memory.data(), 4);
+    CHECK(std::string(back, 4) == "abca");
+    HostMemory::clear(memory.data() + 1, 2);
+    HostMemory::get(back, memory.data(), 4);
+    CHECK(std::string(back, 4) == std::string("a\0\0a", 4));
+    for (const auto nothing : {&HostMemory::put, &HostMemory::get, &HostMemory::copy}) nothing(nullptr, nullptr, 0);
+    HostMemory::clear(nullptr, 0);
+    CHECK(HostMemory().bytes() == 0);
 }

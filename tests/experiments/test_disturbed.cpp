@@ -112,6 +112,8 @@ TEST_CASE("the driver's library says what the device did") {
     CHECK(said["celsius"] == 61.0);
     CHECK(said["watts"] == Approx(450));
     CHECK(said["slowdowns"] == json({"thermal"}));
+    CHECK(slowdowns(0).empty());
+    CHECK(slowdowns(0x78) == std::vector<std::string>{"hardware", "thermal", "thermal (hardware)"});
     CHECK(slowdowns(0x84) == std::vector<std::string>{"power cap", "power brake"});
 }
 

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "integrators/reachability.h"
+#include "integrators/registry.h"
 #include "render/selection.h"
 #include "session/stats_sum.h"
 #include "tests/support/bidirectional_images.h"
@@ -402,21 +403,26 @@ TEST_CASE("the selection repeats: it depends on the seed, and on clocks only whe
     }
 }
 
+namespace {
+
+/// What a device does, by renderers of the host.
+struct Counted : Renderer {
+    Counted(std::unique_ptr<Renderer> r, int& l) : renderer(std::move(r)), living(l) { ++living; }
+    ~Counted() override { --living; }
+    uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+        return renderer->render(first, count, interrupt);
+    }
+    FilmMoments film() override { return renderer->film(); }
+    void clear_film() override { renderer->clear_film(); }
+    RenderStats stats() override { return renderer->stats(); }
+    uint32_t preferred_batch() const override { return 4; }
+    std::unique_ptr<Renderer> renderer;
+    int& living;
+};
+
+}  // namespace
+
 TEST_CASE("a path tracer that renders while the pilot runs makes room for a candidate that has none beside it") {
-    // What a device does, by renderers of the host.
-    struct Counted : Renderer {
-        Counted(std::unique_ptr<Renderer> r, int& l) : renderer(std::move(r)), living(l) { ++living; }
-        ~Counted() override { --living; }
-        uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
-            return renderer->render(first, count, interrupt);
-        }
-        FilmMoments film() override { return renderer->film(); }
-        void clear_film() override { renderer->clear_film(); }
-        RenderStats stats() override { return renderer->stats(); }
-        uint32_t preferred_batch() const override { return 4; }
-        std::unique_ptr<Renderer> renderer;
-        int& living;
-    };
     bool some_timed = false;
     for (const char* name : {"cornell", "glass", "lights", "materials"}) {
         const Scene scene = project_scene(name, 48, 32);
@@ -452,6 +458,36 @@ TEST_CASE("a path tracer that renders while the pilot runs makes room for a cand
         }
     }
     CHECK(some_timed);
+}
+
+TEST_CASE("candidates of a device are timed by a full wave, or by the samples of one where memory is limited") {
+    constexpr uint32_t kPixels = 48 * 32;
+    const Scene scene = project_scene("lights", 48, 32);
+    SharedAccels accels(scene);
+    for (const uint64_t memory : {uint64_t(0), uint64_t(1) << 30}) {
+        CAPTURE(memory);
+        RenderSettings s = automatic_settings(scene, 5);
+        s.variant = "megakernel";
+        s.memory = memory;
+        int living = 0;
+        std::vector<RenderSettings> made;
+        const auto make = [&](const RenderSettings& chosen) -> std::unique_ptr<Renderer> {
+            made.push_back(chosen);
+            return std::make_unique<Counted>(make_renderer(scene, chosen), living);
+        };
+        const SelectionStats selection = make_automatic(scene, s, true, accels, make)->stats().selection;
+        INFO(selection.name);
+        CHECK(std::count_if(selection.candidates.begin(), selection.candidates.end(),
+                            [](const SelectionStats::Candidate& c) { return c.seconds > 0; }) == 2);
+        REQUIRE(made.size() == 3);
+        for (size_t i = 0; i < 2; ++i) {
+            const uint32_t paths = variant_of(made[i]).traits.light_subpaths ? 1u << 21 : 1u << 22;
+            CHECK(made[i].expected_samples == (memory ? paths / kPixels : 0));
+            CHECK(made[i].wave_size == (memory ? 0 : paths));
+        }
+        CHECK(made[2].expected_samples == 0);
+        CHECK(made[2].wave_size == 0);
+    }
 }
 
 TEST_CASE("what a device has no room for is not chosen: the next best runs") {

@@ -100,6 +100,18 @@ TEST_CASE("albedo and normal are those behind glass and in mirrors, depth is tha
     CHECK(mean(layer_of(seen, "normal"), 2) == Approx(-1));
 }
 
+TEST_CASE("albedo inside of glass is that of the surface there, less what the way in reflects") {
+    const test::TempFolder folder;
+    const Scene scene = square(folder, R"(<shape type="cube"><transform name="to_world"><scale x="3" y="3" z="1"/>
+</transform><bsdf type="dielectric"><float name="int_ior" value="1.5"/></bsdf></shape>)");
+    const auto layers = sample_aovs(scene, {}, 4000);
+    const double through = 1 - 0.04;
+    CHECK(mean(layer_of(layers, "albedo"), 0) == Approx(0.2 * through).epsilon(0.01));
+    CHECK(mean(layer_of(layers, "albedo"), 1) == Approx(0.5 * through).epsilon(0.01));
+    CHECK(mean(layer_of(layers, "normal"), 2) == Approx(through).epsilon(0.01));
+    CHECK(layer_of(layers, "depth").values[12] == Approx(1).margin(0.01));
+}
+
 TEST_CASE("what sees nothing is 0") {
     const test::TempFolder folder;
     folder.write("s.xml", R"(<scene version="3.0.0"><sensor type="perspective">

@@ -24,6 +24,22 @@ TEST_CASE("Values dropped by a stage that runs as part of another count, though 
     CHECK(stats.invalid_by_stage["connect"].underflow == 3);
 }
 
+TEST_CASE("NaN, infinite and negative values are errors, each counted for its stage and in all") {
+    CHECK(InvalidCounts{1, 2, 4, 8}.total() == 7);
+    std::vector<StageRecord> records(3);
+    records[0].nan = 1, records[0].inf = 2, records[0].negative = 4, records[0].underflow = 8;
+    records[2].nan = 16, records[2].inf = 32, records[2].negative = 64, records[2].underflow = 128;
+    RenderStats stats;
+    fill_stage_stats({"shade", "occlude", "connect"}, records, stats);
+    const auto is = [](const InvalidCounts& c, uint64_t nan, uint64_t inf, uint64_t negative, uint64_t underflow) {
+        return c.nan == nan && c.inf == inf && c.negative == negative && c.underflow == underflow;
+    };
+    CHECK(is(stats.invalid, 17, 34, 68, 136));
+    REQUIRE(stats.invalid_by_stage.size() == 2);
+    CHECK(is(stats.invalid_by_stage["shade"], 1, 2, 4, 8));
+    CHECK(is(stats.invalid_by_stage["connect"], 16, 32, 64, 128));
+}
+
 TEST_CASE("A sampled clock below zero is no time") {
     std::vector<StageRecord> records(1);
     records[0].launches = 1;

@@ -262,6 +262,35 @@ TEST_CASE("Directions of long subpaths are unit, and their vertices on their sur
     CHECK(worst_distance < 1e-15);
 }
 
+TEST_CASE("The twin's boxes hold up to four primitives each, and count their bytes", "[twin]") {
+    const auto bytes = [](const std::string& shapes) {
+        const Scene scene =
+            scene_from_text(scene_xml(2, "<sensor type='perspective'>" + square_film(4) + "</sensor>" + shapes));
+        const twin::DoubleScene in_double(scene);
+        return twin::Tracer(in_double.view()).memory_bytes();
+    };
+    constexpr uint64_t kNode = 6 * 8 + 2 * 4;
+    CHECK(bytes("<shape type='sphere'/>") == kNode + 4);
+    CHECK(bytes("<shape type='rectangle'/>") == kNode + 2 * 4);
+    CHECK(bytes("<shape type='cube'/>") == 7 * kNode + 12 * 4);  // 12, 6 and 6, 3 and 3 and 3 and 3
+}
+
+TEST_CASE("The twin does not meet triangles that rounding has made a point or an edge", "[twin]") {
+    // From here all corners are one direction, though the plane is not edge-on.
+    const auto hit = [](const std::string& scale, twin::Vec3f from) {
+        const Scene scene = scene_from_text(scene_xml(
+            2, "<sensor type='perspective'>" + square_film(4) +
+                   "</sensor><shape type='rectangle'><transform name='to_world'>" + scale + "</transform></shape>"));
+        const twin::DoubleScene in_double(scene);
+        return twin::Tracer(in_double.view()).closest({from, twin::kInfinity, -from, 0});
+    };
+    const twin::Hit large = hit("<scale value='1'/>", {0.25, 0.25, 1});
+    CHECK(large.prim != twin::kNone);
+    CHECK(std::abs(large.t - 1) < 1e-15);
+    CHECK(hit("<scale value='1e-17'/>", {0.25, 0.25, 1}).prim == twin::kNone);
+    CHECK(hit("<scale value='1'/>", {1, 0.5, 0}).prim == twin::kNone);  // along it
+}
+
 TEST_CASE("The twin repeats its image bit by bit, in parts too", "[twin]") {
     const Scene scene = project_scene("glass", 24, 16);
     const RenderSettings s = twin_settings(scene, "bdpt");

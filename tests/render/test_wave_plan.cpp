@@ -4,6 +4,7 @@
 
 #include "accel/cwbvh.h"
 #include "backends/fusion.h"
+#include "core/error.h"
 #include "integrators/bdpt/lvc/integrator.h"
 #include "integrators/bdpt/megakernel/integrator.h"
 #include "integrators/bdpt/streaming/integrator.h"
@@ -129,4 +130,238 @@ TEST_CASE("one sample of 1920x1080, with any method, in 256 MiB, 1 GiB and 4 GiB
             CHECK_FALSE(path.in_parts);
             if (light_vertices >= 4 && !lvc.in_parts) CHECK(streaming.bytes < lvc.bytes);
         }
+}
+
+namespace {
+
+/// Of 5x3 whole tiles, unless another size is given.
+Scene plain_film(uint32_t width = 40, uint32_t height = 24) {
+    Scene scene;
+    scene.sensor.crop_width = width;
+    scene.sensor.crop_height = height;
+    return scene;
+}
+
+WavePolicy light_policy(uint32_t iteration_samples) {
+    WavePolicy waves;
+    waves.light_subpaths_per_tile = kTilePixels;
+    waves.keeps_light_vertices = true;
+    waves.iteration_samples = iteration_samples;
+    return waves;
+}
+
+template <class Function>
+std::string refusal_of(ExitCode code, Function f) {
+    try {
+        f();
+    } catch (const Error& error) {
+        CHECK(error.code == code);
+        return error.what();
+    }
+    return "no error";
+}
+
+}  // namespace
+
+TEST_CASE("waves of a device hold all samples of an iteration, for as many tiles as there is room") {
+    const Scene scene = plain_film();
+    RenderSettings s;
+    WavePolicy waves = light_policy(4);
+    WavePlan plan(scene, s, waves, true, 0, true);
+    for (const auto& [size, tiles] :
+         std::vector<std::pair<uint32_t, uint32_t>>{{64, 1}, {1024, 4}, {1279, 4}, {1280, 5}, {1u << 20, 15}}) {
+        CAPTURE(size);
+        s.wave_size = size;
+        plan.shape_least();
+        CHECK(plan.wave.tiles == tiles);
+        CHECK(plan.wave.samples == 4);
+        CHECK(plan.film_wave.tiles == 15);
+        CHECK(plan.film_wave.samples == 4);
+        CHECK(plan.in_parts() == (tiles < 15));
+        CHECK(plan.light_subpaths(0) == tiles * kTilePixels);
+        CHECK(plan.iteration_subpaths() == 4 * 40 * 24);
+        CHECK(waves.multi_bounce_below == tiles * kTilePixels * 4 / 16);
+    }
+    s.wave_size = 1024;
+    plan.shape_least();
+    CHECK(plan.light_subpaths(12) == 3 * kTilePixels);  // the last tiles
+    plan.mean = 1;
+    plan.keep(3072);
+    CHECK(plan.mean == 3);
+    plan.keep(2048);
+    CHECK(plan.mean == 3);
+    CHECK(plan.kept() == planned_light_vertices(3, 1024));
+    waves.keeps_light_vertices = false;
+    CHECK(plan.kept() == 0);
+    // With room for it, the whole film.
+    plan.shape_preferred(100, 1u << 30);
+    CHECK(plan.wave.tiles == 15);
+    CHECK_FALSE(plan.in_parts());
+    s.wave_size = 0;
+    s.expected_samples = 7;
+    plan.shape_preferred(100, 1u << 30);
+    CHECK(plan.wave.slot_count() == 15 * kTilePixels * 4);
+
+    WavePolicy single = light_policy(1);
+    WavePlan one(scene, s, single, true, 0, false);
+    one.shape_preferred(100, 1u << 30);
+    CHECK(one.wave.samples == 7);
+    one.shape_preferred(100, 100 * kTilePixels);
+    CHECK(one.wave.samples == 1);
+    CHECK(one.wave.tiles == 15);
+}
+
+TEST_CASE("waves of a host are small, and those of light that lands anywhere hold one sample") {
+    RenderSettings s;
+    for (const auto& [threads, tiles, whole_tiles] :
+         std::vector<std::array<uint32_t, 3>>{{1, 8, 136}, {2, 8, 136}, {3, 5, 140}, {17, 1, 136}, {64, 1, 136}}) {
+        CAPTURE(threads);
+        const Scene scene = plain_film(136, 64);  // 136 tiles
+        const Wave wave = host_wave(scene, s, threads);
+        CHECK(wave.tiles == tiles);
+        CHECK(wave.samples == kHostWaveSize / (tiles * kTilePixels));
+        for (const uint32_t k : {1, 4}) {
+            WavePolicy waves = light_policy(k);
+            WavePlan plan(scene, s, waves, true, threads, k > 1);
+            plan.shape_preferred(500, 0);
+            CHECK(plan.wave.tiles == tiles);
+            CHECK(plan.wave.samples == 1);
+            CHECK(plan.film_wave.tiles == whole_tiles);
+            CHECK(plan.film_wave.samples == k);
+            CHECK(plan.in_parts());
+            CHECK(plan.light_subpaths(0) == tiles * kTilePixels);
+        }
+        WavePolicy narrow = light_policy(1);
+        WavePlan plan(scene, s, narrow, false, threads, false);
+        plan.shape_preferred(500, 0);
+        CHECK(plan.wave.samples == wave.samples);
+        CHECK_FALSE(plan.in_parts());
+    }
+    s.wave_size = 256;
+    CHECK(host_wave(plain_film(136, 64), s, 1).tiles == 4);
+    CHECK(host_wave(plain_film(136, 64), s, 1, 128).tiles == 2);
+    // A film of a single wave is whole in it.
+    const Scene small = plain_film(5, 3);
+    WavePolicy waves = light_policy(1);
+    WavePlan plan(small, s, waves, true, 1, false);
+    plan.shape_preferred(500, 0);
+    CHECK(plan.light_subpaths(0) == 15);
+    waves.slots_in_flight = 1;
+    plan.shape_preferred(500, 0);
+    CHECK(waves.slots_in_flight == kTilePixels);
+    s.wave_size = 4096;
+    const Scene large = plain_film(512, 512);
+    WavePlan streaming(large, s, waves, false, 1, false);
+    streaming.shape_preferred(500, 0);
+    CHECK(waves.slots_in_flight == 1024);
+}
+
+TEST_CASE("sizes of waves follow from what is expected, what there is room for and what pays") {
+    const Scene scene = plain_film();  // 960 slots
+    RenderSettings s;
+    const auto size = [&](uint64_t room) { return device_wave_size(scene, s, 10000, 10, room); };
+    CHECK(size(5000) == 500);
+    CHECK(size(100) == kTilePixels);
+    CHECK(size(1u << 30) == 10000);
+    for (const auto& [samples, paths] :
+         std::vector<std::pair<uint64_t, uint32_t>>{{3, 2880}, {10, 9600}, {11, 10000}}) {
+        s.expected_samples = samples;
+        CHECK(size(1u << 30) == paths);
+    }
+    CHECK(device_wave_size(plain_film(33, 17), s, 1u << 20, 10, 1u << 30) == 960 * 11);
+    s.wave_size = 77;
+    CHECK(size(5000) == 77);
+
+    CHECK(stream_samples(100, 200, 0, 1000000) == 4);
+    CHECK(stream_samples(100, 200, 3, 1000000) == 3);
+    CHECK(stream_samples(100, 200, 5, 1000000) == 4);
+    CHECK(stream_samples(100, 200, 0, 400) == 2);
+    CHECK(stream_samples(100, 10000, 0, 1000000) == 1);
+    for (const uint32_t batch : {1u, 3u, 4u}) CHECK(whole_waves(batch, 4) == 4);
+    CHECK(whole_waves(5, 4) == 8);
+    CHECK(learning_pass(8, 0, 4) == 1);
+    CHECK(learning_pass(8, 3, 4) == 3);
+    CHECK(learning_pass(2, 3, 4) == 2);
+    CHECK(learning_pass(8, 4, 4) == 8);
+
+    s = {};
+    CHECK(multi_bounce_below(s, 1024) == 64);
+    CHECK(multi_bounce_below(s, 1u << 20) == 1u << 15);
+    for (const auto& [key, value] : std::vector<std::pair<std::string, std::string>>{{"tail", "false"},
+                                                                                     {"deterministic", "true"},
+                                                                                     {"technique_depth", "4"},
+                                                                                     {"fuse", "none"},
+                                                                                     {"compaction", "select"},
+                                                                                     {"accel", "bvh2"}}) {
+        CAPTURE(key);
+        RenderSettings other;
+        apply_setting(other, key, value);
+        CHECK(multi_bounce_below(other, 1024) == 0);
+    }
+}
+
+TEST_CASE("where waves stand that go through the film tile by tile, and the largest of numbers that fit") {
+    Wave wave = shape_wave(plain_film(), 1, 4 * kTilePixels, 15);  // 4 waves for a sample, the last of 3 tiles
+    wave.samples = 2;
+    const auto at = [&](uint32_t first_tile, uint32_t waves) {
+        const WaveProgress p = progress_of(wave, first_tile, waves);
+        return std::pair(p.samples, p.next_tile);
+    };
+    CHECK(at(0, 0) == std::pair(0u, 0u));
+    CHECK(at(0, 3) == std::pair(0u, 12u));
+    CHECK(at(0, 4) == std::pair(2u, 0u));
+    CHECK(at(0, 5) == std::pair(2u, 4u));
+    CHECK(at(8, 1) == std::pair(0u, 12u));
+    CHECK(at(8, 2) == std::pair(2u, 0u));
+    CHECK(at(8, 7) == std::pair(4u, 4u));
+    const auto largest = [](uint32_t least, uint32_t most, uint32_t limit) {
+        return largest_that_fits(least, most, [=](uint32_t n) {
+            CHECK(n >= least);
+            CHECK(n <= most);
+            return n <= limit;
+        });
+    };
+    for (uint32_t limit = 0; limit <= 12; ++limit)
+        for (uint32_t least = 1; least <= 11; ++least) {
+            CAPTURE(limit, least);
+            const uint32_t expected = std::min(limit, 10u);
+            CHECK(largest(least, 10, limit) == (least <= expected ? expected : 0));
+        }
+}
+
+TEST_CASE("refusals name the bytes and the numbers that are in the way") {
+    constexpr uint64_t kM = 1 << 20;
+    RenderSettings s;
+    s.memory = 64 * kM;
+    RenderBytes least = {{kM, 2 * kM - 1, 4 * kM + 1}, 3 * kM, 6 * kM, 7 * kM};
+    CHECK(least.total() == 23 * kM);
+    const auto budget = [&] { return refusal_of(ExitCode::device, [&] { refuse_budget(s, least); }); };
+    const std::string parts =
+        "memory=64M: this render needs at least 23M: 1 of geometry, 2 of textures, 3 of acceleration structure, 5 of "
+        "the rest of the scene, 6 of film, 7 of waves";
+    CHECK(budget() == parts + ". Give it more memory, or a smaller --size, or, on a CUDA device, --textures host");
+    s.textures = TextureMemory::host;
+    CHECK(budget() == parts + ". Give it more memory, or a smaller --size");
+    s.wave_size = 128;
+    CHECK(budget() == parts + " of 128 paths. Give it more memory, or a smaller --size");
+    CHECK(refusal_of(ExitCode::device, [] { refuse_wave(5 * kM, 3 * kM, 4096); }) ==
+          "this render needs 5 MiB on the device, and 3 MiB are free: try a smaller --size or --set wave_size=N (now "
+          "4096 paths)");
+    CHECK(refusal_of(ExitCode::device, [] { refuse_film(plain_film()); }).find("a film of 40x24 needs more") !=
+          std::string::npos);
+    CHECK(refusal_of(ExitCode::usage, [] { refuse_samples({}, 4, 8, 3); }) ==
+          "spp: integrator path, variant wavefront, has iterations of 4 samples; samples 8 to 11 are no whole ones");
+
+    const Scene scene = plain_film(1920, 1080);
+    s = {};
+    WavePolicy waves = light_policy(1);
+    WavePlan plan(scene, s, waves, true, 0, false);
+    const auto fit = [&](uint32_t samples) {
+        s.wave_size = samples * 1920 * 1080;
+        plan.shape_least();
+        return refusal_of(ExitCode::usage, [&] { plan.fit(1, [] { return uint64_t(1); }); });
+    };
+    CHECK(fit(2071) == "no error");
+    waves.light_subpaths_per_tile = kTilePixels + 1;
+    CHECK(fit(2071).find("wave_size=4294425600: more light subpaths than can be numbered") == 0);
 }

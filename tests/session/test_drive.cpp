@@ -36,6 +36,54 @@ TEST_CASE("G14: a time budget is met within 5 % of wall clock, whatever a sample
     }
 }
 
+TEST_CASE(
+    "batches grow by four from one sample on, and what a renderer says they cost fills the budget to the sample") {
+    World world;
+    world.batch = 100;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 1;
+    SaysItsTime renderer(scene, {}, world, 1.0 / 1024);
+    std::vector<uint64_t> ends;
+    const RenderPosition all = drive(renderer, {}, {0, 1.0}, nullptr, [&](const RenderPosition& p) {
+        ends.push_back(p.samples);
+        CHECK(p.seconds == double(p.samples) / 1024);
+        CHECK(p.per_sample == 1.0 / 1024);
+    });
+    CHECK(ends == std::vector<uint64_t>{1, 5, 21, 85, 185, 285, 385, 485, 585, 685, 785, 885, 985, 1024});
+    CHECK(all.samples == 1024);
+    CHECK(all.seconds == 1.0);
+    CHECK(all.last_count == 39);
+    CHECK_FALSE(all.interrupted);
+    // What it brings along is not measured again.
+    ends.clear();
+    const auto end = [&](const RenderPosition& p) { ends.push_back(p.samples); };
+    CHECK(drive(renderer, all, {0, 1.25}, nullptr, end).seconds == 1.25);
+    CHECK(ends == std::vector<uint64_t>{1124, 1224, 1280});
+    CHECK(drive(renderer, all, {1100, 1.25}).samples == 1100);
+    CHECK(drive(renderer, all, {5000, 1.25}).samples == 1280);
+    world.batch = 1;
+    SaysItsTime singly(scene, {}, world, 0.5);
+    CHECK(drive(singly, {}, {3, 0}).seconds == 1.5);
+}
+
+TEST_CASE("no more samples than their numbers tell apart, and a renderer that stops by itself has failed") {
+    World world;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 1;
+    SaysItsTime renderer(scene, {}, world, 1.0);
+    constexpr uint64_t kMost = 4294967295;
+    CHECK(contains(error_of([&] { drive(renderer, {}, {kMost + 1, 0}); }, ExitCode::usage), "at most 4294967295"));
+    CHECK(drive(renderer, {kMost - 2, 1, false, 1e-3, 100}, {kMost, 0}).samples == kMost);
+    CHECK(drive(renderer, {kMost - 1, 1, false, 1e-3, 100}, {0, 1e9}).samples == kMost);
+    CHECK(world.samples == 3);
+    struct Lazy : FakeRenderer {
+        using FakeRenderer::FakeRenderer;
+        uint32_t render(uint32_t, uint32_t count, const volatile bool*) override { return count - 1; }
+    };
+    Lazy lazy(scene, {}, world);
+    CHECK(contains(error_of([&] { drive(lazy, {}, {10, 0}); }, ExitCode::device), "stopped without a reason"));
+}
+
 TEST_CASE("sample budgets are exact and interruptions keep whole samples") {
     World world;
     Scene scene;
@@ -75,6 +123,24 @@ TEST_CASE("samples that a renderer brings along are the first of a render with a
     CHECK(world.samples <= 21);  // what the time suffices for, and one by rounding
     Prepared counted(scene, {}, world);
     CHECK(drive(counted, {}, {5, 0}).samples == 5);  // fewer than there are: the renderer sees that
+}
+
+TEST_CASE("after samples that a renderer brought along a batch is no more than as many") {
+    World world;
+    world.batch = 1000;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 1;
+    struct Prepared : SaysItsTime {
+        using SaysItsTime::SaysItsTime;
+        uint32_t ready() const override { return 40; }
+    };
+    Prepared renderer(scene, {}, world, 1.0 / 1024);
+    std::vector<uint64_t> ends;
+    drive(renderer, {}, {0, 1.0}, nullptr, [&](const RenderPosition& p) {
+        ends.push_back(p.samples);
+        CHECK((p.per_sample > 0) == (p.samples > 40));  // those that were ready are no measure
+    });
+    CHECK(ends == std::vector<uint64_t>{40, 80, 240, 880, 1024});
 }
 
 TEST_CASE("the time that is left: by kind, and for budgets of samples and seconds at once") {
@@ -121,4 +187,42 @@ TEST_CASE("what a failed device does not give back is there as of the last copy;
     CHECK(last.film.samples == 3);
     CHECK(last.stats.samples == 3);
     CHECK(last.film.sum == three.sum);
+}
+
+TEST_CASE("films are copied as often as takes a thousandth of the time") {
+    World world;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 1;
+    struct Slow : FakeRenderer {
+        using FakeRenderer::FakeRenderer;
+        int copies = 0;
+        FilmMoments film() override {
+            if (++copies > 3) throw Error(ExitCode::device, "lost");
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+            return FakeRenderer::film();
+        }
+    };
+    Slow renderer(scene, {}, world);
+    KeptFilm kept(renderer);
+    for (uint32_t sample = 0; sample < 8; ++sample) {
+        REQUIRE(renderer.render(sample, 1, nullptr) == 1);
+        kept.look(renderer.stats());
+        std::this_thread::sleep_for(std::chrono::milliseconds(4));
+    }
+    CHECK(renderer.copies == 1);  // the next one is due after two seconds
+    renderer.copies = 3;
+    CHECK(kept.last().film.samples == 1);
+}
+
+TEST_CASE("an error that is not the device's is not kept from anyone") {
+    World world;
+    Scene scene;
+    scene.sensor.crop_width = scene.sensor.crop_height = 1;
+    struct Wrong : FakeRenderer {
+        using FakeRenderer::FakeRenderer;
+        FilmMoments film() override { throw Error(ExitCode::usage, "wrong"); }
+    };
+    Wrong renderer(scene, {}, world);
+    KeptFilm kept(renderer);
+    CHECK(error_of([&] { kept.last(); }, ExitCode::usage) == "wrong");
 }

@@ -2,11 +2,13 @@
 // timeout: 120
 // Renders of whole iterations, and methods whose devices keep a state: what is stopped goes on as if it had not been.
 #include "core/flag.h"
+#include "core/log.h"
 #include "film/exr_io.h"
 #include "integrators/setting.h"
 #include "render/chosen.h"
 #include "render/invalid_watch.h"
 #include "render/sample_watch.h"
+#include "session/parallel/checkpoint.h"
 #include "session/parallel/parallel_render.h"
 #include "session/parallel/state_log.h"
 #include "session/reference.h"
@@ -86,7 +88,8 @@ ParallelResult stopped(ParallelRequest request, const std::function<ParallelResu
 }
 
 bool same(const FilmMoments& a, const FilmMoments& b) {
-    return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares;
+    return a.width == b.width && a.height == b.height && a.samples == b.samples && a.sum == b.sum &&
+           a.sum_squares == b.sum_squares;
 }
 
 FilmMoments pixel() { return {1, 1, 1, std::vector<double>(3), std::vector<double>(3)}; }
@@ -165,6 +168,188 @@ TEST_CASE("wrapped renderers have the iterations and the state of what they wrap
     check([](std::unique_ptr<Renderer> r) { return std::make_unique<Chosen>(std::move(r), 0, SelectionStats{}); });
     check([](std::unique_ptr<Renderer> r) { return std::make_unique<InvalidWatch>(std::move(r)); });
     check([](std::unique_ptr<Renderer> r) { return std::make_unique<SampleWatch>(std::move(r)); });
+}
+
+TEST_CASE("batches that drop values are remembered, and their first bad iterations are found by rendering them again") {
+    World world;
+    struct Dropping : FakeRenderer {
+        using FakeRenderer::FakeRenderer;
+        uint32_t k = 1;
+        std::vector<uint32_t> firsts;
+        std::map<std::string, InvalidCounts> dropped;
+        uint32_t render(uint32_t first, uint32_t count, const volatile bool* interrupt) override {
+            firsts.push_back(first);
+            for (uint32_t sample = first; sample < first + count; ++sample) {
+                if (sample % 3 == 2) dropped["shade"].nan += 1, dropped["shade"].underflow += 1;
+                if (sample % 8 == 3) dropped["splat"].inf += 2, dropped["splat"].negative += 5;
+            }
+            dropped["occlude"].underflow += count;  // no error by itself
+            return FakeRenderer::render(first, count, interrupt);
+        }
+        RenderStats stats() override {
+            RenderStats s = FakeRenderer::stats();
+            s.invalid_by_stage = dropped;
+            return s;
+        }
+        uint32_t iteration_samples() const override { return k; }
+    };
+    const auto make = [&](uint32_t k) {
+        auto renderer = std::make_unique<Dropping>(small_scene(), RenderSettings{}, world);
+        renderer->k = k;
+        return renderer;
+    };
+    auto owned = make(1);
+    Dropping& renderer = *owned;
+    InvalidWatch watch(std::move(owned));
+    CHECK(watch.render(0, 2) == 2);
+    CHECK(watch.batches().empty());
+    CHECK(watch.render(2, 8) == 8);
+    CHECK(watch.render(12, 2) == 2);
+    REQUIRE(watch.batches().size() == 1);
+    const InvalidBatch batch = watch.batches()[0];
+    CHECK(batch.first == 2);
+    CHECK(batch.count == 8);
+    REQUIRE(batch.by_stage.size() == 2);
+    CHECK(batch.by_stage.at("shade").nan == 3);  // 2, 5 and 8
+    CHECK(batch.by_stage.at("shade").total() == 3);
+    CHECK(batch.by_stage.at("splat").inf == 2);
+    CHECK(batch.by_stage.at("splat").negative == 5);
+    CHECK(watch.by_stage().at("occlude").underflow == 12);
+
+    const auto found = [&](InvalidWatch& of, const InvalidBatch& in, size_t most, const volatile bool* stop = nullptr) {
+        std::vector<uint32_t> firsts;
+        for (const InvalidBatch& b : of.samples(in, most, stop)) firsts.push_back(b.first);
+        return firsts;
+    };
+    renderer.firsts.clear();
+    CHECK(found(watch, batch, 2) == std::vector<uint32_t>{2, 3});
+    CHECK(renderer.firsts == std::vector<uint32_t>{2, 3});  // no more than were asked for
+    renderer.firsts.clear();
+    CHECK(found(watch, batch, 100) == std::vector<uint32_t>{2, 3, 5, 8});
+    CHECK(renderer.firsts == std::vector<uint32_t>{2, 3, 4, 5, 6, 7, 8, 9});
+    for (const InvalidBatch& one : watch.samples(batch, 100, nullptr)) CHECK(one.count == 1);
+    CHECK(watch.samples({3, 1, {}}, 100, nullptr).size() == 1);  // by itself
+    const volatile bool stop = true;
+    CHECK(found(watch, batch, 100, &stop).empty());
+    InvalidWatch by_four(make(4));
+    CHECK(found(by_four, {4, 12, {}}, 100) == std::vector<uint32_t>{4, 8, 12});
+    CHECK(found(by_four, {4, 12, {}}, 0).empty());
+
+    for (uint32_t i = 0; i < 12; ++i) watch.render(2, 1);
+    CHECK(watch.batches().size() == InvalidWatch::kMostBatches);
+}
+
+TEST_CASE("a saved state comes back whole, and one that is damaged anywhere is none") {
+    const TempFolder folder;
+    const std::string path = folder / "state";
+    const auto bytes = [](std::initializer_list<int> values) {
+        std::vector<std::byte> all;
+        for (const int v : values) all.push_back(std::byte(v));
+        return all;
+    };
+    const RenderState state = {
+        {2, 1, 5, {1, 2, 3, 4, 5, 6}, {7, 8, 9, 10, 11, 12}}, {{"seconds", 0.5}}, {bytes({1, 2, 3}), {}, bytes({4})}};
+    write_state(path, state);
+    const std::string good = read_file(path);
+    const RenderState back = read_state(path).value();
+    CHECK(back.moments.width == 2);
+    CHECK(back.moments.height == 1);
+    CHECK(same(back.moments, state.moments));
+    CHECK(back.notes == state.notes);
+    CHECK(back.devices == state.devices);
+    CHECK_FALSE(read_state(folder / "none").has_value());
+
+    // By what takes the place of the checksum alone, and with one that fits.
+    constexpr size_t kHash = 8, kMagic = 16;
+    const auto with_checksum = [](std::string content) {
+        uint64_t hash = 0xcbf29ce484222325ull;  // FNV-1a
+        for (const char c : content) hash = (hash ^ uint8_t(c)) * 0x100000001b3ull;
+        return content.append(reinterpret_cast<const char*>(&hash), sizeof hash);
+    };
+    const std::string body = good.substr(0, good.size() - kHash);
+    REQUIRE(with_checksum(body) == good);
+    const auto is_damaged = [&](const std::string& content) {
+        folder.write("state", content);
+        const bool quiet = is_quiet();
+        set_quiet(true);
+        const bool damaged = !read_state(path).has_value();
+        set_quiet(quiet);
+        return damaged;
+    };
+    for (size_t length = 0; length < good.size(); ++length) CHECK(is_damaged(good.substr(0, length)));
+    for (size_t length = 0; length < body.size(); ++length) CHECK(is_damaged(with_checksum(body.substr(0, length))));
+    CHECK(is_damaged(with_checksum(body + '\0')));
+    for (size_t at = 0; at < good.size(); ++at) {
+        std::string changed = good;
+        changed[at] ^= 1;
+        CHECK(is_damaged(changed));
+    }
+    // Sizes: of the notes, of the film, of all values, of the devices, of the state of the first device.
+    const size_t notes = state.notes.dump().size(), devices = kMagic + 48 + notes + 2 * 6 * 8;
+    for (const size_t at : {kMagic, kMagic + 8, kMagic + 16, kMagic + 32, kMagic + 40, devices})
+        for (const uint64_t size : {uint64_t(1) << 20, ~uint64_t(0)}) {
+            CAPTURE(at, size);
+            std::string changed = body;
+            changed.replace(at, 8, reinterpret_cast<const char*>(&size), 8);
+            CHECK(is_damaged(with_checksum(changed)));
+        }
+    std::string no_json = body;
+    no_json[kMagic + 48] = 'x';
+    CHECK(is_damaged(with_checksum(no_json)));
+    CHECK_FALSE(is_damaged(good));
+}
+
+TEST_CASE("the sums of a tree are saved one by one, with notes and states, and a render of something else is refused") {
+    const TempFolder folder;
+    CheckpointFile file(folder / "state");
+    MergeTree tree, read;
+    DeviceStates devices;
+    CHECK_FALSE(file.exists());
+    CHECK(file.read(read, devices).is_null());
+    const auto film = [](uint64_t samples, double first) {
+        return FilmMoments{1, 2, samples, {first, 2, 3, 4, 5, 6}, {7, 8, 9, 10, 11, 12 * first}};
+    };
+    tree.add({1, 0}, film(6, 1));
+    tree.add({0, 3}, film(3, 20));
+    tree.add({2, 2}, film(12, 300));
+    const nlohmann::json identity = {{"scene_hash", "ab"}, {"spp", 100}, {"settings", {{"seed", 1}, {"depth", 4}}}};
+    const DeviceStates kept = {{std::byte{1}}, {}};
+    file.write(tree, {{"identity", identity}, {"range_size", 3}, {"seconds", 0.5}}, kept);
+    file.wait();
+    CHECK(file.exists());
+    const nlohmann::json notes = file.read(read, devices);
+    CHECK(notes.at("seconds") == 0.5);
+    CHECK(devices == kept);
+    CHECK(read.samples() == 21);
+    REQUIRE(read.entries().size() == 3);
+    for (const auto& [first, entry] : tree.entries()) {
+        const MergeTree::Entry& back = read.entries().at(first);
+        CHECK(back.node == entry.node);
+        CHECK(same(back.film, entry.film));
+    }
+    CHECK_NOTHROW(file.check_same(notes, identity, 3));
+    CHECK_NOTHROW(file.check_same(notes, identity, 0));
+    const auto refused = [&](const nlohmann::json& other, uint32_t size) {
+        const std::string text = error_of([&] { file.check_same(notes, other, size); }), from = "its ";
+        return text.substr(text.find(from) + from.size(), text.find(" differs") - text.find(from) - from.size());
+    };
+    CHECK(refused(identity, 4) == "range size");
+    for (const char* key : {"scene_hash", "spp"}) {
+        nlohmann::json other = identity;
+        other[key] = "other";
+        CHECK(refused(other, 3) == key);
+    }
+    for (const char* key : {"seed", "new"}) {
+        nlohmann::json other = identity;
+        other["settings"][key] = 2;
+        CHECK(refused(other, 3) == key);
+    }
+    file.write({}, {{"identity", identity}}, {});
+    file.wait();
+    CHECK(file.read(read, devices).at("nodes").empty());
+    CHECK(read.entries().empty());
+    file.remove();
+    CHECK_FALSE(file.exists());
 }
 
 TEST_CASE("states that are saved have learned from films that are there alone") {

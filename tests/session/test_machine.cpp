@@ -1,10 +1,19 @@
 // libs: ambilux_experiments
 // timeout: 60
 // What an experiment records of its machine: load, versions, clocks.
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstring>
+#include <ctime>
+#include <sstream>
+
 #include "backends/cuda_device.h"
 #include "session/load.h"
 #include "session/machine.h"
 #include "tests/support/experiment_fakes.h"
+#include "tests/support/skip.h"
 
 using namespace ambilux;
 using namespace ambilux::test;
@@ -22,7 +31,14 @@ TEST_CASE("what others take of the machine is told from what this process takes"
     CHECK(other_cores(before, after) == Approx(1.5));
     after.own = 9;  // clocks of different grain
     CHECK(other_cores(before, after) == 0.0);
-    CHECK(load_json(before, after)["own_cores"] == 4.5);
+    before = {10, 20, 30, 40, 50, 0.25, 0};
+    after = {12, 26, 31, 42.5, 50.5, 1.5, 2100};
+    nlohmann::json told = load_json(before, after);
+    CHECK(told["cores"] == std::thread::hardware_concurrency());
+    told.erase("cores");
+    CHECK(told == nlohmann::json::parse(R"({"seconds": 2.0, "other_cores": 1.5, "own_cores": 0.5, "rank_cores": 1.25,
+        "steal_cores": 0.25, "load": {"before": 0.25, "after": 1.5}, "cpu_mhz": {"before": null, "after": 2100.0}})"));
+    CHECK(other_cores(after, before) == 0.0);
     const LoadReading now = read_load();
     CHECK(now.wall > 0);
     CHECK(now.own > 0);
@@ -31,6 +47,81 @@ TEST_CASE("what others take of the machine is told from what this process takes"
     const nlohmann::json versions = describe_versions();
     for (const char* key : {"ambilux", "git_revision", "compiler", "flags", "embree", "tbb"})
         CHECK_FALSE(versions[key].get<std::string>().empty());
+}
+
+TEST_CASE("the command line is told as a shell takes it: only what it would read otherwise is in quotes") {
+    std::ifstream in("/proc/self/cmdline", std::ios::binary);
+    std::string expected;
+    for (std::string argument; std::getline(in, argument, '\0');) {
+        const auto plain = [](char c) {
+            return std::isalnum(static_cast<unsigned char>(c)) || strchr("/._-+=,:~[]", c);
+        };
+        const bool quoted = argument.empty() || !std::all_of(argument.begin(), argument.end(), plain);
+        expected += (expected.empty() ? "" : " ") + (quoted ? "'" + argument + "'" : argument);
+    }
+    CHECK(command_line() == expected);
+}
+
+TEST_CASE("CPU seconds of a process are its own and those of its ended children, whatever its name is") {
+    const std::string numbers = " S 1 2 3 4 5 6 7 8 9 10 100 20 3000 400 20 0 1 0 5000";
+    CHECK(parse_stat_seconds("17 a" + numbers, 100) == 0);
+    CHECK(parse_stat_seconds("17 (a) b) c)" + numbers, 100) == Approx(35.2));
+    CHECK(parse_stat_seconds("17 (a) S 1 2", 100) == 0);
+    CHECK(parse_stat_seconds("", 100) == 0);
+    LoadReading reading;
+    reading.busy = 5;
+    parse_cpu_line("cpu0 100 20 30 4000 50 6 7 80 9 0", 100, reading);  // of one core
+    CHECK(reading.busy == 5);
+}
+
+TEST_CASE("a process that this one has started counts as its own while it runs") {
+    if (!fs::exists("/proc/thread-self/children")) return skip("this kernel does not tell a process's children");
+    int ready[2], end[2];
+    REQUIRE(::pipe(ready) == 0);
+    REQUIRE(::pipe(end) == 0);
+    const LoadReading before = read_load();
+    const pid_t child = ::fork();
+    REQUIRE(child >= 0);
+    char byte = 0;
+    if (child == 0) {
+        while (std::clock() < CLOCKS_PER_SEC / 10) {}
+        ::close(end[1]);
+        if (::write(ready[1], &byte, 1) == 1 && ::read(end[0], &byte, 1) != 0) ::_exit(1);
+        ::_exit(0);
+    }
+    ::close(end[0]);
+    CHECK(::read(ready[0], &byte, 1) == 1);
+    const LoadReading after = read_load();
+    CHECK(after.own - before.own >= 0.07);
+    ::close(end[1]);
+    int status = 0;
+    CHECK(::waitpid(child, &status, 0) == child);
+    CHECK(status == 0);
+}
+
+TEST_CASE("clocks of cores are read from what the kernel prints, and a core that says none is left out") {
+    std::istringstream cpuinfo(
+        "processor\t: 0\nmodel name\t: A 9.99 MHz\ncpu MHz\t\t: 2100.500\ncache size\t: 1 KB\n\n"
+        "processor\t: 1\ncpu MHz\t\t: 1000\n\ncpu MHz\t\t: unknown\ncpu MHz\n"
+        "processor\t: 2\ncpu MHz\t\t: 3000.25\n");
+    const CpuMhz found = parse_cpu_mhz(cpuinfo);
+    CHECK(found.lowest == 1000);
+    CHECK(found.highest == 3000.25);
+    CHECK(found.mean == Approx((2100.5 + 1000 + 3000.25) / 3));
+    std::istringstream nothing("processor\t: 0\n");
+    const CpuMhz none = parse_cpu_mhz(nothing);
+    CHECK((none.lowest == 0 && none.mean == 0 && none.highest == 0));
+}
+
+TEST_CASE("the version of a driver is the first word of digits and dots") {
+    CHECK(parse_driver_version(
+              "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build 1.2") == "580.65.06");
+    CHECK(parse_driver_version("NVRM version: 580 v1.2") == "NVRM version: 580 v1.2");
+    CHECK(parse_driver_version("").empty());
+    const nlohmann::json machine = describe_machine();
+    CHECK(machine["cores"] == std::thread::hardware_concurrency());
+    CHECK(machine["memory_bytes"] > uint64_t(1) << 24);
+    CHECK(machine["system"].get<std::string>().starts_with("Linux "));
 }
 
 TEST_CASE("clocks of graphics cards are read from what nvidia-smi prints") {

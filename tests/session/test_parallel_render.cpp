@@ -30,7 +30,8 @@ ParallelRequest request_for(const Scene& scene, const test::TempFolder& folder, 
 }
 
 bool same(const FilmMoments& a, const FilmMoments& b) {
-    return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares;
+    return a.width == b.width && a.height == b.height && a.samples == b.samples && a.sum == b.sum &&
+           a.sum_squares == b.sum_squares;
 }
 
 }  // namespace
@@ -136,6 +137,64 @@ TEST_CASE("what a worker throws ends the render") {
     CHECK_THROWS_AS(render_parallel(scene, request, ranks()), Error);
 }
 
+TEST_CASE("what bdpt.auto has chosen once, a render that is resumed goes on with") {
+    const Scene scene = project_scene("glass", 16, 12);
+    const test::TempFolder folder;
+    volatile bool interrupt = false;
+    ParallelRequest request = request_for(scene, folder, "bdpt", "wavefront", 1);
+    request.settings.automatic = true;
+    request.interrupt = &interrupt;
+    request.on_progress = [&](const RenderPosition&, const RenderStats&) { set_flag(&interrupt); };
+    const ParallelResult part = render_parallel(scene, request, ranks());
+    REQUIRE(part.position.interrupted);
+    const SelectionStats& chosen = part.stats.selection;
+    CHECK(chosen.seconds > 0);
+    CHECK(part.position.seconds >= chosen.seconds);  // choosing is part of the render
+    interrupt = false;
+    request.on_progress = {};
+    request.resume = true;
+    const ParallelResult whole = render_parallel(scene, request, ranks());
+    CHECK(whole.film.samples == 50);
+    CHECK(whole.stats.selection.settings == chosen.settings);
+    CHECK(whole.stats.selection.seconds == chosen.seconds);
+    CHECK(whole.position.seconds > part.position.seconds);
+}
+
+TEST_CASE("what was rendered before a device failed is saved and gone on with; other errors leave no state") {
+    const Scene scene = project_scene("cornell", 16, 12);
+    const test::TempFolder folder;
+    const auto request = [&] { return request_for(scene, folder, "path", "wavefront", 1); };
+    const FilmMoments expected = render_parallel(scene, request(), ranks()).film;
+    uint64_t rendered = 0;
+    const auto failing = [&](ExitCode code) {
+        ParallelRequest r = request();
+        r.on_progress = [&, code](const RenderPosition& p, const RenderStats&) {
+            rendered = p.samples;
+            if (rendered > 20) throw Error(code, "the device is lost");
+        };
+        try {
+            render_parallel(scene, r, ranks());
+        } catch (const Error& error) {
+            CHECK(error.code == code);
+            return std::string(error.what());
+        }
+        return std::string("no error");
+    };
+    CHECK(failing(ExitCode::bad_input) == "the device is lost");
+    CHECK(!std::filesystem::exists(folder / "state"));
+    CHECK(failing(ExitCode::device) == "the device is lost. " + std::to_string(rendered) +
+                                           " samples per pixel are in " + (folder / "state") +
+                                           "; the same command with --resume goes on");
+    REQUIRE(rendered > 20);
+    REQUIRE(rendered < 50);
+    ParallelRequest rest = request();
+    rest.resume = true;
+    const ParallelResult whole = render_parallel(scene, rest, ranks());
+    CHECK(same(whole.film, expected));
+    CHECK(whole.workers.at(0).samples == 50 - rendered);
+    CHECK(!std::filesystem::exists(folder / "state"));
+}
+
 TEST_CASE("a crew renders a node on all of its devices, hands over one film for it, and has one structure for rays") {
     const Scene scene = project_scene("glass", 24, 16);
     const RenderSettings settings = cpu_settings(scene, Estimator::mis);
@@ -210,7 +269,19 @@ TEST_CASE("devices are numbers or cpu, and agree with the other options") {
         CHECK_THROWS_AS(choose_devices({name}, settings, alone), Error);
     settings.deterministic = true;
     CHECK_THROWS_AS(choose_devices({"0", "cpu"}, settings, alone), Error);
+    const auto open = [&] { return choose_devices({}, settings, alone).at(0).name(); };
+    CHECK(open() == (cuda_available() ? "0" : "cpu"));
+    settings.backend = Backend::cuda;
+    CHECK(open() == "0");
+    CHECK_THROWS_AS(choose_devices({"cpu"}, settings, alone), Error);
+    settings.backend = Backend::automatic;
+    settings.accel = AccelKind::embree;
+    CHECK(open() == "cpu");
+    settings.accel = AccelKind::automatic;
+    settings.precision = Precision::in_double;
+    CHECK(open() == "cpu");
+    settings = {};
     settings.backend = Backend::cpu;
-    CHECK(choose_devices({}, settings, alone)[0].name() == "cpu");
+    CHECK(open() == "cpu");
     CHECK_THROWS_AS(choose_devices({"0"}, settings, alone), Error);
 }

@@ -62,6 +62,7 @@ TEST_CASE("the size of ranges follows from the render alone") {
     CHECK(default_range_size(1024, 24 * 16, false) == 342);
     CHECK(default_range_size(1024, 640 * 360, true) == 292);
     CHECK(default_range_size(8192, 1920 * 1080, true) == 256);
+    CHECK(default_range_size(10000, 1920 * 1080, true) == 256);
     CHECK(default_range_size(2048, 1920 * 1080, true) == 64);
     CHECK(default_range_size(8, 24 * 16, true) == 8);  // no more than there are
 }

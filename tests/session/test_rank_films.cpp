@@ -1,9 +1,11 @@
 // libs: ambilux_session
 // timeout: 60
 // Several ranks render one image: its bits do not depend on who adds which films up.
+#include "core/error.h"
 #include "core/flag.h"
 #include "session/parallel/collector.h"
 #include "session/parallel/parallel_render.h"
+#include "session/parallel/wire.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/thread_ranks.h"
 
@@ -12,7 +14,8 @@ using namespace ambilux;
 namespace {
 
 bool same(const FilmMoments& a, const FilmMoments& b) {
-    return a.samples == b.samples && a.sum == b.sum && a.sum_squares == b.sum_squares;
+    return a.width == b.width && a.height == b.height && a.samples == b.samples && a.sum == b.sum &&
+           a.sum_squares == b.sum_squares;
 }
 
 ParallelRequest request_for(const Scene& scene, const test::TempFolder& folder, unsigned block_nodes) {
@@ -45,6 +48,7 @@ TEST_CASE("1, 2, 4 and 7 ranks make the same bits, whether the first one adds up
     const Scene scene = project_scene("cornell", 16, 12);
     const test::TempFolder folder;
     std::optional<FilmMoments> expected;
+    size_t reused_by_first = 0, reused_by_others = 0;
     for (const int ranks : {1, 2, 4, 7}) {
         std::vector<size_t> films;
         for (const unsigned block_nodes : {1, 2, 4}) {
@@ -55,6 +59,7 @@ TEST_CASE("1, 2, 4 and 7 ranks make the same bits, whether the first one adds up
             CHECK(same(result.film, *expected));
             CHECK(result.stats.samples == 200);
             CHECK(result.workers.size() == size_t(ranks));
+            CHECK((result.stats.device.find(host_name() + ": ") != std::string::npos) == (ranks > 1));
             uint64_t samples = 0;
             for (const WorkerShare& w : result.workers) samples += w.samples;
             CHECK(samples == 200);
@@ -62,8 +67,13 @@ TEST_CASE("1, 2, 4 and 7 ranks make the same bits, whether the first one adds up
             for (int rank = 1; rank < ranks; ++rank) others += all.films(rank);
             if (block_nodes == 1) CHECK(others == 0);
             if (block_nodes > 1 && ranks > 1) CHECK(others > 0);
+            for (int rank = 0; rank < ranks; ++rank)
+                (rank == 0 ? reused_by_first : reused_by_others) += all.reused(rank);
         }
     }
+    // Once a film has been added to another one, the next one comes into its memory.
+    CHECK(reused_by_first > 0);
+    CHECK(reused_by_others > 0);
 }
 
 TEST_CASE("with a budget in seconds blocks that are not whole are handed over at the end") {
@@ -136,4 +146,154 @@ TEST_CASE("blocks go round the ranks but the first one; few ranks need none") {
     CHECK(collector_of({2, 0}, {1, 1}, 7) == 1);
     CHECK(collector_of({2, 5}, {1, 11}, 7) == 6);
     CHECK(collector_of({2, 6}, {1, 12}, 7) == 1);
+}
+
+namespace {
+
+/// What one rank tells itself.
+Told told_back(const std::function<void(Ranks&)>& say) {
+    test::ThreadRanks one(1);
+    std::optional<Told> told;
+    one.run([&](Ranks& ranks) {
+        say(ranks);
+        told = hear(ranks);
+        CHECK_FALSE(hear(ranks).has_value());
+    });
+    REQUIRE(told.has_value());
+    return std::move(*told);
+}
+
+std::string refusal_of(const RankMessage& message) {
+    test::ThreadRanks one(1);
+    std::string refusal = "none";
+    one.run([&](Ranks& ranks) {
+        std::vector<std::span<const double>> arrays(message.arrays.begin(), message.arrays.end());
+        ranks.send(0, message.kind, message.bytes, arrays);
+        try {
+            hear(ranks);
+        } catch (const Error& error) {
+            CHECK(error.code == ExitCode::device);
+            refusal = error.what();
+        }
+    });
+    return refusal;
+}
+
+constexpr const char* kCutOff = "a message of another rank is cut off";
+
+}  // namespace
+
+TEST_CASE("what a rank tells is heard whole: text, film and states, or any of them alone") {
+    const FilmMoments film = {2, 1, 5, {1, 2, 3, 4, 5, 6}, {7, 8, 9, 10, 11, 12}};
+    const std::vector<RangeState> states = {{1, 7, {std::byte(1), std::byte(2), std::byte(3)}}, {0, 9, {}}};
+    const auto check_states = [&](const std::vector<RangeState>& heard) {
+        REQUIRE(heard.size() == 2);
+        for (size_t i = 0; i < 2; ++i) {
+            CHECK(heard[i].device == states[i].device);
+            CHECK(heard[i].range == states[i].range);
+            CHECK(heard[i].state == states[i].state);
+        }
+    };
+    Told told = told_back([&](Ranks& r) { tell(r, 0, Say::finished, {{"a", 1}}, &film, states); });
+    CHECK(told.from == 0);
+    CHECK(told.kind == Say::finished);
+    CHECK(told.text == nlohmann::json({{"a", 1}}));
+    CHECK(told.film.width == 2);
+    CHECK(told.film.height == 1);
+    CHECK(same(told.film, film));
+    check_states(told.states);
+    told = told_back([&](Ranks& r) { tell(r, 0, Say::states, {}, nullptr, states); });
+    CHECK(told.text.is_null());
+    CHECK(told.film.samples == 0);
+    CHECK(told.film.sum.empty());
+    check_states(told.states);
+    told = told_back([](Ranks& r) { tell(r, 0, Say::wanted, {{"ranges", 3}}); });
+    CHECK(told.kind == Say::wanted);
+    CHECK(told.states.empty());
+
+    Finished finished;
+    finished.order.node = {1, 6};
+    finished.order.block = {3, 1};
+    finished.film = film;
+    told = told_back([&](Ranks& r) { tell_part(r, finished); });
+    CHECK(told.kind == Say::part);
+    CHECK(read_node(told.text.at("node")) == RangeNode{1, 6});
+    CHECK(read_node(told.text.at("block")) == RangeNode{3, 1});
+    CHECK(same(told.film, film));
+}
+
+TEST_CASE("a message that is cut off anywhere is refused, and so is a film of another size") {
+    const FilmMoments film = {2, 1, 5, {1, 2, 3, 4, 5, 6}, {7, 8, 9, 10, 11, 12}};
+    const std::vector<RangeState> states = {{1, 7, {std::byte(1), std::byte(2), std::byte(3)}}, {0, 9, {}}};
+    test::ThreadRanks one(1);
+    RankMessage whole, with_film;
+    one.run([&](Ranks& r) {
+        tell(r, 0, Say::states, {{"a", 1}}, nullptr, states);
+        tell(r, 0, Say::finished, {}, &film);
+        whole = r.poll().value();
+        with_film = r.poll().value();
+    });
+    CHECK(refusal_of(whole) == "none");
+    const size_t head = 32 + nlohmann::json({{"a", 1}}).dump().size(), first = head + 24 + 3;
+    REQUIRE(whole.bytes.size() == first + 24);
+    for (size_t length = 0; length < whole.bytes.size(); ++length) {
+        CAPTURE(length);
+        RankMessage part = whole;
+        part.bytes.resize(length);
+        CHECK(refusal_of(part) == (length == head || length == first ? "none" : kCutOff));  // fewer states
+    }
+    CHECK(refusal_of(with_film) == "none");
+    for (const int change : {0, 1, 2, 3}) {
+        CAPTURE(change);
+        RankMessage other = with_film;
+        if (change == 0) other.arrays[0].pop_back();
+        if (change == 1) other.arrays[1].pop_back();
+        if (change == 2) other.arrays.pop_back();
+        if (change == 3) other.arrays.push_back(other.arrays[0]);
+        CHECK(refusal_of(other) == kCutOff);
+    }
+}
+
+TEST_CASE("orders and work come back with every field") {
+    const Order order = {{3, 200}, {2, 5}, 1.25, 0, {4, 1}, 6};
+    for (const bool last : {false, true}) {
+        const nlohmann::json text = nlohmann::json::parse(order_text(order, last).dump());
+        CHECK(text.at("last") == last);
+        const Order back = read_order(text);
+        CHECK(back.ranges.size == 3);
+        CHECK(back.ranges.samples == 200);
+        CHECK(back.node == RangeNode{2, 5});
+        CHECK(back.seconds_left == 1.25);
+        CHECK(back.trial_seconds == 0);
+        CHECK(back.block == RangeNode{4, 1});
+        CHECK(back.collector == 6);
+    }
+    std::vector<DeviceWork> work(2);
+    work[0] = {30, 4, 0.5, {}};
+    work[1] = {60, 7, 0.75, {}};
+    work[1].stats.device = "H100";
+    work[1].stats.rays_extend = 9;
+    const std::vector<DeviceWork> back = restore_work(nlohmann::json::parse(work_text(work).dump()));
+    REQUIRE(back.size() == 2);
+    for (size_t i = 0; i < 2; ++i) {
+        CHECK(back[i].samples == work[i].samples);
+        CHECK(back[i].ranges == work[i].ranges);
+        CHECK(back[i].seconds == work[i].seconds);
+        CHECK(back[i].stats.device == work[i].stats.device);
+        CHECK(back[i].stats.rays_extend == work[i].stats.rays_extend);
+    }
+}
+
+TEST_CASE("memory of a film is its arrays, the one of the next film, and none of one that is empty") {
+    const Arrays memory = memory_of({1, 1, 1, {1, 2, 3}, {4, 5, 6}});
+    REQUIRE(memory.size() == 2);
+    CHECK(memory[0] == std::vector<double>{1, 2, 3});
+    CHECK(memory[1] == std::vector<double>{4, 5, 6});
+    CHECK(memory_of({}).empty());
+    Collector collector;
+    CHECK(collector.add({1, 0}, {0, 0}, filled(1)).empty());
+    CHECK(collector.take_spare().sum.empty());
+    CHECK(collector.add({1, 0}, {0, 1}, filled(2)).size() == 1);
+    CHECK(collector.take_spare().sum.size() == 3);
+    CHECK(collector.take_spare().sum.empty());
 }

@@ -84,6 +84,34 @@ TEST_CASE("the reference: a killed and continued one equals the uninterrupted on
     }
 }
 
+TEST_CASE("settings that make a reference another one than the path tracer's are part of what it is") {
+    const auto text = [](const std::vector<std::pair<std::string, std::string>>& set) {
+        RenderSettings settings;
+        for (const auto& [key, value] : set) apply_setting(settings, key, value);
+        return reference_request("r.exr", 8, settings).settings_text;
+    };
+    CHECK(text({}).empty());
+    CHECK(text({{"max_depth", "4"}, {"seed", "3"}, {"connections", "7"}}).empty());
+    CHECK(text({{"precision", "double"}}) == "precision=double");
+    CHECK(text({{"integrator", "bdpt"}}) == "integrator=bdpt");
+    CHECK(text({{"integrator", "bdpt"}, {"variant", "lvc"}, {"connections", "7"}, {"max_depth", "4"}}) ==
+          "integrator=bdpt variant=lvc connections=7");
+    for (const char* key : {"variant", "estimator"}) {
+        const std::string value = std::string(key) == "variant" ? "ris" : "naive";
+        CHECK(contains(error_of([&] { text({{key, value}}); }, ExitCode::usage), "leave these settings out"));
+    }
+    World world;
+    ReferenceRequest one = reference_request("r.exr", 1, {});
+    CHECK(
+        contains(error_of([&] { make_reference({}, one, fake_hooks(world)); }, ExitCode::usage), "at least 2 samples"));
+    one = reference_request("r.exr", 2, {});
+    one.settings.estimator = Estimator::naive;
+    CHECK(contains(error_of([&] { make_reference({}, one, fake_hooks(world)); }, ExitCode::usage), "all strategies"));
+    CHECK(world.made == 0);
+    CHECK(reference_seed(0) == 0xe220a8397b1dcdafull);  // splitmix64 (Vigna)
+    CHECK(reference_seed(0x9e3779b97f4a7c15ull) == 0x6e789e6aa1b965f4ull);
+}
+
 TEST_CASE("a reference shares no random numbers with a render of the same seed") {
     const TempFolder folder;
     write_inputs(folder);

@@ -27,12 +27,14 @@ public:
     }
     /// Messages with arrays that a rank got.
     size_t films(int rank) const { return boxes_[size_t(rank)].films; }
+    /// Arrays of them that lie in memory that the rank gave.
+    size_t reused(int rank) const { return boxes_[size_t(rank)].reused; }
 
 private:
     struct Box {
         std::mutex mutex;
         std::deque<RankMessage> messages;
-        std::atomic<size_t> films = 0;
+        std::atomic<size_t> films = 0, reused = 0;
     };
     class Seat final : public Ranks {
     public:
@@ -51,12 +53,20 @@ private:
             box.films += arrays.empty() ? 0 : 1;
             box.messages.push_back(std::move(message));
         }
-        std::optional<RankMessage> poll(Arrays*) override {
+        std::optional<RankMessage> poll(Arrays* memory) override {
             Box& box = all_->boxes_[size_t(rank_)];
             const std::lock_guard lock(box.mutex);
             if (box.messages.empty()) return std::nullopt;
             RankMessage first = std::move(box.messages.front());
             box.messages.pop_front();
+            for (std::vector<double>& array : first.arrays) {
+                if (!memory || memory->empty()) break;
+                std::vector<double> there = std::move(memory->back());
+                memory->pop_back();
+                there.assign(array.begin(), array.end());
+                array = std::move(there);
+                ++box.reused;
+            }
             return first;
         }
 
