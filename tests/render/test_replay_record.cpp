@@ -1,58 +1,13 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // What a replay says of a sample: vertices follow from the ones before, and the numbers of diffuse surfaces and of the
 // lamp of "cornell" are those that geometry gives.
-#include <cmath>
 #include <set>
 
 #include "render/replay/describe.h"
-#include "tests/support/replay_settings.h"
+#include "tests/support/replayed.h"
 
 namespace ambilux {
 namespace {
-
-constexpr double kPiDouble = 3.14159265358979323846;
-
-bool close(double a, double b, double relative = 2e-5) { return std::abs(a - b) <= relative * std::abs(b) + 1e-12; }
-bool close(Rgb a, Rgb b, double relative = 2e-5) {
-    bool all = true;
-    for (int c = 0; c < 3; ++c) all = all && close(double(a[c]), double(b[c]), relative);
-    return all;
-}
-bool near(Vec3f a, Vec3f b) { return double(length(a - b)) < 1e-4; }
-
-double number(const std::vector<ReplayNumber>& all, const std::string& name) {
-    for (const ReplayNumber& n : all)
-        if (n.name == name) return n.value;
-    FAIL("there is no " << name);
-    return 0;
-}
-std::string names(const std::vector<ReplayNumber>& all) {
-    std::string text;
-    for (const ReplayNumber& n : all) text += (text.empty() ? "" : " ") + n.name;
-    return text;
-}
-
-/// A scene and the replays of a render of it.
-struct Replayed {
-    const Scene scene;
-    const RenderSettings settings;
-    SharedAccels accels{scene};
-    std::unique_ptr<Replay> replay;
-
-    Replayed(Scene s, const ReplayConfig& c)
-        : scene(std::move(s)), settings(settings_of(scene, c)), replay(make_replay(scene, settings, accels)) {}
-
-    /// The first samples of some pixels.
-    template <class See>
-    void each_sample(uint32_t samples, uint32_t step, See see) const {
-        const Sensor& sensor = scene.sensor;
-        for (uint32_t k = 0; k < samples; ++k)
-            for (uint32_t p = 0; p < sensor.crop_width * sensor.crop_height; p += step) {
-                CAPTURE(p, k);
-                see(replay->sample({p % sensor.crop_width, p / sensor.crop_width, k, {}, false, true}));
-            }
-    }
-};
 
 /// What Russian roulette did in some subpaths.
 struct Played {
@@ -202,20 +157,6 @@ TEST_CASE("Of several reasons why a subpath ends after its BSDF let it go on the
 
 namespace {
 
-/// The lamp of "cornell".
-constexpr Rgb kLamp = {17, 12.5f, 7.5f};
-constexpr double kLampArea = 0.5 * 0.4;
-
-/// Reflectance where "cornell" has the point.
-Rgb cornell_reflectance(const ReplayVertex& v) {
-    if (v.emitter != kNone) return {0, 0, 0};
-    if (double(v.ng.x) > 0.9999 && double(v.p.x) < -0.9999) return {0.61f, 0.06f, 0.05f};
-    if (double(v.ng.x) < -0.9999 && double(v.p.x) > 0.9999) return {0.12f, 0.46f, 0.10f};
-    return {0.73f, 0.72f, 0.69f};
-}
-
-double cosine(const ReplayVertex& v, Vec3f w) { return std::abs(double(dot(v.ng, w))); }
-
 void check_scattering(const ReplayVertex& v) {
     const ReplayScatter& s = v.scatter;
     CHECK(close(double(s.pdf_sa), cosine(v, s.direction) / kPiDouble, 1e-4));
@@ -227,11 +168,6 @@ void check_scattering(const ReplayVertex& v) {
 /// Density per solid angle of the lamp's points, which are sampled by area.
 double lamp_pdf(double distance, Vec3f direction) {
     return distance * distance / std::abs(double(direction.y)) / kLampArea;
-}
-
-/// What a diffuse vertex throws from `v`'s ray towards `w`.
-Rgb thrown(const ReplayVertex& v, Vec3f w) {
-    return v.throughput * cornell_reflectance(v) * float(cosine(v, w) / kPiDouble);
 }
 
 void check_hit_candidate(const ReplayCandidate& c, const ReplayVertex& v) {
@@ -282,16 +218,6 @@ void check_connection(const ReplayCandidate& c, const ReplayVertex& z, const Rep
     CHECK(std::abs(number(c.densities, "pdf_light_reverse_sa") - cosine(y, y.direction) / kPiDouble) < 1e-3);
     if (distance > 0.1 && cosine(z, w) > 0.1 && cosine(y, w) > 0.1)
         CHECK(close(c.value, thrown(z, w) * thrown(y, w) / float(distance * distance), 2e-2));
-}
-
-/// The weight follows from the ratio, and what arrives from both and the value.
-void check_arrival(const ReplayCandidate& c) {
-    CHECK(close(double(c.weight), 1 / (1 + double(c.ratio))));
-    if (c.fate == ReplayFate::arrived)
-        CHECK(close(c.contribution, c.value * c.weight));
-    else
-        CHECK(is_zero(c.contribution));
-    CHECK_FALSE(c.drop.happened());
 }
 
 }  // namespace
