@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <tuple>
 
 #include "core/flag.h"
 #include "core/parallel.h"
@@ -40,8 +41,7 @@ struct InvalidSearch {
 
 bool before(const InvalidRecord& a, const InvalidRecord& b) {
     // Those of one search are of eye subpaths alone, which have none, or of light subpaths alone.
-    if (a.light_subpath != b.light_subpath) return a.light_subpath < b.light_subpath;
-    return a.y != b.y ? a.y < b.y : a.x < b.x;
+    return std::tie(a.light_subpath, a.y, a.x) < std::tie(b.light_subpath, b.y, b.x);
 }
 
 /// What was found, and when that is enough.

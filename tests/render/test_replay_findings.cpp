@@ -108,6 +108,8 @@ TEST_CASE("An infinite flux is found by the number of its light subpath") {
         const InvalidRecord& r = f.found[k];
         CHECK(r.drop.stage == "light_generate");
         REQUIRE(r.light_subpath == k);
+        CHECK(r.x == 0);
+        CHECK(r.y == 0);
         CHECK(r.sample == 0);
         CHECK(r.candidate.kind == std::string());
         std::vector<ReplayCandidate> splats;
@@ -167,6 +169,8 @@ TEST_CASE("A light vertex so bright that its splat is infinite is found with its
     CHECK(r.candidate.eye_depth == 0);
     CHECK(r.candidate.light_subpath == r.light_subpath);
     CHECK(r.candidate.densities.empty());
+    CHECK(r.x == 0);
+    CHECK(r.y == 0);
     CHECK(r.drop.what == "Inf");
     std::vector<ReplayCandidate> splats;
     const ReplaySubpath again = f.replay->light_subpath(r.light_subpath, r.sample, true, splats);

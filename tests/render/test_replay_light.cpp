@@ -365,7 +365,8 @@ TEST_CASE("Light subpaths have numbers round by round, with gaps where there is 
     CHECK(asked(path, 0) == "--light-subpath: integrator path has no light subpaths; light and bdpt have");
 }
 
-TEST_CASE("What has no replay is refused, and what has one is named") {
+TEST_CASE(
+    "What has no replay is refused, what has one is named, and its rays go through the structure of its settings") {
     const Scene scene = cornell();
     const auto refused = [&](const ReplayConfig& c) { return refusal([&] { check_replay(settings_of(scene, c)); }); };
     CHECK(refused({"toy", "wavefront", {}}) ==
@@ -376,6 +377,10 @@ TEST_CASE("What has no replay is refused, and what has one is named") {
           "bdpt.auto=true: which integrator made the sample is up to a pilot; give the settings that `ambilux render` "
           "printed as its selection");
     check_replay(settings_of(scene, {"path", "ris", {}}));
+    const Replayed embree(cornell(), {"path", "wavefront", {{"accel", "embree"}}}),
+        cwbvh(cornell(), {"path", "wavefront", {{"accel", "cwbvh"}}});
+    CHECK(embree.replay->accel == embree.accels.get<EmbreeAccel>());
+    CHECK(cwbvh.replay->accel == cwbvh.accels.get<CwbvhAccel>());
 }
 
 }  // namespace ambilux

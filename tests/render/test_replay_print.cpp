@@ -93,7 +93,7 @@ std::vector<ReplayCandidate> found() {
     std::vector<ReplayCandidate> all = {
         candidate("hit", Strategy::make(0, 2), 1, ReplayFate::arrived),
         candidate("next event", Strategy::make(1, 2), 1, ReplayFate::blocked, 3),
-        candidate("connection", Strategy::make(2, 3), 2, ReplayFate::culled, 1.5f),
+        candidate("connection", Strategy::make(2, 3), 2, ReplayFate::culled, 0.5f),
         candidate("next event", Strategy::make(1, 2), 2, ReplayFate::zero),
         candidate("environment", Strategy::make(0, 3), 2, ReplayFate::invalid),
         candidate("connection", Strategy::make(3, 2), 1, ReplayFate::invalid),
@@ -201,7 +201,7 @@ const char* const kOthers =
            shadow ray from (33, 16.5, -1) along (0, 1, 0), 3 long: blocked
            blocked
   s2t3     connection, eye vertex 2, light subpath 12 vertex 1: value (2, 4, 8), ratio 3, weight 0.25
-           shadow ray from (33, 16.5, -1) along (0, 1, 0), 1.5 long: not traced
+           shadow ray from (33, 16.5, -1) along (0, 1, 0), 0.5 long: not traced
            culled before its shadow ray
   s1t2     next event, eye vertex 2: value (0, 0, 0), ratio 3, weight 0.25
            nothing: value times weight rounds to 0
@@ -312,7 +312,7 @@ TEST_CASE("The JSON of a sample has every field of its record, and null for what
         "densities": {"opacity": 1, "pdf_emission_area": 0.5}, "fate": "arrived", "dropped": null,
         "contribution": [0.5, 1, 2]})"));
     CHECK(c[2]["light_subpath"] == 12);
-    CHECK(c[2]["shadow_ray"]["length"] == 1.5);
+    CHECK(c[2]["shadow_ray"]["length"] == 0.5);
     CHECK(c[4]["value"] == json::parse("[null, 0, 0]"));
     CHECK(c[4]["dropped"] == json::parse(R"({"stage": "mis_weight", "what": "Inf"})"));
     const char* const fates[] = {"arrived", "blocked", "culled", "zero", "invalid", "invalid", "arrived"};

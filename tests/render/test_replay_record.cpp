@@ -259,4 +259,17 @@ TEST_CASE("Densities and values of what an eye subpath finds in a diffuse room a
     }
 }
 
+TEST_CASE("Of the environment the density of next event estimation is told") {
+    const Replayed r(scene_from_text("<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'><integer "
+                                     "name='width' value='4'/><integer name='height' value='4'/></film></sensor>"
+                                     "<emitter type='constant'/></scene>"),
+                     {"path", "wavefront", {}});
+    r.each_sample(1, 1, [&](const ReplaySample& s) {
+        REQUIRE(s.candidates.size() == 1);
+        CHECK(s.candidates[0].kind == std::string("environment"));
+        CHECK(names(s.candidates[0].densities) == "pdf_next_event_sa");
+        CHECK(close(number(s.candidates[0].densities, "pdf_next_event_sa"), 1 / (4 * kPiDouble)));
+    });
+}
+
 }  // namespace ambilux
