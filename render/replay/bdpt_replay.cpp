@@ -46,7 +46,6 @@ public:
         ctx_.radiance_first = pairing_ == ReplayPairing::registers;
         if (!policy_.rules.connect) pairing_ = ReplayPairing::none;
         wave_ = host_wave(scene, settings, uint32_t(tbb::task_arena().max_concurrency()));
-        wave_.samples = 1;
         const Ordering ordering = settings.queues.ordering;
         cache_known_ = settings.backend != Backend::cuda && settings.memory == 0 &&
                        (ordering == Ordering::automatic || ordering == Ordering::none);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <tuple>
 
 #include "core/flag.h"
 #include "core/parallel.h"
@@ -39,9 +40,8 @@ struct InvalidSearch {
 };
 
 bool before(const InvalidRecord& a, const InvalidRecord& b) {
-    // Eye subpaths have none: they come first.
-    if (a.light_subpath != b.light_subpath) return a.light_subpath + 1 < b.light_subpath + 1;
-    return a.y != b.y ? a.y < b.y : a.x < b.x;
+    // Those of one search are of eye subpaths alone, which have none, or of light subpaths alone.
+    return std::tie(a.light_subpath, a.y, a.x) < std::tie(b.light_subpath, b.y, b.x);
 }
 
 /// What was found, and when that is enough.
@@ -50,9 +50,11 @@ struct InvalidList {
     std::vector<InvalidRecord> kept;
     std::map<std::string, uint32_t> of_stage;
 
-    bool has_enough(const std::map<std::string, InvalidCounts>& wanted) {
+    /// Of samples that dropped `wanted`; `before`: of_stage when they began.
+    bool has_enough(const std::map<std::string, InvalidCounts>& wanted, std::map<std::string, uint32_t> before = {}) {
         return std::all_of(wanted.begin(), wanted.end(), [&](const auto& stage) {
-            return of_stage[stage.first] >= std::min<uint64_t>(per_stage, stage.second.total());
+            const uint32_t found = of_stage[stage.first];
+            return found >= per_stage || found - before[stage.first] >= stage.second.total();
         });
     }
     void add(std::vector<InvalidRecord>& found) {
@@ -72,6 +74,7 @@ void search_sample(const InvalidBatch& sample, const Replay& replay, const Scene
     const uint64_t pixels = uint64_t(width) * scene.sensor.crop_height;
     const uint32_t eyes = uint32_t(std::min<uint64_t>(pixels, kMostInvalidSubpaths));
     const uint32_t lights = std::min(replay.light_subpaths(), kMostInvalidSubpaths);
+    const std::map<std::string, uint32_t> before = list.of_stage;
     InvalidSearch search{replay, sample.first, width, {}, {}};
     const auto share = [&](uint32_t first, uint32_t all, auto look) {
         if (first < all) parallel_for(std::min(kTogether, all - first), [&](uint32_t i) { look(first + i); }, 64u);
@@ -79,9 +82,9 @@ void search_sample(const InvalidBatch& sample, const Replay& replay, const Scene
     };
     for (uint32_t first = 0; first < std::max(eyes, lights) && !is_set(interrupt); first += kTogether) {
         share(first, eyes, [&](uint32_t pixel) { search.eye_subpath(pixel); });
-        if (list.has_enough(sample.by_stage)) return;
+        if (list.has_enough(sample.by_stage, before)) return;
         share(first, lights, [&](uint32_t number) { search.light_subpath(number); });
-        if (list.has_enough(sample.by_stage)) return;
+        if (list.has_enough(sample.by_stage, before)) return;
     }
 }
 

@@ -138,7 +138,7 @@ Strategy parse_strategy(const std::string& text) {
     const char* const end = text.data() + text.size();
     const size_t at = text.find('t');
     uint32_t s = 0, t = 0;
-    if (text.size() > 3 && text[0] == 's' && at != std::string::npos) {
+    if (text[0] == 's' && at != std::string::npos) {
         const auto first = std::from_chars(text.data() + 1, text.data() + at, s);
         const auto second = std::from_chars(text.data() + at + 1, end, t);
         if (first.ec == std::errc() && first.ptr == text.data() + at && second.ec == std::errc() && second.ptr == end &&

@@ -90,7 +90,7 @@ struct ReplayCandidate {
 struct ReplaySubpath {
     Side side = Side::eye;
     uint32_t number = 0, part = 0;
-    Rgb start{};  ///< light: flux of the first ray
+    Rgb start{};  ///< light: radiance of the emitter sample
     std::string emitter;
     std::vector<ReplayNumber> start_densities;
     std::vector<ReplayVertex> vertices;

@@ -10,32 +10,11 @@
 #include "render/replay/by_length.h"
 #include "render/replay/outliers.h"
 #include "render/replay/print.h"
-#include "render/replay/replay.h"
-#include "tests/support/render_scene.h"
+#include "tests/support/replay_settings.h"
 #include "tests/support/spherical_scene.h"
 
 namespace ambilux {
 namespace {
-
-/// Settings of a render, by text.
-struct Config {
-    std::string integrator, variant;
-    std::vector<std::pair<std::string, std::string>> set;
-};
-
-RenderSettings settings_of(const Scene& scene, const Config& c) {
-    RenderSettings s = cpu_settings(scene, Estimator::mis, 7);
-    s.integrator = c.integrator;
-    s.variant = c.variant;
-    for (const auto& [key, value] : c.set) apply_setting(s, key, value);
-    return s;
-}
-
-std::string text_of(const Config& c) {
-    std::string text = c.integrator + " " + c.variant;
-    for (const auto& [key, value] : c.set) text += " " + key + "=" + value;
-    return text;
-}
 
 /// The image of one sample.
 FilmMoments one_sample(const Scene& scene, const RenderSettings& settings, uint32_t sample) {
@@ -83,7 +62,15 @@ uint32_t check_samples(const Scene& scene, const RenderSettings& settings, uint3
     return lit;
 }
 
-const Config kPaths[] = {
+/// Segments of the longest path that a replay finds.
+uint32_t longest_of(const ReplaySample& r) {
+    size_t longest = r.eye.vertices.size();
+    for (const auto* all : {&r.candidates, &r.splats})
+        for (const ReplayCandidate& c : *all) longest = std::max<size_t>(longest, c.strategy.segments());
+    return uint32_t(longest);
+}
+
+const ReplayConfig kPaths[] = {
     {"path", "wavefront", {}},
     {"path", "wavefront", {{"estimator", "nee"}}},
     {"path", "wavefront", {{"estimator", "naive"}}},
@@ -93,7 +80,7 @@ const Config kPaths[] = {
     {"path", "ris", {}},
     {"path", "ris", {{"heuristic", "power"}, {"rr_depth", "1"}}},
 };
-const Config kBidirectional[] = {
+const ReplayConfig kBidirectional[] = {
     {"light", "wavefront", {}},
     {"light", "wavefront", {{"light_paths", "1.5"}, {"rr_depth", "1"}}},
     {"bdpt", "wavefront", {}},
@@ -115,7 +102,7 @@ const Config kBidirectional[] = {
 TEST_CASE("A replayed sample of the path tracer is the render's, bit by bit with full kernels") {
     for (const char* name : {"cornell", "glass", "lights", "materials", "textured", "furnace"}) {
         const Scene scene = project_scene(name, 37, 29);
-        for (const Config& c : kPaths)
+        for (const ReplayConfig& c : kPaths)
             for (const bool specialise : {false, true}) {
                 CAPTURE(name, text_of(c), specialise);
                 RenderSettings settings = settings_of(scene, c);
@@ -128,7 +115,7 @@ TEST_CASE("A replayed sample of the path tracer is the render's, bit by bit with
 TEST_CASE("A replayed sample of light tracing and of bdpt is the render's, bit by bit with full kernels") {
     for (const char* name : {"cornell", "glass", "lights", "materials", "textured"}) {
         const Scene scene = project_scene(name, 37, 29);
-        for (const Config& c : kBidirectional)
+        for (const ReplayConfig& c : kBidirectional)
             for (const bool specialise : {false, true}) {
                 CAPTURE(name, text_of(c), specialise);
                 RenderSettings settings = settings_of(scene, c);
@@ -140,12 +127,17 @@ TEST_CASE("A replayed sample of light tracing and of bdpt is the render's, bit b
 
 TEST_CASE("Replayed samples of a spherical sensor are the render's, at the edges of the film too") {
     // Tails of a gaussian are so small that sums of doubles would depend on the order of splats.
-    const Scene scene = scene_from_text(room_around(spherical_camera(12, 6, "tent"), 4));
-    for (const Config& c : {kPaths[0], kBidirectional[0], kBidirectional[2], kBidirectional[6]}) {
-        CAPTURE(text_of(c));
-        RenderSettings settings = settings_of(scene, c);
-        settings.specialise = false;
-        CHECK(check_samples(scene, settings, 5, 1) > 0);
+    const char* const crop =
+        "<integer name='crop_offset_x' value='5'/><integer name='crop_offset_y' value='2'/>"
+        "<integer name='crop_width' value='6'/><integer name='crop_height' value='3'/>";
+    for (const char* part : {"", crop}) {
+        const Scene scene = scene_from_text(room_around(spherical_camera(12, 6, "tent", part), 4));
+        for (const ReplayConfig& c : {kPaths[0], kBidirectional[0], kBidirectional[2], kBidirectional[6]}) {
+            CAPTURE(text_of(c), part);
+            RenderSettings settings = settings_of(scene, c);
+            settings.specialise = false;
+            CHECK(check_samples(scene, settings, 5, 1) > 0);
+        }
     }
 }
 
@@ -185,88 +177,10 @@ TEST_CASE("A watched render has the image of one that is not, and names its larg
     }
 }
 
-namespace {
-
-/// A wall and a lamp behind the camera, both of the given radiance.
-Scene two_lamps(const std::string& wall, const std::string& lamp) {
-    const auto area = [](const std::string& radiance) {
-        return radiance == "0" ? "" : "<emitter type='area'><rgb name='radiance' value='" + radiance + "'/></emitter>";
-    };
-    return scene_from_text(R"(<scene version="3.0.0">
-        <integrator type="path"><integer name="max_depth" value="2"/></integrator>
-        <sensor type="perspective"><float name="fov" value="40"/>
-            <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
-            <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>
-        <shape type="rectangle"><bsdf type="diffuse"/>)" +
-                           area(wall) + R"(</shape>
-        <shape type="rectangle"><transform name="to_world"><scale value="50"/><rotate y="1" angle="180"/>
-                <translate z="5"/></transform>)" +
-                           area(lamp) + "</shape></scene>");
-}
-
-struct InvalidFindings {
-    InvalidWatch watch;
-    SharedAccels accels;
-    std::unique_ptr<Replay> replay;
-    std::vector<InvalidRecord> found;
-
-    /// Renders a batch of three samples.
-    InvalidFindings(const Scene& scene, const RenderSettings& settings, uint32_t per_stage)
-        : watch(make_renderer(scene, settings)), accels(scene), replay(make_replay(scene, settings, accels)) {
-        REQUIRE(watch.render(0, 3) == 3);
-        REQUIRE(watch.batches().size() == 1);
-        CHECK(watch.batches()[0].count == 3);
-        found = find_invalid(watch, *replay, scene, per_stage).found;
-    }
-};
-
-}  // namespace
-
-TEST_CASE("Invalid values of a stage inside of another are counted, and found again with pixel, sample and strategy") {
-    // A lamp so bright that its light, divided by the density of sampling it, is infinite.
-    const Scene scene = two_lamps("0", "1e38");
-    InvalidFindings f(scene, settings_of(scene, {"path", "wavefront", {{"estimator", "nee"}}}), 3);
-    REQUIRE(f.watch.by_stage().at("connect").inf > 0);
-    REQUIRE(f.found.size() == 3);
-    for (const InvalidRecord& r : f.found) {
-        CHECK(r.drop.stage == "connect");
-        CHECK(r.drop.what == "Inf");
-        CHECK(r.candidate.strategy.code == Strategy::make(1, 2).code);
-        const ReplaySample again = f.replay->sample({r.x, r.y, r.sample, {}, true, true});
-        bool same = false;
-        for (const ReplayCandidate& c : again.candidates) same |= c.drop.stage == "connect";
-        CHECK(same);
-    }
-}
-
-TEST_CASE("An infinite flux is found by the number of its light subpath") {
-    const Scene scene = two_lamps("0", "1e38");
-    InvalidFindings f(scene, settings_of(scene, {"light", "wavefront", {}}), 2);
-    REQUIRE(f.watch.by_stage().at("light_generate").inf > 0);
-    REQUIRE(f.found.size() == 2);
-    for (const InvalidRecord& r : f.found) {
-        CHECK(r.drop.stage == "light_generate");
-        REQUIRE(r.light_subpath != kNone);
-        std::vector<ReplayCandidate> splats;
-        const ReplaySubpath again = f.replay->light_subpath(r.light_subpath, r.sample, true, splats);
-        CHECK(again.drop.what == "Inf");
-        CHECK(again.end == "the flux of the emitter sample is invalid");
-    }
-}
-
-TEST_CASE("A sample whose sum is infinite, though its parts are not, is found as that of update_film") {
-    const Scene scene = two_lamps("3e38", "3e38");
-    InvalidFindings f(scene, settings_of(scene, {"path", "wavefront", {{"estimator", "naive"}}}), 1);
-    CHECK(f.watch.by_stage().size() == 1);
-    REQUIRE(f.watch.by_stage().at("update_film").inf > 0);
-    REQUIRE(f.found.size() == 1);
-    const InvalidRecord& r = f.found[0];
-    CHECK(f.replay->sample({r.x, r.y, r.sample, {}, true, true}).drop.stage == "update_film");
-}
-
 TEST_CASE("A comparison by segments agrees with a render, and names the number from which on another one differs") {
     const Scene scene = project_scene("cornell", 24, 16);
-    for (const Config& c : {Config{"path", "wavefront", {}}, Config{"bdpt", "wavefront", {{"max_depth", "5"}}}}) {
+    for (const ReplayConfig& c :
+         {ReplayConfig{"path", "wavefront", {}}, ReplayConfig{"bdpt", "wavefront", {{"max_depth", "5"}}}}) {
         CAPTURE(text_of(c));
         const RenderSettings settings = settings_of(scene, c);
         SharedAccels accels(scene);
@@ -274,9 +188,16 @@ TEST_CASE("A comparison by segments agrees with a render, and names the number f
         const auto rendered = [&](const RenderSettings& s, uint32_t sample) { return rendered_film(scene, s, sample); };
         const std::vector<LengthComparison> same = compare_by_length(scene, settings, request, accels, rendered);
         REQUIRE(same.size() >= 4);
+        const uint32_t longest = longest_of(make_replay(scene, settings, accels)->sample(request));
+        const bool limited = settings.max_depth >= 0 && uint32_t(settings.max_depth) <= longest + 1;
+        CHECK(same.size() == (limited ? uint32_t(settings.max_depth) : longest + 2));
         double sum = 0;
-        for (const LengthComparison& l : same) {
+        for (size_t k = 0; k < same.size(); ++k) {
+            const LengthComparison& l = same[k];
+            CHECK(l.segments == k + 1);
+            CHECK(l.or_more == (!limited && k + 1 == same.size()));
             CHECK_FALSE(l.differs);
+            for (int i = 0; i < 3; ++i) CHECK(std::abs(l.rendered[i] - l.replayed[i]) <= 1e-5 * l.rendered[i] + 1e-6);
             sum += l.rendered[0];
         }
         const double all = rendered(settings, request.sample).sum[(8 * 24 + 12) * 3];
@@ -292,6 +213,40 @@ TEST_CASE("A comparison by segments agrees with a render, and names the number f
         CHECK(by_length_text(other).find("first differ in paths of 3 segments") != std::string::npos);
         CHECK(by_length_text(same).find("agree") != std::string::npos);
     }
+}
+
+TEST_CASE("A comparison by segments allows a thousandth of what they bring, and a millionth of the sum for roundings") {
+    const Scene scene = project_scene("cornell", 24, 16);
+    const RenderSettings settings =
+        settings_of(scene, {"path", "wavefront", {{"max_depth", "3"}, {"specialise", "false"}}});
+    SharedAccels accels(scene);
+    // A pixel whose paths of two segments bring light, and those of three none.
+    ReplayRequest request;
+    const auto brings = [&](int max_depth) {
+        RenderSettings s = settings;
+        s.max_depth = max_depth;
+        return largest(make_replay(scene, s, accels)->sample(request).eye_sum);
+    };
+    const auto fits = [&] { return brings(2) > brings(1) && brings(3) == brings(2); };
+    for (request.y = 8; !fits() && request.x < 23;) ++request.x;
+    REQUIRE(fits());
+    const auto compared = [&](double factor, int from) {
+        return compare_by_length(scene, settings, request, accels, [&](const RenderSettings& s, uint32_t sample) {
+            FilmMoments film = rendered_film(scene, s, sample);
+            for (double& v : film.sum) v *= s.max_depth >= from ? factor : 1.0;
+            return film;
+        });
+    };
+    const auto differs = [&](double factor, int from, uint32_t segments) {
+        return compared(factor, from).at(segments - 1).differs;
+    };
+    CHECK_FALSE(differs(1 + 0.999e-3, 2, 2));
+    CHECK(differs(1 + 1.005e-3, 2, 2));
+    CHECK_FALSE(differs(1 - 0.999e-3, 2, 2));
+    CHECK(differs(1 - 1.005e-3, 2, 2));
+    CHECK_FALSE(differs(1 + 0.998e-6, 3, 3));
+    CHECK(differs(1 + 1.005e-6, 3, 3));
+    CHECK(differs(std::nan(""), 3, 3));
 }
 
 TEST_CASE("Positions are printed in the coordinates of the file, wherever the loader moved the scene") {
