@@ -7,6 +7,7 @@
 
 #include "core/rng.h"
 #include "integrators/bdpt/learned/cells.h"
+#include "integrators/bdpt/learned/cluster_light_vertices.h"
 #include "integrators/bdpt/learned/draws.h"
 #include "render/wave_plan.h"
 #include "tests/support/bidirectional_images.h"

@@ -150,8 +150,7 @@ TEST_CASE("learned draws are offered to the selection as four that are worth twe
     CHECK(offers[0].worth == 12);
     asked.cuda = true;
     CHECK(learned->selection(asked).empty());
-    asked = {s, any, false, false, 0.0f};
-    CHECK(learned->selection(asked).empty());
+    CHECK(learned->selection({s, any, false, false, 0.0f}).empty());
 }
 
 TEST_CASE("numbers of light subpaths between those that tiles can have are refused with the next ones") {
@@ -178,7 +177,8 @@ TEST_CASE("roulette that lets variance double within the depth of paths is warne
         const std::vector<std::string> warnings = render_warnings(scene, s);
         INFO(depth << " of " << doubles_after);
         CHECK(std::any_of(warnings.begin(), warnings.end(), [](const std::string& w) {
-                  return w.starts_with("a surface reflects 0.99 of the light, and Russian roulette ends one path in 20");
+                  return w.starts_with(
+                      "a surface reflects 0.99 of the light, and Russian roulette ends one path in 20");
               }) == warned);
     }
     s.max_depth = -1;
