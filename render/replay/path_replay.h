@@ -25,9 +25,11 @@ public:
         return out;
     }
     ReplaySubpath light_subpath(uint32_t, uint32_t, bool, std::vector<ReplayCandidate>&) const override {
-        const auto have = [](const VariantTraits& v) { return v.light_subpaths; };
+        const auto have = [](const VariantTraits& v) {
+            return v.light_subpaths && v.replay != ReplayPairing::no_replay;
+        };
         throw Error(ExitCode::usage, fmt::format("--light-subpath: integrator {} has no light subpaths; {} have",
-                                                 integrator_, fmt::join(integrators_that(have), " and ")));
+                                                 integrator_, listed(integrators_that(have))));
     }
 
 private:

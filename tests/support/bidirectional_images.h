@@ -106,7 +106,7 @@ inline void check_image(const Scene& scene, const RenderSettings& settings, cons
         worst = std::max(worst, std::abs(pilot.mean[i] - truth.mean[i]) / std::max(1e-30, truth.mean[i]));
     if (worst < 2e-5) return;  // without variance
     const ZTestResult first = z_test(pilot, truth, options);
-    double samples = kPilot * std::pow(first.detectable / 0.013, 2) * 1.4;
+    double samples = kPilot * std::pow(first.detectable / 0.013, 2) * 2;
     if (first.undecided && std::abs(first.relative_difference) > 1e-3) samples = most;  // too few events to tell
     const uint32_t n = uint32_t(std::clamp(samples, double(kPilot), double(most))) / kBatches * kBatches;
     const Estimate image = render_batches(scene, settings, n, kPilot);
