@@ -29,7 +29,7 @@ public:
             return v.light_subpaths && v.replay != ReplayPairing::no_replay;
         };
         throw Error(ExitCode::usage, fmt::format("--light-subpath: integrator {} has no light subpaths; {} have",
-                                                 integrator_, listed(integrators_that(have))));
+                                                 integrator_, fmt::join(integrators_that(have), " and ")));
     }
 
 private:
