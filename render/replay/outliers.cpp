@@ -50,11 +50,11 @@ struct InvalidList {
     std::vector<InvalidRecord> kept;
     std::map<std::string, uint32_t> of_stage;
 
-    /// Of samples that dropped `wanted`; `before`: of_stage when they began.
-    bool has_enough(const std::map<std::string, InvalidCounts>& wanted, std::map<std::string, uint32_t> before = {}) {
+    /// Of samples that dropped `wanted`; `earlier`: of_stage when their search began.
+    bool has_enough(const std::map<std::string, InvalidCounts>& wanted, std::map<std::string, uint32_t> earlier = {}) {
         return std::all_of(wanted.begin(), wanted.end(), [&](const auto& stage) {
             const uint32_t found = of_stage[stage.first];
-            return found >= per_stage || found - before[stage.first] >= stage.second.total();
+            return found >= per_stage || found - earlier[stage.first] >= stage.second.total();
         });
     }
     void add(std::vector<InvalidRecord>& found) {
@@ -74,7 +74,7 @@ void search_sample(const InvalidBatch& sample, const Replay& replay, const Scene
     const uint64_t pixels = uint64_t(width) * scene.sensor.crop_height;
     const uint32_t eyes = uint32_t(std::min<uint64_t>(pixels, kMostInvalidSubpaths));
     const uint32_t lights = std::min(replay.light_subpaths(), kMostInvalidSubpaths);
-    const std::map<std::string, uint32_t> before = list.of_stage;
+    const std::map<std::string, uint32_t> earlier = list.of_stage;
     InvalidSearch search{replay, sample.first, width, {}, {}};
     const auto share = [&](uint32_t first, uint32_t all, auto look) {
         if (first < all) parallel_for(std::min(kTogether, all - first), [&](uint32_t i) { look(first + i); }, 64u);
@@ -82,9 +82,9 @@ void search_sample(const InvalidBatch& sample, const Replay& replay, const Scene
     };
     for (uint32_t first = 0; first < std::max(eyes, lights) && !is_set(interrupt); first += kTogether) {
         share(first, eyes, [&](uint32_t pixel) { search.eye_subpath(pixel); });
-        if (list.has_enough(sample.by_stage, before)) return;
+        if (list.has_enough(sample.by_stage, earlier)) return;
         share(first, lights, [&](uint32_t number) { search.light_subpath(number); });
-        if (list.has_enough(sample.by_stage, before)) return;
+        if (list.has_enough(sample.by_stage, earlier)) return;
     }
 }
 
