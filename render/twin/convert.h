@@ -74,7 +74,7 @@ void convert(const From& from, To& to) {
     } else if constexpr (std::is_array_v<From>) {
         static_assert(std::extent_v<From> == std::extent_v<To>);
         for (size_t i = 0; i < std::extent_v<From>; ++i) convert(from[i], to[i]);
-    } else if constexpr (!std::is_empty_v<From>) {
+    } else if constexpr (!std::is_empty_v<From> && sizeof(From) > 0) {
         const auto a = detail::fields(from);
         auto b = detail::fields(to);
         static_assert(std::tuple_size_v<decltype(a)> == std::tuple_size_v<decltype(b)>);

@@ -29,6 +29,8 @@ AMBILUX_HD Receiver receiver_of_ray(Vec3f p, [[maybe_unused]] Sums sums) {
 
 /// By power, whatever the receiver.
 struct LightsByPower {
+    char nothing[0];  ///< no size, as BsdfDirections
+
     struct Pick {
         static constexpr float over_power = 1.0f;
         uint32_t emitter;

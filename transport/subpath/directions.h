@@ -15,6 +15,8 @@ struct Vertex;
 
 /// The BSDF alone (transport/subpath/bsdf_directions.h).
 struct BsdfDirections {
+    char nothing[0];  ///< no size: what follows in the parameters of a kernel stays where it is
+
     template <Features F, class Mis>
     AMBILUX_HD static bool sample(const Vertex<Mis>& v, Vec3f u, TransportMode mode, BsdfSample& s);
     template <Features F, class Mis>
