@@ -120,7 +120,7 @@ TEST_CASE("lvc has the expectation of paired subpaths, for few draws and many, a
                 s.heuristic = heuristic;
                 apply_setting(s, "strategies", strategies);
                 INFO(name << " " << draws << " draws, heuristic " << int(heuristic));
-                check_agreement(render_batches(scene, s, 256), paired, 0.06);
+                check_agreement(scene, s, 256, paired, 0.06);
             }
         }
     }
@@ -152,7 +152,7 @@ TEST_CASE("lvc: connections and light tracing alone, whose weights sum to one be
     s.variant = "lvc";
     s.seed = 32;
     s.connections = 4;
-    check_agreement(render_batches(scene, s, 512), paired, 0.02);
+    check_agreement(scene, s, 512, paired, 0.02);
 }
 
 TEST_CASE(
@@ -276,7 +276,7 @@ TEST_CASE("streaming has the expectation of paired subpaths") {
             s.variant = "streaming";
             s.seed = 42;
             INFO(name << " heuristic " << int(heuristic));
-            check_agreement(render_batches(scene, s, 512), paired, 0.06);
+            check_agreement(scene, s, 512, paired, 0.06);
         }
     }
     // Where connections matter most: alone with light tracing, on paths of three and four segments.
@@ -287,7 +287,7 @@ TEST_CASE("streaming has the expectation of paired subpaths") {
     const Estimate paired = render_batches(scene, s, 512);
     s.variant = "streaming";
     s.seed = 44;
-    check_agreement(render_batches(scene, s, 512), paired, 0.02);
+    check_agreement(scene, s, 512, paired, 0.02);
 }
 
 TEST_CASE("streaming: bits do not depend on the number of slots, nor memory on the length of paths") {

@@ -65,7 +65,7 @@ TEST_CASE("hidden lights in a room: path tracing, light tracing and all strategi
     for (const bool lamp : {false, true}) {
         const Scene scene = scene_from_text(hidden_room(16, 4, lamp));
         INFO(lamp);
-        agree(scene, {{"all"}, {"all", MisHeuristic::power}, {"-i light"}, {"connections+light"}}, 1u << 12, 1u << 12,
+        agree(scene, {{"all"}, {"all", MisHeuristic::power}, {"-i light"}, {"connections+light"}}, 1u << 12, 1u << 10,
               0.05);
         CHECK(missing_light(scene.features, method_settings(scene, {"all"}, 1)).empty());
     }

@@ -132,6 +132,18 @@ inline void check_agreement(const Estimate& a, const Estimate& b, double sees, c
     CHECK(sees_bias(a, b, sees, options));
 }
 
+/// The same for a render of as many samples as it takes to notice that, at most `most`, and a quarter of these at
+/// least: fewer miss what is rare. A pilot tells roughly how many, and is not part of the comparison.
+inline void check_agreement(const Scene& scene, const RenderSettings& settings, uint32_t most, const Estimate& truth,
+                            double sees, const ZTestOptions& options = {}) {
+    const uint32_t few = std::max(1u, most / 16 / kBatches) * kBatches;
+    const ZTestResult pilot = z_test(render_batches(scene, settings, few), truth, options);
+    const double wanted = pilot.undecided ? most : few * std::pow(1.8 * pilot.detectable / sees, 2);
+    const uint32_t n = std::max(1u, uint32_t(std::clamp(wanted, most / 4.0, double(most))) / kBatches) * kBatches;
+    INFO(n << " of " << most << " samples");
+    check_agreement(render_batches(scene, settings, n, few), truth, sees, options);
+}
+
 // ---- a plane at z = 0, seen from above in [-1,1]², and its light ----
 
 inline constexpr Rgb kLight = {3, 5, 2};
