@@ -3,6 +3,7 @@
 
 #include "formats/pbrt/environment.h"
 #include "formats/pbrt/light_parameters.h"
+#include "formats/pbrt/names.h"
 #include "formats/spot_falloff.h"
 
 namespace ambilux::pbrt {
@@ -164,7 +165,7 @@ void add_light(SceneMaker& scene, const Described& light) {
     else if (type == "goniometric")
         add_goniometric(scene, light);
     else
-        return scene.report.refuse(light.in.where, "light '" + type + "' is not supported", "it is left out");
+        return scene.report.refuse(light.in.where, quoted("light", type) + " is not supported", "it is left out");
     light.in.finish(scene.report);
 }
 

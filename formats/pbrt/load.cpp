@@ -8,6 +8,7 @@
 #include "core/text.h"
 #include "formats/front_end.h"
 #include "formats/gzip.h"
+#include "formats/pbrt/names.h"
 #include "formats/pbrt/scene.h"
 
 namespace ambilux {
@@ -107,7 +108,7 @@ void Parser::directive(const Token& word) {
     // pbrt-v4 has none; files that once were older end with it.
     if (name == "WorldEnd" && in_world_ && open_files_.size() == 1 && tokens_->peek().kind == TokenKind::end)
         return scene_.report.note(at, "WorldEnd is of older versions; the file is read as one of pbrt-v4");
-    fail(at, "unknown directive '" + name + "'");
+    fail(at, "unknown " + quoted("directive", name));
 }
 
 void Parser::need_world(const std::string& name, const Where& at, bool inside) const {

@@ -3,6 +3,7 @@
 
 #include "formats/document/named_media.h"
 #include "formats/pbrt/coating.h"
+#include "formats/pbrt/names.h"
 #include "formats/pbrt/scene.h"
 
 namespace ambilux::pbrt {
@@ -39,7 +40,7 @@ public:
         if (type == "thindielectric") return finish(thin_dielectric(), true);
         if (type == "diffusetransmission") return finish(diffuse_transmission(), true);
         if (type == "mix") return mix();
-        scene_.report.refuse(in_.where, "material '" + type + "' is not supported",
+        scene_.report.refuse(in_.where, quoted("material", type) + " is not supported",
                              "a diffuse surface of reflectance 0.5 is used");
         for (const Parameter& p : in_.list) p.used = true;
         Object& grey = bsdf("diffuse");

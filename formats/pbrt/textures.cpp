@@ -1,5 +1,6 @@
 #include "formats/pbrt/textures.h"
 #include "core/srgb.h"
+#include "formats/pbrt/names.h"
 
 #include <algorithm>
 #include <cmath>
@@ -136,7 +137,7 @@ Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
                (is_float && (in.type == "fbm" || in.type == "windy" || in.type == "wrinkled"))) {
         out = solid(is_float, in, space);
     } else {
-        report_.refuse(in.where, "texture type '" + in.type + "' is not supported", "a grey of 0.5 is used");
+        report_.refuse(in.where, quoted("texture type", in.type) + " is not supported", "a grey of 0.5 is used");
         out.color = splat(0.5f);
         for (const Parameter& p : in.list) p.used = true;
     }

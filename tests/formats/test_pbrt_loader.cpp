@@ -113,6 +113,27 @@ TEST_CASE("what is not known is refused by name, file and line") {
     CHECK(contains(pbrt_error("Camera \"realistic\" WorldBegin"), "scene.pbrt:1: camera 'realistic' is not supported"));
 }
 
+TEST_CASE("a name that is nearly one of pbrt's is told with it") {
+    const std::vector<std::pair<std::string, std::string>> cases = {
+        {"Materal \"diffuse\"", "unknown directive 'Materal' (Material?)"},
+        {"Material \"difuse\" Shape \"sphere\"", "material 'difuse' (diffuse?) is not supported"},
+        {"Shape \"spere\"", "shape 'spere' (sphere?) is not supported"},
+        {"LightSource \"pont\"", "light 'pont' (point?) is not supported"},
+        {"Texture \"t\" \"float\" \"image\"", "texture type 'image' is not supported"},
+        {"Texture \"t\" \"float\" \"checkboard\"", "texture type 'checkboard' (checkerboard?) is not supported"},
+    };
+    for (const auto& [text, message] : cases) CHECK_THAT(world_error(text), ContainsSubstring(message));
+    const std::vector<std::pair<std::string, std::string>> options = {
+        {"Camera \"perspectiv\"", "camera 'perspectiv' (perspective?) is not supported"},
+        {"PixelFilter \"gauss\"", "filter 'gauss' is not supported"},
+        {"PixelFilter \"triangel\"", "filter 'triangel' (triangle?) is not supported"},
+        {"Film \"rgbb\"", "film 'rgbb' (rgb?) is not known"},
+        {"Integrator \"vlpath\"", "integrator 'vlpath' (volpath?) is not supported"},
+    };
+    for (const auto& [text, message] : options)
+        CHECK_THAT(pbrt_error(text + " WorldBegin Shape \"sphere\""), ContainsSubstring(message));
+}
+
 TEST_CASE("errors say where") {
     const std::vector<std::pair<std::string, std::string>> cases = {
         {"Frobnicate", "unknown directive 'Frobnicate'"},
