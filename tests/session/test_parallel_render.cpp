@@ -210,7 +210,12 @@ TEST_CASE("a crew renders a node on all of its devices, hands over one film for 
         for (Finished& f : crew.take(1)) finished.push_back(std::move(f));
     CHECK(crew.wanted() == 3);
     MergeTree together, apart;
-    for (Finished& f : finished) together.add(f.order.node, std::move(f.film));
+    double seconds = 0, worked = 0;
+    for (Finished& f : finished) {
+        CHECK(f.seconds > 0);
+        seconds += f.seconds;
+        together.add(f.order.node, std::move(f.film));
+    }
     const std::unique_ptr<Renderer> one = make_renderer(scene, settings);
     for (uint64_t range = 0; range < ranges.count(); ++range) {
         one->clear_film();
@@ -219,7 +224,8 @@ TEST_CASE("a crew renders a node on all of its devices, hands over one film for 
     }
     CHECK(same(together.sum(), apart.sum()));
     uint64_t samples = 0, rendered = 0;
-    for (const DeviceWork& d : crew.work()) samples += d.samples, rendered += d.ranges;
+    for (const DeviceWork& d : crew.work()) samples += d.samples, rendered += d.ranges, worked += d.seconds;
+    CHECK(seconds == Approx(worked));
     CHECK(samples == 40);
     CHECK(rendered == 14);
 }

@@ -204,6 +204,8 @@ TEST_CASE("what a rank tells is heard whole: text, film and states, or any of th
     check_states(told.states);
     told = told_back([&](Ranks& r) { tell(r, 0, Say::states, {}, nullptr, states); });
     CHECK(told.text.is_null());
+    CHECK(told.film.width == 0);
+    CHECK(told.film.height == 0);
     CHECK(told.film.samples == 0);
     CHECK(told.film.sum.empty());
     check_states(told.states);
