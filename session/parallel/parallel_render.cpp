@@ -231,9 +231,7 @@ private:
             if (!working && collected_later_ == 0) return;
             if (!working && !std::exchange(last, true)) want_collected(true);
             take();
-            // Films of all parties take half of this thread's time at most.
-            dealer.set_node_seconds(
-                std::max(Dealer::kNodeSeconds, 2 * double(parties_.size()) / nodes * film_seconds()));
+            dealer.set_node_seconds(Dealer::node_seconds(parties_.size(), nodes, film_seconds()));
             if (is_set(request_.interrupt)) {
                 interrupted_ = true;
                 return;

@@ -1,6 +1,8 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // timeout: 60
 // From the records of stages to the statistics of a render.
+#include <algorithm>
+
 #include "render/fused_shares.h"
 #include "render/statistics.h"
 
@@ -38,6 +40,54 @@ TEST_CASE("NaN, infinite and negative values are errors, each counted for its st
     REQUIRE(stats.invalid_by_stage.size() == 2);
     CHECK(is(stats.invalid_by_stage["shade"], 1, 2, 4, 8));
     CHECK(is(stats.invalid_by_stage["connect"], 16, 32, 64, 128));
+}
+
+TEST_CASE("Stages are listed as light goes through them, those that only an integrator knows before weights") {
+    const std::vector<std::string> order = {
+        "megakernel", "light_generate", "light_extend",     "light_shade", "connect_camera", "generate",   "extend",
+        "shade",      "connect",        "connect_vertices", "its own",     "another",        "mis_weight", "occlude",
+        "accumulate", "splat",          "update_film"};
+    std::vector<std::string> names(order.rbegin(), order.rend());
+    std::swap(*std::find(names.begin(), names.end(), "its own"), *std::find(names.begin(), names.end(), "another"));
+    std::vector<StageRecord> records(names.size());
+    for (size_t i = 0; i < names.size(); ++i) {
+        records[i].launches = i + 1;
+        records[i].items = 100 * (i + 1);
+        records[i].nanoseconds = 1'000'000'000ull * (i + 1);
+        records[i].items_by_depth[i] = 7;
+    }
+    RenderStats stats;
+    fill_stage_stats(names, records, stats);
+    REQUIRE(stats.stages.size() == order.size());
+    for (size_t k = 0; k < order.size(); ++k) {
+        const StageStats& s = stats.stages[k];
+        CHECK(s.name == order[k]);
+        const size_t i = size_t(std::find(names.begin(), names.end(), s.name) - names.begin());
+        CHECK(s.launches == i + 1);
+        CHECK(s.items == 100 * (i + 1));
+        CHECK(s.seconds == Approx(double(i + 1)));
+        std::vector<uint64_t> by_depth(i + 1);
+        by_depth[i] = 7;
+        CHECK(std::equal(s.items_by_depth.begin(), s.items_by_depth.end(), by_depth.begin(), by_depth.end()));
+    }
+    const auto items = [&](const char* name) {
+        return 100 * uint64_t(std::find(names.begin(), names.end(), name) - names.begin() + 1);
+    };
+    CHECK(stats.rays_extend == items("extend") + items("light_extend"));
+    CHECK(stats.rays_occlude == items("occlude"));
+}
+
+TEST_CASE("A stage without launches and items is not listed") {
+    std::vector<StageRecord> records(3);
+    records[0].launches = 1;
+    records[2].items = 1;
+    RenderStats stats;
+    fill_stage_stats({"extend", "shade", "occlude"}, records, stats);
+    REQUIRE(stats.stages.size() == 2);
+    CHECK(stats.stages[0].name == "extend");
+    CHECK(stats.stages[0].items_by_depth.empty());
+    CHECK(stats.stages[1].name == "occlude");
+    CHECK(stats.rays_occlude == 1);
 }
 
 TEST_CASE("A sampled clock below zero is no time") {

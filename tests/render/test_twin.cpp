@@ -291,6 +291,45 @@ TEST_CASE("The twin does not meet triangles that rounding has made a point or an
     CHECK(hit("<scale value='1'/>", {1, 0.5, 0}).prim == twin::kNone);  // along it
 }
 
+TEST_CASE("The twin's rays that begin on a sphere or a cylinder meet its other side, and not the one that they leave") {
+    const auto tracer_hit = [](const std::string& shape, twin::Vec3f from, twin::Vec3f d, bool& occluded) {
+        const Scene scene =
+            scene_from_text(scene_xml(2, "<sensor type='perspective'>" + square_film(4) + "</sensor>" + shape));
+        const twin::DoubleScene in_double(scene);
+        const twin::Tracer tracer(in_double.view());
+        occluded = tracer.occluded({from, twin::kInfinity, d, 0});
+        return tracer.closest({from, twin::kInfinity, d, 0});
+    };
+    const std::string sphere =
+                          "<shape type='sphere'><point name='center' x='1' y='0' z='0'/><float name='radius' "
+                          "value='2'/></shape>",
+                      cylinder =
+                          "<shape type='cylinder'><point name='p0' x='0' y='0' z='-1'/><point name='p1' x='0' "
+                          "y='0' z='4'/><float name='radius' value='2'/></shape>";
+    struct Case {
+        const std::string& shape;
+        twin::Vec3f from, d;
+        double t;
+    };
+    for (const auto& [shape, from, d, t] : {Case{sphere, {1, 0, 2}, {0.6, 0, -0.8}, 2 * 2 * 0.8},
+                                            {sphere, {1, 0, 2}, {0.6, 0, 0.8}, 0},
+                                            {sphere, {-1, 0, 0}, {1, 0, 0}, 4},
+                                            {sphere, {-1.5, 0, 0}, {1, 0, 0}, 0.5},
+                                            {sphere, {1, 0, 1}, {0, 0, 1}, 1},
+                                            {cylinder, {2, 0, 0}, {-0.8, 0, 0.6}, 2 * 2 / 0.8},
+                                            {cylinder, {2, 0, 0}, {0.8, 0, 0.6}, 0},
+                                            {cylinder, {2, 0, 0}, {-0.6, 0, 0.8}, 0},
+                                            {cylinder, {0, 3, 0}, {0, -1, 0}, 1}}) {
+        INFO((&shape == &sphere ? "sphere" : "cylinder")
+             << " from " << from.x << " " << from.y << " " << from.z << " along " << d.x << " " << d.y << " " << d.z);
+        bool occluded;
+        const twin::Hit hit = tracer_hit(shape, from, d, occluded);
+        CHECK((hit.prim != twin::kNone) == (t > 0));
+        CHECK(occluded == (t > 0));
+        if (t > 0) CHECK(std::abs(hit.t - t) < 1e-14);
+    }
+}
+
 TEST_CASE("The twin repeats its image bit by bit, in parts too", "[twin]") {
     const Scene scene = project_scene("glass", 24, 16);
     const RenderSettings s = twin_settings(scene, "bdpt");

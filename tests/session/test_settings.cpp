@@ -172,6 +172,55 @@ TEST_CASE("learned draws are offered to the selection as four that are worth twe
     CHECK(learned->selection({s, any, false, false, 0.0f}).empty());
 }
 
+TEST_CASE("single strategies switch on the groups that sample them, and are named as they were given") {
+    const auto set = [](const std::string& value) {
+        RenderSettings s;
+        s.integrator = "bdpt";
+        apply_setting(s, "strategies", value);
+        CHECK(setting_text(s, "strategies") == value);
+        return s;
+    };
+    for (const auto& [value, groups] :
+         std::vector<std::pair<const char*, uint32_t>>{{"all", kAllStrategies},
+                                                       {"hits", kHitStrategies},
+                                                       {"next_event+light", kNextEventStrategies | kLightStrategies},
+                                                       {"s0t2", kHitStrategies},
+                                                       {"s0t5", kHitStrategies},
+                                                       {"s1t1", kLightStrategies},
+                                                       {"s4t1", kLightStrategies},
+                                                       {"s1t2", kNextEventStrategies},
+                                                       {"s1t4", kNextEventStrategies},
+                                                       {"s2t2", kConnectionStrategies},
+                                                       {"s0t2+s1t2+s2t2+s4t1", kAllStrategies}}) {
+        CAPTURE(value);
+        const RenderSettings s = set(value);
+        CHECK(s.strategies == groups);
+        CHECK(s.singles.on == (value[0] == 's'));
+    }
+    const RenderSettings s = set("s1t2+s4t1");
+    for (uint32_t k = 0; k <= SingleStrategies::kMaxSegments; ++k)
+        CHECK(s.singles.s[k] == (k == 2 ? 1 : k == 4 ? 4 : SingleStrategies::kNone));
+    const auto refused = [](const std::string& value) {
+        return refusal([&] {
+            RenderSettings other;
+            apply_setting(other, "strategies", value);
+        });
+    };
+    CHECK(refused("s1t2+s2t1") ==
+          "strategies=s1t2+s2t1: 's2t1' and 's1t2' sample the same paths; single strategies have weight 1, so only one "
+          "for each s + t can be on");
+    CHECK(refused("s1t2+hits") == "strategies=s1t2+hits: groups and single strategies cannot be mixed");
+    const std::string last = std::to_string(SingleStrategies::kMaxSegments + 1);
+    for (const std::string& name : {std::string("s2t0"), std::string("s0t1"), "s0t" + last + "0"})
+        CHECK_THAT(refused(name), StartsWith("strategies=" + name + ": '" + name));
+    CHECK(refused("s2t0") == "strategies=s2t0: 's2t0': t is at least 1, and s + t from 2 to " + last);
+    CHECK(set("s0t" + last).singles.s[SingleStrategies::kMaxSegments] == 0);
+    CHECK_THAT(refused("s1t" + last), ContainsSubstring("s + t from 2 to " + last));
+    CHECK_THAT(refused("hits+other"),
+               ContainsSubstring("'other' is none of hits, next_event, connections, light and no "
+                                 "single strategy such as s2t3"));
+}
+
 TEST_CASE("numbers of light subpaths between those that tiles can have are refused with the next ones") {
     RenderSettings s;
     CHECK_THAT(refusal([&] { apply_setting(s, "light_paths", "0.26"); }),
