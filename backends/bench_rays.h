@@ -23,17 +23,23 @@ nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int re
 
 constexpr int kBenchWarmUps = 3;
 
-/// Seconds of each of `repetitions` calls of run(), after kBenchWarmUps that do not count.
+/// What each of `repetitions` calls of run() returns, after kBenchWarmUps that do not count.
+template <class Run>
+auto runs_that_count(int repetitions, const Run& run) {
+    for (int i = 0; i < kBenchWarmUps; ++i) run();
+    std::vector<decltype(run())> all;
+    for (int i = 0; i < repetitions; ++i) all.push_back(run());
+    return all;
+}
+
+/// The seconds that each of them takes.
 template <class Run>
 std::vector<double> seconds_of_runs(int repetitions, const Run& run) {
-    for (int i = 0; i < kBenchWarmUps; ++i) run();
-    std::vector<double> seconds;
-    for (int i = 0; i < repetitions; ++i) {
+    return runs_that_count(repetitions, [&] {
         const auto start = std::chrono::steady_clock::now();
         run();
-        seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-    }
-    return seconds;
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    });
 }
 
 /// The middle of `seconds`, which must not be empty; of an even number the mean of the middle two.

@@ -153,7 +153,10 @@ private:
         kept_.resize(devices);
         for (const Party& p : parties_) {
             std::vector<RangeState> own;
-            for (size_t d = 0; d < p.devices.size(); ++d) own.push_back({d, 0, kept_[p.first_device + d]});
+            for (size_t d = 0; d < p.devices.size(); ++d) {
+                const std::vector<std::byte>& state = kept_[p.first_device + d];
+                own.push_back({d, 0, state});
+            }
             if (p.rank == 0)
                 crew_->load(std::move(own));
             else

@@ -193,6 +193,8 @@ TEST_CASE("runs are timed one by one, after three that do not count") {
         CHECK(seconds.size() == size_t(repetitions));
         for (const double s : seconds) CHECK(s >= 0.002);
     }
+    int runs = 0;
+    CHECK(runs_that_count(2, [&] { return ++runs; }) == std::vector<int>{4, 5});
 }
 
 TEST_CASE("rays are traced by the least set of features that a scene needs, of those that there are") {

@@ -8,6 +8,7 @@
 #include "integrators/auto/film_footprint.h"
 #include "integrators/auto/merging.h"
 #include "integrators/auto/pilot_mis.h"
+#include "integrators/auto/variance_prediction.h"
 #include "integrators/bdpt/shared/policy.h"
 #include "tests/support/bidirectional_images.h"
 #include "transport/subpath/camera_connection.h"
@@ -240,4 +241,175 @@ TEST_CASE("what a splat counts for is the sum of the filters of the film's pixel
     CHECK(filter_energy(box.view()) == Approx(1));
     CHECK(filter_energy(tent.view()) == Approx(2.0 / 3 * 2 / 3).epsilon(1e-3));
     CHECK(filter_energy(cropped(FilterType::box, 1.0f).view()) == Approx(0.25));
+}
+
+namespace {
+
+/// A path tracer, paired subpaths, half a light subpath without connections, and three draws from a cache.
+SecondMoments four_candidates() {
+    SecondMoments m;
+    m.candidates = {{0, false, 0}, {1, true, 0}, {0.5f, false, 0}, {1, true, 3}};
+    m.samples = 1000;
+    m.light_vertices = 2000;
+    m.filter_energy = 0.25f;
+    return m;
+}
+
+double sqr_of(double x) { return x * x; }
+
+}  // namespace
+
+TEST_CASE("a path counts for the second moment of a candidate as often as that would find it") {
+    SecondMoments m = four_candidates();
+    const PilotShares shares = {2, 3, 4};
+    const double sums[] = {2, 2 + 3 + 4, 2 + 0.5 * 3, 2 + 3 + 4 * 3 * 1000.0 / 2000};
+    for (uint32_t c = 0; c < 4; ++c) CHECK(m.sum_of(c, shares) == Approx(sums[c]));
+    CHECK(m.connections(m.candidates[3]) == Approx(1.5));
+    CHECK(m.connections(m.candidates[1]) == 1);
+    PilotEvent e = {{1, 2, 3}, shares, 0.5f};
+    CHECK(e.total() == 9);
+    PilotSums found;
+    for (int times = 0; times < 2; ++times) m.add(e, found);
+    const double light[] = {0, 3, 1.5, 3};
+    for (uint32_t c = 0; c < 4; ++c) {
+        CAPTURE(c);
+        // Of light tracing a splat is spread by the filter.
+        const double moment = 0.5 * (1 - 0.75 * light[c] / sums[c]) / (9 * sums[c]);
+        CHECK(m.second_moment(c, e, float(sums[c])) == Approx(moment));
+        for (int k = 0; k < 3; ++k) CHECK(found.variance[c][k] == Approx(2 * moment * sqr_of(k + 1)));
+    }
+    for (int k = 0; k < 3; ++k) CHECK(found.mean[k] == Approx(2 * 0.5 * (k + 1) / 9));
+    CHECK(found.rare.empty());
+
+    e.nearby = true;
+    CHECK(e.total() == 1);
+    m.light_vertices = 0;
+    CHECK(m.connections(m.candidates[3]) == 3000);
+
+    // Rare is what some candidate finds, but fifty times less often.
+    const auto rare = [&](PilotShares of) {
+        PilotSums s;
+        m.add({{1, 1, 1}, of}, s);
+        return s.rare.size();
+    };
+    CHECK(rare({0, 1, 0}) == 0);  // never
+    CHECK(rare({0.019f, 0.981f, 0}) == 1);
+    CHECK(rare({0.021f, 0.979f, 0}) == 0);
+}
+
+TEST_CASE("variances are relative to means of blocks and their neighbours, or to emitters seen") {
+    const SecondMoments m = four_candidates();
+    constexpr uint32_t kWidth = 4, kHeight = 3, kPerBlock = 2, kSamples = 4;
+    constexpr double kAll = kPerBlock * kSamples;
+    std::vector<PilotSums> pixels(kWidth * kHeight * kPerBlock);
+    pixels[0].mean[0] = pixels[1].mean[0] = 12 * kAll / 2;  // of the first block: 12
+    for (size_t p = 0; p < pixels.size(); p += kPerBlock) pixels[p].variance[1][0] = 30;
+    pixels[10 * kPerBlock].seen[0] = 2;
+    const PilotSplat splat = {{{8, 0, 0}, {1, 2, 1}, 0.5f}, 11, true, {3, 0, 0}},
+                     seldom = {{{0, 0, 0.25f}, {0.005f, 0.05f, 0}}, 7, false, {0, 0, 3}};
+    Pilot result;
+    result.blocks_x = kWidth;
+    result.blocks_y = kHeight;
+    predict_variances(m, {pixels, {&splat, &seldom}, kPerBlock, kSamples, 100, 1000}, result);
+    REQUIRE(result.variance.size() == 4);
+    REQUIRE(result.variance[0].size() == kWidth * kHeight);
+    // The splat brings 8 * 0.5 / 4 / kAll to the mean of the last block, of which four and six blocks are neighbours.
+    const double from_splat = 1 / kAll;
+    const double scale[kHeight][kWidth] = {{12.0 / 4, 12.0 / 6, 0, 0},
+                                           {12.0 / 6, 12.0 / 9, from_splat / 9, from_splat / 6},
+                                           {0, 0, from_splat / 6, from_splat / 4}};
+    for (uint32_t y = 0; y < kHeight; ++y)
+        for (uint32_t x = 0; x < kWidth; ++x) {
+            CAPTURE(x, y);
+            const uint32_t b = y * kWidth + x;
+            const double seen = b == 10 ? 2 : scale[y][x];
+            double expected = 30 / (3 * kAll * (sqr_of(seen) + 0.01));
+            if (b == 11) {
+                const double moment = 0.5 * (1 - 0.75 * 2 / 4) / (4 * 4);
+                expected += moment * 64 / (3 * kAll * (9 + 0.01));
+            }
+            if (b != 7) CHECK(result.variance[1][b] == Approx(expected));
+        }
+    // Of the path tracer, whose strategies found a quarter of the splat's light.
+    CHECK(result.variance[0][11] == Approx(0.5 / 4 * 64 / (3 * kAll * 9.01)));
+    CHECK(result.variance[0][0] == 0);
+    // Seldom, yet not rare. Four blocks around are lit by it alone.
+    const double light = 0.25 / 0.055 / kAll / 6;
+    CHECK(result.variance[0][7] == Approx(sqr_of(0.25) / (0.055 * 0.005) / (3 * kAll * (sqr_of(light) + 0.01))));
+}
+
+TEST_CASE("of the brightest contributions, of which a render has one, the light is missing instead") {
+    constexpr uint32_t kWidth = 2, kHeight = 3, kBlocks = kWidth * kHeight, kSamples = 4;
+    constexpr double kExpected = 50;
+    SecondMoments m = four_candidates();
+    m.candidates = {{0, false, 0}, {0.01f, false, 0}};
+    // Hits find them seldom, and the last one never, which few light subpaths find seldom.
+    struct Found {
+        uint32_t block;
+        Rgb value;
+        float hits, light, coverage;
+    };
+    const Found all[] = {
+        {0, {60, 1, 0}, 0.1f, 9.9f, 1},  {1, {0, 40, 2}, 0.02f, 9.98f, 1},   {2, {3, 0, 10}, 0.15f, 9.85f, 0.5f},
+        {3, {1, 2, 0}, 0.05f, 9.95f, 1}, {3, {2, 5, 1}, 0.06f, 9.94f, 1},    {3, {9, 0, 0}, 0.07f, 9.93f, 0.25f},
+        {4, {7, 7, 7}, 0.01f, 1.99f, 1}, {5, {0, 0, 30}, 0.019f, 0.981f, 1}, {0, {0, 0, 5}, 0, 10, 1}};
+    std::vector<PilotSums> pixels(kBlocks);
+    pixels[0].seen[0] = 100;
+    pixels[3].seen[1] = 1000;
+    double scale[kBlocks][3] = {}, scale2[kBlocks][3];
+    const auto blur = [&](uint32_t from, double to[kBlocks][3], int k, double value) {
+        for (uint32_t b = 0; b < kBlocks; ++b) {
+            const uint32_t y = b / kWidth, rows = y == 1 ? 3 : 2;
+            if (std::abs(int(from / kWidth) - int(y)) <= 1) to[b][k] += value / (rows * kWidth);
+        }
+    };
+    for (const Found& f : all) {
+        m.add({f.value, {f.hits, f.light, 0}, f.coverage}, pixels[f.block]);
+        for (int k = 0; k < 3; ++k)
+            blur(f.block, scale, k, double(f.coverage * f.value[k]) / double(f.hits + f.light) / kSamples);
+    }
+    for (uint32_t b = 0; b < kBlocks; ++b)
+        for (int k = 0; k < 3; ++k) scale2[b][k] = sqr_of(std::max(scale[b][k], pixels[b].seen[k])) + 0.01;
+    std::vector<std::pair<double, const Found*>> by_size;
+    for (const Found& f : all) {
+        if (f.hits == 0) continue;
+        double size = 0;
+        for (int k = 0; k < 3; ++k)
+            size = std::max(size, double(f.value[k]) / double(f.hits) / std::sqrt(scale2[f.block][k]));
+        by_size.emplace_back(-size, &f);
+    }
+    std::sort(by_size.begin(), by_size.end());
+    double probability = 0;
+    for (size_t taken = 0; taken <= by_size.size(); ++taken) {
+        CAPTURE(taken);
+        const auto share = [&](size_t i) {
+            const Found& f = *by_size[i].second;
+            return double(f.coverage) * double(f.hits) / double(f.hits + f.light) / m.samples;
+        };
+        if (taken > 0) probability += share(taken - 1);
+        // Less than the next one needs.
+        const double more = taken < by_size.size() ? share(taken) : 1e-5, outliers = probability + 0.5 * more;
+        double expected[kBlocks] = {}, lost[kBlocks][3] = {};
+        for (size_t i = 0; i < by_size.size(); ++i) {
+            const Found& f = *by_size[i].second;
+            for (int k = 0; k < 3; ++k) {
+                const double value = double(f.value[k]), total = double(f.hits + f.light);
+                if (i < taken)
+                    blur(f.block, lost, k, double(f.coverage) * value / total / kSamples);
+                else
+                    expected[f.block] += double(f.coverage) * value * value / total / double(f.hits) /
+                                         (3 * kSamples * scale2[f.block][k]);
+            }
+        }
+        Pilot result;
+        result.blocks_x = kWidth;
+        result.blocks_y = kHeight;
+        predict_variances(m, {pixels, {}, 1, kSamples, kExpected, uint64_t(1 / (outliers * kExpected))}, result);
+        for (uint32_t b = 0; b < kBlocks; ++b) {
+            CAPTURE(b);
+            for (int k = 0; k < 3; ++k)
+                expected[b] += kExpected * sqr_of(lost[b][k]) / (3 * (sqr_of(scale[b][k]) + 0.01));
+            CHECK(result.variance[0][b] == Approx(expected[b]).epsilon(1e-4).margin(1e-6));
+        }
+    }
 }

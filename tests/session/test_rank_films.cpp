@@ -60,9 +60,27 @@ TEST_CASE("1, 2, 4 and 7 ranks make the same bits, whether the first one adds up
             CHECK(result.stats.samples == 200);
             CHECK(result.workers.size() == size_t(ranks));
             CHECK((result.stats.device.find(host_name() + ": ") != std::string::npos) == (ranks > 1));
-            uint64_t samples = 0;
-            for (const WorkerShare& w : result.workers) samples += w.samples;
+            uint64_t samples = 0, parts = 0;
+            for (size_t i = 0; i < result.workers.size(); ++i) {
+                const WorkerShare& w = result.workers[i];
+                CHECK(w.rank == int(i));
+                CHECK(w.host == host_name());
+                CHECK(w.device.starts_with("CPU, "));
+                CHECK((w.seconds > 0) == (w.ranges > 0));
+                CHECK(w.samples <= 3 * w.ranges);
+                samples += w.samples;
+                parts += w.ranges;
+            }
             CHECK(samples == 200);
+            CHECK(parts == 67);
+            CHECK(result.ranges.size == 3);
+            CHECK(result.ranges.samples == 200);
+            CHECK(result.position.samples == 200);
+            CHECK_FALSE(result.position.interrupted);
+            CHECK(result.stats.render_seconds >= result.position.seconds);
+            CHECK(result.merge_seconds > 0);
+            CHECK((result.receive_seconds > 0) == (ranks > 1));
+            CHECK(result.merge_seconds + result.receive_seconds <= result.position.seconds);
             size_t others = 0;
             for (int rank = 1; rank < ranks; ++rank) others += all.films(rank);
             if (block_nodes == 1) CHECK(others == 0);
