@@ -124,9 +124,9 @@ TEST_CASE("weights of three sets of strategies along one subpath are those of ea
 TEST_CASE("light near an eye vertex is that of vertices on its surface that hits alone find, in paths not too long") {
     constexpr float kAlbedo = 0.5f, kDvc = 2.0f;
     constexpr uint32_t kSubpaths = 1000;
-    const Scene scene =
-        scene_from_text(scene_xml(6, "<sensor type='perspective'>" + film(4) + "</sensor><shape type='rectangle'>" +
-                                         diffuse({kAlbedo, kAlbedo, kAlbedo}) + "</shape>"));
+    const Scene scene = scene_from_text(
+        scene_xml(6, "<sensor type='perspective'>" + film(4) + "</sensor><shape type='rectangle'>" +
+                         "<bsdf type='twosided'>" + diffuse({kAlbedo, kAlbedo, kAlbedo}) + "</bsdf>" + "</shape>"));
     const SceneView view = scene.view();
     using End = SubpathEnd<PilotMis>;
     const auto end = [&](float x, float cosine, uint32_t depth, float throughput) {
@@ -145,11 +145,15 @@ TEST_CASE("light near an eye vertex is that of vertices on its surface that hits
     std::vector<End> ends = {end(0.1f, 0.8f, 2, 1),   end(0.2f, 0.6f, 4, 2),   end(0.3f, 0.5f, 5, 4),
                              end(0.4f, 0.5f, 2, 8),   end(0.5f, 1, 3, 16),     end(0.6f, 5e-4f, 2, 32),
                              end(0.7f, -0.8f, 2, 64), end(0.8f, 0.5f, 2, 128), end(5, 1, 2, 256),
-                             end(0.01f, 1, 1, 512),   end(0.02f, 1, 2, 1024)};
+                             end(0.01f, 1, 1, 512),   end(0.02f, 1, 2, 1024),  end(0.03f, 1, 2, 2048),
+                             end(0.04f, 1, 2, 4096)};
+    for (MisSums& m : ends[0].vertex.sums.of) m.dvc = 1e-3f;
     ends[3].vertex.point.ng = {0.8f, 0, 0.6f};  // around an edge
     ends[4].vertex.point.ng = {0.6f, 0, 0.8f};
     ends[7].vertex.sums.of[2].dvcm = 0.9e-4f * kDvc;        // connections find it too, as cosines are
     for (MisSums& m : ends[10].vertex.sums.of) m = {0, 0};  // hits do not find it
+    ends[11].vertex.sums.of[2].dvcm = 1.005e-4f * kDvc;     // connections do
+    ends[12].vertex.sums.of[1].dvc = ends[12].vertex.sums.of[2].dvc = 2 * kDvc;
     std::vector<const End*> all;
     for (const End& e : ends) all.push_back(&e);
     const HitsOnlyLight<kAllFeatures> light(PilotMis(mis), all, kSubpaths);
@@ -173,11 +177,27 @@ TEST_CASE("light near an eye vertex is that of vertices on its surface that hits
         const auto& [value, ratio] = added.at(k);
         CHECK(value.x == Approx((1 << k) * 0.5 * kAlbedo / M_PI / paths));
         CHECK(value.y == Approx(4 * double(value.x)));
-        CHECK(ratio == Approx(kDvc * cosine / M_PI / paths));
+        CHECK(ratio == Approx((k == 0 ? 1e-3 : kDvc) * cosine / M_PI / paths));
     }
     int shorter = 0;
     light.at(z, 5, [&](Rgb, float) { ++shorter; });
     CHECK(shorter == 2);  // the one behind four segments is too far away
+    const auto count = [](const HitsOnlyLight<kAllFeatures>& of, const End& at) {
+        int n = 0;
+        of.at(at, 6, [&](Rgb, float) { ++n; });
+        return n;
+    };
+    CHECK(count(light, end(0, -0.9f, 2, 0.5f)) == 1);  // seen from below
+    // Of few subpaths close by, and at a place where there is nothing but they.
+    for (End& e : ends) e.vertex.point.p = e.vertex.point.p * 0.01f;
+    CHECK(count(HitsOnlyLight<kAllFeatures>(PilotMis(mis), all, 1), z) == 3);
+    for (End& e : ends) e.vertex.point.p = {0, 0, 0};
+    CHECK(count(HitsOnlyLight<kAllFeatures>(PilotMis(mis), all, kSubpaths), z) == 0);
+    for (size_t k = 0; k < ends.size(); ++k) {
+        ends[k].vertex.point.p = {0.1f * float(k + 1), 0, 0};
+        for (MisSums& m : ends[k].vertex.sums.of) m = {0, kInfinity};
+    }
+    CHECK(count(HitsOnlyLight<kAllFeatures>(PilotMis(mis), all, kSubpaths), z) == 0);
 
     CHECK_FALSE(light.begins_at(1));
     CHECK(light.begins_at(2));
@@ -237,6 +257,13 @@ TEST_CASE("what a splat counts for is the sum of the filters of the film's pixel
     CHECK(coverage(tent, 0.25f, 5.75f) == Approx(0.75 * 0.75));
     CHECK(coverage(tent, 8.25f, 0.25f) == Approx(0.25 * 0.75));
     CHECK(coverage(tent, -0.6f, 3) == 0);
+    // Just inside.
+    CHECK(coverage(box, 0.003f, 3) == 1);
+    CHECK(coverage(box, 4, 0.003f) == 1);
+    // A narrow filter counts no splat more than once.
+    const Scene narrow = cropped(FilterType::tent, 0.5f);
+    CHECK(coverage(narrow, 0.4f, 0.4f) == 1);
+    CHECK(filter_energy(narrow.view()) == 1);
 
     CHECK(filter_energy(box.view()) == Approx(1));
     CHECK(filter_energy(tent.view()) == Approx(2.0 / 3 * 2 / 3).epsilon(1e-3));
