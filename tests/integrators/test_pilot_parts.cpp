@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "accel/embree_tracer.h"
+#include "core/rng.h"
 #include "integrators/auto/film_footprint.h"
 #include "integrators/auto/merging.h"
 #include "integrators/auto/pilot_mis.h"
@@ -370,19 +371,24 @@ TEST_CASE("of the brightest contributions, of which a render has one, the light 
     constexpr double kExpected = 50;
     SecondMoments m = four_candidates();
     m.candidates = {{0, false, 0}, {0.01f, false, 0}};
+    m.samples = 1'000'000;
     // Hits find them seldom, and the last one never, which few light subpaths find seldom.
     struct Found {
         uint32_t block;
         Rgb value;
         float hits, light, coverage;
     };
-    const Found all[] = {
+    std::vector<Found> all = {
         {0, {60, 1, 0}, 0.1f, 9.9f, 1},  {1, {0, 40, 2}, 0.02f, 9.98f, 1},   {2, {3, 0, 10}, 0.15f, 9.85f, 0.5f},
         {3, {1, 2, 0}, 0.05f, 9.95f, 1}, {3, {2, 5, 1}, 0.06f, 9.94f, 1},    {3, {9, 0, 0}, 0.07f, 9.93f, 0.25f},
         {4, {7, 7, 7}, 0.01f, 1.99f, 1}, {5, {0, 0, 30}, 0.019f, 0.981f, 1}, {0, {0, 0, 5}, 0, 10, 1}};
+    for (uint32_t i = 0; i < 40; ++i) {
+        const Vec4f u = random_floats({9, i, 0, Stream::test}, 0), v = random_floats({9, i, 0, Stream::test}, 1);
+        all.push_back({i % kBlocks, {10 * u.x, 5 * u.y, 2 * u.z}, 0.01f + 0.18f * u.w, 9.9f, 0.25f + 0.75f * v.x});
+    }
     std::vector<PilotSums> pixels(kBlocks);
     pixels[0].seen[0] = 100;
-    pixels[3].seen[1] = 1000;
+    for (double& seen : pixels[3].seen) seen = 1e4;  // all is small beside it
     double scale[kBlocks][3] = {}, scale2[kBlocks][3];
     const auto blur = [&](uint32_t from, double to[kBlocks][3], int k, double value) {
         for (uint32_t b = 0; b < kBlocks; ++b) {

@@ -161,6 +161,7 @@ TEST_CASE("blocks go round the ranks but the first one; few ranks need none") {
     CHECK(default_block_nodes(512) == 16);
     CHECK(collector_of({2, 0}, {2, 0}, 7) == 0);
     CHECK(collector_of({2, 0}, {1, 0}, 1) == 0);
+    CHECK(collector_of({2, 5}, {1, 10}, 2) == 1);
     CHECK(collector_of({2, 0}, {1, 1}, 7) == 1);
     CHECK(collector_of({2, 5}, {1, 11}, 7) == 6);
     CHECK(collector_of({2, 6}, {1, 12}, 7) == 1);
