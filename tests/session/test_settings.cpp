@@ -216,9 +216,11 @@ TEST_CASE("single strategies switch on the groups that sample them, and are name
     CHECK(refused("s2t0") == "strategies=s2t0: 's2t0': t is at least 1, and s + t from 2 to " + last);
     CHECK(set("s0t" + last).singles.s[SingleStrategies::kMaxSegments] == 0);
     CHECK_THAT(refused("s1t" + last), ContainsSubstring("s + t from 2 to " + last));
-    CHECK_THAT(refused("hits+other"),
-               ContainsSubstring("'other' is none of hits, next_event, connections, light and no "
-                                 "single strategy such as s2t3"));
+    for (const std::string name : {"other", "x1t2", "s1x2", "s1", "s1t", "st2", "s1t2x", "s1t2 ", ""})
+        CHECK(refused("hits+" + name) ==
+              "strategies=hits+" + name + ": '" + name +
+                  "' is none of hits, next_event, connections, light and no single strategy such as s2t3; join them "
+                  "with '+', or write all");
 }
 
 TEST_CASE("numbers of light subpaths between those that tiles can have are refused with the next ones") {
@@ -324,6 +326,10 @@ TEST_CASE("a path tracer says which of its stages a render does without, and why
     CHECK(skipped(point, Estimator::naive, 8) == Parts{naive, unseen, lost});
     CHECK(skipped(both, Estimator::mis, 8).empty());
     CHECK(skipped(both, Estimator::naive, 8) == Parts{naive, lost});
+    const Scene sky = scene_from_text(
+        "<scene version='3.0.0'><sensor type='perspective'/><emitter type='constant'/><shape type='sphere'/></scene>");
+    CHECK(plan_path(sky, RenderSettings{}).rules.count_environment);
+    CHECK_FALSE(plan_path(both, RenderSettings{}).rules.count_environment);
 }
 
 TEST_CASE("a setting without an effect is refused with key, value, place and where it has one") {
