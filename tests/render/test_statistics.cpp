@@ -124,8 +124,8 @@ TEST_CASE("Queues are as full as in the fullest wave, and lose what all waves lo
 }
 
 TEST_CASE("Images of single strategies are means, raw and weighted, from the shortest paths on") {
-    constexpr uint32_t kDepth = 2, kValues = 3, kStrategies = 5;
-    REQUIRE(strategy_values(kDepth, 1) == 2 * kValues * kStrategies);
+    constexpr uint32_t kDepth = 2, kValues = 300, kStrategies = 5;
+    REQUIRE(strategy_values(kDepth, 100) == 2 * kValues * kStrategies);
     std::vector<double> sums(2 * kValues * kStrategies);
     for (size_t i = 0; i < sums.size(); ++i) sums[i] = 100 + double(i);
     const std::vector<uint64_t> dropped = {7, 0, 5, 6, 8};
@@ -157,6 +157,7 @@ TEST_CASE("A batch takes a fifth of a second, if a sample is known to take less,
     CHECK(batch_of(0.125, 5) == 8);
     CHECK(batch_of(0.125, 1) == 1);
     CHECK(batch_of(0.02, 1) == 10);
+    CHECK(batch_of(0.02, 100) == 1000);
     CHECK(batch_of(10, 1) == 1);
     CHECK(batch_of(1e-9, 1000) == 65536);
 }
