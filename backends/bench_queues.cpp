@@ -19,7 +19,6 @@ namespace {
 constexpr uint32_t kCpuItems = 512 * 512, kCudaItems = 2048 * 2048, kMostItems = 1u << 28;
 constexpr uint32_t kMostSide = 2048;    ///< of the film that the scene's items come from
 constexpr uint32_t kCpuWaveSize = 512;  ///< as renders have
-constexpr int kWarmUps = 3;
 
 /// What a scene's paths have in their queues after the camera rays: their hits, and the rays that leave these.
 struct SceneItems {
@@ -88,8 +87,7 @@ HostSeconds time_on_host(const char* name, const SceneView& scene, const QueuePo
     const uint32_t threads = uint32_t(tbb::this_task_arena::max_concurrency());
     std::vector<HostQueue<Item>> queues;
     for (uint32_t t = 0; t < threads; ++t) queues.emplace_back(policy);
-    std::vector<double> push_seconds, drain_seconds;
-    for (int run = 0; run < kWarmUps + repetitions; ++run) {
+    const auto run = [&]() -> HostSeconds {
         parallel_for(threads, [&](uint32_t t) {
             HostQueue<Item>& q = queues[t];
             q.push = q.drain = {};
@@ -113,9 +111,12 @@ HostSeconds time_on_host(const char* name, const SceneView& scene, const QueuePo
             draining += q.drain.nanoseconds;
         }
         check_contents(name, found, pushed);
-        if (run < kWarmUps) continue;
-        push_seconds.push_back(double(pushing) * 1e-9 / threads);
-        drain_seconds.push_back(double(draining) * 1e-9 / threads);
+        return {double(pushing) * 1e-9 / threads, double(draining) * 1e-9 / threads};
+    };
+    std::vector<double> push_seconds, drain_seconds;
+    for (const HostSeconds& s : runs_that_count(repetitions, run)) {
+        push_seconds.push_back(s.push);
+        drain_seconds.push_back(s.drain);
     }
     return {median(std::move(push_seconds)), median(std::move(drain_seconds))};
 }
@@ -208,7 +209,7 @@ nlohmann::json bench_queues(const Scene& scene, const std::string& backend, uint
     if (!cuda) items = (items + kCpuWaveSize - 1) / kCpuWaveSize * kCpuWaveSize;
     const SceneItems from_scene = make_scene_items(scene, items);
     const std::vector<QueueTiming> timings =
-        cuda ? time_queues_on_device(scene, items, from_scene.hits, from_scene.rays, kWarmUps, repetitions)
+        cuda ? time_queues_on_device(scene, items, from_scene.hits, from_scene.rays, kBenchWarmUps, repetitions)
              : time_queues_on_host(scene, items, from_scene, repetitions);
     nlohmann::json rows = nlohmann::json::array();
     for (const QueueTiming& timing : timings) rows.push_back(row(timing));

@@ -3,7 +3,6 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <chrono>
 
 #include "accel/cwbvh.h"
 #include "accel/embree_tracer.h"
@@ -18,7 +17,6 @@ namespace ambilux {
 namespace {
 
 constexpr uint32_t kCpuSize = 512, kCudaSize = 2048;
-constexpr int kWarmUps = 3;
 
 nlohmann::json row(const RayBatch& batch, const KernelTiming& timing) {
     const double count = double(batch.rays.size());
@@ -37,9 +35,7 @@ KernelTiming time_on_host(const SceneView& scene, const Tracer& tracer, const Ra
     const size_t count = batch.rays.size();
     std::vector<Hit> hits(batch.any_hit ? 0 : count);
     std::vector<uint8_t> blocked(batch.any_hit ? count : 0);
-    std::vector<double> seconds;
-    for (int i = 0; i < kWarmUps + repetitions; ++i) {
-        const auto start = std::chrono::steady_clock::now();
+    const auto trace = [&] {
         if constexpr (kPackets)
             detail::for_all((count + kMostPacketRays - 1) / kMostPacketRays, [&](size_t p) {
                 const size_t k = p * kMostPacketRays;
@@ -54,9 +50,8 @@ KernelTiming time_on_host(const SceneView& scene, const Tracer& tracer, const Ra
             detail::for_all(count, [&](size_t k) { blocked[k] = tracer.template occluded<F>(scene, batch.rays[k]); });
         else
             detail::for_all(count, [&](size_t k) { tracer.template closest<F>(scene, batch.rays[k], hits[k]); });
-        if (i >= kWarmUps)
-            seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-    }
+    };
+    const std::vector<double> seconds = seconds_of_runs(repetitions, trace);
     uint64_t met = 0;
     for (const Hit& hit : hits) met += hit.prim != kNone;
     for (const uint8_t b : blocked) met += b;
@@ -97,7 +92,7 @@ nlohmann::json bench_on_device(const Scene& scene, const std::string& accel_name
         scene.features, [&](auto set) { return make_ray_batches<set.value>(view, accel.tracer(), kCudaSize, 0); });
     nlohmann::json rows = nlohmann::json::array();
     const std::vector<std::vector<KernelTiming>> timings =
-        time_rays_on_device(scene, accel.arrays(), batches, kWarmUps, repetitions);
+        time_rays_on_device(scene, accel.arrays(), batches, kBenchWarmUps, repetitions);
     for (size_t i = 0; i < batches.size(); ++i)
         for (const KernelTiming& timing : timings[i]) rows.push_back(row(batches[i], timing));
     return {{"device", cuda_device_name()},

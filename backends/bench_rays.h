@@ -1,6 +1,7 @@
 // Throughput of ray traversal alone.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -19,6 +20,27 @@ namespace ambilux {
 /// On CUDA the first row of each batch is what renders use. Throws Error(usage) for another backend or no repetitions,
 /// Error(device) for cuda without a device.
 nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int repetitions, bool opaque = false);
+
+constexpr int kBenchWarmUps = 3;
+
+/// What each of `repetitions` calls of run() returns, after kBenchWarmUps that do not count.
+template <class Run>
+auto runs_that_count(int repetitions, const Run& run) {
+    for (int i = 0; i < kBenchWarmUps; ++i) run();
+    std::vector<decltype(run())> all;
+    for (int i = 0; i < repetitions; ++i) all.push_back(run());
+    return all;
+}
+
+/// The seconds that each of them takes.
+template <class Run>
+std::vector<double> seconds_of_runs(int repetitions, const Run& run) {
+    return runs_that_count(repetitions, [&] {
+        const auto start = std::chrono::steady_clock::now();
+        run();
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    });
+}
 
 /// The middle of `seconds`, which must not be empty; of an even number the mean of the middle two.
 double median(std::vector<double> seconds);

@@ -47,8 +47,8 @@ public:
         const auto start = Clock::now();
         uint32_t done = 0;
         while (done < count && !is_set(interrupt)) {
-            uint32_t pass = backend_.pass(std::min(count - done, preferred_batch()), interrupt, samples_);
-            pass = std::min(count - done, whole_waves(pass, k));
+            const uint32_t most = backend_.pass(preferred_batch(), interrupt, samples_);
+            const uint32_t pass = std::min(count - done, whole_waves(most, k));
             const auto pass_start = Clock::now();
             film_is_whole_ = false;
             const uint32_t finished = backend_.run(first + done, pass, state_);

@@ -153,7 +153,10 @@ private:
         kept_.resize(devices);
         for (const Party& p : parties_) {
             std::vector<RangeState> own;
-            for (size_t d = 0; d < p.devices.size(); ++d) own.push_back({d, 0, kept_[p.first_device + d]});
+            for (size_t d = 0; d < p.devices.size(); ++d) {
+                const std::vector<std::byte>& state = kept_[p.first_device + d];
+                own.push_back({d, 0, state});
+            }
             if (p.rank == 0)
                 crew_->load(std::move(own));
             else
@@ -231,9 +234,7 @@ private:
             if (!working && collected_later_ == 0) return;
             if (!working && !std::exchange(last, true)) want_collected(true);
             take();
-            // Films of all parties take half of this thread's time at most.
-            dealer.set_node_seconds(
-                std::max(Dealer::kNodeSeconds, 2 * double(parties_.size()) / nodes * film_seconds()));
+            dealer.set_node_seconds(Dealer::node_seconds(parties_.size(), nodes, film_seconds()));
             if (is_set(request_.interrupt)) {
                 interrupted_ = true;
                 return;

@@ -1,6 +1,7 @@
 // The samples of a render in ranges with fixed bounds, and who renders which.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "film/merge_tree.h"
@@ -33,6 +34,10 @@ public:
     /// `seconds`: the budget in time; 0: none. `done`: what an earlier part rendered. `nodes`: in a block, about.
     Dealer(const Ranges& ranges, double seconds, const MergeTree& done, unsigned nodes = 1);
 
+    /// For nodes of so many seconds films of all `parties` take half of the time of the one that adds them up, at most.
+    static double node_seconds(size_t parties, unsigned nodes, double film_seconds) {
+        return std::max(kNodeSeconds, 2 * double(parties) / nodes * film_seconds);
+    }
     /// From now on, instead of kNodeSeconds.
     void set_node_seconds(double seconds) { node_seconds_ = seconds; }
     /// What `devices` devices do next, each of which needs `per_range` seconds for a range (0: unknown), `elapsed`

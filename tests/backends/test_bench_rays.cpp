@@ -2,6 +2,7 @@
 // The batches of `bench rays` and what it reports about them on the CPU.
 #include <cmath>
 #include <map>
+#include <thread>
 
 #include "accel/cwbvh.h"
 #include "backends/bench_rays.h"
@@ -179,6 +180,21 @@ TEST_CASE("the median is the middle of times, or the mean of the two in the midd
     CHECK(median({5, 1}) == 3);
     CHECK(median({9, 1, 2}) == 2);
     CHECK(median({8, 1, 3, 2}) == 2.5);
+}
+
+TEST_CASE("runs are timed one by one, after three that do not count") {
+    for (const int repetitions : {1, 5}) {
+        CAPTURE(repetitions);
+        int runs = 0;
+        const std::vector<double> seconds = seconds_of_runs(repetitions, [&] {
+            if (++runs > 3) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        });
+        CHECK(runs == 3 + repetitions);
+        CHECK(seconds.size() == size_t(repetitions));
+        for (const double s : seconds) CHECK(s >= 0.002);
+    }
+    int runs = 0;
+    CHECK(runs_that_count(2, [&] { return ++runs; }) == std::vector<int>{4, 5});
 }
 
 TEST_CASE("rays are traced by the least set of features that a scene needs, of those that there are") {

@@ -5,10 +5,14 @@
 #include <cmath>
 #include <numeric>
 
+#include "accel/host_tracer.h"
+#include "backends/fusion.h"
 #include "core/rng.h"
 #include "integrators/bdpt/learned/cells.h"
 #include "integrators/bdpt/learned/cluster_light_vertices.h"
 #include "integrators/bdpt/learned/draws.h"
+#include "integrators/bdpt/learned/integrator.h"
+#include "integrators/bdpt/lvc/integrator.h"
 #include "render/wave_plan.h"
 #include "tests/support/bidirectional_images.h"
 
@@ -143,6 +147,63 @@ TEST_CASE("a draw finds a vertex with the probability that its contribution is d
     }
     const double missing = (1.0 - probability) * kKeys * kDraws;
     CHECK(std::fabs(double(none) - missing) < 5 * std::sqrt(missing));
+}
+
+TEST_CASE("an eye vertex has the cell of the side of its surface that it is seen from, however flat") {
+    DrawSplit splits[2] = {{}, {0.0f, 5}};  // whether the normal points upwards
+    LearnedSource source = {};
+    source.table.cells = {splits, 1};
+    for (const float cosine : {-1.0f, -0.5f, -0.005f, -1e-6f, 1e-6f, 0.005f, 0.5f, 1.0f})
+        for (const float ng : {-1.0f, 1.0f}) {
+            CAPTURE(cosine, ng);
+            BidirectionalVertex v = {};
+            v.scattering.ng = {0, 0, ng};
+            v.scattering.wi_world = {sqrtf(1 - cosine * cosine), 0, cosine};
+            CHECK(source.link(v, 0) == (cosine > 0 ? 1 : 0));
+        }
+}
+
+namespace {
+
+template <class Integrator>
+struct Piloted {
+    typename Integrator::Policy policy;
+    double mean;  ///< light vertices of a subpath
+};
+
+template <class Integrator>
+Piloted<Integrator> piloted(const Scene& scene, const RenderSettings& s) {
+    Piloted<Integrator> p = {Integrator::plan(scene, s), 0};
+    const EmbreeAccel accel(scene);
+    p.mean = Integrator::pilot(p.policy, scene.view(), HostTracer(accel.tracer()), 7);
+    return p;
+}
+
+}  // namespace
+
+TEST_CASE("weights count draws as often as they meet a subpath's vertex on average, times what is set") {
+    using Learned = LearnedIntegrator<kAllFeatures, EmbreeTracer, kNoFusion>;
+    using Lvc = LvcIntegrator<kAllFeatures, EmbreeTracer, kNoFusion>;
+    const Scene scene = project_scene("cornell", 16, 16);
+    RenderSettings lvc = settings_of(scene, "lvc", 1), learned = settings_of(scene, "learned", 1);
+    for (const uint32_t draws : {1u, 6u}) {
+        CAPTURE(draws);
+        lvc.connections = learned.connections = draws;
+        const Piloted<Lvc> a = piloted<Lvc>(scene, lvc);
+        CHECK(a.mean > 1);
+        CHECK(a.policy.rules.mis.connections == Approx(draws / a.mean));
+        for (const float weight : {1.0f, 8.0f}) {
+            apply_setting(learned, "learned_weight", std::to_string(weight));
+            const Piloted<Learned> b = piloted<Learned>(scene, learned);
+            CHECK(b.mean == Approx(a.mean).epsilon(0.2));
+            CHECK(b.policy.rules.mis.connections == Approx(double(weight) * draws / b.mean));
+        }
+    }
+    lvc.strategies = learned.strategies = kHitStrategies;
+    CHECK(piloted<Lvc>(scene, lvc).mean == 0);
+    CHECK(piloted<Lvc>(scene, lvc).policy.rules.mis.connections == 1);
+    CHECK(piloted<Learned>(scene, learned).mean == 0);
+    CHECK(piloted<Learned>(scene, learned).policy.rules.mis.connections == 1);
 }
 
 TEST_CASE("of a wave of many light subpaths every n-th vertex teaches, for n") {

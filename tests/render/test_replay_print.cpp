@@ -382,6 +382,10 @@ TEST_CASE("A comparison by segments is a table and a sentence") {
           head + first + "\n" + second + "  differs\n" + end + "12 segments or more, and agree in shorter ones" + why);
     lengths[0].differs = true;
     CHECK(by_length_text(lengths) == head + first + "  differs\n" + second + "  differs\n" + end + "1 segments" + why);
+    lengths.erase(lengths.begin());
+    lengths[0] = {2, false, {1, 2, 4}, {0.5, 0.25, 8}, true};
+    CHECK(by_length_text(lengths) ==
+          head + "    2  (1, 2, 4), (0.5, 0.25, 8)  differs\n" + end + "2 segments, and agree in shorter ones" + why);
 }
 
 }  // namespace ambilux

@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "render/twin/path_sample.h"
 #include "render/twin/scene.h"
+#include "scene/info.h"
 #include "tests/support/closed_forms.h"
 #include "tests/support/film_difference.h"
 #include "tests/support/spherical_scene.h"
@@ -291,6 +292,45 @@ TEST_CASE("The twin does not meet triangles that rounding has made a point or an
     CHECK(hit("<scale value='1'/>", {1, 0.5, 0}).prim == twin::kNone);  // along it
 }
 
+TEST_CASE("The twin's rays that begin on a sphere or a cylinder meet its other side, and not the one that they leave") {
+    const auto tracer_hit = [](const std::string& shape, twin::Vec3f from, twin::Vec3f d, bool& occluded) {
+        const Scene scene =
+            scene_from_text(scene_xml(2, "<sensor type='perspective'>" + square_film(4) + "</sensor>" + shape));
+        const twin::DoubleScene in_double(scene);
+        const twin::Tracer tracer(in_double.view());
+        occluded = tracer.occluded({from, twin::kInfinity, d, 0});
+        return tracer.closest({from, twin::kInfinity, d, 0});
+    };
+    const std::string sphere =
+                          "<shape type='sphere'><point name='center' x='1' y='0' z='0'/><float name='radius' "
+                          "value='2'/></shape>",
+                      cylinder =
+                          "<shape type='cylinder'><point name='p0' x='0' y='0' z='-1'/><point name='p1' x='0' "
+                          "y='0' z='4'/><float name='radius' value='2'/></shape>";
+    struct Case {
+        const std::string& shape;
+        twin::Vec3f from, d;
+        double t;
+    };
+    for (const auto& [shape, from, d, t] : {Case{sphere, {1, 0, 2}, {0.6, 0, -0.8}, 2 * 2 * 0.8},
+                                            {sphere, {1, 0, 2}, {0.6, 0, 0.8}, 0},
+                                            {sphere, {-1, 0, 0}, {1, 0, 0}, 4},
+                                            {sphere, {-1.5, 0, 0}, {1, 0, 0}, 0.5},
+                                            {sphere, {1, 0, 1}, {0, 0, 1}, 1},
+                                            {cylinder, {2, 0, 0}, {-0.8, 0, 0.6}, 2 * 2 / 0.8},
+                                            {cylinder, {2, 0, 0}, {0.8, 0, 0.6}, 0},
+                                            {cylinder, {2, 0, 0}, {-0.6, 0, 0.8}, 0},
+                                            {cylinder, {0, 3, 0}, {0, -1, 0}, 1}}) {
+        INFO((&shape == &sphere ? "sphere" : "cylinder")
+             << " from " << from.x << " " << from.y << " " << from.z << " along " << d.x << " " << d.y << " " << d.z);
+        bool occluded;
+        const twin::Hit hit = tracer_hit(shape, from, d, occluded);
+        CHECK((hit.prim != twin::kNone) == (t > 0));
+        CHECK(occluded == (t > 0));
+        if (t > 0) CHECK(std::abs(hit.t - t) < 1e-14);
+    }
+}
+
 TEST_CASE("The twin repeats its image bit by bit, in parts too", "[twin]") {
     const Scene scene = project_scene("glass", 24, 16);
     const RenderSettings s = twin_settings(scene, "bdpt");
@@ -303,6 +343,90 @@ TEST_CASE("The twin repeats its image bit by bit, in parts too", "[twin]") {
     CHECK(renderer->film().samples == 4);
     const volatile bool stop = true;
     CHECK(renderer->render(4, 3, &stop) == 0);
+}
+
+TEST_CASE(
+    "The twin's statistics are those of a render: samples, rays, bytes and how many samples take a fifth of a second",
+    "[twin]") {
+    const Scene scene = project_scene("cornell", 24, 16);
+    for (const char* integrator : {"path", "bdpt"}) {
+        INFO(integrator);
+        const RenderSettings s = twin_settings(scene, integrator, 5);
+        const std::unique_ptr<Renderer> renderer = make_renderer(scene, s);
+        CHECK(renderer->preferred_batch() == 1);
+        CHECK(renderer->stats().samples == 0);
+        REQUIRE(renderer->render(0, 4) == 4);
+        const RenderStats twin = renderer->stats(), floats = render_scene(scene, single(s), 4).stats;
+        CHECK(twin.backend == "cpu");
+        CHECK(twin.accel == "median_bvh");
+        CHECK_THAT(twin.device, StartsWith("CPU, "));
+        CHECK(twin.device.ends_with(" threads, double precision"));
+        CHECK(twin.settings.integrator == integrator);
+        CHECK(twin.settings.precision == Precision::in_double);
+        CHECK(twin.samples == 4);
+        // A ray more or less where a path decides differently.
+        CHECK(double(twin.rays_extend) == Approx(double(floats.rays_extend)).epsilon(1e-3));
+        CHECK(double(twin.rays_occlude) == Approx(double(floats.rays_occlude)).epsilon(1e-3));
+        const twin::DoubleScene in_double(scene);
+        const uint64_t bytes = in_double.memory_bytes() + twin::Tracer(in_double.view()).memory_bytes() +
+                               3 * 8 * (24 * 16 * 3);  // the film's sums, those of squares, and the sample
+        CHECK(twin.memory_bytes == bytes);
+        CHECK(twin.memory_bytes_predicted == bytes);
+        CHECK(twin.memory_bytes_peak == bytes);
+        CHECK(twin.features == feature_names(kAllFeatures));
+        CHECK(twin.build_seconds > 0);
+        CHECK(twin.render_seconds > 0);
+        CHECK(renderer->preferred_batch() >= 0.5 * 0.2 / twin.render_seconds);
+
+        const FilmMoments first = renderer->film();
+        renderer->clear_film();
+        CHECK(renderer->film().samples == 0);
+        REQUIRE(renderer->render(0, 4) == 4);
+        CHECK(renderer->film().sum == first.sum);
+        CHECK(renderer->film().sum_squares == first.sum_squares);
+        CHECK(renderer->film().samples == 4);
+        CHECK(renderer->stats().samples == 8);
+        CHECK(renderer->stats().rays_extend == 2 * twin.rays_extend);
+    }
+}
+
+TEST_CASE("Squares of the twin's samples are summed beside them", "[twin]") {
+    const Scene scene = project_scene("cornell", 8, 8);
+    const RenderSettings s = twin_settings(scene, "bdpt");
+    const FilmMoments one = render_scene(scene, s, 1).film;
+    bool lit = false;
+    for (size_t i = 0; i < one.sum.size(); ++i) {
+        CHECK(one.sum_squares[i] == one.sum[i] * one.sum[i]);
+        lit |= one.sum[i] > 0 && one.sum[i] != 1;
+    }
+    CHECK(lit);
+}
+
+TEST_CASE("Light that is none is dropped by the twin and counted by what is wrong with it", "[twin]") {
+    Scene scene = furnace("sphere", 1);
+    const RenderSettings s = twin_settings(scene);
+    REQUIRE(scene.emitters.size() == 1);
+    const double seen = 4 * 8 * 8;
+    const auto dropped = [&](Rgb radiance) {
+        scene.emitters[0].radiance.value = radiance;
+        const RenderResult r = render_scene(scene, s, 4);
+        for (const double v : r.film.sum) CHECK(v == 0);
+        return r.stats.invalid;
+    };
+    const float nan = std::nanf("");
+    for (const Rgb wrong : {Rgb{nan, 1, 1}, Rgb{1, nan, 1}, Rgb{1, kInfinity, nan}}) {
+        const InvalidCounts c = dropped(wrong);
+        CHECK(double(c.nan) == seen);
+        CHECK(c.inf + c.negative == 0);
+    }
+    for (const Rgb wrong : {Rgb{kInfinity, 1, 1}, Rgb{1, 1, -kInfinity}}) {
+        const InvalidCounts c = dropped(wrong);
+        CHECK(double(c.inf) == seen);
+        CHECK(c.nan + c.negative == 0);
+    }
+    const InvalidCounts c = dropped({1, -1, 1});
+    CHECK(double(c.negative) == seen);
+    CHECK(c.nan + c.inf == 0);
 }
 
 TEST_CASE("What the twin does without is refused by name", "[twin]") {

@@ -365,3 +365,38 @@ TEST_CASE("refusals name the bytes and the numbers that are in the way") {
     waves.light_subpaths_per_tile = kTilePixels + 1;
     CHECK(fit(2071).find("wave_size=4294425600: more light subpaths than can be numbered") == 0);
 }
+
+TEST_CASE("light subpaths of a sample are as many as can be numbered, at most") {
+    const auto refused = [](uint32_t width, uint32_t height, uint32_t per_tile) {
+        RenderSettings s;
+        s.integrator = "bdpt";
+        s.light_subpaths_per_tile = per_tile;
+        return refusal_of(ExitCode::usage, [&] { plan_bdpt(plain_film(width, height), s); });
+    };
+    CHECK(refused(65535, 65537, kTilePixels) == "no error");  // 2^32 - 1
+    CHECK(refused(65536, 32768, kTilePixels) == "no error");
+    CHECK(refused(65536, 32767, 2 * kTilePixels) == "no error");
+    // A slot has as many rounds as it needs.
+    CHECK(refused(65536, 32768, kTilePixels + kTilePixels / 2) ==
+          "light_paths=1.5: a film of 65536x32768 has more light subpaths than can be numbered (4294967295)");
+}
+
+TEST_CASE("connections trace their rays themselves in small scenes, where nothing asks for their order") {
+    struct {
+        WavePolicy waves;
+    } policy;
+    policy.waves.queues.ordering = Ordering::none;
+    CHECK(traces_connections(policy, 0));
+    CHECK(traces_connections(policy, 4096));
+    CHECK_FALSE(traces_connections(policy, 4097));
+    const auto with = [&](const auto& change) {
+        auto other = policy;
+        change(other.waves);
+        return traces_connections(other, 0);
+    };
+    CHECK_FALSE(with([](WavePolicy& w) { w.strategy_depth = 1; }));
+    CHECK_FALSE(with([](WavePolicy& w) { w.deterministic = true; }));
+    CHECK_FALSE(with([](WavePolicy& w) { w.queues.compaction = Compaction::select; }));
+    CHECK_FALSE(with([](WavePolicy& w) { w.queues.ordering = Ordering::morton; }));
+    CHECK(with([](WavePolicy& w) { w.cull = 1; }));
+}

@@ -321,6 +321,12 @@ TEST_CASE("the sums of a tree are saved one by one, with notes and states, and a
     CHECK(notes.at("seconds") == 0.5);
     CHECK(devices == kept);
     CHECK(read.samples() == 21);
+    const std::optional<RenderState> state = read_state(folder / "state");
+    REQUIRE(state.has_value());
+    CHECK(state->moments.width == 1);
+    CHECK(state->moments.height == 3 * 2);
+    CHECK(state->moments.samples == 6 + 3 + 12);
+    CHECK(state->notes.at("nodes") == nlohmann::json({{1, 0, 6}, {0, 3, 3}, {2, 2, 12}}));
     REQUIRE(read.entries().size() == 3);
     for (const auto& [first, entry] : tree.entries()) {
         const MergeTree::Entry& back = read.entries().at(first);

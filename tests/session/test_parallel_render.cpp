@@ -10,6 +10,9 @@
 #include "core/flag.h"
 #include "film/ztest.h"
 #include "session/parallel/parallel_render.h"
+#include "session/state.h"
+#include "session/statistics.h"
+#include "session/stats_sum.h"
 #include "tests/support/render_scene.h"
 
 using namespace ambilux;
@@ -95,9 +98,27 @@ TEST_CASE("interrupted and resumed with other workers: the same bits, and the st
     REQUIRE(part.state_path == folder / "state");
     REQUIRE(part.film.samples > 10);
     REQUIRE(part.film.samples < 50);
+    const std::optional<RenderState> state = read_state(part.state_path);
+    REQUIRE(state.has_value());
+    const nlohmann::json& notes = state->notes;
+    CHECK(notes.at("range_size") == 3);
+    CHECK(notes.at("identity").at("spp") == 50);
+    CHECK(notes.at("identity").at("settings") == settings_json(request.settings));
+    CHECK(notes.at("seconds") >= part.position.seconds);
+    const RenderStats saved = restore_stats(notes.at("stats"));
+    CHECK(saved.samples == part.film.samples);
+    CHECK(saved.rays_extend == part.stats.rays_extend);
 
     request = request_for(scene, folder, "bdpt", "wavefront", 3);
-    CHECK_THROWS_AS(render_parallel(scene, request, ranks()), Error);  // without resume
+    try {
+        render_parallel(scene, request, ranks());
+        FAIL("there is a state");
+    } catch (const Error& error) {
+        CHECK(error.code == ExitCode::usage);
+        CHECK(std::string(error.what()) == part.state_path +
+                                               " holds a render that was stopped: go on with it with "
+                                               "--resume, or remove the file");
+    }
     request.resume = true;
     for (const char* other : {"seed", "spp", "range"}) {
         CAPTURE(other);
@@ -112,6 +133,11 @@ TEST_CASE("interrupted and resumed with other workers: the same bits, and the st
     uint64_t rendered = 0;
     for (const WorkerShare& w : whole.workers) rendered += w.samples;
     CHECK(rendered == 50 - part.film.samples);
+    CHECK(whole.position.samples == 50);
+    CHECK(whole.position.seconds > notes.at("seconds"));  // both parts took some time
+    CHECK(whole.stats.samples == 50);
+    CHECK(whole.stats.rays_extend > part.stats.rays_extend);
+    CHECK(whole.state_path.empty());
     CHECK(!std::filesystem::exists(folder / "state"));
 }
 
@@ -210,7 +236,12 @@ TEST_CASE("a crew renders a node on all of its devices, hands over one film for 
         for (Finished& f : crew.take(1)) finished.push_back(std::move(f));
     CHECK(crew.wanted() == 3);
     MergeTree together, apart;
-    for (Finished& f : finished) together.add(f.order.node, std::move(f.film));
+    double seconds = 0, worked = 0;
+    for (Finished& f : finished) {
+        CHECK(f.seconds > 0);
+        seconds += f.seconds;
+        together.add(f.order.node, std::move(f.film));
+    }
     const std::unique_ptr<Renderer> one = make_renderer(scene, settings);
     for (uint64_t range = 0; range < ranges.count(); ++range) {
         one->clear_film();
@@ -219,7 +250,8 @@ TEST_CASE("a crew renders a node on all of its devices, hands over one film for 
     }
     CHECK(same(together.sum(), apart.sum()));
     uint64_t samples = 0, rendered = 0;
-    for (const DeviceWork& d : crew.work()) samples += d.samples, rendered += d.ranges;
+    for (const DeviceWork& d : crew.work()) samples += d.samples, rendered += d.ranges, worked += d.seconds;
+    CHECK(seconds == Approx(worked));
     CHECK(samples == 40);
     CHECK(rendered == 14);
 }

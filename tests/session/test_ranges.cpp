@@ -115,3 +115,19 @@ TEST_CASE("a rank gets as many times the ranges as it has devices, and no more t
     const auto timed = Dealer({1, 0}, 10, {}).next(9, 0.5, 0, 4).value();  // 1 s is left
     CHECK(timed.end() - timed.first() == 8);
 }
+
+TEST_CASE("where films cost much, nodes take longer: films take half of the time of whoever adds them up, at most") {
+    CHECK(Dealer::node_seconds(1, 1, 0) == 2);
+    CHECK(Dealer::node_seconds(8, 1, 0.125) == 2);
+    CHECK(Dealer::node_seconds(8, 1, 0.5) == 8);
+    CHECK(Dealer::node_seconds(8, 2, 0.5) == 4);  // of two nodes in a block one film comes
+    CHECK(Dealer::node_seconds(8, 4, 0.5) == 2);
+    const auto length = [](double node_seconds) {
+        Dealer dealer({1, 1024}, 0, {});
+        dealer.set_node_seconds(node_seconds);
+        const RangeNode node = dealer.next(0, 0.5, 16).value();
+        return node.end() - node.first();
+    };
+    CHECK(length(2) == 4);
+    CHECK(length(8) == 16);
+}

@@ -60,9 +60,27 @@ TEST_CASE("1, 2, 4 and 7 ranks make the same bits, whether the first one adds up
             CHECK(result.stats.samples == 200);
             CHECK(result.workers.size() == size_t(ranks));
             CHECK((result.stats.device.find(host_name() + ": ") != std::string::npos) == (ranks > 1));
-            uint64_t samples = 0;
-            for (const WorkerShare& w : result.workers) samples += w.samples;
+            uint64_t samples = 0, parts = 0;
+            for (size_t i = 0; i < result.workers.size(); ++i) {
+                const WorkerShare& w = result.workers[i];
+                CHECK(w.rank == int(i));
+                CHECK(w.host == host_name());
+                CHECK(w.device.starts_with("CPU, "));
+                CHECK((w.seconds > 0) == (w.ranges > 0));
+                CHECK(w.samples <= 3 * w.ranges);
+                samples += w.samples;
+                parts += w.ranges;
+            }
             CHECK(samples == 200);
+            CHECK(parts == 67);
+            CHECK(result.ranges.size == 3);
+            CHECK(result.ranges.samples == 200);
+            CHECK(result.position.samples == 200);
+            CHECK_FALSE(result.position.interrupted);
+            CHECK(result.stats.render_seconds >= result.position.seconds);
+            CHECK(result.merge_seconds > 0);
+            CHECK((result.receive_seconds > 0) == (ranks > 1));
+            CHECK(result.merge_seconds + result.receive_seconds <= result.position.seconds);
             size_t others = 0;
             for (int rank = 1; rank < ranks; ++rank) others += all.films(rank);
             if (block_nodes == 1) CHECK(others == 0);
@@ -143,6 +161,7 @@ TEST_CASE("blocks go round the ranks but the first one; few ranks need none") {
     CHECK(default_block_nodes(512) == 16);
     CHECK(collector_of({2, 0}, {2, 0}, 7) == 0);
     CHECK(collector_of({2, 0}, {1, 0}, 1) == 0);
+    CHECK(collector_of({2, 5}, {1, 10}, 2) == 1);
     CHECK(collector_of({2, 0}, {1, 1}, 7) == 1);
     CHECK(collector_of({2, 5}, {1, 11}, 7) == 6);
     CHECK(collector_of({2, 6}, {1, 12}, 7) == 1);
@@ -204,6 +223,8 @@ TEST_CASE("what a rank tells is heard whole: text, film and states, or any of th
     check_states(told.states);
     told = told_back([&](Ranks& r) { tell(r, 0, Say::states, {}, nullptr, states); });
     CHECK(told.text.is_null());
+    CHECK(told.film.width == 0);
+    CHECK(told.film.height == 0);
     CHECK(told.film.samples == 0);
     CHECK(told.film.sum.empty());
     check_states(told.states);

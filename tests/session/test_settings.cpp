@@ -76,6 +76,25 @@ TEST_CASE("every setting is parsed, printed, explained and known to the message 
     }
 }
 
+TEST_CASE("help has a block for every setting, and a line for every variant") {
+    const std::string help = settings_help();
+    const auto has = [&](const Setting& s, const std::string& where) {
+        INFO(s.what.key);
+        CHECK(help.find("\n" + s.what.key + "=" + s.default_text() + "\n    " + s.what.help +
+                        "\n    values: " + s.what.allowed + "\n    has an effect on: " + where) != std::string::npos);
+    };
+    for (const Setting& s : general_settings())
+        has(s, s.applies ? applies_text(s.applies) : s.limits.empty() ? "everywhere\n\n" : "everywhere; ");
+    std::string last = "Integrators and their variants:\n\n";
+    for (const Variant& v : variants()) {
+        const std::string name = v.name();
+        last += name + std::string(std::max<size_t>(name.size(), 18) - name.size(), ' ') + " " + v.help + "\n";
+        for (const Setting& s : v.own) has(s, name + "\n\n");
+    }
+    CHECK(help.ends_with("\n\n" + last));
+    CHECK(help.starts_with("Settings, as --set KEY=VALUE or in an experiment:\n\n"));
+}
+
 TEST_CASE("what a variant declares for itself is refused elsewhere by name") {
     for (const Variant& owner : variants())
         for (const Setting& own : owner.own) {
@@ -153,6 +172,57 @@ TEST_CASE("learned draws are offered to the selection as four that are worth twe
     CHECK(learned->selection({s, any, false, false, 0.0f}).empty());
 }
 
+TEST_CASE("single strategies switch on the groups that sample them, and are named as they were given") {
+    const auto set = [](const std::string& value) {
+        RenderSettings s;
+        s.integrator = "bdpt";
+        apply_setting(s, "strategies", value);
+        CHECK(setting_text(s, "strategies") == value);
+        return s;
+    };
+    for (const auto& [value, groups] :
+         std::vector<std::pair<const char*, uint32_t>>{{"all", kAllStrategies},
+                                                       {"hits", kHitStrategies},
+                                                       {"next_event+light", kNextEventStrategies | kLightStrategies},
+                                                       {"s0t2", kHitStrategies},
+                                                       {"s0t5", kHitStrategies},
+                                                       {"s1t1", kLightStrategies},
+                                                       {"s4t1", kLightStrategies},
+                                                       {"s1t2", kNextEventStrategies},
+                                                       {"s1t4", kNextEventStrategies},
+                                                       {"s2t2", kConnectionStrategies},
+                                                       {"s0t2+s1t2+s2t2+s4t1", kAllStrategies}}) {
+        CAPTURE(value);
+        const RenderSettings s = set(value);
+        CHECK(s.strategies == groups);
+        CHECK(s.singles.on == (value[0] == 's'));
+    }
+    const RenderSettings s = set("s1t2+s4t1");
+    for (uint32_t k = 0; k <= SingleStrategies::kMaxSegments; ++k)
+        CHECK(s.singles.s[k] == (k == 2 ? 1 : k == 4 ? 4 : SingleStrategies::kNone));
+    const auto refused = [](const std::string& value) {
+        return refusal([&] {
+            RenderSettings other;
+            apply_setting(other, "strategies", value);
+        });
+    };
+    CHECK(refused("s1t2+s2t1") ==
+          "strategies=s1t2+s2t1: 's2t1' and 's1t2' sample the same paths; single strategies have weight 1, so only one "
+          "for each s + t can be on");
+    CHECK(refused("s1t2+hits") == "strategies=s1t2+hits: groups and single strategies cannot be mixed");
+    const std::string last = std::to_string(SingleStrategies::kMaxSegments + 1);
+    for (const std::string& name : {std::string("s2t0"), std::string("s0t1"), "s0t" + last + "0"})
+        CHECK_THAT(refused(name), StartsWith("strategies=" + name + ": '" + name));
+    CHECK(refused("s2t0") == "strategies=s2t0: 's2t0': t is at least 1, and s + t from 2 to " + last);
+    CHECK(set("s0t" + last).singles.s[SingleStrategies::kMaxSegments] == 0);
+    CHECK_THAT(refused("s1t" + last), ContainsSubstring("s + t from 2 to " + last));
+    for (const std::string name : {"other", "x1t2", "s1x2", "s1", "s1t", "st2", "s1t2x", "s1t2 ", ""})
+        CHECK(refused("hits+" + name) ==
+              "strategies=hits+" + name + ": '" + name +
+                  "' is none of hits, next_event, connections, light and no single strategy such as s2t3; join them "
+                  "with '+', or write all");
+}
+
 TEST_CASE("numbers of light subpaths between those that tiles can have are refused with the next ones") {
     RenderSettings s;
     CHECK_THAT(refusal([&] { apply_setting(s, "light_paths", "0.26"); }),
@@ -181,9 +251,52 @@ TEST_CASE("roulette that lets variance double within the depth of paths is warne
                       "a surface reflects 0.99 of the light, and Russian roulette ends one path in 20");
               }) == warned);
     }
+    const auto text = [&](const char* reflected, const char* paths, const char* cap) {
+        return std::string("a surface reflects ") + reflected +
+               " of the light, and Russian roulette ends one path in " + paths +
+               " at least: where such surfaces see only each other, variance grows without bound and error bars are "
+               "too small; --set rr_cap=" +
+               cap + " avoids that";
+    };
+    using Texts = std::vector<std::string>;
     s.max_depth = -1;
+    CHECK(render_warnings(scene, s) == Texts{text("0.99", "20", "0.99")});
+    s.rr_depth = -1;
+    CHECK(render_warnings(scene, s).empty());  // without roulette
+    s.rr_depth = 5;
     s.rr_cap = 0.99f;
     CHECK(render_warnings(scene, s).empty());
+    const Scene white = scene_from_text(
+        "<scene version='3.0.0'><sensor type='perspective'/><emitter type='constant'/><shape type='sphere'>"
+        "<bsdf type='roughdiffuse'><rgb name='reflectance' value='0.5, 0.5, 1'/></bsdf></shape></scene>");
+    s.rr_cap = 0.75f;
+    CHECK(render_warnings(white, s) == Texts{text("1", "4", "0.999")});
+}
+
+TEST_CASE("light whose products floats cannot hold is warned of, and so are images without a path") {
+    Scene scene = project_scene("cornell", 8, 8);
+    REQUIRE(scene.emitters.size() == 1);
+    scene.emitters.push_back(scene.emitters[0]);
+    RenderSettings s;
+    using Texts = std::vector<std::string>;
+    const auto warned = [&](Rgb radiance) {
+        scene.emitters[1].radiance.value = radiance;
+        return render_warnings(scene, s);
+    };
+    const auto text = [](const char* most) {
+        return Texts{
+            "emitter 1 has " + std::string(most) +
+            ", outside of 1e-30 to 1e+30: products of floats lose digits there or leave their range; scale all "
+            "emission by the same factor, and the image back"};
+    };
+    CHECK(warned({1, 2.345e30f, 0}) == text("2.34e+30"));
+    CHECK(warned({0, 1e-31f, 5e-31f}) == text("5e-31"));
+    for (const float most : {0.0f, 1e-30f, 1.0f, 1e30f}) CHECK(warned({most, 0, 0}).empty());
+    s.max_depth = 0;
+    CHECK(
+        render_warnings(scene, s) ==
+        Texts{"max_depth=0: the shortest path has one segment, so that the image is black; 1 is emission alone, -1 no "
+              "limit"});
 }
 
 TEST_CASE("a path tracer says which of its stages a render does without, and why") {
@@ -202,6 +315,21 @@ TEST_CASE("a path tracer says which of its stages a render does without, and why
     CHECK(skipped(scene, Estimator::mis, 1) == Parts{"connect, occlude: max_depth leaves no segment for them"});
     CHECK(skipped(dark, Estimator::mis, 8) ==
           Parts{"connect, occlude: no emitters", "mis_weight and accumulate of hits: no emitters"});
+    const Scene point = scene_from_text(
+        "<scene version='3.0.0'><sensor type='perspective'/><emitter type='point'/><shape type='sphere'/></scene>");
+    Scene both = scene;
+    both.emitters.push_back(point.emitters.at(0));
+    const std::string unseen = "mis_weight and accumulate of hits: no ray can meet these emitters",
+                      naive = "connect, occlude: estimator naive samples no emitters",
+                      lost = "light of point, spot and directional emitters: estimator naive cannot find it";
+    CHECK(skipped(point, Estimator::mis, 8) == Parts{unseen});
+    CHECK(skipped(point, Estimator::naive, 8) == Parts{naive, unseen, lost});
+    CHECK(skipped(both, Estimator::mis, 8).empty());
+    CHECK(skipped(both, Estimator::naive, 8) == Parts{naive, lost});
+    const Scene sky = scene_from_text(
+        "<scene version='3.0.0'><sensor type='perspective'/><emitter type='constant'/><shape type='sphere'/></scene>");
+    CHECK(plan_path(sky, RenderSettings{}).rules.count_environment);
+    CHECK_FALSE(plan_path(both, RenderSettings{}).rules.count_environment);
 }
 
 TEST_CASE("a setting without an effect is refused with key, value, place and where it has one") {
