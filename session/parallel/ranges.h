@@ -34,7 +34,7 @@ public:
     /// `seconds`: the budget in time; 0: none. `done`: what an earlier part rendered. `nodes`: in a block, about.
     Dealer(const Ranges& ranges, double seconds, const MergeTree& done, unsigned nodes = 1);
 
-    /// For nodes of so many seconds films of all `parties` take half of the time of the one that adds them up, at most.
+    /// Seconds of a node, such that whoever adds up the films of all `parties` spends half of its time on that at most.
     static double node_seconds(size_t parties, unsigned nodes, double film_seconds) {
         return std::max(kNodeSeconds, 2 * double(parties) / nodes * film_seconds);
     }
