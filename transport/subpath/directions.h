@@ -15,7 +15,7 @@ struct Vertex;
 
 /// The BSDF alone (transport/subpath/bsdf_directions.h).
 struct BsdfDirections {
-    char nothing[0];  ///< no size, or Rules would grow; nvcc 13.0 misplaces what follows [[no_unique_address]]
+    char nothing[0];  ///< no size, or Rules would grow, and all parameters of kernels behind it would move
 
     template <Features F, class Mis>
     AMBILUX_HD static bool sample(const Vertex<Mis>& v, Vec3f u, TransportMode mode, BsdfSample& s);
