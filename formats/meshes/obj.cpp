@@ -35,6 +35,7 @@ struct ObjReader {
     std::vector<Vec2f> uvs;
     std::set<std::string> unused;  ///< what the file has beside the mesh
     uint64_t thin_faces = 0;
+    uint64_t names_no_uv = 0, names_no_normal = 0;  ///< the first line that names one before the file has any
 
     [[noreturn]] void fail(const std::string& message) const { throw input_error(path, text.line, message); }
 
@@ -79,14 +80,16 @@ struct ObjReader {
         return uint32_t(zero_based);
     }
 
-    /// Index behind a '/', or none: exporters write slashes without an index behind them.
-    uint32_t next_index(size_t count, const char* what) {
+    /// Index behind a '/', or none: exporters write slashes without an index behind them, and indices of what the file
+    /// has none of.
+    uint32_t next_index(size_t count, const char* what, uint64_t& names_none) {
         if (text.at >= text.end || *text.at != '/') return kAbsent;
         ++text.at;
         int64_t index = 0;
         if (at_corner_end() || *text.at == '/') return kAbsent;
         if (!text.number(index)) fail(std::string("expected a ") + what + " index in 'f'");
-        return resolve(index, count, what);
+        if (count == 0 && names_none == 0) names_none = text.line;
+        return count == 0 ? kAbsent : resolve(index, count, what);
     }
     bool at_corner_end() const {
         return text.done() || std::string_view(" \t\n#\\").find(*text.at) != std::string_view::npos;
@@ -96,8 +99,8 @@ struct ObjReader {
         int64_t index = 0;
         if (!text.number(index)) fail("expected a vertex index in 'f'");
         const uint32_t v = resolve(index, positions.size(), "vertex");
-        const uint32_t vt = next_index(uvs.size(), "texture coordinate");
-        const uint32_t vn = next_index(normals.size(), "normal");
+        const uint32_t vt = next_index(uvs.size(), "texture coordinate", names_no_uv);
+        const uint32_t vn = next_index(normals.size(), "normal", names_no_normal);
         if (!at_corner_end()) fail("expected a blank behind a corner in 'f'");
         return {v, vt, vn};
     }
@@ -138,7 +141,16 @@ void read_vertex(ObjReader& in) {
     if (more >= 3) in.unused.insert("colours of vertices");  // one is a weight
 }
 
+/// Of indices before the file had any of the kind, all are left out, or none.
+void note_absent(const ObjReader& in, uint64_t line, bool has_some, const char* what, Mesh& mesh) {
+    if (line == 0) return;
+    if (has_some) throw input_error(in.path, line, std::string(what) + " are named before the first of them");
+    mesh.notes.push_back(std::string("faces name ") + what + ", and the obj file has none");
+}
+
 void add_notes(const ObjReader& in, Mesh& mesh) {
+    note_absent(in, in.names_no_uv, !in.uvs.empty(), "texture coordinates", mesh);
+    note_absent(in, in.names_no_normal, !in.normals.empty(), "normals", mesh);
     if (in.thin_faces > 0)
         mesh.notes.push_back("faces of fewer than three corners are left out: " + std::to_string(in.thin_faces));
     if (in.unused.empty()) return;

@@ -89,6 +89,23 @@ TEST_CASE("OBJ: corners of all forms, negative indices, polygons, shared vertice
     for (uint32_t v : mixed.faces[1]) CHECK(normalize(mixed.normals[v]) == Vec3f{0, 0, -1});
 }
 
+TEST_CASE("OBJ: what faces name and the file has none of is told once, and left out") {
+    const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n";
+    const Mesh plain = read_obj("m.obj", vertices + "f 1 2 3\nf 2 4 3\n", true);
+    for (const std::string faces : {"f 1/1/1 2/2/2 3/3/3\nf 2/2/2 4/4/4 3/3/3\n", "f 1/0/9 2/0/9 3/0/9\nf 2/5/5 4/1/1 3\n"}) {
+        const Mesh mesh = read_obj("m.obj", vertices + faces, true);
+        CHECK(mesh.positions == plain.positions);
+        CHECK(mesh.faces == plain.faces);
+        CHECK(mesh.uvs.empty());
+        CHECK(mesh.normals.empty());
+        CHECK(mesh.notes == std::vector<std::string>{"faces name texture coordinates, and the obj file has none",
+                                                     "faces name normals, and the obj file has none"});
+    }
+    const Mesh one = read_obj("m.obj", vertices + "vt 0.5 0.5\nf 1/1/1 2/1/2 3/1/3\n", true);
+    CHECK(one.uvs.size() == 3);
+    CHECK(one.notes == std::vector<std::string>{"faces name normals, and the obj file has none"});
+}
+
 TEST_CASE("OBJ: mistakes are named with their line") {
     const std::string start = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     const auto message = [&](const std::string& rest) {
@@ -97,8 +114,10 @@ TEST_CASE("OBJ: mistakes are named with their line") {
     CHECK(contains(message("f 1 2 4\n"), "m.obj:4: vertex index 4 is out of range"));
     CHECK(contains(message("f 1 2 0\n"), "m.obj:4: vertex index 0 is out of range"));
     CHECK(contains(message("f 1 2 -4\n"), "m.obj:4: vertex index -4 is out of range"));
-    CHECK(contains(message("f 1/1 2/1 3/1\n"), "m.obj:4: texture coordinate index 1 is out of range"));
-    CHECK(contains(message("f 1//1 2//1 3//1\n"), "m.obj:4: normal index 1 is out of range"));
+    CHECK(contains(message("vt 0 0\nf 1/1 2/2 3/1\n"), "m.obj:5: texture coordinate index 2 is out of range"));
+    CHECK(contains(message("vn 0 0 1\nf 1//1 2//-2 3//1\n"), "m.obj:5: normal index -2 is out of range"));
+    CHECK(contains(message("f 1/1 2/1 3/1\nvt 0 0\n"), "m.obj:4: texture coordinates are named before the first"));
+    CHECK(contains(message("f 1 2 3\nf 1//1 2//1 3//1\nvn 0 0 1\n"), "m.obj:5: normals are named before the first"));
     CHECK(contains(message("\nf 1 2\n"), "m.obj: the mesh has no faces"));
     CHECK(contains(message("v 1 x 2\n"), "m.obj:4: expected a number in 'v'"));
     CHECK(contains(message("v nan 0 0\nf 1 2 4\n"), "m.obj: position of vertex 2 is not finite"));
