@@ -15,8 +15,8 @@ Microfacets distribution(Builder& builder, Reader& in) {
     const std::string name = in.text("distribution", "beckmann");
     if (name == "ggx") return Microfacets::ggx;
     if (name != "beckmann")
-        builder.refuse(in.where("distribution"), "microfacet distribution '" + name + "' is not supported",
-                       "beckmann is used");
+        builder.refuse(in.where("distribution"),
+                       "microfacet distribution '" + name + "' is not supported (beckmann, ggx)", "beckmann is used");
     return Microfacets::beckmann;
 }
 

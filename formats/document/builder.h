@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "core/sha256.h"
 #include "formats/document/document.h"
+#include "formats/document/plugins.h"
 #include "formats/document/spectrum.h"
 #include "formats/load.h"
 
@@ -110,7 +111,7 @@ public:
     [[noreturn]] void fail(const std::string& message) const;
     [[noreturn]] void fail(const Where& where, const std::string& message) const;
 
-    bool has(const std::string& name) const { return object_.find(name) || child_named(name); }
+    bool has(const std::string& name) const { return find(name) || child_named(name); }
     bool boolean(const std::string& name, bool fallback);
     int64_t integer(const std::string& name, int64_t fallback);
     double number(const std::string& name, double fallback);
@@ -140,11 +141,13 @@ public:
 private:
     ParamRgb checked_reflectance(const std::string& name, const Object& texture, const ParamRgb& parameter);
     const Value* value(const std::string& name, std::initializer_list<ValueKind> kinds, const char* expected);
+    const Value* find(const std::string& name) const;
     const Child* child_named(const std::string& name) const;
 
     Builder& builder_;
     const Object& object_;
     std::set<const Value*> used_values_;
+    mutable Plugins absent_;  ///< names that were asked for: a misspelled one is nearly one of these
     std::set<const Child*> used_children_;
     std::map<std::string, size_t> next_child_;  ///< by tag: where take() looks on
 };

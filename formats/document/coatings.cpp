@@ -29,7 +29,8 @@ CoatPlace read_coat(Builder& builder, Reader& in) {
         if (name == "ggx")
             distribution = Microfacets::ggx;
         else if (name != "beckmann")
-            builder.refuse(in.where("distribution"), "microfacet distribution '" + name + "' is not supported",
+            builder.refuse(in.where("distribution"),
+                           "microfacet distribution '" + name + "' is not supported (beckmann, ggx)",
                            "beckmann is used");
         in.ignore({"sample_visible"});
         builder.note(in.where(),

@@ -8,21 +8,35 @@ bool is_one_of(const Plugins& plugins, const std::string& type) {
     return std::find(plugins.begin(), plugins.end(), type) != plugins.end();
 }
 
+namespace {
+
+/// Letters to change, add, leave out or swap with the next (Damerau 1964).
+size_t distance(const std::string& a, const std::string& b) {
+    std::vector<std::vector<size_t>> d(a.size() + 1, std::vector<size_t>(b.size() + 1));
+    for (size_t i = 0; i <= a.size(); ++i)
+        for (size_t j = 0; j <= b.size(); ++j) {
+            d[i][j] = i == 0 ? j : j == 0 ? i : d[i - 1][j - 1] + (a[i - 1] != b[j - 1]);
+            if (i > 0 && j > 0) d[i][j] = std::min({d[i][j], d[i - 1][j] + 1, d[i][j - 1] + 1});
+            if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+                d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+        }
+    return d[a.size()][b.size()];
+}
+
+}  // namespace
+
 std::string nearest_name(const Plugins& known, const std::string& name) {
     std::string nearest;
     size_t least = std::min<size_t>(3, 1 + name.size() / 3);
-    for (const std::string& k : known) {
-        std::vector<size_t> row(k.size() + 1);  // letters to change, add or leave out (Levenshtein)
-        for (size_t j = 0; j <= k.size(); ++j) row[j] = j;
-        for (size_t i = 1; i <= name.size(); ++i)
-            for (size_t j = 0, left = i - 1; j <= k.size(); ++j) {
-                const size_t above = row[j];
-                row[j] = j == 0 ? i : std::min({above + 1, row[j - 1] + 1, left + (name[i - 1] != k[j - 1])});
-                left = above;
-            }
-        if (row.back() < least) least = row.back(), nearest = k;
-    }
+    for (const std::string& k : known)
+        if (const size_t d = k.size() < name.size() + least ? distance(name, k) : least; d < least)
+            least = d, nearest = k;
     return nearest;
+}
+
+std::string nearly(const Plugins& known, const std::string& name) {
+    const std::string near = nearest_name(known, name);
+    return near.empty() ? "" : ": '" + near + "' is known";
 }
 
 std::string what_is_meant(const std::string& tag, const std::string& type) {
@@ -32,8 +46,7 @@ std::string what_is_meant(const std::string& tag, const std::string& type) {
     Plugins same;
     for (const auto& [name, of] : tags)
         if (of == tag && name != type) same.push_back(name);
-    const std::string near = known == tags.end() ? nearest_name(same, type) : "";
-    return near.empty() ? "" : ": '" + near + "' is known";
+    return known == tags.end() ? nearly(same, type) : "";
 }
 
 std::map<std::string, std::string> plugins() {

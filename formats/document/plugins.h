@@ -23,6 +23,8 @@ bool is_one_of(const Plugins& plugins, const std::string& type);
 
 /// The one of these that differs from `name` by a letter or two; empty if there is none.
 std::string nearest_name(const Plugins& known, const std::string& name);
+/// The end of a message about `name`: which of these it nearly is; empty if none.
+std::string nearly(const Plugins& known, const std::string& name);
 
 /// Why `type` may have been written for an object with this tag, as the end of a message: it is another kind of object,
 /// or nearly one of these; empty if neither.

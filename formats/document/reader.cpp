@@ -77,6 +77,12 @@ void Reader::fail(const Where& where, const std::string& message) const {
     throw input_error(where.file, where.line, message);
 }
 
+const Value* Reader::find(const std::string& name) const {
+    const Value* v = object_.find(name);
+    if (!v) absent_.push_back(name);
+    return v;
+}
+
 const Child* Reader::child_named(const std::string& name) const {
     for (const Child& child : object_.children)
         if (child.name == name) return &child;
@@ -84,7 +90,7 @@ const Child* Reader::child_named(const std::string& name) const {
 }
 
 const Value* Reader::value(const std::string& name, std::initializer_list<ValueKind> kinds, const char* expected) {
-    const Value* v = object_.find(name);
+    const Value* v = find(name);
     if (!v) {
         if (const Child* child = child_named(name))
             fail(child->where, "parameter '" + name + "' of " + object_.type + " must be " + expected + ", not a " +
@@ -143,7 +149,7 @@ float Reader::ior(const std::string& name, const std::string& fallback) {
 }
 
 Where Reader::where(const std::string& name) const {
-    if (const Value* v = object_.find(name)) return v->where;
+    if (const Value* v = find(name)) return v->where;
     if (const Child* child = child_named(name)) return child->where;
     return object_.where;
 }
@@ -204,7 +210,7 @@ ParamFloat Reader::textured_number(const std::string& name, float fallback) {
             fail(texture->where, "a number cannot come from a texture that is scaled by a colour");
         return {without_rounding(scaled.scale.x), scaled.texture};
     }
-    const Value* v = object_.find(name);
+    const Value* v = find(name);
     // A colour is the mean of its channels, as in Mitsuba 3.
     const bool colored = v && (v->kind == ValueKind::rgb || (v->kind == ValueKind::spectrum && v->samples.empty()));
     if (colored) used_values_.insert(v);
@@ -232,14 +238,14 @@ const Object* Reader::take_named(const std::string& name) {
 
 void Reader::ignore(std::initializer_list<const char*> names) {
     for (const char* name : names) {
-        if (const Value* v = object_.find(name)) used_values_.insert(v);
+        if (const Value* v = find(name)) used_values_.insert(v);
         if (const Child* child = child_named(name)) used_children_.insert(child);
     }
 }
 
 void Reader::leave(std::initializer_list<LeftOut> parameters, const std::string& why) {
     for (const auto& [name, done] : parameters) {
-        const Value* v = object_.find(name);
+        const Value* v = find(name);
         if (!v || !used_values_.insert(v).second) continue;
         const bool is_text = v->kind == ValueKind::text, is_flag = v->kind == ValueKind::boolean;
         const std::string given = is_text   ? v->text
@@ -256,11 +262,14 @@ void Reader::finish() {
         if (used_values_.count(&v))
             continue;
         else if (object_.version < 2 || is_one_of(kMarks, v.name))
-            builder_.note(v.where, fmt::format("parameter '{}' of {}{} is not known and left out{}", v.name,
-                                               object_.tag, object_.type.empty() ? "" : " '" + object_.type + "'",
-                                               object_.version < 2 ? ", as Mitsuba 0.6 does" : ""));
+            builder_.note(v.where,
+                          fmt::format("parameter '{}' of {}{} is not known and left out{}{}", v.name, object_.tag,
+                                      object_.type.empty() ? "" : " '" + object_.type + "'",
+                                      object_.version < 2 ? ", as Mitsuba 0.6 does" : "", nearly(absent_, v.name)));
         else
-            builder_.refuse(v.where, "unknown parameter '" + v.name + "' of " + object_.tag + " '" + object_.type + "'",
+            builder_.refuse(v.where,
+                            "unknown parameter '" + v.name + "' of " + object_.tag + " '" + object_.type + "'" +
+                                nearly(absent_, v.name),
                             "it is ignored");
     for (const Child& child : object_.children)
         if (!used_children_.count(&child))

@@ -8,6 +8,7 @@
 #include "core/srgb.h"
 #include "core/text.h"
 #include "core/text_cursor.h"
+#include "formats/document/plugins.h"
 #include "formats/file_budget.h"
 
 namespace ambilux::mitsuba {
@@ -87,7 +88,8 @@ std::string ValueParser::attribute(const XmlSource& source, const pugi::xml_node
 void ValueParser::allow(const XmlSource& source, const pugi::xml_node& node, std::initializer_list<const char*> names) {
     for (const pugi::xml_attribute& a : node.attributes())
         if (std::none_of(names.begin(), names.end(), [&](const char* n) { return std::string(n) == a.name(); }))
-            fail(where(source, node), std::string("unexpected attribute '") + a.name() + "' in <" + node.name() + ">");
+            fail(where(source, node), std::string("unexpected attribute '") + a.name() + "' in <" + node.name() + ">" +
+                                          nearly({names.begin(), names.end()}, a.name()));
 }
 
 std::string ValueParser::parameter_name(const XmlSource& source, const pugi::xml_node& node) {
@@ -157,7 +159,8 @@ Matrix ValueParser::parse_transform(const XmlSource& source, const pugi::xml_nod
             for (size_t i = 0; i < v.size(); ++i) m.m[i / n][i % n] = v[i];
             if (!is_affine(m)) fail(at, "<matrix> is not affine: its last row must be 0 0 0 1");
         } else {
-            fail(at, std::string("unknown element <") + step.name() + "> in <transform>");
+            fail(at, std::string("unknown element <") + step.name() + "> in <transform>" +
+                         nearly({"translate", "scale", "rotate", "lookat", "matrix"}, tag));
         }
         total = m * total;
     }

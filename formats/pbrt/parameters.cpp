@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include "formats/document/plugins.h"
+
 namespace ambilux::pbrt {
 
 namespace {
@@ -106,6 +108,7 @@ const Parameter* Parameters::find(const std::string& name) const {
             p.used = true;
             return &p;
         }
+    absent.push_back(name);
     return nullptr;
 }
 
@@ -168,7 +171,9 @@ void Parameters::ignore(std::initializer_list<const char*> names) const {
 void Parameters::finish(Report& report) const {
     for (const Parameter& p : list)
         if (!p.used)
-            report.refuse(p.where, "unknown parameter '" + p.name + "' of " + directive + " '" + type + "'",
+            report.refuse(p.where,
+                          "unknown parameter '" + p.name + "' of " + directive + " '" + type + "'" +
+                              document::nearly(absent, p.name),
                           "it is ignored");
 }
 

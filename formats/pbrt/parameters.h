@@ -29,6 +29,8 @@ public:
     std::string type;       ///< "sphere"
     Where where;
     std::vector<Parameter> list;
+    mutable std::vector<std::string> absent =
+        {};  ///< names that were asked for: a misspelled one is nearly one of these
 
     /// The parameter, which then counts as used, or null.
     const Parameter* find(const std::string& name) const;

@@ -92,7 +92,8 @@ TEST_CASE("OBJ: corners of all forms, negative indices, polygons, shared vertice
 TEST_CASE("OBJ: what faces name and the file has none of is told once, and left out") {
     const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n";
     const Mesh plain = read_obj("m.obj", vertices + "f 1 2 3\nf 2 4 3\n", true);
-    for (const std::string faces : {"f 1/1/1 2/2/2 3/3/3\nf 2/2/2 4/4/4 3/3/3\n", "f 1/0/9 2/0/9 3/0/9\nf 2/5/5 4/1/1 3\n"}) {
+    for (const std::string faces :
+         {"f 1/1/1 2/2/2 3/3/3\nf 2/2/2 4/4/4 3/3/3\n", "f 1/0/9 2/0/9 3/0/9\nf 2/5/5 4/1/1 3\n"}) {
         const Mesh mesh = read_obj("m.obj", vertices + faces, true);
         CHECK(mesh.positions == plain.positions);
         CHECK(mesh.faces == plain.faces);
