@@ -17,7 +17,7 @@
 namespace ambilux {
 namespace {
 
-struct Options {
+struct BenchArguments {
     SceneOptions scene;
     RenderOptions render;
     std::string json;
@@ -43,7 +43,7 @@ void print_rows(const nlohmann::json& rows) {
     }
 }
 
-int report(const Options& o, const nlohmann::json& json) {
+int report(const BenchArguments& o, const nlohmann::json& json) {
     if (!o.json.empty()) write_json(o.json, json);
     if (o.json == "-") return int(ExitCode::done);
     for (const auto& [key, value] : json.items()) {
@@ -57,22 +57,22 @@ int report(const Options& o, const nlohmann::json& json) {
     return int(ExitCode::done);
 }
 
-void check_repetitions(const Options& o) {
+void check_repetitions(const BenchArguments& o) {
     if (o.repetitions < 1) throw Error(ExitCode::usage, "--repetitions: at least 1 is needed");
 }
 
-int rays(const Options& o) {
+int rays(const BenchArguments& o) {
     check_repetitions(o);
     return report(o, bench_rays(load_scene(o.scene, {{"--json", o.json}}).scene, o.backend, o.repetitions, o.opaque));
 }
 
-int queues(const Options& o) {
+int queues(const BenchArguments& o) {
     check_repetitions(o);
     return report(o, bench_queues(load_scene(o.scene, {{"--json", o.json}}).scene, o.backend, o.items, o.repetitions));
 }
 
 /// A render of `spp` samples of every pixel.
-RenderPosition render(const Options& o, Renderer& renderer) {
+RenderPosition render(const BenchArguments& o, Renderer& renderer) {
     Progress progress("bench stages");
     return drive(renderer, {}, {o.spp, 0}, save_when_interrupted(), [&](const RenderPosition& p) {
         progress.update(double(p.samples) / o.spp, progress_details(p.samples, p.seconds, renderer.stats()));
@@ -98,7 +98,7 @@ nlohmann::json shares_json(const std::vector<FusedShare>& shares, double unfused
     return {{"how", kShares}, {"unfused_seconds", unfused}, {"stages", rows}};
 }
 
-int stages(const Options& o) {
+int stages(const BenchArguments& o) {
     if (o.spp < 1) throw Error(ExitCode::usage, "--spp: at least 1 is needed");
     const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}});
     RenderSettings settings = o.render.settings(loaded.scene);
@@ -136,7 +136,7 @@ int stages(const Options& o) {
 }
 
 /// Images a second.
-int frames(const Options& o) {
+int frames(const BenchArguments& o) {
     if (o.frames < 1) throw Error(ExitCode::usage, "--frames: at least 1 is needed");
     const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}});
     RenderSettings settings = o.render.settings(loaded.scene);
@@ -165,7 +165,7 @@ void add_bench(CLI::App& app, Run& run) {
     CLI::App& command = *app.add_subcommand("bench", "Throughput of one part alone");
     command.require_subcommand(1);
 
-    auto r = std::make_shared<Options>();
+    auto r = std::make_shared<BenchArguments>();
     CLI::App& rays_command =
         *command.add_subcommand("rays", "Ray traversal: primary, bounced and shadow rays of a scene");
     r->scene.add_to(rays_command);
@@ -180,7 +180,7 @@ void add_bench(CLI::App& app, Run& run) {
     rays_command.add_option("--json", r->json, "Write the result to a file, or - for standard output");
     rays_command.callback([r, &run] { run = [r] { return rays(*r); }; });
 
-    auto q = std::make_shared<Options>();
+    auto q = std::make_shared<BenchArguments>();
     CLI::App& queues_command = *command.add_subcommand(
         "queues", "Pushing to queues, compaction, going through them, and ordering a scene's first hits and rays");
     q->scene.add_to(queues_command);
@@ -194,7 +194,7 @@ void add_bench(CLI::App& app, Run& run) {
     queues_command.add_option("--json", q->json, "Write the result to a file, or - for standard output");
     queues_command.callback([q, &run] { run = [q] { return queues(*q); }; });
 
-    auto f = std::make_shared<Options>();
+    auto f = std::make_shared<BenchArguments>();
     CLI::App& frames_command = *command.add_subcommand(
         "frames", "Images a second: one sample of every pixel, on a film that was cleared, and its image on the host");
     f->scene.add_to(frames_command);
@@ -203,7 +203,7 @@ void add_bench(CLI::App& app, Run& run) {
     frames_command.add_option("--json", f->json, "Write the result to a file, or - for standard output");
     frames_command.callback([f, &run] { run = [f] { return frames(*f); }; });
 
-    auto s = std::make_shared<Options>();
+    auto s = std::make_shared<BenchArguments>();
     CLI::App& stages_command = *command.add_subcommand("stages", "Time and items of every stage of a render");
     s->scene.add_to(stages_command);
     s->render.add_to(stages_command, false);

@@ -12,11 +12,11 @@
 namespace ambilux {
 namespace {
 
-struct Options {
+struct CompareArguments {
     std::string image, reference, json;
 };
 
-int compare(const Options& o) {
+int compare(const CompareArguments& o) {
     const std::vector<Output> outputs = {{"--json", o.json}};
     check_outputs(outputs);
     check_not_inputs(outputs, {o.image, o.reference});
@@ -55,7 +55,7 @@ int compare(const Options& o) {
 }  // namespace
 
 void add_compare(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<CompareArguments>();
     CLI::App& command =
         *app.add_subcommand("compare", "Error of an image against a reference: RMSE, relMSE, MAPE, bias");
     command.add_option("IMAGE", o->image, "Image (EXR)")->required();

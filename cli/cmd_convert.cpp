@@ -8,12 +8,12 @@
 namespace ambilux {
 namespace {
 
-struct Options {
+struct ConvertArguments {
     SceneOptions scene;
     std::string output;
 };
 
-int convert(const Options& o) {
+int convert(const ConvertArguments& o) {
     if (!o.output.ends_with(".xml"))
         throw Error(ExitCode::usage,
                     fmt::format("OUT {}: Mitsuba scenes are written, whose names end in .xml", o.output));
@@ -26,7 +26,7 @@ int convert(const Options& o) {
 }  // namespace
 
 void add_convert(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ConvertArguments>();
     CLI::App& command = *app.add_subcommand(
         "convert", "Write a scene as Mitsuba 3 XML, with its meshes and images in a folder beside it");
     o->scene.add_to(command);

@@ -9,7 +9,7 @@
 namespace ambilux {
 namespace {
 
-struct Options {
+struct InfoArguments {
     SceneOptions scene;
     RenderOptions render;
     std::string json;
@@ -38,7 +38,7 @@ void print(const nlohmann::json& value, int indent) {
     }
 }
 
-int info(const Options& o) {
+int info(const InfoArguments& o) {
     const LoadedScene loaded = load_scene(o.scene, {{"--json", o.json}});
     const RenderSettings settings = o.render.settings(loaded.scene);
     nlohmann::json json = scene_info(loaded.scene);
@@ -66,7 +66,7 @@ int info(const Options& o) {
 }  // namespace
 
 void add_info(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<InfoArguments>();
     CLI::App& command =
         *app.add_subcommand("info", "What is in a scene; which kernels and stages it needs, which it skips");
     o->scene.add_to(command);

@@ -15,14 +15,14 @@
 namespace ambilux {
 namespace {
 
-struct Options {
+struct ReferenceArguments {
     SceneOptions scene;
     RenderOptions render;
     std::string output, png, json;
     uint64_t spp = 0;
 };
 
-int reference(const Options& o) {
+int reference(const ReferenceArguments& o) {
     if (o.output.empty()) throw Error(ExitCode::usage, "-o: the reference needs a name");
     check_image_name("-o", o.output, ".exr");
     check_image_name("--png", o.png, ".png");
@@ -84,7 +84,7 @@ int reference(const Options& o) {
 }  // namespace
 
 void add_reference(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ReferenceArguments>();
     CLI::App& command = *app.add_subcommand("reference",
                                             "Ground truth with its standard error, by the path tracer or with --set "
                                             "integrator=bdpt; continues an existing file");

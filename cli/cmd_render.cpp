@@ -28,7 +28,7 @@
 namespace ambilux {
 namespace {
 
-struct Options {
+struct RenderArguments {
     SceneOptions scene;
     RenderOptions render;
     std::string output, png, json, techniques, tev;
@@ -52,7 +52,7 @@ struct Options {
 constexpr float kMostStops = 100;
 constexpr std::chrono::milliseconds kStreamPeriod(500);
 
-void check(const Options& o) {
+void check(const RenderArguments& o) {
     render_budget(o.spp, o.time, {}, "--");
     if (o.exposure && !(std::fabs(*o.exposure) <= kMostStops))
         throw Error(ExitCode::usage, fmt::format("--exposure: {} stops at most, up or down", kMostStops));
@@ -88,16 +88,16 @@ size_t bytes_to_save(const Scene& scene) {
     return size_t(scene.sensor.crop_width) * scene.sensor.crop_height * kPerPixel + kRest;
 }
 
-void write_images(const Options& o, const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
-                  const FilmMoments& film) {
+void write_images(const RenderArguments& o, const Scene& scene, const RenderSettings& settings,
+                  const RenderStats& stats, const FilmMoments& film) {
     const Image image = mean_image(film);
     write_exr(o.output, image, image_attributes(scene, settings, stats), make_aovs(scene, settings, film, o.aovs));
     if (!o.png.empty()) write_png(o.png, image, o.exposure.value_or(0.0f));
 }
 
 /// Statistics with what `found` adds to them, and the last words.
-int conclude(const Options& o, const LoadedScene& loaded, const RenderSettings& settings, const RenderStats& stats,
-             const RenderPosition& position, const nlohmann::json& found) {
+int conclude(const RenderArguments& o, const LoadedScene& loaded, const RenderSettings& settings,
+             const RenderStats& stats, const RenderPosition& position, const nlohmann::json& found) {
     if (!o.json.empty()) {
         nlohmann::json json = stats_json(loaded.scene, settings, stats, loaded.seconds);
         json.update(found);
@@ -118,7 +118,7 @@ int conclude(const Options& o, const LoadedScene& loaded, const RenderSettings& 
 }
 
 /// The scene, its warnings said.
-LoadedScene load(const Options& o) {
+LoadedScene load(const RenderArguments& o) {
     LoadedScene loaded = load_scene(o.scene, {{"-o", o.output}, {"--png", o.png}, {"--json", o.json}});
     if (o.strict && !loaded.scene.warnings.empty())
         throw Error(ExitCode::bad_input, "--strict: the scene has warnings, nothing was rendered");
@@ -145,7 +145,7 @@ nlohmann::json describe_parts(const ParallelResult& result) {
             {"receive_seconds", result.receive_seconds}};
 }
 
-int render_by_ranges(const Options& o) {
+int render_by_ranges(const RenderArguments& o) {
     const LoadedScene loaded = load(o);
     ParallelRequest request;
     request.settings = o.render.settings(loaded.scene);
@@ -184,8 +184,8 @@ int render_by_ranges(const Options& o) {
 }
 
 /// A device failed: saves what was finished, and says so in the message that ends the program.
-[[noreturn]] void save_after_fault(const Options& o, const Scene& scene, const RenderSettings& settings, KeptFilm& kept,
-                                   const Error& fault) {
+[[noreturn]] void save_after_fault(const RenderArguments& o, const Scene& scene, const RenderSettings& settings,
+                                   KeptFilm& kept, const Error& fault) {
     const KeptFilm::Finished finished = kept.last();
     if (finished.film.samples == 0) throw fault;
     write_images(o, scene, settings, finished.stats, finished.film);
@@ -200,7 +200,7 @@ struct Watched {
     const SampleWatch* samples = nullptr;  ///< with --outliers
 };
 
-Watched make_watched(const Options& o, const Scene& scene, const RenderSettings& settings) {
+Watched make_watched(const RenderArguments& o, const Scene& scene, const RenderSettings& settings) {
     auto invalid = std::make_unique<InvalidWatch>(make_renderer(scene, settings));
     Watched watched;
     watched.invalid = invalid.get();
@@ -216,7 +216,7 @@ Watched make_watched(const Options& o, const Scene& scene, const RenderSettings&
 /// With --tev: the image so far, now and then.
 class Preview {
 public:
-    Preview(const Options& o, const Sensor& sensor) {
+    Preview(const RenderArguments& o, const Sensor& sensor) {
         if (!o.tev.empty()) tev_.emplace(o.tev, o.output, sensor.crop_width, sensor.crop_height);
     }
     void look(Renderer& renderer) {
@@ -240,8 +240,8 @@ struct Rendered {
     FilmMoments film;
 };
 
-Rendered render_samples(const Options& o, const Scene& scene, const RenderSettings& settings, const Budget& budget,
-                        Renderer& renderer, Preview& preview) {
+Rendered render_samples(const RenderArguments& o, const Scene& scene, const RenderSettings& settings,
+                        const Budget& budget, Renderer& renderer, Preview& preview) {
     MemoryReserve reserve(bytes_to_save(scene));
     const volatile bool* const interrupt = save_when_interrupted();
     Rendered out;
@@ -272,8 +272,8 @@ Rendered render_samples(const Options& o, const Scene& scene, const RenderSettin
 }
 
 /// What the watches found, for the statistics. Invalid values are no reason to fail.
-nlohmann::json find(const Options& o, const Scene& scene, const RenderSettings& settings, const RenderStats& stats,
-                    const Watched& watched) {
+nlohmann::json find(const RenderArguments& o, const Scene& scene, const RenderSettings& settings,
+                    const RenderStats& stats, const Watched& watched) {
     if (!watched.samples && watched.invalid->batches().empty()) return nlohmann::json::object();
     FinishedRender finished = {o.scene, scene, used_settings(settings, stats), *watched.invalid, watched.samples};
     apply_setting(finished.used, "backend", stats.backend);
@@ -286,7 +286,7 @@ nlohmann::json find(const Options& o, const Scene& scene, const RenderSettings& 
     }
 }
 
-int render(const Options& o) {
+int render(const RenderArguments& o) {
     check(o);
     if (o.by_ranges()) return render_by_ranges(o);
     const LoadedScene loaded = load(o);
@@ -316,7 +316,7 @@ int render(const Options& o) {
 }  // namespace
 
 void add_render(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<RenderArguments>();
     CLI::App& command = *app.add_subcommand("render", "Render a scene to an OpenEXR image");
     o->scene.add_to(command);
     o->render.add_to(command, false);

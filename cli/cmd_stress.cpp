@@ -15,7 +15,7 @@
 namespace ambilux {
 namespace {
 
-struct Options {
+struct StressArguments {
     stress::Request request;
     bool list = false;
     std::string export_to, judge;
@@ -46,7 +46,7 @@ int sweep(stress::Request& request) {
 }
 
 /// Judges what another renderer measured.
-int judge(const Options& o) {
+int judge(const StressArguments& o) {
     need_output(o.request.output, "--judge");
     stress::Summary summary;
     summary.rows = stress::judge_elsewhere(o.judge, stress::families());
@@ -59,7 +59,7 @@ int judge(const Options& o) {
     return int(ExitCode::done);
 }
 
-int stress_command(Options& o) {
+int stress_command(StressArguments& o) {
     if (o.list) return list_families();
     if (!o.judge.empty()) return judge(o);
     if (o.export_to.empty()) return sweep(o.request);
@@ -70,7 +70,7 @@ int stress_command(Options& o) {
 }  // namespace
 
 void add_stress(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<StressArguments>();
     CLI::App& command =
         *app.add_subcommand("stress", "Numerical stability: generated scenes with known answers, by every method");
     command.add_option("-o,--output", o->request.output, "Folder for stress.csv");

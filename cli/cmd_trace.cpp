@@ -12,7 +12,7 @@
 namespace ambilux {
 namespace {
 
-struct Options {
+struct TraceArguments {
     SceneOptions scene;
     RenderOptions render;
     std::string pixel, strategy, json;
@@ -50,7 +50,7 @@ void compare(const Scene& scene, const RenderSettings& settings, const ReplayReq
                         {"differs", c.differs}});
 }
 
-int trace(const Options& o) {
+int trace(const TraceArguments& o) {
     if (o.pixel.empty() && !o.light_subpath)
         throw Error(ExitCode::usage, "trace: --pixel X,Y or --light-subpath N is needed, or both");
     if (o.compare && (o.pixel.empty() || o.light_subpath))
@@ -87,7 +87,7 @@ int trace(const Options& o) {
 }  // namespace
 
 void add_trace(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<TraceArguments>();
     CLI::App& command = *app.add_subcommand(
         "trace", "Replay one sample of a render on the CPU: vertices, densities, weights, contributions");
     o->scene.add_to(command);

@@ -12,14 +12,14 @@
 namespace ambilux {
 namespace {
 
-struct Options {
+struct ViewArguments {
     SceneOptions scene;
     RenderOptions render;
     std::string reference, host = "127.0.0.1";
     uint16_t port = 8765;
 };
 
-int view(const Options& o) {
+int view(const ViewArguments& o) {
 #if defined(AMBILUX_HAS_VIEW)
     ViewOptions options;
     if (!o.reference.empty()) options.reference = read_reference_exr(o.reference);
@@ -45,7 +45,7 @@ int view(const Options& o) {
 }  // namespace
 
 void add_view(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ViewArguments>();
     CLI::App& command = *app.add_subcommand("view", "Look at a scene in a browser while it is rendered");
     o->scene.add_to(command);
     o->render.add_to(command, false);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "session/load.h"
+
 namespace ambilux {
 namespace {
 
@@ -13,8 +15,6 @@ constexpr int kSmClock = 1, kMemoryClock = 2, kChip = 0;
 
 constexpr std::pair<uint64_t, const char*> kSlowdowns[] = {
     {0x04, "power cap"}, {0x08, "hardware"}, {0x20, "thermal"}, {0x40, "thermal (hardware)"}, {0x80, "power brake"}};
-
-nlohmann::json known(double value) { return value > 0 ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
 }  // namespace
 

@@ -42,10 +42,9 @@ double child_seconds(pid_t parent, int depth = 0) {
     return seconds;
 }
 
-/// Null for 0, which stands for unknown.
-nlohmann::json known(double value) { return value > 0 ? nlohmann::json(value) : nlohmann::json(nullptr); }
-
 }  // namespace
+
+nlohmann::json known(double value) { return value > 0 ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
 double parse_stat_seconds(const std::string& text, double per_second) {
     // pid (name) state ppid pgrp session tty tpgid flags minflt cminflt majflt cmajflt utime stime cutime cstime

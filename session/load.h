@@ -17,6 +17,9 @@ struct LoadReading {
     double mhz = 0;    ///< mean over cores; 0: unknown
 };
 
+/// Null for 0, which stands for unknown.
+nlohmann::json known(double value);
+
 /// From /proc; zeros where it does not say.
 LoadReading read_load();
 

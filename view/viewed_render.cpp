@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/flag.h"
+#include "core/seconds.h"
 #include "core/srgb.h"
 #include "film/metrics.h"
 #include "integrators/registry.h"
@@ -17,12 +18,8 @@
 namespace ambilux {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr double kFrameSeconds = 1.0 / 30, kMovingSeconds = 1.0 / 20, kCompareSeconds = 0.5;
 constexpr uint32_t kLargestDivisor = 8;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// sRGB in 8 bits of the square of i / (size - 1): steps are even where the eye sees them.
 const std::array<uint8_t, 4096>& tone_table() {

@@ -6,16 +6,11 @@
 
 #include "backends/cuda_device.h"
 #include "core/flag.h"
+#include "core/seconds.h"
 #include "render/shared_renderer.h"
 
 namespace ambilux {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_between(Clock::time_point a, Clock::time_point b) {
-    return std::chrono::duration<double>(b - a).count();
-}
-double seconds_since(Clock::time_point start) { return seconds_between(start, Clock::now()); }
 
 /// Samples from 0 on, in batches of whole iterations that grow, until about `seconds` are over.
 uint32_t render_for(Renderer& renderer, double seconds, const volatile bool* stop) {

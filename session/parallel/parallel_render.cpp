@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/flag.h"
 #include "core/log.h"
+#include "core/seconds.h"
 #include "render/shared_renderer.h"
 #include "session/parallel/checkpoint.h"
 #include "session/parallel/collector.h"
@@ -18,9 +19,6 @@
 
 namespace ambilux {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// Other ranks are looked at as often; a film of theirs is seconds of work, and a look costs a core 25 us.
 constexpr double kPollSeconds = 5e-3, kPatience = 0.05;
