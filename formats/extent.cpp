@@ -8,9 +8,9 @@
 
 namespace ambilux {
 
-namespace {
-
 Vec3f column(const Affine& a, int i) { return {a.m[0][i], a.m[1][i], a.m[2][i]}; }
+
+namespace {
 
 double volume_scale(const Instance& i) {
     const Vec3f x = column(i.to_world, 0), y = column(i.to_world, 1), z = column(i.to_world, 2);

@@ -5,6 +5,9 @@
 
 namespace ambilux {
 
+/// A column of the 3 x 4 matrix; 3: where the origin goes.
+Vec3f column(const Affine& a, int i);
+
 double triangle_area(const Scene& scene, const Triangle& t);
 
 /// Smallest sphere around the centre of the bounding box that holds all surfaces and the camera; of instances their

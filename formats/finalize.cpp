@@ -26,8 +26,6 @@ std::vector<float> checked_pick_table(const Scene& scene, const std::vector<doub
     return pick_table(weights);
 }
 
-Vec3f column(const Affine& a, int i) { return {a.m[0][i], a.m[1][i], a.m[2][i]}; }
-
 double quadric_area(const Quadric& q) {
     const Vec3f x = column(q.to_world, 0), y = column(q.to_world, 1), z = column(q.to_world, 2);
     switch (q.type) {

@@ -9,7 +9,7 @@ namespace ambilux {
 
 namespace {
 
-struct Header {
+struct BmpHeader {
     uint32_t pixels_at, size;
     uint64_t width, height;
     bool top_down, has_profile;
@@ -17,9 +17,9 @@ struct Header {
     std::array<uint32_t, 4> masks;  ///< of red, green, blue, alpha
 };
 
-Header take_header(ByteReader& in) {
+BmpHeader take_bmp_header(ByteReader& in) {
     const FileBudget& budget = in.budget;
-    Header h{};
+    BmpHeader h{};
     in.take(10);
     h.pixels_at = in.u32();
     h.size = in.u32();
@@ -66,7 +66,7 @@ bool is_bmp(std::string_view bytes) { return bytes.starts_with("BM"); }
 
 Texels read_bmp(std::string_view bytes, FileBudget& budget) {
     ByteReader in{bytes, budget};
-    const Header h = take_header(in);
+    const BmpHeader h = take_bmp_header(in);
     budget.pixels(h.width, h.height);
     const bool indexed = h.bits == 1 || h.bits == 4 || h.bits == 8;
     if (!indexed && h.bits != 16 && h.bits != 24 && h.bits != 32)

@@ -26,7 +26,7 @@ std::string_view take_line(ByteReader& in) {
 }
 
 /// Factors that the values have got, which are taken away, and what the header says beside.
-struct Header {
+struct HdrHeader {
     bool is_rgbe = false;
     double applied[3] = {1, 1, 1};
     std::vector<std::string> notes;
@@ -98,7 +98,7 @@ bool is_hdr(std::string_view bytes) { return bytes.starts_with("#?RADIANCE") || 
 
 Texels read_hdr(std::string_view bytes, FileBudget& budget) {
     ByteReader in{bytes, budget};
-    Header header;
+    HdrHeader header;
     for (std::string_view line; !(line = take_line(in)).empty();) header.take(std::string(line), budget);
     if (!header.is_rgbe) budget.fail("cannot read HDR image: its FORMAT is not 32-bit_rle_rgbe");
     std::string_view size = take_line(in);

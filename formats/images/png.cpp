@@ -15,7 +15,7 @@ static_assert(std::endian::native == std::endian::little, "16-bit samples are sw
 namespace {
 
 /// Deflate packs at most this many bytes into one.
-constexpr uint64_t kMostPacked = 1032;
+constexpr uint64_t kMostDeflated = 1032;
 
 /// libpng's reader. Its errors come by longjmp, over C alone: call() holds no object that would have to be destroyed.
 class PngReader {
@@ -116,7 +116,7 @@ Texels read_png(std::string_view bytes, FileBudget& budget) {
         stored_row = png_get_rowbytes(png, info);
     });
     budget.pixels(width, height);
-    if (stored_row > bytes.size() * kMostPacked / height)
+    if (stored_row > bytes.size() * kMostDeflated / height)
         budget.fail("the image claims more pixels than the file holds");
     reader.call([&](png_structp png, png_infop info) {
         png_set_expand(png);

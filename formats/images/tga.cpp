@@ -11,15 +11,15 @@ enum Kind : uint32_t { kPalette = 1, kColor = 2, kGrey = 3, kRuns = 8 };
 
 using Pixel = std::array<uint8_t, 4>;
 
-struct Header {
+struct TgaHeader {
     uint32_t id_length, has_palette, type, palette_first, palette_length, palette_bits, width, height, bits, descriptor;
 
     uint32_t kind() const { return type & 7; }
     bool in_runs() const { return type & kRuns; }
 };
 
-Header take_header(ByteReader& in) {
-    Header h{};
+TgaHeader take_tga_header(ByteReader& in) {
+    TgaHeader h{};
     h.id_length = in.u8(), h.has_palette = in.u8(), h.type = in.u8();
     h.palette_first = in.u16(), h.palette_length = in.u16(), h.palette_bits = in.u8();
     in.take(4);  // where the image stands on a screen
@@ -29,7 +29,7 @@ Header take_header(ByteReader& in) {
 
 bool is_color_depth(uint32_t bits) { return bits == 15 || bits == 16 || bits == 24 || bits == 32; }
 
-bool is_sound(const Header& h) {
+bool is_sound(const TgaHeader& h) {
     if (h.type & ~uint32_t(kRuns | 3) || h.has_palette > 1 || h.descriptor & 0xc0 || h.width == 0 || h.height == 0)
         return false;
     switch (h.kind()) {
@@ -51,7 +51,7 @@ Pixel take_color(ByteReader& in, uint32_t bits) {
 }
 
 struct PixelReader {
-    const Header& header;
+    const TgaHeader& header;
     ByteReader& in;
     std::vector<Pixel> palette;
 
@@ -73,12 +73,12 @@ bool is_tga(std::string_view bytes) {
     if (bytes.size() < 18) return false;
     static const FileBudget none("");
     ByteReader in{bytes, none};
-    return is_sound(take_header(in));
+    return is_sound(take_tga_header(in));
 }
 
 Texels read_tga(std::string_view bytes, FileBudget& budget) {
     ByteReader in{bytes, budget};
-    const Header h = take_header(in);
+    const TgaHeader h = take_tga_header(in);
     in.take(h.id_length);
     PixelReader pixels{h, in, {}};
     if (h.kind() == kPalette)

@@ -12,7 +12,7 @@ namespace {
 /// Faces around one point: their vertices are found in time of its square.
 constexpr size_t kMostFacesAtPoint = 4096;
 
-struct Corner {
+struct CutCorner {
     Vec3f p;
     Vec2f uv;
     uint32_t face, corner;
@@ -32,7 +32,7 @@ Vec3f face_normal(const Mesh& mesh, const std::array<uint32_t, 3>& f) {
 Mesh split_at_edges(const std::string& path, const Mesh& mesh, double degrees) {
     const float least = float(std::cos(degrees * (M_PI / 180)));
     std::vector<Vec3f> normals;
-    std::vector<Corner> corners;
+    std::vector<CutCorner> corners;
     for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
         normals.push_back(face_normal(mesh, mesh.faces[f]));
         for (uint32_t c = 0; c < 3; ++c) {
@@ -41,7 +41,7 @@ Mesh split_at_edges(const std::string& path, const Mesh& mesh, double degrees) {
         }
     }
     std::stable_sort(corners.begin(), corners.end(),
-                     [](const Corner& a, const Corner& b) { return a.place() < b.place(); });
+                     [](const CutCorner& a, const CutCorner& b) { return a.place() < b.place(); });
     Mesh out;
     out.faces = mesh.faces;
     const auto is_same_side = [&](Vec3f a, Vec3f b) { return a == b || dot(a, b) > least; };
@@ -58,7 +58,7 @@ Mesh split_at_edges(const std::string& path, const Mesh& mesh, double degrees) {
             out.positions.push_back(corners[i].p);
             if (!mesh.uvs.empty()) out.uvs.push_back(corners[i].uv);
             for (size_t k = i; k < end; ++k) {
-                const Corner& c = corners[k];
+                const CutCorner& c = corners[k];
                 if (done[k - begin] || !is_same_side(normals[corners[i].face], normals[c.face])) continue;
                 out.faces[c.face][c.corner] = vertex;
                 done[k - begin] = true;

@@ -183,17 +183,14 @@ struct Parser {
         parse_children(source, root, *document.scene, depth);
     }
 
-    [[noreturn]] void fail_unknown_id(const Child& child) const {
-        Plugins ids;
-        for (const auto& [id, object] : document.ids) ids.push_back(id);
-        fail(child.where, "reference to unknown id '" + child.ref + "'" + nearly(ids, child.ref));
-    }
     void resolve_references() {
         for (const auto& object : document.storage)
             for (Child& child : object->children)
                 if (!child.object) {
                     const auto it = document.ids.find(child.ref);
-                    if (it == document.ids.end()) fail_unknown_id(child);
+                    if (it == document.ids.end())
+                        fail(child.where,
+                             "reference to unknown id '" + child.ref + "'" + nearly(document.ids, child.ref));
                     child.object = it->second;
                 }
         check_references(document);

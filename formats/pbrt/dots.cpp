@@ -11,13 +11,14 @@ namespace ambilux::pbrt {
 namespace {
 
 /// pbrt's noise of two numbers lies in this plane.
-double noise(double x, double y) { return pbrt::noise(x, y, 0.5); }
+double noise_in_plane(double x, double y) { return noise(x, y, 0.5); }
 
 bool in_dot(double s, double t) {
     if (!(std::fabs(s) < 1e9 && std::fabs(t) < 1e9)) return false;
     const double cs = std::floor(s + 0.5), ct = std::floor(t + 0.5), radius = 0.35, shift = 0.5 - radius;
-    if (!(noise(cs + 0.5, ct + 0.5) > 0)) return false;
-    const double x = cs + shift * noise(cs + 1.5, ct + 2.8), y = ct + shift * noise(cs + 4.5, ct + 9.8);
+    if (!(noise_in_plane(cs + 0.5, ct + 0.5) > 0)) return false;
+    const double x = cs + shift * noise_in_plane(cs + 1.5, ct + 2.8),
+                 y = ct + shift * noise_in_plane(cs + 4.5, ct + 9.8);
     return (s - x) * (s - x) + (t - y) * (t - y) < radius * radius;
 }
 

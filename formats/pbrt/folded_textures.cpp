@@ -10,7 +10,7 @@ namespace ambilux::pbrt {
 namespace {
 
 /// Texels a side of a grid.
-constexpr uint64_t kMostTexels = 4096;
+constexpr uint64_t kMostFolded = 4096;
 
 bool is_whole(double x) { return std::fabs(x - std::round(x)) < 1e-6; }
 
@@ -36,7 +36,7 @@ bool place(const Texture& texture, const UvMap& grid, Placed& out) {
     out.s.shift = a[0][2] - out.s.scale * b[0][2], out.t.shift = a[1][2] - out.t.scale * b[1][2];
     // Cells of a checkerboard repeat after two.
     const double period = texture.kind == Texture::Kind::checkerboard ? 2 : 1;
-    if (!(std::fabs(out.s.scale) <= double(kMostTexels) && std::fabs(out.t.scale) <= double(kMostTexels))) return false;
+    if (!(std::fabs(out.s.scale) <= double(kMostFolded) && std::fabs(out.t.scale) <= double(kMostFolded))) return false;
     return is_whole(out.s.scale / period) && is_whole(out.t.scale / period);
 }
 
@@ -71,12 +71,12 @@ uint32_t grid_size(const std::vector<Texture>& parts, const std::vector<Placed>&
     for (size_t i = 0; i < parts.size(); ++i) {
         const uint64_t periods = uint64_t(std::lround(std::fabs((places[i].*axis).scale)));
         if (parts[i].kind == Texture::Kind::checkerboard)
-            cells = std::min(std::lcm(cells, std::max<uint64_t>(periods, 1)), kMostTexels);
+            cells = std::min(std::lcm(cells, std::max<uint64_t>(periods, 1)), kMostFolded);
         else if (!parts[i].is_constant())
             finest = std::max(finest, periods * ((*parts[i].image).*side));
     }
     // Beside a checkerboard an image of one texel would blur its edges.
-    const uint64_t wanted = std::min(std::max(finest, cells > 1 ? 16 * cells : 1), kMostTexels);
+    const uint64_t wanted = std::min(std::max(finest, cells > 1 ? 16 * cells : 1), kMostFolded);
     return uint32_t(std::max(cells, wanted / cells * cells));
 }
 

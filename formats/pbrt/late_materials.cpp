@@ -1,6 +1,7 @@
 // Materials that shapes name before the file defines them: pbrt looks them up at its end.
 #include <set>
 
+#include "formats/document/plugins.h"
 #include "formats/pbrt/scene.h"
 
 namespace ambilux::pbrt {
@@ -57,7 +58,8 @@ void finish_shapes(SceneMaker& scene) {
         if (material->in.directive == kNamedMaterial) {
             const auto known = scene.named_materials.find(material->in.type);
             if (known == scene.named_materials.end())
-                fail(material->in.where, "unknown material '" + material->in.type + "'");
+                fail(material->in.where, "unknown material '" + material->in.type + "'" +
+                                             document::nearly(scene.named_materials, material->in.type));
             scene.state.material = known->second;
         }
         add_shape(scene, late.in);

@@ -165,7 +165,7 @@ void add_light(SceneMaker& scene, const Described& light) {
     else if (type == "goniometric")
         add_goniometric(scene, light);
     else
-        return scene.report.refuse(light.in.where, quoted("light", type) + " is not supported", "it is left out");
+        return scene.report.refuse(light.in.where, not_supported("light", type), "it is left out");
     light.in.finish(scene.report);
 }
 

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/text.h"
+#include "formats/document/plugins.h"
 #include "formats/front_end.h"
 #include "formats/gzip.h"
 #include "formats/pbrt/names.h"
@@ -108,7 +109,7 @@ void Parser::directive(const Token& word) {
     // pbrt-v4 has none; files that once were older end with it.
     if (name == "WorldEnd" && in_world_ && open_files_.size() == 1 && tokens_->peek().kind == TokenKind::end)
         return scene_.report.note(at, "WorldEnd is of older versions; the file is read as one of pbrt-v4");
-    fail(at, "unknown " + quoted("directive", name));
+    fail(at, "unknown directive '" + name + "'" + nearly_known("directive", name));
 }
 
 void Parser::need_world(const std::string& name, const Where& at, bool inside) const {
@@ -201,7 +202,8 @@ bool Parser::transform(const std::string& name, const Where& at) {
     } else if (name == "CoordSysTransform") {
         const std::string system = tokens_->quoted("the name of a coordinate system");
         const auto known = coordinate_systems_.find(system);
-        if (known == coordinate_systems_.end()) fail(at, "unknown coordinate system '" + system + "'");
+        if (known == coordinate_systems_.end())
+            fail(at, "unknown coordinate system '" + system + "'" + document::nearly(coordinate_systems_, system));
         ctm = known->second;
     } else if (name == "ActiveTransform") {
         const Token which = tokens_->next();
@@ -364,7 +366,7 @@ void Parser::object(const std::string& name, const Where& at) {
         return;
     }
     const auto known = scene_.objects.find(id);
-    if (known == scene_.objects.end()) fail(at, "unknown object '" + id + "'");
+    if (known == scene_.objects.end()) fail(at, "unknown object '" + id + "'" + document::nearly(scene_.objects, id));
     add_instance(scene_, *known->second, at);
 }
 

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "formats/document/named_media.h"
+#include "formats/document/plugins.h"
 #include "formats/pbrt/coating.h"
 #include "formats/pbrt/names.h"
 #include "formats/pbrt/scene.h"
@@ -40,7 +41,7 @@ public:
         if (type == "thindielectric") return finish(thin_dielectric(), true);
         if (type == "diffusetransmission") return finish(diffuse_transmission(), true);
         if (type == "mix") return mix();
-        scene_.report.refuse(in_.where, quoted("material", type) + " is not supported",
+        scene_.report.refuse(in_.where, not_supported("material", type),
                              "a diffuse surface of reflectance 0.5 is used");
         for (const Parameter& p : in_.list) p.used = true;
         Object& grey = bsdf("diffuse");
@@ -321,7 +322,8 @@ private:
         textures().set_number(blend, "weight", amount, uv_);
         for (const std::string& name : names->strings) {
             const auto it = scene_.named_materials.find(name);
-            if (it == scene_.named_materials.end()) fail(names->where, "unknown material '" + name + "'");
+            if (it == scene_.named_materials.end())
+                fail(names->where, "unknown material '" + name + "'" + document::nearly(scene_.named_materials, name));
             const Object* part = surface_material(scene_, it->second, surface_);
             if (!part) fail(names->where, "material '" + name + "' is a mix of itself");
             add_child(blend, *part);

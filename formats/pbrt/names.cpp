@@ -27,12 +27,15 @@ const std::map<std::string, std::string> kNames = {
 
 }  // namespace
 
-std::string quoted(const std::string& kind, const std::string& name) {
+std::string nearly_known(const std::string& kind, const std::string& name) {
     document::Plugins known;
     std::istringstream words(kNames.at(kind));
     for (std::string word; words >> word;) known.push_back(word);
-    const std::string near = document::nearest_name(known, name);
-    return kind + " '" + name + "'" + (near.empty() || near == name ? "" : " (" + near + "?)");
+    return document::is_one_of(known, name) ? "" : document::nearly(known, name);
+}
+
+std::string not_supported(const std::string& kind, const std::string& name) {
+    return kind + " '" + name + "' is not supported" + nearly_known(kind, name);
 }
 
 }  // namespace ambilux::pbrt

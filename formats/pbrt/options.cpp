@@ -69,7 +69,7 @@ Object& camera(SceneMaker& scene, const Options& options, double aspect) {
     if (in.type == "spherical") return spherical_camera(scene, in, options);
     const bool parallel = in.type == "orthographic";
     if (!parallel && in.type != "perspective")
-        scene.report.refuse(in.where, quoted("camera", in.type) + " is not supported", "perspective is used");
+        scene.report.refuse(in.where, not_supported("camera", in.type), "perspective is used");
     const double lens = in.number("lensradius", 0), focus = in.number("focaldistance", 1e6);
     if (parallel && lens > 0)
         scene.report.refuse(in.where_of("lensradius"), "a lens on an orthographic camera is not supported",
@@ -141,7 +141,7 @@ Object& filter(SceneMaker& scene, const Options& options) {
                                             "deviation of 0.5 is used");
             in.ignore({"B", "C", "tau"});
         } else if (in.type != "gaussian") {
-            scene.report.refuse(in.where, quoted("filter", in.type) + " is not supported", "gaussian is used");
+            scene.report.refuse(in.where, not_supported("filter", in.type), "gaussian is used");
         } else if (std::fabs(x - 4 * sigma) > 1e-6) {
             scene.report.note(in.where, "gaussian filters end at four standard deviations, not at their radius");
         }
@@ -189,7 +189,8 @@ Object& film(SceneMaker& scene, const Parameters& in, const Options& options, do
         scene.report.note(in.where_of("maxcomponentvalue"), "samples are not clamped: maxcomponentvalue is left out");
     in.ignore({"filename", "savefp16", "diagonal", "coordinatesystem", "lambdamin", "lambdamax", "nbuckets"});
     if (in.type != "rgb" && in.type != "gbuffer" && in.type != "spectral")
-        scene.report.refuse(in.where, quoted("film", in.type) + " is not known", "rgb is used");
+        scene.report.refuse(in.where, "film '" + in.type + "' is not known" + nearly_known("film", in.type),
+                            "rgb is used");
     const Parameters* camera = options.camera ? &*options.camera : nullptr;
     const double seconds = camera ? camera->number("shutterclose", 1) - camera->number("shutteropen", 0) : 1.0;
     scene.exposure = seconds * in.number("iso", 100) / 100;
@@ -209,7 +210,7 @@ void add_integrator(SceneMaker& scene, const Options& options, const Where& wher
                                                 "mlt",  "sppm",    "randomwalk"};
     const bool light = in.type == "lightpath", bdpt = in.type == "bdpt";
     if (!known.contains(in.type) && !light && !bdpt)
-        scene.report.refuse(in.where, quoted("integrator", in.type) + " is not supported", "path is used");
+        scene.report.refuse(in.where, not_supported("integrator", in.type), "path is used");
     else if (in.type != "path" && in.type != "volpath" && !light && !bdpt)
         scene.report.note(in.where, "integrator '" + in.type + "' has the image of the path tracer, which is used");
     Object& out = add_object(scene.document, "integrator", light ? "ptracer" : bdpt ? "bdpt" : "path", in.where);

@@ -252,7 +252,7 @@ void add_shape(SceneMaker& scene, const Parameters& in, bool as_mesh) {
                quadric = round && !as_mesh && !is_cut(in) && !is_stretched(surface_of(type), scene.state.ctm);
     if (!round && type != "trianglemesh" && type != "plymesh" && type != "bilinearmesh" && type != "loopsubdiv" &&
         type != "curve")
-        return scene.report.refuse(in.where, quoted("shape", type) + " is not supported", "it is left out");
+        return scene.report.refuse(in.where, not_supported("shape", type), "it is left out");
     if (++scene.shape_count > scene.document.limits.shapes)
         fail(in.where,
              "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));

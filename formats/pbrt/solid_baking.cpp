@@ -14,7 +14,7 @@ using namespace document;
 namespace {
 
 /// Texels of a shape; before, they are as fine as the texture asks for.
-constexpr double kMostTexels = 1 << 21;
+constexpr double kMostBaked = 1 << 21;
 /// Of the length over which a texture changes: lines between centres are off by a hundredth of its finest octave.
 constexpr double kTexel = 1.0 / 8;
 /// Texels a side of a triangle's block.
@@ -114,7 +114,7 @@ struct Atlas {
         for (const double least = 4.0 * double(blocks.size());; size *= 1.1) {
             double sum = 0;
             for (const double e : edges) sum += side(e) * side(e);
-            if (sum <= std::max(kMostTexels, least)) break;
+            if (sum <= std::max(kMostBaked, least)) break;
         }
         for (size_t i = 0; i < blocks.size(); ++i) blocks[i].side = uint32_t(side(edges[i]));
         pack();
@@ -213,7 +213,7 @@ const Object* bake_solids(SceneMaker& scene, const Where& where, Surface surface
     const double along = surface == Surface::sphere ? M_PI * radius : length(column(to_world, 2));
     const double sizes[2] = {surface == Surface::disk ? radius : turn * radius,
                              surface == Surface::disk ? turn * radius : along};
-    double size = std::max(kTexel * finest_detail(scene, bsdf), std::sqrt(sizes[0] * sizes[1] / kMostTexels));
+    double size = std::max(kTexel * finest_detail(scene, bsdf), std::sqrt(sizes[0] * sizes[1] / kMostBaked));
     size = std::min(size, radius / 32);  // the normal changes too
     const auto count = [size](double extent) { return uint32_t(std::clamp(std::ceil(extent / size), 1.0, 65536.0)); };
     const uint32_t width = count(sizes[0]), height = count(sizes[1]);

@@ -1,5 +1,6 @@
 #include "formats/pbrt/textures.h"
 #include "core/srgb.h"
+#include "formats/document/plugins.h"
 #include "formats/pbrt/names.h"
 
 #include <algorithm>
@@ -32,7 +33,7 @@ const Texture& Textures::named(const Parameter& p, bool is_float) const {
     const auto it = known.find(p.strings[0]);
     if (it == known.end())
         fail(p.where, "no texture of type " + std::string(is_float ? "float" : "spectrum") + " is known by the name '" +
-                          p.strings[0] + "'");
+                          p.strings[0] + "'" + document::nearly(known, p.strings[0]));
     return it->second;
 }
 
@@ -137,7 +138,7 @@ Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
                (is_float && (in.type == "fbm" || in.type == "windy" || in.type == "wrinkled"))) {
         out = solid(is_float, in, space);
     } else {
-        report_.refuse(in.where, quoted("texture type", in.type) + " is not supported", "a grey of 0.5 is used");
+        report_.refuse(in.where, not_supported("texture type", in.type), "a grey of 0.5 is used");
         out.color = splat(0.5f);
         for (const Parameter& p : in.list) p.used = true;
     }

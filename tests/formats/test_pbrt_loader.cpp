@@ -115,23 +115,30 @@ TEST_CASE("what is not known is refused by name, file and line") {
 
 TEST_CASE("a name that is nearly one of pbrt's is told with it") {
     const std::vector<std::pair<std::string, std::string>> cases = {
-        {"Materal \"diffuse\"", "unknown directive 'Materal' (Material?)"},
-        {"Material \"difuse\" Shape \"sphere\"", "material 'difuse' (diffuse?) is not supported"},
-        {"Shape \"spere\"", "shape 'spere' (sphere?) is not supported"},
+        {"Materal \"diffuse\"", "unknown directive 'Materal': 'Material' is known"},
+        {"Material \"difuse\" Shape \"sphere\"", "material 'difuse' is not supported: 'diffuse' is known"},
+        {"Shape \"spere\"", "shape 'spere' is not supported: 'sphere' is known"},
         {"Shape \"sphere\" \"float raduis\" 2", "unknown parameter 'raduis' of Shape 'sphere': 'radius' is known"},
         {"Material \"diffuse\" \"rgb reflektance\" [1 1 1] Shape \"sphere\"",
          "'reflektance' of Material 'diffuse': 'reflectance' is known"},
-        {"LightSource \"pont\"", "light 'pont' (point?) is not supported"},
+        {"MakeNamedMaterial \"Red\" \"string type\" \"diffuse\" NamedMaterial \"red\" Shape \"sphere\"",
+         "unknown material 'red': 'Red' is known"},
+        {"ObjectBegin \"tree\" ObjectEnd ObjectInstance \"trees\"", "unknown object 'trees': 'tree' is known"},
+        {"Texture \"wood\" \"float\" \"constant\" Material \"conductor\" \"texture roughness\" \"wod\" Shape "
+         "\"sphere\"",
+         "is known by the name 'wod': 'wood' is known"},
+        {"LightSource \"pont\"", "light 'pont' is not supported: 'point' is known"},
         {"Texture \"t\" \"float\" \"image\"", "texture type 'image' is not supported"},
-        {"Texture \"t\" \"float\" \"checkboard\"", "texture type 'checkboard' (checkerboard?) is not supported"},
+        {"Texture \"t\" \"float\" \"checkboard\"",
+         "texture type 'checkboard' is not supported: 'checkerboard' is known"},
     };
     for (const auto& [text, message] : cases) CHECK_THAT(world_error(text), ContainsSubstring(message));
     const std::vector<std::pair<std::string, std::string>> options = {
-        {"Camera \"perspectiv\"", "camera 'perspectiv' (perspective?) is not supported"},
+        {"Camera \"perspectiv\"", "camera 'perspectiv' is not supported: 'perspective' is known"},
         {"PixelFilter \"gauss\"", "filter 'gauss' is not supported"},
-        {"PixelFilter \"triangel\"", "filter 'triangel' (triangle?) is not supported"},
-        {"Film \"rgbb\"", "film 'rgbb' (rgb?) is not known"},
-        {"Integrator \"vlpath\"", "integrator 'vlpath' (volpath?) is not supported"},
+        {"PixelFilter \"triangel\"", "filter 'triangel' is not supported: 'triangle' is known"},
+        {"Film \"rgbb\"", "film 'rgbb' is not known: 'rgb' is known"},
+        {"Integrator \"vlpath\"", "integrator 'vlpath' is not supported: 'volpath' is known"},
     };
     for (const auto& [text, message] : options)
         CHECK_THAT(pbrt_error(text + " WorldBegin Shape \"sphere\""), ContainsSubstring(message));
