@@ -74,7 +74,7 @@ TEST_CASE("a caustic seen in a mirror: its noise is predicted from light vertice
     }
     // The path tracer's own variance, relative to the means of blocks as the pilot has them.
     RenderSettings path = cpu_settings(scene, Estimator::mis, 77);
-    const FilmMoments f = render_scene(scene, path, 4096).film;
+    const FilmMoments f = render_scene(scene, path, 1024).film;
     double measured = 0;
     constexpr uint32_t kBlock = 4, kBlocks = 32 / kBlock;
     for (uint32_t y = 0; y < 32; ++y)
