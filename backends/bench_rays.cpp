@@ -77,6 +77,7 @@ nlohmann::json bench_on_host(const Scene& scene, const std::string& accel_name, 
         scene.features, [&](auto set) { return rows_on_host<set.value>(scene, tracer, accel_name, repetitions); });
     return {{"device", "cpu, " + std::to_string(tbb::this_task_arena::max_concurrency()) + " threads"},
             {"accel", accel_name},
+            {"repetitions", repetitions},
             {"build_seconds", accel.build_seconds()},
             {"accel_bytes", accel.memory_bytes()},
             {"rows", rows}};
@@ -95,11 +96,9 @@ nlohmann::json bench_on_device(const Scene& scene, const std::string& accel_name
         time_rays_on_device(scene, accel.arrays(), batches, kBenchWarmUps, repetitions);
     for (size_t i = 0; i < batches.size(); ++i)
         for (const KernelTiming& timing : timings[i]) rows.push_back(row(batches[i], timing));
-    return {{"device", cuda_device_name()},
-            {"accel", accel_name},
-            {"build_seconds", accel.build_seconds()},
-            {"accel_bytes", accel.memory_bytes()},
-            {"rows", rows}};
+    return {{"device", cuda_device_name()},        {"accel", accel_name},
+            {"repetitions", repetitions},          {"build_seconds", accel.build_seconds()},
+            {"accel_bytes", accel.memory_bytes()}, {"rows", rows}};
 }
 
 }  // namespace
@@ -138,7 +137,6 @@ nlohmann::json bench_rays(const Scene& scene, const std::string& backend, int re
                                          "' is not one of auto, cpu, cpu-single, cpu-cwbvh, cpu-bvh2, cuda, cuda-bvh2");
     json["backend"] = chosen;
     json["opaque"] = opaque;
-    json["repetitions"] = repetitions;
     return json;
 }
 

@@ -117,8 +117,8 @@ void Tracer::build(std::vector<Centre>& centres, uint32_t first, uint32_t last) 
         box.extend(scene_.is_triangle(prim) ? triangle_bounds(scene_, prim) : quadric_bounds(scene_.quadric(prim)));
         middle.extend(centres[i].p);
     }
-    // No box is so flat that it gives no interval.
-    const Vec3f pad = max(abs(box.lower), abs(box.upper)) * (4 * kRoundingUnit) + splat(1e-300);
+    // A box that is flat at 0 stays flat: a ray within its plane, of which no interval follows, meets nothing in it.
+    const Vec3f pad = max(abs(box.lower), abs(box.upper)) * (4 * kRoundingUnit);
     const size_t at = nodes_.size();
     nodes_.push_back({box.lower - pad, box.upper + pad, uint32_t(prims_.size()), last - first});
     if (last - first <= kLeafSize) {

@@ -274,12 +274,18 @@ TEST_CASE("bench rays reports complete rows on the CPU, and all structures find 
     }
 }
 
-TEST_CASE("bench rays of a scene without surfaces has rows of nothing") {
-    const nlohmann::json json = bench_rays(Scene{}, "cpu-cwbvh", 1);
-    REQUIRE(json.at("rows").size() == 8);
-    for (const nlohmann::json& row : json.at("rows")) CHECK(row.at("hit") == 0.0);
-    CHECK(json.at("rows")[1].at("count") == 0);
-    for (int row = 3; row < 8; ++row) CHECK(json.at("rows")[row].at("count") == 0);
+TEST_CASE("bench rays of a scene without surfaces has rows of nothing, as often as was asked for") {
+    int repetitions = 1;
+    for (const std::string backend : {"cpu-cwbvh", "cpu", "cpu-single", "cpu-bvh2"}) {
+        INFO(backend);
+        const nlohmann::json json = bench_rays(Scene{}, backend, repetitions);
+        CHECK(json.size() == 8);
+        CHECK(json.at("repetitions") == repetitions++);
+        REQUIRE(json.at("rows").size() == 8);
+        for (const nlohmann::json& row : json.at("rows")) CHECK(row.at("hit") == 0.0);
+        CHECK(json.at("rows")[1].at("count") == 0);
+        for (int row = 3; row < 8; ++row) CHECK(json.at("rows")[row].at("count") == 0);
+    }
 }
 
 TEST_CASE("bench rays takes surfaces of partial opacity as opaque if asked to") {

@@ -4,6 +4,9 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include <atomic>
+#include <chrono>
+
 #include "backends/cpu/executor.h"
 #include "backends/cpu/host_memory.h"
 #include "backends/cpu/whole_executor.h"
@@ -106,7 +109,92 @@ TEST_CASE("executors of a host sort as many pairs as a queue has, and no more th
         whole.sort_pairs(c.place(memory.data()), whole.count(queue), c.bits, &record);
         CHECK(c.sorted(memory));
         CHECK(counter.count == pushed);
+        whole.clear(queue);
+        CHECK(counter.count == 0);
+        CHECK(counter.peak == pushed);
     }
+}
+
+namespace {
+
+/// Drops a few numbers of each kind.
+struct Visit {
+    std::atomic<uint32_t>* visits;
+    StageRecord* record;
+
+    void operator()(uint32_t i) const {
+        ++visits[i];
+        record->nan += i % 100 == 7;
+        record->inf += i % 200 == 8;
+        record->negative += i % 300 == 9;
+        record->underflow += i % 400 == 310;
+    }
+};
+
+/// Nanoseconds of f() by a clock around it.
+template <class Function>
+uint64_t nanoseconds_around(const Function& f) {
+    const auto start = std::chrono::steady_clock::now();
+    f();
+    return uint64_t(std::chrono::nanoseconds(std::chrono::steady_clock::now() - start).count());
+}
+
+}  // namespace
+
+TEST_CASE("a stage between phases sees every number once, and its record tells items, losses and time of one launch") {
+    CpuWholeExecutor whole;
+    for (const uint32_t n : {0u, 1u, 63u, 64u, 65u, 1000u})
+        on_threads([&] {
+            CAPTURE(n);
+            QueueCounter counter{};
+            counter.count = 2 * n;
+            counter.capacity = n;
+            const Queue<Contribution> queue = {{nullptr, n}, &counter};
+            StageRecord record{};
+            std::vector<std::atomic<uint32_t>> visits(n + 1);
+            const Visit visit = {visits.data(), &record};
+            uint64_t most = nanoseconds_around([&] { whole.for_each(visit, n); });
+            CHECK(record.launches == 1);
+            CHECK(record.items == n);
+            CHECK(record.items_by_depth[0] == n);
+            CHECK(record.nanoseconds <= most);
+            if (n > 0) CHECK(record.nanoseconds > 0);
+            CHECK(record.nan == (n + 92) / 100);
+            CHECK(record.inf == (n + 191) / 200);
+            CHECK(record.negative == (n + 290) / 300);
+            CHECK(record.underflow == (n + 89) / 400);
+            most += nanoseconds_around([&] { whole.for_each(visit, queue); });
+            if (n % 5 == 0) most += nanoseconds_around([&] { whole.run_slots(visit, n / 5, 5); });
+            const uint32_t times = n % 5 == 0 ? 3 : 2;
+            CHECK(record.launches == times);
+            CHECK(record.items == times * n);
+            CHECK(record.nanoseconds <= most);
+            CHECK(counter.count == 2 * n);
+            for (uint32_t i = 0; i < n; ++i)
+                if (visits[i] != times) FAIL(i << " was visited " << visits[i] << " times");
+            CHECK(visits[n] == 0);
+        });
+}
+
+TEST_CASE("sorts and scans between phases add their time to a record, and nothing else") {
+    constexpr uint32_t kCount = 10'000;
+    CpuWholeExecutor whole;
+    StageRecord record{};
+    record.nanoseconds = 1'000'000'000'000;
+    std::vector<uint32_t> numbers = test::numbers_to_sum(kCount), sums(kCount);
+    uint64_t most = nanoseconds_around([&] { whole.scan({}, numbers.data(), sums.data(), kCount, &record); });
+    CHECK(sums == test::sums_before(numbers));
+    CHECK(record.nanoseconds > 1'000'000'000'000);
+    CHECK(record.nanoseconds <= 1'000'000'000'000 + most);
+    const test::SortCase<uint32_t> c{test::scrambled_keys<uint32_t>(kCount), 32, host_primitive_bytes()};
+    std::vector<std::byte> memory = c.before();
+    const uint64_t before = record.nanoseconds;
+    most = nanoseconds_around([&] { whole.sort_pairs(c.place(memory.data()), c.size(), c.bits, &record); });
+    CHECK(c.sorted(memory));
+    CHECK(record.nanoseconds > before);
+    CHECK(record.nanoseconds <= before + most);
+    CHECK(record.launches == 0);
+    CHECK(record.items == 0);
 }
 
 TEST_CASE("Memory of a host lies where queues want it, is zero at first, and is copied byte by byte") {
@@ -126,6 +214,10 @@ TEST_CASE("Memory of a host lies where queues want it, is zero at first, and is 
     HostMemory::clear(memory.data() + 1, 2);
     HostMemory::get(back, memory.data(), 4);
     CHECK(std::string(back, 4) == std::string("a\0\0a", 4));
+    HostMemory::clear(memory.data() + 3, 1);
+    HostMemory::put(memory.data() + 1, text + 2, 1);
+    HostMemory::get(back, memory.data(), 4);
+    CHECK(std::string(back, 4) == std::string("ac\0\0", 4));
     for (const auto nothing : {&HostMemory::put, &HostMemory::get, &HostMemory::copy}) nothing(nullptr, nullptr, 0);
     HostMemory::clear(nullptr, 0);
     CHECK(HostMemory().bytes() == 0);

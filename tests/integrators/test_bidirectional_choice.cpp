@@ -5,6 +5,7 @@
 // bdpt.auto=true: what the pilot predicts is what renders show, and what follows from it.
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "core/error.h"
 #include "integrators/reachability.h"
@@ -255,6 +256,91 @@ TEST_CASE("behind a door ajar draws learn, if the render is long enough for it a
         CHECK((c.excluded == "has too few samples to learn from") == (c.name.find("learned") != std::string::npos));
 }
 
+TEST_CASE("draws learn in renders of a quarter of a million eye subpaths or more") {
+    for (const uint32_t height : {64u, 63u}) {
+        const Scene scene = project_scene("cornell", 64, height);
+        RenderSettings s = automatic_settings(scene);
+        s.expected_samples = 64;
+        int learning = 0;
+        for (const auto& c : make_renderer(scene, s)->stats().selection.candidates) {
+            INFO(height << " " << c.name);
+            const bool learns = c.name.find("learned") != std::string::npos;
+            learning += learns;
+            CHECK(c.excluded == (learns && height < 64 ? "has too few samples to learn from" : ""));
+        }
+        CHECK(learning == 3);
+    }
+}
+
+TEST_CASE("the work of a candidate is that of its subpaths, shadow rays and connections, in rays") {
+    PilotWork w;
+    w.eye_rays = 3;
+    w.light_rays = 2;
+    w.next_events = 5;
+    w.splats = 7;
+    w.vertices = 4;
+    w.pairs = 100;
+    w.pair_rays = 11;
+    w.draws = 13;
+    w.draw_rays = 6;
+    const double eye = 3 + 0.8 * 5, light = 2 + 0.8 * 7;
+    for (const bool cuda : {false, true}) {
+        CAPTURE(cuda);
+        // docs/performance.md
+        const double pairs = (cuda ? 0.24 : 0.02) * 100 + (cuda ? 1.06 : 0.8) * 11,
+                     draw = (cuda ? 0.12 : 0.07) * 13 + (cuda ? 1.06 : 0.8) * 6, all = cuda ? 1.2 : 1;
+        const auto work = [&](const char* variant, float light_subpaths, const SelectionOffer& offer) {
+            SelectionCandidate c;
+            c.settings = {{"integrator", "bdpt"}, {"variant", variant}};
+            c.pilot = {light_subpaths, offer.connect, offer.worth};
+            c.offer = offer;
+            return selection_work(w, c, cuda);
+        };
+        CHECK(work("wavefront", 0, {}) == Approx(eye));
+        CHECK(work("wavefront", 0.25f, without_connections()) == Approx(all * (eye + 0.25 * light)));
+        const SelectionOffer paired = {"", {}, true};
+        CHECK(work("wavefront", 1, paired) == Approx(all * (eye + light + pairs)));
+        CHECK(work("lvc", 4, {"", {}, true, 2, 2}) == Approx(all * (eye + 4 * light + 2 * draw)));
+        CHECK(work("learned", 1, {"", {}, true, 4, 12, 1.5}) == Approx(all * 1.5 * (eye + light + 4 * draw)));
+        // A light subpath for every vertex of an eye subpath but the first.
+        CHECK(work("streaming", 1, paired) == Approx(all * (eye + light + pairs + 3 * 2)));
+        CHECK(work("streaming", 1, without_connections()) == Approx(all * (eye + light)));
+        w.vertices = 0.5;
+        CHECK(work("streaming", 1, paired) == Approx(all * (eye + light + pairs)));
+        w.vertices = 4;
+    }
+    // Four draws that learn take a quarter more than four that do not, and are worth twelve.
+    const std::vector<SelectionCandidate> all = selection_candidates(automatic_settings({}), false);
+    const auto named = [&](const std::string& name) {
+        return *std::find_if(all.begin(), all.end(), [&](const SelectionCandidate& c) { return c.name == name; });
+    };
+    const SelectionCandidate learned = named("bdpt, learned, 4 connections"), lvc = named("bdpt, lvc, 4 connections");
+    CHECK(selection_work(w, learned, false) == Approx(1.25 * selection_work(w, lvc, false)));
+    CHECK(learned.pilot.draws == 12);
+    CHECK(lvc.pilot.draws == 4);
+}
+
+TEST_CASE("a hundredth of the blocks, where the best of all candidates is worst, counts for none") {
+    Pilot pilot;
+    pilot.variance = {std::vector<double>(200, 2), std::vector<double>(200, 3)};
+    const auto set = [&](size_t block, double a, double b) {
+        pilot.variance[0][block] = a;
+        pilot.variance[1][block] = b;
+    };
+    set(7, 1000, 500);
+    set(8, 1000, 1);
+    set(9, 400, 600);
+    set(10, 300, 301);
+    const std::vector<double> kept = selection_variances(pilot);
+    REQUIRE(kept.size() == 2);
+    CHECK(kept[0] == Approx((196 * 2 + 1000 + 300) / 198.0));
+    CHECK(kept[1] == Approx((196 * 3 + 1 + 301) / 198.0));
+    for (std::vector<double>& of : pilot.variance) of.resize(99);
+    CHECK(selection_variances(pilot)[1] == Approx((95 * 3 + 500 + 1 + 600 + 301) / 99.0));
+    pilot.variance = {{0, 0}, {1, 0}};
+    CHECK(selection_variances(pilot) == std::vector<double>{1e-12, 0.5});
+}
+
 TEST_CASE("a candidate that cannot find some of the light is never chosen") {
     const Scene scene = scene_from_text(scene_xml(6, kView + kGround + kGlassBall +
                                                          "<emitter type='point'><point name='position' x='0.5' y='0.2' "
@@ -421,6 +507,40 @@ struct Counted : Renderer {
     int& living;
 };
 
+/// Efficiencies are those of the times of two candidates, which their families share by the work of each. Others have
+/// the time of what is best by its work, and are behind.
+void check_efficiencies(const std::vector<SelectionCandidate>& all, const SelectionStats& selection) {
+    const std::vector<SelectionStats::Candidate>& of = selection.candidates;
+    REQUIRE(of.size() == all.size());
+    std::vector<size_t> timed;
+    size_t chosen = 0;
+    for (size_t c = 0; c < of.size(); ++c) {
+        CHECK(of[c].name == all[c].name);
+        if (of[c].seconds > 0) timed.push_back(c);
+        if (of[c].name == selection.name) chosen = c;
+    }
+    REQUIRE(timed.size() == 2);
+    if (of[timed[1]].variance * of[timed[1]].work < of[timed[0]].variance * of[timed[0]].work)
+        std::swap(timed[0], timed[1]);
+    const auto family = [&](size_t c) {
+        const PilotCandidate& p = all[c].pilot;
+        return std::tuple(p.light_subpaths > 0, p.connect, p.draws > 0);
+    };
+    const auto score = [&](size_t c) {
+        const size_t like = timed[family(c) == family(timed[1]) ? 1 : 0];
+        const double behind = family(c) == family(like) ? 1 : 1.3;
+        return of[c].variance * of[like].seconds * of[c].work / of[like].work * behind;
+    };
+    for (size_t c = 0; c < of.size(); ++c) {
+        INFO(of[c].name);
+        CHECK(of[c].efficiency == (std::isfinite(of[c].variance) ? Approx(score(chosen) / score(c)) : Approx(0)));
+        CHECK(of[c].efficiency <= 1);
+    }
+    std::string settings;
+    for (const auto& [key, value] : selection.settings) settings += (settings.empty() ? "" : " ") + key + "=" + value;
+    CHECK(of[chosen].settings == settings);
+}
+
 }  // namespace
 
 TEST_CASE("a path tracer that renders while the pilot runs makes room for a candidate that has none beside it") {
@@ -478,8 +598,7 @@ TEST_CASE("candidates of a device are timed by a full wave, or by the samples of
         };
         const SelectionStats selection = make_automatic(scene, s, true, accels, make)->stats().selection;
         INFO(selection.name);
-        CHECK(std::count_if(selection.candidates.begin(), selection.candidates.end(),
-                            [](const SelectionStats::Candidate& c) { return c.seconds > 0; }) == 2);
+        check_efficiencies(selection_candidates(s, true), selection);
         REQUIRE(made.size() == 3);
         for (size_t i = 0; i < 2; ++i) {
             const uint32_t paths = variant_of(made[i]).traits.light_subpaths ? 1u << 21 : 1u << 22;

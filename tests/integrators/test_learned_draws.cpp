@@ -172,11 +172,20 @@ struct Piloted {
 };
 
 template <class Integrator>
-Piloted<Integrator> piloted(const Scene& scene, const RenderSettings& s) {
+Piloted<Integrator> piloted(const Scene& scene, const RenderSettings& s, uint64_t seed = 7) {
     Piloted<Integrator> p = {Integrator::plan(scene, s), 0};
     const EmbreeAccel accel(scene);
-    p.mean = Integrator::pilot(p.policy, scene.view(), HostTracer(accel.tracer()), 7);
+    p.mean = Integrator::pilot(p.policy, scene.view(), HostTracer(accel.tracer()), seed);
     return p;
+}
+
+/// A point light and a camera in the middle of a sphere. No subpath leaves it.
+Scene hollow_sphere(const std::string& bsdf, float intensity = 1) {
+    return scene_from_text(
+        scene_xml(3, "<sensor type='perspective'><float name='near_clip' value='1e-4'/>" + square_film(16) +
+                         "</sensor><shape type='sphere'><boolean name='flip_normals' value='true'/>" + bsdf +
+                         "</shape><emitter type='point'><point name='position' x='0' y='0' z='0'/>" +
+                         rgb("intensity", {intensity, intensity, intensity}) + "</emitter>"));
 }
 
 }  // namespace
@@ -204,6 +213,44 @@ TEST_CASE("weights count draws as often as they meet a subpath's vertex on avera
     CHECK(piloted<Lvc>(scene, lvc).policy.rules.mis.connections == 1);
     CHECK(piloted<Learned>(scene, learned).mean == 0);
     CHECK(piloted<Learned>(scene, learned).policy.rules.mis.connections == 1);
+}
+
+TEST_CASE("light vertices are counted up to two segments before the longest path: those that connections may use") {
+    using Learned = LearnedIntegrator<kAllFeatures, EmbreeTracer, kNoFusion>;
+    using Lvc = LvcIntegrator<kAllFeatures, EmbreeTracer, kNoFusion>;
+    const Scene scene = hollow_sphere(diffuse({0.5f, 0.5f, 0.5f}));
+    RenderSettings lvc = settings_of(scene, "lvc", 1), learned = settings_of(scene, "learned", 1);
+    lvc.rr_depth = learned.rr_depth = -1;
+    for (const int depth : {1, 2, 3, 6}) {
+        CAPTURE(depth);
+        lvc.max_depth = learned.max_depth = depth;
+        const int vertices = std::max(0, depth - 2);
+        CHECK(piloted<Lvc>(scene, lvc).mean == vertices);
+        CHECK(piloted<Learned>(scene, learned).mean == vertices);
+    }
+}
+
+TEST_CASE("scores are counted in the square of what connections bring on average, unless that is next to nothing") {
+    using Learned = LearnedIntegrator<kAllFeatures, EmbreeTracer, kNoFusion>;
+    // Half of what light subpaths meet, and half of what the camera sees, reflects 0.9, the rest 0.1.
+    const std::string halves =
+        "<bsdf type='diffuse'><texture type='checkerboard' name='reflectance'><rgb name='color0' value='0.9,0.9,0.9'/>"
+        "<rgb name='color1' value='0.1,0.1,0.1'/></texture></bsdf>";
+    const auto unit_of = [&](float intensity, uint64_t seed) {
+        const Scene scene = hollow_sphere(halves, intensity);
+        RenderSettings s = settings_of(scene, "learned", 1);
+        apply_setting(s, "strategies", "connections");
+        return double(piloted<Learned>(scene, s, seed).policy.found.unit);
+    };
+    // Between two points of a sphere of radius 1 the geometry term is 1/4; the lamp's flux is 4 pi.
+    const double mean = 0.5 / M_PI * 0.5 / M_PI / 4 * 4 * M_PI;
+    for (uint64_t seed = 1; seed <= 3; ++seed) {
+        CAPTURE(seed);
+        CHECK(unit_of(1, seed) == Approx(mean * mean).epsilon(0.4));
+        CHECK(unit_of(2, seed) == 4 * unit_of(1, seed));
+        CHECK(unit_of(1e-6f, seed) < 1e-12);
+    }
+    CHECK(unit_of(0, 1) == 1);
 }
 
 TEST_CASE("of a wave of many light subpaths every n-th vertex teaches, for n") {

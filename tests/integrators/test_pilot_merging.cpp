@@ -3,6 +3,7 @@
 // bdpt.auto=true: light that hits alone find is known to the pilot before any render meets it.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/rng.h"
 #include "integrators/auto/nearest.h"
@@ -48,7 +49,7 @@ TEST_CASE("a caustic seen in a mirror: its noise is predicted from light vertice
             lookat("origin='0,-1,1.2' target='0,1.5,1.2' up='0,0,1'") + film(32) +
             "</sensor><shape type='rectangle'><transform name='to_world'><scale value='2'/></transform>" +
             diffuse({0.5f, 0.5f, 0.5f}) +
-            "</shape><shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='55'/>"
+            "</shape><shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='125'/>"
             "<translate y='1.5' z='1.2'/></transform><bsdf type='conductor'/></shape>"
             "<shape type='sphere'><point name='center' x='0' y='0.2' z='0.45'/><float name='radius' value='0.3'/><bsdf "
             "type='dielectric'/></shape><shape type='sphere'><point name='center' x='0' y='0.2' z='2.2'/><float "
@@ -73,7 +74,7 @@ TEST_CASE("a caustic seen in a mirror: its noise is predicted from light vertice
     }
     // The path tracer's own variance, relative to the means of blocks as the pilot has them.
     RenderSettings path = cpu_settings(scene, Estimator::mis, 77);
-    const FilmMoments f = render_scene(scene, path, 4096).film;
+    const FilmMoments f = render_scene(scene, path, 1024).film;
     double measured = 0;
     constexpr uint32_t kBlock = 4, kBlocks = 32 / kBlock;
     for (uint32_t y = 0; y < 32; ++y)
@@ -98,4 +99,50 @@ TEST_CASE("a caustic seen in a mirror: its noise is predicted from light vertice
     CHECK(mean > measured / 1.6);
     CHECK(mean < measured * 1.6);
     CHECK(error < 0.1 * mean);
+}
+
+TEST_CASE("what connections find behind a mirror counts as it is found, though there is light that hits alone find") {
+    // The lamp shines at the ceiling, and the camera sees the ground in a mirror. A small dark ball over the lamp
+    // reflects next to none of the light, but many light subpaths.
+    const auto scene_with = [](const std::string& ball) {
+        return scene_from_text(scene_xml(
+            4, "<sensor type='perspective'><float name='fov' value='30'/>" +
+                   lookat("origin='0,-1,1.2' target='0,1.5,1.2' up='0,0,1'") + film(16) +
+                   "</sensor><shape type='rectangle'><transform name='to_world'><scale value='2'/></transform>" +
+                   diffuse({0.5f, 0.5f, 0.5f}) +
+                   "</shape><shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' "
+                   "angle='180'/><translate z='3'/></transform>" +
+                   diffuse({0.8f, 0.8f, 0.8f}) +
+                   "</shape><shape type='rectangle'><transform name='to_world'><scale value='1'/><rotate x='1' "
+                   "angle='125'/><translate y='1.5' z='1.2'/></transform><bsdf type='conductor'/></shape>"
+                   "<shape type='rectangle'><transform name='to_world'><scale value='0.3'/><translate y='0.2' z='2.5'/>"
+                   "</transform>" +
+                   diffuse({0, 0, 0}) + area_light({30, 30, 30}) + "</shape>" + ball));
+    };
+    const Scene without = scene_with(""),
+                with = scene_with(
+                    "<shape type='sphere'><point name='center' x='0.1' y='0.2' z='2.7'/><float name='radius' "
+                    "value='0.03'/><bsdf type='conductor'><string name='material' value='none'/><rgb "
+                    "name='specular_reflectance' value='0.01,0.01,0.01'/></bsdf></shape>");
+    const auto predicted = [](const Scene& scene) {
+        RenderSettings s = cpu_settings(scene, Estimator::mis, 1);
+        s.integrator = "bdpt";
+        s.automatic = true;
+        s.expected_samples = 1u << 10;
+        std::vector<PilotCandidate> pilots;
+        for (const SelectionCandidate& c : selection_candidates(s, false)) pilots.push_back(c.pilot);
+        SharedAccels accels(scene);
+        const Pilot pilot = run_pilot(scene, s, false, false, accels, pilots, 16384);
+        std::vector<double> sums;
+        for (const std::vector<double>& of : pilot.variance)
+            sums.push_back(std::accumulate(of.begin(), of.end(), 0.0) / double(of.size()));
+        return sums;
+    };
+    const std::vector<double> a = predicted(without), b = predicted(with);
+    REQUIRE(a.size() == b.size());
+    for (size_t c = 0; c < a.size(); ++c) {
+        CAPTURE(c);
+        CHECK(a[c] > 0);
+        CHECK(b[c] == Approx(a[c]).epsilon(0.1));
+    }
 }

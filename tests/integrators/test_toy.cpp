@@ -2,9 +2,14 @@
 // Ambient occlusion against what is known: an open plane, a closed box, a plane under a disk.
 #include <cmath>
 
+#include "accel/embree_tracer.h"
+#include "core/sampling.h"
 #include "film/ztest.h"
 #include "tests/support/injected_bias.h"
 #include "tests/support/render_scene.h"
+#include "transport/mis/unidirectional.h"
+#include "transport/subpath/start.h"
+#include "transport/subpath/trace.h"
 
 using namespace ambilux;
 
@@ -63,6 +68,46 @@ TEST_CASE("a disk above a plane hides its form factor from the point below") {
     CHECK(z.pass);
     CHECK(z.detectable < 0.05);
     CHECK(sees_bias(image, truth, 0.05));
+}
+
+TEST_CASE("a plain loop finds what the stages find, under surfaces that let some rays pass too") {
+    const Scene scene = scene_from_text(
+        std::string(kDown) +
+        "<shape type='disk'><transform name='to_world'><scale value='0.15'/><translate z='0.08'/></transform><bsdf "
+        "type='mask'><float name='opacity' value='0.4'/><bsdf type='twosided'><bsdf type='diffuse'/></bsdf></bsdf>"
+        "</shape><shape type='sphere'><point name='center' x='0.1' y='0' z='0.05'/><float name='radius' value='0.05'/>"
+        "</shape></scene>");
+    constexpr uint32_t kSamples = 4, kSide = 16;
+    RenderSettings settings = toy_settings(scene, "0.18");
+    settings.specialise = false;
+    const FilmMoments film = render_scene(scene, settings, kSamples).film;
+    const SceneView view = scene.view();
+    const EmbreeAccel accel(scene);
+    const EmbreeTracer tracer = accel.tracer();
+    uint32_t different = 0, blocked = 0, seen = 0;
+    for (uint32_t pixel = 0; pixel < kSide * kSide; ++pixel) {
+        uint32_t sum = 0;
+        for (uint32_t s = 0; s < kSamples; ++s) {
+            const RandomNumbers numbers = {{settings.seed, pixel, s, Stream::eye}};
+            float tmax;
+            const auto path =
+                start_eye_subpath<kAllFeatures>(view, UnidirectionalMis{}, pixel % kSide, pixel / kSide, numbers, tmax);
+            const Hit hit = end_of_ray<kAllFeatures>(view, tracer, path, tmax, numbers);
+            if (hit.prim == kNone) continue;
+            const SurfacePoint p = surface_at<kAllFeatures>(view, hit.prim, hit.u, hit.v);
+            const Vec3f n = dot(p.ng, path.direction) > 0.0f ? -p.ng : p.ng;
+            const Vec4f u = numbers.scatter(Side::eye, 1);
+            const Vec3f d = frame_from_normal(n).to_world(square_to_cosine_hemisphere({u.x, u.y}));
+            const Vec3f o = offset_ray_origin(p.p, ray_offset(p.p, p.p_error, p.ng), p.ng, d);
+            const bool open = !tracer.occluded<kAllFeatures>(view, Ray{o, 0.18f, d, numbers.shadow_seed(1)});
+            sum += open;
+            ++(open ? seen : blocked);
+        }
+        for (uint32_t c = 0; c < 3; ++c) different += film.sum[3 * pixel + c] != sum;
+    }
+    CHECK(seen > 100);
+    CHECK(blocked > 100);
+    CHECK(different <= 6);  // copies of a function are rounded differently
 }
 
 TEST_CASE("every tile of a wave is seen, and stages count at their depths, wave after wave") {

@@ -143,6 +143,20 @@ TEST_CASE("Of invalid values a watch keeps the first, by what it is") {
     CHECK(see({kInfinity, kNan, 3}));
     CHECK(drop.what == "NaN");
     CHECK(drop.stage == "shade");
+    // However many of each kind there are.
+    for (const uint64_t nan : {0, 1, 2})
+        for (const uint64_t inf : {0, 1, 2})
+            for (const uint64_t negative : {0, 1, 2}) {
+                CAPTURE(nan, inf, negative);
+                StageRecord& record = *watch.record();
+                record.nan = nan;
+                record.inf = inf;
+                record.negative = negative;
+                record.underflow = 1;
+                drop = {};
+                CHECK(watch.dropped("occlude", drop) == (nan + inf + negative > 0));
+                CHECK(drop.what == (nan ? "NaN" : inf ? "Inf" : negative ? "negative" : ""));
+            }
 }
 
 TEST_CASE("The largest of a contribution is that of its largest channel") {

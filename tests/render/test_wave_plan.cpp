@@ -2,6 +2,8 @@
 // Waves of a device for the memory that there is, planned on the host: the layouts are those of the device's kernels.
 #include "render/wave_maker.h"
 
+#include <map>
+
 #include "accel/cwbvh.h"
 #include "backends/fusion.h"
 #include "core/error.h"
@@ -399,4 +401,166 @@ TEST_CASE("connections trace their rays themselves in small scenes, where nothin
     CHECK_FALSE(with([](WavePolicy& w) { w.queues.compaction = Compaction::select; }));
     CHECK_FALSE(with([](WavePolicy& w) { w.queues.ordering = Ordering::morton; }));
     CHECK(with([](WavePolicy& w) { w.cull = 1; }));
+}
+
+TEST_CASE("room for light vertices is a quarter more than their mean and six deviations, as far as can be numbered") {
+    CHECK(planned_light_vertices(0, 1000) == 64);
+    CHECK(planned_light_vertices(3, 10000) == 39642);  // 1.25 * 30000 + 6 * sqrt(120000) + 64
+    CHECK(planned_light_vertices(0.5, 64) == 145);     // 1.25 * 32 + 6 * sqrt(48) + 64
+    CHECK(planned_light_vertices(1e9, 1000) == 4'000'000'000u);
+}
+
+namespace {
+
+/// Slots of the queues that have any.
+using Rooms = std::map<std::string, uint32_t>;
+constexpr uint32_t kSlots = 512, kStreams = 128, kKept = 700;  ///< of a wave; in flight; light vertices
+
+template <template <Features, class, Fusion> class Of, Fusion K>
+Rooms rooms_of(const char* integrator, const char* variant,
+               const std::vector<std::pair<const char*, const char*>>& settings = {}) {
+    using Integrator = Of<kFeatures, CwbvhTracer, K>;
+    const Scene scene = project_scene("cornell", 16, 16);
+    RenderSettings s = cpu_settings(scene, Estimator::mis);
+    s.integrator = integrator;
+    s.variant = variant;
+    s.max_depth = 5;
+    for (const auto& [key, value] : settings) apply_setting(s, key, value);
+    typename Integrator::Policy p = Integrator::plan(scene, s);
+    p.waves.slots_in_flight = kStreams;
+    Layout dry;
+    Integrator::lay_out(dry, p, WaveSize{kSlots, kKept, {}});
+    Rooms rooms;
+    for (size_t q = 0; q < dry.queue_names().size(); ++q)
+        if (const uint32_t capacity = dry.queue_capacities()[q]; capacity > 0) rooms[dry.queue_names()[q]] = capacity;
+    return rooms;
+}
+
+/// `others`, and so many slots for each of `names`.
+Rooms rooms(uint32_t slots, const std::vector<std::string>& names, Rooms others = {}) {
+    for (const std::string& name : names) others[name] = slots;
+    return others;
+}
+
+}  // namespace
+
+TEST_CASE("queues have room for what their strategies can fill, and none where nothing fills them") {
+    constexpr uint32_t kSplats = kKept + kSlots;  // at every vertex, and of the emitter itself
+    const Rooms pairs = rooms(kSlots, {"eye_vertices", "pairs", "deferred"}, {{"light_vertices", kKept}}),
+                hits = rooms(kSlots, {"hits", "rays"}),
+                emission = rooms(kSlots, {"emission", "emission_contributions"}, hits),
+                shadows = rooms(kSlots, {"vertices", "candidates", "shadows", "shadow_contributions"}, hits),
+                splats =
+                    rooms(kSlots, {"camera_vertices", "splat_candidates", "weighted_splats"}, {{"splats", kSplats}});
+    const auto together = [](Rooms all, const std::vector<Rooms>& others) {
+        for (const Rooms& other : others) all.insert(other.begin(), other.end());
+        return all;
+    };
+    const auto staged = [](const char* key, const char* value) {
+        return rooms_of<WavefrontIntegrator, kNoFusion>("bdpt", "wavefront", {{key, value}});
+    };
+    CHECK(staged("strategies", "all") == together(emission, {shadows, pairs, splats}));
+    CHECK(staged("max_depth", "2") == together(emission, {shadows, splats}));
+    CHECK(staged("strategies", "hits") == emission);
+    CHECK(staged("strategies", "next_event") == shadows);
+    CHECK(staged("strategies", "connections") == together(shadows, {pairs}));
+    CHECK(staged("strategies", "light") == together(hits, {splats}));
+    CHECK(rooms_of<LightIntegrator, kNoFusion>("light", "wavefront", {{"light_paths", "2"}}) ==
+          together(rooms(kKept + 2 * kSlots, {"splats"}, hits), {splats}));
+    const Rooms fused = rooms(kSlots, {"shadows", "weighted_splats"}, {{"splats", kSplats}});
+    CHECK(rooms_of<WavefrontIntegrator, kDeviceFusion>("bdpt", "wavefront") == together(hits, {fused, pairs}));
+    CHECK(rooms_of<WavefrontIntegrator, kHostFusion>("bdpt", "wavefront") ==
+          together(hits, {fused, {{"light_vertices", kKept}}}));
+    CHECK(rooms_of<WavefrontIntegrator, kHostFusion>("bdpt", "wavefront", {{"strategies", "hits"}}) == hits);
+
+    CHECK(rooms_of<PathTracer, kNoFusion>("path", "wavefront") == together(emission, {shadows}));
+    CHECK(rooms_of<PathTracer, kNoFusion>("path", "wavefront", {{"estimator", "naive"}}) == emission);
+    CHECK(rooms_of<PathTracer, kDeviceFusion>("path", "wavefront") == rooms(kSlots, {"shadows"}, hits));
+    CHECK(rooms_of<PathTracer, kDeviceFusion>("path", "wavefront", {{"estimator", "naive"}}) == hits);
+
+    const std::vector<std::pair<const char*, const char*>> only_hits = {{"strategies", "hits"}};
+    CHECK(rooms_of<MegakernelIntegrator, kNoFusion>("bdpt", "megakernel") ==
+          Rooms{{"light_vertices", kKept}, {"splats", kSplats}});
+    CHECK(rooms_of<MegakernelIntegrator, kNoFusion>("bdpt", "megakernel", only_hits).empty());
+
+    const std::vector<std::string> light = {"light_hits", "pairs",           "vertices",
+                                            "shadows",    "camera_vertices", "weighted_splats"},
+                                   staged_light = {"candidates", "shadow_contributions", "splat_candidates"};
+    const Rooms streams = rooms(kStreams, {"rays", "eye_hits", "turns"}),
+                streamed = rooms(kStreams, light, rooms(with_holes(kStreams), {"splats"}, streams)),
+                seen = rooms(kStreams, {"emission", "emission_contributions"}, streams);
+    CHECK(rooms_of<StreamingIntegrator, kDeviceFusion>("bdpt", "streaming") == streamed);
+    CHECK(rooms_of<StreamingIntegrator, kNoFusion>("bdpt", "streaming") ==
+          together(rooms(kStreams, staged_light, streamed), {seen}));
+    CHECK(rooms_of<StreamingIntegrator, kDeviceFusion>("bdpt", "streaming", only_hits) == streams);
+    CHECK(rooms_of<StreamingIntegrator, kNoFusion>("bdpt", "streaming", only_hits) == seen);
+}
+
+namespace {
+
+template <template <Features, class, Fusion> class Of, Features F>
+auto stages_of(const char* integrator, const char* variant, float cull) {
+    using Integrator = Of<F, CwbvhTracer, kDeviceFusion>;
+    const Scene scene = project_scene("cornell", 16, 16);
+    RenderSettings s = cpu_settings(scene, Estimator::mis);
+    s.integrator = integrator;
+    s.variant = variant;
+    s.max_depth = 5;
+    s.cull = cull;
+    s.queues.ordering = Ordering::none;
+    WaveMaker<Integrator, F, CwbvhTracer> maker = {
+        scene, s, 0, {{}, [](QueuePolicy, uint32_t) { return uint64_t(0); }}};
+    maker.plan.shape_least();
+    WaveMemory<Integrator> memory;
+    Layout dry;
+    return maker.lay_out(dry, memory, 0);
+}
+
+template <Features F>
+void check_seeds(float cull) {
+    CAPTURE(F.opacity, cull);
+    const bool seeds = F.opacity || cull > 0;
+    CHECK(stages_of<PathTracer, F>("path", "wavefront", cull).connect_emitter.connect.seeds == seeds);
+    const auto lvc = stages_of<LvcIntegrator, F>("bdpt", "lvc", cull);
+    CHECK(lvc.connect_emitter.connect.next_event.seeds == seeds);
+    CHECK(lvc.connect_vertices.seeds == seeds);
+    CHECK(lvc.connect_deferred.seeds == seeds);
+    const auto streaming = stages_of<StreamingIntegrator, F>("bdpt", "streaming", cull);
+    CHECK(streaming.connect_emitter.connect.seeds == seeds);
+    CHECK(streaming.connect_vertices.seeds == seeds);
+}
+
+}  // namespace
+
+TEST_CASE("shadow rays have seeds where surfaces let some rays pass or some are left out, however few") {
+    for (const float cull : {0.0f, 0.005f, 1.0f}) {
+        check_seeds<kDiffuseFeatures>(cull);
+        check_seeds<kFeatures>(cull);
+    }
+}
+
+TEST_CASE("strategies that a render does without are named") {
+    const Scene scene = project_scene("cornell", 16, 16);
+    const auto skipped = [](const Scene& of, const char* strategies, int max_depth) {
+        RenderSettings s = cpu_settings(of, Estimator::mis);
+        s.integrator = "bdpt";
+        s.max_depth = max_depth;
+        apply_setting(s, "strategies", strategies);
+        return skipped_strategies(of, plan_bdpt(of, s));
+    };
+    using Names = std::vector<std::string>;
+    const std::string subpaths = "light subpaths: no strategy needs them", light = "light tracing (t = 1)",
+                      connections = "connections (s, t >= 2)", next_event = "next event estimation (s = 1)",
+                      hits = "hits of area emitters (s = 0)";
+    CHECK(skipped(scene, "all", 3).empty());
+    CHECK(skipped(scene, "all", 2) == Names{connections});
+    CHECK(skipped(scene, "all", 1) == Names{connections, next_event});
+    CHECK(skipped(scene, "all", 0) == Names{subpaths, light, connections, next_event});
+    CHECK(skipped(scene, "hits", 5) == Names{subpaths, light, connections, next_event});
+    CHECK(skipped(scene, "next_event", 5) == Names{subpaths, light, connections, hits});
+    CHECK(skipped(scene, "connections", 5) == Names{light, next_event, hits});
+    CHECK(skipped(scene, "light", 5) ==
+          Names{connections, next_event, hits, "eye subpaths beyond their first segment"});
+    CHECK(skipped(plain_film(), "all", 5) ==
+          Names{"all strategies: no emitters", subpaths, light, connections, next_event, hits});
 }

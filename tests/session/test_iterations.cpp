@@ -170,6 +170,56 @@ TEST_CASE("wrapped renderers have the iterations and the state of what they wrap
     check([](std::unique_ptr<Renderer> r) { return std::make_unique<SampleWatch>(std::move(r)); });
 }
 
+TEST_CASE("samples that are ready begin a render from the first one on, and whatever else is asked for drops them") {
+    World world;
+    const Scene scene = small_scene();
+    const auto made = [&](uint32_t ready) {
+        auto inner = std::make_unique<FakeRenderer>(scene, RenderSettings{}, world);
+        inner->render(0, ready, nullptr);
+        SelectionStats selection;
+        selection.name = "path";
+        return std::make_unique<Chosen>(std::move(inner), ready, selection);
+    };
+    const auto plain = [&](uint32_t first, uint32_t count) {
+        FakeRenderer renderer(scene, {}, world);
+        renderer.render(first, count, nullptr);
+        return renderer.film();
+    };
+    for (const uint32_t ready : {0u, 1u, 5u}) {
+        CAPTURE(ready);
+        for (const uint32_t count : {ready, ready + 2}) {
+            const auto r = made(ready);
+            CHECK(r->ready() == ready);
+            CHECK(r->stats().selection.name == "path");
+            const uint64_t before = world.samples;
+            CHECK(r->render(0, count, nullptr) == count);
+            CHECK(world.samples - before == count - ready);
+            CHECK(r->ready() == 0);
+            CHECK(r->render(count, 3, nullptr) == 3);
+            CHECK(same(r->film(), plain(0, count + 3)));
+        }
+        const auto of_others = made(ready);
+        CHECK(of_others->render(2, 6, nullptr) == 6);
+        REQUIRE(same(of_others->film(), plain(2, 6)));
+        if (ready > 0) {
+            const auto of_fewer = made(ready);
+            CHECK(of_fewer->render(0, ready - 1, nullptr) == ready - 1);
+            CHECK(same(of_fewer->film(), plain(0, ready - 1)));
+        }
+        const std::vector<std::function<void(Chosen&)>> asked = {
+            [](Chosen& r) { CHECK(r.film().samples == 0); }, [](Chosen& r) { CHECK(r.take_film()().samples == 0); },
+            [](Chosen& r) { r.clear_film(); }, [](Chosen& r) { CHECK_FALSE(r.device_image().has_value()); },
+            [](Chosen& r) { r.load_state({}); }};
+        for (const auto& ask : asked) {
+            const auto r = made(ready);
+            ask(*r);
+            CHECK(r->ready() == 0);
+            CHECK(r->render(0, 4, nullptr) == 4);
+            CHECK(same(r->film(), plain(0, 4)));
+        }
+    }
+}
+
 TEST_CASE("batches that drop values are remembered, and their first bad iterations are found by rendering them again") {
     World world;
     struct Dropping : FakeRenderer {
@@ -293,6 +343,12 @@ TEST_CASE("a saved state comes back whole, and one that is damaged anywhere is n
             changed.replace(at, 8, reinterpret_cast<const char*>(&size), 8);
             CHECK(is_damaged(with_checksum(changed)));
         }
+    // More values than there can be, as many as the film says.
+    std::string large = body;
+    const uint64_t sides[] = {uint64_t(1) << 30, uint64_t(1) << 31}, values = 3 * sides[0] * sides[1];
+    large.replace(kMagic + 8, 16, reinterpret_cast<const char*>(sides), 16);
+    large.replace(kMagic + 32, 8, reinterpret_cast<const char*>(&values), 8);
+    CHECK(is_damaged(with_checksum(large)));
     std::string no_json = body;
     no_json[kMagic + 48] = 'x';
     CHECK(is_damaged(with_checksum(no_json)));

@@ -1,6 +1,8 @@
 // libs: ambilux_experiments
 // timeout: 60
 // What an experiment records of its machine: load, versions, clocks.
+#include <sys/sysinfo.h>
+#include <sys/utsname.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -10,6 +12,7 @@
 #include <sstream>
 
 #include "backends/cuda_device.h"
+#include "core/version.h"
 #include "session/load.h"
 #include "session/machine.h"
 #include "tests/support/experiment_fakes.h"
@@ -45,8 +48,12 @@ TEST_CASE("what others take of the machine is told from what this process takes"
     CHECK(now.busy >= 0);
     CHECK(contains(command_line(), "test_machine"));
     const nlohmann::json versions = describe_versions();
+    CHECK(versions.size() == 7);
     for (const char* key : {"ambilux", "git_revision", "compiler", "flags", "embree", "tbb"})
         CHECK_FALSE(versions[key].get<std::string>().empty());
+    CHECK(versions["ambilux"] == version());
+    CHECK(versions["git_revision"] == git_revision());
+    CHECK(versions["compiler"] == compiler());
 }
 
 TEST_CASE("the command line is told as a shell takes it: only what it would read otherwise is in quotes") {
@@ -118,10 +125,25 @@ TEST_CASE("the version of a driver is the first word of digits and dots") {
               "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.65.06  Release Build 1.2") == "580.65.06");
     CHECK(parse_driver_version("NVRM version: 580 v1.2") == "NVRM version: 580 v1.2");
     CHECK(parse_driver_version("").empty());
+}
+
+TEST_CASE("a machine is described by its processor, cores, memory and system, and a driver if there is one") {
     const nlohmann::json machine = describe_machine();
+    CHECK(machine.size() == 5);
     CHECK(machine["cores"] == std::thread::hardware_concurrency());
-    CHECK(machine["memory_bytes"] > uint64_t(1) << 24);
-    CHECK(machine["system"].get<std::string>().starts_with("Linux "));
+    struct sysinfo memory{};
+    REQUIRE(::sysinfo(&memory) == 0);
+    CHECK(machine["memory_bytes"].get<double>() == Approx(double(memory.totalram) * memory.mem_unit).epsilon(0.01));
+    utsname system;
+    REQUIRE(::uname(&system) == 0);
+    CHECK(machine["system"] == std::string(system.sysname) + ' ' + system.release + ' ' + system.machine);
+    const auto value_of = [](const std::string& line) { return line.substr(line.find_first_not_of(" \t:", 10)); };
+    nlohmann::json model;  // of the first core; processors of some kinds have no name
+    std::ifstream in("/proc/cpuinfo");
+    for (std::string line; model.is_null() && std::getline(in, line);)
+        if (line.starts_with("model name")) model = value_of(line);
+    CHECK(machine["cpu"] == model);
+    CHECK(machine["driver"].is_null() == !fs::exists("/proc/driver/nvidia/version"));
 }
 
 TEST_CASE("clocks of graphics cards are read from what nvidia-smi prints") {
@@ -133,9 +155,21 @@ TEST_CASE("clocks of graphics cards are read from what nvidia-smi prints") {
     CHECK(gpus[1]["memory_mhz"].is_null());
     CHECK(parse_gpu_clocks("").empty());
     CHECK(describe_clocks("start", false)["gpu"].is_null());
+    const std::time_t before = std::time(nullptr);
     const auto clocks = describe_clocks("start", true);
+    CHECK(clocks.size() == 4);
     CHECK(clocks["when"] == "start");
-    CHECK(clocks["date"].is_string());
+    std::tm date{};
+    const std::string text = clocks["date"];
+    const char* const end = ::strptime(text.c_str(), "%Y-%m-%dT%H:%M:%SZ", &date);
+    REQUIRE(end == text.c_str() + text.size());
+    CHECK(::timegm(&date) >= before);
+    CHECK(::timegm(&date) <= std::time(nullptr));
+    if (const auto& mhz = clocks["cpu_mhz"]; !mhz.is_null()) {
+        CHECK(mhz["lowest"] > 0);
+        CHECK(mhz["lowest"] <= mhz["mean"]);
+        CHECK(mhz["mean"] <= mhz["highest"]);
+    }
     // Of the device that renders alone, whatever else the machine has.
     if (cuda_device_bus_id().empty())
         CHECK(clocks["gpu"].is_null());
