@@ -26,11 +26,12 @@ size_t distance(const std::string& a, const std::string& b) {
 }  // namespace
 
 std::string nearest_name(const Plugins& known, const std::string& name) {
+    constexpr size_t kLongest = 64;  // files may hold names of any length, and the distance takes their product
     std::string nearest;
     size_t least = std::min<size_t>(3, 1 + name.size() / 3);
     for (const std::string& k : known)
-        if (const size_t d = k.size() < name.size() + least ? distance(name, k) : least; d < least)
-            least = d, nearest = k;
+        if (std::max(name.size(), k.size()) <= kLongest)
+            if (const size_t d = distance(name, k); d < least) least = d, nearest = k;
     return nearest;
 }
 

@@ -543,6 +543,10 @@ TEST_CASE("mistakes are named with file and line") {
         INFO(message);
         CHECK(contains(message, expected));
     }
+    const std::string longest(300000, 'a');
+    const std::string ids =
+        "<bsdf type='diffuse' id='" + longest + "b'/><shape type='cube'><ref id='" + longest + "'/></shape>";
+    CHECK(error_of(ids, {}, "3.0.0", &folder).ends_with("reference to unknown id '" + longest + "'"));
     CHECK_THROWS_AS(load_mitsuba("/nonexistent/scene.xml"), Error);
     const std::string empty = folder.write("empty.xml", "<scene version='3.0.0'/>");
     CHECK_THROWS_WITH(load_mitsuba(empty), empty + ": the scene has no sensor");

@@ -31,16 +31,21 @@ struct Planned {
     bool in_parts = false, fits = false;
 };
 
+RenderSettings unordered(const Scene& scene, const char* integrator, const char* variant, uint32_t max_depth) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis);
+    s.integrator = integrator;
+    s.variant = variant;
+    s.max_depth = max_depth;
+    s.queues.ordering = Ordering::none;
+    return s;
+}
+
 template <template <Features, class, Fusion> class Of>
 Planned plan_of(const char* integrator, const char* variant, double light_vertices, uint64_t samples, uint64_t room) {
     using Integrator = Of<kFeatures, CwbvhTracer, kDeviceFusion>;
     static const Scene scene = project_scene("cornell", 1920, 1080);
-    RenderSettings s = cpu_settings(scene, Estimator::mis);
-    s.integrator = integrator;
-    s.variant = variant;
-    s.max_depth = 8;
+    RenderSettings s = unordered(scene, integrator, variant, 8);
     s.expected_samples = samples;
-    s.queues.ordering = Ordering::none;
     WaveMaker<Integrator, kFeatures, CwbvhTracer> maker = {
         scene, s, 0, {{}, [](QueuePolicy, uint32_t) { return uint64_t(0); }}};
     WavePlan& plan = maker.plan;
@@ -502,12 +507,8 @@ template <template <Features, class, Fusion> class Of, Features F>
 auto stages_of(const char* integrator, const char* variant, float cull) {
     using Integrator = Of<F, CwbvhTracer, kDeviceFusion>;
     const Scene scene = project_scene("cornell", 16, 16);
-    RenderSettings s = cpu_settings(scene, Estimator::mis);
-    s.integrator = integrator;
-    s.variant = variant;
-    s.max_depth = 5;
+    RenderSettings s = unordered(scene, integrator, variant, 5);
     s.cull = cull;
-    s.queues.ordering = Ordering::none;
     WaveMaker<Integrator, F, CwbvhTracer> maker = {
         scene, s, 0, {{}, [](QueuePolicy, uint32_t) { return uint64_t(0); }}};
     maker.plan.shape_least();
