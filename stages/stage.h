@@ -13,17 +13,13 @@
 
 namespace ambilux {
 
-/// True if `v` can be radiance: finite and not negative. Anything else is counted in the record of the stage that made
-/// it, which drops it.
+/// True if `v` can be radiance. Anything else is counted in the record of the stage that made it, which drops it: by one
+/// atomic addition, since three at each place cost registers.
 AMBILUX_HD bool is_valid_radiance(Rgb v, StageRecord* record) {
     if (is_valid_radiance(v)) return true;
-    if (is_finite(v)) {
-        if (min_component(v) >= 0.0f) return true;  // -0
-        add_count(&record->negative, 1);
-        return false;
-    }
-    const bool nan = v.x != v.x || v.y != v.y || v.z != v.z;
-    add_count(nan ? &record->nan : &record->inf, 1);
+    uint64_t* kind = &record->negative;
+    if (!is_finite(v)) kind = v.x != v.x || v.y != v.y || v.z != v.z ? &record->nan : &record->inf;
+    add_count(kind, 1);
     return false;
 }
 

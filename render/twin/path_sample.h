@@ -150,7 +150,7 @@ private:
     }
     /// What is no radiance is counted.
     bool valid(Rgb v) {
-        if (is_valid_radiance(v) || (is_finite(v) && min_component(v) >= 0)) return true;
+        if (is_valid_radiance(v)) return true;
         if (is_finite(v))
             ++counts_.invalid.negative;
         else if (v.x != v.x || v.y != v.y || v.z != v.z)

@@ -79,10 +79,7 @@ using NumbersOf = typename Mis::Numbers;
 /// Which shadow ray of an eye vertex at `depth` a connection with a light vertex is (RandomNumbers::shadow_seed).
 AMBILUX_HD uint32_t connection_ray(uint32_t depth, uint32_t light) { return depth + (light << kDepthBits); }
 
-/// True if `v` can be radiance: finite, neither negative nor -0. One comparison: the bits of such floats are below
-/// those of infinity.
-AMBILUX_HD bool is_valid_radiance(Rgb v) {
-    return (float_bits(v.x) < kInfinityBits) & (float_bits(v.y) < kInfinityBits) & (float_bits(v.z) < kInfinityBits);
-}
+/// True if `v` can be radiance: finite and not negative.
+AMBILUX_HD bool is_valid_radiance(Rgb v) { return is_finite(v) && min_component(v) >= 0.0f; }
 
 }  // namespace ambilux
