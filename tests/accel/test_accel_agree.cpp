@@ -118,25 +118,37 @@ void check_trace(const SceneView& view, const Tracer& tracer, const Ray& ray, bo
         FAIL("trace disagrees with closest or occluded");
 }
 
+/// What Embree says of a ray.
+struct Answer {
+    Hit hit;
+    bool is_hit, occluded;
+};
+
+template <Features F>
+Answer answer_of(const SceneView& view, const EmbreeTracer& embree, const Ray& ray) {
+    Answer e{};
+    e.is_hit = embree.closest<F>(view, ray, e.hit);
+    e.occluded = embree.occluded<F>(view, ray);
+    check_trace<F>(view, embree, ray, e.occluded, e.is_hit, e.hit);
+    return e;
+}
+
 template <Features F, class Tracer>
-void compare(const SceneView& view, const EmbreeTracer& embree, const Tracer& own, const Ray& ray, float scale,
-             Agreement& a) {
-    Hit e, c;
-    const bool e_hit = embree.closest<F>(view, ray, e), c_hit = own.template closest<F>(view, ray, c);
+void compare(const SceneView& view, const Answer& e, const Tracer& own, const Ray& ray, float scale, Agreement& a) {
+    Hit c;
+    const bool c_hit = own.template closest<F>(view, ray, c);
     ++a.rays;
     a.hits += c_hit;
-    const bool same = e_hit == c_hit && (!e_hit || fabsf(e.t - c.t) <= 1e-5f * (e.t + scale));
-    const bool other_occlusion = embree.occluded<F>(view, ray) != c_hit;
-    if (!same || other_occlusion) {
+    const bool same = e.is_hit == c_hit && (!c_hit || fabsf(e.hit.t - c.t) <= 1e-5f * (e.hit.t + scale));
+    if (!same || e.occluded != c_hit) {
         ++a.different;
         if (!valid(view, ray, c_hit, c, scale)) ++a.wrong_own;
-        if (!valid(view, ray, e_hit, e, scale)) ++a.wrong_embree;
-    } else if (e.prim != c.prim) {
+        if (!valid(view, ray, e.is_hit, e.hit, scale)) ++a.wrong_embree;
+    } else if (e.hit.prim != c.prim) {
         ++a.ties;
     }
     if (own.template occluded<F>(view, ray) != c_hit) FAIL("any hit and closest hit disagree for ray " << a.rays);
     check_trace<F>(view, own, ray, c_hit, c_hit, c);
-    check_trace<F>(view, embree, ray, embree.occluded<F>(view, ray), e_hit, e);
 }
 
 /// Rays of all kinds that make tracers differ.
@@ -180,13 +192,12 @@ std::vector<Ray> test_rays(const Scene& scene, uint32_t count, float scale, uint
 }
 
 template <Features F, class Accel>
-void compare_with(const Scene& scene, uint32_t count, float scale, uint64_t seed, double ties) {
+void compare_with(const Scene& scene, const std::vector<Ray>& rays, const std::vector<Answer>& answers, float scale,
+                  double ties) {
     const SceneView view = scene.view();
-    const EmbreeAccel embree(scene);
     const Accel own(scene);
     Agreement a;
-    for (const Ray& ray : test_rays(scene, count, scale, seed))
-        compare<F>(view, embree.tracer(), own.tracer(), ray, scale, a);
+    for (size_t i = 0; i < rays.size(); ++i) compare<F>(view, answers[i], own.tracer(), rays[i], scale, a);
     INFO(a.rays << " rays, " << a.hits << " hits, " << a.ties << " ties, " << a.different
                 << " different within rounding, wrong: Embree " << a.wrong_embree << ", own " << a.wrong_own);
     CHECK(a.hits > a.rays / 20);
@@ -200,12 +211,16 @@ void compare_with(const Scene& scene, uint32_t count, float scale, uint64_t seed
 
 template <Features F>
 void compare_all(const Scene& scene, uint32_t count, float scale, uint64_t seed, double ties = 0.05) {
+    const EmbreeAccel embree(scene);
+    const std::vector<Ray> rays = test_rays(scene, count, scale, seed);
+    std::vector<Answer> answers;
+    for (const Ray& ray : rays) answers.push_back(answer_of<F>(scene.view(), embree.tracer(), ray));
     {
         INFO("wide");
-        compare_with<F, CwbvhAccel>(scene, count, scale, seed, ties);
+        compare_with<F, CwbvhAccel>(scene, rays, answers, scale, ties);
     }
     INFO("binary");
-    compare_with<F, PairAccel>(scene, count, scale, seed, ties);
+    compare_with<F, PairAccel>(scene, rays, answers, scale, ties);
 }
 
 }  // namespace

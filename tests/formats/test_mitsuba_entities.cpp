@@ -101,7 +101,10 @@ TEST_CASE("entities: what is wrong is an error with its line") {
 
 TEST_CASE("a scene of format 0.x without emitters is lit by sun and sky, a newer one by nothing") {
     const std::string ball = "<shape type='sphere'/>";
-    const Scene old = load_quietly(ball, "0.6.0"), newer = load_quietly(ball, "2.0.0");
+    const TempFolder folder;
+    const Scene old = load_mitsuba(folder.write("scene.xml", wrap(ball + kSensor, "0.6.0"))),
+                newer = load_quietly(ball, "2.0.0");
+    CHECK(old.warnings.empty());
     CHECK(has_note(old, "the scene has no emitter; as in Mitsuba 0.6 one of type sunsky lights it"));
     CHECK(has_note(newer, "the scene has no emitter: its image is black"));
     CHECK(newer.emitters.empty());

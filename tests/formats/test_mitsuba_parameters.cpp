@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstring>
+#include <optional>
 
 #include "formats/images/image_write.h"
 #include "tests/support/mitsuba_text.h"
@@ -156,9 +157,13 @@ std::vector<Plugin> lights() {
          {color("radiance"), number("sampling_weight"), kTransform}},
         {"sunsky",
          "<emitter type='sunsky'>%s</emitter>",
-         {number("turbidity", "5"), color("albedo"), number("sun_scale"), number("sky_scale"), number("sun_aperture"),
-          integer("hour", "11"), number("latitude", "50"), number("longitude", "8"), number("timezone", "2"),
-          flag("complex_sun"), kTransform, number("sampling_weight")}},
+         {number("sun_scale"), number("sun_aperture"), flag("complex_sun")}},
+        // Without a sun the map is a quarter as large.
+        {"sunsky",
+         "<emitter type='sunsky'><float name='sun_scale' value='0'/>%s</emitter>",
+         {number("turbidity", "5"), color("albedo"), number("sky_scale"), integer("hour", "11"),
+          number("latitude", "50"), number("longitude", "8"), number("timezone", "2"), kTransform,
+          number("sampling_weight")}},
     };
 }
 
@@ -231,18 +236,29 @@ std::vector<Plugin> others() {
     return all;
 }
 
+Scene scene_of(const Plugin& plugin, const std::string& parameters, const TempFolder& folder) {
+    std::string xml = plugin.xml;
+    return load(xml.replace(xml.find("%s"), 2, parameters), {}, "3.0.0", &folder);
+}
+
+/// The scene of a plugin without further parameters, loaded once.
+struct Plain {
+    size_t notes;
+    std::string contents;
+};
+
 /// "" or what became of a parameter that is neither used nor refused nor noted.
-std::string unsaid(const Plugin& plugin, const std::string& parameter, const TempFolder& folder) {
-    const auto scene = [&](const std::string& parameters) {
-        std::string xml = plugin.xml;
-        return load(xml.replace(xml.find("%s"), 2, parameters), {}, "3.0.0", &folder);
-    };
+std::string unsaid(const Plugin& plugin, const std::string& parameter, std::optional<Plain>& plain,
+                   const TempFolder& folder) {
     try {
-        const Scene with = scene(parameter);
+        const Scene with = scene_of(plugin, parameter, folder);
         if (!with.warnings.empty() || has_note(with, std::string("'") + plugin.name + "'")) return "";
-        const Scene without = scene("");
-        const bool noted = with.notes.size() > without.notes.size();
-        return noted || contents(with) != contents(without) ? "" : std::string(plugin.name) + ": " + parameter;
+        if (!plain) {
+            const Scene scene = scene_of(plugin, "", folder);
+            plain = Plain{scene.notes.size(), contents(scene)};
+        }
+        const bool noted = with.notes.size() > plain->notes;
+        return noted || contents(with) != plain->contents ? "" : std::string(plugin.name) + ": " + parameter;
     } catch (const Error& e) {
         CHECK(e.code == ExitCode::bad_input);
         return "";
@@ -272,10 +288,12 @@ TEST_CASE("every parameter of Mitsuba's plugins is used, refused or noted") {
     folder.write("g.vol", grid);
     size_t tried = 0;
     for (const auto& plugins : {shapes(), bsdfs(), lights(), sensors(), others()})
-        for (const Plugin& plugin : plugins)
+        for (const Plugin& plugin : plugins) {
+            std::optional<Plain> plain;
             for (const std::string& parameter : plugin.parameters) {
-                CHECK(unsaid(plugin, parameter, folder) == "");
+                CHECK(unsaid(plugin, parameter, plain, folder) == "");
                 ++tried;
             }
+        }
     CHECK(tried > 250);
 }

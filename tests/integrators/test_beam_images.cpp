@@ -96,7 +96,7 @@ TEST_CASE("beams in a room beside a lamp: light tracing and all strategies agree
     uint64_t seed = 20;
     for (const Method& m : {Method{"all"}, Method{"all", MisHeuristic::power, "lvc"}}) {
         INFO(m.name << ' ' << m.variant);
-        check_agreement(render_batches(scene, method_settings(scene, m, seed++), 1u << 10), light, 0.05, options);
+        check_agreement(scene, method_settings(scene, m, seed++), 1u << 10, light, 0.05, options);
     }
 }
 

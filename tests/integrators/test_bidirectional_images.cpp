@@ -264,10 +264,10 @@ TEST_CASE("B19, B20: a sharp edge through every filter is the same for every str
         ZTestOptions pixels;
         pixels.block = 1;
         const Estimate hits = render_path(edge, 2048), next_event = render_path(lit, 2048);
-        check_agreement(render_batches(edge, method_settings(edge, kLightTracer, 1), 1024), hits, 0.03, pixels);
-        check_agreement(render_batches(edge, method_settings(edge, kAll, 2), 1024), hits, 0.03, pixels);
-        check_agreement(render_batches(lit, method_settings(lit, kLightTracer, 3), 1024), next_event, 0.03, pixels);
-        check_agreement(render_batches(lit, method_settings(lit, kAll, 4), 1024), next_event, 0.03, pixels);
+        check_agreement(edge, method_settings(edge, kLightTracer, 1), 1024, hits, 0.03, pixels);
+        check_agreement(edge, method_settings(edge, kAll, 2), 1024, hits, 0.03, pixels);
+        check_agreement(lit, method_settings(lit, kLightTracer, 3), 1024, next_event, 0.03, pixels);
+        check_agreement(lit, method_settings(lit, kAll, 4), 1024, next_event, 0.03, pixels);
     }
 }
 

@@ -314,7 +314,7 @@ TEST_CASE("B12: mirrored lamps with and without vertex normals shine to the same
                 const Estimate path = render_path(scene, 512);
                 for (const char* name : {"-i light", "hits", "next_event", "all"}) {
                     INFO(name);
-                    check_agreement(render_batches(scene, method_settings(scene, {name}, 1), 256), path, 0.08);
+                    check_agreement(scene, method_settings(scene, {name}, 1), 256, path, 0.08);
                 }
             }
 }

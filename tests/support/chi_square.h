@@ -65,14 +65,18 @@ public:
                std::clamp(int(phi * phi_cells_), 0, phi_cells_ - 1);
     }
 
+    struct Tolerance {
+        double relative, absolute;
+    };
+
     /// Integral over cell `index` of a density per solid angle, by adaptive Gauss quadrature that bisects `forced`
-    /// times in any case.
+    /// times in any case. `tolerance`: of a piece, relative to the cell.
     template <typename Density>
-    double integrate(int index, Density density, int forced = 2) const {
+    double integrate(int index, Density density, int forced = 2, Tolerance tolerance = {1e-4, 1e-8}) const {
         const double t0 = double(index / phi_cells_) / t_cells_, p0 = double(index % phi_cells_) / phi_cells_;
         const double t1 = t0 + 1.0 / t_cells_, p1 = p0 + 1.0 / phi_cells_;
         const double whole = gauss(t0, t1, p0, p1, density);
-        return refine(t0, t1, p0, p1, whole, forced, forced + 6, density, nullptr);
+        return refine(t0, t1, p0, p1, whole, forced, forced + 6, density, tolerance, nullptr);
     }
 
     /// Counts that `samples` draws from the density put into each cell. Where a count in `observed` (from index
@@ -83,23 +87,25 @@ public:
                                         Density density) const {
         std::vector<double> expected(size());
         bool all = true;
-        for (int forced = 2; forced <= 6; forced += 2) {
+        for (int forced = 1; forced <= 6; forced += forced == 1 ? 1 : 2) {
             double sum = 0, observed_sum = 0;
             for (int c = 0; c < size(); ++c) {
                 const double o = observed[first + c];
                 if (all || std::fabs(o - expected[c]) > 3 * std::sqrt(expected[c]))
-                    expected[c] = samples * integrate(c, density, forced);
+                    expected[c] = samples * integrate(c, density, forced, kOfCounts);
                 sum += expected[c];
                 observed_sum += o;
             }
             const double p = std::min(sum / samples, 1.0);
-            all = std::fabs(sum - observed_sum) > 2.5 * std::sqrt(samples * p * (1 - p)) + 1;
+            all = std::fabs(sum - observed_sum) > 2.5 * std::sqrt(samples * p * (1 - p)) + kQuadrature * samples + 1;
         }
         return expected;
     }
 
 private:
     static constexpr double kPiD = 3.14159265358979323846;
+    static constexpr double kQuadrature = 5e-5;  ///< error of all cells together that is no reason for more effort
+    static constexpr Tolerance kOfCounts = {5e-4, 1e-7};  ///< far below what chance makes of counts up to a million
     Frame frame_;
     double width_, log_;
     int t_cells_, phi_cells_;
@@ -129,16 +135,16 @@ private:
 
     template <typename Density>
     double refine(double t0, double t1, double p0, double p1, double whole, int forced, int depth, Density& density,
-                  const double* tolerance) const {
+                  Tolerance tolerance, const double* of_cell) const {
         const double tm = 0.5 * (t0 + t1), pm = 0.5 * (p0 + p1);
         const double part[4] = {gauss(t0, tm, p0, pm, density), gauss(tm, t1, p0, pm, density),
                                 gauss(t0, tm, pm, p1, density), gauss(tm, t1, pm, p1, density)};
         const double sum = part[0] + part[1] + part[2] + part[3];
         // Fixed by the first estimate: an absolute error per piece.
-        const double allowed = tolerance ? *tolerance : 1e-4 * sum + 1e-8;
+        const double allowed = of_cell ? *of_cell : tolerance.relative * sum + tolerance.absolute;
         if (depth == 0 || (forced <= 0 && std::fabs(sum - whole) <= allowed)) return sum;
         const auto piece = [&](double a, double b, double c, double d, double estimate) {
-            return refine(a, b, c, d, estimate, forced - 1, depth - 1, density, &allowed);
+            return refine(a, b, c, d, estimate, forced - 1, depth - 1, density, tolerance, &allowed);
         };
         return piece(t0, tm, p0, pm, part[0]) + piece(tm, t1, p0, pm, part[1]) + piece(t0, tm, pm, p1, part[2]) +
                piece(tm, t1, pm, p1, part[3]);

@@ -6,9 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "film/ztest.h"
-#include "tests/support/injected_bias.h"
-#include "tests/support/render_scene.h"
+#include "tests/support/enough_samples.h"
 
 namespace ambilux {
 
@@ -65,13 +63,13 @@ inline double worst_difference(const FilmMoments& film, const Image& expected) {
 }
 
 /// Fails unless renders of `scene` have `expected` as their expectation; takes as many samples as it needs to see a
-/// mean that is 0.8% off. A pilot of 128 samples tells how many, and is not part of the comparison.
+/// mean that is 0.9% off. A pilot of 128 samples tells roughly how many, and is not part of the comparison.
 inline void check_expectation(const Scene& scene, const RenderSettings& settings, const Image& expected) {
     ZTestOptions options;
     options.block = 4;
     options.rounding = 1e-5;
-    constexpr uint32_t kPilot = 128;
-    constexpr double kSeen = 0.008;
+    constexpr uint32_t kPilot = 128, kMost = 45000;
+    constexpr double kAim = 0.009, kSees = 0.01;
     const std::unique_ptr<Renderer> renderer = make_renderer(scene, settings);
     REQUIRE(renderer->render(0, kPilot) == kPilot);
     REQUIRE(renderer->film().width == expected.width);
@@ -79,23 +77,26 @@ inline void check_expectation(const Scene& scene, const RenderSettings& settings
     const bool exact =
         worst_difference(renderer->film(), expected) < 2e-5;  // an estimator without variance: rounding is all there is
     if (!exact) {
-        const ZTestResult pilot = z_test(to_estimate(renderer->film()), exact_estimate(expected), options);
-        const double samples = kPilot * std::pow(pilot.detectable / kSeen, 2) * 1.2;
-        const auto n = uint32_t(std::clamp(samples, double(kPilot), 4.5e4));
+        const Estimate truth = exact_estimate(expected);
+        const ZTestResult pilot = z_test(to_estimate(renderer->film()), truth, options);
+        const double samples = kPilot * std::pow(pilot.detectable / kAim, 2);
         renderer->clear_film();
-        REQUIRE(renderer->render(kPilot, n) == n);
-        const Estimate image = to_estimate(renderer->film()), truth = exact_estimate(expected);
+        const auto n = uint32_t(std::clamp(samples, double(kPilot), double(kMost)));
+        const Estimate image = until_seen(n, kMost, truth, kSees, options, [&](uint32_t done, uint32_t more) {
+            REQUIRE(renderer->render(kPilot + done, more) == more);
+            return to_estimate(renderer->film());
+        });
         const ZTestResult z = z_test(image, truth, options);
-        INFO(n << " samples: " << z.report());
+        INFO(image.samples << " samples: " << z.report());
         // Almost without variance: the few subpaths that met roulette are too few to be tested, and together may matter
         // one in 1000 at most.
         if (z.undecided) {
-            CHECK(std::abs(z.relative_difference) < 1e-3);
+            CHECK(std::abs(z.relative_difference) < kNoVariance);
         } else {
             CHECK(z.pass);
-            CHECK(sees_bias(image, truth, 0.01, options));
+            CHECK(sees_bias(image, truth, kSees, options));
         }
-        CHECK(z.detectable < 0.01);
+        CHECK(z.detectable < kSees);
     }
     CHECK(renderer->stats().invalid.total() == 0);
 }

@@ -20,13 +20,21 @@ inline std::string wrap(const std::string& body, const std::string& version) {
     return "<scene version='" + version + "'>\n" + body + "\n</scene>\n";
 }
 
-/// Loads a scene of the given content, with a sensor added unless it has one.
+/// `body` with a sensor unless it has one, and in format 0.x with an emitter unless it has one: such a scene would be
+/// lit by a sky of 2048x2048 pixels.
+inline std::string completed(const std::string& body, const std::string& version) {
+    std::string all = body;
+    if (!contains(all, "<sensor")) all += kSensor;
+    if (version[0] == '0' && !contains(all, "<emitter") && !contains(all, "<luminaire"))
+        all += "<emitter type='constant'/>";
+    return all;
+}
+
+/// Loads a scene of the given content and what it lacks.
 inline Scene load(const std::string& body, const LoadOptions& options = {}, const std::string& version = "3.0.0",
                   const TempFolder* folder = nullptr) {
     const TempFolder own;
-    const std::string path =
-        (folder ? *folder : own).write("scene.xml", wrap(contains(body, "<sensor") ? body : body + kSensor, version));
-    return load_mitsuba(path, options);
+    return load_mitsuba((folder ? *folder : own).write("scene.xml", wrap(completed(body, version), version)), options);
 }
 
 inline std::string error_of(const std::string& body, const LoadOptions& options = {},
