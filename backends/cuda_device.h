@@ -9,6 +9,9 @@ namespace ambilux {
 /// device, or on a device of another architecture. Never throws, never prints; the answer is kept.
 bool cuda_device_present();
 
+/// What cuda_device_present() being false means, and what helps.
+const char* why_no_cuda_device();
+
 /// Name of the current device; empty if cuda_device_present() is false.
 std::string cuda_device_name();
 

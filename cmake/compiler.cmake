@@ -29,7 +29,6 @@ if(AMBILUX_HAS_CUDA)
   target_compile_options(ambilux_options INTERFACE
     $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -prec-div=false -prec-sqrt=false>
     $<$<COMPILE_LANGUAGE:CUDA>:$<IF:$<BOOL:${AMBILUX_CUDA_SMALL}>,--compress-mode=size,-lineinfo>>)
-  target_compile_definitions(ambilux_options INTERFACE AMBILUX_HAS_CUDA=1)
   if(NOT AMBILUX_CUDA_OPTIMISE)
     string(REPLACE "-O3" "-O1" CMAKE_CUDA_FLAGS_RELEASE "${CMAKE_CUDA_FLAGS_RELEASE}")  # of the host's part
     if(CMAKE_CUDA_COMPILER_VERSION VERSION_GREATER_EQUAL 12.9)

@@ -37,15 +37,7 @@ CompiledRenderer::Make compiled_for(bool cuda, const Scene& scene, const RenderS
 }
 
 std::unique_ptr<Renderer> make_on(bool cuda, const Scene& scene, const RenderSettings& s, SharedAccels& accels) {
-#if defined(AMBILUX_HAS_CUDA)
-    if (cuda && !cuda_device_present())
-        throw Error(ExitCode::device, "no CUDA device answers: check the driver with nvidia-smi, or take backend cpu");
-#else
-    if (cuda)
-        throw Error(ExitCode::device,
-                    "this program was built without CUDA: install the CUDA toolkit and build again, "
-                    "or take backend cpu");
-#endif
+    if (cuda && !cuda_device_present()) throw Error(ExitCode::device, why_no_cuda_device());
     return compiled_for(cuda, scene, s)(scene, s, accels);
 }
 

@@ -54,7 +54,7 @@ SelectionCandidate candidate_of(const Variant& variant, SelectionOffer offer, fl
     c.pilot = {light_paths, offer.connect, offer.worth};
     c.settings = {{"integrator", variant.integrator}, {"variant", variant.variant}};
     c.settings.insert(c.settings.end(), offer.settings.begin(), offer.settings.end());
-    if (light_paths > 0.0f && light_paths != 1.0f) {
+    if (light_paths != 0.0f && light_paths != 1.0f) {
         c.name += fmt::format(", {} light subpaths per pixel", light_paths);
         c.settings.emplace_back("light_paths", fmt::format("{}", light_paths));
     }
@@ -65,7 +65,7 @@ SelectionCandidate candidate_of(const Variant& variant, SelectionOffer offer, fl
 /// Candidates of one family do the same but for the numbers of light subpaths and draws, so that the time of one tells
 /// that of the others.
 uint32_t family(const SelectionCandidate& c) {
-    return (c.pilot.light_subpaths > 0.0f ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0);
+    return (c.pilot.light_subpaths != 0.0f ? 1 : 0) + (c.pilot.connect ? 2 : 0) + (c.pilot.draws ? 4 : 0);
 }
 
 /// Seconds per sample of every pixel. On a device: of about one full wave, smaller than a render's for the sake of

@@ -68,7 +68,8 @@ void WavePlan::shape_on_device() {
 void WavePlan::shape_preferred(uint64_t bytes_per_path, uint64_t room) {
     if (threads_ > 0) return shape(settings_.wave_size ? settings_.wave_size : kHostWaveSize);
     const uint32_t plateau = streams() ? kStreamPlateau : film_wide_ ? kFilmWidePlateau : kWavePlateau;
-    const uint32_t size = device_wave_size(scene_, settings_, plateau, bytes_per_path, room);
+    const uint32_t size =
+        device_wave_size(scene_, settings_, plateau, bytes_per_path, settings_.memory ? room : room / 2);
     const bool whole = film_wide_ && !streams();
     const uint64_t film = uint64_t(tile_count(shape_wave(scene_, 0, size, 1))) * kTilePixels *
                           (whole_iterations_ ? waves_.iteration_samples : 1);

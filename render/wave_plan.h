@@ -61,7 +61,7 @@ public:
 
     /// The smallest wave that may be: what was set, where it was.
     void shape_least() { shape(least_size()); }
-    /// A wave that does well, on a device in about `room` bytes.
+    /// A wave that does well, on a device in about `room` bytes of a budget, or in half of what is free without one.
     void shape_preferred(uint64_t bytes_per_path, uint64_t room);
     /// Makes the wave smaller until needed() bytes fit into `room`. A size that was set stays, but for what was added
     /// to it to have the whole film in one wave. False, with the smallest wave, if that does not fit.

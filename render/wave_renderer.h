@@ -158,7 +158,7 @@ private:
             const uint64_t splat = !kFilmWide ? 0 : waves.deterministic ? 3 * sizeof(double) : sizeof(Lane);
             per_path = (million.bytes() >> 20) + splat + sizeof(Lane);
         }
-        plan_.shape_preferred(per_path, maker_.settings.memory ? room : room / 2);
+        plan_.shape_preferred(per_path, room);
         if (!plan_.fit(room, [&] { return needed_bytes(true); })) refuse(needed_bytes(true), true);
     }
     [[noreturn]] void refuse(uint64_t needed, bool with_film) {

@@ -109,6 +109,14 @@ std::string command_line() {
     return line;
 }
 
+std::string printed_by(const std::string& command) {
+    std::FILE* const pipe = ::popen(command.c_str(), "r");
+    if (!pipe) return {};
+    std::string text;
+    for (int c; (c = std::fgetc(pipe)) != EOF;) text += char(c);
+    return ::pclose(pipe) == 0 ? text : std::string();
+}
+
 nlohmann::json describe_clocks(const std::string& when, bool cuda) {
     nlohmann::json clocks = {{"when", when}, {"date", utc_now()}, {"cpu_mhz", nullptr}, {"gpu", nullptr}};
     if (const CpuMhz mhz = cpu_mhz(); mhz.mean > 0)
@@ -119,12 +127,7 @@ nlohmann::json describe_clocks(const std::string& when, bool cuda) {
     const std::string ask =
         "timeout 10 nvidia-smi -i " + id +
         " --query-gpu=clocks.sm,clocks.mem,temperature.gpu --format=csv,noheader,nounits 2>/dev/null";
-    if (std::FILE* pipe = ::popen(ask.c_str(), "r")) {
-        std::string lines;
-        char buffer[256];
-        while (std::fgets(buffer, sizeof buffer, pipe)) lines += buffer;
-        if (::pclose(pipe) == 0) clocks["gpu"] = parse_gpu_clocks(lines);
-    }
+    if (const std::string lines = printed_by(ask); !lines.empty()) clocks["gpu"] = parse_gpu_clocks(lines);
     return clocks;
 }
 

@@ -22,6 +22,9 @@ CpuMhz cpu_mhz();
 /// From lines such as "cpu MHz\t\t: 2100.000" of that file; lines without a number do not count.
 CpuMhz parse_cpu_mhz(std::istream& cpuinfo);
 
+/// What a command of the shell prints; empty if it fails.
+std::string printed_by(const std::string& command);
+
 /// What the clocks run at now, as {when, cpu_mhz {lowest, mean, highest}, gpu [{sm_mhz, memory_mhz, celsius}]}: figures
 /// of a machine that was throttled or shared can be told. From /proc/cpuinfo and nvidia-smi; null where those do not
 /// say. `cuda`: a device renders, whose clocks they are; else null. A GPU without work shows its idle clocks.

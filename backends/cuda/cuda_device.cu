@@ -25,6 +25,10 @@ bool cuda_device_present() {
     return present;
 }
 
+const char* why_no_cuda_device() {
+    return "no CUDA device answers: check the driver with nvidia-smi, or take backend cpu";
+}
+
 std::string cuda_device_name() {
     int device = 0;
     cudaDeviceProp properties;

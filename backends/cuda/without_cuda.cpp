@@ -15,6 +15,10 @@ Error not_built() { return {ExitCode::device, "this program was built without CU
 
 bool cuda_device_present() { return false; }
 
+const char* why_no_cuda_device() {
+    return "this program was built without CUDA: install the CUDA toolkit and build again, or take backend cpu";
+}
+
 std::string cuda_device_name() { return {}; }
 
 std::string cuda_device_bus_id() { return {}; }

@@ -33,8 +33,8 @@ inline float filter_coverage(const SceneView& scene, Vec2f film) {
             sum += 1.0f;
             return;
         }
-        for (float py = max(0.0f, ceilf(y - r - 0.5f)); py <= y + r - 0.5f && py < float(s.crop_height); py += 1.0f)
-            for (float px = max(0.0f, ceilf(x - r - 0.5f)); px <= x + r - 0.5f && px < float(s.crop_width); px += 1.0f)
+        for (float py = max(0.0f, floorf(y - r)); py < min(y + r, float(s.crop_height)); py += 1.0f)
+            for (float px = max(0.0f, floorf(x - r)); px < min(x + r, float(s.crop_width)); px += 1.0f)
                 sum += filter_value(scene, {x - (px + 0.5f), y - (py + 0.5f)});
     });
     return min(sum, 1.0f);

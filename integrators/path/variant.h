@@ -18,7 +18,7 @@ struct PathVariant {
         return s.estimator == Estimator::naive ? uint32_t(kHitStrategies) : kHitStrategies | kNextEventStrategies;
     }
     static std::vector<SelectionOffer> selection(const SelectionRequest& r) {
-        if (r.light_paths > 0.0f) return {};
+        if (r.light_paths != 0.0f) return {};
         return {{"", {{"estimator", "mis"}}}};
     }
     static std::vector<Stressed> stress() {

@@ -22,7 +22,6 @@ struct ToyIntegrator {
     };
     static Policy plan(const Scene&, const RenderSettings& settings) {
         Policy p{};
-        p.rules.max_depth = 2;
         p.rules.next_event = true;  // rooms for shadow rays, one a path
         p.waves.queues = settings.queues;
         p.waves.deterministic = settings.deterministic;

@@ -69,7 +69,7 @@ struct InvalidList {
 /// something in it.
 void search_sample(const InvalidBatch& sample, const Replay& replay, const Scene& scene, InvalidList& list,
                    const volatile bool* interrupt) {
-    constexpr uint32_t kTogether = 1u << 15;
+    constexpr uint32_t kTogether = 1u << 15, kOfTask = 64;
     const uint32_t width = scene.sensor.crop_width;
     const uint64_t pixels = uint64_t(width) * scene.sensor.crop_height;
     const uint32_t eyes = uint32_t(std::min<uint64_t>(pixels, kMostInvalidSubpaths));
@@ -77,7 +77,7 @@ void search_sample(const InvalidBatch& sample, const Replay& replay, const Scene
     const std::map<std::string, uint32_t> earlier = list.of_stage;
     InvalidSearch search{replay, sample.first, width, {}, {}};
     const auto share = [&](uint32_t first, uint32_t all, auto look) {
-        if (first < all) parallel_for(std::min(kTogether, all - first), [&](uint32_t i) { look(first + i); }, 64u);
+        if (first < all) parallel_for(std::min(kTogether, all - first), [&](uint32_t i) { look(first + i); }, kOfTask);
         list.add(search.found);
     };
     for (uint32_t first = 0; first < std::max(eyes, lights) && !is_set(interrupt); first += kTogether) {

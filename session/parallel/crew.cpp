@@ -8,25 +8,9 @@
 #include "core/flag.h"
 #include "core/seconds.h"
 #include "render/shared_renderer.h"
+#include "session/drive.h"
 
 namespace ambilux {
-namespace {
-
-/// Samples from 0 on, in batches of whole iterations that grow, until about `seconds` are over.
-uint32_t render_for(Renderer& renderer, double seconds, const volatile bool* stop) {
-    const auto start = Clock::now();
-    const uint32_t k = renderer.iteration_samples();
-    uint32_t done = 0;
-    for (;;) {
-        const double passed = seconds_since(start);
-        if (is_set(stop) || passed >= seconds) return done;
-        const double left = done ? (seconds - passed) / passed * done : 1;
-        const auto count = uint32_t(std::clamp<double>(left, 1, std::max<uint32_t>(1, 4 * done)));
-        done += renderer.render(done, std::max(k, count / k * k), stop);
-    }
-}
-
-}  // namespace
 
 Crew::Crew(const Scene& scene, const RenderSettings& settings, const std::vector<Device>& devices, SharedAccels& host) {
     for (const Device& device : devices) {
@@ -141,7 +125,7 @@ std::optional<Crew::Piece> Crew::render(size_t index, Renderer& renderer, const 
     const auto start = Clock::now();
     Order& order = task.node->order;
     if (order.trial_seconds > 0) {
-        order.ranges.size = render_for(renderer, order.trial_seconds, &stop_);
+        order.ranges.size = uint32_t(drive(renderer, {}, {0, order.trial_seconds}, &stop_).samples);
     } else {
         const uint32_t samples = order.ranges.length(task.range);
         if (renderer.render(order.ranges.first_sample(task.range), samples, &stop_) < samples) return {};

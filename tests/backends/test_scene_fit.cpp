@@ -47,6 +47,35 @@ TEST_CASE("what a scene needs is compared with what is free, and told part by pa
                  "9 of 81920 MiB of Device of 80 GiB are free", "--textures host"});
 }
 
+TEST_CASE("geometry is vertices, primitives and what places them; what is no texture beside is the rest") {
+    Scene scene;
+    uint64_t geometry = 0;
+    const auto check = [&](uint64_t textures, uint64_t rest) {
+        const SceneBytes bytes = scene_bytes(scene, TextureMemory::device);
+        CHECK(bytes.geometry == geometry);
+        CHECK(bytes.textures == textures);
+        CHECK(bytes.rest == rest);
+        CHECK(bytes.total() == scene.memory_bytes());
+    };
+    const auto add = [&](auto& values, size_t count) {
+        values.resize(count);
+        geometry += count * sizeof(values[0]);
+        check(0, 0);
+    };
+    add(scene.vertices, 2);
+    add(scene.triangles, 3);
+    add(scene.quadrics, 5);
+    add(scene.groups, 7);
+    add(scene.instances, 11);
+    add(scene.sort_keys, 13);
+    scene.texels.resize(17);
+    check(17, 0);
+    scene.emitters.resize(19);
+    check(17, 19 * sizeof(Emitter));
+    CHECK(scene_bytes(scene, TextureMemory::pinned).textures == 0);
+    CHECK(scene_bytes(scene, TextureMemory::host).total() == scene.memory_bytes() - 17);
+}
+
 TEST_CASE("textures on the host do not count, and are not offered where they do not help") {
     const Scene scene = small_scene();
     const uint64_t needed = scene.memory_bytes() + kStructure - scene.texels.size();

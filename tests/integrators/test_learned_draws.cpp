@@ -12,6 +12,7 @@
 #include "integrators/bdpt/learned/cluster_light_vertices.h"
 #include "integrators/bdpt/learned/draws.h"
 #include "integrators/bdpt/learned/integrator.h"
+#include "integrators/bdpt/learned/update_draws.h"
 #include "integrators/bdpt/lvc/integrator.h"
 #include "render/wave_plan.h"
 #include "tests/support/bidirectional_images.h"
@@ -339,6 +340,72 @@ TEST_CASE("clusters begin where the vertices of those before end") {
     const FindClusters find = {source, nullptr};
     for (uint32_t cluster = 0; cluster < 4; ++cluster) find(cluster);
     CHECK(first == std::vector<uint32_t>{0, 2, 2, 4});
+}
+
+namespace {
+
+/// Two clusters, and the first group of cells; in cell c they have brought sums[2c] and sums[2c + 1].
+struct LearnedGroup {
+    std::vector<int64_t> sums = std::vector<int64_t>(16);
+    std::vector<uint16_t> tickets = std::vector<uint16_t>(16, 7);
+    WaveState state = {};
+
+    /// After wave samples [first, first + count).
+    void update(float share, uint32_t first = 0, uint32_t count = 1) {
+        state.first_sample = first;
+        state.samples = count;
+        UpdateDraws{{{nullptr, 3}, {nullptr, 1}, tickets.data(), sums.data(), 1.0f}, &state, share, nullptr}(0);
+    }
+    bool updates(uint32_t first, uint32_t count) {
+        tickets.assign(16, 7);
+        update(1.0f, first, count);
+        return tickets != std::vector<uint16_t>(16, 7);
+    }
+};
+
+}  // namespace
+
+TEST_CASE(
+    "a cell draws by the roots of what its clusters brought: six tenths are its own, the rest of its neighbours") {
+    LearnedGroup g;
+    g.update(1.0f);
+    CHECK(g.tickets == std::vector<uint16_t>(16, 7));  // nothing was learned
+    g.sums = {300, 100, 0, 500, 40, 0, 10, 50};
+    g.sums.resize(16);
+    const double of_group[2] = {350.0 / 1000, 650.0 / 1000};
+    for (const double share : {1.0, 0.75, 0.01}) {
+        g.update(float(share));
+        for (uint32_t c = 0; c < 8; ++c) {
+            CAPTURE(share, c);
+            double roots[2];
+            for (uint32_t k = 0; k < 2; ++k) {
+                const double all = double(g.sums[2 * c] + g.sums[2 * c + 1]);
+                roots[k] = std::sqrt(0.4 * of_group[k] + (all > 0 ? 0.6 * double(g.sums[2 * c + k]) / all : 0));
+            }
+            CHECK(g.tickets[2 * c] == Approx(share * 65535 * roots[0] / (roots[0] + roots[1])).margin(1));
+            CHECK(g.tickets[2 * c + 1] == Approx(share * 65535).margin(1));
+        }
+    }
+    // All of the tickets but one are to be had.
+    g.sums.assign(16, 0);
+    g.sums[1] = 1024;
+    g.update(1.0f);
+    CHECK(g.tickets[14] == 0);
+    CHECK(g.tickets[15] == 65535);
+}
+
+TEST_CASE("what was learned is used after 1, 2, 4, 8 and 16 samples, and then after every 16") {
+    LearnedGroup g;
+    g.sums[0] = 1;
+    std::vector<uint32_t> after;
+    for (uint32_t sample = 0; sample < 70; ++sample)
+        if (g.updates(sample, 1)) after.push_back(sample + 1);
+    CHECK(after == std::vector<uint32_t>{1, 2, 4, 8, 16, 32, 48, 64});
+    CHECK(g.updates(40, 8));
+    CHECK(g.updates(41, 15));
+    CHECK_FALSE(g.updates(33, 14));
+    CHECK(g.updates(33, 16));
+    CHECK(g.updates(32, 500));
 }
 
 TEST_CASE("behind a door ajar learned draws have much less variance than uniform ones", "[data]") {

@@ -11,6 +11,7 @@
 #include "accel/shared_accels.h"
 #include "core/error.h"
 #include "integrators/feature_levels.h"
+#include "integrators/parse_value.h"
 #include "render/cpu_backend.h"
 #include "render/wave_renderer.h"
 #include "tests/support/mark_film.h"
@@ -160,9 +161,16 @@ TEST_CASE(
         CHECK(stage(divided, "splat").items == 4 * 70 * 38);
     }
     s = mark_settings({});
+    Scene heavy = scene();
+    heavy.texels.resize(5 << 20);
+    heavy.vertices.resize(heavy.vertices.size() + (3 << 20) / sizeof(MeshVertex));
     on_threads(1, [&] {
-        s.memory = predicted();
-        CHECK_THROWS_WITH(make<Learning>(s)->render(0, 1), StartsWith("memory="));
+        s.memory = make<Learning>(s, heavy)->stats().memory_bytes_predicted;
+        // Film and state take less than a MiB.
+        CHECK_THROWS_WITH(make<Learning>(s, heavy)->render(0, 1),
+                          StartsWith("memory=" + text_of_bytes(s.memory) + ": this render needs at least ") &&
+                              ContainsSubstring(": 4 of geometry, 5 of textures, ") &&
+                              ContainsSubstring(" structure, 1 of the rest of the scene, 1 of film, "));
     });
 }
 

@@ -177,6 +177,64 @@ TEST_CASE("A watched render has the image of one that is not, and names its larg
     }
 }
 
+namespace {
+
+/// Renders given samples, one a call, of a film one pixel high.
+struct GivenSamples : Renderer {
+    std::vector<std::vector<double>> samples;
+    FilmMoments of;
+
+    explicit GivenSamples(std::vector<std::vector<double>> all) : samples(std::move(all)) {}
+    uint32_t render(uint32_t first, uint32_t count, const volatile bool*) override {
+        CHECK(count == 1);
+        of = {uint32_t(samples[0].size() / 3), 1, 1, samples.at(first), samples.at(first)};
+        return 1;
+    }
+    FilmMoments film() override { return of; }
+    void clear_film() override { of = {}; }
+    RenderStats stats() override { return {}; }
+    uint32_t preferred_batch() const override { return 1; }
+};
+
+/// Of all pixels, the worst first.
+std::vector<WatchedPixel> watched(SampleWatch& watch, uint32_t count) {
+    watch.clear_film();
+    CHECK(watch.render(0, count) == count);
+    return watch.worst(10);
+}
+
+}  // namespace
+
+TEST_CASE("A sample is as large as its largest channel, and exceeds the mean of the pixel's others") {
+    SampleWatch watch(std::make_unique<GivenSamples>(std::vector<std::vector<double>>{
+        {1, 2, 3, 9, 0, 0, 2, 8, 4}, {0, 0, 5, 0, 1, 0, 2, 6, 4}, {4, 4, 4, 0, 0, 7, 2, 4, 5}}));
+    const auto check = [](const WatchedPixel& w, uint32_t x, uint32_t sample, std::array<double, 3> value,
+                          double excess) {
+        CAPTURE(x);
+        CHECK(w.x == x);
+        CHECK(w.y == 0);
+        CHECK(w.sample == sample);
+        for (size_t c = 0; c < 3; ++c) CHECK(w.value[c] == value[c]);
+        CHECK(w.excess == excess);
+    };
+    std::vector<WatchedPixel> w = watched(watch, 3);
+    REQUIRE(w.size() == 3);
+    check(w[0], 1, 0, {9, 0, 0}, 9);
+    check(w[1], 2, 0, {2, 8, 4}, 8 - (6 + 4) / 2.0);
+    check(w[2], 0, 1, {0, 0, 5}, 5 - (3 + 4) / 2.0);
+    w = watched(watch, 2);
+    check(w[0], 1, 0, {9, 0, 0}, 9);
+    check(w[1], 0, 1, {0, 0, 5}, 5 - 3);
+    check(w[2], 2, 0, {2, 8, 4}, 8 - 6);
+    w = watched(watch, 1);  // there are no others
+    check(w[0], 1, 0, {9, 0, 0}, 9);
+    check(w[1], 2, 0, {2, 8, 4}, 8);
+    check(w[2], 0, 0, {1, 2, 3}, 3);
+    CHECK(watch.worst(2).size() == 2);
+    const volatile bool stop = true;
+    CHECK(watch.render(1, 2, &stop) == 0);
+}
+
 TEST_CASE("A comparison by segments agrees with a render, and names the number from which on another one differs") {
     const Scene scene = project_scene("cornell", 24, 16);
     for (const ReplayConfig& c :

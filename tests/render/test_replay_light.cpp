@@ -317,6 +317,19 @@ TEST_CASE("A light subpath that was asked for is shown once") {
         };
         CHECK(numbers(40) == std::vector<uint32_t>{40});
         CHECK(numbers(41) == std::vector<uint32_t>{40, 41});
+        // It is that of the sample.
+        for (const uint32_t sample : {0u, 2u}) {
+            ReplayRequest request = r.request(40, sample);
+            request.light_subpath = 41;
+            std::vector<ReplayCandidate> splats;
+            const ReplaySubpath alone = r.replay->light_subpath(41, sample, true, splats),
+                                shown = r.replay->sample(request).lights.at(1);
+            REQUIRE_FALSE(alone.vertices.empty());
+            REQUIRE(shown.vertices.size() == alone.vertices.size());
+            CHECK(names(shown.start_densities) == names(alone.start_densities));
+            for (size_t k = 0; k < alone.vertices.size(); ++k)
+                for (int c = 0; c < 3; ++c) CHECK(shown.vertices[k].direction[c] == alone.vertices[k].direction[c]);
+        }
     }
 }
 

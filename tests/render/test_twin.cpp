@@ -292,6 +292,36 @@ TEST_CASE("The twin's boxes hold up to four primitives each, and count their byt
     CHECK(bytes("<shape type='cube'/>") == 7 * kNode + 12 * 4);  // 12, 6 and 6, 3 and 3 and 3 and 3
 }
 
+TEST_CASE("Emitters of the twin have maps whose inverses, and directions whose lengths, are those of doubles",
+          "[twin]") {
+    Scene scene;
+    const EmitterType types[] = {EmitterType::spot, EmitterType::projector, EmitterType::envmap,
+                                 EmitterType::directional, EmitterType::point};
+    for (const EmitterType type : types) {
+        Emitter& e = scene.emitters.emplace_back();
+        e.type = type;
+        e.direction = {0.6f, 0.7f, 0.3f};
+        const float turn[3][4] = {{0.36f, -0.8f, 0.48f, 3}, {0.48f, 0.6f, 0.64f, -2}, {-0.8f, 0, 0.6f, 0.1f}};
+        for (int i = 0; i < 3; ++i) std::copy(std::begin(turn[i]), std::end(turn[i]), e.to_world.m[i]);
+    }
+    const twin::DoubleScene in_double(scene);
+    for (size_t k = 0; k < scene.emitters.size(); ++k) {
+        const twin::Emitter& e = in_double.view().emitters[k];
+        CAPTURE(uint32_t(types[k]));
+        const bool axis = types[k] == EmitterType::spot || types[k] == EmitterType::directional;
+        CHECK((std::abs(twin::length(e.direction) - 1) < 1e-15) == axis);
+        CHECK(std::abs(twin::length(e.direction) - 1) < 0.04);
+        if (k >= 3) continue;  // without a map
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 4; ++j) {
+                double there_and_back = j == 3 ? e.to_local.m[i][3] : 0;
+                for (int l = 0; l < 3; ++l) there_and_back += e.to_local.m[i][l] * e.to_world.m[l][j];
+                CHECK(std::abs(there_and_back - (i == j)) < 4e-15);
+                CHECK(std::abs(e.to_world.m[i][j] - double(scene.emitters[k].to_world.m[i][j])) < 1e-6);
+            }
+    }
+}
+
 TEST_CASE("The twin does not meet triangles that rounding has made a point or an edge", "[twin]") {
     // From here all corners are one direction, though the plane is not edge-on.
     const auto hit = [](const std::string& scale, twin::Vec3f from) {

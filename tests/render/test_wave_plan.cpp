@@ -46,6 +46,7 @@ Planned plan_of(const char* integrator, const char* variant, double light_vertic
     static const Scene scene = project_scene("cornell", 1920, 1080);
     RenderSettings s = unordered(scene, integrator, variant, 8);
     s.expected_samples = samples;
+    s.memory = room;
     WaveMaker<Integrator, kFeatures, CwbvhTracer> maker = {
         scene, s, 0, {{}, [](QueuePolicy, uint32_t) { return uint64_t(0); }}};
     WavePlan& plan = maker.plan;
@@ -216,6 +217,12 @@ TEST_CASE("waves of a device hold all samples of an iteration, for as many tiles
     one.shape_preferred(100, 100 * kTilePixels);
     CHECK(one.wave.samples == 1);
     CHECK(one.wave.tiles == 15);
+    // Of what is free a half, of a budget all.
+    one.shape_preferred(100, 100 * 960 * 6);
+    CHECK(one.wave.samples == 3);
+    s.memory = 1u << 30;
+    one.shape_preferred(100, 100 * 960 * 6);
+    CHECK(one.wave.samples == 6);
 }
 
 TEST_CASE("waves of a host are small, and those of light that lands anywhere hold one sample") {
@@ -499,6 +506,20 @@ TEST_CASE("queues have room for what their strategies can fill, and none where n
           together(rooms(kStreams, staged_light, streamed), {seen}));
     CHECK(rooms_of<StreamingIntegrator, kDeviceFusion>("bdpt", "streaming", only_hits) == streams);
     CHECK(rooms_of<StreamingIntegrator, kNoFusion>("bdpt", "streaming", only_hits) == seen);
+}
+
+TEST_CASE(
+    "what paths are by strategy has room where images of strategies are asked for, a lane a path, and else none") {
+    const auto bytes = [](uint32_t strategy_depth, uint32_t paths) {
+        WavePolicy waves;
+        waves.strategy_depth = strategy_depth;
+        Layout dry;
+        EyeQueues<UnidirectionalMis>::lay_out<kHostFusion, kFeatures>(dry, kSlots, paths, {}, waves);
+        return dry.bytes();
+    };
+    CHECK(bytes(0, kSlots) == bytes(0, 0));
+    CHECK(bytes(1, kSlots) == bytes(0, 0) + kSlots * sizeof(Lane));
+    CHECK(bytes(3, 2 * kSlots) == bytes(0, 0) + 2 * kSlots * sizeof(Lane));
 }
 
 namespace {

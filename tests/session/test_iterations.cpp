@@ -122,8 +122,14 @@ TEST_CASE("batches are whole iterations, by samples and by time, and so is what 
     CHECK(p.interrupted);
     CHECK(p.samples == 28);
 
-    // An iteration takes 0.4 s.
+    // The last samples that have numbers are 3 too few for an iteration.
     world.batch = 1000;
+    renderer.counts.clear();
+    constexpr uint64_t kWhole = 4294967292;
+    CHECK(drive(renderer, {kWhole - 12, 0.001, false, 1e-6, 1000}, {0, 1e9}).samples == kWhole);
+    CHECK(renderer.counts == std::vector<uint32_t>{12});
+
+    // An iteration takes 0.4 s.
     for (const auto& [seconds, samples] : std::vector<std::pair<double, uint64_t>>{{0.01, 4}, {0.9, 8}, {1.1, 12}}) {
         CAPTURE(seconds);
         TimedByFour timed(scene, {}, world);

@@ -146,6 +146,13 @@ TEST_CASE("a machine is described by its processor, cores, memory and system, an
     CHECK(machine["driver"].is_null() == !fs::exists("/proc/driver/nvidia/version"));
 }
 
+TEST_CASE("what a command prints is read to its end, and that of one that fails is nothing") {
+    CHECK(printed_by("echo 1980, 2619; echo 41") == "1980, 2619\n41\n");
+    CHECK(printed_by("seq 1000").size() == 9 * 2 + 90 * 3 + 900 * 4 + 5);
+    CHECK(printed_by("echo 7; false").empty());
+    CHECK(printed_by("no-such-command 2>/dev/null").empty());
+}
+
 TEST_CASE("clocks of graphics cards are read from what nvidia-smi prints") {
     const auto gpus = parse_gpu_clocks("1980, 2619, 41\n345, [N/A], 30\n");
     REQUIRE(gpus.size() == 2);

@@ -89,11 +89,11 @@ Ends trace(const SceneView& scene, const HostTracer& tracer, const Rules<Mis>& r
 uint32_t widest(const PilotPoint* begin, const PilotPoint* end, float size) {
     std::array<double, 6> sum{}, squares{};
     for (const PilotPoint* p = begin; p != end; ++p)
-        for (int k = 0; k < 6; ++k) sum[k] += p->x[k], squares[k] += double(p->x[k]) * p->x[k];
+        for (size_t k = 0; k < sum.size(); ++k) sum[k] += p->x[k], squares[k] += double(p->x[k]) * p->x[k];
     const double n = double(end - begin), normal = 0.25 * size;
     uint32_t best = 0;
     double most = -1;
-    for (uint32_t k = 0; k < 6; ++k) {
+    for (uint32_t k = 0; k < sum.size(); ++k) {
         const double spread = (squares[k] - sum[k] * sum[k] / n) * (k < 3 ? 1.0 : normal * normal);
         if (spread > most) best = k, most = spread;
     }

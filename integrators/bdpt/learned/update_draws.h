@@ -20,7 +20,7 @@ struct UpdateDraws {
     /// The table changes after 1, 2, 4, 8, 16 samples of a pixel and then after every 16.
     AMBILUX_HD bool is_due() const {
         const uint32_t before = state->first_sample, now = before + state->samples;
-        return state->samples >= kOften || (now & (now - 1)) == 0 || now / kOften != before / kOften;
+        return (now & (now - 1)) == 0 || now / kOften != before / kOften;
     }
 
     /// Of a group of cells.

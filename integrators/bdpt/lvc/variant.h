@@ -19,7 +19,7 @@ struct LvcVariant {
 
     static std::vector<SelectionOffer> selection(const SelectionRequest& r) {
         std::vector<SelectionOffer> offers;
-        for (uint32_t k = 1; r.light_paths > 0.0f && r.may_draw() && k <= 16; k *= 2)
+        for (uint32_t k = 1; r.light_paths != 0.0f && r.may_draw() && k <= 16; k *= 2)
             offers.push_back({", lvc, " + std::to_string(k) + (k > 1 ? " connections" : " connection"),
                               {{"strategies", "all"}, {"connections", std::to_string(k)}},
                               true,
