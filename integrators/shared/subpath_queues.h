@@ -44,10 +44,10 @@ struct NothingBefore {
     void operator()(A...) const {}
 };
 
-/// From the hits of depth 1 in place 0 on: after before(k) vertex[k] goes through the hits of a depth in place k and pushes rays to
-/// place 1 - k, which after rest(several_bounces) become the next hits. `several_bounces` is true where a device takes
-/// fewer than `multi_bounce_below` subpaths through several at once: what is pushed may belong to one path more than
-/// once.
+/// From the hits of depth 1 in place 0 on: after before(k) vertex[k] goes through the hits of a depth in place k and
+/// pushes rays to place 1 - k, which after rest(several_bounces) become the next hits. `several_bounces` is true where
+/// a device takes fewer than `multi_bounce_below` subpaths through several at once: what is pushed may belong to one
+/// path more than once.
 template <class Executor, class VertexStage, class Extend, class Rest, class Before = NothingBefore>
 void repeat_depths(Executor& exec, const VertexStage (&vertex)[2], const Extend (&extend)[2],
                    uint32_t multi_bounce_below, Rest rest, Before before = {}) {

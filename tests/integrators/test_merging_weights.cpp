@@ -16,9 +16,8 @@ using namespace ambilux::test;
 
 TEST_CASE("Weights with merging equal those of all strategies enumerated, and sum to one with those of merges") {
     const MergeNow now[] = {{0.01f, 0x1p-10f}, {0.1f, 1.0f}, {0.5f, 300.0f}};
-    const std::map<std::string, uint64_t> seen = compare_weights(0.05, [&](uint32_t i) {
-        return MergingMis{settings(i), &now[i / 16 % 3], i / 48 % 2 == 0};
-    });
+    const std::map<std::string, uint64_t> seen =
+        compare_weights(0.05, [&](uint32_t i) { return MergingMis{settings(i), &now[i / 16 % 3], i / 48 % 2 == 0}; });
     CHECK(seen.at("merges") > 10000);
     for (const char* kind : {"hit", "escape", "next event", "connection", "light tracing", "visible light"})
         CHECK(seen.at(std::string(kind) + ", perspective") >= 20);

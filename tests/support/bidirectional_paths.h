@@ -429,7 +429,7 @@ private:
     }
 
     void connect(uint32_t a, uint32_t b) {
-        const Vertex<Mis> &y = light_[a - 1].vertex, &z = eye_[b - 1].vertex;
+        const Vertex<Mis>&y = light_[a - 1].vertex, &z = eye_[b - 1].vertex;
         Candidate<Mis> c;
         if (!connection<F>(rules_, {z, {1, 1, 1}, b}, {y, {1, 1, 1}, a}, c)) return;
         const Vec3f to_y = y.point.p - z.point.p;
@@ -460,8 +460,8 @@ private:
     /// `counts`: strategy s has a candidate, which is `c`.
     void compare(Kind kind, uint32_t s, const Candidate<Mis>& c, const OraclePath& path, bool counts = true) {
         const OracleSteps steps = oracle_steps(scene_, path, false);
-        const OracleStrategies all =
-            oracle_strategies(scene_, path, steps, double(mis_.light_subpaths), double(mis_.connections), merges_of(mis_));
+        const OracleStrategies all = oracle_strategies(scene_, path, steps, double(mis_.light_subpaths),
+                                                       double(mis_.connections), merges_of(mis_));
         INFO(kKindNames[kind] << " s " << s << " k " << path.k << " index " << index_ << " mask " << mis_.strategies
                               << " heuristic " << int(mis_.heuristic) << " emitter type "
                               << int(scene_.emitters[path.emitter].type) << " vertices " << describe(path));
@@ -570,8 +570,7 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
         if (!connect_to_camera<F>(scene_.sensor, position(k - 1), path.lens_u, camera)) return;
         path.to_eye[k - 1] = camera.wi;
     }
-    const auto go_on = [&](const Vertex<Mis>& vertex, const OraclePath::Vertex& x, Vec3f wo,
-                           Subpath<Mis>& w) {
+    const auto go_on = [&](const Vertex<Mis>& vertex, const OraclePath::Vertex& x, Vec3f wo, Subpath<Mis>& w) {
         float forward = 1.0f, reverse = 1.0f;
         if (x.delta) {
             const Scattering& s = vertex.scattering;
@@ -637,9 +636,9 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
         }
     }
 
-    const OracleStrategies all = oracle_strategies(scene_, path, oracle_steps(scene_, path, false),
-                                                   double(mis_.light_subpaths), double(mis_.connections),
-                                                   merges_of(mis_));
+    const OracleStrategies all =
+        oracle_strategies(scene_, path, oracle_steps(scene_, path, false), double(mis_.light_subpaths),
+                          double(mis_.connections), merges_of(mis_));
     double sum = 0;
     std::string weights;
     for (uint32_t s = 0; s <= k; ++s) {
@@ -648,7 +647,8 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
         Candidate<Mis> candidate;
         if (s == 0) {
             CHECK((infinite ? mis_.template escape_ratio<F>(scene_, rules_.lights, w, w.sums, ratio)
-                            : mis_.template hit_ratio<F>(scene_, rules_.lights, w, w.sums, path.emitter, path.light, ratio)));
+                            : mis_.template hit_ratio<F>(scene_, rules_.lights, w, w.sums, path.emitter, path.light,
+                                                         ratio)));
         } else if (s == k) {
             if (k == 1 ? !visible_emitter<F>(scene_, rules_, start, path.lens_u, candidate)
                        : !camera_connection<F>(scene_, rules_, y[k - 1], {1, 1, 1}, k - 1, path.lens_u, candidate))
@@ -669,14 +669,13 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
             f.pdf_sa = scatter_pdf<F>(z[1].scattering, light.wi);
             f.pdf_reverse_sa = reverse_pdf(z[1].scattering, light.wi);
             ratio = mis_.template next_event_ratio<F>(scene_, 1.0f, z[1].sums, z[1].first, light, f,
-                                             fabsf(dot(z[1].point.ng, light.wi)));
+                                                      fabsf(dot(z[1].point.ng, light.wi)));
         } else {
             if (!connection<F>(rules_, {z[s], {1, 1, 1}, k - s}, {y[s - 1], {1, 1, 1}, s - 1}, candidate)) return;
             ratio = candidate.ratio;
         }
-        const double weight = std::isnan(ratio)
-                                  ? overflowed(oracle_weight(all, s, mis_.strategies, mis_.heuristic))
-                                  : 1.0 / (1.0 + double(ratio));
+        const double weight = std::isnan(ratio) ? overflowed(oracle_weight(all, s, mis_.strategies, mis_.heuristic))
+                                                : 1.0 / (1.0 + double(ratio));
         sum += weight;
         weights += " s" + std::to_string(s) + ":" + std::to_string(weight);
     }
@@ -687,7 +686,9 @@ void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
             f.pdf_sa = scatter_pdf<F>(z[j].scattering, -path.to_eye[j - 1]);
             f.pdf_reverse_sa = reverse_pdf(z[j].scattering, -path.to_eye[j - 1]);
             const float ratio = mis_.merge_ratio(y[j].sums, y[j].first, z[j].sums, z[j].first, f);
-            const double weight = std::isnan(ratio) ? overflowed(oracle_merge_weight(all, j, mis_.strategies, mis_.heuristic)) : 1 / (1.0 + ratio);
+            const double weight = std::isnan(ratio)
+                                      ? overflowed(oracle_merge_weight(all, j, mis_.strategies, mis_.heuristic))
+                                      : 1 / (1.0 + ratio);
             sum += weight;
             ++tally_.merges;
             weights += " merge " + std::to_string(j) + ":" + std::to_string(weight);

@@ -27,8 +27,8 @@ struct BdptPolicyOf {
     /// The same with another model.
     template <class Other>
     BdptPolicyOf<Other> with(const Other& mis) const {
-        return {rules.with(mis), waves, cache_draws, coherent_draws, one_connection_per_launch, traces_connections,
-                keeps_vertices};
+        return {rules.with(mis),    waves,         cache_draws, coherent_draws, one_connection_per_launch,
+                traces_connections, keeps_vertices};
     }
 };
 using BdptPolicy = BdptPolicyOf<BidirectionalMis>;

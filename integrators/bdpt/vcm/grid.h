@@ -54,8 +54,8 @@ struct MergeGrid {
     }
 };
 
-/// Keys put light vertices in order of their place in the table, light subpath and depth: an order that knows nothing of
-/// waves and threads, so that sums over a cell have the same bits for any number of them.
+/// Keys put light vertices in order of their place in the table, light subpath and depth: an order that knows nothing
+/// of waves and threads, so that sums over a cell have the same bits for any number of them.
 constexpr uint32_t kMergeDepthBits = 11, kMergeSubpathBits = 29, kMergeKeyShift = kMergeDepthBits + kMergeSubpathBits;
 constexpr uint32_t kLeastMergeBits = 8, kMostMergeBits = 24;  ///< of the table
 AMBILUX_HD uint64_t merge_key(uint32_t hash, uint32_t subpath, uint32_t depth) {
@@ -84,8 +84,8 @@ struct VcmVertices {
 struct VcmState {
     static constexpr StateKind kKind = StateKind::by_index;
 
-    VcmVertices all;                                        ///< as they were appended; keys are those of `order`
-    LaneArray<MergeVertex> sorted;                          ///< in the order of keys
+    VcmVertices all;                ///< as they were appended; keys are those of `order`
+    LaneArray<MergeVertex> sorted;  ///< in the order of keys
     LaneArray<ConnectionVertex<MergingMis>> sorted_connections;
     SortMemory<uint64_t> order;  ///< keys and places
     uint32_t* starts;            ///< in the order of keys: of each place in the table, and the end

@@ -40,8 +40,7 @@ struct MergingMis : BidirectionalMis {
     template <Features F, class Path, class Lights>
     AMBILUX_HD Sums sums_at(const SceneView& scene, const Lights& lights, Side side, const Path& path, const Sums& sums,
                             const SurfacePoint& point) const {
-        const MisSums s =
-            BidirectionalMis::sums_at<F>(scene, lights, side, path, {sums.dvcm, sums.dvc}, point);
+        const MisSums s = BidirectionalMis::sums_at<F>(scene, lights, side, path, {sums.dvcm, sums.dvc}, point);
         if (path.depth == 1) return {s.dvcm, s.dvc, side == Side::light || merges_first ? 1.0f : 0.0f};
         return {s.dvcm, s.dvc, sums.dvm / fabsf(dot(point.ng, path.direction))};
     }
@@ -57,9 +56,7 @@ struct MergingMis : BidirectionalMis {
     // ---- ratios ----
 
     /// dvc with the merges behind this vertex.
-    AMBILUX_HD float with_merges(const Sums& s, bool first) const {
-        return first ? s.dvc : norm(s.dvc, eta() * s.dvm);
-    }
+    AMBILUX_HD float with_merges(const Sums& s, bool first) const { return first ? s.dvc : norm(s.dvc, eta() * s.dvm); }
     /// Sums for the ratios of BidirectionalMis, to be taken as those of a first vertex, whose dvcm has all factors:
     /// with the merge at this vertex itself, if that counts.
     AMBILUX_HD MisSums seen(const Sums& s, bool first, bool merge_here) const {

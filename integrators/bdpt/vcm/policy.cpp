@@ -19,8 +19,8 @@ VcmPolicy VcmPolicy::plan(const Scene& scene, const RenderSettings& settings) {
     p.waves.multi_bounce_below = 0;  // merges are a stage of their own
     if (p.rules.connect) p.cache_draws = settings.connections;
     p.one_connection_per_launch |= p.cache_draws == 1;
-    const uint64_t keys = uint64_t(scene.sensor.crop_width) * scene.sensor.crop_height * p.waves.light_rounds() *
-                          p.vcm.samples;
+    const uint64_t keys =
+        uint64_t(scene.sensor.crop_width) * scene.sensor.crop_height * p.waves.light_rounds() * p.vcm.samples;
     if (keys > uint64_t(1) << kMergeSubpathBits)
         throw Error(ExitCode::usage,
                     fmt::format("merge_samples={}: light subpaths of an iteration are numbered up to {}, and a film of "

@@ -16,8 +16,6 @@ std::vector<Declaration<VcmSettings>> VcmVariant::settings() {
                        "samples of every pixel in one iteration: they share light vertices and radius")};
 }
 
-VcmSettings VcmSettings::plan(const RenderSettings& settings) {
-    return own_settings(VcmVariant::settings(), settings);
-}
+VcmSettings VcmSettings::plan(const RenderSettings& settings) { return own_settings(VcmVariant::settings(), settings); }
 
 }  // namespace ambilux
