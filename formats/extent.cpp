@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "core/vec3d.h"
 #include "scene/primitive_bounds.h"
 
 namespace ambilux {
@@ -21,10 +22,7 @@ double volume_scale(const Instance& i) {
 
 double triangle_area(const Scene& scene, const Triangle& t) {
     const Vec3f &a = scene.vertices[t.v0].p, &b = scene.vertices[t.v1].p, &c = scene.vertices[t.v2].p;
-    const double u[3] = {double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z},
-                 v[3] = {double(c.x) - a.x, double(c.y) - a.y, double(c.z) - a.z};
-    const double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
-    return 0.5 * std::sqrt(x * x + y * y + z * z);
+    return 0.5 * length(cross(in_double(b) - in_double(a), in_double(c) - in_double(a)));
 }
 
 void fill_bounds(Scene& scene) {

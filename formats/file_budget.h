@@ -24,14 +24,14 @@ public:
     void bytes(uint64_t count, uint64_t size = 1) const;
     /// True once the time is over. Looks at the clock.
     bool expired() const;
+    /// Throws then.
+    void check_time() const;
     /// Called again and again while reading; throws once the time is over.
     void tick(uint64_t entries = 1) {
         if ((ticks_ += entries) >= 1024) ticks_ = 0, check_time();
     }
 
 private:
-    void check_time() const;
-
     std::string path_;
     Limits limits_;
     std::chrono::steady_clock::time_point start_;

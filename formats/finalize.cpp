@@ -3,12 +3,12 @@
 #include <cstring>
 
 #include "core/error.h"
-#include "core/half.h"
 #include "core/huge_pages.h"
 #include "formats/extent.h"
 #include "formats/finalize.h"
 #include "scene/pick_table.h"
 #include "transport/sensor/filter.h"
+#include "transport/texture.h"
 
 namespace ambilux {
 
@@ -65,30 +65,16 @@ void fill_areas(Scene& scene) {
     }
 }
 
-Rgb load_texel(const Scene& scene, const Texture& t, size_t i) {
-    if (t.format == TexelFormat::rgba32f) {
-        float c[4];
-        memcpy(c, scene.texels.data() + t.offset + i * 16, 16);
-        return {c[0], c[1], c[2]};
-    }
-    if (t.format == TexelFormat::rgba16f) {
-        const Vec4f c = load_half4(scene.texels.data() + t.offset + i * 8);
-        return {c.x, c.y, c.z};
-    }
-    const uint8_t* c = scene.texels.data() + t.offset + i * 4;
-    const float* decode = scene.tables.data() + t.decode_table;
-    return {decode[c[0]], decode[c[1]], decode[c[2]]};
-}
-
 /// Mean luminance of a colour over its texture.
 double mean_luminance(const Scene& scene, const ParamRgb& parameter) {
     if (parameter.texture < 0) return luminance(parameter.value);
     const Texture& t = scene.textures[size_t(parameter.texture)];
     if (t.type == TextureType::checkerboard) return luminance(parameter.value * (t.color0 + t.color1)) / 2;
     double sum = 0;
-    const size_t n = size_t(t.width) * t.height;
-    for (size_t i = 0; i < n; ++i) sum += luminance(parameter.value * load_texel(scene, t, i));
-    return sum / double(n);
+    const SceneView view = scene.view();
+    for (uint32_t y = 0; y < t.height; ++y)
+        for (uint32_t x = 0; x < t.width; ++x) sum += luminance(parameter.value * load_texel(view, t, x, y));
+    return sum / (double(t.width) * t.height);
 }
 
 /// Integral of a hat function (1 at 0, 0 at -1 and 1) up to x.
@@ -133,9 +119,12 @@ double fill_environment(Scene& scene, Emitter& emitter) {
     const int64_t w = t.width, h = t.height;
     if (w > (1 << 20) || h > (1 << 20))
         throw input_error(scene.path, 0, "environment maps are limited to 2^20 rows and columns");
-    std::vector<float> lum(size_t(w * h));
-    for (size_t i = 0; i < lum.size(); ++i)
-        lum[i] = std::max(0.0f, luminance(emitter.radiance.value * load_texel(scene, t, i)));
+    std::vector<float> lum;
+    lum.reserve(size_t(w * h));
+    const SceneView view = scene.view();
+    for (uint32_t y = 0; y < t.height; ++y)
+        for (uint32_t x = 0; x < t.width; ++x)
+            lum.push_back(std::max(0.0f, luminance(emitter.radiance.value * load_texel(view, t, x, y))));
 
     std::vector<double> row_means(size_t(h), 0.0), row_sums(size_t(h), 0.0);
     for (size_t i = 0; i < lum.size(); ++i) row_means[i / size_t(w)] += lum[i] / double(w);

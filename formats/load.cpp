@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include "core/error.h"
-#include "formats/gltf/load.h"
 
 namespace ambilux {
 

@@ -38,6 +38,9 @@ Scene load_mitsuba(const std::string& path, const LoadOptions& options = {});
 /// Loads a scene of pbrt-v4. Throws Error(bad_input) with file and line.
 Scene load_pbrt(const std::string& path, const LoadOptions& options = {});
 
+/// Loads a scene of glTF 2.0 from a .gltf or .glb file. Throws Error(bad_input) that names the file and the part of it.
+Scene load_gltf(const std::string& path, const LoadOptions& options = {});
+
 /// The same as load_mitsuba of a text, as if it stood in a file at `path`: that is where the files that it names are
 /// looked for.
 Scene load_mitsuba_text(const std::string& text, const std::string& path, const LoadOptions& options = {});

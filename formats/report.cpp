@@ -1,7 +1,5 @@
 #include "formats/report.h"
 
-#include "core/error.h"
-
 namespace ambilux {
 
 using document::Where;
@@ -23,7 +21,7 @@ std::vector<std::string> Report::List::lines() const {
 void Report::note(const Where& where, const std::string& text) { notes_.add(where, text); }
 
 void Report::refuse(const Where& where, const std::string& problem, const std::string& instead) {
-    if (!lenient_) throw input_error(where.file, where.line, problem);
+    if (!lenient_) document::fail(where, problem);
     warnings_.add(where, problem + "; " + instead);
 }
 

@@ -14,21 +14,14 @@ void add_spot_falloff(document::Document& document, document::Object& spot, doub
     const double ring = (c1 - c0) * std::pow(1 + steepest * steepest, 1.5) / (steepest * edge);
     const int n = std::clamp(int(std::min(std::ceil(2 * kRing / ring), 1e6)), kLeast, kMost);
     const std::string name = "spot " + std::to_string(document.images.size());
-    Texels& image = document.images[name];
-    image.width = image.height = uint32_t(n);
-    image.is_linear = true;
+    Texels& image = document::add_image(document, name, uint32_t(n), uint32_t(n));
     for (int y = 0; y < n; ++y)
         for (int x = 0; x < n; ++x) {
             const double a = edge * (2 * (x + 0.5) / n - 1), b = edge * (2 * (y + 0.5) / n - 1);
-            const float value =
-                float(profile(std::clamp((1 / std::sqrt(1 + a * a + b * b) - c0) / (c1 - c0), 0.0, 1.0)));
-            image.floats.insert(image.floats.end(), {value, value, value, 1.0f});
+            const double share = std::clamp((1 / std::sqrt(1 + a * a + b * b) - c0) / (c1 - c0), 0.0, 1.0);
+            std::fill_n(&image.floats[4 * (size_t(y) * size_t(n) + size_t(x))], 3, float(profile(share)));
         }
-    document::Object& texture = document::add_object(document, "texture", "bitmap", spot.where);
-    document::set_text(texture, "image", name);
-    document::set_boolean(texture, "raw", true);
-    document::set_text(texture, "wrap_mode", "clamp");
-    document::add_child(spot, texture, "texture");
+    document::add_child(spot, document::add_bitmap(document, spot.where, name), "texture");
 }
 
 }  // namespace ambilux

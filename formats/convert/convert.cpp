@@ -56,6 +56,15 @@ void add_film(Writer& w, xml_node sensor) {
     }
 }
 
+const char* plugin_of(EmitterType type) {
+    const char* plugin = "";
+    EmitterModels::for_each([&](auto model) {
+        using Model = typename decltype(model)::type;
+        if (type == kEmitterType<Model>) plugin = Model::plugin;
+    });
+    return plugin;
+}
+
 /// The map with its columns scaled.
 Affine scaled(Affine a, double x, double y) {
     for (auto& row : a.m) row[0] = float(row[0] * x), row[1] = float(row[1] * y);
@@ -94,12 +103,11 @@ void add_sensor(Writer& w, xml_node root) {
 
 void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
     switch (e.type) {
-        case EmitterType::area: return add_color(w, add_object(parent, "emitter", "area"), "radiance", e.radiance);
+        case EmitterType::hidden_area: w.note("Mitsuba 3 has no emitter 'hiddenarea'"); [[fallthrough]];
+        case EmitterType::area:
         case EmitterType::directional_area:
-            return add_color(w, add_object(parent, "emitter", "directionalarea"), "radiance", e.radiance);
-        case EmitterType::hidden_area:
-            add_color(w, add_object(parent, "emitter", "hiddenarea"), "radiance", e.radiance);
-            return w.note("Mitsuba 3 has no emitter 'hiddenarea'");
+        case EmitterType::constant:
+            return add_color(w, add_object(parent, "emitter", plugin_of(e.type)), "radiance", e.radiance);
         case EmitterType::collimated: {
             xml_node node = add_object(parent, "emitter", "collimated");
             const Frame frame = frame_from_normal(e.direction);
@@ -111,9 +119,6 @@ void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
             add_transform(node, "to_world", to_world);
             add_rgb(node, "power", e.radiance.value);
             return w.note("Mitsuba 3 has no emitter 'collimated'");
-        }
-        case EmitterType::constant: {
-            return add_color(w, add_object(parent, "emitter", "constant"), "radiance", e.radiance);
         }
         case EmitterType::point: {
             xml_node node = add_object(parent, "emitter", "point");

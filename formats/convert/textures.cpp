@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstring>
 
-#include "core/half.h"
 #include "core/srgb.h"
 #include "formats/convert/writer.h"
 #include "formats/images/image_write.h"
+#include "transport/texture.h"
 
 namespace ambilux::convert {
 
@@ -32,21 +31,12 @@ size_t texel_count(const Texture& t) { return size_t(t.width) * t.height; }
 std::vector<float> linear_texels(const Scene& scene, const Texture& t, Rgb factor) {
     std::vector<float> rgb;
     rgb.reserve(texel_count(t) * 3);
-    const uint8_t* texels = scene.texels.data() + t.offset;
-    for (size_t i = 0; i < texel_count(t); ++i) {
-        Rgb c;
-        if (t.format == TexelFormat::rgba8) {
-            const float* table = scene.tables.data() + t.decode_table;
-            c = {table[texels[4 * i]], table[texels[4 * i + 1]], table[texels[4 * i + 2]]};
-        } else if (t.format == TexelFormat::rgba16f) {
-            const Vec4f h = load_half4(texels + i * 8);
-            c = {h.x, h.y, h.z};
-        } else {
-            memcpy(&c, texels + i * 16, sizeof c);
+    const SceneView view = scene.view();
+    for (uint32_t y = 0; y < t.height; ++y)
+        for (uint32_t x = 0; x < t.width; ++x) {
+            const Rgb c = load_texel(view, t, x, y) * factor;
+            rgb.insert(rgb.end(), {c.x, c.y, c.z});
         }
-        c = c * factor;
-        rgb.insert(rgb.end(), {c.x, c.y, c.z});
-    }
     return rgb;
 }
 

@@ -1,5 +1,3 @@
-#include <cstring>
-
 #include "formats/document/bsdf_plugins.h"
 #include "formats/document/named_media.h"
 #include "formats/document/plugins.h"
@@ -9,9 +7,7 @@
 
 namespace ambilux::document {
 
-namespace {
-
-Microfacets distribution(Builder& builder, Reader& in) {
+Microfacets read_distribution(Builder& builder, Reader& in) {
     const std::string name = in.text("distribution", "beckmann");
     if (name == "ggx") return Microfacets::ggx;
     if (name != "beckmann")
@@ -20,9 +16,11 @@ Microfacets distribution(Builder& builder, Reader& in) {
     return Microfacets::beckmann;
 }
 
+namespace {
+
 template <class Parameters>
 void read_roughness(Builder& builder, Reader& in, Parameters& p) {
-    p.distribution = distribution(builder, in);
+    p.distribution = read_distribution(builder, in);
     const bool anisotropic = in.has("alpha_u") || in.has("alpha_v");
     if (anisotropic && in.has("alpha")) in.fail(in.where("alpha"), "both 'alpha' and 'alpha_u' or 'alpha_v' are given");
     if (anisotropic) {
@@ -154,7 +152,7 @@ void read_plugin(Builder& builder, Reader& in, Textured<Plastic>& p) {
 
 void read_plugin(Builder& builder, Reader& in, Textured<RoughPlastic>& p) {
     read_plastic(builder, in, p);
-    p.distribution = distribution(builder, in);
+    p.distribution = read_distribution(builder, in);
     p.sample_visible = in.boolean("sample_visible", true);
     p.alpha = {float(in.number("alpha", 0.1)), -1};
     if (!(p.alpha.value >= 0)) in.fail(in.where("alpha"), "roughness must not be negative");

@@ -96,9 +96,7 @@ uint32_t add_record(Builder& builder, BsdfRecord r, const Object& object, const 
     r.normal_map = adapters.normal_map;
     r.bump_map = adapters.bump_map;
     r.bump_scale = adapters.bump_scale;
-    if (builder.validate_only) return 0;
-    builder.scene.bsdfs.push_back(r);
-    return uint32_t(builder.scene.bsdfs.size() - 1);
+    return builder.validate_only ? 0 : add_bsdf(builder, r);
 }
 
 /// Lets all light pass: a mask of opacity 0, which rays do not see. A shape that emits must be seen: there it is a pane
@@ -107,10 +105,8 @@ uint32_t null_material(Builder& builder, const Object& object, bool emits) {
     Reader(builder, object).finish();
     uint32_t& known = builder.null_materials[emits];
     if (builder.validate_only || known != kNone) return known;
-    builder.scene.bsdfs.push_back(emits ? clear_pane_record() : diffuse_record(0));
-    const uint32_t record = uint32_t(builder.scene.bsdfs.size() - 1);
-    builder.scene.materials.push_back({record, record, 0, {emits ? 1.0f : 0.0f, -1}});
-    return known = uint32_t(builder.scene.materials.size() - 1);
+    const uint32_t record = add_bsdf(builder, emits ? clear_pane_record() : diffuse_record(0));
+    return known = add_material(builder, {record, record, 0, {emits ? 1.0f : 0.0f, -1}});
 }
 
 struct MaterialBuilder {
@@ -118,9 +114,7 @@ struct MaterialBuilder {
 
     uint32_t add(Material material, const Adapters& adapters) {
         material.opacity = adapters.opacity;
-        if (builder.validate_only) return 0;
-        builder.scene.materials.push_back(material);
-        return uint32_t(builder.scene.materials.size() - 1);
+        return builder.validate_only ? 0 : add_material(builder, material);
     }
 
     /// Material of a BSDF that is inside of `outer`.
@@ -270,8 +264,7 @@ struct MaterialBuilder {
 
     uint32_t black() {
         if (builder.validate_only) return 0;
-        builder.scene.bsdfs.push_back(diffuse_record(0));
-        const uint32_t record = uint32_t(builder.scene.bsdfs.size() - 1);
+        const uint32_t record = add_bsdf(builder, diffuse_record(0));
         return add({record, record, 0, {}}, {});
     }
 
@@ -295,6 +288,16 @@ struct MaterialBuilder {
 
 }  // namespace
 
+uint32_t add_bsdf(Builder& builder, const BsdfRecord& bsdf) {
+    builder.scene.bsdfs.push_back(bsdf);
+    return uint32_t(builder.scene.bsdfs.size() - 1);
+}
+
+uint32_t add_material(Builder& builder, const Material& material) {
+    builder.scene.materials.push_back(material);
+    return uint32_t(builder.scene.materials.size() - 1);
+}
+
 uint32_t build_material(Builder& builder, const Object& bsdf, bool emits) {
     if (bsdf.tag == "bsdf" && bsdf.type == "null") return null_material(builder, bsdf, emits);
     const auto known = builder.materials.find(&bsdf);
@@ -312,25 +315,19 @@ uint32_t shape_material(Builder& builder, const Object* bsdf, const Object* emit
     if (emitter && emitter->type == HiddenAreaEmitter::plugin) {
         const uint32_t index = bsdf ? build_material(builder, *bsdf) : kNone;
         const bool unseen = bsdf && (builder.validate_only || builder.scene.materials[index].unseen());
-        if (!unseen) throw input_error(where.file, where.line, "a shape with emitter 'hiddenarea' needs bsdf 'null'");
+        if (!unseen) fail(where, "a shape with emitter 'hiddenarea' needs bsdf 'null'");
         return index;
     }
     if (bsdf) return build_material(builder, *bsdf, emitter != nullptr);
     uint32_t& known = builder.default_materials[emitter != nullptr];
     if (known != kNone) return known;
-    builder.scene.bsdfs.push_back(diffuse_record(emitter ? 0.0f : 0.5f));
-    const uint32_t record = uint32_t(builder.scene.bsdfs.size() - 1);
-    builder.scene.materials.push_back({record, record, 0, {1, -1}});
-    return known = uint32_t(builder.scene.materials.size() - 1);
+    const uint32_t record = add_bsdf(builder, diffuse_record(emitter ? 0.0f : 0.5f));
+    return known = add_material(builder, {record, record, 0, {1, -1}});
 }
 
 const Plugins& bsdf_plugins() {
-    static const Plugins known = [] {
-        Plugins list = {"twosided",    "mask",    "bumpmap",      "normalmap", "blendbsdf",
-                        "mixturebsdf", "coating", "roughcoating", "null"};
-        BsdfModels::for_each([&](auto model) { list.emplace_back(decltype(model)::type::plugin); });
-        return list;
-    }();
+    static const Plugins known = with_plugins_of<BsdfModels>(
+        {"twosided", "mask", "bumpmap", "normalmap", "blendbsdf", "mixturebsdf", "coating", "roughcoating", "null"});
     return known;
 }
 

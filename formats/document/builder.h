@@ -74,6 +74,10 @@ struct Builder {
     void warn(const Where& where, const std::string& text);
 };
 
+/// Append to the scene; the index there.
+uint32_t add_bsdf(Builder& builder, const BsdfRecord& bsdf);
+uint32_t add_material(Builder& builder, const Material& material);
+
 /// Size and place of an image whose texels are in the scene.
 struct LoadedImage {
     uint32_t width = 0, height = 0;
@@ -135,10 +139,13 @@ public:
     void ignore(std::initializer_list<const char*> names);
     /// Parameters that ask for what is not done: a note says why.
     void leave(std::initializer_list<LeftOut> parameters, const std::string& why);
+    /// Fails since there is no parameter `name`, or by the misspelled one that there is instead.
+    [[noreturn]] void fail_without(const std::string& name, const std::string& message) const;
     /// Refuses what is left over.
     void finish();
 
 private:
+    std::string unknown(const Value& value, const Plugins& known) const;
     ParamRgb checked_reflectance(const std::string& name, const Object& texture, const ParamRgb& parameter);
     const Value* value(const std::string& name, std::initializer_list<ValueKind> kinds, const char* expected);
     const Value* find(const std::string& name) const;
@@ -156,6 +163,8 @@ private:
 enum class TextureUse { color, number, light };
 /// Texture object as index into Scene::textures (0 when only validating).
 int32_t load_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
+/// Whether a texture takes its values from the mesh.
+bool is_attribute(const Object& texture);
 /// The texture that stands for an attribute of the mesh (Builder::attribute_textures).
 int32_t attribute_texture(const Builder& builder, Reader& in);
 /// A texture inside of textures of type `scale`, and their factors.

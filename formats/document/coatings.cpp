@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/document/bsdf_plugins.h"
 #include "transport/bsdf/coating.h"
 #include "transport/bsdf/precompute.h"
 
@@ -25,13 +26,7 @@ CoatPlace read_coat(Builder& builder, Reader& in) {
         alpha = float(in.number("alpha", 0.1));
         if (!(alpha >= 0)) in.fail(in.where("alpha"), "roughness must not be negative");
         alpha = std::max(alpha, 1e-4f);
-        const std::string name = in.text("distribution", "beckmann");
-        if (name == "ggx")
-            distribution = Microfacets::ggx;
-        else if (name != "beckmann")
-            builder.refuse(in.where("distribution"),
-                           "microfacet distribution '" + name + "' is not supported (beckmann, ggx)",
-                           "beckmann is used");
+        distribution = read_distribution(builder, in);
         in.ignore({"sample_visible"});
         builder.note(in.where(),
                      "what lies below a roughcoating is as bright as below a smooth one; Mitsuba 0.6 has it darker by "

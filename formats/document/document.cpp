@@ -10,6 +10,18 @@ namespace ambilux::document {
 
 namespace fs = std::filesystem;
 
+void fail(const Where& where, const std::string& message) { throw input_error(where.file, where.line, message); }
+
+void check_shapes(const Limits& limits, uint64_t count, const Where& where) {
+    if (count > limits.shapes)
+        fail(where, "the scene has more shapes than --limits shapes=" + std::to_string(limits.shapes));
+}
+
+void check_nesting(const Limits& limits, uint64_t depth, const Where& where, const char* what) {
+    if (depth > limits.nesting)
+        fail(where, std::string(what) + " are nested deeper than --limits nesting=" + std::to_string(limits.nesting));
+}
+
 const Value* Object::find(const std::string& name) const {
     for (const Value& value : values)
         if (value.name == name) return &value;
@@ -28,7 +40,7 @@ std::string Document::resolve(const std::string& name, const Where& where) const
         for (const fs::path& folder : folders)
             if (fs::path candidate = folder / path; fs::exists(candidate, ignored)) return candidate.string();
     }
-    throw input_error(where.file, where.line, "file '" + name + "' does not exist");
+    fail(where, "file '" + name + "' does not exist");
 }
 
 Scene naming_includes(const Document& document, const std::function<Scene()>& load) {
@@ -43,10 +55,7 @@ Scene naming_includes(const Document& document, const std::function<Scene()>& lo
         constexpr int kMostNamed = 4;
         std::string outer;
         for (int i = 0; at != included.end() && i < kMostNamed; at = included.find(at->second.file), ++i)
-            outer.append(i ? ", by " : " (included by ")
-                .append(at->second.file)
-                .append(":")
-                .append(std::to_string(at->second.line));
+            outer.append(i ? ", by " : " (included by ").append(at->second.text());
         throw Error(e.code, message + outer + ")");
     }
 }
@@ -92,9 +101,8 @@ void take_texels(Document& document, const Where& where, uint64_t texels, uint64
     FileBudget(where.file, document.limits).bytes(texels, bytes_each);
     document.made_texels += texels * bytes_each;
     if (document.made_texels > document.limits.total_bytes)
-        throw input_error(where.file, where.line,
-                          "with it, textures take more memory than --limits total_bytes=" +
-                              std::to_string(document.limits.total_bytes));
+        fail(where, "with it, textures take more memory than --limits total_bytes=" +
+                        std::to_string(document.limits.total_bytes));
 }
 
 Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where) {
@@ -105,6 +113,24 @@ Object& add_object(Document& document, const std::string& tag, const std::string
     object.where = where;
     object.version = 2;
     return object;
+}
+
+Texels& add_image(Document& document, const std::string& name, uint32_t width, uint32_t height) {
+    Texels& image = document.images[name];
+    image = {};
+    image.width = width, image.height = height;
+    image.is_linear = true;
+    image.floats.assign(4 * size_t(width) * height, 1.0f);
+    return image;
+}
+
+Object& add_bitmap(Document& document, const Where& where, const std::string& image, const char* filter) {
+    Object& texture = add_object(document, "texture", "bitmap", where);
+    set_text(texture, "image", image);
+    set_boolean(texture, "raw", true);
+    set_text(texture, "wrap_mode", "clamp");
+    set_text(texture, "filter_type", filter);
+    return texture;
 }
 
 Object& add_light_back(Document& document, const Object& shape) {

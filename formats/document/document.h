@@ -32,6 +32,9 @@ struct Where {
     std::string text() const { return line ? file + ":" + std::to_string(line) : file; }
 };
 
+/// Throws Error(bad_input).
+[[noreturn]] void fail(const Where& where, const std::string& message);
+
 enum class ValueKind { boolean, integer, number, text, vector, rgb, spectrum, transform };
 
 /// One parameter of an object.
@@ -103,6 +106,11 @@ Scene naming_includes(const Document& document, const std::function<Scene()>& lo
 /// nested deeper than the limits allow.
 void check_references(const Document& document);
 
+/// Throw Error(bad_input) where the scene has more than `count` says is allowed: shapes in all, and `what` in each
+/// other.
+void check_shapes(const Limits& limits, uint64_t count, const Where& where);
+void check_nesting(const Limits& limits, uint64_t depth, const Where& where, const char* what);
+
 /// A new object of the document, of format 2.
 Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where);
 /// Calls f once for the object and each below it.
@@ -110,6 +118,10 @@ void for_all_below(const Object& object, const std::function<void(const Object&)
 /// Before a front end makes an image of its own: throws Error(bad_input) where one or all are more than the limits
 /// allow.
 void take_texels(Document& document, const Where& where, uint64_t texels, uint64_t bytes_each);
+/// An image of the document, of linear floats that are 1.
+Texels& add_image(Document& document, const std::string& name, uint32_t width, uint32_t height);
+/// A texture of an image of the document, its values as they are, and not repeated.
+Object& add_bitmap(Document& document, const Where& where, const std::string& image, const char* filter = "bilinear");
 /// What the file of an image says of itself and is not taken as it says, each once.
 void note_image(std::vector<std::string>& notes, const std::string& path, const Texels& image);
 /// Texels of a file, its digest and what there is to say of it.

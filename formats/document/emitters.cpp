@@ -21,8 +21,6 @@ void check_sampling_weight(Builder& builder, Reader& in) {
         builder.note(in.where("sampling_weight"), "sampling weights of emitters are left to --light-picking");
 }
 
-Vec3f to_vec3f(Vec3d v) { return {float(v.x), float(v.y), float(v.z)}; }
-
 /// Where it stands and how it is turned. `scale`, of all axes alike, means nothing to a light that spreads from a point
 /// or comes from afar.
 Matrix rigid_transform(Builder& builder, Reader& in, double* scale = nullptr) {
@@ -42,15 +40,24 @@ Matrix rigid_transform(Builder& builder, Reader& in, double* scale = nullptr) {
     return m;
 }
 
-/// Its rotation: what is infinitely far away has no place.
-Matrix without_place(Matrix m) {
-    for (int i = 0; i < 3; ++i) m.m[i][3] = 0;
-    return m;
+void place(Emitter& e, const Matrix& m) {
+    e.to_world = to_affine(m);
+    e.to_local = to_affine(affine_inverse(m));
+}
+
+/// Where it stands and what it points at.
+void place_beam(Builder& builder, Reader& in, Emitter& e, const Matrix& m) {
+    builder.check_range(in.where(), "the emitter of type '" + in.object().type + "'", {column(m, 3)});
+    e.position = rounded(column(m, 3));
+    e.direction = rounded(column(m, 2));
 }
 
 // One plugin a model: what its XML says.
 
-void read_plugin(ModelTag<AreaEmitter>, Builder&, Reader& in, Emitter& e) {
+/// All that are on shapes; `hiddenarea` is of pbrt, for scenes that are converted.
+template <class Model>
+    requires(Model::surface)
+void read_plugin(ModelTag<Model>, Builder&, Reader& in, Emitter& e) {
     e.radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
 }
 
@@ -61,17 +68,14 @@ void read_plugin(ModelTag<PointEmitter>, Builder& builder, Reader& in, Emitter& 
     const Matrix to_world = in.has("position") ? translation(p.x, p.y, p.z) : in.transform("to_world");
     const Vec3d at = column(builder.to_scene * to_world, 3);
     builder.check_range(in.where(), "the emitter of type 'point'", {at});
-    e.position = to_vec3f(at);
+    e.position = rounded(at);
     e.radiance = {in.color("intensity", {1, 1, 1}, SpectrumUse::emission), -1};
 }
 
 void read_plugin(ModelTag<SpotEmitter>, Builder& builder, Reader& in, Emitter& e) {
     const Matrix m = rigid_transform(builder, in);
-    builder.check_range(in.where(), "the emitter of type 'spot'", {column(m, 3)});
-    e.to_world = to_affine(m);
-    e.to_local = to_affine(affine_inverse(m));
-    e.position = to_vec3f(column(m, 3));
-    e.direction = to_vec3f(column(m, 2));
+    place_beam(builder, in, e, m);
+    place(e, m);
     const double cutoff = in.number("cutoff_angle", 20), beam = in.number("beam_width", cutoff * 0.75);
     if (!(cutoff > 0 && cutoff < 90))
         in.fail(in.where("cutoff_angle"), "cutoff_angle must lie between 0 and 90 degrees");
@@ -86,11 +90,8 @@ void read_plugin(ModelTag<SpotEmitter>, Builder& builder, Reader& in, Emitter& e
 void read_plugin(ModelTag<ProjectorEmitter>, Builder& builder, Reader& in, Emitter& e) {
     double enlarged = 1;
     const Matrix m = rigid_transform(builder, in, &enlarged);
-    builder.check_range(in.where(), "the emitter of type 'projector'", {column(m, 3)});
-    e.to_world = to_affine(m);
-    e.to_local = to_affine(affine_inverse(m));
-    e.position = to_vec3f(column(m, 3));
-    e.direction = to_vec3f(column(m, 2));
+    place_beam(builder, in, e, m);
+    place(e, m);
     e.radiance = in.textured_color("irradiance", {1, 1, 1}, SpectrumUse::emission);
     e.radiance.value = e.radiance.value * float(M_PI * in.number("scale", 1) * enlarged);  // as in Mitsuba
     double aspect = 1;
@@ -108,9 +109,8 @@ void read_plugin(ModelTag<DirectionalEmitter>, Builder&, Reader& in, Emitter& e)
         in.fail(in.where("to_world"), "both 'direction' and 'to_world' are given");
     Vec3d d = column(in.transform("to_world"), 2);
     if (in.has("direction")) d = in.vector("direction", {0, 0, 1});
-    const double l = length(d);
-    if (!(l > 0)) in.fail(in.where("direction"), "the direction of the emitter is zero");
-    e.direction = to_vec3f({d.x / l, d.y / l, d.z / l});
+    if (!(length(d) > 0)) in.fail(in.where("direction"), "the direction of the emitter is zero");
+    e.direction = rounded(unit(d));
     e.radiance = {in.color("irradiance", {1, 1, 1}, SpectrumUse::emission), -1};
 }
 
@@ -120,30 +120,16 @@ void read_plugin(ModelTag<ConstantEmitter>, Builder&, Reader& in, Emitter& e) {
 }
 
 void read_plugin(ModelTag<CollimatedEmitter>, Builder& builder, Reader& in, Emitter& e) {
-    const Matrix m = rigid_transform(builder, in);
-    builder.check_range(in.where(), "the emitter of type 'collimated'", {column(m, 3)});
-    e.position = to_vec3f(column(m, 3));
-    e.direction = to_vec3f(column(m, 2));
+    place_beam(builder, in, e, rigid_transform(builder, in));
     e.radiance = {in.color("power", {1, 1, 1}, SpectrumUse::emission), -1};
 }
 
-void read_plugin(ModelTag<DirectionalAreaEmitter>, Builder&, Reader& in, Emitter& e) {
-    e.radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
-}
-
-/// Of pbrt, for scenes that are converted.
-void read_plugin(ModelTag<HiddenAreaEmitter>, Builder&, Reader& in, Emitter& e) {
-    e.radiance = in.textured_color("radiance", {1, 1, 1}, SpectrumUse::emission);
-}
-
 void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter& e) {
-    const Matrix m = without_place(rigid_transform(builder, in));
-    e.to_world = to_affine(m);
-    e.to_local = to_affine(affine_inverse(m));
+    place(e, without_place(rigid_transform(builder, in)));
     const auto given = builder.document.images.find(in.object().find("image") ? in.text("image", "") : "");
     const bool is_given = given != builder.document.images.end();
     const std::string name = is_given ? "" : in.text("filename", "");
-    if (name.empty() && !is_given) in.fail("envmap has no filename");
+    if (name.empty() && !is_given) in.fail_without("filename", "envmap has no filename");
     const double scale = in.number("scale", 1);
     if (!(scale >= 0)) in.fail(in.where("scale"), "scale must not be negative");
     in.leave({{"cache"}, {"mis_compensation", "false"}}, "it is sampled in our own way");
@@ -205,11 +191,7 @@ void build_emitter(Builder& builder, const Object& object) {
 }
 
 const Plugins& emitter_plugins() {
-    static const Plugins known = [] {
-        Plugins list = {"sky", "sun", "sunsky"};
-        EmitterModels::for_each([&](auto model) { list.emplace_back(decltype(model)::type::plugin); });
-        return list;
-    }();
+    static const Plugins known = with_plugins_of<EmitterModels>({"sky", "sun", "sunsky"});
     return known;
 }
 

@@ -5,7 +5,6 @@
 #include "core/error.h"
 #include "core/half.h"
 #include "core/scoped_seconds.h"
-#include "core/srgb.h"
 #include "formats/document/builder.h"
 #include "formats/file_budget.h"
 #include "formats/images/image_io.h"
@@ -14,20 +13,12 @@ namespace ambilux::document {
 
 namespace {
 
-/// How stored values become linear ones: gamma 1 linear, -1 sRGB, other values a power.
-float decode(float value, double gamma) {
-    if (gamma == 1) return value;
-    const double v = value;
-    if (gamma == -1) return float(srgb_to_linear(v));
-    return float(std::pow(v, gamma));
-}
-
 uint32_t decode_table(Builder& builder, double gamma) {
     const std::string key = "decode " + std::to_string(gamma);
     const auto it = builder.table_pool.find(key);
     if (it != builder.table_pool.end()) return it->second;
     const uint32_t offset = uint32_t(builder.scene.tables.size());
-    for (int i = 0; i < 256; ++i) builder.scene.tables.push_back(decode(float(i) / 255.0f, gamma));
+    for (int i = 0; i < 256; ++i) builder.scene.tables.push_back(float(decoded(float(i) / 255.0f, gamma)));
     builder.table_pool[key] = offset;
     return offset;
 }
@@ -118,7 +109,7 @@ LoadedImage load_image(Builder& builder, const std::string& path, double gamma, 
         std::vector<float> texels(count * 4);
         for (size_t i = 0; i < texels.size(); ++i) {
             const float stored = image.is_8bit ? float(image.bytes[i]) / 255.0f : image.floats[i];
-            texels[i] = i % 4 == 3 ? stored : decode(stored, used_gamma);
+            texels[i] = i % 4 == 3 ? stored : float(decoded(stored, used_gamma));
             if (!std::isfinite(texels[i]))
                 throw input_error(path, 0,
                                   "texel (" + std::to_string(i / 4 % image.width) + ", " +

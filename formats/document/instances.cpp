@@ -40,7 +40,7 @@ void centre(GroupJobs& group, const std::vector<MeshSource>& sources, std::vecto
     double lower[3] = {INFINITY, INFINITY, INFINITY}, upper[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (const Job* job : shared)
         for (const Vec3f& p : sources[size_t(job->source)].content().positions) {
-            const Vec3d q = column(job->to_world * translation(p.x, p.y, p.z), 3);
+            const Vec3d q = transformed(job->to_world, in_double(p));
             const double c[3] = {q.x, q.y, q.z};
             for (int i = 0; i < 3; ++i) lower[i] = std::min(lower[i], c[i]), upper[i] = std::max(upper[i], c[i]);
         }
@@ -66,23 +66,17 @@ void place_instances(const Builder& builder, std::vector<GroupJobs>& groups, con
         const uint64_t triangles = triangles_of(groups[g], sources);
         shared[g] = uses[g] > 1 && triangles > 0 && uses[g] > builder.options.limits.copies / triangles;
     }
-    const auto check_count = [&](const Where& where, size_t count) {
-        if (count <= builder.options.limits.shapes) return;
-        throw input_error(
-            where.file, where.line,
-            "the scene has more shapes than --limits shapes=" + std::to_string(builder.options.limits.shapes));
-    };
     std::vector<Job> placed;
     size_t count = 0;
     for (Job& job : jobs) {
         if (job.group < 0) {
-            check_count(job.where, ++count);
+            check_shapes(builder.options.limits, ++count, job.where);
             placed.push_back(std::move(job));
             continue;
         }
         GroupJobs& group = groups[size_t(job.group)];
         const bool shares = shared[size_t(job.group)] && has_ordinary_scale(job.to_world);
-        check_count(job.where, count += group.jobs.size());
+        check_shapes(builder.options.limits, count += group.jobs.size(), job.where);
         for (const Job& part : group.jobs)
             if (!shares || part.source < 0) placed.push_back(copy_of(part, job.to_world));
         if (shares) group.where.push_back(job.where), group.placements.push_back(job.to_world);
@@ -133,8 +127,7 @@ void add_instances(const Builder& builder, const std::vector<GroupJobs>& groups,
             next += group.triangle_count;
             copies += group.triangle_count;
             if (next >= kNone / 2)
-                throw input_error(groups[g].where[i].file, groups[g].where[i].line,
-                                  "the scene has too many triangles, those of instances counted one by one");
+                fail(groups[g].where[i], "the scene has too many triangles, those of instances counted one by one");
             scene.instances.push_back(instance);
             const Bounds3f b = instance_bounds(placed, instance);
             builder.check_range(groups[g].where[i], "the instance",

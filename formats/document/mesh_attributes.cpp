@@ -11,9 +11,9 @@
 
 namespace ambilux::document {
 
-namespace {
-
 bool is_attribute(const Object& texture) { return texture.type == "mesh_attribute" || texture.type == "vertexcolors"; }
+
+namespace {
 
 /// The attribute that such a texture shows.
 std::string attribute_of(const Object& texture) {
@@ -85,8 +85,7 @@ std::set<std::string> mesh_attributes_of(const Object& bsdf) {
     AttributeUse use;
     use.look_into(bsdf);
     if (!use.attributes.empty() && use.others)
-        throw input_error(bsdf.where.file, bsdf.where.line,
-                          "mesh attributes together with other textures in one BSDF are not supported");
+        fail(bsdf.where, "mesh attributes together with other textures in one BSDF are not supported");
     return use.attributes;
 }
 
@@ -125,27 +124,24 @@ Mesh with_attribute_atlas(Builder& builder, const std::string& path, const Mesh&
         textures[a.name] = add_atlas(builder, atlas.width, atlas.height, texels, facts);
     }
     builder.take_memory(mesh_bytes(3 * mesh.faces.size(), mesh.faces.size()), path);
-    Mesh out;
-    out.origin = mesh.origin;
+    Mesh out = with_own_corners(mesh);
     // Vertices that were shared keep the normal that they would have got.
-    const bool flat = mesh.normals.empty() && !builder.document.smooth_normals;
-    const std::vector<Vec3f> normals = mesh.normals.empty() && !flat ? smooth_normals(mesh) : mesh.normals;
+    if (mesh.normals.empty() && builder.document.smooth_normals) {
+        const std::vector<Vec3f> normals = smooth_normals(mesh);
+        for (const auto& face : mesh.faces)
+            for (const uint32_t v : face) out.normals.push_back(normals[v]);
+    }
     for (size_t t = 0; t < mesh.faces.size(); ++t)
         for (uint32_t k = 0; k < 3; ++k) {
-            const uint32_t v = mesh.faces[t][k];
-            out.positions.push_back(mesh.positions[v]);
-            if (!flat) out.normals.push_back(normals[v]);
             const double x = atlas.x(t) + (k == 1 ? 1.5 : 0.5), y = atlas.y(t) + (k == 2 ? 1.5 : 0.5);
             out.uvs.push_back({float(x / atlas.width), float(y / atlas.height)});
-            if (k == 2) out.faces.push_back({uint32_t(3 * t), uint32_t(3 * t + 1), uint32_t(3 * t + 2)});
         }
     return out;
 }
 
 int32_t attribute_texture(const Builder& builder, Reader& in) {
     const std::string name = attribute_of(in.object());
-    in.ignore({"name"});
-    if (in.number("scale", 1) != 1) in.fail(in.where("scale"), "a scale of mesh_attribute is not supported");
+    in.ignore({"name", "scale"});  // load_scaled_texture() takes the scale
     in.finish();
     if (builder.validate_only) return 0;
     const auto* known = builder.attribute_textures;

@@ -86,6 +86,13 @@ bool equal_ignoring_case(std::string_view a, const char* b) {
     return !*b;
 }
 
+template <class Table>
+std::string names_of(const Table& table) {
+    std::string names;
+    for (const auto& entry : table) names += (names.empty() ? "" : ", ") + std::string(entry.name);
+    return names;
+}
+
 }  // namespace
 
 bool find_ior(std::string_view name, float& ior) {
@@ -112,16 +119,7 @@ bool find_metal(std::string_view name, Rgb& eta, Rgb& k) {
     return find(name) || (name.ends_with(suffix) && find(name.substr(0, name.size() - suffix.size())));
 }
 
-std::string ior_names() {
-    std::string names;
-    for (const Ior& entry : kIors) names += (names.empty() ? "" : ", ") + std::string(entry.name);
-    return names;
-}
-
-std::string metal_names() {
-    std::string names;
-    for (const Metal& metal : kMetals) names += (names.empty() ? "" : ", ") + std::string(metal.name);
-    return names;
-}
+std::string ior_names() { return names_of(kIors); }
+std::string metal_names() { return names_of(kMetals); }
 
 }  // namespace ambilux

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "core/error.h"
 #include "core/text_cursor.h"
 
 namespace ambilux::document {
@@ -15,8 +14,7 @@ double parse_number(const std::string& text, const Where& where, const std::stri
     cursor.skip_space();
     if (ok && !cursor.done()) ok = cursor.word() == "f";  // 0.5f, as Mitsuba 2 takes it
     cursor.skip_space();
-    if (!ok || !cursor.done() || !std::isfinite(value))
-        throw input_error(where.file, where.line, "'" + text + "' is not a number (" + what + ")");
+    if (!ok || !cursor.done() || !std::isfinite(value)) fail(where, "'" + text + "' is not a number (" + what + ")");
     return value;
 }
 

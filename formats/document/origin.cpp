@@ -24,9 +24,8 @@ Vec3d far_center(const Scene& scene) {
     Bounds3f box = surface_bounds(scene);
     const auto& m = scene.sensor.to_world.m;
     box.extend(Vec3f{m[0][3], m[1][3], m[2][3]});
-    const auto half = [](float a, float b) { return 0.5 * (double(a) + double(b)); };
-    const Vec3d c = {half(box.lower.x, box.upper.x), half(box.lower.y, box.upper.y), half(box.lower.z, box.upper.z)};
-    const double radius = length({box.upper.x - c.x, box.upper.y - c.y, box.upper.z - c.z}),
+    const Vec3d c = (in_double(box.lower) + in_double(box.upper)) * 0.5;
+    const double radius = length(in_double(box.upper) - c),
                  away = std::max({std::fabs(c.x), std::fabs(c.y), std::fabs(c.z)});
     // Written so that what is not finite stays where it is, to be refused by name.
     return radius > 0 && std::isfinite(away + radius) && away > kFar * radius ? c : Vec3d{};

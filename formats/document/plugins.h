@@ -19,6 +19,13 @@ const Plugins& sensor_plugins();
 const Plugins& shape_plugins();
 const Plugins& texture_plugins();
 
+/// The list and, behind it, the plugins of all models.
+template <class Models>
+Plugins with_plugins_of(Plugins list = {}) {
+    Models::for_each([&](auto model) { list.emplace_back(decltype(model)::type::plugin); });
+    return list;
+}
+
 bool is_one_of(const Plugins& plugins, const std::string& type);
 
 /// The one of these that differs from `name` by a letter or two; empty if there is none.

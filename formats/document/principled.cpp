@@ -11,7 +11,10 @@
 namespace ambilux::document {
 namespace {
 
-constexpr const char* kSampling = "samples are chosen in our own way";
+void leave_rates(Reader& in, std::initializer_list<const char*> lobes) {
+    for (const std::string lobe : lobes)
+        in.leave({{(lobe + "_sampling_rate").c_str()}}, "samples are chosen in our own way");
+}
 
 ParamFloat textured_share(Reader& in, const char* name, float fallback) {
     const ParamFloat given = in.textured_number(name, fallback);
@@ -91,12 +94,7 @@ PrincipledParts read_principled(Builder& builder, Reader& in) {
     p.clearcoat = share(builder, in, "clearcoat", 0);
     p.clearcoat_alpha = 0.1f + (0.001f - 0.1f) * share(builder, in, "clearcoat_gloss", 0);
     const ParamFloat spec_trans = textured_share(in, "spec_trans", 0);
-    in.leave({{"diffuse_reflectance_sampling_rate"},
-              {"main_specular_sampling_rate"},
-              {"clearcoat_sampling_rate"},
-              {"spec_reflectance_sampling_rate"},
-              {"spec_trans_sampling_rate"}},
-             kSampling);
+    leave_rates(in, {"diffuse_reflectance", "main_specular", "clearcoat", "spec_reflectance", "spec_trans"});
     if (spec_trans.texture < 0 && spec_trans.value == 0) return parts;
 
     if (p.ior == 1) in.fail(in.where("eta"), "spec_trans needs an index of refraction other than 1");
@@ -134,11 +132,7 @@ Textured<PrincipledThin> read_principled_thin(Builder& builder, Reader& in) {
     p.specular = textured_share(in, "spec_trans", 0);
     p.ior = in.has("eta") ? read_eta(builder, in) : 1.5f;
     p.through = share(builder, in, "diff_trans", 0, 2) / 2;
-    in.leave({{"diffuse_reflectance_sampling_rate"},
-              {"specular_reflectance_sampling_rate"},
-              {"specular_transmittance_sampling_rate"},
-              {"diffuse_transmittance_sampling_rate"}},
-             kSampling);
+    leave_rates(in, {"diffuse_reflectance", "specular_reflectance", "specular_transmittance", "diffuse_transmittance"});
     return p;
 }
 

@@ -19,7 +19,7 @@ static const Plugins kMarks = {"caustic_caster_single", "caustic_caster_multi", 
                                "caustic_bouncer",       "caustic_emitter_single", "caustic_emitter_multi"};
 
 void Builder::refuse(const Where& where, const std::string& problem, const std::string& instead) {
-    if (!options.lenient) throw input_error(where.file, where.line, problem);
+    if (!options.lenient) fail(where, problem);
     warn(where, problem + "; " + instead);
 }
 
@@ -73,9 +73,7 @@ void Builder::check_range(const Where& where, const std::string& what, std::init
 }
 
 void Reader::fail(const std::string& message) const { fail(object_.where, message); }
-void Reader::fail(const Where& where, const std::string& message) const {
-    throw input_error(where.file, where.line, message);
-}
+void Reader::fail(const Where& where, const std::string& message) const { document::fail(where, message); }
 
 const Value* Reader::find(const std::string& name) const {
     const Value* v = object_.find(name);
@@ -257,6 +255,17 @@ void Reader::leave(std::initializer_list<LeftOut> parameters, const std::string&
     }
 }
 
+std::string Reader::unknown(const Value& value, const Plugins& known) const {
+    return fmt::format("unknown parameter '{}' of {} '{}'{}", value.name, object_.tag, object_.type,
+                       nearly(known, value.name));
+}
+
+void Reader::fail_without(const std::string& name, const std::string& message) const {
+    for (const Value& v : object_.values)
+        if (!used_values_.contains(&v) && nearest_name({name}, v.name) == name) fail(v.where, unknown(v, {name}));
+    fail(message);
+}
+
 void Reader::finish() {
     for (const Value& v : object_.values)
         if (used_values_.count(&v))
@@ -267,10 +276,7 @@ void Reader::finish() {
                                       object_.type.empty() ? "" : " '" + object_.type + "'",
                                       object_.version < 2 ? ", as Mitsuba 0.6 does" : "", nearly(absent_, v.name)));
         else
-            builder_.refuse(v.where,
-                            "unknown parameter '" + v.name + "' of " + object_.tag + " '" + object_.type + "'" +
-                                nearly(absent_, v.name),
-                            "it is ignored");
+            builder_.refuse(v.where, unknown(v, absent_), "it is ignored");
     for (const Child& child : object_.children)
         if (!used_children_.count(&child))
             builder_.refuse(child.where,
@@ -285,15 +291,10 @@ Matrix rigid_part(const Matrix& m, bool& problem) {
     // Published matrices have six digits.
     problem = !is_orthogonal(m, 1e-3);
     for (const Vec3d& c : {x, y, z}) problem |= !(std::abs(length(c) - 1) < 1e-3);
-    const auto scaled = [](Vec3d a, double s) { return Vec3d{a.x * s, a.y * s, a.z * s}; };
     // Gram-Schmidt from z, the view direction; a reflection stays one.
-    const Vec3d uz = scaled(z, 1 / length(z));
-    const Vec3d py = y - scaled(uz, dot(y, uz)), uy = scaled(py, 1 / length(py));
-    const Vec3d right = cross(uy, uz), ux = scaled(right, dot(right, x) < 0 ? -1 : 1);
-    Matrix r = m;
-    const Vec3d columns[3] = {ux, uy, uz};
-    for (int j = 0; j < 3; ++j) r.m[0][j] = columns[j].x, r.m[1][j] = columns[j].y, r.m[2][j] = columns[j].z;
-    return r;
+    const Vec3d uz = z * (1 / length(z));
+    const Vec3d py = y - uz * dot(y, uz), uy = py * (1 / length(py)), right = cross(uy, uz);
+    return from_columns(right * (dot(right, x) < 0 ? -1 : 1), uy, uz, column(m, 3));
 }
 
 }  // namespace ambilux::document

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <map>
 
-#include "core/error.h"
 #include "formats/document/document.h"
 
 namespace ambilux::document {
@@ -27,18 +26,16 @@ struct Extents {
         Extent sum = {1, 1};
         for (const Child& child : object.children) {
             const Where& at = child.where.file.empty() ? child.object->where : child.where;
-            const auto fail = [&at](const std::string& problem) { throw input_error(at.file, at.line, problem); };
             const Extent inner = depth < limits.nesting ? measure(*child.object, depth + 1) : Extent{1, 1};
-            if (inner.objects == 0) fail("circular reference to id '" + child.object->id + "'");
+            if (inner.objects == 0) fail(at, "circular reference to id '" + child.object->id + "'");
             // What instances make of a group is limited where it is copied (Limits::copies, shapes).
             const uint64_t objects =
                 child.object->type == "shapegroup" && object.type == "instance" ? 1 : inner.objects;
             sum = {sum.objects + objects, std::max(sum.height, inner.height + 1)};
-            if (depth + inner.height > limits.nesting)
-                fail("references are nested deeper than --limits nesting=" + std::to_string(limits.nesting));
+            check_nesting(limits, depth + inner.height, at, "references");
             if (sum.objects / kObjectsPerShape > limits.shapes)
-                fail("the references of the scene make more objects of it than --limits shapes=" +
-                     std::to_string(limits.shapes) + " would need");
+                fail(at, "the references of the scene make more objects of it than --limits shapes=" +
+                             std::to_string(limits.shapes) + " would need");
         }
         return known[&object] = sum;
     }

@@ -4,11 +4,9 @@
 #include <cmath>
 
 #include "accel/range.h"
-#include "core/error.h"
 #include "core/text_cursor.h"
 #include "formats/document/builder.h"
 #include "formats/document/plugins.h"
-#include "transport/subpath/subpath.h"
 
 namespace ambilux::document {
 
@@ -167,23 +165,10 @@ void read_film(Builder& builder, const Object* object, Sensor& sensor) {
     // The note on such a type says so.
     if (known && type != "hdrfilm")
         in.ignore({"exposure", "key", "burn", "tonemap_method", "label", "digits", "variable", "gamma", "tonemap"});
-    in.leave({{"banner", "false"},
-              {"attach_log", "false"},
-              {"gamma"},
-              {"exposure"},
-              {"key"},
-              {"burn"},
-              {"tonemap_method"},
-              {"label"},
-              {"digits"},
-              {"variable"},
-              {"tonemap"},
-              {"fps"},
-              {"cache"},
-              {"reinhard_key"},
-              {"mode"},
-              {"filename"}},
-             shown);
+    in.leave({{"banner", "false"}, {"attach_log", "false"}}, shown);
+    for (const char* name : {"gamma", "exposure", "key", "burn", "tonemap_method", "label", "digits", "variable",
+                             "tonemap", "fps", "cache", "reinhard_key", "mode", "filename"})
+        in.leave({{name}}, shown);
     if (known) in.finish();
     if (builder.options.width) resize_film(builder.options.width, builder.options.height, sensor);
 }
@@ -233,7 +218,7 @@ void read_lens(Reader& in, Sensor& sensor, double aspect) {
         in.fail(in.where("near_clip"), "near_clip must be positive and smaller than far_clip");
     sensor.focus_distance = float(in.number("focus_distance", sensor.far_clip));
     if (has_lens(sensor.type)) {
-        if (!in.has("aperture_radius")) in.fail("thinlens has no aperture_radius");
+        if (!in.has("aperture_radius")) in.fail_without("aperture_radius", "thinlens has no aperture_radius");
         sensor.aperture_radius = range_parameter(in, "aperture_radius", 0);
         if (!(sensor.aperture_radius >= 0))
             in.fail(in.where("aperture_radius"), "aperture_radius must not be negative");
@@ -306,11 +291,7 @@ void build_sensor(Builder& builder, const Object& object) {
 }
 
 const Plugins& sensor_plugins() {
-    static const Plugins known = [] {
-        Plugins list;
-        SensorModels::for_each([&](auto model) { list.emplace_back(decltype(model)::type::plugin); });
-        return list;
-    }();
+    static const Plugins known = with_plugins_of<SensorModels>();
     return known;
 }
 

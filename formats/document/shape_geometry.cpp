@@ -22,10 +22,7 @@ Vec3f point_of(const Matrix& a, Vec3f p) {
 }
 
 /// Twice the area of a triangle along its normal; in double, since the area of a small triangle may be no float.
-Vec3d area_normal(Vec3f a, Vec3f b, Vec3f c) {
-    const auto from_a = [a](Vec3f p) { return Vec3d{double(p.x) - a.x, double(p.y) - a.y, double(p.z) - a.z}; };
-    return cross(from_a(b), from_a(c));
-}
+Vec3d area_normal(Vec3f a, Vec3f b, Vec3f c) { return cross(in_double(b) - in_double(a), in_double(c) - in_double(a)); }
 
 /// How far the back of a light lies behind its front, in shares of its extent and of its coordinates: several roundings
 /// of a ray's origin.
@@ -49,7 +46,7 @@ void move_behind(const Job& job, Matrix& m) {
                  distance = std::max(double(kBackOfExtent) * extent, double(kBackOfCoordinate) * (most + extent));
     if (job.type == "disk") {
         const Vec3d n = cross(x, y);
-        const double side = (n.x * z.x + n.y * z.y + n.z * z.z < 0) == job.flip ? 1 : -1, l = length(n);
+        const double side = (dot(n, z) < 0) == job.flip ? 1 : -1, l = length(n);
         m = translation(side * distance * n.x / l, side * distance * n.y / l, side * distance * n.z / l) * m;
         return;
     }
@@ -105,7 +102,7 @@ void place_mesh(const Builder& builder, Job& job, const Mesh& source) {
     for (auto& f : out.faces) {
         const Vec3d n = normal_of(f);
         const double area = length(n);
-        const Vec3f ng = {float(n.x / area), float(n.y / area), float(n.z / area)};
+        const Vec3f ng = rounded({n.x / area, n.y / area, n.z / area});
         Vec3f sum = {0, 0, 0};
         for (uint32_t v : f) {
             if (is_zero(out.normals[v])) out.normals[v] = ng;  // the file gives none here
@@ -138,10 +135,7 @@ Quadric make_quadric(Builder& builder, const Job& job) {
         if (is_orthogonal(m, 1e-6)) q.radius = float(std::max(lx, ly));
     } else {
         const double radius = q.type == PrimitiveType::sphere ? (lx + ly + lz) / 3 : (lx + ly) / 2;
-        const bool uniform = is_orthogonal(m, 1e-3) && std::fabs(lx - radius) < 1e-3 * radius &&
-                             std::fabs(ly - radius) < 1e-3 * radius &&
-                             (q.type == PrimitiveType::cylinder || std::fabs(lz - radius) < 1e-3 * radius);
-        if (!uniform)
+        if (!keeps_round(m, q.type == PrimitiveType::sphere))
             builder.refuse(job.where, "a " + job.type + " with shear or non-uniform scale is not supported",
                            "the mean scale is used");
         // Make the axes exactly orthogonal and the scale exactly uniform, so that every formula sees the same shape.
@@ -159,9 +153,8 @@ Quadric make_quadric(Builder& builder, const Job& job) {
                         {{c.x - reach, c.y - reach, c.z - reach}, {c.x + reach, c.y + reach, c.z + reach}});
     const double least = std::min({lx, ly, q.type == PrimitiveType::disk ? lx : lz});
     if (!(least >= double(kLeastExtent)))
-        throw input_error(
-            job.where.file, job.where.line,
-            fmt::format("the shape of type '{}' is {:g} wide, less than {:g}", job.type, least, kLeastExtent));
+        fail(job.where,
+             fmt::format("the shape of type '{}' is {:g} wide, less than {:g}", job.type, least, kLeastExtent));
     q.to_world = to_affine(m);
     q.to_local = to_affine(affine_inverse(m));
     return q;

@@ -2,9 +2,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/error.h"
 #include "core/parallel.h"
-#include "core/scoped_seconds.h"
 #include "formats/document/builder.h"
 #include "formats/document/plugins.h"
 #include "formats/document/shape_jobs.h"
@@ -32,8 +30,8 @@ struct ShapeBuilder {
         return it->second;
     }
 
-    void add_shape(const Object& object, const Matrix& outer, bool in_instance, bool in_group);
-    bool add_shapes_inside(Reader& in, const Matrix& outer, bool in_instance, bool in_group);
+    void add_shape(const Object& object, const Matrix& outer, bool in_group);
+    bool add_shapes_inside(Reader& in, const Matrix& outer, bool in_group);
     void read_placement(Reader& in, const Matrix& outer, Job& job);
     void add_instance(const Object& object, const Matrix& outer);
     void read_geometry(Reader& in, Job& job);
@@ -60,35 +58,30 @@ Matrix local_form(Reader& in, const std::string& type) {
     }
     if (type == "disk") return {};
     const Vec3d p0 = in.vector("p0", {0, 0, 0}), p1 = in.vector("p1", {0, 0, 1});
-    const Vec3d axis = {p1.x - p0.x, p1.y - p0.y, p1.z - p0.z};
-    const double l = length(axis);
+    const double l = length(p1 - p0);
     if (!(l > 0)) in.fail("cylinder has no length: p0 equals p1");
     // The frame of core/math.h (and of Mitsuba), in double: it decides where the azimuth starts.
-    const Vec3d n = {axis.x / l, axis.y / l, axis.z / l};
+    const Vec3d n = unit(p1 - p0);
     const double sign = std::copysign(1.0, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
-    const Vec3d columns[4] = {
-        {1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}, n, {p0.x, p0.y, p0.z}};
-    Matrix frame;
-    for (int j = 0; j < 4; ++j)
-        frame.m[0][j] = columns[j].x, frame.m[1][j] = columns[j].y, frame.m[2][j] = columns[j].z;
-    return frame * scaling(radius, radius, l);
+    const Vec3d s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, t = {b, sign + n.y * n.y * a, -n.y};
+    return from_columns(s, t, n, p0) * scaling(radius, radius, l);
 }
 
 /// Of an object that is made of others. False if it is none.
-bool ShapeBuilder::add_shapes_inside(Reader& in, const Matrix& outer, bool in_instance, bool in_group) {
+bool ShapeBuilder::add_shapes_inside(Reader& in, const Matrix& outer, bool in_group) {
     const std::string& type = in.object().type;
     if (type == "shapegroup") {
         if (in_group) in.fail("a shapegroup inside of a shapegroup is not supported");
         return true;  // shown by its instances
     }
     if (type == "instance") {
-        if (in_instance) in.fail("an instance inside of a shapegroup is not supported");
+        if (in_group) in.fail("an instance inside of a shapegroup is not supported");
         add_instance(in.object(), outer);
         return true;
     }
     if (type != "merge") return false;
     // One mesh of those inside, which looks the same.
-    while (const Object* shape = in.take("shape")) add_shape(*shape, outer, in_instance, in_group);
+    while (const Object* shape = in.take("shape")) add_shape(*shape, outer, in_group);
     in.finish();
     return true;
 }
@@ -111,9 +104,9 @@ void ShapeBuilder::read_placement(Reader& in, const Matrix& outer, Job& job) {
     }
 }
 
-void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_instance, bool in_group) {
+void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_group) {
     Reader in(builder, object);
-    if (add_shapes_inside(in, outer, in_instance, in_group)) return;
+    if (add_shapes_inside(in, outer, in_group)) return;
     const std::string& type = object.type;
     const bool given = type == "mesh" && !builder.document.meshes.empty();
     if (!is_one_of(shape_plugins(), type) && !given) {
@@ -133,7 +126,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     else
         read_geometry(in, job);
     const Object* emitter = in.take("emitter");
-    if (emitter && in_instance)
+    if (emitter && in_group)
         builder.refuse(emitter->where, "an emitter inside of a shapegroup is not supported", "the shape does not emit");
     else if (emitter)
         job.emitter = add_emitter(*emitter);
@@ -145,8 +138,7 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     in.leave({{"shutter_open", "0"}, {"shutter_close", "0"}}, "nothing moves");
     if (type == "ply" && object.version < 2) in.ignore({"srgb"});  // of colours that nothing uses
     in.finish();
-    if (jobs.size() >= builder.options.limits.shapes)
-        in.fail("the scene has more shapes than --limits shapes=" + std::to_string(builder.options.limits.shapes));
+    check_shapes(builder.options.limits, jobs.size() + 1, object.where);
     jobs.push_back(std::move(job));
 }
 
@@ -191,7 +183,7 @@ void ShapeBuilder::read_geometry(Reader& in, Job& job) {
 void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
     MeshSource source;
     const std::string name = in.text("filename", "");
-    if (name.empty()) in.fail(job.type + " shape has no filename");
+    if (name.empty()) in.fail_without("filename", job.type + " shape has no filename");
     source.path = builder.file(name, in.where("filename"));
     source.type = job.type;
     source.flip_v = in.boolean("flip_tex_coords", job.type == "obj");
@@ -209,7 +201,7 @@ void ShapeBuilder::read_mesh_file(Reader& in, Job& job) {
 
 void ShapeBuilder::read_tessellated(Reader& in, Job& job, const Matrix& outer) {
     const std::string name = in.text("filename", "");
-    if (name.empty()) in.fail(job.type + " shape has no filename");
+    if (name.empty()) in.fail_without("filename", job.type + " shape has no filename");
     const std::string path = builder.file(name, in.where("filename"));
     const bool grid = job.type == "sdfgrid", field = job.type == "heightfield";
     const double scale = field ? in.number("scale", 1) : 1;
@@ -244,10 +236,7 @@ void ShapeBuilder::read_tessellated(Reader& in, Job& job, const Matrix& outer) {
     } else {
         std::vector<Curve> curves = read_curves(path, bytes, limits);
         for (Curve& curve : curves)
-            for (CurvePoint& c : curve) {
-                const Vec3d p = column(placed * translation(c.p[0], c.p[1], c.p[2]), 3);
-                c.p[0] = p.x, c.p[1] = p.y, c.p[2] = p.z;
-            }
+            for (CurvePoint& c : curve) c.p = transformed(placed, c.p);
         source.mesh = job.type == "linearcurve" ? mesh_of_linear_curves(curves) : mesh_of_bspline_curves(path, curves);
     }
     builder.note(in.where(), "shapes of type '" + job.type +
@@ -284,13 +273,12 @@ void ShapeBuilder::add_instance(const Object& object, const Matrix& outer) {
     if (is_new) {
         std::vector<Job> others = std::exchange(jobs, {});
         Reader group_in(builder, *group);
-        while (const Object* shape = group_in.take("shape")) add_shape(*shape, {}, true, true);
+        while (const Object* shape = group_in.take("shape")) add_shape(*shape, {}, true);
         group_in.finish();
         groups.push_back({std::exchange(jobs, std::move(others)), {}, {}});
     }
     job.group = known->second;
-    if (jobs.size() >= builder.options.limits.shapes)
-        in.fail("the scene has more shapes than --limits shapes=" + std::to_string(builder.options.limits.shapes));
+    check_shapes(builder.options.limits, jobs.size() + 1, object.where);
     jobs.push_back(std::move(job));
 }
 
@@ -300,9 +288,8 @@ uint64_t memory_of(const Mesh& mesh) { return mesh_bytes(mesh.positions.size(), 
 
 void build_shapes(Builder& builder, const Object& root) {
     ShapeBuilder shapes{builder, {}, {}, {}, {}, {}};
-    for (const Child& child : root.children) {
-        if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false, false);
-    }
+    for (const Child& child : root.children)
+        if (child.object->tag == "shape") shapes.add_shape(*child.object, builder.to_scene, false);
     load_sources(builder, shapes.sources, shapes.jobs, shapes.groups);
     place_instances(builder, shapes.groups, shapes.sources, shapes.jobs);
     // Shapes get meshes of their own, and so does the scene.

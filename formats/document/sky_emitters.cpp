@@ -24,29 +24,12 @@ struct SkySettings {
 
 bool is_newer(const Reader& in) { return in.object().version >= 2; }
 
-Vec3d unit(Vec3d v) {
-    const double l = length(v);
-    return {v.x / l, v.y / l, v.z / l};
-}
-
 Vec3d on_sphere(double zenith, double azimuth) {
     return {std::sin(azimuth) * std::sin(zenith), std::cos(zenith), -std::cos(azimuth) * std::sin(zenith)};
 }
 
 /// From the frame of environment maps to that of the plugin. The newer one has +z up, north at -x and east at -y.
-Matrix map_to_local(bool newer) {
-    Matrix m;
-    if (!newer) return m;
-    const double rows[3][3] = {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}};
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) m.m[i][j] = rows[i][j];
-    return m;
-}
-
-Vec3d rotated(const Matrix& m, Vec3d v) {
-    return {m.m[0][0] * v.x + m.m[0][1] * v.y + m.m[0][2] * v.z, m.m[1][0] * v.x + m.m[1][1] * v.y + m.m[1][2] * v.z,
-            m.m[2][0] * v.x + m.m[2][1] * v.y + m.m[2][2] * v.z};
-}
+Matrix map_to_local(bool newer) { return newer ? from_columns({1, 0, 0}, {0, 0, 1}, {0, -1, 0}) : Matrix{}; }
 
 int whole(Reader& in, const char* name, int fallback) {
     const int64_t value = in.integer(name, fallback);
@@ -71,7 +54,7 @@ Vec3d read_sun(Reader& in, const Matrix& to_world) {
     if (in.has("sun_direction")) {
         const Vec3d given = in.vector("sun_direction", {});
         if (!(length(given) > 0)) in.fail(in.where("sun_direction"), "the direction of the sun is zero");
-        d = rotated(affine_inverse(to_world), unit(given));
+        d = transformed(affine_inverse(to_world), unit(given), 0);
     } else {
         const SunAngles a = sun_position(time);
         // The newer plugin counts its azimuth from +x to +y, and the sun stands at azimuth - 180 degrees.

@@ -2,10 +2,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/error.h"
 #include "formats/document/builder.h"
 #include "formats/document/plugins.h"
-#include "formats/file_budget.h"
 #include "formats/images/image_io.h"
 
 namespace ambilux::document {
@@ -80,7 +78,7 @@ int32_t add_texture(Builder& builder, const Texture& texture, const TextureFacts
 /// Value of a rawconstant: a number or three of them, which need be no colour.
 Rgb raw_value(Reader& in) {
     const Value* value = in.object().find("value");
-    if (!value) in.fail("rawconstant has no value");
+    if (!value) in.fail_without("value", "rawconstant has no value");
     if (value->kind != ValueKind::vector) return in.color("value", {}, SpectrumUse::unbounded);
     const Vec3d v = in.vector("value", {});
     return {float(v.x), float(v.y), float(v.z)};
@@ -129,7 +127,7 @@ void read_bitmap(Builder& builder, Reader& in, Texture& texture, TextureFacts& f
     texture.type = TextureType::bitmap;
     const Texels* given = given_image(builder, in);
     const std::string name = in.text(given ? "image" : "filename", "");
-    if (name.empty()) in.fail("bitmap texture has no filename");
+    if (name.empty()) in.fail_without("filename", "bitmap texture has no filename");
     const std::string path = given ? name : builder.file(name, in.where("filename"));
     const bool raw = in.boolean("raw", false);
     const double given_gamma = read_gamma(in), gamma = raw ? 1 : given_gamma;
@@ -180,12 +178,13 @@ ScaledTexture load_scaled_texture(Builder& builder, const Object& object, Textur
         in.finish();
         inner = nested;
     }
+    if (is_attribute(*inner)) scale *= float(Reader(builder, *inner).number("scale", 1));
     return {load_texture(builder, *inner, use), scale};
 }
 
 int32_t load_texture(Builder& builder, const Object& object, TextureUse use) {
     Reader in(builder, object);
-    if (object.type == "mesh_attribute" || object.type == "vertexcolors") return attribute_texture(builder, in);
+    if (is_attribute(object)) return attribute_texture(builder, in);
     Texture texture;
     memset(&texture, 0, sizeof texture);  // padding too, because the record is its own key
     TextureFacts facts{{}, {}, object.where.file};

@@ -37,9 +37,6 @@ Matrix rotation(double x, double y, double z, double degrees) {
     return a;
 }
 
-double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vec3d cross(Vec3d a, Vec3d b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-double length(Vec3d a) { return std::sqrt(dot(a, a)); }
 Vec3d transformed(const Matrix& a, Vec3d p, double w) {
     const auto row = [&](int i) { return a.m[i][0] * p.x + a.m[i][1] * p.y + a.m[i][2] * p.z + w * a.m[i][3]; };
     return {row(0), row(1), row(2)};
@@ -47,18 +44,29 @@ Vec3d transformed(const Matrix& a, Vec3d p, double w) {
 
 Vec3d column(const Matrix& a, int i) { return {a.m[0][i], a.m[1][i], a.m[2][i]}; }
 
-Matrix look_at(Vec3d origin, Vec3d target, Vec3d up, bool& valid) {
-    const auto unit = [](Vec3d v) {
-        const double l = length(v);
-        return Vec3d{v.x / l, v.y / l, v.z / l};
-    };
-    const Vec3d dir = unit({target.x - origin.x, target.y - origin.y, target.z - origin.z});
-    const Vec3d left = unit(cross(up, dir)), new_up = cross(dir, left);
-    valid = std::isfinite(left.x + left.y + left.z + dir.x + dir.y + dir.z);
+Matrix from_columns(Vec3d x, Vec3d y, Vec3d z, Vec3d origin) {
     Matrix a;
-    const Vec3d columns[4] = {left, new_up, dir, origin};
+    const Vec3d columns[4] = {x, y, z, origin};
     for (int j = 0; j < 4; ++j) a.m[0][j] = columns[j].x, a.m[1][j] = columns[j].y, a.m[2][j] = columns[j].z;
     return a;
+}
+
+Matrix without_place(Matrix m) {
+    for (int i = 0; i < 3; ++i) m.m[i][3] = 0;
+    return m;
+}
+
+Matrix unscaled(Matrix m) {
+    const double scale = std::cbrt(std::fabs(determinant(m)));
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) m.m[i][j] /= scale > 0 ? scale : 1;
+    return m;
+}
+
+Matrix look_at(Vec3d origin, Vec3d target, Vec3d up, bool& valid) {
+    const Vec3d dir = unit(target - origin), left = unit(cross(up, dir)), new_up = cross(dir, left);
+    valid = std::isfinite(left.x + left.y + left.z + dir.x + dir.y + dir.z);
+    return from_columns(left, new_up, dir, origin);
 }
 
 double determinant(const Matrix& a) { return dot(column(a, 0), cross(column(a, 1), column(a, 2))); }
@@ -87,6 +95,14 @@ bool is_affine(const Matrix& a) {
         for (double v : row)
             if (!std::isfinite(v)) return false;
     return a.m[3][0] == 0 && a.m[3][1] == 0 && a.m[3][2] == 0 && a.m[3][3] == 1;
+}
+
+bool keeps_round(const Matrix& a, bool is_sphere) {
+    constexpr double kTolerance = 1e-3;
+    const double lx = length(column(a, 0)), ly = length(column(a, 1)), lz = length(column(a, 2)),
+                 radius = is_sphere ? (lx + ly + lz) / 3 : (lx + ly) / 2;
+    const auto is_radius = [&](double l) { return std::fabs(l - radius) < kTolerance * radius; };
+    return is_orthogonal(a, kTolerance) && is_radius(lx) && is_radius(ly) && (!is_sphere || is_radius(lz));
 }
 
 bool is_orthogonal(const Matrix& a, double tolerance) {

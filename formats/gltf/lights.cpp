@@ -15,8 +15,6 @@ constexpr int64_t kHeight = 720;  // of the image, which glTF does not tell
 constexpr double kFov = 40;       // of the default camera, degrees
 constexpr double kWidestSpot = 89.9 * (M_PI / 180);
 
-Vec3d negated(Vec3d v) { return {-v.x, -v.y, -v.z}; }
-
 /// Mitsuba's cameras and spots look along +z with x to the left, glTF's along -z with x to the right.
 Matrix turned(Matrix m) {
     for (int j = 0; j < 3; ++j) {
@@ -53,7 +51,7 @@ void add_light(Context& context, const tinygltf::Light& light, const Matrix& to_
         context.note("the range of lights is left out: their light falls off with the squared distance");
     if (light.type == "directional") {
         Object& out = add_object(context.document, "emitter", "directional", context.where);
-        set_vector(out, "direction", negated(column(to_world, 2)));
+        set_vector(out, "direction", column(to_world, 2) * -1);
         set_rgb(out, "irradiance", value);
         return add_child(*context.document.scene, out);
     }

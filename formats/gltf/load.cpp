@@ -1,7 +1,4 @@
-#include "formats/gltf/load.h"
-
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "core/math.h"
@@ -69,8 +66,7 @@ private:
         Matrix m;
         for (size_t steps = 0; node >= 0; node = parents_[size_t(node)]) {
             if (size_t(node) >= parents_.size()) c_.fail("there is no node " + std::to_string(node));
-            if (++steps > c_.document.limits.nesting)
-                c_.fail("nodes are nested deeper than --limits nesting=" + std::to_string(c_.document.limits.nesting));
+            check_nesting(c_.document.limits, ++steps, c_.where, "nodes");
             m = local(c_.model.nodes[size_t(node)]) * m;
         }
         return m;
@@ -143,12 +139,9 @@ private:
             const auto &t = node.translation, &r = node.rotation, &s = node.scale;
             const double x = value(r, 0, 0), y = value(r, 1, 0), z = value(r, 2, 0), w = value(r, 3, 1);
             const double l2 = x * x + y * y + z * z + w * w, n = l2 > 0 ? 2 / l2 : 0;
-            Matrix q;
-            const double rows[3][3] = {{1 - n * (y * y + z * z), n * (x * y - z * w), n * (x * z + y * w)},
-                                       {n * (x * y + z * w), 1 - n * (x * x + z * z), n * (y * z - x * w)},
-                                       {n * (x * z - y * w), n * (y * z + x * w), 1 - n * (x * x + y * y)}};
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) q.m[i][j] = rows[i][j];
+            const Matrix q = from_columns({1 - n * (y * y + z * z), n * (x * y + z * w), n * (x * z - y * w)},
+                                          {n * (x * y - z * w), 1 - n * (x * x + z * z), n * (y * z + x * w)},
+                                          {n * (x * z + y * w), n * (y * z - x * w), 1 - n * (x * x + y * y)});
             m = translation(value(t, 0, 0), value(t, 1, 0), value(t, 2, 0)) * q *
                 scaling(value(s, 0, 1), value(s, 1, 1), value(s, 2, 1));
         }
@@ -166,8 +159,7 @@ private:
     void visit(int index, const Matrix& outer, uint64_t depth, bool visible) {
         const Limits& limits = c_.document.limits;
         if (index < 0 || size_t(index) >= c_.model.nodes.size()) c_.fail("there is no node " + std::to_string(index));
-        if (depth > limits.nesting)
-            c_.fail("nodes are nested deeper than --limits nesting=" + std::to_string(limits.nesting));
+        check_nesting(limits, depth, c_.where, "nodes");
         if (++visited_ > limits.shapes)
             c_.fail("it has more nodes than --limits shapes=" + std::to_string(limits.shapes));
         const tinygltf::Node& node = c_.model.nodes[size_t(index)];

@@ -24,7 +24,8 @@ public:
         : c_(context), m_(material), what_(what), colors_(use.colors), use_(use), textures_(context, index, what) {}
 
     Context::Surface make() {
-        check_extensions();
+        if (m_.extensions.contains("KHR_materials_unlit"))
+            c_.note("unlit surfaces are lit, as by programs that do not know the extension");
         const auto& pbr = m_.pbrMetallicRoughness;
         base_ = at_most_1(color_of(pbr.baseColorFactor, splat(1)), "baseColorFactor");
         alpha_ = pbr.baseColorFactor.size() > 3 ? pbr.baseColorFactor[3] : 1;
@@ -82,21 +83,6 @@ private:
             base_ = as.base, metallic_ = as.metallic, rough_ = 1 - from.glossiness;
         }
         c_.note("specular-glossiness materials are converted to metallic-roughness");
-    }
-
-    void check_extensions() {
-        for (const auto& [name, value] : m_.extensions) {
-            if (name == "KHR_materials_emissive_strength" || name == "KHR_materials_transmission" ||
-                name == "KHR_materials_volume" || name == "KHR_materials_ior" || name == "KHR_materials_clearcoat" ||
-                name == "KHR_materials_specular" || name == "KHR_materials_sheen" ||
-                name == "KHR_materials_anisotropy" || name == "KHR_materials_diffuse_transmission" ||
-                name == kGlossiness)
-                continue;
-            if (name == "KHR_materials_unlit")
-                c_.note("unlit surfaces are lit, as by programs that do not know the extension");
-            else if (name.starts_with("KHR_materials_") || name.starts_with("EXT_") || name.starts_with("MSFT_"))
-                c_.leave_out(name, "extension '" + name + "'");
-        }
     }
 
     const Object& attribute(const char* name) {
@@ -215,6 +201,15 @@ private:
         return out;
     }
 
+    /// Of both sides of what is opaque, and of what lets light pass.
+    const Object& blend_of(Object& blend, const Object& opaque, const Object& through) {
+        Object& both = object("bsdf", "twosided");
+        add_child(both, opaque);
+        add_child(blend, both);
+        add_child(blend, through);
+        return blend;
+    }
+
     /// A share of the light that is scattered passes; that share reflects nothing.
     const Object* with_diffuse_transmission(const Object& opaque) {
         const tinygltf::Value* given = extension(m_.extensions, "KHR_materials_diffuse_transmission");
@@ -222,18 +217,14 @@ private:
         if (!(weight > 0)) return nullptr;
         transmits_ = true;
         c_.note("what KHR_materials_diffuse_transmission lets pass is taken from the highlight, too");
-        Object &blend = object("bsdf", "blendbsdf"), &both = object("bsdf", "twosided"),
-               &through = object("bsdf", "difftrans");
+        Object &blend = object("bsdf", "blendbsdf"), &through = object("bsdf", "difftrans");
         set_number_or_texture(blend, "weight", std::min(weight, 1.0),
                               textures_.with_image(used(given, "diffuseTransmissionTexture")), "a");
         set_color_or_texture(
             through, "transmittance",
             at_most_1(color_in(*given, "diffuseTransmissionColorFactor", splat(1)), "diffuseTransmissionColorFactor"),
             textures_.with_image(used(given, "diffuseTransmissionColorTexture")));
-        add_child(both, opaque);
-        add_child(blend, both);
-        add_child(blend, through);
-        return &blend;
+        return &blend_of(blend, opaque, through);
     }
 
     /// Light passes with the weight of the transmission: through a thin pane, or with a thickness into a volume.
@@ -268,11 +259,7 @@ private:
         if (metallic_ > 0) c_.note("materials that transmit and are metallic are a blend by their transmission alone");
         Object& blend = object("bsdf", "blendbsdf");
         set_number_or_texture(blend, "weight", std::min(weight, 1.0), texture, "r");
-        Object& both = object("bsdf", "twosided");
-        add_child(both, opaque);
-        add_child(blend, both);
-        add_child(blend, glass);
-        return blend;
+        return blend_of(blend, opaque, glass);
     }
 
     const Object& with_normals(const Object& inner) {

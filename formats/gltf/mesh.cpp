@@ -1,6 +1,5 @@
 // Triangles of a primitive as they stand: morphed, and on the joints of a skin.
 #include <algorithm>
-#include <cmath>
 
 #include "formats/gltf/model.h"
 
@@ -86,11 +85,9 @@ bool put_on_skin(Context& context, Mesh& mesh, const tinygltf::Primitive& primit
         mesh.positions[i] = document::to_affine(m).point(mesh.positions[i]);
         if (mesh.normals.empty()) continue;
         // By the cofactors, so that it stays perpendicular to the surface, and on its side.
-        const document::Vec3d x = document::column(m, 0), y = document::column(m, 1), z = document::column(m, 2),
-                              a = cross(y, z), b = cross(z, x), c = cross(x, y);
+        const Vec3d x = document::column(m, 0), y = document::column(m, 1), z = document::column(m, 2);
         const Vec3f v = mesh.normals[i] * side;
-        mesh.normals[i] = {float(a.x * v.x + b.x * v.y + c.x * v.z), float(a.y * v.x + b.y * v.y + c.y * v.z),
-                           float(a.z * v.x + b.z * v.y + c.z * v.z)};
+        mesh.normals[i] = rounded(cross(y, z) * v.x + cross(z, x) * v.y + cross(x, y) * v.z);
     }
     return mirrored;
 }

@@ -77,18 +77,19 @@ void unpack_view(Context& context, size_t index, const tinygltf::Value& given) {
 
 }  // namespace
 
+std::string_view json_part(std::string_view bytes) {
+    if (!bytes.starts_with("glTF")) return bytes;
+    uint32_t length = 0;
+    if (bytes.size() < 20) return {};
+    memcpy(&length, bytes.data() + 12, 4);
+    return length > bytes.size() - 20 ? std::string_view{} : bytes.substr(20, length);
+}
+
 std::string with_fallback_buffers(const std::string& bytes) {
     if (bytes.find(kName) == std::string::npos) return bytes;
-    const auto word = [&](size_t at) {
-        uint32_t v = 0;
-        if (at + 4 <= bytes.size()) memcpy(&v, bytes.data() + at, 4);
-        return size_t(v);
-    };
     const bool binary = bytes.starts_with("glTF");
-    const size_t first = binary ? 20 : 0, length = binary ? word(12) : bytes.size();
-    if (first > bytes.size() || length > bytes.size() - first) return bytes;
-    auto json = nlohmann::json::parse(bytes.begin() + std::ptrdiff_t(first),
-                                      bytes.begin() + std::ptrdiff_t(first + length), nullptr, false);
+    const std::string_view part = json_part(bytes);
+    auto json = nlohmann::json::parse(part.begin(), part.end(), nullptr, false);
     if (!json.is_object() || !json.contains("buffers") || !json["buffers"].is_array()) return bytes;
     for (auto& buffer : json["buffers"])
         if (buffer.is_object() && !buffer.contains("uri") && buffer.contains("extensions") &&
@@ -103,7 +104,7 @@ std::string with_fallback_buffers(const std::string& bytes) {
         out.append(reinterpret_cast<const char*>(&w), 4);
     };
     put(text.size());
-    out += bytes.substr(16, 4) + text + bytes.substr(first + length);
+    out += bytes.substr(16, 4) + text + bytes.substr(20 + part.size());
     const uint32_t total = uint32_t(out.size());
     memcpy(out.data() + 8, &total, 4);
     return out;

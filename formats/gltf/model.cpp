@@ -4,29 +4,26 @@
 
 #include <algorithm>
 #include <climits>
-#include <cmath>
 #include <filesystem>
-#include <set>
 
-#include "core/error.h"
 #include "core/text.h"
 #include "formats/file_budget.h"
 #include "formats/gltf/meshopt.h"
 
 namespace ambilux::gltf {
 
-void Context::fail(const std::string& message) const { throw input_error(where.file, where.line, message); }
+void Context::fail(const std::string& message) const { document::fail(where, message); }
 
 double Context::at_most_1(double value, const std::string& what) {
     if (value > double(document::kRoundedOne)) note(fmt::format("{} is {:.4g} and counts as 1", what, value));
     return std::min(value, 1.0);
 }
 
-void Context::leave_out(const std::string& extension, const std::string& what) {
+void Context::leave_out(const std::string& extension, const std::string& what, const std::string& hint) {
     const auto& required = model.extensionsRequired;
     if (std::find(required.begin(), required.end(), extension) != required.end())
-        return refuse(what + " is not supported", "it is left out");
-    note(what + " is left out, which the file allows");
+        return refuse(what + " is not supported" + hint, "it is left out");
+    note(what + " is left out, which the file allows" + hint);
 }
 
 namespace {
@@ -132,21 +129,7 @@ void read_model(Context& context, const std::string& path) {
     unpack_views(context);
     context.image_bytes.resize(context.model.images.size());
     image_views(context);
-    static const std::set<std::string> known = {"KHR_lights_punctual",        "KHR_materials_emissive_strength",
-                                                "KHR_materials_transmission", "KHR_materials_volume",
-                                                "KHR_materials_ior",          "KHR_materials_clearcoat",
-                                                "KHR_texture_transform",      "KHR_mesh_quantization",
-                                                "KHR_materials_specular",     "KHR_materials_sheen",
-                                                "KHR_materials_unlit",        "EXT_mesh_gpu_instancing",
-                                                "KHR_node_visibility",        "KHR_materials_pbrSpecularGlossiness",
-                                                "KHR_materials_anisotropy",   "KHR_materials_diffuse_transmission",
-                                                "EXT_meshopt_compression"};
-    for (const std::string& name : context.model.extensionsRequired)
-        if (!known.contains(name)) context.leave_out(name, "extension '" + name + "'");
-    const auto& required = context.model.extensionsRequired;
-    for (const std::string& name : context.model.extensionsUsed)
-        if (!known.contains(name) && std::find(required.begin(), required.end(), name) == required.end())
-            context.leave_out(name, "extension '" + name + "'");
+    check_names(context, json_part(bytes));
     if (!context.model.animations.empty()) context.note("animations are left out: nodes stand as they do without them");
 }
 

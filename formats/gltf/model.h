@@ -4,6 +4,8 @@
 #include <tiny_gltf.h>
 
 #include <map>
+#include <set>
+#include <string_view>
 
 #include "formats/report.h"
 
@@ -38,8 +40,11 @@ struct Context {
     /// A number that glTF has from 0 to 1.
     double at_most_1(double value, const std::string& what);
     /// A part of an extension that is not supported: refused only where the file says that nobody can do without it.
-    void leave_out(const std::string& extension, const std::string& what);
+    void leave_out(const std::string& extension, const std::string& what, const std::string& hint = "");
 };
+
+/// Notes properties and extensions of other names than those that are known. `json`: of the file.
+void check_names(Context& context, std::string_view json);
 
 /// Reads the file with its buffers and images. Sets what a Context needs of them.
 void read_model(Context& context, const std::string& path);

@@ -27,13 +27,8 @@ struct Sample {
 Sample sample(const Texels* image, double u, double v) {
     if (!image) return {};
     const size_t x = std::min(size_t(u * image->width), size_t(image->width) - 1),
-                 y = std::min(size_t(v * image->height), size_t(image->height) - 1), at = 4 * (y * image->width + x);
-    const auto value = [&](size_t k) { return image->is_8bit ? image->bytes[at + k] / 255.0 : image->floats[at + k]; };
-    Sample out;
-    for (int k = 0; k < 3; ++k)
-        out.color[k] = float(image->is_linear ? value(size_t(k)) : srgb_to_linear(value(size_t(k))));
-    out.alpha = value(3);
-    return out;
+                 y = std::min(size_t(v * image->height), size_t(image->height) - 1), at = y * image->width + x;
+    return {image->linear(at), image->stored(4 * at + 3)};
 }
 
 }  // namespace

@@ -7,15 +7,12 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/srgb.h"
 
 namespace ambilux::gltf {
 
 using namespace document;
 
 namespace {
-
-double texel(const Texels& image, size_t i) { return image.is_8bit ? image.bytes[i] / 255.0 : image.floats[i]; }
 
 const char* wrap_of(int mode) {
     return mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? "clamp"
@@ -207,7 +204,7 @@ std::string TextureMaker::turned_normals(const std::string& name, double scale, 
     Texels& out = derived(out_name, source, source.width, source.height, false);
     if (!out.floats.empty()) return out_name;
     for (size_t i = 0; i < 4 * size_t(out.width) * out.height; i += 4) {
-        const auto value = [&](size_t k) { return 2 * texel(source, i + k) - 1; };
+        const auto value = [&](size_t k) { return 2 * source.stored(i + k) - 1; };
         const double x = value(0) * scale, y = value(1) * scale, z = value(2);
         const double n[3] = {turn.m[0][0] * x + turn.m[0][1] * y, turn.m[1][0] * x + turn.m[1][1] * y, z};
         const double l = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
@@ -245,7 +242,7 @@ Object& TextureMaker::cut_alpha(const Used& use, double factor, double cutoff) {
     Texels& out = derived(out_name, source, source.width, source.height, true);
     if (out.bytes.empty())
         for (size_t i = 0; i < size_t(out.width) * out.height; ++i) {
-            const uint8_t v = texel(source, 4 * i + 3) * factor >= cutoff ? 255 : 0;
+            const uint8_t v = source.stored(4 * i + 3) * factor >= cutoff ? 255 : 0;
             out.bytes.insert(out.bytes.end(), {v, v, v, 255});
         }
     Object& made = bitmap_of(use, out_name);
@@ -266,10 +263,7 @@ Rgb TextureMaker::mean(const Used& use, bool raw) {
     const size_t count = size_t(source.width) * source.height;
     double sum[3] = {0, 0, 0};
     for (size_t i = 0; i < count; ++i)
-        for (size_t k = 0; k < 3; ++k) {
-            const double v = texel(source, 4 * i + k);
-            sum[k] += raw || source.is_linear ? v : srgb_to_linear(v);
-        }
+        for (size_t k = 0; k < 3; ++k) sum[k] += decoded(source.stored(4 * i + k), raw || source.is_linear ? 1 : -1);
     return Rgb{float(sum[0]), float(sum[1]), float(sum[2])} / float(std::max<size_t>(count, 1));
 }
 

@@ -189,8 +189,7 @@ template <class File>
 void ExrFile::read_lines(File& file) {
     for (int64_t y = window().min.y; y <= window().max.y; y += int64_t(kMostLines)) {
         file.readPixels(int(y), int(std::min<int64_t>(y + int64_t(kMostLines) - 1, window().max.y)));
-        if (budget_.expired())
-            budget_.fail("reading it takes longer than --limits seconds=" + std::to_string(budget_.limits().seconds));
+        budget_.check_time();
     }
 }
 

@@ -1,8 +1,18 @@
 #include "formats/images/image_io.h"
 
+#include "core/srgb.h"
 #include "formats/images/readers.h"
 
 namespace ambilux {
+
+double decoded(double value, double gamma) {
+    return gamma == 1 ? value : gamma == -1 ? srgb_to_linear(value) : std::pow(value, gamma);
+}
+
+Rgb Texels::linear(size_t texel) const {
+    const auto value = [&](size_t c) { return float(decoded(stored(4 * texel + c), is_linear ? 1 : -1)); };
+    return {value(0), value(1), value(2)};
+}
 
 Texels make_texels(uint64_t width, uint64_t height, bool is_8bit, const FileBudget& budget) {
     budget.pixels(width, height);

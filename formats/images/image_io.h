@@ -19,7 +19,15 @@ struct Texels {
     std::vector<uint8_t> bytes;      ///< 4 per texel if is_8bit
     std::vector<float> floats;       ///< 4 per texel otherwise
     std::vector<std::string> notes;  ///< what the file says of itself that is followed in our own way, or not at all
+
+    /// Number `i` of all, bytes as parts of 255.
+    double stored(size_t i) const { return is_8bit ? bytes[i] / 255.0 : double(floats[i]); }
+    /// Colour of a texel, decoded as the format of the file implies.
+    Rgb linear(size_t texel) const;
 };
+
+/// How stored values become linear ones: gamma 1 linear, -1 sRGB, other values a power.
+double decoded(double value, double gamma);
 
 /// Decodes PNG (libpng), JPEG (libjpeg-turbo), EXR (OpenEXR, data window), HDR, PNM (P5, P6,
 /// PF), BMP or TGA. The format follows from the content. Throws Error(bad_input) with `path`, also for what is beyond

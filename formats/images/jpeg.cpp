@@ -1,6 +1,5 @@
 #include <csetjmp>
 #include <cstdio>
-#include <cstring>
 
 #include <jpeglib.h>
 // After jpeglib.h.

@@ -4,7 +4,6 @@
 
 #include "core/error.h"
 #include "core/math.h"
-#include "core/srgb.h"
 #include "formats/file_budget.h"
 
 namespace ambilux {
@@ -67,14 +66,7 @@ Mesh mesh_of_heights(const std::string& path, uint32_t width, uint32_t height, c
 Mesh mesh_of_image(const std::string& path, const Texels& texels, double scale, bool smooth, const Limits& limits) {
     std::vector<float> heights(size_t(texels.width) * texels.height);
     for (size_t i = 0; i < heights.size(); ++i) {
-        Vec3f c;
-        for (int k = 0; k < 3; ++k) {
-            const size_t at = 4 * i + size_t(k);
-            double v = texels.is_8bit ? texels.bytes[at] / 255.0 : double(texels.floats[at]);
-            if (!texels.is_linear) v = srgb_to_linear(v);
-            c[k] = float(v);
-        }
-        heights[i] = float(scale * double(luminance(c)));
+        heights[i] = float(scale * double(luminance(texels.linear(i))));
         if (!std::isfinite(heights[i])) throw input_error(path, 0, "a height is not finite");
     }
     return mesh_of_heights(path, texels.width, texels.height, heights, smooth, limits);

@@ -1,10 +1,7 @@
 #include "formats/meshes/loop_subdivision.h"
 
-#include <cmath>
 #include <map>
 
-#include "core/error.h"
-#include "core/math.h"
 #include "formats/file_budget.h"
 
 namespace ambilux {

@@ -71,6 +71,28 @@ std::vector<Vec3f> smooth_normals(const Mesh& mesh) {
     return sums;
 }
 
+Mesh with_own_corners(const Mesh& mesh) {
+    Mesh out;
+    out.origin = mesh.origin;
+    for (const auto& face : mesh.faces) {
+        const uint32_t first = uint32_t(out.positions.size());
+        for (const uint32_t v : face) {
+            out.positions.push_back(mesh.positions[v]);
+            if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[v]);
+        }
+        out.faces.push_back({first, first + 1, first + 2});
+    }
+    return out;
+}
+
+void add_grid_faces(Mesh& mesh, uint32_t first, uint32_t nx, uint32_t ny) {
+    for (uint32_t j = 0; j < ny; ++j)
+        for (uint32_t i = 0; i < nx; ++i) {
+            const uint32_t a = first + j * (nx + 1) + i, b = a + 1, c = a + nx + 1, d = c + 1;
+            mesh.faces.insert(mesh.faces.end(), {{a, b, d}, {a, d, c}});
+        }
+}
+
 uint64_t mesh_bytes(uint64_t vertices, uint64_t triangles) {
     return vertices * (2 * sizeof(Vec3f) + sizeof(Vec2f)) + triangles * sizeof(std::array<uint32_t, 3>);
 }
@@ -94,15 +116,14 @@ void set_positions(Mesh& mesh, const std::vector<std::array<double, 3>>& points)
 }
 
 void check_mesh(const std::string& path, Mesh& mesh) {
-    if (mesh.faces.empty()) throw input_error(path, 0, "the mesh has no faces");
+    const auto fail = [&](const std::string& message) { throw input_error(path, 0, message); };
+    if (mesh.faces.empty()) fail("the mesh has no faces");
     for (const size_t count : {mesh.normals.size(), mesh.uvs.size()})
         if (count != 0 && count != mesh.positions.size())
-            throw input_error(path, 0,
-                              "normals or texture coordinates are given for " + std::to_string(count) + " of " +
-                                  std::to_string(mesh.positions.size()) + " vertices");
+            fail("normals or texture coordinates are given for " + std::to_string(count) + " of " +
+                 std::to_string(mesh.positions.size()) + " vertices");
     for (size_t i = 0; i < mesh.positions.size(); ++i)
-        if (!is_finite(mesh.positions[i]))
-            throw input_error(path, 0, "position of vertex " + std::to_string(i) + " is not finite");
+        if (!is_finite(mesh.positions[i])) fail("position of vertex " + std::to_string(i) + " is not finite");
     size_t bad_normals = 0;
     for (Vec3f& n : mesh.normals)
         if (!is_finite(n)) n = {0, 0, 0}, ++bad_normals;
@@ -110,13 +131,12 @@ void check_mesh(const std::string& path, Mesh& mesh) {
         mesh.notes.push_back("normals that are not finite count as none: " + std::to_string(bad_normals));
     for (size_t i = 0; i < mesh.uvs.size(); ++i)
         if (!is_finite(Vec3f{mesh.uvs[i].x, mesh.uvs[i].y, 0}))
-            throw input_error(path, 0, "texture coordinate of vertex " + std::to_string(i) + " is not finite");
+            fail("texture coordinate of vertex " + std::to_string(i) + " is not finite");
     for (size_t i = 0; i < mesh.faces.size(); ++i)
         for (uint32_t v : mesh.faces[i])
             if (v >= mesh.positions.size())
-                throw input_error(path, 0,
-                                  "face " + std::to_string(i) + " refers to vertex " + std::to_string(v) + " of " +
-                                      std::to_string(mesh.positions.size()));
+                fail("face " + std::to_string(i) + " refers to vertex " + std::to_string(v) + " of " +
+                     std::to_string(mesh.positions.size()));
 }
 
 }  // namespace ambilux

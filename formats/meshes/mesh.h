@@ -67,6 +67,11 @@ std::vector<Vec3f> smooth_normals(const Mesh& mesh);
 /// no vertex yet gets one, together with all whose normals lie within the angle (Mitsuba 0.6, maxSmoothAngle).
 Mesh split_at_edges(const std::string& path, const Mesh& mesh, double degrees);
 
+/// The mesh with vertices of its own for every face, in the order of faces and corners; without texture coordinates.
+Mesh with_own_corners(const Mesh& mesh);
+/// Two faces for every cell of a grid of vertices, of `nx` cells a row, from the vertex `first` on.
+void add_grid_faces(Mesh& mesh, uint32_t first, uint32_t nx, uint32_t ny);
+
 /// Memory of a mesh of that many vertices and triangles, at most.
 uint64_t mesh_bytes(uint64_t vertices, uint64_t triangles);
 

@@ -1,5 +1,4 @@
 // Headers of PLY files: what their elements and properties are called.
-#include <algorithm>
 #include <initializer_list>
 
 #include "core/error.h"

@@ -7,7 +7,6 @@
 #include <bit>
 #include <cstring>
 
-#include "core/error.h"
 #include "formats/file_budget.h"
 #include "formats/meshes/mesh.h"
 
@@ -23,13 +22,12 @@ constexpr int kLongestName = 1 << 16;
 
 /// Inflates a stream piece by piece.
 struct Inflater {
-    const std::string& path;
     FileBudget& budget;
     std::string_view rest;  ///< what zlib, which counts in 32 bits, has not got yet
     z_stream stream{};
 
-    Inflater(const std::string& file, std::string_view bytes, FileBudget& b) : path(file), budget(b), rest(bytes) {
-        if (inflateInit(&stream) != Z_OK) throw input_error(path, 0, "cannot start zlib");
+    Inflater(std::string_view bytes, FileBudget& b) : budget(b), rest(bytes) {
+        if (inflateInit(&stream) != Z_OK) budget.fail("cannot start zlib");
     }
     ~Inflater() { inflateEnd(&stream); }
     Inflater(const Inflater&) = delete;
@@ -49,14 +47,12 @@ struct Inflater {
             const size_t got = chunk - stream.avail_out;
             out += got;
             size -= got;
-            if (status == Z_STREAM_END && size > 0) throw input_error(path, 0, "mesh data ends too early");
             if (status != Z_OK && status != Z_STREAM_END)
-                throw input_error(
-                    path, 0,
-                    std::string("mesh data is damaged (zlib: ") + (stream.msg ? stream.msg : "no progress") + ")");
-            if (got == 0 && size > 0 && rest.empty()) throw input_error(path, 0, "mesh data ends too early");
-            if (budget.expired())
-                budget.fail("reading it takes longer than --limits seconds=" + std::to_string(budget.limits().seconds));
+                budget.fail(std::string("mesh data is damaged (zlib: ") + (stream.msg ? stream.msg : "no progress") +
+                            ")");
+            if (size > 0 && (status == Z_STREAM_END || (got == 0 && rest.empty())))
+                budget.fail("mesh data ends too early");
+            budget.check_time();
         }
     }
     template <class T>
@@ -88,8 +84,8 @@ struct Inflater {
 };
 
 template <class T>
-T load(const std::string& path, std::string_view bytes, size_t offset) {
-    if (offset + sizeof(T) > bytes.size()) throw input_error(path, 0, "file ends too early");
+T load(const FileBudget& budget, std::string_view bytes, size_t offset) {
+    if (offset + sizeof(T) > bytes.size()) budget.fail("file ends too early");
     T value;
     memcpy(&value, bytes.data() + offset, sizeof value);
     return value;
@@ -100,35 +96,34 @@ T load(const std::string& path, std::string_view bytes, size_t offset) {
 Mesh read_serialized(const std::string& path, std::string_view bytes, int shape_index, bool flip_v,
                      const Limits& limits) {
     FileBudget budget(path, limits);
-    if (load<uint16_t>(path, bytes, 0) != 0x041C) throw input_error(path, 0, "not a Mitsuba serialized mesh");
-    const uint16_t version = load<uint16_t>(path, bytes, 2);
+    if (load<uint16_t>(budget, bytes, 0) != 0x041C) budget.fail("not a Mitsuba serialized mesh");
+    const uint16_t version = load<uint16_t>(budget, bytes, 2);
     if (version != 3 && version != 4)
-        throw input_error(path, 0, "unknown version " + std::to_string(version) + " of the serialized format");
-    if (bytes.size() < 8) throw input_error(path, 0, "file ends too early");
+        budget.fail("unknown version " + std::to_string(version) + " of the serialized format");
+    if (bytes.size() < 8) budget.fail("file ends too early");
 
-    const uint32_t count = load<uint32_t>(path, bytes, bytes.size() - 4);
+    const uint32_t count = load<uint32_t>(budget, bytes, bytes.size() - 4);
     if (shape_index < 0 || uint32_t(shape_index) >= count)
-        throw input_error(path, 0,
-                          "shape_index " + std::to_string(shape_index) + " is out of range (the file has " +
-                              std::to_string(count) + " meshes)");
+        budget.fail("shape_index " + std::to_string(shape_index) + " is out of range (the file has " +
+                    std::to_string(count) + " meshes)");
     size_t offset = 0;
     if (shape_index > 0) {
         const size_t entry = version == 4 ? 8 : 4, back = entry * (count - uint32_t(shape_index)) + 4;
-        if (back > bytes.size()) throw input_error(path, 0, "the table of meshes is damaged");
-        offset = version == 4 ? load<uint64_t>(path, bytes, bytes.size() - back)
-                              : load<uint32_t>(path, bytes, bytes.size() - back);
+        if (back > bytes.size()) budget.fail("the table of meshes is damaged");
+        offset = version == 4 ? load<uint64_t>(budget, bytes, bytes.size() - back)
+                              : load<uint32_t>(budget, bytes, bytes.size() - back);
     }
-    if (offset + 4 >= bytes.size() || offset + 4 < offset) throw input_error(path, 0, "the table of meshes is damaged");
+    if (offset + 4 >= bytes.size() || offset + 4 < offset) budget.fail("the table of meshes is damaged");
 
-    Inflater in(path, bytes.substr(offset + 4), budget);
+    Inflater in(bytes.substr(offset + 4), budget);
     const uint32_t flags = in.value<uint32_t>();
     if (version == 4)
         for (int length = 0; in.value<char>() != 0; ++length)
-            if (length == kLongestName) throw input_error(path, 0, "the name of the mesh does not end");
+            if (length == kLongestName) budget.fail("the name of the mesh does not end");
     const uint64_t vertices = in.value<uint64_t>(), triangles = in.value<uint64_t>();
     // Deflate packs at most 1032:1, so larger claims are wrong and must not be allocated.
     if (vertices > bytes.size() * 1032 / 12 || triangles > bytes.size() * 1032 / 12)
-        throw input_error(path, 0, "mesh claims more data than the file holds");
+        budget.fail("mesh claims more data than the file holds");
     budget.bytes(mesh_bytes(vertices, triangles));
 
     const bool doubles = flags & kDoublePrecision;

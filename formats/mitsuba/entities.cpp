@@ -1,4 +1,5 @@
-#include "formats/mitsuba/entities.h"
+// Entities that an XML file declares itself (<!DOCTYPE scene [<!ENTITY name "text"> ...]>).
+#include "formats/mitsuba/xml.h"
 
 #include <algorithm>
 #include <map>
@@ -63,14 +64,13 @@ struct Expander {
         at = end + 1;
         return result;
     }
-    /// Of a declaration of which only the end matters.
-    void skip_declaration(size_t& at) const {
-        while (at < text.size() && text[at] != '>')
+    /// Up to one of these characters outside of quotes.
+    void skip_to(size_t& at, std::string_view ends) const {
+        while (at < text.size() && ends.find(text[at]) == std::string_view::npos)
             if (text[at] == '"' || text[at] == '\'')
                 quoted(at);
             else
                 ++at;
-        ++at;
     }
 
     void read_entity(size_t& at) {
@@ -88,18 +88,14 @@ struct Expander {
             entity.is_file = true;
         }
         entity.text = quoted(at);
-        skip_declaration(at);
+        skip_to(at, ">"), ++at;
         entities.emplace(name, std::move(entity));  // the first one counts
     }
 
     /// Reads the declarations; `at` is behind "<!DOCTYPE" and then behind the whole of it.
     void read_doctype(size_t& at) {
         const size_t start = at;
-        while (at < text.size() && text[at] != '[' && text[at] != '>')
-            if (text[at] == '"' || text[at] == '\'')
-                quoted(at);
-            else
-                ++at;
+        skip_to(at, "[>");
         if (at < text.size() && text[at] == '[') {
             for (++at; at < text.size() && text[at] != ']';) {
                 if (const size_t end = behind_opaque(text, at); end != at)
@@ -107,7 +103,7 @@ struct Expander {
                 else if (text.compare(at, 8, "<!ENTITY") == 0)
                     read_entity(at);
                 else if (text[at] == '<')
-                    skip_declaration(at);
+                    skip_to(at, ">"), ++at;
                 else
                     ++at;
             }
@@ -122,8 +118,7 @@ struct Expander {
         const Where from{path, entity.line};
         const std::string file = document.resolve(entity.text, from);
         if (document.files.size() > document.limits.includes)
-            throw input_error(path, entity.line,
-                              "more files than --limits includes=" + std::to_string(document.limits.includes));
+            document::fail(from, "more files than --limits includes=" + std::to_string(document.limits.includes));
         std::string content = read_input(file, document.limits);
         document.files.push_back({file, content});
         content = plain_text_of_utf16(file, content);
@@ -131,8 +126,7 @@ struct Expander {
         // A file that is no XML stays out of values, and so out of messages.
         const auto first = std::find_if_not(content.begin(), content.end(), is_blank);
         if (first != content.end() && *first != '<')
-            throw input_error(path, entity.line,
-                              "file '" + entity.text + "' of an entity does not begin with an element");
+            document::fail(from, "file '" + entity.text + "' of an entity does not begin with an element");
         return content;
     }
 

@@ -1,6 +1,6 @@
 #include "formats/load.h"
 
-#include "core/scoped_seconds.h"
+#include "formats/front_end.h"
 #include "formats/mitsuba/xml.h"
 
 namespace ambilux {
@@ -10,14 +10,8 @@ namespace {
 /// Of a file or, if there is one, of a text.
 Scene scene_of(const std::string& path, const LoadOptions& options, const std::string* text) {
     document::Document document;
-    document.limits = options.limits;
-    return naming_includes(document, [&] {
-        {
-            const ScopedSeconds clock(options.times ? &options.times->read : nullptr);
-            mitsuba::parse_document(document, path, options.parameters, text);
-        }
-        return document::load_document(path, document, options);
-    });
+    return load_through(document, path, options,
+                        [&] { mitsuba::parse_document(document, path, options.parameters, text); });
 }
 
 }  // namespace

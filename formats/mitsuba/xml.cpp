@@ -9,7 +9,6 @@
 #include "core/text_cursor.h"
 #include "formats/document/plugins.h"
 #include "formats/file_budget.h"
-#include "formats/mitsuba/entities.h"
 #include "formats/mitsuba/xml_values.h"
 
 namespace ambilux::mitsuba {
@@ -43,9 +42,7 @@ struct Parser {
     std::vector<std::string> open_files;  ///< canonical paths of the files being parsed
 
     void parse_children(const XmlSource& source, const pugi::xml_node& node, Object& object, uint64_t depth) {
-        if (depth > document.limits.nesting)
-            fail(where(source, node),
-                 "elements are nested deeper than --limits nesting=" + std::to_string(document.limits.nesting));
+        check_nesting(document.limits, depth, where(source, node), "elements");
         std::set<std::string> names;
         for (const pugi::xml_node& child : node.children()) {
             if (child.type() != pugi::node_element) continue;
@@ -102,17 +99,15 @@ struct Parser {
     /// The last one counts in Mitsuba 0.6.
     void replace_value(const XmlSource& source, Object& object, Value value) {
         if (source.version >= 2) fail(value.where, "parameter '" + value.name + "' is given twice");
-        document.notes.push_back(value.where.file + ":" + std::to_string(value.where.line) + ": parameter '" +
-                                 value.name + "' is given twice; the last one counts");
+        document.notes.push_back(value.where.text() + ": parameter '" + value.name +
+                                 "' is given twice; the last one counts");
         for (Value& v : object.values)
             if (v.name == value.name) v = value;
     }
 
     void add_id(const std::string& id, const Object* object, const Where& at) {
         const auto [it, added] = document.ids.emplace(id, object);
-        if (!added)
-            fail(at, "id '" + id + "' is already used at " + it->second->where.file + ":" +
-                         std::to_string(it->second->where.line));
+        if (!added) fail(at, "id '" + id + "' is already used at " + it->second->where.text());
     }
 
     void check_includes(size_t count, const Where& at) const {

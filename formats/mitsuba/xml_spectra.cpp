@@ -8,6 +8,12 @@
 namespace ambilux::mitsuba {
 namespace {
 
+Value spectrum_value() {
+    Value out;
+    out.kind = ValueKind::spectrum;
+    return out;
+}
+
 double positive(const Value& value) {
     if (!(value.number > 0 && std::isfinite(value.number)))
         fail(value.where, "'" + value.name + "' of a spectrum must be positive");
@@ -35,8 +41,7 @@ private:
         if (type == "d65" || type == "srgb") return scaled_white();
         if (type == "irregular" || type == "regular") return tabulated();
         if (type != "blackbody") fail(at, "spectrum type '" + type + "' is not supported");
-        Value out;
-        out.kind = ValueKind::spectrum;
+        Value out = spectrum_value();
         const double scale = number("scale", 1);
         out.samples = planck(positive(take("temperature")), scale);
         return out;
@@ -50,7 +55,7 @@ private:
         out.number = value.number;
         if (value.kind == ValueKind::vector) {
             out.kind = ValueKind::rgb;
-            out.rgb = {float(value.vector.x), float(value.vector.y), float(value.vector.z)};
+            out.rgb = rounded(value.vector);
         }
         return out;
     }
@@ -59,8 +64,7 @@ private:
     Value scaled_white() {
         const double scale = number("scale", 1);
         const char* name = given.contains("value") ? "value" : "color";
-        Value out;
-        out.kind = ValueKind::spectrum;
+        Value out = spectrum_value();
         out.number = scale;
         if (!given.contains(name)) return out;
         out = take(name);
@@ -81,8 +85,7 @@ private:
         }
         if (waves.size() != values.size() || waves.size() < 2)
             fail(at, "a spectrum needs as many wavelengths as values, and two at least");
-        Value out;
-        out.kind = ValueKind::spectrum;
+        Value out = spectrum_value();
         for (size_t i = 0; i < waves.size(); ++i) {
             if (i > 0 && !(waves[i] > waves[i - 1])) fail(at, "wavelengths of <spectrum> must rise");
             out.samples.push_back({waves[i], values[i]});
@@ -113,11 +116,10 @@ Value ValueParser::parse_blackbody(const XmlSource& source, const pugi::xml_node
     const Where at = where(source, node);
     std::string text = attribute(source, node, "temperature");
     while (!text.empty() && (text.back() == 'K' || text.back() == 'k' || text.back() == ' ')) text.pop_back();
-    Value kelvin, out;
+    Value kelvin, out = spectrum_value();
     kelvin.name = "temperature";
     kelvin.where = at;
     kelvin.number = parse_number(text, at, "temperature");
-    out.kind = ValueKind::spectrum;
     out.samples = planck(positive(kelvin), number_or(source, node, "scale", 1));
     return out;
 }

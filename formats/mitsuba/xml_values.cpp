@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "core/error.h"
 #include "core/srgb.h"
 #include "core/text.h"
 #include "core/text_cursor.h"
@@ -32,7 +31,7 @@ std::string lower_case(std::string text) {
 
 /// Up vector of a <lookat> without one: the second tangent of Duff et al. 2017 about the view direction, as Mitsuba 3.
 Vec3d any_up(Vec3d d) {
-    const double l = length(d), x = d.x / l, y = d.y / l, z = d.z / l;
+    const auto [x, y, z] = unit(d);
     const double sign = std::copysign(1.0, z), a = -1 / (sign + z);
     return {1 + sign * x * x * a, sign * x * y * a, -sign * x};
 }
@@ -44,8 +43,6 @@ Where where(const XmlSource& source, ptrdiff_t offset) {
     return {source.path, int(it - source.line_ends.begin()) + 1};
 }
 Where where(const XmlSource& source, const pugi::xml_node& node) { return where(source, node.offset_debug()); }
-
-void fail(const Where& where, const std::string& message) { throw input_error(where.file, where.line, message); }
 
 std::string ValueParser::substitute(const std::string& text, const Where& at) {
     std::string out;
@@ -146,7 +143,7 @@ Matrix ValueParser::parse_transform(const XmlSource& source, const pugi::xml_nod
                 if (list.size() != 3) fail(at, std::string("'") + names[i] + "' of <lookat> needs three numbers");
                 v[i] = {list[0], list[1], list[2]};
             }
-            if (!(length(v[2]) > 0)) v[2] = any_up({v[1].x - v[0].x, v[1].y - v[0].y, v[1].z - v[0].z});
+            if (!(length(v[2]) > 0)) v[2] = any_up(v[1] - v[0]);
             bool valid = true;
             m = look_at(v[0], v[1], v[2], valid);
             if (!valid) fail(at, "<lookat> is degenerate: target equals origin, or up is along the view direction");
@@ -246,8 +243,7 @@ Value ValueParser::parse_value(const XmlSource& source, const pugi::xml_node& no
     } else if (tag == "point" || tag == "vector") {
         allow(source, node, {"name", "x", "y", "z", "value"});
         value.kind = ValueKind::vector;
-        const Vec3d v = triple(source, node, 0, false);
-        value.vector = {v.x, v.y, v.z};
+        value.vector = triple(source, node, 0, false);
     } else if (tag == "spectrum" && node.attribute("type")) {
         value = parse_spectrum_plugin(source, node);
     } else if (tag == "spectrum") {

@@ -22,8 +22,6 @@ struct XmlSource {
 Where where(const XmlSource& source, ptrdiff_t offset);
 Where where(const XmlSource& source, const pugi::xml_node& node);
 
-[[noreturn]] void fail(const Where& where, const std::string& message);
-
 class ValueParser {
 public:
     explicit ValueParser(Document& document) : document_(document) {}

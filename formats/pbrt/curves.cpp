@@ -10,36 +10,20 @@ using namespace document;
 
 namespace {
 
-using Point = std::array<double, 3>;
-
 /// Control points of a uniform B-spline that is one cubic Bezier segment.
-std::array<Point, 4> spline_of(const std::array<Point, 4>& b) {
-    std::array<Point, 4> d;
-    for (size_t i = 0; i < 3; ++i) {
-        d[0][i] = 6 * b[0][i] - 7 * b[1][i] + 2 * b[2][i];
-        d[1][i] = 2 * b[1][i] - b[2][i];
-        d[2][i] = 2 * b[2][i] - b[1][i];
-        d[3][i] = 2 * b[1][i] - 7 * b[2][i] + 6 * b[3][i];
-    }
-    return d;
+std::array<Vec3d, 4> spline_of(const std::array<Vec3d, 4>& b) {
+    return {b[0] * 6 - b[1] * 7 + b[2] * 2, b[1] * 2 - b[2], b[2] * 2 - b[1], b[1] * 2 - b[2] * 7 + b[3] * 6};
 }
 
 /// The curve of cubic B-splines of these points, whose radius goes from `first` to `last` along it. The radius at a
 /// control point is that at its Greville abscissa, which makes it linear.
-Curve curve_of(const Point* points, size_t count, double first, double last) {
+Curve curve_of(const Vec3d* points, size_t count, double first, double last) {
     Curve curve;
     for (size_t i = 0; i < count; ++i) {
         const double u = (double(i) - 1) / double(count - 3);
-        curve.push_back({{points[i][0], points[i][1], points[i][2]}, first + (last - first) * u});
+        curve.push_back({points[i], first + (last - first) * u});
     }
     return curve;
-}
-
-bool same(const Matrix& a, const Matrix& b) {
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j)
-            if (a.m[i][j] != b.m[i][j]) return false;
-    return true;
 }
 
 }  // namespace
@@ -65,8 +49,8 @@ std::vector<Curve> read_curve(SceneMaker& scene, const Parameters& in) {
     if (!(first >= 0 && last >= 0 && std::max(first, last) > 0))
         fail(in.where, "the width of a curve must be positive");
     const std::vector<double>& numbers = in.numbers("P", 3);
-    std::vector<Point> p(numbers.size() / 3);
-    for (size_t i = 0; i < numbers.size(); ++i) p[i / 3][i % 3] = numbers[i];
+    std::vector<Vec3d> p;
+    for (size_t i = 0; i < numbers.size(); i += 3) p.push_back({numbers[i], numbers[i + 1], numbers[i + 2]});
     const size_t step = size_t(degree);
     if (p.size() <= step || (basis == "bezier" && (p.size() - 1) % step != 0))
         fail(in.where_of("P"),
@@ -75,11 +59,9 @@ std::vector<Curve> read_curve(SceneMaker& scene, const Parameters& in) {
     std::vector<Curve> curves;
     const size_t segments = (p.size() - 1) / step;
     for (size_t k = 0; k < segments; ++k) {
-        const Point* q = p.data() + k * step;
-        std::array<Point, 4> cubic = {q[0], q[1], q[2], q[step]};
-        if (degree == 2)
-            for (size_t i = 0; i < 3; ++i)
-                cubic[1][i] = (q[0][i] + 2 * q[1][i]) / 3, cubic[2][i] = (2 * q[1][i] + q[2][i]) / 3;
+        const Vec3d* q = p.data() + k * step;
+        std::array<Vec3d, 4> cubic = {q[0], q[1], q[2], q[step]};
+        if (degree == 2) cubic[1] = (q[0] + q[1] * 2) * (1. / 3), cubic[2] = (q[1] * 2 + q[2]) * (1. / 3);
         const auto radius = [&](size_t j) { return (first + (last - first) * double(j) / double(segments)) / 2; };
         curves.push_back(curve_of(spline_of(cubic).data(), 4, radius(k), radius(k + 1)));
     }
@@ -91,13 +73,12 @@ Object* add_curves(SceneMaker& scene, const Parameters& in, const std::vector<Cu
     if (!alone && !scene.curves.empty()) {
         CurveMesh& last = scene.curves.back();
         if (last.bsdf == bsdf && last.group == scene.open_object && last.reversed == scene.state.reverse_orientation &&
-            same(last.to_world, scene.state.ctm)) {
+            last.to_world == scene.state.ctm) {
             last.curves.insert(last.curves.end(), curves.begin(), curves.end());
             return nullptr;
         }
     }
-    const std::string name =
-        in.where.file + ":" + std::to_string(in.where.line) + "#curves" + std::to_string(scene.curves.size());
+    const std::string name = in.where.text() + "#curves" + std::to_string(scene.curves.size());
     scene.curves.push_back({name, in.where, curves, alone ? nullptr : bsdf, scene.open_object,
                             scene.state.reverse_orientation, scene.state.ctm});
     Object& shape = add_object(scene.document, "shape", "mesh", in.where);

@@ -35,10 +35,7 @@ Texture Textures::dots(const Parameters& in) const {
     const double cells = std::max(std::fabs(to_cells.m[0][0]), std::fabs(to_cells.m[1][1]));
     const uint32_t side = uint32_t(std::clamp(64 * cells, 256.0, 2048.0));
     out.wrap = "clamp", out.filter = "nearest";
-    out.image = std::make_shared<TextureImage>();
-    out.image->is_file = false;
-    out.image->width = out.image->height = side;
-    out.image->texels.reserve(size_t(side) * side);
+    out.image = made_image(side, side);
     for (uint32_t row = 0; row < side; ++row)
         for (uint32_t column = 0; column < side; ++column) {
             const double u = (column + 0.5) / side, v = 1 - (row + 0.5) / side;

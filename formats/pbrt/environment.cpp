@@ -5,7 +5,6 @@
 
 #include "core/math.h"
 #include "core/parallel.h"
-#include "core/srgb.h"
 #include "formats/file_budget.h"
 
 namespace ambilux::pbrt {
@@ -24,7 +23,7 @@ std::pair<double, double> square_of(double x, double y, double z) {
 }
 
 /// Its inverse.
-document::Vec3d direction_of(double s, double t) {
+Vec3d direction_of(double s, double t) {
     const double u = 2 * s - 1, v = 2 * t - 1, a = std::fabs(u), b = std::fabs(v), distance = 1 - (a + b),
                  r = 1 - std::fabs(distance), phi = (r == 0 ? 1 : (b - a) / r + 1) * M_PI / 4,
                  z = std::copysign(1 - r * r, distance), sine = r * std::sqrt(std::max(0.0, 2 - r * r));
@@ -47,13 +46,11 @@ SphereImage read_sphere_image(document::Document& document, const std::string& p
                         std::to_string(texels.height) + "; an equal-area octahedral map is square");
     const size_t n = texels.width;
     SphereImage out{n, std::vector<Rgb>(n * n)};
-    for (size_t i = 0; i < n * n; ++i)
-        for (int c = 0; c < 3; ++c) {
-            double v = texels.is_8bit ? texels.bytes[4 * i + size_t(c)] / 255.0 : texels.floats[4 * i + size_t(c)];
-            if (!texels.is_linear) v = srgb_to_linear(v);
-            if (!std::isfinite(v)) fail({path, 0}, "a texel is not finite");
-            out.texels[i][c] = float(std::max(v, 0.0));
-        }
+    for (size_t i = 0; i < n * n; ++i) {
+        const Rgb c = texels.linear(i);
+        if (!is_finite(c)) fail({path, 0}, "a texel is not finite");
+        out.texels[i] = max(c, splat(0));
+    }
     return out;
 }
 
@@ -73,11 +70,7 @@ Environment read_environment(document::Document& document, const std::string& pa
 
     const size_t width = 2 * n, height = std::max<size_t>(n, 2);
     FileBudget(path, document.limits).bytes(width * height, 16);
-    Texels& image = document.images[out.image];
-    image = {};
-    image.width = uint32_t(width), image.height = uint32_t(height);
-    image.is_linear = true;
-    image.floats.resize(width * height * 4);
+    Texels& image = document::add_image(document, out.image, uint32_t(width), uint32_t(height));
     constexpr int kSub = 4;
     parallel_for(height, [&](size_t y) {
         for (size_t x = 0; x < width; ++x) {
@@ -97,7 +90,6 @@ Environment read_environment(document::Document& document, const std::string& pa
             }
             float* texel = image.floats.data() + (y * width + x) * 4;
             for (int c = 0; c < 3; ++c) texel[c] = float(sum[c] / weight);
-            texel[3] = 1;
         }
     });
     return out;

@@ -23,7 +23,7 @@ struct Placed {
 };
 
 bool same_projection(const Texture& a, const Texture& b) {
-    return a.projection && b.projection ? a.projection->same(*b.projection) : a.projection == b.projection;
+    return a.projection && b.projection ? *a.projection == *b.projection : a.projection == b.projection;
 }
 
 /// False if a grid with coordinates `grid` holds no whole number of periods of the texture.
@@ -81,21 +81,20 @@ uint32_t grid_size(const std::vector<Texture>& parts, const std::vector<Placed>&
 }
 
 /// One period of `parts`, put together by `f`.
-TextureImage image_of(const std::vector<Texture>& parts, const std::vector<Placed>& places, FileBudget budget,
-                      const std::function<Rgb(const std::vector<Rgb>&)>& f) {
-    TextureImage image;
-    image.is_file = false;
-    image.width = grid_size(parts, places, &Placed::s, &TextureImage::width);
-    image.height = grid_size(parts, places, &Placed::t, &TextureImage::height);
-    budget.bytes(uint64_t(image.width) * image.height, sizeof(Rgb));
+std::shared_ptr<TextureImage> image_of(const std::vector<Texture>& parts, const std::vector<Placed>& places,
+                                       FileBudget budget, const std::function<Rgb(const std::vector<Rgb>&)>& f) {
+    const uint32_t width = grid_size(parts, places, &Placed::s, &TextureImage::width),
+                   height = grid_size(parts, places, &Placed::t, &TextureImage::height);
+    budget.bytes(uint64_t(width) * height, sizeof(Rgb));
+    const auto image = made_image(width, height);
     std::vector<Rgb> values(parts.size());
-    for (uint32_t y = 0; y < image.height; ++y)
-        for (uint32_t x = 0; x < image.width; ++x) {
-            const double s = (x + 0.5) / image.width, t = 1 - (y + 0.5) / image.height;
+    for (uint32_t y = 0; y < height; ++y)
+        for (uint32_t x = 0; x < width; ++x) {
+            const double s = (x + 0.5) / width, t = 1 - (y + 0.5) / height;
             for (size_t i = 0; i < parts.size(); ++i)
                 values[i] = lookup(parts[i], places[i].s.scale * s + places[i].s.shift,
                                    places[i].t.scale * t + places[i].t.shift);
-            image.texels.push_back(f(values));
+            image->texels.push_back(f(values));
         }
     return image;
 }
@@ -145,9 +144,7 @@ Texture Textures::fold(const Parameters& in, const std::vector<Texture>& parts,
         out.odd = combine([](const Texture& t) { return t.odd; });
         return out;
     }
-    out.image = std::make_shared<TextureImage>();
-    out.image->is_file = false;
-    out.image->width = model->image->width, out.image->height = model->image->height;
+    out.image = made_image(model->image->width, model->image->height);
     for (size_t i = 0; i < model->image->texels.size(); ++i)
         out.image->texels.push_back(combine([i](const Texture& t) { return t.color * t.image->texels[i]; }));
     out.color = splat(1);
@@ -182,12 +179,11 @@ Texture Textures::on_one_grid(const Parameters& in, const std::vector<Texture>& 
         fits &= place(parts[i], grid, places[i]) && same_projection(parts[i], *longest);
     }
     fits &= repeats || same;
-    if (!fits)
+    if (!fits) {
         report_.refuse(
             in.where,
             "a texture of type '" + in.type + "' of textures whose periods do not fit into each other is not supported",
             "constants are put in for them");
-    if (!fits) {
         std::vector<Rgb> values(parts.size());
         for (size_t i = 0; i < parts.size(); ++i) values[i] = parts[i].color;
         out.color = f(values);
@@ -200,7 +196,7 @@ Texture Textures::on_one_grid(const Parameters& in, const std::vector<Texture>& 
     out.projection = longest->projection;
     out.wrap = longest->wrap;
     out.filter = nearest ? "nearest" : "bilinear";
-    out.image = std::make_shared<TextureImage>(image_of(parts, places, FileBudget(in.where.file, document_.limits), f));
+    out.image = image_of(parts, places, FileBudget(in.where.file, document_.limits), f);
     return out;
 }
 
@@ -212,13 +208,10 @@ Texture Textures::bilerp(bool is_float, const Parameters& in, ColorSpace space) 
     set_mapping(out, in);
     out.mapping = UvMap{{{0.5, 0, 0.25}, {0, 0.5, 0.25}}} * out.mapping;
     out.wrap = "clamp";
-    out.image = std::make_shared<TextureImage>();
-    out.image->is_file = false;
-    out.image->width = out.image->height = 2;
+    out.image = made_image(2, 2);
     const std::pair<const char*, double> corners[4] = {{"v01", 1}, {"v11", 1}, {"v00", 0}, {"v10", 0}};
     for (const auto& [name, fallback] : corners) {
-        const Texture corner = is_float ? number(in, name, fallback)
-                                        : color(in, name, splat(float(fallback)), ColorUse::reflectance, space);
+        const Texture corner = part(is_float, in, name, fallback, space);
         if (!corner.is_constant()) fail(in.where_of(name), "corners of a bilerp must be constants");
         out.image->texels.push_back(corner.color);
     }

@@ -20,32 +20,20 @@ double cube_of_cosine(double x, double y) {
     return cosine * cosine * cosine;
 }
 
-/// A projector at `to_world` whose image is empty yet.
+/// A projector at `to_world`, whose image is to be filled.
 Texels& add_projector(SceneMaker& scene, const Where& where, const Matrix& to_world, double fov, double scale,
-                      const char* filter) {
+                      const char* filter, uint32_t width, uint32_t height) {
     Document& document = scene.document;
+    FileBudget(where.file, document.limits).bytes(uint64_t(width) * height, 16);
     Object& object = add_object(document, "emitter", "projector", where);
     set_transform(object, "to_world", to_world);
     set_number(object, "fov", fov);
     set_text(object, "fov_axis", "smaller");
     set_number(object, "scale", scale / M_PI);
-    Object& texture = add_object(document, "texture", "bitmap", where);
     const std::string name = "light " + std::to_string(document.images.size());
-    set_text(texture, "image", name);
-    set_boolean(texture, "raw", true);
-    set_text(texture, "wrap_mode", "clamp");
-    set_text(texture, "filter_type", filter);
-    add_child(object, texture, "irradiance");
+    add_child(object, add_bitmap(document, where, name, filter), "irradiance");
     add_child(*document.scene, object);
-    Texels& image = document.images[name];
-    image.is_linear = true;
-    return image;
-}
-
-void resize(SceneMaker& scene, const Where& where, Texels& image, uint32_t width, uint32_t height) {
-    FileBudget(where.file, scene.document.limits).bytes(uint64_t(width) * height, 16);
-    image.width = width, image.height = height;
-    image.floats.assign(size_t(4) * width * height, 1.0f);
+    return add_image(document, name, width, height);
 }
 
 /// Faces of a cube: axis of the projector, and where its +x and +y point.
@@ -60,7 +48,7 @@ constexpr Face kFaces[6] = {{{0, 1, 0}, {0, 0, 1}, {1, 0, 0}}, {{0, 1, 0}, {0, 0
 
 void add_projection(SceneMaker& scene, const Described& light) {
     const Parameters& in = light.in;
-    const std::string path = resolve(scene.folder, in.text("filename", ""), in.where_of("filename"));
+    const std::string path = resolve(scene.folder, in.filename(), in.where_of("filename"));
     const double fov = in.number("fov", 90), scale = in.number("scale", 1) * scene.exposure;
     if (!(fov > 0 && fov < 180)) fail(in.where_of("fov"), "fov must lie between 0 and 180 degrees");
     if (!(scale >= 0)) fail(in.where_of("scale"), "the scale of a light must not be negative");
@@ -81,9 +69,9 @@ void add_projection(SceneMaker& scene, const Described& light) {
                      cosine_at((x + 0.5) / w, (y + 0.5) / h) * 4 * half_x * half_y / (double(w) * h);
     // pbrt's x points to the right of the image, that of a projector to its left.
     const int fine = (kLeastTexels + std::max(w, h) - 1) / std::max(w, h);
-    Texels& image = add_projector(scene, in.where, place_of(scene.state.ctm) * scaling(-1, 1, 1), fov,
-                                  scale * (power > 0 ? power_factor(light, "power", power) : 1), "nearest");
-    resize(scene, in.where, image, uint32_t(w * fine), uint32_t(h * fine));
+    Texels& image = add_projector(scene, in.where, unscaled(scene.state.ctm) * scaling(-1, 1, 1), fov,
+                                  scale * (power > 0 ? power_factor(light, "power", power) : 1), "nearest",
+                                  uint32_t(w * fine), uint32_t(h * fine));
     for (int y = 0; y < h * fine; ++y)
         for (int x = 0; x < w * fine; ++x) {
             const Rgb c = max(source.texels[size_t(y / fine) * size_t(w) + size_t(x / fine)], splat(0)) *
@@ -96,7 +84,7 @@ void add_projection(SceneMaker& scene, const Described& light) {
 void add_goniometric(SceneMaker& scene, const Described& light) {
     const Parameters& in = light.in;
     const Emission e = emission(scene, light, "I");
-    const std::string path = resolve(scene.folder, in.text("filename", ""), in.where_of("filename"));
+    const std::string path = resolve(scene.folder, in.filename(), in.where_of("filename"));
     const SphereImage sphere = read_sphere_image(scene.document, path, in.where, "a goniometric light");
     const auto mean = [](Rgb c) { return (double(c.x) + c.y + c.z) / 3; };
     double power = 0;
@@ -114,21 +102,16 @@ void add_goniometric(SceneMaker& scene, const Described& light) {
                     // As the image of a camera: +x is left, +y up, and the first row on top.
                     const double a = 1 - 2 * (column + (k % kSub + 0.5) / kSub) / n,
                                  b = 1 - 2 * (row + (k / kSub + 0.5) / kSub) / n, l = 1 / std::sqrt(1 + a * a + b * b);
-                    const Vec3d d = {(face.x.x * a + face.y.x * b + face.z.x) * l,
-                                     (face.x.y * a + face.y.y * b + face.z.y) * l,
-                                     (face.x.z * a + face.y.z * b + face.z.z) * l};
+                    const Vec3d d = (face.x * a + face.y * b + face.z) * l;
                     // Images stand upright along y.
                     sum += mean(sphere.at(d.x, d.z, d.y)) * l * l * l;
                 }
                 values[size_t(row) * size_t(n) + size_t(column)] = float(sum / (kSub * kSub));
             }
         if (std::all_of(values.begin(), values.end(), [](float v) { return v == 0; })) continue;
-        Matrix turn;
-        const Vec3d columns[3] = {face.x, face.y, face.z};
-        for (int j = 0; j < 3; ++j)
-            turn.m[0][j] = columns[j].x, turn.m[1][j] = columns[j].y, turn.m[2][j] = columns[j].z;
-        Texels& image = add_projector(scene, in.where, place_of(scene.state.ctm) * turn, 90, 1, "bilinear");
-        resize(scene, in.where, image, uint32_t(n), uint32_t(n));
+        const Matrix turn = from_columns(face.x, face.y, face.z);
+        Texels& image = add_projector(scene, in.where, unscaled(scene.state.ctm) * turn, 90, 1, "bilinear", uint32_t(n),
+                                      uint32_t(n));
         for (size_t i = 0; i < values.size(); ++i)
             for (int c = 0; c < 3; ++c) image.floats[4 * i + size_t(c)] = intensity[c] * values[i];
     }

@@ -41,8 +41,7 @@ struct Copies {
 }  // namespace
 
 void add_instance(SceneMaker& scene, Object& group, const Where& where) {
-    if (++scene.shape_count > scene.document.limits.shapes)
-        fail(where, "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
+    check_shapes(scene.document.limits, ++scene.shape_count, where);
     Object& object = add_object(scene.document, "shape", "instance", where);
     set_transform(object, "to_world", scene.state.ctm);
     add_child(*scene.document.scene, object);

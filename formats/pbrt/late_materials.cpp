@@ -32,11 +32,7 @@ bool is_known(const SceneMaker& scene, const Shared& material) {
 Shared named_material(const SceneMaker& scene, const std::string& name, const Where& where) {
     const auto known = scene.named_materials.find(name);
     if (known != scene.named_materials.end()) return known->second;
-    Described later;
-    later.in.directive = kNamedMaterial;
-    later.in.type = name;
-    later.in.where = where;
-    return std::make_shared<const Described>(std::move(later));
+    return std::make_shared<const Described>(Described{{kNamedMaterial, name, where, {}}});
 }
 
 void add_shape_when_known(SceneMaker& scene, Parameters in) {
@@ -44,9 +40,7 @@ void add_shape_when_known(SceneMaker& scene, Parameters in) {
     if (scene.state.material && scene.state.material->in.directive == kNamedMaterial)
         scene.state.material = named_material(scene, scene.state.material->in.type, scene.state.material->in.where);
     if (is_known(scene, scene.state.material)) return add_shape(scene, in);
-    if (scene.late_shapes.size() >= scene.document.limits.shapes)
-        fail(in.where,
-             "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
+    document::check_shapes(scene.document.limits, scene.late_shapes.size() + 1, in.where);
     scene.late_shapes.push_back({std::move(in), scene.state, scene.open_object});
 }
 

@@ -28,21 +28,7 @@ inline double power_factor(const Described& light, const char* name, double of_o
 }
 
 /// Rotation of the world's transform; a uniform scale is nothing to what is infinitely far away.
-inline Matrix rotation_part(Matrix m) {
-    const double scale = std::cbrt(std::fabs(document::determinant(m)));
-    for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) m.m[i][j] /= scale > 0 ? scale : 1;
-        m.m[i][3] = 0;
-    }
-    return m;
-}
-
-/// The same with its place: a scale is nothing to a point that shines.
-inline Matrix place_of(const Matrix& m) {
-    Matrix out = rotation_part(m);
-    for (int i = 0; i < 3; ++i) out.m[i][3] = m.m[i][3];
-    return out;
-}
+inline Matrix rotation_of(const Matrix& m) { return document::without_place(document::unscaled(m)); }
 
 /// Lights with an image: from a point through a frustum, and in all directions.
 void add_projection(SceneMaker& scene, const Described& light);

@@ -83,11 +83,9 @@ void add_to_environment(SceneMaker& scene, Rgb radiance) {
 /// True if the environment is that map already.
 bool is_the_same_map(const SceneMaker& scene, const std::string& image, double scale, const Matrix& to_world) {
     if (!scene.environment || scene.environment->type != "envmap") return false;
-    const Matrix& known = scene.environment->find("to_world")->transform;
-    bool same = scene.environment->find("image")->text == image && scene.environment->find("scale")->number == scale;
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) same &= known.m[i][j] == to_world.m[i][j];
-    return same;
+    const Object& known = *scene.environment;
+    return known.find("image")->text == image && known.find("scale")->number == scale &&
+           known.find("to_world")->transform == to_world;
 }
 
 void add_infinite(SceneMaker& scene, const Described& light) {
@@ -112,7 +110,7 @@ void add_infinite(SceneMaker& scene, const Described& light) {
                       "environment maps are resampled from the equal-area octahedron to latitude and "
                       "longitude, which blurs them by half a texel");
     const double scale = e.scale * power_factor(light, "illuminance", environment.illuminance);
-    const Matrix turned = rotation_part(scene.state.ctm);
+    const Matrix turned = rotation_of(scene.state.ctm);
     if (in.find("portal") && is_the_same_map(scene, environment.image, scale, turned)) {
         return scene.report.note(in.where, "portals that look at one map share its light");
     }
@@ -140,9 +138,7 @@ Texture cells(const Texture& checkerboard) {
     out.filter = "nearest";
     out.mapping = UvMap{{{0.5, 0, 0}, {0, 0.5, 0}}} * checkerboard.mapping;
     out.color = splat(1);
-    out.image = std::make_shared<TextureImage>();
-    out.image->is_file = false;
-    out.image->width = out.image->height = 2;
+    out.image = made_image(2, 2);
     const Rgb even = checkerboard.color, odd = checkerboard.odd;
     out.image->texels = {odd, even, even, odd};
     return out;

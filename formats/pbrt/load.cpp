@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <set>
 
-#include "core/error.h"
 #include "core/text.h"
 #include "formats/document/plugins.h"
 #include "formats/front_end.h"
@@ -67,8 +66,7 @@ private:
 
 void Parser::parse_file(const std::string& path, const Where& from, uint64_t depth) {
     const Limits& limits = scene_.document.limits;
-    if (depth > limits.nesting)
-        fail(from, "files are nested deeper than --limits nesting=" + std::to_string(limits.nesting));
+    check_nesting(limits, depth, from, "files");
     if (++file_count_ > limits.includes)
         fail(from, "more files than --limits includes=" + std::to_string(limits.includes));
     if (std::find(open_files_.begin(), open_files_.end(), path) != open_files_.end())
@@ -118,10 +116,7 @@ void Parser::need_world(const std::string& name, const Where& at, bool inside) c
 }
 
 Parameters Parser::parameters(const std::string& directive, const Where& at, const char* kind) {
-    Parameters in;
-    in.directive = directive;
-    in.where = at;
-    in.type = tokens_->quoted("the type of " + directive);
+    Parameters in{directive, tokens_->quoted("the type of " + directive), at, {}};
     read_list(in, kind);
     return in;
 }
@@ -219,9 +214,7 @@ bool Parser::transform(const std::string& name, const Where& at) {
 }
 
 void Parser::save(bool is_object, const Where& at) {
-    if (saved_.size() >= scene_.document.limits.nesting)
-        fail(at,
-             "attributes are nested deeper than --limits nesting=" + std::to_string(scene_.document.limits.nesting));
+    check_nesting(scene_.document.limits, saved_.size() + 1, at, "attributes");
     saved_.push_back({scene_.state, is_object, at});
 }
 
@@ -299,9 +292,7 @@ bool Parser::material(const std::string& name, const Where& at) {
     } else if (name == "MakeNamedMaterial") {
         const std::string id = tokens_->quoted("the name of a material");
         if (scene_.named_materials.contains(id)) fail(at, "material '" + id + "' is defined twice");
-        Parameters in;
-        in.directive = name;
-        in.where = at;
+        Parameters in{name, "", at, {}};
         read_list(in, "material");
         in.type = in.text("type", "");
         if (in.type.empty()) fail(at, "material '" + id + "' has no type");

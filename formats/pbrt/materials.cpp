@@ -350,12 +350,7 @@ UvMap uv_map(Surface surface) {
 }
 
 const Object* surface_material(SceneMaker& scene, const Shared& material, Surface surface) {
-    static const Shared plain = [] {
-        Described d;
-        d.in.directive = "Material";
-        d.in.type = "diffuse";
-        return std::make_shared<const Described>(std::move(d));
-    }();
+    static const Shared plain = std::make_shared<const Described>(Described{{"Material", "diffuse", {}, {}}});
     const Shared& described = material ? material : plain;
     const auto known = scene.materials.find({described, surface});
     if (known != scene.materials.end()) return known->second;

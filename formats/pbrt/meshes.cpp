@@ -67,17 +67,8 @@ Mesh triangle_mesh(SceneMaker& scene, const Parameters& in) {
 }
 
 Mesh with_default_uvs(const Mesh& mesh) {
-    Mesh out;
-    constexpr Vec2f uvs[3] = {{0, 0}, {1, 0}, {1, 1}};
-    for (const auto& face : mesh.faces) {
-        const uint32_t first = uint32_t(out.positions.size());
-        for (int i = 0; i < 3; ++i) {
-            out.positions.push_back(mesh.positions[face[size_t(i)]]);
-            if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[face[size_t(i)]]);
-            out.uvs.push_back(uvs[i]);
-        }
-        out.faces.push_back({first, first + 1, first + 2});
-    }
+    Mesh out = with_own_corners(mesh);
+    for (size_t i = 0; i < out.faces.size(); ++i) out.uvs.insert(out.uvs.end(), {{0, 0}, {1, 0}, {1, 1}});
     return out;
 }
 
@@ -112,12 +103,7 @@ Mesh bilinear_mesh(SceneMaker& scene, const Parameters& in) {
                 if (!corners.normals.empty()) out.normals.push_back(normal);
                 out.uvs.push_back(corners.uvs.empty() ? Vec2f{u, v} : uv);
             }
-        for (uint32_t j = 0; j < n; ++j)
-            for (uint32_t i = 0; i < n; ++i) {
-                const uint32_t a = base + j * (n + 1) + i, b = a + 1, c = a + n + 1, d = c + 1;
-                out.faces.push_back({a, b, d});
-                out.faces.push_back({a, d, c});
-            }
+        add_grid_faces(out, base, n, n);
     }
     return out;
 }
@@ -128,8 +114,7 @@ Mesh loop_subdivision(SceneMaker& scene, const Parameters& in) {
     if (levels < 0 || levels > 12) fail(in.where_of("levels"), "levels must lie between 0 and 12");
     scene.report.note(in.where,
                       "a loopsubdiv is refined as often as it says, and its vertices moved to the limit surface");
-    return subdivide_loop(in.where.file + ":" + std::to_string(in.where.line), mesh, int(levels),
-                          scene.document.limits);
+    return subdivide_loop(in.where.text(), mesh, int(levels), scene.document.limits);
 }
 
 bool has_uvs(const std::string& path) {

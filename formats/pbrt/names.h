@@ -5,8 +5,10 @@
 
 namespace ambilux::pbrt {
 
-/// Which name of that kind it nearly is, as the end of a message. `kind`: directive, camera, filter, film, integrator,
-/// shape, material, light or texture type.
+/// Whether pbrt-v4 has a name of that kind. `kind`: directive, camera, filter, film, integrator,
+/// sampler, shape, material, light or texture type.
+bool is_known(const std::string& kind, const std::string& name);
+/// Which of them it nearly is, as the end of a message.
 std::string nearly_known(const std::string& kind, const std::string& name);
 /// "KIND 'name' is not supported", with the same end.
 std::string not_supported(const std::string& kind, const std::string& name);

@@ -5,8 +5,6 @@
 
 namespace ambilux::pbrt {
 
-using document::Vec3d;
-
 namespace {
 
 /// Ken Perlin's permutation of 2002, which pbrt takes.

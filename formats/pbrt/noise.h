@@ -1,7 +1,7 @@
 // Perlin's noise and sums of it, as pbrt-v4 has them.
 #pragma once
 
-#include "formats/document/transform.h"
+#include "core/vec3d.h"
 
 namespace ambilux::pbrt {
 
@@ -13,8 +13,8 @@ inline constexpr double kLacunarity = 1.99;
 
 /// Fractional Brownian motion: octaves of noise, each of `omega` times the amplitude of the one before (PBRT 4th ed.,
 /// 10.6). All octaves count: there is no pixel that some would be too fine for.
-double fbm(document::Vec3d p, double omega, int octaves);
+double fbm(Vec3d p, double omega, int octaves);
 /// The same of absolute values.
-double turbulence(document::Vec3d p, double omega, int octaves);
+double turbulence(Vec3d p, double omega, int octaves);
 
 }  // namespace ambilux::pbrt

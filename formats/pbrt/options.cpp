@@ -1,7 +1,6 @@
 // What stands before WorldBegin: camera, film, filter, sampler, integrator.
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "formats/pbrt/names.h"
 #include "formats/pbrt/scene.h"
@@ -18,14 +17,6 @@ struct Window {
     double half_width() const { return (x1 - x0) / 2; }
     double half_height() const { return (y1 - y0) / 2; }
 };
-
-/// The map without the uniform part of its scale, which is nothing to what starts in one point.
-Matrix unscaled(Matrix m) {
-    const double scale = std::cbrt(std::fabs(determinant(m)));
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) m.m[i][j] /= scale > 0 ? scale : 1;
-    return m;
-}
 
 Window screen_window(SceneMaker& scene, const Parameters& in, double aspect) {
     const double frame = in.number("frameaspectratio", aspect);
@@ -48,10 +39,7 @@ Object& spherical_camera(SceneMaker& scene, const Parameters& in, const Options&
                             "mapping '" + mapping + "' of a spherical camera is not supported",
                             "equirectangular is used");
     Object& sensor = add_object(scene.document, "sensor", "spherical", in.where);
-    Matrix turn = scaling(1, 1, 1);
-    turn.m[0][0] = turn.m[2][2] = 0;
-    turn.m[0][2] = -1;
-    turn.m[2][0] = 1;
+    const Matrix turn = from_columns({0, 0, 1}, {0, 1, 0}, {-1, 0, 0});
     set_transform(sensor, "to_world", unscaled(options.camera_to_world * turn));
     in.ignore({"lensradius", "focaldistance", "frameaspectratio", "screenwindow"});
     in.finish(scene.report);
@@ -59,13 +47,7 @@ Object& spherical_camera(SceneMaker& scene, const Parameters& in, const Options&
 }
 
 Object& camera(SceneMaker& scene, const Options& options, double aspect) {
-    static const Parameters plain = [] {
-        Parameters p;
-        p.directive = "Camera";
-        p.type = "perspective";
-        return p;
-    }();
-    const Parameters& in = options.camera ? *options.camera : plain;
+    const Parameters in = options.camera.value_or(Parameters{"Camera", "perspective", {}, {}});
     if (in.type == "spherical") return spherical_camera(scene, in, options);
     const bool parallel = in.type == "orthographic";
     if (!parallel && in.type != "perspective")
@@ -115,15 +97,8 @@ Object& camera(SceneMaker& scene, const Options& options, double aspect) {
 }
 
 Object& filter(SceneMaker& scene, const Options& options) {
-    static const Parameters plain = [] {
-        Parameters p;
-        p.directive = "PixelFilter";
-        p.type = "gaussian";
-        return p;
-    }();
-    Parameters absent = plain;
-    absent.where = scene.document.scene->where;
-    const Parameters& in = options.filter ? *options.filter : absent;
+    const Parameters in =
+        options.filter.value_or(Parameters{"PixelFilter", "gaussian", scene.document.scene->where, {}});
     const bool is_tent = in.type == "triangle", is_box = in.type == "box";
     Object& out = add_object(scene.document, "rfilter", is_tent ? "tent" : is_box ? "box" : "gaussian", in.where);
     const double fallback = is_box ? 0.5 : is_tent ? 2 : in.type == "sinc" ? 4 : in.type == "mitchell" ? 2 : 1.5;
@@ -187,10 +162,14 @@ Object& film(SceneMaker& scene, const Parameters& in, const Options& options, do
                                         "' counts for its exposure only");
     if (in.find("maxcomponentvalue"))
         scene.report.note(in.where_of("maxcomponentvalue"), "samples are not clamped: maxcomponentvalue is left out");
-    in.ignore({"filename", "savefp16", "diagonal", "coordinatesystem", "lambdamin", "lambdamax", "nbuckets"});
-    if (in.type != "rgb" && in.type != "gbuffer" && in.type != "spectral")
-        scene.report.refuse(in.where, "film '" + in.type + "' is not known" + nearly_known("film", in.type),
-                            "rgb is used");
+    in.ignore({"filename", "savefp16"});  // where the image goes; floats hold what halves do
+    in.leave(scene.report, {"coordinatesystem", "lambdamin", "lambdamax", "nbuckets"},
+             "images have the channels R, G and B");
+    in.leave(scene.report, {"diagonal"}, "it is for lenses of glass");
+    if (!is_known("film", in.type))
+        scene.report.refuse(in.where, not_supported("film", in.type), "rgb is used");
+    else if (in.type != "rgb")
+        scene.report.note(in.where, "film '" + in.type + "' gets the channels of rgb");
     const Parameters* camera = options.camera ? &*options.camera : nullptr;
     const double seconds = camera ? camera->number("shutterclose", 1) - camera->number("shutteropen", 0) : 1.0;
     scene.exposure = seconds * in.number("iso", 100) / 100;
@@ -201,15 +180,9 @@ Object& film(SceneMaker& scene, const Parameters& in, const Options& options, do
 }
 
 void add_integrator(SceneMaker& scene, const Options& options, const Where& where) {
-    Parameters plain;
-    plain.directive = "Integrator";
-    plain.type = "volpath";
-    plain.where = where;
-    const Parameters& in = options.integrator ? *options.integrator : plain;
-    static const std::set<std::string> known = {"path", "volpath", "simplepath", "simplevolpath",
-                                                "mlt",  "sppm",    "randomwalk"};
+    const Parameters in = options.integrator.value_or(Parameters{"Integrator", "volpath", where, {}});
     const bool light = in.type == "lightpath", bdpt = in.type == "bdpt";
-    if (!known.contains(in.type) && !light && !bdpt)
+    if (!is_known("integrator", in.type))
         scene.report.refuse(in.where, not_supported("integrator", in.type), "path is used");
     else if (in.type != "path" && in.type != "volpath" && !light && !bdpt)
         scene.report.note(in.where, "integrator '" + in.type + "' has the image of the path tracer, which is used");
@@ -234,7 +207,13 @@ Object* sampler(SceneMaker& scene, const Options& options) {
     int64_t count = in.integer("pixelsamples", 16);
     if (in.type == "stratified") count = in.integer("xsamples", 4) * in.integer("ysamples", 4);
     if (count < 1) fail(in.where, "the number of samples must be positive");
-    in.ignore({"randomization", "seed", "jitter"});
+    // Every sampler has the same expected image.
+    if (!is_known("sampler", in.type))
+        scene.report.refuse(in.where, not_supported("sampler", in.type), "samples are independent");
+    else if (in.type != "independent")
+        scene.report.note(in.where, "sampler '" + in.type + "' is not followed; samples are independent");
+    in.ignore({"randomization", "jitter"});
+    in.leave(scene.report, {"seed"}, "--seed has the last word");
     in.finish(scene.report);
     Object& out = add_object(scene.document, "sampler", "independent", in.where);
     set_integer(out, "sample_count", std::min<int64_t>(count, 1000000000));
@@ -244,17 +223,14 @@ Object* sampler(SceneMaker& scene, const Options& options) {
 }  // namespace
 
 void add_options(SceneMaker& scene, const Options& options) {
-    Parameters plain;
-    plain.directive = "Film";
-    plain.type = "rgb";
-    plain.where = scene.document.scene->where;
+    const Where& where = scene.document.scene->where;
     double aspect = 1;
-    Object& picture = film(scene, options.film ? *options.film : plain, options, aspect);
+    Object& picture = film(scene, options.film.value_or(Parameters{"Film", "rgb", where, {}}), options, aspect);
     Object& sensor = camera(scene, options, aspect);
     add_child(sensor, picture);
     if (const Object* samples = sampler(scene, options)) add_child(sensor, *samples);
     add_child(*scene.document.scene, sensor);
-    add_integrator(scene, options, plain.where);
+    add_integrator(scene, options, where);
 }
 
 }  // namespace ambilux::pbrt

@@ -168,13 +168,28 @@ void Parameters::ignore(std::initializer_list<const char*> names) const {
     for (const char* name : names) find(name);
 }
 
+void Parameters::leave(Report& report, std::initializer_list<const char*> names, const std::string& why) const {
+    for (const char* name : names)
+        if (const Parameter* p = find(name))
+            report.note(p->where, "'" + p->name + "' of " + directive + " '" + type + "' is not followed: " + why);
+}
+
+std::string Parameters::filename() const {
+    const std::string name = text("filename", "");
+    if (!name.empty()) return name;
+    for (const Parameter& p : list)
+        if (!p.used && document::nearest_name({"filename"}, p.name) == "filename")
+            fail(p.where, unknown(p, {"filename"}));
+    fail(where, directive + " '" + type + "' has no filename");
+}
+
+std::string Parameters::unknown(const Parameter& p, const std::vector<std::string>& known) const {
+    return "unknown parameter '" + p.name + "' of " + directive + " '" + type + "'" + document::nearly(known, p.name);
+}
+
 void Parameters::finish(Report& report) const {
     for (const Parameter& p : list)
-        if (!p.used)
-            report.refuse(p.where,
-                          "unknown parameter '" + p.name + "' of " + directive + " '" + type + "'" +
-                              document::nearly(absent, p.name),
-                          "it is ignored");
+        if (!p.used) report.refuse(p.where, unknown(p, absent), "it is ignored");
 }
 
 }  // namespace ambilux::pbrt

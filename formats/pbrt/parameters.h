@@ -10,8 +10,6 @@
 
 namespace ambilux::pbrt {
 
-using document::Vec3d;
-
 struct Parameter {
     std::string type, name;
     Where where;
@@ -45,10 +43,15 @@ public:
     const std::vector<double>& numbers(const std::string& name, size_t size = 1) const;
 
     void ignore(std::initializer_list<const char*> names) const;
+    /// Parameters that ask for what is not done: a note says why.
+    void leave(Report& report, std::initializer_list<const char*> names, const std::string& why) const;
+    /// The name of a file, which must be there.
+    std::string filename() const;
     /// Refuses what nobody asked for.
     void finish(Report& report) const;
 
 private:
+    std::string unknown(const Parameter& p, const std::vector<std::string>& known) const;
     const Parameter* typed(const std::string& name, std::initializer_list<const char*> types) const;
 };
 

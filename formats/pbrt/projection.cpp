@@ -7,9 +7,6 @@ namespace ambilux::pbrt {
 namespace {
 
 using document::Matrix;
-using document::Vec3d;
-
-Vec3d placed(const Matrix& m, Vec3f p) { return transformed(m, {p.x, p.y, p.z}); }
 
 Vec2f in_texture(const Projection& projection, Vec3d p) {
     const double phi = std::atan2(p.y, p.x);
@@ -30,46 +27,35 @@ Vec2f coordinates(const Projection& projection, Vec3d world) {
     return in_texture(projection, transformed(projection.to_texture, world));
 }
 
-bool Projection::same(const Projection& other) const {
-    const auto equal = [](Vec3d a, Vec3d b) { return a.x == b.x && a.y == b.y && a.z == b.z; };
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 4; ++j)
-            if (to_texture.m[i][j] != other.to_texture.m[i][j]) return false;
-    return kind == other.kind && equal(v1, other.v1) && equal(v2, other.v2) && ds == other.ds && dt == other.dt;
-}
-
 Mesh projected(const Mesh& mesh, const Matrix& to_world, const Projection& projection) {
     const Matrix m = projection.to_texture * to_world;
     Mesh out;
     if (projection.kind == Projection::Kind::planar) {
         out = mesh;
         out.uvs.clear();
-        for (const Vec3f& p : mesh.positions) out.uvs.push_back(in_texture(projection, placed(m, p)));
+        for (const Vec3f& p : mesh.positions) out.uvs.push_back(in_texture(projection, transformed(m, in_double(p))));
         return out;
     }
     float Vec2f::* const turn = projection.kind == Projection::Kind::cylindrical ? &Vec2f::x : &Vec2f::y;
-    for (const auto& face : mesh.faces) {
-        const uint32_t first = uint32_t(out.positions.size());
+    out = with_own_corners(mesh);
+    for (const auto& face : out.faces) {
         bool on_axis[3];
         float most = 0, sum = 0;
         int count = 0;
         for (size_t k = 0; k < 3; ++k) {
-            const Vec3d p = placed(m, mesh.positions[face[k]]);
+            const Vec3d p = transformed(m, in_double(out.positions[face[k]]));
             on_axis[k] = std::hypot(p.x, p.y) <= 1e-6 * length(p);
-            out.positions.push_back(mesh.positions[face[k]]);
-            if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[face[k]]);
             out.uvs.push_back(in_texture(projection, p));
             if (!on_axis[k]) most = std::fmax(most, out.uvs.back().*turn);
         }
         for (size_t k = 0; k < 3; ++k) {
-            float& t = out.uvs[first + k].*turn;
+            float& t = out.uvs[face[k]].*turn;
             if (on_axis[k]) continue;
             if (most - t > 0.5f) t += 1;  // on the other side of the seam
             sum += t, ++count;
         }
         for (size_t k = 0; k < 3; ++k)
-            if (on_axis[k] && count > 0) out.uvs[first + k].*turn = sum / float(count);
-        out.faces.push_back({first, first + 1, first + 2});
+            if (on_axis[k] && count > 0) out.uvs[face[k]].*turn = sum / float(count);
     }
     return out;
 }

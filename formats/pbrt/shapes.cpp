@@ -21,16 +21,10 @@ bool has_texture(const Object& object) {
 
 /// Area of the triangles in the world if all have the same, else 0: pbrt gives its power to each.
 double triangle_area(const Mesh& mesh, const Matrix& m) {
-    const auto row = [&m](int i, Vec3f p) {
-        return m.m[i][0] * double(p.x) + m.m[i][1] * double(p.y) + m.m[i][2] * double(p.z);
-    };
     double first = 0;
     for (const auto& f : mesh.faces) {
-        const Vec3f &a = mesh.positions[f[0]], &b = mesh.positions[f[1]], &c = mesh.positions[f[2]];
-        const auto edge = [&](Vec3f p) {
-            return Vec3d{row(0, p) - row(0, a), row(1, p) - row(1, a), row(2, p) - row(2, a)};
-        };
-        const double area = length(cross(edge(b), edge(c))) / 2;
+        const auto corner = [&](int k) { return transformed(m, in_double(mesh.positions[f[size_t(k)]]), 0); };
+        const double area = length(cross(corner(1) - corner(0), corner(2) - corner(0))) / 2;
         if (first == 0) first = area;
         if (std::fabs(area - first) > 1e-4 * first) return 0;
     }
@@ -95,7 +89,7 @@ Placed add_mesh(SceneMaker& scene, const Parameters& in, bool textured, const Pr
     Mesh mesh;
     const bool is_file = in.type == "plymesh";
     if (is_file) {
-        const std::string path = resolve(scene.folder, in.text("filename", ""), in.where_of("filename"));
+        const std::string path = resolve(scene.folder, in.filename(), in.where_of("filename"));
         if (in.find("displacement"))
             scene.report.refuse(in.where_of("displacement"), "displacement of meshes is not supported",
                                 "it is left out");
@@ -114,7 +108,7 @@ Placed add_mesh(SceneMaker& scene, const Parameters& in, bool textured, const Pr
     } else {
         mesh = own_mesh(scene, in, exact_area);
     }
-    check_mesh(in.where.file + ":" + std::to_string(in.where.line), mesh);
+    check_mesh(in.where.text(), mesh);
     const Matrix placed = scene.state.ctm * out.local;
     if (projection)
         mesh = projected(mesh, placed, *projection);
@@ -127,8 +121,7 @@ Placed add_mesh(SceneMaker& scene, const Parameters& in, bool textured, const Pr
     }
     out.area = is_file ? 0 : exact_area > 0 ? exact_area : triangle_area(mesh, scene.state.ctm);
     out.object = &add_object(scene.document, "shape", "mesh", in.where);
-    const std::string name =
-        in.where.file + ":" + std::to_string(in.where.line) + "#" + std::to_string(scene.document.meshes.size());
+    const std::string name = in.where.text() + "#" + std::to_string(scene.document.meshes.size());
     mesh.notes.clear(), mesh.origin = {};  // said, and in `local`
     scene.document.meshes[name] = std::move(mesh);
     set_text(*out.object, "name", name);
@@ -233,13 +226,7 @@ Placed add_surface(SceneMaker& scene, const Parameters& in, Look& look) {
 }  // namespace
 
 bool is_stretched(Surface surface, const Matrix& m) {
-    if (surface != Surface::sphere && surface != Surface::cylinder) return false;
-    constexpr double kTolerance = 1e-3;
-    const auto axis = [&m](int i) { return length(Vec3d{m.m[0][i], m.m[1][i], m.m[2][i]}); };
-    const double lx = axis(0), ly = axis(1), lz = axis(2);
-    const double radius = surface == Surface::sphere ? (lx + ly + lz) / 3 : (lx + ly) / 2;
-    const auto differs = [&](double l) { return !(std::fabs(l - radius) < kTolerance * radius); };
-    return !is_orthogonal(m, kTolerance) || differs(lx) || differs(ly) || (surface == Surface::sphere && differs(lz));
+    return (surface == Surface::sphere || surface == Surface::cylinder) && !keeps_round(m, surface == Surface::sphere);
 }
 
 void note_stretched(SceneMaker& scene, const Where& where) {
@@ -253,9 +240,7 @@ void add_shape(SceneMaker& scene, const Parameters& in, bool as_mesh) {
     if (!round && type != "trianglemesh" && type != "plymesh" && type != "bilinearmesh" && type != "loopsubdiv" &&
         type != "curve")
         return scene.report.refuse(in.where, not_supported("shape", type), "it is left out");
-    if (++scene.shape_count > scene.document.limits.shapes)
-        fail(in.where,
-             "the scene has more shapes than --limits shapes=" + std::to_string(scene.document.limits.shapes));
+    check_shapes(scene.document.limits, ++scene.shape_count, in.where);
     Look look = look_of(scene, in, quadric ? surface_of(type) : Surface::mesh);
     const Placed placed = add_surface(scene, in, look);
     if (!placed.object) return in.finish(scene.report);

@@ -20,15 +20,7 @@ constexpr double kTexel = 1.0 / 8;
 /// Texels a side of a triangle's block.
 constexpr double kMostSide = 1024;
 
-Vec3d unit(Vec3d v) {
-    const double l = length(v);
-    return l > 0 ? Vec3d{v.x / l, v.y / l, v.z / l} : Vec3d{0, 0, 1};
-}
-/// a + x (b - a) + y (c - a)
-Vec3d between(Vec3d a, Vec3d b, Vec3d c, double x, double y) {
-    const auto mix = [&](double p, double q, double r) { return p + x * (q - p) + y * (r - p); };
-    return {mix(a.x, b.x, c.x), mix(a.y, b.y, c.y), mix(a.z, b.z, c.z)};
-}
+Vec3d unit_or_z(Vec3d v) { return length(v) > 0 ? unit(v) : Vec3d{0, 0, 1}; }
 
 /// The BSDF again, with what `replace` gives in the place of textures.
 class Copier {
@@ -63,18 +55,9 @@ double finest_detail(const SceneMaker& scene, const Object& bsdf) {
 
 const Object* add_image(SceneMaker& scene, const Where& where, uint32_t width, uint32_t height,
                         std::vector<float> texels) {
-    const std::string name =
-        where.file + ":" + std::to_string(where.line) + "#" + std::to_string(scene.document.images.size());
-    Texels& image = scene.document.images[name];
-    image.width = width, image.height = height;
-    image.is_linear = true;
-    image.floats = std::move(texels);
-    Object& object = add_object(scene.document, "texture", "bitmap", where);
-    set_text(object, "image", name);
-    set_boolean(object, "raw", true);
-    set_text(object, "wrap_mode", "clamp");
-    set_text(object, "filter_type", "bilinear");
-    return &object;
+    const std::string name = where.text() + "#" + std::to_string(scene.document.images.size());
+    document::add_image(scene.document, name, width, height).floats = std::move(texels);
+    return &add_bitmap(scene.document, where, name);
 }
 
 void note_size(SceneMaker& scene, const Where& where, double size) {
@@ -92,7 +75,8 @@ struct Corners {
     double longest() const { return std::max({length(p[1] - p[0]), length(p[2] - p[1]), length(p[0] - p[2])}); }
     SurfacePlace at(double x, double y) const {
         const auto mix = [&](float a, float b, float c) { return a + x * (double(b) - a) + y * (double(c) - a); };
-        return {between(p[0], p[1], p[2], x, y), n, mix(uv[0].x, uv[1].x, uv[2].x), mix(uv[0].y, uv[1].y, uv[2].y)};
+        return {p[0] + (p[1] - p[0]) * x + (p[2] - p[0]) * y, n, mix(uv[0].x, uv[1].x, uv[2].x),
+                mix(uv[0].y, uv[1].y, uv[2].y)};
     }
 };
 
@@ -162,11 +146,10 @@ BakedMesh bake_solids(SceneMaker& scene, const Where& where, const Mesh& mesh, c
     for (const auto& face : mesh.faces) {
         Corners t;
         for (size_t k = 0; k < 3; ++k) {
-            const Vec3f p = mesh.positions[face[k]];
-            t.p[k] = transformed(to_world, {p.x, p.y, p.z});
+            t.p[k] = transformed(to_world, in_double(mesh.positions[face[k]]));
             t.uv[k] = mesh.uvs[face[k]];
         }
-        t.n = unit(cross(t.p[1] - t.p[0], t.p[2] - t.p[0]));
+        t.n = unit_or_z(cross(t.p[1] - t.p[0], t.p[2] - t.p[0]));
         triangles.push_back(t);
     }
     const Atlas atlas(triangles, kTexel * finest_detail(scene, bsdf));
@@ -191,18 +174,12 @@ BakedMesh bake_solids(SceneMaker& scene, const Where& where, const Mesh& mesh, c
     });
     BakedMesh out;
     out.bsdf = copier.copy(bsdf);
-    for (size_t i = 0; i < mesh.faces.size(); ++i) {
-        const Atlas::Block& b = atlas.blocks[i];
-        const uint32_t first = uint32_t(out.mesh.positions.size());
+    out.mesh = with_own_corners(mesh);
+    for (const Atlas::Block& b : atlas.blocks)
         for (uint32_t k = 0; k < 3; ++k) {
-            const uint32_t v = mesh.faces[i][k];
-            out.mesh.positions.push_back(mesh.positions[v]);
-            if (!mesh.normals.empty()) out.mesh.normals.push_back(mesh.normals[v]);
             const double x = b.x + 0.5 + (k == 1 ? b.side - 1 : 0), y = b.y + 0.5 + (k == 2 ? b.side - 1 : 0);
             out.mesh.uvs.push_back({float(x / atlas.width), float(y / atlas.height)});
         }
-        out.mesh.faces.push_back({first, first + 1, first + 2});
-    }
     return out;
 }
 
@@ -244,12 +221,10 @@ const Object* bake_solids(SceneMaker& scene, const Where& where, Surface surface
                 local(u, v, p, n);
                 const auto& m = to_pbrt.m;
                 // Normals go by the transposed inverse.
-                Vec3d world_n;
-                double* const out[3] = {&world_n.x, &world_n.y, &world_n.z};
-                for (int i = 0; i < 3; ++i)
-                    *out[i] = inverse.m[0][i] * n.x + inverse.m[1][i] * n.y + inverse.m[2][i] * n.z;
-                const Rgb c = made->at({transformed(to_world, p), unit(world_n), m[0][0] * u + m[0][1] * v + m[0][2],
-                                        m[1][0] * u + m[1][1] * v + m[1][2]});
+                const Vec3d world_n = {dot(column(inverse, 0), n), dot(column(inverse, 1), n),
+                                       dot(column(inverse, 2), n)};
+                const Rgb c = made->at({transformed(to_world, p), unit_or_z(world_n),
+                                        m[0][0] * u + m[0][1] * v + m[0][2], m[1][0] * u + m[1][1] * v + m[1][2]});
                 float* texel = &texels[4 * (size_t(y) * width + x)];
                 texel[0] = c.x, texel[1] = c.y, texel[2] = c.z;
             }

@@ -14,8 +14,6 @@ using document::transformed;
 
 namespace {
 
-Vec3d operator*(double s, Vec3d v) { return {s * v.x, s * v.y, s * v.z}; }
-
 /// Colour of pbrt's marble for t in [0,1]: cubic Bezier curves through colours of a photograph.
 Rgb marble_color(double t) {
     constexpr Rgb grey = {0.58f, 0.58f, 0.6f};
@@ -36,14 +34,11 @@ double finest(int octaves) { return std::pow(kLacunarity, 1 - octaves); }
 Texture Textures::solid(bool is_float, const Parameters& in, ColorSpace space) {
     if (!(std::fabs(document::determinant(ctm_)) > 0)) fail(in.where, "the transform of the texture is singular");
     const Matrix to_texture = document::affine_inverse(ctm_);
-    const auto part = [&](const char* name, double fallback) {
-        return is_float ? number(in, name, fallback)
-                        : color(in, name, splat(float(fallback)), ColorUse::reflectance, space);
-    };
+    const auto part = [&](const char* name, double v) { return this->part(is_float, in, name, v, space); };
     if (in.type == "checkerboard") {
         Texture out = solid_of(in.where, {part("tex1", 1), part("tex2", 0)},
                                [to_texture](const std::vector<Rgb>& c, const SurfacePlace& place) {
-                                   const Vec3d p = transformed(to_texture, place.p, 1);
+                                   const Vec3d p = transformed(to_texture, place.p);
                                    const double sum = std::floor(p.x) + std::floor(p.y) + std::floor(p.z);
                                    return std::fmod(sum, 2) == 0 ? c[0] : c[1];
                                });
@@ -52,11 +47,11 @@ Texture Textures::solid(bool is_float, const Parameters& in, ColorSpace space) {
     }
     if (in.type == "directionmix") {
         Vec3d axis = transformed(ctm_, in.point("dir", {0, 1, 0}), 0);
-        if (!(document::length(axis) > 0)) fail(in.where_of("dir"), "a directionmix needs a direction");
-        axis = (1 / document::length(axis)) * axis;
+        if (!(length(axis) > 0)) fail(in.where_of("dir"), "a directionmix needs a direction");
+        axis = axis * (1 / length(axis));
         return solid_of(in.where, {part("tex1", 0), part("tex2", 1)},
                         [axis](const std::vector<Rgb>& c, const SurfacePlace& place) {
-                            const float amount = float(std::fabs(document::dot(place.n, axis)));
+                            const float amount = float(std::fabs(dot(place.n, axis)));
                             return c[0] * amount + c[1] * (1 - amount);
                         });
     }
@@ -70,10 +65,10 @@ Texture Textures::solid(bool is_float, const Parameters& in, ColorSpace space) {
     out.where = in.where;
     out.detail = std::cbrt(std::fabs(document::determinant(ctm_))) * finest(octaves) / std::max(std::fabs(scale), 1e-9);
     out.solid = std::make_shared<const SolidFunction>([=](const SurfacePlace& place) {
-        const Vec3d p = scale * transformed(to_texture, place.p, 1);
+        const Vec3d p = transformed(to_texture, place.p) * scale;
         if (type == "fbm") return splat(float(fbm(p, omega, octaves)));
         if (type == "wrinkled") return splat(float(turbulence(p, omega, octaves)));
-        if (type == "windy") return splat(float(std::fabs(fbm(0.1 * p, 0.5, 3)) * fbm(p, omega, octaves)));
+        if (type == "windy") return splat(float(std::fabs(fbm(p * 0.1, 0.5, 3)) * fbm(p, omega, octaves)));
         return marble_color(0.5 + 0.5 * std::sin(p.y + variation * fbm(p, omega, octaves)));
     });
     return out;

@@ -1,7 +1,6 @@
 #include "formats/pbrt/spectra.h"
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 
 #include "core/text.h"

@@ -1,5 +1,4 @@
 #include "formats/pbrt/textures.h"
-#include "core/srgb.h"
 #include "formats/document/plugins.h"
 #include "formats/pbrt/names.h"
 
@@ -56,6 +55,19 @@ Texture Textures::color(const Parameters& in, const std::string& name, Rgb fallb
     return texture;
 }
 
+Texture Textures::part(bool is_float, const Parameters& in, const char* name, double fallback, ColorSpace space) const {
+    return is_float ? number(in, name, fallback)
+                    : color(in, name, splat(float(fallback)), ColorUse::reflectance, space);
+}
+
+std::shared_ptr<TextureImage> made_image(uint32_t width, uint32_t height) {
+    auto image = std::make_shared<TextureImage>();
+    image->is_file = false;
+    image->width = width, image->height = height;
+    image->texels.reserve(size_t(width) * height);
+    return image;
+}
+
 void Textures::set_mapping(Texture& texture, const Parameters& in) const {
     const std::string kind = in.text("mapping", "uv");
     if (kind == "uv") {
@@ -87,7 +99,7 @@ std::shared_ptr<const Projection> Textures::projection_of(const Object& object) 
     document::for_all_below(object, [&](const Object& o) {
         const auto it = projections_.find(&o);
         if (it == projections_.end()) return;
-        const bool same = found && it->second ? found->same(*it->second) : found == it->second;
+        const bool same = found && it->second ? *found == *it->second : found == it->second;
         mixed |= any && !same;
         if (!any) found = it->second;
         any = true;
@@ -99,10 +111,7 @@ std::shared_ptr<const Projection> Textures::projection_of(const Object& object) 
 }
 
 Texture Textures::build(bool is_float, const Parameters& in, ColorSpace space) {
-    const auto part = [&](const char* name, double fallback) {
-        return is_float ? number(in, name, fallback)
-                        : color(in, name, splat(float(fallback)), ColorUse::reflectance, space);
-    };
+    const auto part = [&](const char* name, double v) { return this->part(is_float, in, name, v, space); };
     Texture out;
     out.where = in.where;
     if (in.type == "constant") {
@@ -149,7 +158,7 @@ Texture Textures::image_texture(bool is_float, const Parameters& in) {
     Texture out;
     out.kind = Texture::Kind::image;
     out.where = in.where;
-    const std::string path = resolve(spectra_.folder, in.text("filename", ""), in.where_of("filename"));
+    const std::string path = resolve(spectra_.folder, in.filename(), in.where_of("filename"));
     const std::string encoding = in.text("encoding", "");
     double gamma = 0;  // of files that are not PNG, what their format implies
     if (path.ends_with(".png") || path.ends_with(".PNG")) {
@@ -194,15 +203,10 @@ void Textures::load_texels(TextureImage& image) const {
     FileBudget(image.path, document_.limits).bytes(uint64_t(texels.width) * texels.height, sizeof(Rgb));
     image.width = texels.width, image.height = texels.height;
     const double gamma = image.gamma != 0 ? image.gamma : texels.is_linear ? 1 : -1;
-    const auto decode = [gamma](double v) {
-        if (gamma == 1) return v;
-        if (gamma == -1) return srgb_to_linear(v);
-        return std::pow(v, gamma);
-    };
     double table[256];
-    for (int i = 0; i < 256; ++i) table[i] = decode(i / 255.0);
+    for (int i = 0; i < 256; ++i) table[i] = decoded(i / 255.0, gamma);
     const auto value = [&](size_t i) {
-        return float(texels.is_8bit ? table[texels.bytes[i]] : decode(texels.floats[i]));
+        return float(texels.is_8bit ? table[texels.bytes[i]] : decoded(texels.floats[i], gamma));
     };
     const size_t count = size_t(texels.width) * texels.height;
     bool has_alpha = false, is_grey = true;
@@ -226,16 +230,11 @@ std::string Textures::bake(const Texture& texture, const ColorMap& map) {
     load_texels(*texture.image);
     const TextureImage& image = *texture.image;
     document::take_texels(document_, texture.where, image.texels.size(), 16);
-    const std::string name =
-        texture.where.file + ":" + std::to_string(texture.where.line) + "#" + std::to_string(document_.images.size());
-    Texels& out = document_.images[name];
-    out.width = image.width, out.height = image.height;
-    out.is_linear = true;
-    out.floats.reserve(image.texels.size() * 4);
-    for (const Rgb& texel : image.texels) {
-        Rgb c = texture.color * texel;
-        if (map) c = map(c);
-        out.floats.insert(out.floats.end(), {c.x, c.y, c.z, 1.0f});
+    const std::string name = texture.where.text() + "#" + std::to_string(document_.images.size());
+    Texels& out = document::add_image(document_, name, image.width, image.height);
+    for (size_t i = 0; i < image.texels.size(); ++i) {
+        const Rgb c = texture.color * image.texels[i], mapped = map ? map(c) : c;
+        for (int k = 0; k < 3; ++k) out.floats[4 * i + size_t(k)] = mapped[k];
     }
     return name;
 }

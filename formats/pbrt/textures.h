@@ -28,6 +28,9 @@ struct TextureImage {
     std::vector<Rgb> texels;
 };
 
+/// One that is made here, without texels yet.
+std::shared_ptr<TextureImage> made_image(uint32_t width, uint32_t height);
+
 /// A point of a surface where a texture is asked for.
 struct SurfacePlace {
     Vec3d p;              ///< in the world
@@ -81,6 +84,8 @@ public:
     /// Parameters that are numbers or textures of them, colours or textures of them.
     Texture number(const Parameters& in, const std::string& name, double fallback) const;
     Texture color(const Parameters& in, const std::string& name, Rgb fallback, ColorUse use, ColorSpace space) const;
+    /// One of the two, of a texture that is made of others.
+    Texture part(bool is_float, const Parameters& in, const char* name, double fallback, ColorSpace space) const;
 
     /// Sets a parameter of `object`. `uv`: from coordinates of the shape to pbrt's (u,v). Numbers pass `map` first.
     void set_number(Object& object, const std::string& name, const Texture& texture, const UvMap& uv,

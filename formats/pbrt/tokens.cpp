@@ -3,11 +3,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "core/error.h"
-
 namespace ambilux::pbrt {
-
-void fail(const Where& where, const std::string& message) { throw input_error(where.file, where.line, message); }
 
 namespace {
 

@@ -8,9 +8,8 @@
 
 namespace ambilux::pbrt {
 
+using document::fail;
 using document::Where;
-
-[[noreturn]] void fail(const Where& where, const std::string& message);
 
 enum class TokenKind { end, word, quoted, open, close };
 

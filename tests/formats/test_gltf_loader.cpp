@@ -1,7 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_convert ambilux_formats ambilux_accel JPEG::JPEG
 // timeout: 120
 // What glTF scenes become, what is refused, files that lie, and the image of the same scene in Mitsuba's XML.
-#include "formats/gltf/load.h"
+#include "formats/load.h"
 
 #include <cstring>
 

@@ -176,6 +176,42 @@ TEST_CASE("what a file may be shown without is left out with a note") {
     CHECK(contains(error_of(j), "extension 'KHR_materials_variants' is not supported"));
 }
 
+TEST_CASE("a property or an extension of another name is told, with the one that it nearly is") {
+    const auto note_of = [](const std::function<void(Json&)>& change) {
+        Json j = quad_scene();
+        change(j);
+        std::string all;
+        for (const std::string& note : load(j).notes) all += note + "\n";
+        return all;
+    };
+    CHECK_FALSE(contains(note_of([](Json&) {}), "left out"));
+    CHECK(
+        contains(note_of([](Json& j) { j["materials"][0]["pbrMetallicRoughness"]["baseColourFactor"] = 1; }),
+                 "property 'baseColourFactor' of pbrMetallicRoughness is not known and left out: 'baseColorFactor' is "
+                 "known"));
+    CHECK(contains(note_of([](Json& j) { j["nodes"][0]["trnslation"] = {1, 2, 3}; }),
+                   "property 'trnslation' of node is not known and left out: 'translation' is known"));
+    CHECK(contains(note_of([](Json& j) { j["cameras"][0]["perspective"]["fieldOfView"] = 1; }),
+                   "property 'fieldOfView' of perspective is not known and left out\n"));
+    CHECK(contains(
+        note_of([](Json& j) { j["materials"][0]["extensions"]["KHR_materials_clearcoat"] = {{"clearcoatFactr", 1}}; }),
+        "'clearcoatFactr' of KHR_materials_clearcoat is not known and left out: 'clearcoatFactor' is known"));
+    CHECK(contains(note_of([](Json& j) { j["extensionsUsed"] = {"KHR_materials_iorr"}; }),
+                   "extension 'KHR_materials_iorr' is left out, which the file allows: 'KHR_materials_ior' is known"));
+    CHECK(contains(note_of([](Json& j) { j["materials"][0]["extensions"]["EXT_thing"] = {{"a", 1}}; }),
+                   "extension 'EXT_thing' is left out"));
+    // What is the author's own.
+    CHECK_FALSE(contains(note_of([](Json& j) {
+                             j["materials"][0]["extras"]["mine"] = {{"color", 1}};
+                             j["materials"][0]["name"] = "a";
+                             j["meshes"][0]["primitives"][0]["attributes"]["_MINE"] = 0;
+                         }),
+                         "left out"));
+    Json required = quad_scene();
+    required["extensionsRequired"] = {"KHR_texture_transfrom"};
+    CHECK(contains(error_of(required), "'KHR_texture_transfrom' is not supported: 'KHR_texture_transform' is known"));
+}
+
 TEST_CASE("scaled normals, means of textures, modes of the two axes") {
     Json j = quad_scene();
     j["images"] = {{{"uri", data_uri("image/png", png_bytes(1, 1, {204, 128, 230}))}},

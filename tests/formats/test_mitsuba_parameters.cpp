@@ -71,6 +71,14 @@ std::vector<Plugin> shapes() {
         {"disk", "<shape type='disk'>%s</shape>", with({})},
         {"rectangle", "<shape type='rectangle'>%s</shape>", with({})},
         {"cube", "<shape type='cube'>%s</shape>", with({})},
+        {"sdfgrid", "<shape type='sdfgrid'>" + text("filename", "g.vol") + "%s</shape>",
+         with({text("normals", "analytic"), flag("watertight", "false")})},
+        {"linearcurve", "<shape type='linearcurve'>" + text("filename", "c.txt") + "%s</shape>", with({})},
+        {"bsplinecurve", "<shape type='bsplinecurve'>" + text("filename", "c.txt") + "%s</shape>", with({})},
+        {"merge", "<shape type='merge'><shape type='cube'/>%s</shape>", with({"<shape type='sphere'/>"})},
+        {"instance",
+         "<shape type='shapegroup' id='g'><shape type='cube'/></shape><shape type='instance'><ref id='g'/>%s</shape>",
+         with({})},
     };
 }
 
@@ -214,6 +222,11 @@ std::vector<Plugin> others() {
                    texture("type='bitmap'><string name='filename' value='e.png'/>%s"),
                    {text("filter_type", "nearest"), text("wrap_mode", "clamp"), flag("raw"), text("format", "float16"),
                     flag("accel"), uv}});
+    all.push_back({"mesh_attribute",
+                   "<shape type='ply'><string name='filename' value='m.ply'/><bsdf type='diffuse'><texture "
+                   "name='reflectance' type='mesh_attribute'><string name='name' value='vertex_color'/>%s</texture>"
+                   "</bsdf></shape>",
+                   {number("scale"), integer("scale")}});
     all.push_back({"checkerboard", texture("type='checkerboard'>%s"), {color("color0"), color("color1"), uv}});
     return all;
 }
@@ -247,8 +260,16 @@ TEST_CASE("every parameter of Mitsuba's plugins is used, refused or noted") {
     folder.write(
         "m.ply",
         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty "
-        "float u\nproperty float v\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0 0 "
-        ".3\n1 0 0 0 0\n0 1 0 1 0\n0 0 1 0 1\n3 0 1 2\n3 0 3 1\n");
+        "float u\nproperty float v\nproperty float r\nproperty float g\nproperty float b\nelement face 2\nproperty "
+        "list uchar int vertex_indices\nend_header\n0 0 0 0 .3 .1 .2 .3\n1 0 0 0 0 .4 .4 .4\n0 1 0 1 0 .5 .2 .1\n0 0 1 "
+        "0 1 .3 .3 .9\n3 0 1 2\n3 0 3 1\n");
+    folder.write("c.txt", "0 0 0 .1\n1 0 0 .2\n1 1 0 .1\n2 1 1 .1\n");
+    std::string grid = "VOL\3";
+    const auto add = [&](const auto& value) { grid.append(reinterpret_cast<const char*>(&value), sizeof value); };
+    for (const int32_t i : {1, 3, 3, 3, 1}) add(i);
+    for (int i = 0; i < 6; ++i) add(float(i / 3));
+    for (int i = 0; i < 27; ++i) add(i == 13 ? -1.0f : 1.0f + 0.1f * float(i % 5));
+    folder.write("g.vol", grid);
     size_t tried = 0;
     for (const auto& plugins : {shapes(), bsdfs(), lights(), sensors(), others()})
         for (const Plugin& plugin : plugins)

@@ -131,17 +131,45 @@ TEST_CASE("a name that is nearly one of pbrt's is told with it") {
         {"Texture \"t\" \"float\" \"image\"", "texture type 'image' is not supported"},
         {"Texture \"t\" \"float\" \"checkboard\"",
          "texture type 'checkboard' is not supported: 'checkerboard' is known"},
+        {"Shape \"plymesh\" \"string filenam\" \"a.ply\"",
+         "unknown parameter 'filenam' of Shape 'plymesh': 'filename' is known"},
+        {"Shape \"plymesh\"", "scene.pbrt:2: Shape 'plymesh' has no filename"},
+        {"Texture \"t\" \"float\" \"imagemap\"", "Texture 'imagemap' has no filename"},
     };
     for (const auto& [text, message] : cases) CHECK_THAT(world_error(text), ContainsSubstring(message));
     const std::vector<std::pair<std::string, std::string>> options = {
         {"Camera \"perspectiv\"", "camera 'perspectiv' is not supported: 'perspective' is known"},
         {"PixelFilter \"gauss\"", "filter 'gauss' is not supported"},
         {"PixelFilter \"triangel\"", "filter 'triangel' is not supported: 'triangle' is known"},
-        {"Film \"rgbb\"", "film 'rgbb' is not known: 'rgb' is known"},
+        {"Film \"rgbb\"", "film 'rgbb' is not supported: 'rgb' is known"},
+        {"Sampler \"zsobl\"", "sampler 'zsobl' is not supported: 'zsobol' is known"},
+        {"Film \"rgb\" \"integer xresolutoin\" 8",
+         "unknown parameter 'xresolutoin' of Film 'rgb': 'xresolution' is known"},
+        {"Sampler \"sobol\" \"integer pixelsample\" 8",
+         "unknown parameter 'pixelsample' of Sampler 'sobol': 'pixelsamples' is known"},
         {"Integrator \"vlpath\"", "integrator 'vlpath' is not supported: 'volpath' is known"},
     };
     for (const auto& [text, message] : options)
         CHECK_THAT(pbrt_error(text + " WorldBegin Shape \"sphere\""), ContainsSubstring(message));
+}
+
+TEST_CASE("what a film or a sampler asks for and does not get is told") {
+    const auto notes_of = [](const std::string& option) { return load_pbrt_text(option + " WorldBegin").notes; };
+    const size_t plain = notes_of("").size();
+    const std::vector<std::pair<std::string, std::string>> told = {
+        {"Film \"gbuffer\"", "film 'gbuffer' gets the channels of rgb"},
+        {"Film \"gbuffer\" \"string coordinatesystem\" \"world\"",
+         "'coordinatesystem' of Film 'gbuffer' is not followed"},
+        {"Film \"spectral\" \"integer nbuckets\" 8", "'nbuckets' of Film 'spectral' is not followed"},
+        {"Film \"rgb\" \"float diagonal\" 20", "'diagonal' of Film 'rgb' is not followed"},
+        {"Film \"rgb\" \"float maxcomponentvalue\" 20", "samples are not clamped"},
+        {"Sampler \"halton\"", "sampler 'halton' is not followed; samples are independent"},
+        {"Sampler \"independent\" \"integer seed\" 3", "'seed' of Sampler 'independent' is not followed"},
+    };
+    for (const auto& [option, note] : told) CHECK(has_note(load_pbrt_text(option + " WorldBegin"), note));
+    for (const char* option : {"Film \"rgb\" \"string filename\" \"a.exr\" \"bool savefp16\" false",
+                               "Sampler \"independent\" \"integer pixelsamples\" 3"})
+        CHECK(notes_of(option).size() == plain);
 }
 
 TEST_CASE("errors say where") {

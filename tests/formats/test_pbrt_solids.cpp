@@ -111,7 +111,7 @@ TEST_CASE("marble, windy and wrinkled follow pbrt's formulas") {
         [](const SurfacePoint& s) { return splat(0.5f * float(pbrt::turbulence({s.p.x, s.p.y, s.p.z}, 0.3, 2))); });
     CHECK(wrinkled.mean < 0.002);
     const Difference windy = difference(reflectance("windy", ""), [](const SurfacePoint& s) {
-        const document::Vec3d p = {s.p.x, s.p.y, s.p.z}, far = {0.1 * p.x, 0.1 * p.y, 0.1 * p.z};
+        const Vec3d p = {s.p.x, s.p.y, s.p.z}, far = {0.1 * p.x, 0.1 * p.y, 0.1 * p.z};
         return splat(std::clamp(0.5f * float(std::fabs(pbrt::fbm(far, 0.5, 3)) * pbrt::fbm(p, 0.5, 6)), 0.0f, 1.0f));
     });
     CHECK(windy.mean < 0.0005);

@@ -1,4 +1,4 @@
-#include "formats/gltf/load.h"
+#include "formats/load.h"
 #include "tests/fuzz/target.h"
 
 void ambilux::fuzz::read(std::string_view bytes) {

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/error.h"
-#include "formats/gltf/load.h"
+#include "formats/load.h"
 #include "tests/support/catch.h"
 #include "tests/support/temp_folder.h"
 

@@ -6,6 +6,7 @@
 
 #include <cstdio>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -69,6 +70,16 @@ inline std::vector<std::string> render(const TempFolder& folder, std::vector<std
     std::vector<std::string> all = {"render", kCornell, "--size", "24x16", "-o", folder / output};
     all.insert(all.end(), more.begin(), more.end());
     return all;
+}
+
+/// Statistics of such a render.
+inline nlohmann::json statistics(const TempFolder& folder, std::vector<std::string> more,
+                                 const std::string& output = "a.exr") {
+    more.insert(more.end(), {"--json", "-"});
+    const Outcome o = run(folder, render(folder, more, output));
+    INFO(o.err);
+    REQUIRE(o.code == 0);
+    return nlohmann::json::parse(o.out);
 }
 
 }  // namespace ambilux::test
