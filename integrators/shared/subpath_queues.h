@@ -38,15 +38,22 @@ void start_eye_subpaths(Executor& exec, const Generate& generate, const Extend& 
     exec.extend_coherent(extend);
 }
 
-/// From the hits of depth 1 in place 0 on: vertex[k] goes through the hits of a depth in place k and pushes rays to
-/// place 1 - k, which after rest(several_bounces) become the next hits. `several_bounces` is true where a device takes
-/// fewer than `multi_bounce_below` subpaths through several at once: what is pushed may belong to one path more than
-/// once.
-template <class Executor, class VertexStage, class Extend, class Rest>
+/// Nothing is done before the vertices of a depth.
+struct NothingBefore {
+    template <class... A>
+    void operator()(A...) const {}
+};
+
+/// From the hits of depth 1 in place 0 on: after before(k) vertex[k] goes through the hits of a depth in place k and
+/// pushes rays to place 1 - k, which after rest(several_bounces) become the next hits. `several_bounces` is true where
+/// a device takes fewer than `multi_bounce_below` subpaths through several at once: what is pushed may belong to one
+/// path more than once.
+template <class Executor, class VertexStage, class Extend, class Rest, class Before = NothingBefore>
 void repeat_depths(Executor& exec, const VertexStage (&vertex)[2], const Extend (&extend)[2],
-                   uint32_t multi_bounce_below, Rest rest) {
+                   uint32_t multi_bounce_below, Rest rest, Before before = {}) {
     const auto two_rounds = [&](auto several_bounces) {
         for (const int k : {0, 1}) {
+            before(k);
             if constexpr (several_bounces)
                 exec.run(MultiBounce<VertexStage, Extend>{vertex[k], extend[1 - k], vertex[k].record});
             else

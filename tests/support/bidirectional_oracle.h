@@ -52,6 +52,14 @@ struct OracleSteps {
 struct OracleStrategies {
     std::vector<uint32_t> group;
     std::vector<double> density;
+    std::vector<double> merges;  ///< [j]: of both subpaths ending at x_j; 0 where they cannot
+};
+
+/// Merging of light and eye vertices: how many light subpaths a disk around a vertex expects at density 1, and whether
+/// eye subpaths merge at their first vertex.
+struct OracleMerges {
+    double eta = 0;
+    bool first = true;
 };
 
 namespace oracle {
@@ -242,7 +250,7 @@ inline OracleSteps oracle_steps(const SceneView& scene, const OraclePath& path, 
 /// Densities of all strategies for a path. `light_subpaths`: light subpaths per eye subpath of a pixel; `connections`:
 /// light subpaths that an eye vertex is connected with.
 inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePath& path, const OracleSteps& steps,
-                                          double light_subpaths, double connections) {
+                                          double light_subpaths, double connections, const OracleMerges& merges = {}) {
     const uint32_t k = path.k;
     const EmitterType type = scene.emitters[path.emitter].type;
     const auto delta = [&](uint32_t i) { return path.vertices[i].delta; };
@@ -271,20 +279,36 @@ inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePa
         r.group[s] = group;
         r.density[s] = group ? p : 0.0;
     }
+    r.merges.assign(k, 0.0);
+    for (uint32_t j = 1; j < k; ++j) {
+        if (delta(j) || (j == k - 1 && !merges.first)) continue;
+        double p = merges.eta;
+        for (uint32_t i = 0; i < k; ++i) p *= (i <= j ? steps.light[i].value : 1) * (i >= j ? steps.eye[i].value : 1);
+        r.merges[j] = p;
+    }
     // The environment that the camera sees belongs to both masks that could show it.
     if (k == 1 && is_infinite(type) && !is_delta(type)) r.group[0] = kHitStrategies | kLightStrategies;
     return r;
 }
 
-/// Weight of strategy s when only the strategies of `mask` are used.
-inline double oracle_weight(const OracleStrategies& all, uint32_t s, uint32_t mask, MisHeuristic heuristic) {
+/// Weight of a strategy of density `own` when only the strategies of `mask` are used, and merges where there are any.
+inline double oracle_weight_of(const OracleStrategies& all, double own, uint32_t mask, MisHeuristic heuristic) {
     double sum = 0;
-    for (size_t i = 0; i < all.density.size(); ++i) {
-        if (!(all.group[i] & mask)) continue;
-        const double ratio = all.density[i] / all.density[s];
+    const auto add = [&](double density) {
+        const double ratio = density / own;
         sum += heuristic == MisHeuristic::power ? ratio * ratio : ratio;
-    }
+    };
+    for (size_t i = 0; i < all.density.size(); ++i)
+        if (all.group[i] & mask) add(all.density[i]);
+    for (const double p : all.merges) add(p);
     return 1 / sum;
+}
+inline double oracle_weight(const OracleStrategies& all, uint32_t s, uint32_t mask, MisHeuristic heuristic) {
+    return oracle_weight_of(all, all.density[s], mask, heuristic);
+}
+/// Weight of the merge at x_j.
+inline double oracle_merge_weight(const OracleStrategies& all, uint32_t j, uint32_t mask, MisHeuristic heuristic) {
+    return oracle_weight_of(all, all.merges[j], mask, heuristic);
 }
 
 /// How much rounding of directions and positions may change that weight, relative, to first order: densities i and s
@@ -306,6 +330,17 @@ inline double oracle_weight_error(const OracleStrategies& all, const OracleSteps
             // Light steps below both are the same factor, except that of next event estimation.
             const bool differs = i >= std::min(other, s) || (i == 0 && (other == 1 || s == 1));
             if (differs && other != s) e += step(other, i) + step(s, i);
+        }
+        sum += term;
+        error += term * e * (heuristic == MisHeuristic::power ? 2 : 1);
+    }
+    for (uint32_t j = 0; j < all.merges.size(); ++j) {
+        const double ratio = all.merges[j] / all.density[s],
+                     term = heuristic == MisHeuristic::power ? ratio * ratio : ratio;
+        double e = s == 1 ? steps.next_event.error : 0;
+        for (uint32_t i = 0; i < k; ++i) {
+            if ((i <= j) != (i < s)) e += steps.light[i].error;
+            if ((i >= j) != (i >= s)) e += steps.eye[i].error;
         }
         sum += term;
         error += term * e * (heuristic == MisHeuristic::power ? 2 : 1);

@@ -25,13 +25,10 @@ namespace ambilux::test {
 constexpr Features F = kOracleFeatures;
 constexpr uint32_t kMaxVertices = 6;  ///< surfaces per subpath
 
-using BidirectionalSubpath = Subpath<BidirectionalMis>;
-using BidirectionalVertex = Vertex<BidirectionalMis>;
-using BidirectionalCandidate = Candidate<BidirectionalMis>;
-
 /// Everything counts, and nothing ends a subpath.
-inline Rules<BidirectionalMis> all_rules(const BidirectionalMis& mis) {
-    Rules<BidirectionalMis> r{};
+template <class Mis>
+Rules<Mis> all_rules(const Mis& mis) {
+    Rules<Mis> r{};
     r.mis = mis;
     r.max_depth = kMaxDepth;
     r.rr_depth = ~0u;
@@ -250,20 +247,12 @@ inline Scene load(const SceneCase& c) {
 
 // ---- subpaths ----
 
-/// A vertex of a subpath and the ray that met it.
-struct Node {
-    BidirectionalVertex vertex;
-    Vec3f d;
-    Hit hit;
-    bool delta = false;  ///< the subpath left it by a delta lobe
-};
-
 enum Kind : uint32_t { kHit, kEscape, kNextEvent, kConnect, kSplat, kVisible, kKinds };
 const char* const kKindNames[] = {"hit", "escape", "next event", "connection", "light tracing", "visible light"};
 
 /// What was compared, and the worst of it.
 struct Tally {
-    uint64_t paths = 0, ill = 0, unbounded = 0, summed = 0, overflows = 0;
+    uint64_t paths = 0, ill = 0, unbounded = 0, summed = 0, merges = 0, overflows = 0;
     std::map<std::string, uint64_t>
         seen;  ///< paths by strategy and emitter, sensor or BSDF; a BSDF counts once per vertex
     double worst = 0, worst_of_bound = 0, worst_sum = 0;
@@ -274,13 +263,26 @@ inline float reverse_pdf(const Scattering& s, Vec3f wo_world) {
     return bsdf_pdf<F>(s.bsdf, s.frame.to_local(wo_world), s.wi, TransportMode::radiance);
 }
 
+/// What a model of weights knows of merges.
+inline OracleMerges merges_of(const BidirectionalMis&) { return {}; }
+
+/// `Mis`: the model whose weights are compared. Merges have weights in sums only (sum_of_weights).
+template <class Mis>
 class Bench {
 public:
+    /// A vertex of a subpath and the ray that met it.
+    struct Node {
+        Vertex<Mis> vertex;
+        Vec3f d;
+        Hit hit;
+        bool delta = false;  ///< the subpath left it by a delta lobe
+    };
+
     Bench(const Scene& scene, Tally& tally)
         : scene_(scene.view()), accel_(scene), tracer_(accel_.tracer()), tally_(tally) {}
 
     /// One light subpath and one eye subpath, and all paths that they make together.
-    void run(const BidirectionalMis& mis, uint32_t index) {
+    void run(const Mis& mis, uint32_t index) {
         mis_ = mis;
         rules_ = all_rules(mis);
         index_ = index;
@@ -303,7 +305,7 @@ private:
         const Vec4f d = random(1);
         lit_ = sample_emission<F>(scene_, random(0), {d.x, d.y}, emission_);
         if (!lit_) return;
-        BidirectionalSubpath path = start_light(mis_, emission_);
+        Subpath<Mis> path = start_light(mis_, emission_);
         if (mis_.has(kLightStrategies)) visible({d.z, d.w});
         while (light_.size() < kMaxVertices) {
             Hit hit;
@@ -322,7 +324,7 @@ private:
         const CameraSample c =
             sample_camera_ray<F>(sensor, {u.x * float(sensor.film_width), u.y * float(sensor.film_height)}, lens_u_);
         camera_p_ = lens(lens_u_);
-        BidirectionalSubpath path = start_eye<F>(scene_, mis_, c);
+        Subpath<Mis> path = start_eye<F>(scene_, mis_, c);
         float tmax = c.tmax;
         while (eye_.size() < kMaxVertices) {
             Hit hit;
@@ -331,7 +333,7 @@ private:
                 return;
             }
             tmax = kInfinity;
-            const BidirectionalVertex z = vertex_at<F>(scene_, rules_, Side::eye, path, point(hit));
+            const Vertex<Mis> z = vertex_at<F>(scene_, rules_, Side::eye, path, point(hit));
             hit_emitter(path, z);
             eye_.push_back({z, path.direction, hit});
             if (!scatter<F>(rules_, Side::eye, z, random(30 + path.depth), path)) return;
@@ -382,35 +384,35 @@ private:
         return s;
     }
 
-    void escaped(BidirectionalSubpath path) {
+    void escaped(Subpath<Mis> path) {
         if (scene_.environment == kNone || is_zero(environment_radiance<F>(scene_, path.direction))) return;
         OraclePath p = join(0, uint32_t(eye_.size()), -path.direction, true);
         p.emitter = scene_.environment;
         path.throughput = {1, 1, 1};
-        BidirectionalCandidate c{};
+        Candidate<Mis> c{};
         const bool counts = escape<F>(scene_, rules_, path, c);
         // The rules and the ratio agree on that.
         float ratio;
-        CHECK(mis_.escape_ratio<F>(scene_, rules_.lights, path, path.sums, ratio) == counts);
+        CHECK(mis_.template escape_ratio<F>(scene_, rules_.lights, path, path.sums, ratio) == counts);
         compare(kEscape, 0, c, p, counts);
     }
 
-    void hit_emitter(BidirectionalSubpath path, const BidirectionalVertex& z) {
+    void hit_emitter(Subpath<Mis> path, const Vertex<Mis>& z) {
         const uint32_t emitter = scene_.shapes[z.point.shape].emitter;
         if (emitter == kNone || is_zero(emitted_radiance<F>(scene_, emitter, z.point, -path.direction))) return;
         OraclePath p = join(0, uint32_t(eye_.size()), -path.direction, true);
         p.emitter = emitter;
         p.light = z.point;
         path.throughput = {1, 1, 1};
-        BidirectionalCandidate c{};
+        Candidate<Mis> c{};
         const bool counts = emission<F>(scene_, rules_, path, z.point, c);
         compare(kHit, 0, c, p, counts);
     }
 
     void next_events(uint32_t b) {
-        const BidirectionalVertex& z = eye_[b - 1].vertex;
+        const Vertex<Mis>& z = eye_[b - 1].vertex;
         const Vec4f u = random(50 + b);
-        BidirectionalCandidate c;
+        Candidate<Mis> c;
         if (!next_event<F>(scene_, rules_, z, {1, 1, 1}, b, u, c)) return;
         EmitterSample light;
         REQUIRE(sample_emitter_deferred<F>(scene_, z.point.p, u, light));
@@ -427,8 +429,8 @@ private:
     }
 
     void connect(uint32_t a, uint32_t b) {
-        const BidirectionalVertex &y = light_[a - 1].vertex, &z = eye_[b - 1].vertex;
-        BidirectionalCandidate c;
+        const Vertex<Mis>&y = light_[a - 1].vertex, &z = eye_[b - 1].vertex;
+        Candidate<Mis> c;
         if (!connection<F>(rules_, {z, {1, 1, 1}, b}, {y, {1, 1, 1}, a}, c)) return;
         const Vec3f to_y = y.point.p - z.point.p;
         compare(kConnect, a + 1, c, join(a, b, to_y * (-1.0f / sqrtf(length_squared(to_y)))));
@@ -436,7 +438,7 @@ private:
 
     void splat(uint32_t a) {
         const Vec4f u = random(70 + a);
-        BidirectionalCandidate c;
+        Candidate<Mis> c;
         if (!camera_connection<F>(scene_, rules_, light_[a - 1].vertex, {1, 1, 1}, a, {u.x, u.y}, c)) return;
         OraclePath p = join(a, 0, c.direction);
         p.lens_u = {u.x, u.y};
@@ -445,7 +447,7 @@ private:
     }
 
     void visible(Vec2f lens_u) {
-        BidirectionalCandidate c;
+        Candidate<Mis> c;
         if (!visible_emitter<F>(scene_, rules_, emission_, lens_u, c)) return;
         OraclePath p = join(0, 0, c.direction);
         p.emitter = emission_.emitter;
@@ -456,10 +458,10 @@ private:
     }
 
     /// `counts`: strategy s has a candidate, which is `c`.
-    void compare(Kind kind, uint32_t s, const BidirectionalCandidate& c, const OraclePath& path, bool counts = true) {
+    void compare(Kind kind, uint32_t s, const Candidate<Mis>& c, const OraclePath& path, bool counts = true) {
         const OracleSteps steps = oracle_steps(scene_, path, false);
-        const OracleStrategies all =
-            oracle_strategies(scene_, path, steps, double(mis_.light_subpaths), double(mis_.connections));
+        const OracleStrategies all = oracle_strategies(scene_, path, steps, double(mis_.light_subpaths),
+                                                       double(mis_.connections), merges_of(mis_));
         INFO(kKindNames[kind] << " s " << s << " k " << path.k << " index " << index_ << " mask " << mis_.strategies
                               << " heuristic " << int(mis_.heuristic) << " emitter type "
                               << int(scene_.emitters[path.emitter].type) << " vertices " << describe(path));
@@ -523,12 +525,20 @@ private:
 
     void sum_of_weights(const OraclePath& sampled);
 
+    /// The weight of a subpath that would have to draw what it all but never draws: the inverse of a density is no
+    /// float. No such subpath exists, and its weight, which is `expected`, would be nothing.
+    double overflowed(double expected) {
+        ++tally_.overflows;
+        CHECK(expected < 1e-7);
+        return expected;
+    }
+
     SceneView scene_;
     CwbvhAccel accel_;
     CwbvhTracer tracer_;
     Tally& tally_;
-    BidirectionalMis mis_{};
-    Rules<BidirectionalMis> rules_{};
+    Mis mis_{};
+    Rules<Mis> rules_{};
     uint32_t index_ = 0;
     EmissionSample emission_{};
     bool lit_ = false;
@@ -540,7 +550,8 @@ private:
 /// Every strategy's weight by the recursion, each along its own subpaths over the vertices of one path. Directions are
 /// those between the vertices as they are stored, so that all subpaths agree on them to the bit and the sum tells of
 /// the recursion alone.
-inline void Bench::sum_of_weights(const OraclePath& sampled) {
+template <class Mis>
+void Bench<Mis>::sum_of_weights(const OraclePath& sampled) {
     OraclePath path = sampled;
     const uint32_t k = path.k;
     const Emitter& e = scene_.emitters[path.emitter];
@@ -559,8 +570,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
         if (!connect_to_camera<F>(scene_.sensor, position(k - 1), path.lens_u, camera)) return;
         path.to_eye[k - 1] = camera.wi;
     }
-    const auto go_on = [&](const BidirectionalVertex& vertex, const OraclePath::Vertex& x, Vec3f wo,
-                           BidirectionalSubpath& w) {
+    const auto go_on = [&](const Vertex<Mis>& vertex, const OraclePath::Vertex& x, Vec3f wo, Subpath<Mis>& w) {
         float forward = 1.0f, reverse = 1.0f;
         if (x.delta) {
             const Scattering& s = vertex.scattering;
@@ -583,12 +593,12 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
         return true;
     };
 
-    const auto meet = [&](Side side, const BidirectionalSubpath& w, const OraclePath::Vertex& x) {
+    const auto meet = [&](Side side, const Subpath<Mis>& w, const OraclePath::Vertex& x) {
         return vertex_at<F>(scene_, rules_, side, w, surface_at<F>(scene_, x.prim, x.u, x.v));
     };
 
     // Light subpath over x_1 ... x_(k-1).
-    std::vector<BidirectionalVertex> y(k), z(k);
+    std::vector<Vertex<Mis>> y(k), z(k);
     EmissionSample start{};
     start.p = infinite ? position(1 < k ? 1 : 0) - path.to_eye[0] * (2.0f * scene_.bounds_radius) : position(0);
     start.ng = area ? path.light.ng : path.to_eye[0];
@@ -604,7 +614,7 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
     start.opacity =
         area ? scene_.materials[scene_.shapes[scene_.shape_of(path.light.prim)].material].opacity.value : 1.0f;
     if (!(start.pdf_dir > 0.0f)) return;
-    BidirectionalSubpath w = start_light(mis_, start);
+    Subpath<Mis> w = start_light(mis_, start);
     w.origin = start.p;
     for (uint32_t i = 1; i < k; ++i) {
         y[i] = meet(Side::light, w, path.vertices[i]);
@@ -626,17 +636,19 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
         }
     }
 
-    const OracleStrategies all = oracle_strategies(scene_, path, oracle_steps(scene_, path, false),
-                                                   double(mis_.light_subpaths), double(mis_.connections));
+    const OracleStrategies all =
+        oracle_strategies(scene_, path, oracle_steps(scene_, path, false), double(mis_.light_subpaths),
+                          double(mis_.connections), merges_of(mis_));
     double sum = 0;
     std::string weights;
     for (uint32_t s = 0; s <= k; ++s) {
         if (!(all.group[s] & mis_.strategies)) continue;
         float ratio = 0;
-        BidirectionalCandidate candidate;
+        Candidate<Mis> candidate;
         if (s == 0) {
-            CHECK((infinite ? mis_.escape_ratio<F>(scene_, rules_.lights, w, w.sums, ratio)
-                            : mis_.hit_ratio<F>(scene_, rules_.lights, w, w.sums, path.emitter, path.light, ratio)));
+            CHECK((infinite ? mis_.template escape_ratio<F>(scene_, rules_.lights, w, w.sums, ratio)
+                            : mis_.template hit_ratio<F>(scene_, rules_.lights, w, w.sums, path.emitter, path.light,
+                                                         ratio)));
         } else if (s == k) {
             if (k == 1 ? !visible_emitter<F>(scene_, rules_, start, path.lens_u, candidate)
                        : !camera_connection<F>(scene_, rules_, y[k - 1], {1, 1, 1}, k - 1, path.lens_u, candidate))
@@ -656,23 +668,31 @@ inline void Bench::sum_of_weights(const OraclePath& sampled) {
             BsdfValue f{};
             f.pdf_sa = scatter_pdf<F>(z[1].scattering, light.wi);
             f.pdf_reverse_sa = reverse_pdf(z[1].scattering, light.wi);
-            ratio = mis_.next_event_ratio<F>(scene_, 1.0f, z[1].sums, z[1].first, light, f,
-                                             fabsf(dot(z[1].point.ng, light.wi)));
+            ratio = mis_.template next_event_ratio<F>(scene_, 1.0f, z[1].sums, z[1].first, light, f,
+                                                      fabsf(dot(z[1].point.ng, light.wi)));
         } else {
             if (!connection<F>(rules_, {z[s], {1, 1, 1}, k - s}, {y[s - 1], {1, 1, 1}, s - 1}, candidate)) return;
             ratio = candidate.ratio;
         }
-        double weight = 1.0 / (1.0 + double(ratio));
-        if (std::isnan(ratio)) {
-            // A subpath that would have to draw what it all but never draws: the inverse of a density is no float. No
-            // such subpath exists, and its weight would be nothing.
-            ++tally_.overflows;
-            weight = oracle_weight(all, s, mis_.strategies, mis_.heuristic);
-            CHECK(weight < 1e-7);
-        }
+        const double weight = std::isnan(ratio) ? overflowed(oracle_weight(all, s, mis_.strategies, mis_.heuristic))
+                                                : 1.0 / (1.0 + double(ratio));
         sum += weight;
         weights += " s" + std::to_string(s) + ":" + std::to_string(weight);
     }
+    if constexpr (requires { mis_.merge_ratio(y[0].sums, true, z[0].sums, true, BsdfValue{}); })
+        for (uint32_t j = 1; j < k; ++j) {
+            if (!(all.merges[j] > 0)) continue;
+            BsdfValue f{};
+            f.pdf_sa = scatter_pdf<F>(z[j].scattering, -path.to_eye[j - 1]);
+            f.pdf_reverse_sa = reverse_pdf(z[j].scattering, -path.to_eye[j - 1]);
+            const float ratio = mis_.merge_ratio(y[j].sums, y[j].first, z[j].sums, z[j].first, f);
+            const double weight = std::isnan(ratio)
+                                      ? overflowed(oracle_merge_weight(all, j, mis_.strategies, mis_.heuristic))
+                                      : 1 / (1.0 + ratio);
+            sum += weight;
+            ++tally_.merges;
+            weights += " merge " + std::to_string(j) + ":" + std::to_string(weight);
+        }
     ++tally_.summed;
     tally_.worst_sum = std::max(tally_.worst_sum, std::abs(sum - 1));
     INFO("weights" << weights);
@@ -687,16 +707,18 @@ inline BidirectionalMis settings(uint32_t i) {
             light_subpaths[i / 32 % 4], i / 128 % 2 ? 3.0f : 1.0f};
 }
 
-/// Compares `times` as many subpaths as each scene asks for, and reports what was seen.
-inline std::map<std::string, uint64_t> compare_weights(double times) {
+/// Compares `times` as many subpaths as each scene asks for, and reports what was seen. `model(i)`: the i-th of the
+/// settings, as a model of weights.
+template <class Model>
+std::map<std::string, uint64_t> compare_weights(double times, Model model) {
     std::map<std::string, uint64_t> seen;
     for (const SceneCase& c : scene_cases()) {
         Tally tally;
         {
             INFO(c.name);
             const Scene scene = load(c);
-            Bench bench(scene, tally);
-            for (uint32_t i = 0; i < uint32_t(c.subpaths * times); ++i) bench.run(settings(i / 4), i);
+            Bench<decltype(model(0u))> bench(scene, tally);
+            for (uint32_t i = 0; i < uint32_t(c.subpaths * times); ++i) bench.run(model(i / 4), i);
             CHECK(tally.unbounded < 1e-5 * double(tally.paths) + 1);
             CHECK(tally.ill < 1e-3 * double(tally.paths));
         }
@@ -707,6 +729,7 @@ inline std::map<std::string, uint64_t> compare_weights(double times) {
             (unsigned long long)tally.unbounded, (unsigned long long)tally.summed, tally.worst_sum,
             (unsigned long long)tally.overflows);
         for (const auto& [name, n] : tally.seen) seen[name] += n;
+        seen["merges"] += tally.merges;
     }
     return seen;
 }

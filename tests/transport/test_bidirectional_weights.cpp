@@ -9,7 +9,7 @@ using namespace ambilux;
 using namespace ambilux::test;
 
 TEST_CASE("Recursive weights equal those of all strategies enumerated, and those of a path sum to one") {
-    const std::map<std::string, uint64_t> seen = compare_weights(1.0);
+    const std::map<std::string, uint64_t> seen = compare_weights(1.0, settings);
     const auto require = [&](const std::string& name) {
         INFO(name);
         const auto it = seen.find(name);

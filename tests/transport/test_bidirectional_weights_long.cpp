@@ -7,5 +7,5 @@
 using namespace ambilux::test;
 
 TEST_CASE("Recursive weights equal those of all strategies enumerated, for many millions of paths") {
-    compare_weights(20.0);
+    compare_weights(20.0, settings);
 }

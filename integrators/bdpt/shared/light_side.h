@@ -129,20 +129,23 @@ struct LightStages {
     }
 };
 
-template <class Executor, Features F, class Tracer, Fusion K, class Mis>
+/// `before(k, first_key)`: what else is done with the hits in place k (Wave::first_key).
+template <class Executor, Features F, class Tracer, Fusion K, class Mis, class Before = NothingBefore>
 void run_light_subpaths(Executor& exec, const LightStages<F, Tracer, K, Mis>& all,
-                        const SplatSide<F, Tracer, K, Mis>& splats, const BdptPolicyOf<Mis>& p) {
+                        const SplatSide<F, Tracer, K, Mis>& splats, const BdptPolicyOf<Mis>& p, Before before = {}) {
     for (uint32_t round = 0; round < p.waves.light_rounds(); ++round) {
         const auto s = all.in_round(round);
         exec.run_slots(s.generate, s.generate.wave.tiles * kTilePixels);
         if (p.rules.splat) run_splats(exec, splats);
         exec.set_depth(1);
         exec.extend(s.extend[0]);
-        repeat_depths(exec, s.vertex, s.extend, p.waves.multi_bounce_below, [&](bool) {
+        const auto rest = [&](bool) {
             if (!p.rules.splat) return;
             if constexpr (!K.connect) exec.run(s.connect_camera);
             run_splats(exec, splats);
-        });
+        };
+        repeat_depths(exec, s.vertex, s.extend, p.waves.multi_bounce_below, rest,
+                      [&](int k) { before(k, s.vertex[k].wave.first_key); });
         exec.set_depth(0);
     }
     exec.fail_on_overflow(all.vertex[0].vertices, splats.splat.splats);

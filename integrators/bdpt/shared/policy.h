@@ -14,12 +14,21 @@ struct BdptPolicyOf {
     bool coherent_draws;             ///< LightVertexSource
     bool one_connection_per_launch;  ///< else sums of a path depend on the order of threads
     bool traces_connections;         ///< on a device: connect_vertices traces its shadow rays itself
+    bool keeps_vertices = false;     ///< the method keeps light vertices, of all waves, and these need not
 
-    bool light_subpaths() const { return rules.splat || rules.connect; }
+    bool light_subpaths() const { return rules.splat || rules.connect || keeps_vertices; }
+    bool wave_keeps_vertices() const { return rules.connect && !keeps_vertices; }
+    /// Light subpaths leave no vertices for connections of their wave.
+    BdptPolicyOf of_light_side() const {
+        BdptPolicyOf p = *this;
+        p.rules.connect = wave_keeps_vertices();
+        return p;
+    }
     /// The same with another model.
     template <class Other>
     BdptPolicyOf<Other> with(const Other& mis) const {
-        return {rules.with(mis), waves, cache_draws, coherent_draws, one_connection_per_launch, traces_connections};
+        return {rules.with(mis),    waves,         cache_draws, coherent_draws, one_connection_per_launch,
+                traces_connections, keeps_vertices};
     }
 };
 using BdptPolicy = BdptPolicyOf<BidirectionalMis>;

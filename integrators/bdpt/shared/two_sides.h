@@ -34,7 +34,7 @@ struct TwoSidesMemory {
         m.splats =
             SplatQueues<Mis>::template lay_out<K, F>(layout, n.slots, n.kept + p.waves.most_light_subpaths(n.slots), p);
         m.eye_vertices = layout.queue<Vertex>("eye_vertices", pairs, false, lanes);
-        m.light_vertices = layout.growing_queue<Vertex>("light_vertices", p.rules.connect ? n.kept : 0, lanes);
+        m.light_vertices = layout.growing_queue<Vertex>("light_vertices", p.wave_keeps_vertices() ? n.kept : 0, lanes);
         m.pairs = layout.queue<PairItem>("pairs", pairs, by_path);
         m.deferred = layout.queue<PairItem>("deferred", p.traces_connections ? 0 : pairs, by_path);
         m.last_vertex = p.cache_draws == 0 ? layout.allocate<uint32_t>(n.slots) : nullptr;
@@ -74,7 +74,7 @@ struct TwoSidesStages {
         : TwoSidesStages(parts, p, m, Source{m.light_vertices, m.last_vertex, p.cache_draws, p.coherent_draws}) {}
     TwoSidesStages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const Source& from)
         : policy(p), wave(parts.wave), eye(parts, m.eye, p.waves, from.learn()), splats(parts, m.splats, p, m.eye.raw),
-          light(parts, m.subpaths, m.light_vertices, m.last_vertex, splats, p), source(from) {
+          light(parts, m.subpaths, m.light_vertices, m.last_vertex, splats, p.of_light_side()), source(from) {
         const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
         const SceneView& scene = parts.scene;
         const bool seeds = F.opacity || p.waves.cull > 0.0f;
@@ -138,11 +138,12 @@ void run_connections(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>&
     });
 }
 
-template <class Executor, Features F, class Tracer, Fusion K, class Source>
-void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s) {
+/// `before(k)`: what else is done with the hits in place k.
+template <class Executor, Features F, class Tracer, Fusion K, class Source, class Before = NothingBefore>
+void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>& s, Before before = {}) {
     const auto& rules = s.policy.rules;
     start_eye_subpaths<K.generate>(exec, s.generate, s.extend[0], s.wave.tiles * kTilePixels);
-    repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, [&](bool several_bounces) {
+    const auto rest = [&](bool several_bounces) {
         run_emission(exec, s.eye);
         if constexpr (!K.connect) exec.run(s.connect_emitter);
         if (rules.next_event || K.occlude) run_candidates(exec, s.eye, several_bounces);
@@ -151,7 +152,8 @@ void run_eye_subpaths(Executor& exec, const TwoSidesStages<F, Tracer, K, Source>
             run_connections(exec, s, several_bounces);
             exec.clear(s.connect_vertices.vertices);
         }
-    });
+    };
+    repeat_depths(exec, s.eye_vertex, s.extend, s.policy.waves.multi_bounce_below, rest, before);
     exec.set_depth(0);
 }
 

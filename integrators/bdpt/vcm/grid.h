@@ -1,0 +1,141 @@
+// Where the light vertices of an iteration lie: cells of twice the radius, of which a hash table holds the starts.
+#pragma once
+
+#include "integrators/bdpt/vcm/merging_mis.h"
+#include "integrators/bdpt/vcm/settings.h"
+#include "integrators/kept_state.h"
+#include "stages/vertex_queues.h"
+
+namespace ambilux {
+
+/// A light vertex as a merge sees it.
+struct MergeVertex {
+    Vec3f p;
+    uint32_t depth;  ///< segments of the light subpath up to here
+    Rgb flux;        ///< over the number of light subpaths it is what arrives
+    float dvcm;
+    Vec2f d;  ///< of the light, octahedral map
+    float dvc, dvm;
+
+    AMBILUX_HD MergingSums sums() const { return {dvcm, dvc, dvm}; }
+};
+
+/// A cell of the grid.
+struct MergeCell {
+    int32_t x, y, z;
+
+    AMBILUX_HD bool operator==(const MergeCell& o) const { return x == o.x && y == o.y && z == o.z; }
+    /// Cells that share a place in the table are told apart by the places of their vertices.
+    AMBILUX_HD uint32_t hash(uint32_t bits) const {
+        uint32_t h = uint32_t(x) * 0x9e3779b1u ^ uint32_t(y) * 0x85ebca77u ^ uint32_t(z) * 0xc2b2ae3du;
+        h = (h ^ h >> 15) * 0x2c1b3c6du;
+        h = (h ^ h >> 12) * 0x297a2d39u;
+        return (h ^ h >> 15) >> (32 - bits);
+    }
+};
+
+/// Cells have edges of twice the radius, so that a ball lies in at most eight.
+struct MergeGrid {
+    Vec3f low;
+    float cells_per_length;
+
+    AMBILUX_HD static MergeGrid of(const SceneView& scene, float radius) {
+        const float size = scene.bounds_radius;
+        return {scene.bounds_center - Vec3f{size, size, size}, 0.5f / radius};
+    }
+    AMBILUX_HD MergeCell cell(Vec3f p) const {
+        const Vec3f c = (p - low) * cells_per_length;
+        return {int32_t(floorf(c.x)), int32_t(floorf(c.y)), int32_t(floorf(c.z))};
+    }
+    /// The cell of the eight around `p` with the smallest coordinates.
+    AMBILUX_HD MergeCell first_cell(Vec3f p) const {
+        const Vec3f c = (p - low) * cells_per_length;
+        return {int32_t(floorf(c.x - 0.5f)), int32_t(floorf(c.y - 0.5f)), int32_t(floorf(c.z - 0.5f))};
+    }
+};
+
+/// Keys put light vertices in order of their place in the table, light subpath and depth: an order that knows nothing
+/// of waves and threads, so that sums over a cell have the same bits for any number of them.
+constexpr uint32_t kMergeDepthBits = 11, kMergeSubpathBits = 29, kMergeKeyShift = kMergeDepthBits + kMergeSubpathBits;
+constexpr uint32_t kLeastMergeBits = 8, kMostMergeBits = 24;  ///< of the table
+AMBILUX_HD uint64_t merge_key(uint32_t hash, uint32_t subpath, uint32_t depth) {
+    return uint64_t(hash) << kMergeKeyShift | uint64_t(subpath) << kMergeDepthBits |
+           (depth & ((1u << kMergeDepthBits) - 1));
+}
+
+/// Light vertices: as merges see them and, where subpaths are connected, as connections do.
+struct VcmVertices {
+    Queue<MergeVertex> merges;
+    LaneArray<ConnectionVertex<MergingMis>> connections;  ///< at the places of `merges`
+    uint64_t* keys;                                       ///< likewise
+
+    /// `growing`: the name of the queue.
+    template <class Policy>
+    static VcmVertices lay_out(Layout& layout, const char* growing, const Policy& p, uint32_t n) {
+        VcmVertices v;
+        v.merges = layout.growing_queue<MergeVertex>(growing, p.keeps_vertices ? n : 0);
+        v.connections = layout.array<ConnectionVertex<MergingMis>>(p.rules.connect ? n : 0, p.vertex_lanes);
+        return v;
+    }
+};
+
+/// What lives as long as an iteration: the light vertices of all its waves. Nothing outlives it, and the radius follows
+/// from its number.
+struct VcmState {
+    static constexpr StateKind kKind = StateKind::by_index;
+
+    VcmVertices all;                ///< as they were appended; keys are those of `order`
+    LaneArray<MergeVertex> sorted;  ///< in the order of keys
+    LaneArray<ConnectionVertex<MergingMis>> sorted_connections;
+    SortMemory<uint64_t> order;  ///< keys and places
+    uint32_t* starts;            ///< in the order of keys: of each place in the table, and the end
+    uint32_t table_bits;
+    uint32_t lanes;  ///< of a vertex for connections
+
+    template <class Policy>
+    static VcmState lay_out(Layout& layout, const Policy& p, const StateSize& size) {
+        const uint32_t n = p.keeps_vertices ? size.appended : 0;
+        VcmState s;
+        s.all = VcmVertices::lay_out(layout, "merge_vertices", p, n);
+        s.sorted = layout.array<MergeVertex>(n);
+        s.sorted_connections = layout.array<ConnectionVertex<MergingMis>>(p.rules.connect ? n : 0, p.vertex_lanes);
+        s.order = SortMemory<uint64_t>::lay_out(layout, n, size.primitives);
+        s.all.keys = s.order.keys[0];
+        s.starts = layout.allocate<uint32_t>((uint64_t(1) << p.table_bits) + 1);
+        s.table_bits = p.table_bits;
+        s.lanes = p.vertex_lanes;
+        return s;
+    }
+    /// The vertices in order, for connections that draw from them.
+    AMBILUX_HD Queue<ConnectionVertex<MergingMis>> drawn() const {
+        Queue<ConnectionVertex<MergingMis>> q;
+        q.items = sorted_connections;
+        q.counter = all.merges.counter;
+        return q;
+    }
+
+    template <class Policy, class Put>
+    void init(const Policy&, Put) const {}
+    template <class Visit>
+    void for_each_saved(Visit) const {}
+    /// Of `old`, which had too little room.
+    template <class Copy>
+    void take_items(const VcmState& old, uint32_t items, Copy copy) const {
+        take_lanes(all.merges.items, old.all.merges.items, LaneArray<MergeVertex>::kLanes, items, copy);
+        if (all.connections.capacity > 0) take_lanes(all.connections, old.all.connections, lanes, items, copy);
+        copy(order.keys[0], old.order.keys[0], items);
+        copy(order.values[0], old.order.values[0], items);
+    }
+
+private:
+    template <class Item, class Copy>
+    static void take_lanes(LaneArray<Item> to, LaneArray<Item> from, uint32_t lanes, uint32_t items, Copy copy) {
+        for (uint32_t lane = 0; lane < lanes;) {
+            const uint32_t together = lane < paired_lanes<Item>() ? 2 : 1;
+            copy(to.base + to.place(0, lane), from.base + from.place(0, lane), uint64_t(together) * items);
+            lane += together;
+        }
+    }
+};
+
+}  // namespace ambilux

@@ -1,0 +1,38 @@
+#include "integrators/bdpt/vcm/policy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+
+#include "core/error.h"
+#include "integrators/bdpt/vcm/grid.h"
+#include "scene/scene.h"
+
+namespace ambilux {
+
+VcmPolicy VcmPolicy::plan(const Scene& scene, const RenderSettings& settings) {
+    VcmPolicy p{plan_bdpt<MergingMis>(scene, settings), VcmSettings::plan(settings), kLeastMergeBits, 0};
+    p.rules.mis.merges_first = p.vcm.first;
+    p.keeps_vertices = !scene.emitters.empty() && p.rules.max_depth >= 2 && !p.rules.singles.on;
+    p.waves.iteration_samples = p.vcm.samples;
+    p.waves.multi_bounce_below = 0;  // merges are a stage of their own
+    if (p.rules.connect) p.cache_draws = settings.connections;
+    p.one_connection_per_launch |= p.cache_draws == 1;
+    const uint64_t keys =
+        uint64_t(scene.sensor.crop_width) * scene.sensor.crop_height * p.waves.light_rounds() * p.vcm.samples;
+    if (keys > uint64_t(1) << kMergeSubpathBits)
+        throw Error(ExitCode::usage,
+                    fmt::format("merge_samples={}: light subpaths of an iteration are numbered up to {}, and a film of "
+                                "{}x{} has {}; choose fewer samples in an iteration",
+                                p.vcm.samples, uint64_t(1) << kMergeSubpathBits, scene.sensor.crop_width,
+                                scene.sensor.crop_height, keys));
+    return p;
+}
+
+void VcmPolicy::size_table(double mean_vertices) {
+    const uint64_t vertices = uint64_t(std::max(mean_vertices * double(subpaths()), 1.0));
+    table_bits = std::clamp(uint32_t(std::bit_width(vertices)), kLeastMergeBits, kMostMergeBits);
+}
+
+}  // namespace ambilux

@@ -1,0 +1,24 @@
+// What vcm does where, decided once by the host.
+#pragma once
+
+#include "integrators/bdpt/shared/policy.h"
+#include "integrators/bdpt/vcm/merging_mis.h"
+#include "integrators/bdpt/vcm/settings.h"
+
+namespace ambilux {
+
+struct VcmPolicy : BdptPolicyOf<MergingMis> {
+    VcmSettings vcm;
+    uint32_t table_bits;    ///< of the grid's hash table
+    uint32_t vertex_lanes;  ///< of a light vertex, as kernels of these features use them
+
+    /// Light subpaths of an iteration.
+    AMBILUX_HD float subpaths() const { return rules.mis.light_subpaths * float(vcm.samples); }
+
+    /// Throws Error(usage) if light subpaths of an iteration are more than keys can number.
+    static VcmPolicy plan(const Scene& scene, const RenderSettings& settings);
+    /// Chooses the table by the mean number of vertices that a light subpath leaves.
+    void size_table(double mean_vertices);
+};
+
+}  // namespace ambilux

@@ -1,0 +1,124 @@
+// Light vertices of a wave are kept, appended to those of all waves, and put in the order of their cells.
+#pragma once
+
+#include "integrators/bdpt/vcm/grid.h"
+#include "integrators/bdpt/vcm/policy.h"
+#include "stages/stage.h"
+#include "transport/subpath/visit.h"
+
+namespace ambilux {
+
+/// The radius of the iteration (Knaus and Zwicker 2011).
+struct SetRadius {
+    static constexpr const char* kName = "set_radius";
+
+    const WaveState* state;
+    MergeNow* now;
+    float first;  ///< of the first iteration
+    float alpha;
+    float light_subpaths;  ///< of an iteration
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t) const {
+        const float r = first * powf(float(state->iteration + 1), 0.5f * (alpha - 1.0f));
+        *now = {r, kPi * r * r * light_subpaths};
+    }
+};
+
+/// Vertices of light subpaths where merges and connections may end, one for each hit.
+template <Features F>
+struct KeepVertices {
+    static constexpr const char* kName = "keep_vertices";
+    using Mis = MergingMis;
+    using Items = SubpathItems<Mis>;
+
+    SceneView scene;
+    Wave wave;
+    Rules<Mis> rules;
+    Queue<HitItem<typename Items::Ray>> hits;
+    VcmVertices kept;
+    const MergeNow* now;
+    uint32_t samples;  ///< of an iteration
+    uint32_t rounds;   ///< light subpaths of a pixel, at most
+    uint32_t table_bits;
+    bool connects;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const auto h = hits.load(i);
+        if (h.prim == kNone) return;
+        const Subpath<Mis> path = Items::unpack(h.ray);
+        if (path.depth + 1 > rules.max_depth) return;
+        const SurfacePoint point = surface_at<F>(scene, h.prim, h.u, h.v);
+        const Vertex<Mis> y = vertex_at<F>(scene, rules, Side::light, path, point);
+        if (!bsdf_is_smooth(y.scattering.bsdf)) return;
+        const uint32_t place = kept.merges.push({y.point.p, path.depth, path.throughput, y.sums.dvcm,
+                                                 octahedral_encode(path.direction), y.sums.dvc, y.sums.dvm});
+        if (place >= kept.merges.capacity()) return;
+        const uint32_t cell = MergeGrid::of(scene, now->radius).cell(y.point.p).hash(table_bits);
+        kept.keys[place] = merge_key(cell, subpath(h.ray.path), path.depth);
+        if (!connects) return;
+        const auto vertex = pack_connection_vertex(y, path, kNone);
+        kept.connections.store(place, vertex, lanes_of<F>(vertex));
+    }
+
+private:
+    /// Number of the light subpath in the iteration.
+    AMBILUX_HD uint32_t subpath(uint32_t slot) const {
+        const RngKey key = wave.key(slot, Stream::light);
+        return (key.sample - wave.state->iteration * samples) * (wave.width * wave.height * rounds) + key.index;
+    }
+};
+
+/// Those of a wave become vertices of all.
+struct AppendVertices {
+    static constexpr const char* kName = "append_vertices";
+
+    VcmVertices mine;
+    VcmState state;
+    StageRecord* record;
+
+    const Queue<MergeVertex>& items() const { return mine.merges; }
+    QueueCounter* target() const { return state.all.merges.counter; }
+
+    AMBILUX_HD void operator()(uint32_t i, uint32_t place) const {
+        state.all.merges.store(place, mine.merges.load(i));
+        state.order.keys[0][place] = mine.keys[i];
+        state.order.values[0][place] = place;
+        if (mine.connections.capacity > 0)
+            state.all.connections.store(place, mine.connections.load(i, state.lanes), state.lanes);
+    }
+};
+
+/// Where the vertices of each place in the table start, once keys are sorted. Over one item more than there are.
+struct FindCells {
+    static constexpr const char* kName = "find_cells";
+
+    VcmState state;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const uint64_t* keys = state.order.keys[1];
+        const uint32_t count = state.all.merges.counter->size(), end = 1u << state.table_bits;
+        const uint32_t first = i > 0 ? uint32_t(keys[i - 1] >> kMergeKeyShift) + 1 : 0;
+        const uint32_t last = i < count ? uint32_t(keys[i] >> kMergeKeyShift) : end;
+        for (uint32_t cell = first; cell <= last; ++cell) state.starts[cell] = i;
+    }
+};
+
+/// Vertices go to their places in the order of keys.
+struct PlaceVertices {
+    static constexpr const char* kName = "place_vertices";
+
+    VcmState state;
+    StageRecord* record;
+
+    AMBILUX_HD void operator()(uint32_t i) const {
+        const uint32_t from = state.order.values[1][i];
+        state.sorted.store(i, state.all.merges.load(from));
+        if (state.sorted_connections.capacity > 0)
+            state.sorted_connections.store(i, state.all.connections.load(from, state.lanes), state.lanes);
+    }
+};
+
+}  // namespace ambilux

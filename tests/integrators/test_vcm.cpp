@@ -1,0 +1,161 @@
+// libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
+// seconds: 20
+// Integrator vcm: closed forms, the mean of the path tracer, and that no thread, wave or budget decides a bit.
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <cmath>
+
+#include "core/error.h"
+#include "tests/support/render_scene.h"
+
+using namespace ambilux;
+
+namespace {
+
+RenderSettings vcm_settings(const Scene& scene, const char* radius = "0.01", uint64_t seed = 3) {
+    RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
+    s.integrator = "vcm";
+    apply_setting(s, "merge_radius", radius);
+    return s;
+}
+
+double mean_of(const FilmMoments& film) {
+    double sum = 0;
+    for (const double v : film.sum) sum += v;
+    return sum / double(film.sum.size()) / double(film.samples);
+}
+
+/// Over independent renders.
+struct Mean {
+    double value, error;
+};
+Mean mean_over_seeds(const Scene& scene, RenderSettings s, uint32_t samples, uint32_t seeds) {
+    double sum = 0, squares = 0;
+    for (uint32_t k = 0; k < seeds; ++k) {
+        s.seed = 100 + k;
+        const double m = mean_of(render_scene(scene, s, samples).film);
+        sum += m, squares += m * m;
+    }
+    const double mean = sum / seeds;
+    return {mean, std::sqrt(std::max(squares / seeds - mean * mean, 0.0) / (seeds - 1))};
+}
+
+/// On so many threads.
+RenderResult render_on(int threads, const Scene& scene, const RenderSettings& s, uint32_t samples) {
+    RenderResult result;
+    const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, size_t(threads));
+    tbb::task_arena arena(threads);
+    arena.execute([&] { result = render_scene(scene, s, samples); });
+    return result;
+}
+
+}  // namespace
+
+TEST_CASE("vcm: inside a glowing sphere all masks of strategies find the same radiance, whatever share merges have") {
+    const Scene scene = scene_from_text(
+        "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><float name='fov' value='60'/>"
+        "<transform name='to_world'><lookat origin='0.2,0.1,0' target='1,0,0' up='0,1,0'/></transform><film "
+        "type='hdrfilm'><integer name='width' value='16'/><integer name='height' value='16'/></film></sensor>"
+        "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'><rgb name='reflectance' "
+        "value='0.5'/></bsdf><emitter type='area'><rgb name='radiance' value='1'/></emitter></shape></scene>");
+    for (const char* mask : {"all", "hits", "hits+next_event", "hits+light", "hits+connections+light"})
+        for (const char* heuristic : {"balance", "power"})
+            for (const char* first : {"true", "false"}) {
+                RenderSettings s = vcm_settings(scene, "0.1");
+                apply_setting(s, "strategies", mask);
+                apply_setting(s, "heuristic", heuristic);
+                apply_setting(s, "merge_first", first);
+                INFO(mask << ", " << heuristic << ", merges at first vertices: " << first);
+                const Mean m = mean_over_seeds(scene, s, 16, 6);
+                // The sphere bends away from a disk of a tenth of its radius: at most r^2 / 4 of the light.
+                CHECK(std::fabs(m.value - 2.0) < 4.0 * m.error + 0.005);
+                CHECK(m.error < 0.02);
+            }
+}
+
+TEST_CASE("vcm finds the light of a point behind glass that is seen through glass, which no other strategy does") {
+    const Scene scene = scene_from_text(
+        "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='4'/></integrator><sensor "
+        "type='perspective'><float name='fov' value='4'/><transform name='to_world'><lookat origin='0,0,2' "
+        "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' value='8'/><integer "
+        "name='height' value='8'/></film></sensor><emitter type='point'><point name='position' x='0.5' y='0' "
+        "z='1.5'/><rgb name='intensity' value='3'/></emitter><shape type='rectangle'><bsdf type='diffuse'><rgb "
+        "name='reflectance' value='0.6'/></bsdf></shape><shape type='rectangle'><transform name='to_world'><scale "
+        "value='2'/><translate z='1'/></transform><bsdf type='thindielectric'/></shape></scene>");
+    const auto transmitted = [](double cosine) {  // of a pane of index 1.5046 with all reflections inside it
+        const double ior = 1.5046, inside = std::sqrt(1 - (1 - cosine * cosine) / (ior * ior));
+        const double s = (cosine - ior * inside) / (cosine + ior * inside),
+                     p = (ior * cosine - inside) / (ior * cosine + inside), r = 0.5 * (s * s + p * p);
+        return (1 - r) / (1 + r);
+    };
+    const double d2 = 0.5 * 0.5 + 1.5 * 1.5, cosine = 1.5 / std::sqrt(d2);
+    const double expected = 0.6 / 3.14159265358979 * 3 * cosine / d2 * transmitted(cosine) * transmitted(1.0);
+    RenderSettings s = vcm_settings(scene, "0.02");
+    apply_setting(s, "light_paths", "16");
+    const Mean m = mean_over_seeds(scene, s, 128, 8);
+    CHECK(std::fabs(m.value - expected) < 4.0 * m.error + 0.005 * expected);
+    CHECK(m.error < 0.05 * expected);
+    s.integrator = "bdpt";
+    CHECK(mean_of(render_scene(scene, s, 4).film) == 0.0);
+}
+
+TEST_CASE("vcm has the mean of the path tracer, to within its bias") {
+    for (const char* name : {"cornell", "glass", "lights"}) {
+        const Scene scene = project_scene(name, 32, 24);
+        INFO(name);
+        const Mean path = mean_over_seeds(scene, cpu_settings(scene, Estimator::mis), 128, 6);
+        RenderSettings s = vcm_settings(scene, "0.005");
+        const Mean merged = mean_over_seeds(scene, s, 16, 6);
+        CHECK(std::fabs(merged.value - path.value) < 4.0 * std::hypot(merged.error, path.error) + 0.01 * path.value);
+        const RenderResult one = render_scene(scene, s, 4);
+        CHECK(one.stats.invalid.total() == 0);
+        for (const QueueStats& q : one.stats.queues) CHECK(q.overflow == 0);
+    }
+}
+
+TEST_CASE("vcm: the same bits for any number of threads, size of waves and budget") {
+    const Scene scene = project_scene("glass", 56, 40);
+    for (const char* samples : {"1", "4"}) {
+        RenderSettings s = vcm_settings(scene);
+        apply_setting(s, "merge_samples", samples);
+        const RenderResult one = render_on(1, scene, s, 4);
+        const auto same = [&](const RenderResult& other) {
+            CHECK(other.film.sum == one.film.sum);
+            CHECK(other.film.sum_squares == one.film.sum_squares);
+        };
+        INFO(samples << " samples an iteration");
+        same(render_on(2, scene, s, 4));
+        same(render_on(7, scene, s, 4));
+        for (const uint32_t wave_size : {64u, 256u, 4096u}) {
+            s.wave_size = wave_size;
+            same(render_on(2, scene, s, 4));
+        }
+        s.wave_size = 0;
+        s.memory = one.stats.memory_bytes - one.stats.memory_bytes / 16;
+        same(render_on(1, scene, s, 4));
+    }
+}
+
+TEST_CASE("vcm: iterations are whole, a render goes on from its film alone, and impossible settings are refused") {
+    const Scene scene = project_scene("cornell", 24, 24);
+    RenderSettings s = vcm_settings(scene);
+    apply_setting(s, "merge_samples", "4");
+    const std::unique_ptr<Renderer> renderer = make_renderer(scene, s);
+    CHECK(renderer->iteration_samples() == 4);
+    CHECK(renderer->state_kind() == StateKind::by_index);
+    CHECK_THROWS_AS(renderer->render(0, 6), Error);
+    renderer->render(0, 8);
+    const FilmMoments whole = renderer->film();
+    std::vector<double> parts(whole.sum.size());
+    for (const uint32_t first : {0u, 4u}) {
+        const std::unique_ptr<Renderer> another = make_renderer(scene, s);
+        another->render(first, 4);
+        const FilmMoments film = another->film();
+        for (size_t i = 0; i < parts.size(); ++i) parts[i] += film.sum[i];
+    }
+    for (size_t i = 0; i < parts.size(); ++i) CHECK(parts[i] == Approx(whole.sum[i]).epsilon(1e-12));
+    const Scene large = project_scene("cornell", 4096, 4096);
+    apply_setting(s, "merge_samples", "64");
+    CHECK_THROWS_WITH(make_renderer(large, s), ContainsSubstring("merge_samples=64") && ContainsSubstring("4096x4096"));
+}
