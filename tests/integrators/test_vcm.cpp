@@ -96,8 +96,9 @@ TEST_CASE("vcm finds the light of a point behind glass that is seen through glas
     const Mean m = mean_over_seeds(scene, s, 128, 8);
     CHECK(std::fabs(m.value - expected) < 4.0 * m.error + 0.005 * expected);
     CHECK(m.error < 0.05 * expected);
-    s.integrator = "bdpt";
-    CHECK(mean_of(render_scene(scene, s, 4).film) == 0.0);
+    RenderSettings bdpt = cpu_settings(scene, Estimator::mis);
+    bdpt.integrator = "bdpt";
+    CHECK(mean_of(render_scene(scene, bdpt, 4).film) == 0.0);
 }
 
 TEST_CASE("vcm has the mean of the path tracer, to within its bias") {
@@ -132,7 +133,7 @@ TEST_CASE("vcm: the same bits for any number of threads, size of waves and budge
             same(render_on(2, scene, s, 4));
         }
         s.wave_size = 0;
-        s.memory = one.stats.memory_bytes - one.stats.memory_bytes / 16;
+        s.memory = one.stats.memory_bytes - one.stats.memory_bytes / 64;
         same(render_on(1, scene, s, 4));
     }
 }
