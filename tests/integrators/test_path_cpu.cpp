@@ -293,8 +293,8 @@ TEST_CASE("Renders that would not end or cannot be made are refused", "[path]") 
     deep.max_depth = 1 << 14;
     CHECK_THROWS_AS(make_renderer(scene, deep), Error);
     RenderSettings wrong = settings_of(scene);
-    wrong.integrator = "vcm";
-    CHECK_THROWS_WITH(make_renderer(scene, wrong), ContainsSubstring("vcm"));
+    wrong.integrator = "metropolis";
+    CHECK_THROWS_WITH(make_renderer(scene, wrong), ContainsSubstring("metropolis"));
     RenderSettings device = settings_of(scene);
     device.backend = "cuda";
     device.accel = "embree";
