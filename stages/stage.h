@@ -13,8 +13,8 @@
 
 namespace ambilux {
 
-/// True if `v` can be radiance. Anything else is counted in the record of the stage that made it, which drops it. One
-/// atomic addition at each place: three cost registers.
+/// True if `v` can be radiance. Anything else is counted in the record of the stage that made it, which drops it. With
+/// a quick test before the exact one, kernels at their limit of registers spill.
 AMBILUX_HD bool is_valid_radiance(Rgb v, StageRecord* record) {
     if (is_valid_radiance(v)) return true;
     uint64_t* kind = &record->negative;

@@ -2,19 +2,9 @@
 // labels: gpu
 // Integrator vcm on a device: the image of the CPU, and bits that depend on no size of waves.
 #include "tests/support/gpu_device.h"
-#include "tests/support/render_scene.h"
+#include "tests/support/whole_iterations.h"
 
 using namespace ambilux;
-
-namespace {
-
-double mean_of(const FilmMoments& film) {
-    double sum = 0;
-    for (const double v : film.sum) sum += v;
-    return sum / double(film.sum.size()) / double(film.samples);
-}
-
-}  // namespace
 
 TEST_CASE("vcm: CPU and CUDA agree, and with deterministic=true bits depend on no size of waves") {
     if (!device()) return;
@@ -30,19 +20,6 @@ TEST_CASE("vcm: CPU and CUDA agree, and with deterministic=true bits depend on n
                 apply_setting(s, "merge_samples", "2");
                 apply_setting(s, "deterministic", "true");
                 INFO(name << ", depth " << depth << ", " << mask);
-                const double on_cpu = mean_of(render_scene(scene, s, 8).film);
-                s.backend = "cuda";
-                const RenderResult one = render_scene(scene, s, 8);
-                CHECK(mean_of(one.film) == Approx(on_cpu).epsilon(2e-3));
-                CHECK(one.stats.invalid.total() == 0);
-                for (const uint32_t wave_size : {1024u, 4096u, 1u << 16}) {
-                    s.wave_size = wave_size;
-                    const RenderResult other = render_scene(scene, s, 8);
-                    CHECK(other.film.sum == one.film.sum);
-                    CHECK(other.film.sum_squares == one.film.sum_squares);
-                }
-                s.wave_size = 0;
-                s.graph = false;
-                CHECK(render_scene(scene, s, 8).film.sum == one.film.sum);
+                check_on_device(scene, s, 8);
             }
 }

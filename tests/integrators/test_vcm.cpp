@@ -1,13 +1,9 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // seconds: 20
 // Integrator vcm: closed forms, the mean of the path tracer, and that no thread, wave or budget decides a bit.
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
-
 #include <cmath>
 
-#include "core/error.h"
-#include "tests/support/render_scene.h"
+#include "tests/support/whole_iterations.h"
 
 using namespace ambilux;
 
@@ -18,12 +14,6 @@ RenderSettings vcm_settings(const Scene& scene, const char* radius = "0.01", uin
     s.integrator = "vcm";
     apply_setting(s, "merge_radius", radius);
     return s;
-}
-
-double mean_of(const FilmMoments& film) {
-    double sum = 0;
-    for (const double v : film.sum) sum += v;
-    return sum / double(film.sum.size()) / double(film.samples);
 }
 
 /// Over independent renders.
@@ -39,15 +29,6 @@ Mean mean_over_seeds(const Scene& scene, RenderSettings s, uint32_t samples, uin
     }
     const double mean = sum / seeds;
     return {mean, std::sqrt(std::max(squares / seeds - mean * mean, 0.0) / (seeds - 1))};
-}
-
-/// On so many threads.
-RenderResult render_on(int threads, const Scene& scene, const RenderSettings& s, uint32_t samples) {
-    RenderResult result;
-    const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, size_t(threads));
-    tbb::task_arena arena(threads);
-    arena.execute([&] { result = render_scene(scene, s, samples); });
-    return result;
 }
 
 }  // namespace
@@ -120,21 +101,8 @@ TEST_CASE("vcm: the same bits for any number of threads, size of waves and budge
     for (const char* samples : {"1", "4"}) {
         RenderSettings s = vcm_settings(scene);
         apply_setting(s, "merge_samples", samples);
-        const RenderResult one = render_on(1, scene, s, 4);
-        const auto same = [&](const RenderResult& other) {
-            CHECK(other.film.sum == one.film.sum);
-            CHECK(other.film.sum_squares == one.film.sum_squares);
-        };
         INFO(samples << " samples an iteration");
-        same(render_on(2, scene, s, 4));
-        same(render_on(7, scene, s, 4));
-        for (const uint32_t wave_size : {64u, 256u, 4096u}) {
-            s.wave_size = wave_size;
-            same(render_on(2, scene, s, 4));
-        }
-        s.wave_size = 0;
-        s.memory = one.stats.memory_bytes - one.stats.memory_bytes / 64;
-        same(render_on(1, scene, s, 4));
+        check_bits_on_cpu(scene, s, 4, 64);
     }
 }
 
@@ -142,20 +110,7 @@ TEST_CASE("vcm: iterations are whole, a render goes on from its film alone, and 
     const Scene scene = project_scene("cornell", 24, 24);
     RenderSettings s = vcm_settings(scene);
     apply_setting(s, "merge_samples", "4");
-    const std::unique_ptr<Renderer> renderer = make_renderer(scene, s);
-    CHECK(renderer->iteration_samples() == 4);
-    CHECK(renderer->state_kind() == StateKind::by_index);
-    CHECK_THROWS_AS(renderer->render(0, 6), Error);
-    renderer->render(0, 8);
-    const FilmMoments whole = renderer->film();
-    std::vector<double> parts(whole.sum.size());
-    for (const uint32_t first : {0u, 4u}) {
-        const std::unique_ptr<Renderer> another = make_renderer(scene, s);
-        another->render(first, 4);
-        const FilmMoments film = another->film();
-        for (size_t i = 0; i < parts.size(); ++i) parts[i] += film.sum[i];
-    }
-    for (size_t i = 0; i < parts.size(); ++i) CHECK(parts[i] == Approx(whole.sum[i]).epsilon(1e-12));
+    check_resumes_from_film(scene, s);
     const Scene large = project_scene("cornell", 4096, 4096);
     apply_setting(s, "merge_samples", "64");
     CHECK_THROWS_WITH(make_renderer(large, s), ContainsSubstring("merge_samples=64") && ContainsSubstring("4096x4096"));

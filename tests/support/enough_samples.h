@@ -14,7 +14,9 @@ namespace ambilux {
 constexpr double kNoVariance = 1e-3;
 
 /// `few` samples, and as many again until a difference of `sees` from `truth` is noticed, at most `most`. The error
-/// says when to stop, and not the mean. `image(done, n)`: the estimate of all samples once n are added to those done.
+/// says when to stop. The mean does so for images almost without variance alone, and after the first `few`: whoever may
+/// stop whenever it is near passes sooner or later. `image(done, n)`: the estimate of all samples once n are added to
+/// those done.
 template <class Image>
 Estimate until_seen(uint32_t few, uint32_t most, const Estimate& truth, double sees, const ZTestOptions& options,
                     Image image) {
@@ -22,8 +24,9 @@ Estimate until_seen(uint32_t few, uint32_t most, const Estimate& truth, double s
         const Estimate so_far = image(done, n);
         done += n;
         const ZTestResult z = z_test(so_far, truth, options);
-        const bool enough = z.undecided ? truth.samples == 0 && std::abs(z.relative_difference) < kNoVariance
-                                        : z.detectable < sees && sees_bias(so_far, truth, sees, options);
+        const bool enough = z.undecided
+                                ? done == few && truth.samples == 0 && std::abs(z.relative_difference) < kNoVariance
+                                : z.detectable < sees && sees_bias(so_far, truth, sees, options);
         if (enough || done >= most) return so_far;
     }
 }

@@ -3,19 +3,9 @@
 // Integrator photon_density on a device: the image of the CPU, whatever waves hold, and where photons had too little
 // room.
 #include "tests/support/gpu_device.h"
-#include "tests/support/render_scene.h"
+#include "tests/support/whole_iterations.h"
 
 using namespace ambilux;
-
-namespace {
-
-double mean_of(const FilmMoments& film) {
-    double sum = 0;
-    for (const double v : film.sum) sum += v;
-    return sum / double(film.sum.size()) / double(film.samples);
-}
-
-}  // namespace
 
 TEST_CASE("photon_density: CPU and CUDA agree, and bits depend on no size of waves") {
     if (!device()) return;
@@ -28,19 +18,6 @@ TEST_CASE("photon_density: CPU and CUDA agree, and bits depend on no size of wav
             apply_setting(s, "photon_radius", "0.05");
             apply_setting(s, "photon_samples", "2");
             INFO(name << ", depth " << depth);
-            const double on_cpu = mean_of(render_scene(scene, s, 8).film);
-            s.backend = "cuda";
-            const RenderResult one = render_scene(scene, s, 8);
-            CHECK(mean_of(one.film) == Approx(on_cpu).epsilon(2e-3));
-            CHECK(one.stats.invalid.total() == 0);
-            for (const uint32_t wave_size : {1024u, 4096u, 1u << 16}) {
-                s.wave_size = wave_size;
-                const RenderResult other = render_scene(scene, s, 8);
-                CHECK(other.film.sum == one.film.sum);
-                CHECK(other.film.sum_squares == one.film.sum_squares);
-            }
-            s.wave_size = 0;
-            s.graph = false;
-            CHECK(render_scene(scene, s, 8).film.sum == one.film.sum);
+            check_on_device(scene, s, 8);
         }
 }

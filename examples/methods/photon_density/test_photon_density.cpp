@@ -1,11 +1,7 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // seconds: 20
 // Integrator photon_density: what it converges to, and that no thread, wave or budget decides a bit.
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
-
-#include "core/error.h"
-#include "tests/support/render_scene.h"
+#include "tests/support/whole_iterations.h"
 
 using namespace ambilux;
 
@@ -16,21 +12,6 @@ RenderSettings settings_of(const Scene& scene, const char* radius = "0.02") {
     s.integrator = "photon_density";
     apply_setting(s, "photon_radius", radius);
     return s;
-}
-
-double mean_of(const FilmMoments& film) {
-    double sum = 0;
-    for (const double v : film.sum) sum += v;
-    return sum / double(film.sum.size()) / double(film.samples);
-}
-
-/// On so many threads.
-RenderResult render_on(int threads, const Scene& scene, const RenderSettings& s, uint32_t samples) {
-    RenderResult result;
-    const tbb::global_control allowed(tbb::global_control::max_allowed_parallelism, size_t(threads));
-    tbb::task_arena arena(threads);
-    arena.execute([&] { result = render_scene(scene, s, samples); });
-    return result;
 }
 
 }  // namespace
@@ -77,21 +58,8 @@ TEST_CASE(
     for (const char* samples : {"1", "4"}) {
         RenderSettings s = settings_of(scene);
         apply_setting(s, "photon_samples", samples);
-        const RenderResult one = render_on(1, scene, s, 8);
-        const auto same = [&](const RenderResult& other) {
-            CHECK(other.film.sum == one.film.sum);
-            CHECK(other.film.sum_squares == one.film.sum_squares);
-        };
         INFO(samples << " samples an iteration");
-        same(render_on(2, scene, s, 8));
-        same(render_on(7, scene, s, 8));
-        for (const uint32_t wave_size : {64u, 256u, 4096u}) {
-            s.wave_size = wave_size;
-            same(render_on(2, scene, s, 8));
-        }
-        s.wave_size = 0;
-        s.memory = one.stats.memory_bytes - one.stats.memory_bytes / 16;
-        same(render_on(1, scene, s, 8));
+        check_bits_on_cpu(scene, s, 8, 16);
     }
 }
 
@@ -99,22 +67,5 @@ TEST_CASE("photon_density: iterations are whole, and a render goes on from its f
     const Scene scene = project_scene("cornell", 24, 24);
     RenderSettings s = settings_of(scene);
     apply_setting(s, "photon_samples", "4");
-    const std::unique_ptr<Renderer> renderer = make_renderer(scene, s);
-    CHECK(renderer->iteration_samples() == 4);
-    CHECK(renderer->state_kind() == StateKind::by_index);
-    CHECK_THROWS_AS(renderer->render(0, 6), Error);
-    renderer->render(0, 8);
-    const FilmMoments whole = renderer->film();
-    FilmMoments parts;
-    for (const uint32_t first : {0u, 4u}) {
-        const std::unique_ptr<Renderer> another = make_renderer(scene, s);
-        another->render(first, 4);
-        const FilmMoments film = another->film();
-        if (first == 0) {
-            parts = film;
-        } else {
-            for (size_t i = 0; i < film.sum.size(); ++i) parts.sum[i] += film.sum[i];
-        }
-    }
-    for (size_t i = 0; i < whole.sum.size(); ++i) CHECK(parts.sum[i] == Approx(whole.sum[i]).epsilon(1e-12));
+    check_resumes_from_film(scene, s);
 }

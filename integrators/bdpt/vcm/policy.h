@@ -13,7 +13,7 @@ struct VcmPolicy : BdptPolicyOf<MergingMis> {
     uint32_t vertex_lanes;  ///< of a light vertex, as kernels of these features use them
 
     /// Light subpaths of an iteration.
-    AMBILUX_HD float subpaths() const { return rules.mis.light_subpaths * float(vcm.samples); }
+    float subpaths() const { return rules.mis.light_subpaths * float(vcm.samples); }
 
     /// Throws Error(usage) if light subpaths of an iteration are more than keys can number.
     static VcmPolicy plan(const Scene& scene, const RenderSettings& settings);
