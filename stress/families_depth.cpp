@@ -24,6 +24,7 @@ Family depths(const std::string& name, const std::string& parameter, std::initia
         furnace.max_depth = d.segments;
         furnace.rr_depth = ends == Ends::nothing ? d.segments + 1 : 5;
         // Connections of paired subpaths grow with the square of their length: few paths must do.
+        if (ends == Ends::nothing) furnace.film = {8, 8};
         if (d.segments > 20) furnace.film = {8, 4};
         if (d.segments > 400) furnace.film = {4, 2};
         Cell cell{name, decade(d.albedo), d.albedo, furnace_answer(furnace),

@@ -157,7 +157,8 @@ private:
 
     Effort effort_of(const Cell& cell) const {
         // Of the quick sweep all samples are the same on any machine; the other one goes by the clock.
-        Effort effort = request_.quick ? Effort{0.004, 1.3e5 * cell.effort, 60} : Effort{5e-5, 8e6, 0.4};
+        // Its first round is as small as a film allows: most rows need no more.
+        Effort effort = request_.quick ? Effort{0.004, 1.3e5 * cell.effort, 60, 8e3} : Effort{5e-5, 8e6, 0.4};
         effort.first_paths *= cell.effort;
         effort.samples = cell.samples;
         if (cell.samples) effort.seconds = 15;

@@ -35,7 +35,7 @@ std::string rectangle(const Frame& frame, double half_x, double half_y, double h
                       const std::string& inside);
 
 struct Film {
-    unsigned width = 32, height = 32;
+    unsigned width = 16, height = 16;
 };
 /// A camera at `origin`, of field of view `fov` in degrees along x. Clipping planes lie at `near` and 1e5 times that.
 std::string perspective(const Frame& frame, Point origin, Point target, Point up, double fov, double near,

@@ -15,7 +15,10 @@ struct MegakernelVariant {
                                               .references = References::as_it_is};
 
     static std::vector<SelectionOffer> selection(const SelectionRequest& r) { return paired_offers(r, ", megakernel"); }
-    static std::vector<Stressed> stress() { return both_heuristics("megakernel"); }
+    /// Not part of --quick: its samples are those of bdpt (tests/integrators/test_bidirectional_variants.cpp).
+    static std::vector<Stressed> stress() {
+        return {{"megakernel", {}, false}, {"megakernel-power", {{"heuristic", "power"}}, false}};
+    }
 };
 
 }  // namespace ambilux
