@@ -8,11 +8,16 @@
 
 namespace ambilux {
 
-/// A light vertex as a merge sees it.
-struct MergeVertex {
+/// What is looked at of the many vertices that are near but not within the radius.
+struct MergePlace {
     Vec3f p;
     uint32_t depth;  ///< segments of the light subpath up to here
-    Rgb flux;        ///< over the number of light subpaths it is what arrives
+};
+
+/// A light vertex as a merge sees it.
+struct MergeVertex {
+    MergePlace front;
+    Rgb flux;  ///< over the number of light subpaths it is what arrives
     float dvcm;
     Vec2f d;  ///< of the light, octahedral map
     float dvc, dvm;
@@ -135,6 +140,41 @@ private:
             copy(to.base + to.place(0, lane), from.base + from.place(0, lane), uint64_t(together) * items);
             lane += together;
         }
+    }
+};
+
+/// Light vertices within a radius, one after the other.
+struct NearVertices {
+    const VcmState& state;
+    MergeGrid grid;
+    Vec3f p;
+    float radius;
+    MergeCell first;
+    uint32_t cells = 0;  ///< that were begun, of eight
+    uint32_t place = 0, end = 0;
+
+    AMBILUX_HD NearVertices(const VcmState& s, const MergeGrid& g, Vec3f center, float r)
+        : state(s), grid(g), p(center), radius(r), first(g.first_cell(center)) {}
+
+    /// The next, or kNone after the last. Threads of a warp search together until each has found one: few of those that
+    /// are looked at are within the radius, and what is done for one costs more than to look at ten.
+    AMBILUX_HD uint32_t next() {
+        for (;;) {
+            while (place < end) {
+                const uint32_t i = place++;
+                const Vec3f q = state.sorted.load_front(i).p;
+                if (length_squared(q - p) <= sqr(radius) && grid.cell(q) == cell(cells - 1)) return i;
+            }
+            if (cells == 8) return kNone;
+            const uint32_t hash = cell(cells++).hash(state.table_bits);
+            place = state.starts[hash];
+            end = state.starts[hash + 1];
+        }
+    }
+
+private:
+    AMBILUX_HD MergeCell cell(uint32_t k) const {
+        return {first.x + int32_t(k & 1), first.y + int32_t(k >> 1 & 1), first.z + int32_t(k >> 2)};
     }
 };
 

@@ -67,7 +67,7 @@ struct VcmIntegrator {
             p.rules.mis.now = now;
             return p;
         }
-        Stages(const WaveParts<Tracer>& parts, const Memory& m, const State& state, const Policy& p)
+        [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Memory& m, const State& state, const Policy& p)
             : two_sides(parts, p, m.two_sides, VcmSource{state.drawn(), p.cache_draws, p.subpaths()}),
               keeps(p.keeps_vertices) {
             const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };

@@ -13,17 +13,16 @@ struct MergeSum {
     const Rules<MergingMis>& rules;
     const Vertex<MergingMis>& z;
     uint32_t most_depth;  ///< of light subpaths
-    float radius;
     Rgb sum;
 
     /// Flux over an area is radiance times the cosine to that area.
     AMBILUX_HD void add(const MergeVertex& y) {
         const Vec3f d = octahedral_decode(y.d);
         const float cosine = fabsf(dot(z.point.ng, d));
-        if (y.depth > most_depth || !(cosine > 0.0f)) return;
+        if (y.front.depth > most_depth || !(cosine > 0.0f)) return;
         const BsdfValue f = rules.directions.template evaluate<F>(z, -d, TransportMode::radiance);
         if (is_zero(f.value)) return;
-        const float ratio = rules.mis.merge_ratio(y.sums(), y.depth == 1, z.sums, z.first, f);
+        const float ratio = rules.mis.merge_ratio(y.sums(), y.front.depth == 1, z.sums, z.first, f);
         sum += f.value * y.flux * (mis_weight(ratio) / cosine);
     }
 };
@@ -43,32 +42,16 @@ struct Merge {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const auto h = hits.load(i);
-        if (h.prim == kNone) return;
-        const Subpath<Mis> path = Items::unpack(h.ray);
-        if (path.depth >= rules.max_depth || (path.depth == 1 && !rules.mis.merges_first)) return;
-        const SurfacePoint point = surface_at<F>(scene, h.prim, h.u, h.v);
-        const Vertex<Mis> z = vertex_at<F>(scene, rules, Side::eye, path, point);
-        if (!bsdf_is_smooth(z.scattering.bsdf)) return;
-        const float radius = rules.mis.now->radius;
-        MergeSum<F> sum = {scene, rules, z, rules.max_depth - path.depth, radius, {0.0f, 0.0f, 0.0f}};
-        for_each_near(point.p, radius, sum);
-        const Rgb light = path.throughput * sum.sum * (1.0f / rules.mis.eta());
-        if (!is_zero(light)) samples.push(Contribution{light, h.ray.path});
-    }
-
-private:
-    AMBILUX_HD void for_each_near(Vec3f p, float radius, MergeSum<F>& sum) const {
-        const MergeGrid grid = MergeGrid::of(scene, radius);
-        const MergeCell first = grid.first_cell(p);
-        for (int32_t k = 0; k < 8; ++k) {
-            const MergeCell cell = {first.x + (k & 1), first.y + (k >> 1 & 1), first.z + (k >> 2)};
-            const uint32_t place = cell.hash(state.table_bits), end = state.starts[place + 1];
-            for (uint32_t i = state.starts[place]; i < end; ++i) {
-                const MergeVertex y = state.sorted.load(i);
-                if (length_squared(y.p - p) <= sqr(radius) && grid.cell(y.p) == cell) sum.add(y);
-            }
-        }
+        const auto hit = hits.load(i);
+        at_mergeable<F>(scene, rules, Side::eye, hit, [&](const Subpath<Mis>& path, const Vertex<Mis>& z) {
+            if (path.depth == 1 && !rules.mis.merges_first) return;
+            const float radius = rules.mis.now->radius;
+            MergeSum<F> sum = {scene, rules, z, rules.max_depth - path.depth, {0.0f, 0.0f, 0.0f}};
+            NearVertices near = {state, MergeGrid::of(scene, radius), z.point.p, radius};
+            for (uint32_t k; (k = near.next()) != kNone;) sum.add(state.sorted.load(k));
+            const Rgb light = path.throughput * sum.sum * (1.0f / rules.mis.eta());
+            if (!is_zero(light)) samples.push(Contribution{light, hit.ray.path});
+        });
     }
 };
 

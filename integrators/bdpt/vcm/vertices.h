@@ -25,6 +25,18 @@ struct SetRadius {
     }
 };
 
+/// Calls `use` with the vertex where a subpath hit, if a merge there would be part of a path that counts.
+template <Features F, class Use>
+AMBILUX_HD void at_mergeable(const SceneView& scene, const Rules<MergingMis>& rules, Side side,
+                             const HitItem<SubpathItems<MergingMis>::Ray>& h, Use use) {
+    if (h.prim == kNone) return;
+    const Subpath<MergingMis> path = SubpathItems<MergingMis>::unpack(h.ray);
+    if (path.depth >= rules.max_depth) return;
+    const Vertex<MergingMis> vertex =
+        vertex_at<F>(scene, rules, side, path, surface_at<F>(scene, h.prim, h.u, h.v));
+    if (bsdf_is_smooth(vertex.scattering.bsdf)) use(path, vertex);
+}
+
 /// Vertices of light subpaths where merges and connections may end, one for each hit.
 template <Features F>
 struct KeepVertices {
@@ -45,24 +57,22 @@ struct KeepVertices {
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
-        const auto h = hits.load(i);
-        if (h.prim == kNone) return;
-        const Subpath<Mis> path = Items::unpack(h.ray);
-        if (path.depth + 1 > rules.max_depth) return;
-        const SurfacePoint point = surface_at<F>(scene, h.prim, h.u, h.v);
-        const Vertex<Mis> y = vertex_at<F>(scene, rules, Side::light, path, point);
-        if (!bsdf_is_smooth(y.scattering.bsdf)) return;
-        const uint32_t place = kept.merges.push({y.point.p, path.depth, path.throughput, y.sums.dvcm,
+        const auto hit = hits.load(i);
+        at_mergeable<F>(scene, rules, Side::light, hit,
+                        [&](const Subpath<Mis>& path, const Vertex<Mis>& y) { keep(hit.ray.path, path, y); });
+    }
+
+private:
+    AMBILUX_HD void keep(uint32_t slot, const Subpath<Mis>& path, const Vertex<Mis>& y) const {
+        const uint32_t place = kept.merges.push({{y.point.p, path.depth}, path.throughput, y.sums.dvcm,
                                                  octahedral_encode(path.direction), y.sums.dvc, y.sums.dvm});
         if (place >= kept.merges.capacity()) return;
         const uint32_t cell = MergeGrid::of(scene, now->radius).cell(y.point.p).hash(table_bits);
-        kept.keys[place] = merge_key(cell, subpath(h.ray.path), path.depth);
+        kept.keys[place] = merge_key(cell, subpath(slot), path.depth);
         if (!connects) return;
         const auto vertex = pack_connection_vertex(y, path, kNone);
         kept.connections.store(place, vertex, lanes_of<F>(vertex));
     }
-
-private:
     /// Number of the light subpath in the iteration.
     AMBILUX_HD uint32_t subpath(uint32_t slot) const {
         const RngKey key = wave.key(slot, Stream::light);
