@@ -30,7 +30,7 @@ if(AMBILUX_HAS_CUDA)
     $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -prec-div=false -prec-sqrt=false>
     $<$<COMPILE_LANGUAGE:CUDA>:$<IF:$<BOOL:${AMBILUX_CUDA_SMALL}>,--compress-mode=size,-lineinfo>>)
   if(NOT AMBILUX_CUDA_OPTIMISE)
-    string(REPLACE "-O3" "-O1" CMAKE_CUDA_FLAGS_RELEASE "${CMAKE_CUDA_FLAGS_RELEASE}")  # of the host's part
+    string(REPLACE "-O3" "-O0" CMAKE_CUDA_FLAGS_RELEASE "${CMAKE_CUDA_FLAGS_RELEASE}")  # of the host's part
     if(CMAKE_CUDA_COMPILER_VERSION VERSION_GREATER_EQUAL 12.9)
       target_compile_options(ambilux_options INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:--Ofast-compile=max>)
     else()
