@@ -34,7 +34,7 @@ public:
     /// A queue without items. `by_path`: an item lies at the slot of its path; the memory must then be zero at first.
     /// `lanes`: of each item, the first ones, which are all that is used of it.
     template <class Item>
-    Queue<Item> queue(const char* name, uint32_t capacity, bool by_path = false,
+    [[gnu::cold]] Queue<Item> queue(const char* name, uint32_t capacity, bool by_path = false,
                       uint32_t lanes = LaneArray<Item>::kLanes) {
         Queue<Item> q;
         q.counter = counters_ ? counters_ + names_.size() : nullptr;
@@ -76,7 +76,7 @@ public:
     }
 
     /// The record of the stage of this name; null while there is no memory.
-    StageRecord* record(const std::string& name) {
+    [[gnu::cold]] StageRecord* record(const std::string& name) {
         const size_t at = size_t(std::find(record_names_.begin(), record_names_.end(), name) - record_names_.begin());
         if (at == record_names_.size()) record_names_.push_back(name);
         return records_ ? records_ + at : nullptr;

@@ -238,7 +238,7 @@ private:
                        wave.tiles * kTilePixels, 1);
     }
 
-    void allocate(OwnWave& w, uint32_t kept) {
+    [[gnu::cold]] void allocate(OwnWave& w, uint32_t kept) {
         const StageRecord* const old = w.layout.records();
         const std::vector<StageRecord> records(old, old + w.layout.record_names().size());
         w = {};
@@ -253,7 +253,7 @@ private:
         std::copy(records.begin(), records.end(), w.layout.records());
     }
     /// A wave of `tiles` had more light vertices than there was capacity for. False if a budget leaves no room.
-    bool grow(OwnWave& w, uint32_t tiles) {
+    [[gnu::cold]] bool grow(OwnWave& w, uint32_t tiles) {
         const uint64_t needed = w.layout.most_grown(w.layout.counters());
         const uint32_t kept = uint32_t(std::min<uint64_t>(needed + needed / 4, 1u << 30));
         const uint64_t more = maker_.wave_bytes(kept) - w.planned_bytes;

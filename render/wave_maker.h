@@ -48,7 +48,7 @@ struct WaveMaker {
     bool keeps_samples() const { return !kFilmWide || (threads == 0 && plan.in_parts()); }
 
     /// Lays out a wave with room for `kept` light vertices.
-    Stages lay_out(Layout& layout, Memory& m, uint32_t kept) {
+    [[gnu::cold]] Stages lay_out(Layout& layout, Memory& m, uint32_t kept) {
         const uint32_t slots = plan.wave.slot_count(), listed = policy.waves.order_slots(slots);
         m.state = layout.allocate<WaveState>(1);
         m.samples = layout.allocate<Lane>(keeps_samples() ? slots : 0);
@@ -62,7 +62,7 @@ struct WaveMaker {
         return stages(layout, m, wave, buffers);
     }
     /// The stages over what is laid out, for a part of the film.
-    Stages stages(Layout& layout, const Memory& m, const Wave& wave, const FilmBuffers& buffers) const {
+    [[gnu::cold]] Stages stages(Layout& layout, const Memory& m, const Wave& wave, const FilmBuffers& buffers) const {
         return Stages(WaveParts<Tracer>{layout, view, tracer, wave, buffers}, policy, m.queues, state);
     }
     uint64_t wave_bytes(uint32_t kept) {
@@ -82,7 +82,7 @@ struct WaveMaker {
     uint64_t film_values() const { return uint64_t(plan.wave.width) * plan.wave.height * 3; }
     /// Memory of the film must be zero at first. A sample of any pixel may splat on any other one, so that each pixel
     /// has a sum for every sample of a wave.
-    FilmBuffers lay_out_film(Layout& layout) const {
+    [[gnu::cold]] FilmBuffers lay_out_film(Layout& layout) const {
         const uint64_t values = film_values(), pixels = values / 3;
         const uint64_t cells = kFilmWide ? pixels * plan.film_wave.samples : 0;
         const bool doubles = threads > 0 || policy.waves.deterministic;

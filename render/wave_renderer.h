@@ -18,7 +18,7 @@ class WaveRenderer final : public Renderer {
     static_assert(contract::check_method<Integrator, typename Maker::Tracer>());
 
 public:
-    WaveRenderer(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
+    [[gnu::cold]] WaveRenderer(const Scene& scene, const RenderSettings& settings, SharedAccels& accels)
         : maker_{scene, settings, Backend::threads(), Backend::bytes()} {
         const auto start = Clock::now();
         try {
@@ -97,7 +97,7 @@ public:
         return kWholeIterations<Integrator> ? maker_.policy.waves.iteration_samples : 1;
     }
 
-    RenderStats stats() override {
+    [[gnu::cold]] RenderStats stats() override {
         RenderStats s;
         s.backend = Backend::kName;
         s.device = backend_.device();
@@ -144,7 +144,7 @@ private:
         return backend_.waves() * maker_.wave_bytes(plan_.kept()) + (with_film ? maker_.film_bytes() : 0);
     }
     /// Waves that do well in the memory that there is. Slots of a device are counted from the bytes of a million.
-    void shape_waves() {
+    [[gnu::cold]] void shape_waves() {
         const uint64_t room = backend_.room(fixed_bytes(state_.bytes()));
         uint64_t per_path = 0;
         if constexpr (!Backend::kHost) {

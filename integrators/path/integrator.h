@@ -65,7 +65,7 @@ struct PathIntegrator {
         EyeVertex<F, Mis, typename Eye::Emission, AtVertex> eye_vertex[2];
         ConnectEmitter<F, Mis, Connect> connect_emitter;
 
-        Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
+        [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
             : policy(p), wave(parts.wave), eye(parts, m.eye, p.waves) {
             const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
             const SceneView& scene = parts.scene;

@@ -21,7 +21,7 @@ struct EyeQueues {
     EyeQueues() = default;
     /// `slots`: items of a depth; `paths`: of the wave; `connects`: rules let vertices be connected with anything.
     template <Fusion K, Features F>
-    static EyeQueues lay_out(Layout& layout, uint32_t slots, uint32_t paths, const Rules<Mis>& rules,
+    [[gnu::cold]] static EyeQueues lay_out(Layout& layout, uint32_t slots, uint32_t paths, const Rules<Mis>& rules,
                              const WavePolicy& waves) {
         const bool by_path = waves.queues.fixed_places(),
                    hits = !K.weigh && (rules.count_hits || rules.count_environment);
@@ -56,7 +56,7 @@ struct EyeSide {
     WeighStage weigh;
 
     template <class Mis>
-    EyeSide(const WaveParts<Tracer>& parts, const EyeQueues<Mis, Learn>& q, const WavePolicy& waves,
+    [[gnu::cold]] EyeSide(const WaveParts<Tracer>& parts, const EyeQueues<Mis, Learn>& q, const WavePolicy& waves,
             const Learn& learn = {}) {
         const auto& [layout, scene, tracer, wave, film] = parts;
         const StrategyFilm strategies = {film.strategies, film.strategies_dropped, q.raw, waves.strategy_depth};

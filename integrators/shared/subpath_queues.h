@@ -18,7 +18,7 @@ struct SubpathQueues {
     Queue<HitItem<Ray>> hits[2];
 
     SubpathQueues() = default;
-    SubpathQueues(Layout& layout, uint32_t slots, const QueuePolicy& policy) {
+    [[gnu::cold]] SubpathQueues(Layout& layout, uint32_t slots, const QueuePolicy& policy) {
         hits[0] = layout.queue<HitItem<Ray>>("hits", slots, policy.fixed_places());
         rays[0] = layout.front<Ray>("rays", hits[0]);
         if (policy.keyed_hits) hits[0].keys = layout.allocate<uint16_t>(slots);

@@ -70,7 +70,7 @@ struct PhotonDensityIntegrator {
         photon_density::Gather<F, Mis> gather[2];
         StageRecord* sort;
 
-        Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State& all)
+        [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State& all)
             : wave(parts.wave), light(p.rules.splat), multi_bounce_below(p.waves.multi_bounce_below), state(all) {
             const auto record = [&](const char* name) { return parts.layout.record(name); };
             const SceneView& scene = parts.scene;

@@ -54,7 +54,7 @@ struct LearnedIntegrator {
         FindClusters find;
         UpdateDraws update;
 
-        Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State& state)
+        [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State& state)
             : two_sides(parts, p, m.two_sides,
                         LearnedSource{m.two_sides.light_vertices, p.cache_draws, m.by_cluster, state.table}) {
             StageRecord* const record = parts.layout.record(KeyByCluster::kName);

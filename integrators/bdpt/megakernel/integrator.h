@@ -42,7 +42,7 @@ struct MegakernelOf {
         Megakernel<F, Tracer, Mis> megakernel;
         Splat<F> splat;
 
-        Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
+        [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
             : policy(p), wave(parts.wave) {
             const auto record = [&](const char* name) { return parts.layout.record(name); };
             const MegakernelRecords records = {

@@ -25,7 +25,7 @@ struct TwoSidesMemory {
     uint32_t* last_vertex;
 
     template <Fusion K, Features F>
-    static TwoSidesMemory lay_out(Layout& layout, const BdptPolicyOf<Mis>& p, WaveSize n) {
+    [[gnu::cold]] static TwoSidesMemory lay_out(Layout& layout, const BdptPolicyOf<Mis>& p, WaveSize n) {
         const bool by_path = p.waves.queues.fixed_places();
         const uint32_t lanes = Vertex::template lanes<F>(), pairs = p.rules.connect && !K.occlude ? n.slots : 0;
         TwoSidesMemory m;
@@ -72,7 +72,7 @@ struct TwoSidesStages {
 
     TwoSidesStages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const NoState&)
         : TwoSidesStages(parts, p, m, Source{m.light_vertices, m.last_vertex, p.cache_draws, p.coherent_draws}) {}
-    TwoSidesStages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const Source& from)
+    [[gnu::cold]] TwoSidesStages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const Source& from)
         : policy(p), wave(parts.wave), eye(parts, m.eye, p.waves, from.learn()), splats(parts, m.splats, p, m.eye.raw),
           light(parts, m.subpaths, m.light_vertices, m.last_vertex, splats, p.of_light_side()), source(from) {
         const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };

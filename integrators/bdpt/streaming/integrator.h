@@ -76,7 +76,7 @@ struct StreamingOf {
         ConnectEmitter<F, Mis, Connect> connect_emitter;
         StreamConnect<F, Mis, typename Eye::Candidates> connect_vertices;
 
-        Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
+        [[gnu::cold]] Stages(const WaveParts<Tracer>& parts, const Policy& p, const Memory& m, const State&)
             : policy(p), wave(parts.wave), eye(parts, m.eye, p.waves), splats(parts, m.splats, p, m.eye.raw) {
             const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
             const SceneView& scene = parts.scene;
