@@ -138,7 +138,7 @@ def cpu_seconds(pid):
 def test_an_interrupt_ends_a_render_after_the_sample_in_work():
     code = textwrap.dedent("""
         import sys, time, ambilux
-        scene = ambilux.load(sys.argv[1], size=(640, 480))
+        scene = ambilux.load(sys.argv[1], size=(320, 240))
         print("ready", flush=True)
         try:
             ambilux.render(scene, integrator="bdpt", spp=100000, backend="cpu")
