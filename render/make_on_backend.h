@@ -4,6 +4,7 @@
 
 #include "accel/shared_accels.h"
 #include "backends/fusion.h"
+#include "core/error.h"
 #include "integrators/feature_levels.h"
 #include "render/renderer.h"
 
@@ -31,11 +32,16 @@ struct CompiledRenderer {
 /// Levels of one variant follow each other from the smallest on; the last holds all features.
 const std::vector<CompiledRenderer>& compiled_renderers();
 
-/// fuse=none is compiled for the level of all features only.
-template <Features F, Fusion kFused, class Make>
+/// fuse=none is compiled for the level of all features only, and not where it is kLeftOut.
+template <Features F, Fusion kFused, bool kLeftOut = false, class Make>
 std::unique_ptr<Renderer> with_fusion(const RenderSettings& settings, Make make) {
     if constexpr (F == kAllFeatures)
-        if (settings.fuse == Fuse::none) return make.template operator()<kNoFusion>();
+        if (settings.fuse == Fuse::none) {
+            if constexpr (kLeftOut)
+                throw Error(ExitCode::usage, "fuse=none: this build has no such kernels; set AMBILUX_CUDA_OPTIMISE=ON");
+            else
+                return make.template operator()<kNoFusion>();
+        }
     return make.template operator()<kFused>();
 }
 
