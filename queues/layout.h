@@ -35,7 +35,7 @@ public:
     /// `lanes`: of each item, the first ones, which are all that is used of it.
     template <class Item>
     [[gnu::cold]] Queue<Item> queue(const char* name, uint32_t capacity, bool by_path = false,
-                      uint32_t lanes = LaneArray<Item>::kLanes) {
+                                    uint32_t lanes = LaneArray<Item>::kLanes) {
         Queue<Item> q;
         q.counter = counters_ ? counters_ + names_.size() : nullptr;
         names_.emplace_back(name);

@@ -22,7 +22,7 @@ struct EyeQueues {
     /// `slots`: items of a depth; `paths`: of the wave; `connects`: rules let vertices be connected with anything.
     template <Fusion K, Features F>
     [[gnu::cold]] static EyeQueues lay_out(Layout& layout, uint32_t slots, uint32_t paths, const Rules<Mis>& rules,
-                             const WavePolicy& waves) {
+                                           const WavePolicy& waves) {
         const bool by_path = waves.queues.fixed_places(),
                    hits = !K.weigh && (rules.count_hits || rules.count_environment);
         const uint32_t connects = rules.next_event || rules.connect ? slots : 0, emits = hits ? slots : 0;
@@ -57,7 +57,7 @@ struct EyeSide {
 
     template <class Mis>
     [[gnu::cold]] EyeSide(const WaveParts<Tracer>& parts, const EyeQueues<Mis, Learn>& q, const WavePolicy& waves,
-            const Learn& learn = {}) {
+                          const Learn& learn = {}) {
         const auto& [layout, scene, tracer, wave, film] = parts;
         const StrategyFilm strategies = {film.strategies, film.strategies_dropped, q.raw, waves.strategy_depth};
         StageRecord* const accumulates = layout.record(Accumulate::kName);

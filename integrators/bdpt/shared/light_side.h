@@ -23,7 +23,8 @@ struct SplatQueues {
     SplatQueues() = default;
     /// `slots`: items of a depth; `kept`: splats of the wave.
     template <Fusion K, Features F>
-    [[gnu::cold]] static SplatQueues lay_out(Layout& layout, uint32_t slots, uint64_t kept, const BdptPolicyOf<Mis>& p) {
+    [[gnu::cold]] static SplatQueues lay_out(Layout& layout, uint32_t slots, uint64_t kept,
+                                             const BdptPolicyOf<Mis>& p) {
         const bool by_path = p.waves.queues.fixed_places();
         const uint32_t n = p.rules.splat ? slots : 0;
         SplatQueues q;
@@ -53,7 +54,8 @@ struct SplatSide {
     ConnectCameraQueue<F, Mis, Candidates> connect_camera;
     Splat<F> splat;
 
-    [[gnu::cold]] SplatSide(const WaveParts<Tracer>& parts, const SplatQueues<Mis>& q, const BdptPolicyOf<Mis>& p, Lane* raw) {
+    [[gnu::cold]] SplatSide(const WaveParts<Tracer>& parts, const SplatQueues<Mis>& q, const BdptPolicyOf<Mis>& p,
+                            Lane* raw) {
         const auto& [layout, scene, tracer, wave, film] = parts;
         occlude = {scene, tracer, q.weighted, {q.splats}, layout.record(OccludeStage::kName)};
         weigh = {q.candidates,
@@ -91,8 +93,9 @@ struct LightStages {
     LightVertex<F, Mis, typename Splats::AtVertex> vertex[2];
     ConnectCameraQueue<F, Mis, typename Splats::Candidates> connect_camera;
 
-    [[gnu::cold]] LightStages(const WaveParts<Tracer>& parts, const SubpathQueues<SubpathRay<Mis>>& q, LightVertices<Mis> vertices,
-                uint32_t* last_vertex, const Splats& splats, const BdptPolicyOf<Mis>& p)
+    [[gnu::cold]] LightStages(const WaveParts<Tracer>& parts, const SubpathQueues<SubpathRay<Mis>>& q,
+                              LightVertices<Mis> vertices, uint32_t* last_vertex, const Splats& splats,
+                              const BdptPolicyOf<Mis>& p)
         : connect_camera(splats.connect_camera) {
         const auto& [layout, scene, tracer, wave, film] = parts;
         const auto record = [&records = layout](const auto& stage) { return records.record(stage.kName); };

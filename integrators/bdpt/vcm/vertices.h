@@ -32,8 +32,7 @@ AMBILUX_HD void at_mergeable(const SceneView& scene, const Rules<MergingMis>& ru
     if (h.prim == kNone) return;
     const Subpath<MergingMis> path = SubpathItems<MergingMis>::unpack(h.ray);
     if (path.depth >= rules.max_depth) return;
-    const Vertex<MergingMis> vertex =
-        vertex_at<F>(scene, rules, side, path, surface_at<F>(scene, h.prim, h.u, h.v));
+    const Vertex<MergingMis> vertex = vertex_at<F>(scene, rules, side, path, surface_at<F>(scene, h.prim, h.u, h.v));
     if (bsdf_is_smooth(vertex.scattering.bsdf)) use(path, vertex);
 }
 
@@ -64,8 +63,12 @@ struct KeepVertices {
 
 private:
     AMBILUX_HD void keep(uint32_t slot, const Subpath<Mis>& path, const Vertex<Mis>& y) const {
-        const uint32_t place = kept.merges.push({{y.point.p, path.depth}, path.throughput, y.sums.dvcm,
-                                                 octahedral_encode(path.direction), y.sums.dvc, y.sums.dvm});
+        const uint32_t place = kept.merges.push({{y.point.p, path.depth},
+                                                 path.throughput,
+                                                 y.sums.dvcm,
+                                                 octahedral_encode(path.direction),
+                                                 y.sums.dvc,
+                                                 y.sums.dvm});
         if (place >= kept.merges.capacity()) return;
         const uint32_t cell = MergeGrid::of(scene, now->radius).cell(y.point.p).hash(table_bits);
         kept.keys[place] = merge_key(cell, subpath(slot), path.depth);
