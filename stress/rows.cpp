@@ -110,7 +110,7 @@ void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benig
     row.invalid = m.invalid;
     row.lost = m.lost;
     row.underflow = m.underflow;
-    row.variance = relative_variance(row.mean, m.paths);
+    set(row.variance, text_of(relative_variance(row.mean, m.paths)));  // as a sweep that goes on reads it
     if (benign && benign->variance > 0) row.variance_ratio = row.variance / benign->variance;
     if (cell.answer.kind == AnswerKind::invariance && !benign) {
         // The benign cell of an invariance is its own answer: it is the others that are judged.

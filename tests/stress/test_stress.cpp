@@ -233,8 +233,8 @@ TEST_CASE("a sweep finds the method that is biased and notes the one that refuse
     }
     CHECK(refused == 2);
     CHECK(summary.bad() == 4);
-    CHECK(contains(report(summary), "4 ok") == false);
     CHECK(contains(report(summary), "2 failed, 0 invalid, 2 refused"));
+    CHECK(contains(report(summary), fmt::format(", {} ok,", summary.rows.size() - 4)));
     // Nothing of the scenes is left behind.
     CHECK_FALSE(fs::exists(folder / "out/scene-in-work"));
 }
@@ -345,12 +345,12 @@ TEST_CASE("a row that outlasts the time of a sweep ends with it") {
 TEST_CASE("a sweep ends in the time that it is given and says so") {
     TempFolder folder;
     World world;
-    world.sleep_per_sample = 0.002;
+    world.sleep_per_sample = 0.01;
     Request request = stress_request(folder, "out");
     request.seconds = 1;
     const auto start = std::chrono::steady_clock::now();
     const Summary summary = stress::run(request, {fake_family("a", 2), fake_family("b", 2)}, stress_hooks(world));
-    // One more first round at most: 32 calls of 5 samples.
+    // One more first round at most.
     CHECK(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < 5);
     CHECK(summary.interrupted);
     CHECK(summary.rows.size() < summary.planned);
