@@ -4,7 +4,7 @@ target_include_directories(ambilux_options INTERFACE $<BUILD_INTERFACE:${PROJECT
 # Compilers contract a*b+c differently in every copy of an inlined function; without that, images do not depend on which stages are inlined where.
 target_compile_options(ambilux_options INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wshadow -fno-math-errno -ffp-contract=off>)
-# Its garbage collector starts at 128 MB otherwise, which most sources exceed, and takes a tenth of their time. What it would free is not needed again.
+# GCC's garbage collector starts at 128 MB of heap otherwise, which most sources exceed, and takes up to a tenth of their time.
 target_compile_options(ambilux_options INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:--param=ggc-min-heapsize=1048576>)
 # Tests of rays join conditions without branches on purpose.
 target_compile_options(ambilux_options INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,Clang>:-Wno-bitwise-instead-of-logical>)

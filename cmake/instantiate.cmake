@@ -78,7 +78,7 @@ function(instantiate target table replays)
     configure_file(${PROJECT_SOURCE_DIR}/cmake/renderer_cpu.cpp.in ${file} @ONLY)
     target_sources(${target} PRIVATE ${file})
   endforeach()
-  # They double what is compiled, and are those of the other backend.
+  # Unfused kernels double what is compiled; renderers of the CPU are compiled without fusion too, from the same stages.
   set(LEAVES_UNFUSED_OUT true)
   if(AMBILUX_CUDA_OPTIMISE)
     set(LEAVES_UNFUSED_OUT false)

@@ -32,7 +32,7 @@ struct CompiledRenderer {
 /// Levels of one variant follow each other from the smallest on; the last holds all features.
 const std::vector<CompiledRenderer>& compiled_renderers();
 
-/// fuse=none is compiled for the level of all features only, and not where it is kLeftOut.
+/// fuse=none is compiled for the level of all features only; with kLeftOut not at all, and then refused.
 template <Features F, Fusion kFused, bool kLeftOut = false, class Make>
 std::unique_ptr<Renderer> with_fusion(const RenderSettings& settings, Make make) {
     if constexpr (F == kAllFeatures)

@@ -47,7 +47,8 @@ struct WaveMaker {
     /// Samples lie in the memory of a wave until they are added to the film, or copied there.
     bool keeps_samples() const { return !kFilmWide || (threads == 0 && plan.in_parts()); }
 
-    /// Lays out a wave with room for `kept` light vertices.
+    /// Lays out a wave with room for `kept` light vertices. Cold, as constructors of stages are: else the compiler
+    /// inlines them as much as stages, which takes a third of a renderer's compile time.
     [[gnu::cold]] Stages lay_out(Layout& layout, Memory& m, uint32_t kept) {
         const uint32_t slots = plan.wave.slot_count(), listed = policy.waves.order_slots(slots);
         m.state = layout.allocate<WaveState>(1);
