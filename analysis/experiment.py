@@ -11,7 +11,7 @@ import tomllib
 from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 
-TEXT = ("scene", "run", "budget", "method")
+TEXT = ("scene", "run", "budget", "method", "stated_bias")
 KINDS = ("spp", "seconds", "")  # of checkpoints; the last one: not recorded
 INTEGERS = ("seed", "checkpoint", "batch", "spp", "rays", "invalid")
 FORMAT = 2  # of the folder, as its manifest states it; folders without a number are of format 1 and are read too
@@ -48,6 +48,7 @@ class Row:
     relmse_trimmed: float = math.nan  # relMSE without the worst `trimmed_share` of the pixels
     relmse_trimmed_corrected: float = math.nan
     method: str = ""  # what ran: integrator, variant and settings, those that bdpt.auto chose included
+    stated_bias: str = ""  # what the method says of its bias; empty: it has none
 
     @property
     def error(self):

@@ -146,6 +146,8 @@ def remarks(experiment, lines):
     threshold, quiet = verdicts.bias_threshold(verdicts.family(lines)), {}
     for line in lines:
         place = f"{line.scene}, {line.run}"
+        if line.stated_bias:
+            found.append(f"{place}: {line.stated_bias}, so that errors hold this bias and need not fall with −1/2 of samples")
         noise = summary.reference_noise(experiment, line.scene)
         if line.invalid:
             found.append(f"{place}: {line.invalid} values were NaN, Inf or negative and were dropped")
@@ -157,7 +159,7 @@ def remarks(experiment, lines):
         elif line.bias and line.bias.p < verdicts.limit(lines):
             found.append(f"{place}: the mean over seeds differs from the reference's by {line.bias.estimate.value:+.2e} ± {line.bias.estimate.error:.1e}, "
                          "noise of the reference included; chance does that in less than 1 % over all statements")
-        if verdicts.slope_p(line) < verdicts.limit(lines):
+        if not line.stated_bias and verdicts.slope_p(line) < verdicts.limit(lines):
             found.append(f"{place}: the error falls with slope {line.slope.value:.3f} ± {line.slope.error:.3f} of samples, which is not the −1/2 of independent "
                          "samples without bias: look for bias, rare bright samples, or samples that are not independent")
         if not line.rmse.value >= noise and not math.isnan(noise):

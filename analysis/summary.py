@@ -60,6 +60,7 @@ class Line:
     bias_z: float            # greatest |z| over seeds of "the mean differs from the reference's"
     invalid: int             # dropped values, all seeds
     methods: dict            # Experiment.methods
+    stated_bias: str         # what the method says of its bias; empty: it has none
 
     @cached_property
     def efficiency_seeds(self):
@@ -191,7 +192,8 @@ def line(experiment, scene, run, checkpoint):
         speedup=speedup(experiment, scene, run) if experiment.select(scene, experiment.base, checkpoint) else None,
         slope=slope_spp, slope_time=slope(experiment, scene, run, "seconds")[0], slope_seeds=slope_seeds,
         bias=bias.bias_test([r.bias for r in rows], reference_error, [r.bias_z for r in rows]),
-        reference_error=reference_error, bias_z=max(abs(r.bias_z) for r in rows), invalid=sum(r.invalid for r in rows), methods=experiment.methods(scene, run))
+        reference_error=reference_error, bias_z=max(abs(r.bias_z) for r in rows), invalid=sum(r.invalid for r in rows), methods=experiment.methods(scene, run),
+        stated_bias=rows[0].stated_bias)
 
 
 def lines(experiment, flips=None, apart=None):

@@ -85,5 +85,5 @@ def verdicts(lines):
             known = "" if math.isfinite(line.reference_error) else " (the noise of the reference is unknown and counts as none)"
             bias_said = (f"mean off by {e.value:+.2e} [{e.low:+.1e}, {e.high:+.1e}]: "
                          + told(line.bias.p, limit(lines), line.seeds, "more than chance and the noise of the reference explain", "no bias found") + known)
-        out[line.scene, line.run] = (slope_said, bias_said)
+        out[line.scene, line.run] = (slope_said, f"{bias_said}; by its method {line.stated_bias}" if line.stated_bias else bias_said)
     return out

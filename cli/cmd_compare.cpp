@@ -16,6 +16,12 @@ struct CompareArguments {
     std::string image, reference, json;
 };
 
+/// Empty without such an attribute; files of other programs may have one of another kind.
+std::string text_attribute(const Attributes& attributes, const std::string& name) {
+    const auto at = attributes.find(name);
+    return at != attributes.end() && at->is_string() ? at->get<std::string>() : "";
+}
+
 int compare(const CompareArguments& o) {
     const std::vector<Output> outputs = {{"--json", o.json}};
     check_outputs(outputs);
@@ -34,6 +40,8 @@ int compare(const CompareArguments& o) {
     json["reference"] = o.reference;
     json["size"] = {image.width, image.height};
     json["spp"] = attributes.contains("spp") ? attributes["spp"] : nlohmann::json(nullptr);
+    const std::string stated = text_attribute(attributes, "bias");
+    json["stated_bias"] = stated;
     json["reference_spp"] = reference.samples ? nlohmann::json(reference.samples) : nlohmann::json(nullptr);
     if (!o.json.empty()) write_json(o.json, json);
     if (o.json == "-") return int(ExitCode::done);
@@ -48,6 +56,7 @@ int compare(const CompareArguments& o) {
         "relMSE  {:.6g}\n        {:.6g} without the worst {} % of the pixels\nMAPE    {:.6g}\nbias    {:+.6g} ({:+.3f} "
         "% of the mean), z = {:+.2f}\n",
         m.relmse, m.relmse_trimmed, 100 * kTrimmedShare, m.mape, m.bias, 100 * m.relative_bias, m.bias_z);
+    if (!stated.empty()) std::cout << fmt::format("        the image says: {}\n", stated);
     if (m.non_finite) std::cout << fmt::format("{} values of the image are NaN or Inf\n", m.non_finite);
     return int(ExitCode::done);
 }

@@ -18,6 +18,7 @@
 #include "core/ranks.h"
 #include "film/exr_io.h"
 #include "film/png_io.h"
+#include "integrators/registry.h"
 #include "integrators/warnings.h"
 #include "session/kept_film.h"
 #include "session/parallel/parallel_render.h"
@@ -110,8 +111,9 @@ int conclude(const RenderArguments& o, const LoadedScene& loaded, const RenderSe
                                    : "interrupted before the first sample was finished: nothing was saved");
         return int(ExitCode::interrupted);
     }
-    log_info(fmt::format("{}: {} spp in {}, {}", o.output, position.samples, format_duration(position.seconds),
-                         stats.device));
+    const std::string bias = bias_text(used_settings(settings, stats));
+    log_info(fmt::format("{}: {} spp in {}, {}{}", o.output, position.samples, format_duration(position.seconds),
+                         stats.device, bias.empty() ? "" : "; " + bias));
     if (const std::string text = lost_values(stats); o.strict && !text.empty())
         throw Error(ExitCode::device, "--strict: " + text + ". The image was saved");
     return int(ExitCode::done);

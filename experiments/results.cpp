@@ -14,7 +14,7 @@ namespace ambilux {
 const char* const kResultHeader =
     "scene,run,seed,checkpoint,budget,integrator,variant,estimator,backend,spp,time,rmse,rmse_corrected,reference_"
     "noise,relmse,relmse_corrected,relmse_trimmed,"
-    "relmse_trimmed_corrected,mape,bias,bias_z,rays,invalid,method,device,host";
+    "relmse_trimmed_corrected,mape,bias,bias_z,rays,invalid,method,stated_bias,device,host";
 const char* const kBatchHeader = "scene,run,seed,batch,spp,time,mse,relmse,other_cores";
 
 namespace {
@@ -42,11 +42,11 @@ std::string result_line(const ResultRow& r) {
     const Metrics& m = r.metrics;
     return fmt::format(
         "{}{},{},{},{},{},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.5g},{},{},{},{"
-        "},{}",
+        "},{},{}",
         result_prefix(r.scene, r.run, r.seed), r.checkpoint, r.budget, r.integrator, r.variant, r.estimator, r.backend,
         r.spp, r.time, m.rmse, m.rmse_corrected, m.reference_noise, m.relmse, m.relmse_corrected, m.relmse_trimmed,
-        m.relmse_trimmed_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid, quoted(r.method), quoted(r.device),
-        quoted(r.host));
+        m.relmse_trimmed_corrected, m.mape, m.bias, m.bias_z, r.rays, r.invalid, quoted(r.method),
+        quoted(r.stated_bias), quoted(r.device), quoted(r.host));
 }
 
 std::string batch_line(const BatchRow& r) {

@@ -21,7 +21,8 @@ struct ResultRow {
     double time = 0;  ///< seconds inside the renderer, wall clock
     Metrics metrics;
     uint64_t rays = 0, invalid = 0;
-    std::string method;  ///< what ran (method_text)
+    std::string method;       ///< what ran (method_text)
+    std::string stated_bias;  ///< bias_text
     std::string device, host;
 };
 

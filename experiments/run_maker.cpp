@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "integrators/registry.h"
 #include "session/statistics.h"
 
 namespace ambilux {
@@ -22,7 +23,7 @@ std::unique_ptr<Renderer> OwnRuns::make(const RenderOf& render, const RenderStat
 
 MethodNames OwnRuns::names(const RenderOf& render, const RenderStats& stats) const {
     const RenderSettings used = used_settings(render.settings, stats);
-    return {used.integrator, used.variant, setting_text(used, "estimator"), method_text(used)};
+    return {used.integrator, used.variant, setting_text(used, "estimator"), method_text(used), bias_text(used)};
 }
 
 nlohmann::json OwnRuns::statistics(const RenderOf& render, const RenderStats& stats) const {

@@ -18,7 +18,7 @@ struct RenderOf {
 
 /// What the table of results calls it.
 struct MethodNames {
-    std::string integrator, variant, estimator, method;
+    std::string integrator, variant, estimator, method, bias;
 };
 
 class RunMaker {

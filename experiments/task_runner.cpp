@@ -229,6 +229,7 @@ ResultRow TaskRunner::row(const RenderTask& task, size_t k) const {
     r.variant = names.variant;
     r.estimator = names.estimator;
     r.method = names.method;
+    r.stated_bias = names.bias;
     r.backend = task.total.backend;
     r.spp = task.state.moments.samples;
     r.time = task.state.notes["seconds"].get<double>();

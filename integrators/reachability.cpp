@@ -46,6 +46,8 @@ bool finds(uint32_t strategies, const Word& w) {
     if (w.segments == 1) return w.origin == Origin::extent && (strategies & kLightStrategies);
     if ((strategies & kNextEventStrategies) && w.origin != Origin::beam && w.connectable(1)) return true;
     if ((strategies & kLightStrategies) && w.connectable(w.segments - 1)) return true;
+    for (int i = 1; i < w.segments; ++i)
+        if ((strategies & kMergeStrategies) && w.connectable(i)) return true;
     for (int i = 1; i + 1 < w.segments; ++i)
         if ((strategies & kConnectionStrategies) && w.connectable(i) && w.connectable(i + 1)) return true;
     return false;
@@ -117,11 +119,15 @@ std::string missing_light(const Features& features, const RenderSettings& settin
     }
     const uint32_t strategies = sampled_strategies(settings);
     if (strategies == 0) return "";  // an integrator that is no estimator of all light
-    std::string lost = unreachable_path(features, strategies, kAllStrategies, settings.max_depth);
-    const bool findable = !lost.empty();
-    if (!findable) lost = unreachable_path(features, strategies, settings.max_depth);
-    if (lost.empty()) return "";
-    return lacking(lost, findable ? "these strategies do not find; integrator bdpt finds more" : "no strategy finds");
+    const std::pair<uint32_t, const char*> others[] = {
+        {kAllStrategies, "these strategies do not find; integrator bdpt finds more"},
+        {kAllStrategies | kMergeStrategies, "these strategies do not find; integrator vcm does, by merging"}};
+    for (const auto& [reference, why] : others)
+        if (const std::string lost = unreachable_path(features, strategies, reference, settings.max_depth);
+            !lost.empty())
+            return lacking(lost, why);
+    const std::string lost = unreachable_path(features, strategies, settings.max_depth);
+    return lost.empty() ? "" : lacking(lost, "no strategy finds");
 }
 
 }  // namespace ambilux

@@ -141,6 +141,11 @@ void check_settings(const RenderSettings& settings, const Variant& variant, bool
     }
 }
 
+std::string bias_text(const RenderSettings& settings) {
+    const Variant* v = find_variant(settings.integrator, settings.variant);
+    return v && v->bias ? v->bias(settings) : "";
+}
+
 SettingValue shown_strategies(const RenderSettings& settings) {
     const Variant* v = find_variant(settings.integrator, settings.variant);
     if (!v || !v->traits.light_subpaths || !v->strategies) return std::string();

@@ -18,6 +18,7 @@ struct Variant {
     std::vector<Setting> own = {};  ///< settings that only this variant has
     /// The groups (StrategyBits) that it samples; null: none that this notation describes.
     uint32_t (*strategies)(const RenderSettings&) = nullptr;
+    std::string (*bias)(const RenderSettings&) = nullptr;                         ///< null: unbiased
     std::vector<SelectionOffer> (*selection)(const SelectionRequest&) = nullptr;  ///< null: it is never selected
     std::vector<Stressed> stress = {};
     bool outside = false;  ///< of the tree (AMBILUX_EXTENSIONS)
@@ -31,7 +32,8 @@ struct Variant {
 };
 
 /// What `Description` (a folder's variant.h) says of itself: kTraits and kHelp, and what it has of settings(),
-/// strategies(settings), selection(request) and stress(). Without these, it is never selected and stressed as it is.
+/// strategies(settings), bias(settings), selection(request) and stress(). Without these, it is unbiased, never selected
+/// and stressed as it is.
 template <class Description>
 Variant describe(const std::string& integrator, const std::string& variant) {
     Variant v = {integrator, variant, Description::kTraits, Description::kHelp};
@@ -41,6 +43,7 @@ Variant describe(const std::string& integrator, const std::string& variant) {
         v.strategies = Description::strategies;
     else if (v.traits.strategies)
         v.strategies = [](const RenderSettings& settings) { return settings.strategies; };
+    if constexpr (requires { Description::bias; }) v.bias = Description::bias;
     if constexpr (requires { Description::selection; }) v.selection = Description::selection;
     if constexpr (requires { Description::stress; })
         v.stress = Description::stress();
@@ -82,6 +85,10 @@ std::string applies_text(Applies applies, bool in_tree = false);
 /// Throws Error(usage) that names the first setting, or value, without an effect on `variant`: whoever sets it expects
 /// one.
 void check_settings(const RenderSettings& settings, const Variant& variant, bool cuda);
+
+/// How far the mean of an image lies from the truth, and whether it goes there; empty: it is the truth. A phrase such
+/// as "consistent, biased by a radius of 0.003 of the scene's".
+std::string bias_text(const RenderSettings& settings);
 
 /// The setting strategies in statistics: of variants that have none to choose from, what they sample.
 SettingValue shown_strategies(const RenderSettings& settings);

@@ -95,7 +95,7 @@ std::string strategies_text(const RenderSettings& settings) {
         for (uint32_t k = 1; k <= SingleStrategies::kMaxSegments; ++k)
             if (const uint8_t s = settings.singles.s[k]; s != SingleStrategies::kNone)
                 names.push_back(fmt::format("s{}t{}", s, k + 1 - s));
-    } else if (settings.strategies == kAllStrategies) {
+    } else if ((settings.strategies & kAllStrategies) == kAllStrategies) {
         names.emplace_back("all");
     } else {
         for (size_t g = 0; g < kStrategyGroups.size(); ++g)

@@ -22,6 +22,17 @@ enum class References : uint32_t {
     as_it_is,  ///< settings are a part of the identity
 };
 
+/// What merges, of an eye subpath's vertex with light vertices nearby, stand beside.
+enum class Merges : uint32_t {
+    none,    ///< nothing is merged
+    beside,  ///< all other strategies, weighted against them
+    alone,   ///< merges at the other vertices, weighted; emission counts where it is seen through deltas alone
+    first,   ///< nothing: an eye subpath ends where it would scatter after it has merged
+};
+
+/// Beside StrategyBits: both subpaths end at one vertex, within a radius.
+constexpr uint32_t kMergeStrategies = 16;
+
 /// What a variant of an integrator has. Settings that need something else are refused by name (setting.h).
 struct VariantTraits {
     bool estimators = false;       ///< hits, next event estimation or both (Estimator)
@@ -39,6 +50,7 @@ struct VariantTraits {
     bool streams = false;          ///< a wave holds more paths than it has slots
     bool in_double = false;        ///< has a twin in double precision (render/twin/twin.h)
     bool selects_any = false;      ///< bdpt.auto=true selects any variant; else this one or the path tracer
+    Merges merges = Merges::none;
     ReplayPairing replay = ReplayPairing::no_replay;
     References references = References::none;
 };

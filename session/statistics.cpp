@@ -111,6 +111,7 @@ nlohmann::json stats_json(const Scene& scene, const RenderSettings& asked, const
     json.update(
         {{"asked", settings_json(asked)},
          {"method", method_text(used)},
+         {"bias", bias_text(used)},
          {"scene", scene.path},
          {"scene_hash", scene_hash(scene)},
          {"warnings", scene.warnings},
@@ -153,6 +154,7 @@ Attributes image_attributes(const Scene& scene, const RenderSettings& asked, con
                              {"git_revision", git_revision()}};
     const RenderSettings settings = used_settings(asked, stats);
     attributes["method"] = method_text(settings);
+    if (const std::string bias = bias_text(settings); !bias.empty()) attributes["bias"] = bias;
     attributes["settings"] = settings_json(settings).dump();
     std::string kernels;
     for (const std::string& f : stats.features) kernels += (kernels.empty() ? "" : " ") + f;

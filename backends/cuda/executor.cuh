@@ -147,16 +147,22 @@ public:
         kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(stage, mine, state_);
         finish_over(stage, mine);
     }
-    /// Of as many pairs as `queue` has items, by the lowest `bits` bits. Their time is that of the stage that follows.
+    /// Of as many pairs as `queue` has items, by the lowest `bits` bits; of fewer than `least` none. Their time is that
+    /// of the stage that follows.
     template <class Key, class Item>
-    void sort_pairs(const SortMemory<Key>& m, const Queue<Item>& queue, uint32_t bits, StageRecord*) {
+    void sort_pairs(const SortMemory<Key>& m, const Queue<Item>& queue, uint32_t bits, StageRecord*,
+                    uint32_t least = 0) {
         const bool switched = graph_.active();
         const detail::SortSwitch sorts = {switched ? graph_.make_condition() : cudaGraphConditionalHandle{}, switched};
         const auto kernel = detail::pad_keys<Key>;
         const Key last = Key(bits < 8 * sizeof(Key) ? (Key(1) << bits) - 1 : ~Key(0));
         kernel<<<blocks(kernel, kStageBlock), kStageBlock, 0, stream()>>>(m.keys[0], queue.counter, m.capacity, last,
-                                                                          sorts);
-        if (!switched) return sort_pairs_on_device(m, size_of(queue.counter), bits, stream());
+                                                                          least, sorts);
+        if (!switched) {
+            const uint32_t n = size_of(queue.counter);
+            if (n >= least) sort_pairs_on_device(m, n, bits, stream());
+            return;
+        }
         graph_.conditional(cudaGraphCondTypeSwitch, sorts.handle, detail::kSortSizes,
                            [&](uint32_t k) { sort_pairs_on_device(m, m.capacity >> k, bits, stream()); });
     }

@@ -76,12 +76,12 @@ __global__ inline void __launch_bounds__(kStageBlock)
     for (uint32_t i = n + blockIdx.x * kStageBlock + threadIdx.x; i < end; i += gridDim.x * kStageBlock) keys[i] = last;
 }
 
-/// `last` for the pairs that are sorted beyond those that there are. They stay behind those whose key it is: the sort
-/// is stable.
+/// `last` for the pairs that are sorted beyond those that there are, if there are `least`. They stay behind those whose
+/// key it is: the sort is stable.
 template <class Key>
 __global__ void __launch_bounds__(kStageBlock)
-    pad_keys(Key* keys, const QueueCounter* counter, uint32_t capacity, Key last, SortSwitch sorts) {
-    const uint32_t n = counter->size(), size = smallest_size(capacity, n);
+    pad_keys(Key* keys, const QueueCounter* counter, uint32_t capacity, Key last, uint32_t least, SortSwitch sorts) {
+    const uint32_t n = counter->size(), size = n < least ? kSortSizes : smallest_size(capacity, n);
     if (sorts.on && blockIdx.x == 0 && threadIdx.x == 0) cudaGraphSetConditional(sorts.handle, size);
     for (uint32_t i = n + blockIdx.x * kStageBlock + threadIdx.x; i < capacity >> size; i += gridDim.x * kStageBlock)
         keys[i] = last;

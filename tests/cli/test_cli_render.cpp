@@ -93,8 +93,10 @@ TEST_CASE("light that no strategy in use can find is named, in the warning and b
     CHECK(contains(render_with({"-i", "path"}).err, "such as Ld S D E"));
     CHECK(contains(render_with({"-i", "path"}).err, "integrator bdpt finds more"));
     // A point lamp seen through glass alone.
-    CHECK(contains(render_with({"-i", "bdpt"}).err, "Ld S E"));
-    CHECK(contains(render_with({"-i", "bdpt"}).err, "no strategy finds"));
+    CHECK(contains(render_with({"-i", "bdpt"}).err, "Ld S D S E"));
+    CHECK(contains(render_with({"-i", "bdpt"}).err, "integrator vcm does, by merging"));
+    CHECK(contains(render_with({"-i", "vcm"}).err, "Ld S E"));
+    CHECK(contains(render_with({"-i", "vcm"}).err, "no strategy finds"));
     // The lamp of the Cornell box has extent, and its surfaces are diffuse.
     CHECK_FALSE(contains(run(folder, render(folder, {"-i", "path", "--spp", "1"})).err, "warning"));
     CHECK(contains(run(folder, render(folder, {"--max-depth", "0", "--spp", "1"})).err, "max_depth=0: the shortest"));

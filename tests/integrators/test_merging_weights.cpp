@@ -7,7 +7,9 @@
 
 namespace ambilux {
 
-inline test::OracleMerges merges_of(const MergingMis& mis) { return {double(mis.eta()), mis.merges_first}; }
+inline test::OracleMerges merges_of(const MergingMis& mis) {
+    return {double(mis.eta()), mis.merges_first, !mis.beside()};
+}
 
 }  // namespace ambilux
 
@@ -21,6 +23,18 @@ TEST_CASE("Weights with merging equal those of all strategies enumerated, and su
     CHECK(seen.at("merges") > 10000);
     for (const char* kind : {"hit", "escape", "next event", "connection", "light tracing", "visible light"})
         CHECK(seen.at(std::string(kind) + ", perspective") >= 20);
+}
+
+TEST_CASE("Where merges are alone, their weights sum to one, and hits count where none is possible") {
+    const MergeNow now[] = {{0.01f, 0x1p-10f}, {0.1f, 1.0f}, {0.5f, 300.0f}};
+    const std::map<std::string, uint64_t> seen = compare_weights(0.05, [&](uint32_t i) {
+        MergingMis mis{settings(i), &now[i / 16 % 3]};
+        mis.strategies = kHitStrategies;
+        mis.merges = Merges::alone;
+        return mis;
+    });
+    CHECK(seen.at("merges") > 10000);
+    CHECK(seen.at("hit, perspective") >= 20);
 }
 
 TEST_CASE("A merge with a radius of nothing weighs nothing, and leaves the others their weights") {

@@ -1,17 +1,22 @@
 // libs: ambilux_render ambilux_integrators ambilux_film ambilux_formats ambilux_accel ambilux_core
 // seconds: 20
-// Integrator vcm: closed forms, the mean of the path tracer, and that no thread, wave or budget decides a bit.
+// Integrators that merge: closed forms, the mean of the path tracer, and that no thread, wave or budget decides a bit.
 #include <cmath>
 
+#include "integrators/reachability.h"
+#include "integrators/registry.h"
 #include "tests/support/whole_iterations.h"
 
 using namespace ambilux;
 
 namespace {
 
-RenderSettings vcm_settings(const Scene& scene, const char* radius = "0.01", uint64_t seed = 3) {
-    RenderSettings s = cpu_settings(scene, Estimator::mis, seed);
-    s.integrator = "vcm";
+/// All that merge, with the strategies that their names leave on.
+const char* const kMerging[] = {"vcm", "bpm", "ppm", "sppm", "pm"};
+
+RenderSettings vcm_settings(const Scene& scene, const char* radius = "0.01", const char* integrator = "vcm") {
+    RenderSettings s = cpu_settings(scene, Estimator::mis, 3);
+    s.integrator = integrator;
     apply_setting(s, "merge_radius", radius);
     return s;
 }
@@ -31,15 +36,26 @@ Mean mean_over_seeds(const Scene& scene, RenderSettings s, uint32_t samples, uin
     return {mean, std::sqrt(std::max(squares / seeds - mean * mean, 0.0) / (seeds - 1))};
 }
 
-}  // namespace
-
-TEST_CASE("vcm: inside a glowing sphere all masks of strategies find the same radiance, whatever share merges have") {
-    const Scene scene = scene_from_text(
+/// The camera is in a glowing sphere that reflects a half: radiance 2 everywhere.
+Scene glowing_sphere() {
+    return scene_from_text(
         "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'><float name='fov' value='60'/>"
         "<transform name='to_world'><lookat origin='0.2,0.1,0' target='1,0,0' up='0,1,0'/></transform><film "
         "type='hdrfilm'><integer name='width' value='16'/><integer name='height' value='16'/></film></sensor>"
         "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'><rgb name='reflectance' "
         "value='0.5'/></bsdf><emitter type='area'><rgb name='radiance' value='1'/></emitter></shape></scene>");
+}
+
+/// The sphere bends away from a disk of a tenth of its radius: at most r^2 / 4 of the light.
+void check_glow(const Mean& m) {
+    CHECK(std::fabs(m.value - 2.0) < 4.0 * m.error + 0.005);
+    CHECK(m.error < 0.02);
+}
+
+}  // namespace
+
+TEST_CASE("vcm: inside a glowing sphere all masks of strategies find the same radiance, whatever share merges have") {
+    const Scene scene = glowing_sphere();
     for (const char* mask : {"all", "hits", "hits+next_event", "hits+light", "hits+connections+light"})
         for (const char* heuristic : {"balance", "power"})
             for (const char* first : {"true", "false"}) {
@@ -48,14 +64,20 @@ TEST_CASE("vcm: inside a glowing sphere all masks of strategies find the same ra
                 apply_setting(s, "heuristic", heuristic);
                 apply_setting(s, "merge_first", first);
                 INFO(mask << ", " << heuristic << ", merges at first vertices: " << first);
-                const Mean m = mean_over_seeds(scene, s, 16, 6);
-                // The sphere bends away from a disk of a tenth of its radius: at most r^2 / 4 of the light.
-                CHECK(std::fabs(m.value - 2.0) < 4.0 * m.error + 0.005);
-                CHECK(m.error < 0.02);
+                check_glow(mean_over_seeds(scene, s, 16, 6));
             }
 }
 
-TEST_CASE("vcm finds the light of a point behind glass that is seen through glass, which no other strategy does") {
+TEST_CASE("Inside a glowing sphere all that merge find the same radiance") {
+    const Scene scene = glowing_sphere();
+    for (const char* integrator : kMerging) {
+        INFO(integrator);
+        check_glow(mean_over_seeds(scene, vcm_settings(scene, "0.1", integrator), 16, 6));
+    }
+}
+
+TEST_CASE(
+    "All that merge find light of a point behind glass that is seen through glass, which no other strategy does") {
     const Scene scene = scene_from_text(
         "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='4'/></integrator><sensor "
         "type='perspective'><float name='fov' value='4'/><transform name='to_world'><lookat origin='0,0,2' "
@@ -72,36 +94,73 @@ TEST_CASE("vcm finds the light of a point behind glass that is seen through glas
     };
     const double d2 = 0.5 * 0.5 + 1.5 * 1.5, cosine = 1.5 / std::sqrt(d2);
     const double expected = 0.6 / 3.14159265358979 * 3 * cosine / d2 * transmitted(cosine) * transmitted(1.0);
-    RenderSettings s = vcm_settings(scene, "0.02");
-    apply_setting(s, "light_paths", "16");
-    const Mean m = mean_over_seeds(scene, s, 128, 8);
-    CHECK(std::fabs(m.value - expected) < 4.0 * m.error + 0.005 * expected);
-    CHECK(m.error < 0.05 * expected);
+    for (const char* integrator : kMerging) {
+        RenderSettings s = vcm_settings(scene, "0.02", integrator);
+        apply_setting(s, "light_paths", "16");
+        INFO(integrator);
+        CHECK(missing_light(scene.features, s).find("Ld S E (L: ") != std::string::npos);  // which nothing finds
+        const Mean m = mean_over_seeds(scene, s, 64, 8);
+        CHECK(std::fabs(m.value - expected) < 4.0 * m.error + 0.005 * expected);
+        CHECK(m.error < 0.05 * expected);
+    }
     RenderSettings bdpt = cpu_settings(scene, Estimator::mis);
     bdpt.integrator = "bdpt";
     CHECK(mean_of(render_scene(scene, bdpt, 4).film) == 0.0);
+    CHECK(missing_light(scene.features, bdpt).find("Ld S D S E (L: ") != std::string::npos);
 }
 
-TEST_CASE("vcm has the mean of the path tracer, to within its bias") {
+TEST_CASE("All that merge have the mean of the path tracer, to within their bias") {
     for (const char* name : {"cornell", "glass", "lights"}) {
         const Scene scene = project_scene(name, 32, 24);
         INFO(name);
         const Mean path = mean_over_seeds(scene, cpu_settings(scene, Estimator::mis), 128, 6);
-        RenderSettings s = vcm_settings(scene, "0.005");
-        const Mean merged = mean_over_seeds(scene, s, 16, 6);
-        CHECK(std::fabs(merged.value - path.value) < 4.0 * std::hypot(merged.error, path.error) + 0.01 * path.value);
-        const RenderResult one = render_scene(scene, s, 4);
-        CHECK(one.stats.invalid.total() == 0);
-        for (const QueueStats& q : one.stats.queues) CHECK(q.overflow == 0);
+        for (const char* integrator : kMerging) {
+            INFO(integrator);
+            RenderSettings s = vcm_settings(scene, "0.005", integrator);
+            const Mean merged = mean_over_seeds(scene, s, 16, 6);
+            CHECK(std::fabs(merged.value - path.value) <
+                  4.0 * std::hypot(merged.error, path.error) + 0.01 * path.value);
+            const RenderResult one = render_scene(scene, s, 4);
+            CHECK(one.stats.invalid.total() == 0);
+            for (const QueueStats& q : one.stats.queues) CHECK(q.overflow == 0);
+        }
     }
 }
 
-TEST_CASE("vcm: the same bits for any number of threads, size of waves and budget") {
+TEST_CASE("sppm merges where the light of a beam arrives first, which next event estimation cannot sample") {
+    const Scene scene = scene_from_text(
+        "<scene version='3.0.0'><integrator type='path'/><sensor type='orthographic'><transform name='to_world'>"
+        "<lookat origin='0,0,2' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
+        "value='8'/><integer name='height' value='8'/></film></sensor><shape type='rectangle'><transform "
+        "name='to_world'><scale value='3'/><rotate x='1' angle='180'/><translate z='3'/></transform><emitter "
+        "type='directionalarea'><rgb name='radiance' value='2'/></emitter></shape><shape type='rectangle'><transform "
+        "name='to_world'><scale value='2'/></transform><bsdf type='diffuse'><rgb name='reflectance' "
+        "value='0.5'/></bsdf></shape></scene>");
+    const Mean m = mean_over_seeds(scene, vcm_settings(scene, "0.05", "sppm"), 256, 8);
+    CHECK(std::fabs(m.value - 1 / 3.14159265358979) < 4.0 * m.error);
+    CHECK(m.error < 0.005);
+}
+
+TEST_CASE("What an image says of its bias follows from its settings") {
+    const Scene scene = project_scene("cornell", 8, 8);
+    CHECK(bias_text(vcm_settings(scene, "0.01")) ==
+          "consistent, biased by a radius of 0.01 of the scene's that shrinks (merge_alpha 0.75)");
+    CHECK(bias_text(vcm_settings(scene, "0.01", "pm")) == "biased by a radius of 0.01 of the scene's");
+    RenderSettings stays = vcm_settings(scene, "0.01");
+    apply_setting(stays, "merge_alpha", "1");
+    CHECK(bias_text(stays) == "biased by a radius of 0.01 of the scene's");
+    RenderSettings open = vcm_settings(scene, "0", "ppm");
+    apply_setting(open, "merge_samples", "9");
+    CHECK(bias_text(open) == "consistent, biased by a radius of 0.001 of the scene's that shrinks (merge_alpha 0.75)");
+    CHECK(bias_text(cpu_settings(scene, Estimator::mis)).empty());
+}
+
+TEST_CASE("All that merge: the same bits for any number of threads, size of waves and budget") {
     const Scene scene = project_scene("glass", 56, 40);
-    for (const char* samples : {"1", "4"}) {
-        RenderSettings s = vcm_settings(scene);
+    for (const auto& [integrator, samples] : {std::pair("vcm", "1"), {"vcm", "4"}, {"bpm", "2"}, {"sppm", "2"}}) {
+        RenderSettings s = vcm_settings(scene, "0.01", integrator);
         apply_setting(s, "merge_samples", samples);
-        INFO(samples << " samples an iteration");
+        INFO(integrator << ", " << samples << " samples an iteration");
         check_bits_on_cpu(scene, s, 4, 64);
     }
 }
@@ -114,4 +173,5 @@ TEST_CASE("vcm: iterations are whole, a render goes on from its film alone, and 
     const Scene large = project_scene("cornell", 4096, 4096);
     apply_setting(s, "merge_samples", "64");
     CHECK_THROWS_WITH(make_renderer(large, s), ContainsSubstring("merge_samples=64") && ContainsSubstring("4096x4096"));
+    CHECK_THROWS_WITH(make_renderer(scene, vcm_settings(scene, "1e-7")), ContainsSubstring("merge_radius=1e-07"));
 }

@@ -55,11 +55,12 @@ struct OracleStrategies {
     std::vector<double> merges;  ///< [j]: of both subpaths ending at x_j; 0 where they cannot
 };
 
-/// Merging of light and eye vertices: how many light subpaths a disk around a vertex expects at density 1, and whether
-/// eye subpaths merge at their first vertex.
+/// Merging of light and eye vertices: how many light subpaths a disk around a vertex expects at density 1, whether
+/// eye subpaths merge at their first vertex, and whether merges leave to hits only what none of them finds.
 struct OracleMerges {
     double eta = 0;
     bool first = true;
+    bool alone = false;
 };
 
 namespace oracle {
@@ -285,6 +286,7 @@ inline OracleStrategies oracle_strategies(const SceneView& scene, const OraclePa
         double p = merges.eta;
         for (uint32_t i = 0; i < k; ++i) p *= (i <= j ? steps.light[i].value : 1) * (i >= j ? steps.eye[i].value : 1);
         r.merges[j] = p;
+        if (merges.alone) r.group[0] = 0, r.density[0] = 0;
     }
     // The environment that the camera sees belongs to both masks that could show it.
     if (k == 1 && is_infinite(type) && !is_delta(type)) r.group[0] = kHitStrategies | kLightStrategies;

@@ -12,9 +12,9 @@ namespace {
 
 /// Groups and single strategies that are on, and the longest path that one of these finds.
 void set_strategies(Rules<BidirectionalMis>& r, const RenderSettings& settings) {
-    const bool all = variant_of(settings).traits.strategies;  // else those of the light tracer
-    r.mis.strategies = all ? settings.strategies : uint32_t(kLightStrategies);
-    r.singles = all ? settings.singles : SingleStrategies{};
+    const Variant& variant = variant_of(settings);
+    r.mis.strategies = variant.strategies ? variant.strategies(settings) & kAllStrategies : kLightStrategies;
+    r.singles = variant.traits.strategies ? settings.singles : SingleStrategies{};
     if (!r.singles.on) return;
     uint32_t longest = SingleStrategies::kMaxSegments;
     while (longest > 0 && r.singles.s[longest] == SingleStrategies::kNone) --longest;

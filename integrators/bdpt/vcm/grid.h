@@ -156,20 +156,21 @@ struct NearVertices {
     AMBILUX_HD NearVertices(const VcmState& s, const MergeGrid& g, Vec3f center, float r)
         : state(s), grid(g), p(center), radius(r), first(g.first_cell(center)) {}
 
-    /// The next, or kNone after the last. Threads of a warp search together until each has found one: few of those that
-    /// are looked at are within the radius, and what is done for one costs more than to look at ten.
+    /// The next, or kNone after the last. One loop over cells and their vertices: threads of a warp that begin a cell
+    /// do not wait for those that look at vertices.
     AMBILUX_HD uint32_t next() {
-        for (;;) {
-            while (place < end) {
+        while (place < end || cells < 8) {
+            if (place < end) {
                 const uint32_t i = place++;
                 const Vec3f q = state.sorted.load_front(i).p;
                 if (length_squared(q - p) <= sqr(radius) && grid.cell(q) == cell(cells - 1)) return i;
+            } else {
+                const uint32_t hash = cell(cells++).hash(state.table_bits);
+                place = state.starts[hash];
+                end = state.starts[hash + 1];
             }
-            if (cells == 8) return kNone;
-            const uint32_t hash = cell(cells++).hash(state.table_bits);
-            place = state.starts[hash];
-            end = state.starts[hash + 1];
         }
+        return kNone;
     }
 
 private:

@@ -37,6 +37,7 @@ struct VcmIntegrator {
         TwoSidesMemory<Mis> two_sides;
         VcmVertices kept;
         MergeNow* now;
+        SortMemory<uint32_t> queries;
     };
     static Memory lay_out(Layout& layout, const Policy& p, const WaveSize& n) {
         Memory m;
@@ -44,6 +45,8 @@ struct VcmIntegrator {
         m.kept = VcmVertices::lay_out(layout, "wave_merge_vertices", p, n.kept);
         m.kept.keys = layout.allocate<uint64_t>(m.kept.merges.capacity());
         m.now = layout.allocate<MergeNow>(1);
+        m.queries =
+            SortMemory<uint32_t>::lay_out(layout, p.keeps_vertices && !kFusion.occlude ? n.slots : 0, n.primitives);
         return m;
     }
 
@@ -56,6 +59,7 @@ struct VcmIntegrator {
         StageRecord* sort;
         FindCells find;
         PlaceVertices place;
+        OrderQueries<F> order[2];
         Merge<F> merge[2];
 
         Stages(const WaveParts<Tracer>& parts, const Policy& plan, const Memory& m, const State& state)
@@ -86,7 +90,9 @@ struct VcmIntegrator {
                            p.waves.light_rounds(),
                            state.table_bits,
                            p.rules.connect,
+                           p.rules.mis.competes() || !p.rules.next_event,
                            record(keep[k])};
+                order[k] = {scene, hits[k], {m.queries, hits[k].counter}, record(order[k])};
                 merge[k] = {scene, parts.wave, p.rules, hits[k], state, two_sides.eye.accumulate, record(merge[k])};
             }
             append = {m.kept, state, record(append)};
@@ -137,9 +143,29 @@ private:
         if (all.policy.rules.max_depth == 0) return;
         exec.for_each(s.set_radius, 1);
         run_eye_subpaths(exec, all, [&](int k) {
-            if (s.keeps) exec.for_each(s.merge[k], s.merge[k].hits);
+            if (s.keeps) merge(exec, s.order[k], s.merge[k]);
         });
     }
+    template <class Executor>
+    static void merge(Executor& exec, const OrderQueries<F>& order, const Merge<F>& merge) {
+        if constexpr (Executor::kHost) {
+            exec.for_each(merge, merge.hits);
+        } else {
+            exec.for_each(order, merge.hits);
+            exec.sort_pairs(order.order.sort, merge.hits, QueryOrder::kBits, merge.record, QueryOrder::kLeast);
+            exec.for_each(MergeInOrder<F>{merge, order.order, merge.record}, merge.hits);
+        }
+    }
 };
+
+/// The same, with what their names switch off.
+template <Features F, class Tracer, Fusion K>
+using BpmIntegrator = VcmIntegrator<F, Tracer, K>;
+template <Features F, class Tracer, Fusion K>
+using PpmIntegrator = VcmIntegrator<F, Tracer, K>;
+template <Features F, class Tracer, Fusion K>
+using SppmIntegrator = VcmIntegrator<F, Tracer, K>;
+template <Features F, class Tracer, Fusion K>
+using PmIntegrator = VcmIntegrator<F, Tracer, K>;
 
 }  // namespace ambilux

@@ -7,7 +7,9 @@
 // eta. So a subpath carries their sum without it, as a third number, and eta is applied where a weight is asked for.
 #pragma once
 
+#include "integrators/variant_traits.h"
 #include "transport/mis/bidirectional.h"
+#include "transport/subpath/bsdf_directions.h"
 
 namespace ambilux {
 
@@ -23,13 +25,33 @@ struct MergingSums {
     float dvcm, dvc, dvm;
 };
 
+/// Of eye subpaths that end where they would leave a vertex by another lobe than a delta.
+struct MergingDirections {
+    bool deltas_only = false;
+
+    template <Features F, class Mis>
+    AMBILUX_HD bool sample(const Vertex<Mis>& v, Vec3f u, TransportMode mode, BsdfSample& s) const {
+        return BsdfDirections::sample<F>(v, u, mode, s) &&
+               !(deltas_only && mode == TransportMode::radiance && !(s.flags & kScatterDelta));
+    }
+    template <Features F, class Mis>
+    AMBILUX_HD static BsdfValue evaluate(const Vertex<Mis>& v, Vec3f wo, TransportMode mode) {
+        return BsdfDirections::evaluate<F>(v, wo, mode);
+    }
+};
+
 struct MergingMis : BidirectionalMis {
     using Sums = MergingSums;
+    using Directions = MergingDirections;
 
     const MergeNow* now = nullptr;  ///< of the wave
     bool merges_first = true;       ///< eye subpaths merge at their first vertex
+    Merges merges = Merges::beside;
 
     AMBILUX_HD float eta() const { return now->eta; }
+    AMBILUX_HD bool beside() const { return merges == Merges::beside; }
+    /// All other strategies find paths that no merge does.
+    AMBILUX_HD bool competes() const { return merges != Merges::first; }
 
     template <Features F>
     AMBILUX_HD void start_eye(const SceneView& scene, Vec3f d, Sums& sums, SubpathStart& start) const {
@@ -41,7 +63,10 @@ struct MergingMis : BidirectionalMis {
     AMBILUX_HD Sums sums_at(const SceneView& scene, const Lights& lights, Side side, const Path& path, const Sums& sums,
                             const SurfacePoint& point) const {
         const MisSums s = BidirectionalMis::sums_at<F>(scene, lights, side, path, {sums.dvcm, sums.dvc}, point);
-        if (path.depth == 1) return {s.dvcm, s.dvc, side == Side::light || merges_first ? 1.0f : 0.0f};
+        if (path.depth == 1) {
+            const float merge = competes() && (side == Side::light || merges_first) ? 1.0f : 0.0f;
+            return side == Side::eye || beside() ? Sums{s.dvcm, s.dvc, merge} : Sums{0.0f, 0.0f, merge};
+        }
         return {s.dvcm, s.dvc, sums.dvm / fabsf(dot(point.ng, path.direction))};
     }
     AMBILUX_HD Sums sums_after_scatter(const Sums& s, bool first, bool delta, float pdf_forward_sa,
@@ -49,8 +74,8 @@ struct MergingMis : BidirectionalMis {
         const MisSums two = BidirectionalMis::sums_after_scatter({s.dvcm, s.dvc}, first, delta, pdf_forward_sa,
                                                                  pdf_reverse_sa, cos_out);
         const float behind = first ? 0.0f : s.dvm * pdf_reverse_sa;
-        const float merges = delta ? behind : norm(behind, first ? s.dvm : 1.0f);
-        return {two.dvcm, two.dvc, cos_out / pdf_forward_sa * merges};
+        const float here = delta || !competes() ? behind : norm(behind, first ? s.dvm : 1.0f);
+        return {two.dvcm, two.dvc, cos_out / pdf_forward_sa * here};
     }
 
     // ---- ratios ----
@@ -64,22 +89,31 @@ struct MergingMis : BidirectionalMis {
         const float here = !merge_here ? 0.0f : first ? eta() * s.dvm : eta();
         return {norm(ends, here), with_merges(s, first)};
     }
+    /// Merges find all paths but those of deltas, where they do not compete with other strategies for them: the ray of
+    /// such an eye subpath has no merge behind it.
+    AMBILUX_HD static bool by_deltas_alone(const Sums& ray, float& ratio) {
+        ratio = 0.0f;
+        return ray.dvm == 0.0f;
+    }
     /// Sums of a ray that left a vertex.
     AMBILUX_HD MisSums of_ray(const Sums& s) const { return {s.dvcm, norm(s.dvc, eta() * s.dvm)}; }
 
     template <Features F, class Path, class Lights>
     AMBILUX_HD bool hit_ratio(const SceneView& scene, const Lights& lights, const Path& path, const Sums& ray,
                               uint32_t emitter, const SurfacePoint& light, float& ratio) const {
+        if (!beside()) return by_deltas_alone(ray, ratio);
         return BidirectionalMis::hit_ratio<F>(scene, lights, path, of_ray(ray), emitter, light, ratio);
     }
     template <Features F, class Path, class Lights>
     AMBILUX_HD bool escape_ratio(const SceneView& scene, const Lights& lights, const Path& path, const Sums& ray,
                                  float& ratio) const {
+        if (!beside()) return by_deltas_alone(ray, ratio);
         return BidirectionalMis::escape_ratio<F>(scene, lights, path, of_ray(ray), ratio);
     }
     template <Features F>
     AMBILUX_HD float next_event_ratio(const SceneView& scene, float over_power, const Sums& z, bool first,
                                       const EmitterSample& light, const BsdfValue& f, float cos_z) const {
+        if (!competes()) return 0.0f;
         return BidirectionalMis::next_event_ratio<F>(scene, over_power, seen(z, first, true), true, light, f, cos_z);
     }
     AMBILUX_HD float connection_ratio(const Sums& y, bool y_first, const Sums& z, bool z_first,

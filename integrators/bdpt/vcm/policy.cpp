@@ -7,13 +7,16 @@
 
 #include "core/error.h"
 #include "integrators/bdpt/vcm/grid.h"
+#include "integrators/registry.h"
 #include "scene/scene.h"
 
 namespace ambilux {
 
 VcmPolicy VcmPolicy::plan(const Scene& scene, const RenderSettings& settings) {
     VcmPolicy p{plan_bdpt<MergingMis>(scene, settings), VcmSettings::plan(settings), kLeastMergeBits, 0};
+    p.rules.mis.merges = variant_of(settings).traits.merges;
     p.rules.mis.merges_first = p.vcm.first;
+    p.rules.directions.deltas_only = !p.rules.mis.competes();
     p.keeps_vertices = !scene.emitters.empty() && p.rules.max_depth >= 2 && !p.rules.singles.on;
     p.waves.iteration_samples = p.vcm.samples;
     p.waves.multi_bounce_below = 0;  // merges are a stage of their own

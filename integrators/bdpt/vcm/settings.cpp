@@ -1,21 +1,63 @@
 #include "integrators/bdpt/vcm/settings.h"
 
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "core/error.h"
 #include "integrators/bdpt/vcm/variant.h"
+#include "integrators/registry.h"
 
 namespace ambilux {
+namespace {
 
-std::vector<Declaration<VcmSettings>> VcmVariant::settings() {
-    using Of = Declare<VcmSettings>;
-    return {Of::number("merge_radius", &VcmSettings::radius, 1e-7f, 1.0f,
-                       "radius around an eye vertex within which light vertices merge with it, in the first iteration, "
-                       "over the radius of the scene"),
-            Of::number("merge_alpha", &VcmSettings::alpha, 0.0f, 1.0f,
-                       "the squared radius of iteration i is i^(alpha - 1) times that of the first; 1: it stays"),
-            Of::flag("merge_first", &VcmSettings::first, "eye subpaths merge at their first vertex too"),
-            Of::number("merge_samples", &VcmSettings::samples, 1u, 1024u,
-                       "samples of every pixel in one iteration: they share light vertices and radius")};
+using Of = Declare<VcmSettings>;
+
+std::vector<Declaration<VcmSettings>> fixed_radius() {
+    return {
+        Of::number("merge_radius", &VcmSettings::radius, 0.0f, 1.0f,
+                   fmt::format("radius around an eye vertex within which light vertices merge with it, in the "
+                               "first iteration, over the radius of the scene; 0: {} over the root of merge_samples",
+                               kUsualRadius)),
+        Of::number("merge_samples", &VcmSettings::samples, 1u, 1024u,
+                   "samples of every pixel in one iteration: they share light vertices and radius")};
 }
 
-VcmSettings VcmSettings::plan(const RenderSettings& settings) { return own_settings(VcmVariant::settings(), settings); }
+std::vector<Declaration<VcmSettings>> shrinking_radius() {
+    std::vector<Declaration<VcmSettings>> all = fixed_radius();
+    all.insert(all.begin() + 1,
+               Of::number("merge_alpha", &VcmSettings::alpha, 0.0f, 1.0f,
+                          "the squared radius of iteration i is i^(alpha - 1) times that of the first; 1: it stays"));
+    return all;
+}
+
+}  // namespace
+
+std::vector<Declaration<VcmSettings>> MergingVariant::settings() { return shrinking_radius(); }
+std::vector<Declaration<VcmSettings>> PmVariant::settings() { return fixed_radius(); }
+std::vector<Declaration<VcmSettings>> VcmVariant::settings() {
+    std::vector<Declaration<VcmSettings>> all = shrinking_radius();
+    all.insert(all.begin() + 2,
+               Of::flag("merge_first", &VcmSettings::first, "eye subpaths merge at their first vertex too"));
+    return all;
+}
+
+VcmSettings VcmSettings::plan(const RenderSettings& settings) {
+    VcmSettings s = own_settings(VcmVariant::settings(), settings);
+    if (!variant_of(settings).find_own("merge_alpha")) s.alpha = 1.0f;
+    if (s.radius == 0.0f) s.radius = kUsualRadius / std::sqrt(float(s.samples));
+    if (s.radius < kLeastRadius)
+        throw Error(ExitCode::usage, fmt::format("merge_radius={}: floats tell places apart down to {} of the scene's "
+                                                 "radius; choose that or more, or an integrator that does not merge",
+                                                 s.radius, kLeastRadius));
+    return s;
+}
+
+std::string MergingVariant::bias(const RenderSettings& settings) {
+    const VcmSettings s = VcmSettings::plan(settings);
+    const std::string radius = fmt::format("a radius of {:.3g} of the scene's", s.radius);
+    return s.alpha < 1.0f ? fmt::format("consistent, biased by {} that shrinks (merge_alpha {:.3g})", radius, s.alpha)
+                          : fmt::format("biased by {}", radius);
+}
 
 }  // namespace ambilux

@@ -7,12 +7,19 @@ namespace ambilux {
 
 struct RenderSettings;
 
-struct VcmSettings {
-    float radius = 0.003f;  ///< of the first iteration, over that of the scene's bounds
-    float alpha = 0.75f;    ///< how fast it shrinks: r_i^2 = r_1^2 i^(alpha - 1); 1: not at all
-    bool first = true;      ///< eye subpaths merge at their first vertex
-    uint32_t samples = 1;   ///< of every pixel that share their light vertices
+/// That of the papers.
+constexpr float kUsualRadius = 0.003f;
+/// Floats tell places in a scene apart down to some 1e-7 of its radius.
+constexpr float kLeastRadius = 1e-6f;
 
+struct VcmSettings {
+    float radius = 0.0f;   ///< of the first iteration, over that of the scene's bounds; 0: as many merges a vertex as
+                           ///< one sample an iteration brings with kUsualRadius
+    float alpha = 0.75f;   ///< how fast it shrinks: r_i^2 = r_1^2 i^(alpha - 1); 1: not at all
+    bool first = true;     ///< eye subpaths merge at their first vertex
+    uint32_t samples = 1;  ///< of every pixel that share their light vertices
+
+    /// Nothing is left open in them. Throws Error(usage) for a radius below kLeastRadius.
     static VcmSettings plan(const RenderSettings& settings);
 };
 

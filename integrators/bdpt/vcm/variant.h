@@ -1,4 +1,4 @@
-// What integrator vcm has.
+// Integrators that merge: vcm, and what is the same with strategies switched off.
 #pragma once
 
 #include "integrators/bdpt/vcm/settings.h"
@@ -7,15 +7,72 @@
 
 namespace ambilux {
 
-struct VcmVariant {
+/// What they share.
+struct MergingVariant {
+    static std::vector<Declaration<VcmSettings>> settings();
+    static std::string bias(const RenderSettings& settings);
+    static std::vector<Stressed> stress() { return {}; }  // tests of means would find the bias
+
+protected:
+    static constexpr VariantTraits traits(Merges merges) {
+        return {.strategies = merges == Merges::beside,
+                .light_subpaths = true,
+                .draws = merges == Merges::beside,
+                .weights = merges != Merges::first,
+                .sorts = false,
+                .compacts = false,
+                .merges = merges};
+    }
+};
+
+struct VcmVariant : MergingVariant {
     static constexpr const char* kHelp =
         "vertex connection and merging (Georgiev et al. 2012), consistent, not unbiased: bdpt that also merges eye "
         "vertices with the light vertices of an iteration that lie within a radius";
-    static constexpr VariantTraits kTraits = {
-        .strategies = true, .light_subpaths = true, .draws = true, .sorts = false, .compacts = false};
+    static constexpr VariantTraits kTraits = traits(Merges::beside);
 
     static std::vector<Declaration<VcmSettings>> settings();
-    static std::vector<Stressed> stress() { return {}; }  // tests of means would find its bias
+    static uint32_t strategies(const RenderSettings& s) { return s.strategies | kMergeStrategies; }
+};
+
+struct BpmVariant : MergingVariant {
+    static constexpr const char* kHelp =
+        "bidirectional photon mapping (Vorba 2011), consistent, not unbiased: merges at all vertices of eye subpaths, "
+        "weighted, and emission that is seen through deltas";
+    static constexpr VariantTraits kTraits = traits(Merges::alone);
+
+    static uint32_t strategies(const RenderSettings&) { return kHitStrategies | kMergeStrategies; }
+};
+
+struct PpmVariant : MergingVariant {
+    static constexpr const char* kHelp =
+        "progressive photon mapping (Hachisuka et al. 2008, with the radius of Knaus and Zwicker 2011 and new eye "
+        "subpaths in every iteration), consistent, not unbiased: merges where eye subpaths first scatter other than "
+        "by a delta";
+    static constexpr VariantTraits kTraits = traits(Merges::first);
+
+    static uint32_t strategies(const RenderSettings&) { return kHitStrategies | kMergeStrategies; }
+};
+
+struct SppmVariant : MergingVariant {
+    static constexpr const char* kHelp =
+        "stochastic progressive photon mapping (Hachisuka and Jensen 2009, with the radius of Knaus and Zwicker 2011), "
+        "consistent, not unbiased: as ppm, but light from emitters comes by next event estimation, that of beams "
+        "excepted";
+    static constexpr VariantTraits kTraits = traits(Merges::first);
+
+    static uint32_t strategies(const RenderSettings&) {
+        return kHitStrategies | kNextEventStrategies | kMergeStrategies;
+    }
+};
+
+struct PmVariant : MergingVariant {
+    static constexpr const char* kHelp =
+        "photon mapping (Jensen 1996) without a final gathering step, biased: as ppm, with a radius that stays";
+    static constexpr VariantTraits kTraits = traits(Merges::first);
+
+    static std::vector<Declaration<VcmSettings>> settings();
+    static uint32_t strategies(const RenderSettings&) { return kHitStrategies | kMergeStrategies; }
 };
 
 }  // namespace ambilux

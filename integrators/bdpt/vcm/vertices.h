@@ -53,12 +53,15 @@ struct KeepVertices {
     uint32_t rounds;   ///< light subpaths of a pixel, at most
     uint32_t table_bits;
     bool connects;
+    bool keeps_first;  ///< else next event estimation finds what arrives from emitters, beams excepted
     StageRecord* record;
 
     AMBILUX_HD void operator()(uint32_t i) const {
         const auto hit = hits.load(i);
-        at_mergeable<F>(scene, rules, Side::light, hit,
-                        [&](const Subpath<Mis>& path, const Vertex<Mis>& y) { keep(hit.ray.path, path, y); });
+        at_mergeable<F>(scene, rules, Side::light, hit, [&](const Subpath<Mis>& path, const Vertex<Mis>& y) {
+            if (keeps_first || path.depth > 1 || is_beam(scene.emitters[path.start.emitter].type))
+                keep(hit.ray.path, path, y);
+        });
     }
 
 private:
