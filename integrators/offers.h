@@ -50,6 +50,7 @@ struct Stressed {
     std::string name;
     SettingTexts settings = {};  ///< beside integrator and variant
     bool quick = true;           ///< part of --quick
+    double bias = 0;             ///< share of the answer that its mean may be off, of methods that are not unbiased
 };
 
 /// With the balance and with the power heuristic.

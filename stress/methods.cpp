@@ -11,7 +11,7 @@ const std::vector<Method>& methods() {
         std::vector<Method> all;
         for (const Variant& v : variants())
             for (const Stressed& s : v.stress) {
-                all.push_back({s.name, {{"integrator", v.integrator}, {"variant", v.variant}}, s.quick});
+                all.push_back({s.name, {{"integrator", v.integrator}, {"variant", v.variant}}, s.quick, s.bias});
                 all.back().settings.insert(all.back().settings.end(), s.settings.begin(), s.settings.end());
             }
         return all;

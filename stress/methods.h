@@ -14,6 +14,7 @@ struct Method {
     std::string name;
     std::vector<std::pair<std::string, std::string>> settings;
     bool quick = true;  ///< part of --quick
+    double bias = 0;    ///< Stressed::bias
 };
 
 /// What variants say in their folders, in the order of the registry.

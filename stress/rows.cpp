@@ -101,7 +101,7 @@ void leave_out(Row& row, const std::string& why) {
     row.verdict = Verdict::left_out;
 }
 
-void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benign, double rows) {
+void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benign, double rows, double bias) {
     row.mean = mean_of(m.batches);
     row.first = m.first;
     row.samples = double(m.samples);
@@ -119,7 +119,7 @@ void fill_row(Row& row, const Cell& cell, const Measurement& m, const Row* benig
         else
             return leave_out(row, "the benign cell, which is the answer, has no mean");
     }
-    row.comparison = compare(m.batches, row.answer, cell.answer.uniform, cell.answer.rounding);
+    row.comparison = compare(m.batches, row.answer, cell.answer.uniform, std::max(cell.answer.rounding, bias));
     row.verdict = judge({row.comparison, row.mean.value, has_prefix_of(cell.rare, row.method), !cell.limit.empty(),
                          row.invalid + row.lost},
                         rows);

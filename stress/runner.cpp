@@ -192,7 +192,7 @@ private:
             }
             const Measurement m = measure(hooks_, *scene, settings, effort_of(cell), deadline_.flag());
             if (m.interrupted) return {};
-            fill_row(row, cell, m, benign, rows_in_all_);
+            fill_row(row, cell, m, benign, rows_in_all_, method.bias);
         } catch (const Error& e) {
             refuse_row(row, cell, e.what());
         }

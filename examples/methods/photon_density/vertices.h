@@ -43,7 +43,7 @@ AMBILUX_HD Rgb density(const State& state, const Grid& grid, const Vertex<Mis>& 
             uint32_t i = lower_bound(keys, count, cell_key(row + first[0]));
             for (; i < count && keys[i] >> kCellShift <= row + last[0]; ++i) {
                 const Photon photon = state.photons.load(state.order.values[1][i]);
-                const float cosine = fabsf(dot(z.scattering.frame.n, photon.d));
+                const float cosine = fabsf(dot(z.point.ng, photon.d));
                 if (length_squared(photon.p - p) > sqr(grid.radius) || photon.depth > most_depth || !(cosine > 0.0f))
                     continue;
                 // Flux over an area has the cosine already that the BSDF's value has too.

@@ -11,14 +11,15 @@ namespace ambilux {
 struct MergingVariant {
     static std::vector<Declaration<VcmSettings>> settings();
     static std::string bias(const RenderSettings& settings);
-    static std::vector<Stressed> stress() { return {}; }  // tests of means would find the bias
+    static std::vector<Stressed> stress() { return {}; }  // vcm stands for them
 
 protected:
-    static constexpr VariantTraits traits(Merges merges) {
+    static constexpr VariantTraits traits(Merges merges, bool shadow_rays = false) {
         return {.strategies = merges == Merges::beside,
                 .light_subpaths = true,
                 .draws = merges == Merges::beside,
                 .weights = merges != Merges::first,
+                .culls = shadow_rays,
                 .sorts = false,
                 .compacts = false,
                 .merges = merges};
@@ -29,9 +30,11 @@ struct VcmVariant : MergingVariant {
     static constexpr const char* kHelp =
         "vertex connection and merging (Georgiev et al. 2012), consistent, not unbiased: bdpt that also merges eye "
         "vertices with the light vertices of an iteration that lie within a radius";
-    static constexpr VariantTraits kTraits = traits(Merges::beside);
+    static constexpr VariantTraits kTraits = traits(Merges::beside, true);
 
     static std::vector<Declaration<VcmSettings>> settings();
+    /// With the radius that papers use. Corners and edges are what it does not fit to.
+    static std::vector<Stressed> stress() { return {{"vcm", {}, false, 0.01}}; }
     static uint32_t strategies(const RenderSettings& s) { return s.strategies | kMergeStrategies; }
 };
 
@@ -59,7 +62,7 @@ struct SppmVariant : MergingVariant {
         "stochastic progressive photon mapping (Hachisuka and Jensen 2009, with the radius of Knaus and Zwicker 2011), "
         "consistent, not unbiased: as ppm, but light from emitters comes by next event estimation, that of beams "
         "excepted";
-    static constexpr VariantTraits kTraits = traits(Merges::first);
+    static constexpr VariantTraits kTraits = traits(Merges::first, true);
 
     static uint32_t strategies(const RenderSettings&) {
         return kHitStrategies | kNextEventStrategies | kMergeStrategies;
