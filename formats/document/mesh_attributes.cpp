@@ -94,9 +94,11 @@ Mesh read_with_attributes(Builder& builder, Reader& in, const MeshSource& source
     const Limits& limits = builder.options.limits;
     const std::string bytes = gunzip_if_packed(source.path, read_input(source.path, limits), limits);
     builder.file_digests.push_back({source.path, sha256(bytes)});
-    Mesh mesh = read_ply(source.path, bytes, source.flip_v, limits, names);
+    const bool is_ply = source.type == "ply";
+    Mesh mesh = is_ply ? read_ply(source.path, bytes, source.flip_v, limits, names)
+                       : read_obj(source.path, bytes, source.flip_v, limits, names);
     for (const std::string& note : mesh.notes) builder.note({source.path, 0}, note);
-    const bool older = in.object().version < 2, srgb = older && in.boolean("srgb", true);
+    const bool older = in.object().version < 2, srgb = older && is_ply && in.boolean("srgb", true);
     for (MeshAttribute& a : mesh.attributes) {
         if (a.most > 1 && (!older || a.property == "r"))
             builder.note({source.path, 0}, "colours in whole numbers are parts of the largest, " +

@@ -120,7 +120,8 @@ void ShapeBuilder::add_shape(const Object& object, const Matrix& outer, bool in_
     read_placement(in, outer, job);
     const Object* bsdf = in.take("bsdf");
     const std::set<std::string> attributes = bsdf ? mesh_attributes_of(*bsdf) : std::set<std::string>{};
-    if (!attributes.empty() && type != "ply" && type != "mesh") in.fail("mesh attributes are read from ply files only");
+    if (!attributes.empty() && type != "ply" && type != "obj" && type != "mesh")
+        in.fail("mesh attributes are read from ply and obj files only");
     if (is_tessellated(type))
         read_tessellated(in, job, outer);
     else

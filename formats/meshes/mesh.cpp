@@ -71,17 +71,24 @@ std::vector<Vec3f> smooth_normals(const Mesh& mesh) {
     return sums;
 }
 
+uint32_t append_vertex(Mesh& to, const Mesh& from, uint32_t v) {
+    to.positions.push_back(from.positions[v]);
+    if (!from.normals.empty()) to.normals.push_back(from.normals[v]);
+    if (!from.uvs.empty()) to.uvs.push_back(from.uvs[v]);
+    for (size_t i = 0; i < to.attributes.size(); ++i)
+        if (!to.attributes[i].per_face) to.attributes[i].values.push_back(from.attributes[i].values[v]);
+    return uint32_t(to.positions.size() - 1);
+}
+
 Mesh with_own_corners(const Mesh& mesh) {
     Mesh out;
     out.origin = mesh.origin;
     for (const auto& face : mesh.faces) {
         const uint32_t first = uint32_t(out.positions.size());
-        for (const uint32_t v : face) {
-            out.positions.push_back(mesh.positions[v]);
-            if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[v]);
-        }
+        for (const uint32_t v : face) append_vertex(out, mesh, v);
         out.faces.push_back({first, first + 1, first + 2});
     }
+    out.uvs.clear();
     return out;
 }
 

@@ -37,12 +37,14 @@ struct Mesh {
 /// Wavefront OBJ: v, vt, vn and f with positive or negative indices and any number of corners (cut into a fan).
 /// Vertices with the same triple of indices are shared. Faces of two corners and other statements are left out.
 /// `flip_v`: v becomes 1-v (Mitsuba's flip_tex_coords). `path` is for messages. A file without faces is refused, as by
-/// all readers.
-Mesh read_obj(const std::string& path, std::string_view text, bool flip_v, const Limits& limits = {});
+/// all readers. Colours behind the places of vertices are kept if `attributes` has vertex_color.
+Mesh read_obj(const std::string& path, std::string_view text, bool flip_v, const Limits& limits = {},
+              const std::set<std::string>& attributes = {});
 
 /// Stanford PLY, ascii or binary of either byte order: coordinates, normals, texture coordinates, colours, faces and
 /// triangle strips by the names that programs give them (ply_header.cpp). Properties NAME_0 to NAME_2, and colours as
 /// NAME color, are attributes, of which those in `attributes` are kept. What the file has beside is in Mesh::notes.
+/// Vertices whose corners have texture coordinates of their own that differ are divided.
 Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits = {},
               const std::set<std::string>& attributes = {});
 /// Whether a PLY file that begins with these bytes has texture coordinates.
@@ -67,6 +69,8 @@ std::vector<Vec3f> smooth_normals(const Mesh& mesh);
 /// no vertex yet gets one, together with all whose normals lie within the angle (Mitsuba 0.6, maxSmoothAngle).
 Mesh split_at_edges(const std::string& path, const Mesh& mesh, double degrees);
 
+/// Appends a vertex of `from`, which may be the same mesh, with those attributes that `to` has too; its index.
+uint32_t append_vertex(Mesh& to, const Mesh& from, uint32_t v);
 /// The mesh with vertices of its own for every face, in the order of faces and corners; without texture coordinates.
 Mesh with_own_corners(const Mesh& mesh);
 /// Two faces for every cell of a grid of vertices, of `nx` cells a row, from the vertex `first` on.

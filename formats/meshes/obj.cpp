@@ -1,35 +1,25 @@
 #include <set>
-#include <unordered_map>
 
 #include "core/error.h"
 #include "core/text.h"
 #include "core/text_cursor.h"
 #include "formats/file_budget.h"
+#include "formats/meshes/corners.h"
 #include "formats/meshes/mesh.h"
 
 namespace ambilux {
 
 namespace {
 
+/// An index of what a corner has not; others count the file's lists from 0.
 constexpr uint32_t kAbsent = 0xffffffffu;
-
-/// Indices of a corner into the file's three lists, from 0.
-struct Corner {
-    uint32_t v, vt, vn;
-    bool operator==(const Corner&) const = default;
-};
-
-struct CornerHash {
-    size_t operator()(const Corner& c) const {
-        const uint64_t h = c.v * 0x9E3779B97F4A7C15ull ^ c.vt * 0xC2B2AE3D27D4EB4Full ^ c.vn * 0x165667B19E3779F9ull;
-        return h ^ h >> 29;
-    }
-};
 
 struct ObjReader {
     const std::string& path;
     TextCursor text;
+    bool wants_colors;
     std::vector<std::array<double, 3>> positions;
+    std::vector<Rgb> colors;  ///< of positions
     std::vector<Vec3f> normals;
     std::vector<Vec2f> uvs;
     std::set<std::string> unused;  ///< what the file has beside the mesh
@@ -114,10 +104,8 @@ void flatten_faces(Mesh& mesh, std::vector<Corner>& corners) {
         for (uint32_t& v : face) {
             if (corners[v].vn != kAbsent) continue;
             corners.push_back(corners[v]);
-            mesh.positions.push_back(mesh.positions[v]);
-            mesh.normals.push_back(n);
-            if (!mesh.uvs.empty()) mesh.uvs.push_back(mesh.uvs[v]);
-            v = uint32_t(mesh.positions.size() - 1);
+            v = append_vertex(mesh, mesh, v);
+            mesh.normals[v] = n;
         }
     }
 }
@@ -135,9 +123,30 @@ void leave_out(ObjReader& in, std::string_view keyword) {
 void read_vertex(ObjReader& in) {
     const double x = in.coordinate<double>("v"), y = in.coordinate<double>("v"), z = in.coordinate<double>("v");
     in.positions.push_back({x, y, z});
-    int more = 0;
-    for (; !in.at_end(); in.word()) ++more;
-    if (more >= 3) in.unused.insert("colours of vertices");  // one is a weight
+    Rgb color{};
+    int more = 0;  // one is a weight, three are a colour
+    for (; !in.at_end(); ++more)
+        if (in.wants_colors && more < 3)
+            color[more] = in.coordinate("v");
+        else
+            in.word();
+    if (more < 3) return;
+    if (in.wants_colors)
+        in.colors.push_back(color);
+    else
+        in.unused.insert("colours of vertices");
+}
+
+void add_colors(const ObjReader& in, const std::vector<Corner>& corners, Mesh& mesh) {
+    if (in.colors.empty()) return;
+    if (in.colors.size() != in.positions.size())
+        throw input_error(in.path, 0,
+                          "colours are given for " + std::to_string(in.colors.size()) + " of " +
+                              std::to_string(in.positions.size()) + " vertices");
+    MeshAttribute& attribute = mesh.attributes.emplace_back();
+    attribute.name = "vertex_color";
+    attribute.channels = 3;
+    for (const Corner& c : corners) attribute.values.push_back(in.colors[c.v]);
 }
 
 /// Of indices before the file had any of the kind, all are left out, or none.
@@ -160,11 +169,13 @@ void add_notes(const ObjReader& in, Mesh& mesh) {
 
 }  // namespace
 
-Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits) {
+Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, const Limits& limits,
+              const std::set<std::string>& attributes) {
     FileBudget budget(path, limits);
     std::string store;
-    ObjReader in{path, TextCursor(plain_text(path, bytes, store)), {}, {}, {}, {}};
-    std::unordered_map<Corner, uint32_t, CornerHash> vertex_of;
+    ObjReader in{path, TextCursor(plain_text(path, bytes, store)), attributes.contains("vertex_color"), {}, {}, {}, {},
+                 {}};
+    CornerMap vertex_of;
     std::vector<Corner> corners;  ///< of each vertex
     Mesh mesh;
     std::vector<uint32_t> polygon;
@@ -214,6 +225,7 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
         if (some_normals) mesh.normals.push_back(c.vn == kAbsent ? Vec3f{0, 0, 0} : in.normals[c.vn]);
     }
     set_positions(mesh, points);
+    add_colors(in, corners, mesh);
     if (some_normals && lacks_normals) flatten_faces(mesh, corners);
     add_notes(in, mesh);
     check_mesh(path, mesh);

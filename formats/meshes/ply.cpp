@@ -2,9 +2,11 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "core/text.h"
 #include "core/text_cursor.h"
 #include "formats/file_budget.h"
+#include "formats/meshes/corners.h"
 #include "formats/meshes/mesh.h"
 #include "formats/meshes/ply_blocks.h"
 
@@ -74,6 +76,7 @@ struct MeshBuilder {
     uint64_t vertices = 0, thin_faces = 0;
     std::string unused = {};
     std::vector<std::array<double, 3>> points = {};  ///< positions that may be more than floats
+    std::vector<Vec2f> corner_uvs = {};              ///< of faces up to the last one that has some
 
     void read(Element element) {
         const uint64_t size = least_size(element, in.encoding);
@@ -98,6 +101,7 @@ struct MeshBuilder {
     Mesh finish(const std::string& path) {
         if (!points.empty()) set_positions(mesh, points);
         for (MeshAttribute& a : mesh.attributes) finish_attribute(a);
+        if (!corner_uvs.empty()) divide_vertices();
         if (thin_faces > 0)
             mesh.notes.push_back("faces of fewer than three corners are left out: " + std::to_string(thin_faces));
         if (!unused.empty()) mesh.notes.push_back("the ply file has what is not used: " + unused);
@@ -244,10 +248,54 @@ private:
         }
     }
 
+    /// So that all corners at a vertex have the same texture coordinates.
+    void divide_vertices() {
+        if (!mesh.uvs.empty())
+            mesh.notes.emplace_back("texture coordinates of corners count, and not those of vertices");
+        corner_uvs.resize(3 * mesh.faces.size());
+        mesh.uvs.assign(mesh.positions.size(), {0, 0});
+        std::vector<bool> is_used(mesh.positions.size());
+        CornerMap vertex_of;
+        for (size_t i = 0; i < corner_uvs.size(); ++i) {
+            const Vec2f uv = corner_uvs[i];
+            uint32_t& v = mesh.faces[i / 3][i % 3];
+            if (v >= is_used.size()) continue;  // check_mesh() says so
+            const auto [vertex, is_new] = vertex_of.try_emplace({v, float_bits(uv.x), float_bits(uv.y)}, v);
+            if (is_new && is_used[v]) vertex->second = append_vertex(mesh, mesh, v);
+            is_used[v] = true;
+            v = vertex->second;
+            mesh.uvs[v] = uv;
+        }
+    }
+
+    void read_corner_uvs(const Property& p, std::vector<Vec2f>& out) {
+        const uint32_t count = in.index(p.count_type);
+        if (count % 2) in.fail("'" + p.name + "' needs two numbers for each corner");
+        out.clear();
+        for (uint32_t i = 0; i < count; ++i) {
+            const float value = float(in.value(p.type));
+            if (i % 2 == 0)
+                out.push_back({value, 0});
+            else
+                out.back().y = flip_v ? 1 - value : value;
+        }
+    }
+
+    /// Of the fan of `corners` triangle corners that begins at face `first`.
+    void add_corner_uvs(size_t first, size_t corners, const std::vector<Vec2f>& uvs) {
+        if (uvs.empty() || corners < 3) return;
+        if (uvs.size() != corners)
+            in.fail("a face of " + std::to_string(corners) + " corners has texture coordinates of " +
+                    std::to_string(uvs.size()));
+        corner_uvs.resize(3 * first);
+        for (size_t k = 2; k < corners; ++k) corner_uvs.insert(corner_uvs.end(), {uvs[0], uvs[k - 1], uvs[k]});
+    }
+
     void read_faces(const Element& element) {
         budget.bytes(mesh_bytes(vertices, element.count));
         mesh.faces.reserve(element.count);
         std::vector<uint32_t> polygon;
+        std::vector<Vec2f> uvs;
         const FaceLayout layout = in.encoding == Encoding::ascii ? FaceLayout{} : face_layout(element);
         for (uint64_t i = 0; i < element.count; ++i) {
             if (layout.valid) {
@@ -266,6 +314,8 @@ private:
                     uint32_t left = in.index(p.count_type);
                     budget.bytes(mesh_bytes(vertices, mesh.faces.size() + left));
                     for (; left > 0; --left) polygon.push_back(in.index(p.type));
+                } else if (p.role == Role::corner_uvs) {
+                    read_corner_uvs(p, uvs);
                 } else if (p.list) {
                     skip_list(p);
                 } else {
@@ -274,9 +324,10 @@ private:
             }
             thin_faces += polygon.size() < 3;
             for (size_t k = 2; k < polygon.size(); ++k) mesh.faces.push_back({polygon[0], polygon[k - 1], polygon[k]});
+            add_corner_uvs(first, polygon.size(), uvs);
             for (MeshAttribute& a : mesh.attributes)
                 if (a.per_face && first < a.values.size()) a.values.resize(mesh.faces.size(), Rgb(a.values[first]));
-            budget.bytes(mesh_bytes(vertices, mesh.faces.size()));
+            budget.bytes(mesh_bytes(vertices + corner_uvs.size(), mesh.faces.size()));
             budget.tick();
         }
     }
@@ -335,9 +386,10 @@ Mesh read_ply(const std::string& path, std::string_view bytes, bool flip_v, cons
 }
 
 bool ply_has_uvs(const std::string& path, std::string_view bytes) {
-    for (const Element& element : read_header(path, bytes).elements)
-        if (element.name == "vertex") return has_role(element, Role::u);
-    return false;
+    const auto& elements = read_header(path, bytes).elements;
+    return std::any_of(elements.begin(), elements.end(), [](const Element& element) {
+        return has_role(element, Role::u) || has_role(element, Role::corner_uvs);
+    });
 }
 
 }  // namespace ambilux

@@ -11,8 +11,8 @@ namespace ambilux::ply {
 enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 enum class Encoding { ascii, little_endian, big_endian };
 
-/// What a property means to us: of vertices, and `corners` of faces and strips.
-enum class Role { skip, x, y, z, nx, ny, nz, u, v, corners };
+/// What a property means to us: of vertices, `corners` of faces and strips, and two numbers for each of these.
+enum class Role { skip, x, y, z, nx, ny, nz, u, v, corners, corner_uvs };
 
 struct Property {
     std::string name;

@@ -88,7 +88,10 @@ void name_parts(Element& element) {
     for (Property& p : element.properties)
         if (p.list && !has_role(element, Role::corners) && (p.name == "vertex_indices" || p.name == "vertex_index"))
             p.role = Role::corners;
-    if (element.name == "face") name_attributes(element, "face_");
+    if (element.name != "face") return;
+    for (Property& p : element.properties)
+        if (p.list && p.name == "texcoord") p.role = Role::corner_uvs;
+    name_attributes(element, "face_");
 }
 
 /// Bytes of the header with its last line end. Behind lines that end in CR alone, LF is the first byte of the data.

@@ -41,6 +41,8 @@ std::string properties(const std::string& type, std::initializer_list<const char
     return text;
 }
 
+bool is_at(Vec2f uv, float x, float y) { return uv.x == x && uv.y == y; }
+
 template <class T>
 void put(std::string& out, T value) {
     out.append(reinterpret_cast<const char*>(&value), sizeof value);
@@ -73,6 +75,131 @@ TEST_CASE("OBJ: faces of two corners are left out, and what is not used is named
     const Mesh colored = read_obj("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nv 5 5 5 1\nf 1 2 3\n", true);
     REQUIRE(colored.notes.size() == 1);
     CHECK(contains(colored.notes[0], "colours of vertices"));
+}
+
+TEST_CASE("OBJ: colours behind the places of vertices are the attribute vertex_color, as those of PLY files are") {
+    const std::string vertices = "v 0 0 0 1 0.5 0\nv 1 0 0 0 0.25 1\nv 1 1 0 0.5 0.5 0.5\n",
+                      faces = "vn 0 0 1\nf 1//1 2//1 3//1\nf 3 2 1\n";
+    const auto read = [](const std::string& text) { return read_obj("a.obj", text, true, {}, {"vertex_color"}); };
+    const Mesh mesh = read(vertices + faces);
+    CHECK(mesh.notes.empty());
+    REQUIRE(mesh.attributes.size() == 1);
+    CHECK(mesh.attributes[0].name == "vertex_color");
+    // Every vertex has one, also those that a face without normals got for itself.
+    REQUIRE(mesh.attributes[0].values.size() == mesh.positions.size());
+    for (size_t i = 0; i < mesh.positions.size(); ++i) {
+        const Vec3f p = mesh.positions[i];
+        check_rgb(mesh.attributes[0].values[i], p.x == 0   ? Rgb{1, 0.5f, 0}
+                                                : p.y == 0 ? Rgb{0, 0.25f, 1}
+                                                           : Rgb{0.5f, 0.5f, 0.5f});
+    }
+    // A weight is no colour, and what comes behind a colour is left out.
+    CHECK(read("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").attributes.empty());
+    CHECK(read("v 0 0 0 1 0 0 9\nv 1 0 0 1 0 0 x\nv 0 1 0 1 0 0\nf 1 2 3\n").attributes[0].values[1] == Rgb{1, 0, 0});
+    const auto message = [&](const std::string& text) -> std::string {
+        try {
+            read(text);
+        } catch (const Error& e) {
+            return e.what();
+        }
+        return "no error";
+    };
+    CHECK(contains(message("v 0 0 0\n" + vertices + "f 1 2 3\n"), "colours are given for 3 of 4 vertices"));
+    CHECK(contains(message("v 0 0 0 1 red 0\n"), "a.obj:1: expected a number in 'v'"));
+    // In a scene; where nothing shows them they are told once.
+    const TempFolder folder;
+    folder.write("m.obj", vertices + faces);
+    const auto scene = [&](const std::string& texture) {
+        return load("<shape type='obj'><string name='filename' value='m.obj'/><bsdf type='diffuse'>" + texture +
+                        "</bsdf></shape><emitter type='point'/>",
+                    {}, "3.0.0", &folder);
+    };
+    const Scene shown =
+        scene("<texture name='reflectance' type='mesh_attribute'><string name='name' value='vertex_color'/></texture>");
+    float texel[3];
+    memcpy(texel, shown.texels.data() + shown.textures.at(0).offset, sizeof texel);
+    check_rgb({texel[0], texel[1], texel[2]}, {1, 0.5f, 0}, 1e-6);
+    CHECK_FALSE(has_note(shown, "not used"));
+    CHECK(has_note(scene(""), "the obj file has what is not used: colours of vertices"));
+}
+
+TEST_CASE("PLY: texture coordinates of corners divide the vertices where they differ") {
+    const auto file = [](const std::string& more, const std::string& first, const std::string& second) {
+        return "ply\nformat ascii 1.0\nelement vertex 4\n" + properties("float", {"x", "y", "z", "nx", "ny", "nz"}) +
+               "element face 2\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\n" + more +
+               "end_header\n0 0 0 0 0 1\n1 0 0 0 0 1\n1 1 0 0 0 1\n0 1 0 0 0 2\n" + first + "\n" + second + "\n";
+    };
+    // A seam through vertices 0 and 2; corner 0 of the second face has what it had in the first one.
+    const std::string seam = file("", "3 0 1 2 6 0 0 1 0 1 1", "3 0 2 3 6 0 0 0.5 0.5 0 1");
+    const Mesh mesh = read_ply("a.ply", seam, false);
+    CHECK(mesh.notes.empty());
+    REQUIRE(mesh.positions.size() == 5);
+    REQUIRE(mesh.faces.size() == 2);
+    CHECK(mesh.faces[0] == std::array<uint32_t, 3>{0, 1, 2});
+    CHECK(mesh.faces[1] == std::array<uint32_t, 3>{0, 4, 3});
+    CHECK(mesh.positions[4] == mesh.positions[2]);
+    CHECK(mesh.normals.size() == 5);
+    CHECK(mesh.normals[3] == Vec3f{0, 0, 2});
+    CHECK((is_at(mesh.uvs[2], 1, 1) && is_at(mesh.uvs[4], 0.5f, 0.5f) && is_at(mesh.uvs[3], 0, 1)));
+    CHECK(is_at(read_ply("a.ply", seam, true).uvs[2], 1, 0));
+    CHECK(ply_has_uvs("a.ply", seam));
+    // The same as an OBJ file says it, but for the order of the vertices.
+    const Mesh obj = read_obj("a.obj",
+                              "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt .5 .5\nvt 0 1\n"
+                              "f 1/1 2/2 3/3\nf 1/1 3/4 4/5\n",
+                              false);
+    REQUIRE(obj.positions.size() == 5);
+    for (size_t f = 0; f < 2; ++f)
+        for (size_t k = 0; k < 3; ++k) {
+            CHECK(obj.positions[obj.faces[f][k]] == mesh.positions[mesh.faces[f][k]]);
+            const Vec2f uv = mesh.uvs[mesh.faces[f][k]];
+            CHECK(is_at(obj.uvs[obj.faces[f][k]], uv.x, uv.y));
+        }
+    // A polygon is a fan; a face may have none; the number of the image is named, since there is one for all.
+    const Mesh fan =
+        read_ply("a.ply", file("property int texnumber\n", "4 0 1 2 3 8 0 0 1 0 1 1 0 1 0", "3 0 1 3 0 1"), false);
+    REQUIRE(fan.faces.size() == 3);
+    CHECK(is_at(fan.uvs[fan.faces[1][2]], 0, 1));
+    CHECK(is_at(fan.uvs[fan.faces[2][2]], 0, 0));
+    REQUIRE(fan.notes.size() == 1);
+    CHECK(contains(fan.notes[0], "not used: texnumber of element face"));
+    const auto message = [&](const std::string& first) -> std::string {
+        try {
+            read_ply("a.ply", file("", first, "3 0 1 2 6 0 0 1 0 1 1"), false);
+        } catch (const Error& e) {
+            return e.what();
+        }
+        return "no error";
+    };
+    CHECK(contains(message("3 0 1 2 4 0 0 1 0"), "a face of 3 corners has texture coordinates of 2"));
+    CHECK(contains(message("3 0 1 2 5 0 0 1 0 1"), "'texcoord' needs two numbers for each corner"));
+    CHECK(contains(message("3 0 1 9 6 0 0 1 0 1 1"), "face 0 refers to vertex 9 of 4"));
+    CHECK(contains(message("3 0 1 2 6 0 0 nan 0 1 1"), "texture coordinate of vertex"));
+}
+
+TEST_CASE("PLY: texture coordinates of corners in binary files, with colours, and beside those of vertices") {
+    std::string text = "ply\nformat binary_little_endian 1.0\nelement vertex 3\n" +
+                       properties("float", {"x", "y", "z", "s", "t"}) + properties("uchar", {"red", "green", "blue"}) +
+                       "element face 2\nproperty list uchar int vertex_indices\n"
+                       "property list uchar float texcoord\nend_header\n";
+    for (int v = 0; v < 3; ++v) {
+        for (const float f : {float(v == 1), float(v == 2), 0.0f, 9.0f, 9.0f}) put(text, f);
+        for (int c = 0; c < 3; ++c) put(text, uint8_t(51 * v));
+    }
+    for (int f = 0; f < 2; ++f) {
+        put(text, uint8_t(3));
+        for (int k = 0; k < 3; ++k) put(text, k);
+        put(text, uint8_t(6));
+        for (int k = 0; k < 6; ++k) put(text, 0.125f * float(k + f));
+    }
+    const Mesh mesh = read_ply("a.ply", text, false, {}, {"vertex_color"});
+    REQUIRE(mesh.positions.size() == 6);
+    REQUIRE(mesh.attributes.size() == 1);
+    REQUIRE(mesh.attributes[0].values.size() == 6);
+    CHECK(is_at(mesh.uvs[mesh.faces[1][1]], 0.375f, 0.5f));
+    CHECK(mesh.attributes[0].values[mesh.faces[1][2]].x == Approx(2 * 51 / 255.0));
+    REQUIRE(mesh.notes.size() == 1);
+    CHECK(contains(mesh.notes[0], "texture coordinates of corners count, and not those of vertices"));
 }
 
 TEST_CASE("PLY: coordinates and normals by all their names give the same mesh, without a note") {

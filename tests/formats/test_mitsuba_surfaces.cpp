@@ -188,7 +188,7 @@ TEST_CASE("mesh attributes are linear between vertices, constant on faces") {
                    ":3: the shape has no attribute 'vertex_x'"));
     CHECK(contains(refused("<shape type='cube'><bsdf type='diffuse'><texture name='reflectance' "
                            "type='mesh_attribute'/></bsdf></shape>"),
-                   "mesh attributes are read from ply files only"));
+                   "mesh attributes are read from ply and obj files only"));
 }
 
 TEST_CASE("roughness of 0 is taken, as in Mitsuba; what is negative is not") {
