@@ -57,7 +57,7 @@ struct Inflater {
     }
     template <class T>
     T value() {
-        T v;
+        T v{};
         read(&v, sizeof v);
         return v;
     }
@@ -86,7 +86,7 @@ struct Inflater {
 template <class T>
 T load(const FileBudget& budget, std::string_view bytes, size_t offset) {
     if (offset + sizeof(T) > bytes.size()) budget.fail("file ends too early");
-    T value;
+    T value{};
     memcpy(&value, bytes.data() + offset, sizeof value);
     return value;
 }
