@@ -10,10 +10,14 @@ void add_ior(xml_node node, float ior) {
     add_number(node, "ext_ior", 1);
 }
 
+void add_distribution(xml_node node, Microfacets distribution, bool sample_visible = true) {
+    add_text(node, "distribution", distribution == Microfacets::ggx ? "ggx" : "beckmann");
+    if (!sample_visible) add_boolean(node, "sample_visible", false);
+}
+
 template <class P>
 void add_roughness(Writer& w, xml_node node, const P& p) {
-    add_text(node, "distribution", p.distribution == Microfacets::ggx ? "ggx" : "beckmann");
-    if (!p.sample_visible) add_boolean(node, "sample_visible", false);
+    add_distribution(node, p.distribution, p.sample_visible);
     add_textured_number(w, node, "alpha_u", p.alpha_u);
     add_textured_number(w, node, "alpha_v", p.alpha_v);
 }
@@ -71,8 +75,7 @@ void add_parameters(Writer& w, xml_node node, const Textured<RoughDielectric>& p
 void add_parameters(Writer& w, xml_node node, const Textured<Plastic>& p) { add_coating(w, node, p); }
 void add_parameters(Writer& w, xml_node node, const Textured<RoughPlastic>& p) {
     add_coating(w, node, p);
-    add_text(node, "distribution", p.distribution == Microfacets::ggx ? "ggx" : "beckmann");
-    if (!p.sample_visible) add_boolean(node, "sample_visible", false);
+    add_distribution(node, p.distribution, p.sample_visible);
     add_number(node, "alpha", p.alpha.value);
 }
 void add_parameters(Writer& w, xml_node node, const Textured<Phong>& p) {
@@ -127,7 +130,7 @@ xml_node add_coat(Writer& w, xml_node parent, const Coat& coat) {
     add_rgb(node, "sigma_a", coat.absorption());
     add_rgb(node, "specular_reflectance", coat.reflectance());
     if (coat.rough()) {
-        add_text(node, "distribution", coat.distribution() == Microfacets::ggx ? "ggx" : "beckmann");
+        add_distribution(node, coat.distribution());
         add_number(node, "alpha", coat.alpha());
     }
     w.note("Mitsuba 3 has no BSDFs 'coating' and 'roughcoating'");

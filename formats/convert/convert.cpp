@@ -102,14 +102,13 @@ void add_sensor(Writer& w, xml_node root) {
 }
 
 void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
+    xml_node node = add_object(parent, "emitter", plugin_of(e.type));
     switch (e.type) {
         case EmitterType::hidden_area: w.note("Mitsuba 3 has no emitter 'hiddenarea'"); [[fallthrough]];
         case EmitterType::area:
         case EmitterType::directional_area:
-        case EmitterType::constant:
-            return add_color(w, add_object(parent, "emitter", plugin_of(e.type)), "radiance", e.radiance);
+        case EmitterType::constant: return add_color(w, node, "radiance", e.radiance);
         case EmitterType::collimated: {
-            xml_node node = add_object(parent, "emitter", "collimated");
             const Frame frame = frame_from_normal(e.direction);
             Affine to_world{};
             for (int i = 0; i < 3; ++i) {
@@ -120,27 +119,20 @@ void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
             add_rgb(node, "power", e.radiance.value);
             return w.note("Mitsuba 3 has no emitter 'collimated'");
         }
-        case EmitterType::point: {
-            xml_node node = add_object(parent, "emitter", "point");
+        case EmitterType::point:
             add_vector(node, "point", "position", e.position);
             return add_color(w, node, "intensity", e.radiance);
-        }
-        case EmitterType::directional: {
-            xml_node node = add_object(parent, "emitter", "directional");
+        case EmitterType::directional:
             add_vector(node, "vector", "direction", e.direction);
             return add_color(w, node, "irradiance", e.radiance);
-        }
-        case EmitterType::spot: {
-            xml_node node = add_object(parent, "emitter", "spot");
+        case EmitterType::spot:
             add_transform(node, "to_world", e.to_world);
             add_number(node, "cutoff_angle", degrees(e.cutoff));
             add_number(node, "beam_width", degrees(e.beam_width));
             add_rgb(node, "intensity", e.radiance.value);
             if (e.radiance.texture >= 0) add_texture(w, node, "texture", e.radiance.texture, splat(1), false);
             return;
-        }
         case EmitterType::projector: {
-            xml_node node = add_object(parent, "emitter", "projector");
             add_transform(node, "to_world", e.to_world);
             add_number(node, "fov", degrees(2 * std::atan(double(e.cutoff))));
             add_text(node, "fov_axis", "x");
@@ -148,12 +140,10 @@ void add_emitter(Writer& w, xml_node parent, const Emitter& e) {
             irradiance.value = irradiance.value * float(1 / M_PI);  // the loader multiplies, as Mitsuba does
             return add_color(w, node, "irradiance", irradiance);
         }
-        case EmitterType::envmap: {
-            xml_node node = add_object(parent, "emitter", "envmap");
+        case EmitterType::envmap:
             add_text(node, "filename", float_image(w, w.scene.textures[size_t(e.radiance.texture)], splat(1)));
             add_number(node, "scale", e.radiance.value.x);
             return add_transform(node, "to_world", e.to_world);
-        }
         case EmitterType::count: return;
     }
 }

@@ -173,10 +173,12 @@ struct ScaledTexture {
     Rgb scale;
 };
 ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use = TextureUse::color);
+/// The image of the document that `in` names, or null.
+const Texels* given_image(const Builder& builder, Reader& in);
 /// Image as float texels without flip or decoding table, for the environment map `in`; and the largest of them.
-int32_t load_environment_image(Builder& builder, Reader& in, const std::string& path, float& largest);
-/// The same of an image of the document.
-int32_t add_environment_image(Builder& builder, const std::string& name, const Texels& image, float& largest);
+/// `given`: of the document, not of a file.
+int32_t load_environment_image(Builder& builder, Reader& in, const std::string& path, float& largest,
+                               const Texels* given);
 /// The same of RGBA texels that are at hand.
 int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels);
 /// Texture of float texels that bilinear lookups find at texel centres.
@@ -204,7 +206,9 @@ Emitter read_emitter(Builder& builder, const Object& object, bool on_shape);
 
 /// Emitters sky, sun and sunsky as environment maps. `rotation`: of the emitter.
 bool is_sky(const std::string& type);
-Emitter read_sky(Builder& builder, Reader& in, const Matrix& rotation);
+void read_sky(Builder& builder, Reader& in, const Matrix& rotation, Emitter& out);
+/// Places an emitter.
+void place(Emitter& e, const Matrix& to_world);
 
 /// Tangent of half the field of view along x and y. Mitsuba's rule: `fov` with `fov_axis`, or `focal_length` in
 /// millimetres on the diagonal of a 36 x 24 mm film.

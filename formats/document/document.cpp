@@ -105,13 +105,23 @@ void take_texels(Document& document, const Where& where, uint64_t texels, uint64
                         std::to_string(document.limits.total_bytes));
 }
 
-Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where) {
-    document.storage.push_back(std::make_unique<Object>());
-    Object& object = *document.storage.back();
+Object make_object(const std::string& tag, const std::string& type, const Where& where, int version) {
+    Object object;
     object.tag = tag;
     object.type = type;
     object.where = where;
-    object.version = 2;
+    object.version = version;
+    return object;
+}
+
+Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where) {
+    document.storage.push_back(std::make_unique<Object>(make_object(tag, type, where, 2)));
+    return *document.storage.back();
+}
+
+Object& add_to_scene(Document& document, const std::string& tag, const std::string& type, const Where& where) {
+    Object& object = add_object(document, tag, type, where);
+    add_child(*document.scene, object);
     return object;
 }
 

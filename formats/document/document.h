@@ -111,8 +111,12 @@ void check_references(const Document& document);
 void check_shapes(const Limits& limits, uint64_t count, const Where& where);
 void check_nesting(const Limits& limits, uint64_t depth, const Where& where, const char* what);
 
+/// An object of no document.
+Object make_object(const std::string& tag, const std::string& type, const Where& where, int version = 3);
 /// A new object of the document, of format 2.
 Object& add_object(Document& document, const std::string& tag, const std::string& type, const Where& where);
+/// The same, in the scene.
+Object& add_to_scene(Document& document, const std::string& tag, const std::string& type, const Where& where);
 /// Calls f once for the object and each below it.
 void for_all_below(const Object& object, const std::function<void(const Object&)>& f);
 /// Before a front end makes an image of its own: throws Error(bad_input) where one or all are more than the limits

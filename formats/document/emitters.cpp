@@ -9,6 +9,11 @@
 
 namespace ambilux::document {
 
+void place(Emitter& e, const Matrix& to_world) {
+    e.to_world = to_affine(to_world);
+    e.to_local = to_affine(affine_inverse(to_world));
+}
+
 namespace {
 
 /// Weights that only steer another renderer's sampling: ours has its own rule.
@@ -38,11 +43,6 @@ Matrix rigid_transform(Builder& builder, Reader& in, double* scale = nullptr) {
                            "' must not shear, or scale one axis more than another",
                        "scale and shear are left out");
     return m;
-}
-
-void place(Emitter& e, const Matrix& m) {
-    e.to_world = to_affine(m);
-    e.to_local = to_affine(affine_inverse(m));
 }
 
 /// Where it stands and what it points at.
@@ -126,17 +126,15 @@ void read_plugin(ModelTag<CollimatedEmitter>, Builder& builder, Reader& in, Emit
 
 void read_plugin(ModelTag<EnvmapEmitter>, Builder& builder, Reader& in, Emitter& e) {
     place(e, without_place(rigid_transform(builder, in)));
-    const auto given = builder.document.images.find(in.object().find("image") ? in.text("image", "") : "");
-    const bool is_given = given != builder.document.images.end();
-    const std::string name = is_given ? "" : in.text("filename", "");
-    if (name.empty() && !is_given) in.fail_without("filename", "envmap has no filename");
+    const Texels* given = given_image(builder, in);
+    const std::string name = in.text(given ? "image" : "filename", "");
+    if (name.empty()) in.fail_without("filename", "envmap has no filename");
     const double scale = in.number("scale", 1);
     if (!(scale >= 0)) in.fail(in.where("scale"), "scale must not be negative");
     in.leave({{"cache"}, {"mis_compensation", "false"}}, "it is sampled in our own way");
     float largest = 0;
-    const int32_t texture =
-        is_given ? add_environment_image(builder, given->first, given->second, largest)
-                 : load_environment_image(builder, in, builder.file(name, in.where("filename")), largest);
+    const std::string path = given ? name : builder.file(name, in.where("filename"));
+    const int32_t texture = load_environment_image(builder, in, path, largest, given);
     e.radiance = {splat(float(scale)), texture};
     const double most = std::numeric_limits<float>::max();
     if (!(scale <= most && scale * largest <= most))
@@ -155,7 +153,7 @@ Emitter read_emitter(Builder& builder, const Object& object, bool on_shape) {
     e.to_world = e.to_local = to_affine(Matrix{});
     if (!on_shape && is_sky(object.type)) {
         Reader in(builder, object);
-        e = read_sky(builder, in, without_place(rigid_transform(builder, in)));
+        read_sky(builder, in, without_place(rigid_transform(builder, in)), e);
         check_sampling_weight(builder, in);
         in.finish();
         return e;

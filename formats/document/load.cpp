@@ -60,11 +60,7 @@ void build_default_light(Builder& builder, const Document& document) {
     const Where& at = document.scene->where;
     if (document.scene->version >= 2) return builder.note(at, "the scene has no emitter: its image is black");
     builder.note(at, "the scene has no emitter; as in Mitsuba 0.6 one of type sunsky lights it");
-    Object emitter;
-    emitter.tag = "emitter";
-    emitter.type = "sunsky";
-    emitter.where = at;
-    emitter.version = document.scene->version;
+    Object emitter = make_object("emitter", "sunsky", at, document.scene->version);
     set_number(emitter, "scale", 2);
     set_boolean(emitter, "extend", true);
     set_number(emitter, "sun_radius_scale", 15);

@@ -12,7 +12,7 @@ namespace ambilux::document {
 void build_sensors(Builder& builder, const Object& first) {
     if (first.type != "batch") return build_sensor(builder, first);
     Reader in(builder, first);
-    Object sensor, film;
+    Object sensor, film = make_object("film", "hdrfilm", first.where);
     int64_t count = 0;
     while (const Object* inner = in.take("sensor"))
         if (count++ == 0) sensor = *inner;
@@ -21,9 +21,6 @@ void build_sensors(Builder& builder, const Object& first) {
     // Those of the sensor inside have no meaning.
     std::erase_if(sensor.children,
                   [](const Child& c) { return c.object->tag == "film" || c.object->tag == "sampler"; });
-    film.tag = "film";
-    film.type = "hdrfilm";
-    film.where = first.where;
     set_integer(film, "width", 768);
     if (const Object* given = in.take("film")) film = *given;
     for (Value& v : film.values) {
@@ -48,10 +45,7 @@ void build_default_sensor(Builder& builder, const Object& scene) {
     for (int i = 0; i < 3; ++i) extent = std::max(extent, double(box.upper[i]) - box.lower[i]);
     const double distance = extent / (2 * std::tan(kFov * (M_PI / 360)));
     const auto center = [&](int i) { return 0.5 * (double(box.lower[i]) + box.upper[i]) + origin[size_t(i)]; };
-    Object sensor;
-    sensor.tag = "sensor";
-    sensor.type = "perspective";
-    sensor.where = scene.where;
+    Object sensor = make_object("sensor", "perspective", scene.where);
     set_number(sensor, "fov", kFov);
     set_number(sensor, "near_clip", distance / 100);
     set_number(sensor, "far_clip", 5 * extent + distance);

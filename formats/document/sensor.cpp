@@ -138,12 +138,7 @@ void resize_film(uint32_t width, uint32_t height, Sensor& sensor) {
 }
 
 void read_film(Builder& builder, const Object* object, Sensor& sensor) {
-    static const Object default_film = [] {
-        Object film;
-        film.tag = "film";
-        film.type = "hdrfilm";
-        return film;
-    }();
+    static const Object default_film = make_object("film", "hdrfilm", {});
     Reader in(builder, object ? *object : default_film);
     const std::string& type = in.object().type;
     const bool known = is_one_of(film_plugins(), type);

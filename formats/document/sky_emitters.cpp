@@ -165,7 +165,7 @@ void add_sun(Image& image, const SkySettings& s) {
 
 bool is_sky(const std::string& type) { return type == "sky" || type == "sun" || type == "sunsky"; }
 
-Emitter read_sky(Builder& builder, Reader& in, const Matrix& rotation) {
+void read_sky(Builder& builder, Reader& in, const Matrix& rotation, Emitter& out) {
     const bool newer = is_newer(in);
     const Matrix to_world = rotation * map_to_local(newer);
     const SkySettings settings = read_settings(in, to_world);
@@ -182,13 +182,9 @@ Emitter read_sky(Builder& builder, Reader& in, const Matrix& rotation) {
     if (settings.sky_scale > 0) add_sky(image, settings);
     if (settings.sun_scale > 0) add_sun(image, settings);
 
-    Emitter e{};
-    e.type = EmitterType::envmap;
-    e.shape = e.area_cdf = kNone;
-    e.to_world = to_affine(to_world);
-    e.to_local = to_affine(affine_inverse(to_world));
-    e.radiance = {splat(1), add_environment_image(builder, image.width, image.height, image.texels)};
-    return e;
+    out.type = EmitterType::envmap;
+    place(out, to_world);
+    out.radiance = {splat(1), add_environment_image(builder, image.width, image.height, image.texels)};
 }
 
 }  // namespace ambilux::document

@@ -18,14 +18,6 @@ double read_gamma(Reader& in) {
     return gamma;
 }
 
-/// The image of the document that the object names, if it does.
-const Texels* given_image(Builder& builder, Reader& in) {
-    if (builder.document.images.empty() || !in.has("image")) return nullptr;
-    const auto image = builder.document.images.find(in.text("image", ""));
-    if (image == builder.document.images.end()) in.fail("the document has no image of that name");
-    return &image->second;
-}
-
 /// uv transform: `to_uv` of the newer format, scale and offset of the older one.
 void read_to_uv(Reader& in, float out[2][3]) {
     const Matrix m = in.transform("to_uv");
@@ -122,9 +114,18 @@ void read_grid(Builder& builder, Reader& in, TextureUse use, Texture& texture, T
     texture.offset = append_texels(builder.scene, texels.data(), texels.size() * sizeof(float));
 }
 
+/// The texels of a bitmap.
+void set_image(Texture& texture, const LoadedImage& image) {
+    texture.type = TextureType::bitmap;
+    texture.format = image.format;
+    texture.width = image.width;
+    texture.height = image.height;
+    texture.offset = image.offset;
+    texture.decode_table = image.decode_table;
+}
+
 /// An image of a file or of the document.
 void read_bitmap(Builder& builder, Reader& in, Texture& texture, TextureFacts& facts) {
-    texture.type = TextureType::bitmap;
     const Texels* given = given_image(builder, in);
     const std::string name = in.text(given ? "image" : "filename", "");
     if (name.empty()) in.fail_without("filename", "bitmap texture has no filename");
@@ -143,11 +144,7 @@ void read_bitmap(Builder& builder, Reader& in, Texture& texture, TextureFacts& f
     if (builder.validate_only) return;
     const LoadedImage image =
         load_image(builder, path, gamma, false, channel.empty() ? -1 : int(std::string("rgba").find(channel)), given);
-    texture.format = image.format;
-    texture.width = image.width;
-    texture.height = image.height;
-    texture.offset = image.offset;
-    texture.decode_table = image.decode_table;
+    set_image(texture, image);
     facts = image.facts;
 }
 
@@ -166,6 +163,13 @@ void read_checkerboard(Builder& builder, Reader& in, TextureUse use, Texture& te
 }
 
 }  // namespace
+
+const Texels* given_image(const Builder& builder, Reader& in) {
+    if (builder.document.images.empty() || !in.has("image")) return nullptr;
+    const auto image = builder.document.images.find(in.text("image", ""));
+    if (image == builder.document.images.end()) in.fail("the document has no image of that name");
+    return &image->second;
+}
 
 ScaledTexture load_scaled_texture(Builder& builder, const Object& object, TextureUse use) {
     Rgb scale = splat(1);
@@ -214,40 +218,36 @@ namespace {
 int32_t add_plain_texture(Builder& builder, const LoadedImage& image) {
     Texture texture;
     memset(&texture, 0, sizeof texture);
-    texture.type = TextureType::bitmap;
-    texture.format = image.format;
+    set_image(texture, image);
     texture.wrap = WrapMode::repeat;
     texture.filter = TextureFilter::bilinear;
-    texture.width = image.width;
-    texture.height = image.height;
-    texture.offset = image.offset;
     texture.to_uv[0][0] = texture.to_uv[1][1] = 1;
     return add_texture(builder, texture, image.facts);
 }
 
-}  // namespace
-
-int32_t load_environment_image(Builder& builder, Reader& in, const std::string& path, float& largest) {
-    const double gamma = in.object().version < 2 ? read_gamma(in) : 0;
-    const LoadedImage image = load_image(builder, path, gamma, true);
-    largest = max_component(image.facts.largest);
+int32_t add_texels(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels, bool allow_half,
+                   const TextureFacts& facts) {
+    LoadedImage image;
+    image.width = width;
+    image.height = height;
+    image.facts = facts;
+    image.offset = append_floats(builder.scene, texels, allow_half, image.format);
     return add_plain_texture(builder, image);
 }
 
-int32_t add_environment_image(Builder& builder, const std::string& name, const Texels& texels, float& largest) {
-    const LoadedImage image = load_image(builder, name, 1, true, -1, &texels);
+}  // namespace
+
+int32_t load_environment_image(Builder& builder, Reader& in, const std::string& path, float& largest,
+                               const Texels* given) {
+    const double gamma = given ? 1 : in.object().version < 2 ? read_gamma(in) : 0;
+    const LoadedImage image = load_image(builder, path, gamma, true, -1, given);
     largest = max_component(image.facts.largest);
     return add_plain_texture(builder, image);
 }
 
 int32_t add_atlas(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels,
                   const TextureFacts& facts) {
-    LoadedImage image;
-    image.width = width;
-    image.height = height;
-    image.facts = facts;
-    image.offset = append_floats(builder.scene, texels, false, image.format);
-    return add_plain_texture(builder, image);
+    return add_texels(builder, width, height, texels, false, facts);
 }
 
 int32_t add_baked_texture(Builder& builder, const Texture& settings, const std::vector<float>& texels,
@@ -258,11 +258,7 @@ int32_t add_baked_texture(Builder& builder, const Texture& settings, const std::
 }
 
 int32_t add_environment_image(Builder& builder, uint32_t width, uint32_t height, const std::vector<float>& texels) {
-    LoadedImage image;
-    image.width = width;
-    image.height = height;
-    image.offset = append_floats(builder.scene, texels, true, image.format);
-    return add_plain_texture(builder, image);
+    return add_texels(builder, width, height, texels, true, {});
 }
 
 Rgb mean_color(const Builder& builder, const ParamRgb& parameter) {

@@ -49,20 +49,16 @@ void add_light(Context& context, const tinygltf::Light& light, const Matrix& to_
     context.emits = true;
     if (light.range > 0)
         context.note("the range of lights is left out: their light falls off with the squared distance");
+    Object& out = add_to_scene(context.document, "emitter", light.type, context.where);
     if (light.type == "directional") {
-        Object& out = add_object(context.document, "emitter", "directional", context.where);
         set_vector(out, "direction", column(to_world, 2) * -1);
-        set_rgb(out, "irradiance", value);
-        return add_child(*context.document.scene, out);
+        return set_rgb(out, "irradiance", value);
     }
     if (light.type == "point") {
-        Object& out = add_object(context.document, "emitter", "point", context.where);
         set_vector(out, "position", column(to_world, 3));
-        set_rgb(out, "intensity", value);
-        return add_child(*context.document.scene, out);
+        return set_rgb(out, "intensity", value);
     }
     if (light.type != "spot") context.fail("light '" + light.name + "' is of the unknown type '" + light.type + "'");
-    Object& out = add_object(context.document, "emitter", "spot", context.where);
     double outer = light.spot.outerConeAngle, inner = light.spot.innerConeAngle;
     if (!(inner >= 0 && inner <= outer && outer <= M_PI / 2 + 1e-4))
         context.fail("the cone of light '" + light.name + "' must be pi/2 at most and hold its inner cone");
@@ -78,7 +74,6 @@ void add_light(Context& context, const tinygltf::Light& light, const Matrix& to_
         context.note(kSpotNote);
         add_spot_falloff(context.document, out, outer, inner, [](double t) { return t * t; });
     }
-    add_child(*context.document.scene, out);
 }
 
 Object& add_camera(Context& context, const tinygltf::Camera& camera, Matrix to_world) {

@@ -33,12 +33,10 @@ public:
         if (shown_ == 0) c_.fail("it shows no triangles");
         Object& sensor = sensor_ ? *sensor_ : add_default_camera(c_, lower_, upper_);
         add_child(*c_.document.scene, sensor);
-        add_child(*c_.document.scene, add_object(c_.document, "integrator", "path", c_.where));
+        add_to_scene(c_.document, "integrator", "path", c_.where);
         if (c_.emits) return;
         c_.note("the file has no light: an environment of radiance 1 is used");
-        Object& sky = add_object(c_.document, "emitter", "constant", c_.where);
-        set_rgb(sky, "radiance", splat(1));
-        add_child(*c_.document.scene, sky);
+        set_rgb(add_to_scene(c_.document, "emitter", "constant", c_.where), "radiance", splat(1));
     }
 
 private:
@@ -239,10 +237,9 @@ private:
             }
         }
         if (!any_shared) return;
-        Object& instance = add_object(c_.document, "shape", "instance", c_.where);
+        Object& instance = add_to_scene(c_.document, "shape", "instance", c_.where);
         set_transform(instance, "to_world", to_world);
         add_child(instance, *groups_[group]);
-        add_child(*c_.document.scene, instance);
     }
 
     /// A mesh in the document.

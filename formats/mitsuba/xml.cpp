@@ -117,12 +117,8 @@ struct Parser {
 
     Object* parse_object(const XmlSource& source, const pugi::xml_node& node, const std::string& tag, uint64_t depth) {
         ValueParser::allow(source, node, {"type", "id", "name"});
-        document.storage.push_back(std::make_unique<Object>());
-        Object* object = document.storage.back().get();
-        object->tag = tag;
-        object->where = where(source, node);
+        Object* object = &add_object(document, tag, values.attribute(source, node, "type"), where(source, node));
         object->version = source.version;
-        object->type = values.attribute(source, node, "type");
         if (node.attribute("id")) {
             object->id = values.attribute(source, node, "id");
             add_id(object->id, object, object->where);
@@ -169,10 +165,7 @@ struct Parser {
                      "'" + version + "' is no version that is known (0.5 to " + std::to_string(kNewestVersion) + ".x)");
         }
         if (!document.scene) {
-            document.storage.push_back(std::make_unique<Object>());
-            document.scene = document.storage.back().get();
-            document.scene->tag = "scene";
-            document.scene->where = where(source, root);
+            document.scene = &add_object(document, "scene", "", where(source, root));
             document.scene->version = source.version;
         }
         parse_children(source, root, *document.scene, depth);

@@ -11,9 +11,6 @@ namespace {
 /// Cells of a whole turn, and of half a turn from pole to pole.
 constexpr double kTurn = 256, kHalfTurn = 128;
 
-/// Angle of rotation in radians.
-double turn_of(const Parameters& in) { return std::clamp(in.number("phimax", 360), 0.0, 360.0) * (M_PI / 180); }
-
 /// Grid of nu times nv cells; the outside is where (u,v) runs counter-clockwise.
 Mesh grid(uint32_t nu, uint32_t nv, const std::function<void(double u, double v, Vec3d& p, Vec3d& n)>& at) {
     Mesh out;
@@ -32,53 +29,58 @@ Mesh grid(uint32_t nu, uint32_t nv, const std::function<void(double u, double v,
 
 }  // namespace
 
-bool is_cut(const Parameters& in) {
-    const auto differs = [&](const char* name, double value) {
-        return std::fabs(in.number(name, value) - value) > 1e-6 * std::max(std::fabs(value), 1.0);
-    };
-    if (differs("phimax", 360)) return true;
-    const double radius = in.number("radius", 1);
-    if (in.type == "sphere")
-        return in.number("zmin", -radius) > -radius * (1 - 1e-6) || in.number("zmax", radius) < radius * (1 - 1e-6);
-    return in.type == "disk" && differs("innerradius", 0);
+QuadricShape read_quadric(const Parameters& in) {
+    QuadricShape q;
+    q.radius = in.number("radius", 1);
+    if (!(q.radius > 0)) fail(in.where_of("radius"), "radius must be positive");
+    const double phimax = in.number("phimax", 360), r = q.radius;
+    q.turn = std::clamp(phimax, 0.0, 360.0) * (M_PI / 180);
+    q.is_cut = std::fabs(phimax - 360) > 360e-6;
+    if (!(q.turn > 0)) fail(in.where_of("phimax"), "phimax must be positive");
+    if (in.type == "disk") {
+        q.inner = in.number("innerradius", 0);
+        q.low = q.high = in.number("height", 0);
+        q.is_cut |= std::fabs(q.inner) > 1e-6;
+        if (q.is_cut && !(q.inner >= 0 && q.inner < r))
+            fail(in.where_of("innerradius"), "innerradius must be less than radius");
+        q.area = q.turn / 2 * (r * r - q.inner * q.inner);
+        return q;
+    }
+    const bool is_sphere = in.type == "sphere";
+    const double a = in.number("zmin", is_sphere ? -r : -1), b = in.number("zmax", is_sphere ? r : 1);
+    q.low = std::min(a, b), q.high = std::max(a, b);
+    if (is_sphere) {
+        q.is_cut |= a > -r * (1 - 1e-6) || b < r * (1 - 1e-6);
+        q.low = std::clamp(q.low, -r, r), q.high = std::clamp(q.high, -r, r);
+    }
+    if (!(q.high > q.low))
+        fail(in.where,
+             is_sphere ? "a sphere needs a height: zmin equals zmax" : "a cylinder needs a length: zmin equals zmax");
+    q.area = q.turn * r * (q.high - q.low);
+    return q;
 }
 
-Mesh cut_quadric(const Parameters& in, double& area) {
-    const double radius = in.number("radius", 1), turn = turn_of(in);
-    if (!(radius > 0)) fail(in.where_of("radius"), "radius must be positive");
-    if (!(turn > 0)) fail(in.where_of("phimax"), "phimax must be positive");
-    const uint32_t nu = uint32_t(std::max(std::ceil(kTurn * turn / (2 * M_PI)), 1.0));
-    if (in.type == "sphere") {
-        const double a = in.number("zmin", -radius), b = in.number("zmax", radius),
-                     low = std::clamp(std::min(a, b), -radius, radius),
-                     high = std::clamp(std::max(a, b), -radius, radius);
-        if (!(high > low)) fail(in.where, "a sphere needs a height: zmin equals zmax");
-        area = turn * radius * (high - low);
-        const double first = std::acos(low / radius), last = std::acos(high / radius);
+Mesh mesh_of_quadric(const std::string& type, const QuadricShape& q) {
+    const uint32_t nu = uint32_t(std::max(std::ceil(kTurn * q.turn / (2 * M_PI)), 1.0));
+    if (type == "sphere") {
+        const double first = std::acos(q.low / q.radius), last = std::acos(q.high / q.radius);
         const uint32_t nv = uint32_t(std::max(std::ceil(kHalfTurn * (first - last) / M_PI), 1.0));
         return grid(nu, nv, [&](double u, double v, Vec3d& p, Vec3d& n) {
-            const double theta = first + v * (last - first), phi = u * turn;
+            const double theta = first + v * (last - first), phi = u * q.turn;
             n = {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
-            p = n * radius;
+            p = n * q.radius;
         });
     }
-    if (in.type == "disk") {
-        const double inner = in.number("innerradius", 0), height = in.number("height", 0);
-        if (!(inner >= 0 && inner < radius)) fail(in.where_of("innerradius"), "innerradius must be less than radius");
-        area = turn / 2 * (radius * radius - inner * inner);
+    if (type == "disk")
         return grid(nu, 1, [&](double u, double v, Vec3d& p, Vec3d& n) {
-            const double r = (1 - v) * radius + v * inner, phi = u * turn;
-            p = {r * std::cos(phi), r * std::sin(phi), height};
+            const double r = (1 - v) * q.radius + v * q.inner, phi = u * q.turn;
+            p = {r * std::cos(phi), r * std::sin(phi), q.low};
             n = {0, 0, 1};
         });
-    }
-    const double a = in.number("zmin", -1), b = in.number("zmax", 1), low = std::min(a, b), high = std::max(a, b);
-    if (!(high > low)) fail(in.where, "a cylinder needs a length: zmin equals zmax");
-    area = turn * radius * (high - low);
     return grid(nu, 1, [&](double u, double v, Vec3d& p, Vec3d& n) {
-        const double phi = u * turn;
+        const double phi = u * q.turn;
         n = {std::cos(phi), std::sin(phi), 0};
-        p = {radius * n.x, radius * n.y, low + v * (high - low)};
+        p = {q.radius * n.x, q.radius * n.y, q.low + v * (q.high - q.low)};
     });
 }
 

@@ -1,4 +1,4 @@
-// Parts of spheres, disks and cylinders, as meshes.
+// Spheres, disks and cylinders, and parts of them as meshes.
 #pragma once
 
 #include "formats/meshes/mesh.h"
@@ -6,10 +6,17 @@
 
 namespace ambilux::pbrt {
 
-/// True if parameters of a sphere, disk or cylinder leave out a part of it.
-bool is_cut(const Parameters& in);
+/// The parameters of a sphere, disk or cylinder.
+struct QuadricShape {
+    double radius = 1, inner = 0;  ///< that of the hole in a disk
+    double low = 0, high = 0;      ///< along z
+    double turn = 0;               ///< about z, in radians
+    double area = 0;               ///< exact, in its own space
+    bool is_cut = false;           ///< a part of it is left out
+};
+QuadricShape read_quadric(const Parameters& in);
 
-/// The part that is left, with pbrt's normals and coordinates, and its exact area in its own space.
-Mesh cut_quadric(const Parameters& in, double& area);
+/// What is there of it, with pbrt's normals and coordinates. `type`: of the shape.
+Mesh mesh_of_quadric(const std::string& type, const QuadricShape& q);
 
 }  // namespace ambilux::pbrt

@@ -25,14 +25,13 @@ Texels& add_projector(SceneMaker& scene, const Where& where, const Matrix& to_wo
                       const char* filter, uint32_t width, uint32_t height) {
     Document& document = scene.document;
     FileBudget(where.file, document.limits).bytes(uint64_t(width) * height, 16);
-    Object& object = add_object(document, "emitter", "projector", where);
+    Object& object = add_to_scene(document, "emitter", "projector", where);
     set_transform(object, "to_world", to_world);
     set_number(object, "fov", fov);
     set_text(object, "fov_axis", "smaller");
     set_number(object, "scale", scale / M_PI);
     const std::string name = "light " + std::to_string(document.images.size());
     add_child(object, add_bitmap(document, where, name, filter), "irradiance");
-    add_child(*document.scene, object);
     return add_image(document, name, width, height);
 }
 
@@ -52,9 +51,7 @@ void add_projection(SceneMaker& scene, const Described& light) {
     const double fov = in.number("fov", 90), scale = in.number("scale", 1) * scene.exposure;
     if (!(fov > 0 && fov < 180)) fail(in.where_of("fov"), "fov must lie between 0 and 180 degrees");
     if (!(scale >= 0)) fail(in.where_of("scale"), "the scale of a light must not be negative");
-    Texture texture;
-    texture.image = std::make_shared<TextureImage>();
-    texture.image->path = path;
+    const Texture texture = texture_of_file(path, in.where);
     const TextureImage& source = scene.textures.texels_of(texture);
     const int w = int(source.width), h = int(source.height);
     const double half = std::tan(fov * (M_PI / 360)), aspect = double(w) / h, half_x = half * std::max(aspect, 1.0),

@@ -42,9 +42,8 @@ struct Copies {
 
 void add_instance(SceneMaker& scene, Object& group, const Where& where) {
     check_shapes(scene.document.limits, ++scene.shape_count, where);
-    Object& object = add_object(scene.document, "shape", "instance", where);
+    Object& object = add_to_scene(scene.document, "shape", "instance", where);
     set_transform(object, "to_world", scene.state.ctm);
-    add_child(*scene.document.scene, object);
     scene.instances.push_back({&object, &group, scene.state.ctm});
 }
 

@@ -1,7 +1,7 @@
 // Materials that shapes name before the file defines them: pbrt looks them up at its end.
 #include <set>
 
-#include "formats/document/plugins.h"
+#include "formats/pbrt/names.h"
 #include "formats/pbrt/scene.h"
 
 namespace ambilux::pbrt {
@@ -49,13 +49,8 @@ void finish_shapes(SceneMaker& scene) {
         scene.state = std::move(late.state);
         scene.open_object = late.open_object;
         const Shared& material = scene.state.material;
-        if (material->in.directive == kNamedMaterial) {
-            const auto known = scene.named_materials.find(material->in.type);
-            if (known == scene.named_materials.end())
-                fail(material->in.where, "unknown material '" + material->in.type + "'" +
-                                             document::nearly(scene.named_materials, material->in.type));
-            scene.state.material = known->second;
-        }
+        if (material->in.directive == kNamedMaterial)
+            scene.state.material = known_as(scene.named_materials, material->in.type, material->in.where, "material");
         add_shape(scene, late.in);
     }
     scene.late_shapes.clear();

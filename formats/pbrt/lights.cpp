@@ -13,25 +13,23 @@ using namespace document;
 namespace {
 
 void add_point(SceneMaker& scene, const Described& light) {
-    Object& object = add_object(scene.document, "emitter", "point", light.in.where);
+    Object& object = add_to_scene(scene.document, "emitter", "point", light.in.where);
     const Vec3d p = transformed(scene.state.ctm, light.in.point("from", {0, 0, 0}));
     set_vector(object, "position", p);
     set_rgb(object, "intensity", emission(scene, light, "I").scaled(power_factor(light, "power", 4 * M_PI)));
-    add_child(*scene.document.scene, object);
 }
 
 void add_distant(SceneMaker& scene, const Described& light) {
-    Object& object = add_object(scene.document, "emitter", "directional", light.in.where);
+    Object& object = add_to_scene(scene.document, "emitter", "directional", light.in.where);
     const Vec3d from = transformed(scene.state.ctm, light.in.point("from", {0, 0, 0})),
                 to = transformed(scene.state.ctm, light.in.point("to", {0, 0, 1}));
     set_vector(object, "direction", to - from);
     set_rgb(object, "irradiance", emission(scene, light, "L").scaled(power_factor(light, "illuminance", 1)));
-    add_child(*scene.document.scene, object);
 }
 
 void add_spot(SceneMaker& scene, const Described& light) {
     const Parameters& in = light.in;
-    Object& object = add_object(scene.document, "emitter", "spot", in.where);
+    Object& object = add_to_scene(scene.document, "emitter", "spot", in.where);
     const Vec3d from = transformed(scene.state.ctm, in.point("from", {0, 0, 0})),
                 to = transformed(scene.state.ctm, in.point("to", {0, 0, 1})), axis = to - from;
     bool valid = true;
@@ -52,7 +50,6 @@ void add_spot(SceneMaker& scene, const Described& light) {
         scene.report.note(in.where, kSpotNote);
         add_spot_falloff(scene.document, object, outer, inner, [](double t) { return t * t * (3 - 2 * t); });
     }
-    add_child(*scene.document.scene, object);
 }
 
 /// Several infinite lights are one: a constant light on top of the one there is.
@@ -99,9 +96,8 @@ void add_infinite(SceneMaker& scene, const Described& light) {
     if (name.empty()) {
         const Rgb radiance = e.scaled(power_factor(light, "illuminance", M_PI));
         if (scene.environment) return add_to_environment(scene, radiance);
-        scene.environment = &add_object(scene.document, "emitter", "constant", in.where);
-        set_rgb(*scene.environment, "radiance", radiance);
-        return add_child(*scene.document.scene, *scene.environment);
+        scene.environment = &add_to_scene(scene.document, "emitter", "constant", in.where);
+        return set_rgb(*scene.environment, "radiance", radiance);
     }
     if (in.find("L")) fail(in.where_of("L"), "both 'L' and 'filename' are given");
     const std::string path = resolve(scene.folder, name, in.where_of("filename"));
@@ -121,8 +117,7 @@ void add_infinite(SceneMaker& scene, const Described& light) {
         scene.environment->type = "envmap";
         scene.environment->values.clear();
     } else {
-        scene.environment = &add_object(scene.document, "emitter", "envmap", in.where);
-        add_child(*scene.document.scene, *scene.environment);
+        scene.environment = &add_to_scene(scene.document, "emitter", "envmap", in.where);
     }
     Object& object = *scene.environment;
     set_text(object, "image", environment.image);
@@ -193,13 +188,9 @@ const Object& area_emitter(SceneMaker& scene, const Described& light, const UvMa
         set_rgb(object, "radiance", radiance);
     } else {
         if (in.find("L")) fail(in.where_of("L"), "both 'L' and 'filename' are given");
-        Texture texture;
-        texture.kind = Texture::Kind::image;
-        texture.where = in.where;
+        Texture texture = texture_of_file(resolve(scene.folder, name, in.where_of("filename")), in.where);
         texture.wrap = "clamp";
         texture.color = radiance;
-        texture.image = std::make_shared<TextureImage>();
-        texture.image->path = resolve(scene.folder, name, in.where_of("filename"));
         add_child(object, scene.textures.object(texture, uv), "radiance");
     }
     in.finish(scene.report);

@@ -30,7 +30,6 @@ private:
         bool is_object;
         Where where;
     };
-    using Handler = void (Parser::*)(const Where&);
 
     void directive(const Token& word);
     bool transform(const std::string& name, const Where& at);
@@ -196,10 +195,7 @@ bool Parser::transform(const std::string& name, const Where& at) {
         coordinate_systems_[tokens_->quoted("the name of a CoordinateSystem")] = ctm;
     } else if (name == "CoordSysTransform") {
         const std::string system = tokens_->quoted("the name of a coordinate system");
-        const auto known = coordinate_systems_.find(system);
-        if (known == coordinate_systems_.end())
-            fail(at, "unknown coordinate system '" + system + "'" + document::nearly(coordinate_systems_, system));
-        ctm = known->second;
+        ctm = known_as(coordinate_systems_, system, at, "coordinate system");
     } else if (name == "ActiveTransform") {
         const Token which = tokens_->next();
         if (which.text != "All")
@@ -356,9 +352,7 @@ void Parser::object(const std::string& name, const Where& at) {
         scene_.objects[id] = scene_.open_object = &add_object(scene_.document, "shape", "shapegroup", at);
         return;
     }
-    const auto known = scene_.objects.find(id);
-    if (known == scene_.objects.end()) fail(at, "unknown object '" + id + "'" + document::nearly(scene_.objects, id));
-    add_instance(scene_, *known->second, at);
+    add_instance(scene_, *known_as(scene_.objects, id, at, "object"), at);
 }
 
 void Parser::include(const Where& at, bool import) {

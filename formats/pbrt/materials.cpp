@@ -35,7 +35,7 @@ public:
         if (type == "interface" || type.empty() || type == "none") return finish(bsdf("null"), true);
         if (type == "diffuse") return finish(diffuse(), false);
         if (type == "coateddiffuse") return finish(coated_diffuse(), false);
-        if (type == "conductor") return finish(conductor(), false);
+        if (type == "conductor") return finish(bare_conductor(), false);
         if (type == "coatedconductor") return finish(coated_conductor(), false);
         if (type == "dielectric") return finish(dielectric(), true);
         if (type == "thindielectric") return finish(thin_dielectric(), true);
@@ -73,11 +73,8 @@ private:
             scene_.report.refuse(bumps->where, "displacement and a normal map on one material are not supported",
                                  "the displacement is left out");
         if (!map.empty()) {
-            Texture texture;
-            texture.kind = Texture::Kind::image;
-            texture.where = in_.where_of("normalmap");
-            texture.image = std::make_shared<TextureImage>();
-            texture.image->path = resolve(scene_.folder, map, texture.where);
+            const Where at = in_.where_of("normalmap");
+            const Texture texture = texture_of_file(resolve(scene_.folder, map, at), at);
             texture.image->gamma = 1;
             Object& outer = map_of("normalmap");
             add_child(outer, textures().object(texture, uv_));
@@ -196,12 +193,16 @@ private:
         return metal;
     }
 
-    Metal metal(const std::string& prefix, Object& object, const Texture* colored) {
+    /// Sets a texture of the reflectance, if there is one: `is_textured`.
+    Metal metal(const std::string& prefix, Object& object, bool& is_textured) {
         Metal metal;
         find_metal("Cu", metal.eta, metal.k);
         const Parameter *eta = in_.find(prefix + "eta"), *k = in_.find(prefix + "k");
+        std::optional<Texture> colored;
+        if (in_.find("reflectance")) colored = reflectance("reflectance", 0.5);
         if (colored && (eta || k)) fail(in_.where, "both a reflectance and eta or k are given");
         if (colored && colored->is_constant()) return metal_of(colored->color);
+        is_textured = colored.has_value();
         if (colored) {
             scene_.report.note(in_.where, "a metal of a textured reflectance has it at all angles");
             textures().set_color(object, "specular_reflectance", *colored, uv_);
@@ -214,32 +215,31 @@ private:
         return metal;
     }
 
-    Object& conductor() {
-        const Roughness r = roughness("", 0);
+    Object& conductor(const std::string& prefix, Metal& m, bool& is_textured) {
+        const Roughness r = roughness(prefix, 0);
         Object& object = bsdf(r.is_smooth() ? "conductor" : "roughconductor");
         if (!r.is_smooth()) set_roughness(object, r);
-        std::optional<Texture> colored;
-        if (in_.find("reflectance")) colored = reflectance("reflectance", 0.5);
-        const Metal m = metal("", object, colored ? &*colored : nullptr);
+        m = metal(prefix, object, is_textured);
         set_rgb(object, "eta", m.eta);
         set_rgb(object, "k", m.k);
         return object;
     }
 
+    Object& bare_conductor() {
+        Metal m;
+        bool is_textured = false;
+        return conductor("", m, is_textured);
+    }
+
     Object& coated_conductor() {
         roughness("interface.", 0);  // the coating is taken for smooth
-        const Roughness r = roughness("conductor.", 0);
+        Metal m;
+        bool is_textured = false;
+        Object& object = conductor("conductor.", m, is_textured);
         const Coating coat = coating("interface.eta");
-        Object& object = bsdf(r.is_smooth() ? "conductor" : "roughconductor");
-        if (!r.is_smooth()) set_roughness(object, r);
-        std::optional<Texture> colored;
-        if (in_.find("reflectance")) colored = reflectance("reflectance", 0.5);
-        const Metal m = metal("conductor.", object, colored ? &*colored : nullptr);
         scene_.report.note(in_.where, "coatedconductor is approximated by " + object.type +
                                           " with the reflectance that coating and metal have at normal incidence");
-        set_rgb(object, "eta", m.eta);
-        set_rgb(object, "k", m.k);
-        if (colored && !colored->is_constant()) return object;
+        if (is_textured) return object;
         // All orders of reflection between a smooth coating and the metal below it, over that of the metal alone.
         const auto fresnel = [](double n, double eta, double k) {
             return ((eta - n) * (eta - n) + k * k) / ((eta + n) * (eta + n) + k * k);
@@ -321,10 +321,8 @@ private:
         const Texture amount = textures().number(in_, "amount", 0.5);
         textures().set_number(blend, "weight", amount, uv_);
         for (const std::string& name : names->strings) {
-            const auto it = scene_.named_materials.find(name);
-            if (it == scene_.named_materials.end())
-                fail(names->where, "unknown material '" + name + "'" + document::nearly(scene_.named_materials, name));
-            const Object* part = surface_material(scene_, it->second, surface_);
+            const Shared& named = known_as(scene_.named_materials, name, names->where, "material");
+            const Object* part = surface_material(scene_, named, surface_);
             if (!part) fail(names->where, "material '" + name + "' is a mix of itself");
             add_child(blend, *part);
         }

@@ -1,9 +1,6 @@
 #include "formats/pbrt/names.h"
 
-#include <map>
 #include <sstream>
-
-#include "formats/document/plugins.h"
 
 namespace ambilux::pbrt {
 namespace {

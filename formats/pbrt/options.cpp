@@ -186,7 +186,7 @@ void add_integrator(SceneMaker& scene, const Options& options, const Where& wher
         scene.report.refuse(in.where, not_supported("integrator", in.type), "path is used");
     else if (in.type != "path" && in.type != "volpath" && !light && !bdpt)
         scene.report.note(in.where, "integrator '" + in.type + "' has the image of the path tracer, which is used");
-    Object& out = add_object(scene.document, "integrator", light ? "ptracer" : bdpt ? "bdpt" : "path", in.where);
+    Object& out = add_to_scene(scene.document, "integrator", light ? "ptracer" : bdpt ? "bdpt" : "path", in.where);
     const int64_t depth = in.integer("maxdepth", 5);
     if (depth < 0 || depth > (1 << 30)) fail(in.where_of("maxdepth"), "maxdepth must not be negative");
     // pbrt counts scattering, Mitsuba segments.
@@ -198,7 +198,6 @@ void add_integrator(SceneMaker& scene, const Options& options, const Where& wher
                "bootstrapsamples", "chains", "mutationsperpixel", "largestepprobability", "sigma",
                "photonsperiteration", "radius", "seed"});
     in.finish(scene.report);
-    add_child(*scene.document.scene, out);
 }
 
 Object* sampler(SceneMaker& scene, const Options& options) {

@@ -45,34 +45,23 @@ Surface surface_of(const std::string& type) {
 }
 
 Placed add_quadric(SceneMaker& scene, const Parameters& in) {
-    Placed out;
-    out.object = &add_object(scene.document, "shape", in.type, in.where);
-    const double radius = in.number("radius", 1);
-    if (!(radius > 0)) fail(in.where_of("radius"), "radius must be positive");
-    if (in.type == "sphere") {
-        out.local = scaling(radius, radius, radius);
-        out.area = 4 * M_PI * radius * radius;
-    } else if (in.type == "disk") {
-        out.local = translation(0, 0, in.number("height", 0)) * scaling(radius, radius, 1);
-        out.area = M_PI * radius * radius;
-    } else {
-        const double low = in.number("zmin", -1), high = in.number("zmax", 1);
-        const double bottom = std::min(low, high), top = std::max(low, high);
-        if (!(top > bottom)) fail(in.where, "a cylinder needs a length: zmin equals zmax");
-        out.local = translation(0, 0, bottom) * scaling(radius, radius, top - bottom);
-        out.area = 2 * M_PI * radius * (top - bottom);
-    }
-    return out;
+    const QuadricShape q = read_quadric(in);
+    Object& object = add_object(scene.document, "shape", in.type, in.where);
+    if (in.type == "sphere") return {&object, scaling(q.radius, q.radius, q.radius), q.area};
+    const double length = in.type == "disk" ? 1 : q.high - q.low;
+    return {&object, translation(0, 0, q.low) * scaling(q.radius, q.radius, length), q.area};
 }
 
 Mesh own_mesh(SceneMaker& scene, const Parameters& in, double& exact_area) {
     if (surface_of(in.type) != Surface::mesh) {
-        if (is_cut(in))
+        const QuadricShape q = read_quadric(in);
+        exact_area = q.area;
+        if (q.is_cut)
             scene.report.note(in.where,
                               "parts of spheres, disks and cylinders are triangles: 256 around, 128 from pole to pole");
         else if (is_stretched(surface_of(in.type), scene.state.ctm))
             note_stretched(scene, in.where);
-        return cut_quadric(in, exact_area);
+        return mesh_of_quadric(in.type, q);
     }
     if (in.type == "trianglemesh") return triangle_mesh(scene, in);
     if (in.type == "bilinearmesh") return bilinear_mesh(scene, in);
@@ -235,8 +224,8 @@ void note_stretched(SceneMaker& scene, const Where& where) {
 
 void add_shape(SceneMaker& scene, const Parameters& in, bool as_mesh) {
     const std::string& type = in.type;
-    const bool round = surface_of(type) != Surface::mesh,
-               quadric = round && !as_mesh && !is_cut(in) && !is_stretched(surface_of(type), scene.state.ctm);
+    const bool round = surface_of(type) != Surface::mesh, quadric = round && !as_mesh && !read_quadric(in).is_cut &&
+                                                                    !is_stretched(surface_of(type), scene.state.ctm);
     if (!round && type != "trianglemesh" && type != "plymesh" && type != "bilinearmesh" && type != "loopsubdiv" &&
         type != "curve")
         return scene.report.refuse(in.where, not_supported("shape", type), "it is left out");

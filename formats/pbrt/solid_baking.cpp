@@ -53,11 +53,18 @@ double finest_detail(const SceneMaker& scene, const Object& bsdf) {
     return detail;
 }
 
-const Object* add_image(SceneMaker& scene, const Where& where, uint32_t width, uint32_t height,
-                        std::vector<float> texels) {
+/// A texture of an image whose texels `fill` sets.
+const Object* add_texture(SceneMaker& scene, const Where& where, uint32_t width, uint32_t height,
+                          const std::function<void(Texels&)>& fill) {
+    take_texels(scene.document, where, uint64_t(width) * height, 16);
     const std::string name = where.text() + "#" + std::to_string(scene.document.images.size());
-    document::add_image(scene.document, name, width, height).floats = std::move(texels);
+    fill(add_image(scene.document, name, width, height));
     return &add_bitmap(scene.document, where, name);
+}
+
+void set_texel(Texels& image, uint32_t x, uint32_t y, Rgb c) {
+    float* texel = &image.floats[4 * (size_t(y) * image.width + x)];
+    texel[0] = c.x, texel[1] = c.y, texel[2] = c.z;
 }
 
 void note_size(SceneMaker& scene, const Where& where, double size) {
@@ -157,20 +164,15 @@ BakedMesh bake_solids(SceneMaker& scene, const Where& where, const Mesh& mesh, c
     Copier copier(scene.document, [&](const Object& texture) -> const Object* {
         const MadeTexture* made = scene.textures.made(texture);
         if (!made) return nullptr;
-        const uint64_t count = uint64_t(atlas.width) * atlas.height;
-        take_texels(scene.document, where, count, 16);
-        std::vector<float> texels(4 * count, 1.0f);
-        tbb::parallel_for(size_t(0), triangles.size(), [&](size_t i) {
-            const Atlas::Block& b = atlas.blocks[i];
-            const double cells = b.side - 1;
-            for (uint32_t y = 0; y < b.side; ++y)
-                for (uint32_t x = 0; x < b.side && x + y <= b.side; ++x) {  // the last ones lie behind the third edge
-                    const Rgb c = made->at(triangles[i].at(x / cells, y / cells));
-                    float* texel = &texels[4 * ((uint64_t(b.y) + y) * atlas.width + b.x + x)];
-                    texel[0] = c.x, texel[1] = c.y, texel[2] = c.z;
-                }
+        return add_texture(scene, where, atlas.width, atlas.height, [&](Texels& image) {
+            tbb::parallel_for(size_t(0), triangles.size(), [&](size_t i) {
+                const Atlas::Block& b = atlas.blocks[i];
+                const double cells = b.side - 1;
+                for (uint32_t y = 0; y < b.side; ++y)
+                    for (uint32_t x = 0; x < b.side && x + y <= b.side; ++x)  // the last ones lie behind the third edge
+                        set_texel(image, b.x + x, b.y + y, made->at(triangles[i].at(x / cells, y / cells)));
+            });
         });
-        return add_image(scene, where, atlas.width, atlas.height, std::move(texels));
     });
     BakedMesh out;
     out.bsdf = copier.copy(bsdf);
@@ -208,28 +210,25 @@ const Object* bake_solids(SceneMaker& scene, const Where& where, Surface surface
     };
     const Matrix inverse = affine_inverse(to_world);
     const UvMap to_pbrt = uv_map(surface);
+    const auto place = [&](double u, double v) -> SurfacePlace {
+        Vec3d p, n;
+        local(u, v, p, n);
+        const auto& m = to_pbrt.m;
+        // Normals go by the transposed inverse.
+        const Vec3d world_n = {dot(column(inverse, 0), n), dot(column(inverse, 1), n), dot(column(inverse, 2), n)};
+        return {transformed(to_world, p), unit_or_z(world_n), m[0][0] * u + m[0][1] * v + m[0][2],
+                m[1][0] * u + m[1][1] * v + m[1][2]};
+    };
     Copier copier(scene.document, [&](const Object& texture) -> const Object* {
         const MadeTexture* made = scene.textures.made(texture);
         if (!made) return nullptr;
         if (made->texture.kind != Texture::Kind::solid) return &texture;
-        take_texels(scene.document, where, uint64_t(width) * height, 16);
-        std::vector<float> texels(4 * size_t(width) * height, 1.0f);
-        tbb::parallel_for(0u, height, [&](uint32_t y) {
-            for (uint32_t x = 0; x < width; ++x) {
-                const double u = (x + 0.5) / width, v = (y + 0.5) / height;
-                Vec3d p, n;
-                local(u, v, p, n);
-                const auto& m = to_pbrt.m;
-                // Normals go by the transposed inverse.
-                const Vec3d world_n = {dot(column(inverse, 0), n), dot(column(inverse, 1), n),
-                                       dot(column(inverse, 2), n)};
-                const Rgb c = made->at({transformed(to_world, p), unit_or_z(world_n),
-                                        m[0][0] * u + m[0][1] * v + m[0][2], m[1][0] * u + m[1][1] * v + m[1][2]});
-                float* texel = &texels[4 * (size_t(y) * width + x)];
-                texel[0] = c.x, texel[1] = c.y, texel[2] = c.z;
-            }
+        return add_texture(scene, where, width, height, [&](Texels& image) {
+            tbb::parallel_for(0u, height, [&](uint32_t y) {
+                for (uint32_t x = 0; x < width; ++x)
+                    set_texel(image, x, y, made->at(place((x + 0.5) / width, (y + 0.5) / height)));
+            });
         });
-        return add_image(scene, where, width, height, std::move(texels));
     });
     return copier.copy(bsdf);
 }

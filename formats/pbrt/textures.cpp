@@ -68,6 +68,15 @@ std::shared_ptr<TextureImage> made_image(uint32_t width, uint32_t height) {
     return image;
 }
 
+Texture texture_of_file(const std::string& path, const Where& where) {
+    Texture texture;
+    texture.kind = Texture::Kind::image;
+    texture.where = where;
+    texture.image = std::make_shared<TextureImage>();
+    texture.image->path = path;
+    return texture;
+}
+
 void Textures::set_mapping(Texture& texture, const Parameters& in) const {
     const std::string kind = in.text("mapping", "uv");
     if (kind == "uv") {

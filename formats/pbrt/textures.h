@@ -57,6 +57,9 @@ struct Texture {
     bool is_constant() const { return kind == Kind::constant; }
 };
 
+/// The image of a file, which is not read yet.
+Texture texture_of_file(const std::string& path, const Where& where);
+
 using ColorMap = std::function<Rgb(Rgb)>;
 
 /// What a texture object was made of.
