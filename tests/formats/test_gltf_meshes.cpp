@@ -200,6 +200,19 @@ TEST_CASE("a property or an extension of another name is told, with the one that
                    "extension 'KHR_materials_iorr' is left out, which the file allows: 'KHR_materials_ior' is known"));
     CHECK(contains(note_of([](Json& j) { j["materials"][0]["extensions"]["EXT_thing"] = {{"a", 1}}; }),
                    "extension 'EXT_thing' is left out"));
+    // Letters may be written by their numbers, and names may hold what JSON is made of.
+    const test::TempFolder folder;
+    const auto notes_of = [&](const std::string& key) {
+        std::string text = quad_scene().dump();
+        text.replace(text.find("\"materials\""), 11, "\"materials\"\n\t");
+        text.replace(text.find("\"metallicFactor\""), 16, "\"name\" : \"a \\\"b\\\": {[ \\\\\",\"" + key + "\" ");
+        std::string all;
+        for (const std::string& note : load_scene_file(folder.write("a.gltf", text), {}).notes) all += note + "\n";
+        return all;
+    };
+    CHECK_FALSE(contains(notes_of("met\\u0061llicFactor"), "left out"));
+    CHECK(contains(notes_of("met\\u0061llicFactr"),
+                   "property 'metallicFactr' of pbrMetallicRoughness is not known and left out: 'metallicFactor'"));
     // What is the author's own.
     CHECK_FALSE(contains(note_of([](Json& j) {
                              j["materials"][0]["extras"]["mine"] = {{"color", 1}};
