@@ -17,12 +17,7 @@ Mesh mesh_of_faces(const Mesh& from, const std::vector<std::array<uint32_t, 3>>&
         std::array<uint32_t, 3> to;
         for (size_t k = 0; k < 3; ++k) {
             const uint32_t i = face[k];
-            if (place[i] == ~0u) {
-                place[i] = uint32_t(out.positions.size());
-                out.positions.push_back(from.positions[i]);
-                if (!from.normals.empty()) out.normals.push_back(from.normals[i]);
-                if (!from.uvs.empty()) out.uvs.push_back(from.uvs[i]);
-            }
+            if (place[i] == ~0u) place[i] = append_vertex(out, from, i);
             to[k] = place[i];
         }
         out.faces.push_back(to);

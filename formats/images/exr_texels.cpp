@@ -58,7 +58,8 @@ std::vector<Layer> colored_layers(const Layers& layers) {
     std::vector<Layer> out;
     for (const auto& [name, channels] : layers)
         for (const auto& [colors, names] : kKinds) {
-            if (!std::all_of(names.begin(), names.end(), [&](const auto& n) { return channels.contains(n); })) continue;
+            const auto is_there = [&all = channels](const std::string& n) { return all.contains(n); };
+            if (!std::all_of(names.begin(), names.end(), is_there)) continue;
             if (colors == Colors::chroma && !channels.at("ry").ends_with("RY")) continue;  // OpenEXR knows no others
             Layer layer{name, colors, {}, {}};
             for (const std::string& n : names) layer.channels.push_back(channels.at(n));

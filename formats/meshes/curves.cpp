@@ -40,11 +40,7 @@ struct Tube {
             mesh.uvs.push_back({float(i) / float(sides), float(v)});
         }
         if (!joined) return;
-        const uint32_t above = uint32_t(mesh.positions.size()) - sides - 1, below = above - sides - 1;
-        for (uint32_t i = 0; i < sides; ++i) {
-            mesh.faces.push_back({below + i, below + i + 1, above + i + 1});
-            mesh.faces.push_back({below + i, above + i + 1, above + i});
-        }
+        add_grid_faces(mesh, uint32_t(mesh.positions.size()) - 2 * (sides + 1), sides, 1);
     }
 };
 

@@ -137,6 +137,17 @@ void read_vertex(ObjReader& in) {
         in.unused.insert("colours of vertices");
 }
 
+/// The vertices of a face; new ones are added to `corners`.
+void read_polygon(ObjReader& in, CornerMap& vertex_of, std::vector<Corner>& corners, std::vector<uint32_t>& polygon) {
+    polygon.clear();
+    while (!in.at_end()) {
+        const Corner c = in.corner();
+        const auto [vertex, is_new] = vertex_of.try_emplace(c, uint32_t(corners.size()));
+        if (is_new) corners.push_back(c);
+        polygon.push_back(vertex->second);
+    }
+}
+
 void add_colors(const ObjReader& in, const std::vector<Corner>& corners, Mesh& mesh) {
     if (in.colors.empty()) return;
     if (in.colors.size() != in.positions.size())
@@ -195,13 +206,7 @@ Mesh read_obj(const std::string& path, std::string_view bytes, bool flip_v, cons
             const float v = in.at_end() ? 0.0f : in.coordinate("vt");
             in.uvs.push_back({u, flip_v ? 1 - v : v});
         } else if (keyword == "f" || keyword == "fo") {
-            polygon.clear();
-            while (!in.at_end()) {
-                const Corner c = in.corner();
-                const auto [vertex, is_new] = vertex_of.try_emplace(c, uint32_t(corners.size()));
-                if (is_new) corners.push_back(c);
-                polygon.push_back(vertex->second);
-            }
+            read_polygon(in, vertex_of, corners, polygon);
             if (polygon.size() < 3) {
                 ++in.thin_faces;
                 continue;
