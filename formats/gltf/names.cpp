@@ -123,7 +123,9 @@ private:
         const size_t behind = json.find_first_not_of(" \t\r\n", end + 1);
         if (behind == std::string_view::npos || json[behind] != ':' || around.empty()) return end;
         std::string key(json.substr(begin + 1, end - begin - 1));
-        if (escapes) key = nlohmann::json::parse('"' + key + '"').get<std::string>();
+        if (escapes)
+            if (const auto plain = nlohmann::json::parse('"' + key + '"', nullptr, false); plain.is_string())
+                key = plain;
         next = kind_inside(around.back(), key);
         return end;
     }
