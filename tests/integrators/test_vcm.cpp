@@ -151,7 +151,8 @@ TEST_CASE("What an image says of its bias follows from its settings") {
     CHECK(bias_text(stays) == "biased by a radius of 0.01 of the scene's");
     RenderSettings open = vcm_settings(scene, "0", "ppm");
     apply_setting(open, "merge_samples", "9");
-    CHECK(bias_text(open) == "consistent, biased by a radius of 0.001 of the scene's that shrinks (merge_alpha 0.75)");
+    CHECK(bias_text(open) ==
+          "consistent, biased by a radius of at most 0.001 of the scene's that shrinks (merge_alpha 0.75)");
     CHECK(bias_text(cpu_settings(scene, Estimator::mis)).empty());
 }
 

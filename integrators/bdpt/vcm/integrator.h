@@ -5,6 +5,7 @@
 
 #include "integrators/bdpt/shared/two_sides.h"
 #include "integrators/bdpt/vcm/merge.h"
+#include "integrators/bdpt/vcm/pixel_radius.h"
 #include "integrators/bdpt/vcm/source.h"
 
 namespace ambilux {
@@ -24,6 +25,8 @@ struct VcmIntegrator {
     }
     static double pilot(Policy& p, const SceneView& scene, const HostTracer& tracer, uint64_t seed) {
         if (!p.light_subpaths()) return 0.0;
+        const float pixel = p.vcm.open_radius() ? pixel_radius<F>(scene, tracer) / scene.bounds_radius : 0.0f;
+        p.first_radius = p.vcm.first_radius(pixel) * scene.bounds_radius;
         const double mean = mean_light_vertices<F>(scene, tracer, p.rules, seed);
         if (p.cache_draws > 0 && mean > 0.0) p.rules.mis.connections = float(p.cache_draws / mean);
         p.size_table(mean);
@@ -77,8 +80,7 @@ struct VcmIntegrator {
             const auto record = [&](const auto& stage) { return parts.layout.record(stage.kName); };
             const SceneView& scene = parts.scene;
             const auto& hits = m.two_sides.subpaths.hits;
-            set_radius = {parts.wave.state, m.now,        p.vcm.radius * scene.bounds_radius,
-                          p.vcm.alpha,      p.subpaths(), record(set_radius)};
+            set_radius = {parts.wave.state, m.now, p.first_radius, p.vcm.alpha, p.subpaths(), record(set_radius)};
             for (int k = 0; k < 2; ++k) {
                 keep[k] = {scene,
                            parts.wave,

@@ -10,6 +10,7 @@ namespace ambilux {
 struct VcmPolicy : BdptPolicyOf<MergingMis> {
     VcmSettings vcm;
     uint32_t table_bits;    ///< of the grid's hash table
+    float first_radius;     ///< of the first iteration
     uint32_t vertex_lanes;  ///< of a light vertex, as kernels of these features use them
 
     /// Light subpaths of an iteration.

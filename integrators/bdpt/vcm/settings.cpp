@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -14,13 +15,14 @@ namespace {
 using Of = Declare<VcmSettings>;
 
 std::vector<Declaration<VcmSettings>> fixed_radius() {
-    return {
-        Of::number("merge_radius", &VcmSettings::radius, 0.0f, 1.0f,
-                   fmt::format("radius around an eye vertex within which light vertices merge with it, in the "
-                               "first iteration, over the radius of the scene; 0: {} over the root of merge_samples",
-                               kUsualRadius)),
-        Of::number("merge_samples", &VcmSettings::samples, 1u, 1024u,
-                   "samples of every pixel in one iteration: they share light vertices and radius")};
+    return {Of::number(
+                "merge_radius", &VcmSettings::radius, 0.0f, 1.0f,
+                fmt::format("radius around an eye vertex within which light vertices merge with it, in the "
+                            "first iteration, over the radius of the scene; 0: {} or that of a pixel at the median of "
+                            "what is seen, whichever is less, over the root of merge_samples",
+                            kUsualRadius)),
+            Of::number("merge_samples", &VcmSettings::samples, 1u, 1024u,
+                       "samples of every pixel in one iteration: they share light vertices and radius")};
 }
 
 std::vector<Declaration<VcmSettings>> shrinking_radius() {
@@ -45,17 +47,22 @@ std::vector<Declaration<VcmSettings>> VcmVariant::settings() {
 VcmSettings VcmSettings::plan(const RenderSettings& settings) {
     VcmSettings s = own_settings(VcmVariant::settings(), settings);
     if (!variant_of(settings).find_own("merge_alpha")) s.alpha = 1.0f;
-    if (s.radius == 0.0f) s.radius = kUsualRadius / std::sqrt(float(s.samples));
-    if (s.radius < kLeastRadius)
+    if (!s.open_radius() && s.radius < kLeastRadius)
         throw Error(ExitCode::usage, fmt::format("merge_radius={}: floats tell places apart down to {} of the scene's "
                                                  "radius; choose that or more, or an integrator that does not merge",
                                                  s.radius, kLeastRadius));
     return s;
 }
 
+float VcmSettings::first_radius(float pixel) const {
+    if (!open_radius()) return radius;
+    return std::max(std::min(pixel, kUsualRadius) / std::sqrt(float(samples)), kLeastRadius);
+}
+
 std::string MergingVariant::bias(const RenderSettings& settings) {
     const VcmSettings s = VcmSettings::plan(settings);
-    const std::string radius = fmt::format("a radius of {:.3g} of the scene's", s.radius);
+    const std::string radius = fmt::format("a radius of {}{:.3g} of the scene's", s.open_radius() ? "at most " : "",
+                                           s.first_radius(kUsualRadius));
     return s.alpha < 1.0f ? fmt::format("consistent, biased by {} that shrinks (merge_alpha {:.3g})", radius, s.alpha)
                           : fmt::format("biased by {}", radius);
 }

@@ -13,13 +13,18 @@ constexpr float kUsualRadius = 0.003f;
 constexpr float kLeastRadius = 1e-6f;
 
 struct VcmSettings {
-    float radius = 0.0f;   ///< of the first iteration, over that of the scene's bounds; 0: as many merges a vertex as
-                           ///< one sample an iteration brings with kUsualRadius
+    float radius = 0.0f;   ///< of the first iteration, over that of the scene's bounds; 0: kUsualRadius or a
+                           ///< pixel's (pixel_radius.h), whichever is less, over the root of `samples`, so that an eye
+                           ///< vertex merges with as many whatever their number
     float alpha = 0.75f;   ///< how fast it shrinks: r_i^2 = r_1^2 i^(alpha - 1); 1: not at all
     bool first = true;     ///< eye subpaths merge at their first vertex
     uint32_t samples = 1;  ///< of every pixel that share their light vertices
 
-    /// Nothing is left open in them. Throws Error(usage) for a radius below kLeastRadius.
+    bool open_radius() const { return radius == 0.0f; }
+    /// `pixel`: radius of a pixel; both over that of the scene's bounds.
+    float first_radius(float pixel) const;
+
+    /// Throws Error(usage) for a radius below kLeastRadius.
     static VcmSettings plan(const RenderSettings& settings);
 };
 
