@@ -107,6 +107,7 @@ inline bool is_textured(const BsdfRecord& record) {
         bool textured = false;
         for_each_input(record.as<Model>(), inputs,
                        [&](const auto& parameter, auto&) { textured |= parameter.texture >= 0; });
+        if constexpr (HasSlots<Model>) textured |= in_slots(record.as<Model>());
         return textured;
     });
 }

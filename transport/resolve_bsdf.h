@@ -55,8 +55,24 @@ struct InputsAt {
             else
                 value = eval_float<F>(scene, parameter, uv);
         });
+        if constexpr (F.textures && HasSlots<Model>)
+            if (in_slots(parameters)) inputs.colors[1].y = uv.x, inputs.colors[1].z = uv.y;
     }
 };
+
+/// Constants of a record with slots where texture coordinates are `uv`.
+template <Features F, class Model>
+AMBILUX_HD_APART typename Model::Constants constants_from_slots(const SceneView& scene,
+                                                                typename Model::Constants record, Vec2f uv) {
+    static_assert(detail::InputCount<Model>::colors == 1, "inputs have room for coordinates");
+    const float32* at = scene.tables + slots_at(record);
+    float numbers[kSlots<Model>];
+    for (uint32_t i = 0; i < kSlots<Model>; ++i)
+        numbers[i] = eval_float<F>(scene, {at[2 * i], __builtin_bit_cast(int32_t, at[2 * i + 1])}, uv);
+    typename Model::template Slots<float> slots;
+    memcpy(&slots, numbers, sizeof slots);
+    return Model::with_slots(record, slots);
+}
 
 /// The BSDF of `record`; `find_inputs(parameters, inputs)` sets what textures may set.
 template <Features F, class FindInputs>
@@ -70,6 +86,10 @@ AMBILUX_HD Bsdf make_bsdf(const SceneView& scene, const BsdfRecord& record, cons
         const Textured<Model>& parameters = record.as<Model>();
         find_inputs(parameters, b.inputs);
         b.constants.set<typename Model::Constants>(parameters);
+        if constexpr (F.textures && HasSlots<Model>)
+            if (in_slots(parameters))
+                b.constants.set(
+                    constants_from_slots<F, Model>(scene, parameters, {b.inputs.colors[1].y, b.inputs.colors[1].z}));
         return true;
     });
     return b;

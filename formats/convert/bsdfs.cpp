@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <bit>
+#include <optional>
+
 #include "formats/convert/writer.h"
 #include "transport/bsdf/coating.h"
 
@@ -93,34 +97,63 @@ void add_parameters(Writer& w, xml_node node, const Textured<DiffuseTransmitter>
     add_color(w, node, "transmittance", p.transmittance);
     w.note("Mitsuba 3 has no BSDF 'difftrans'");
 }
-void add_unless_zero(xml_node node, const char* name, double value, double most = 1) {
-    if (value > 1e-7) add_number(node, name, value < most ? value : most);
+void add_unless_zero(Writer& w, xml_node node, const char* name, const ParamFloat& value) {
+    if (value.texture >= 0 || value.value > 1e-7f) add_textured_number(w, node, name, value);
+}
+
+/// Slots that are in a table, all of them; of a record without there is none.
+template <class Model>
+std::optional<typename Model::template Slots<ParamFloat>> table_slots(const Writer& w, const Textured<Model>& p) {
+    if (!in_slots(p)) return {};
+    typename Model::template Slots<ParamFloat> slots;
+    for (uint32_t i = 0; i < kSlots<Model>; ++i) {
+        const float* at = w.scene.tables.data() + slots_at(p) + 2 * i;
+        slot_array<ParamFloat>(slots)[i] = {at[0], std::bit_cast<int32_t>(at[1])};
+    }
+    return slots;
+}
+
+/// A share in 1/65535.
+ParamFloat of_65535(uint16_t share) { return {float(share / 65535.0), -1}; }
+
+typename Principled::Slots<ParamFloat> slots_of(const Writer& w, const Textured<Principled>& p) {
+    if (const auto slots = table_slots(w, p)) return *slots;
+    const double gloss = (0.1 - double(p.clearcoat_alpha)) / (0.1 - 0.001);
+    return {{p.specular_tint},    {p.sheen},     of_65535(p.sheen_tint),
+            of_65535(p.flatness), {p.clearcoat}, {p.clearcoat > 0 ? std::min(float(gloss), 1.0f) : 0}};
+}
+typename PrincipledThin::Slots<ParamFloat> slots_of(const Writer& w, const Textured<PrincipledThin>& p) {
+    if (const auto slots = table_slots(w, p)) return *slots;
+    return {{p.specular_tint}, {p.sheen}, of_65535(p.sheen_tint), of_65535(p.flatness), {p.ior}, {p.through}};
 }
 
 /// What both principled BSDFs have.
-template <class P>
-void add_principled(Writer& w, xml_node node, const P& p) {
+template <class P, class Slots>
+void add_principled(Writer& w, xml_node node, const P& p, const Slots& slots) {
     add_color(w, node, "base_color", p.base_color);
     add_textured_number(w, node, "roughness", p.roughness);
-    add_number(node, "eta", p.ior);
-    if (p.anisotropic.texture >= 0 || p.anisotropic.value > 0)
-        add_textured_number(w, node, "anisotropic", p.anisotropic);
-    add_unless_zero(node, "spec_tint", p.specular_tint);
-    add_unless_zero(node, "sheen", p.sheen);
-    add_unless_zero(node, "sheen_tint", p.sheen_tint / 65535.0);
-    add_unless_zero(node, "flatness", p.flatness / 65535.0);
+    add_unless_zero(w, node, "anisotropic", p.anisotropic);
+    add_unless_zero(w, node, "spec_tint", slots.specular_tint);
+    add_unless_zero(w, node, "sheen", slots.sheen);
+    add_unless_zero(w, node, "sheen_tint", slots.sheen_tint);
+    add_unless_zero(w, node, "flatness", slots.flatness);
 }
 
 void add_parameters(Writer& w, xml_node node, const Textured<Principled>& p) {
-    add_principled(w, node, p);
+    const auto slots = slots_of(w, p);
+    add_principled(w, node, p, slots);
+    add_number(node, "eta", p.ior);
     add_textured_number(w, node, "metallic", p.metallic);
-    add_unless_zero(node, "clearcoat", p.clearcoat);
-    if (p.clearcoat > 0) add_unless_zero(node, "clearcoat_gloss", (0.1 - double(p.clearcoat_alpha)) / (0.1 - 0.001));
+    add_unless_zero(w, node, "clearcoat", slots.clearcoat);
+    add_unless_zero(w, node, "clearcoat_gloss", slots.clearcoat_gloss);
 }
 void add_parameters(Writer& w, xml_node node, const Textured<PrincipledThin>& p) {
-    add_principled(w, node, p);
+    auto slots = slots_of(w, p);
+    add_principled(w, node, p, slots);
+    add_textured_number(w, node, "eta", slots.ior);
     add_textured_number(w, node, "spec_trans", p.specular);
-    add_unless_zero(node, "diff_trans", 2 * double(p.through), 2);
+    slots.through.value *= 2;
+    add_unless_zero(w, node, "diff_trans", slots.through);
 }
 
 /// A coating; the BSDF below it goes inside.

@@ -8,6 +8,8 @@
 
 namespace ambilux::document {
 
+inline bool is_constant(const ParamFloat& p) { return p.texture < 0; }
+
 /// Values of the inputs at one point.
 using BakedFunction = std::function<Rgb(const std::vector<Rgb>&)>;
 

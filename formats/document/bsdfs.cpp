@@ -23,7 +23,6 @@ struct Adapters {
 /// What a BSDF is inside of.
 enum class Place { outside, two_sided };
 
-bool is_constant(const ParamFloat& p) { return p.texture < 0; }
 bool same(const ParamFloat& a, const ParamFloat& b) { return a.value == b.value && a.texture == b.texture; }
 
 ParamFloat product(Builder& builder, const Reader& in, const ParamFloat& a, const ParamFloat& b) {

@@ -116,6 +116,8 @@ public:
     [[noreturn]] void fail(const Where& where, const std::string& message) const;
 
     bool has(const std::string& name) const { return find(name) || child_named(name); }
+    /// Whether an object, a texture, gives the parameter.
+    bool is_textured(const std::string& name) const { return child_named(name); }
     bool boolean(const std::string& name, bool fallback);
     int64_t integer(const std::string& name, int64_t fallback);
     double number(const std::string& name, double fallback);

@@ -76,8 +76,9 @@ Rgb raw_value(Reader& in) {
     return {float(v.x), float(v.y), float(v.z)};
 }
 
-/// What colours of textures may be: those of lights have no largest one.
+/// What colours of textures may be: those of lights and numbers have no largest one.
 SpectrumUse colors_of(TextureUse use) {
+    if (use == TextureUse::number) return SpectrumUse::unbounded;
     return use == TextureUse::light ? SpectrumUse::emission : SpectrumUse::reflectance;
 }
 

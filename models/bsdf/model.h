@@ -32,7 +32,8 @@ struct Resolved : M::template Inputs<Rgb, float>, M::Constants {
 };
 
 /// What textures may have set at a point: colours and numbers in the order of the model's Inputs. Vertices in queues
-/// keep it. The third number of a model with one colour is the first component of the second one.
+/// keep it. The third number of a model with one colour is the first component of the second one; of a record with
+/// slots (models/bsdf/slots.h) the others are the texture coordinates.
 struct BsdfInputs {
     Rgb colors[2];
     float numbers[2];

@@ -1,7 +1,7 @@
 // The principled BSDF of a sheet without thickness, both sides.
 #pragma once
 
-#include "models/bsdf/model.h"
+#include "models/bsdf/slots.h"
 
 namespace ambilux {
 
@@ -25,6 +25,21 @@ struct PrincipledThin {
         uint16_t sheen_tint;  ///< share of the base colour in the sheen, in 1/65535
         uint16_t flatness;    ///< share of the approximation of subsurface scattering, in 1/65535
     };
+
+    /// What textures may set of these, too.
+    template <class Number>
+    struct Slots {
+        Number specular_tint, sheen, sheen_tint, flatness, ior, through;
+    };
+    AMBILUX_HD static Constants with_slots(Constants c, const Slots<float>& s) {
+        c.ior = max(s.ior, 1.0f);
+        c.specular_tint = clamp(s.specular_tint, 0.0f, 1.0f);
+        c.sheen = max(s.sheen, 0.0f);
+        c.through = clamp(s.through, 0.0f, 1.0f);
+        c.sheen_tint = share_of_65535(s.sheen_tint);
+        c.flatness = share_of_65535(s.flatness);
+        return c;
+    }
 };
 
 }  // namespace ambilux

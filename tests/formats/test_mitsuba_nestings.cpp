@@ -6,6 +6,7 @@
 #include "tests/support/image_files.h"
 #include "tests/support/mitsuba_text.h"
 #include "transport/opacity.h"
+#include "transport/resolve_bsdf.h"
 
 using namespace ambilux;
 using namespace ambilux::test;
@@ -243,7 +244,52 @@ TEST_CASE("principled: transmission with textures") {
     CHECK(sheet.specular.texture == sheet.anisotropic.texture);
     LoadOptions lenient;
     lenient.lenient = true;
-    const std::string tinted = "<shape type='rectangle'>" + nested("principled", texture("clearcoat")) + "</shape>";
-    CHECK(contains(error_of(tinted, {}, "3.0.0", &folder), "a texture as 'clearcoat' of principled is not supported"));
-    CHECK(load(tinted, lenient, "3.0.0", &folder).warnings.size() == 1);
+    const std::string other = "<shape type='rectangle'>" + nested("principled", texture("specular")) + "</shape>";
+    CHECK(contains(error_of(other, {}, "3.0.0", &folder), "a texture as 'specular' is not supported"));
+    CHECK(load(other, lenient, "3.0.0", &folder).warnings.size() == 1);
+}
+
+TEST_CASE("principled: what is not glass has the terms of all, texel by texel") {
+    const TempFolder folder;
+    // Texels of 0.2 and 0.6.
+    folder.write("c.png", png_bytes(2, 1, {51, 51, 51, 153, 153, 153}));
+    const auto texture = [](const std::string& name) {
+        return "<texture type='bitmap' name='" + name +
+               "'><string name='filename' value='c.png'/><boolean name='raw' value='true'/><string name='filter_type' "
+               "value='nearest'/></texture>";
+    };
+    const auto opaque_at = [&](const Scene& s, float u) {
+        const Material& m = s.materials[s.shapes[0].material];
+        const BsdfRecord& record = s.bsdfs[s.materials[m.first == kNone ? s.shapes[0].material : m.first].front];
+        return resolve_bsdf<kAllFeatures>(s.view(), record, Vec2f{u, 0.5f}).as<Principled>();
+    };
+    const Scene s =
+        rectangle(nested("principled", texture("spec_trans") + number("metallic", 0.5) + number("spec_tint", 0.3) +
+                                           number("sheen", 0.4) + number("clearcoat", 0.8)),
+                  &folder);
+    for (const auto& [u, st] : {std::pair{0.25f, 0.2}, {0.75f, 0.6}}) {
+        const auto p = opaque_at(s, u);
+        CHECK(p.specular_tint == Approx(0.3 / (1 - st)));
+        CHECK(p.sheen == Approx(0.4 / (1 - st)));
+        CHECK(p.clearcoat == Approx(0.8 / (1 - 0.5 * st)));
+        CHECK(p.metallic == Approx(0.5 / (1 - 0.5 * st)));
+    }
+    const Scene t = rectangle(
+        nested("principled", texture("metallic") + texture("sheen") + texture("clearcoat") + number("spec_trans", 0.5)),
+        &folder);
+    for (const auto& [u, v] : {std::pair{0.25f, 0.2}, {0.75f, 0.6}}) {
+        CHECK(opaque_at(t, u).sheen == Approx(v / 0.5));
+        CHECK(opaque_at(t, u).clearcoat == Approx(v / (1 - (1 - v) * 0.5)));
+    }
+    const auto error = [&](const std::string& xml) {
+        return error_of("<shape type='rectangle'>" + nested("principled", xml) + "</shape>", {}, "3.0.0", &folder);
+    };
+    CHECK(contains(error(texture("spec_trans") + number("spec_tint", 0.5)), "spec_tint and spec_trans may be 1"));
+    folder.write("c.png", png_bytes(2, 1, {255, 255, 255, 0, 0, 0}));
+    CHECK(contains(error(texture("spec_trans") + number("clearcoat", 0.5)), "clearcoat on glass alone"));
+    CHECK(contains(error(number("spec_trans", 1) + number("clearcoat", 0.5)), "clearcoat on glass alone"));
+    // Where all is metal, none is glass.
+    const Scene metal = rectangle(
+        nested("principled", texture("spec_trans") + texture("metallic") + number("clearcoat", 0.5)), &folder);
+    for (const float u : {0.25f, 0.75f}) CHECK(opaque_at(metal, u).clearcoat == 0.5f);
 }

@@ -47,6 +47,7 @@ std::string text(const char* name, const char* value) {
     return fmt::format("<string name='{}' value='{}'/>", name, value);
 }
 std::string color(const char* name) { return fmt::format("<rgb name='{}' value='0.3, 0.4, 0.45'/>", name); }
+std::string texture(const char* name) { return fmt::format("<texture type='checkerboard' name='{}'/>", name); }
 const std::string kTransform = "<transform name='to_world'><translate x='1'/><rotate y='1' angle='20'/></transform>";
 
 std::string on_shape(const std::string& bsdf) { return "<shape type='sphere'>" + bsdf + "</shape>"; }
@@ -109,6 +110,14 @@ std::vector<Plugin> bsdfs() {
         a.insert(a.end(), b.begin(), b.end());
         return a;
     };
+    // All that both have may be textures.
+    const auto textured = [](std::vector<std::string> all, std::initializer_list<const char*> names) {
+        for (const char* name :
+             {"base_color", "roughness", "anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness"})
+            all.push_back(texture(name));
+        for (const char* name : names) all.push_back(texture(name));
+        return all;
+    };
     return {
         plugin("diffuse", {color("reflectance")}),
         plugin("conductor", metal),
@@ -119,13 +128,14 @@ std::vector<Plugin> bsdfs() {
         plugin("plastic", plastic),
         plugin("roughplastic",
                and_more(plastic, {text("distribution", "ggx"), number("alpha"), flag("sample_visible", "false")})),
-        plugin("principled", and_more(principled, {number("metallic"), number("specular"), number("clearcoat"),
-                                                   number("clearcoat_gloss"), number("main_specular_sampling_rate"),
-                                                   number("clearcoat_sampling_rate")})),
-        plugin("principledthin",
-               and_more(principled, {number("diff_trans"), number("specular_reflectance_sampling_rate"),
-                                     number("specular_transmittance_sampling_rate"),
-                                     number("diffuse_transmittance_sampling_rate")})),
+        plugin("principled",
+               and_more(textured(principled, {"metallic", "clearcoat", "clearcoat_gloss"}),
+                        {number("metallic"), number("specular"), number("clearcoat"), number("clearcoat_gloss"),
+                         number("main_specular_sampling_rate"), number("clearcoat_sampling_rate")})),
+        plugin("principledthin", and_more(textured(principled, {"diff_trans", "eta"}),
+                                          {number("diff_trans"), number("specular_reflectance_sampling_rate"),
+                                           number("specular_transmittance_sampling_rate"),
+                                           number("diffuse_transmittance_sampling_rate")})),
         {"mask", on_shape("<bsdf type='mask'><bsdf type='diffuse'/>%s</bsdf>"), {number("opacity")}},
         {"blendbsdf",
          on_shape("<bsdf type='blendbsdf'>%s<bsdf type='diffuse'/><bsdf type='conductor'/></bsdf>"),

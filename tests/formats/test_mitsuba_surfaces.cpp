@@ -9,6 +9,7 @@
 #include "tests/support/mitsuba_text.h"
 #include "transport/blend.h"
 #include "transport/bsdf/coating.h"
+#include "transport/resolve_bsdf.h"
 
 using namespace ambilux;
 using namespace ambilux::test;
@@ -281,12 +282,102 @@ TEST_CASE("principledthin: parameters, and what is refused") {
     };
     CHECK(contains(error(number("diff_trans", "2.5")), "'diff_trans' must lie between 0 and 2"));
     CHECK(contains(error(number("eta", "0.9")), "'eta' of principledthin must not be less than 1"));
-    CHECK(contains(error("<texture type='checkerboard' name='sheen'/>"),
-                   ":2: a texture as 'sheen' of principledthin is not supported"));
+    CHECK(contains(error(number("sheen", "-0.1")), "'sheen' must not be negative"));
+    CHECK(load_thin(number("sheen", "1.5")).sheen == 1.5f);
     CHECK(contains(error(number("metallic", "1")), "unknown parameter 'metallic' of bsdf 'principledthin'"));
     CHECK(
         contains(error_of("<shape type='rectangle'><bsdf type='twosided'><bsdf type='principledthin'/></bsdf></shape>"),
                  "transmits light cannot be inside of twosided"));
+}
+
+namespace {
+
+struct Slot {
+    const char* name;
+    float lower = 0, upper = 1;
+};
+const std::vector<Slot> kSlotsOfBoth = {{"roughness"}, {"anisotropic"}, {"spec_tint"},
+                                        {"sheen"},     {"sheen_tint"},  {"flatness"}};
+std::vector<Slot> slots_of(const std::string& plugin) {
+    std::vector<Slot> slots = kSlotsOfBoth;
+    const std::vector<Slot> own = plugin == "principled"
+                                      ? std::vector<Slot>{{"metallic"}, {"clearcoat"}, {"clearcoat_gloss"}}
+                                      : std::vector<Slot>{{"spec_trans"}, {"diff_trans", 0, 2}, {"eta", 1, 2}};
+    slots.insert(slots.end(), own.begin(), own.end());
+    return slots;
+}
+
+/// A BSDF whose slot `i` is of a checkerboard of two of these values, or of one, and all others of one.
+std::string with_slots(const std::string& plugin, size_t textured, float a, float b) {
+    std::string xml = "<shape type='rectangle'><bsdf type='" + plugin + "'>";
+    const std::vector<Slot> slots = slots_of(plugin);
+    for (size_t i = 0; i < slots.size(); ++i) {
+        const auto of = [&](float share) {
+            return std::to_string(slots[i].lower + share * (slots[i].upper - slots[i].lower));
+        };
+        const std::string name = std::string(" name='") + slots[i].name + "'";
+        if (i == textured && a != b)  // as a number, the colours are exchanged
+            xml += "<texture type='checkerboard'" + name + "><rgb name='color0' value='" + of(b) +
+                   "'/><rgb name='color1' value='" + of(a) + "'/></texture>";
+        else
+            xml += "<float" + name + " value='" + of(i == textured ? a : 0.3f + 0.05f * float(i)) + "'/>";
+    }
+    return xml + "</bsdf></shape>";
+}
+
+/// What of the BSDF does not depend on where it lies in a scene, at texture coordinates `uv`.
+template <class Model>
+std::vector<float> at(const Scene& s, Vec2f uv) {
+    const SceneView view = s.view();
+    const BsdfRecord& record = s.bsdfs[s.materials[s.shapes[0].material].front];
+    const Bsdf found = resolve_bsdf<kAllFeatures>(view, record, uv);
+    // As vertices in queues have it.
+    const Bsdf again = resolve_bsdf<kAllFeatures>(view, record, found.inputs);
+    const Resolved<Model> p = found.as<Model>(), q = again.as<Model>();
+    CHECK(memcmp(&p, &q, sizeof p) == 0);
+    std::vector<float> all = {p.base_color.x, p.roughness, p.anisotropic, p.ior, p.specular_tint, p.sheen};
+    for (const uint16_t share : {p.sheen_tint, p.flatness}) all.push_back(float(share) / 65535);
+    if constexpr (std::is_same_v<Model, Principled>)
+        for (const float x : {p.metallic, p.clearcoat, p.clearcoat_alpha}) all.push_back(x);
+    else
+        for (const float x : {p.specular, p.through}) all.push_back(x);
+    return all;
+}
+
+void check_same(const std::vector<float>& a, const std::vector<float>& b) {
+    REQUIRE(a.size() == b.size());
+    for (size_t i = 0; i < a.size(); ++i) CHECK(a[i] == Approx(b[i]).epsilon(1e-6).margin(1e-7));
+}
+
+template <class Model>
+void check_every_slot() {
+    const std::string plugin = Model::plugin;
+    const size_t count = slots_of(plugin).size();
+    for (size_t i = 0; i < count; ++i) {
+        INFO(plugin << ' ' << slots_of(plugin)[i].name);
+        const Scene both = load(with_slots(plugin, i, 0.25f, 0.75f)), low = load(with_slots(plugin, i, 0.25f, 0.25f)),
+                    high = load(with_slots(plugin, i, 0.75f, 0.75f));
+        CHECK(both.features.textures);
+        CHECK(!low.features.textures);
+        check_same(at<Model>(both, {0.2f, 0.2f}), at<Model>(low, {0.2f, 0.2f}));
+        CHECK(at<Model>(low, {}) != at<Model>(high, {}));
+        check_same(at<Model>(both, {0.2f, 0.7f}), at<Model>(high, {0.2f, 0.7f}));
+        const TempFolder folder;
+        write_mitsuba(both, folder / "out.xml");
+        const Scene read = load_mitsuba(folder / "out.xml");
+        CHECK(read.features == both.features);
+        for (const Vec2f uv : {Vec2f{0.2f, 0.2f}, {0.2f, 0.7f}}) check_same(at<Model>(read, uv), at<Model>(both, uv));
+    }
+}
+
+}  // namespace
+
+TEST_CASE("principled, principledthin: a texture in every slot, resolved, written and read again") {
+    check_every_slot<Principled>();
+    check_every_slot<PrincipledThin>();
+    // A record that has them is no longer than before.
+    CHECK(sizeof(BsdfRecord) == 88);
+    CHECK(sizeof(BsdfInputs) == 32);
 }
 
 TEST_CASE("collimated and directionalarea: a ray with power, a shape with power per area") {

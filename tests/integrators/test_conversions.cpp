@@ -89,8 +89,8 @@ struct Generator {
             default:
                 return "<bsdf type='principled'>" + color("base_color") + amount("roughness", .2, .9) +
                        amount("metallic", 0, 1) + real("specular", .1, .8) + real("anisotropic", 0, .8) +
-                       real("clearcoat", 0, 1) + real("clearcoat_gloss", 0, 1) + real("sheen", 0, 1) +
-                       real("spec_tint", 0, 1) + real("flatness", 0, .8) + "</bsdf>";
+                       amount("clearcoat", 0, 1) + real("clearcoat_gloss", 0, 1) + amount("sheen", 0, 1) +
+                       amount("spec_tint", 0, 1) + real("flatness", 0, .8) + "</bsdf>";
         }
     }
     std::string bsdf() {
@@ -110,7 +110,7 @@ struct Generator {
             case 7: return "<bsdf type='difftrans'>" + color("transmittance") + "</bsdf>";
             case 8:
                 return "<bsdf type='principledthin'>" + color("base_color") + real("roughness", .2, .9) +
-                       real("spec_trans", 0, 1) + real("diff_trans", 0, 2) + "</bsdf>";
+                       real("spec_trans", 0, 1) + amount("diff_trans", 0, 2) + "</bsdf>";
             case 9:
                 return "<bsdf type='" + one_of({"coating", "roughcoating"}) + "'>" + index() + rgb("sigma_a", 0, 1) +
                        "<bsdf type='diffuse'>" + color("reflectance") + "</bsdf></bsdf>";
